@@ -1,0 +1,8 @@
+//! The ensemble: what was asked for ([`Spec`]), its members and their random numbers, and what a member's
+//! run leaves behind ([`Outcome`]).
+
+pub mod outcome;
+pub mod spec;
+
+pub use outcome::{Observables, Outcome, SeriesRow, Sink, Snapshot, Status};
+pub use spec::Spec;

@@ -1,0 +1,120 @@
+//! What a member's run leaves behind: its status, its times, and its observables at the start and the end.
+
+use crate::error::Result;
+
+/// How a member ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u32)]
+pub enum Status {
+    /// Its excess reached the threshold.
+    Relaxed = 1,
+    /// The final time came first.
+    Unfinished = 2,
+    /// Curvature times spacing too large, an edge vanished, or the turning number was lost.
+    Singular = 3,
+    /// A value was not finite.
+    Nonfinite = 4,
+    /// The sweep cap was reached.
+    Stalled = 5,
+}
+
+impl Status {
+    /// All statuses, in the order in which tables list them.
+    pub const ALL: [Status; 5] =
+        [Status::Relaxed, Status::Unfinished, Status::Singular, Status::Nonfinite, Status::Stalled];
+
+    /// The word used in `summary.csv`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Relaxed => "relaxed",
+            Status::Unfinished => "unfinished",
+            Status::Singular => "singular",
+            Status::Nonfinite => "nonfinite",
+            Status::Stalled => "stalled",
+        }
+    }
+}
+
+/// Scalar observables of one curve at one time (f64 whatever the precision of the run).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Observables {
+    /// Length `L` of the polygon `x`.
+    pub length: f64,
+    /// Signed area `A` of the polygon `x`, positive counter-clockwise.
+    pub area: f64,
+    /// `L²/(4πA) - (n/π)·tan(π/n)`: 0 on a regular polygon.
+    pub excess: f64,
+    /// `∮(½k² + λ) ds` from the scheme's `k` and `r`; λ = 0 unless the flow is elastic.
+    pub energy: f64,
+    /// Smallest curvature.
+    pub k_min: f64,
+    /// Largest curvature.
+    pub k_max: f64,
+    /// Longest over shortest edge of the polygon.
+    pub mesh_ratio: f64,
+    /// `max |r_i - |e_i|| / |e_i|`: how far the scheme's lengths have left the polygon's.
+    pub metric_drift: f64,
+    /// Turning number of the polygon.
+    pub turning: i32,
+}
+
+/// One row of `summary.csv`. Times are in the curve's own units (length⁴).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// Index of the member, from 0.
+    pub member: u64,
+    /// How it ended.
+    pub status: Status,
+    /// Time of its last accepted state.
+    pub t_end: f64,
+    /// Accepted steps.
+    pub steps: u64,
+    /// Gauss–Seidel sweeps spent on curvature systems (0 with the direct solver).
+    pub sweeps_k: u64,
+    /// Gauss–Seidel sweeps spent on position systems.
+    pub sweeps_x: u64,
+    /// First time the excess was at or under the threshold.
+    pub t_relax: Option<f64>,
+    /// First time the excess was at or under half its start.
+    pub t_half: Option<f64>,
+    /// Observables of the initial curve, computed in f64 from the sampled nodes.
+    pub start: Observables,
+    /// Observables of the last accepted state.
+    pub end: Observables,
+}
+
+/// One row of `series.csv`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeriesRow {
+    /// Index of the member.
+    pub member: u64,
+    /// Time.
+    pub t: f64,
+    /// Observables at `t`.
+    pub at: Observables,
+}
+
+/// The nodes of one member at one time; each vector has n entries, node i = 1…n at index i-1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Snapshot {
+    /// Index of the member.
+    pub member: u64,
+    /// Time.
+    pub t: f64,
+    /// Node coordinates, in the user's frame.
+    pub x: Vec<f64>,
+    /// Node coordinates, in the user's frame.
+    pub y: Vec<f64>,
+    /// Curvature on the segment that ends at the node.
+    pub k: Vec<f64>,
+    /// The scheme's length of the segment that ends at the node.
+    pub r: Vec<f64>,
+}
+
+/// Receives everything that one member left, exactly once per member and in member order.
+pub trait Sink {
+    /// `series` and `snapshots` are in time order.
+    fn member(&mut self, outcome: &Outcome, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<()>;
+    /// `done` of `total` members have ended; `share` ∈ [0, 1] counts the unfinished ones by their time.
+    fn progress(&mut self, done: u64, total: u64, share: f64);
+}

@@ -1,0 +1,68 @@
+//! Errors: what, where, the numbers and the remedy, with the exit code each one leads to.
+
+use std::path::{Path, PathBuf};
+
+/// Everything that can end a command early.
+///
+/// The message is one line (a TOML error keeps its caret lines); `main` prints it after `error: `.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The request is wrong: nothing was started and nothing was written. Exit code 2.
+    #[error("{0}")]
+    Request(String),
+    /// A file or folder could not be read or written. Exit code 1.
+    #[error("{action} {}: {source}", path.display())]
+    Io {
+        /// What was attempted, for example `cannot write`.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The device or its driver failed while running. Exit code 1.
+    #[error("{0}")]
+    Device(String),
+    /// A comparison or run ended badly, as reported in its table. Exit code 1.
+    #[error("{0}")]
+    Failed(String),
+}
+
+/// Result with the crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// A wrong value of a key: `--KEY VALUE: PROBLEM; ALLOWED`.
+    pub fn value(key: &str, value: impl std::fmt::Display, problem: &str, allowed: &str) -> Self {
+        Error::Request(format!("--{key} {value}: {problem}; {allowed}"))
+    }
+
+    /// Wraps an I/O error with what was attempted on which path.
+    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Error {
+        let path = path.to_path_buf();
+        move |source| Error::Io { action, path, source }
+    }
+
+    /// The process exit code that this error leads to.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Request(_) => 2,
+            Error::Io { .. } | Error::Device(_) | Error::Failed(_) => 1,
+        }
+    }
+}
+
+/// The candidate nearest to `word`, if one is near enough to be meant.
+pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    candidates
+        .into_iter()
+        .map(|candidate| (strsim::jaro_winkler(word, candidate), candidate))
+        .filter(|(likeness, _)| *likeness > 0.75)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}
+
+/// `" (did you mean `X`?)"` for the nearest candidate, or nothing.
+pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(word, candidates).map_or(String::new(), |near| format!(" (did you mean `{near}`?)"))
+}

@@ -1,0 +1,8 @@
+//! curvelax relaxes ensembles of plane curves by fourth-order geometric flows.
+
+pub mod curve;
+pub mod ensemble;
+pub mod error;
+pub mod flow;
+
+pub use error::{Error, Result};

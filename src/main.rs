@@ -1,0 +1,3 @@
+//! The `curvelax` program.
+
+fn main() {}
