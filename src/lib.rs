@@ -4,5 +4,8 @@ pub mod curve;
 pub mod ensemble;
 pub mod error;
 pub mod flow;
+pub mod number;
+pub mod scheme;
+pub mod solver;
 
 pub use error::{Error, Result};

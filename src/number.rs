@@ -1,0 +1,219 @@
+//! The number that the scheme is generic over: `f64` is the reference, `f32` mirrors the kernel.
+//!
+//! [`Number`] asks only for what a group of SIMD lanes can also give: arithmetic, and comparisons that return
+//! masks instead of steering branches. [`Real`] is a single number. Rust never contracts `a*b + c`, so every
+//! expression rounds as written, on every machine.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+
+/// Values above this bound count as not finite; far below the overflow of `f32`, so that squares survive.
+pub const BIG: f64 = 1e18;
+
+/// The outcome of a comparison: one truth value per lane.
+pub trait Mask: Copy {
+    /// Every lane holds `value`.
+    fn all_of(value: bool) -> Self;
+    /// True in at least one lane.
+    fn any(self) -> bool;
+    /// Lane-wise and.
+    fn and(self, other: Self) -> Self;
+    /// Lane-wise negation.
+    fn not(self) -> Self;
+}
+
+impl Mask for bool {
+    fn all_of(value: bool) -> bool {
+        value
+    }
+    fn any(self) -> bool {
+        self
+    }
+    fn and(self, other: bool) -> bool {
+        self & other
+    }
+    fn not(self) -> bool {
+        !self
+    }
+}
+
+/// A number, or several side by side.
+pub trait Number:
+    Copy
+    + Default
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + AddAssign
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// Result of a comparison.
+    type Mask: Mask;
+    /// Machine epsilon.
+    const EPSILON: f64;
+
+    /// The number nearest to `value`, in every lane.
+    fn of(value: f64) -> Self;
+    /// Square root, correctly rounded.
+    fn sqrt(self) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// The larger one; arguments must not be NaN.
+    fn max(self, other: Self) -> Self;
+    /// The smaller one; arguments must not be NaN.
+    fn min(self, other: Self) -> Self;
+    /// Largest integer not above.
+    fn floor(self) -> Self;
+    /// `2^self` for an integral `self` in [-126, 127].
+    fn exp2_integral(self) -> Self;
+    /// `self <= other`; false where either is NaN.
+    fn le(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask holds, else `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+
+    /// 1/self.
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self::of(1.0) / self
+    }
+
+    /// `|self|`, or 2·[`BIG`] where that is NaN or above [`BIG`]: safe to take maxima of.
+    #[inline(always)]
+    fn bounded_abs(self) -> Self {
+        let size = self.abs();
+        Self::select(size.le(Self::of(BIG)), size, Self::of(2.0 * BIG))
+    }
+
+    /// `e^self` to 2 ulp for |self| ≤ 40, clamped beyond: reduction by ln 2, then a Horner polynomial.
+    ///
+    /// Written out because WGSL has no `exp` for `f64`; `shaders/number.wgsl` has the same steps.
+    #[inline(always)]
+    fn exp(self) -> Self {
+        let x = self.max(Self::of(-40.0)).min(Self::of(40.0));
+        let n = (x * Self::of(std::f64::consts::LOG2_E) + Self::of(0.5)).floor();
+        let reduced = (x - n * Self::of(LN2_HIGH)) - n * Self::of(LN2_LOW);
+        let mut sum = Self::of(EXP_SERIES[0]);
+        for coefficient in &EXP_SERIES[1..] {
+            sum = sum * reduced + Self::of(*coefficient);
+        }
+        sum * n.exp2_integral()
+    }
+}
+
+/// The leading nine bits of ln 2: `n · LN2_HIGH` is exact in `f32` and `f64` for |n| ≤ 64.
+const LN2_HIGH: f64 = 0.693359375;
+/// ln 2 - [`LN2_HIGH`].
+const LN2_LOW: f64 = -2.121_944_400_546_905_8e-4;
+/// 1/13!, 1/12!, …, 1/1!, 1/0!.
+const EXP_SERIES: [f64; 14] = [
+    1.0 / 6_227_020_800.0,
+    1.0 / 479_001_600.0,
+    1.0 / 39_916_800.0,
+    1.0 / 3_628_800.0,
+    1.0 / 362_880.0,
+    1.0 / 40_320.0,
+    1.0 / 5_040.0,
+    1.0 / 720.0,
+    1.0 / 120.0,
+    1.0 / 24.0,
+    1.0 / 6.0,
+    0.5,
+    1.0,
+    1.0,
+];
+
+/// A single number that can be copied to and from a device.
+pub trait Real: Number<Mask = bool> + bytemuck::Pod + PartialOrd + std::fmt::Display + std::fmt::Debug {
+    /// Its name in WGSL.
+    const NAME: &'static str;
+    /// Exact conversion.
+    fn to_f64(self) -> f64;
+}
+
+macro_rules! real {
+    ($type:ty, $name:literal, $bits:ty, $mantissa:expr, $bias:expr) => {
+        impl Number for $type {
+            type Mask = bool;
+            const EPSILON: f64 = <$type>::EPSILON as f64;
+            #[inline(always)]
+            fn of(value: f64) -> Self {
+                value as $type
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                <$type>::sqrt(self)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                <$type>::abs(self)
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                if self > other { self } else { other }
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                if self < other { self } else { other }
+            }
+            #[inline(always)]
+            fn floor(self) -> Self {
+                <$type>::floor(self)
+            }
+            #[inline(always)]
+            fn exp2_integral(self) -> Self {
+                <$type>::from_bits(((self as i64 + $bias) as $bits) << $mantissa)
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> bool {
+                self <= other
+            }
+            #[inline(always)]
+            fn select(mask: bool, yes: Self, no: Self) -> Self {
+                if mask { yes } else { no }
+            }
+        }
+        impl Real for $type {
+            const NAME: &'static str = $name;
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                self.into()
+            }
+        }
+    };
+}
+
+real!(f64, "f64", u64, 52, 1023);
+real!(f32, "f32", u32, 23, 127);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn worst_exp<T: Real>() -> f64 {
+        let mut worst = 0.0_f64;
+        for j in -3999..=3999 {
+            let x = T::of(f64::from(j) * 0.01 + 1.234e-4);
+            let exact = x.to_f64().exp();
+            worst = worst.max((x.exp().to_f64() / exact - 1.0).abs() / T::EPSILON);
+        }
+        worst
+    }
+
+    #[test]
+    fn exp_is_accurate_to_two_ulp_in_both_precisions() {
+        assert!(worst_exp::<f64>() < 2.0, "{}", worst_exp::<f64>());
+        assert!(worst_exp::<f32>() < 2.0, "{}", worst_exp::<f32>());
+        assert_eq!(Number::exp(0.0_f64), 1.0);
+    }
+
+    #[test]
+    fn bounded_abs_makes_nan_and_infinity_large() {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e19] {
+            assert_eq!(bad.bounded_abs(), 2.0 * BIG);
+        }
+        assert_eq!((-3.0_f32).bounded_abs(), 3.0);
+    }
+}

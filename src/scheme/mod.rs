@@ -1,0 +1,29 @@
+//! The semi-implicit Lagrangian scheme of Mikula and Ševčovič, once, generic over the number.
+//!
+//! *Theory.* One step of length τ ([`step`](step::step)) goes through four stages, each in its own file with a
+//! WGSL twin of the same stem in `shaders/`:
+//!
+//! 1. [`redistribution`]: velocity β and tangential velocity α of the old state, then the new lengths r;
+//! 2. [`curvature`]: the pentadiagonal system for the increment of k;
+//! 3. [`position`]: one matrix, two right-hand sides, for the increments of x and y;
+//! 4. [`observe`]: sums and maxima of the new state, from which status and relaxation events follow.
+//!
+//! The paper's `𝓑_i` averages φ over segments i and i-1; that is a misprint (`docs/method.md`), and the average
+//! here is over i and i+1. Both systems are written for the increment δ over the step: the right-hand side is
+//! the residual of the old state in node differences, so no digits are lost to the size of x.
+//!
+//! *Practice.* Node i = 1…n of the paper is index i-1 here. `k[i]` and `r[i]` live on the segment that ends at
+//! node i, `q[i]` between the middles of segments i and i+1. A [`State`] is a curve; a [`Workspace`] holds what
+//! a step computes on the way, and doubles as its trace for the conformance test.
+
+pub mod curvature;
+pub mod evolve;
+pub mod observe;
+pub mod parameters;
+pub mod position;
+pub mod redistribution;
+pub mod state;
+pub mod step;
+
+pub use parameters::Parameters;
+pub use state::{State, Workspace};

@@ -1,0 +1,121 @@
+//! Sums and maxima of a curve, from which its report, its status and its events follow. Twin of
+//! `shaders/observe.wgsl`.
+//!
+//! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r.
+
+use super::Parameters;
+use crate::{
+    number::Number,
+    solver::{Blocks, Ring},
+};
+
+/// `|k|·r` from which on a curve counts as not resolved: its tangent turns by 2 rad from segment to segment.
+pub const MAX_TURN: f64 = 2.0;
+/// Shortest over mean edge below which an edge counts as vanished.
+pub const MIN_EDGE: f64 = 1e-5;
+
+/// The four sums, in the order of the kernel's `vec4`.
+#[derive(Clone, Copy, Debug)]
+pub struct Sums<N> {
+    /// `Σ |e_i|`.
+    pub length: N,
+    /// `½ Σ x_{i-1} × x_i`.
+    pub area: N,
+    /// `Σ (½k_i² + λ) r_i`.
+    pub energy: N,
+    /// Windings of the edge vector round the origin.
+    pub turning: N,
+}
+
+/// The maxima; a value that is not finite shows as more than [`BIG`](crate::number::BIG).
+#[derive(Clone, Copy, Debug)]
+pub struct Maxima<N> {
+    /// `max |k_i| r_i`.
+    pub turn: N,
+    /// `max |r_i - |e_i|| / |e_i|`.
+    pub drift: N,
+    /// Longest edge.
+    pub longest: N,
+    /// Minus the shortest edge.
+    pub minus_shortest: N,
+    /// Largest curvature.
+    pub k_max: N,
+    /// Minus the smallest curvature.
+    pub minus_k_min: N,
+}
+
+/// The fields of a curve.
+#[derive(Clone, Copy)]
+pub struct Curve<'a, N> {
+    /// Nodes.
+    pub x: &'a Ring<N>,
+    /// Nodes.
+    pub y: &'a Ring<N>,
+    /// Curvatures.
+    pub k: &'a Ring<N>,
+    /// Lengths.
+    pub r: &'a Ring<N>,
+}
+
+/// Sums over the ring.
+pub fn sums<N: Number>(curve: Curve<N>, p: &Parameters<N>, blocks: Blocks) -> Sums<N> {
+    let half = N::of(0.5);
+    Sums {
+        length: blocks.sum(|i| edge(curve, i)[2]),
+        area: half
+            * blocks.sum(|i| {
+                let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
+                xm * y - x * ym
+            }),
+        energy: blocks.sum(|i| {
+            let k = curve.k[i];
+            (half * (k * k) + p.length_penalty) * curve.r[i]
+        }),
+        turning: blocks.sum(|i| winding(curve, i)),
+    }
+}
+
+/// Maxima over the ring.
+pub fn maxima<N: Number>(curve: Curve<N>) -> Maxima<N> {
+    let low = N::of(-2.0 * crate::number::BIG);
+    let mut m = Maxima { turn: low, drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
+    for i in 0..curve.x.len() {
+        let (k, r, e) = (curve.k[i], curve.r[i], edge(curve, i)[2]);
+        m.turn = m.turn.max((k * r).bounded_abs());
+        m.drift = m.drift.max(((r - e) / e).bounded_abs());
+        m.longest = m.longest.max(e.bounded_abs());
+        m.minus_shortest = m.minus_shortest.max(-e.bounded_abs());
+        m.k_max = m.k_max.max(k);
+        m.minus_k_min = m.minus_k_min.max(-k);
+    }
+    m
+}
+
+/// `L²/(4π|A|)` above that of the regular polygon.
+#[inline(always)]
+pub fn excess<N: Number>(sums: &Sums<N>, p: &Parameters<N>) -> N {
+    sums.length * sums.length / (N::of(4.0 * std::f64::consts::PI) * sums.area.abs()) - p.polygon_ratio
+}
+
+/// Edge that ends at node i: `[Δx, Δy, |e|]`.
+#[inline(always)]
+fn edge<N: Number>(curve: Curve<N>, i: usize) -> [N; 3] {
+    let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
+    let (dx, dy) = (x - xm, y - ym);
+    [dx, dy, (dx * dx + dy * dy).sqrt()]
+}
+
+/// +1 (-1) where the edge vector turns from `e_i` to `e_{i+1}` across the positive x axis, the short way round.
+#[inline(always)]
+fn winding<N: Number>(curve: Curve<N>, i: usize) -> N {
+    let ([_, xm, x, xp, _], [_, ym, y, yp, _]) = (curve.x.window(i), curve.y.window(i));
+    let (ex, ey, fx, fy) = (x - xm, y - ym, xp - x, yp - y);
+    let (zero, one) = (N::of(0.0), N::of(1.0));
+    let side = ex * fy - fx * ey;
+    let e_below = N::select(ey.le(zero), one, zero);
+    let f_below = N::select(fy.le(zero), one, zero);
+    let left = N::select(side.le(zero), zero, one);
+    let right = N::select(zero.le(side), zero, one);
+    // Upwards across the axis with the origin on the left, or downwards with it on the right.
+    e_below * (one - f_below) * left - (one - e_below) * f_below * right
+}

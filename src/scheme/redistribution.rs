@@ -1,0 +1,90 @@
+//! Velocity, tangential redistribution and the new lengths. Twin of `shaders/redistribution.wgsl`.
+//!
+//! From the old state, with `q_i = (r_i + r_{i+1})/2`:
+//!
+//! - `β_i = -(1/r_i)·((k_{i+1}-k_i)/q_i - (k_i-k_{i-1})/q_{i-1}) + b(k_i)`, the paper's eq. (1);
+//! - `α_i = α_{i-1} + r_i k_i β_i - r_i B + ω(M - r_i)`, eq. (5), with `B = Σ r k β / L`, `M = L/n`,
+//!   `α_0 = α_n = 0`;
+//! - `r_i ← r_i·exp(τ(-B + ω(M/r_i - 1)))`, eq. (3) for `η = ln r`; without redistribution α = 0 and
+//!   `r_i ← r_i·exp(-τ k_i β_i)`.
+
+use super::{Parameters, State, Workspace};
+use crate::{number::Number, solver::Ring};
+
+/// Fills β, r·k·β, α and the new r (with 1/r and 1/q) of `work`; returns the length `L = Σr` of the old state.
+pub fn redistribute<N: Number>(
+    state: &State<N>,
+    p: &Parameters<N>,
+    redistribution: bool,
+    work: &mut Workspace<N>,
+) -> N {
+    let n = state.len();
+    for i in 0..n {
+        let beta = velocity(p, state.k.window(i), state.r.window(i));
+        work.beta[i] = beta;
+        work.rkb[i] = state.r[i] * state.k[i] * beta;
+    }
+    let length = work.blocks.sum(|i| state.r[i]);
+    let mean_rkb = work.blocks.sum(|i| work.rkb[i]) / length;
+    let mean_length = length / N::of(n as f64);
+    if redistribution {
+        tangential_velocity(state, p, mean_rkb, mean_length, work);
+        for i in 0..n {
+            let r = state.r[i];
+            let rate = p.omega * (mean_length / r - N::of(1.0)) - mean_rkb;
+            work.r[i] = r * (p.tau * rate).exp();
+        }
+    } else {
+        work.alpha = Ring::zeros(n);
+        for i in 0..n {
+            work.r[i] = state.r[i] * (-(p.tau * (state.k[i] * work.beta[i]))).exp();
+        }
+    }
+    work.r.close();
+    reciprocals(work);
+    length
+}
+
+#[inline(always)]
+fn velocity<N: Number>(p: &Parameters<N>, [_, km, k, kp, _]: [N; 5], [_, rm, r, rp, _]: [N; 5]) -> N {
+    let half = N::of(0.5);
+    let q = (r + rp) * half;
+    let qm = (rm + r) * half;
+    p.b(k) - ((kp - k) / q - (k - km) / qm) / r
+}
+
+/// α by a running sum that restarts from the sum of whole blocks, as the kernel's prefix sum does.
+fn tangential_velocity<N: Number>(
+    state: &State<N>,
+    p: &Parameters<N>,
+    mean_rkb: N,
+    mean_length: N,
+    work: &mut Workspace<N>,
+) {
+    let growth = |i: usize| {
+        let r = state.r[i];
+        work.rkb[i] - r * mean_rkb + p.omega * (mean_length - r)
+    };
+    let mut before = N::of(0.0);
+    for (start, length) in work.blocks.iter() {
+        let mut part = growth(start);
+        work.alpha[start] = before + part;
+        for i in start + 1..start + length {
+            part += growth(i);
+            work.alpha[i] = before + part;
+        }
+        before += part;
+    }
+    work.alpha[state.len() - 1] = N::of(0.0);
+    work.alpha.close();
+}
+
+fn reciprocals<N: Number>(work: &mut Workspace<N>) {
+    for i in 0..work.blocks.n {
+        let [_, _, r, rp, _] = work.r.window(i);
+        work.ir[i] = r.recip();
+        work.iq[i] = ((r + rp) * N::of(0.5)).recip();
+    }
+    work.ir.close();
+    work.iq.close();
+}

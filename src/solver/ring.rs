@@ -1,0 +1,198 @@
+//! The ring of nodes: ghosts for the periodic neighbours, and blocks that give every node its colour.
+//!
+//! *Theory.* A row of bandwidth 2 couples a node to its four nearest neighbours, so nodes updated at the same
+//! time must be at least three apart. Cut the ring into blocks of three or four consecutive nodes and colour a
+//! node by its place in its block: any two nodes of one colour are then at least three apart, also across block
+//! borders. Every n ≥ 6 is 4a + 3b with b ≤ 3; n = 5 is not.
+//!
+//! *Practice.* [`Blocks`] is the one place that knows the cut; the kernel gives each thread one block
+//! (`shaders/ring.wgsl`). Sums are taken block by block there, and so they are here, in the same order.
+
+use std::ops::{Index, IndexMut};
+
+use crate::number::Number;
+
+/// The largest block, and so the number of colours.
+pub const COLOURS: usize = 4;
+/// The smallest ring that can be cut into blocks.
+pub const MIN_POINTS: usize = 6;
+
+/// The cut of a ring of `n` ≥ [`MIN_POINTS`] nodes: first blocks of four, then up to three blocks of three.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Blocks {
+    /// Nodes.
+    pub n: usize,
+    /// Blocks of four nodes, which come first.
+    pub fours: usize,
+    /// Blocks of three nodes.
+    pub threes: usize,
+}
+
+impl Blocks {
+    /// Cuts a ring of `n` nodes, or `None` if it is too small.
+    pub fn new(n: usize) -> Option<Blocks> {
+        let threes = (4 - n % 4) % 4;
+        (n >= MIN_POINTS).then(|| Blocks { n, fours: (n - 3 * threes) / 4, threes })
+    }
+
+    /// Number of blocks: threads of the kernel.
+    pub fn count(self) -> usize {
+        self.fours + self.threes
+    }
+
+    /// First node and number of nodes of each block.
+    #[inline(always)]
+    pub fn iter(self) -> impl Iterator<Item = (usize, usize)> {
+        let after_fours = 4 * self.fours;
+        let fours = (0..self.fours).map(|block| (4 * block, 4));
+        fours.chain((0..self.threes).map(move |block| (after_fours + 3 * block, 3)))
+    }
+
+    /// Σ value(i) over the ring, summed within blocks first.
+    #[inline(always)]
+    pub fn sum<N: Number>(self, value: impl Fn(usize) -> N) -> N {
+        let mut total = N::of(0.0);
+        for (start, length) in self.iter() {
+            let mut part = value(start);
+            for i in start + 1..start + length {
+                part += value(i);
+            }
+            total += part;
+        }
+        total
+    }
+
+    /// Calls `visit` for every node of `colour` (0…3), in the order of the blocks.
+    #[inline(always)]
+    pub fn of_colour(self, colour: usize, mut visit: impl FnMut(usize)) {
+        for block in 0..self.fours {
+            visit(4 * block + colour);
+        }
+        if colour < 3 {
+            for block in 0..self.threes {
+                visit(4 * self.fours + 3 * block + colour);
+            }
+        }
+    }
+}
+
+/// A field on the nodes of a ring, with two ghosts at either end for the periodic neighbours.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ring<N> {
+    padded: Vec<N>,
+}
+
+const GHOSTS: usize = 2;
+
+impl<N: Number> Ring<N> {
+    /// A field of zeros on `n` nodes.
+    pub fn zeros(n: usize) -> Ring<N> {
+        Ring { padded: vec![N::default(); n + 2 * GHOSTS] }
+    }
+
+    /// A field from its `n` values.
+    pub fn from_nodes(values: impl IntoIterator<Item = N>) -> Ring<N> {
+        let mut padded = vec![N::default(); GHOSTS];
+        padded.extend(values);
+        padded.extend([N::default(); GHOSTS]);
+        let mut ring = Ring { padded };
+        ring.close();
+        ring
+    }
+
+    /// Nodes.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.padded.len() - 2 * GHOSTS
+    }
+
+    /// Whether it has no nodes.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Copies the end nodes to the ghosts; call after writing.
+    #[inline(always)]
+    pub fn close(&mut self) {
+        let n = self.len();
+        self.padded[0] = self.padded[n];
+        self.padded[1] = self.padded[n + 1];
+        self.padded[n + 2] = self.padded[2];
+        self.padded[n + 3] = self.padded[3];
+    }
+
+    /// Values at `i-2, i-1, i, i+1, i+2`, periodic.
+    #[inline(always)]
+    pub fn window(&self, i: usize) -> [N; 5] {
+        let w = &self.padded[i..i + 5];
+        [w[0], w[1], w[2], w[3], w[4]]
+    }
+
+    /// The nodes without ghosts.
+    pub fn nodes(&self) -> &[N] {
+        &self.padded[GHOSTS..GHOSTS + self.len()]
+    }
+}
+
+impl<N: Number> Index<usize> for Ring<N> {
+    type Output = N;
+    #[inline(always)]
+    fn index(&self, i: usize) -> &N {
+        &self.padded[i + GHOSTS]
+    }
+}
+
+impl<N: Number> IndexMut<usize> for Ring<N> {
+    #[inline(always)]
+    fn index_mut(&mut self, i: usize) -> &mut N {
+        &mut self.padded[i + GHOSTS]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_of_one_colour_are_at_least_three_apart_for_every_n() {
+        for n in MIN_POINTS..200 {
+            let blocks = Blocks::new(n).unwrap();
+            let mut colours = vec![usize::MAX; n];
+            for colour in 0..COLOURS {
+                blocks.of_colour(colour, |i| {
+                    assert_eq!(colours[i], usize::MAX, "n = {n}: node {i} has two colours");
+                    colours[i] = colour;
+                });
+            }
+            for i in 0..n {
+                assert!(colours[i] < COLOURS, "n = {n}: node {i} has no colour");
+                for apart in 1..=2 {
+                    assert_ne!(colours[i], colours[(i + apart) % n], "n = {n}: nodes {i} and {}", i + apart);
+                }
+            }
+        }
+        assert_eq!(Blocks::new(5), None);
+    }
+
+    #[test]
+    fn blocks_cover_the_ring_in_order() {
+        for n in MIN_POINTS..100 {
+            let blocks = Blocks::new(n).unwrap();
+            let mut next = 0;
+            for (start, length) in blocks.iter() {
+                assert_eq!(start, next);
+                next = start + length;
+            }
+            assert_eq!(next, n);
+            assert_eq!(blocks.iter().count(), blocks.count());
+            assert_eq!(blocks.sum(|i| i as f64), (n * (n - 1) / 2) as f64);
+        }
+    }
+
+    #[test]
+    fn a_window_wraps_round_the_ring() {
+        let ring = Ring::from_nodes((0..7).map(f64::from));
+        assert_eq!(ring.window(0), [5.0, 6.0, 0.0, 1.0, 2.0]);
+        assert_eq!(ring.window(6), [4.0, 5.0, 6.0, 0.0, 1.0]);
+    }
+}

@@ -1,0 +1,83 @@
+//! The f64 scheme against full-precision states of an independent implementation (`tests/data/README.md`).
+
+use curvelax::{
+    flow::Flow,
+    scheme::{
+        Parameters, State, Workspace,
+        step::{self, Method},
+    },
+    solver::{Blocks, Order, Solver},
+};
+use glam::DVec2;
+
+/// One row of a reference file: `t, i, x, y, k, r`.
+type Row = [f64; 6];
+
+fn read(name: &str) -> Vec<(f64, Vec<Row>)> {
+    let path = format!("{}/tests/data/reference/{name}.csv", env!("CARGO_MANIFEST_DIR"));
+    let mut states: Vec<(f64, Vec<Row>)> = Vec::new();
+    for record in csv::Reader::from_path(path).unwrap().deserialize() {
+        let row: Row = record.unwrap();
+        match states.last_mut() {
+            Some((t, rows)) if *t == row[0] => rows.push(row),
+            _ => states.push((row[0], vec![row])),
+        }
+    }
+    states
+}
+
+fn parameters(flow: &Flow, tau: f64) -> Parameters<f64> {
+    let [c1, c2, c3, ..] = flow.coefficients();
+    Parameters { c1, c2, c3, tau, omega: 1.0, redistribution: 1.0, tolerance: 1e-5, sor: 1.0, ..Default::default() }
+}
+
+/// Largest deviation over all stored times, per column relative to its largest entry.
+fn worst_deviation(name: &str, flow: Flow, tau: f64, redistribution: bool) -> f64 {
+    let states = read(name);
+    assert!(states.len() > 3);
+    let nodes: Vec<DVec2> = states[0].1.iter().map(|row| DVec2::new(row[2], row[3])).collect();
+    let mut state = State::<f64>::from_nodes(&nodes);
+    let mut work = Workspace::new(Blocks::new(nodes.len()).unwrap());
+    let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1, redistribution };
+    let p = parameters(&flow, tau);
+    let (mut steps, mut worst) = (0, 0.0_f64);
+    for (t, rows) in &states {
+        while steps < (t / tau).round() as u64 {
+            step::step(&state, &p, &method, &mut work);
+            step::accept(&mut state, &mut work);
+            steps += 1;
+        }
+        for (column, field) in [&state.x, &state.y, &state.k, &state.r].into_iter().enumerate() {
+            let scale = rows.iter().map(|row| row[column + 2].abs()).fold(0.0, f64::max);
+            for (row, value) in rows.iter().zip(field.nodes()) {
+                worst = worst.max((row[column + 2] - value).abs() / scale);
+            }
+        }
+        eprintln!("{name} t={t} {worst:e}");
+    }
+    worst
+}
+
+#[test]
+fn surface_diffusion_with_redistribution_matches_the_reference() {
+    let worst = worst_deviation("ref_sd_ellipse_2_1_n100_tau1e-3", Flow::SurfaceDiffusion, 1e-3, true);
+    assert!(worst < 1e-9, "{worst:e}");
+}
+
+#[test]
+fn surface_diffusion_with_fixed_nodes_matches_the_reference() {
+    let worst = worst_deviation("ref_sd_ellipse_2_1_n100_tau1e-3_fixed_nodes", Flow::SurfaceDiffusion, 1e-3, false);
+    assert!(worst < 1e-9, "{worst:e}");
+}
+
+#[test]
+fn willmore_flow_matches_the_reference() {
+    let worst = worst_deviation("ref_willmore_ellipse_2_1_n100_tau1e-3", Flow::Willmore, 1e-3, true);
+    assert!(worst < 1e-9, "{worst:e}");
+}
+
+#[test]
+fn the_nonconvex_curve_matches_the_reference() {
+    let worst = worst_deviation("ref_sd_nonconvex_n100_tau1e-6", Flow::SurfaceDiffusion, 1e-6, true);
+    assert!(worst < 1e-9, "{worst:e}");
+}
