@@ -164,6 +164,17 @@ mod tests {
     }
 
     #[test]
+    fn segments_meet_when_any_of_their_four_ends_touches() {
+        let [a, b, top, middle] = [(0.0, 0.0), (2.0, 0.0), (1.0, 3.0), (1.0, 0.0)].map(DVec2::from);
+        for (p, q) in [(top, middle), (middle, top)] {
+            assert!(segments_meet(a, b, p, q) && segments_meet(p, q, a, b));
+        }
+        let beyond = DVec2::new(3.0, 0.0);
+        assert!(!segments_meet(a, b, beyond, top) && !segments_meet(top, beyond, b, a));
+        assert!(segments_meet(a, b, middle, beyond) && !segments_meet(a, middle, b, beyond));
+    }
+
+    #[test]
     fn a_vertex_on_another_edge_and_a_repeated_vertex_are_touches() {
         let on_edge = polygon([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.0), (0.0, 2.0)]);
         let repeated = polygon([(0.0, 0.0), (2.0, -1.0), (2.0, 1.0), (0.0, 0.0), (-2.0, 1.0), (-2.0, -1.0)]);

@@ -150,6 +150,35 @@ mod tests {
     }
 
     #[test]
+    fn member_0_of_the_default_ensemble_never_changes() {
+        let nodes = in_user_frame(&family(&Spec::default()).member(0).unwrap());
+        let pinned = [
+            (0, DVec2::new(1.9736111059010777, 0.09649039999015596)),
+            (49, DVec2::new(-2.018789996233421, 0.01631228074190085)),
+            (99, DVec2::new(1.9787948327127796, 0.0)),
+        ];
+        for (i, node) in pinned {
+            assert!(nodes[i].distance(node) < 1e-12, "node {}: {:?}", i + 1, nodes[i]);
+        }
+    }
+
+    #[test]
+    fn amplitude_and_phase_of_a_mode_are_independent() {
+        let spec = Spec { modes: Modes { low: 2, high: 2 }, ..Spec::default() };
+        let family = family(&spec);
+        let (a_quarter, count) = (DVec2::from_angle(-TAU / 8.0), 20_000_u32);
+        // With amplitude a and phase φ these are a cos φ and a sin φ: of equal variance, and uncorrelated.
+        let parts = (0..count).map(|j| {
+            let factor = family.draw(Stream::new(1, j.into(), 0));
+            DVec2::new(factor.excursion(DVec2::X), factor.excursion(a_quarter)) / family.law.radial_deviation()
+        });
+        let [xx, xy, yy] = parts.fold([0.0; 3], |s, p| [s[0] + p.x * p.x, s[1] + p.x * p.y, s[2] + p.y * p.y]);
+        let mean = [xx, xy, yy].map(|sum| sum / f64::from(count));
+        // Standard errors are under 1/70: the fourth moment of a cos φ is 4.5.
+        assert!((mean[0] - 1.0).abs() < 0.07 && (mean[2] - 1.0).abs() < 0.07 && mean[1].abs() < 0.05, "{mean:?}");
+    }
+
+    #[test]
     fn seeds_and_large_indices_make_different_members() {
         let make = |seed, index| family(&Spec { seed, ..Spec::default() }).member(index).unwrap().nodes;
         let nodes = [make(1, 0), make(2, 0), make(1 << 32, 0), make(1, u64::MAX), make(1, 1 << 32)];
