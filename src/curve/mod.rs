@@ -1,68 +1,27 @@
 //! Plane-curve mathematics in f64: shapes, perturbations, sampling into nodes, and measures of polygons.
+//!
+//! A [`Shape`] is what a user writes; [`Shape::resolve`] makes it a [`BaseCurve`], a closed curve that can be
+//! evaluated at any parameter `u`. A [`RadialFactor`] moves the plane about the curve's centroid, which turns the
+//! one base curve into a different curve for each member of an ensemble. A [`Sampler`] finally places n nodes on
+//! it. Nothing here draws random numbers: the ensemble does, and hands amplitudes and phases down.
+//!
+//! Nodes are numbered i = 1…n, counter-clockwise, as in the paper, and stored at index i-1.
 
-use serde::{Deserialize, Serialize};
+mod base;
+mod crossing;
+mod outline;
+mod perturbation;
+pub mod polygon;
+mod sampling;
+mod shape;
 
-/// The curve that an ensemble is made of, before perturbation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(into = "String", try_from = "String")]
-pub enum Shape {
-    /// `(a cos 2πu, b sin 2πu)`.
-    Ellipse {
-        /// Half-axis along x.
-        a: f64,
-        /// Half-axis along y.
-        b: f64,
-    },
-}
+pub use base::BaseCurve;
+pub use crossing::crossing;
+pub use outline::{MAX_POINTS, Outline};
+pub use perturbation::{MIN_FACTOR, Modes, RadialFactor, RadialLaw, check_directions};
+pub use sampling::{Sampler, Sampling};
+pub use shape::{FlowerMode, Shape};
 
-/// How nodes are placed on a curve.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Sampling {
-    /// At u = i/n, the paper's.
-    Parameter,
-    /// Equally spaced along the curve.
-    Arclength,
-    /// A file's own points, in its order.
-    Points,
-}
-
-/// Modes `low..=high` of the perturbation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(into = "String", try_from = "String")]
-pub struct Modes {
-    /// Lowest mode, at least 1.
-    pub low: u32,
-    /// Highest mode.
-    pub high: u32,
-}
-
-impl From<Modes> for String {
-    fn from(modes: Modes) -> String {
-        format!("{}..={}", modes.low, modes.high)
-    }
-}
-
-impl TryFrom<String> for Modes {
-    type Error = String;
-    fn try_from(text: String) -> Result<Modes, String> {
-        let wrong = || format!("`{text}` is not a range of modes such as `2..=8`");
-        let (low, high) = text.split_once("..=").ok_or_else(wrong)?;
-        let (low, high) = (low.parse().map_err(|_| wrong())?, high.parse().map_err(|_| wrong())?);
-        Ok(Modes { low, high })
-    }
-}
-
-impl From<Shape> for String {
-    fn from(shape: Shape) -> String {
-        let Shape::Ellipse { a, b } = shape;
-        format!("ellipse:{a},{b}")
-    }
-}
-
-impl TryFrom<String> for Shape {
-    type Error = String;
-    fn try_from(_: String) -> Result<Shape, String> {
-        Ok(Shape::Ellipse { a: 2.0, b: 1.0 })
-    }
-}
+/// Highest mode of a flower or a perturbation. A mode takes four nodes at the very least, and far fewer than 4000
+/// nodes are ever relaxed; the cap keeps the cost of a curve bounded before anything else is known about it.
+pub const MAX_MODE: u32 = 1000;

@@ -1,8 +1,11 @@
 //! The ensemble: what was asked for ([`Spec`]), its members and their random numbers, and what a member's
 //! run leaves behind ([`Outcome`]).
 
+pub mod member;
 pub mod outcome;
+pub mod random;
 pub mod spec;
 
+pub use member::{Family, Member};
 pub use outcome::{Observables, Outcome, SeriesRow, Sink, Snapshot, Status};
 pub use spec::Spec;

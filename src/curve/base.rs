@@ -1,0 +1,94 @@
+//! A shape that is ready to be evaluated: a closed formula or a polygon, as a map of `u ∈ [0, 1]`.
+
+use glam::DVec2;
+
+use super::{Outline, polygon};
+
+/// Parameters at which a formula's area centroid is taken. A polygon misses second order: 1e-7 of the size here.
+/// The number is fixed, because the centroid is the centre of the perturbation and a member must be the same
+/// curve whatever its number of nodes.
+const CENTROID_SAMPLES: usize = 1 << 14;
+
+/// A closed plane curve, counter-clockwise if it has a sense, at any parameter `u ∈ [0, 1]`.
+pub struct BaseCurve {
+    kind: Kind,
+    centroid: DVec2,
+}
+
+enum Kind {
+    Formula(Box<dyn Fn(f64) -> DVec2 + Send + Sync>),
+    Polygon(Outline),
+}
+
+impl BaseCurve {
+    /// The curve `u ↦ formula(u)`, of period 1.
+    pub fn from_formula(formula: impl Fn(f64) -> DVec2 + Send + Sync + 'static) -> BaseCurve {
+        let samples: Vec<DVec2> = (0..CENTROID_SAMPLES).map(|j| formula(j as f64 / CENTROID_SAMPLES as f64)).collect();
+        BaseCurve { kind: Kind::Formula(Box::new(formula)), centroid: polygon::area_centroid(&samples) }
+    }
+
+    /// The closed polygon of a file; `u` is the share of its length from the first vertex on.
+    pub fn from_outline(outline: Outline) -> BaseCurve {
+        let centroid = polygon::area_centroid(outline.vertices());
+        BaseCurve { kind: Kind::Polygon(outline), centroid }
+    }
+
+    /// The point at `u ∈ [0, 1]`.
+    pub fn point(&self, u: f64) -> DVec2 {
+        match &self.kind {
+            Kind::Formula(formula) => formula(u),
+            Kind::Polygon(outline) => outline.point(u),
+        }
+    }
+
+    /// Centroid of the enclosed area: exact for a polygon, to 1e-7 of its size for a formula.
+    pub fn centroid(&self) -> DVec2 {
+        self.centroid
+    }
+
+    /// The polygon, if the curve is one.
+    pub fn outline(&self) -> Option<&Outline> {
+        match &self.kind {
+            Kind::Formula(_) => None,
+            Kind::Polygon(outline) => Some(outline),
+        }
+    }
+
+    /// `(u, point)` once round, the first point again at `u = 1`; at least `pieces` pieces, and every vertex of a
+    /// polygon is among them, so that no corner is cut.
+    pub fn subdivision(&self, pieces: usize) -> Vec<(f64, DVec2)> {
+        match &self.kind {
+            Kind::Formula(formula) => {
+                let at = |j: usize| (j as f64 / pieces as f64, formula((j % pieces) as f64 / pieces as f64));
+                (0..=pieces).map(at).collect()
+            }
+            Kind::Polygon(outline) => outline.subdivision(pieces),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_centroid_of_a_formula_is_that_of_its_area() {
+        // r = 1 + a cos θ has its area centroid at x = a(1 + a²/4)/(1 + a²/2): ∫r³ cos θ / 3 over ∫r² / 2.
+        let a = 0.4_f64;
+        let curve = BaseCurve::from_formula(move |u| {
+            let direction = DVec2::from_angle(std::f64::consts::TAU * u);
+            direction * (1.0 + a * direction.x) + DVec2::new(10.0, -5.0)
+        });
+        let exact = DVec2::new(10.0 + a * (1.0 + a * a / 4.0) / (1.0 + a * a / 2.0), -5.0);
+        assert!(curve.centroid().distance(exact) < 1e-7, "{} {exact}", curve.centroid());
+    }
+
+    #[test]
+    fn a_subdivision_starts_and_ends_at_the_same_point() {
+        let curve = BaseCurve::from_formula(|u| DVec2::from_angle(std::f64::consts::TAU * u));
+        let samples = curve.subdivision(7);
+        assert_eq!(samples.len(), 8);
+        assert_eq!((samples[0].0, samples[7].0), (0.0, 1.0));
+        assert_eq!(samples[0].1, samples[7].1);
+    }
+}

@@ -1,0 +1,393 @@
+//! Outlines from files: a table of points becomes a closed counter-clockwise polygon, or a refusal that says why.
+//!
+//! The format is CSV: a point a line, `x,y`. Blank lines and lines that begin with `#` are skipped. A first line
+//! without any number is a header; it must name the columns `x` and `y`, and then further columns are ignored.
+//! The last point may repeat the first. Either orientation is accepted; a clockwise outline is turned round about
+//! its first point, which stays first.
+
+use std::{fs::File, io::Read, path::Path};
+
+use glam::DVec2;
+
+use super::{crossing, polygon};
+use crate::error::{Error, Result};
+
+/// Largest number of points of an outline, and of nodes of a curve.
+pub const MAX_POINTS: usize = 1_000_000;
+
+/// Bytes after which reading stops: a million long lines, but not an endless device.
+const MAX_BYTES: u64 = 1 << 29;
+
+/// Largest coordinate. Fourth powers of lengths, which times are measured in, stay finite.
+const MAX_COORDINATE: f64 = 1e30;
+
+/// Distance, as a share of the outline's extent, at which neighbours are one point. Coordinates are rounded at
+/// 1e-16; an edge much shorter than this has no direction left.
+const COINCIDENT: f64 = 1e-12;
+
+/// A closed counter-clockwise polygon, traversed by arclength.
+#[derive(Clone, Debug)]
+pub struct Outline {
+    vertices: Vec<DVec2>,
+    /// Length from vertex 0 to each vertex; one entry more than vertices, the last is the whole length.
+    reached: Vec<f64>,
+    warnings: Vec<String>,
+}
+
+impl Outline {
+    /// Reads an outline from a CSV file.
+    ///
+    /// # Errors
+    /// [`Error::Request`] naming the path, the line, the value and the remedy: the file cannot be read, is empty,
+    /// or holds more than [`MAX_POINTS`] points or less than three distinct ones; a line is no pair of finite
+    /// numbers; neighbouring points coincide; no net area is enclosed. An outline that crosses itself is
+    /// accepted with a warning.
+    pub fn read(path: &Path) -> Result<Outline> {
+        let source = Source { path };
+        let mut bytes = Vec::new();
+        let opened = File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
+        opened.map_err(|error| source.refusal(None, &format!("cannot read it: {error}"), "give a CSV file x,y"))?;
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(source.too_many(&format!("more than {MAX_BYTES} bytes")));
+        }
+        source.outline(&String::from_utf8_lossy(&bytes))
+    }
+
+    /// The polygon through points that are known to be fit: counter-clockwise, no two neighbours the same.
+    fn through(vertices: Vec<DVec2>, warnings: Vec<String>) -> Outline {
+        let mut reached = vec![0.0];
+        reached.extend(polygon::edges(&vertices).scan(0.0, |sum, edge| {
+            *sum += edge.length();
+            Some(*sum)
+        }));
+        Outline { vertices, reached, warnings }
+    }
+
+    /// The vertices, without a repeated closing point.
+    pub fn vertices(&self) -> &[DVec2] {
+        &self.vertices
+    }
+
+    /// What the user should know about the outline, a sentence each.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    fn length(&self) -> f64 {
+        self.reached[self.vertices.len()]
+    }
+
+    /// The point at the share `u ∈ [0, 1]` of the length, from the first vertex.
+    pub fn point(&self, u: f64) -> DVec2 {
+        let target = u * self.length();
+        let n = self.vertices.len();
+        let edge = self.reached[1..n].partition_point(|&reached| reached <= target);
+        let share = (target - self.reached[edge]) / (self.reached[edge + 1] - self.reached[edge]);
+        self.vertices[edge].lerp(self.vertices[(edge + 1) % n], share)
+    }
+
+    /// `(u, point)` once round: every vertex, and between vertices pieces no longer than `length / pieces`.
+    pub(super) fn subdivision(&self, pieces: usize) -> Vec<(f64, DVec2)> {
+        let (n, length) = (self.vertices.len(), self.length());
+        let mut samples = Vec::with_capacity(n + pieces + 1);
+        for i in 0..n {
+            let (start, end) = (self.reached[i], self.reached[i + 1]);
+            let (a, b) = (self.vertices[i], self.vertices[(i + 1) % n]);
+            let parts = ((end - start) / length * pieces as f64).ceil().max(1.0);
+            samples.extend((0..parts as usize).map(|j| {
+                let share = j as f64 / parts;
+                ((start + share * (end - start)) / length, a.lerp(b, share))
+            }));
+        }
+        samples.push((1.0, self.vertices[0]));
+        samples
+    }
+}
+
+/// The points of a file with the lines that they came from.
+#[derive(Default)]
+struct Table {
+    points: Vec<DVec2>,
+    lines: Vec<usize>,
+}
+
+/// The columns, from 0, that hold the coordinates; without a header they are the `only` ones.
+#[derive(Clone, Copy)]
+struct Columns {
+    x: usize,
+    y: usize,
+    only: bool,
+}
+
+/// Where the text came from, for the messages.
+struct Source<'a> {
+    path: &'a Path,
+}
+
+impl Source<'_> {
+    fn refusal(&self, line: Option<usize>, problem: &str, remedy: &str) -> Error {
+        let line = line.map_or(String::new(), |line| format!(" line {line}:"));
+        Error::Request(format!("--shape file:{}:{line} {problem}; {remedy}", self.path.display()))
+    }
+
+    fn too_many(&self, count: &str) -> Error {
+        let remedy = format!("at most {MAX_POINTS} points: thin the outline out");
+        self.refusal(None, &format!("the file holds {count}"), &remedy)
+    }
+
+    fn outline(&self, text: &str) -> Result<Outline> {
+        let mut table = self.table(text.strip_prefix('\u{feff}').unwrap_or(text))?;
+        self.make_distinct(&mut table)?;
+        let mut points = table.points;
+        let (area, length) = (polygon::signed_area(&points), polygon::length(&points));
+        if area.abs() <= polygon::NO_AREA * length * length {
+            let problem = format!("the outline encloses no net area ({area:e} at a length of {length:e})");
+            return Err(self.refusal(None, &problem, "give a closed curve with an inside"));
+        }
+        let warnings = crossing(&points).map(|pair| self.crossing_warning(pair, &table.lines)).into_iter().collect();
+        if area < 0.0 {
+            polygon::turn_round(&mut points);
+        }
+        Ok(Outline::through(points, warnings))
+    }
+
+    fn crossing_warning(&self, (i, j): (usize, usize), lines: &[usize]) -> String {
+        let from_to = |edge: usize| format!("{} to {}", lines[edge], lines[(edge + 1) % lines.len()]);
+        format!(
+            "{}: the outline crosses or touches itself (the edges from line {} and from line {}); \
+             its area and relaxation are those of an immersed curve",
+            self.path.display(),
+            from_to(i),
+            from_to(j)
+        )
+    }
+
+    /// Parses the lines into points.
+    fn table(&self, text: &str) -> Result<Table> {
+        let mut table = Table::default();
+        let mut columns = None;
+        let content = (1..).zip(text.lines().map(str::trim));
+        for (line, content) in content.filter(|(_, content)| !content.is_empty() && !content.starts_with('#')) {
+            let fields: Vec<&str> = fields(content).collect();
+            if columns.is_none() && fields.iter().all(|field| field.parse::<f64>().is_err()) {
+                columns = Some(self.header(line, &fields)?);
+                continue;
+            }
+            let Columns { x, y, only } = *columns.get_or_insert(Columns { x: 0, y: 1, only: true });
+            let (Some(x), Some(y), false) = (fields.get(x), fields.get(y), only && fields.len() > 2) else {
+                let problem = format!("the number of columns is {} where x,y is expected", fields.len());
+                let remedy = "separate by commas, and name further columns in a header";
+                return Err(self.refusal(Some(line), &problem, remedy));
+            };
+            if table.points.len() == MAX_POINTS {
+                return Err(self.too_many(&format!("more than {MAX_POINTS} points")));
+            }
+            table.points.push(DVec2::new(self.coordinate(line, x)?, self.coordinate(line, y)?));
+            table.lines.push(line);
+        }
+        Ok(table)
+    }
+
+    /// The columns of x and y that a header names.
+    fn header(&self, line: usize, fields: &[&str]) -> Result<Columns> {
+        let column = |name: &str| fields.iter().position(|field| field.eq_ignore_ascii_case(name));
+        let (Some(x), Some(y)) = (column("x"), column("y")) else {
+            let problem = format!("`{}` names no columns x and y", shortened(&fields.join(",")));
+            return Err(self.refusal(
+                Some(line),
+                &problem,
+                "begin with the header x,y or with a point such as 1.0,0.5",
+            ));
+        };
+        Ok(Columns { x, y, only: false })
+    }
+
+    fn coordinate(&self, line: usize, field: &str) -> Result<f64> {
+        let shown = shortened(field);
+        match field.parse::<f64>() {
+            Ok(value) if value.abs() <= MAX_COORDINATE => Ok(value),
+            Ok(value) => {
+                let problem = if value.is_finite() { "is too large" } else { "is not finite" };
+                let remedy = format!("coordinates are numbers from -{MAX_COORDINATE:e} to {MAX_COORDINATE:e}");
+                Err(self.refusal(Some(line), &format!("`{shown}` {problem}"), &remedy))
+            }
+            Err(_) => Err(self.refusal(Some(line), &format!("`{shown}` is not a number"), "write x,y such as 1.0,0.5")),
+        }
+    }
+
+    /// Drops a closing point that repeats the first, and refuses every other coincidence.
+    fn make_distinct(&self, table: &mut Table) -> Result<()> {
+        let Table { points, lines } = table;
+        let [Some(&first), Some(&last)] = [points.first(), points.last()] else {
+            return Err(self.refusal(None, "the file holds no points", "give at least three, x,y a line"));
+        };
+        let (low, high) = points.iter().fold((first, first), |(low, high), p| (low.min(*p), high.max(*p)));
+        let coincide = |a: DVec2, b: DVec2| a.distance(b) <= COINCIDENT * low.distance(high);
+        if points.len() > 1 && coincide(first, last) {
+            points.pop();
+            lines.pop();
+        }
+        let second = points.iter().find(|p| **p != first).copied().unwrap_or(first);
+        if points.iter().all(|p| *p == first || *p == second) {
+            let count = if second == first { 1 } else { 2 };
+            let problem = format!("the file holds {count} distinct point{}", if count == 1 { "" } else { "s" });
+            return Err(self.refusal(None, &problem, "a closed curve takes at least three"));
+        }
+        for i in 0..points.len() {
+            let next = (i + 1) % points.len();
+            if coincide(points[i], points[next]) {
+                let problem =
+                    format!("the point ({}, {}) is that of line {} again", points[next].x, points[next].y, lines[i]);
+                return Err(self.refusal(Some(lines[next]), &problem, "remove one of the two lines"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Fields between commas, trimmed, without quotes; a comma inside quotes does not separate.
+fn fields(line: &str) -> impl Iterator<Item = &str> {
+    let mut quoted = false;
+    let separates = move |c: char| {
+        quoted ^= c == '"';
+        c == ',' && !quoted
+    };
+    line.split(separates).map(|field| field.trim().trim_matches('"').trim())
+}
+
+/// At most 40 characters of foreign text, control characters escaped.
+fn shortened(text: &str) -> String {
+    let mut shown: String = text.chars().take(40).flat_map(char::escape_debug).collect();
+    if text.chars().nth(40).is_some() {
+        shown.push_str("...");
+    }
+    shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SQUARE: &str = "0,0\n1,0\n1,1\n0,1\n";
+
+    fn outline(text: &str) -> Result<Outline> {
+        Source { path: Path::new("shape.csv") }.outline(text)
+    }
+
+    fn vertices(text: &str) -> Vec<(f64, f64)> {
+        outline(text).unwrap().vertices().iter().map(|p| (p.x, p.y)).collect()
+    }
+
+    fn assert_refused(text: &str, parts: &[&str]) {
+        let error = outline(text).expect_err(text);
+        assert_eq!(error.exit_code(), 2);
+        let message = error.to_string();
+        assert!(message.starts_with("--shape file:shape.csv:") && message.contains("; "), "{message}");
+        for part in parts {
+            assert!(message.contains(part), "{part:?} is not in: {message}");
+        }
+    }
+
+    #[test]
+    fn points_are_read_in_order_with_headers_comments_and_other_columns_set_aside() {
+        let square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        assert_eq!(vertices(SQUARE), square);
+        assert_eq!(vertices("x,y\n# a square\n\n0,0\r\n1, 0\n 1 ,1\n0,1"), square);
+        assert_eq!(vertices("\u{feff}\"name\",\"Y\",\"X\"\n\"a,b\",0,0\n,0,1\nc,1,1\nd,1,0\n"), square);
+    }
+
+    #[test]
+    fn a_repeated_closing_point_is_dropped() {
+        assert_eq!(vertices(&format!("{SQUARE}0,0\n")).len(), 4);
+    }
+
+    #[test]
+    fn a_clockwise_outline_is_turned_round_and_keeps_its_first_point() {
+        assert_eq!(vertices("0,0\n0,1\n1,1\n1,0\n"), [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]);
+    }
+
+    #[test]
+    fn a_line_that_is_no_pair_of_finite_numbers_is_refused_with_its_number_and_value() {
+        assert_refused("0,0\n# c\n1,zero\n1,1\n", &["line 3:", "`zero` is not a number"]);
+        assert_refused("0,0\n1,nan\n1,1\n", &["line 2:", "`nan` is not finite"]);
+        assert_refused("inf,0\n1,0\n1,1\n", &["line 1:", "`inf` is not finite"]);
+        assert_refused("0,0\n1e31,0\n1,1\n", &["line 2:", "`1e31` is too large"]);
+        assert_refused("0,0\n1\n1,1\n", &["line 2:", "columns is 1 "]);
+        assert_refused("0,0,7\n1,0,7\n1,1,7\n", &["line 1:", "columns is 3 ", "header"]);
+        assert_refused("0;0\n1;0\n", &["line 1:", "`0;0`", "x,y"]);
+        assert_refused("lon,lat\n0,0\n1,0\n1,1\n", &["line 1:", "`lon,lat` names no columns x and y"]);
+        assert_refused("x,y\nx,y\n0,0\n", &["line 2:", "`x` is not a number"]);
+    }
+
+    #[test]
+    fn too_few_points_are_refused_with_their_number() {
+        assert_refused("", &["no points"]);
+        assert_refused("x,y\n", &["no points"]);
+        assert_refused("1,1\n", &["1 distinct point;"]);
+        assert_refused("1,1\n1,1\n1,1\n", &["1 distinct point;"]);
+        assert_refused("0,0\n1,1\n0,0\n1,1\n", &["2 distinct points"]);
+    }
+
+    #[test]
+    fn coincident_neighbours_are_refused_with_both_lines() {
+        assert_refused("0,0\n1,0\n\n1,0\n0,1\n", &["line 4:", "line 2", "(1, 0)"]);
+        assert_refused("0,0\n1,0\n1,1e-14\n0,1\n", &["line 3:", "line 2"]);
+        assert_refused("0,0\n1,0\n0,1\n0,0\n0,0\n", &["line 1:", "line 4"]);
+    }
+
+    #[test]
+    fn an_outline_without_area_is_refused() {
+        assert_refused("0,0\n1,1\n2,2\n", &["no net area"]);
+        assert_refused("0,0\n1,1\n1,0\n0,1\n", &["no net area"]);
+    }
+
+    #[test]
+    fn a_crossing_outline_is_accepted_with_a_warning_that_names_the_lines() {
+        let crossed = outline("x,y\n0,0\n3,3\n3,0\n0,1\n").unwrap();
+        assert!(crossed.warnings()[0].contains("from line 2 to 3 and from line 4 to 5"), "{:?}", crossed.warnings());
+        assert!(outline(SQUARE).unwrap().warnings().is_empty());
+    }
+
+    #[test]
+    fn a_missing_file_and_a_folder_are_wrong_requests() {
+        for path in ["no/such/file.csv", "src"] {
+            let error = Outline::read(Path::new(path)).unwrap_err();
+            assert!(error.exit_code() == 2 && error.to_string().contains(path), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_million_points_are_read_and_one_more_is_refused() {
+        let point = |j: usize| DVec2::from_angle(j as f64 * std::f64::consts::TAU / 1e6);
+        let mut text: String = (0..MAX_POINTS).map(|j| format!("{},{}\n", point(j).x, point(j).y)).collect();
+        let start = std::time::Instant::now();
+        assert_eq!(outline(&text).unwrap().vertices().len(), MAX_POINTS);
+        assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+        text.push_str("0,0\n");
+        assert_refused(&text, &["more than 1000000 points", "at most 1000000"]);
+    }
+
+    #[test]
+    fn the_parameter_of_a_polygon_is_its_share_of_the_length() {
+        let rectangle = outline("0,0\n3,0\n3,1\n0,1\n").unwrap();
+        let expected = [(0.0, 0.0, 0.0), (0.25, 2.0, 0.0), (0.375, 3.0, 0.0), (0.5, 3.0, 1.0), (0.9375, 0.0, 0.5)];
+        for (u, x, y) in expected {
+            assert!(rectangle.point(u).distance(DVec2::new(x, y)) < 1e-15, "u = {u}");
+        }
+        assert_eq!(rectangle.point(1.0), rectangle.point(0.0));
+    }
+
+    #[test]
+    fn a_subdivision_contains_every_vertex_and_lies_on_the_polygon() {
+        let triangle = outline("0,0\n10,0\n0,0.1\n").unwrap();
+        for pieces in [1, 2, 50] {
+            let samples = triangle.subdivision(pieces);
+            assert!(samples.len() > pieces);
+            for vertex in triangle.vertices() {
+                assert!(samples.iter().any(|(_, p)| p == vertex), "{vertex} of {pieces}");
+            }
+            assert!(samples.windows(2).all(|pair| pair[0].0 < pair[1].0));
+            assert!(samples.iter().all(|(u, p)| triangle.point(*u).distance(*p) < 1e-14));
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Measures of closed polygons: length, area, centroid, excess, turning number, mesh ratio.
+//!
+//! A polygon is the slice of its n ≥ 1 vertices; the edge from the last back to the first closes it. All areas
+//! are signed, positive counter-clockwise. Sums are taken about the first vertex, not about the coordinate
+//! origin, so a small curve far away keeps its digits.
+
+use std::f64::consts::PI;
+
+use glam::DVec2;
+
+/// Share of `L²` under which an area is rounding. The sums below leave about 1e-16·L²; a sliver of relative
+/// width 1e-11 is still a curve.
+pub const NO_AREA: f64 = 1e-12;
+
+/// The n edge vectors; the last one leads back to the first vertex.
+pub fn edges(points: &[DVec2]) -> impl Iterator<Item = DVec2> + '_ {
+    let next = points.iter().cycle().skip(1);
+    points.iter().zip(next).map(|(a, b)| *b - *a)
+}
+
+/// Length `L`.
+pub fn length(points: &[DVec2]) -> f64 {
+    edges(points).map(DVec2::length).sum()
+}
+
+/// Signed area `A = ½ Σ x_i × x_{i+1}`, positive counter-clockwise.
+pub fn signed_area(points: &[DVec2]) -> f64 {
+    0.5 * fan(points).map(|(a, b)| a.perp_dot(b)).sum::<f64>()
+}
+
+/// The triangles of the fan about the first vertex, as their two far corners relative to it.
+fn fan(points: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
+    points.windows(2).map(|pair| (pair[0] - points[0], pair[1] - points[0]))
+}
+
+/// Centroid of the enclosed area, each part counted as often as the polygon winds round it.
+///
+/// A figure-eight whose loops cancel has no area and so no such centroid; then the centroid of the line itself.
+pub fn area_centroid(points: &[DVec2]) -> DVec2 {
+    let length = length(points);
+    let double_area = 2.0 * signed_area(points);
+    if double_area.abs() > 2.0 * NO_AREA * length * length {
+        let moment: DVec2 = fan(points).map(|(a, b)| a.perp_dot(b) * (a + b)).sum();
+        return points[0] + moment / (3.0 * double_area);
+    }
+    let moment: DVec2 = points.iter().zip(edges(points)).map(|(p, e)| e.length() * (*p - points[0] + 0.5 * e)).sum();
+    if length > 0.0 { points[0] + moment / length } else { points[0] }
+}
+
+/// Excess `L²/(4πA) - (n/π)·tan(π/n)`: 0 on the regular n-gon, the rounder of all n-gons, and > 0 on every other
+/// embedded counter-clockwise polygon. Without dimension.
+///
+/// The isoperimetric quotient alone would leave a relaxed polygon 1 + π²/(3n²) above a circle's 1 for ever.
+pub fn excess(points: &[DVec2]) -> f64 {
+    excess_of(length(points), signed_area(points), points.len())
+}
+
+/// [`excess`] from a length, a signed area and the number of nodes n ≥ 3.
+pub fn excess_of(length: f64, area: f64, n: usize) -> f64 {
+    let n = n as f64;
+    length * length / (4.0 * PI * area) - n / PI * (PI / n).tan()
+}
+
+/// Turning number: how often the edge direction goes round, +1 for an embedded counter-clockwise polygon, 0 for a
+/// figure-eight.
+///
+/// At each node the direction turns by less than π, so the hodograph (the closed polygon of the edge vectors) goes
+/// round the origin as often as the direction does. Its winding is the number of its edges that cross the positive
+/// x-axis upwards less those that cross it downwards: integers and signs, no angle. A node that turns by exactly π
+/// has no sense of turning and counts as none.
+pub fn turning_number(points: &[DVec2]) -> i32 {
+    let next = edges(points).chain(edges(points)).skip(1);
+    let crossing = |(d, e): (DVec2, DVec2)| match (d.y <= 0.0, e.y <= 0.0) {
+        (true, false) if d.perp_dot(e) > 0.0 => 1,
+        (false, true) if d.perp_dot(e) < 0.0 => -1,
+        _ => 0,
+    };
+    edges(points).zip(next).map(crossing).sum()
+}
+
+/// Longest edge over shortest edge; infinite when an edge has no length.
+pub fn mesh_ratio(points: &[DVec2]) -> f64 {
+    let (shortest, longest) = edges(points)
+        .map(DVec2::length)
+        .fold((f64::INFINITY, 0.0_f64), |(low, high), edge| (low.min(edge), high.max(edge)));
+    longest / shortest
+}
+
+/// Reverses the sense in which the polygon is traversed and keeps its first vertex first.
+pub fn turn_round(points: &mut [DVec2]) {
+    if let [_, rest @ ..] = points {
+        rest.reverse();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+
+    fn sampled(n: usize, curve: impl Fn(f64) -> (f64, f64)) -> Vec<DVec2> {
+        (1..=n).map(|i| curve(TAU * i as f64 / n as f64).into()).collect()
+    }
+
+    fn assert_near(found: f64, expected: f64, bound: f64) {
+        assert!((found - expected).abs() <= bound, "{found} is not {expected} ± {bound}");
+    }
+
+    #[test]
+    fn a_regular_polygon_has_its_length_and_area_and_no_excess() {
+        for n in [3, 7, 100] {
+            let polygon = sampled(n, |t| (5.0 + 2.0 * t.cos(), 2.0 * t.sin() - 3.0));
+            let m = n as f64;
+            assert_near(length(&polygon), 4.0 * m * (PI / m).sin(), 1e-13);
+            assert_near(signed_area(&polygon), 2.0 * m * (TAU / m).sin(), 1e-13);
+            assert_near(area_centroid(&polygon).distance(DVec2::new(5.0, -3.0)), 0.0, 1e-14);
+            assert_near(excess(&polygon), 0.0, 1e-13);
+            assert_near(mesh_ratio(&polygon), 1.0, 1e-12);
+            assert_eq!(turning_number(&polygon), 1);
+        }
+    }
+
+    #[test]
+    fn the_measures_of_an_ellipse_converge_to_the_integrals() {
+        let ellipse = sampled(20_000, |t| (2.0 * t.cos(), t.sin()));
+        assert_near(length(&ellipse), 9.688_448_220_547_675, 1e-6);
+        assert_near(signed_area(&ellipse), TAU, 1e-6);
+        assert_near(excess(&ellipse), 9.688_448_220_547_675_f64.powi(2) / (8.0 * PI * PI) - 1.0, 1e-6);
+        assert_near(mesh_ratio(&ellipse), 2.0, 1e-6);
+    }
+
+    #[test]
+    fn a_small_curve_far_away_keeps_its_digits() {
+        let far = sampled(100, |t| (1e6 + t.cos(), 1e6 + t.sin()));
+        assert_near(signed_area(&far), 50.0 * (TAU / 100.0).sin(), 1e-8);
+        assert_near(area_centroid(&far).distance(DVec2::splat(1e6)), 0.0, 1e-8);
+    }
+
+    #[test]
+    fn the_centroid_weighs_area_and_not_nodes() {
+        let half_sampled: Vec<DVec2> =
+            [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 0.5), (2.0, 1.0), (0.0, 1.0)].map(DVec2::from).into();
+        assert_near(area_centroid(&half_sampled).distance(DVec2::new(1.0, 0.5)), 0.0, 1e-15);
+    }
+
+    #[test]
+    fn a_figure_eight_turns_by_nothing_and_has_the_centroid_of_its_line() {
+        let eight = sampled(101, |t| (3.0 + t.sin(), 1.0 + t.sin() * t.cos()));
+        assert_eq!(turning_number(&eight), 0);
+        assert_near(signed_area(&eight), 0.0, 1e-14);
+        assert_near(area_centroid(&eight).distance(DVec2::new(3.0, 1.0)), 0.0, 1e-13);
+    }
+
+    #[test]
+    fn a_doubly_covered_circle_turns_twice_and_backwards_it_turns_minus_twice() {
+        let mut double = sampled(101, |t| ((2.0 * t).cos(), (2.0 * t).sin()));
+        assert_eq!(turning_number(&double), 2);
+        let first = double[0];
+        turn_round(&mut double);
+        assert_eq!((turning_number(&double), double[0]), (-2, first));
+    }
+
+    #[test]
+    fn the_turning_number_does_not_depend_on_the_direction_of_the_axes() {
+        for j in 0..360 {
+            let spin = DVec2::from_angle(f64::from(j).to_radians());
+            let square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|p| DVec2::from(p).rotate(spin));
+            assert_eq!(turning_number(&square), 1, "{j} degrees");
+        }
+    }
+
+    #[test]
+    fn a_vanished_edge_makes_the_mesh_ratio_infinite() {
+        let points = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(DVec2::from);
+        assert_eq!(mesh_ratio(&points), f64::INFINITY);
+    }
+}

@@ -1,0 +1,282 @@
+//! Sampling: n nodes on a curve, i = 1…n, equally spaced in the parameter or along the curve.
+//!
+//! What does not depend on the member is tabulated once: the base curve's nodes, or a fine subdivision of it with
+//! the direction of each sample from the centre. A member then costs one radial factor a sample.
+//!
+//! Equal spacing is found by inverting the cumulated chord length of the *perturbed* samples. Within a piece the
+//! parameter is interpolated linearly, and the curve itself is evaluated there: so nodes lie on the curve to the
+//! rounding, and only their spacing is approximate (to 5e-4 of itself on the shapes that have a formula).
+
+use std::{fmt, str::FromStr};
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use super::{BaseCurve, MAX_POINTS, RadialFactor};
+use crate::error::{Error, did_you_mean};
+
+/// Samples for each node, and the least number of them, that equal spacing is measured on. Half as many double the
+/// error of the spacing; the time to make a member is proportional to them.
+const SAMPLES_PER_NODE: usize = 32;
+const MIN_SAMPLES: usize = 4096;
+
+/// How nodes are placed on a curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub enum Sampling {
+    /// At u = i/n, the paper's. On a file's polygon `u` is the share of its length before perturbation.
+    Parameter,
+    /// Equally spaced along the perturbed curve; node n at u = 0.
+    Arclength,
+    /// A file's own points, in its order.
+    Points,
+}
+
+impl Sampling {
+    const ALL: [Sampling; 3] = [Sampling::Parameter, Sampling::Arclength, Sampling::Points];
+
+    /// The word on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Sampling::Parameter => "parameter",
+            Sampling::Arclength => "arclength",
+            Sampling::Points => "points",
+        }
+    }
+}
+
+impl fmt::Display for Sampling {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Sampling {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Sampling, String> {
+        Sampling::ALL.into_iter().find(|sampling| sampling.name() == text).ok_or_else(|| {
+            let names = Sampling::ALL.map(Sampling::name);
+            format!("unknown sampling `{text}`{}; one of {}", did_you_mean(text, names), names.join(", "))
+        })
+    }
+}
+
+impl From<Sampling> for String {
+    fn from(sampling: Sampling) -> String {
+        sampling.to_string()
+    }
+}
+
+impl TryFrom<String> for Sampling {
+    type Error = String;
+    fn try_from(text: String) -> Result<Sampling, String> {
+        text.parse()
+    }
+}
+
+/// A base curve prepared for sampling into n nodes, whatever its perturbation.
+pub struct Sampler {
+    curve: BaseCurve,
+    nodes: usize,
+    plan: Plan,
+}
+
+enum Plan {
+    /// The base curve's nodes, each mapped.
+    Fixed(Vec<DVec2>),
+    /// A fine subdivision, mapped and measured for each member.
+    Measured(Vec<Sample>),
+}
+
+/// A point of the base curve with its parameter and its direction from the centre.
+struct Sample {
+    u: f64,
+    point: DVec2,
+    direction: DVec2,
+}
+
+impl Sampler {
+    /// Prepares `curve` for `nodes` nodes; with [`Sampling::Points`] the file's own number is taken instead.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when `nodes` is not in 3 to [`MAX_POINTS`], or `Points` is asked of a curve that is no
+    /// file.
+    pub fn new(curve: BaseCurve, sampling: Sampling, nodes: usize) -> Result<Sampler, Error> {
+        if !(3..=MAX_POINTS).contains(&nodes) {
+            let allowed = format!("allowed are 3 to {MAX_POINTS}");
+            return Err(Error::value("points", nodes, "out of range", &allowed));
+        }
+        let plan = match (sampling, curve.outline()) {
+            (Sampling::Parameter, _) => {
+                Plan::Fixed((1..=nodes).map(|i| curve.point(i as f64 / nodes as f64)).collect())
+            }
+            (Sampling::Arclength, _) => Plan::Measured(samples(&curve, MIN_SAMPLES.max(SAMPLES_PER_NODE * nodes))),
+            (Sampling::Points, Some(outline)) => Plan::Fixed(outline.vertices().to_vec()),
+            (Sampling::Points, None) => {
+                let problem = "only a file has points of its own";
+                return Err(Error::value(
+                    "sampling",
+                    sampling,
+                    problem,
+                    "take --shape file:PATH, parameter or arclength",
+                ));
+            }
+        };
+        let nodes = if let Plan::Fixed(points) = &plan { points.len() } else { nodes };
+        Ok(Sampler { curve, nodes, plan })
+    }
+
+    /// Number of nodes n.
+    pub fn nodes(&self) -> usize {
+        self.nodes
+    }
+
+    /// The nodes i = 1…n, at index i-1, of the curve stretched by `factor` about its area centroid.
+    pub fn sample(&self, factor: &RadialFactor) -> Vec<DVec2> {
+        let centre = self.curve.centroid();
+        match &self.plan {
+            Plan::Fixed(points) => points.iter().map(|p| factor.apply(centre, *p)).collect(),
+            Plan::Measured(samples) => self.equally_spaced(samples, factor),
+        }
+    }
+
+    fn equally_spaced(&self, samples: &[Sample], factor: &RadialFactor) -> Vec<DVec2> {
+        let centre = self.curve.centroid();
+        let reached = cumulated_length(samples.iter().map(|s| factor.apply_towards(s.direction, centre, s.point)));
+        let spacing = reached[samples.len() - 1] / self.nodes as f64;
+        let mut piece = 0;
+        let parameter = |i: usize| {
+            let target = i as f64 * spacing;
+            while piece + 2 < samples.len() && reached[piece + 1] < target {
+                piece += 1;
+            }
+            let share = (target - reached[piece]) / (reached[piece + 1] - reached[piece]);
+            samples[piece].u + share * (samples[piece + 1].u - samples[piece].u)
+        };
+        (1..self.nodes).map(parameter).chain([0.0]).map(|u| factor.apply(centre, self.curve.point(u))).collect()
+    }
+}
+
+fn samples(curve: &BaseCurve, pieces: usize) -> Vec<Sample> {
+    let centre = curve.centroid();
+    let directed = |(u, point)| Sample { u, point, direction: (point - centre).normalize_or_zero() };
+    curve.subdivision(pieces).into_iter().map(directed).collect()
+}
+
+/// Length along the polyline at each of its points, 0 at the first.
+fn cumulated_length(points: impl Iterator<Item = DVec2>) -> Vec<f64> {
+    let mut previous = None;
+    points
+        .scan(0.0, |sum, point| {
+            *sum += previous.replace(point).map_or(0.0, |p: DVec2| p.distance(point));
+            Some(*sum)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::{Shape, polygon};
+
+    fn sampler(shape: &str, sampling: Sampling, nodes: usize) -> Sampler {
+        Sampler::new(shape.parse::<Shape>().unwrap().resolve().unwrap(), sampling, nodes).unwrap()
+    }
+
+    fn island() -> &'static str {
+        "file:examples/islands/jamaica.csv"
+    }
+
+    #[test]
+    fn equal_parameters_reproduce_the_reference_nodes() {
+        let reference = include_str!("../../tests/data/reference/ref_sd_ellipse_2_1_n100_tau1e-3.csv");
+        let rows: Vec<Vec<f64>> = reference
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').map(|field| field.parse().unwrap()).collect())
+            .filter(|row: &Vec<f64>| row[0] == 0.0)
+            .collect();
+        assert_eq!(rows.len(), 100);
+        let nodes = sampler("ellipse:2,1", Sampling::Parameter, 100).sample(&RadialFactor::default());
+        for row in rows {
+            let node = nodes[row[1] as usize - 1];
+            assert!(node.distance(DVec2::new(row[2], row[3])) < 1e-15, "node {}", row[1]);
+        }
+    }
+
+    #[test]
+    fn arclength_nodes_are_equally_spaced_along_the_perturbed_curve() {
+        let factor = RadialFactor::new(2, [(0.1, 0.3), (-0.15, 2.0)]);
+        for shape in ["ellipse:2,1", "nonconvex", "flower:3:0.3"] {
+            // So many that the chords' deficit, (κh)²/24, falls under the error of the interpolation.
+            let nodes = sampler(shape, Sampling::Arclength, 16_001).sample(&factor);
+            assert!(polygon::mesh_ratio(&nodes) < 1.0005, "{shape} {}", polygon::mesh_ratio(&nodes));
+        }
+        let circle = sampler("circle:1", Sampling::Arclength, 101).sample(&RadialFactor::default());
+        assert!(polygon::mesh_ratio(&circle) < 1.0 + 1e-9);
+    }
+
+    #[test]
+    fn arclength_nodes_lie_on_the_curve_and_end_at_its_start() {
+        let factor = RadialFactor::new(3, [(0.2, 0.5)]);
+        let nodes = sampler("ellipse:2,1", Sampling::Arclength, 97).sample(&factor);
+        for node in &nodes {
+            let stretch = 1.0 + 0.2 * (3.0 * node.to_angle() + 0.5).cos();
+            let on_ellipse = *node / stretch;
+            let gap = (on_ellipse.x / 2.0).powi(2) + on_ellipse.y.powi(2) - 1.0;
+            assert!(gap.abs() < 1e-13, "{gap:e} at {node}");
+        }
+        assert!(nodes[96].distance(DVec2::new(2.0 * (1.0 + 0.2 * 0.5_f64.cos()), 0.0)) < 1e-14);
+    }
+
+    #[test]
+    fn arclength_nodes_of_an_unperturbed_polygon_share_its_length_equally() {
+        let none = RadialFactor::default();
+        let by_length = sampler(island(), Sampling::Arclength, 100).sample(&none);
+        let by_parameter = sampler(island(), Sampling::Parameter, 100).sample(&none);
+        for (a, b) in by_length.iter().zip(&by_parameter) {
+            assert!(a.distance(*b) < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_perturbed_polygon_is_measured_through_all_its_corners() {
+        let factor = RadialFactor::new(2, [(0.2, 0.0)]);
+        let coarse = sampler(island(), Sampling::Arclength, 1000).sample(&factor);
+        let fine = sampler(island(), Sampling::Arclength, 20_000).sample(&factor);
+        for (i, node) in coarse.iter().enumerate() {
+            assert!(node.distance(fine[20 * i + 19]) < 1e-6, "node {}", i + 1);
+        }
+    }
+
+    #[test]
+    fn a_file_s_own_points_are_the_nodes_in_order() {
+        let own = sampler(island(), Sampling::Points, 100);
+        let nodes = own.sample(&RadialFactor::default());
+        assert_eq!((own.nodes(), nodes.len()), (47, 47));
+        assert_eq!(nodes[0], DVec2::new(0.032240, 0.656819));
+        // The file runs clockwise, so its last point is the second node.
+        assert_eq!(nodes[1], DVec2::new(-0.135410, 0.673176));
+    }
+
+    #[test]
+    fn points_of_a_formula_and_absurd_numbers_of_nodes_are_refused() {
+        let refusal = |sampling, nodes| {
+            let curve = "nonconvex".parse::<Shape>().unwrap().resolve().unwrap();
+            Sampler::new(curve, sampling, nodes).err().unwrap().to_string()
+        };
+        assert!(refusal(Sampling::Points, 100).contains("--sampling points: only a file"));
+        assert!(refusal(Sampling::Parameter, 0).contains("--points 0: out of range; allowed are 3 to 1000000"));
+        assert!(refusal(Sampling::Arclength, usize::MAX).contains("--points"));
+    }
+
+    #[test]
+    fn a_sampling_prints_as_it_is_parsed_and_a_wrong_one_names_the_nearest() {
+        for sampling in Sampling::ALL {
+            assert_eq!(sampling.to_string().parse(), Ok(sampling));
+        }
+        let message = "arclenght".parse::<Sampling>().unwrap_err();
+        assert!(message.contains("did you mean `arclength`?") && message.contains("parameter, arclength, points"));
+    }
+}

@@ -1,0 +1,309 @@
+//! Members: member j of an ensemble is one base curve, randomly perturbed, sampled into n nodes.
+//!
+//! A member is a pure function of the spec and j. Its amplitudes and phases are draws addressed by (seed, j,
+//! attempt, mode), so neither the batch, the order, the thread nor the other members matter, and mode m is
+//! the same number whichever other modes are asked for. The number of nodes does not enter either: at n = 100 and
+//! n = 200 member j is the same curve.
+
+use std::f64::consts::TAU;
+
+use glam::DVec2;
+
+use super::{Spec, random::Stream};
+use crate::{
+    curve::{RadialFactor, RadialLaw, Sampler, Sampling, check_directions, polygon},
+    error::{Error, Result},
+};
+
+/// Draws of one member before giving up. By Rice's formula the harshest law that is admitted, a
+/// thousand modes of one size, still keeps two draws in a hundred.
+const MAX_ATTEMPTS: u32 = 1000;
+
+/// One curve at the start of its run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Member {
+    /// Index of the member, from 0.
+    pub index: u64,
+    /// Nodes relative to `origin`, counter-clockwise, i = 1…n at index i-1.
+    pub nodes: Vec<DVec2>,
+    /// Area centroid of the nodes in the user's frame, subtracted so that f32 keeps its digits.
+    pub origin: DVec2,
+}
+
+/// The curve of a spec, prepared once, from which every member is made.
+pub struct Family {
+    sampler: Sampler,
+    law: RadialLaw,
+    seed: u64,
+    /// Directions at which a draw is checked.
+    directions: Vec<DVec2>,
+    warnings: Vec<String>,
+}
+
+impl Family {
+    /// Loads the shape and checks the keys shape, sampling, points, amplitude, modes and decay.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when one of them, or the file of the shape, is wrong.
+    pub fn new(spec: &Spec) -> Result<Family> {
+        let law = RadialLaw::new(spec.amplitude, spec.modes, spec.decay)?;
+        let curve = spec.shape.resolve()?;
+        let outline = curve.outline();
+        if let (Sampling::Points, Some(own)) = (spec.sampling, outline.map(|outline| outline.vertices().len())) {
+            check_own_points(spec.points, own)?;
+        }
+        let warnings = outline.map_or(Vec::new(), |outline| outline.warnings().to_vec());
+        let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
+        let directions = check_directions(spec.modes.high);
+        Ok(Family { sampler, law, seed: spec.seed, directions, warnings })
+    }
+
+    /// What the user should know about the curve, a sentence each.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Number of nodes n: with `--sampling points` the file's number of points, else the spec's.
+    pub fn points(&self) -> usize {
+        self.sampler.nodes()
+    }
+
+    /// Member `index`.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when no draw leaves the radius positive.
+    pub fn member(&self, index: u64) -> Result<Member> {
+        let factor = self.radial_factor(index)?;
+        let mut nodes = self.sampler.sample(&factor);
+        let length = polygon::length(&nodes);
+        // Loops that cancel have an area of rounding only, whose sign must not decide the orientation.
+        if polygon::signed_area(&nodes) < -polygon::NO_AREA * length * length {
+            polygon::turn_round(&mut nodes);
+        }
+        let origin = polygon::area_centroid(&nodes);
+        nodes.iter_mut().for_each(|node| *node -= origin);
+        Ok(Member { index, nodes, origin })
+    }
+
+    /// The first draw of member `index` that keeps the radius positive.
+    fn radial_factor(&self, index: u64) -> Result<RadialFactor> {
+        if self.law.is_none() {
+            return Ok(RadialFactor::default());
+        }
+        let draws = (0..MAX_ATTEMPTS).map(|attempt| self.draw(Stream::new(self.seed, index, attempt)));
+        draws.into_iter().find(|factor| factor.is_embedding(&self.directions)).ok_or_else(|| {
+            let problem = format!("member {index} has no positive radius in {MAX_ATTEMPTS} draws");
+            Error::value("amplitude", self.law.amplitude(), &problem, "lower --amplitude or raise --decay")
+        })
+    }
+
+    /// Mode m takes draw 2m for its amplitude and draw 2m + 1 for its phase.
+    fn draw(&self, stream: Stream) -> RadialFactor {
+        let modes = self.law.modes();
+        let amplitude_and_phase = |m: u32| {
+            let [turn, _] = stream.uniforms(2 * m + 1);
+            (self.law.deviation(m) * stream.normal(2 * m), TAU * turn)
+        };
+        RadialFactor::new(modes.low, (modes.low..=modes.high).map(amplitude_and_phase))
+    }
+}
+
+/// With the file's own points as nodes, `--points` must be its number or the default, which stands for not given.
+fn check_own_points(asked: usize, own: usize) -> Result<()> {
+    if asked == own || asked == Spec::default().points {
+        return Ok(());
+    }
+    let problem = format!("the file has {own} points and --sampling points makes each a node");
+    Err(Error::value(
+        "points",
+        asked,
+        &problem,
+        &format!("leave --points out, give {own}, or use --sampling arclength"),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::{Modes, Shape, crossing};
+
+    fn spec(shape: &str, sampling: Sampling, points: usize, amplitude: f64) -> Spec {
+        Spec { shape: shape.parse::<Shape>().unwrap(), sampling, points, amplitude, ..Spec::default() }
+    }
+
+    fn family(spec: &Spec) -> Family {
+        Family::new(spec).unwrap()
+    }
+
+    fn in_user_frame(member: &Member) -> Vec<DVec2> {
+        member.nodes.iter().map(|node| *node + member.origin).collect()
+    }
+
+    #[test]
+    fn a_member_does_not_depend_on_the_members_before_it() {
+        let default = Spec::default();
+        let (one, other) = (family(&default), family(&default));
+        let forwards: Vec<Member> = (0..11).map(|j| one.member(j).unwrap()).collect();
+        let backwards: Vec<Member> = (0..11).rev().map(|j| other.member(j).unwrap()).collect();
+        assert!(forwards.iter().eq(backwards.iter().rev()));
+        assert!((1..11).all(|j| forwards[j].nodes != forwards[j - 1].nodes));
+    }
+
+    #[test]
+    fn member_0_of_the_default_ensemble_never_changes() {
+        let nodes = in_user_frame(&family(&Spec::default()).member(0).unwrap());
+        let pinned = [
+            (0, DVec2::new(1.9736111059010777, 0.09649039999015596)),
+            (49, DVec2::new(-2.018789996233421, 0.01631228074190085)),
+            (99, DVec2::new(1.9787948327127796, 0.0)),
+        ];
+        for (i, node) in pinned {
+            assert!(nodes[i].distance(node) < 1e-12, "node {}: {:?}", i + 1, nodes[i]);
+        }
+    }
+
+    #[test]
+    fn amplitude_and_phase_of_a_mode_are_independent() {
+        let spec = Spec { modes: Modes { low: 2, high: 2 }, ..Spec::default() };
+        let family = family(&spec);
+        let (a_quarter, count) = (DVec2::from_angle(-TAU / 8.0), 20_000_u32);
+        // With amplitude a and phase φ these are a cos φ and a sin φ: of equal variance, and uncorrelated.
+        let parts = (0..count).map(|j| {
+            let factor = family.draw(Stream::new(1, j.into(), 0));
+            DVec2::new(factor.excursion(DVec2::X), factor.excursion(a_quarter)) / family.law.radial_deviation()
+        });
+        let [xx, xy, yy] = parts.fold([0.0; 3], |s, p| [s[0] + p.x * p.x, s[1] + p.x * p.y, s[2] + p.y * p.y]);
+        let mean = [xx, xy, yy].map(|sum| sum / f64::from(count));
+        // Standard errors are under 1/70: the fourth moment of a cos φ is 4.5.
+        assert!((mean[0] - 1.0).abs() < 0.07 && (mean[2] - 1.0).abs() < 0.07 && mean[1].abs() < 0.05, "{mean:?}");
+    }
+
+    #[test]
+    fn seeds_and_large_indices_make_different_members() {
+        let make = |seed, index| family(&Spec { seed, ..Spec::default() }).member(index).unwrap().nodes;
+        let nodes = [make(1, 0), make(2, 0), make(1 << 32, 0), make(1, u64::MAX), make(1, 1 << 32)];
+        for (i, a) in nodes.iter().enumerate() {
+            assert!(nodes[..i].iter().all(|b| a != b), "{i}");
+        }
+    }
+
+    #[test]
+    fn without_amplitude_a_member_is_the_base_curve() {
+        let member = family(&spec("ellipse:2,1", Sampling::Parameter, 100, 0.0)).member(5).unwrap();
+        for (i, node) in (1..).zip(in_user_frame(&member)) {
+            let angle = TAU * (f64::from(i) / 100.0);
+            assert!(node.distance(DVec2::new(2.0 * angle.cos(), angle.sin())) < 1e-15, "node {i}");
+        }
+    }
+
+    #[test]
+    fn nodes_are_counter_clockwise_about_their_own_centroid() {
+        for shape in ["ellipse:2,1", "nonconvex", "file:examples/islands/iceland.csv"] {
+            let family = family(&spec(shape, Sampling::Arclength, 101, 0.1));
+            for j in 0..7 {
+                let member = family.member(j).unwrap();
+                assert!(polygon::signed_area(&member.nodes) > 0.0);
+                assert!(polygon::area_centroid(&member.nodes).length() < 1e-14, "{shape} {j}");
+            }
+        }
+    }
+
+    #[test]
+    fn more_nodes_sample_the_same_curve() {
+        let at = |n| in_user_frame(&family(&spec("nonconvex", Sampling::Arclength, n, 0.05)).member(3).unwrap());
+        let (coarse, fine) = (at(100), at(400));
+        for (i, node) in coarse.iter().enumerate() {
+            assert!(node.distance(fine[4 * i + 3]) < 1e-5, "node {}", i + 1);
+        }
+    }
+
+    #[test]
+    fn a_mode_is_the_same_draw_whichever_others_are_asked_for() {
+        let factor = |low, high| {
+            let family = family(&Spec { modes: Modes { low, high }, ..Spec::default() });
+            family.draw(Stream::new(1, 9, 0))
+        };
+        let circle = |k: u32| DVec2::from_angle(0.1 * f64::from(k));
+        for k in 0..20 {
+            let parts = factor(2, 4).excursion(circle(k)) + factor(5, 8).excursion(circle(k));
+            assert!((factor(2, 8).excursion(circle(k)) - parts).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_radius_deviates_as_the_law_says() {
+        let mut spec = spec("circle:1", Sampling::Parameter, 16, 0.1);
+        spec.modes = Modes { low: 2, high: 6 };
+        let family = family(&spec);
+        let members = 4000_u32;
+        let mut sums = [0.0; 2];
+        for j in 0..members {
+            let excursion = in_user_frame(&family.member(j.into()).unwrap())[4].length() - 1.0;
+            sums = [sums[0] + excursion, sums[1] + excursion * excursion];
+        }
+        let count = f64::from(members);
+        let deviation = (sums[1] / count).sqrt();
+        let expected = family.law.radial_deviation();
+        assert!((sums[0] / count).abs() < 5.0 * expected / count.sqrt(), "seed 1: mean {}", sums[0] / count);
+        assert!((deviation / expected - 1.0).abs() < 0.06, "seed 1: {deviation} instead of {expected}");
+    }
+
+    #[test]
+    fn the_strongest_law_still_makes_embedded_curves_of_embedded_ones() {
+        let mut spec = spec("nonconvex", Sampling::Arclength, 601, 0.37);
+        spec.modes = Modes { low: 2, high: 5 };
+        spec.decay = 0.5;
+        let family = family(&spec);
+        assert!(family.law.radial_deviation() > 0.28, "{}", family.law.radial_deviation());
+        let redrawn = (0..50).filter(|&j| !family.draw(Stream::new(1, j, 0)).is_embedding(&family.directions)).count();
+        assert!(redrawn > 0, "seed 1: no draw was rejected, the test has lost its point");
+        for j in 0..50 {
+            assert_eq!(crossing(&family.member(j).unwrap().nodes), None, "seed 1, member {j}");
+        }
+    }
+
+    #[test]
+    fn a_file_s_own_number_of_points_must_agree_with_the_one_asked_for() {
+        let island = |points| Family::new(&spec("file:examples/islands/jamaica.csv", Sampling::Points, points, 0.02));
+        assert_eq!(island(100).unwrap().points(), 47);
+        assert_eq!(island(47).unwrap().member(0).unwrap().nodes.len(), 47);
+        let message = island(48).err().unwrap().to_string();
+        assert!(message.contains("--points 48: the file has 47 points"), "{message}");
+    }
+
+    #[test]
+    fn a_crossing_outline_warns() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bow.csv");
+        std::fs::write(&path, "0,0\n3,3\n3,0\n0,1\n").unwrap();
+        let crossed = family(&spec(&format!("file:{}", path.display()), Sampling::Arclength, 50, 0.0));
+        assert!(crossed.warnings()[0].contains("crosses"), "{:?}", crossed.warnings());
+        assert!(family(&Spec::default()).warnings().is_empty());
+    }
+
+    #[test]
+    fn every_wrong_key_is_refused_before_any_member_is_made() {
+        let wrong = [
+            (Spec { amplitude: 0.6, ..Spec::default() }, "--amplitude 0.6"),
+            (Spec { modes: Modes { low: 0, high: 3 }, ..Spec::default() }, "--modes `0..=3`"),
+            (Spec { decay: f64::NAN, ..Spec::default() }, "--decay NaN"),
+            (Spec { points: 2, ..Spec::default() }, "--points 2"),
+            (Spec { sampling: Sampling::Points, ..Spec::default() }, "--sampling points"),
+            (Spec { shape: Shape::Circle { radius: 0.0 }, ..Spec::default() }, "--shape circle:0"),
+            (Spec { shape: Shape::File("none.csv".into()), ..Spec::default() }, "--shape file:none.csv"),
+        ];
+        for (spec, key) in wrong {
+            let error = Family::new(&spec).err().expect(key);
+            assert!(error.exit_code() == 2 && error.to_string().starts_with(key), "{error}");
+        }
+    }
+
+    #[test]
+    #[ignore = "a measurement: cargo test --release -- --ignored --nocapture microseconds"]
+    fn microseconds_a_member() {
+        let family = family(&Spec::default());
+        let start = std::time::Instant::now();
+        (0..1000).for_each(|j| drop(family.member(j).unwrap()));
+        println!("{:?} a member of 100 nodes", start.elapsed() / 1000);
+    }
+}
