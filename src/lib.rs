@@ -1,5 +1,6 @@
 //! curvelax relaxes ensembles of plane curves by fourth-order geometric flows.
 
+pub mod backend;
 pub mod curve;
 pub mod ensemble;
 pub mod error;

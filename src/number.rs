@@ -17,6 +17,8 @@ pub trait Mask: Copy {
     fn any(self) -> bool;
     /// Lane-wise and.
     fn and(self, other: Self) -> Self;
+    /// Lane-wise or.
+    fn or(self, other: Self) -> Self;
     /// Lane-wise negation.
     fn not(self) -> Self;
 }
@@ -30,6 +32,9 @@ impl Mask for bool {
     }
     fn and(self, other: bool) -> bool {
         self & other
+    }
+    fn or(self, other: bool) -> bool {
+        self | other
     }
     fn not(self) -> bool {
         !self

@@ -1,5 +1,7 @@
 //! A member's run: steps, acceptance, status and relaxation events. Twin of `shaders/evolve.wgsl`.
 
+use glam::DVec2;
+
 use super::{
     Parameters, State, Workspace,
     observe::{self, Curve, Maxima, Sums},
@@ -24,6 +26,46 @@ pub struct Run<T> {
     pub report: Report<T>,
 }
 
+/// Where a member starts, in f64 whatever the precision of its run.
+#[derive(Clone, Debug)]
+pub struct Launch {
+    /// The n nodes, counter-clockwise, near the origin.
+    pub nodes: Vec<DVec2>,
+    /// What governs it.
+    pub parameters: Parameters<f64>,
+    /// Steps to make at first.
+    pub goal: u32,
+    /// End it when it is relaxed.
+    pub stop_when_relaxed: bool,
+    /// Excess of the nodes.
+    pub excess: f64,
+    /// Turning number of the nodes.
+    pub turning: i32,
+}
+
+impl<T: Real> Run<T> {
+    /// A member at its start, rounded to the precision of the run.
+    pub fn new(launch: &Launch) -> Run<T> {
+        let parameters: Vec<T> = launch.parameters.to_numbers().into_iter().map(T::of).collect();
+        Run {
+            state: State::from_nodes(&launch.nodes),
+            parameters: Parameters::from_numbers(&parameters),
+            counters: Counters {
+                goal: launch.goal,
+                stop_when_relaxed: launch.stop_when_relaxed.into(),
+                relax_step: NEVER,
+                half_step: NEVER,
+                ..Counters::default()
+            },
+            report: Report {
+                excess: T::of(launch.excess),
+                turning: T::of(f64::from(launch.turning)),
+                ..Report::default()
+            },
+        }
+    }
+}
+
 /// Advances a running member by at most `steps` steps towards its goal.
 ///
 /// A step that fails (stalled, not finite, singular) is not accepted: the member ends in its last good state.
@@ -40,10 +82,12 @@ pub fn evolve<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T
         let new = Curve { x: &work.x, y: &work.y, k: &work.k, r: &work.r };
         let sums = observe::sums(new, &run.parameters, work.blocks);
         let maxima = observe::maxima(new);
-        let failure = if !stepped.finite || !is_finite(&sums) {
+        let failure = if !stepped.finite {
             Some(Status::Nonfinite)
         } else if !stepped.solved {
             Some(Status::Stalled)
+        } else if !is_finite(&sums) {
+            Some(Status::Nonfinite)
         } else if is_singular(&sums, &maxima, run.report.turning, T::of(work.blocks.n as f64)) {
             Some(Status::Singular)
         } else {

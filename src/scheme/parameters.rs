@@ -3,7 +3,10 @@
 //! Every field is one number of the run's precision, in declaration order, so that host and WGSL agree by
 //! construction; a test compares names and offsets with naga's view of `shaders/member.wgsl`.
 
-use crate::{flow::MAX_DEGREE, number::Number};
+use crate::{
+    flow::MAX_DEGREE,
+    number::{Number, Real},
+};
 
 /// A struct of numbers of one type, convertible to and from an array in declaration order.
 macro_rules! numbers {
@@ -122,6 +125,14 @@ pub struct Counters {
     pub sweeps_k: u32,
     /// Sweeps on position systems in this dispatch.
     pub sweeps_x: u32,
+}
+
+impl<T: Real> Report<T> {
+    /// The same report in f64, exactly.
+    pub fn widened(&self) -> Report<f64> {
+        let numbers: Vec<f64> = self.to_numbers().into_iter().map(T::to_f64).collect();
+        Report::from_numbers(&numbers)
+    }
 }
 
 impl Counters {

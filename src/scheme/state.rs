@@ -75,6 +75,12 @@ impl<T: Real> State<T> {
         [&self.x, &self.y, &self.k, &self.r, &self.dk, &self.dx, &self.dy]
     }
 
+    /// The same state in f64, exactly.
+    pub fn widened(&self) -> State<f64> {
+        let numbers: Vec<f64> = self.to_numbers().into_iter().map(T::to_f64).collect();
+        State::from_numbers(&numbers)
+    }
+
     /// All fields one after another, `7n` numbers.
     pub fn to_numbers(&self) -> Vec<T> {
         self.fields().into_iter().flat_map(|field| field.nodes().iter().copied()).collect()

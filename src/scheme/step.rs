@@ -53,11 +53,12 @@ pub fn step<N: Number>(state: &State<N>, p: &Parameters<N>, method: &Method, wor
     add(&state.x, &work.dx, &mut work.x);
     add(&state.y, &work.dy, &mut work.y);
 
+    // What the second solve did counts only where the first one succeeded.
     Stepped {
         sweeps_k: for_k.sweeps,
-        sweeps_x: for_x.sweeps,
+        sweeps_x: N::select(for_k.converged, for_x.sweeps, N::of(0.0)),
         solved: for_k.converged.and(for_x.converged),
-        finite: for_k.finite.and(for_x.finite),
+        finite: for_k.finite.and(for_x.finite.or(for_k.converged.not())),
     }
 }
 

@@ -19,7 +19,7 @@ use super::{
 use crate::number::{BIG, Mask, Number};
 
 /// Sweeps between two looks at the residual; a look costs about as much as a sweep.
-pub const SWEEPS_PER_CHECK: u32 = 4;
+pub const SWEEPS_PER_CHECK: u32 = 8;
 
 /// The order in which a sweep visits the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,0 +1,127 @@
+// Coloured Gauss–Seidel sweeps to a residual. Twin of src/solver/gauss_seidel.rs.
+//
+// Rows and right-hand sides stay in registers; only the unknowns are in workgroup memory. In phase c every thread
+// updates the node of colour c in its block; a barrier ends the phase. A neighbour value is read once a sweep where
+// no phase in between can have changed it.
+
+const SWEEPS_PER_CHECK = 8u;
+
+/// How a solve ended.
+const UNSOLVED = 0u;
+const SOLVED = 1u;
+const NOT_FINITE = 2u;
+
+/// Sweeps made by the last solve.
+var<private> sweeps: u32;
+/// The unknowns of the block: the start of a solve, then its result. The curvature system has `u` alone.
+var<private> u: vec;
+var<private> v: vec;
+
+/// Sweeps `u` for rhs_x; returns how it ended.
+fn solve_one(negligible: real) -> u32 {
+    share(u, u);
+    sweeps = 0u;
+    var ended = UNSOLVED;
+    while ended == UNSOLVED && sweeps < dispatch.max_sweeps {
+        let batch = min(SWEEPS_PER_CHECK, dispatch.max_sweeps - sweeps);
+        for (var s = 0u; s < batch; s++) { sweep_one(); }
+        sweeps += batch;
+        let error = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
+        ended = judge(block_max(error), block_max(bounded_abs(u)), negligible);
+    }
+    return ended;
+}
+
+/// Sweeps `u` for rhs_x and `v` for rhs_y, with the barriers of one; returns how it ended.
+fn solve_two(negligible: real) -> u32 {
+    share(u, v);
+    sweeps = 0u;
+    var ended = UNSOLVED;
+    while ended == UNSOLVED && sweeps < dispatch.max_sweeps {
+        let batch = min(SWEEPS_PER_CHECK, dispatch.max_sweeps - sweeps);
+        for (var s = 0u; s < batch; s++) { sweep_two(); }
+        sweeps += batch;
+        let error_u = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
+        let error_v = bounded_abs(row_of.weight * residual(rhs_y, read_b()));
+        let size = max(bounded_abs(u), bounded_abs(v));
+        ended = judge(block_max(max(error_u, error_v)), block_max(size), negligible);
+    }
+    return ended;
+}
+
+fn judge(error: real, size: real, negligible: real) -> u32 {
+    let norms = ring_maxima(vec(error, size, 0.0, 0.0));
+    let bound = max(p.tolerance * norms.y, negligible);
+    var ended = UNSOLVED;
+    if !(norms.x <= real(BIG)) {
+        ended = NOT_FINITE;
+    } else if norms.x <= bound {
+        ended = SOLVED;
+    }
+    return uniform_decision(ended);
+}
+
+/// One sweep over ring_a.
+fn sweep_one() {
+    let um1 = ring_a[near_low.y];
+    u.x = relax(0u, rhs_x.x, ring_a[near_low.x], um1, u.x, u.y, u.z);
+    if owns > 0u { ring_a[first] = u.x; }
+    workgroupBarrier();
+    let up3 = ring_a[near_high.y];
+    u.y = relax(1u, rhs_x.y, um1, u.x, u.y, u.z, up3);
+    if owns > 0u { ring_a[first + 1u] = u.y; }
+    workgroupBarrier();
+    let up4 = ring_a[near_high.z];
+    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, up3, up4);
+    if owns > 0u { ring_a[first + 2u] = u.z; }
+    workgroupBarrier();
+    if owns == 4u {
+        u.w = relax(3u, rhs_x.w, u.y, u.z, u.w, up4, ring_a[near_high.w]);
+        ring_a[first + 3u] = u.w;
+    }
+    workgroupBarrier();
+}
+
+/// One sweep over ring_a and ring_b.
+fn sweep_two() {
+    let um1 = ring_a[near_low.y];
+    let vm1 = ring_b[near_low.y];
+    u.x = relax(0u, rhs_x.x, ring_a[near_low.x], um1, u.x, u.y, u.z);
+    v.x = relax(0u, rhs_y.x, ring_b[near_low.x], vm1, v.x, v.y, v.z);
+    if owns > 0u {
+        ring_a[first] = u.x;
+        ring_b[first] = v.x;
+    }
+    workgroupBarrier();
+    let up3 = ring_a[near_high.y];
+    let vp3 = ring_b[near_high.y];
+    u.y = relax(1u, rhs_x.y, um1, u.x, u.y, u.z, up3);
+    v.y = relax(1u, rhs_y.y, vm1, v.x, v.y, v.z, vp3);
+    if owns > 0u {
+        ring_a[first + 1u] = u.y;
+        ring_b[first + 1u] = v.y;
+    }
+    workgroupBarrier();
+    let up4 = ring_a[near_high.z];
+    let vp4 = ring_b[near_high.z];
+    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, up3, up4);
+    v.z = relax(2u, rhs_y.z, v.x, v.y, v.z, vp3, vp4);
+    if owns > 0u {
+        ring_a[first + 2u] = u.z;
+        ring_b[first + 2u] = v.z;
+    }
+    workgroupBarrier();
+    if owns == 4u {
+        u.w = relax(3u, rhs_x.w, u.y, u.z, u.w, up4, ring_a[near_high.w]);
+        v.w = relax(3u, rhs_y.w, v.y, v.z, v.w, vp4, ring_b[near_high.w]);
+        ring_a[first + 3u] = u.w;
+        ring_b[first + 3u] = v.w;
+    }
+    workgroupBarrier();
+}
+
+/// own + sor (rhs - row . u) for the node in component j of the block.
+fn relax(j: u32, rhs: real, m2: real, m1: real, own: real, p1: real, p2: real) -> real {
+    let left = rhs - row_of.a[j] * m2 - row_of.b[j] * m1 - row_of.d[j] * p1 - row_of.e[j] * p2 - own;
+    return own + p.sor * left;
+}

@@ -1,0 +1,33 @@
+// Numbers: `real` is f32 or f64, chosen by the line that the host puts in front. Twin of src/number.rs.
+
+alias vec = vec4<real>;
+
+/// Values above this bound count as not finite. `!(abs(x) <= BIG)` also holds for NaN; `x != x` never does.
+const BIG = 1e18;
+
+/// |v|, or 2 BIG where that is NaN or above BIG: safe to take maxima of.
+fn bounded_abs(v: vec) -> vec {
+    return select(vec(2.0 * BIG), abs(v), abs(v) <= vec(BIG));
+}
+
+/// e^x for |x| <= 40, clamped beyond: reduction by ln 2, then a Horner polynomial. WGSL's own exp is garbage in f64.
+fn exponential(v: vec) -> vec {
+    let x = min(max(v, vec(-40.0)), vec(40.0));
+    let n = floor(x * real(1.4426950408889634) + vec(0.5));
+    let reduced = (x - n * real(0.693359375)) - n * real(-2.1219444005469058e-4);
+    var sum = vec(1.0 / 6227020800.0);
+    sum = sum * reduced + vec(1.0 / 479001600.0);
+    sum = sum * reduced + vec(1.0 / 39916800.0);
+    sum = sum * reduced + vec(1.0 / 3628800.0);
+    sum = sum * reduced + vec(1.0 / 362880.0);
+    sum = sum * reduced + vec(1.0 / 40320.0);
+    sum = sum * reduced + vec(1.0 / 5040.0);
+    sum = sum * reduced + vec(1.0 / 720.0);
+    sum = sum * reduced + vec(1.0 / 120.0);
+    sum = sum * reduced + vec(1.0 / 24.0);
+    sum = sum * reduced + vec(1.0 / 6.0);
+    sum = sum * reduced + vec(0.5);
+    sum = sum * reduced + vec(1.0);
+    sum = sum * reduced + vec(1.0);
+    return ldexp(sum, vec4<i32>(n));
+}

@@ -1,0 +1,70 @@
+// Sums and maxima of a curve, and what follows from them. Twin of src/scheme/observe.rs.
+
+/// |k| r from which on a curve counts as not resolved.
+const MAX_TURN = 2.0;
+/// Shortest over mean edge below which an edge counts as vanished.
+const MIN_EDGE = 1e-5;
+const FOUR_PI = 12.566370614359172;
+
+/// Sums of the new curve: length, area, energy, turning.
+var<private> sums: vec;
+/// Maxima of the new curve: |k| r, metric drift, longest edge, minus the shortest edge.
+var<private> extremes: vec;
+/// Largest curvature and minus the smallest.
+var<private> k_range: vec2<real>;
+
+/// Observes the curve whose windows of x and y and nodes of k and r are given.
+fn observe(wx: Window, wy: Window, kh: vec, rh: vec) {
+    let ex = here(wx) - minus1(wx);
+    let ey = here(wy) - minus1(wy);
+    let fx = plus1(wx) - here(wx);
+    let fy = plus1(wy) - here(wy);
+    let edge = sqrt(ex * ex + ey * ey);
+    let cross = minus1(wx) * here(wy) - here(wx) * minus1(wy);
+    let energy = (real(0.5) * (kh * kh) + vec(p.length_penalty)) * rh;
+    let part = vec(block_sum(edge), block_sum(cross), block_sum(energy), block_sum(winding(ex, ey, fx, fy)));
+    var unused = vec(0.0);
+    sums = ring_sums(part, &unused);
+    sums.y = real(0.5) * sums.y;
+
+    let shortest = -bounded_abs(edge);
+    extremes = ring_maxima(vec(
+        block_max(bounded_abs(kh * rh)),
+        block_max(bounded_abs((rh - edge) / edge)),
+        block_max(bounded_abs(edge)),
+        block_max_signed(shortest),
+    ));
+    let range = ring_maxima(vec(block_max_signed(kh), block_max_signed(-kh), 0.0, 0.0));
+    k_range = range.xy;
+}
+
+/// Largest owned component, of either sign.
+fn block_max_signed(v: vec) -> real {
+    return max(max(v.x, v.y), select(v.z, max(v.z, v.w), owns == 4u));
+}
+
+/// +1 (-1) where the edge vector turns from e to f across the positive x axis, the short way round.
+fn winding(ex: vec, ey: vec, fx: vec, fy: vec) -> vec {
+    let side = ex * fy - fx * ey;
+    let e_below = select(vec(0.0), vec(1.0), ey <= vec(0.0));
+    let f_below = select(vec(0.0), vec(1.0), fy <= vec(0.0));
+    let left = select(vec(1.0), vec(0.0), side <= vec(0.0));
+    let right = select(vec(1.0), vec(0.0), vec(0.0) <= side);
+    return e_below * (vec(1.0) - f_below) * left - (vec(1.0) - e_below) * f_below * right;
+}
+
+fn excess_of_sums() -> real {
+    return sums.x * sums.x / (real(FOUR_PI) * abs(sums.y)) - p.polygon_ratio;
+}
+
+fn sums_are_finite() -> bool {
+    let big = real(BIG);
+    return sums.x <= big && abs(sums.y) <= big && abs(sums.z) <= big;
+}
+
+fn is_singular(turning: real) -> bool {
+    let mean_edge = sums.x / real(NODES);
+    let resolved = extremes.x <= real(MAX_TURN);
+    let apart = real(MIN_EDGE) * mean_edge <= -extremes.w;
+    return !(resolved && apart && sums.w == turning);
+}

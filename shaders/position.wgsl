@@ -1,0 +1,35 @@
+// Rows of the system for the increments of x and y. Twin of src/scheme/position.rs.
+
+/// `wk`: the new curvatures.
+fn assemble_position(wk: Window) {
+    let kh = here(wk);
+    let kp = plus1(wk);
+    let irm = minus1(ir);
+    let irh = here(ir);
+    let irp = plus1(ir);
+    let irpp = plus2(ir);
+    let iqm = minus1(iq);
+    let iqh = here(iq);
+    let iqp = plus1(iq);
+    let row_a = irh * iqm * irm;
+    let row_e = irp * iqp * irpp;
+    let middle = irh * iqh * irp;
+    let low = irh * irh * (iqm + iqh);
+    let high = irp * irp * (iqh + iqp);
+    let mean_phi = real(0.5) * (phi(kh) + phi(kp));
+    let drift = real(0.5) * alpha - real(0.75) * ((kp * kp - kh * kh) * iqh);
+    let row_b = (mean_phi * irh + drift) - (middle + low + row_a);
+    let row_d = (mean_phi * irp - drift) - (middle + high + row_e);
+    let q = (here(r_new) + plus1(r_new)) * real(0.5);
+    let rate = real(1.0) / p.tau;
+    let row_c = q * rate - (row_a + row_b + row_d + row_e);
+    normalise(row_a, row_b, row_c, row_d, row_e, p.tau * iqh);
+    share(x, y);
+    rhs_x = residual_of_old(row_a, row_b, row_d, row_e, read_a()) * inverse;
+    rhs_y = residual_of_old(row_a, row_b, row_d, row_e, read_b()) * inverse;
+}
+
+fn residual_of_old(a: vec, b: vec, d: vec, e: vec, w: Window) -> vec {
+    let at = here(w);
+    return -(a * (minus2(w) - at) + b * (minus1(w) - at) + d * (plus1(w) - at) + e * (plus2(w) - at));
+}

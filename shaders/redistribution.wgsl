@@ -1,0 +1,71 @@
+// Velocity, tangential redistribution and the new lengths. Twin of src/scheme/redistribution.rs.
+
+/// r k beta of the old state.
+var<private> rkb: vec;
+/// Tangential velocity at the nodes, and at the nodes before them.
+var<private> alpha: vec;
+var<private> alpha_before: vec;
+/// New lengths, 1/r and 1/q on the window of the block.
+var<private> r_new: Window;
+var<private> ir: Window;
+var<private> iq: Window;
+
+fn velocity(wk: Window, wr: Window) -> vec {
+    let q = (here(wr) + plus1(wr)) * real(0.5);
+    let qm = (minus1(wr) + here(wr)) * real(0.5);
+    let up = (plus1(wk) - k) / q;
+    let down = (k - minus1(wk)) / qm;
+    return b(k) - (up - down) / r;
+}
+
+/// Fills the variables above; returns the length L of the old state.
+fn redistribute() -> real {
+    share(k, r);
+    let beta = velocity(read_a(), read_b());
+    trace(0u, beta);
+    rkb = r * k * beta;
+    var unused = vec(0.0);
+    let sums = ring_sums(vec(block_sum(r), block_sum(rkb), 0.0, 0.0), &unused);
+    let length = sums.x;
+    let mean_rkb = sums.y / length;
+    let mean_length = length / real(NODES);
+    var next: vec;
+    if p.redistribution > real(0.5) {
+        tangential_velocity(mean_rkb, mean_length);
+        let rate = p.omega * (vec(mean_length) / r - vec(1.0)) - vec(mean_rkb);
+        next = r * exponential(p.tau * rate);
+    } else {
+        alpha = vec(0.0);
+        alpha_before = vec(0.0);
+        next = r * exponential(-(p.tau * (k * beta)));
+    }
+    trace(1u, alpha);
+    trace(2u, next);
+    share(next, next);
+    r_new = read_a();
+    reciprocals();
+    return length;
+}
+
+/// alpha by a running sum that restarts from the sum of whole blocks.
+fn tangential_velocity(mean_rkb: real, mean_length: real) {
+    let growth = rkb - r * mean_rkb + p.omega * (vec(mean_length) - r);
+    var earlier = vec(0.0);
+    ring_sums(vec(block_sum(growth), 0.0, 0.0, 0.0), &earlier);
+    let before = earlier.x;
+    let two = growth.x + growth.y;
+    let three = two + growth.z;
+    alpha = vec(before + growth.x, before + two, before + three, before + (three + growth.w));
+    alpha_before = vec(before, alpha.xyz);
+    if lane == BLOCKS - 1u {
+        if owns == 4u { alpha.w = real(0.0); } else { alpha.z = real(0.0); }
+    }
+}
+
+fn reciprocals() {
+    ir = Window(vec(1.0) / r_new.low, vec(1.0) / r_new.high);
+    let low = (r_new.low + minus1(r_new)) * real(0.5);
+    // The last q would need first+6; no row asks for it.
+    let high = (r_new.high + vec(r_new.high.yzw, r_new.high.w)) * real(0.5);
+    iq = Window(vec(1.0) / low, vec(1.0) / high);
+}

@@ -1,0 +1,21 @@
+// A pentadiagonal system in registers, every row divided by its diagonal entry. Twin of src/solver/system.rs.
+
+/// Row i: a u[i-2] + b u[i-1] + u[i] + d u[i+1] + e u[i+2] = rhs.
+var<private> row_of: Rows;
+/// Right-hand sides; the curvature system uses the first alone.
+var<private> rhs_x: vec;
+var<private> rhs_y: vec;
+/// 1/diagonal.
+var<private> inverse: vec;
+
+struct Rows { a: vec, b: vec, d: vec, e: vec, weight: vec }
+
+fn normalise(a: vec, b: vec, c: vec, d: vec, e: vec, time_over_length: vec) {
+    inverse = vec(1.0) / c;
+    row_of = Rows(a * inverse, b * inverse, d * inverse, e * inverse, time_over_length * c);
+}
+
+/// rhs - (row . u) for the block.
+fn residual(rhs: vec, w: Window) -> vec {
+    return rhs - row_of.a * minus2(w) - row_of.b * minus1(w) - row_of.d * plus1(w) - row_of.e * plus2(w) - here(w);
+}

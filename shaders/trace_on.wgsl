@@ -1,0 +1,15 @@
+// The kernel of the conformance test writes what every stage computed, for the host to compare with its twin.
+
+/// TRACE_FIELDS fields of NODES numbers a member; the host lists them in src/conformance/trace.rs.
+@group(0) @binding(5) var<storage, read_write> traces: array<real>;
+
+const TRACE_FIELDS = 19u;
+
+fn trace(field: u32, value: vec) {
+    let base = (member * TRACE_FIELDS + field) * NODES + first;
+    if owns == 0u { return; }
+    traces[base] = value.x;
+    traces[base + 1u] = value.y;
+    traces[base + 2u] = value.z;
+    if owns == 4u { traces[base + 3u] = value.w; }
+}

@@ -1,0 +1,157 @@
+//! Adapters: what is there, what each can do, and which one to take.
+
+use std::sync::{Arc, Mutex};
+
+use crate::{
+    backend::gpu::shader,
+    ensemble::spec::Precision,
+    error::{Error, Result},
+    number::Real,
+    solver::Blocks,
+};
+
+/// An adapter that could run the kernel.
+pub struct Gpu {
+    adapter: wgpu::Adapter,
+    info: wgpu::AdapterInfo,
+}
+
+/// An opened device: where kernels are made and run.
+pub struct Device {
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    /// Every adapter of this machine, hardware first, in the order in which `auto` prefers them.
+    pub fn list() -> Vec<Gpu> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.flags = wgpu::InstanceFlags::empty();
+        descriptor.backends = wgpu::Backends::PRIMARY;
+        let instance = wgpu::Instance::new(descriptor);
+        let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+        let mut found: Vec<Gpu> =
+            adapters.into_iter().map(|adapter| Gpu { info: adapter.get_info(), adapter }).collect();
+        // The no-op back end computes nothing but calls itself a CPU device.
+        found.retain(|gpu| gpu.info.backend != wgpu::Backend::Noop);
+        found.sort_by_key(|gpu| gpu.rank());
+        found
+    }
+
+    fn rank(&self) -> u32 {
+        match self.info.device_type {
+            wgpu::DeviceType::DiscreteGpu => 0,
+            wgpu::DeviceType::IntegratedGpu => 1,
+            wgpu::DeviceType::VirtualGpu => 2,
+            wgpu::DeviceType::Other => 3,
+            wgpu::DeviceType::Cpu => 4,
+        }
+    }
+
+    /// Whether it is hardware, not a software GPU on the CPU.
+    pub fn is_hardware(&self) -> bool {
+        self.rank() < 3
+    }
+
+    /// Its name, as `--adapter` matches it.
+    pub fn name(&self) -> &str {
+        &self.info.name
+    }
+
+    /// `Vulkan`, `Metal` or `Dx12`.
+    pub fn api(&self) -> String {
+        format!("{:?}", self.info.backend)
+    }
+
+    /// `DiscreteGpu`, `IntegratedGpu`, `VirtualGpu`, `Cpu` or `Other`.
+    pub fn device_type(&self) -> String {
+        format!("{:?}", self.info.device_type)
+    }
+
+    /// Driver name and version.
+    pub fn driver(&self) -> String {
+        format!("{} {}", self.info.driver, self.info.driver_info).trim().to_string()
+    }
+
+    /// Whether shaders may use f64.
+    pub fn has_f64(&self) -> bool {
+        self.adapter.features().contains(wgpu::Features::SHADER_F64)
+    }
+
+    /// The limits that bound a run.
+    pub fn limits(&self) -> wgpu::Limits {
+        self.adapter.limits()
+    }
+
+    /// Threads of a subgroup; a workgroup is a whole number of them.
+    pub fn subgroup(&self) -> u32 {
+        self.info.subgroup_max_size.clamp(1, 64)
+    }
+
+    /// The precision of a run that asks for none.
+    pub fn best_precision(&self) -> Precision {
+        if self.has_f64() { Precision::F64 } else { Precision::F32 }
+    }
+
+    /// The largest n that fits the adapter's workgroups in precision `T`.
+    pub fn max_points<T: Real>(&self) -> usize {
+        let fits = |n| Blocks::new(n).is_some_and(|blocks| self.check_size::<T>(blocks).is_ok());
+        (crate::solver::ring::MIN_POINTS..1 << 16).take_while(|n| fits(*n)).last().unwrap_or(0)
+    }
+
+    /// Whether members of this size fit: threads and workgroup memory.
+    pub fn check_size<T: Real>(&self, blocks: Blocks) -> std::result::Result<(), String> {
+        let limits = self.limits();
+        let threads = limits.max_compute_invocations_per_workgroup.min(limits.max_compute_workgroup_size_x) as usize;
+        let memory = limits.max_compute_workgroup_storage_size as usize;
+        let needed = shader::threads(blocks, self.subgroup());
+        if needed > threads {
+            return Err(format!("{needed} threads a workgroup, and the adapter has {threads}"));
+        }
+        let bytes = shader::workgroup_bytes::<T>(blocks);
+        if bytes > memory {
+            return Err(format!("{bytes} bytes of workgroup memory, and the adapter has {memory}"));
+        }
+        Ok(())
+    }
+
+    /// Opens the adapter with all its limits, and with f64 where it has it.
+    pub fn open(&self) -> Result<Device> {
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("curvelax"),
+            required_features: self.adapter.features() & wgpu::Features::SHADER_F64,
+            required_limits: self.adapter.limits(),
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(self.adapter.request_device(&descriptor))
+            .map_err(|e| Error::Device(format!("adapter {}: cannot be opened: {e}; try --backend cpu", self.name())))?;
+        let fault = Arc::new(Mutex::new(None));
+        let record = |fault: &Arc<Mutex<Option<String>>>, what: String| {
+            if let Ok(mut fault) = fault.lock() {
+                fault.get_or_insert(what);
+            }
+        };
+        let at = fault.clone();
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| record(&at, error.to_string())));
+        let at = fault.clone();
+        device.set_device_lost_callback(move |reason, message| {
+            // Dropping the device also calls back; that is no fault.
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                record(&at, format!("the device was lost: {message}"));
+            }
+        });
+        Ok(Device { device, queue, fault })
+    }
+}
+
+impl Device {
+    /// The first fault that wgpu reported, if any.
+    pub fn check(&self) -> Result<()> {
+        match self.fault.lock().map(|fault| fault.clone()) {
+            Ok(None) => Ok(()),
+            Ok(Some(fault)) => Err(Error::Device(format!("GPU: {fault}; try --backend cpu"))),
+            Err(_) => Err(Error::Device("GPU: a callback failed; try --backend cpu".into())),
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Where members are advanced: slots for resident members, on the CPU or on a GPU.
+//!
+//! A back end knows nothing of an ensemble. It holds as many members as it has slots, takes each towards the
+//! step it is aimed at, and reports; [`simulate`](crate::simulate) fills, collects and refills.
+
+pub mod cpu;
+pub mod gpu;
+
+use crate::{
+    error::Result,
+    scheme::{
+        State,
+        evolve::Launch,
+        parameters::{Counters, Report},
+    },
+};
+
+/// Members on their way, side by side.
+pub trait Backend {
+    /// How many members are resident at once.
+    fn slots(&self) -> usize;
+
+    /// Puts a member into a slot, in place of whatever was there.
+    fn load(&mut self, slot: usize, launch: &Launch) -> Result<()>;
+
+    /// Lets the member in `slot` run until it has made `goal` steps, with step length `tau`.
+    fn aim(&mut self, slot: usize, goal: u32, tau: f64);
+
+    /// Empties a slot.
+    fn clear(&mut self, slot: usize);
+
+    /// Takes every member that is running and short of its goal some steps further.
+    fn advance(&mut self) -> Result<()>;
+
+    /// Counters after the last `advance`; the sweeps are those of that call.
+    fn counters(&self, slot: usize) -> Counters;
+
+    /// The report after the last `advance`.
+    fn report(&self, slot: usize) -> Report<f64>;
+
+    /// The state of a member, read back and widened.
+    fn state(&mut self, slot: usize) -> Result<State<f64>>;
+}
