@@ -28,8 +28,8 @@ pub enum Error {
     Failed(String),
 }
 
-/// Result with the crate's [`Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+/// Result with the crate's [`Error`] unless another is named.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl Error {
     /// A wrong value of a key: `--KEY VALUE: PROBLEM; ALLOWED`.

@@ -3,6 +3,7 @@
 
 pub mod outcome;
 pub mod spec;
+mod validate;
 
 pub use outcome::{Observables, Outcome, SeriesRow, Sink, Snapshot, Status};
 pub use spec::Spec;
