@@ -27,53 +27,90 @@ const PRECISIONS: &[&str] = &["f32", "f64"];
 #[derive(clap::Args)]
 pub struct SpecFlags {
     /// Members of the ensemble [default: 256]
-    #[arg(long, value_name = "COUNT", value_parser = whole::<u64>, allow_hyphen_values = true, help_heading = ENSEMBLE)]
+    #[arg(
+        long, value_name = "COUNT", value_parser = whole::<u64>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
     curves: Option<u64>,
     /// Nodes per member, n [default: 100]
-    #[arg(long, value_name = "N", value_parser = whole::<usize>, allow_hyphen_values = true, help_heading = ENSEMBLE)]
+    #[arg(
+        long, value_name = "N", value_parser = whole::<usize>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
     points: Option<usize>,
     /// Seed of the random perturbations [default: 1]
-    #[arg(long, value_name = "SEED", value_parser = whole::<u64>, allow_hyphen_values = true, help_heading = ENSEMBLE)]
+    #[arg(
+        long, value_name = "SEED", value_parser = whole::<u64>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
     seed: Option<u64>,
     /// Curve that is perturbed [default: ellipse:2,1]
-    #[arg(long, value_name = "SHAPE", value_parser = text::<Shape>, allow_hyphen_values = true, help_heading = ENSEMBLE)]
+    #[arg(
+        long, value_name = "SHAPE", value_parser = text::<Shape>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
     shape: Option<Shape>,
     /// How nodes are placed on the curve [default: arclength]
     #[arg(long, value_name = "HOW", value_parser = word::<Sampling>(SAMPLINGS), help_heading = ENSEMBLE)]
     sampling: Option<Sampling>,
     /// Size σ of the random perturbation, 0 for none [default: 0.05]
-    #[arg(long, value_name = "SIGMA", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE)]
+    #[arg(
+        long, value_name = "SIGMA", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE
+    )]
     amplitude: Option<f64>,
     /// Modes of the random perturbation [default: 2..=8]
-    #[arg(long, value_name = "LO..=HI", value_parser = text::<Modes>, allow_hyphen_values = true, help_heading = ENSEMBLE)]
+    #[arg(
+        long, value_name = "LO..=HI", value_parser = text::<Modes>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
     modes: Option<Modes>,
     /// Power p: mode m has standard deviation σ m^-p [default: 1]
     #[arg(long, value_name = "P", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE)]
     decay: Option<f64>,
     /// Run only these members, bit for bit as in the whole ensemble [default: all]
-    #[arg(long, value_name = "J1,J2,...", value_delimiter = ',', value_parser = whole::<u64>, allow_hyphen_values = true, help_heading = ENSEMBLE)]
+    #[arg(
+        long, value_name = "J1,J2,...", value_delimiter = ',', value_parser = whole::<u64>,
+        allow_hyphen_values = true, help_heading = ENSEMBLE
+    )]
     only: Option<Vec<u64>>,
 
     /// surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,... [default: surface-diffusion]
-    #[arg(long, value_name = "FLOW", value_parser = text::<Flow>, allow_hyphen_values = true, help_heading = EVOLUTION)]
+    #[arg(
+        long, value_name = "FLOW", value_parser = text::<Flow>, allow_hyphen_values = true,
+        help_heading = EVOLUTION
+    )]
     flow: Option<Flow>,
     /// Time step τ [default: 0.001]
-    #[arg(long, value_name = "TAU", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
+    #[arg(
+        long, value_name = "TAU", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION
+    )]
     tau: Option<f64>,
     /// Final time [default: 2]
     #[arg(long, value_name = "T", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
     t_end: Option<f64>,
     /// Speed ω of the redistribution towards equal spacing [default: 1]
-    #[arg(long, value_name = "OMEGA", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
+    #[arg(
+        long, value_name = "OMEGA", value_parser = real, allow_hyphen_values = true,
+        help_heading = EVOLUTION
+    )]
     omega: Option<f64>,
     /// Move nodes along the normal only [default: false]
-    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true", hide_possible_values = true, help_heading = EVOLUTION)]
+    #[arg(
+        long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        hide_possible_values = true, help_heading = EVOLUTION
+    )]
     no_redistribution: Option<bool>,
     /// A member is relaxed at this fraction of its initial excess [default: 0.01]
-    #[arg(long, value_name = "FRACTION", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
+    #[arg(
+        long, value_name = "FRACTION", value_parser = real, allow_hyphen_values = true,
+        help_heading = EVOLUTION
+    )]
     relax_to: Option<f64>,
     /// End a member when it is relaxed [default: false]
-    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true", hide_possible_values = true, help_heading = EVOLUTION)]
+    #[arg(
+        long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        hide_possible_values = true, help_heading = EVOLUTION
+    )]
     stop_when_relaxed: Option<bool>,
 
     /// Solver of the pentadiagonal systems [default: gauss-seidel]
@@ -86,10 +123,15 @@ pub struct SpecFlags {
     #[arg(long, value_name = "TOL", value_parser = real, allow_hyphen_values = true, help_heading = METHOD)]
     tolerance: Option<f64>,
     /// Over-relaxation of the sweeps, 1 is plain Gauss-Seidel [default: 1]
-    #[arg(long, value_name = "FACTOR", value_parser = real, allow_hyphen_values = true, help_heading = METHOD)]
+    #[arg(
+        long, value_name = "FACTOR", value_parser = real, allow_hyphen_values = true, help_heading = METHOD
+    )]
     sor: Option<f64>,
     /// Sweeps per system after which a member has stalled [default: 50000]
-    #[arg(long, value_name = "COUNT", value_parser = whole::<u32>, allow_hyphen_values = true, help_heading = METHOD)]
+    #[arg(
+        long, value_name = "COUNT", value_parser = whole::<u32>, allow_hyphen_values = true,
+        help_heading = METHOD
+    )]
     max_sweeps: Option<u32>,
 
     /// Where to run; auto takes a hardware GPU, else the CPU [default: auto]
@@ -102,14 +144,20 @@ pub struct SpecFlags {
     #[arg(long, value_name = "TYPE", value_parser = word::<Precision>(PRECISIONS), help_heading = MACHINE)]
     precision: Option<Precision>,
     /// Threads of the CPU back end [default: all cores]
-    #[arg(long, value_name = "COUNT", value_parser = whole::<usize>, allow_hyphen_values = true, help_heading = MACHINE)]
+    #[arg(
+        long, value_name = "COUNT", value_parser = whole::<usize>, allow_hyphen_values = true,
+        help_heading = MACHINE
+    )]
     threads: Option<usize>,
 
     /// Write series.csv, a row per member every DT [default: off]
     #[arg(long, value_name = "DT", value_parser = real, allow_hyphen_values = true, help_heading = OUTPUT)]
     series: Option<f64>,
     /// Write snapshots.csv, all nodes at these times [default: off]
-    #[arg(long, value_name = "T1,T2,...", value_delimiter = ',', value_parser = real, allow_hyphen_values = true, help_heading = OUTPUT)]
+    #[arg(
+        long, value_name = "T1,T2,...", value_delimiter = ',', value_parser = real,
+        allow_hyphen_values = true, help_heading = OUTPUT
+    )]
     snapshots: Option<Vec<f64>>,
 }
 

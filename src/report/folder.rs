@@ -39,6 +39,10 @@ impl OutputFolder {
             Error::Request(format!("--out {}: cannot be written ({e}); name a folder that can", path.display()))
         };
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+            if parent.exists() && !parent.is_dir() {
+                let problem = format!("{} is no folder", parent.display());
+                return Err(Error::value("out", path.display(), &problem, "name a place inside a folder"));
+            }
             fs::create_dir_all(parent).map_err(refuse)?;
         }
         let created = match fs::create_dir(path) {

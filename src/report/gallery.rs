@@ -9,8 +9,9 @@ use crate::ensemble::Status;
 pub const MOST_PANELS: usize = 12;
 
 const COLUMNS: usize = 4;
-/// Side of a panel, in pixels, and the free space inside it.
+/// Width of a panel and the most of its height, in pixels, and the free space inside it.
 const SIDE: f64 = 200.0;
+const LEAST_HEIGHT: f64 = 100.0;
 const PADDING: f64 = 14.0;
 const CAPTION: f64 = 44.0;
 const GAP: f64 = 14.0;
@@ -79,10 +80,10 @@ pub fn draw(panels: &[Panel]) -> String {
     let panels = &panels[..panels.len().min(MOST_PANELS)];
     let columns = panels.len().clamp(LEAST_COLUMNS, COLUMNS);
     let rows = panels.len().div_ceil(columns).max(1);
-    let pitch = DVec2::new(SIDE + GAP, SIDE + CAPTION);
+    let Layout { scale, frame } = layout(panels);
+    let pitch = frame + DVec2::new(GAP, CAPTION);
     let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
     let height = HEAD + rows as f64 * pitch.y + FOOT;
-    let scale = pixels_per_length(panels);
 
     let mut svg = Svg::new(width, height, STYLE, "Members before and after relaxation");
     svg.rectangle("back", DVec2::ZERO, DVec2::new(width, height), 0.0);
@@ -90,16 +91,16 @@ pub fn draw(panels: &[Panel]) -> String {
     svg.text("note end", DVec2::new(width - MARGIN, 30.0), "grey: initial curve, colour: final curve");
     for (i, panel) in panels.iter().enumerate() {
         let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
-        draw_panel(&mut svg, panel, DVec2::new(MARGIN, HEAD) + place * pitch, scale);
+        draw_panel(&mut svg, panel, DVec2::new(MARGIN, HEAD) + place * pitch, frame, scale);
     }
     draw_scale(&mut svg, DVec2::new(MARGIN, height - 20.0), scale);
     svg.finish()
 }
 
-fn draw_panel(svg: &mut Svg, panel: &Panel, corner: DVec2, scale: f64) {
-    let middle = corner + 0.5 * SIDE;
+fn draw_panel(svg: &mut Svg, panel: &Panel, corner: DVec2, frame: DVec2, scale: f64) {
+    let middle = corner + 0.5 * frame;
     svg.open(&format!("panel {}", panel.status.name()));
-    svg.rectangle("frame", corner, DVec2::splat(SIDE), 6.0);
+    svg.rectangle("frame", corner, frame, 6.0);
     if let Some((low, high)) = bounds(panel) {
         // y grows downwards in SVG.
         let place = |p: DVec2| middle + (p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
@@ -111,7 +112,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, corner: DVec2, scale: f64) {
             svg.path("nodes", &dots(&after));
         }
     }
-    let below = DVec2::new(middle.x, corner.y + SIDE + 16.0);
+    let below = DVec2::new(middle.x, corner.y + frame.y + 16.0);
     let caption = match panel.t_relax {
         Some(t) => format!("{} at t = {}", panel.status.name(), rounded(t)),
         None => panel.status.name().into(),
@@ -133,10 +134,21 @@ fn draw_scale(svg: &mut Svg, left: DVec2, scale: f64) {
     svg.text("note", label, &format!("length {}", rounded(length)));
 }
 
-/// Pixels per unit of length with which the largest of `panels` fills its frame.
-fn pixels_per_length(panels: &[Panel]) -> f64 {
-    let extent = panels.iter().filter_map(bounds).map(|(low, high)| (high - low).max_element()).fold(0.0, f64::max);
-    if extent > 0.0 && extent.is_finite() { (SIDE - 2.0 * PADDING) / extent } else { 1.0 }
+/// What all panels share.
+struct Layout {
+    /// Pixels per unit of length.
+    scale: f64,
+    /// Size of a panel.
+    frame: DVec2,
+}
+
+/// The largest of `panels` fills its frame, which is as low as the tallest allows.
+fn layout(panels: &[Panel]) -> Layout {
+    let extent = panels.iter().filter_map(bounds).map(|(low, high)| high - low).fold(DVec2::ZERO, DVec2::max);
+    let largest = extent.max_element();
+    let scale = if largest > 0.0 && largest.is_finite() { (SIDE - 2.0 * PADDING) / largest } else { 1.0 };
+    let height = (extent.y * scale + 2.0 * PADDING).clamp(LEAST_HEIGHT, SIDE);
+    Layout { scale, frame: DVec2::new(SIDE, height) }
 }
 
 /// Lower left and upper right corner of both curves; none if no node is finite.
@@ -145,8 +157,9 @@ fn bounds(panel: &Panel) -> Option<(DVec2, DVec2)> {
     Some((nodes().reduce(DVec2::min)?, nodes().reduce(DVec2::max)?))
 }
 
+/// The nodes that can be drawn: finite, and small enough for their differences to be.
 fn finite(nodes: &[DVec2]) -> impl Iterator<Item = DVec2> {
-    nodes.iter().copied().filter(|p| p.is_finite())
+    nodes.iter().copied().filter(|p| p.abs().cmplt(DVec2::splat(1e100)).all())
 }
 
 /// Every m-th of `points`, with the least m that leaves at most [`MOST_VERTICES`].
@@ -212,18 +225,20 @@ mod tests {
     }
 
     #[test]
-    fn one_scale_fits_the_largest_member_and_keeps_circles_round() {
+    fn one_scale_fits_the_largest_member() {
         let mut panels = panels(3, 60);
         panels[1].before.iter_mut().for_each(|p| *p *= 10.0);
-        let scale = pixels_per_length(&panels);
+        let Layout { scale, frame } = layout(&panels);
         let (low, high) = bounds(&panels[1]).unwrap();
-        assert!(((high - low).max_element() * scale - (SIDE - 2.0 * PADDING)).abs() < 1e-9);
+        let slack = frame - (high - low) * scale - 2.0 * PADDING;
+        assert!(slack.x.abs() < 1e-9 && slack.y.abs() < 1e-9, "{slack}");
     }
 
     #[test]
     fn values_that_are_not_finite_do_not_reach_the_picture() {
         let mut panels = panels(2, 60);
         panels[0].after[3].x = f64::NAN;
+        panels[0].after[4].y = -f64::MAX;
         panels[1].before = vec![DVec2::splat(f64::INFINITY); 60];
         panels[1].after = panels[1].before.clone();
         let text = draw(&panels).to_lowercase();

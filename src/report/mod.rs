@@ -106,3 +106,66 @@ impl Sink for Report {
         self.progress.show(done, total, share);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, path::Path};
+
+    use glam::DVec2;
+
+    use super::*;
+    use crate::ensemble::{Observables, Status};
+
+    fn files(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = entries.collect();
+        names.sort();
+        names
+    }
+
+    /// A report into `out` that has received one member.
+    fn report(out: &Path, spec: &Spec) -> Report {
+        let mut report = Report::begin(OutputFolder::open(out, true).unwrap(), spec, true).unwrap();
+        assert_eq!(report.kept_rows(), None);
+        let row = SeriesRow { member: 0, t: 0.0, at: Observables::default() };
+        let snapshot = Snapshot { member: 0, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] };
+        report.member(&tally::tests::outcome(0, Status::Relaxed, Some(0.5)), &[row], &[snapshot]).unwrap();
+        report
+    }
+
+    #[test]
+    fn a_finished_report_leaves_the_files_asked_for_and_no_others() {
+        let home = tempfile::tempdir().unwrap();
+        let out = home.path().join("out");
+        let platform = provenance::tests::platform();
+        let triangle = vec![DVec2::ZERO, DVec2::X, DVec2::Y];
+        let panel =
+            Panel { member: 0, status: Status::Relaxed, t_relax: None, before: triangle.clone(), after: triangle };
+
+        let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
+        let overview = report(&out, &all).finish(&all, &platform, &[panel], &[]).unwrap();
+        assert_eq!(files(&out), ["plots", "run.json", "series.csv", "snapshots.csv", "summary.csv"]);
+        assert_eq!(files(&out.join("plots")), ["curves.svg"]);
+        for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
+            assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");
+        }
+        assert!(overview.contains("summary.csv, series.csv, snapshots.csv, plots/curves.svg, run.json"), "{overview}");
+
+        let few = Spec::default();
+        report(&out, &few).finish(&few, &platform, &[], &["a warning".into()]).unwrap();
+        assert_eq!(files(&out), ["plots", "run.json", "summary.csv"]);
+        assert_eq!(files(&out.join("plots")), [""; 0]);
+        assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
+    }
+
+    #[test]
+    fn a_run_that_fails_keeps_the_members_that_ended() {
+        let home = tempfile::tempdir().unwrap();
+        let out = home.path().join("out");
+        let failed = report(&out, &Spec::default());
+        let kept = failed.kept_rows().unwrap();
+        drop(failed);
+        assert_eq!(files(&out), [".summary.csv.part"]);
+        assert_eq!(fs::read_to_string(kept).unwrap().lines().count(), 2);
+    }
+}

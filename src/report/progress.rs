@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressStyle, style::TemplateError};
 
 /// Time between lines where there is no terminal.
 const PERIOD: Duration = Duration::from_secs(10);
@@ -38,10 +38,8 @@ impl Progress {
             return Progress::Lines { began: now, last: now };
         }
         let colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-        let bar = if colour { "{bar:32.cyan/dim}" } else { "{bar:32}" };
-        let style = ProgressStyle::with_template(&format!("{bar} {{percent:>3}} %  {{msg}}  {{eta}} left"));
         let bar = ProgressBar::new(TICKS);
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━━─"));
+        bar.set_style(style(colour).unwrap_or_else(|_| ProgressStyle::default_bar()));
         Progress::Bar(bar)
     }
 
@@ -68,6 +66,12 @@ impl Progress {
             bar.finish_and_clear();
         }
     }
+}
+
+fn style(colour: bool) -> Result<ProgressStyle, TemplateError> {
+    let bar = if colour { "{bar:32.cyan/dim}" } else { "{bar:32}" };
+    let style = ProgressStyle::with_template(&format!("{bar} {{percent:>3}} %  {{msg}}  {{eta}} left"))?;
+    Ok(style.progress_chars("━━─"))
 }
 
 fn line(done: u64, total: u64, share: f64, elapsed: Duration) -> String {
@@ -97,6 +101,11 @@ mod tests {
         let elapsed = Duration::from_secs(30);
         assert_eq!(line(64, 256, 0.25, elapsed), "64 of 256 members, 25.0 %, about 1 min 30 s left");
         assert_eq!(line(0, 256, 0.0, elapsed), "0 of 256 members, 0.0 %");
+    }
+
+    #[test]
+    fn the_bar_is_well_formed() {
+        assert!(style(true).is_ok() && style(false).is_ok());
     }
 
     #[test]
