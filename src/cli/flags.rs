@@ -287,10 +287,13 @@ mod tests {
             let refused = T::deserialize(StrDeserializer::<serde::de::value::Error>::new("")).unwrap_err().to_string();
             refused.split('`').skip(3).step_by(2).map(str::to_owned).collect()
         }
-        assert_eq!(words::<Sampling>(), SAMPLINGS);
         assert_eq!(words::<Solver>(), SOLVERS);
         assert_eq!(words::<Order>(), ORDERS);
         assert_eq!(words::<BackendChoice>(), BACKENDS);
         assert_eq!(words::<Precision>(), PRECISIONS);
+        for name in SAMPLINGS {
+            let sampling: Sampling = serde_json::from_value((*name).into()).unwrap();
+            assert_eq!(serde_json::to_value(sampling).unwrap(), *name);
+        }
     }
 }
