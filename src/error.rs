@@ -28,8 +28,8 @@ pub enum Error {
     Failed(String),
 }
 
-/// Result with the crate's [`Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+/// Result with the crate's [`Error`] unless another is named.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl Error {
     /// A wrong value of a key: `--KEY VALUE: PROBLEM; ALLOWED`.
@@ -56,13 +56,36 @@ impl Error {
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .into_iter()
-        .map(|candidate| (strsim::jaro_winkler(word, candidate), candidate))
+        .map(|candidate| (likeness(word, candidate), candidate))
         .filter(|(likeness, _)| *likeness > 0.75)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, candidate)| candidate)
 }
 
+/// 1 for equal words. One slip, two letters swapped included, is near even in a word as short as `tau`, where the
+/// Jaro-Winkler likeness sees next to nothing in common.
+fn likeness(a: &str, b: &str) -> f64 {
+    let one_slip = a.len().min(b.len()) >= 3 && strsim::osa_distance(a, b) == 1;
+    strsim::jaro_winkler(a, b).max(if one_slip { 0.9 } else { 0.0 })
+}
+
 /// `" (did you mean `X`?)"` for the nearest candidate, or nothing.
 pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
     nearest(word, candidates).map_or(String::new(), |near| format!(" (did you mean `{near}`?)"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_spelling_is_found_if_there_is_one() {
+        let keys = ["tau", "t-end", "seed", "sor", "max-sweeps"];
+        for (word, meant) in [("tua", "tau"), ("t_end", "t-end"), ("sed", "seed"), ("max-sweep", "max-sweeps")] {
+            assert_eq!(nearest(word, keys), Some(meant), "{word}");
+        }
+        for word in ["", "x", "colour"] {
+            assert_eq!(nearest(word, keys), None, "{word}");
+        }
+    }
 }

@@ -1,11 +1,13 @@
 //! curvelax relaxes ensembles of plane curves by fourth-order geometric flows.
 
 pub mod backend;
+pub mod cli;
 pub mod curve;
 pub mod ensemble;
 pub mod error;
 pub mod flow;
 pub mod number;
+pub mod report;
 pub mod scheme;
 pub mod solver;
 

@@ -1,3 +1,7 @@
-//! The `curvelax` program.
+//! The `curvelax` program: arguments → work → exit code.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    curvelax::cli::main()
+}

@@ -5,6 +5,7 @@ pub mod member;
 pub mod outcome;
 pub mod random;
 pub mod spec;
+mod validate;
 
 pub use member::{Family, Member};
 pub use outcome::{Observables, Outcome, SeriesRow, Sink, Snapshot, Status};

@@ -1,9 +1,15 @@
 //! The spec: everything that determines a run, under the names that flags and TOML keys share.
+//!
+//! A spec is read once ([`Spec::from_toml`]), overlaid with the flags by `cli`, and checked once
+//! ([`Spec::validate`], in `validate.rs`); everything after that relies on it.
 
-use serde::{Deserialize, Serialize};
+use std::{fmt, marker::PhantomData, path::Path, str::FromStr};
+
+use serde::{Deserialize, Deserializer, Serialize, de};
 
 use crate::{
     curve::{Modes, Sampling, Shape},
+    error::{Error, Result, did_you_mean},
     flow::Flow,
 };
 
@@ -108,9 +114,10 @@ pub struct Spec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub series: Option<f64>,
     /// Times of `snapshots.csv`.
+    #[serde(deserialize_with = "list")]
     pub snapshots: Vec<f64>,
     /// Run only these members.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
     pub only: Option<Vec<u64>>,
     /// Threads of the CPU back end; all cores if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -148,5 +155,154 @@ impl Default for Spec {
             only: None,
             threads: None,
         }
+    }
+}
+
+impl Spec {
+    /// Reads a spec file; absent keys take their defaults.
+    ///
+    /// Not yet [validated](Spec::validate): flags may still replace what is wrong in it.
+    pub fn read(path: &Path) -> Result<Spec> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Error::Request(format!("cannot read the spec {}: {e}", path.display())))?;
+        Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", path.display())))
+    }
+
+    /// Parses the text of a spec file. The message has toml's line and caret, and the nearest valid spelling.
+    pub fn from_toml(text: &str) -> Result<Spec, String> {
+        toml::from_str(text).map_err(|e| format!("{}{}", e.to_string().trim_end(), suggestion(e.message())))
+    }
+
+    /// The spec as a TOML file that [`Spec::from_toml`] reads back to the same spec.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string(self).map_err(|e| Error::Failed(format!("cannot write the spec as TOML: {e}")))
+    }
+
+    /// The names of all keys, in order.
+    pub fn keys() -> Vec<String> {
+        let refused = toml::from_str::<Spec>("\"\" = 0").expect_err("the empty key is unknown");
+        quoted(refused.message()).skip(1).map(str::to_owned).collect()
+    }
+
+    /// The residual tolerance in use at `precision`.
+    pub fn tolerance_at(&self, precision: Precision) -> f64 {
+        self.tolerance.unwrap_or(match precision {
+            Precision::F32 => 1e-3,
+            Precision::F64 => 1e-5,
+        })
+    }
+}
+
+/// The nearest of the names that serde lists after "unknown field `x`, expected one of `a`, `b`".
+fn suggestion(message: &str) -> String {
+    let mut names = quoted(message);
+    match names.next() {
+        Some(word) if message.starts_with("unknown ") => did_you_mean(word, names),
+        _ => String::new(),
+    }
+}
+
+/// The parts of `text` between backticks.
+fn quoted(text: &str) -> impl Iterator<Item = &str> {
+    text.split('`').skip(1).step_by(2)
+}
+
+/// A list as a TOML array, or as the comma-separated text that the flag takes.
+fn list<'de, D, T>(deserializer: D) -> Result<Vec<T>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de> + FromStr,
+{
+    deserializer.deserialize_any(ListVisitor(PhantomData))
+}
+
+fn some_list<'de, D, T>(deserializer: D) -> Result<Option<Vec<T>>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de> + FromStr,
+{
+    list(deserializer).map(Some)
+}
+
+struct ListVisitor<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de> + FromStr> de::Visitor<'de> for ListVisitor<T> {
+    type Value = Vec<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "an array of numbers, or numbers with commas between them in quotes")
+    }
+
+    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<Vec<T>, A::Error> {
+        let mut list = Vec::new();
+        while let Some(item) = items.next_element()? {
+            list.push(item);
+        }
+        Ok(list)
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Vec<T>, E> {
+        let item = |word: &str| {
+            word.trim().parse().map_err(|_| E::custom(format!("`{word}` in `{text}` is not a number of this list")))
+        };
+        text.split(',').map(item).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spec_reads_back_from_its_toml() {
+        let spec = Spec {
+            seed: u64::MAX,
+            tau: 1e-300,
+            omega: 0.1 + 0.2,
+            flow: Flow::Polynomial(vec![0.5, 0.0, -0.25]),
+            precision: Some(Precision::F32),
+            tolerance: Some(3e-4),
+            series: Some(0.01),
+            snapshots: vec![0.0, 1.0 / 3.0],
+            only: Some(vec![0, 200]),
+            ..Spec::default()
+        };
+        for spec in [spec, Spec::default()] {
+            let text = spec.to_toml().unwrap();
+            assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");
+        }
+    }
+
+    #[test]
+    fn the_keys_are_those_of_the_default_spec_and_the_optional_ones() {
+        let keys = Spec::keys();
+        let written: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
+        assert!(written.keys().all(|key| keys.contains(key)));
+        for optional in ["tolerance", "adapter", "precision", "series", "only", "threads"] {
+            assert!(keys.iter().any(|key| key == optional), "{optional}");
+        }
+        assert_eq!(keys.len(), written.len() + 6);
+    }
+
+    #[test]
+    fn a_list_is_an_array_or_the_text_of_the_flag() {
+        for text in ["snapshots = [0, 0.5]", "snapshots = '0,0.5'", "snapshots = '0, 0.5'"] {
+            assert_eq!(Spec::from_toml(text).unwrap().snapshots, [0.0, 0.5], "{text}");
+        }
+        assert_eq!(Spec::from_toml("only = [3, 1]").unwrap().only, Some(vec![3, 1]));
+        for text in ["snapshots = 1", "snapshots = '0,,1'", "snapshots = ['a']", "only = [1.5]", "only = [-1]"] {
+            assert!(Spec::from_toml(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_key_or_word_is_shown_in_its_line_with_the_nearest_spelling() {
+        let message = Spec::from_toml("curves = 3\nomga = 1\n").unwrap_err();
+        for part in ["line 2, column 1", "2 | omga = 1", "^^^^", "unknown field `omga`", "did you mean `omega`?"] {
+            assert!(message.contains(part), "no {part:?} in: {message}");
+        }
+        let message = Spec::from_toml("order = 'colored'").unwrap_err();
+        assert!(message.contains("unknown variant `colored`"), "{message}");
+        assert!(message.contains("did you mean `coloured`?"), "{message}");
     }
 }

@@ -1,0 +1,299 @@
+//! The flags that are the spec's keys: the same names, the same values; a flag wins over the file.
+//!
+//! Values are only parsed here. Ranges are checked once, on the resolved spec, so that a number from the file
+//! and a number from a flag meet the same check.
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use serde::{Deserialize, de::value::StrDeserializer};
+
+use crate::{
+    curve::{Modes, Sampling, Shape},
+    ensemble::{
+        Spec,
+        spec::{BackendChoice, Order, Precision, Solver},
+    },
+    flow::Flow,
+};
+
+const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
+const SOLVERS: &[&str] = &["gauss-seidel", "direct"];
+const ORDERS: &[&str] = &["coloured", "lexicographic"];
+const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
+const PRECISIONS: &[&str] = &["f32", "f64"];
+
+/// One flag for each key of [`Spec`], none given unless the user gave it.
+///
+/// A value that begins with a hyphen is taken as a value, so that `--tau -1` is refused for its range.
+#[derive(clap::Args)]
+pub struct SpecFlags {
+    /// Members of the ensemble [default: 256]
+    #[arg(
+        long, value_name = "COUNT", value_parser = whole::<u64>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
+    curves: Option<u64>,
+    /// Nodes per member, n [default: 100]
+    #[arg(
+        long, value_name = "N", value_parser = whole::<usize>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
+    points: Option<usize>,
+    /// Seed of the random perturbations [default: 1]
+    #[arg(
+        long, value_name = "SEED", value_parser = whole::<u64>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
+    seed: Option<u64>,
+    /// Curve that is perturbed [default: ellipse:2,1]
+    #[arg(
+        long, value_name = "SHAPE", value_parser = text::<Shape>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
+    shape: Option<Shape>,
+    /// How nodes are placed on the curve [default: arclength]
+    #[arg(long, value_name = "HOW", value_parser = word::<Sampling>(SAMPLINGS), help_heading = ENSEMBLE)]
+    sampling: Option<Sampling>,
+    /// Size σ of the random perturbation, 0 for none [default: 0.05]
+    #[arg(
+        long, value_name = "SIGMA", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE
+    )]
+    amplitude: Option<f64>,
+    /// Modes of the random perturbation [default: 2..=8]
+    #[arg(
+        long, value_name = "LO..=HI", value_parser = text::<Modes>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
+    modes: Option<Modes>,
+    /// Power p: mode m has standard deviation σ m^-p [default: 1]
+    #[arg(long, value_name = "P", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE)]
+    decay: Option<f64>,
+    /// Run only these members, bit for bit as in the whole ensemble [default: all]
+    #[arg(
+        long, value_name = "J1,J2,...", value_delimiter = ',', value_parser = whole::<u64>,
+        allow_hyphen_values = true, help_heading = ENSEMBLE
+    )]
+    only: Option<Vec<u64>>,
+
+    /// surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,... [default: surface-diffusion]
+    #[arg(
+        long, value_name = "FLOW", value_parser = text::<Flow>, allow_hyphen_values = true,
+        help_heading = EVOLUTION
+    )]
+    flow: Option<Flow>,
+    /// Time step τ [default: 0.001]
+    #[arg(
+        long, value_name = "TAU", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION
+    )]
+    tau: Option<f64>,
+    /// Final time [default: 2]
+    #[arg(long, value_name = "T", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
+    t_end: Option<f64>,
+    /// Speed ω of the redistribution towards equal spacing [default: 1]
+    #[arg(
+        long, value_name = "OMEGA", value_parser = real, allow_hyphen_values = true,
+        help_heading = EVOLUTION
+    )]
+    omega: Option<f64>,
+    /// Move nodes along the normal only [default: false]
+    #[arg(
+        long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        hide_possible_values = true, help_heading = EVOLUTION
+    )]
+    no_redistribution: Option<bool>,
+    /// A member is relaxed at this fraction of its initial excess [default: 0.01]
+    #[arg(
+        long, value_name = "FRACTION", value_parser = real, allow_hyphen_values = true,
+        help_heading = EVOLUTION
+    )]
+    relax_to: Option<f64>,
+    /// End a member when it is relaxed [default: false]
+    #[arg(
+        long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        hide_possible_values = true, help_heading = EVOLUTION
+    )]
+    stop_when_relaxed: Option<bool>,
+
+    /// Solver of the pentadiagonal systems [default: gauss-seidel]
+    #[arg(long, value_name = "SOLVER", value_parser = word::<Solver>(SOLVERS), help_heading = METHOD)]
+    solver: Option<Solver>,
+    /// Order in which a sweep visits the nodes [default: coloured]
+    #[arg(long, value_name = "ORDER", value_parser = word::<Order>(ORDERS), help_heading = METHOD)]
+    order: Option<Order>,
+    /// Residual tolerance of the sweeps [default: 1e-3 in f32, 1e-5 in f64]
+    #[arg(long, value_name = "TOL", value_parser = real, allow_hyphen_values = true, help_heading = METHOD)]
+    tolerance: Option<f64>,
+    /// Over-relaxation of the sweeps, 1 is plain Gauss-Seidel [default: 1]
+    #[arg(
+        long, value_name = "FACTOR", value_parser = real, allow_hyphen_values = true, help_heading = METHOD
+    )]
+    sor: Option<f64>,
+    /// Sweeps per system after which a member has stalled [default: 50000]
+    #[arg(
+        long, value_name = "COUNT", value_parser = whole::<u32>, allow_hyphen_values = true,
+        help_heading = METHOD
+    )]
+    max_sweeps: Option<u32>,
+
+    /// Where to run; auto takes a hardware GPU, else the CPU [default: auto]
+    #[arg(long, value_name = "WHERE", value_parser = word::<BackendChoice>(BACKENDS), help_heading = MACHINE)]
+    backend: Option<BackendChoice>,
+    /// Part of the name of the GPU adapter to take [default: the best]
+    #[arg(long, value_name = "NAME", help_heading = MACHINE)]
+    adapter: Option<String>,
+    /// Number type [default: f64 where the device has it]
+    #[arg(long, value_name = "TYPE", value_parser = word::<Precision>(PRECISIONS), help_heading = MACHINE)]
+    precision: Option<Precision>,
+    /// Threads of the CPU back end [default: all cores]
+    #[arg(
+        long, value_name = "COUNT", value_parser = whole::<usize>, allow_hyphen_values = true,
+        help_heading = MACHINE
+    )]
+    threads: Option<usize>,
+
+    /// Write series.csv, a row per member every DT [default: off]
+    #[arg(long, value_name = "DT", value_parser = real, allow_hyphen_values = true, help_heading = OUTPUT)]
+    series: Option<f64>,
+    /// Write snapshots.csv, all nodes at these times [default: off]
+    #[arg(
+        long, value_name = "T1,T2,...", value_delimiter = ',', value_parser = real,
+        allow_hyphen_values = true, help_heading = OUTPUT
+    )]
+    snapshots: Option<Vec<f64>>,
+}
+
+const ENSEMBLE: &str = "Ensemble";
+const EVOLUTION: &str = "Evolution";
+const METHOD: &str = "Method";
+const MACHINE: &str = "Machine";
+/// Heading of the flags that say what is written and where.
+pub const OUTPUT: &str = "Output";
+
+impl SpecFlags {
+    /// Replaces in `spec` what was given as a flag.
+    pub fn overlay(self, spec: &mut Spec) {
+        macro_rules! replace {
+            ($($key:ident)*; $($optional:ident)*) => {{
+                // Names every field, so that a flag cannot be forgotten here.
+                let SpecFlags { $($key,)* $($optional,)* } = self;
+                $(if let Some(value) = $key { spec.$key = value; })*
+                $(if $optional.is_some() { spec.$optional = $optional; })*
+            }};
+        }
+        replace! {
+            curves points seed shape sampling amplitude modes decay flow tau t_end omega no_redistribution solver
+            order sor max_sweeps backend relax_to stop_when_relaxed snapshots;
+            only tolerance adapter precision series threads
+        }
+    }
+}
+
+fn real(text: &str) -> Result<f64, String> {
+    text.trim().parse().map_err(|_| "not a number".into())
+}
+
+fn whole<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
+    let value = text.trim().parse::<u64>().ok().and_then(|value| T::try_from(value).ok());
+    value.ok_or_else(|| format!("not a whole number from 0 to {}", u128::MAX >> (128 - 8 * size_of::<T>())))
+}
+
+fn text<T: TryFrom<String, Error = String>>(text: &str) -> Result<T, String> {
+    T::try_from(text.to_owned())
+}
+
+/// One of `names`, with clap's listing and suggestions, read as the spec file is.
+fn word<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+where
+    T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(names)
+        .try_map(|name| T::deserialize(StrDeserializer::<serde::de::value::Error>::new(&name)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use clap::{Args, FromArgMatches};
+
+    fn command() -> clap::Command {
+        SpecFlags::augment_args(clap::Command::new("test"))
+    }
+
+    fn parse(arguments: &[&str]) -> Spec {
+        let matches = command().no_binary_name(true).try_get_matches_from(arguments).unwrap();
+        let mut spec = Spec::default();
+        SpecFlags::from_arg_matches(&matches).unwrap().overlay(&mut spec);
+        spec
+    }
+
+    #[test]
+    fn the_flags_are_the_keys_of_the_spec() {
+        let flags: BTreeSet<String> = command().get_arguments().map(|a| a.get_long().unwrap().to_owned()).collect();
+        assert_eq!(flags, Spec::keys().into_iter().collect());
+    }
+
+    #[test]
+    fn the_help_states_the_defaults_of_the_spec() {
+        let defaults: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
+        for argument in command().get_arguments() {
+            let help = argument.get_help().unwrap().to_string();
+            let stated = help.rsplit_once("[default: ").expect("a default").1.trim_end_matches(']');
+            let Some(value) = defaults.get(argument.get_long().unwrap()) else { continue };
+            let expected = match value {
+                toml::Value::String(text) => text.clone(),
+                toml::Value::Float(number) => number.to_string(),
+                toml::Value::Array(list) if list.is_empty() => "off".into(),
+                other => other.to_string(),
+            };
+            assert_eq!(stated, expected, "{argument}");
+        }
+    }
+
+    #[test]
+    fn every_flag_replaces_its_key() {
+        let spec = parse(
+            "--curves 3 --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --flow willmore \
+             --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --solver direct --order lexicographic --tolerance 1e-4 \
+             --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \
+             --series 0.1 --snapshots 0,1 --only 1,2 --threads 2"
+                .split_whitespace()
+                .collect::<Vec<_>>()
+                .as_slice(),
+        );
+        let (given, default) = (spec.to_toml().unwrap(), Spec::default().to_toml().unwrap());
+        let default: BTreeSet<&str> = default.lines().filter(|line| !line.starts_with("shape")).collect();
+        let kept: Vec<&str> = given.lines().filter(|line| default.contains(line)).collect();
+        assert_eq!(kept, [""; 0]);
+        assert_eq!(given.lines().count(), Spec::keys().len());
+    }
+
+    #[test]
+    fn a_flag_that_is_not_given_replaces_nothing() {
+        assert_eq!(parse(&[]), Spec::default());
+    }
+
+    #[test]
+    fn a_switch_can_undo_the_file() {
+        let mut spec = Spec { stop_when_relaxed: true, ..Spec::default() };
+        let matches = command().no_binary_name(true).try_get_matches_from(["--stop-when-relaxed=false"]).unwrap();
+        SpecFlags::from_arg_matches(&matches).unwrap().overlay(&mut spec);
+        assert!(!spec.stop_when_relaxed);
+    }
+
+    #[test]
+    fn the_words_of_a_flag_are_those_of_its_type() {
+        fn words<T: for<'de> Deserialize<'de> + std::fmt::Debug>() -> Vec<String> {
+            let refused = T::deserialize(StrDeserializer::<serde::de::value::Error>::new("")).unwrap_err().to_string();
+            refused.split('`').skip(3).step_by(2).map(str::to_owned).collect()
+        }
+        assert_eq!(words::<Solver>(), SOLVERS);
+        assert_eq!(words::<Order>(), ORDERS);
+        assert_eq!(words::<BackendChoice>(), BACKENDS);
+        assert_eq!(words::<Precision>(), PRECISIONS);
+        for name in SAMPLINGS {
+            let sampling: Sampling = serde_json::from_value((*name).into()).unwrap();
+            assert_eq!(serde_json::to_value(sampling).unwrap(), *name);
+        }
+    }
+}

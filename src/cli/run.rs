@@ -1,0 +1,91 @@
+//! `curvelax run`: arguments → spec → members → files.
+
+use std::path::PathBuf;
+
+use super::{flags, note, print};
+use crate::{
+    ensemble::Spec,
+    error::{Error, Result},
+    report::{OutputFolder, Panel, Platform, Report},
+};
+
+const EXAMPLES: &str = "\
+Examples:
+  curvelax run --out ellipses
+      256 perturbed 2:1 ellipses under surface diffusion, with the paper's n, τ and ω
+  curvelax run --flow willmore --curves 10000 --stop-when-relaxed --out willmore
+  curvelax run --curves 8 --tau 1e-4 --print-spec > spec.toml
+  curvelax run spec.toml --seed 2 --out second
+
+The keys of SPEC.toml are the names of the flags; a flag wins over the file.";
+
+/// Simulate one ensemble.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct RunArgs {
+    /// Spec file; what it does not set takes its default
+    #[arg(value_name = "SPEC.toml")]
+    spec: Option<PathBuf>,
+    #[command(flatten)]
+    flags: flags::SpecFlags,
+    /// Folder for the results, which must not exist yet
+    #[arg(long, value_name = "DIR", required_unless_present = "print_spec", help_heading = flags::OUTPUT)]
+    out: Option<PathBuf>,
+    /// Write into an existing DIR, replacing the files of an earlier run
+    #[arg(long, help_heading = flags::OUTPUT)]
+    force: bool,
+    /// No progress, no notes, no table: only errors
+    #[arg(long, help_heading = flags::OUTPUT)]
+    quiet: bool,
+    /// Print the resolved spec and stop
+    #[arg(long, help_heading = flags::OUTPUT)]
+    print_spec: bool,
+}
+
+/// Runs the command.
+pub fn run(args: RunArgs) -> Result<()> {
+    let spec = resolve(args.spec, args.flags)?;
+    let prepared = prepare(&spec)?;
+    if args.print_spec {
+        return print(&spec.to_toml()?);
+    }
+    let out = args.out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
+    let mut report = Report::begin(OutputFolder::open(&out, args.force)?, &spec, args.quiet)?;
+    let finished = match simulate(&spec, prepared, &mut report) {
+        Ok(finished) => finished,
+        Err(error) => {
+            report.kept_rows().inspect(|rows| note(&format!("note: the members that ended are kept in {rows}")));
+            return Err(error);
+        }
+    };
+    let overview = report.finish(&spec, &finished.platform, &finished.panels, &finished.warnings)?;
+    if args.quiet { Ok(()) } else { print(&overview) }
+}
+
+/// The spec file, overlaid with the flags, checked.
+fn resolve(file: Option<PathBuf>, flags: flags::SpecFlags) -> Result<Spec> {
+    let mut spec = file.map_or_else(|| Ok(Spec::default()), |path| Spec::read(&path))?;
+    flags.overlay(&mut spec);
+    spec.validate()
+}
+
+/// What a simulation leaves besides the rows that it sent to the [`Report`].
+struct Finished {
+    platform: Platform,
+    panels: Vec<Panel>,
+    warnings: Vec<String>,
+}
+
+/// What is opened before any file is made, because opening it may show that the request is wrong.
+struct Prepared {}
+
+// HOOK(lead): `Family::new(spec)?`; unless the spec is only printed, also the back end and the one line that says
+// what `auto` took and why.
+fn prepare(_spec: &Spec) -> Result<Prepared> {
+    Ok(Prepared {})
+}
+
+// HOOK(lead): simulate, sending each member to `report` (it is a `Sink`).
+fn simulate(_spec: &Spec, Prepared {}: Prepared, _report: &mut Report) -> Result<Finished> {
+    Err(Error::Failed("`curvelax run` is not connected yet".into()))
+}

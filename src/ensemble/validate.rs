@@ -1,0 +1,345 @@
+//! Range checks of a [`Spec`]: each number alone, then the combinations that make no sense.
+//!
+//! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that
+//! takes the file they come from; only the resolution of the highest mode is checked here.
+
+use super::spec::{BackendChoice, Order, Solver, Spec};
+use crate::error::{Error, Result};
+
+/// More members than this is a slip of the keyboard.
+const MOST_CURVES: u64 = 1_000_000_000;
+/// With fewer nodes the five-point rows reach around the ring and its colours meet.
+const FEWEST_POINTS: usize = 6;
+const MOST_POINTS: usize = 1_000_000;
+/// A member with more steps than this would not end in a year.
+const MOST_STEPS: f64 = 1e9;
+const MOST_SERIES_ROWS: f64 = 1e7;
+const MOST_SNAPSHOTS: usize = 10_000;
+/// A sweep residual above this no longer says that a system is solved.
+const LOOSEST_TOLERANCE: f64 = 0.1;
+const MOST_SWEEPS: u32 = 100_000_000;
+const MOST_THREADS: usize = 1024;
+
+impl Spec {
+    /// Checks every range and combination and returns the spec with its lists sorted and free of repetitions.
+    pub fn validate(mut self) -> Result<Spec> {
+        self.check_counts()?;
+        self.check_times()?;
+        self.check_method()?;
+        self.check_relaxation()?;
+        self.check_combinations()?;
+        self.tidy_snapshots()?;
+        self.tidy_only()?;
+        Ok(self)
+    }
+
+    fn check_counts(&self) -> Result<()> {
+        if !(1..=MOST_CURVES).contains(&self.curves) {
+            let problem = if self.curves == 0 { "an ensemble needs a member" } else { "too many members" };
+            return Err(Error::value("curves", self.curves, problem, &format!("take 1 to {MOST_CURVES}")));
+        }
+        if !(FEWEST_POINTS..=MOST_POINTS).contains(&self.points) {
+            let problem = if self.points < FEWEST_POINTS {
+                "a ring of fewer than 6 nodes cannot be coloured"
+            } else {
+                "too many nodes"
+            };
+            let allowed = format!("take {FEWEST_POINTS} to {MOST_POINTS}");
+            return Err(Error::value("points", self.points, problem, &allowed));
+        }
+        if let Some(threads) = self.threads
+            && !(1..=MOST_THREADS).contains(&threads)
+        {
+            let problem = if threads == 0 { "no thread to run on" } else { "too many threads" };
+            return Err(Error::value("threads", threads, problem, &format!("take 1 to {MOST_THREADS}")));
+        }
+        Ok(())
+    }
+
+    fn check_times(&self) -> Result<()> {
+        positive("tau", self.tau, "a time step", "0.001")?;
+        positive("t-end", self.t_end, "a final time", "2")?;
+        let (tau, t_end) = (number(self.tau), number(self.t_end));
+        if self.tau > self.t_end {
+            let allowed = format!("take a step of at most {t_end}, or a later --t-end");
+            return Err(Error::value(
+                "tau",
+                tau,
+                &format!("the step is longer than the whole run of {t_end}"),
+                &allowed,
+            ));
+        }
+        let steps = self.t_end / self.tau;
+        if steps > MOST_STEPS {
+            let problem = format!("about {steps:.1e} steps of {tau} to --t-end {t_end}");
+            let allowed = format!("at most {MOST_STEPS:e} steps: take a larger --tau or an earlier --t-end");
+            return Err(Error::value("tau", tau, &problem, &allowed));
+        }
+        let Some(series) = self.series else { return Ok(()) };
+        positive("series", series, "an interval of time", "0.01")?;
+        let rows = self.t_end / series;
+        if rows > MOST_SERIES_ROWS {
+            let allowed = format!("at most {MOST_SERIES_ROWS:e} rows: take a longer interval");
+            return Err(Error::value("series", number(series), &format!("about {rows:.1e} rows per member"), &allowed));
+        }
+        Ok(())
+    }
+
+    fn check_method(&self) -> Result<()> {
+        if !(self.omega.is_finite() && self.omega >= 0.0) {
+            let allowed = "take 0 or any positive number, for example 1";
+            return Err(Error::value("omega", number(self.omega), "not a redistribution speed", allowed));
+        }
+        if let Some(tolerance) = self.tolerance
+            && !(tolerance > 0.0 && tolerance <= LOOSEST_TOLERANCE)
+        {
+            let allowed = format!("take a number above 0, up to {LOOSEST_TOLERANCE}, for example 1e-5");
+            return Err(Error::value("tolerance", number(tolerance), "not a residual tolerance", &allowed));
+        }
+        if !(self.sor > 0.0 && self.sor < 2.0) {
+            let allowed = "take a number between 0 and 2, both excluded; 1 is plain Gauss-Seidel";
+            return Err(Error::value(
+                "sor",
+                number(self.sor),
+                "sweeps do not converge with this over-relaxation",
+                allowed,
+            ));
+        }
+        if !(1..=MOST_SWEEPS).contains(&self.max_sweeps) {
+            let problem = if self.max_sweeps == 0 { "no sweep to solve with" } else { "too many sweeps" };
+            return Err(Error::value("max-sweeps", self.max_sweeps, problem, &format!("take 1 to {MOST_SWEEPS}")));
+        }
+        let resolved = self.points / 4;
+        if self.amplitude != 0.0 && self.modes.high as usize > resolved {
+            let modes = String::from(self.modes);
+            let problem = format!("{} nodes resolve no mode above {resolved}", self.points);
+            let allowed = format!("take --points {} or more, or lower modes", 4 * u64::from(self.modes.high));
+            return Err(Error::value("modes", modes, &problem, &allowed));
+        }
+        Ok(())
+    }
+
+    fn check_relaxation(&self) -> Result<()> {
+        if self.relax_to > 0.0 && self.relax_to < 1.0 {
+            return Ok(());
+        }
+        let allowed = "take a number between 0 and 1, both excluded, for example 0.01";
+        Err(Error::value("relax-to", number(self.relax_to), "not a fraction of the initial excess", allowed))
+    }
+
+    fn check_combinations(&self) -> Result<()> {
+        let lexicographic = self.order == Order::Lexicographic;
+        if lexicographic && self.solver == Solver::Direct {
+            let allowed = "leave out --order, or take --solver gauss-seidel";
+            return Err(Error::value("order", "lexicographic", "the direct solver makes no sweeps to order", allowed));
+        }
+        if self.backend == BackendChoice::Gpu {
+            let cpu = "take --backend cpu";
+            if lexicographic {
+                let problem = "a GPU sweeps colour by colour only";
+                return Err(Error::value("order", "lexicographic", problem, cpu));
+            }
+            if self.solver == Solver::Direct {
+                return Err(Error::value("solver", "direct", "the GPU back end has no direct solver", cpu));
+            }
+        }
+        match &self.adapter {
+            Some(name) if self.backend == BackendChoice::Cpu => {
+                let allowed = "leave out --adapter, or take --backend gpu";
+                Err(Error::value("adapter", name, "the CPU back end uses no adapter", allowed))
+            }
+            Some(name) if name.trim().is_empty() => {
+                Err(Error::value("adapter", "''", "an empty name", "see `curvelax adapters` for the names"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn tidy_snapshots(&mut self) -> Result<()> {
+        if let Some(&t) = self.snapshots.iter().find(|t| !(**t >= 0.0 && **t <= self.t_end)) {
+            let allowed = format!("take times from 0 to --t-end {}", number(self.t_end));
+            return Err(Error::value("snapshots", number(t), "not a time of the run", &allowed));
+        }
+        self.snapshots.iter_mut().for_each(|t| *t += 0.0); // -0 becomes 0
+        self.snapshots.sort_by(f64::total_cmp);
+        self.snapshots.dedup();
+        if self.snapshots.len() > MOST_SNAPSHOTS {
+            let problem = "too many times";
+            return Err(Error::value(
+                "snapshots",
+                format!("({} times)", self.snapshots.len()),
+                problem,
+                &format!("at most {MOST_SNAPSHOTS}"),
+            ));
+        }
+        Ok(())
+    }
+
+    fn tidy_only(&mut self) -> Result<()> {
+        let Some(only) = &mut self.only else { return Ok(()) };
+        if only.is_empty() {
+            return Err(Error::value("only", "[]", "no member to run", "name at least one, or leave the key out"));
+        }
+        if let Some(member) = only.iter().find(|member| **member >= self.curves) {
+            let problem = format!("no such member among {}", self.curves);
+            return Err(Error::value("only", member, &problem, &format!("take members from 0 to {}", self.curves - 1)));
+        }
+        only.sort_unstable();
+        only.dedup();
+        Ok(())
+    }
+}
+
+fn positive(key: &str, value: f64, what: &str, example: &str) -> Result<()> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    let allowed = format!("take a finite number above 0, for example {example}");
+    Err(Error::value(key, number(value), &format!("not {what}"), &allowed))
+}
+
+/// `value` as a person would write it: 0.001, -1, 1e300.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if value.is_finite() && size != 0.0 && !(1e-5..1e15).contains(&size) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// TOML text whose validation must fail, and what the message must begin with.
+    const REFUSED: &[(&str, &str)] = &[
+        ("curves = 0", "--curves 0: "),
+        ("curves = 1000000001", "--curves 1000000001: "),
+        ("points = 0", "--points 0: a ring of fewer than 6 nodes cannot be coloured; take 6 to 1000000"),
+        ("points = 5", "--points 5: "),
+        ("points = 1000001", "--points 1000001: "),
+        ("threads = 0", "--threads 0: "),
+        ("threads = 1025", "--threads 1025: "),
+        ("tau = 0", "--tau 0: "),
+        ("tau = -1", "--tau -1: not a time step; take a finite number above 0, for example 0.001"),
+        ("tau = nan", "--tau NaN: "),
+        ("tau = inf", "--tau inf: "),
+        ("tau = 1e-300", "--tau 1e-300: about 2.0e300 steps"),
+        ("tau = 2.5", "--tau 2.5: the step is longer than the whole run of 2"),
+        ("t-end = 0", "--t-end 0: "),
+        ("t-end = -2", "--t-end -2: "),
+        ("t-end = nan", "--t-end NaN: "),
+        ("t-end = inf", "--t-end inf: "),
+        ("t-end = 1e300", "--tau 0.001: about 1.0e303 steps"),
+        ("t-end = 1.1e6", "--tau 0.001: about 1.1e9 steps"),
+        ("omega = -0.5", "--omega -0.5: "),
+        ("omega = nan", "--omega NaN: "),
+        ("omega = inf", "--omega inf: "),
+        ("tolerance = 0", "--tolerance 0: "),
+        ("tolerance = -1e-3", "--tolerance -0.001: "),
+        ("tolerance = 0.2", "--tolerance 0.2: "),
+        ("tolerance = nan", "--tolerance NaN: "),
+        ("tolerance = inf", "--tolerance inf: "),
+        ("sor = 0", "--sor 0: "),
+        ("sor = 2", "--sor 2: "),
+        ("sor = -1", "--sor -1: "),
+        ("sor = nan", "--sor NaN: "),
+        ("max-sweeps = 0", "--max-sweeps 0: "),
+        ("max-sweeps = 100000001", "--max-sweeps 100000001: "),
+        ("relax-to = 0", "--relax-to 0: "),
+        ("relax-to = 1", "--relax-to 1: "),
+        ("relax-to = -0.1", "--relax-to -0.1: "),
+        ("relax-to = nan", "--relax-to NaN: "),
+        ("series = 0", "--series 0: "),
+        ("series = -1", "--series -1: "),
+        ("series = nan", "--series NaN: "),
+        ("series = inf", "--series inf: "),
+        ("series = 1e-9", "--series 1e-9: about 2.0e9 rows"),
+        ("snapshots = [0, 3]", "--snapshots 3: not a time of the run; take times from 0 to --t-end 2"),
+        ("snapshots = [-1]", "--snapshots -1: "),
+        ("snapshots = [nan]", "--snapshots NaN: "),
+        ("snapshots = [inf]", "--snapshots inf: "),
+        ("only = []", "--only []: "),
+        ("only = [256]", "--only 256: no such member among 256; take members from 0 to 255"),
+        ("only = [18446744073709551615]", "--only 18446744073709551615: "),
+        ("modes = '2..=26'", "--modes 2..=26: 100 nodes resolve no mode above 25; take --points 104"),
+        ("points = 31", "--modes 2..=8: 31 nodes resolve no mode above 7"),
+        ("order = 'lexicographic'\nbackend = 'gpu'", "--order lexicographic: "),
+        ("order = 'lexicographic'\nsolver = 'direct'", "--order lexicographic: "),
+        ("solver = 'direct'\nbackend = 'gpu'", "--solver direct: "),
+        ("adapter = 'llvmpipe'\nbackend = 'cpu'", "--adapter llvmpipe: "),
+        ("adapter = ' '", "--adapter '': "),
+    ];
+
+    /// TOML text at the edge of what is allowed.
+    const ACCEPTED: &[&str] = &[
+        "",
+        "curves = 1",
+        "curves = 1000000000",
+        "points = 6\namplitude = 0",
+        "points = 32",
+        "points = 1000000",
+        "seed = 0",
+        "seed = 18446744073709551615",
+        "tau = 2",
+        "t-end = 0.001",
+        "tau = 0.001\nt-end = 999999",
+        "omega = 0",
+        "omega = 1e300",
+        "tolerance = 0.1",
+        "tolerance = 1e-300",
+        "sor = 1.99",
+        "max-sweeps = 1",
+        "relax-to = 0.999",
+        "series = 5",
+        "snapshots = [0, 2]",
+        "snapshots = []",
+        "threads = 1024",
+        "order = 'lexicographic'",
+        "order = 'lexicographic'\nbackend = 'cpu'",
+        "solver = 'direct'\nbackend = 'cpu'",
+        "adapter = 'llvmpipe'",
+    ];
+
+    #[test]
+    fn every_value_out_of_range_is_refused_by_name() {
+        for (text, start) in REFUSED {
+            let error = Spec::from_toml(text).unwrap().validate().expect_err(text);
+            assert_eq!(error.exit_code(), 2);
+            let message = error.to_string();
+            assert!(message.starts_with(start), "{text}: {message}");
+            assert!(message.contains("; ") && !message.contains('\n'), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn the_edges_of_every_range_are_allowed() {
+        for text in ACCEPTED {
+            Spec::from_toml(text).unwrap().validate().unwrap_or_else(|e| panic!("{text}: {e}"));
+        }
+    }
+
+    #[test]
+    fn every_number_has_a_case() {
+        let numbers = ["curves", "points", "tau", "t-end", "omega", "tolerance", "sor", "max-sweeps", "relax-to"];
+        for key in numbers.into_iter().chain(["series", "snapshots", "only", "threads"]) {
+            assert!(REFUSED.iter().any(|(_, start)| start.starts_with(&format!("--{key} "))), "{key}");
+        }
+    }
+
+    #[test]
+    fn lists_are_sorted_and_free_of_repetitions() {
+        let spec = Spec::from_toml("snapshots = [1, 0, 1.0, -0.0]\nonly = [7, 3, 7]").unwrap().validate().unwrap();
+        assert_eq!(spec.snapshots, [0.0, 1.0]);
+        assert!(spec.snapshots[0].is_sign_positive());
+        assert_eq!(spec.only, Some(vec![3, 7]));
+    }
+
+    #[test]
+    fn too_many_snapshots_are_refused() {
+        let snapshots: Vec<f64> = (0..=MOST_SNAPSHOTS).map(|i| i as f64 * 1e-4).collect();
+        let message = Spec { snapshots, ..Spec::default() }.validate().unwrap_err().to_string();
+        assert!(message.starts_with("--snapshots (10001 times): "), "{message}");
+    }
+}

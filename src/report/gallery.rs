@@ -1,0 +1,259 @@
+//! `plots/curves.svg`: the first members before and after, all to one scale.
+
+use glam::DVec2;
+
+use super::svg::{Svg, closed_path, coordinate, dots};
+use crate::ensemble::Status;
+
+/// More members than this are not drawn.
+pub const MOST_PANELS: usize = 12;
+
+const COLUMNS: usize = 4;
+/// Width of a panel and the most of its height, in pixels, and the free space inside it.
+const SIDE: f64 = 200.0;
+const LEAST_HEIGHT: f64 = 100.0;
+const PADDING: f64 = 14.0;
+const CAPTION: f64 = 44.0;
+const GAP: f64 = 14.0;
+const MARGIN: f64 = 24.0;
+const HEAD: f64 = 48.0;
+const FOOT: f64 = 40.0;
+/// A picture this wide holds the head line.
+const LEAST_COLUMNS: usize = 2;
+/// A curve is drawn through at most this many of its nodes: more do not show.
+const MOST_VERTICES: usize = 600;
+/// Nodes closer than this, in pixels, are a line already, and are not marked.
+const LEAST_SPACING: f64 = 2.5;
+
+const STYLE: &str = "
+.back { fill: #ffffff }
+.frame { fill: none; stroke: #e3e6ea }
+text { font-family: sans-serif; font-size: 12px; fill: #24292f }
+.head { font-size: 15px; font-weight: bold }
+.note { fill: #656d76 }
+.middle { text-anchor: middle }
+.end { text-anchor: end }
+.before { fill: none; stroke: #8c959f; stroke-width: 1 }
+.after { stroke-width: 1.6; stroke-linejoin: round; fill-opacity: 0.08 }
+.nodes { fill: none; stroke-width: 3.2; stroke-linecap: round }
+.scale { fill: none; stroke: #24292f; stroke-width: 1.2 }
+.relaxed path { stroke: #0b6bb5; fill: #0b6bb5 } .relaxed .word { fill: #0b6bb5 }
+.unfinished path { stroke: #b35900; fill: #b35900 } .unfinished .word { fill: #b35900 }
+.singular path { stroke: #c4262e; fill: #c4262e } .singular .word { fill: #c4262e }
+.nonfinite path { stroke: #8a3ab9; fill: #8a3ab9 } .nonfinite .word { fill: #8a3ab9 }
+.stalled path { stroke: #5a6b00; fill: #5a6b00 } .stalled .word { fill: #5a6b00 }
+.panel .before { fill: none; stroke: #8c959f }
+.panel .nodes { fill: none }
+@media screen and (prefers-color-scheme: dark) {
+.back { fill: #15191e }
+.frame { stroke: #2d343c }
+text { fill: #e6edf3 }
+.note { fill: #9aa4af }
+.scale { stroke: #e6edf3 }
+.relaxed path { stroke: #58b0f5; fill: #58b0f5 } .relaxed .word { fill: #58b0f5 }
+.unfinished path { stroke: #f0a04b; fill: #f0a04b } .unfinished .word { fill: #f0a04b }
+.singular path { stroke: #ff7b76; fill: #ff7b76 } .singular .word { fill: #ff7b76 }
+.nonfinite path { stroke: #cf9bf0; fill: #cf9bf0 } .nonfinite .word { fill: #cf9bf0 }
+.stalled path { stroke: #b9cc4a; fill: #b9cc4a } .stalled .word { fill: #b9cc4a }
+.panel .before { fill: none; stroke: #7d8792 }
+.panel .nodes { fill: none }
+}
+";
+
+/// One member of the gallery.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// Index of the member.
+    pub member: u64,
+    /// How it ended.
+    pub status: Status,
+    /// Its relaxation time.
+    pub t_relax: Option<f64>,
+    /// Nodes of the initial curve.
+    pub before: Vec<DVec2>,
+    /// Nodes of the last accepted state.
+    pub after: Vec<DVec2>,
+}
+
+/// The gallery of the first [`MOST_PANELS`] of `panels`, as the text of an SVG file.
+pub fn draw(panels: &[Panel]) -> String {
+    let panels = &panels[..panels.len().min(MOST_PANELS)];
+    let columns = panels.len().clamp(LEAST_COLUMNS, COLUMNS);
+    let rows = panels.len().div_ceil(columns).max(1);
+    let Layout { scale, frame } = layout(panels);
+    let pitch = frame + DVec2::new(GAP, CAPTION);
+    let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
+    let height = HEAD + rows as f64 * pitch.y + FOOT;
+
+    let mut svg = Svg::new(width, height, STYLE, "Members before and after relaxation");
+    svg.rectangle("back", DVec2::ZERO, DVec2::new(width, height), 0.0);
+    svg.text("head", DVec2::new(MARGIN, 30.0), "Before and after");
+    svg.text("note end", DVec2::new(width - MARGIN, 30.0), "grey: initial curve, colour: final curve");
+    for (i, panel) in panels.iter().enumerate() {
+        let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
+        draw_panel(&mut svg, panel, DVec2::new(MARGIN, HEAD) + place * pitch, frame, scale);
+    }
+    draw_scale(&mut svg, DVec2::new(MARGIN, height - 20.0), scale);
+    svg.finish()
+}
+
+fn draw_panel(svg: &mut Svg, panel: &Panel, corner: DVec2, frame: DVec2, scale: f64) {
+    let middle = corner + 0.5 * frame;
+    svg.open(&format!("panel {}", panel.status.name()));
+    svg.rectangle("frame", corner, frame, 6.0);
+    if let Some((low, high)) = bounds(panel) {
+        // y grows downwards in SVG.
+        let place = |p: DVec2| middle + (p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
+        let project = |nodes: &[DVec2]| -> Vec<DVec2> { finite(nodes).map(place).collect() };
+        let (before, after) = (project(&panel.before), project(&panel.after));
+        svg.path("before", &closed_path(&thinned(&before)));
+        svg.path("after", &closed_path(&thinned(&after)));
+        if mean_spacing(&after) >= LEAST_SPACING {
+            svg.path("nodes", &dots(&after));
+        }
+    }
+    let below = DVec2::new(middle.x, corner.y + frame.y + 16.0);
+    let caption = match panel.t_relax {
+        Some(t) => format!("{} at t = {}", panel.status.name(), rounded(t)),
+        None => panel.status.name().into(),
+    };
+    svg.text("middle", below, &format!("member {}", panel.member));
+    svg.text("middle word", below + DVec2::new(0.0, 15.0), &caption);
+    svg.close();
+}
+
+/// A bar of a round length: 1, 2 or 5 times a power of ten, at most half a panel long.
+fn draw_scale(svg: &mut Svg, left: DVec2, scale: f64) {
+    let most = 0.5 * SIDE / scale;
+    let power = 10_f64.powi(most.log10().floor() as i32);
+    let length = [5.0, 2.0, 1.0].map(|digit| digit * power).into_iter().find(|l| *l <= most).unwrap_or(power);
+    let [x, y, end] = [left.x, left.y, left.x + length * scale].map(coordinate);
+    let [top, bottom] = [left.y - 4.0, left.y + 4.0].map(coordinate);
+    svg.path("scale", &format!("M{x} {top}V{bottom}M{x} {y}H{end}M{end} {top}V{bottom}"));
+    let label = DVec2::new(left.x + length * scale + 8.0, left.y + 4.0);
+    svg.text("note", label, &format!("length {}", rounded(length)));
+}
+
+/// What all panels share.
+struct Layout {
+    /// Pixels per unit of length.
+    scale: f64,
+    /// Size of a panel.
+    frame: DVec2,
+}
+
+/// The largest of `panels` fills its frame, which is as low as the tallest allows.
+fn layout(panels: &[Panel]) -> Layout {
+    let extent = panels.iter().filter_map(bounds).map(|(low, high)| high - low).fold(DVec2::ZERO, DVec2::max);
+    let largest = extent.max_element();
+    let scale = if largest > 0.0 && largest.is_finite() { (SIDE - 2.0 * PADDING) / largest } else { 1.0 };
+    let height = (extent.y * scale + 2.0 * PADDING).clamp(LEAST_HEIGHT, SIDE);
+    Layout { scale, frame: DVec2::new(SIDE, height) }
+}
+
+/// Lower left and upper right corner of both curves; none if no node is finite.
+fn bounds(panel: &Panel) -> Option<(DVec2, DVec2)> {
+    let nodes = || finite(&panel.before).chain(finite(&panel.after));
+    Some((nodes().reduce(DVec2::min)?, nodes().reduce(DVec2::max)?))
+}
+
+/// The nodes that can be drawn: finite, and small enough for their differences to be.
+fn finite(nodes: &[DVec2]) -> impl Iterator<Item = DVec2> {
+    nodes.iter().copied().filter(|p| p.abs().cmplt(DVec2::splat(1e100)).all())
+}
+
+/// Every m-th of `points`, with the least m that leaves at most [`MOST_VERTICES`].
+fn thinned(points: &[DVec2]) -> Vec<DVec2> {
+    points.iter().copied().step_by(points.len().div_ceil(MOST_VERTICES).max(1)).collect()
+}
+
+fn mean_spacing(points: &[DVec2]) -> f64 {
+    let length: f64 = points.iter().zip(points.iter().cycle().skip(1)).map(|(a, b)| a.distance(*b)).sum();
+    length / points.len().max(1) as f64
+}
+
+/// `value` to three significant digits.
+fn rounded(value: f64) -> String {
+    let short: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    if short == 0.0 || (1e-3..1e6).contains(&short.abs()) { short.to_string() } else { format!("{short:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+
+    /// Perturbed ellipses of different sizes that end as circles or part of the way there.
+    fn panels(count: u64, n: usize) -> Vec<Panel> {
+        let curve = |member: u64, rest: f64| -> Vec<DVec2> {
+            let size = 1.0 + 0.1 * (member % 3) as f64;
+            let node = |u: f64| {
+                let wave = 1.0 + rest * 0.15 * ((3.0 + (member % 4) as f64) * u + member as f64).cos();
+                DVec2::new((1.0 + rest) * u.cos(), u.sin() * (1.0 + 0.4 * (1.0 - rest))) * wave * size
+            };
+            (0..n).map(|i| node(TAU * i as f64 / n as f64)).collect()
+        };
+        let panel = |member: u64| {
+            let status = match member {
+                4 => Status::Unfinished,
+                6 => Status::Singular,
+                9 => Status::Stalled,
+                11 => Status::Nonfinite,
+                _ => Status::Relaxed,
+            };
+            let rest = if status == Status::Relaxed { 0.02 } else { 0.4 };
+            let t_relax = (status == Status::Relaxed).then_some(0.4 + 0.0123456 * member as f64);
+            Panel { member, status, t_relax, before: curve(member, 1.0), after: curve(member, rest) }
+        };
+        (0..count).map(panel).collect()
+    }
+
+    #[test]
+    fn a_gallery_has_a_panel_for_each_of_the_first_twelve() {
+        for (count, shown) in [(0, 0), (1, 1), (5, 5), (12, 12), (30, 12)] {
+            let text = draw(&panels(count, 60));
+            assert_eq!(text.matches("class=\"frame\"").count(), shown);
+            assert_eq!(text.matches("class=\"after\"").count(), shown);
+            assert_eq!(text, draw(&panels(count, 60)));
+            // To look at: CURVELAX_GALLERY=FOLDER cargo test gallery
+            if let Some(folder) = std::env::var_os("CURVELAX_GALLERY") {
+                let path = std::path::Path::new(&folder).join(format!("gallery{count}.svg"));
+                std::fs::write(path, &text).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn one_scale_fits_the_largest_member() {
+        let mut panels = panels(3, 60);
+        panels[1].before.iter_mut().for_each(|p| *p *= 10.0);
+        let Layout { scale, frame } = layout(&panels);
+        let (low, high) = bounds(&panels[1]).unwrap();
+        let slack = frame - (high - low) * scale - 2.0 * PADDING;
+        assert!(slack.x.abs() < 1e-9 && slack.y.abs() < 1e-9, "{slack}");
+    }
+
+    #[test]
+    fn values_that_are_not_finite_do_not_reach_the_picture() {
+        let mut panels = panels(2, 60);
+        panels[0].after[3].x = f64::NAN;
+        panels[0].after[4].y = -f64::MAX;
+        panels[1].before = vec![DVec2::splat(f64::INFINITY); 60];
+        panels[1].after = panels[1].before.clone();
+        let text = draw(&panels).to_lowercase();
+        assert!(!text.contains("nan") && !text.contains("inf"), "{text}");
+    }
+
+    #[test]
+    fn many_nodes_are_drawn_as_a_line() {
+        let text = draw(&panels(1, 5000));
+        assert!(!text.contains("class=\"nodes\""));
+        assert!(text.len() < 40_000, "{}", text.len());
+    }
+
+    #[test]
+    fn numbers_in_captions_are_short() {
+        assert_eq!([0.123456, 2.0, 1234.5, 1e-7].map(rounded), ["0.123", "2", "1230", "1e-7"]);
+    }
+}

@@ -1,0 +1,171 @@
+//! What a run leaves for people and programs: tables, plots and provenance in a folder, and an overview.
+//!
+//! A [`Report`] is opened before the work starts, so that a folder that cannot be written costs nothing. It is the
+//! [`Sink`] of the simulation: rows stream to disk, and only a few numbers per member stay in memory.
+
+pub mod folder;
+pub mod gallery;
+pub mod overview;
+pub mod progress;
+pub mod provenance;
+pub mod svg;
+pub mod tables;
+pub mod tally;
+
+use std::time::{Instant, SystemTime};
+
+pub use folder::OutputFolder;
+pub use gallery::Panel;
+pub use provenance::Platform;
+
+use crate::{
+    ensemble::{Outcome, SeriesRow, Sink, Snapshot, Spec},
+    error::Result,
+};
+use progress::Progress;
+use tables::{SeriesTable, SnapshotTable, SummaryTable};
+use tally::Tally;
+
+/// Everything that is written about one run.
+// The tables come before the folder: dropped first, they leave it empty for its own clean-up.
+pub struct Report {
+    summary: SummaryTable,
+    series: Option<SeriesTable>,
+    snapshots: Option<SnapshotTable>,
+    folder: OutputFolder,
+    tally: Tally,
+    progress: Progress,
+    started: SystemTime,
+    clock: Instant,
+}
+
+impl Report {
+    /// Opens the tables that `spec` asks for.
+    pub fn begin(folder: OutputFolder, spec: &Spec, quiet: bool) -> Result<Report> {
+        Ok(Report {
+            summary: SummaryTable::begin(folder.file(folder::SUMMARY)?)?,
+            series: spec.series.map(|_| SeriesTable::begin(folder.file(folder::SERIES)?)).transpose()?,
+            snapshots: match spec.snapshots.is_empty() {
+                true => None,
+                false => Some(SnapshotTable::begin(folder.file(folder::SNAPSHOTS)?)?),
+            },
+            folder,
+            tally: Tally::default(),
+            progress: Progress::new(quiet),
+            started: SystemTime::now(),
+            clock: Instant::now(),
+        })
+    }
+
+    /// The file that keeps the rows of the members that ended, should the run fail now; none if there are none.
+    pub fn kept_rows(&self) -> Option<String> {
+        (self.tally.members() > 0).then(|| self.summary.part().display().to_string())
+    }
+
+    /// Puts every file under its final name, `run.json` last, and returns the overview for stdout.
+    pub fn finish(self, spec: &Spec, platform: &Platform, panels: &[Panel], warnings: &[String]) -> Result<String> {
+        let Report { summary, series, snapshots, folder, tally, progress, started, clock } = self;
+        progress.finish();
+        let wall = clock.elapsed();
+        folder.remove_earlier()?;
+        let mut files = vec![folder::SUMMARY];
+        summary.finish()?;
+        if let Some(series) = series {
+            series.finish()?;
+            files.push(folder::SERIES);
+        }
+        if let Some(snapshots) = snapshots {
+            snapshots.finish()?;
+            files.push(folder::SNAPSHOTS);
+        }
+        if !panels.is_empty() {
+            folder.write(folder::CURVES, &gallery::draw(panels))?;
+            files.push(folder::CURVES);
+        }
+        let provenance = provenance::Provenance::new(spec, platform, &tally, warnings, started, wall);
+        folder.write(folder::RUN, &provenance.to_json()?)?;
+        files.push(folder::RUN);
+        Ok(overview::Overview { spec, platform, tally: &tally, wall, folder: folder.path(), files: &files }.to_string())
+    }
+}
+
+impl Sink for Report {
+    fn member(&mut self, outcome: &Outcome, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<()> {
+        if let Some(table) = &mut self.series {
+            series.iter().try_for_each(|row| table.row(row))?;
+        }
+        if let Some(table) = &mut self.snapshots {
+            snapshots.iter().try_for_each(|snapshot| table.snapshot(snapshot))?;
+        }
+        self.summary.row(outcome)?;
+        self.tally.add(outcome);
+        Ok(())
+    }
+
+    fn progress(&mut self, done: u64, total: u64, share: f64) {
+        self.progress.show(done, total, share);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, path::Path};
+
+    use glam::DVec2;
+
+    use super::*;
+    use crate::ensemble::{Observables, Status};
+
+    fn files(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = entries.collect();
+        names.sort();
+        names
+    }
+
+    /// A report into `out` that has received one member.
+    fn report(out: &Path, spec: &Spec) -> Report {
+        let mut report = Report::begin(OutputFolder::open(out, true).unwrap(), spec, true).unwrap();
+        assert_eq!(report.kept_rows(), None);
+        let row = SeriesRow { member: 0, t: 0.0, at: Observables::default() };
+        let snapshot = Snapshot { member: 0, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] };
+        report.member(&tally::tests::outcome(0, Status::Relaxed, Some(0.5)), &[row], &[snapshot]).unwrap();
+        report
+    }
+
+    #[test]
+    fn a_finished_report_leaves_the_files_asked_for_and_no_others() {
+        let home = tempfile::tempdir().unwrap();
+        let out = home.path().join("out");
+        let platform = provenance::tests::platform();
+        let triangle = vec![DVec2::ZERO, DVec2::X, DVec2::Y];
+        let panel =
+            Panel { member: 0, status: Status::Relaxed, t_relax: None, before: triangle.clone(), after: triangle };
+
+        let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
+        let overview = report(&out, &all).finish(&all, &platform, &[panel], &[]).unwrap();
+        assert_eq!(files(&out), ["plots", "run.json", "series.csv", "snapshots.csv", "summary.csv"]);
+        assert_eq!(files(&out.join("plots")), ["curves.svg"]);
+        for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
+            assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");
+        }
+        assert!(overview.contains("summary.csv, series.csv, snapshots.csv, plots/curves.svg, run.json"), "{overview}");
+
+        let few = Spec::default();
+        report(&out, &few).finish(&few, &platform, &[], &["a warning".into()]).unwrap();
+        assert_eq!(files(&out), ["plots", "run.json", "summary.csv"]);
+        assert_eq!(files(&out.join("plots")), [""; 0]);
+        assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
+    }
+
+    #[test]
+    fn a_run_that_fails_keeps_the_members_that_ended() {
+        let home = tempfile::tempdir().unwrap();
+        let out = home.path().join("out");
+        let failed = report(&out, &Spec::default());
+        let kept = failed.kept_rows().unwrap();
+        drop(failed);
+        assert_eq!(files(&out), [".summary.csv.part"]);
+        assert_eq!(fs::read_to_string(kept).unwrap().lines().count(), 2);
+    }
+}

@@ -1,0 +1,164 @@
+//! The table that a run prints when it is done.
+
+use std::{fmt, path::Path, time::Duration};
+
+use super::{progress::duration, provenance::Platform, tally::Tally};
+use crate::ensemble::Spec;
+
+/// A finished run at a glance; its `Display` is the text for stdout.
+pub struct Overview<'a> {
+    /// What was asked for.
+    pub spec: &'a Spec,
+    /// Where it was computed.
+    pub platform: &'a Platform,
+    /// What came out.
+    pub tally: &'a Tally,
+    /// How long it took.
+    pub wall: Duration,
+    /// The output folder.
+    pub folder: &'a Path,
+    /// The files written there.
+    pub files: &'a [&'static str],
+}
+
+impl fmt::Display for Overview<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        self.statuses(f)?;
+        writeln!(f)?;
+        for (label, text) in [
+            ("ensemble", self.ensemble()),
+            ("t_relax", self.relaxation()),
+            ("work", self.work()),
+            ("ran on", self.machine()),
+            ("wall time", duration(self.wall.as_secs_f64())),
+            ("results", format!("{}: {}", self.folder.display(), self.files.join(", "))),
+        ] {
+            writeln!(f, "{label:<11}{text}")?;
+        }
+        Ok(())
+    }
+}
+
+impl Overview<'_> {
+    /// Members by status; the rarer endings only where there are any.
+    fn statuses(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let members = self.tally.members();
+        writeln!(f, "{:<11}{:>10}{:>10}", "status", "members", "share")?;
+        for (rank, (status, count)) in self.tally.counts().enumerate() {
+            if count > 0 || rank < 2 {
+                let share = 100.0 * count as f64 / members.max(1) as f64;
+                writeln!(f, "{:<11}{count:>10}{share:>8.1} %", status.name())?;
+            }
+        }
+        writeln!(f, "{:<11}{members:>10}", "all")
+    }
+
+    fn ensemble(&self) -> String {
+        let Spec { flow, points, tau, t_end, seed, .. } = self.spec;
+        let shape = String::from(self.spec.shape.clone());
+        format!("{shape}, {flow}, n = {points}, tau = {tau:?}, t-end = {t_end}, seed {seed}")
+    }
+
+    fn relaxation(&self) -> String {
+        let members = self.tally.members();
+        match self.tally.relaxation() {
+            None => format!("none of {members} relaxed"),
+            Some(relaxed) => {
+                let (count, censored) = (relaxed.count, members.saturating_sub(relaxed.count));
+                let others = match censored {
+                    0 => String::new(),
+                    _ => format!("; {censored} censored, so both are biased low"),
+                };
+                let (mean, median) = (significant(relaxed.mean), significant(relaxed.median));
+                format!("mean {mean}, median {median} over {count} relaxed{others}")
+            }
+        }
+    }
+
+    fn work(&self) -> String {
+        let Tally { steps, sweeps_k, sweeps_x, .. } = self.tally;
+        let each = |total: u64| significant(total as f64 / self.tally.members().max(1) as f64);
+        let steps_each = each(*steps);
+        match sweeps_k + sweeps_x {
+            0 => format!("{steps_each} steps per member, no sweeps"),
+            _ => format!(
+                "{steps_each} steps per member, sweeps {} for k and {} for x, y",
+                each(*sweeps_k),
+                each(*sweeps_x)
+            ),
+        }
+    }
+
+    fn machine(&self) -> String {
+        let Platform { backend, adapter, precision, reason, threads, .. } = self.platform;
+        let adapter = adapter.as_ref().map_or(String::new(), |name| format!(" {name}"));
+        let threads = threads.map_or(String::new(), |count| format!(", {count} threads"));
+        let precision = format!("{precision:?}").to_lowercase();
+        format!("{backend}{adapter}, {precision}{threads} ({reason})")
+    }
+}
+
+/// Four significant digits; whole numbers from 1000 on in full.
+fn significant(value: f64) -> String {
+    let size = value.abs();
+    match size {
+        _ if size == 0.0 => "0".into(),
+        _ if !(1e-4..1e15).contains(&size) => format!("{value:.3e}"),
+        _ => {
+            let digits = (3 - size.log10().floor() as i32).max(0) as usize;
+            format!("{value:.digits$}")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        ensemble::Status,
+        report::{folder, provenance::tests::platform, tally::tests::outcome},
+    };
+
+    fn overview(tally: &Tally) -> String {
+        let (spec, platform) = (Spec::default(), platform());
+        let wall = Duration::from_millis(12_345);
+        let files = &[folder::SUMMARY, folder::RUN];
+        Overview { spec: &spec, platform: &platform, tally, wall, folder: Path::new("out"), files }.to_string()
+    }
+
+    #[test]
+    fn an_overview_looks_like_this() {
+        let mut tally = Tally::default();
+        tally.add(&outcome(0, Status::Relaxed, Some(0.3)));
+        tally.add(&outcome(1, Status::Relaxed, Some(0.5)));
+        tally.add(&outcome(2, Status::Unfinished, None));
+        tally.add(&outcome(3, Status::Stalled, None));
+        let expected = "\
+status        members     share
+relaxed             2    50.0 %
+unfinished          1    25.0 %
+stalled             1    25.0 %
+all                 4
+
+ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
+t_relax    mean 0.4000, median 0.4000 over 2 relaxed; 2 censored, so both are biased low
+work       10.00 steps per member, sweeps 20.00 for k and 5.000 for x, y
+ran on     cpu, f64, 2 threads (no hardware GPU)
+wall time  12.3 s
+results    out: summary.csv, run.json
+";
+        assert_eq!(overview(&tally), expected);
+    }
+
+    #[test]
+    fn nobody_relaxed_is_said_so() {
+        let text = overview(&Tally::default());
+        assert!(text.contains("t_relax    none of 0 relaxed\n"), "{text}");
+    }
+
+    #[test]
+    fn numbers_have_four_digits() {
+        let shown = [0.0, 1.0, 12345.6, 0.001234567, 1e-7, 99.999].map(significant);
+        assert_eq!(shown, ["0", "1.000", "12346", "0.001235", "1.000e-7", "100.00"]);
+    }
+}

@@ -1,0 +1,116 @@
+//! How far a run is, on stderr: a bar with an estimate on a terminal, else a line every ten seconds.
+
+use std::{
+    io::{self, IsTerminal, Write},
+    time::{Duration, Instant},
+};
+
+use indicatif::{ProgressBar, ProgressStyle, style::TemplateError};
+
+/// Time between lines where there is no terminal.
+const PERIOD: Duration = Duration::from_secs(10);
+/// Resolution of the bar.
+const TICKS: u64 = 10_000;
+
+/// Shows progress in the way that suits stderr.
+pub enum Progress {
+    /// Shows nothing.
+    Quiet,
+    /// On a terminal.
+    Bar(ProgressBar),
+    /// In a file or a pipe.
+    Lines {
+        /// When the run began.
+        began: Instant,
+        /// When the last line was written.
+        last: Instant,
+    },
+}
+
+impl Progress {
+    /// Chooses the way.
+    pub fn new(quiet: bool) -> Progress {
+        if quiet {
+            return Progress::Quiet;
+        }
+        if !io::stderr().is_terminal() {
+            let now = Instant::now();
+            return Progress::Lines { began: now, last: now };
+        }
+        let colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+        let bar = ProgressBar::new(TICKS);
+        bar.set_style(style(colour).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Progress::Bar(bar)
+    }
+
+    /// `done` of `total` members have ended; `share` ∈ [0, 1] counts the others by their time.
+    pub fn show(&mut self, done: u64, total: u64, share: f64) {
+        match self {
+            Progress::Quiet => {}
+            Progress::Bar(bar) => {
+                bar.set_message(format!("{done} of {total} members"));
+                bar.set_position((share.clamp(0.0, 1.0) * TICKS as f64) as u64);
+            }
+            Progress::Lines { began, last } => {
+                if last.elapsed() >= PERIOD {
+                    *last = Instant::now();
+                    let _ = writeln!(io::stderr().lock(), "{}", line(done, total, share, began.elapsed()));
+                }
+            }
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(self) {
+        if let Progress::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn style(colour: bool) -> Result<ProgressStyle, TemplateError> {
+    let bar = if colour { "{bar:32.cyan/dim}" } else { "{bar:32}" };
+    let style = ProgressStyle::with_template(&format!("{bar} {{percent:>3}} %  {{msg}}  {{eta}} left"))?;
+    Ok(style.progress_chars("━━─"))
+}
+
+fn line(done: u64, total: u64, share: f64, elapsed: Duration) -> String {
+    let share = share.clamp(0.0, 1.0);
+    let estimate = elapsed.as_secs_f64() * (1.0 - share) / share;
+    let left = if share > 0.0 { format!(", about {} left", duration(estimate)) } else { String::new() };
+    format!("{done} of {total} members, {:.1} %{left}", 100.0 * share)
+}
+
+/// Seconds in the unit that a person would take.
+pub fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..10 => format!("{seconds:.2} s"),
+        10..60 => format!("{seconds:.1} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_estimates_what_is_left() {
+        let elapsed = Duration::from_secs(30);
+        assert_eq!(line(64, 256, 0.25, elapsed), "64 of 256 members, 25.0 %, about 1 min 30 s left");
+        assert_eq!(line(0, 256, 0.0, elapsed), "0 of 256 members, 0.0 %");
+    }
+
+    #[test]
+    fn the_bar_is_well_formed() {
+        assert!(style(true).is_ok() && style(false).is_ok());
+    }
+
+    #[test]
+    fn durations_read_as_people_say_them() {
+        let said = [0.123, 12.34, 75.0, 3600.0, 90_000.0].map(duration);
+        assert_eq!(said, ["0.12 s", "12.3 s", "1 min 15 s", "1 h 00 min", "25 h 00 min"]);
+    }
+}

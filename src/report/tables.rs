@@ -1,0 +1,338 @@
+//! The CSV files: one header, floats that read back exactly, unknown is empty, sorted by member.
+//!
+//! A float that is not finite is unknown. No clock times here: equal runs give equal bytes.
+
+use std::path::{Path, PathBuf};
+
+use csv::{Writer, WriterBuilder};
+use serde::Serialize;
+
+use super::folder::PartFile;
+use crate::{
+    ensemble::{Outcome, SeriesRow, Snapshot},
+    error::{Error, Result},
+};
+
+const SUMMARY: &str = "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,\
+    length_start,length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
+    mesh_ratio,metric_drift,self_crossing";
+const SERIES: &str = "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift";
+const SNAPSHOTS: &str = "member,t,i,x,y,k,r";
+
+/// Bytes gathered before they are written.
+const BUFFER: usize = 1 << 16;
+
+/// A table that grows row by row. Dropped unfinished, it leaves its rows under their temporary name.
+struct Table {
+    writer: Option<Writer<PartFile>>,
+    target: PathBuf,
+    part: PathBuf,
+    rows: u64,
+}
+
+impl Table {
+    fn begin(file: PartFile, header: &str) -> Result<Table> {
+        let (target, part) = (file.target().to_path_buf(), file.part().to_path_buf());
+        let writer = WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
+        let mut table = Table { writer: Some(writer), target, part, rows: 0 };
+        table.write(header.split(',').collect::<Vec<_>>())?;
+        Ok(table)
+    }
+
+    fn row(&mut self, row: impl Serialize) -> Result<()> {
+        self.write(row)?;
+        self.rows += 1;
+        Ok(())
+    }
+
+    fn write(&mut self, row: impl Serialize) -> Result<()> {
+        match &mut self.writer {
+            Some(writer) => writer.serialize(row).map_err(|e| Error::io("cannot write", &self.target)(e.into())),
+            None => Ok(()),
+        }
+    }
+
+    fn finish(mut self) -> Result<()> {
+        let Some(writer) = self.writer.take() else { return Ok(()) };
+        writer.into_inner().map_err(|e| Error::io("cannot write", &self.target)(e.into_error()))?.finish()
+    }
+}
+
+impl Drop for Table {
+    fn drop(&mut self) {
+        if let Some(Ok(mut file)) = self.writer.take().map(Writer::into_inner)
+            && self.rows > 0
+        {
+            file.keep();
+        }
+    }
+}
+
+/// `summary.csv`: one row a member.
+pub struct SummaryTable(Table);
+
+/// `series.csv`: the observables of each member over time.
+pub struct SeriesTable(Table);
+
+/// `snapshots.csv`: the nodes of each member at given times.
+pub struct SnapshotTable(Table);
+
+/// Columns of `summary.csv`; those of type `()` are not computed by this version and stay empty.
+#[derive(Serialize)]
+struct SummaryRow {
+    member: u64,
+    cell: u64,
+    status: &'static str,
+    t_end: Option<f64>,
+    steps: u64,
+    rejected: (),
+    sweeps_k: u64,
+    sweeps_x: u64,
+    t_relax: Option<f64>,
+    t_half: Option<f64>,
+    rate: (),
+    rate_r2: (),
+    length_start: Option<f64>,
+    length_end: Option<f64>,
+    area_start: Option<f64>,
+    area_end: Option<f64>,
+    excess_start: Option<f64>,
+    excess_end: Option<f64>,
+    energy_start: Option<f64>,
+    energy_end: Option<f64>,
+    k_min: Option<f64>,
+    k_max: Option<f64>,
+    turning: i32,
+    mesh_ratio: Option<f64>,
+    metric_drift: Option<f64>,
+    self_crossing: (),
+}
+
+impl SummaryTable {
+    /// Writes the header.
+    pub fn begin(file: PartFile) -> Result<SummaryTable> {
+        Table::begin(file, SUMMARY).map(SummaryTable)
+    }
+
+    /// Writes the row of one member.
+    pub fn row(&mut self, member: &Outcome) -> Result<()> {
+        let Outcome { start, end, .. } = member;
+        self.0.row(SummaryRow {
+            member: member.member,
+            cell: 0,
+            status: member.status.name(),
+            t_end: known(member.t_end),
+            steps: member.steps,
+            rejected: (),
+            sweeps_k: member.sweeps_k,
+            sweeps_x: member.sweeps_x,
+            t_relax: member.t_relax.and_then(known),
+            t_half: member.t_half.and_then(known),
+            rate: (),
+            rate_r2: (),
+            length_start: known(start.length),
+            length_end: known(end.length),
+            area_start: known(start.area),
+            area_end: known(end.area),
+            excess_start: known(start.excess),
+            excess_end: known(end.excess),
+            energy_start: known(start.energy),
+            energy_end: known(end.energy),
+            k_min: known(end.k_min),
+            k_max: known(end.k_max),
+            turning: end.turning,
+            mesh_ratio: known(end.mesh_ratio),
+            metric_drift: known(end.metric_drift),
+            self_crossing: (),
+        })
+    }
+
+    /// The temporary name under which rows lie until the table is finished.
+    pub fn part(&self) -> &Path {
+        &self.0.part
+    }
+
+    /// Puts the table under its final name.
+    pub fn finish(self) -> Result<()> {
+        self.0.finish()
+    }
+}
+
+impl SeriesTable {
+    /// Writes the header.
+    pub fn begin(file: PartFile) -> Result<SeriesTable> {
+        Table::begin(file, SERIES).map(SeriesTable)
+    }
+
+    /// Writes one row.
+    pub fn row(&mut self, row: &SeriesRow) -> Result<()> {
+        let at = &row.at;
+        let scalars = [at.length, at.area, at.excess, at.energy, at.k_min, at.k_max, at.mesh_ratio, at.metric_drift];
+        self.0.row((row.member, row.t, scalars.map(known)))
+    }
+
+    /// Puts the table under its final name.
+    pub fn finish(self) -> Result<()> {
+        self.0.finish()
+    }
+}
+
+impl SnapshotTable {
+    /// Writes the header.
+    pub fn begin(file: PartFile) -> Result<SnapshotTable> {
+        Table::begin(file, SNAPSHOTS).map(SnapshotTable)
+    }
+
+    /// Writes one row a node, i = 1…n.
+    pub fn snapshot(&mut self, snapshot: &Snapshot) -> Result<()> {
+        let Snapshot { member, t, x, y, k, r } = snapshot;
+        let nodes = x.iter().zip(y).zip(k).zip(r);
+        for (i, (((x, y), k), r)) in (1_u64..).zip(nodes) {
+            self.0.row((member, t, i, [x, y, k, r].map(|value| known(*value))))?;
+        }
+        Ok(())
+    }
+
+    /// Puts the table under its final name.
+    pub fn finish(self) -> Result<()> {
+        self.0.finish()
+    }
+}
+
+fn known(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::{
+        ensemble::{Observables, Status},
+        report::OutputFolder,
+    };
+
+    fn outcome(start: Observables, end: Observables) -> Outcome {
+        Outcome {
+            member: 3,
+            status: Status::Relaxed,
+            t_end: 0.5,
+            steps: 500,
+            sweeps_k: 1234,
+            sweeps_x: 987,
+            t_relax: Some(0.1 + 0.2),
+            t_half: None,
+            start,
+            end,
+        }
+    }
+
+    fn observables() -> Observables {
+        Observables {
+            length: 9.688448220547675,
+            area: 6.5,
+            excess: 1e-300,
+            energy: -0.0,
+            k_min: f64::MIN_POSITIVE / 8.0,
+            k_max: f64::MAX,
+            mesh_ratio: 1.0,
+            metric_drift: 1.0 / 3.0,
+            turning: -1,
+        }
+    }
+
+    /// The text of the file that `fill` writes.
+    fn written(name: &str, fill: impl FnOnce(PartFile) -> Result<()>) -> String {
+        let home = tempfile::tempdir().unwrap();
+        let folder = OutputFolder::open(home.path(), true).unwrap();
+        fill(folder.file(name).unwrap()).unwrap();
+        fs::read_to_string(home.path().join(name)).unwrap()
+    }
+
+    fn summary(rows: &[Outcome]) -> String {
+        written("summary.csv", |file| {
+            let mut table = SummaryTable::begin(file)?;
+            rows.iter().try_for_each(|row| table.row(row))?;
+            table.finish()
+        })
+    }
+
+    #[test]
+    fn the_summary_has_these_bytes() {
+        let end = Observables { length: 8.5, area: 6.0, turning: 1, excess: f64::NAN, ..Default::default() };
+        let text = summary(&[outcome(Observables { length: 9.0, energy: f64::INFINITY, ..Default::default() }, end)]);
+        assert_eq!(
+            text,
+            "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
+             length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
+             mesh_ratio,metric_drift,self_crossing\n\
+             3,0,relaxed,0.5,500,,1234,987,0.30000000000000004,,,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,\n"
+        );
+    }
+
+    #[test]
+    fn an_empty_table_is_a_header() {
+        assert_eq!(summary(&[]), format!("{SUMMARY}\n"));
+    }
+
+    #[test]
+    fn series_and_snapshots_have_these_bytes() {
+        let text = written("series.csv", |file| {
+            let mut table = SeriesTable::begin(file)?;
+            table.row(&SeriesRow { member: 1, t: 0.01, at: Observables { k_max: f64::NAN, ..observables() } })?;
+            table.finish()
+        });
+        assert_eq!(
+            text,
+            "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift\n\
+             1,0.01,9.688448220547675,6.5,1e-300,-0.0,2.781342323134e-309,,1.0,0.3333333333333333\n"
+        );
+        let text = written("snapshots.csv", |file| {
+            let mut table = SnapshotTable::begin(file)?;
+            let (x, y) = (vec![1.0, 2.0], vec![3.0, 4.0]);
+            table.snapshot(&Snapshot { member: 1, t: 0.25, x, y, k: vec![5.0, 6.0], r: vec![7.0, 8.0] })?;
+            table.finish()
+        });
+        assert_eq!(text, "member,t,i,x,y,k,r\n1,0.25,1,1.0,3.0,5.0,7.0\n1,0.25,2,2.0,4.0,6.0,8.0\n");
+    }
+
+    #[test]
+    fn floats_read_back_to_the_same_bits() {
+        let text = summary(&[outcome(observables(), observables())]);
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let columns = reader.headers().unwrap().clone();
+        let row = reader.records().next().unwrap().unwrap();
+        let bits = |column: &str| {
+            let field = columns.iter().zip(&row).find(|(name, _)| *name == column).unwrap().1;
+            field.parse::<f64>().unwrap().to_bits()
+        };
+        let at = observables();
+        for (column, value) in [
+            ("t_relax", 0.1 + 0.2),
+            ("length_start", at.length),
+            ("area_end", at.area),
+            ("excess_start", at.excess),
+            ("energy_end", at.energy),
+            ("k_min", at.k_min),
+            ("k_max", at.k_max),
+            ("mesh_ratio", at.mesh_ratio),
+            ("metric_drift", at.metric_drift),
+        ] {
+            assert_eq!(bits(column), value.to_bits(), "{column}");
+        }
+    }
+
+    #[test]
+    fn rows_survive_a_failure_and_a_lone_header_does_not() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = OutputFolder::open(home.path(), true).unwrap();
+        let mut table = SummaryTable::begin(folder.file("summary.csv").unwrap()).unwrap();
+        let lone = SeriesTable::begin(folder.file("series.csv").unwrap()).unwrap();
+        table.row(&outcome(observables(), observables())).unwrap();
+        let part = table.part().to_path_buf();
+        drop((table, lone));
+        assert_eq!(fs::read_to_string(&part).unwrap().lines().count(), 2);
+        assert_eq!(fs::read_dir(home.path()).unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,96 @@
+//! Running totals over members: what the overview and `run.json` say, without keeping the members.
+
+use crate::ensemble::{Outcome, Status};
+
+/// Counts and sums over the members that ended.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    counts: [u64; Status::ALL.len()],
+    relaxation_times: Vec<f64>,
+    /// Steps of all members.
+    pub steps: u64,
+    /// Sweeps on curvature systems of all members.
+    pub sweeps_k: u64,
+    /// Sweeps on position systems of all members.
+    pub sweeps_x: u64,
+}
+
+impl Tally {
+    /// Adds one member.
+    pub fn add(&mut self, outcome: &Outcome) {
+        for (count, status) in self.counts.iter_mut().zip(Status::ALL) {
+            *count += u64::from(status == outcome.status);
+        }
+        self.relaxation_times.extend(outcome.t_relax);
+        self.steps += outcome.steps;
+        self.sweeps_k += outcome.sweeps_k;
+        self.sweeps_x += outcome.sweeps_x;
+    }
+
+    /// Members that ended.
+    pub fn members(&self) -> u64 {
+        self.counts.iter().sum()
+    }
+
+    /// Each status with its number of members, in the order of [`Status::ALL`].
+    pub fn counts(&self) -> impl Iterator<Item = (Status, u64)> {
+        Status::ALL.into_iter().zip(self.counts)
+    }
+
+    /// Relaxation time over the members that have one; none if no member has.
+    pub fn relaxation(&self) -> Option<Relaxation> {
+        let mut times = self.relaxation_times.clone();
+        times.sort_by(f64::total_cmp);
+        let (count, half) = (times.len(), times.len() / 2);
+        let median = match count % 2 {
+            _ if count == 0 => return None,
+            0 => 0.5 * (times[half - 1] + times[half]),
+            _ => times[half],
+        };
+        Some(Relaxation { count: count as u64, mean: times.iter().sum::<f64>() / count as f64, median })
+    }
+}
+
+/// Relaxation time over the members that have one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Relaxation {
+    /// How many have.
+    pub count: u64,
+    /// Their mean.
+    pub mean: f64,
+    /// Their median.
+    pub median: f64,
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::ensemble::Observables;
+
+    pub fn outcome(member: u64, status: Status, t_relax: Option<f64>) -> Outcome {
+        let (start, end) = (Observables::default(), Observables::default());
+        Outcome { member, status, t_end: 2.0, steps: 10, sweeps_k: 20, sweeps_x: 5, t_relax, t_half: None, start, end }
+    }
+
+    fn tally(times: &[f64], censored: u64) -> Tally {
+        let mut tally = Tally::default();
+        times.iter().for_each(|t| tally.add(&outcome(0, Status::Relaxed, Some(*t))));
+        (0..censored).for_each(|_| tally.add(&outcome(0, Status::Unfinished, None)));
+        tally
+    }
+
+    #[test]
+    fn totals_count_every_member_once() {
+        let tally = tally(&[1.0, 2.0], 3);
+        assert_eq!((tally.members(), tally.steps, tally.sweeps_k, tally.sweeps_x), (5, 50, 100, 25));
+        let counts: Vec<u64> = tally.counts().map(|(_, count)| count).collect();
+        assert_eq!(counts, [2, 3, 0, 0, 0]);
+    }
+
+    #[test]
+    fn the_median_takes_the_middle_whatever_the_order() {
+        assert_eq!(tally(&[], 2).relaxation(), None);
+        assert_eq!(tally(&[9.0, 1.0, 2.0], 1).relaxation(), Some(Relaxation { count: 3, mean: 4.0, median: 2.0 }));
+        assert_eq!(tally(&[9.0, 1.0, 2.0, 4.0], 0).relaxation().unwrap().median, 3.0);
+    }
+}
