@@ -21,13 +21,14 @@ var<private> v: vec;
 fn solve_one(negligible: real) -> u32 {
     share(u, u);
     sweeps = 0u;
+    let tolerance = max(p.tolerance, rounding_limit());
     var ended = UNSOLVED;
     while ended == UNSOLVED && sweeps < dispatch.max_sweeps {
         let batch = min(SWEEPS_PER_CHECK, dispatch.max_sweeps - sweeps);
         for (var s = 0u; s < batch; s++) { sweep_one(); }
         sweeps += batch;
         let error = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
-        ended = judge(block_max(error), block_max(bounded_abs(u)), negligible);
+        ended = judge(block_max(error), block_max(bounded_abs(u)), tolerance, negligible);
     }
     return ended;
 }
@@ -36,6 +37,7 @@ fn solve_one(negligible: real) -> u32 {
 fn solve_two(negligible: real) -> u32 {
     share(u, v);
     sweeps = 0u;
+    let tolerance = max(p.tolerance, rounding_limit());
     var ended = UNSOLVED;
     while ended == UNSOLVED && sweeps < dispatch.max_sweeps {
         let batch = min(SWEEPS_PER_CHECK, dispatch.max_sweeps - sweeps);
@@ -44,14 +46,21 @@ fn solve_two(negligible: real) -> u32 {
         let error_u = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
         let error_v = bounded_abs(row_of.weight * residual(rhs_y, read_b()));
         let size = max(bounded_abs(u), bounded_abs(v));
-        ended = judge(block_max(max(error_u, error_v)), block_max(size), negligible);
+        ended = judge(block_max(max(error_u, error_v)), block_max(size), tolerance, negligible);
     }
     return ended;
 }
 
-fn judge(error: real, size: real, negligible: real) -> u32 {
+/// The tolerance below which a scaled residual is rounding error.
+fn rounding_limit() -> real {
+    let terms = vec(1.0) + abs(row_of.a) + abs(row_of.b) + abs(row_of.d) + abs(row_of.e);
+    let largest = ring_maxima(vec(block_max(bounded_abs(row_of.weight * terms)), 0.0, 0.0, 0.0));
+    return real(EPSILON) * largest.x;
+}
+
+fn judge(error: real, size: real, tolerance: real, negligible: real) -> u32 {
     let norms = ring_maxima(vec(error, size, 0.0, 0.0));
-    let bound = max(p.tolerance * norms.y, negligible);
+    let bound = max(tolerance * norms.y, negligible);
     var ended = UNSOLVED;
     if !(norms.x <= real(BIG)) {
         ended = NOT_FINITE;

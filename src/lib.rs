@@ -8,7 +8,10 @@ pub mod error;
 pub mod flow;
 pub mod number;
 pub mod report;
+pub mod schedule;
 pub mod scheme;
+pub mod simulate;
 pub mod solver;
+pub mod trajectory;
 
 pub use error::{Error, Result};

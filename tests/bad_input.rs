@@ -210,7 +210,6 @@ fn a_reader_that_goes_away_ends_the_program_quietly() {
 
 /// What the reader of shapes and the perturbation refuse.
 #[test]
-#[ignore = "passes once shapes are read from files and `Family::new` checks the spec"]
 fn a_wrong_shape_is_refused_by_name() {
     let files = [
         ("empty.csv", ""),
@@ -249,7 +248,6 @@ fn a_wrong_shape_is_refused_by_name() {
 
 /// No adapter has this name, whatever the machine.
 #[test]
-#[ignore = "passes once a run opens its back end"]
 fn an_adapter_that_is_not_there_is_refused_by_name() {
     let message = refused(&["--backend", "gpu", "--adapter", "abacus"], &[]);
     assert_says(&message, &["--adapter abacus", "curvelax adapters"]);

@@ -1,12 +1,50 @@
 //! `curvelax adapters`: what this machine offers, and which adapter `auto` takes and why.
 
-use crate::error::{Error, Result};
+use super::print;
+use crate::{
+    backend::{self, choose::MAX_POINTS_F32, gpu::Gpu},
+    ensemble::Spec,
+    error::Result,
+};
 
 /// List the GPU adapters, their features and limits, and which one `--backend auto` takes and why.
 #[derive(clap::Args)]
 pub struct AdaptersArgs {}
 
-// HOOK(lead): print the listing.
+/// Prints the listing.
 pub fn adapters(AdaptersArgs {}: AdaptersArgs) -> Result<()> {
-    Err(Error::Failed("`curvelax adapters` is not connected yet".into()))
+    let found = Gpu::list();
+    let mut text = String::new();
+    for gpu in &found {
+        text += &describe(gpu);
+    }
+    if found.is_empty() {
+        text += "no GPU adapter; Debian's software GPU is the package mesa-vulkan-drivers\n";
+    }
+    let spec = Spec::default();
+    let choice = backend::choose(&spec, spec.points)?;
+    print(&format!("{text}\n--backend auto, for the default run: {}\n", choice.sentence()))
+}
+
+fn describe(gpu: &Gpu) -> String {
+    let limits = gpu.limits();
+    let kind = if gpu.is_hardware() { "hardware" } else { "software" };
+    let points = match gpu.has_f64() {
+        true => format!("{} in f32, {} in f64", gpu.max_points::<f32>().min(MAX_POINTS_F32), gpu.max_points::<f64>()),
+        false => format!("{} in f32", gpu.max_points::<f32>().min(MAX_POINTS_F32)),
+    };
+    let rows = [
+        ("kind", format!("{kind}, {}, {}", gpu.device_type(), gpu.api())),
+        ("driver", gpu.driver()),
+        ("precisions", if gpu.has_f64() { "f32, f64" } else { "f32" }.into()),
+        ("points", format!("at most {points}")),
+        ("workgroup", {
+            let (threads, bytes) =
+                (limits.max_compute_invocations_per_workgroup, limits.max_compute_workgroup_storage_size);
+            format!("{threads} threads, {bytes} bytes, subgroups of {}", gpu.subgroup())
+        }),
+        ("binding", format!("{} bytes", limits.max_storage_buffer_binding_size)),
+    ];
+    let rows: String = rows.iter().map(|(label, value)| format!("  {label:<12}{value}\n")).collect();
+    format!("{}\n{rows}", gpu.name())
 }

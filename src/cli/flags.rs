@@ -127,7 +127,7 @@ pub struct SpecFlags {
         long, value_name = "FACTOR", value_parser = real, allow_hyphen_values = true, help_heading = METHOD
     )]
     sor: Option<f64>,
-    /// Sweeps per system after which a member has stalled [default: 50000]
+    /// Sweeps per system after which a member has stalled [default: 200000]
     #[arg(
         long, value_name = "COUNT", value_parser = whole::<u32>, allow_hyphen_values = true,
         help_heading = METHOD

@@ -4,9 +4,11 @@ use std::path::PathBuf;
 
 use super::{flags, note, print};
 use crate::{
-    ensemble::Spec,
+    backend,
+    ensemble::{Family, Spec},
     error::{Error, Result},
-    report::{OutputFolder, Panel, Platform, Report},
+    report::{OutputFolder, Report, gallery::MOST_PANELS},
+    simulate::simulate,
 };
 
 const EXAMPLES: &str = "\
@@ -44,21 +46,32 @@ pub struct RunArgs {
 
 /// Runs the command.
 pub fn run(args: RunArgs) -> Result<()> {
-    let spec = resolve(args.spec, args.flags)?;
-    let prepared = prepare(&spec)?;
+    let mut spec = resolve(args.spec, args.flags)?;
+    let family = Family::new(&spec)?;
+    spec.points = family.points();
+    let choice = backend::choose(&spec, spec.points)?;
+    choice.settle(&mut spec);
     if args.print_spec {
         return print(&spec.to_toml()?);
     }
     let out = args.out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
-    let mut report = Report::begin(OutputFolder::open(&out, args.force)?, &spec, args.quiet)?;
-    let finished = match simulate(&spec, prepared, &mut report) {
-        Ok(finished) => finished,
-        Err(error) => {
-            report.kept_rows().inspect(|rows| note(&format!("note: the members that ended are kept in {rows}")));
-            return Err(error);
+    let say = |line: &str| {
+        if !args.quiet {
+            note(line)
         }
     };
-    let overview = report.finish(&spec, &finished.platform, &finished.panels, &finished.warnings)?;
+    say(&choice.sentence());
+    family.warnings().iter().for_each(|warning| say(&format!("warning: {warning}")));
+    let folder = OutputFolder::open(&out, args.force)?;
+    let precision = choice.precision();
+    let (mut backend, platform) = choice.open(&spec, spec.points)?;
+    let mut report = Report::begin(folder, &spec, args.quiet)?;
+    let done = simulate(&spec, &family, precision, backend.as_mut(), MOST_PANELS, &mut report);
+    if let Err(error) = done {
+        report.kept_rows().inspect(|rows| note(&format!("note: the members that ended are kept in {rows}")));
+        return Err(error);
+    }
+    let overview = report.finish(&spec, &platform, family.warnings())?;
     if args.quiet { Ok(()) } else { print(&overview) }
 }
 
@@ -67,25 +80,4 @@ fn resolve(file: Option<PathBuf>, flags: flags::SpecFlags) -> Result<Spec> {
     let mut spec = file.map_or_else(|| Ok(Spec::default()), |path| Spec::read(&path))?;
     flags.overlay(&mut spec);
     spec.validate()
-}
-
-/// What a simulation leaves besides the rows that it sent to the [`Report`].
-struct Finished {
-    platform: Platform,
-    panels: Vec<Panel>,
-    warnings: Vec<String>,
-}
-
-/// What is opened before any file is made, because opening it may show that the request is wrong.
-struct Prepared {}
-
-// HOOK(lead): `Family::new(spec)?`; unless the spec is only printed, also the back end and the one line that says
-// what `auto` took and why.
-fn prepare(_spec: &Spec) -> Result<Prepared> {
-    Ok(Prepared {})
-}
-
-// HOOK(lead): simulate, sending each member to `report` (it is a `Sink`).
-fn simulate(_spec: &Spec, Prepared {}: Prepared, _report: &mut Report) -> Result<Finished> {
-    Err(Error::Failed("`curvelax run` is not connected yet".into()))
 }

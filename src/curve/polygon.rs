@@ -57,8 +57,13 @@ pub fn excess(points: &[DVec2]) -> f64 {
 
 /// [`excess`] from a length, a signed area and the number of nodes n ≥ 3.
 pub fn excess_of(length: f64, area: f64, n: usize) -> f64 {
+    length * length / (4.0 * PI * area) - regular_ratio(n)
+}
+
+/// Isoperimetric ratio `L²/(4πA) = (n/π)·tan(π/n)` of the regular n-gon.
+pub fn regular_ratio(n: usize) -> f64 {
     let n = n as f64;
-    length * length / (4.0 * PI * area) - n / PI * (PI / n).tan()
+    n / PI * (PI / n).tan()
 }
 
 /// Turning number: how often the edge direction goes round, +1 for an embedded counter-clockwise polygon, 0 for a

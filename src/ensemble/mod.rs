@@ -8,5 +8,5 @@ pub mod spec;
 mod validate;
 
 pub use member::{Family, Member};
-pub use outcome::{Observables, Outcome, SeriesRow, Sink, Snapshot, Status};
+pub use outcome::{Ended, Observables, Outcome, Portrait, SeriesRow, Sink, Snapshot, Status};
 pub use spec::Spec;

@@ -1,5 +1,7 @@
 //! What a member's run leaves behind: its status, its times, and its observables at the start and the end.
 
+use glam::DVec2;
+
 use crate::error::Result;
 
 /// How a member ended.
@@ -111,10 +113,32 @@ pub struct Snapshot {
     pub r: Vec<f64>,
 }
 
-/// Receives everything that one member left, exactly once per member and in member order.
+/// A member's nodes in the user's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Portrait {
+    /// At the start.
+    pub before: Vec<DVec2>,
+    /// In the last accepted state.
+    pub after: Vec<DVec2>,
+}
+
+/// Everything that one member left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ended {
+    /// Its row of the summary.
+    pub outcome: Outcome,
+    /// Its rows of the series, in time order.
+    pub series: Vec<SeriesRow>,
+    /// Its snapshots, in time order.
+    pub snapshots: Vec<Snapshot>,
+    /// Its nodes at both ends, where they were asked for.
+    pub portrait: Option<Portrait>,
+}
+
+/// Receives everything that the members leave.
 pub trait Sink {
-    /// `series` and `snapshots` are in time order.
-    fn member(&mut self, outcome: &Outcome, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<()>;
-    /// `done` of `total` members have ended; `share` ∈ [0, 1] counts the unfinished ones by their time.
+    /// A member has ended; called exactly once per member, in member order.
+    fn member(&mut self, ended: &Ended) -> Result<()>;
+    /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done.
     fn progress(&mut self, done: u64, total: u64, share: f64);
 }

@@ -13,25 +13,7 @@ use crate::{
     flow::Flow,
 };
 
-/// Which solver takes the periodic pentadiagonal systems.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Solver {
-    /// Gauss–Seidel sweeps, the paper's.
-    GaussSeidel,
-    /// Periodic pentadiagonal elimination.
-    Direct,
-}
-
-/// The order in which a Gauss–Seidel sweep visits the nodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Order {
-    /// Colour by colour: what the kernel does.
-    Coloured,
-    /// Node by node, as the paper does (CPU only).
-    Lexicographic,
-}
+pub use crate::solver::{Order, Solver};
 
 /// Where the members are advanced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -144,7 +126,7 @@ impl Default for Spec {
             order: Order::Coloured,
             tolerance: None,
             sor: 1.0,
-            max_sweeps: 50_000,
+            max_sweeps: 200_000,
             backend: BackendChoice::Auto,
             adapter: None,
             precision: None,
@@ -182,6 +164,19 @@ impl Spec {
     pub fn keys() -> Vec<String> {
         let refused = toml::from_str::<Spec>("\"\" = 0").expect_err("the empty key is unknown");
         quoted(refused.message()).skip(1).map(str::to_owned).collect()
+    }
+
+    /// The indices of the members to run, ascending.
+    pub fn members(&self) -> Box<dyn Iterator<Item = u64> + '_> {
+        match &self.only {
+            Some(only) => Box::new(only.iter().copied()),
+            None => Box::new(0..self.curves),
+        }
+    }
+
+    /// How many members [`Spec::members`] has.
+    pub fn member_count(&self) -> u64 {
+        self.only.as_ref().map_or(self.curves, |only| only.len() as u64)
     }
 
     /// The residual tolerance in use at `precision`.

@@ -16,10 +16,10 @@ use std::time::{Instant, SystemTime};
 
 pub use folder::OutputFolder;
 pub use gallery::Panel;
-pub use provenance::Platform;
 
 use crate::{
-    ensemble::{Outcome, SeriesRow, Sink, Snapshot, Spec},
+    backend::Platform,
+    ensemble::{Ended, Outcome, Portrait, Sink, Spec},
     error::Result,
 };
 use progress::Progress;
@@ -34,6 +34,7 @@ pub struct Report {
     snapshots: Option<SnapshotTable>,
     folder: OutputFolder,
     tally: Tally,
+    panels: Vec<Panel>,
     progress: Progress,
     started: SystemTime,
     clock: Instant,
@@ -51,6 +52,7 @@ impl Report {
             },
             folder,
             tally: Tally::default(),
+            panels: Vec::new(),
             progress: Progress::new(quiet),
             started: SystemTime::now(),
             clock: Instant::now(),
@@ -63,8 +65,8 @@ impl Report {
     }
 
     /// Puts every file under its final name, `run.json` last, and returns the overview for stdout.
-    pub fn finish(self, spec: &Spec, platform: &Platform, panels: &[Panel], warnings: &[String]) -> Result<String> {
-        let Report { summary, series, snapshots, folder, tally, progress, started, clock } = self;
+    pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String]) -> Result<String> {
+        let Report { summary, series, snapshots, folder, tally, panels, progress, started, clock } = self;
         progress.finish();
         let wall = clock.elapsed();
         folder.remove_earlier()?;
@@ -79,7 +81,7 @@ impl Report {
             files.push(folder::SNAPSHOTS);
         }
         if !panels.is_empty() {
-            folder.write(folder::CURVES, &gallery::draw(panels))?;
+            folder.write(folder::CURVES, &gallery::draw(&panels))?;
             files.push(folder::CURVES);
         }
         let provenance = provenance::Provenance::new(spec, platform, &tally, warnings, started, wall);
@@ -90,7 +92,8 @@ impl Report {
 }
 
 impl Sink for Report {
-    fn member(&mut self, outcome: &Outcome, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<()> {
+    fn member(&mut self, ended: &Ended) -> Result<()> {
+        let Ended { outcome, series, snapshots, portrait } = ended;
         if let Some(table) = &mut self.series {
             series.iter().try_for_each(|row| table.row(row))?;
         }
@@ -99,6 +102,10 @@ impl Sink for Report {
         }
         self.summary.row(outcome)?;
         self.tally.add(outcome);
+        if let Some(Portrait { before, after }) = portrait.clone() {
+            let Outcome { member, status, t_relax, .. } = *outcome;
+            self.panels.push(Panel { member, status, t_relax, before, after });
+        }
         Ok(())
     }
 
@@ -114,7 +121,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::ensemble::{Observables, Status};
+    use crate::ensemble::{Observables, SeriesRow, Snapshot, Status};
 
     fn files(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
@@ -124,12 +131,13 @@ mod tests {
     }
 
     /// A report into `out` that has received one member.
-    fn report(out: &Path, spec: &Spec) -> Report {
+    fn report(out: &Path, spec: &Spec, portrait: Option<Portrait>) -> Report {
         let mut report = Report::begin(OutputFolder::open(out, true).unwrap(), spec, true).unwrap();
         assert_eq!(report.kept_rows(), None);
         let row = SeriesRow { member: 0, t: 0.0, at: Observables::default() };
         let snapshot = Snapshot { member: 0, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] };
-        report.member(&tally::tests::outcome(0, Status::Relaxed, Some(0.5)), &[row], &[snapshot]).unwrap();
+        let outcome = tally::tests::outcome(0, Status::Relaxed, Some(0.5));
+        report.member(&Ended { outcome, series: vec![row], snapshots: vec![snapshot], portrait }).unwrap();
         report
     }
 
@@ -139,11 +147,10 @@ mod tests {
         let out = home.path().join("out");
         let platform = provenance::tests::platform();
         let triangle = vec![DVec2::ZERO, DVec2::X, DVec2::Y];
-        let panel =
-            Panel { member: 0, status: Status::Relaxed, t_relax: None, before: triangle.clone(), after: triangle };
+        let portrait = Portrait { before: triangle.clone(), after: triangle };
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
-        let overview = report(&out, &all).finish(&all, &platform, &[panel], &[]).unwrap();
+        let overview = report(&out, &all, Some(portrait)).finish(&all, &platform, &[]).unwrap();
         assert_eq!(files(&out), ["plots", "run.json", "series.csv", "snapshots.csv", "summary.csv"]);
         assert_eq!(files(&out.join("plots")), ["curves.svg"]);
         for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
@@ -152,7 +159,7 @@ mod tests {
         assert!(overview.contains("summary.csv, series.csv, snapshots.csv, plots/curves.svg, run.json"), "{overview}");
 
         let few = Spec::default();
-        report(&out, &few).finish(&few, &platform, &[], &["a warning".into()]).unwrap();
+        report(&out, &few, None).finish(&few, &platform, &["a warning".into()]).unwrap();
         assert_eq!(files(&out), ["plots", "run.json", "summary.csv"]);
         assert_eq!(files(&out.join("plots")), [""; 0]);
         assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
@@ -162,7 +169,7 @@ mod tests {
     fn a_run_that_fails_keeps_the_members_that_ended() {
         let home = tempfile::tempdir().unwrap();
         let out = home.path().join("out");
-        let failed = report(&out, &Spec::default());
+        let failed = report(&out, &Spec::default(), None);
         let kept = failed.kept_rows().unwrap();
         drop(failed);
         assert_eq!(files(&out), [".summary.csv.part"]);

@@ -2,8 +2,8 @@
 
 use std::{fmt, path::Path, time::Duration};
 
-use super::{progress::duration, provenance::Platform, tally::Tally};
-use crate::ensemble::Spec;
+use super::{progress::duration, tally::Tally};
+use crate::{backend::Platform, ensemble::Spec};
 
 /// A finished run at a glance; its `Display` is the text for stdout.
 pub struct Overview<'a> {

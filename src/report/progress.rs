@@ -43,7 +43,7 @@ impl Progress {
         Progress::Bar(bar)
     }
 
-    /// `done` of `total` members have ended; `share` ∈ [0, 1] counts the others by their time.
+    /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done.
     pub fn show(&mut self, done: u64, total: u64, share: f64) {
         match self {
             Progress::Quiet => {}

@@ -9,28 +9,10 @@ use serde::Serialize;
 
 use super::tally::Tally;
 use crate::{
+    backend::Platform,
     ensemble::{Spec, spec::Precision},
     error::{Error, Result},
 };
-
-/// Where a run was computed.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Platform {
-    /// `gpu` or `cpu`.
-    pub backend: String,
-    /// Name of the GPU adapter.
-    pub adapter: Option<String>,
-    /// Its driver and the driver's version.
-    pub driver: Option<String>,
-    /// Hardware or software, integrated or discrete.
-    pub device_type: Option<String>,
-    /// Number type of the arithmetic.
-    pub precision: Precision,
-    /// Why this back end was taken.
-    pub reason: String,
-    /// Threads of the CPU back end.
-    pub threads: Option<usize>,
-}
 
 /// The content of `run.json`.
 #[derive(Serialize)]

@@ -48,6 +48,11 @@ impl<N: Number> State<N> {
 }
 
 impl<T: Real> State<T> {
+    /// The nodes.
+    pub fn positions(&self) -> impl Iterator<Item = DVec2> {
+        self.x.nodes().iter().zip(self.y.nodes()).map(|(x, y)| DVec2::new(x.to_f64(), y.to_f64()))
+    }
+
     /// The initial state of the polygon `nodes` (n ≥ 6, counter-clockwise): `r_i = |R_i|` and
     /// `k_i = angle(R_{i-1}, R_{i+1}) / 2r_i`, computed in f64 and rounded.
     ///

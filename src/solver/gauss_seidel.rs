@@ -4,7 +4,8 @@
 //! replaces `u_i` by `u_i + ω_SOR·residual_i`; ω_SOR = 1 is Gauss–Seidel. The slow modes of a fourth-order
 //! operator hardly show in the residual: their eigenvalue is only q/τ. So the residual is scaled by τ/q,
 //! which bounds the error of just these modes, and the sweeps stop when
-//! `max (τ/q)|residual| ≤ tolerance · max|u|`, or when that error is below the rounding of the unknown itself.
+//! `max (τ/q)|residual| ≤ tolerance · max|u|`, or when that error is below the rounding of the unknown itself, or
+//! when the residual is all rounding (f32 reaches that at a tolerance of about 16·ε·τ/h⁴).
 //! Stopping on the update instead stops hundreds of times too early.
 //!
 //! *Practice.* Coloured order gives the kernel its parallelism and needs the same number of sweeps as the
@@ -65,6 +66,7 @@ pub fn solve<N: Number, const F: usize>(
     control: &Control<N>,
 ) -> Swept<N> {
     let mut active = N::Mask::all_of(true);
+    let tolerance = control.tolerance.max(rounding_limit(system));
     let mut swept = Swept { sweeps: N::of(0.0), converged: N::Mask::all_of(false), finite: N::Mask::all_of(true) };
     let mut done = 0;
     while done < control.max_sweeps && active.any() {
@@ -78,7 +80,7 @@ pub fn solve<N: Number, const F: usize>(
         done += sweeps;
         swept.sweeps += N::select(active, N::of(f64::from(sweeps)), N::of(0.0));
         let [error, size] = norms(system, &unknown);
-        let bound = (control.tolerance * size).max(control.negligible);
+        let bound = (tolerance * size).max(control.negligible);
         swept.finite = error.le(N::of(BIG));
         swept.converged = swept.finite.and(error.le(bound));
         active = active.and(swept.finite).and(swept.converged.not());
@@ -133,6 +135,16 @@ fn relax<N: Number, const F: usize>(
 ) {
     let relaxed = u[i] + sor * system.residual(f, i, u);
     u[i] = N::select(active, relaxed, u[i]);
+}
+
+/// The tolerance below which a scaled residual is rounding error: no sweep, and no direct solve, gets further.
+fn rounding_limit<N: Number, const F: usize>(system: &System<N, F>) -> N {
+    let mut largest = N::of(0.0);
+    for row in &system.rows {
+        let terms = N::of(1.0) + row.a.abs() + row.b.abs() + row.d.abs() + row.e.abs();
+        largest = largest.max((row.weight * terms).bounded_abs());
+    }
+    N::of(N::EPSILON) * largest
 }
 
 /// `[max weight·|residual|, max |u|]` over nodes and right-hand sides; not finite shows as more than [`BIG`].

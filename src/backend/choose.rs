@@ -1,0 +1,215 @@
+//! Which back end a spec gets, and why: all that can be refused is refused here, before any work.
+
+use serde::Serialize;
+
+use super::{
+    Backend,
+    cpu::CpuBackend,
+    gpu::{Gpu, Kernel},
+};
+use crate::{
+    ensemble::{
+        Spec,
+        spec::{BackendChoice, Precision},
+    },
+    error::{Error, Result},
+    number::Real,
+    scheme::step::Method,
+    solver::{Blocks, Order, Solver},
+};
+
+/// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
+pub const MAX_POINTS_F32: usize = 400;
+
+/// Where a run is computed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Platform {
+    /// `gpu` or `cpu`.
+    pub backend: String,
+    /// Name of the GPU adapter.
+    pub adapter: Option<String>,
+    /// Its driver and the driver's version.
+    pub driver: Option<String>,
+    /// Hardware or software, integrated or discrete.
+    pub device_type: Option<String>,
+    /// Number type of the arithmetic.
+    pub precision: Precision,
+    /// Why this back end was taken.
+    pub reason: String,
+    /// Threads of the CPU back end.
+    pub threads: Option<usize>,
+}
+
+/// A back end that suits a spec, not yet opened.
+pub struct Choice {
+    gpu: Option<Gpu>,
+    precision: Precision,
+    reason: String,
+}
+
+/// Chooses the back end for members of `n` nodes.
+///
+/// # Errors
+/// [`Error::Request`] when the adapter, the precision or n cannot be had.
+pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
+    match spec.backend {
+        BackendChoice::Cpu => cpu(spec, n, "asked for".into()),
+        BackendChoice::Gpu => gpu(spec, n),
+        BackendChoice::Auto if spec.adapter.is_some() => gpu(spec, n),
+        BackendChoice::Auto => auto(spec, n, Gpu::list()),
+    }
+}
+
+/// What `--backend auto` takes: the first hardware GPU that can do the run, else the CPU.
+fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
+    if spec.solver == Solver::Direct {
+        return cpu(spec, n, "the direct solver runs on the CPU".into());
+    }
+    if spec.order == Order::Lexicographic {
+        return cpu(spec, n, "lexicographic sweeps run on the CPU".into());
+    }
+    let mut reason = "no hardware GPU found".to_string();
+    for adapter in adapters.into_iter().filter(Gpu::is_hardware) {
+        let name = adapter.name().to_string();
+        match take(spec, n, adapter, format!("hardware GPU {name}")) {
+            Ok(choice) => return Ok(choice),
+            Err(error) => reason = format!("GPU {name} cannot do it: {error}"),
+        }
+    }
+    cpu(spec, n, reason)
+}
+
+fn cpu(spec: &Spec, n: usize, reason: String) -> Result<Choice> {
+    let precision = spec.precision.unwrap_or(Precision::F64);
+    check_precision(n, precision)?;
+    Ok(Choice { gpu: None, precision, reason })
+}
+
+fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
+    if spec.solver == Solver::Direct || spec.order == Order::Lexicographic {
+        let message = "--adapter: direct and lexicographic solves run on the CPU only; leave out --adapter";
+        return Err(Error::Request(message.into()));
+    }
+    let found = Gpu::list();
+    let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
+    let matches = |gpu: &Gpu| match &spec.adapter {
+        Some(part) => gpu.name().to_lowercase().contains(&part.to_lowercase()),
+        None => true,
+    };
+    match found.into_iter().find(matches) {
+        Some(adapter) => take(spec, n, adapter, "asked for".into()),
+        None => Err(no_adapter(spec.adapter.as_deref(), &names)),
+    }
+}
+
+fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
+    let there = if names.is_empty() {
+        "this machine has none; take --backend cpu, or install a GPU driver (Debian's software GPU is \
+         mesa-vulkan-drivers)"
+            .to_string()
+    } else {
+        format!("there are: {}", names.join(", "))
+    };
+    match asked {
+        Some(name) => Error::Request(format!("--adapter {name}: no such adapter; {there} (see `curvelax adapters`)")),
+        None => Error::Request(format!("--backend gpu: no GPU adapter; {there}")),
+    }
+}
+
+fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<Choice> {
+    let precision = spec.precision.unwrap_or(adapter.best_precision());
+    if precision == Precision::F64 && !adapter.has_f64() {
+        let problem = format!("adapter {} has no f64", adapter.name());
+        return Err(Error::value("precision", "f64", &problem, "take --precision f32, or --backend cpu"));
+    }
+    check_precision(n, precision)?;
+    let (fits, most) = match precision {
+        Precision::F32 => (adapter.check_size::<f32>(ring(n)?), adapter.max_points::<f32>().min(MAX_POINTS_F32)),
+        Precision::F64 => (adapter.check_size::<f64>(ring(n)?), adapter.max_points::<f64>()),
+    };
+    fits.map_err(|needs| {
+        let problem = format!("a member needs {needs}");
+        Error::value("points", n, &problem, &format!("take {most} or fewer, or --backend cpu"))
+    })?;
+    Ok(Choice { gpu: Some(adapter), precision, reason })
+}
+
+/// f32 has a resolution limit: rounding grows like (1/h)⁴, and beyond the verified n results would only look right.
+fn check_precision(n: usize, precision: Precision) -> Result<()> {
+    if precision == Precision::F32 && n > MAX_POINTS_F32 {
+        let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");
+        return Err(Error::value("points", n, &problem, "take fewer points, or --precision f64"));
+    }
+    Ok(())
+}
+
+fn ring(n: usize) -> Result<Blocks> {
+    Blocks::new(n)
+        .ok_or_else(|| Error::value("points", n, "a ring of fewer than 6 nodes cannot be coloured", "take 6 or more"))
+}
+
+impl Choice {
+    /// The number type of the run.
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+
+    /// One line: what was taken and why.
+    pub fn sentence(&self) -> String {
+        let precision = match self.precision {
+            Precision::F32 => "f32",
+            Precision::F64 => "f64",
+        };
+        match &self.gpu {
+            Some(gpu) => format!("back end: GPU {} ({}), {precision} ({})", gpu.name(), gpu.api(), self.reason),
+            None => format!("back end: CPU, {precision} ({})", self.reason),
+        }
+    }
+
+    /// The spec with everything that this choice settled written out, so that it can be repeated as it is.
+    pub fn settle(&self, spec: &mut Spec) {
+        spec.backend = if self.gpu.is_some() { BackendChoice::Gpu } else { BackendChoice::Cpu };
+        spec.adapter = self.gpu.as_ref().map(|gpu| gpu.name().to_string());
+        spec.tolerance = Some(spec.tolerance_at(self.precision));
+        spec.precision = Some(self.precision);
+    }
+
+    /// Opens it for `members` members of `n` nodes.
+    pub fn open(self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+        match self.precision {
+            Precision::F32 => self.open_in::<f32>(spec, n),
+            Precision::F64 => self.open_in::<f64>(spec, n),
+        }
+    }
+
+    fn open_in<T: Real>(self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+        let blocks = ring(n)?;
+        let mut platform = Platform {
+            backend: "cpu".into(),
+            adapter: None,
+            driver: None,
+            device_type: None,
+            precision: self.precision,
+            reason: self.reason,
+            threads: None,
+        };
+        if let Some(gpu) = self.gpu {
+            let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
+            let kernel = Kernel::<T>::new(&gpu, blocks, members, spec.max_sweeps, false)?;
+            platform.backend = "gpu".into();
+            platform.adapter = Some(gpu.name().to_string());
+            platform.driver = Some(gpu.driver());
+            platform.device_type = Some(gpu.device_type());
+            return Ok((Box::new(kernel), platform));
+        }
+        let method = Method {
+            solver: spec.solver,
+            order: spec.order,
+            max_sweeps: spec.max_sweeps,
+            redistribution: !spec.no_redistribution,
+        };
+        let backend = CpuBackend::<T>::new(blocks, method, spec.threads.unwrap_or(0))?;
+        platform.threads = Some(backend.threads());
+        Ok((Box::new(backend), platform))
+    }
+}

@@ -1,0 +1,133 @@
+//! The loop: fill slots with members, advance them, collect what they report, refill.
+//!
+//! Nothing here depends on where the members are advanced or on how many are resident: a member's steps are its
+//! own, its output times are reached by aiming at the steps around them, and rows leave in member order.
+
+use std::collections::BTreeMap;
+
+use crate::{
+    backend::Backend,
+    ensemble::{Ended, Family, Sink, Spec, spec::Precision},
+    error::Result,
+    schedule::{Clock, Stop, stops},
+    trajectory::Trajectory,
+};
+
+/// Runs every member that `spec` asks for on `backend`, and hands each to `sink` in member order.
+///
+/// The first `portraits` members come with their nodes before and after.
+pub fn simulate(
+    spec: &Spec,
+    family: &Family,
+    precision: Precision,
+    backend: &mut dyn Backend,
+    portraits: usize,
+    sink: &mut dyn Sink,
+) -> Result<()> {
+    let clock = Clock::new(spec.tau, spec.t_end);
+    let stops = stops(&clock, spec.series, &spec.snapshots);
+    let mut waiting = spec.members().enumerate();
+    let mut pool = Pool {
+        spec,
+        family,
+        precision,
+        clock,
+        stops: &stops,
+        resident: (0..backend.slots()).map(|_| None).collect(),
+        portraits,
+    };
+    let mut queue = Queue { total: spec.member_count(), ended: 0, next: 0, early: BTreeMap::new() };
+    loop {
+        for slot in 0..pool.resident.len() {
+            while pool.resident[slot].is_none() {
+                let Some((rank, index)) = waiting.next() else { break };
+                if let Some(ended) = pool.admit(backend, slot, rank, index)? {
+                    queue.leave(rank, ended, sink)?;
+                }
+            }
+        }
+        let work = queue.ended as f64 + pool.share();
+        sink.progress(queue.ended, queue.total, work / queue.total as f64);
+        if pool.resident.iter().all(Option::is_none) {
+            return Ok(());
+        }
+        backend.advance()?;
+        for slot in 0..pool.resident.len() {
+            if let Some((rank, ended)) = pool.collect(backend, slot)? {
+                queue.leave(rank, ended, sink)?;
+            }
+        }
+    }
+}
+
+/// The resident members of a run.
+struct Pool<'a> {
+    spec: &'a Spec,
+    family: &'a Family,
+    precision: Precision,
+    clock: Clock,
+    stops: &'a [Stop],
+    resident: Vec<Option<(usize, Trajectory<'a>)>>,
+    portraits: usize,
+}
+
+impl Pool<'_> {
+    /// Puts member `index`, the `rank`-th of this run, into a free slot; or ends it where there is nothing to do.
+    fn admit(&mut self, backend: &mut dyn Backend, slot: usize, rank: usize, index: u64) -> Result<Option<Ended>> {
+        let member = self.family.member(index)?;
+        let tolerance = self.spec.tolerance_at(self.precision);
+        let mut trajectory = Trajectory::new(member, self.spec, tolerance, self.clock, self.stops);
+        trajectory.keep_portrait(rank < self.portraits);
+        if trajectory.is_over() {
+            return Ok(Some(trajectory.end(None)));
+        }
+        backend.load(slot, &trajectory.launch())?;
+        self.resident[slot] = Some((rank, trajectory));
+        Ok(None)
+    }
+
+    /// Looks at the member in `slot`: serves its output times, aims it further, or ends it.
+    fn collect(&mut self, backend: &mut dyn Backend, slot: usize) -> Result<Option<(usize, Ended)>> {
+        let Some((_, trajectory)) = &mut self.resident[slot] else { return Ok(None) };
+        trajectory.observe(backend.counters(slot), &backend.report(slot));
+        if trajectory.wants_state() {
+            trajectory.serve(Some(&backend.state(slot)?));
+        } else {
+            trajectory.serve(None);
+        }
+        if !trajectory.is_over() {
+            if let Some((goal, tau)) = trajectory.next_goal() {
+                backend.aim(slot, goal, tau);
+            }
+            return Ok(None);
+        }
+        let last = if trajectory.keeps_portrait() { Some(backend.state(slot)?) } else { None };
+        backend.clear(slot);
+        Ok(self.resident[slot].take().map(|(rank, trajectory)| (rank, trajectory.end(last.as_ref()))))
+    }
+
+    /// Work done on the resident members, in members.
+    fn share(&self) -> f64 {
+        self.resident.iter().flatten().map(|(_, trajectory)| trajectory.share()).sum()
+    }
+}
+
+/// Members that have ended, kept until those before them have.
+struct Queue {
+    total: u64,
+    ended: u64,
+    next: usize,
+    early: BTreeMap<usize, Ended>,
+}
+
+impl Queue {
+    fn leave(&mut self, rank: usize, ended: Ended, sink: &mut dyn Sink) -> Result<()> {
+        self.ended += 1;
+        self.early.insert(rank, ended);
+        while let Some(ended) = self.early.remove(&self.next) {
+            sink.member(&ended)?;
+            self.next += 1;
+        }
+        Ok(())
+    }
+}
