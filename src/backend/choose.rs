@@ -202,12 +202,7 @@ impl Choice {
             platform.device_type = Some(gpu.device_type());
             return Ok((Box::new(kernel), platform));
         }
-        let method = Method {
-            solver: spec.solver,
-            order: spec.order,
-            max_sweeps: spec.max_sweeps,
-            redistribution: !spec.no_redistribution,
-        };
+        let method = Method { solver: spec.solver, order: spec.order, max_sweeps: spec.max_sweeps };
         let backend = CpuBackend::<T>::new(blocks, method, spec.threads.unwrap_or(0))?;
         platform.threads = Some(backend.threads());
         Ok((Box::new(backend), platform))
