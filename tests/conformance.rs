@@ -6,10 +6,7 @@
 use std::io::Write;
 
 use curvelax::{
-    backend::{
-        Backend,
-        gpu::{Gpu, Kernel, kernel::Budget},
-    },
+    backend::gpu::{Gpu, Kernel, kernel::Budget},
     conformance::{
         Row, Tamper,
         compare::{on_gpu, runs, stages},

@@ -35,6 +35,9 @@ pub const TRACE_FIELDS: [&str; 19] = [
     "δy",
 ];
 
+/// Field names of what one dispatch asks for, in memory order.
+pub const DISPATCH_FIELDS: [&str; 3] = ["steps", "max_sweeps", "sweeps"];
+
 /// What one dispatch asks for.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
