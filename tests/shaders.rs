@@ -285,36 +285,35 @@ fn noop_device() -> wgpu::Device {
     pollster::block_on(adapter.request_device(&asked)).unwrap().0
 }
 
-fn pipeline_error<T: Real>(device: &wgpu::Device, n: usize, traced: bool) -> Option<String> {
+/// The error of building the pipeline and binding `buffers` storage buffers behind the uniform one.
+fn pipeline_error<T: Real>(device: &wgpu::Device, n: usize, traced: bool, buffers: u32) -> Option<String> {
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    kernel::compile::<T>(device, Blocks::new(n).unwrap(), 32, traced);
+    let pipeline = kernel::compile::<T>(device, Blocks::new(n).unwrap(), 32, traced);
+    let buffer = |usage| {
+        device.create_buffer(&wgpu::BufferDescriptor { label: None, size: 4096, usage, mapped_at_creation: false })
+    };
+    let (uniform, storage) = (buffer(wgpu::BufferUsages::UNIFORM), buffer(wgpu::BufferUsages::STORAGE));
+    let resource = |binding| if binding == 0 { uniform.as_entire_binding() } else { storage.as_entire_binding() };
+    let entries: Vec<_> =
+        (0..=buffers).map(|binding| wgpu::BindGroupEntry { binding, resource: resource(binding) }).collect();
+    let layout = pipeline.get_bind_group_layout(0);
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
     pollster::block_on(scope.pop()).map(|error| error.to_string())
 }
 
 #[test]
-fn pipelines_are_built_without_any_gpu() {
+fn pipelines_are_built_and_bound_without_any_gpu() {
     let device = noop_device();
+    assert!(device.features().contains(wgpu::Features::SHADER_F64));
     for n in [6, 7, 64, 100, 257] {
         for traced in [false, true] {
-            assert_eq!(pipeline_error::<f32>(&device, n, traced), None, "f32, n = {n}");
-            if device.features().contains(wgpu::Features::SHADER_F64) {
-                assert_eq!(pipeline_error::<f64>(&device, n, traced), None, "f64, n = {n}");
-            }
+            let buffers = 4 + u32::from(traced);
+            assert_eq!(pipeline_error::<f32>(&device, n, traced, buffers), None, "f32, n = {n}");
+            assert_eq!(pipeline_error::<f64>(&device, n, traced, buffers), None, "f64, n = {n}");
+            // Negative control: a buffer too few is noticed.
+            assert!(pipeline_error::<f32>(&device, n, traced, buffers - 1).is_some());
         }
     }
-    // Negative control: without its sizes the kernel is refused.
-    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let source = wgpu::ShaderSource::Wgsl(shader::source::<f32>(false).into());
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
-    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: None,
-        layout: None,
-        module: &module,
-        entry_point: Some("evolve"),
-        compilation_options: Default::default(),
-        cache: None,
-    });
-    assert!(pollster::block_on(scope.pop()).is_some());
 }
 
 #[test]
