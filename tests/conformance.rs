@@ -101,7 +101,7 @@ fn check(rows: &[Row]) -> Outcome {
 fn line(row: &Row) -> String {
     let Row { quantity, precision, n, steps, scale, error, bound, at } = row;
     let (member, node) = at;
-    let share = error / bound;
+    let share = row.share();
     format!(
         "{precision} n={n} steps={steps} {quantity}: error {error:.2e}, bound {bound:.2e} ({share:.3}), scale \
          {scale:.2e}, member {member}, node {node}"

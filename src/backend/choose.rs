@@ -92,17 +92,14 @@ fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
     }
     let found = Gpu::list();
     let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
-    let matches = |gpu: &Gpu| match &spec.adapter {
-        Some(part) => gpu.name().to_lowercase().contains(&part.to_lowercase()),
-        None => true,
-    };
-    match found.into_iter().find(matches) {
+    match found.into_iter().find(|gpu| gpu.matches(spec.adapter.as_deref())) {
         Some(adapter) => take(spec, n, adapter, "asked for".into()),
         None => Err(no_adapter(spec.adapter.as_deref(), &names)),
     }
 }
 
-fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
+/// The error of an adapter that is not there; `names` are those that are.
+pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
     let there = if names.is_empty() {
         "this machine has none; take --backend cpu, or install a GPU driver (Debian's software GPU is \
          mesa-vulkan-drivers)"

@@ -2,7 +2,6 @@
 
 use super::{
     bounds::{Bound, FIELDS, STAGES, Scale},
-    cases::MEMBERS,
     members,
 };
 use crate::{
@@ -20,6 +19,8 @@ use crate::{
     },
     solver::{Blocks, Order, Ring, Solver},
 };
+
+pub use super::cases::MEMBERS;
 
 /// What the kernel computed.
 struct Gpu<V>(V);
@@ -50,7 +51,7 @@ pub struct Row {
     pub steps: u32,
     /// Natural scale where the error is worst.
     pub scale: f64,
-    /// Largest difference, relative to its bound.
+    /// The difference that takes the largest share of its bound.
     pub error: f64,
     /// The bound there, `k · ε · scale`.
     pub bound: f64,
@@ -62,6 +63,11 @@ impl Row {
     /// Whether the error is within its bound; NaN is not.
     pub fn passes(&self) -> bool {
         self.error <= self.bound
+    }
+
+    /// The error as a share of its bound.
+    pub fn share(&self) -> f64 {
+        self.error / self.bound
     }
 
     fn begin<T: Real>(bound: &Bound, n: usize, steps: u32) -> Row {
