@@ -253,7 +253,7 @@ impl<'a> Trajectory<'a> {
             start: self.start,
             end: self.now,
         };
-        Ended { outcome, series: self.series, snapshots: self.snapshots, portrait }
+        Ended { outcome, series: self.series, snapshots: self.snapshots, portrait, mollified: self.member.mollified }
     }
 }
 

@@ -19,7 +19,7 @@ pub use base::BaseCurve;
 pub use crossing::crossing;
 pub use outline::{MAX_POINTS, Outline};
 pub use perturbation::{MIN_FACTOR, Modes, RadialFactor, RadialLaw, check_directions};
-pub use sampling::{Sampler, Sampling};
+pub use sampling::{Sampler, Sampling, resample};
 pub use shape::{FlowerMode, Shape};
 
 /// Highest mode of a flower or a perturbation. A mode takes four nodes at the very least, and far fewer than 4000

@@ -164,6 +164,23 @@ fn samples(curve: &BaseCurve, pieces: usize) -> Vec<Sample> {
     curve.subdivision(pieces).into_iter().map(directed).collect()
 }
 
+/// As many nodes as `nodes` has, equally spaced along that closed polygon; the last one stays where it is.
+pub fn resample(nodes: &[DVec2]) -> Vec<DVec2> {
+    let n = nodes.len();
+    let closed: Vec<DVec2> = nodes[n - 1..].iter().chain(nodes).copied().collect();
+    let reached = cumulated_length(closed.iter().copied());
+    let spacing = reached[n] / n as f64;
+    let mut piece = 0;
+    let at = |i: usize| {
+        let target = i as f64 * spacing;
+        while piece + 1 < n && reached[piece + 1] < target {
+            piece += 1;
+        }
+        closed[piece].lerp(closed[piece + 1], (target - reached[piece]) / (reached[piece + 1] - reached[piece]))
+    };
+    (1..n).map(at).chain([nodes[n - 1]]).collect()
+}
+
 /// Length along the polyline at each of its points, 0 at the first.
 fn cumulated_length(points: impl Iterator<Item = DVec2>) -> Vec<f64> {
     let mut previous = None;
@@ -186,6 +203,17 @@ mod tests {
 
     fn island() -> &'static str {
         "file:examples/islands/jamaica.csv"
+    }
+
+    #[test]
+    fn resampling_spaces_nodes_equally_on_the_polygon() {
+        let square = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y, DVec2::new(0.0, 0.5), DVec2::new(0.0, 0.25)];
+        let nodes = resample(&square);
+        assert_eq!(nodes.len(), 6);
+        assert_eq!(nodes[5], square[5]);
+        let spacing = 4.0 / 6.0;
+        assert!(nodes[0].distance(DVec2::new(spacing - 0.25, 0.0)) < 1e-12, "{}", nodes[0]);
+        assert!(nodes[4].distance(DVec2::new(0.0, 0.25 + spacing)) < 1e-12, "{}", nodes[4]);
     }
 
     #[test]

@@ -9,10 +9,11 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::{Spec, random::Stream};
+use super::{Mollified, Spec, mollifier::mollify, random::Stream};
 use crate::{
     curve::{RadialFactor, RadialLaw, Sampler, Sampling, check_directions, polygon},
     error::{Error, Result},
+    solver::ring::MIN_POINTS,
 };
 
 /// Draws of one member before giving up. By Rice's formula the harshest law that is admitted, a
@@ -28,6 +29,8 @@ pub struct Member {
     pub nodes: Vec<DVec2>,
     /// Area centroid of the nodes in the user's frame, subtracted so that f32 keeps its digits.
     pub origin: DVec2,
+    /// What rounding off its corners did; only outlines sampled by arclength have any.
+    pub mollified: Mollified,
 }
 
 /// The curve of a spec, prepared once, from which every member is made.
@@ -38,6 +41,8 @@ pub struct Family {
     /// Directions at which a draw is checked.
     directions: Vec<DVec2>,
     warnings: Vec<String>,
+    /// An outline spaced equally: its corners may be too sharp for n nodes.
+    has_corners: bool,
 }
 
 impl Family {
@@ -52,10 +57,11 @@ impl Family {
         if let (Sampling::Points, Some(own)) = (spec.sampling, outline.map(|outline| outline.vertices().len())) {
             check_own_points(spec.points, own)?;
         }
+        let has_corners = outline.is_some() && spec.sampling == Sampling::Arclength && spec.points >= MIN_POINTS;
         let warnings = outline.map_or(Vec::new(), |outline| outline.warnings().to_vec());
         let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
         let directions = check_directions(spec.modes.high);
-        Ok(Family { sampler, law, seed: spec.seed, directions, warnings })
+        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners })
     }
 
     /// What the user should know about the curve, a sentence each.
@@ -75,6 +81,7 @@ impl Family {
     pub fn member(&self, index: u64) -> Result<Member> {
         let factor = self.radial_factor(index)?;
         let mut nodes = self.sampler.sample(&factor);
+        let mollified = if self.has_corners { mollify(&mut nodes) } else { Mollified::default() };
         let length = polygon::length(&nodes);
         // Loops that cancel have an area of rounding only, whose sign must not decide the orientation.
         if polygon::signed_area(&nodes) < -polygon::NO_AREA * length * length {
@@ -82,7 +89,7 @@ impl Family {
         }
         let origin = polygon::area_centroid(&nodes);
         nodes.iter_mut().for_each(|node| *node -= origin);
-        Ok(Member { index, nodes, origin })
+        Ok(Member { index, nodes, origin, mollified })
     }
 
     /// The first draw of member `index` that keeps the radius positive.

@@ -2,11 +2,13 @@
 //! run leaves behind ([`Outcome`]).
 
 pub mod member;
+pub mod mollifier;
 pub mod outcome;
 pub mod random;
 pub mod spec;
 mod validate;
 
 pub use member::{Family, Member};
+pub use mollifier::Mollified;
 pub use outcome::{Ended, Observables, Outcome, Portrait, SeriesRow, Sink, Snapshot, Status};
 pub use spec::Spec;

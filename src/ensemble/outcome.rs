@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::Mollified;
 use crate::error::Result;
 
 /// How a member ended.
@@ -133,6 +134,8 @@ pub struct Ended {
     pub snapshots: Vec<Snapshot>,
     /// Its nodes at both ends, where they were asked for.
     pub portrait: Option<Portrait>,
+    /// What rounding off did to its corners before the run.
+    pub mollified: Mollified,
 }
 
 /// Receives everything that the members leave.

@@ -93,7 +93,7 @@ impl Report {
 
 impl Sink for Report {
     fn member(&mut self, ended: &Ended) -> Result<()> {
-        let Ended { outcome, series, snapshots, portrait } = ended;
+        let Ended { outcome, series, snapshots, portrait, mollified } = ended;
         if let Some(table) = &mut self.series {
             series.iter().try_for_each(|row| table.row(row))?;
         }
@@ -102,6 +102,7 @@ impl Sink for Report {
         }
         self.summary.row(outcome)?;
         self.tally.add(outcome);
+        self.tally.mollified.add(mollified);
         if let Some(Portrait { before, after }) = portrait.clone() {
             let Outcome { member, status, t_relax, .. } = *outcome;
             self.panels.push(Panel { member, status, t_relax, before, after });
@@ -121,7 +122,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::ensemble::{Observables, SeriesRow, Snapshot, Status};
+    use crate::ensemble::{Mollified, Observables, SeriesRow, Snapshot, Status};
 
     fn files(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
@@ -137,7 +138,15 @@ mod tests {
         let row = SeriesRow { member: 0, t: 0.0, at: Observables::default() };
         let snapshot = Snapshot { member: 0, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] };
         let outcome = tally::tests::outcome(0, Status::Relaxed, Some(0.5));
-        report.member(&Ended { outcome, series: vec![row], snapshots: vec![snapshot], portrait }).unwrap();
+        report
+            .member(&Ended {
+                outcome,
+                series: vec![row],
+                snapshots: vec![snapshot],
+                portrait,
+                mollified: Mollified::default(),
+            })
+            .unwrap();
         report
     }
 

@@ -2,7 +2,10 @@
 
 use std::{fmt, path::Path, time::Duration};
 
-use super::{progress::duration, tally::Tally};
+use super::{
+    progress::duration,
+    tally::{MollifiedMembers, Tally},
+};
 use crate::{backend::Platform, ensemble::Spec};
 
 /// A finished run at a glance; its `Display` is the text for stdout.
@@ -27,13 +30,16 @@ impl fmt::Display for Overview<'_> {
         writeln!(f)?;
         for (label, text) in [
             ("ensemble", self.ensemble()),
+            ("corners", self.corners()),
             ("t_relax", self.relaxation()),
             ("work", self.work()),
             ("ran on", self.machine()),
             ("wall time", duration(self.wall.as_secs_f64())),
             ("results", format!("{}: {}", self.folder.display(), self.files.join(", "))),
         ] {
-            writeln!(f, "{label:<11}{text}")?;
+            if !text.is_empty() {
+                writeln!(f, "{label:<11}{text}")?;
+            }
         }
         Ok(())
     }
@@ -57,6 +63,16 @@ impl Overview<'_> {
         let Spec { flow, points, tau, t_end, seed, .. } = self.spec;
         let shape = String::from(self.spec.shape.clone());
         format!("{shape}, {flow}, n = {points}, tau = {tau:?}, t-end = {t_end}, seed {seed}")
+    }
+
+    /// What was done to outlines whose corners the nodes do not resolve; empty where nothing was.
+    fn corners(&self) -> String {
+        let MollifiedMembers { members, most_rounds, largest_area_change } = self.tally.mollified;
+        if members == 0 {
+            return String::new();
+        }
+        let change = significant(100.0 * largest_area_change);
+        format!("rounded off in {members} members, at most {most_rounds} rounds, area changed by at most {change} %")
     }
 
     fn relaxation(&self) -> String {

@@ -7,7 +7,7 @@ use std::{
 
 use serde::Serialize;
 
-use super::tally::Tally;
+use super::tally::{MollifiedMembers, Tally};
 use crate::{
     backend::Platform,
     ensemble::{Spec, spec::Precision},
@@ -28,6 +28,7 @@ pub struct Provenance<'a> {
     steps: u64,
     sweeps_k: u64,
     sweeps_x: u64,
+    mollified: MollifiedMembers,
     warnings: &'a [String],
     started: String,
     wall_seconds: f64,
@@ -55,6 +56,7 @@ impl<'a> Provenance<'a> {
             steps: tally.steps,
             sweeps_k: tally.sweeps_k,
             sweeps_x: tally.sweeps_x,
+            mollified: tally.mollified,
             warnings,
             started: rfc3339(started),
             wall_seconds: (wall.as_secs_f64() * 1e3).round() / 1e3,

@@ -1,6 +1,8 @@
 //! Running totals over members: what the overview and `run.json` say, without keeping the members.
 
-use crate::ensemble::{Outcome, Status};
+use serde::Serialize;
+
+use crate::ensemble::{Mollified, Outcome, Status};
 
 /// Counts and sums over the members that ended.
 #[derive(Clone, Debug, Default)]
@@ -13,6 +15,28 @@ pub struct Tally {
     pub sweeps_k: u64,
     /// Sweeps on position systems of all members.
     pub sweeps_x: u64,
+    /// Members whose corners were rounded off before the run.
+    pub mollified: MollifiedMembers,
+}
+
+/// What rounding off corners did to the members (`ensemble/mollifier.rs`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MollifiedMembers {
+    /// How many were not left alone.
+    pub members: u64,
+    /// Most rounds that one took.
+    pub most_rounds: u32,
+    /// Largest relative change of area.
+    pub largest_area_change: f64,
+}
+
+impl MollifiedMembers {
+    /// Adds one member.
+    pub fn add(&mut self, mollified: &Mollified) {
+        self.members += u64::from(mollified.rounds > 0);
+        self.most_rounds = self.most_rounds.max(mollified.rounds);
+        self.largest_area_change = self.largest_area_change.max(mollified.area_change.abs());
+    }
 }
 
 impl Tally {
