@@ -297,7 +297,7 @@ fn pipeline_error<T: Real>(device: &wgpu::Device, n: usize, traced: bool, buffer
     let entries: Vec<_> =
         (0..=buffers).map(|binding| wgpu::BindGroupEntry { binding, resource: resource(binding) }).collect();
     let layout = pipeline.get_bind_group_layout(0);
-    device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
+    let _ = device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
     pollster::block_on(scope.pop()).map(|error| error.to_string())
 }
 

@@ -88,7 +88,7 @@ impl Row {
         for (node, (a, b)) in ours.iter().zip(theirs).enumerate() {
             let error = (a - b).abs();
             let first = self.bound.is_infinite();
-            if first || !(error / bound <= self.error / self.bound) {
+            if first || error.is_nan() || error / bound > self.share() {
                 (self.scale, self.error, self.bound, self.at) = (scale, error, bound, (member, node));
             }
             if error.is_nan() {
