@@ -44,7 +44,7 @@ fn main() {
     for (index, gpu) in found.iter().enumerate() {
         println!("adapter {index}: {} ({}, {})", gpu.name(), gpu.device_type(), gpu.driver());
         cases::<f32>(index, &mut trials);
-        if gpu.best_precision() == Precision::F64 {
+        if gpu.capacity().best_precision() == Precision::F64 {
             cases::<f64>(index, &mut trials);
         }
     }
@@ -231,7 +231,8 @@ fn relaxation<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
 }
 
 fn largest<T: Real>(gpu: &Gpu, _: usize) -> Outcome {
-    let n = gpu.max_points::<T>().min(1024);
+    let most = gpu.capacity().max_points::<T>();
+    let n = most.min(1024);
     if n < 512 {
         return Err(format!("only {n} points fit").into());
     }
@@ -241,8 +242,8 @@ fn largest<T: Real>(gpu: &Gpu, _: usize) -> Outcome {
             return Err(format!("member {j} of {n} points: {counters:?}").into());
         }
     }
-    let blocks = Blocks::new(gpu.max_points::<T>() + 1).ok_or("n")?;
-    if gpu.check_size::<T>(blocks).is_ok() || Kernel::<T>::new(gpu, blocks, 1, 1, false).is_ok() {
+    let blocks = Blocks::new(most + 1).ok_or("n")?;
+    if gpu.capacity().check_size::<T>(blocks).is_ok() || Kernel::<T>::new(gpu, blocks, 1, 1, false).is_ok() {
         return Err("one point more was not refused".into());
     }
     Ok(())

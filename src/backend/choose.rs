@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{
     Backend,
     cpu::CpuBackend,
-    gpu::{Gpu, Kernel},
+    gpu::{Capacity, Gpu, Kernel},
 };
 use crate::{
     ensemble::{
@@ -114,21 +114,27 @@ pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
 }
 
 fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<Choice> {
-    let precision = spec.precision.unwrap_or(adapter.best_precision());
-    if precision == Precision::F64 && !adapter.has_f64() {
-        let problem = format!("adapter {} has no f64", adapter.name());
+    let precision = fitting_precision(spec, n, adapter.name(), &adapter.capacity())?;
+    Ok(Choice { gpu: Some(adapter), precision, reason })
+}
+
+/// The precision of the run on an adapter, if members of `n` nodes fit it.
+fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> Result<Precision> {
+    let precision = spec.precision.unwrap_or(capacity.best_precision());
+    if precision == Precision::F64 && !capacity.f64 {
+        let problem = format!("adapter {name} has no f64");
         return Err(Error::value("precision", "f64", &problem, "take --precision f32, or --backend cpu"));
     }
     check_precision(n, precision)?;
     let (fits, most) = match precision {
-        Precision::F32 => (adapter.check_size::<f32>(ring(n)?), adapter.max_points::<f32>().min(MAX_POINTS_F32)),
-        Precision::F64 => (adapter.check_size::<f64>(ring(n)?), adapter.max_points::<f64>()),
+        Precision::F32 => (capacity.check_size::<f32>(ring(n)?), capacity.max_points::<f32>().min(MAX_POINTS_F32)),
+        Precision::F64 => (capacity.check_size::<f64>(ring(n)?), capacity.max_points::<f64>()),
     };
     fits.map_err(|needs| {
         let problem = format!("a member needs {needs}");
         Error::value("points", n, &problem, &format!("take {most} or fewer, or --backend cpu"))
     })?;
-    Ok(Choice { gpu: Some(adapter), precision, reason })
+    Ok(precision)
 }
 
 /// f32 has a resolution limit: rounding grows like (1/h)⁴, and beyond the verified n results would only look right.
@@ -203,5 +209,57 @@ impl Choice {
         let backend = CpuBackend::<T>::new(blocks, method, spec.threads.unwrap_or(0))?;
         platform.threads = Some(backend.threads());
         Ok((Box::new(backend), platform))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What every WebGPU device has at least.
+    const LEAST: Capacity = Capacity { f64: false, threads: 256, workgroup_bytes: 16_384, subgroup: 32 };
+
+    fn refused(precision: Option<Precision>, n: usize, capacity: &Capacity) -> String {
+        let spec = Spec { precision, ..Spec::default() };
+        fitting_precision(&spec, n, "toaster", capacity).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn f64_on_an_adapter_without_it_is_refused_by_name() {
+        let message = refused(Some(Precision::F64), 100, &LEAST);
+        for part in ["--precision f64", "adapter toaster has no f64", "--precision f32", "--backend cpu"] {
+            assert!(message.contains(part), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_run_that_asks_for_no_precision_gets_the_best_there_is() {
+        let spec = Spec::default();
+        assert_eq!(fitting_precision(&spec, 100, "toaster", &LEAST).unwrap(), Precision::F32);
+        let with_f64 = Capacity { f64: true, ..LEAST };
+        assert_eq!(fitting_precision(&spec, 100, "toaster", &with_f64).unwrap(), Precision::F64);
+    }
+
+    #[test]
+    fn more_points_than_the_workgroup_holds_are_refused_with_the_largest_number_that_fits() {
+        let capacity = Capacity { f64: true, ..LEAST };
+        let most = capacity.max_points::<f64>();
+        assert!(most >= 512, "{most}");
+        let spec = Spec { precision: Some(Precision::F64), ..Spec::default() };
+        fitting_precision(&spec, most, "toaster", &capacity).unwrap();
+        let message = refused(Some(Precision::F64), most + 1, &capacity);
+        for part in [format!("--points {}", most + 1), format!("take {most} or fewer"), "--backend cpu".into()] {
+            assert!(message.contains(&part), "{message}");
+        }
+        let few_threads = Capacity { threads: 32, ..capacity };
+        assert!(refused(Some(Precision::F64), 256, &few_threads).contains("threads a workgroup"));
+    }
+
+    #[test]
+    fn f32_beyond_what_was_verified_is_refused_with_the_reason() {
+        let spec = Spec { precision: Some(Precision::F32), backend: BackendChoice::Cpu, ..Spec::default() };
+        choose(&spec, MAX_POINTS_F32).unwrap();
+        let message = choose(&spec, MAX_POINTS_F32 + 1).err().unwrap().to_string();
+        assert!(message.contains("verified against f64 up to"), "{message}");
     }
 }

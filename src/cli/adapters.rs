@@ -27,22 +27,28 @@ pub fn adapters(AdaptersArgs {}: AdaptersArgs) -> Result<()> {
 }
 
 fn describe(gpu: &Gpu) -> String {
-    let limits = gpu.limits();
+    let (limits, capacity) = (gpu.limits(), gpu.capacity());
     let kind = if gpu.is_hardware() { "hardware" } else { "software" };
     let points = match gpu.has_f64() {
-        true => format!("{} in f32, {} in f64", gpu.max_points::<f32>().min(MAX_POINTS_F32), gpu.max_points::<f64>()),
-        false => format!("{} in f32", gpu.max_points::<f32>().min(MAX_POINTS_F32)),
+        true => format!(
+            "{} in f32, {} in f64",
+            capacity.max_points::<f32>().min(MAX_POINTS_F32),
+            capacity.max_points::<f64>()
+        ),
+        false => format!("{} in f32", capacity.max_points::<f32>().min(MAX_POINTS_F32)),
     };
     let rows = [
         ("kind", format!("{kind}, {}, {}", gpu.device_type(), gpu.api())),
         ("driver", gpu.driver()),
         ("precisions", if gpu.has_f64() { "f32, f64" } else { "f32" }.into()),
         ("points", format!("at most {points}")),
-        ("workgroup", {
-            let (threads, bytes) =
-                (limits.max_compute_invocations_per_workgroup, limits.max_compute_workgroup_storage_size);
-            format!("{threads} threads, {bytes} bytes, subgroups of {}", gpu.subgroup())
-        }),
+        (
+            "workgroup",
+            format!(
+                "{} threads, {} bytes, subgroups of {}",
+                capacity.threads, capacity.workgroup_bytes, capacity.subgroup
+            ),
+        ),
         ("binding", format!("{} bytes", limits.max_storage_buffer_binding_size)),
     ];
     let rows: String = rows.iter().map(|(label, value)| format!("  {label:<12}{value}\n")).collect();

@@ -7,7 +7,7 @@ use crate::{
     ensemble::spec::Precision,
     error::{Error, Result},
     number::Real,
-    solver::Blocks,
+    solver::{Blocks, ring::MIN_POINTS},
 };
 
 /// An adapter that could run the kernel.
@@ -21,6 +21,45 @@ pub struct Device {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     fault: Arc<Mutex<Option<String>>>,
+}
+
+/// What an adapter's workgroups can hold.
+#[derive(Clone, Copy, Debug)]
+pub struct Capacity {
+    /// Whether shaders may use f64.
+    pub f64: bool,
+    /// Threads of a workgroup at most.
+    pub threads: usize,
+    /// Bytes of workgroup memory at most.
+    pub workgroup_bytes: usize,
+    /// Threads of a subgroup.
+    pub subgroup: u32,
+}
+
+impl Capacity {
+    /// The precision of a run that asks for none.
+    pub fn best_precision(&self) -> Precision {
+        if self.f64 { Precision::F64 } else { Precision::F32 }
+    }
+
+    /// The largest n that fits in precision `T`.
+    pub fn max_points<T: Real>(&self) -> usize {
+        let fits = |n: &usize| Blocks::new(*n).is_some_and(|blocks| self.check_size::<T>(blocks).is_ok());
+        (MIN_POINTS..1 << 16).take_while(fits).last().unwrap_or(0)
+    }
+
+    /// Whether members of this size fit: threads and workgroup memory.
+    pub fn check_size<T: Real>(&self, blocks: Blocks) -> std::result::Result<(), String> {
+        let threads = shader::threads(blocks, self.subgroup);
+        if threads > self.threads {
+            return Err(format!("{threads} threads a workgroup, and the adapter has {}", self.threads));
+        }
+        let bytes = shader::workgroup_bytes::<T>(blocks);
+        if bytes > self.workgroup_bytes {
+            return Err(format!("{bytes} bytes of workgroup memory, and the adapter has {}", self.workgroup_bytes));
+        }
+        Ok(())
+    }
 }
 
 impl Gpu {
@@ -94,31 +133,15 @@ impl Gpu {
         self.info.subgroup_max_size.clamp(1, 64)
     }
 
-    /// The precision of a run that asks for none.
-    pub fn best_precision(&self) -> Precision {
-        if self.has_f64() { Precision::F64 } else { Precision::F32 }
-    }
-
-    /// The largest n that fits the adapter's workgroups in precision `T`.
-    pub fn max_points<T: Real>(&self) -> usize {
-        let fits = |n| Blocks::new(n).is_some_and(|blocks| self.check_size::<T>(blocks).is_ok());
-        (crate::solver::ring::MIN_POINTS..1 << 16).take_while(|n| fits(*n)).last().unwrap_or(0)
-    }
-
-    /// Whether members of this size fit: threads and workgroup memory.
-    pub fn check_size<T: Real>(&self, blocks: Blocks) -> std::result::Result<(), String> {
+    /// What decides whether a run fits.
+    pub fn capacity(&self) -> Capacity {
         let limits = self.limits();
-        let threads = limits.max_compute_invocations_per_workgroup.min(limits.max_compute_workgroup_size_x) as usize;
-        let memory = limits.max_compute_workgroup_storage_size as usize;
-        let needed = shader::threads(blocks, self.subgroup());
-        if needed > threads {
-            return Err(format!("{needed} threads a workgroup, and the adapter has {threads}"));
+        Capacity {
+            f64: self.has_f64(),
+            threads: limits.max_compute_invocations_per_workgroup.min(limits.max_compute_workgroup_size_x) as usize,
+            workgroup_bytes: limits.max_compute_workgroup_storage_size as usize,
+            subgroup: self.subgroup(),
         }
-        let bytes = shader::workgroup_bytes::<T>(blocks);
-        if bytes > memory {
-            return Err(format!("{bytes} bytes of workgroup memory, and the adapter has {memory}"));
-        }
-        Ok(())
     }
 
     /// Opens the adapter with all its limits, and with f64 where it has it.

@@ -109,7 +109,7 @@ impl<T: Real> Kernel<T> {
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let fit = (binding / state_bytes.max(trace_bytes) as u64) as usize;
         let slots = members.min(fit).min(MAX_SLOTS).min(limits.max_compute_workgroups_per_dimension as usize).max(1);
-        gpu.check_size::<T>(blocks).map_err(|e| Error::Request(format!("n = {} needs {e}", blocks.n)))?;
+        gpu.capacity().check_size::<T>(blocks).map_err(|e| Error::Request(format!("n = {} needs {e}", blocks.n)))?;
         let most = Budget::most(gpu, blocks);
         let device = gpu.open()?;
         let pipeline = compile::<T>(&device.device, blocks, gpu.subgroup(), traced);

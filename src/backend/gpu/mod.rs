@@ -4,5 +4,5 @@ pub mod adapter;
 pub mod kernel;
 pub mod shader;
 
-pub use adapter::Gpu;
+pub use adapter::{Capacity, Gpu};
 pub use kernel::Kernel;
