@@ -1,8 +1,10 @@
 // The entry point: one workgroup takes one member through up to `dispatch.steps` steps towards its goal. Twin of
 // src/scheme/evolve.rs. A step that fails is not accepted: the member ends in its last good state.
+//
+// A dispatch also ends when its sweeps are used up. The step then pauses: the increments so far are stored, and the
+// next dispatch computes the same rows again and sweeps on, so that no bit depends on where a dispatch ended.
 
 var<private> report: Report;
-var<private> counters: Counters;
 
 @compute @workgroup_size(THREADS)
 fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
@@ -17,7 +19,8 @@ fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     let steps = uniform_decision(min(dispatch.steps, due));
     if steps > 0u {
         load_state();
-        for (var s = 0u; s < steps; s++) {
+        budget = dispatch.sweeps;
+        for (var s = 0u; s < steps && budget > 0u; s++) {
             if advance() != RUNNING { break; }
         }
         store_state();
@@ -28,11 +31,12 @@ fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     }
 }
 
-/// One step and its consequences; returns the member's status, the same in every thread.
+/// One step and its consequences; returns the member's status, or PAUSED, the same in every thread.
 fn advance() -> u32 {
     let solved = step();
-    counters.sweeps_k += step_sweeps.x;
-    counters.sweeps_x += step_sweeps.y;
+    if solved == PAUSED { return PAUSED; }
+    counters.phase = STEP_BEGINS;
+    counters.solve_sweeps = 0u;
     if solved == SOLVED {
         observe(new_x, new_y, new_k, here(r_new));
     }

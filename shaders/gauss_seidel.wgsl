@@ -10,9 +10,12 @@ const SWEEPS_PER_CHECK = 8u;
 const UNSOLVED = 0u;
 const SOLVED = 1u;
 const NOT_FINITE = 2u;
+const PAUSED = 99u;
 
-/// Sweeps made by the last solve.
+/// Sweeps made by this solve, over all dispatches.
 var<private> sweeps: u32;
+/// Sweeps left in this dispatch.
+var<private> budget: u32;
 /// The unknowns of the block: the start of a solve, then its result. The curvature system has `u` alone.
 var<private> u: vec;
 var<private> v: vec;
@@ -20,35 +23,44 @@ var<private> v: vec;
 /// Sweeps `u` for rhs_x; returns how it ended.
 fn solve_one(negligible: real) -> u32 {
     share(u, u);
-    sweeps = 0u;
+    sweeps = counters.solve_sweeps;
     let tolerance = max(p.tolerance, rounding_limit());
     var ended = UNSOLVED;
-    while ended == UNSOLVED && sweeps < dispatch.max_sweeps {
+    while ended == UNSOLVED && sweeps < dispatch.max_sweeps && budget > 0u {
         let batch = min(SWEEPS_PER_CHECK, dispatch.max_sweeps - sweeps);
         for (var s = 0u; s < batch; s++) { sweep_one(); }
         sweeps += batch;
+        budget -= min(budget, batch);
         let error = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
         ended = judge(block_max(error), block_max(bounded_abs(u)), tolerance, negligible);
     }
-    return ended;
+    return paused_or(ended);
 }
 
 /// Sweeps `u` for rhs_x and `v` for rhs_y, with the barriers of one; returns how it ended.
 fn solve_two(negligible: real) -> u32 {
     share(u, v);
-    sweeps = 0u;
+    sweeps = counters.solve_sweeps;
     let tolerance = max(p.tolerance, rounding_limit());
     var ended = UNSOLVED;
-    while ended == UNSOLVED && sweeps < dispatch.max_sweeps {
+    while ended == UNSOLVED && sweeps < dispatch.max_sweeps && budget > 0u {
         let batch = min(SWEEPS_PER_CHECK, dispatch.max_sweeps - sweeps);
         for (var s = 0u; s < batch; s++) { sweep_two(); }
         sweeps += batch;
+        budget -= min(budget, batch);
         let error_u = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
         let error_v = bounded_abs(row_of.weight * residual(rhs_y, read_b()));
         let size = max(bounded_abs(u), bounded_abs(v));
         ended = judge(block_max(max(error_u, error_v)), block_max(size), tolerance, negligible);
     }
-    return ended;
+    return paused_or(ended);
+}
+
+/// A solve that neither ended nor reached the cap has run out of this dispatch's sweeps.
+fn paused_or(ended: u32) -> u32 {
+    if ended != UNSOLVED || sweeps >= dispatch.max_sweeps { return ended; }
+    counters.solve_sweeps = sweeps;
+    return PAUSED;
 }
 
 /// The tolerance below which a scaled residual is rounding error.

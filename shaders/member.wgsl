@@ -29,7 +29,7 @@ struct Report {
     half_fraction: real,
 }
 
-/// Integers of a member. `status` is 0 while it is running.
+/// Integers of a member. `status` is 0 while it is running; `phase` and `solve_sweeps` say where a step was paused.
 struct Counters {
     status: u32,
     steps: u32,
@@ -39,6 +39,8 @@ struct Counters {
     half_step: u32,
     sweeps_k: u32,
     sweeps_x: u32,
+    phase: u32,
+    solve_sweeps: u32,
 }
 
 const RUNNING = 0u;
@@ -54,6 +56,8 @@ struct Dispatch {
     steps: u32,
     /// Sweeps a system at most.
     max_sweeps: u32,
+    /// Sweeps after which the dispatch pauses, in the middle of a solve if need be.
+    sweeps: u32,
 }
 
 @group(0) @binding(0) var<uniform> dispatch: Dispatch;
@@ -66,6 +70,7 @@ struct Dispatch {
 /// Index of this workgroup's member, and its parameters.
 var<private> member: u32;
 var<private> p: Parameters;
+var<private> counters: Counters;
 /// Its nodes in this thread's block: the state at the start of a step.
 var<private> x: vec;
 var<private> y: vec;

@@ -8,44 +8,61 @@ const HALF_OVER_PI = 0.15915494309189535;
 var<private> new_k: vec;
 var<private> new_x: Window;
 var<private> new_y: Window;
-/// Sweeps of the step's two solves.
-var<private> step_sweeps: vec2<u32>;
 
-/// Computes the new state; returns SOLVED, UNSOLVED or NOT_FINITE. The old state stays until `accept`.
+/// Where a step goes on: values of `counters.phase`.
+const STEP_BEGINS = 0u;
+const CURVATURE_SOLVED = 1u;
+
+/// Computes the new state; returns SOLVED, UNSOLVED, NOT_FINITE or PAUSED. The old state stays until `accept`.
 fn step() -> u32 {
     let length = redistribute();
     let radius = length * real(HALF_OVER_PI);
     let rounding = real(NEGLIGIBLE * EPSILON);
 
+    if uniform_decision(counters.phase) == STEP_BEGINS {
+        let for_k = step_curvature(rounding / radius);
+        if for_k != SOLVED { return for_k; }
+        counters.phase = CURVATURE_SOLVED;
+        counters.solve_sweeps = 0u;
+    }
+    new_k = k + dk;
+    let for_x = step_position(rounding * radius);
+    if for_x != SOLVED { return for_x; }
+    share(x + dx, y + dy);
+    new_x = read_a();
+    new_y = read_b();
+    return SOLVED;
+}
+
+fn step_curvature(negligible: real) -> u32 {
     assemble_curvature();
     trace_system(3u);
     trace(8u, rhs_x);
+    let before = counters.solve_sweeps;
     u = dk;
-    let for_k = solve_one(rounding / radius);
+    let ended = solve_one(negligible);
     dk = u;
-    step_sweeps = vec2<u32>(sweeps, 0u);
-    if for_k != SOLVED { return for_k; }
+    counters.sweeps_k += sweeps - before;
     trace(9u, dk);
-    new_k = k + dk;
+    return ended;
+}
 
+fn step_position(negligible: real) -> u32 {
     share(new_k, new_k);
     assemble_position(read_a());
     trace_system(10u);
     trace(15u, rhs_x);
     trace(16u, rhs_y);
+    let before = counters.solve_sweeps;
     u = dx;
     v = dy;
-    let for_x = solve_two(rounding * radius);
+    let ended = solve_two(negligible);
     dx = u;
     dy = v;
-    step_sweeps.y = sweeps;
-    if for_x != SOLVED { return for_x; }
+    counters.sweeps_x += sweeps - before;
     trace(17u, dx);
     trace(18u, dy);
-    share(x + dx, y + dy);
-    new_x = read_a();
-    new_y = read_b();
-    return SOLVED;
+    return ended;
 }
 
 fn trace_system(field: u32) {

@@ -85,6 +85,7 @@
 
 pub mod backend;
 pub mod cli;
+pub mod conformance;
 pub mod curve;
 pub mod ensemble;
 pub mod error;

@@ -92,17 +92,14 @@ fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
     }
     let found = Gpu::list();
     let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
-    let matches = |gpu: &Gpu| match &spec.adapter {
-        Some(part) => gpu.name().to_lowercase().contains(&part.to_lowercase()),
-        None => true,
-    };
-    match found.into_iter().find(matches) {
+    match found.into_iter().find(|gpu| gpu.matches(spec.adapter.as_deref())) {
         Some(adapter) => take(spec, n, adapter, "asked for".into()),
         None => Err(no_adapter(spec.adapter.as_deref(), &names)),
     }
 }
 
-fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
+/// The error of an adapter that is not there; `names` are those that are.
+pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
     let there = if names.is_empty() {
         "this machine has none; take --backend cpu, or install a GPU driver (Debian's software GPU is \
          mesa-vulkan-drivers)"
@@ -202,12 +199,7 @@ impl Choice {
             platform.device_type = Some(gpu.device_type());
             return Ok((Box::new(kernel), platform));
         }
-        let method = Method {
-            solver: spec.solver,
-            order: spec.order,
-            max_sweeps: spec.max_sweeps,
-            redistribution: !spec.no_redistribution,
-        };
+        let method = Method { solver: spec.solver, order: spec.order, max_sweeps: spec.max_sweeps };
         let backend = CpuBackend::<T>::new(blocks, method, spec.threads.unwrap_or(0))?;
         platform.threads = Some(backend.threads());
         Ok((Box::new(backend), platform))

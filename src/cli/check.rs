@@ -1,12 +1,115 @@
 //! `curvelax check`: does the GPU compute what the CPU computes, on this machine?
 
-use crate::error::{Error, Result};
+use super::{note, print};
+use crate::{
+    backend::{
+        choose::no_adapter,
+        gpu::{Gpu, kernel::Budget},
+    },
+    conformance::{Row, compare::MEMBERS, runs, stages},
+    error::{Error, Result},
+    number::Real,
+};
+
+const EXAMPLES: &str = "\
+Examples:
+  curvelax check
+  curvelax check --adapter llvmpipe
+
+An error is the largest difference between GPU and CPU over all members and nodes; a bound is a small multiple of
+the rounding error of the quantity's natural scale. Exit code 1 if one is exceeded.";
+
+/// Sizes of the rings that are compared: odd, a power of two, the default, a prime.
+const SIZES: [usize; 4] = [7, 64, 100, 101];
+/// Steps after which whole runs are compared.
+const STEPS: [u32; 2] = [1, 100];
 
 /// Compare the GPU with the CPU on this machine's adapters, as a table; exit code 1 on failure.
 #[derive(clap::Args)]
-pub struct CheckArgs {}
+#[command(after_help = EXAMPLES)]
+pub struct CheckArgs {
+    /// Part of the name of the adapter to check [default: all]
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// No remarks on stderr
+    #[arg(long)]
+    quiet: bool,
+}
 
-// HOOK(lead): run the conformance cases and print their table.
-pub fn check(CheckArgs {}: CheckArgs) -> Result<()> {
-    Err(Error::Failed("`curvelax check` is not connected yet".into()))
+/// Runs the comparisons and prints their table.
+pub fn check(args: CheckArgs) -> Result<()> {
+    let found = Gpu::list();
+    let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
+    let chosen: Vec<Gpu> = found.into_iter().filter(|gpu| gpu.matches(args.adapter.as_deref())).collect();
+    if chosen.is_empty() {
+        return Err(match args.adapter {
+            Some(name) => no_adapter(Some(&name), &names),
+            None => Error::Failed("no GPU adapter to check; `--backend cpu` needs none".into()),
+        });
+    }
+    let mut failed = 0;
+    for gpu in &chosen {
+        let say = |precision: &str| {
+            if !args.quiet {
+                note(&format!("comparing {} in {precision} with the CPU", gpu.name()));
+            }
+        };
+        say("f32");
+        let mut rows = compare::<f32>(gpu)?;
+        if gpu.has_f64() {
+            say("f64");
+            rows.extend(compare::<f64>(gpu)?);
+        }
+        failed += rows.iter().filter(|row| !row.passes()).count();
+        print(&table(gpu, &rows))?;
+    }
+    match failed {
+        0 => Ok(()),
+        _ => Err(Error::Failed(format!("{failed} quantities differ by more than their bound; take --backend cpu"))),
+    }
+}
+
+/// The worst row of every quantity over all sizes.
+fn compare<T: Real>(gpu: &Gpu) -> Result<Vec<Row>> {
+    let mut worst: Vec<Row> = Vec::new();
+    for n in SIZES {
+        let mut rows = stages::<T>(gpu, n, None)?;
+        for steps in STEPS {
+            rows.extend(runs::<T>(gpu, n, steps, Budget { steps: 16, sweeps: u32::MAX }, None)?);
+        }
+        match worst.is_empty() {
+            true => worst = rows,
+            false => worst.iter_mut().zip(rows).for_each(|(worst, row)| {
+                if row.share() > worst.share() || row.error.is_nan() {
+                    *worst = row;
+                }
+            }),
+        }
+    }
+    Ok(worst)
+}
+
+fn table(gpu: &Gpu, rows: &[Row]) -> String {
+    let sizes = SIZES.map(|n| n.to_string()).join(", ");
+    let mut text = format!(
+        "{} ({}): {MEMBERS} members, n = {sizes}\n\n{:<5}{:>5}  {:<24}{:>10}{:>13}{:>10}  {:<8}at\n",
+        gpu.name(),
+        gpu.driver(),
+        "",
+        "steps",
+        "quantity",
+        "scale",
+        "worst error",
+        "bound",
+        "verdict",
+    );
+    for row in rows {
+        let Row { quantity, precision, n, steps, scale, error, bound, at: (member, node) } = row;
+        let verdict = if row.passes() { "ok" } else { "FAILED" };
+        let place = if *error == 0.0 { "bit for bit".into() } else { format!("n {n}, member {member}, node {node}") };
+        text += &format!(
+            "{precision:<5}{steps:>5}  {quantity:<24}{scale:>10.2e}{error:>13.2e}{bound:>10.2e}  {verdict:<8}{place}\n"
+        );
+    }
+    text
 }

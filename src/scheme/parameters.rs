@@ -125,6 +125,10 @@ pub struct Counters {
     pub sweeps_k: u32,
     /// Sweeps on position systems in this dispatch.
     pub sweeps_x: u32,
+    /// Where the kernel paused inside a step: 0 before or in the curvature solve, 1 after it. The CPU never pauses.
+    pub phase: u32,
+    /// Sweeps that the paused solve has made.
+    pub solve_sweeps: u32,
 }
 
 impl<T: Real> Report<T> {
@@ -137,8 +141,18 @@ impl<T: Real> Report<T> {
 
 impl Counters {
     /// Field names in memory order.
-    pub const FIELDS: [&'static str; 8] =
-        ["status", "steps", "goal", "stop_when_relaxed", "relax_step", "half_step", "sweeps_k", "sweeps_x"];
+    pub const FIELDS: [&'static str; 10] = [
+        "status",
+        "steps",
+        "goal",
+        "stop_when_relaxed",
+        "relax_step",
+        "half_step",
+        "sweeps_k",
+        "sweeps_x",
+        "phase",
+        "solve_sweeps",
+    ];
 }
 
 impl<N: Number> Parameters<N> {

@@ -9,15 +9,13 @@
 //!   `r_i ← r_i·exp(-τ k_i β_i)`.
 
 use super::{Parameters, State, Workspace};
-use crate::{number::Number, solver::Ring};
+use crate::{
+    number::{Mask, Number},
+    solver::Ring,
+};
 
 /// Fills β, r·k·β, α and the new r (with 1/r and 1/q) of `work`; returns the length `L = Σr` of the old state.
-pub fn redistribute<N: Number>(
-    state: &State<N>,
-    p: &Parameters<N>,
-    redistribution: bool,
-    work: &mut Workspace<N>,
-) -> N {
+pub fn redistribute<N: Number>(state: &State<N>, p: &Parameters<N>, work: &mut Workspace<N>) -> N {
     let n = state.len();
     for i in 0..n {
         let beta = velocity(p, state.k.window(i), state.r.window(i));
@@ -27,7 +25,8 @@ pub fn redistribute<N: Number>(
     let length = work.blocks.sum(|i| state.r[i]);
     let mean_rkb = work.blocks.sum(|i| work.rkb[i]) / length;
     let mean_length = length / N::of(n as f64);
-    if redistribution {
+    // Members side by side in lanes have it or not together.
+    if N::of(0.5).le(p.redistribution).any() {
         tangential_velocity(state, p, mean_rkb, mean_length, work);
         for i in 0..n {
             let r = state.r[i];

@@ -15,8 +15,6 @@ pub struct Method {
     pub order: Order,
     /// Sweeps per system after which a member is stalled.
     pub max_sweeps: u32,
-    /// Tangential redistribution, or α = 0.
-    pub redistribution: bool,
 }
 
 /// How the two solves of a step went.
@@ -37,7 +35,7 @@ pub const NEGLIGIBLE: f64 = 0.1;
 
 /// Computes the new state into `work`; `state` stays as it is, so a step can be refused.
 pub fn step<N: Number>(state: &State<N>, p: &Parameters<N>, method: &Method, work: &mut Workspace<N>) -> Stepped<N> {
-    let length = redistribution::redistribute(state, p, method.redistribution, work);
+    let length = redistribution::redistribute(state, p, work);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
     let rounding = N::of(NEGLIGIBLE * N::EPSILON);

@@ -59,6 +59,11 @@ impl Gpu {
         &self.info.name
     }
 
+    /// Whether its name contains `part`, in any case; every name contains nothing.
+    pub fn matches(&self, part: Option<&str>) -> bool {
+        part.is_none_or(|part| self.name().to_lowercase().contains(&part.to_lowercase()))
+    }
+
     /// `Vulkan`, `Metal` or `Dx12`.
     pub fn api(&self) -> String {
         format!("{:?}", self.info.backend)

@@ -19,7 +19,7 @@ use crate::{
         parameters::{Counters, Report},
         state::STATE_FIELDS,
     },
-    solver::Blocks,
+    solver::{Blocks, gauss_seidel::SWEEPS_PER_CHECK},
 };
 
 /// A dispatch aims to last this long: short enough for every watchdog, long enough to hide its overhead.
@@ -35,12 +35,42 @@ pub const TRACE_FIELDS: [&str; 19] = [
     "δy",
 ];
 
+/// Field names of what one dispatch asks for, in memory order.
+pub const DISPATCH_FIELDS: [&str; 3] = ["steps", "max_sweeps", "sweeps"];
+
 /// What one dispatch asks for.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Dispatch {
     steps: u32,
     max_sweeps: u32,
+    sweeps: u32,
+}
+
+/// How much one dispatch may do. No bit of a result depends on it: a dispatch that runs out pauses, even inside a
+/// solve, and the next one goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Budget {
+    /// Steps per member.
+    pub steps: u32,
+    /// Sweeps per member, rounded up to the next look at the residual.
+    pub sweeps: u32,
+}
+
+/// llvmpipe leaves all loops of a shader, without a word, once they have made 65 535 iterations together.
+const SOFTWARE_ITERATIONS: u32 = 50_000;
+
+impl Budget {
+    /// The most that one dispatch may do on this adapter.
+    fn most(gpu: &Gpu, blocks: Blocks) -> Budget {
+        if gpu.is_hardware() {
+            return Budget { steps: 1 << 20, sweeps: 1 << 24 };
+        }
+        // A sweep is one iteration; a look at the residual walks over all blocks, and a step does so ten times.
+        let walk = blocks.count() as u32 + 1;
+        let sweeps = SOFTWARE_ITERATIONS / 2 * SWEEPS_PER_CHECK / (SWEEPS_PER_CHECK + walk);
+        Budget { steps: (SOFTWARE_ITERATIONS / 2 / (10 * walk)).max(1), sweeps: sweeps.max(SWEEPS_PER_CHECK) }
+    }
 }
 
 /// Compiled kernel and resident members of `n` nodes in numbers of type `T`.
@@ -51,8 +81,9 @@ pub struct Kernel<T> {
     buffers: Buffers,
     blocks: Blocks,
     max_sweeps: u32,
-    steps_per_dispatch: u32,
-    fixed_steps: bool,
+    budget: Budget,
+    most: Budget,
+    fixed: bool,
     parameters: Vec<T>,
     counters: Vec<Counters>,
     reports: Vec<Report<T>>,
@@ -79,6 +110,7 @@ impl<T: Real> Kernel<T> {
         let fit = (binding / state_bytes.max(trace_bytes) as u64) as usize;
         let slots = members.min(fit).min(MAX_SLOTS).min(limits.max_compute_workgroups_per_dimension as usize).max(1);
         gpu.check_size::<T>(blocks).map_err(|e| Error::Request(format!("n = {} needs {e}", blocks.n)))?;
+        let most = Budget::most(gpu, blocks);
         let device = gpu.open()?;
         let pipeline = compile::<T>(&device.device, blocks, gpu.subgroup(), traced);
         let buffers = Buffers::new(&device.device, slots, state_bytes, trace_bytes, size_of::<T>());
@@ -91,8 +123,9 @@ impl<T: Real> Kernel<T> {
             buffers,
             blocks,
             max_sweeps,
-            steps_per_dispatch: 1,
-            fixed_steps: false,
+            budget: Budget { sweeps: 256, ..most },
+            most,
+            fixed: false,
             parameters: vec![T::of(0.0); slots * Parameters::<T>::FIELDS.len()],
             counters: vec![Counters::default(); slots],
             reports: vec![Report::default(); slots],
@@ -100,21 +133,20 @@ impl<T: Real> Kernel<T> {
         })
     }
 
-    /// Fixes the number of steps per dispatch; otherwise it follows the time a dispatch takes. Results do not depend on it.
-    pub fn with_steps_per_dispatch(mut self, steps: u32) -> Self {
-        self.steps_per_dispatch = steps;
-        self.fixed_steps = true;
+    /// Fixes what a dispatch may do; otherwise it follows the time that dispatches take.
+    pub fn with_budget(mut self, budget: Budget) -> Self {
+        self.budget =
+            Budget { steps: budget.steps.clamp(1, self.most.steps), sweeps: budget.sweeps.clamp(1, self.most.sweeps) };
+        self.fixed = true;
         self
     }
 
-    /// Overwrites everything that a dispatch should write with NaN and all-ones, so that nothing stale passes for a result.
-    pub fn poison(&mut self) -> Result<()> {
-        let nan = |buffer: &wgpu::Buffer| {
+    /// Overwrites the trace with NaN, so that nothing stale passes for a result.
+    pub fn poison_trace(&mut self) -> Result<()> {
+        if let Some(buffer) = &self.buffers.trace {
             let numbers = vec![T::of(f64::NAN); buffer.size() as usize / size_of::<T>()];
             self.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&numbers));
-        };
-        self.buffers.trace.as_ref().map(nan);
-        nan(&self.buffers.reports);
+        }
         self.gpu.check()
     }
 
@@ -126,7 +158,8 @@ impl<T: Real> Kernel<T> {
     }
 
     fn upload(&mut self) {
-        let asked = Dispatch { steps: self.steps_per_dispatch, max_sweeps: self.max_sweeps };
+        let Budget { steps, sweeps } = self.budget;
+        let asked = Dispatch { steps, max_sweeps: self.max_sweeps, sweeps };
         self.gpu.queue.write_buffer(&self.buffers.dispatch, 0, bytemuck::bytes_of(&asked));
         if std::mem::take(&mut self.changed) {
             let reports: Vec<T> = self.reports.iter().flat_map(Report::to_numbers).collect();
@@ -188,12 +221,13 @@ impl<T: Real> Kernel<T> {
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
-    /// Doubles or shrinks the steps of the next dispatch towards [`DISPATCH_TIME`].
+    /// Doubles or shrinks the sweeps of the next dispatch towards [`DISPATCH_TIME`].
     fn tune(&mut self, took: Duration) {
-        if !self.fixed_steps {
-            let wanted =
-                f64::from(self.steps_per_dispatch) * DISPATCH_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
-            self.steps_per_dispatch = (wanted as u32).clamp(1, 2 * self.steps_per_dispatch).min(1 << 20);
+        if !self.fixed {
+            let now = self.budget.sweeps;
+            let wanted = f64::from(now) * DISPATCH_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
+            let least = SWEEPS_PER_CHECK.min(self.most.sweeps);
+            self.budget.sweeps = (wanted as u32).clamp(least, 2 * now).min(self.most.sweeps);
         }
     }
 }

@@ -1,0 +1,109 @@
+//! The one table of tolerances: quantity, natural scale, factor. Measured maxima are in `docs/conformance.md`.
+
+use crate::{
+    scheme::{Parameters, State, Workspace},
+    solver::Row as Coefficients,
+};
+
+/// What a bound is measured in: the size of the terms whose rounding the quantity inherits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// Largest of `|k|/r²` (the terms of a second difference) and `|b(k)|`.
+    Velocity,
+    /// `Σ|r k β| + ω L`: α is a running sum.
+    Tangential,
+    /// Longest segment.
+    Length,
+    /// 1: rows are divided by their diagonal.
+    One,
+    /// Largest weight `(τ/q)·c`.
+    Weight,
+    /// Largest `|k|`.
+    Curvature,
+    /// Largest `|k|` times the root of the largest weight: a solve passes rounding on, the more the stiffer it is.
+    SolvedCurvature,
+    /// Radius of the circle of the same length.
+    Position,
+    /// Longest segment times the root of the largest weight.
+    SolvedPosition,
+}
+
+/// A quantity of one step: its name, its scale, and the factors k for software and hardware adapters.
+#[derive(Clone, Copy, Debug)]
+pub struct Bound {
+    /// The quantity.
+    pub quantity: &'static str,
+    /// What its rounding errors are measured in.
+    pub scale: Scale,
+    /// k on a software adapter, which rounds as Rust does.
+    pub software: f64,
+    /// k on hardware, which may fuse `a*b + c`.
+    pub hardware: f64,
+}
+
+const fn bound(quantity: &'static str, scale: Scale, software: f64, hardware: f64) -> Bound {
+    Bound { quantity, scale, software, hardware }
+}
+
+/// The stages of a step, in the order of the kernel's trace.
+pub const STAGES: [Bound; 19] = [
+    bound("β", Scale::Velocity, 4.0, 16.0),
+    bound("α", Scale::Tangential, 4.0, 16.0),
+    bound("r", Scale::Length, 4.0, 16.0),
+    bound("a", Scale::One, 8.0, 32.0),
+    bound("b", Scale::One, 8.0, 32.0),
+    bound("d", Scale::One, 8.0, 32.0),
+    bound("e", Scale::One, 8.0, 32.0),
+    bound("weight of k", Scale::Weight, 8.0, 32.0),
+    bound("right-hand side of k", Scale::Curvature, 8.0, 32.0),
+    bound("δk", Scale::SolvedCurvature, 16.0, 64.0),
+    bound("𝓐", Scale::One, 8.0, 32.0),
+    bound("𝓑", Scale::One, 8.0, 32.0),
+    bound("𝓓", Scale::One, 8.0, 32.0),
+    bound("𝓔", Scale::One, 8.0, 32.0),
+    bound("weight of x", Scale::Weight, 8.0, 32.0),
+    bound("right-hand side of x", Scale::Length, 8.0, 32.0),
+    bound("right-hand side of y", Scale::Length, 8.0, 32.0),
+    bound("δx", Scale::SolvedPosition, 16.0, 64.0),
+    bound("δy", Scale::SolvedPosition, 16.0, 64.0),
+];
+
+/// The curve after a run.
+pub const FIELDS: [Bound; 4] = [
+    bound("x", Scale::Position, 16.0, 64.0),
+    bound("y", Scale::Position, 16.0, 64.0),
+    bound("k", Scale::SolvedCurvature, 16.0, 64.0),
+    bound("r", Scale::Length, 16.0, 64.0),
+];
+
+impl Bound {
+    /// The factor k for an adapter of this kind.
+    pub fn factor(&self, hardware: bool) -> f64 {
+        if hardware { self.hardware } else { self.software }
+    }
+}
+
+impl Scale {
+    /// The scale of one member, from the state before the step and what the step computed.
+    pub fn of(self, state: &State<f64>, p: &Parameters<f64>, work: &Workspace<f64>) -> f64 {
+        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        let k = || largest(&mut state.k.nodes().iter().map(|k| k.abs()));
+        let longest = || largest(&mut state.r.nodes().iter().copied());
+        let weight = |rows: &[Coefficients<f64>]| largest(&mut rows.iter().map(|row| row.weight));
+        let length: f64 = state.r.nodes().iter().sum();
+        match self {
+            Scale::Velocity => {
+                let shortest = state.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
+                k() / (shortest * shortest) + p.b(k()).abs()
+            }
+            Scale::Tangential => work.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
+            Scale::Length => longest(),
+            Scale::One => 1.0,
+            Scale::Weight => weight(&work.curvature.rows).max(weight(&work.position.rows)),
+            Scale::Curvature => k(),
+            Scale::SolvedCurvature => k() * weight(&work.curvature.rows).sqrt(),
+            Scale::Position => length / std::f64::consts::TAU,
+            Scale::SolvedPosition => longest() * weight(&work.position.rows).sqrt(),
+        }
+    }
+}

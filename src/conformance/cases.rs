@@ -1,0 +1,61 @@
+//! The ensemble that conformance is tested on: no two members alike, every flow, with and without redistribution.
+
+use crate::{
+    curve::polygon,
+    ensemble::{Family, Spec},
+    error::Result,
+    flow::Flow,
+    scheme::{Parameters, evolve::Launch},
+};
+
+/// Members of the comparison: a prime number, so that nothing divides it.
+pub const MEMBERS: usize = 11;
+
+/// τ of the smallest member, chosen so that `τ/h⁴` and with it the number of sweeps is the same at every n; at
+/// n = 100 it is the paper's 10⁻³.
+fn tau(n: usize) -> f64 {
+    1e-3 * (100.0 / n as f64).powi(4).min(20.0)
+}
+
+/// `count` different members of `n` nodes, each with its own curve, flow, τ and ω, to run `steps` steps.
+pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec<Launch>> {
+    let amplitude = if n < 20 { 0.02 } else { 0.05 };
+    let spec = Spec { points: n, amplitude, seed: 20, ..Spec::default() };
+    let family = Family::new(&spec)?;
+    let flows = [
+        Flow::SurfaceDiffusion,
+        Flow::Willmore,
+        Flow::Elastic(0.3),
+        Flow::Polynomial(vec![0.1, -0.2, 0.05, 0.0, -0.01]),
+    ];
+    (0..count)
+        .map(|j| {
+            let nodes = family.member(j as u64)?.nodes;
+            let flow = &flows[j % flows.len()];
+            let [c1, c2, c3, c4, c5, c6, c7, c8] = flow.coefficients();
+            let excess = polygon::excess(&nodes);
+            let parameters = Parameters {
+                c1,
+                c2,
+                c3,
+                c4,
+                c5,
+                c6,
+                c7,
+                c8,
+                tau: tau(n) * (1.0 - 0.05 * j as f64),
+                omega: 1.0 + j as f64,
+                // One member in five keeps its nodes.
+                redistribution: if j % 5 == 3 { 0.0 } else { 1.0 },
+                tolerance,
+                sor: 1.0 + 0.07 * (j % 10) as f64,
+                length_penalty: flow.length_penalty(),
+                polygon_ratio: polygon::regular_ratio(n),
+                relax_at: 0.9 * excess,
+                half_at: 0.95 * excess,
+            };
+            let turning = polygon::turning_number(&nodes);
+            Ok(Launch { nodes, parameters, goal: steps, stop_when_relaxed: false, excess, turning })
+        })
+        .collect()
+}

@@ -1,0 +1,249 @@
+//! The two comparisons, and their rows.
+
+use super::{
+    bounds::{Bound, FIELDS, STAGES, Scale},
+    members,
+};
+use crate::{
+    backend::{
+        Backend, gpu,
+        gpu::kernel::{Budget, TRACE_FIELDS},
+    },
+    error::{Error, Result},
+    number::Real,
+    scheme::{
+        Parameters, State, Workspace,
+        evolve::{Launch, Run, evolve},
+        parameters::Counters,
+        step::{self, Method},
+    },
+    solver::{Blocks, Order, Ring, Solver},
+};
+
+pub use super::cases::MEMBERS;
+
+/// What the kernel computed.
+struct Gpu<V>(V);
+/// What its twin computed. A type of its own, so that one side cannot be passed twice.
+struct Cpu<V>(V);
+
+/// Moves one node of one member on the GPU side by `by`, relative to the radius: the comparison must then fail.
+#[derive(Clone, Copy, Debug)]
+pub struct Tamper {
+    /// The member.
+    pub member: usize,
+    /// The node.
+    pub node: usize,
+    /// How far.
+    pub by: f64,
+}
+
+/// One line of the table: the worst case of a quantity over all members and nodes.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The quantity.
+    pub quantity: &'static str,
+    /// `f32` or `f64`.
+    pub precision: &'static str,
+    /// Nodes per member.
+    pub n: usize,
+    /// Steps after which it was compared.
+    pub steps: u32,
+    /// Natural scale where the error is worst.
+    pub scale: f64,
+    /// The difference that takes the largest share of its bound.
+    pub error: f64,
+    /// The bound there, `k · ε · scale`.
+    pub bound: f64,
+    /// Member and node of the largest difference.
+    pub at: (usize, usize),
+}
+
+impl Row {
+    /// Whether the error is within its bound; NaN is not.
+    pub fn passes(&self) -> bool {
+        self.error <= self.bound
+    }
+
+    /// The error as a share of its bound.
+    pub fn share(&self) -> f64 {
+        self.error / self.bound
+    }
+
+    fn begin<T: Real>(bound: &Bound, n: usize, steps: u32) -> Row {
+        Row {
+            quantity: bound.quantity,
+            precision: T::NAME,
+            n,
+            steps,
+            scale: 1.0,
+            error: 0.0,
+            bound: f64::INFINITY,
+            at: (0, 0),
+        }
+    }
+
+    /// Takes a member into account; the larger share of the bound wins, and NaN wins always.
+    fn add(&mut self, member: usize, scale: f64, bound: f64, Gpu(ours): Gpu<&[f64]>, Cpu(theirs): Cpu<&[f64]>) {
+        for (node, (a, b)) in ours.iter().zip(theirs).enumerate() {
+            let error = (a - b).abs();
+            let first = self.bound.is_infinite();
+            if first || !(error / bound <= self.error / self.bound) {
+                (self.scale, self.error, self.bound, self.at) = (scale, error, bound, (member, node));
+            }
+            if error.is_nan() {
+                return;
+            }
+        }
+    }
+}
+
+fn method(max_sweeps: u32) -> Method {
+    Method { solver: Solver::GaussSeidel, order: Order::Coloured, max_sweeps }
+}
+
+/// Sweeps at most in these comparisons.
+const MAX_SWEEPS: u32 = 200_000;
+
+/// Default tolerance of the precision.
+fn tolerance<T: Real>() -> f64 {
+    if T::NAME == "f32" { 1e-3 } else { 1e-5 }
+}
+
+fn tampered(mut launches: Vec<Launch>, tamper: Option<Tamper>) -> Vec<Launch> {
+    if let Some(Tamper { member, node, by }) = tamper {
+        launches[member].nodes[node] *= 1.0 + by;
+    }
+    launches
+}
+
+fn blocks(n: usize) -> Result<Blocks> {
+    Blocks::new(n).ok_or_else(|| Error::Failed(format!("n = {n}: a ring has at least 6 nodes")))
+}
+
+/// Everything that one step computes, stage by stage.
+pub fn stages<T: Real>(adapter: &gpu::Gpu, n: usize, tamper: Option<Tamper>) -> Result<Vec<Row>> {
+    let launches = members(n, MEMBERS, 1, tolerance::<T>())?;
+    let mut kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, MEMBERS, MAX_SWEEPS, true)?;
+    for (slot, launch) in tampered(launches.clone(), tamper).iter().enumerate() {
+        kernel.load(slot, launch)?;
+    }
+    kernel.poison_trace()?;
+    while (0..MEMBERS).any(|slot| unfinished(kernel.counters(slot))) {
+        kernel.advance()?;
+    }
+    let trace = kernel.trace()?;
+    let mut rows: Vec<Row> = STAGES.iter().map(|bound| Row::begin::<T>(bound, n, 1)).collect();
+    for (member, launch) in launches.iter().enumerate() {
+        let run = Run::<T>::new(launch);
+        let mut work = Workspace::new(blocks(n)?);
+        step::step(&run.state, &run.parameters, &method(MAX_SWEEPS), &mut work);
+        let twin = traced(&work);
+        let scales = Scales::of(launch)?;
+        for (field, (row, bound)) in rows.iter_mut().zip(&STAGES).enumerate() {
+            let at = (member * TRACE_FIELDS.len() + field) * n;
+            let scale = scales.get(bound.scale);
+            let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale;
+            row.add(member, scale, limit, Gpu(&trace[at..at + n]), Cpu(&twin[field]));
+        }
+    }
+    Ok(rows)
+}
+
+/// The curve after `steps` steps, in dispatches of `budget`.
+pub fn runs<T: Real>(
+    adapter: &gpu::Gpu,
+    n: usize,
+    steps: u32,
+    budget: Budget,
+    tamper: Option<Tamper>,
+) -> Result<Vec<Row>> {
+    let launches = members(n, MEMBERS, steps, tolerance::<T>())?;
+    let ours = on_gpu::<T>(adapter, n, &tampered(launches.clone(), tamper), budget)?;
+    let mut rows: Vec<Row> = FIELDS.iter().map(|bound| Row::begin::<T>(bound, n, steps)).collect();
+    for (member, (launch, (state, counters))) in launches.iter().zip(&ours).enumerate() {
+        let mut twin = Run::<T>::new(launch);
+        evolve(&mut twin, &method(MAX_SWEEPS), &mut Workspace::new(blocks(n)?), steps);
+        if (counters.status, counters.steps) != (twin.counters.status, twin.counters.steps) {
+            return Err(Error::Failed(format!(
+                "{} n = {n}, member {member}: status {} after {} steps on the GPU, {} after {} on the CPU",
+                T::NAME,
+                counters.status,
+                counters.steps,
+                twin.counters.status,
+                twin.counters.steps
+            )));
+        }
+        let widened = twin.state.widened();
+        let scales = Scales::of(launch)?;
+        for (field, (row, bound)) in rows.iter_mut().zip(&FIELDS).enumerate() {
+            let scale = scales.get(bound.scale);
+            let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale * growth(steps);
+            row.add(member, scale, limit, Gpu(state.fields()[field].nodes()), Cpu(widened.fields()[field].nodes()));
+        }
+    }
+    Ok(rows)
+}
+
+/// How roundings add up over steps: like a random walk, since the flow itself damps what they leave.
+fn growth(steps: u32) -> f64 {
+    f64::from(steps).sqrt()
+}
+
+/// Runs `launches` to their goals on the GPU.
+pub fn on_gpu<T: Real>(
+    adapter: &gpu::Gpu,
+    n: usize,
+    launches: &[Launch],
+    budget: Budget,
+) -> Result<Vec<(State<f64>, Counters)>> {
+    let kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, launches.len(), MAX_SWEEPS, false)?;
+    let mut kernel = kernel.with_budget(budget);
+    for (slot, launch) in launches.iter().enumerate() {
+        kernel.load(slot, launch)?;
+    }
+    while (0..launches.len()).any(|slot| unfinished(kernel.counters(slot))) {
+        kernel.advance()?;
+    }
+    (0..launches.len()).map(|slot| Ok((kernel.state(slot)?, kernel.counters(slot)))).collect()
+}
+
+fn unfinished(counters: Counters) -> bool {
+    counters.status == 0 && counters.steps < counters.goal
+}
+
+/// The twin's side of [`TRACE_FIELDS`].
+fn traced<T: Real>(work: &Workspace<T>) -> Vec<Vec<f64>> {
+    let wide = |values: &[T]| values.iter().map(|v| v.to_f64()).collect::<Vec<f64>>();
+    let ring = |ring: &Ring<T>| wide(ring.nodes());
+    let rows = |rows: &[crate::solver::Row<T>]| {
+        let column = |entry: fn(&crate::solver::Row<T>) -> T| rows.iter().map(|row| entry(row).to_f64()).collect();
+        [column(|row| row.a), column(|row| row.b), column(|row| row.d), column(|row| row.e), column(|row| row.weight)]
+    };
+    let mut fields = vec![wide(&work.beta), ring(&work.alpha), ring(&work.r)];
+    fields.extend(rows(&work.curvature.rows));
+    fields.extend([wide(&work.curvature.rhs[0]), ring(&work.dk)]);
+    fields.extend(rows(&work.position.rows));
+    fields.extend([wide(&work.position.rhs[0]), wide(&work.position.rhs[1]), ring(&work.dx), ring(&work.dy)]);
+    fields
+}
+
+/// Natural scales of one member, from its first step in f64.
+struct Scales {
+    state: State<f64>,
+    parameters: Parameters<f64>,
+    work: Workspace<f64>,
+}
+
+impl Scales {
+    fn of(launch: &Launch) -> Result<Scales> {
+        let run = Run::<f64>::new(launch);
+        let mut work = Workspace::new(blocks(launch.nodes.len())?);
+        step::step(&run.state, &run.parameters, &Method { solver: Solver::Direct, ..method(1) }, &mut work);
+        Ok(Scales { state: run.state, parameters: run.parameters, work })
+    }
+
+    fn get(&self, scale: Scale) -> f64 {
+        scale.of(&self.state, &self.parameters, &self.work)
+    }
+}

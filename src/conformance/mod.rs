@@ -1,0 +1,16 @@
+//! Conformance: the kernel against its CPU twin, stage by stage and over whole runs.
+//!
+//! *Theory.* The kernel and the CPU do the same operations in the same order, so they differ only where a compiler
+//! fuses or reassociates: by a few roundings of each quantity's natural scale. A bound is `k · ε · scale`; the
+//! factors stand in one table ([`bounds`]), with the reason for each scale.
+//!
+//! *Practice.* [`stages`] compares everything that one step computes, [`runs`] the curve after many steps. Both take
+//! an ensemble in which every member has its own curve, flow, τ and ω ([`members`]). `curvelax check` prints the
+//! table, `tests/conformance.rs` asserts it, with a negative control for each comparison.
+
+pub mod bounds;
+pub mod cases;
+pub mod compare;
+
+pub use cases::members;
+pub use compare::{Row, Tamper, runs, stages};

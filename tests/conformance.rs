@@ -1,0 +1,267 @@
+//! The kernel against its CPU twin on every adapter of this machine: each case is a value, each comparison has a
+//! negative control.
+//!
+//! No adapter is a failure, unless `ALLOW_NO_GPU=1`: then every case is reported as ignored.
+
+use std::io::Write;
+
+use curvelax::{
+    backend::gpu::{Gpu, Kernel, kernel::Budget},
+    conformance::{
+        Row, Tamper,
+        compare::{on_gpu, runs, stages},
+        members,
+    },
+    ensemble::{Status, spec::Precision},
+    number::Real,
+    scheme::{
+        State, Workspace,
+        evolve::{Launch, Run, evolve},
+        parameters::{Counters, NEVER},
+        step::Method,
+    },
+    solver::{Blocks, Order, Solver},
+};
+use glam::DVec2;
+use libtest_mimic::{Arguments, Failed, Trial};
+
+/// The sizes: smallest odd, power of two, divisible by 3, by 4, prime, and odd beyond a workgroup of 64 threads.
+const SIZES: [usize; 6] = [7, 64, 99, 100, 101, 257];
+
+type Outcome = Result<(), Failed>;
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let found = Gpu::list();
+    let allowed = std::env::var("ALLOW_NO_GPU").is_ok_and(|value| value == "1");
+    let mut trials = Vec::new();
+    if found.is_empty() {
+        let missing = || -> Outcome {
+            Err("no GPU adapter: install one (Debian: mesa-vulkan-drivers), or set ALLOW_NO_GPU=1".into())
+        };
+        trials.push(Trial::test("an adapter is there", missing).with_ignored_flag(allowed));
+    }
+    for (index, gpu) in found.iter().enumerate() {
+        println!("adapter {index}: {} ({}, {})", gpu.name(), gpu.device_type(), gpu.driver());
+        cases::<f32>(index, &mut trials);
+        if gpu.best_precision() == Precision::F64 {
+            cases::<f64>(index, &mut trials);
+        }
+    }
+    let conclusion = libtest_mimic::run(&arguments, trials);
+    println!("conformance cases: {}", conclusion.num_passed);
+    record(conclusion.num_passed);
+    conclusion.exit();
+}
+
+/// Leaves the number of cases where a script can see it.
+fn record(cases: u64) {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/target/conformance-cases.txt");
+    let file = std::fs::OpenOptions::new().create(true).append(true).open(path);
+    let written = file.and_then(|mut file| writeln!(file, "{cases} conformance"));
+    if let Err(error) = written {
+        println!("cannot write {path}: {error}");
+    }
+}
+
+fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
+    let mut add = |name: String, case: fn(&Gpu, usize) -> Outcome, n: usize| {
+        trials.push(Trial::test(format!("{} adapter {index}: {name}", T::NAME), move || case(&Gpu::list()[index], n)));
+    };
+    for n in SIZES {
+        add(format!("every stage of a step agrees, n = {n}"), stages_agree::<T>, n);
+        add(format!("the curve agrees after 1 and 100 steps, n = {n}"), runs_agree::<T>, n);
+    }
+    for n in [7, 100] {
+        add(format!("a moved node fails both comparisons by name, n = {n}"), a_moved_node_fails::<T>, n);
+    }
+    add("permuted members give permuted results, bit for bit".into(), permutation::<T>, 101);
+    add("where a dispatch ends or pauses changes no bit".into(), dispatches::<T>, 64);
+    add("members that end badly leave the others untouched".into(), bad_members::<T>, 99);
+    add("relaxed members stop, at the step and in the place the CPU finds".into(), relaxation::<T>, 64);
+    add("the largest n that fits the adapter runs".into(), largest::<T>, 0);
+    add("the paper's ellipse at t = 2 is that of the CPU in f64".into(), paper::<T>, 100);
+}
+
+/// At most `steps` steps in a dispatch.
+fn dispatches_of(steps: u32) -> Budget {
+    Budget { steps, sweeps: u32::MAX }
+}
+
+fn check(rows: &[Row]) -> Outcome {
+    for row in rows {
+        println!("{}", line(row));
+    }
+    match rows.iter().find(|row| !row.passes()) {
+        None => Ok(()),
+        Some(row) => Err(line(row).into()),
+    }
+}
+
+fn line(row: &Row) -> String {
+    let Row { quantity, precision, n, steps, scale, error, bound, at } = row;
+    let (member, node) = at;
+    let share = row.share();
+    format!(
+        "{precision} n={n} steps={steps} {quantity}: error {error:.2e}, bound {bound:.2e} ({share:.3}), scale \
+         {scale:.2e}, member {member}, node {node}"
+    )
+}
+
+fn stages_agree<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+    check(&stages::<T>(gpu, n, None)?)
+}
+
+fn runs_agree<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+    check(&runs::<T>(gpu, n, 1, dispatches_of(1), None)?)?;
+    check(&runs::<T>(gpu, n, 100, dispatches_of(7), None)?)
+}
+
+/// The negative control: a displacement far below anything visible must fail, and the row must name the member.
+fn a_moved_node_fails<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+    let tamper = Tamper { member: 4, node: n / 2, by: 4096.0 * T::EPSILON };
+    let after_step = stages::<T>(gpu, n, Some(tamper))?;
+    let after_run = runs::<T>(gpu, n, 1, dispatches_of(1), Some(tamper))?;
+    for rows in [after_step, after_run] {
+        let caught: Vec<&Row> = rows.iter().filter(|row| !row.passes()).collect();
+        if caught.is_empty() {
+            return Err("a moved node was not noticed".into());
+        }
+        if let Some(row) = caught.iter().find(|row| row.at.0 != tamper.member) {
+            return Err(format!("the wrong member was named: {}", line(row)).into());
+        }
+    }
+    Ok(())
+}
+
+fn permutation<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+    let launches = members(n, 7, 20, 1e-4)?;
+    let order = [3, 0, 6, 2, 5, 1, 4];
+    let permuted: Vec<Launch> = order.iter().map(|j| launches[*j].clone()).collect();
+    let plain = on_gpu::<T>(gpu, n, &launches, dispatches_of(6))?;
+    let shuffled = on_gpu::<T>(gpu, n, &permuted, dispatches_of(6))?;
+    for (slot, j) in order.iter().enumerate() {
+        same(&shuffled[slot], &plain[*j], &format!("member {j} in slot {slot}"))?;
+    }
+    if shuffled[0].0 == plain[0].0 {
+        return Err("the members do not differ".into());
+    }
+    Ok(())
+}
+
+fn same(a: &(State<f64>, Counters), b: &(State<f64>, Counters), what: &str) -> Outcome {
+    let counts = |c: Counters| (c.status, c.steps, c.relax_step, c.half_step);
+    let bits = |state: &State<f64>| state.to_numbers().into_iter().map(f64::to_bits).collect::<Vec<_>>();
+    if counts(a.1) != counts(b.1) || bits(&a.0) != bits(&b.0) {
+        return Err(format!("{what} differs").into());
+    }
+    Ok(())
+}
+
+fn dispatches<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+    let launches = members(n, 5, 50, 1e-4)?;
+    let at_once = on_gpu::<T>(gpu, n, &launches, dispatches_of(50))?;
+    for per_dispatch in [1, 7] {
+        let in_parts = on_gpu::<T>(gpu, n, &launches, dispatches_of(per_dispatch))?;
+        for j in 0..launches.len() {
+            same(&in_parts[j], &at_once[j], &format!("member {j} at {per_dispatch} steps per dispatch"))?;
+        }
+    }
+    let paused = on_gpu::<T>(gpu, n, &launches, Budget { steps: 50, sweeps: 24 })?;
+    for j in 0..launches.len() {
+        same(&paused[j], &at_once[j], &format!("member {j}, paused every 24 sweeps,"))?;
+    }
+    Ok(())
+}
+
+/// One member of each bad end, at different places; the good ones must not notice.
+fn bad_members<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+    let good = members(n, 8, 20, 1e-4)?;
+    let alone = on_gpu::<T>(gpu, n, &good, dispatches_of(5))?;
+    let mut mixed = good.clone();
+    mixed[1].nodes[n / 3] = DVec2::new(f64::NAN, 0.0);
+    mixed[3].nodes[5].x = 1e30;
+    // Two neighbouring nodes in one place.
+    mixed[4].nodes[8] = mixed[4].nodes[7];
+    // A turning number that the curve does not have.
+    mixed[6].turning = 2;
+    let together = on_gpu::<T>(gpu, n, &mixed, dispatches_of(5))?;
+    let expected = [
+        (1, vec![Status::Nonfinite]),
+        (3, vec![Status::Nonfinite, Status::Singular]),
+        (4, vec![Status::Nonfinite, Status::Singular, Status::Stalled]),
+        (6, vec![Status::Singular]),
+    ];
+    for (j, statuses) in expected {
+        let ended = together[j].1.status;
+        if !statuses.iter().any(|status| *status as u32 == ended) {
+            return Err(format!("member {j} ended with status {ended}, not one of {statuses:?}").into());
+        }
+    }
+    for j in [0, 2, 5, 7] {
+        same(&together[j], &alone[j], &format!("good member {j}"))?;
+    }
+    Ok(())
+}
+
+fn relaxation<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+    let tolerance = if T::NAME == "f32" { 1e-3 } else { 1e-5 };
+    let mut launches = members(n, 5, 60, tolerance)?;
+    for launch in &mut launches {
+        launch.stop_when_relaxed = true;
+    }
+    let ended = on_gpu::<T>(gpu, n, &launches, dispatches_of(7))?;
+    let blocks = Blocks::new(n).ok_or("n")?;
+    let method = Method { solver: Solver::GaussSeidel, order: Order::Coloured, max_sweeps: 200_000 };
+    let mut relaxed = 0;
+    for (j, launch) in launches.iter().enumerate() {
+        let mut twin = Run::<T>::new(launch);
+        evolve(&mut twin, &method, &mut Workspace::new(blocks), 60);
+        let (ours, theirs) = (ended[j].1, twin.counters);
+        let key = |c: Counters| (c.status, c.steps, c.relax_step, c.half_step);
+        if key(ours) != key(theirs) {
+            return Err(format!("member {j}: {:?} on the GPU, {:?} on the CPU", key(ours), key(theirs)).into());
+        }
+        relaxed += usize::from(ours.status == Status::Relaxed as u32 && ours.relax_step != NEVER);
+    }
+    if relaxed == 0 {
+        return Err("no member relaxed, so nothing was compared".into());
+    }
+    Ok(())
+}
+
+fn largest<T: Real>(gpu: &Gpu, _: usize) -> Outcome {
+    let n = gpu.max_points::<T>().min(1024);
+    if n < 512 {
+        return Err(format!("only {n} points fit").into());
+    }
+    let launches = members(n, 2, 2, 1e-3)?;
+    for (j, (state, counters)) in on_gpu::<T>(gpu, n, &launches, dispatches_of(2))?.into_iter().enumerate() {
+        if (counters.status, counters.steps) != (0, 2) || !state.x.nodes().iter().all(|x| x.is_finite()) {
+            return Err(format!("member {j} of {n} points: {counters:?}").into());
+        }
+    }
+    let blocks = Blocks::new(gpu.max_points::<T>() + 1).ok_or("n")?;
+    if gpu.check_size::<T>(blocks).is_ok() || Kernel::<T>::new(gpu, blocks, 1, 1, false).is_ok() {
+        return Err("one point more was not refused".into());
+    }
+    Ok(())
+}
+
+/// Positions within 5·10⁻⁴ of the direct f64 solution on the CPU: the error of f32 and of its tolerance of 10⁻³.
+fn paper<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+    let node = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64) * DVec2::new(2.0, 1.0);
+    let mut launch = members(n, 1, 2000, if T::NAME == "f32" { 1e-3 } else { 1e-5 })?.remove(0);
+    launch.nodes = (1..=n).map(node).collect();
+    launch.parameters.tau = 1e-3;
+    let mut exact = Run::<f64>::new(&launch);
+    let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
+    evolve(&mut exact, &method, &mut Workspace::new(Blocks::new(n).ok_or("n")?), 2000);
+    let (state, counters) = on_gpu::<T>(gpu, n, &[launch], dispatches_of(50))?.remove(0);
+    if (counters.steps, exact.counters.steps) != (2000, 2000) {
+        return Err(format!("{counters:?} on the GPU, {:?} on the CPU", exact.counters).into());
+    }
+    let error = state.positions().zip(exact.state.positions()).map(|(a, b)| (a - b).length()).fold(0.0, f64::max);
+    println!("{}: paper's ellipse at t = 2, positions off by {error:.2e}", T::NAME);
+    if error > 5e-4 { Err(format!("positions off by {error:e}").into()) } else { Ok(()) }
+}

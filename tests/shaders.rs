@@ -1,0 +1,322 @@
+//! Every shader, without any GPU: valid in both precisions, translated for every API, laid out as the host
+//! believes, and free of what WGSL does silently wrong.
+
+use std::collections::BTreeMap;
+
+use curvelax::{
+    backend::gpu::{kernel, shader},
+    ensemble::Status,
+    number::{BIG, Real},
+    scheme::{
+        observe::{MAX_TURN, MIN_EDGE},
+        parameters::{Counters, NEVER, Parameters, Report},
+        step::NEGLIGIBLE,
+    },
+    solver::{Blocks, gauss_seidel::SWEEPS_PER_CHECK},
+};
+use naga::{
+    AddressSpace, Module, TypeInner,
+    back::{hlsl, msl, spv},
+    valid::{Capabilities, ModuleInfo, ValidationFlags, Validator},
+};
+
+fn capabilities<T: Real>() -> Capabilities {
+    if T::NAME == "f64" { Capabilities::FLOAT64 } else { Capabilities::empty() }
+}
+
+/// Parses and validates a source; an error names the shader's own file and line.
+fn validated(source: &str, traced: bool, capabilities: Capabilities) -> Result<(Module, ModuleInfo), String> {
+    let at =
+        |line: usize| shader::locate(line, traced).map_or(String::new(), |(file, line)| format!("{file}:{line}: "));
+    let module = naga::front::wgsl::parse_str(source).map_err(|error| {
+        let line = error.location(source).map_or(0, |location| location.line_number as usize);
+        format!("{}{}", at(line), error.message())
+    })?;
+    let info = Validator::new(ValidationFlags::all(), capabilities).validate(&module).map_err(|error| {
+        let line = error.location(source).map_or(0, |location| location.line_number as usize);
+        format!("{}{}", at(line), error.emit_to_string(source))
+    })?;
+    Ok((module, info))
+}
+
+/// The module with its sizes filled in for rings of `n` nodes.
+fn sized<T: Real>(n: usize, traced: bool) -> (Module, ModuleInfo) {
+    let (module, info) = validated(&shader::source::<T>(traced), traced, capabilities::<T>()).unwrap();
+    let constants = shader::constants(Blocks::new(n).unwrap(), 32);
+    let constants = constants.iter().map(|(name, value)| (name.to_string(), *value)).collect();
+    let (module, info) = naga::back::pipeline_constants::process_overrides(&module, &info, None, &constants).unwrap();
+    (module.into_owned(), info.into_owned())
+}
+
+#[test]
+fn every_shader_is_valid_in_both_precisions() {
+    for traced in [false, true] {
+        validated(&shader::source::<f32>(traced), traced, Capabilities::empty()).unwrap();
+        validated(&shader::source::<f64>(traced), traced, Capabilities::FLOAT64).unwrap();
+    }
+    // Negative control: f64 is refused where it is not asked for.
+    assert!(validated(&shader::source::<f64>(false), false, Capabilities::empty()).is_err());
+}
+
+#[test]
+fn an_error_names_the_shader_file_and_line() {
+    let source = shader::source::<f32>(false).replacen("fn accept() {", "fn accept() { nonsense;", 1);
+    let message = validated(&source, false, Capabilities::empty()).unwrap_err();
+    let line = include_str!("../shaders/step.wgsl").lines().position(|line| line == "fn accept() {").unwrap() + 1;
+    assert!(message.starts_with(&format!("step.wgsl:{line}:")), "{message}");
+}
+
+#[test]
+fn every_file_in_the_folder_is_part_of_the_kernel() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/shaders");
+    let source = shader::source::<f32>(false) + &shader::source::<f32>(true);
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "wgsl") {
+            let text = std::fs::read_to_string(&path).unwrap();
+            assert!(source.contains(&text), "{} is in no kernel", path.display());
+        }
+    }
+}
+
+#[test]
+fn f32_translates_for_every_api_and_f64_for_vulkan() {
+    for n in [6, 100, 257] {
+        let (module, info) = sized::<f32>(n, false);
+        let options = spv::Options { lang_version: (1, 3), ..Default::default() };
+        spv::write_vec(&module, &info, &options, None).unwrap();
+        msl::write_string(
+            &module,
+            &info,
+            &msl::Options { fake_missing_bindings: true, ..Default::default() },
+            &Default::default(),
+        )
+        .unwrap();
+        let mut text = String::new();
+        let options = hlsl::Options { fake_missing_bindings: true, ..Default::default() };
+        hlsl::Writer::new(&mut text, &options, &Default::default()).write(&module, &info, None).unwrap();
+        assert!(text.contains("evolve"));
+
+        let (module, info) = sized::<f64>(n, false);
+        spv::write_vec(&module, &info, &spv::Options { lang_version: (1, 3), ..Default::default() }, None).unwrap();
+    }
+}
+
+/// Name → (field, offset) and size of every struct.
+fn structs(module: &Module) -> BTreeMap<String, (Vec<(String, u32)>, u32)> {
+    let mut found = BTreeMap::new();
+    for (_, ty) in module.types.iter() {
+        if let (Some(name), TypeInner::Struct { members, span }) = (&ty.name, &ty.inner) {
+            let fields = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect();
+            found.insert(name.clone(), (fields, *span));
+        }
+    }
+    found
+}
+
+fn layouts_agree<T: Real>() {
+    let (module, _) = validated(&shader::source::<T>(false), false, capabilities::<T>()).unwrap();
+    let found = structs(&module);
+    let number = size_of::<T>() as u32;
+    let expect = |name: &str, fields: &[&str], step: u32| {
+        let expected: Vec<_> = (0..).zip(fields).map(|(i, field)| (field.to_string(), i * step)).collect();
+        assert_eq!(found[name], (expected, fields.len() as u32 * step), "{name} in {}", T::NAME);
+    };
+    expect("Parameters", Parameters::<T>::FIELDS, number);
+    expect("Report", Report::<T>::FIELDS, number);
+    expect("Counters", &Counters::FIELDS, 4);
+    expect("Dispatch", &kernel::DISPATCH_FIELDS, 4);
+}
+
+#[test]
+fn the_structs_shared_with_the_host_have_its_layout() {
+    layouts_agree::<f32>();
+    layouts_agree::<f64>();
+    use std::mem::offset_of;
+    assert_eq!(size_of::<Counters>(), 4 * Counters::FIELDS.len());
+    assert_eq!(offset_of!(Counters, goal), 8);
+    assert_eq!(offset_of!(Counters, solve_sweeps), 4 * 9);
+    assert_eq!(offset_of!(Parameters<f64>, tau), 8 * 8);
+    assert_eq!(size_of::<Report<f32>>(), 4 * Report::<f32>::FIELDS.len());
+}
+
+#[test]
+fn bindings_are_found_by_name_where_the_host_puts_them() {
+    for traced in [false, true] {
+        let (module, _) = validated(&shader::source::<f32>(traced), traced, Capabilities::empty()).unwrap();
+        let mut bound = BTreeMap::new();
+        for (_, variable) in module.global_variables.iter() {
+            if let Some(binding) = &variable.binding {
+                assert_eq!(binding.group, 0);
+                bound.insert(binding.binding, variable.name.clone().unwrap());
+            }
+        }
+        let mut expected = vec!["dispatch", "all_parameters", "all_counters", "all_reports", "all_states"];
+        if traced {
+            expected.push("traces");
+        }
+        assert_eq!(bound.into_values().collect::<Vec<_>>(), expected);
+    }
+}
+
+#[test]
+fn workgroup_memory_is_what_the_host_counts() {
+    for n in [6, 7, 100, 257, 1024] {
+        let blocks = Blocks::new(n).unwrap();
+        let (module, _) = sized::<f64>(n, false);
+        let mut layouter = naga::proc::Layouter::default();
+        layouter.update(module.to_ctx()).unwrap();
+        let in_workgroup = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);
+        let bytes: u32 = in_workgroup.map(|(_, v)| layouter[v.ty].size).sum();
+        let counted = shader::workgroup_bytes::<f64>(blocks);
+        assert!(bytes as usize <= counted && counted <= bytes as usize + 16, "n = {n}: {bytes}, counted {counted}");
+        if n <= 512 {
+            assert!(counted <= 16_384, "n = {n} exceeds what every WebGPU device has: {counted}");
+        }
+    }
+}
+
+/// The text of all shaders without comments.
+fn code() -> String {
+    let source = shader::source::<f64>(false) + &shader::source::<f64>(true);
+    source.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
+}
+
+/// f64 transcendentals pass validation and return garbage, and a hardware's f32 ones are not Rust's.
+fn transcendental(module: &Module) -> Option<naga::MathFunction> {
+    use naga::{Expression, MathFunction as M};
+    let functions = module.functions.iter().map(|(_, f)| f).chain(module.entry_points.iter().map(|e| &e.function));
+    let banned = |fun: &M| {
+        matches!(
+            fun,
+            M::Exp
+                | M::Exp2
+                | M::Log
+                | M::Log2
+                | M::Pow
+                | M::Sin
+                | M::Cos
+                | M::Tan
+                | M::Sinh
+                | M::Cosh
+                | M::Tanh
+                | M::Asin
+                | M::Acos
+                | M::Atan
+                | M::Atan2
+                | M::Asinh
+                | M::Acosh
+                | M::Atanh
+                | M::InverseSqrt
+                | M::Fma
+        )
+    };
+    functions.flat_map(|f| f.expressions.iter().map(|(_, e)| e)).find_map(|e| match e {
+        Expression::Math { fun, .. } if banned(fun) => Some(*fun),
+        _ => None,
+    })
+}
+
+#[test]
+fn no_transcendental_function_is_used() {
+    let (module, _) = validated(&shader::source::<f64>(true), true, Capabilities::FLOAT64).unwrap();
+    assert_eq!(transcendental(&module), None);
+    // Negative control.
+    let with = naga::front::wgsl::parse_str("fn f(x: f32) -> f32 { return exp(x); }").unwrap();
+    assert!(transcendental(&with).is_some());
+}
+
+/// A comparison of a value with itself: meant to detect NaN, and optimised away.
+fn self_comparison(code: &str) -> Option<&str> {
+    let words: Vec<&str> = code.split([' ', '\n', '(', ')', ';', '{', '}']).filter(|word| !word.is_empty()).collect();
+    words.windows(3).find(|w| w[1] == "!=" && w[0] == w[2]).map(|w| w[0])
+}
+
+#[test]
+fn nan_is_never_looked_for_by_comparing_a_value_with_itself() {
+    assert_eq!(self_comparison(&code()), None);
+    assert_eq!(self_comparison("if (x != x) {"), Some("x"));
+}
+
+/// Value of `const NAME = …;` in the shaders.
+fn constant(name: &str) -> f64 {
+    let start = format!("const {name} = ");
+    let code = code();
+    let line = code.lines().find(|line| line.starts_with(&start)).unwrap_or_else(|| panic!("no constant {name}"));
+    let text = line[start.len()..].trim_end_matches(';').trim_end_matches('u');
+    text.strip_prefix("0x")
+        .map_or_else(|| text.parse().unwrap(), |hex| f64::from(u32::from_str_radix(hex, 16).unwrap()))
+}
+
+#[test]
+fn the_constants_of_shaders_and_host_are_equal() {
+    for (name, value) in [
+        ("BIG", BIG),
+        ("MAX_TURN", MAX_TURN),
+        ("MIN_EDGE", MIN_EDGE),
+        ("NEGLIGIBLE", NEGLIGIBLE),
+        ("SWEEPS_PER_CHECK", f64::from(SWEEPS_PER_CHECK)),
+        ("NEVER", f64::from(NEVER)),
+        ("RUNNING", 0.0),
+        ("RELAXED", f64::from(Status::Relaxed as u32)),
+        ("SINGULAR", f64::from(Status::Singular as u32)),
+        ("NONFINITE", f64::from(Status::Nonfinite as u32)),
+        ("STALLED", f64::from(Status::Stalled as u32)),
+        ("FOUR_PI", 4.0 * std::f64::consts::PI),
+        ("HALF_OVER_PI", 0.5 / std::f64::consts::PI),
+        ("TRACE_FIELDS", kernel::TRACE_FIELDS.len() as f64),
+    ] {
+        assert_eq!(constant(name), value, "{name}");
+    }
+}
+
+/// A device of wgpu's back end that computes nothing and checks everything.
+fn noop_device() -> wgpu::Device {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::NOOP;
+    descriptor.backend_options.noop.enable = true;
+    let instance = wgpu::Instance::new(descriptor);
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default())).unwrap();
+    let asked = wgpu::DeviceDescriptor {
+        required_features: adapter.features() & wgpu::Features::SHADER_F64,
+        // WebGPU's default limits, which every device has.
+        ..Default::default()
+    };
+    pollster::block_on(adapter.request_device(&asked)).unwrap().0
+}
+
+/// The error of building the pipeline and binding `buffers` storage buffers behind the uniform one.
+fn pipeline_error<T: Real>(device: &wgpu::Device, n: usize, traced: bool, buffers: u32) -> Option<String> {
+    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let pipeline = kernel::compile::<T>(device, Blocks::new(n).unwrap(), 32, traced);
+    let buffer = |usage| {
+        device.create_buffer(&wgpu::BufferDescriptor { label: None, size: 4096, usage, mapped_at_creation: false })
+    };
+    let (uniform, storage) = (buffer(wgpu::BufferUsages::UNIFORM), buffer(wgpu::BufferUsages::STORAGE));
+    let resource = |binding| if binding == 0 { uniform.as_entire_binding() } else { storage.as_entire_binding() };
+    let entries: Vec<_> =
+        (0..=buffers).map(|binding| wgpu::BindGroupEntry { binding, resource: resource(binding) }).collect();
+    let layout = pipeline.get_bind_group_layout(0);
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
+    pollster::block_on(scope.pop()).map(|error| error.to_string())
+}
+
+#[test]
+fn pipelines_are_built_and_bound_without_any_gpu() {
+    let device = noop_device();
+    assert!(device.features().contains(wgpu::Features::SHADER_F64));
+    for n in [6, 7, 64, 100, 257] {
+        for traced in [false, true] {
+            let buffers = 4 + u32::from(traced);
+            assert_eq!(pipeline_error::<f32>(&device, n, traced, buffers), None, "f32, n = {n}");
+            assert_eq!(pipeline_error::<f64>(&device, n, traced, buffers), None, "f64, n = {n}");
+            // Negative control: a buffer too few is noticed.
+            assert!(pipeline_error::<f32>(&device, n, traced, buffers - 1).is_some());
+        }
+    }
+}
+
+#[test]
+fn the_noop_back_end_never_passes_for_an_adapter() {
+    assert!(curvelax::backend::gpu::Gpu::list().iter().all(|gpu| gpu.api() != "Noop"));
+}
