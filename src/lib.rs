@@ -38,7 +38,7 @@
 //! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
 //! | [`schedule`], [`trajectory`], [`simulate`] | steps and output times; one member's way; the loop over all |
 //! | [`report`] | tables, plots, provenance |
-//! | `conformance` | the GPU compared with the CPU, stage by stage and over whole runs |
+//! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
 //! | [`cli`] | the commands |
 //!
 //! # Example
