@@ -1,4 +1,87 @@
-//! curvelax relaxes ensembles of plane curves by fourth-order geometric flows.
+//! curvelax relaxes ensembles of closed plane curves by fourth-order geometric flows
+//!
+//! ```text
+//! ∂_t x = β N + α T,    β = -∂²_s k + b(k),    b(0) = 0,
+//! ```
+//!
+//! by the semi-implicit Lagrangian scheme of K. Mikula and D. Ševčovič, *Numerical aspects of evolution of plane
+//! curves satisfying the fourth order geometric equation*. It runs on the CPU and, through WGSL and wgpu, on a GPU.
+//! `README.md` is about the program, `docs/method.md` about the scheme.
+//!
+//! # Notation
+//!
+//! | symbol | meaning | place |
+//! |---|---|---|
+//! | n, i = 1…n | number of nodes; a node (index i-1 in arrays, periodic) | |
+//! | x | position | node |
+//! | k, r | signed curvature, > 0 on a circle; length, as the scheme evolves it | segment [x_{i-1}, x_i] |
+//! | q | (r_i + r_{i+1})/2 | node |
+//! | T, N | unit tangent; unit inward normal, det(T, N) = 1; curves run counter-clockwise | |
+//! | β, α | normal velocity; tangential velocity, which moves nodes along the curve only | segment; node |
+//! | τ, ω | time step; speed of the redistribution of nodes, in 1/time | |
+//! | L, A | length and signed area of the polygon x | |
+//! | excess | L²/(4πA) - (n/π)·tan(π/n), 0 on the regular polygon | |
+//!
+//! Lengths are in the user's unit and times in its fourth power.
+//!
+//! # Modules
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`error`] | what, where, numbers, remedy, exit code |
+//! | [`number`] | the number that the scheme is generic over |
+//! | [`flow`] | the law b(k) |
+//! | [`curve`] | plane curves in f64: shapes, perturbation, sampling, measures |
+//! | [`solver`] | periodic pentadiagonal systems: rows, sweeps, direct solution |
+//! | [`scheme`] | the paper's step, one file a stage, with the stems of `shaders/` |
+//! | [`ensemble`] | the spec, its members and their random numbers, what a member leaves |
+//! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
+//! | [`schedule`], [`trajectory`], [`simulate`] | steps and output times; one member's way; the loop over all |
+//! | [`report`] | tables, plots, provenance |
+//! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
+//! | [`cli`] | the commands |
+//!
+//! # Example
+//!
+//! A run is a [`Spec`](ensemble::Spec), validated once, whose members are handed to a [`Sink`](ensemble::Sink). One
+//! ellipse under surface diffusion keeps its area and loses length:
+//!
+//! ```
+//! use curvelax::{
+//!     backend,
+//!     ensemble::{Ended, Family, Sink, Spec, Status, spec::{BackendChoice, Solver}},
+//!     simulate::simulate,
+//! };
+//!
+//! struct Check;
+//!
+//! impl Sink for Check {
+//!     fn member(&mut self, ended: &Ended) -> curvelax::Result<()> {
+//!         let (start, end) = (ended.outcome.start, ended.outcome.end);
+//!         assert!((end.area / start.area - 1.0).abs() < 1e-3);
+//!         assert!(end.length < 0.96 * start.length);
+//!         assert_eq!(ended.outcome.status, Status::Unfinished);
+//!         Ok(())
+//!     }
+//!     fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
+//! }
+//!
+//! let spec = Spec {
+//!     curves: 1,
+//!     amplitude: 0.0,
+//!     t_end: 0.2,
+//!     solver: Solver::Direct,
+//!     backend: BackendChoice::Cpu,
+//!     ..Spec::default()
+//! };
+//! let spec = spec.validate()?;
+//! let family = Family::new(&spec)?;
+//! let choice = backend::choose(&spec, family.points())?;
+//! let precision = choice.precision();
+//! let (mut backend, _) = choice.open(&spec, family.points())?;
+//! simulate(&spec, &family, precision, backend.as_mut(), 0, &mut Check)?;
+//! # Ok::<(), curvelax::Error>(())
+//! ```
 
 pub mod backend;
 pub mod cli;
