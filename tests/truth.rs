@@ -280,7 +280,7 @@ fn f32_errors(n: usize) -> [f64; 2] {
 
 #[test]
 fn single_precision_follows_double_as_n_grows() {
-    for n in [100, 200] {
+    for n in [100, 200, 257] {
         let [positions, t_relax] = f32_errors(n);
         assert!(positions <= 5e-4 && t_relax.abs() <= 1e-3, "n = {n}: {positions:e}, {t_relax:e}");
     }
