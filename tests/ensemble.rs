@@ -92,7 +92,7 @@ fn column(rows: &[Row], name: &str) -> Vec<f64> {
 }
 
 /// Prime numbers of members and nodes, more members than slots, output times on and between steps.
-const MIXED: &str = "--curves 41 --points 37 --t-end 0.05 --series 0.0071 --snapshots 0,0.0123,0.05";
+const MIXED: &str = "--curves 41 --points 61 --t-end 0.05 --series 0.0071 --snapshots 0,0.0123,0.05";
 
 #[test]
 fn equal_seeds_make_equal_bytes_whatever_the_threads() {
@@ -171,6 +171,22 @@ fn rows_come_at_the_times_asked_for() {
         let (found, told) = (curvelax::curve::polygon::length(&last), number(ends, "length_end"));
         assert!((found / told - 1.0).abs() < 1e-13, "{found} {told}");
     }
+}
+
+#[test]
+fn the_last_step_is_as_short_as_the_final_time_demands() {
+    let common = "--curves 3 --points 41 --solver direct --series 0.0217";
+    let short = run(&format!("{common} --t-end 0.0217")).summary();
+    // A longer run passes that time inside a step of full length.
+    let long: Vec<Row> = run(&format!("{common} --t-end 0.03")).rows("series.csv");
+    for (short, long) in short.iter().zip(long.iter().filter(|row| row["t"] == "0.0217")) {
+        for name in ["length", "area", "excess", "energy"] {
+            let (end, inside) = (number(short, &format!("{name}_end")), number(long, name));
+            eprintln!("{name}: {end} by a short step, {inside} inside a whole one");
+            assert!((end / inside - 1.0).abs() < 1e-4, "{name}: {end} {inside}");
+        }
+    }
+    assert_eq!(long.len(), 6);
 }
 
 fn positions(rows: &[Row]) -> Vec<DVec2> {
