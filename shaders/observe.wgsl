@@ -4,6 +4,8 @@
 const MAX_TURN = 2.0;
 /// Shortest over mean edge below which an edge counts as vanished.
 const MIN_EDGE = 1e-5;
+/// Metric drift above which the scheme's lengths say nothing about the polygon.
+const MAX_DRIFT = 10.0;
 const FOUR_PI = 12.566370614359172;
 
 /// Sums of the new curve: length, area, energy, turning.
@@ -66,5 +68,6 @@ fn is_singular(turning: real) -> bool {
     let mean_edge = sums.x / real(NODES);
     let resolved = extremes.x <= real(MAX_TURN);
     let apart = real(MIN_EDGE) * mean_edge <= -extremes.w;
-    return !(resolved && apart && sums.w == turning);
+    let measured = extremes.y <= real(MAX_DRIFT);
+    return !(resolved && apart && measured && sums.w == turning);
 }

@@ -13,7 +13,7 @@ pub enum Status {
     Relaxed = 1,
     /// The final time came first.
     Unfinished = 2,
-    /// Curvature times spacing too large, an edge vanished, or the turning number was lost.
+    /// Curvature times spacing too large, an edge vanished, the metric was lost, or the turning number.
     Singular = 3,
     /// A value was not finite.
     Nonfinite = 4,

@@ -116,7 +116,8 @@ fn is_singular<T: Real>(sums: &Sums<T>, maxima: &Maxima<T>, turning: T, n: T) ->
     let mean_edge = sums.length / n;
     let resolved = maxima.turn.le(T::of(observe::MAX_TURN));
     let apart = (T::of(observe::MIN_EDGE) * mean_edge).le(-maxima.minus_shortest);
-    !(resolved && apart && sums.turning == turning)
+    let measured = maxima.drift.le(T::of(observe::MAX_DRIFT));
+    !(resolved && apart && measured && sums.turning == turning)
 }
 
 /// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.

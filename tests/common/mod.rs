@@ -1,0 +1,133 @@
+//! What the integration tests share: a curve that is stepped by hand, and measures of it.
+#![allow(dead_code, missing_docs)] // every test file takes its own part of it
+
+use std::f64::consts::TAU;
+
+use curvelax::{
+    flow::Flow,
+    number::Real,
+    scheme::{
+        Parameters, State, Workspace,
+        observe::{self, Curve, Sums},
+        step::{self, Method},
+    },
+    solver::{Blocks, Order, Solver},
+};
+use glam::DVec2;
+
+pub const DIRECT: Method =
+    Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1, redistribution: true };
+pub const SWEEPS: Method = Method { solver: Solver::GaussSeidel, max_sweeps: 1_000_000, ..DIRECT };
+
+/// The parameters of a flow with ω = 1 and the default tolerance of f64.
+pub fn parameters(flow: &Flow, tau: f64) -> Parameters<f64> {
+    let [c1, c2, c3, c4, c5, c6, c7, c8] = flow.coefficients();
+    let length_penalty = flow.length_penalty();
+    let (omega, redistribution, tolerance, sor) = (1.0, 1.0, 1e-5, 1.0);
+    Parameters {
+        c1,
+        c2,
+        c3,
+        c4,
+        c5,
+        c6,
+        c7,
+        c8,
+        tau,
+        omega,
+        redistribution,
+        tolerance,
+        sor,
+        length_penalty,
+        ..Default::default()
+    }
+}
+
+/// n nodes at `u = i/n`, i = 1…n.
+pub fn nodes(n: usize, curve: impl Fn(f64) -> DVec2) -> Vec<DVec2> {
+    (1..=n).map(|i| curve(TAU * i as f64 / n as f64)).collect()
+}
+
+/// The paper's ellipse, axes 2 and 1, equal-parameter nodes.
+pub fn ellipse(n: usize) -> Vec<DVec2> {
+    nodes(n, |u| DVec2::new(2.0 * u.cos(), u.sin()))
+}
+
+/// The circle `radius·(1 + amplitude·cos mθ)`.
+pub fn wavy_circle(n: usize, radius: f64, m: u32, amplitude: f64) -> Vec<DVec2> {
+    nodes(n, |u| radius * (1.0 + amplitude * (f64::from(m) * u).cos()) * DVec2::from_angle(u))
+}
+
+/// A curve and what steps it.
+pub struct Stepper<T: Real> {
+    pub state: State<T>,
+    pub work: Workspace<T>,
+    p: Parameters<T>,
+    method: Method,
+}
+
+impl<T: Real> Stepper<T> {
+    pub fn new(nodes: &[DVec2], p: &Parameters<f64>, method: Method) -> Stepper<T> {
+        let numbers: Vec<T> = p.to_numbers().into_iter().map(T::of).collect();
+        Stepper {
+            state: State::from_nodes(nodes),
+            work: Workspace::new(Blocks::new(nodes.len()).unwrap()),
+            p: Parameters::from_numbers(&numbers),
+            method,
+        }
+    }
+
+    /// One step, which must succeed.
+    #[track_caller]
+    pub fn step(&mut self) {
+        let stepped = step::step(&self.state, &self.p, &self.method, &mut self.work);
+        assert!(stepped.solved && stepped.finite, "a system was not solved");
+        step::accept(&mut self.state, &mut self.work);
+    }
+
+    #[track_caller]
+    pub fn steps(mut self, steps: usize) -> Stepper<T> {
+        (0..steps).for_each(|_| self.step());
+        self
+    }
+
+    pub fn sums(&self) -> Sums<T> {
+        let State { x, y, k, r, .. } = &self.state;
+        observe::sums(Curve { x, y, k, r }, &self.p, self.work.blocks)
+    }
+
+    pub fn positions(&self) -> Vec<DVec2> {
+        self.state.positions().collect()
+    }
+}
+
+/// Largest distance between nodes of the same number.
+pub fn distance(a: &[DVec2], b: &[DVec2]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
+}
+
+/// Mean distance of the nodes from the origin.
+pub fn radius(nodes: &[DVec2]) -> f64 {
+    nodes.iter().map(|node| node.length()).sum::<f64>() / nodes.len() as f64
+}
+
+/// Amplitude of mode m of the radius as a function of the angle, by the trapezium rule.
+pub fn mode(nodes: &[DVec2], m: u32) -> f64 {
+    let n = nodes.len();
+    let mean = radius(nodes);
+    let wave = |i: usize| {
+        let node = nodes[i % n];
+        (node.length() - mean) * DVec2::from_angle(f64::from(m) * node.to_angle())
+    };
+    let sum: DVec2 = (0..n).map(|i| nodes[i].angle_to(nodes[(i + 1) % n]) * (wave(i) + wave(i + 1))).sum();
+    sum.length() / TAU
+}
+
+/// Slope of the line through the points by least squares.
+pub fn slope(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let [xy, xx] = points.iter().fold([0.0; 2], |s, p| [s[0] + (p.0 - x) * (p.1 - y), s[1] + (p.0 - x).powi(2)]);
+    xy / xx
+}

@@ -1,0 +1,564 @@
+//! Ensembles through the program and the library: repetition, output times, events, statuses, files, input.
+
+mod common;
+
+use std::{collections::HashMap, fs, path::Path};
+
+use assert_cmd::Command;
+use curvelax::{
+    backend::{Backend, cpu::CpuBackend},
+    ensemble::{Ended, Family, Sink, Spec, Status, spec::Precision},
+    error::Result,
+    scheme::{Parameters, State, evolve::Launch, parameters::Counters, step::Method},
+    simulate::simulate,
+    solver::Blocks,
+};
+use glam::DVec2;
+use tempfile::TempDir;
+
+use common::{DIRECT, SWEEPS, distance, nodes, parameters};
+
+const FILES: [&str; 3] = ["summary.csv", "series.csv", "snapshots.csv"];
+
+/// A finished run in its own folder.
+struct Done {
+    home: TempDir,
+}
+
+/// A row by column name.
+type Row = HashMap<String, String>;
+
+/// `curvelax run ARGUMENTS --backend cpu`, which must succeed; `files` lie in the folder where it runs.
+#[track_caller]
+fn run_with(files: &[(&str, &str)], arguments: &str) -> Done {
+    let home = TempDir::new().unwrap();
+    for (name, text) in files {
+        fs::write(home.path().join(name), text).unwrap();
+    }
+    let mut command = Command::cargo_bin("curvelax").unwrap();
+    // Where this is not set, a layer of Mesa says so on stderr.
+    command.current_dir(home.path()).env("XDG_RUNTIME_DIR", home.path()).arg("run");
+    command.args(arguments.split_whitespace()).args(["--backend", "cpu", "--quiet", "--out", "out"]);
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.is_empty(), "{arguments}: {said}");
+    Done { home }
+}
+
+#[track_caller]
+fn run(arguments: &str) -> Done {
+    run_with(&[], arguments)
+}
+
+impl Done {
+    fn path(&self) -> std::path::PathBuf {
+        self.home.path().join("out")
+    }
+
+    #[track_caller]
+    fn text(&self, name: &str) -> String {
+        fs::read_to_string(self.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    fn texts(&self) -> [String; 3] {
+        FILES.map(|name| self.text(name))
+    }
+
+    fn rows(&self, name: &str) -> Vec<Row> {
+        let mut reader = csv::Reader::from_path(self.path().join(name)).unwrap();
+        let header = reader.headers().unwrap().clone();
+        let row = |record: csv::StringRecord| header.iter().zip(&record).map(|(k, v)| (k.into(), v.into())).collect();
+        reader.records().map(|record| row(record.unwrap())).collect()
+    }
+
+    fn summary(&self) -> Vec<Row> {
+        self.rows("summary.csv")
+    }
+
+    /// The lines of `name` that belong to `members`.
+    fn lines_of(&self, name: &str, members: &[u64]) -> Vec<String> {
+        let of_member = |line: &&str| members.iter().any(|m| line.split(',').next() == Some(&m.to_string()));
+        self.text(name).lines().skip(1).filter(of_member).map(str::to_owned).collect()
+    }
+}
+
+#[track_caller]
+fn number(row: &Row, column: &str) -> f64 {
+    row[column].parse().unwrap_or_else(|_| panic!("{column} is {:?}", row[column]))
+}
+
+fn column(rows: &[Row], name: &str) -> Vec<f64> {
+    rows.iter().map(|row| number(row, name)).collect()
+}
+
+/// Prime numbers of members and nodes, more members than slots, output times on and between steps.
+const MIXED: &str = "--curves 41 --points 61 --t-end 0.05 --series 0.0071 --snapshots 0,0.0123,0.05";
+
+#[test]
+fn equal_seeds_make_equal_bytes_whatever_the_threads() {
+    let first = run(&format!("{MIXED} --threads 1")).texts();
+    for again in ["--threads 1", "--threads 2", "--threads 3", ""] {
+        assert!(run(&format!("{MIXED} {again}")).texts() == first, "{again}");
+    }
+    let other = run(&format!("{MIXED} --seed 2")).texts();
+    assert!(FILES.iter().zip(first.iter().zip(&other)).all(|(_, (a, b))| a != b), "the seed does not matter");
+    let mut rows: Vec<&str> = first[0].lines().map(|line| line.split_once(',').unwrap().1).collect();
+    rows.sort_unstable();
+    rows.dedup();
+    assert_eq!(rows.len(), 42, "members are not all different");
+}
+
+#[test]
+fn a_chosen_member_is_the_same_bit_for_bit() {
+    let (all, only) = (run(MIXED), run(&format!("{MIXED} --only 37,3,7")));
+    for name in FILES {
+        let expected = all.lines_of(name, &[3, 7, 37]);
+        assert!(!expected.is_empty());
+        assert_eq!(only.text(name).lines().skip(1).collect::<Vec<_>>(), expected, "{name}");
+    }
+}
+
+#[test]
+fn the_printed_spec_repeats_the_run_of_the_flags() {
+    let flags = "--curves 5 --points 53 --tau 0.0007 --t-end 0.03 --flow elastic:0.3 --omega 0.5 --sampling parameter \
+                 --shape flower:3:0.2 --amplitude 0.02 --modes 3..=6 --decay 0.5 --solver direct --relax-to 0.5 \
+                 --series 0.004 --snapshots 0.01,0.03 --stop-when-relaxed --threads 1";
+    let home = TempDir::new().unwrap();
+    let mut print = Command::cargo_bin("curvelax").unwrap();
+    print.env("XDG_RUNTIME_DIR", home.path()).args(["run", "--backend", "cpu", "--print-spec"]);
+    let printed = print.args(flags.split_whitespace()).output().unwrap();
+    let printed = String::from_utf8(printed.stdout).unwrap();
+    let (by_flags, by_file) = (run(flags), run_with(&[("spec.toml", &printed)], "spec.toml"));
+    assert!(by_flags.texts() == by_file.texts(), "{printed}");
+    assert!(run(&flags.replace("0.0007", "0.0008")).texts() != by_file.texts());
+}
+
+#[test]
+fn the_spec_in_run_json_repeats_the_run() {
+    let first = run(&format!("{MIXED} --only 2,5 --tolerance 1e-6"));
+    let json: serde_json::Value = serde_json::from_str(&first.text("run.json")).unwrap();
+    let spec: Spec = serde_json::from_value(json["spec"].clone()).unwrap();
+    let again = run_with(&[("spec.toml", &spec.to_toml().unwrap())], "spec.toml");
+    assert!(again.texts() == first.texts());
+    assert_eq!((&json["members"], &json["members_by_status"]["unfinished"]), (&2.into(), &2.into()));
+    assert_eq!((&json["platform"]["backend"], &json["precision"]), (&"cpu".into(), &"f64".into()));
+}
+
+#[test]
+fn rows_come_at_the_times_asked_for() {
+    // Neither the interval nor the final time is a multiple of τ = 0.001.
+    let done = run("--curves 3 --points 41 --t-end 0.0217 --series 0.0013 --snapshots 0,0.00155,0.0217");
+    let summary = done.summary();
+    assert!(summary.iter().all(|row| row["t_end"] == "0.0217" && row["steps"] == "22"), "{summary:?}");
+    for member in 0..3 {
+        let of_member = |row: &Row| row["member"] == member.to_string();
+        let series: Vec<Row> = done.rows("series.csv").into_iter().filter(of_member).collect();
+        let asked: Vec<f64> = (0..=16).map(|row| f64::from(row) * 0.0013).collect();
+        assert_eq!(column(&series, "t"), asked);
+        let length = column(&series, "length");
+        assert!(length.windows(2).all(|pair| pair[1] < pair[0]), "{length:?}");
+
+        let snapshots: Vec<Row> = done.rows("snapshots.csv").into_iter().filter(of_member).collect();
+        for (chunk, t) in snapshots.chunks(41).zip([0.0, 0.00155, 0.0217]) {
+            assert!(chunk.iter().all(|row| number(row, "t") == t));
+            assert!(chunk.iter().zip(1..).all(|(row, i): (_, u32)| row["i"] == i.to_string()));
+        }
+        assert_eq!(snapshots.len(), 3 * 41);
+        // The first row of the series and the last snapshot are the ends that the summary tells of.
+        let ends = &summary[member];
+        assert_eq!((&series[0]["length"], &series[0]["excess"]), (&ends["length_start"], &ends["excess_start"]));
+        let last: Vec<DVec2> = positions(&snapshots[82..]);
+        let (found, told) = (curvelax::curve::polygon::length(&last), number(ends, "length_end"));
+        assert!((found / told - 1.0).abs() < 1e-13, "{found} {told}");
+    }
+}
+
+#[test]
+fn the_last_step_is_as_short_as_the_final_time_demands() {
+    let common = "--curves 3 --points 41 --solver direct --series 0.0217";
+    let short = run(&format!("{common} --t-end 0.0217")).summary();
+    // A longer run passes that time inside a step of full length.
+    let long: Vec<Row> = run(&format!("{common} --t-end 0.03")).rows("series.csv");
+    for (short, long) in short.iter().zip(long.iter().filter(|row| row["t"] == "0.0217")) {
+        for name in ["length", "area", "excess", "energy"] {
+            let (end, inside) = (number(short, &format!("{name}_end")), number(long, name));
+            eprintln!("{name}: {end} by a short step, {inside} inside a whole one");
+            assert!((end / inside - 1.0).abs() < 1e-4, "{name}: {end} {inside}");
+        }
+    }
+    assert_eq!(long.len(), 6);
+}
+
+fn positions(rows: &[Row]) -> Vec<DVec2> {
+    rows.iter().map(|row| DVec2::new(number(row, "x"), number(row, "y"))).collect()
+}
+
+const SERIES_COLUMNS: [&str; 8] =
+    ["length", "area", "excess", "energy", "k_min", "k_max", "mesh_ratio", "metric_drift"];
+
+#[test]
+fn a_row_inside_a_step_lies_on_the_line_between_its_ends() {
+    let common = "--curves 2 --points 41 --t-end 0.02 --tau 0.001 --solver direct";
+    let steps = run(&format!("{common} --series 0.001 --snapshots 0.004,0.005")).rows("series.csv");
+    let inside = run(&format!("{common} --series 0.00125 --snapshots 0.0045")).rows("series.csv");
+    let (steps, inside) = (&steps[..21], &inside[..17]);
+    for row in inside {
+        let (step, fraction) = ((number(row, "t") / 0.001 + 1e-9).floor(), (number(row, "t") / 0.001).fract());
+        if !(1e-9..1.0 - 1e-9).contains(&fraction) {
+            continue;
+        }
+        for name in SERIES_COLUMNS {
+            let [a, b] = [0, 1].map(|next| number(&steps[step as usize + next], name));
+            let error = number(row, name) - (a + fraction * (b - a));
+            assert!(error.abs() < 1e-12 * (1.0 + b.abs()), "{name} at {}: {error:e}", row["t"]);
+        }
+    }
+}
+
+#[test]
+fn interpolated_rows_are_as_near_to_small_steps_as_rows_on_steps() {
+    let common = "--curves 1 --points 41 --t-end 0.3 --series 0.0125 --solver direct --amplitude 0";
+    let exact = column(&run(&format!("{common} --tau 0.00003125")).rows("series.csv"), "excess");
+    let error = |tau: &str| -> Vec<f64> {
+        let found = column(&run(&format!("{common} --tau {tau}")).rows("series.csv"), "excess");
+        assert_eq!(found.len(), 25);
+        found.iter().zip(&exact).map(|(found, exact)| (found - exact).abs()).collect()
+    };
+    // Every second time lies in the middle of a step of 0.005 and every time on a step of 0.0025.
+    let (coarse, fine) = (error("0.005"), error("0.0025"));
+    eprintln!("{coarse:?}\n{fine:?}");
+    for i in 4..25 {
+        let ratio = coarse[i] / fine[i];
+        assert!((1.6..2.4).contains(&ratio), "row {i}: {:e} and {:e}", coarse[i], fine[i]);
+    }
+}
+
+#[test]
+fn a_member_that_stops_when_relaxed_ends_in_that_step() {
+    let common = "--curves 7 --points 53 --t-end 1 --solver direct --series 0.1";
+    let (whole, stopped) = (run(common), run(&format!("{common} --stop-when-relaxed")));
+    let mut ends = Vec::new();
+    for (whole, stopped) in whole.summary().iter().zip(stopped.summary()) {
+        let (t_end, t_relax) = (number(&stopped, "t_end"), number(&stopped, "t_relax"));
+        assert!(t_end - 0.001 <= t_relax && t_relax <= t_end && t_end < 1.0, "{t_relax} {t_end}");
+        assert_eq!((&*stopped["status"], &*whole["status"]), ("relaxed", "relaxed"));
+        for name in ["t_relax", "t_half", "length_start", "area_start", "excess_start"] {
+            assert_eq!(whole[name], stopped[name], "{name}");
+        }
+        ends.push(stopped["t_end"].clone());
+    }
+    ends.dedup();
+    assert!(ends.len() > 3, "members do not end at their own times: {ends:?}");
+    for member in 0..7 {
+        let [all, until] = [&whole, &stopped].map(|done| done.lines_of("series.csv", &[member]));
+        assert_eq!(until, all[..until.len()], "member {member}");
+        let t_end = number(&stopped.summary()[member as usize], "t_end");
+        assert_eq!(until.len(), (t_end / 0.1).floor() as usize + 1, "member {member}");
+    }
+}
+
+#[test]
+fn a_circle_is_relaxed_before_its_first_step() {
+    for stop in ["", "--stop-when-relaxed"] {
+        let rows = run(&format!("--curves 3 --shape circle:0.7 --amplitude 0 --t-end 0.01 {stop}")).summary();
+        for row in rows {
+            assert_eq!((&*row["status"], number(&row, "t_relax")), ("relaxed", 0.0));
+            assert_eq!(row["steps"], if stop.is_empty() { "10" } else { "0" });
+        }
+    }
+}
+
+/// The excess of mode 2 is proportional to the square of its amplitude, which decays at the rate 12/R⁴.
+#[test]
+fn a_small_mode_relaxes_when_the_linear_theory_says() {
+    for (radius, sampling, bound) in
+        [(1.0_f64, "parameter", 0.012), (1.0, "arclength", 0.006), (0.5, "arclength", 0.006)]
+    {
+        let unit = radius.powi(4);
+        let outline: String = nodes(400, |u| radius * (1.0 + 0.01 * (2.0 * u).cos()) * DVec2::from_angle(u))
+            .iter()
+            .map(|node| format!("{:?},{:?}\n", node.x, node.y))
+            .collect();
+        let shape = if radius == 1.0 { "flower:2:0.01" } else { "file:flower.csv" };
+        let (tau, t_end) = (1e-4 * unit, 0.25 * unit);
+        let flags = format!("--shape {shape} --amplitude 0 --curves 1 --tau {tau} --t-end {t_end} --solver direct");
+        let row = run_with(&[("flower.csv", &outline)], &format!("{flags} --sampling {sampling}")).summary().remove(0);
+        for (name, fall) in [("t_relax", 100.0_f64), ("t_half", 2.0)] {
+            let error = number(&row, name) / (fall.ln() / 24.0 * unit) - 1.0;
+            eprintln!("R = {radius}, {sampling}: {name} is off by {error:.2e}");
+            assert!(error.abs() < bound, "{sampling}: {name} is {}", row[name]);
+        }
+    }
+}
+
+/// Members by status in the summary.
+fn members_by_status(rows: &[Row]) -> HashMap<String, Vec<u64>> {
+    rows.iter().fold(HashMap::new(), |mut members, row| {
+        members.entry(row["status"].clone()).or_insert_with(Vec::new).push(row["member"].parse().unwrap());
+        members
+    })
+}
+
+#[test]
+fn too_few_sweeps_stall_every_member() {
+    let rows = run("--curves 5 --max-sweeps 8 --t-end 0.01").summary();
+    for row in rows {
+        assert_eq!((&*row["status"], &*row["steps"], &*row["sweeps_k"]), ("stalled", "0", "8"));
+        assert_eq!((&*row["t_relax"], &*row["t_half"], &*row["t_end"]), ("", "", "0.0"));
+        for end in ["length", "area", "excess", "energy"] {
+            assert_eq!(row[&format!("{end}_end")], row[&format!("{end}_start")]);
+        }
+    }
+}
+
+/// A step far too large for the shape ends members in different ways; those that survive do not notice.
+#[test]
+fn members_that_fail_leave_the_others_alone() {
+    for (flags, failures) in [
+        ("--shape nonconvex --curves 23 --tau 1e-4 --t-end 0.02 --max-sweeps 20000", &["nonfinite", "stalled"][..]),
+        ("--shape flower:3:0.3,5:0.5 --points 64 --amplitude 0.1 --curves 23 --tau 0.001 --t-end 0.1", &["singular"]),
+        ("--curves 23 --points 61 --t-end 0.02 --max-sweeps 64", &["stalled"]),
+    ] {
+        let done = run(flags);
+        let by_status = members_by_status(&done.summary());
+        eprintln!("{flags}: {by_status:?}");
+        for failure in failures {
+            assert!(by_status.contains_key(*failure), "{flags}: no member is {failure}");
+        }
+        let good = |status: &str| by_status.get(status).cloned().unwrap_or_default();
+        let survivors = [good("relaxed"), good("unfinished")].concat();
+        assert!(!survivors.is_empty(), "{flags}: no member survives");
+        let only: Vec<String> = survivors.iter().map(u64::to_string).collect();
+        let alone = run(&format!("{flags} --only {}", only.join(",")));
+        assert_eq!(alone.lines_of("summary.csv", &survivors), done.lines_of("summary.csv", &survivors), "{flags}");
+    }
+}
+
+/// Under too large a step k and r lose x, and the curve shrinks to a point that looks round.
+#[test]
+fn a_curve_that_its_metric_has_left_is_never_called_relaxed() {
+    let flags = "--shape nonconvex --sampling parameter --curves 48 --tau 1e-4 --t-end 0.2 --solver direct";
+    for row in run(flags).summary() {
+        let kept = number(&row, "area_end") / number(&row, "area_start");
+        let drift = number(&row, "metric_drift");
+        assert!(row["status"] == "singular" || drift < 1.0, "{}: area times {kept:e}, drift {drift:e}", row["status"]);
+    }
+}
+
+/// An immersed curve has no circle to relax to.
+#[test]
+fn a_figure_eight_with_unequal_lobes_ends_singular() {
+    let eight = |t: f64| DVec2::new(t.sin() * (1.0 + 0.3 * t.sin()), t.sin() * t.cos() * (1.0 + 0.3 * t.sin()));
+    let file: String = nodes(101, eight).iter().map(|node| format!("{:?},{:?}\n", node.x, node.y)).collect();
+    let home = TempDir::new().unwrap();
+    fs::write(home.path().join("eight.csv"), &file).unwrap();
+    for tau in ["1e-4", "1e-5"] {
+        let flags = format!("--shape file:eight.csv --amplitude 0 --curves 1 --tau {tau} --t-end 0.2 --solver direct");
+        let row = run_quiet_with_warning(home.path(), &flags, tau);
+        eprintln!(
+            "eight, τ = {tau}: {} at {}, area {} to {}",
+            row["status"], row["t_end"], row["area_start"], row["area_end"]
+        );
+        assert_eq!((&*row["status"], &*row["turning"]), ("singular", "0"));
+    }
+}
+
+fn run_quiet_with_warning(home: &Path, flags: &str, out: &str) -> Row {
+    let mut command = Command::cargo_bin("curvelax").unwrap();
+    command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(["run", "--backend", "cpu", "--out", out]);
+    let output = command.args(flags.split_whitespace()).output().unwrap();
+    assert!(output.status.success());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("crosses"), "no warning of the crossing: {said}");
+    let mut reader = csv::Reader::from_path(home.join(out).join("summary.csv")).unwrap();
+    reader.deserialize().next().unwrap().unwrap()
+}
+
+/// Runs `launches` on the CPU until they end; their counters, and the states they end in.
+fn advance(launches: &[Launch], method: Method) -> Vec<(Counters, State<f64>)> {
+    let n = launches[0].nodes.len();
+    let mut backend = CpuBackend::<f64>::new(Blocks::new(n).unwrap(), method, 2).unwrap();
+    for (slot, launch) in launches.iter().enumerate() {
+        backend.load(slot, launch).unwrap();
+    }
+    let running = |c: Counters| c.status == 0 && c.steps < c.goal;
+    while (0..launches.len()).any(|slot| running(backend.counters(slot))) {
+        backend.advance().unwrap();
+    }
+    (0..launches.len()).map(|slot| (backend.counters(slot), backend.state(slot).unwrap())).collect()
+}
+
+#[test]
+fn a_poisoned_member_is_nonfinite_and_alone_in_it() {
+    let family = Family::new(&Spec { points: 37, ..Spec::default() }).unwrap();
+    let launch = |j| Launch {
+        nodes: family.member(j).unwrap().nodes,
+        parameters: Parameters {
+            relax_at: -1.0,
+            half_at: -1.0,
+            ..parameters(&curvelax::flow::Flow::SurfaceDiffusion, 1e-3)
+        },
+        goal: 97,
+        stop_when_relaxed: false,
+        excess: 1.0,
+        turning: 1,
+    };
+    let healthy: Vec<Launch> = (0..7).map(launch).collect();
+    for method in [SWEEPS, DIRECT] {
+        let expected = advance(&healthy, method);
+        assert!(expected.iter().all(|(counters, _)| (counters.status, counters.steps) == (0, 97)));
+        for poison in [f64::NAN, f64::INFINITY, 1e200] {
+            let mut sick = healthy.clone();
+            sick[3].nodes[11].x = poison;
+            let found = advance(&sick, method);
+            let (counters, _) = &found[3];
+            assert_eq!((counters.status, counters.steps), (Status::Nonfinite as u32, 0), "{poison}, {method:?}");
+            for (j, (found, expected)) in found.iter().zip(&expected).enumerate().filter(|(j, _)| *j != 3) {
+                assert!(found == expected, "{poison}: member {j} has changed");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_files_have_the_columns_of_the_manual() {
+    let done = run("--curves 2 --points 33 --t-end 0.003 --series 0.001 --snapshots 0.002");
+    let header = |name| done.text(name).lines().next().unwrap().to_owned();
+    assert_eq!(
+        header("summary.csv"),
+        "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
+         length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
+         mesh_ratio,metric_drift,self_crossing"
+    );
+    assert_eq!(header("series.csv"), "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift");
+    assert_eq!(header("snapshots.csv"), "member,t,i,x,y,k,r");
+    for row in done.summary() {
+        assert_eq!((&*row["status"], &*row["t_relax"], &*row["t_half"]), ("unfinished", "", ""));
+    }
+}
+
+/// Keeps all that the members leave.
+#[derive(Default)]
+struct Recorder(Vec<Ended>);
+
+impl Sink for Recorder {
+    fn member(&mut self, ended: &Ended) -> Result<()> {
+        self.0.push(ended.clone());
+        Ok(())
+    }
+    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
+}
+
+#[test]
+fn every_number_in_the_files_is_the_one_that_was_computed() {
+    let spec = Spec {
+        curves: 7,
+        points: 37,
+        t_end: 0.15,
+        relax_to: 0.6,
+        series: Some(0.01),
+        snapshots: vec![0.0, 0.0123],
+        ..Spec::default()
+    };
+    let spec = spec.validate().unwrap();
+    let done = run_with(&[("spec.toml", &spec.to_toml().unwrap())], "spec.toml");
+    let mut backend = CpuBackend::<f64>::new(Blocks::new(37).unwrap(), SWEEPS, 1).unwrap();
+    let mut recorder = Recorder::default();
+    simulate(&spec, &Family::new(&spec).unwrap(), Precision::F64, &mut backend, 0, &mut recorder).unwrap();
+
+    let read = |row: &Row, names: &[&str]| -> Vec<Option<u64>> {
+        names.iter().map(|name| (!row[*name].is_empty()).then(|| number(row, name).to_bits())).collect()
+    };
+    let bits = |values: &[f64]| -> Vec<Option<u64>> { values.iter().map(|value| Some(value.to_bits())).collect() };
+    for (row, ended) in done.summary().iter().zip(&recorder.0) {
+        let o = &ended.outcome;
+        let (s, e) = (&o.start, &o.end);
+        assert_eq!(read(row, &["t_relax", "t_half"]), [o.t_relax, o.t_half].map(|t| t.map(f64::to_bits)));
+        let names = ["t_end", "length_start", "area_start", "excess_start", "energy_start"];
+        assert_eq!(read(row, &names), bits(&[o.t_end, s.length, s.area, s.excess, s.energy]));
+        let names = ["length_end", "area_end", "excess_end", "energy_end", "k_min", "k_max", "mesh_ratio"];
+        assert_eq!(read(row, &names), bits(&[e.length, e.area, e.excess, e.energy, e.k_min, e.k_max, e.mesh_ratio]));
+        assert_eq!(read(row, &["metric_drift"]), bits(&[e.metric_drift]));
+        assert_eq!([&row["steps"], &row["sweeps_k"]], [&o.steps.to_string(), &o.sweeps_k.to_string()]);
+    }
+    assert!(recorder.0.iter().any(|ended| ended.outcome.t_relax.is_some()));
+
+    let series = done.rows("series.csv");
+    let computed: Vec<_> = recorder.0.iter().flat_map(|ended| &ended.series).collect();
+    assert_eq!(series.len(), computed.len());
+    for (row, c) in series.iter().zip(computed) {
+        let at = &c.at;
+        let values = [at.length, at.area, at.excess, at.energy, at.k_min, at.k_max, at.mesh_ratio, at.metric_drift];
+        assert_eq!(read(row, &SERIES_COLUMNS), bits(&values));
+        assert_eq!(number(row, "t").to_bits(), c.t.to_bits());
+    }
+    let snapshots = done.rows("snapshots.csv");
+    let computed: Vec<_> = recorder.0.iter().flat_map(|ended| &ended.snapshots).collect();
+    assert_eq!(snapshots.len(), 37 * computed.len());
+    for (i, row) in snapshots.iter().enumerate() {
+        let (c, i) = (computed[i / 37], i % 37);
+        assert_eq!(read(row, &["t", "x", "y", "k", "r"]), bits(&[c.t, c.x[i], c.y[i], c.k[i], c.r[i]]));
+    }
+}
+
+/// A lopsided outline of 61 points, as the text of a file.
+fn outline(offset: DVec2, order: impl Fn(usize) -> usize) -> String {
+    let bean = |u: f64| DVec2::from_angle(u) * (1.0 + 0.2 * (2.0 * u).cos() + 0.1 * (3.0 * u).sin());
+    let points = nodes(61, bean);
+    (0..61).map(|i| points[order(i) % 61] + offset).map(|p| format!("{:?},{:?}\n", p.x, p.y)).collect()
+}
+
+fn outline_run(text: &str, more: &str) -> Done {
+    let flags = "--shape file:bean.csv --amplitude 0 --curves 1 --t-end 0.1 --snapshots 0,0.0505,0.1";
+    let solver = if more.contains("f32") { "gauss-seidel" } else { "direct" };
+    run_with(&[("bean.csv", text)], &format!("{flags} {more} --solver {solver}"))
+}
+
+#[test]
+fn a_clockwise_file_is_the_same_curve() {
+    let forwards = outline(DVec2::ZERO, |i| i);
+    // From the same first point the other way round, the nodes are the same nodes.
+    let backwards = outline(DVec2::ZERO, |i| 61 - i);
+    for sampling in ["--sampling points", "--sampling points --no-redistribution"] {
+        let [a, b] = [&forwards, &backwards].map(|text| outline_run(text, sampling));
+        assert_eq!(a.text("summary.csv"), b.text("summary.csv"));
+        assert_eq!(a.text("snapshots.csv"), b.text("snapshots.csv"));
+        assert!(number(&a.summary()[0], "area_start") > 0.0);
+    }
+    // From another first point they are numbered from another one (and without redistribution no node is special).
+    let turned = outline(DVec2::ZERO, |i| 61 + 60 - i);
+    let [a, b] = [&forwards, &turned].map(|text| outline_run(text, "--sampling points --no-redistribution"));
+    let [a, b] = [a, b].map(|done| done.rows("snapshots.csv").chunks(61).map(positions).collect::<Vec<_>>());
+    for (a, mut b) in a.into_iter().zip(b) {
+        b.rotate_left(1);
+        let apart = distance(&a, &b);
+        assert!(apart < 1e-11, "{apart:e}");
+    }
+    // Sampled by arclength, the two files describe one polygon through the same points.
+    let [a, b] = [&forwards, &backwards].map(|text| outline_run(text, "--points 61").summary().remove(0));
+    for name in ["length_end", "area_end", "excess_end", "t_half"] {
+        assert!((number(&a, name) / number(&b, name) - 1.0).abs() < 1e-9, "{name}: {} {}", a[name], b[name]);
+    }
+}
+
+/// At 10⁶ a coordinate is rounded to 10⁻¹⁰; nothing else is lost, as the state is centred.
+#[test]
+fn a_file_far_away_relaxes_as_one_at_home() {
+    let far = DVec2::new(1e6, -1e6);
+    for sampling in ["--sampling points", "--points 67", "--sampling points --precision f32"] {
+        let home = outline_run(&outline(DVec2::ZERO, |i| i), sampling);
+        let away = outline_run(&outline(far, |i| i), sampling);
+        let bound = if sampling.contains("f32") { 1e-5 } else { 1e-8 };
+        let [a, b] = [&home, &away].map(|done| done.summary().remove(0));
+        for name in ["length_end", "area_end", "excess_end", "energy_end", "k_max", "t_half"] {
+            // The excess is a difference of numbers near 1.
+            let error = (number(&b, name) - number(&a, name)) / number(&a, name).max(1.0);
+            assert!(error.abs() < bound, "{sampling}, {name}: {} and {}", a[name], b[name]);
+        }
+        let [a, mut b] = [home, away].map(|done| positions(&done.rows("snapshots.csv")));
+        b.iter_mut().for_each(|node| *node -= far);
+        let apart = distance(&a, &b);
+        eprintln!("{sampling}: {apart:.1e} apart");
+        assert!(apart < bound, "{sampling}: {apart:e}");
+    }
+}
