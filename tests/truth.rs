@@ -66,7 +66,7 @@ fn correct_step(Linear { state, work, p }: &mut Linear) {
 
 /// A step whose 𝓑_i has `φ(k_i) + φ(k_{i-1})`, as the paper prints it.
 fn misprinted_step(Linear { state, work, p }: &mut Linear) {
-    redistribution::redistribute(state, p, true, work);
+    redistribution::redistribute(state, p, work);
     curvature::assemble(state, p, work);
     direct::solve(&work.curvature, [&mut work.dk]);
     (0..state.len()).for_each(|i| work.k[i] = state.k[i] + work.dk[i]);

@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
-pub const MAX_POINTS_F32: usize = 400;
+pub const MAX_POINTS_F32: usize = 320;
 
 /// Where a run is computed.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -15,8 +15,7 @@ use curvelax::{
 };
 use glam::DVec2;
 
-pub const DIRECT: Method =
-    Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1, redistribution: true };
+pub const DIRECT: Method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
 pub const SWEEPS: Method = Method { solver: Solver::GaussSeidel, max_sweeps: 1_000_000, ..DIRECT };
 
 /// The parameters of a flow with ω = 1 and the default tolerance of f64.
