@@ -10,6 +10,7 @@ const SWEEPS_PER_CHECK = 8u;
 const UNSOLVED = 0u;
 const SOLVED = 1u;
 const NOT_FINITE = 2u;
+const DIVERGED = 3u;
 const PAUSED = 99u;
 
 /// Sweeps made by this solve, over all dispatches.
@@ -24,8 +25,9 @@ var<private> v: vec;
 fn solve_one(negligible: real) -> u32 {
     share(u, u);
     sweeps = counters.solve_sweeps;
-    let tolerance = max(p.tolerance, rounding_limit());
-    var ended = UNSOLVED;
+    let size = system_size(rhs_x);
+    let tolerance = max(p.tolerance, real(EPSILON) * size);
+    var ended = finite_or_not(size);
     while ended == UNSOLVED && sweeps < dispatch.max_sweeps && budget > 0u {
         let batch = min(SWEEPS_PER_CHECK, dispatch.max_sweeps - sweeps);
         for (var s = 0u; s < batch; s++) { sweep_one(); }
@@ -41,8 +43,9 @@ fn solve_one(negligible: real) -> u32 {
 fn solve_two(negligible: real) -> u32 {
     share(u, v);
     sweeps = counters.solve_sweeps;
-    let tolerance = max(p.tolerance, rounding_limit());
-    var ended = UNSOLVED;
+    let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
+    let tolerance = max(p.tolerance, real(EPSILON) * size);
+    var ended = finite_or_not(size);
     while ended == UNSOLVED && sweeps < dispatch.max_sweeps && budget > 0u {
         let batch = min(SWEEPS_PER_CHECK, dispatch.max_sweeps - sweeps);
         for (var s = 0u; s < batch; s++) { sweep_two(); }
@@ -50,8 +53,8 @@ fn solve_two(negligible: real) -> u32 {
         budget -= min(budget, batch);
         let error_u = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
         let error_v = bounded_abs(row_of.weight * residual(rhs_y, read_b()));
-        let size = max(bounded_abs(u), bounded_abs(v));
-        ended = judge(block_max(max(error_u, error_v)), block_max(size), tolerance, negligible);
+        let increment = max(bounded_abs(u), bounded_abs(v));
+        ended = judge(block_max(max(error_u, error_v)), block_max(increment), tolerance, negligible);
     }
     return paused_or(ended);
 }
@@ -63,19 +66,25 @@ fn paused_or(ended: u32) -> u32 {
     return PAUSED;
 }
 
-/// The tolerance below which a scaled residual is rounding error.
-fn rounding_limit() -> real {
+/// Largest scaled row sum; more than BIG where an entry or a right-hand side is not finite. Times EPSILON it is the
+/// tolerance below which a scaled residual is rounding error.
+fn system_size(rhs: vec) -> real {
     let terms = vec(1.0) + abs(row_of.a) + abs(row_of.b) + abs(row_of.d) + abs(row_of.e);
-    let largest = ring_maxima(vec(block_max(bounded_abs(row_of.weight * terms)), 0.0, 0.0, 0.0));
-    return real(EPSILON) * largest.x;
+    let finite = bounded_abs(rhs) <= vec(BIG);
+    let sizes = select(vec(2.0 * BIG), bounded_abs(row_of.weight * terms), finite);
+    return ring_maxima(vec(block_max(sizes), 0.0, 0.0, 0.0)).x;
 }
 
-fn judge(error: real, size: real, tolerance: real, negligible: real) -> u32 {
-    let norms = ring_maxima(vec(error, size, 0.0, 0.0));
+fn finite_or_not(size: real) -> u32 {
+    return uniform_decision(select(NOT_FINITE, UNSOLVED, size <= real(BIG)));
+}
+
+fn judge(error: real, increment: real, tolerance: real, negligible: real) -> u32 {
+    let norms = ring_maxima(vec(error, increment, 0.0, 0.0));
     let bound = max(tolerance * norms.y, negligible);
     var ended = UNSOLVED;
     if !(norms.x <= real(BIG)) {
-        ended = NOT_FINITE;
+        ended = DIVERGED;
     } else if norms.x <= bound {
         ended = SOLVED;
     }

@@ -25,8 +25,9 @@ use curvelax::{
 use glam::DVec2;
 use libtest_mimic::{Arguments, Failed, Trial};
 
-/// The sizes: smallest odd, power of two, divisible by 3, by 4, prime, and odd beyond a workgroup of 64 threads.
-const SIZES: [usize; 6] = [7, 64, 99, 100, 101, 257];
+/// The sizes: the two smallest, a power of two, divisible by 3, by 4, prime, every remainder by 4 (the number of blocks
+/// of three), and one beyond 64 threads.
+const SIZES: [usize; 8] = [6, 7, 64, 99, 100, 101, 102, 257];
 
 type Outcome = Result<(), Failed>;
 

@@ -71,7 +71,10 @@ pub fn run(args: RunArgs) -> Result<()> {
         report.kept_rows().inspect(|rows| note(&format!("note: the members that ended are kept in {rows}")));
         return Err(error);
     }
-    let overview = report.finish(&spec, &platform, family.warnings())?;
+    let late = report.warnings();
+    let warnings = [family.warnings(), &late].concat();
+    let overview = report.finish(&spec, &platform, &warnings)?;
+    late.iter().for_each(|warning| say(&format!("warning: {warning}")));
     if args.quiet { Ok(()) } else { print(&overview) }
 }
 

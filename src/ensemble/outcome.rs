@@ -17,7 +17,7 @@ pub enum Status {
     Singular = 3,
     /// A value was not finite.
     Nonfinite = 4,
-    /// The sweep cap was reached.
+    /// The sweep cap was reached, or the sweeps diverged.
     Stalled = 5,
 }
 
@@ -25,6 +25,11 @@ impl Status {
     /// All statuses, in the order in which tables list them.
     pub const ALL: [Status; 5] =
         [Status::Relaxed, Status::Unfinished, Status::Singular, Status::Nonfinite, Status::Stalled];
+
+    /// Whether the member ended before its time and without having relaxed.
+    pub fn is_failure(self) -> bool {
+        matches!(self, Status::Singular | Status::Nonfinite | Status::Stalled)
+    }
 
     /// The word used in `summary.csv`.
     pub fn name(self) -> &'static str {

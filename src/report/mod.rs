@@ -64,6 +64,11 @@ impl Report {
         (self.tally.members() > 0).then(|| self.summary.part().display().to_string())
     }
 
+    /// What the user should know about the results so far.
+    pub fn warnings(&self) -> Vec<String> {
+        self.tally.warnings()
+    }
+
     /// Puts every file under its final name, `run.json` last, and returns the overview for stdout.
     pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String]) -> Result<String> {
         let Report { summary, series, snapshots, folder, tally, panels, progress, started, clock } = self;

@@ -93,7 +93,11 @@ impl Overview<'_> {
 
     fn work(&self) -> String {
         let Tally { steps, sweeps_k, sweeps_x, .. } = self.tally;
-        let each = |total: u64| significant(total as f64 / self.tally.members().max(1) as f64);
+        let members = self.tally.members().max(1);
+        let each = |total: u64| match total % members {
+            0 => (total / members).to_string(),
+            _ => significant(total as f64 / members as f64),
+        };
         let steps_each = each(*steps);
         match sweeps_k + sweeps_x {
             0 => format!("{steps_each} steps per member, no sweeps"),
@@ -158,7 +162,7 @@ all                 4
 
 ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
 t_relax    mean 0.4000, median 0.4000 over 2 relaxed; 2 censored, so both are biased low
-work       10.00 steps per member, sweeps 20.00 for k and 5.000 for x, y
+work       10 steps per member, sweeps 20 for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s
 results    out: summary.csv, run.json

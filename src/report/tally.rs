@@ -17,7 +17,12 @@ pub struct Tally {
     pub sweeps_x: u64,
     /// Members whose corners were rounded off before the run.
     pub mollified: MollifiedMembers,
+    /// Members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
+    drifted: (u64, f64),
 }
+
+/// Metric drift above which the scheme's lengths are so far from the polygon's that times mean little.
+const DISTRUSTED_DRIFT: f64 = 0.1;
 
 /// What rounding off corners did to the members (`ensemble/mollifier.rs`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -46,9 +51,33 @@ impl Tally {
             *count += u64::from(status == outcome.status);
         }
         self.relaxation_times.extend(outcome.t_relax);
+        let drift = outcome.end.metric_drift;
+        self.drifted.0 += u64::from(drift > DISTRUSTED_DRIFT);
+        self.drifted.1 = self.drifted.1.max(drift);
         self.steps += outcome.steps;
         self.sweeps_k += outcome.sweeps_k;
         self.sweeps_x += outcome.sweeps_x;
+    }
+
+    /// What the user should know about the results, a sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let members = self.members();
+        let mut warnings = Vec::new();
+        let failed: u64 = self.counts().filter(|(status, _)| status.is_failure()).map(|(_, count)| count).sum();
+        if failed > 0 {
+            warnings.push(format!(
+                "{failed} of {members} members ended badly (see `status`); unless the flow itself goes wrong there, a \
+                 smaller --tau or more --points helps"
+            ));
+        }
+        let (drifted, worst) = self.drifted;
+        if drifted > 0 {
+            warnings.push(format!(
+                "{drifted} of {members} members ended with a metric drift above {DISTRUSTED_DRIFT} (worst {worst:.2}): \
+                 their times and areas are not to be trusted; take a smaller --tau or more --points"
+            ));
+        }
+        warnings
     }
 
     /// Members that ended.
@@ -116,5 +145,24 @@ pub(crate) mod tests {
         assert_eq!(tally(&[], 2).relaxation(), None);
         assert_eq!(tally(&[9.0, 1.0, 2.0], 1).relaxation(), Some(Relaxation { count: 3, mean: 4.0, median: 2.0 }));
         assert_eq!(tally(&[9.0, 1.0, 2.0, 4.0], 0).relaxation().unwrap().median, 3.0);
+    }
+
+    #[test]
+    fn bad_ends_and_drift_are_warned_of_and_nothing_else_is() {
+        let mut tally = Tally::default();
+        tally.add(&outcome(0, Status::Relaxed, Some(0.5)));
+        tally.add(&outcome(1, Status::Unfinished, None));
+        assert_eq!(tally.warnings(), [""; 0]);
+        tally.add(&outcome(2, Status::Stalled, None));
+        let mut drifted = outcome(3, Status::Relaxed, Some(0.5));
+        drifted.end.metric_drift = 0.25;
+        tally.add(&drifted);
+        let warnings = tally.warnings();
+        assert!(warnings[0].starts_with("1 of 4 members ended badly"), "{warnings:?}");
+        assert!(
+            warnings[1].contains("1 of 4 members ended with a metric drift above 0.1 (worst 0.25)"),
+            "{warnings:?}"
+        );
+        assert_eq!(warnings.len(), 2);
     }
 }

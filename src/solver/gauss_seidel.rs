@@ -52,9 +52,9 @@ pub struct Control<N> {
 pub struct Swept<N: Number> {
     /// Sweeps made, per lane.
     pub sweeps: N,
-    /// Where the residual reached its bound; false after the cap or when a value was not finite.
+    /// Where the residual reached its bound; false after the cap, or where the sweeps diverged.
     pub converged: N::Mask,
-    /// Where the residual was finite.
+    /// Where the system itself was finite; no sweep is made of one that is not.
     pub finite: N::Mask,
 }
 
@@ -65,9 +65,11 @@ pub fn solve<N: Number, const F: usize>(
     blocks: Blocks,
     control: &Control<N>,
 ) -> Swept<N> {
-    let mut active = N::Mask::all_of(true);
-    let tolerance = control.tolerance.max(rounding_limit(system));
-    let mut swept = Swept { sweeps: N::of(0.0), converged: N::Mask::all_of(false), finite: N::Mask::all_of(true) };
+    let size = size(system);
+    let tolerance = control.tolerance.max(N::of(N::EPSILON) * size);
+    let finite = size.le(N::of(BIG));
+    let mut active = finite;
+    let mut swept = Swept { sweeps: N::of(0.0), converged: N::Mask::all_of(false), finite };
     let mut done = 0;
     while done < control.max_sweeps && active.any() {
         let sweeps = SWEEPS_PER_CHECK.min(control.max_sweeps - done);
@@ -79,11 +81,10 @@ pub fn solve<N: Number, const F: usize>(
         }
         done += sweeps;
         swept.sweeps += N::select(active, N::of(f64::from(sweeps)), N::of(0.0));
-        let [error, size] = norms(system, &unknown);
-        let bound = (tolerance * size).max(control.negligible);
-        swept.finite = error.le(N::of(BIG));
-        swept.converged = swept.finite.and(error.le(bound));
-        active = active.and(swept.finite).and(swept.converged.not());
+        let [error, increment] = norms(system, &unknown);
+        let bound = (tolerance * increment).max(control.negligible);
+        swept.converged = finite.and(error.le(bound));
+        active = active.and(error.le(N::of(BIG))).and(swept.converged.not());
     }
     swept
 }
@@ -137,14 +138,21 @@ fn relax<N: Number, const F: usize>(
     u[i] = N::select(active, relaxed, u[i]);
 }
 
-/// The tolerance below which a scaled residual is rounding error: no sweep, and no direct solve, gets further.
-fn rounding_limit<N: Number, const F: usize>(system: &System<N, F>) -> N {
+/// Largest scaled row sum; more than [`BIG`] where an entry or a right-hand side is not finite.
+///
+/// Times ε it is the tolerance below which a scaled residual is rounding error: no sweep, and no direct solve, gets
+/// further.
+fn size<N: Number, const F: usize>(system: &System<N, F>) -> N {
     let mut largest = N::of(0.0);
-    for row in &system.rows {
+    for (i, row) in system.rows.iter().enumerate() {
         let terms = N::of(1.0) + row.a.abs() + row.b.abs() + row.d.abs() + row.e.abs();
         largest = largest.max((row.weight * terms).bounded_abs());
+        for rhs in &system.rhs {
+            let huge = rhs[i].bounded_abs().le(N::of(BIG)).not();
+            largest = N::select(huge, N::of(2.0 * BIG), largest);
+        }
     }
-    N::of(N::EPSILON) * largest
+    largest
 }
 
 /// `[max weight·|residual|, max |u|]` over nodes and right-hand sides; not finite shows as more than [`BIG`].
@@ -205,13 +213,23 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_is_not_finite_ends_the_sweeps_at_the_first_look() {
+    fn sweeps_that_diverge_end_before_the_cap() {
+        let system = test_system(64, 3.0);
+        let mut u = [Ring::zeros(64), Ring::zeros(64)];
+        let [x, y] = &mut u;
+        let swept = solve(&system, [x, y], Blocks::new(64).unwrap(), &control(Order::Coloured, 2.5));
+        assert!(!swept.converged && swept.finite);
+        assert!(swept.sweeps < 10_000.0, "{} sweeps", swept.sweeps);
+    }
+
+    #[test]
+    fn no_sweep_is_made_of_a_system_that_is_not_finite() {
         let mut system = test_system(64, 3.0);
         system.rhs[1][17] = f64::NAN;
         let mut u = [Ring::zeros(64), Ring::zeros(64)];
         let [x, y] = &mut u;
         let swept = solve(&system, [x, y], Blocks::new(64).unwrap(), &control(Order::Coloured, 1.0));
         assert!(!swept.converged && !swept.finite);
-        assert_eq!(swept.sweeps, f64::from(SWEEPS_PER_CHECK));
+        assert_eq!(swept.sweeps, 0.0);
     }
 }
