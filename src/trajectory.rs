@@ -259,25 +259,13 @@ impl<'a> Trajectory<'a> {
 
 /// The parameters of a member with `n` nodes, thresholds aside.
 fn parameters(spec: &Spec, n: usize, tolerance: f64) -> Parameters<f64> {
-    let [c1, c2, c3, c4, c5, c6, c7, c8] = spec.flow.coefficients();
     Parameters {
-        c1,
-        c2,
-        c3,
-        c4,
-        c5,
-        c6,
-        c7,
-        c8,
-        tau: spec.tau,
         omega: spec.omega,
         redistribution: f64::from(u8::from(!spec.no_redistribution)),
         tolerance,
         sor: spec.sor,
-        length_penalty: spec.flow.length_penalty(),
         polygon_ratio: polygon::regular_ratio(n),
-        relax_at: 0.0,
-        half_at: 0.0,
+        ..Parameters::of_flow(&spec.flow, spec.tau)
     }
 }
 

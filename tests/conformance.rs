@@ -6,7 +6,10 @@
 use std::io::Write;
 
 use curvelax::{
-    backend::gpu::{Gpu, Kernel, kernel::Budget},
+    backend::{
+        choose::MAX_POINTS_F32,
+        gpu::{Gpu, Kernel, kernel::Budget},
+    },
     conformance::{
         Row, Tamper,
         compare::{on_gpu, runs, stages},
@@ -81,6 +84,7 @@ fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
     add("members that end badly leave the others untouched".into(), bad_members::<T>, 99);
     add("relaxed members stop, at the step and in the place the CPU finds".into(), relaxation::<T>, 64);
     add("the largest n that fits the adapter runs".into(), largest::<T>, 0);
+    add("the program refuses a ring that the adapter cannot hold".into(), program_refuses::<T>, 0);
     add("the paper's ellipse at t = 2 is that of the CPU in f64".into(), paper::<T>, 100);
 }
 
@@ -246,6 +250,25 @@ fn largest<T: Real>(gpu: &Gpu, _: usize) -> Outcome {
     let blocks = Blocks::new(most + 1).ok_or("n")?;
     if gpu.capacity().check_size::<T>(blocks).is_ok() || Kernel::<T>::new(gpu, blocks, 1, 1, false).is_ok() {
         return Err("one point more was not refused".into());
+    }
+    Ok(())
+}
+
+/// The same from outside: exit code 2, one message with both numbers, nothing written.
+fn program_refuses<T: Real>(gpu: &Gpu, _: usize) -> Outcome {
+    let most = gpu.capacity().max_points::<T>();
+    let folder = tempfile::tempdir()?;
+    let points = (most + 1).to_string();
+    let arguments = ["run", "--backend", "gpu", "--adapter", gpu.name(), "--precision", T::NAME, "--points", &points];
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
+    command.current_dir(&folder).env("XDG_RUNTIME_DIR", folder.path()).args(arguments).args(["--out", "out"]);
+    let output = command.output()?;
+    let message = String::from_utf8(output.stderr)?;
+    let beyond_f32 = T::NAME == "f32" && most >= MAX_POINTS_F32;
+    let remedy = if beyond_f32 { "take fewer points".to_string() } else { format!("take {most} or fewer") };
+    let named = message.starts_with(&format!("error: --points {points}: ")) && message.contains(&remedy);
+    if output.status.code() != Some(2) || !named || message.lines().count() != 1 || folder.path().join("out").exists() {
+        return Err(format!("{:?}: {message}", output.status).into());
     }
     Ok(())
 }

@@ -16,7 +16,7 @@ use curvelax::{
 use glam::DVec2;
 use tempfile::TempDir;
 
-use common::{DIRECT, SWEEPS, distance, nodes, parameters};
+use common::{DIRECT, SWEEPS, distance, nodes};
 
 const FILES: [&str; 3] = ["summary.csv", "series.csv", "snapshots.csv"];
 
@@ -396,7 +396,7 @@ fn a_poisoned_member_is_nonfinite_and_alone_in_it() {
         parameters: Parameters {
             relax_at: -1.0,
             half_at: -1.0,
-            ..parameters(&curvelax::flow::Flow::SurfaceDiffusion, 1e-3)
+            ..Parameters::of_flow(&curvelax::flow::Flow::SurfaceDiffusion, 1e-3)
         },
         goal: 97,
         stop_when_relaxed: false,

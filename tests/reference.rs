@@ -26,11 +26,6 @@ fn read(name: &str) -> Vec<(f64, Vec<Row>)> {
     states
 }
 
-fn parameters(flow: &Flow, tau: f64) -> Parameters<f64> {
-    let [c1, c2, c3, ..] = flow.coefficients();
-    Parameters { c1, c2, c3, tau, omega: 1.0, redistribution: 1.0, tolerance: 1e-5, sor: 1.0, ..Default::default() }
-}
-
 /// Largest deviation over all stored times, per column relative to its largest entry.
 fn worst_deviation(name: &str, flow: Flow, tau: f64, redistribution: bool) -> f64 {
     let states = read(name);
@@ -39,7 +34,7 @@ fn worst_deviation(name: &str, flow: Flow, tau: f64, redistribution: bool) -> f6
     let mut state = State::<f64>::from_nodes(&nodes);
     let mut work = Workspace::new(Blocks::new(nodes.len()).unwrap());
     let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
-    let mut p = parameters(&flow, tau);
+    let mut p = Parameters::of_flow(&flow, tau);
     p.redistribution = f64::from(u8::from(redistribution));
     let (mut steps, mut worst) = (0, 0.0_f64);
     for (t, rows) in &states {

@@ -20,7 +20,7 @@ use curvelax::{
 };
 use glam::DVec2;
 
-use common::{DIRECT, SWEEPS, Stepper, distance, ellipse, mode, parameters, radius, slope, wavy_circle};
+use common::{DIRECT, SWEEPS, Stepper, distance, ellipse, mode, radius, slope, wavy_circle};
 
 /// Relative amplitude of a mode that still decays linearly.
 const SMALL: f64 = 1e-3;
@@ -45,7 +45,7 @@ fn linear_theory(flow: &Flow, radius: f64, m: u32, end: f64) -> (f64, f64) {
 fn decay_over_theory(flow: &Flow, radius: f64, m: u32, n: usize, steps: u32, mut step: impl FnMut(&mut Linear)) -> f64 {
     let end = 1.0 / flow.linear_rate(m, radius).abs();
     let nodes = wavy_circle(n, radius, m, SMALL);
-    let p = parameters(flow, end / f64::from(steps));
+    let p = Parameters::of_flow(flow, end / f64::from(steps));
     let mut curve = Linear { state: State::from_nodes(&nodes), work: Workspace::new(Blocks::new(n).unwrap()), p };
     (0..steps).for_each(|_| step(&mut curve));
     let after: Vec<DVec2> = curve.state.positions().collect();
@@ -157,7 +157,7 @@ fn the_linear_theory_of_willmore_flow_is_the_closed_form() {
 fn the_willmore_circle_grows_as_it_should_with_order_two() {
     let exact = 3.0_f64.powf(0.25);
     let errors = [10, 20, 40, 80, 160].map(|n| {
-        let p = parameters(&Flow::Willmore, 1.0 / (n * n) as f64);
+        let p = Parameters::of_flow(&Flow::Willmore, 1.0 / (n * n) as f64);
         let curve = Stepper::<f64>::new(&wavy_circle(n, 1.0, 2, 0.0), &p, DIRECT).steps(n * n);
         (n, (radius(&curve.positions()) - exact).abs())
     });
@@ -172,7 +172,7 @@ fn the_willmore_circle_grows_as_it_should_with_order_two() {
 /// Surface diffusion conserves the area.
 #[test]
 fn the_area_of_the_paper_s_ellipse_is_kept() {
-    let p = parameters(&Flow::SurfaceDiffusion, 1e-3);
+    let p = Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3);
     for (name, method) in [("direct", DIRECT), ("Gauss-Seidel", SWEEPS)] {
         let mut curve = Stepper::<f64>::new(&ellipse(100), &p, method);
         let start = curve.sums().area;
@@ -188,7 +188,7 @@ fn the_area_of_the_paper_s_ellipse_is_kept() {
 
 /// The paper's ellipse at t = 2.
 fn paper_ellipse<T: Real>(method: Method, tolerance: f64) -> Vec<DVec2> {
-    let p = Parameters { tolerance, ..parameters(&Flow::SurfaceDiffusion, 1e-3) };
+    let p = Parameters { tolerance, ..Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3) };
     Stepper::<T>::new(&ellipse(100), &p, method).steps(2000).positions()
 }
 
@@ -215,7 +215,7 @@ fn single_precision_agrees_with_double_on_the_paper_s_ellipse() {
 fn the_circle_that_balances_bending_and_length_stays() {
     for lambda in [0.5, 2.0, 0.1] {
         let steady = (2.0_f64 * lambda).sqrt().recip();
-        let p = parameters(&Flow::Elastic(lambda), 1e-3 * steady.powi(4));
+        let p = Parameters::of_flow(&Flow::Elastic(lambda), 1e-3 * steady.powi(4));
         let drifts = [50, 100, 200].map(|n| {
             let curve = Stepper::<f64>::new(&wavy_circle(n, steady, 2, 0.0), &p, DIRECT).steps(2000);
             radius(&curve.positions()) / steady - 1.0
@@ -231,7 +231,7 @@ fn the_circle_that_balances_bending_and_length_stays() {
 #[test]
 fn every_gradient_flow_lowers_its_energy_at_every_step() {
     for (flow, steps) in [(Flow::SurfaceDiffusion, 1000), (Flow::Willmore, 1000), (Flow::Elastic(0.5), 1000)] {
-        let mut curve = Stepper::<f64>::new(&ellipse(100), &parameters(&flow, 1e-3), DIRECT);
+        let mut curve = Stepper::<f64>::new(&ellipse(100), &Parameters::of_flow(&flow, 1e-3), DIRECT);
         let energy = |curve: &Stepper<f64>| match flow {
             Flow::SurfaceDiffusion => curve.sums().length,
             _ => curve.sums().energy,
@@ -259,7 +259,7 @@ fn relaxed_ellipse<T: Real>(n: usize, method: &Method, tolerance: f64) -> (Vec<D
         polygon_ratio: polygon::regular_ratio(n),
         relax_at: 0.01 * excess,
         half_at: 0.5 * excess,
-        ..parameters(&Flow::SurfaceDiffusion, 1e-3)
+        ..Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3)
     };
     let launch = Launch { nodes, parameters, goal: 1000, stop_when_relaxed: false, excess, turning: 1 };
     let (mut run, mut work) = (Run::<T>::new(&launch), Workspace::new(Blocks::new(n).unwrap()));

@@ -60,9 +60,9 @@ pub fn run(args: RunArgs) -> Result<()> {
             note(line)
         }
     };
+    let folder = OutputFolder::open(&out, args.force)?;
     say(&choice.sentence());
     family.warnings().iter().for_each(|warning| say(&format!("warning: {warning}")));
-    let folder = OutputFolder::open(&out, args.force)?;
     let precision = choice.precision();
     let (mut backend, platform) = choice.open(&spec, spec.points)?;
     let mut report = Report::begin(folder, &spec, args.quiet)?;

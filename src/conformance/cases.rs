@@ -32,27 +32,17 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
         .map(|j| {
             let nodes = family.member(j as u64)?.nodes;
             let flow = &flows[j % flows.len()];
-            let [c1, c2, c3, c4, c5, c6, c7, c8] = flow.coefficients();
             let excess = polygon::excess(&nodes);
             let parameters = Parameters {
-                c1,
-                c2,
-                c3,
-                c4,
-                c5,
-                c6,
-                c7,
-                c8,
-                tau: tau(n) * (1.0 - 0.05 * j as f64),
                 omega: 1.0 + j as f64,
                 // One member in five keeps its nodes.
                 redistribution: if j % 5 == 3 { 0.0 } else { 1.0 },
                 tolerance,
                 sor: 1.0 + 0.07 * (j % 10) as f64,
-                length_penalty: flow.length_penalty(),
                 polygon_ratio: polygon::regular_ratio(n),
                 relax_at: 0.9 * excess,
                 half_at: 0.95 * excess,
+                ..Parameters::of_flow(flow, tau(n) * (1.0 - 0.05 * j as f64))
             };
             let turning = polygon::turning_number(&nodes);
             Ok(Launch { nodes, parameters, goal: steps, stop_when_relaxed: false, excess, turning })

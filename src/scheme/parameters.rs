@@ -4,7 +4,7 @@
 //! construction; a test compares names and offsets with naga's view of `shaders/member.wgsl`.
 
 use crate::{
-    flow::MAX_DEGREE,
+    flow::{Flow, MAX_DEGREE},
     number::{Number, Real},
 };
 
@@ -129,6 +129,35 @@ pub struct Counters {
     pub phase: u32,
     /// Sweeps that the paused solve has made.
     pub solve_sweeps: u32,
+}
+
+impl Parameters<f64> {
+    /// The law of `flow` with step `tau`, the paper's ω = 1, redistribution and plain sweeps to 1e-5; no thresholds.
+    pub fn of_flow(flow: &Flow, tau: f64) -> Parameters<f64> {
+        let [c1, c2, c3, c4, c5, c6, c7, c8] = flow.coefficients();
+        let length_penalty = flow.length_penalty();
+        let (omega, redistribution, tolerance, sor) = (1.0, 1.0, 1e-5, 1.0);
+        let (polygon_ratio, relax_at, half_at) = (1.0, 0.0, 0.0);
+        Parameters {
+            c1,
+            c2,
+            c3,
+            c4,
+            c5,
+            c6,
+            c7,
+            c8,
+            tau,
+            omega,
+            redistribution,
+            tolerance,
+            sor,
+            length_penalty,
+            polygon_ratio,
+            relax_at,
+            half_at,
+        }
+    }
 }
 
 impl<T: Real> Report<T> {

@@ -4,7 +4,6 @@
 use std::f64::consts::TAU;
 
 use curvelax::{
-    flow::Flow,
     number::Real,
     scheme::{
         Parameters, State, Workspace,
@@ -17,30 +16,6 @@ use glam::DVec2;
 
 pub const DIRECT: Method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
 pub const SWEEPS: Method = Method { solver: Solver::GaussSeidel, max_sweeps: 1_000_000, ..DIRECT };
-
-/// The parameters of a flow with ω = 1 and the default tolerance of f64.
-pub fn parameters(flow: &Flow, tau: f64) -> Parameters<f64> {
-    let [c1, c2, c3, c4, c5, c6, c7, c8] = flow.coefficients();
-    let length_penalty = flow.length_penalty();
-    let (omega, redistribution, tolerance, sor) = (1.0, 1.0, 1e-5, 1.0);
-    Parameters {
-        c1,
-        c2,
-        c3,
-        c4,
-        c5,
-        c6,
-        c7,
-        c8,
-        tau,
-        omega,
-        redistribution,
-        tolerance,
-        sor,
-        length_penalty,
-        ..Default::default()
-    }
-}
 
 /// n nodes at `u = i/n`, i = 1…n.
 pub fn nodes(n: usize, curve: impl Fn(f64) -> DVec2) -> Vec<DVec2> {
