@@ -4,44 +4,7 @@ use glam::DVec2;
 
 use super::Mollified;
 use crate::error::Result;
-
-/// How a member ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[repr(u32)]
-pub enum Status {
-    /// Its excess reached the threshold.
-    Relaxed = 1,
-    /// The final time came first.
-    Unfinished = 2,
-    /// Curvature times spacing too large, an edge vanished, the metric was lost, or the turning number.
-    Singular = 3,
-    /// A value was not finite.
-    Nonfinite = 4,
-    /// The sweep cap was reached, or the sweeps diverged.
-    Stalled = 5,
-}
-
-impl Status {
-    /// All statuses, in the order in which tables list them.
-    pub const ALL: [Status; 5] =
-        [Status::Relaxed, Status::Unfinished, Status::Singular, Status::Nonfinite, Status::Stalled];
-
-    /// Whether the member ended before its time and without having relaxed.
-    pub fn is_failure(self) -> bool {
-        matches!(self, Status::Singular | Status::Nonfinite | Status::Stalled)
-    }
-
-    /// The word used in `summary.csv`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Status::Relaxed => "relaxed",
-            Status::Unfinished => "unfinished",
-            Status::Singular => "singular",
-            Status::Nonfinite => "nonfinite",
-            Status::Stalled => "stalled",
-        }
-    }
-}
+pub use crate::scheme::Status;
 
 /// Scalar observables of one curve at one time (f64 whatever the precision of the run).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

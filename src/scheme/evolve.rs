@@ -3,15 +3,12 @@
 use glam::DVec2;
 
 use super::{
-    Parameters, State, Workspace,
+    Parameters, State, Status, Workspace,
     observe::{self, Curve, Maxima, Sums},
     parameters::{Counters, NEVER, Report},
     step::{self, Method},
 };
-use crate::{
-    ensemble::Status,
-    number::{BIG, Real},
-};
+use crate::number::{BIG, Real};
 
 /// One member on its way: everything that a dispatch reads and writes.
 #[derive(Clone, Debug)]

@@ -23,7 +23,9 @@ pub mod parameters;
 pub mod position;
 pub mod redistribution;
 pub mod state;
+pub mod status;
 pub mod step;
 
 pub use parameters::Parameters;
 pub use state::{State, Workspace};
+pub use status::Status;

@@ -109,7 +109,7 @@ pub const NEVER: u32 = u32::MAX;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Counters {
-    /// 0 while the member is running, else its [`Status`](crate::ensemble::Status).
+    /// 0 while the member is running, else its [`Status`](super::Status).
     pub status: u32,
     /// Accepted steps since the start.
     pub steps: u32,
