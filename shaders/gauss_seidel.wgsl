@@ -6,21 +6,6 @@
 
 const SWEEPS_PER_CHECK = 8u;
 
-/// How a solve ended.
-const UNSOLVED = 0u;
-const SOLVED = 1u;
-const NOT_FINITE = 2u;
-const DIVERGED = 3u;
-const PAUSED = 99u;
-
-/// Sweeps made by this solve, over all dispatches.
-var<private> sweeps: u32;
-/// Sweeps left in this dispatch.
-var<private> budget: u32;
-/// The unknowns of the block: the start of a solve, then its result. The curvature system has `u` alone.
-var<private> u: vec;
-var<private> v: vec;
-
 /// Sweeps `u` for rhs_x; returns how it ended.
 fn solve_one(negligible: real) -> u32 {
     share(u, u);

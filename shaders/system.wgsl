@@ -19,3 +19,18 @@ fn normalise(a: vec, b: vec, c: vec, d: vec, e: vec, time_over_length: vec) {
 fn residual(rhs: vec, w: Window) -> vec {
     return rhs - row_of.a * minus2(w) - row_of.b * minus1(w) - row_of.d * plus1(w) - row_of.e * plus2(w) - here(w);
 }
+
+/// How a solve ended.
+const UNSOLVED = 0u;
+const SOLVED = 1u;
+const NOT_FINITE = 2u;
+const DIVERGED = 3u;
+const PAUSED = 99u;
+
+/// Sweeps made by this solve, over all dispatches.
+var<private> sweeps: u32;
+/// Sweeps left in this dispatch.
+var<private> budget: u32;
+/// The unknowns of the block: where sweeps start, then the result. The curvature system has `u` alone.
+var<private> u: vec;
+var<private> v: vec;

@@ -97,7 +97,6 @@ fn a_value_that_cannot_be_read_is_named_with_its_flag() {
 fn combinations_without_sense_name_a_remedy() {
     for (arguments, parts) in [
         ("--order lexicographic --backend gpu", ["--order lexicographic: ", "take --backend cpu"]),
-        ("--solver direct --backend gpu", ["--solver direct: ", "take --backend cpu"]),
         ("--order lexicographic --solver direct", ["--order lexicographic: ", "leave out --order"]),
         ("--adapter llvmpipe --backend cpu", ["--adapter llvmpipe: ", "leave out --adapter"]),
         ("--points 20", ["--modes 2..=8: ", "take --points 32 or more"]),

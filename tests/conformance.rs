@@ -8,7 +8,7 @@ use std::io::Write;
 use curvelax::{
     backend::{
         choose::MAX_POINTS_F32,
-        gpu::{Gpu, Kernel, kernel::Budget},
+        gpu::{Gpu, Kernel, Variant, kernel::Budget},
     },
     conformance::{
         Row, Tamper,
@@ -69,23 +69,26 @@ fn record(cases: u64) {
 }
 
 fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
-    let mut add = |name: String, case: fn(&Gpu, usize) -> Outcome, n: usize| {
-        trials.push(Trial::test(format!("{} adapter {index}: {name}", T::NAME), move || case(&Gpu::list()[index], n)));
-    };
-    for n in SIZES {
-        add(format!("every stage of a step agrees, n = {n}"), stages_agree::<T>, n);
-        add(format!("the curve agrees after 1 and 100 steps, n = {n}"), runs_agree::<T>, n);
+    for (solver, word) in [(Solver::GaussSeidel, "sweeps"), (Solver::Direct, "direct")] {
+        let mut add = |name: String, case: fn(&Gpu, Solver, usize) -> Outcome, n: usize| {
+            let name = format!("{} {word} adapter {index}: {name}", T::NAME);
+            trials.push(Trial::test(name, move || case(&Gpu::list()[index], solver, n)));
+        };
+        for n in SIZES {
+            add(format!("every stage of a step agrees, n = {n}"), stages_agree::<T>, n);
+            add(format!("the curve agrees after 1 and 100 steps, n = {n}"), runs_agree::<T>, n);
+        }
+        for n in [7, 100] {
+            add(format!("a moved node fails both comparisons by name, n = {n}"), a_moved_node_fails::<T>, n);
+        }
+        add("permuted members give permuted results, bit for bit".into(), permutation::<T>, 101);
+        add("where a dispatch ends or pauses changes no bit".into(), dispatches::<T>, 64);
+        add("members that end badly leave the others untouched".into(), bad_members::<T>, 99);
+        add("relaxed members stop, at the step and in the place the CPU finds".into(), relaxation::<T>, 64);
+        add("the largest n that fits the adapter runs".into(), largest::<T>, 0);
+        add("the program refuses a ring that the adapter cannot hold".into(), program_refuses::<T>, 0);
+        add("the paper's ellipse at t = 2 is that of the CPU in f64".into(), paper::<T>, 100);
     }
-    for n in [7, 100] {
-        add(format!("a moved node fails both comparisons by name, n = {n}"), a_moved_node_fails::<T>, n);
-    }
-    add("permuted members give permuted results, bit for bit".into(), permutation::<T>, 101);
-    add("where a dispatch ends or pauses changes no bit".into(), dispatches::<T>, 64);
-    add("members that end badly leave the others untouched".into(), bad_members::<T>, 99);
-    add("relaxed members stop, at the step and in the place the CPU finds".into(), relaxation::<T>, 64);
-    add("the largest n that fits the adapter runs".into(), largest::<T>, 0);
-    add("the program refuses a ring that the adapter cannot hold".into(), program_refuses::<T>, 0);
-    add("the paper's ellipse at t = 2 is that of the CPU in f64".into(), paper::<T>, 100);
 }
 
 /// At most `steps` steps in a dispatch.
@@ -104,29 +107,29 @@ fn check(rows: &[Row]) -> Outcome {
 }
 
 fn line(row: &Row) -> String {
-    let Row { quantity, precision, n, steps, scale, error, bound, at } = row;
+    let Row { quantity, solver, precision, n, steps, scale, error, bound, at } = row;
     let (member, node) = at;
     let share = row.share();
     format!(
-        "{precision} n={n} steps={steps} {quantity}: error {error:.2e}, bound {bound:.2e} ({share:.3}), scale \
+        "{precision} {solver:?} n={n} steps={steps} {quantity}: error {error:.2e}, bound {bound:.2e} ({share:.3}), scale \
          {scale:.2e}, member {member}, node {node}"
     )
 }
 
-fn stages_agree<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
-    check(&stages::<T>(gpu, n, None)?)
+fn stages_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    check(&stages::<T>(gpu, solver, n, None)?)
 }
 
-fn runs_agree<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
-    check(&runs::<T>(gpu, n, 1, dispatches_of(1), None)?)?;
-    check(&runs::<T>(gpu, n, 100, dispatches_of(7), None)?)
+fn runs_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    check(&runs::<T>(gpu, solver, n, 1, dispatches_of(1), None)?)?;
+    check(&runs::<T>(gpu, solver, n, 100, dispatches_of(7), None)?)
 }
 
 /// The negative control: a displacement far below anything visible must fail, and the row must name the member.
-fn a_moved_node_fails<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+fn a_moved_node_fails<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let tamper = Tamper { member: 4, node: n / 2, by: 4096.0 * T::EPSILON };
-    let after_step = stages::<T>(gpu, n, Some(tamper))?;
-    let after_run = runs::<T>(gpu, n, 1, dispatches_of(1), Some(tamper))?;
+    let after_step = stages::<T>(gpu, solver, n, Some(tamper))?;
+    let after_run = runs::<T>(gpu, solver, n, 1, dispatches_of(1), Some(tamper))?;
     for rows in [after_step, after_run] {
         let caught: Vec<&Row> = rows.iter().filter(|row| !row.passes()).collect();
         if caught.is_empty() {
@@ -139,12 +142,12 @@ fn a_moved_node_fails<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
     Ok(())
 }
 
-fn permutation<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+fn permutation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let launches = members(n, 7, 20, 1e-4)?;
     let order = [3, 0, 6, 2, 5, 1, 4];
     let permuted: Vec<Launch> = order.iter().map(|j| launches[*j].clone()).collect();
-    let plain = on_gpu::<T>(gpu, n, &launches, dispatches_of(6))?;
-    let shuffled = on_gpu::<T>(gpu, n, &permuted, dispatches_of(6))?;
+    let plain = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(6))?;
+    let shuffled = on_gpu::<T>(gpu, solver, n, &permuted, dispatches_of(6))?;
     for (slot, j) in order.iter().enumerate() {
         same(&shuffled[slot], &plain[*j], &format!("member {j} in slot {slot}"))?;
     }
@@ -163,16 +166,16 @@ fn same(a: &(State<f64>, Counters), b: &(State<f64>, Counters), what: &str) -> O
     Ok(())
 }
 
-fn dispatches<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+fn dispatches<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let launches = members(n, 5, 50, 1e-4)?;
-    let at_once = on_gpu::<T>(gpu, n, &launches, dispatches_of(50))?;
+    let at_once = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(50))?;
     for per_dispatch in [1, 7] {
-        let in_parts = on_gpu::<T>(gpu, n, &launches, dispatches_of(per_dispatch))?;
+        let in_parts = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(per_dispatch))?;
         for j in 0..launches.len() {
             same(&in_parts[j], &at_once[j], &format!("member {j} at {per_dispatch} steps per dispatch"))?;
         }
     }
-    let paused = on_gpu::<T>(gpu, n, &launches, Budget { steps: 50, sweeps: 24 })?;
+    let paused = on_gpu::<T>(gpu, solver, n, &launches, Budget { steps: 50, sweeps: 24 })?;
     for j in 0..launches.len() {
         same(&paused[j], &at_once[j], &format!("member {j}, paused every 24 sweeps,"))?;
     }
@@ -180,9 +183,9 @@ fn dispatches<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
 }
 
 /// One member of each bad end, at different places; the good ones must not notice.
-fn bad_members<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let good = members(n, 8, 20, 1e-4)?;
-    let alone = on_gpu::<T>(gpu, n, &good, dispatches_of(5))?;
+    let alone = on_gpu::<T>(gpu, solver, n, &good, dispatches_of(5))?;
     let mut mixed = good.clone();
     mixed[1].nodes[n / 3] = DVec2::new(f64::NAN, 0.0);
     mixed[3].nodes[5].x = 1e30;
@@ -190,7 +193,7 @@ fn bad_members<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
     mixed[4].nodes[8] = mixed[4].nodes[7];
     // A turning number that the curve does not have.
     mixed[6].turning = 2;
-    let together = on_gpu::<T>(gpu, n, &mixed, dispatches_of(5))?;
+    let together = on_gpu::<T>(gpu, solver, n, &mixed, dispatches_of(5))?;
     let expected = [
         (1, vec![Status::Nonfinite]),
         (3, vec![Status::Nonfinite, Status::Singular]),
@@ -209,15 +212,15 @@ fn bad_members<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
     Ok(())
 }
 
-fn relaxation<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let tolerance = if T::NAME == "f32" { 1e-3 } else { 1e-5 };
     let mut launches = members(n, 5, 60, tolerance)?;
     for launch in &mut launches {
         launch.stop_when_relaxed = true;
     }
-    let ended = on_gpu::<T>(gpu, n, &launches, dispatches_of(7))?;
+    let ended = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(7))?;
     let blocks = Blocks::new(n).ok_or("n")?;
-    let method = Method { solver: Solver::GaussSeidel, order: Order::Coloured, max_sweeps: 200_000 };
+    let method = Method { solver, order: Order::Coloured, max_sweeps: 200_000 };
     let mut relaxed = 0;
     for (j, launch) in launches.iter().enumerate() {
         let mut twin = Run::<T>::new(launch);
@@ -235,33 +238,40 @@ fn relaxation<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
     Ok(())
 }
 
-fn largest<T: Real>(gpu: &Gpu, _: usize) -> Outcome {
-    let most = gpu.capacity().max_points::<T>();
+fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
+    let most = gpu.capacity().max_points::<T>(solver);
     let n = most.min(1024);
     if n < 512 {
         return Err(format!("only {n} points fit").into());
     }
     let launches = members(n, 2, 2, 1e-3)?;
-    for (j, (state, counters)) in on_gpu::<T>(gpu, n, &launches, dispatches_of(2))?.into_iter().enumerate() {
+    for (j, (state, counters)) in on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(2))?.into_iter().enumerate() {
         if (counters.status, counters.steps) != (0, 2) || !state.x.nodes().iter().all(|x| x.is_finite()) {
             return Err(format!("member {j} of {n} points: {counters:?}").into());
         }
     }
     let blocks = Blocks::new(most + 1).ok_or("n")?;
-    if gpu.capacity().check_size::<T>(blocks).is_ok() || Kernel::<T>::new(gpu, blocks, 1, 1, false).is_ok() {
+    if gpu.capacity().check_size::<T>(blocks, solver).is_ok()
+        || Kernel::<T>::new(gpu, blocks, 1, 1, Variant { solver, traced: false }).is_ok()
+    {
         return Err("one point more was not refused".into());
     }
     Ok(())
 }
 
 /// The same from outside: exit code 2, one message with both numbers, nothing written.
-fn program_refuses<T: Real>(gpu: &Gpu, _: usize) -> Outcome {
-    let most = gpu.capacity().max_points::<T>();
+fn program_refuses<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
+    let most = gpu.capacity().max_points::<T>(solver);
     let folder = tempfile::tempdir()?;
     let points = (most + 1).to_string();
     let arguments = ["run", "--backend", "gpu", "--adapter", gpu.name(), "--precision", T::NAME, "--points", &points];
+    let solver = if solver == Solver::Direct { "direct" } else { "gauss-seidel" };
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
-    command.current_dir(&folder).env("XDG_RUNTIME_DIR", folder.path()).args(arguments).args(["--out", "out"]);
+    command
+        .current_dir(&folder)
+        .env("XDG_RUNTIME_DIR", folder.path())
+        .args(arguments)
+        .args(["--solver", solver, "--out", "out"]);
     let output = command.output()?;
     let message = String::from_utf8(output.stderr)?;
     let beyond_f32 = T::NAME == "f32" && most >= MAX_POINTS_F32;
@@ -274,7 +284,7 @@ fn program_refuses<T: Real>(gpu: &Gpu, _: usize) -> Outcome {
 }
 
 /// Positions within 5·10⁻⁴ of the direct f64 solution on the CPU: the error of f32 and of its tolerance of 10⁻³.
-fn paper<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
+fn paper<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let node = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64) * DVec2::new(2.0, 1.0);
     let mut launch = members(n, 1, 2000, if T::NAME == "f32" { 1e-3 } else { 1e-5 })?.remove(0);
     launch.nodes = (1..=n).map(node).collect();
@@ -282,7 +292,7 @@ fn paper<T: Real>(gpu: &Gpu, n: usize) -> Outcome {
     let mut exact = Run::<f64>::new(&launch);
     let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
     evolve(&mut exact, &method, &mut Workspace::new(Blocks::new(n).ok_or("n")?), 2000);
-    let (state, counters) = on_gpu::<T>(gpu, n, &[launch], dispatches_of(50))?.remove(0);
+    let (state, counters) = on_gpu::<T>(gpu, solver, n, &[launch], dispatches_of(50))?.remove(0);
     if (counters.steps, exact.counters.steps) != (2000, 2000) {
         return Err(format!("{counters:?} on the GPU, {:?} on the CPU", exact.counters).into());
     }

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use curvelax::{
-    backend::gpu::{kernel, shader},
+    backend::gpu::{Variant, kernel, shader},
     ensemble::Status,
     number::{BIG, Real},
     scheme::{
@@ -12,7 +12,7 @@ use curvelax::{
         parameters::{Counters, NEVER, Parameters, Report},
         step::NEGLIGIBLE,
     },
-    solver::{Blocks, gauss_seidel::SWEEPS_PER_CHECK},
+    solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK},
 };
 use naga::{
     AddressSpace, Module, TypeInner,
@@ -20,14 +20,21 @@ use naga::{
     valid::{Capabilities, ModuleInfo, ValidationFlags, Validator},
 };
 
+const SWEEPS: Variant = Variant { solver: Solver::GaussSeidel, traced: false };
+
+/// The sources of all kernels one after another.
+fn all_sources<T: Real>() -> String {
+    Variant::ALL.map(shader::source::<T>).concat()
+}
+
 fn capabilities<T: Real>() -> Capabilities {
     if T::NAME == "f64" { Capabilities::FLOAT64 } else { Capabilities::empty() }
 }
 
 /// Parses and validates a source; an error names the shader's own file and line.
-fn validated(source: &str, traced: bool, capabilities: Capabilities) -> Result<(Module, ModuleInfo), String> {
+fn validated(source: &str, variant: Variant, capabilities: Capabilities) -> Result<(Module, ModuleInfo), String> {
     let at =
-        |line: usize| shader::locate(line, traced).map_or(String::new(), |(file, line)| format!("{file}:{line}: "));
+        |line: usize| shader::locate(line, variant).map_or(String::new(), |(file, line)| format!("{file}:{line}: "));
     let module = naga::front::wgsl::parse_str(source).map_err(|error| {
         let line = error.location(source).map_or(0, |location| location.line_number as usize);
         format!("{}{}", at(line), error.message())
@@ -40,8 +47,8 @@ fn validated(source: &str, traced: bool, capabilities: Capabilities) -> Result<(
 }
 
 /// The module with its sizes filled in for rings of `n` nodes.
-fn sized<T: Real>(n: usize, traced: bool) -> (Module, ModuleInfo) {
-    let (module, info) = validated(&shader::source::<T>(traced), traced, capabilities::<T>()).unwrap();
+fn sized<T: Real>(n: usize, variant: Variant) -> (Module, ModuleInfo) {
+    let (module, info) = validated(&shader::source::<T>(variant), variant, capabilities::<T>()).unwrap();
     let constants = shader::constants(Blocks::new(n).unwrap(), 32);
     let constants = constants.iter().map(|(name, value)| (name.to_string(), *value)).collect();
     let (module, info) = naga::back::pipeline_constants::process_overrides(&module, &info, None, &constants).unwrap();
@@ -50,18 +57,18 @@ fn sized<T: Real>(n: usize, traced: bool) -> (Module, ModuleInfo) {
 
 #[test]
 fn every_shader_is_valid_in_both_precisions() {
-    for traced in [false, true] {
-        validated(&shader::source::<f32>(traced), traced, Capabilities::empty()).unwrap();
-        validated(&shader::source::<f64>(traced), traced, Capabilities::FLOAT64).unwrap();
+    for variant in Variant::ALL {
+        validated(&shader::source::<f32>(variant), variant, Capabilities::empty()).unwrap();
+        validated(&shader::source::<f64>(variant), variant, Capabilities::FLOAT64).unwrap();
     }
     // Negative control: f64 is refused where it is not asked for.
-    assert!(validated(&shader::source::<f64>(false), false, Capabilities::empty()).is_err());
+    assert!(validated(&shader::source::<f64>(SWEEPS), SWEEPS, Capabilities::empty()).is_err());
 }
 
 #[test]
 fn an_error_names_the_shader_file_and_line() {
-    let source = shader::source::<f32>(false).replacen("fn accept() {", "fn accept() { nonsense;", 1);
-    let message = validated(&source, false, Capabilities::empty()).unwrap_err();
+    let source = shader::source::<f32>(SWEEPS).replacen("fn accept() {", "fn accept() { nonsense;", 1);
+    let message = validated(&source, SWEEPS, Capabilities::empty()).unwrap_err();
     let line = include_str!("../shaders/step.wgsl").lines().position(|line| line == "fn accept() {").unwrap() + 1;
     assert!(message.starts_with(&format!("step.wgsl:{line}:")), "{message}");
 }
@@ -69,7 +76,7 @@ fn an_error_names_the_shader_file_and_line() {
 #[test]
 fn every_file_in_the_folder_is_part_of_the_kernel() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/shaders");
-    let source = shader::source::<f32>(false) + &shader::source::<f32>(true);
+    let source = all_sources::<f32>();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|extension| extension == "wgsl") {
@@ -81,8 +88,8 @@ fn every_file_in_the_folder_is_part_of_the_kernel() {
 
 #[test]
 fn f32_translates_for_every_api_and_f64_for_vulkan() {
-    for n in [6, 100, 257] {
-        let (module, info) = sized::<f32>(n, false);
+    for (n, variant) in [6, 100, 257].into_iter().flat_map(|n| Variant::ALL.map(|variant| (n, variant))) {
+        let (module, info) = sized::<f32>(n, variant);
         let options = spv::Options { lang_version: (1, 3), ..Default::default() };
         spv::write_vec(&module, &info, &options, None).unwrap();
         msl::write_string(
@@ -97,7 +104,7 @@ fn f32_translates_for_every_api_and_f64_for_vulkan() {
         hlsl::Writer::new(&mut text, &options, &Default::default()).write(&module, &info, None).unwrap();
         assert!(text.contains("evolve"));
 
-        let (module, info) = sized::<f64>(n, false);
+        let (module, info) = sized::<f64>(n, variant);
         spv::write_vec(&module, &info, &spv::Options { lang_version: (1, 3), ..Default::default() }, None).unwrap();
     }
 }
@@ -115,7 +122,7 @@ fn structs(module: &Module) -> BTreeMap<String, (Vec<(String, u32)>, u32)> {
 }
 
 fn layouts_agree<T: Real>() {
-    let (module, _) = validated(&shader::source::<T>(false), false, capabilities::<T>()).unwrap();
+    let (module, _) = validated(&shader::source::<T>(SWEEPS), SWEEPS, capabilities::<T>()).unwrap();
     let found = structs(&module);
     let number = size_of::<T>() as u32;
     let expect = |name: &str, fields: &[&str], step: u32| {
@@ -142,8 +149,8 @@ fn the_structs_shared_with_the_host_have_its_layout() {
 
 #[test]
 fn bindings_are_found_by_name_where_the_host_puts_them() {
-    for traced in [false, true] {
-        let (module, _) = validated(&shader::source::<f32>(traced), traced, Capabilities::empty()).unwrap();
+    for variant in Variant::ALL {
+        let (module, _) = validated(&shader::source::<f32>(variant), variant, Capabilities::empty()).unwrap();
         let mut bound = BTreeMap::new();
         for (_, variable) in module.global_variables.iter() {
             if let Some(binding) = &variable.binding {
@@ -152,7 +159,7 @@ fn bindings_are_found_by_name_where_the_host_puts_them() {
             }
         }
         let mut expected = vec!["dispatch", "all_parameters", "all_counters", "all_reports", "all_states"];
-        if traced {
+        if variant.traced {
             expected.push("traces");
         }
         assert_eq!(bound.into_values().collect::<Vec<_>>(), expected);
@@ -161,16 +168,16 @@ fn bindings_are_found_by_name_where_the_host_puts_them() {
 
 #[test]
 fn workgroup_memory_is_what_the_host_counts() {
-    for n in [6, 7, 100, 257, 1024] {
+    for (n, variant) in [6, 7, 100, 257, 1024].into_iter().flat_map(|n| Variant::ALL.map(|variant| (n, variant))) {
         let blocks = Blocks::new(n).unwrap();
-        let (module, _) = sized::<f64>(n, false);
+        let (module, _) = sized::<f64>(n, variant);
         let mut layouter = naga::proc::Layouter::default();
         layouter.update(module.to_ctx()).unwrap();
         let in_workgroup = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);
         let bytes: u32 = in_workgroup.map(|(_, v)| layouter[v.ty].size).sum();
-        let counted = shader::workgroup_bytes::<f64>(blocks);
+        let counted = shader::workgroup_bytes::<f64>(blocks, variant.solver);
         assert!(bytes as usize <= counted && counted <= bytes as usize + 16, "n = {n}: {bytes}, counted {counted}");
-        if n <= 512 {
+        if n <= 512 && variant.solver == Solver::GaussSeidel {
             assert!(counted <= 16_384, "n = {n} exceeds what every WebGPU device has: {counted}");
         }
     }
@@ -178,7 +185,7 @@ fn workgroup_memory_is_what_the_host_counts() {
 
 /// The text of all shaders without comments.
 fn code() -> String {
-    let source = shader::source::<f64>(false) + &shader::source::<f64>(true);
+    let source = all_sources::<f64>();
     source.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
 }
 
@@ -219,8 +226,10 @@ fn transcendental(module: &Module) -> Option<naga::MathFunction> {
 
 #[test]
 fn no_transcendental_function_is_used() {
-    let (module, _) = validated(&shader::source::<f64>(true), true, Capabilities::FLOAT64).unwrap();
-    assert_eq!(transcendental(&module), None);
+    for variant in Variant::ALL {
+        let (module, _) = validated(&shader::source::<f64>(variant), variant, Capabilities::FLOAT64).unwrap();
+        assert_eq!(transcendental(&module), None);
+    }
     // Negative control.
     let with = naga::front::wgsl::parse_str("fn f(x: f32) -> f32 { return exp(x); }").unwrap();
     assert!(transcendental(&with).is_some());
@@ -286,9 +295,9 @@ fn noop_device() -> wgpu::Device {
 }
 
 /// The error of building the pipeline and binding `buffers` storage buffers behind the uniform one.
-fn pipeline_error<T: Real>(device: &wgpu::Device, n: usize, traced: bool, buffers: u32) -> Option<String> {
+fn pipeline_error<T: Real>(device: &wgpu::Device, n: usize, variant: Variant, buffers: u32) -> Option<String> {
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let pipeline = kernel::compile::<T>(device, Blocks::new(n).unwrap(), 32, traced);
+    let pipeline = kernel::compile::<T>(device, Blocks::new(n).unwrap(), 32, variant);
     let buffer = |usage| {
         device.create_buffer(&wgpu::BufferDescriptor { label: None, size: 4096, usage, mapped_at_creation: false })
     };
@@ -306,12 +315,12 @@ fn pipelines_are_built_and_bound_without_any_gpu() {
     let device = noop_device();
     assert!(device.features().contains(wgpu::Features::SHADER_F64));
     for n in [6, 7, 64, 100, 257] {
-        for traced in [false, true] {
-            let buffers = 4 + u32::from(traced);
-            assert_eq!(pipeline_error::<f32>(&device, n, traced, buffers), None, "f32, n = {n}");
-            assert_eq!(pipeline_error::<f64>(&device, n, traced, buffers), None, "f64, n = {n}");
+        for variant in Variant::ALL {
+            let buffers = 4 + u32::from(variant.traced);
+            assert_eq!(pipeline_error::<f32>(&device, n, variant, buffers), None, "f32, n = {n}");
+            assert_eq!(pipeline_error::<f64>(&device, n, variant, buffers), None, "f64, n = {n}");
             // Negative control: a buffer too few is noticed.
-            assert!(pipeline_error::<f32>(&device, n, traced, buffers - 1).is_some());
+            assert!(pipeline_error::<f32>(&device, n, variant, buffers - 1).is_some());
         }
     }
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{
     Backend,
     cpu::CpuBackend,
-    gpu::{Capacity, Gpu, Kernel},
+    gpu::{Capacity, Gpu, Kernel, Variant},
 };
 use crate::{
     ensemble::{
@@ -15,7 +15,7 @@ use crate::{
     error::{Error, Result},
     number::Real,
     scheme::step::Method,
-    solver::{Blocks, Order, Solver},
+    solver::{Blocks, Order},
 };
 
 /// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
@@ -62,9 +62,6 @@ pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
 
 /// What `--backend auto` takes: the first hardware GPU that can do the run, else the CPU.
 fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
-    if spec.solver == Solver::Direct {
-        return cpu(spec, n, "the direct solver runs on the CPU".into());
-    }
     if spec.order == Order::Lexicographic {
         return cpu(spec, n, "lexicographic sweeps run on the CPU".into());
     }
@@ -86,8 +83,8 @@ fn cpu(spec: &Spec, n: usize, reason: String) -> Result<Choice> {
 }
 
 fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
-    if spec.solver == Solver::Direct || spec.order == Order::Lexicographic {
-        let message = "--adapter: direct and lexicographic solves run on the CPU only; leave out --adapter";
+    if spec.order == Order::Lexicographic {
+        let message = "--adapter: lexicographic sweeps run on the CPU only; leave out --adapter";
         return Err(Error::Request(message.into()));
     }
     let found = Gpu::list();
@@ -127,8 +124,11 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
     }
     check_precision(n, precision)?;
     let (fits, most) = match precision {
-        Precision::F32 => (capacity.check_size::<f32>(ring(n)?), capacity.max_points::<f32>().min(MAX_POINTS_F32)),
-        Precision::F64 => (capacity.check_size::<f64>(ring(n)?), capacity.max_points::<f64>()),
+        Precision::F32 => (
+            capacity.check_size::<f32>(ring(n)?, spec.solver),
+            capacity.max_points::<f32>(spec.solver).min(MAX_POINTS_F32),
+        ),
+        Precision::F64 => (capacity.check_size::<f64>(ring(n)?, spec.solver), capacity.max_points::<f64>(spec.solver)),
     };
     fits.map_err(|needs| {
         let problem = format!("a member needs {needs}");
@@ -198,7 +198,8 @@ impl Choice {
         };
         if let Some(gpu) = self.gpu {
             let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
-            let kernel = Kernel::<T>::new(&gpu, blocks, members, spec.max_sweeps, false)?;
+            let variant = Variant { solver: spec.solver, traced: false };
+            let kernel = Kernel::<T>::new(&gpu, blocks, members, spec.max_sweeps, variant)?;
             platform.backend = "gpu".into();
             platform.adapter = Some(gpu.name().to_string());
             platform.driver = Some(gpu.driver());
@@ -243,9 +244,9 @@ mod tests {
     #[test]
     fn more_points_than_the_workgroup_holds_are_refused_with_the_largest_number_that_fits() {
         let capacity = Capacity { f64: true, ..LEAST };
-        let most = capacity.max_points::<f64>();
-        assert!(most >= 512, "{most}");
         let spec = Spec { precision: Some(Precision::F64), ..Spec::default() };
+        let most = capacity.max_points::<f64>(spec.solver);
+        assert!(most >= 512, "{most}");
         fitting_precision(&spec, most, "toaster", &capacity).unwrap();
         let message = refused(Some(Precision::F64), most + 1, &capacity);
         for part in [format!("--points {}", most + 1), format!("take {most} or fewer"), "--backend cpu".into()] {

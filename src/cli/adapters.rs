@@ -14,28 +14,28 @@ pub struct AdaptersArgs {}
 /// Prints the listing.
 pub fn adapters(AdaptersArgs {}: AdaptersArgs) -> Result<()> {
     let found = Gpu::list();
+    let spec = Spec::default();
     let mut text = String::new();
     for gpu in &found {
-        text += &describe(gpu);
+        text += &describe(gpu, &spec);
     }
     if found.is_empty() {
         text += "no GPU adapter; Debian's software GPU is the package mesa-vulkan-drivers\n";
     }
-    let spec = Spec::default();
     let choice = backend::choose(&spec, spec.points)?;
     print(&format!("{text}\n--backend auto, for the default run: {}\n", choice.sentence()))
 }
 
-fn describe(gpu: &Gpu) -> String {
+fn describe(gpu: &Gpu, spec: &Spec) -> String {
     let (limits, capacity) = (gpu.limits(), gpu.capacity());
     let kind = if gpu.is_hardware() { "hardware" } else { "software" };
     let points = match gpu.has_f64() {
         true => format!(
             "{} in f32, {} in f64",
-            capacity.max_points::<f32>().min(MAX_POINTS_F32),
-            capacity.max_points::<f64>()
+            capacity.max_points::<f32>(spec.solver).min(MAX_POINTS_F32),
+            capacity.max_points::<f64>(spec.solver)
         ),
-        false => format!("{} in f32", capacity.max_points::<f32>().min(MAX_POINTS_F32)),
+        false => format!("{} in f32", capacity.max_points::<f32>(spec.solver).min(MAX_POINTS_F32)),
     };
     let rows = [
         ("kind", format!("{kind}, {}, {}", gpu.device_type(), gpu.api())),

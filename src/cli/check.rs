@@ -9,6 +9,7 @@ use crate::{
     conformance::{Row, compare::MEMBERS, runs, stages},
     error::{Error, Result},
     number::Real,
+    solver::Solver,
 };
 
 const EXAMPLES: &str = "\
@@ -55,10 +56,12 @@ pub fn check(args: CheckArgs) -> Result<()> {
             }
         };
         say("f32");
-        let mut rows = compare::<f32>(gpu)?;
+        let mut rows = compare::<f32>(gpu, Solver::GaussSeidel)?;
+        rows.extend(compare::<f32>(gpu, Solver::Direct)?);
         if gpu.has_f64() {
             say("f64");
-            rows.extend(compare::<f64>(gpu)?);
+            rows.extend(compare::<f64>(gpu, Solver::GaussSeidel)?);
+            rows.extend(compare::<f64>(gpu, Solver::Direct)?);
         }
         failed += rows.iter().filter(|row| !row.passes()).count();
         print(&table(gpu, &rows))?;
@@ -69,13 +72,14 @@ pub fn check(args: CheckArgs) -> Result<()> {
     }
 }
 
-/// The worst row of every quantity over all sizes.
-fn compare<T: Real>(gpu: &Gpu) -> Result<Vec<Row>> {
+/// The worst row of every quantity over all sizes; of the direct solver what does not come before a solve.
+fn compare<T: Real>(gpu: &Gpu, solver: Solver) -> Result<Vec<Row>> {
     let mut worst: Vec<Row> = Vec::new();
     for n in SIZES {
-        let mut rows = stages::<T>(gpu, n, None)?;
+        let mut rows = stages::<T>(gpu, solver, n, None)?;
+        rows.retain(|row| solver == Solver::GaussSeidel || row.quantity.starts_with('δ'));
         for steps in STEPS {
-            rows.extend(runs::<T>(gpu, n, steps, Budget { steps: 16, sweeps: u32::MAX }, None)?);
+            rows.extend(runs::<T>(gpu, solver, n, steps, Budget { steps: 16, sweeps: u32::MAX }, None)?);
         }
         match worst.is_empty() {
             true => worst = rows,
@@ -92,10 +96,11 @@ fn compare<T: Real>(gpu: &Gpu) -> Result<Vec<Row>> {
 fn table(gpu: &Gpu, rows: &[Row]) -> String {
     let sizes = SIZES.map(|n| n.to_string()).join(", ");
     let mut text = format!(
-        "{} ({}): {MEMBERS} members, n = {sizes}\n\n{:<5}{:>5}  {:<24}{:>10}{:>13}{:>10}  {:<8}at\n",
+        "{} ({}): {MEMBERS} members, n = {sizes}\n\n{:<5}{:<8}{:>5}  {:<24}{:>10}{:>13}{:>10}  {:<8}at\n",
         gpu.name(),
         gpu.driver(),
         "",
+        "solver",
         "steps",
         "quantity",
         "scale",
@@ -104,11 +109,12 @@ fn table(gpu: &Gpu, rows: &[Row]) -> String {
         "verdict",
     );
     for row in rows {
-        let Row { quantity, precision, n, steps, scale, error, bound, at: (member, node) } = row;
+        let Row { quantity, solver, precision, n, steps, scale, error, bound, at: (member, node) } = row;
+        let solver = if *solver == Solver::Direct { "direct" } else { "sweeps" };
         let verdict = if row.passes() { "ok" } else { "FAILED" };
         let place = if *error == 0.0 { "bit for bit".into() } else { format!("n {n}, member {member}, node {node}") };
         text += &format!(
-            "{precision:<5}{steps:>5}  {quantity:<24}{scale:>10.2e}{error:>13.2e}{bound:>10.2e}  {verdict:<8}{place}\n"
+            "{precision:<5}{solver:<8}{steps:>5}  {quantity:<24}{scale:>10.2e}{error:>13.2e}{bound:>10.2e}  {verdict:<8}{place}\n"
         );
     }
     text

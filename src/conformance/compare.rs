@@ -7,7 +7,10 @@ use super::{
 use crate::{
     backend::{
         Backend, gpu,
-        gpu::kernel::{Budget, TRACE_FIELDS},
+        gpu::{
+            Variant,
+            kernel::{Budget, TRACE_FIELDS},
+        },
     },
     error::{Error, Result},
     number::Real,
@@ -43,6 +46,8 @@ pub struct Tamper {
 pub struct Row {
     /// The quantity.
     pub quantity: &'static str,
+    /// Solver of the systems.
+    pub solver: Solver,
     /// `f32` or `f64`.
     pub precision: &'static str,
     /// Nodes per member.
@@ -70,9 +75,10 @@ impl Row {
         self.error / self.bound
     }
 
-    fn begin<T: Real>(bound: &Bound, n: usize, steps: u32) -> Row {
+    fn begin<T: Real>(bound: &Bound, solver: Solver, n: usize, steps: u32) -> Row {
         Row {
             quantity: bound.quantity,
+            solver,
             precision: T::NAME,
             n,
             steps,
@@ -98,8 +104,8 @@ impl Row {
     }
 }
 
-fn method(max_sweeps: u32) -> Method {
-    Method { solver: Solver::GaussSeidel, order: Order::Coloured, max_sweeps }
+fn method(solver: Solver) -> Method {
+    Method { solver, order: Order::Coloured, max_sweeps: MAX_SWEEPS }
 }
 
 /// Sweeps at most in these comparisons.
@@ -122,9 +128,9 @@ fn blocks(n: usize) -> Result<Blocks> {
 }
 
 /// Everything that one step computes, stage by stage.
-pub fn stages<T: Real>(adapter: &gpu::Gpu, n: usize, tamper: Option<Tamper>) -> Result<Vec<Row>> {
+pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Option<Tamper>) -> Result<Vec<Row>> {
     let launches = members(n, MEMBERS, 1, tolerance::<T>())?;
-    let mut kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, MEMBERS, MAX_SWEEPS, true)?;
+    let mut kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, MEMBERS, MAX_SWEEPS, Variant { solver, traced: true })?;
     for (slot, launch) in tampered(launches.clone(), tamper).iter().enumerate() {
         kernel.load(slot, launch)?;
     }
@@ -133,11 +139,11 @@ pub fn stages<T: Real>(adapter: &gpu::Gpu, n: usize, tamper: Option<Tamper>) -> 
         kernel.advance()?;
     }
     let trace = kernel.trace()?;
-    let mut rows: Vec<Row> = STAGES.iter().map(|bound| Row::begin::<T>(bound, n, 1)).collect();
+    let mut rows: Vec<Row> = STAGES.iter().map(|bound| Row::begin::<T>(bound, solver, n, 1)).collect();
     for (member, launch) in launches.iter().enumerate() {
         let run = Run::<T>::new(launch);
         let mut work = Workspace::new(blocks(n)?);
-        step::step(&run.state, &run.parameters, &method(MAX_SWEEPS), &mut work);
+        step::step(&run.state, &run.parameters, &method(solver), &mut work);
         let twin = traced(&work);
         let scales = Scales::of(launch)?;
         for (field, (row, bound)) in rows.iter_mut().zip(&STAGES).enumerate() {
@@ -153,17 +159,18 @@ pub fn stages<T: Real>(adapter: &gpu::Gpu, n: usize, tamper: Option<Tamper>) -> 
 /// The curve after `steps` steps, in dispatches of `budget`.
 pub fn runs<T: Real>(
     adapter: &gpu::Gpu,
+    solver: Solver,
     n: usize,
     steps: u32,
     budget: Budget,
     tamper: Option<Tamper>,
 ) -> Result<Vec<Row>> {
     let launches = members(n, MEMBERS, steps, tolerance::<T>())?;
-    let ours = on_gpu::<T>(adapter, n, &tampered(launches.clone(), tamper), budget)?;
-    let mut rows: Vec<Row> = FIELDS.iter().map(|bound| Row::begin::<T>(bound, n, steps)).collect();
+    let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
+    let mut rows: Vec<Row> = FIELDS.iter().map(|bound| Row::begin::<T>(bound, solver, n, steps)).collect();
     for (member, (launch, (state, counters))) in launches.iter().zip(&ours).enumerate() {
         let mut twin = Run::<T>::new(launch);
-        evolve(&mut twin, &method(MAX_SWEEPS), &mut Workspace::new(blocks(n)?), steps);
+        evolve(&mut twin, &method(solver), &mut Workspace::new(blocks(n)?), steps);
         if (counters.status, counters.steps) != (twin.counters.status, twin.counters.steps) {
             return Err(Error::Failed(format!(
                 "{} n = {n}, member {member}: status {} after {} steps on the GPU, {} after {} on the CPU",
@@ -193,11 +200,13 @@ fn growth(steps: u32) -> f64 {
 /// Runs `launches` to their goals on the GPU.
 pub fn on_gpu<T: Real>(
     adapter: &gpu::Gpu,
+    solver: Solver,
     n: usize,
     launches: &[Launch],
     budget: Budget,
 ) -> Result<Vec<(State<f64>, Counters)>> {
-    let kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, launches.len(), MAX_SWEEPS, false)?;
+    let kernel =
+        gpu::Kernel::<T>::new(adapter, blocks(n)?, launches.len(), MAX_SWEEPS, Variant { solver, traced: false })?;
     let mut kernel = kernel.with_budget(budget);
     for (slot, launch) in launches.iter().enumerate() {
         kernel.load(slot, launch)?;
@@ -239,7 +248,7 @@ impl Scales {
     fn of(launch: &Launch) -> Result<Scales> {
         let run = Run::<f64>::new(launch);
         let mut work = Workspace::new(blocks(launch.nodes.len())?);
-        step::step(&run.state, &run.parameters, &Method { solver: Solver::Direct, ..method(1) }, &mut work);
+        step::step(&run.state, &run.parameters, &method(Solver::Direct), &mut work);
         Ok(Scales { state: run.state, parameters: run.parameters, work })
     }
 

@@ -139,9 +139,6 @@ impl Spec {
                 let problem = "a GPU sweeps colour by colour only";
                 return Err(Error::value("order", "lexicographic", problem, cpu));
             }
-            if self.solver == Solver::Direct {
-                return Err(Error::value("solver", "direct", "the GPU back end has no direct solver", cpu));
-            }
         }
         match &self.adapter {
             Some(name) if self.backend == BackendChoice::Cpu => {
@@ -267,7 +264,6 @@ mod tests {
         ("points = 31", "--modes 2..=8: 31 nodes resolve no mode above 7"),
         ("order = 'lexicographic'\nbackend = 'gpu'", "--order lexicographic: "),
         ("order = 'lexicographic'\nsolver = 'direct'", "--order lexicographic: "),
-        ("solver = 'direct'\nbackend = 'gpu'", "--solver direct: "),
         ("adapter = 'llvmpipe'\nbackend = 'cpu'", "--adapter llvmpipe: "),
         ("adapter = ' '", "--adapter '': "),
     ];

@@ -7,7 +7,7 @@ use crate::{
     ensemble::spec::Precision,
     error::{Error, Result},
     number::Real,
-    solver::{Blocks, ring::MIN_POINTS},
+    solver::{Blocks, Solver, ring::MIN_POINTS},
 };
 
 /// An adapter that could run the kernel.
@@ -43,18 +43,18 @@ impl Capacity {
     }
 
     /// The largest n that fits in precision `T`.
-    pub fn max_points<T: Real>(&self) -> usize {
-        let fits = |n: &usize| Blocks::new(*n).is_some_and(|blocks| self.check_size::<T>(blocks).is_ok());
+    pub fn max_points<T: Real>(&self, solver: Solver) -> usize {
+        let fits = |n: &usize| Blocks::new(*n).is_some_and(|blocks| self.check_size::<T>(blocks, solver).is_ok());
         (MIN_POINTS..1 << 16).take_while(fits).last().unwrap_or(0)
     }
 
     /// Whether members of this size fit: threads and workgroup memory.
-    pub fn check_size<T: Real>(&self, blocks: Blocks) -> std::result::Result<(), String> {
+    pub fn check_size<T: Real>(&self, blocks: Blocks, solver: Solver) -> std::result::Result<(), String> {
         let threads = shader::threads(blocks, self.subgroup);
         if threads > self.threads {
             return Err(format!("{threads} threads a workgroup, and the adapter has {}", self.threads));
         }
-        let bytes = shader::workgroup_bytes::<T>(blocks);
+        let bytes = shader::workgroup_bytes::<T>(blocks, solver);
         if bytes > self.workgroup_bytes {
             return Err(format!("{bytes} bytes of workgroup memory, and the adapter has {}", self.workgroup_bytes));
         }

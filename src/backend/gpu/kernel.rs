@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::{
     adapter::{Device, Gpu},
-    shader,
+    shader::{self, Variant},
 };
 use crate::{
     backend::Backend,
@@ -19,7 +19,7 @@ use crate::{
         parameters::{Counters, Report},
         state::STATE_FIELDS,
     },
-    solver::{Blocks, gauss_seidel::SWEEPS_PER_CHECK},
+    solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK},
 };
 
 /// A dispatch aims to last this long: short enough for every watchdog, long enough to hide its overhead.
@@ -84,6 +84,7 @@ pub struct Kernel<T> {
     budget: Budget,
     most: Budget,
     fixed: bool,
+    solver: Solver,
     parameters: Vec<T>,
     counters: Vec<Counters>,
     reports: Vec<Report<T>>,
@@ -102,17 +103,19 @@ struct Buffers {
 
 impl<T: Real> Kernel<T> {
     /// Compiles the kernel for rings cut by `blocks` and makes room for up to `members` members.
-    pub fn new(gpu: &Gpu, blocks: Blocks, members: usize, max_sweeps: u32, traced: bool) -> Result<Self> {
+    pub fn new(gpu: &Gpu, blocks: Blocks, members: usize, max_sweeps: u32, variant: Variant) -> Result<Self> {
         let limits = gpu.limits();
         let state_bytes = STATE_FIELDS * blocks.n * size_of::<T>();
-        let trace_bytes = if traced { TRACE_FIELDS.len() * blocks.n * size_of::<T>() } else { 0 };
+        let trace_bytes = if variant.traced { TRACE_FIELDS.len() * blocks.n * size_of::<T>() } else { 0 };
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let fit = (binding / state_bytes.max(trace_bytes) as u64) as usize;
         let slots = members.min(fit).min(MAX_SLOTS).min(limits.max_compute_workgroups_per_dimension as usize).max(1);
-        gpu.capacity().check_size::<T>(blocks).map_err(|e| Error::Request(format!("n = {} needs {e}", blocks.n)))?;
+        gpu.capacity()
+            .check_size::<T>(blocks, variant.solver)
+            .map_err(|e| Error::Request(format!("n = {} needs {e}", blocks.n)))?;
         let most = Budget::most(gpu, blocks);
         let device = gpu.open()?;
-        let pipeline = compile::<T>(&device.device, blocks, gpu.subgroup(), traced);
+        let pipeline = compile::<T>(&device.device, blocks, gpu.subgroup(), variant);
         let buffers = Buffers::new(&device.device, slots, state_bytes, trace_bytes, size_of::<T>());
         let bindings = buffers.bind(&device.device, &pipeline);
         device.check()?;
@@ -123,7 +126,11 @@ impl<T: Real> Kernel<T> {
             buffers,
             blocks,
             max_sweeps,
-            budget: Budget { sweeps: 256, ..most },
+            budget: match variant.solver {
+                Solver::GaussSeidel => Budget { sweeps: 256, ..most },
+                Solver::Direct => Budget { steps: 1, ..most },
+            },
+            solver: variant.solver,
             most,
             fixed: false,
             parameters: vec![T::of(0.0); slots * Parameters::<T>::FIELDS.len()],
@@ -221,13 +228,15 @@ impl<T: Real> Kernel<T> {
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
-    /// Doubles or shrinks the sweeps of the next dispatch towards [`DISPATCH_TIME`].
+    /// Doubles or shrinks the work of the next dispatch towards [`DISPATCH_TIME`]: its sweeps, or its steps where there
+    /// are no sweeps.
     fn tune(&mut self, took: Duration) {
-        if !self.fixed {
-            let now = self.budget.sweeps;
-            let wanted = f64::from(now) * DISPATCH_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
-            let least = SWEEPS_PER_CHECK.min(self.most.sweeps);
-            self.budget.sweeps = (wanted as u32).clamp(least, 2 * now).min(self.most.sweeps);
+        let share = DISPATCH_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
+        let next = |now: u32, most: u32| ((f64::from(now) * share) as u32).clamp(1, 2 * now).min(most);
+        match self.solver {
+            _ if self.fixed => {}
+            Solver::GaussSeidel => self.budget.sweeps = next(self.budget.sweeps, self.most.sweeps),
+            Solver::Direct => self.budget.steps = next(self.budget.steps, self.most.steps),
         }
     }
 }
@@ -296,10 +305,15 @@ impl<T: Real> Backend for Kernel<T> {
 }
 
 /// The compute pipeline, specialised for a ring and a precision.
-pub fn compile<T: Real>(device: &wgpu::Device, blocks: Blocks, subgroup: u32, traced: bool) -> wgpu::ComputePipeline {
+pub fn compile<T: Real>(
+    device: &wgpu::Device,
+    blocks: Blocks,
+    subgroup: u32,
+    variant: Variant,
+) -> wgpu::ComputePipeline {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("evolve"),
-        source: wgpu::ShaderSource::Wgsl(shader::source::<T>(traced).into()),
+        source: wgpu::ShaderSource::Wgsl(shader::source::<T>(variant).into()),
     });
     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some("evolve"),

@@ -6,3 +6,4 @@ pub mod shader;
 
 pub use adapter::{Capacity, Gpu};
 pub use kernel::Kernel;
+pub use shader::Variant;

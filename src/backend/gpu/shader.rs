@@ -1,6 +1,9 @@
 //! The kernel's source: a fixed list of WGSL files behind one line that chooses the number.
 
-use crate::{number::Real, solver::Blocks};
+use crate::{
+    number::Real,
+    solver::{Blocks, Solver},
+};
 
 /// A part of the source: its file name in `shaders/` and its text.
 pub type Part = (&'static str, &'static str);
@@ -11,8 +14,36 @@ macro_rules! parts {
     };
 }
 
-/// The files of the kernel, in the order of the step.
-pub const PARTS: [Part; 12] = parts![
+/// What a kernel is made for, besides its number and sizes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variant {
+    /// Solver of the pentadiagonal systems.
+    pub solver: Solver,
+    /// Keeps what every stage of a step computes.
+    pub traced: bool,
+}
+
+impl Variant {
+    /// All of them.
+    pub const ALL: [Variant; 4] = [
+        Variant { solver: Solver::GaussSeidel, traced: false },
+        Variant { solver: Solver::GaussSeidel, traced: true },
+        Variant { solver: Solver::Direct, traced: false },
+        Variant { solver: Solver::Direct, traced: true },
+    ];
+
+    /// The files of the kernel, in the order of the step.
+    pub fn parts(self) -> impl Iterator<Item = Part> {
+        let solver = match self.solver {
+            Solver::GaussSeidel => GAUSS_SEIDEL,
+            Solver::Direct => DIRECT,
+        };
+        let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
+        COMMON.into_iter().chain(solver).chain(trace)
+    }
+}
+
+const COMMON: [Part; 11] = parts![
     "number.wgsl",
     "ring.wgsl",
     "member.wgsl",
@@ -21,18 +52,19 @@ pub const PARTS: [Part; 12] = parts![
     "system.wgsl",
     "curvature.wgsl",
     "position.wgsl",
-    "gauss_seidel.wgsl",
     "observe.wgsl",
     "step.wgsl",
     "evolve.wgsl",
 ];
+const GAUSS_SEIDEL: [Part; 1] = parts!["gauss_seidel.wgsl"];
+const DIRECT: [Part; 1] = parts!["direct.wgsl"];
 const TRACE_OFF: [Part; 1] = parts!["trace_off.wgsl"];
 const TRACE_ON: [Part; 1] = parts!["trace_on.wgsl"];
 
-/// The whole source in precision `T`; `traced` keeps what every stage computes.
-pub fn source<T: Real>(traced: bool) -> String {
+/// The whole source in precision `T`.
+pub fn source<T: Real>(variant: Variant) -> String {
     let mut text = format!("alias real = {}; const EPSILON = {:e};\n", T::NAME, T::EPSILON);
-    for (_, part) in PARTS.iter().chain(if traced { &TRACE_ON } else { &TRACE_OFF }) {
+    for (_, part) in variant.parts() {
         text.push_str(part);
         text.push('\n');
     }
@@ -40,9 +72,9 @@ pub fn source<T: Real>(traced: bool) -> String {
 }
 
 /// File and line, within `shaders/`, of a line (from 1) of [`source`].
-pub fn locate(line: usize, traced: bool) -> Option<(&'static str, usize)> {
+pub fn locate(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
     let mut before = 1;
-    for (file, part) in PARTS.iter().chain(if traced { &TRACE_ON } else { &TRACE_OFF }) {
+    for (file, part) in variant.parts() {
         let lines = part.lines().count() + 1;
         if line > before && line <= before + lines {
             return Some((file, line - before));
@@ -67,12 +99,13 @@ pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 4] {
     ]
 }
 
-/// Bytes of workgroup memory that the kernel takes: two rings, a row of four per block, one decision.
+/// Bytes of workgroup memory that the kernel takes: two rings, a row of four per block, for the direct solve four more
+/// rows per block, one decision.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
-pub fn workgroup_bytes<T: Real>(blocks: Blocks) -> usize {
-    let number = size_of::<T>();
-    2 * blocks.n * number + 4 * blocks.count() * number + 16
+pub fn workgroup_bytes<T: Real>(blocks: Blocks, solver: Solver) -> usize {
+    let rows = if solver == Solver::Direct { 5 } else { 1 };
+    (2 * blocks.n + 4 * rows * blocks.count()) * size_of::<T>() + 16
 }
 
 #[cfg(test)]
@@ -81,14 +114,14 @@ mod tests {
 
     #[test]
     fn a_line_of_the_source_is_found_in_its_file() {
-        for traced in [false, true] {
-            let text = source::<f64>(traced);
+        for variant in Variant::ALL {
+            let text = source::<f64>(variant);
             for (number, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.is_empty()) {
-                let (file, at) = locate(number + 1, traced).unwrap();
-                let (_, part) = PARTS.iter().chain(&TRACE_ON).chain(&TRACE_OFF).find(|part| part.0 == file).unwrap();
+                let (file, at) = locate(number + 1, variant).unwrap();
+                let (_, part) = variant.parts().find(|part| part.0 == file).unwrap();
                 assert_eq!(part.lines().nth(at - 1), Some(line), "{file}:{at}");
             }
         }
-        assert_eq!(locate(1, false), None);
+        assert_eq!(locate(1, Variant::ALL[0]), None);
     }
 }
