@@ -23,8 +23,11 @@ fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
         for (var s = 0u; s < steps && budget > 0u; s++) {
             if advance() != RUNNING { break; }
         }
+        storageBarrier();
         store_state();
     }
+    // Every thread has read what thread 0 now overwrites.
+    storageBarrier();
     if lane == 0u {
         all_counters[member] = counters;
         all_reports[member] = report;

@@ -60,11 +60,13 @@ struct Dispatch {
     sweeps: u32,
 }
 
+const STATE_FIELDS = 7u;
+
 @group(0) @binding(0) var<uniform> dispatch: Dispatch;
 @group(0) @binding(1) var<storage, read> all_parameters: array<Parameters>;
 @group(0) @binding(2) var<storage, read_write> all_counters: array<Counters>;
 @group(0) @binding(3) var<storage, read_write> all_reports: array<Report>;
-/// Fields x, y, k, r and the last increments of k, x, y: 7 NODES numbers a member.
+/// Fields x, y, k, r and the last increments of k, x, y, NODES numbers each.
 @group(0) @binding(4) var<storage, read_write> all_states: array<real>;
 
 /// Index of this workgroup's member, and its parameters.
@@ -82,7 +84,7 @@ var<private> dx: vec;
 var<private> dy: vec;
 
 fn load_field(field: u32) -> vec {
-    let base = (member * 7u + field) * NODES;
+    let base = (member * STATE_FIELDS + field) * NODES;
     return vec(
         all_states[base + near_low.z], all_states[base + near_low.w],
         all_states[base + near_high.x], all_states[base + near_high.y],
@@ -90,7 +92,7 @@ fn load_field(field: u32) -> vec {
 }
 
 fn store_field(field: u32, v: vec) {
-    let base = (member * 7u + field) * NODES + first;
+    let base = (member * STATE_FIELDS + field) * NODES + first;
     if owns == 0u { return; }
     all_states[base] = v.x;
     all_states[base + 1u] = v.y;

@@ -4,6 +4,7 @@
 //! masks instead of steering branches. [`Real`] is a single number. Rust never contracts `a*b + c`, so every
 //! expression rounds as written, on every machine.
 
+use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 /// Values above this bound count as not finite; far below the overflow of `f32`, so that squares survive.
@@ -134,12 +135,42 @@ const EXP_SERIES: [f64; 14] = [
 pub trait Real: Number<Mask = bool> + bytemuck::Pod + PartialOrd + std::fmt::Display + std::fmt::Debug {
     /// Its name in WGSL.
     const NAME: &'static str;
+    /// Which of the two it is.
+    const PRECISION: Precision;
     /// Exact conversion.
     fn to_f64(self) -> f64;
 }
 
+/// The number type of the state and of all arithmetic on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Precision {
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+impl Precision {
+    /// Machine epsilon.
+    pub fn epsilon(self) -> f64 {
+        match self {
+            Precision::F32 => f32::EPSILON.into(),
+            Precision::F64 => f64::EPSILON,
+        }
+    }
+
+    /// Tolerance of the sweeps where none is asked for.
+    pub fn tolerance(self) -> f64 {
+        match self {
+            Precision::F32 => 1e-3,
+            Precision::F64 => 1e-5,
+        }
+    }
+}
+
 macro_rules! real {
-    ($type:ty, $name:literal, $bits:ty, $mantissa:expr, $bias:expr) => {
+    ($type:ty, $precision:ident, $name:literal, $bits:ty, $mantissa:expr, $bias:expr) => {
         impl Number for $type {
             type Mask = bool;
             const EPSILON: f64 = <$type>::EPSILON as f64;
@@ -182,6 +213,7 @@ macro_rules! real {
         }
         impl Real for $type {
             const NAME: &'static str = $name;
+            const PRECISION: Precision = Precision::$precision;
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 self.into()
@@ -190,8 +222,8 @@ macro_rules! real {
     };
 }
 
-real!(f64, "f64", u64, 52, 1023);
-real!(f32, "f32", u32, 23, 127);
+real!(f64, F64, "f64", u64, 52, 1023);
+real!(f32, F32, "f32", u32, 23, 127);
 
 #[cfg(test)]
 mod tests {

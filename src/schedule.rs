@@ -62,16 +62,19 @@ pub struct Stop {
 
 impl Stop {
     fn new(clock: &Clock, t: f64, series: bool, snapshot: bool) -> Stop {
+        let at = |t, step, fraction| Stop { t, step, fraction, series, snapshot };
+        if t >= clock.t_end * (1.0 - ON_A_STEP) {
+            return at(clock.t_end, clock.steps, 0.0);
+        }
         let ratio = t / clock.tau;
         let near = ratio.round();
-        let on_a_step = (ratio - near).abs() <= ON_A_STEP * near.max(1.0) && near < f64::from(clock.steps);
-        let step = if on_a_step { near } else { ratio.floor() } as u32;
-        if t >= clock.t_end {
-            return Stop { t, step: clock.steps, fraction: 0.0, series, snapshot };
+        // Where the last step is short, the step before it is the last that lies on a multiple of τ.
+        if (ratio - near).abs() <= ON_A_STEP * near.max(1.0) && near < f64::from(clock.steps) {
+            return at(t, near as u32, 0.0);
         }
-        let length = clock.time(step + 1) - clock.time(step);
-        let fraction = if on_a_step { 0.0 } else { (t - clock.time(step)) / length };
-        Stop { t, step, fraction, series, snapshot }
+        let step = (ratio.floor() as u32).min(clock.steps - 1);
+        let inside = (t - clock.time(step)) / (clock.time(step + 1) - clock.time(step));
+        at(t, step, inside.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON))
     }
 }
 
@@ -126,6 +129,30 @@ mod tests {
         );
         assert_eq!(stops[2].fraction, 0.0);
         assert!((stops[1].fraction - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn every_output_time_lies_in_a_step_and_the_last_one_at_the_end() {
+        for exponent in 1..=9 {
+            for m in [1, 2, 3, 5, 7] {
+                let tau = f64::from(m) * 10f64.powi(-exponent);
+                for (steps, rows) in [(10, 10), (10, 7), (97, 10), (1000, 100), (3, 30)] {
+                    let t_end = tau * f64::from(steps);
+                    let clock = Clock::new(tau, t_end);
+                    let dt = t_end / f64::from(rows);
+                    let stops = stops(&clock, Some(dt), &[t_end, 0.5 * t_end]);
+                    for stop in &stops {
+                        assert!((0.0..1.0).contains(&stop.fraction), "tau {tau}, t_end {t_end}: {stop:?}");
+                        assert!(stop.step < clock.steps || stop.fraction == 0.0, "{stop:?}");
+                        let t = clock.inside(stop.step, stop.fraction);
+                        assert!((t - stop.t).abs() <= 1e-8 * tau.max(stop.t), "tau {tau}: {stop:?} is at {t}");
+                    }
+                    let last = stops[stops.len() - 1];
+                    assert_eq!((last.t, last.step, last.series, last.snapshot), (t_end, clock.steps, true, true));
+                    assert_eq!(stops.iter().filter(|stop| stop.series).count(), rows as usize + 1);
+                }
+            }
+        }
     }
 
     #[test]

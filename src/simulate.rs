@@ -13,6 +13,9 @@ use crate::{
     trajectory::Trajectory,
 };
 
+/// A member is admitted when at most this many times the slots are waiting for the first one that has not ended.
+const MEMBERS_AHEAD: usize = 8;
+
 /// Runs every member that `spec` asks for on `backend`, and hands each to `sink` in member order.
 ///
 /// The first `portraits` members come with their nodes before and after.
@@ -26,7 +29,9 @@ pub fn simulate(
 ) -> Result<()> {
     let clock = Clock::new(spec.tau, spec.t_end);
     let stops = stops(&clock, spec.series, &spec.snapshots);
-    let mut waiting = spec.members().enumerate();
+    let mut waiting = spec.members().enumerate().peekable();
+    // Members that end early wait for those before them: this bounds how many.
+    let ahead = MEMBERS_AHEAD * backend.slots();
     let mut pool = Pool {
         spec,
         family,
@@ -40,7 +45,7 @@ pub fn simulate(
     loop {
         for slot in 0..pool.resident.len() {
             while pool.resident[slot].is_none() {
-                let Some((rank, index)) = waiting.next() else { break };
+                let Some((rank, index)) = waiting.next_if(|(rank, _)| *rank < queue.next + ahead) else { break };
                 if let Some(ended) = pool.admit(backend, slot, rank, index)? {
                     queue.leave(rank, ended, sink)?;
                 }
@@ -75,8 +80,7 @@ impl Pool<'_> {
     /// Puts member `index`, the `rank`-th of this run, into a free slot; or ends it where there is nothing to do.
     fn admit(&mut self, backend: &mut dyn Backend, slot: usize, rank: usize, index: u64) -> Result<Option<Ended>> {
         let member = self.family.member(index)?;
-        let tolerance = self.spec.tolerance_at(self.precision);
-        let mut trajectory = Trajectory::new(member, self.spec, tolerance, self.clock, self.stops);
+        let mut trajectory = Trajectory::new(member, self.spec, self.precision, self.clock, self.stops);
         trajectory.keep_portrait(rank < self.portraits);
         if trajectory.is_over() {
             return Ok(Some(trajectory.end(None)));

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::{
     curve::polygon,
-    ensemble::{Ended, Member, Observables, Outcome, Portrait, SeriesRow, Snapshot, Spec, Status},
+    ensemble::{Ended, Member, Observables, Outcome, Portrait, SeriesRow, Snapshot, Spec, Status, spec::Precision},
     schedule::{Clock, Stop},
     scheme::{
         Parameters, State,
@@ -17,6 +17,23 @@ use crate::{
 
 /// Excess below which a curve is a regular polygon to rounding: such a member is relaxed at time 0.
 const ROUND: f64 = 1e-13;
+/// An excess is a difference of numbers near 1: below this many ε a threshold lies in its rounding.
+const RESOLUTION: f64 = 128.0;
+/// A threshold that no excess reaches.
+const NO_THRESHOLD: f64 = -1.0;
+
+/// What can be said of the relaxation of a member.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Course {
+    /// Its excess is followed to the threshold.
+    Followed,
+    /// It is a regular polygon from the start.
+    Round,
+    /// It is so nearly round that its threshold lies in the rounding of the precision.
+    Unresolved,
+    /// It is no simple curve: whatever its excess, it does not relax to a circle.
+    Immersed,
+}
 
 /// A resident member.
 pub struct Trajectory<'a> {
@@ -33,6 +50,7 @@ pub struct Trajectory<'a> {
     series: Vec<SeriesRow>,
     snapshots: Vec<Snapshot>,
     sweeps: [u64; 2],
+    course: Course,
     /// Where inside their steps the member relaxed and its excess halved.
     fractions: [f64; 2],
     portrait: bool,
@@ -40,12 +58,23 @@ pub struct Trajectory<'a> {
 
 impl<'a> Trajectory<'a> {
     /// A member at its start; serves the output times that are due there.
-    pub fn new(member: Member, spec: &Spec, tolerance: f64, clock: Clock, stops: &'a [Stop]) -> Trajectory<'a> {
-        let mut parameters = parameters(spec, member.nodes.len(), tolerance);
+    pub fn new(member: Member, spec: &Spec, precision: Precision, clock: Clock, stops: &'a [Stop]) -> Trajectory<'a> {
+        let mut parameters = parameters(spec, member.nodes.len(), spec.tolerance_at(precision));
         let state = State::<f64>::from_nodes(&member.nodes);
         let start = observe_start(&state, &parameters);
-        parameters.relax_at = spec.relax_to * start.excess;
-        parameters.half_at = 0.5 * start.excess;
+        let threshold = |excess: f64| match excess {
+            _ if start.excess <= ROUND || start.turning.abs() != 1 => NO_THRESHOLD,
+            _ if excess < RESOLUTION * precision.epsilon() => NO_THRESHOLD,
+            _ => excess,
+        };
+        parameters.relax_at = threshold(spec.relax_to * start.excess);
+        parameters.half_at = threshold(0.5 * start.excess);
+        let course = match parameters.relax_at {
+            _ if start.excess <= ROUND => Course::Round,
+            _ if start.turning.abs() != 1 => Course::Immersed,
+            NO_THRESHOLD => Course::Unresolved,
+            _ => Course::Followed,
+        };
         let launch = Launch {
             nodes: member.nodes.clone(),
             parameters,
@@ -67,23 +96,15 @@ impl<'a> Trajectory<'a> {
             series: Vec::new(),
             snapshots: Vec::new(),
             sweeps: [0; 2],
+            course,
             fractions: [0.0; 2],
             portrait: false,
         };
-        if start.excess <= ROUND {
-            trajectory.begin_relaxed();
+        if course == Course::Round && spec.stop_when_relaxed {
+            trajectory.counters.status = Status::Relaxed as u32;
         }
         trajectory.serve(Some(&state));
         trajectory
-    }
-
-    /// A regular polygon has nothing to relax: no event may follow from the rounding of its excess.
-    fn begin_relaxed(&mut self) {
-        self.launch.parameters.relax_at = -1.0;
-        self.launch.parameters.half_at = -1.0;
-        if self.launch.stop_when_relaxed {
-            self.counters.status = Status::Relaxed as u32;
-        }
     }
 
     /// What the back end needs to start the member.
@@ -225,9 +246,8 @@ impl<'a> Trajectory<'a> {
 
     /// What the member leaves; `last` is its last state, for the portrait.
     pub fn end(self, last: Option<&State<f64>>) -> Ended {
-        let round = self.start.excess <= ROUND;
-        let event = |step: u32, fraction: f64| match (round, step) {
-            (true, _) => Some(0.0),
+        let event = |step: u32, fraction: f64| match (self.course, step) {
+            (Course::Round, _) => Some(0.0),
             (_, NEVER) => None,
             _ => Some(self.clock.inside(step, fraction)),
         };
@@ -253,7 +273,14 @@ impl<'a> Trajectory<'a> {
             start: self.start,
             end: self.now,
         };
-        Ended { outcome, series: self.series, snapshots: self.snapshots, portrait, mollified: self.member.mollified }
+        Ended {
+            outcome,
+            series: self.series,
+            snapshots: self.snapshots,
+            portrait,
+            mollified: self.member.mollified,
+            unresolved: self.course == Course::Unresolved,
+        }
     }
 }
 

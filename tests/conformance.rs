@@ -213,8 +213,7 @@ fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 }
 
 fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    let tolerance = if T::NAME == "f32" { 1e-3 } else { 1e-5 };
-    let mut launches = members(n, 5, 60, tolerance)?;
+    let mut launches = members(n, 5, 60, T::PRECISION.tolerance())?;
     for launch in &mut launches {
         launch.stop_when_relaxed = true;
     }
@@ -286,7 +285,7 @@ fn program_refuses<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
 /// Positions within 5·10⁻⁴ of the direct f64 solution on the CPU: the error of f32 and of its tolerance of 10⁻³.
 fn paper<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let node = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64) * DVec2::new(2.0, 1.0);
-    let mut launch = members(n, 1, 2000, if T::NAME == "f32" { 1e-3 } else { 1e-5 })?.remove(0);
+    let mut launch = members(n, 1, 2000, T::PRECISION.tolerance())?.remove(0);
     launch.nodes = (1..=n).map(node).collect();
     launch.parameters.tau = 1e-3;
     let mut exact = Run::<f64>::new(&launch);

@@ -8,8 +8,9 @@ use curvelax::{
     ensemble::Status,
     number::{BIG, Real},
     scheme::{
-        observe::{MAX_TURN, MIN_EDGE},
+        observe::{MAX_DRIFT, MAX_TURN, MIN_EDGE},
         parameters::{Counters, NEVER, Parameters, Report},
+        state::STATE_FIELDS,
         step::NEGLIGIBLE,
     },
     solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK},
@@ -237,14 +238,18 @@ fn no_transcendental_function_is_used() {
 
 /// A comparison of a value with itself: meant to detect NaN, and optimised away.
 fn self_comparison(code: &str) -> Option<&str> {
-    let words: Vec<&str> = code.split([' ', '\n', '(', ')', ';', '{', '}']).filter(|word| !word.is_empty()).collect();
-    words.windows(3).find(|w| w[1] == "!=" && w[0] == w[2]).map(|w| w[0])
+    let spaced = code.replace("!=", " != ").replace("==", " == ");
+    let words: Vec<&str> = spaced.split([' ', '\n', '(', ')', ';', '{', '}']).filter(|word| !word.is_empty()).collect();
+    let compared = words.windows(3).find(|w| ["!=", "=="].contains(&w[1]) && w[0] == w[2])?[0];
+    code.find(compared).map(|at| &code[at..at + compared.len()])
 }
 
 #[test]
 fn nan_is_never_looked_for_by_comparing_a_value_with_itself() {
     assert_eq!(self_comparison(&code()), None);
-    assert_eq!(self_comparison("if (x != x) {"), Some("x"));
+    for bad in ["if (x != x) {", "x!=x", "!(x == x)"] {
+        assert_eq!(self_comparison(bad), Some("x"), "{bad}");
+    }
 }
 
 /// Value of `const NAME = …;` in the shaders.
@@ -263,6 +268,8 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("BIG", BIG),
         ("MAX_TURN", MAX_TURN),
         ("MIN_EDGE", MIN_EDGE),
+        ("MAX_DRIFT", MAX_DRIFT),
+        ("STATE_FIELDS", STATE_FIELDS as f64),
         ("NEGLIGIBLE", NEGLIGIBLE),
         ("SWEEPS_PER_CHECK", f64::from(SWEEPS_PER_CHECK)),
         ("NEVER", f64::from(NEVER)),

@@ -65,9 +65,9 @@ pub struct Row {
 }
 
 impl Row {
-    /// Whether the error is within its bound; NaN is not.
+    /// Whether the error is within its bound; NaN is not, and neither is a row that compared nothing.
     pub fn passes(&self) -> bool {
-        self.error <= self.bound
+        self.error <= self.bound && self.bound.is_finite()
     }
 
     /// The error as a share of its bound.
@@ -83,7 +83,7 @@ impl Row {
             n,
             steps,
             scale: 1.0,
-            error: 0.0,
+            error: f64::NAN,
             bound: f64::INFINITY,
             at: (0, 0),
         }
@@ -91,6 +91,7 @@ impl Row {
 
     /// Takes a member into account; the larger share of the bound wins, and NaN wins always.
     fn add(&mut self, member: usize, scale: f64, bound: f64, Gpu(ours): Gpu<&[f64]>, Cpu(theirs): Cpu<&[f64]>) {
+        assert!(!ours.is_empty() && ours.len() == theirs.len(), "{}: sides of different length", self.quantity);
         for (node, (a, b)) in ours.iter().zip(theirs).enumerate() {
             let error = (a - b).abs();
             let first = self.bound.is_infinite();
@@ -111,11 +112,6 @@ fn method(solver: Solver) -> Method {
 /// Sweeps at most in these comparisons.
 const MAX_SWEEPS: u32 = 200_000;
 
-/// Default tolerance of the precision.
-fn tolerance<T: Real>() -> f64 {
-    if T::NAME == "f32" { 1e-3 } else { 1e-5 }
-}
-
 fn tampered(mut launches: Vec<Launch>, tamper: Option<Tamper>) -> Vec<Launch> {
     if let Some(Tamper { member, node, by }) = tamper {
         launches[member].nodes[node] *= 1.0 + by;
@@ -129,7 +125,7 @@ fn blocks(n: usize) -> Result<Blocks> {
 
 /// Everything that one step computes, stage by stage.
 pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Option<Tamper>) -> Result<Vec<Row>> {
-    let launches = members(n, MEMBERS, 1, tolerance::<T>())?;
+    let launches = members(n, MEMBERS, 1, T::PRECISION.tolerance())?;
     let mut kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, MEMBERS, MAX_SWEEPS, Variant { solver, traced: true })?;
     for (slot, launch) in tampered(launches.clone(), tamper).iter().enumerate() {
         kernel.load(slot, launch)?;
@@ -165,7 +161,7 @@ pub fn runs<T: Real>(
     budget: Budget,
     tamper: Option<Tamper>,
 ) -> Result<Vec<Row>> {
-    let launches = members(n, MEMBERS, steps, tolerance::<T>())?;
+    let launches = members(n, MEMBERS, steps, T::PRECISION.tolerance())?;
     let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
     let mut rows: Vec<Row> = FIELDS.iter().map(|bound| Row::begin::<T>(bound, solver, n, steps)).collect();
     for (member, (launch, (state, counters))) in launches.iter().zip(&ours).enumerate() {

@@ -104,6 +104,8 @@ pub struct Ended {
     pub portrait: Option<Portrait>,
     /// What rounding off did to its corners before the run.
     pub mollified: Mollified,
+    /// Its threshold lies in the rounding of the precision, so no relaxation time can be told.
+    pub unresolved: bool,
 }
 
 /// Receives everything that the members leave.

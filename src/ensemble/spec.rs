@@ -13,7 +13,10 @@ use crate::{
     flow::Flow,
 };
 
-pub use crate::solver::{Order, Solver};
+pub use crate::{
+    number::Precision,
+    solver::{Order, Solver},
+};
 
 /// Where the members are advanced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,16 +28,6 @@ pub enum BackendChoice {
     Gpu,
     /// The CPU back end.
     Cpu,
-}
-
-/// The number type of the state and of all arithmetic on it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Precision {
-    /// Single precision.
-    F32,
-    /// Double precision.
-    F64,
 }
 
 /// A complete description of an ensemble and of the method that relaxes it.
@@ -181,10 +174,7 @@ impl Spec {
 
     /// The residual tolerance in use at `precision`.
     pub fn tolerance_at(&self, precision: Precision) -> f64 {
-        self.tolerance.unwrap_or(match precision {
-            Precision::F32 => 1e-3,
-            Precision::F64 => 1e-5,
-        })
+        self.tolerance.unwrap_or(precision.tolerance())
     }
 }
 

@@ -98,7 +98,7 @@ impl Report {
 
 impl Sink for Report {
     fn member(&mut self, ended: &Ended) -> Result<()> {
-        let Ended { outcome, series, snapshots, portrait, mollified } = ended;
+        let Ended { outcome, series, snapshots, portrait, mollified, unresolved } = ended;
         if let Some(table) = &mut self.series {
             series.iter().try_for_each(|row| table.row(row))?;
         }
@@ -107,7 +107,7 @@ impl Sink for Report {
         }
         self.summary.row(outcome)?;
         self.tally.add(outcome);
-        self.tally.mollified.add(mollified);
+        self.tally.add_aside(mollified, *unresolved);
         if let Some(Portrait { before, after }) = portrait.clone() {
             let Outcome { member, status, t_relax, .. } = *outcome;
             self.panels.push(Panel { member, status, t_relax, before, after });
@@ -150,6 +150,7 @@ mod tests {
                 snapshots: vec![snapshot],
                 portrait,
                 mollified: Mollified::default(),
+                unresolved: false,
             })
             .unwrap();
         report

@@ -19,6 +19,8 @@ pub struct Tally {
     pub mollified: MollifiedMembers,
     /// Members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
     drifted: (u64, f64),
+    /// Members whose relaxation cannot be told in this precision.
+    unresolved: u64,
 }
 
 /// Metric drift above which the scheme's lengths are so far from the polygon's that times mean little.
@@ -37,7 +39,7 @@ pub struct MollifiedMembers {
 
 impl MollifiedMembers {
     /// Adds one member.
-    pub fn add(&mut self, mollified: &Mollified) {
+    fn add(&mut self, mollified: &Mollified) {
         self.members += u64::from(mollified.rounds > 0);
         self.most_rounds = self.most_rounds.max(mollified.rounds);
         self.largest_area_change = self.largest_area_change.max(mollified.area_change.abs());
@@ -59,6 +61,12 @@ impl Tally {
         self.sweeps_x += outcome.sweeps_x;
     }
 
+    /// Adds what is not in the summary's row.
+    pub fn add_aside(&mut self, mollified: &Mollified, unresolved: bool) {
+        self.mollified.add(mollified);
+        self.unresolved += u64::from(unresolved);
+    }
+
     /// What the user should know about the results, a sentence each.
     pub fn warnings(&self) -> Vec<String> {
         let members = self.members();
@@ -68,6 +76,13 @@ impl Tally {
             warnings.push(format!(
                 "{failed} of {members} members ended badly (see `status`); unless the flow itself goes wrong there, a \
                  smaller --tau or more --points helps"
+            ));
+        }
+        if self.unresolved > 0 {
+            warnings.push(format!(
+                "{} of {members} members are so nearly round that their threshold lies in the rounding of the \
+                 precision: they have no t_relax; take --precision f64 or a larger --relax-to",
+                self.unresolved
             ));
         }
         let (drifted, worst) = self.drifted;

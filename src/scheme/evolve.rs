@@ -74,8 +74,8 @@ pub fn evolve<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T
             break;
         }
         let stepped = step::step(&run.state, &run.parameters, method, work);
-        run.counters.sweeps_k += stepped.sweeps_k.to_f64() as u32;
-        run.counters.sweeps_x += stepped.sweeps_x.to_f64() as u32;
+        run.counters.sweeps_k = run.counters.sweeps_k.saturating_add(stepped.sweeps_k.to_f64() as u32);
+        run.counters.sweeps_x = run.counters.sweeps_x.saturating_add(stepped.sweeps_x.to_f64() as u32);
         let new = Curve { x: &work.x, y: &work.y, k: &work.k, r: &work.r };
         let sums = observe::sums(new, &run.parameters, work.blocks);
         let maxima = observe::maxima(new);

@@ -4,9 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use crate::{
     backend::gpu::shader,
-    ensemble::spec::Precision,
     error::{Error, Result},
-    number::Real,
+    number::{Precision, Real},
     solver::{Blocks, Solver, ring::MIN_POINTS},
 };
 

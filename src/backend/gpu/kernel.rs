@@ -228,6 +228,21 @@ impl<T: Real> Kernel<T> {
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
+    /// Every member that was due has made a step or a sweep, or ended: a kernel that does nothing must not be awaited.
+    fn check_progress(&self, before: &[Counters]) -> Result<()> {
+        let stuck = before.iter().zip(&self.counters).position(|(old, new)| {
+            let due = old.status == 0 && old.steps < old.goal;
+            due && (old.status, old.steps, old.solve_sweeps) == (new.status, new.steps, new.solve_sweeps)
+                && new.sweeps_k + new.sweeps_x == 0
+        });
+        match stuck {
+            None => Ok(()),
+            Some(slot) => Err(Error::Device(format!(
+                "GPU: a dispatch did nothing for the member in slot {slot}; see `curvelax check`, or try --backend cpu"
+            ))),
+        }
+    }
+
     /// Doubles or shrinks the work of the next dispatch towards [`DISPATCH_TIME`]: its sweeps, or its steps where there
     /// are no sweeps.
     fn tune(&mut self, took: Duration) {
@@ -282,7 +297,8 @@ impl<T: Real> Backend for Kernel<T> {
         let bytes = self.submit_and_read(encoder, &reads)?;
         self.tune(started.elapsed());
         let (counters, reports) = bytes.split_at(counters.size() as usize);
-        self.counters = bytemuck::pod_collect_to_vec(counters);
+        let before = std::mem::replace(&mut self.counters, bytemuck::pod_collect_to_vec(counters));
+        self.check_progress(&before)?;
         let numbers: Vec<T> = bytemuck::pod_collect_to_vec(reports);
         self.reports = numbers.chunks_exact(Report::<T>::FIELDS.len()).map(Report::from_numbers).collect();
         Ok(())
