@@ -5,7 +5,7 @@ const MAX_TURN = 2.0;
 /// Shortest over mean edge below which an edge counts as vanished.
 const MIN_EDGE = 1e-5;
 /// Metric drift above which the scheme's lengths say nothing about the polygon.
-const MAX_DRIFT = 10.0;
+const MAX_DRIFT = 1.0;
 const FOUR_PI = 12.566370614359172;
 
 /// Sums of the new curve: length, area, energy, turning.

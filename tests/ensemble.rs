@@ -562,3 +562,43 @@ fn a_file_far_away_relaxes_as_one_at_home() {
         assert!(apart < bound, "{sampling}: {apart:e}");
     }
 }
+
+/// A figure eight with lobes of different size, as a file.
+fn figure_eight() -> String {
+    let point = |i: usize| {
+        let (sin, cos) = (std::f64::consts::TAU * i as f64 / 120.0).sin_cos();
+        let size = if cos > 0.0 { 1.8 } else { 1.0 };
+        format!("{},{}\n", size * cos, size * sin * cos)
+    };
+    "x,y\n".to_string() + &(0..120).map(point).collect::<String>()
+}
+
+#[test]
+fn a_curve_that_is_not_simple_is_never_called_relaxed() {
+    let flags = "--shape file:eight.csv --curves 1 --amplitude 0 --tau 1e-5 --t-end 0.1 --relax-to 0.5 --solver direct";
+    let row = run_with(&[("eight.csv", &figure_eight())], flags).summary().remove(0);
+    assert_ne!(row["turning"], "1", "the curve is simple, and the test tests nothing");
+    assert_ne!(row["status"], "relaxed");
+    assert_eq!((&*row["t_relax"], &*row["t_half"]), ("", ""));
+}
+
+#[test]
+fn a_threshold_in_the_rounding_of_the_excess_gives_no_relaxation_time() {
+    let flags = "--shape circle:1 --amplitude 0.002 --modes 2..=4 --t-end 0.6 --curves 4 --solver direct --backend cpu";
+    let single = run(&format!("{flags} --precision f32"));
+    for row in single.summary() {
+        assert_eq!((&*row["status"], &*row["t_relax"]), ("unfinished", ""), "excess {}", row["excess_start"]);
+    }
+    for row in run(flags).summary() {
+        assert_eq!(row["status"], "relaxed");
+    }
+}
+
+#[test]
+fn outputs_at_the_final_time_are_written_whatever_its_rounding() {
+    let done = run("--curves 1 --tau 1e-6 --t-end 1e-5 --series 1e-6 --snapshots 1e-5 --solver direct");
+    let text = done.text("series.csv");
+    assert_eq!(text.lines().count(), 12);
+    assert_eq!(number(&done.rows("series.csv")[10], "t"), 1e-5);
+    assert_eq!(done.text("snapshots.csv").lines().count(), 101);
+}

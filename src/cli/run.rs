@@ -48,7 +48,9 @@ pub struct RunArgs {
 pub fn run(args: RunArgs) -> Result<()> {
     let mut spec = resolve(args.spec, args.flags)?;
     let family = Family::new(&spec)?;
+    // A file's own points are a number that no check has seen.
     spec.points = family.points();
+    spec = spec.validate()?;
     let choice = backend::choose(&spec, spec.points)?;
     choice.settle(&mut spec);
     if args.print_spec {

@@ -26,6 +26,12 @@ pub enum Scale {
     Position,
     /// Longest segment times the root of the largest weight.
     SolvedPosition,
+    /// Area of the circle of the same length.
+    Area,
+    /// `Σ k² r + λ L`.
+    Energy,
+    /// Radius over the shortest segment: edges are differences of positions.
+    Mesh,
 }
 
 /// A quantity of one step: its name, its scale, and the factors k for software and hardware adapters.
@@ -76,6 +82,20 @@ pub const FIELDS: [Bound; 4] = [
     bound("r", Scale::Length, 16.0, 64.0),
 ];
 
+/// What the members report after a run, in the order of `Report`'s fields; the two fractions are compared where
+/// events are.
+pub const REPORT: [Bound; 9] = [
+    bound("length", Scale::Position, 16.0, 64.0),
+    bound("area", Scale::Area, 16.0, 64.0),
+    bound("excess", Scale::One, 16.0, 64.0),
+    bound("energy", Scale::Energy, 16.0, 64.0),
+    bound("k_min", Scale::SolvedCurvature, 16.0, 64.0),
+    bound("k_max", Scale::SolvedCurvature, 16.0, 64.0),
+    bound("mesh ratio", Scale::Mesh, 16.0, 64.0),
+    bound("metric drift", Scale::Mesh, 16.0, 64.0),
+    bound("turning", Scale::One, 0.0, 0.0),
+];
+
 impl Bound {
     /// The factor k for an adapter of this kind.
     pub fn factor(&self, hardware: bool) -> f64 {
@@ -103,6 +123,15 @@ impl Scale {
             Scale::Curvature => k(),
             Scale::SolvedCurvature => k() * weight(&work.curvature.rows).sqrt(),
             Scale::Position => length / std::f64::consts::TAU,
+            Scale::Area => length * length / (4.0 * std::f64::consts::PI),
+            Scale::Energy => {
+                state.k.nodes().iter().zip(state.r.nodes()).map(|(k, r)| k * k * r).sum::<f64>()
+                    + p.length_penalty * length
+            }
+            Scale::Mesh => {
+                let shortest = state.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
+                length / std::f64::consts::TAU / shortest
+            }
             Scale::SolvedPosition => longest() * weight(&work.position.rows).sqrt(),
         }
     }

@@ -1,7 +1,7 @@
 //! The two comparisons, and their rows.
 
 use super::{
-    bounds::{Bound, FIELDS, STAGES, Scale},
+    bounds::{Bound, FIELDS, REPORT, STAGES, Scale},
     members,
 };
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
     scheme::{
         Parameters, State, Workspace,
         evolve::{Launch, Run, evolve},
-        parameters::Counters,
+        parameters::{Counters, Report},
         step::{self, Method},
     },
     solver::{Blocks, Order, Ring, Solver},
@@ -72,7 +72,7 @@ impl Row {
 
     /// The error as a share of its bound.
     pub fn share(&self) -> f64 {
-        self.error / self.bound
+        if self.error == 0.0 { 0.0 } else { self.error / self.bound }
     }
 
     fn begin<T: Real>(bound: &Bound, solver: Solver, n: usize, steps: u32) -> Row {
@@ -95,7 +95,8 @@ impl Row {
         for (node, (a, b)) in ours.iter().zip(theirs).enumerate() {
             let error = (a - b).abs();
             let first = self.bound.is_infinite();
-            if first || error.is_nan() || error / bound > self.share() {
+            let share = if error == 0.0 { 0.0 } else { error / bound };
+            if first || error.is_nan() || share > self.share() {
                 (self.scale, self.error, self.bound, self.at) = (scale, error, bound, (member, node));
             }
             if error.is_nan() {
@@ -163,8 +164,9 @@ pub fn runs<T: Real>(
 ) -> Result<Vec<Row>> {
     let launches = members(n, MEMBERS, steps, T::PRECISION.tolerance())?;
     let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
-    let mut rows: Vec<Row> = FIELDS.iter().map(|bound| Row::begin::<T>(bound, solver, n, steps)).collect();
-    for (member, (launch, (state, counters))) in launches.iter().zip(&ours).enumerate() {
+    let quantities: Vec<Bound> = FIELDS.iter().chain(&REPORT).copied().collect();
+    let mut rows: Vec<Row> = quantities.iter().map(|bound| Row::begin::<T>(bound, solver, n, steps)).collect();
+    for (member, (launch, Left { state, counters, report })) in launches.iter().zip(&ours).enumerate() {
         let mut twin = Run::<T>::new(launch);
         evolve(&mut twin, &method(solver), &mut Workspace::new(blocks(n)?), steps);
         if (counters.status, counters.steps) != (twin.counters.status, twin.counters.steps) {
@@ -178,11 +180,16 @@ pub fn runs<T: Real>(
             )));
         }
         let widened = twin.state.widened();
+        let (our_report, their_report) = (report.to_numbers(), twin.report.widened().to_numbers());
+        let ours = state.fields().into_iter().take(FIELDS.len()).map(|field| field.nodes());
+        let ours: Vec<&[f64]> = ours.chain(our_report.chunks(1).take(REPORT.len())).collect();
+        let theirs = widened.fields().into_iter().take(FIELDS.len()).map(|field| field.nodes());
+        let theirs: Vec<&[f64]> = theirs.chain(their_report.chunks(1).take(REPORT.len())).collect();
         let scales = Scales::of(launch)?;
-        for (field, (row, bound)) in rows.iter_mut().zip(&FIELDS).enumerate() {
+        for (field, (row, bound)) in rows.iter_mut().zip(&quantities).enumerate() {
             let scale = scales.get(bound.scale);
             let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale * growth(steps);
-            row.add(member, scale, limit, Gpu(state.fields()[field].nodes()), Cpu(widened.fields()[field].nodes()));
+            row.add(member, scale, limit, Gpu(ours[field]), Cpu(theirs[field]));
         }
     }
     Ok(rows)
@@ -193,6 +200,17 @@ fn growth(steps: u32) -> f64 {
     f64::from(steps).sqrt()
 }
 
+/// What a member leaves on the GPU.
+#[derive(Clone, Debug)]
+pub struct Left {
+    /// Its last accepted state.
+    pub state: State<f64>,
+    /// Its counters; the sweeps are those of the last dispatch.
+    pub counters: Counters,
+    /// Its report.
+    pub report: Report<f64>,
+}
+
 /// Runs `launches` to their goals on the GPU.
 pub fn on_gpu<T: Real>(
     adapter: &gpu::Gpu,
@@ -200,7 +218,7 @@ pub fn on_gpu<T: Real>(
     n: usize,
     launches: &[Launch],
     budget: Budget,
-) -> Result<Vec<(State<f64>, Counters)>> {
+) -> Result<Vec<Left>> {
     let kernel =
         gpu::Kernel::<T>::new(adapter, blocks(n)?, launches.len(), MAX_SWEEPS, Variant { solver, traced: false })?;
     let mut kernel = kernel.with_budget(budget);
@@ -210,7 +228,9 @@ pub fn on_gpu<T: Real>(
     while (0..launches.len()).any(|slot| unfinished(kernel.counters(slot))) {
         kernel.advance()?;
     }
-    (0..launches.len()).map(|slot| Ok((kernel.state(slot)?, kernel.counters(slot)))).collect()
+    let left =
+        |slot| Ok(Left { state: kernel.state(slot)?, counters: kernel.counters(slot), report: kernel.report(slot) });
+    (0..launches.len()).map(left).collect()
 }
 
 fn unfinished(counters: Counters) -> bool {

@@ -68,6 +68,14 @@ impl Shape {
         })
     }
 
+    /// The highest mode that the shape is made of, for those that are made of modes.
+    pub fn highest_mode(&self) -> Option<u32> {
+        match self {
+            Shape::Flower(modes) => modes.iter().map(|term| term.mode).max(),
+            _ => None,
+        }
+    }
+
     /// The ranges of the numbers: problem and remedy, without the key.
     fn check(&self) -> Result<(), String> {
         match self {

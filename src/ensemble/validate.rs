@@ -9,12 +9,15 @@ use crate::error::{Error, Result};
 /// More members than this is a slip of the keyboard.
 const MOST_CURVES: u64 = 1_000_000_000;
 /// With fewer nodes the five-point rows reach around the ring and its colours meet.
-const FEWEST_POINTS: usize = 6;
+const FEWEST_POINTS: usize = crate::solver::ring::MIN_POINTS;
 const MOST_POINTS: usize = 1_000_000;
 /// A member with more steps than this would not end in a year.
 const MOST_STEPS: f64 = 1e9;
-const MOST_SERIES_ROWS: f64 = 1e7;
+/// The rows of a resident member stay in memory until it ends.
+const MOST_SERIES_ROWS: f64 = 1e6;
 const MOST_SNAPSHOTS: usize = 10_000;
+/// The lengths approach their mean explicitly, by a factor 1 - ωτ a step.
+const MOST_OMEGA_TAU: f64 = 1.0;
 /// A sweep residual above this no longer says that a system is solved.
 const LOOSEST_TOLERANCE: f64 = 0.1;
 const MOST_SWEEPS: u32 = 100_000_000;
@@ -90,6 +93,12 @@ impl Spec {
             let allowed = "take 0 or any positive number, for example 1";
             return Err(Error::value("omega", number(self.omega), "not a redistribution speed", allowed));
         }
+        let turns = self.omega * self.tau;
+        if turns > MOST_OMEGA_TAU && !self.no_redistribution {
+            let problem = format!("omega tau = {}, and the redistribution overshoots above 1", number(turns));
+            let allowed = format!("it is a rate: take --omega {} or less", number(1.0 / self.tau));
+            return Err(Error::value("omega", number(self.omega), &problem, &allowed));
+        }
         if let Some(tolerance) = self.tolerance
             && !(tolerance > 0.0 && tolerance <= LOOSEST_TOLERANCE)
         {
@@ -110,6 +119,13 @@ impl Spec {
             return Err(Error::value("max-sweeps", self.max_sweeps, problem, &format!("take 1 to {MOST_SWEEPS}")));
         }
         let resolved = self.points / 4;
+        if let Some(mode) = self.shape.highest_mode()
+            && mode as usize > resolved
+        {
+            let problem = format!("{} nodes resolve no mode above {resolved}", self.points);
+            let allowed = format!("take --points {} or more, or lower modes", 4 * u64::from(mode));
+            return Err(Error::value("shape", &self.shape, &problem, &allowed));
+        }
         if self.amplitude != 0.0 && self.modes.high as usize > resolved {
             let modes = String::from(self.modes);
             let problem = format!("{} nodes resolve no mode above {resolved}", self.points);
@@ -233,6 +249,9 @@ mod tests {
         ("omega = -0.5", "--omega -0.5: "),
         ("omega = nan", "--omega NaN: "),
         ("omega = inf", "--omega inf: "),
+        ("omega = 2000", "--omega 2000: omega tau = 2, and the redistribution overshoots above 1"),
+        ("tau = 1.5", "--omega 1: omega tau = 1.5"),
+        ("shape = 'flower:26:0.1'", "--shape flower:26:0.1: 100 nodes resolve no mode above 25; take --points 104"),
         ("tolerance = 0", "--tolerance 0: "),
         ("tolerance = -1e-3", "--tolerance -0.001: "),
         ("tolerance = 0.2", "--tolerance 0.2: "),
@@ -253,6 +272,7 @@ mod tests {
         ("series = nan", "--series NaN: "),
         ("series = inf", "--series inf: "),
         ("series = 1e-9", "--series 1e-9: about 2.0e9 rows"),
+        ("series = 1e-6", "--series 1e-6: about 2.0e6 rows"),
         ("snapshots = [0, 3]", "--snapshots 3: not a time of the run; take times from 0 to --t-end 2"),
         ("snapshots = [-1]", "--snapshots -1: "),
         ("snapshots = [nan]", "--snapshots NaN: "),
@@ -278,11 +298,14 @@ mod tests {
         "points = 1000000",
         "seed = 0",
         "seed = 18446744073709551615",
-        "tau = 2",
+        "tau = 1",
+        "tau = 2\nno-redistribution = true",
         "t-end = 0.001",
         "tau = 0.001\nt-end = 999999",
         "omega = 0",
-        "omega = 1e300",
+        "omega = 1000",
+        "omega = 1e300\nno-redistribution = true",
+        "shape = 'flower:25:0.1'",
         "tolerance = 0.1",
         "tolerance = 1e-300",
         "sor = 1.99",

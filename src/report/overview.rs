@@ -78,7 +78,7 @@ impl Overview<'_> {
     fn relaxation(&self) -> String {
         let members = self.tally.members();
         match self.tally.relaxation() {
-            None => format!("none of {members} relaxed"),
+            None => format!("none of {members} members reached it"),
             Some(relaxed) => {
                 let (count, censored) = (relaxed.count, members.saturating_sub(relaxed.count));
                 let others = match censored {
@@ -86,7 +86,7 @@ impl Overview<'_> {
                     _ => format!("; {censored} censored, so both are biased low"),
                 };
                 let (mean, median) = (significant(relaxed.mean), significant(relaxed.median));
-                format!("mean {mean}, median {median} over {count} relaxed{others}")
+                format!("mean {mean}, median {median} over {count} members that reached it{others}")
             }
         }
     }
@@ -161,7 +161,7 @@ stalled             1    25.0 %
 all                 4
 
 ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
-t_relax    mean 0.4000, median 0.4000 over 2 relaxed; 2 censored, so both are biased low
+t_relax    mean 0.4000, median 0.4000 over 2 members that reached it; 2 censored, so both are biased low
 work       10 steps per member, sweeps 20 for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s
@@ -173,7 +173,7 @@ results    out: summary.csv, run.json
     #[test]
     fn nobody_relaxed_is_said_so() {
         let text = overview(&Tally::default());
-        assert!(text.contains("t_relax    none of 0 relaxed\n"), "{text}");
+        assert!(text.contains("t_relax    none of 0 members reached it\n"), "{text}");
     }
 
     #[test]

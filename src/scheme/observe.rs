@@ -14,8 +14,8 @@ pub const MAX_TURN: f64 = 2.0;
 /// Shortest over mean edge below which an edge counts as vanished.
 pub const MIN_EDGE: f64 = 1e-5;
 /// Metric drift above which the scheme's lengths say nothing about the polygon: with far too large a step k and r
-/// lose x, and the polygon shrinks to a point that would look round. Rough outlines reach 2 on single segments.
-pub const MAX_DRIFT: f64 = 10.0;
+/// lose x, and the polygon shrinks to a point that would look round.
+pub const MAX_DRIFT: f64 = 1.0;
 
 /// The four sums, in the order of the kernel's `vec4`.
 #[derive(Clone, Copy, Debug)]
