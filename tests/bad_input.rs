@@ -198,6 +198,36 @@ fn a_folder_that_exists_or_cannot_be_made_is_refused() {
 }
 
 #[test]
+fn a_folder_with_something_in_the_way_is_refused_with_force() {
+    let home = TempDir::new().unwrap();
+    for (folder, file, reason) in [
+        ("first", "plots", "--out first: first/plots is no folder; "),
+        ("second", "summary.csv/mine", "--out second: second/summary.csv is a folder; "),
+    ] {
+        let file = home.path().join(folder).join(file);
+        let run = home.path().join(folder).join("run.json");
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(&file, "mine").unwrap();
+        fs::write(&run, "old").unwrap();
+        let output = curvelax(home.path(), &["run", "--curves", "2", "--backend", "cpu", "--out", folder, "--force"]);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert_says(&message, &[reason]);
+        assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
+        assert_eq!(fs::read_to_string(&run).unwrap(), "old");
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_leaves_no_parents() {
+    let home = TempDir::new().unwrap();
+    let out = format!("new/deep/{}", "x".repeat(1000));
+    let output = curvelax(home.path(), &["run", "--curves", "2", "--backend", "cpu", "--out", &out]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!home.path().join("new").exists());
+}
+
+#[test]
 fn a_reader_that_goes_away_ends_the_program_quietly() {
     for arguments in [&["run", "--backend", "cpu", "--print-spec"][..], &["run", "--help"]] {
         let (reader, writer) = std::io::pipe().unwrap();

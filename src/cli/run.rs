@@ -68,14 +68,16 @@ pub fn run(args: RunArgs) -> Result<()> {
     let precision = choice.precision();
     let (mut backend, platform) = choice.open(&spec, spec.points)?;
     let mut report = Report::begin(folder, &spec, args.quiet)?;
-    let done = simulate(&spec, &family, precision, backend.as_mut(), MOST_PANELS, &mut report);
-    if let Err(error) = done {
-        report.kept_rows().inspect(|rows| note(&format!("note: the members that ended are kept in {rows}")));
-        return Err(error);
+    let rows = report.kept_rows();
+    let done = simulate(&spec, &family, precision, backend.as_mut(), MOST_PANELS, &mut report).and_then(|()| {
+        let late = report.warnings();
+        let warnings = [family.warnings(), &late].concat();
+        Ok((report.finish(&spec, &platform, &warnings)?, late))
+    });
+    if done.is_err() && rows.exists() {
+        note(&format!("note: the members that ended are kept in {}", rows.display()));
     }
-    let late = report.warnings();
-    let warnings = [family.warnings(), &late].concat();
-    let overview = report.finish(&spec, &platform, &warnings)?;
+    let (overview, late) = done?;
     late.iter().for_each(|warning| say(&format!("warning: {warning}")));
     if args.quiet { Ok(()) } else { print(&overview) }
 }

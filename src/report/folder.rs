@@ -1,7 +1,8 @@
 //! The output folder. A file grows as `.NAME.part` and takes its final name only when it is complete and on disk.
 
 use std::{
-    fs::{self, File},
+    cell::Cell,
+    fs::{self, File, TryLockError},
     io::{self, Write},
     path::{Path, PathBuf},
 };
@@ -22,31 +23,41 @@ pub const CURVES: &str = "plots/curves.svg";
 /// All files that a run may write, the one that vouches for the others first.
 const OWN: [&str; 5] = [RUN, SUMMARY, SERIES, SNAPSHOTS, CURVES];
 
-/// A folder that this run may write into.
+/// The folder of the plots, the only one below that of the run.
+const PLOTS: &str = "plots";
+
+/// Locked while a run writes; what counts is the lock, which ends with its process, and not the file.
+const LOCK: &str = ".curvelax.lock";
+
+/// A folder that this run, and no other at the same time, may write into.
 ///
-/// Dropped while empty, a folder that was made for this run is removed again.
+/// Dropped while empty, the folders that were made for this run are removed again.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
-    created: bool,
+    /// The folders that were made for this run, outermost first.
+    made: Vec<PathBuf>,
+    new_plots: bool,
+    lock: Option<File>,
 }
 
 impl OutputFolder {
     /// Makes the folder and its parents. One that exists is refused unless `force` allows to replace in it the files
-    /// of an earlier run; so is a place that cannot be written.
+    /// of an earlier run; so is a place that cannot be written, or where another run is writing.
     pub fn open(path: &Path, force: bool) -> Result<OutputFolder> {
         let refuse = |e: io::Error| {
             Error::Request(format!("--out {}: cannot be written ({e}); name a folder that can", path.display()))
         };
+        let mut folder = OutputFolder { path: path.to_path_buf(), made: Vec::new(), new_plots: false, lock: None };
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             if parent.exists() && !parent.is_dir() {
                 let problem = format!("{} is no folder", parent.display());
                 return Err(Error::value("out", path.display(), &problem, "name a place inside a folder"));
             }
-            fs::create_dir_all(parent).map_err(refuse)?;
+            folder.make_all(parent).map_err(refuse)?;
         }
-        let created = match fs::create_dir(path) {
-            Ok(()) => true,
+        match fs::create_dir(path) {
+            Ok(()) => folder.made.push(path.to_path_buf()),
             Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(refuse(e)),
             Err(_) if !path.is_dir() => {
                 return Err(Error::value("out", path.display(), "exists and is no folder", "name another"));
@@ -55,11 +66,17 @@ impl OutputFolder {
                 let allowed = "name a new folder, or add --force to replace the files of an earlier run";
                 return Err(Error::value("out", path.display(), "already exists", allowed));
             }
-            Err(_) => false,
-        };
-        let folder = OutputFolder { path: path.to_path_buf(), created };
+            Err(_) => {}
+        }
+        folder.lock = lock(&path.join(LOCK)).map_err(refuse)?;
+        if folder.lock.is_none() {
+            return Err(Error::value("out", path.display(), "a run is writing here", "name another folder"));
+        }
+        folder.check_names()?;
         let probe = path.join(".curvelax.part");
-        File::create(&probe).and_then(|_| fs::remove_file(&probe)).map_err(refuse)?;
+        create(&probe).and_then(|_| fs::remove_file(&probe)).map_err(refuse)?;
+        // What an interrupted run left; its lock is gone, so it is no longer writing.
+        OWN.iter().try_for_each(|name| remove(&folder.part(name))).map_err(refuse)?;
         Ok(folder)
     }
 
@@ -70,41 +87,95 @@ impl OutputFolder {
 
     /// Begins the file `name` (with `/` between a subfolder and the file).
     pub fn file(&self, name: &str) -> Result<PartFile> {
-        let target = self.path.join(name);
+        let (target, part) = (self.path.join(name), self.part(name));
         let parent = target.parent().unwrap_or(&self.path);
         fs::create_dir_all(parent).map_err(Error::io("cannot make the folder", parent))?;
-        let file_name = target.file_name().unwrap_or_default().to_string_lossy();
-        let part = target.with_file_name(format!(".{file_name}.part"));
-        let file = File::create(&part).map_err(Error::io("cannot write", &part))?;
-        Ok(PartFile { file, part, target, keep: false, finished: false })
+        let file = create(&part).map_err(Error::io("cannot write", &part))?;
+        Ok(PartFile { file, part, target, keep: Cell::new(false), broken: false, finished: false })
     }
 
-    /// Writes the whole file `name`.
-    pub fn write(&self, name: &str, text: &str) -> Result<()> {
+    /// Writes the whole file `name`, ready for [`OutputFolder::publish`].
+    pub fn write(&self, name: &str, text: &str) -> Result<PartFile> {
         let mut file = self.file(name)?;
         file.write_all(text.as_bytes()).map_err(Error::io("cannot write", &file.target))?;
-        file.finish()
+        file.sync()?;
+        Ok(file)
     }
 
-    /// Removes the files of an earlier run, so that what lies here afterwards is of one run.
-    pub fn remove_earlier(&self) -> Result<()> {
-        for path in OWN.map(|name| self.path.join(name)) {
-            match fs::remove_file(&path) {
-                Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(Error::io("cannot remove", &path)(e)),
-                _ => {}
+    /// Gives complete files their final names, `run` last, and removes what an earlier run wrote and this one did not.
+    ///
+    /// All of them are on disk by now, so that little is left that can fail. The earlier `run.json` goes first: no
+    /// moment has one that vouches for the files of two runs.
+    pub fn publish(&self, files: Vec<PartFile>, run: PartFile) -> Result<()> {
+        let written: Vec<PathBuf> = files.iter().map(|file| file.target.clone()).collect();
+        self.remove_own(RUN)?;
+        files.into_iter().try_for_each(PartFile::finish)?;
+        OWN.iter()
+            .filter(|name| !written.contains(&self.path.join(name)))
+            .try_for_each(|name| self.remove_own(name))?;
+        run.finish()
+    }
+
+    fn remove_own(&self, name: &str) -> Result<()> {
+        let path = self.path.join(name);
+        remove(&path).map_err(Error::io("cannot remove", &path))
+    }
+
+    /// The temporary name of `name`.
+    fn part(&self, name: &str) -> PathBuf {
+        let target = self.path.join(name);
+        let file_name = target.file_name().unwrap_or_default().to_string_lossy();
+        target.with_file_name(format!(".{file_name}.part"))
+    }
+
+    /// As `fs::create_dir_all`, remembering what was made.
+    fn make_all(&mut self, path: &Path) -> io::Result<()> {
+        let missing: Vec<&Path> = path.ancestors().take_while(|folder| !folder.is_dir()).collect();
+        for folder in missing.into_iter().rev().filter(|folder| !folder.as_os_str().is_empty()) {
+            match fs::create_dir(folder) {
+                Ok(()) => self.made.push(folder.to_path_buf()),
+                Err(_) if folder.is_dir() => {}
+                Err(e) => return Err(e),
             }
         }
+        Ok(())
+    }
+
+    /// Refuses, before any work, names that this run could not give to its files at the end.
+    fn check_names(&mut self) -> Result<()> {
+        let in_the_way = |path: &Path, what: &str| {
+            let problem = format!("{} is {what}", path.display());
+            Err(Error::value("out", self.path.display(), &problem, "move it away, or name another folder"))
+        };
+        let plots = self.path.join(PLOTS);
+        let new_plots = plots.symlink_metadata().is_err();
+        if !new_plots && !plots.is_dir() {
+            return in_the_way(&plots, "no folder");
+        }
+        for name in OWN {
+            for path in [self.path.join(name), self.part(name)] {
+                if path.is_dir() {
+                    return in_the_way(&path, "a folder");
+                }
+            }
+        }
+        self.new_plots = new_plots;
         Ok(())
     }
 }
 
 impl Drop for OutputFolder {
     fn drop(&mut self) {
-        if self.created {
-            // Fails, as it should, where there is something inside.
-            let _ = fs::remove_dir(self.path.join("plots"));
-            let _ = fs::remove_dir(&self.path);
+        // Removing a folder fails, as it should, where there is something inside.
+        if self.new_plots {
+            let _ = fs::remove_dir(self.path.join(PLOTS));
         }
+        // Still locked: unlocked first, it could be another run's by the time it is removed.
+        if self.lock.is_some() {
+            let _ = fs::remove_file(self.path.join(LOCK));
+        }
+        // A folder that stays keeps those above it, also those that only its name goes through (`new/../out`).
+        let _ = self.made.iter().rev().try_for_each(fs::remove_dir);
     }
 }
 
@@ -114,14 +185,15 @@ pub struct PartFile {
     file: File,
     part: PathBuf,
     target: PathBuf,
-    keep: bool,
+    keep: Cell<bool>,
+    broken: bool,
     finished: bool,
 }
 
 impl PartFile {
     /// What was written so far is worth keeping even if the run fails.
-    pub fn keep(&mut self) {
-        self.keep = true;
+    pub fn keep(&self) {
+        self.keep.set(true);
     }
 
     /// Its temporary name.
@@ -134,9 +206,13 @@ impl PartFile {
         &self.target
     }
 
-    /// Gives the file its final name, once its content is on disk.
-    pub fn finish(mut self) -> Result<()> {
-        self.file.sync_all().map_err(Error::io("cannot write", &self.target))?;
+    /// Returns once its content is on disk.
+    pub fn sync(&self) -> Result<()> {
+        self.file.sync_all().map_err(Error::io("cannot write", &self.target))
+    }
+
+    /// Gives the file its final name; its content should be on disk.
+    fn finish(mut self) -> Result<()> {
         fs::rename(&self.part, &self.target).map_err(Error::io("cannot write", &self.target))?;
         self.finished = true;
         sync_parent(&self.target)
@@ -145,7 +221,13 @@ impl PartFile {
 
 impl Write for PartFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes)
+        // A writer with a buffer tries again when dropped, and would repeat what had got through.
+        if self.broken {
+            return Err(io::Error::other("an earlier write failed"));
+        }
+        let written = self.file.write(bytes);
+        self.broken = written.as_ref().is_err_and(|e| e.kind() != io::ErrorKind::Interrupted);
+        written
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -155,10 +237,57 @@ impl Write for PartFile {
 
 impl Drop for PartFile {
     fn drop(&mut self) {
-        if !self.finished && !self.keep {
+        let nothing = || self.file.metadata().is_ok_and(|file| file.len() == 0);
+        if !self.finished && (!self.keep.get() || nothing()) {
             let _ = fs::remove_file(&self.part);
         }
     }
+}
+
+/// Makes the file anew: what lies there is removed and not written into, as it may be a link to elsewhere.
+fn create(path: &Path) -> io::Result<File> {
+    remove(path)?;
+    File::create_new(path)
+}
+
+/// Removes a file, which may be absent.
+fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        // Below a folder that is absent, too.
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
+        _ => Ok(()),
+    }
+}
+
+/// Locks the file at `path`, made if need be; none if another holds it.
+fn lock(path: &Path) -> io::Result<Option<File>> {
+    loop {
+        if path.is_symlink() {
+            remove(path)?;
+        }
+        let file = File::options().write(true).create(true).truncate(false).open(path)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => return Ok(None),
+            // A file system without locks is no reason not to run.
+            Err(TryLockError::Error(e)) if e.kind() != io::ErrorKind::Unsupported => return Err(e),
+            // The run before may have removed the file after it was opened here: a lock that nobody else sees.
+            _ if !lies_at(&file, path) => {}
+            _ => return Ok(Some(file)),
+        }
+    }
+}
+
+#[cfg(unix)]
+fn lies_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let id = |of: &fs::Metadata| (of.dev(), of.ino());
+    matches!((file.metadata(), fs::metadata(path)), (Ok(a), Ok(b)) if id(&a) == id(&b))
+}
+
+/// Elsewhere a file has no number to ask for in safe and stable Rust; a file at its place has to do.
+#[cfg(not(unix))]
+fn lies_at(_: &File, path: &Path) -> bool {
+    path.exists()
 }
 
 /// Makes a rename durable; only Unix lets a folder be synced.
@@ -188,6 +317,7 @@ mod tests {
         let folder = OutputFolder::open(&home.path().join("a/b"), false).unwrap();
         let mut file = folder.file(CURVES).unwrap();
         file.write_all(b"half").unwrap();
+        file.sync().unwrap();
         assert_eq!(names(&folder.path().join("plots")), [".curves.svg.part"]);
         file.finish().unwrap();
         assert_eq!(names(&folder.path().join("plots")), ["curves.svg"]);
@@ -214,12 +344,114 @@ mod tests {
             fs::write(home.path().join(name), "old").unwrap();
         }
         let folder = OutputFolder::open(home.path(), true).unwrap();
-        assert_eq!(names(home.path()).len(), 4, "nothing goes before the new files are ready");
-        folder.remove_earlier().unwrap();
-        folder.write(SUMMARY, "new").unwrap();
+        let summary = folder.write(SUMMARY, "new").unwrap();
+        let run = folder.write(RUN, "new").unwrap();
+        for name in [SUMMARY, SERIES, RUN] {
+            assert_eq!(fs::read(home.path().join(name)).unwrap(), b"old", "{name} goes before the new files are ready");
+        }
+        folder.publish(vec![summary], run).unwrap();
         drop(folder);
-        assert_eq!(names(home.path()), ["notes.txt", SUMMARY]);
-        assert_eq!(fs::read(home.path().join(SUMMARY)).unwrap(), b"new");
+        assert_eq!(names(home.path()), ["notes.txt", RUN, SUMMARY]);
+        for (name, text) in [(SUMMARY, "new"), (RUN, "new"), ("notes.txt", "old")] {
+            assert_eq!(fs::read_to_string(home.path().join(name)).unwrap(), text, "{name}");
+        }
+    }
+
+    #[test]
+    fn names_that_no_file_could_take_are_refused_before_any_work() {
+        for (folders, files) in [(&[SUMMARY][..], &[][..]), (&["plots", CURVES], &[]), (&[], &["plots"])] {
+            let home = tempfile::tempdir().unwrap();
+            folders.iter().for_each(|name| fs::create_dir(home.path().join(name)).unwrap());
+            files.iter().for_each(|name| fs::write(home.path().join(name), "mine").unwrap());
+            let before = names(home.path());
+            let error = OutputFolder::open(home.path(), true).unwrap_err();
+            let name = folders.last().or(files.last()).unwrap();
+            assert_eq!(error.exit_code(), 2);
+            assert!(error.to_string().contains(&format!("{} is ", home.path().join(name).display())), "{error}");
+            assert_eq!(names(home.path()), before);
+        }
+    }
+
+    #[test]
+    fn force_removes_what_an_interrupted_run_left() {
+        let home = tempfile::tempdir().unwrap();
+        fs::create_dir(home.path().join("plots")).unwrap();
+        for name in [".summary.csv.part", ".snapshots.csv.part", "plots/.curves.svg.part", ".mine.part"] {
+            fs::write(home.path().join(name), "old").unwrap();
+        }
+        drop(OutputFolder::open(home.path(), true).unwrap());
+        assert_eq!(names(home.path()), [".mine.part", "plots"]);
+        assert_eq!(names(&home.path().join("plots")), [""; 0]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn no_link_is_followed() {
+        let home = tempfile::tempdir().unwrap();
+        let (out, mine) = (home.path().join("out"), home.path().join("mine"));
+        fs::create_dir(&out).unwrap();
+        fs::write(&mine, "mine").unwrap();
+        let link = |name: &str, to: &Path| std::os::unix::fs::symlink(to, out.join(name)).unwrap();
+        link(".curvelax.part", &mine);
+        link(LOCK, &home.path().join("absent"));
+        let folder = OutputFolder::open(&out, true).unwrap();
+        link(".summary.csv.part", &mine);
+        folder.write(SUMMARY, "new").unwrap().finish().unwrap();
+        drop(folder);
+        assert_eq!(fs::read_to_string(&mine).unwrap(), "mine");
+        assert!(!out.join(SUMMARY).is_symlink());
+        assert_eq!(names(home.path()), ["mine", "out"]);
+    }
+
+    #[test]
+    fn parents_made_for_nothing_are_removed_and_others_are_not() {
+        let home = tempfile::tempdir().unwrap();
+        fs::create_dir(home.path().join("old")).unwrap();
+        drop(OutputFolder::open(&home.path().join("old/new/out"), false).unwrap());
+        assert_eq!(names(&home.path().join("old")), [""; 0]);
+        let endless = "x".repeat(1000);
+        OutputFolder::open(&home.path().join("new/deep").join(endless), false).unwrap_err();
+        assert_eq!(names(home.path()), ["old"]);
+
+        let path = home.path().join("through/../out");
+        let folder = OutputFolder::open(&path, false).unwrap();
+        folder.write(RUN, "new").unwrap().finish().unwrap();
+        drop(folder);
+        assert_eq!(names(&path), [RUN], "a folder in use keeps its name");
+    }
+
+    #[test]
+    fn one_run_at_a_time_writes_into_a_folder() {
+        let home = tempfile::tempdir().unwrap();
+        let out = home.path().join("out");
+        let first = OutputFolder::open(&out, false).unwrap();
+        let rows = first.file(SUMMARY).unwrap();
+        let error = OutputFolder::open(&out, true).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().contains("a run is writing here"), "{error}");
+        assert_eq!(names(&out), [LOCK, ".summary.csv.part"], "the first run is not disturbed");
+        drop((rows, first));
+        assert_eq!(names(home.path()), [""; 0]);
+
+        // As a killed run leaves it.
+        fs::create_dir(&out).unwrap();
+        fs::write(out.join(LOCK), "").unwrap();
+        drop(OutputFolder::open(&out, true).unwrap());
+        assert_eq!(names(&out), [""; 0]);
+    }
+
+    #[test]
+    fn nothing_is_written_after_a_failed_write() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = OutputFolder::open(home.path(), true).unwrap();
+        let mut file = folder.file(SUMMARY).unwrap();
+        let good = std::mem::replace(&mut file.file, File::open(&file.part).unwrap());
+        file.write_all(b"to a file that can only be read").unwrap_err();
+        file.file = good;
+        file.write_all(b"again").unwrap_err();
+        file.keep();
+        drop(file);
+        assert_eq!(names(home.path()), [LOCK], "an empty file is not worth keeping");
     }
 
     #[test]
@@ -228,6 +460,7 @@ mod tests {
         let path = home.path().join("out");
         let folder = OutputFolder::open(&path, false).unwrap();
         let (useless, mut useful) = (folder.file(SERIES).unwrap(), folder.file(SUMMARY).unwrap());
+        useful.write_all(b"row").unwrap();
         useful.keep();
         drop((useless, useful, folder));
         assert_eq!(names(&path), [".summary.csv.part"]);

@@ -12,7 +12,10 @@ pub mod svg;
 pub mod tables;
 pub mod tally;
 
-use std::time::{Instant, SystemTime};
+use std::{
+    path::PathBuf,
+    time::{Instant, SystemTime},
+};
 
 pub use folder::OutputFolder;
 pub use gallery::Panel;
@@ -59,9 +62,10 @@ impl Report {
         })
     }
 
-    /// The file that keeps the rows of the members that ended, should the run fail now; none if there are none.
-    pub fn kept_rows(&self) -> Option<String> {
-        (self.tally.members() > 0).then(|| self.summary.part().display().to_string())
+    /// Where the rows of the members that ended lie until the report is finished. If the file is there when the report
+    /// is gone, the run has failed and they are kept.
+    pub fn kept_rows(&self) -> PathBuf {
+        self.summary.part().to_path_buf()
     }
 
     /// What the user should know about the results so far.
@@ -69,30 +73,31 @@ impl Report {
         self.tally.warnings()
     }
 
-    /// Puts every file under its final name, `run.json` last, and returns the overview for stdout.
+    /// Puts every file under its final name, once all are on disk, and returns the overview for stdout.
     pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String]) -> Result<String> {
-        let Report { summary, series, snapshots, folder, tally, panels, progress, started, clock } = self;
+        // In reverse order they are dropped: the folder last, after its files.
+        let Report { folder, tally, panels, progress, started, clock, summary, series, snapshots } = self;
         progress.finish();
         let wall = clock.elapsed();
-        folder.remove_earlier()?;
-        let mut files = vec![folder::SUMMARY];
-        summary.finish()?;
+        let mut names = vec![folder::SUMMARY];
+        let mut files = vec![summary.ready()?];
         if let Some(series) = series {
-            series.finish()?;
-            files.push(folder::SERIES);
+            files.push(series.ready()?);
+            names.push(folder::SERIES);
         }
         if let Some(snapshots) = snapshots {
-            snapshots.finish()?;
-            files.push(folder::SNAPSHOTS);
+            files.push(snapshots.ready()?);
+            names.push(folder::SNAPSHOTS);
         }
         if !panels.is_empty() {
-            folder.write(folder::CURVES, &gallery::draw(&panels))?;
-            files.push(folder::CURVES);
+            files.push(folder.write(folder::CURVES, &gallery::draw(&panels))?);
+            names.push(folder::CURVES);
         }
         let provenance = provenance::Provenance::new(spec, platform, &tally, warnings, started, wall);
-        folder.write(folder::RUN, &provenance.to_json()?)?;
-        files.push(folder::RUN);
-        Ok(overview::Overview { spec, platform, tally: &tally, wall, folder: folder.path(), files: &files }.to_string())
+        let run = folder.write(folder::RUN, &provenance.to_json()?)?;
+        names.push(folder::RUN);
+        folder.publish(files, run)?;
+        Ok(overview::Overview { spec, platform, tally: &tally, wall, folder: folder.path(), files: &names }.to_string())
     }
 }
 
@@ -139,7 +144,6 @@ mod tests {
     /// A report into `out` that has received one member.
     fn report(out: &Path, spec: &Spec, portrait: Option<Portrait>) -> Report {
         let mut report = Report::begin(OutputFolder::open(out, true).unwrap(), spec, true).unwrap();
-        assert_eq!(report.kept_rows(), None);
         let row = SeriesRow { member: 0, t: 0.0, at: Observables::default() };
         let snapshot = Snapshot { member: 0, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] };
         let outcome = tally::tests::outcome(0, Status::Relaxed, Some(0.5));
@@ -185,7 +189,7 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let out = home.path().join("out");
         let failed = report(&out, &Spec::default(), None);
-        let kept = failed.kept_rows().unwrap();
+        let kept = failed.kept_rows();
         drop(failed);
         assert_eq!(files(&out), [".summary.csv.part"]);
         assert_eq!(fs::read_to_string(kept).unwrap().lines().count(), 2);

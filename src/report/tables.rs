@@ -2,7 +2,7 @@
 //!
 //! A float that is not finite is unknown. No clock times here: equal runs give equal bytes.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use csv::{Writer, WriterBuilder};
 use serde::Serialize;
@@ -24,47 +24,34 @@ const BUFFER: usize = 1 << 16;
 
 /// A table that grows row by row. Dropped unfinished, it leaves its rows under their temporary name.
 struct Table {
-    writer: Option<Writer<PartFile>>,
-    target: PathBuf,
-    part: PathBuf,
-    rows: u64,
+    // Flushes when dropped.
+    writer: Writer<PartFile>,
 }
 
 impl Table {
     fn begin(file: PartFile, header: &str) -> Result<Table> {
-        let (target, part) = (file.target().to_path_buf(), file.part().to_path_buf());
         let writer = WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
-        let mut table = Table { writer: Some(writer), target, part, rows: 0 };
+        let mut table = Table { writer };
         table.write(header.split(',').collect::<Vec<_>>())?;
         Ok(table)
     }
 
     fn row(&mut self, row: impl Serialize) -> Result<()> {
         self.write(row)?;
-        self.rows += 1;
+        // Not left to the end: the flush may fail there, and the rows before it are still worth keeping.
+        self.writer.get_ref().keep();
         Ok(())
     }
 
     fn write(&mut self, row: impl Serialize) -> Result<()> {
-        match &mut self.writer {
-            Some(writer) => writer.serialize(row).map_err(|e| Error::io("cannot write", &self.target)(e.into())),
-            None => Ok(()),
-        }
+        self.writer.serialize(row).map_err(|e| Error::io("cannot write", self.writer.get_ref().target())(e.into()))
     }
 
-    fn finish(mut self) -> Result<()> {
-        let Some(writer) = self.writer.take() else { return Ok(()) };
-        writer.into_inner().map_err(|e| Error::io("cannot write", &self.target)(e.into_error()))?.finish()
-    }
-}
-
-impl Drop for Table {
-    fn drop(&mut self) {
-        if let Some(Ok(mut file)) = self.writer.take().map(Writer::into_inner)
-            && self.rows > 0
-        {
-            file.keep();
-        }
+    fn ready(self) -> Result<PartFile> {
+        let target = self.writer.get_ref().target().to_path_buf();
+        let file = self.writer.into_inner().map_err(|e| Error::io("cannot write", &target)(e.into_error()))?;
+        file.sync()?;
+        Ok(file)
     }
 }
 
@@ -149,12 +136,12 @@ impl SummaryTable {
 
     /// The temporary name under which rows lie until the table is finished.
     pub fn part(&self) -> &Path {
-        &self.0.part
+        self.0.writer.get_ref().part()
     }
 
-    /// Puts the table under its final name.
-    pub fn finish(self) -> Result<()> {
-        self.0.finish()
+    /// The whole table, on disk and ready for its final name.
+    pub fn ready(self) -> Result<PartFile> {
+        self.0.ready()
     }
 }
 
@@ -171,9 +158,9 @@ impl SeriesTable {
         self.0.row((row.member, row.t, scalars.map(known)))
     }
 
-    /// Puts the table under its final name.
-    pub fn finish(self) -> Result<()> {
-        self.0.finish()
+    /// The whole table, on disk and ready for its final name.
+    pub fn ready(self) -> Result<PartFile> {
+        self.0.ready()
     }
 }
 
@@ -193,9 +180,9 @@ impl SnapshotTable {
         Ok(())
     }
 
-    /// Puts the table under its final name.
-    pub fn finish(self) -> Result<()> {
-        self.0.finish()
+    /// The whole table, on disk and ready for its final name.
+    pub fn ready(self) -> Result<PartFile> {
+        self.0.ready()
     }
 }
 
@@ -243,18 +230,18 @@ mod tests {
     }
 
     /// The text of the file that `fill` writes.
-    fn written(name: &str, fill: impl FnOnce(PartFile) -> Result<()>) -> String {
+    fn written(name: &str, fill: impl FnOnce(PartFile) -> Result<PartFile>) -> String {
         let home = tempfile::tempdir().unwrap();
         let folder = OutputFolder::open(home.path(), true).unwrap();
-        fill(folder.file(name).unwrap()).unwrap();
-        fs::read_to_string(home.path().join(name)).unwrap()
+        let file = fill(folder.file(name).unwrap()).unwrap();
+        fs::read_to_string(file.part()).unwrap()
     }
 
     fn summary(rows: &[Outcome]) -> String {
         written("summary.csv", |file| {
             let mut table = SummaryTable::begin(file)?;
             rows.iter().try_for_each(|row| table.row(row))?;
-            table.finish()
+            table.ready()
         })
     }
 
@@ -281,7 +268,7 @@ mod tests {
         let text = written("series.csv", |file| {
             let mut table = SeriesTable::begin(file)?;
             table.row(&SeriesRow { member: 1, t: 0.01, at: Observables { k_max: f64::NAN, ..observables() } })?;
-            table.finish()
+            table.ready()
         });
         assert_eq!(
             text,
@@ -292,7 +279,7 @@ mod tests {
             let mut table = SnapshotTable::begin(file)?;
             let (x, y) = (vec![1.0, 2.0], vec![3.0, 4.0]);
             table.snapshot(&Snapshot { member: 1, t: 0.25, x, y, k: vec![5.0, 6.0], r: vec![7.0, 8.0] })?;
-            table.finish()
+            table.ready()
         });
         assert_eq!(text, "member,t,i,x,y,k,r\n1,0.25,1,1.0,3.0,5.0,7.0\n1,0.25,2,2.0,4.0,6.0,8.0\n");
     }
@@ -331,7 +318,7 @@ mod tests {
         let lone = SeriesTable::begin(folder.file("series.csv").unwrap()).unwrap();
         table.row(&outcome(observables(), observables())).unwrap();
         let part = table.part().to_path_buf();
-        drop((table, lone));
+        drop((table, lone, folder));
         assert_eq!(fs::read_to_string(&part).unwrap().lines().count(), 2);
         assert_eq!(fs::read_dir(home.path()).unwrap().count(), 1);
     }
