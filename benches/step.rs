@@ -1,7 +1,8 @@
-//! One step of the scheme on the CPU, whole and solver by solver: `cargo bench`.
+//! One step of the scheme on the CPU, solver by solver, and the making of a member: `cargo bench`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use curvelax::{
+    ensemble::{Family, Spec},
     flow::Flow,
     number::Real,
     scheme::{
@@ -48,9 +49,15 @@ fn step_in<T: Real>(c: &mut Criterion) {
     }
 }
 
+/// One member of the default ensemble: its random numbers, its curve, its nodes.
+fn member(c: &mut Criterion) {
+    let family = Family::new(&Spec::default()).expect("the default spec");
+    c.bench_function("member/n=100", |b| b.iter(|| family.member(7)));
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20);
-    targets = step_in::<f64>, step_in::<f32>
+    targets = step_in::<f64>, step_in::<f32>, member
 }
 criterion_main!(benches);

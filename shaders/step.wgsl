@@ -13,7 +13,8 @@ var<private> new_y: Window;
 const STEP_BEGINS = 0u;
 const CURVATURE_SOLVED = 1u;
 
-/// Computes the new state; returns how its solves ended. x, y, k and r stay until `accept`; the increments are where the next attempt starts.
+/// Computes the new state; returns how its solves ended. x, y, k and r stay until `accept`; the increments are where the
+/// next attempt starts.
 fn step() -> u32 {
     let length = redistribute();
     let radius = length * real(HALF_OVER_PI);

@@ -304,13 +304,4 @@ mod tests {
             assert!(error.exit_code() == 2 && error.to_string().starts_with(key), "{error}");
         }
     }
-
-    #[test]
-    #[ignore = "a measurement: cargo test --release -- --ignored --nocapture microseconds"]
-    fn microseconds_a_member() {
-        let family = family(&Spec::default());
-        let start = std::time::Instant::now();
-        (0..1000).for_each(|j| drop(family.member(j).unwrap()));
-        println!("{:?} a member of 100 nodes", start.elapsed() / 1000);
-    }
 }
