@@ -62,19 +62,17 @@ impl<'a> Trajectory<'a> {
         let mut parameters = parameters(spec, member.nodes.len(), spec.tolerance_at(precision));
         let state = State::<f64>::from_nodes(&member.nodes);
         let start = observe_start(&state, &parameters);
-        let threshold = |excess: f64| match excess {
-            _ if start.excess <= ROUND || start.turning.abs() != 1 => NO_THRESHOLD,
-            _ if excess < RESOLUTION * precision.epsilon() => NO_THRESHOLD,
-            _ => excess,
-        };
-        parameters.relax_at = threshold(spec.relax_to * start.excess);
-        parameters.half_at = threshold(0.5 * start.excess);
-        let course = match parameters.relax_at {
+        let resolution = RESOLUTION * precision.epsilon();
+        let course = match spec.relax_to * start.excess {
             _ if start.excess <= ROUND => Course::Round,
             _ if start.turning.abs() != 1 => Course::Immersed,
-            NO_THRESHOLD => Course::Unresolved,
+            threshold if threshold < resolution => Course::Unresolved,
             _ => Course::Followed,
         };
+        let reachable = !matches!(course, Course::Round | Course::Immersed);
+        let threshold = |excess: f64| if reachable && excess >= resolution { excess } else { NO_THRESHOLD };
+        parameters.relax_at = threshold(spec.relax_to * start.excess);
+        parameters.half_at = threshold(0.5 * start.excess);
         let launch = Launch {
             nodes: member.nodes.clone(),
             parameters,
@@ -123,17 +121,7 @@ impl<'a> Trajectory<'a> {
         self.counters = counters;
         // Until the first step is accepted the report holds nothing but its start.
         if counters.steps > 0 {
-            self.now = Observables {
-                length: report.length,
-                area: report.area,
-                excess: report.excess,
-                energy: report.energy,
-                k_min: report.k_min,
-                k_max: report.k_max,
-                mesh_ratio: report.mesh_ratio,
-                metric_drift: report.metric_drift,
-                turning: report.turning as i32,
-            };
+            self.now = report.into();
         }
         self.fractions = [report.relax_fraction, report.half_fraction];
     }
@@ -301,15 +289,7 @@ fn observe_start(state: &State<f64>, p: &Parameters<f64>) -> Observables {
     let blocks = Blocks::new(state.len()).expect("n was validated");
     let curve = Curve { x: &state.x, y: &state.y, k: &state.k, r: &state.r };
     let (sums, maxima) = (observe::sums(curve, p, blocks), observe::maxima(curve));
-    Observables {
-        length: sums.length,
-        area: sums.area,
-        excess: observe::excess(&sums, p),
-        energy: sums.energy,
-        k_min: -maxima.minus_k_min,
-        k_max: maxima.k_max,
-        mesh_ratio: maxima.longest / -maxima.minus_shortest,
-        metric_drift: maxima.drift,
-        turning: sums.turning as i32,
-    }
+    let mut report = Report { excess: observe::excess(&sums, p), ..Report::default() };
+    report.observe(&sums, &maxima);
+    Observables::from(&report)
 }

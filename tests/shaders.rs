@@ -280,7 +280,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("STALLED", f64::from(Status::Stalled as u32)),
         ("FOUR_PI", 4.0 * std::f64::consts::PI),
         ("HALF_OVER_PI", 0.5 / std::f64::consts::PI),
-        ("TRACE_FIELDS", kernel::TRACE_FIELDS.len() as f64),
+        ("TRACE_FIELDS", kernel::TRACE_FIELDS as f64),
     ] {
         assert_eq!(constant(name), value, "{name}");
     }

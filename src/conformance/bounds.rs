@@ -1,6 +1,7 @@
 //! The one table of tolerances: quantity, natural scale, factor. Measured maxima are in `docs/conformance.md`.
 
 use crate::{
+    backend::gpu::kernel::TRACE_FIELDS,
     scheme::{Parameters, State, Workspace},
     solver::Row as Coefficients,
 };
@@ -52,7 +53,7 @@ const fn bound(quantity: &'static str, scale: Scale, software: f64, hardware: f6
 }
 
 /// The stages of a step, in the order of the kernel's trace.
-pub const STAGES: [Bound; 19] = [
+pub const STAGES: [Bound; TRACE_FIELDS] = [
     bound("β", Scale::Velocity, 4.0, 16.0),
     bound("α", Scale::Tangential, 4.0, 16.0),
     bound("r", Scale::Length, 4.0, 16.0),

@@ -144,7 +144,7 @@ pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Opt
         let twin = traced(&work);
         let scales = Scales::of(launch)?;
         for (field, (row, bound)) in rows.iter_mut().zip(&STAGES).enumerate() {
-            let at = (member * TRACE_FIELDS.len() + field) * n;
+            let at = (member * TRACE_FIELDS + field) * n;
             let scale = scales.get(bound.scale);
             let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale;
             row.add(member, scale, limit, Gpu(&trace[at..at + n]), Cpu(&twin[field]));
@@ -237,7 +237,7 @@ fn unfinished(counters: Counters) -> bool {
     counters.status == 0 && counters.steps < counters.goal
 }
 
-/// The twin's side of [`TRACE_FIELDS`].
+/// The twin's side of the trace, in the order of [`STAGES`].
 fn traced<T: Real>(work: &Workspace<T>) -> Vec<Vec<f64>> {
     let wide = |values: &[T]| values.iter().map(|v| v.to_f64()).collect::<Vec<f64>>();
     let ring = |ring: &Ring<T>| wide(ring.nodes());

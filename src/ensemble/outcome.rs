@@ -3,8 +3,8 @@
 use glam::DVec2;
 
 use super::Mollified;
-use crate::error::Result;
 pub use crate::scheme::Status;
+use crate::{error::Result, scheme::parameters::Report};
 
 /// Scalar observables of one curve at one time (f64 whatever the precision of the run).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,6 +27,22 @@ pub struct Observables {
     pub metric_drift: f64,
     /// Turning number of the polygon.
     pub turning: i32,
+}
+
+impl From<&Report<f64>> for Observables {
+    fn from(report: &Report<f64>) -> Observables {
+        Observables {
+            length: report.length,
+            area: report.area,
+            excess: report.excess,
+            energy: report.energy,
+            k_min: report.k_min,
+            k_max: report.k_max,
+            mesh_ratio: report.mesh_ratio,
+            metric_drift: report.metric_drift,
+            turning: report.turning as i32,
+        }
+    }
 }
 
 /// One row of `summary.csv`. Times are in the curve's own units (length⁴).

@@ -96,7 +96,7 @@ pub fn evolve<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T
         }
         step::accept(&mut run.state, work);
         record_events(run, &sums);
-        report(run, &sums, &maxima);
+        run.report.observe(&sums, &maxima);
         run.counters.steps += 1;
         if run.counters.relax_step != NEVER && run.counters.stop_when_relaxed != 0 {
             run.counters.status = Status::Relaxed as u32;
@@ -129,16 +129,4 @@ fn record_events<T: Real>(run: &mut Run<T>, sums: &Sums<T>) {
         run.report.relax_fraction = (before - run.parameters.relax_at) / (before - after);
     }
     run.report.excess = after;
-}
-
-fn report<T: Real>(run: &mut Run<T>, sums: &Sums<T>, maxima: &Maxima<T>) {
-    let report = &mut run.report;
-    report.length = sums.length;
-    report.area = sums.area;
-    report.energy = sums.energy;
-    report.k_min = -maxima.minus_k_min;
-    report.k_max = maxima.k_max;
-    report.mesh_ratio = maxima.longest / -maxima.minus_shortest;
-    report.metric_drift = maxima.drift;
-    report.turning = sums.turning;
 }

@@ -3,6 +3,7 @@
 //! Every field is one number of the run's precision, in declaration order, so that host and WGSL agree by
 //! construction; a test compares names and offsets with naga's view of `shaders/member.wgsl`.
 
+use super::observe::{Maxima, Sums};
 use crate::{
     flow::{Flow, MAX_DEGREE},
     number::{Number, Real},
@@ -161,6 +162,18 @@ impl Parameters<f64> {
 }
 
 impl<T: Real> Report<T> {
+    /// Takes what the sums and maxima of a curve say; the excess and the events are left alone.
+    pub fn observe(&mut self, sums: &Sums<T>, maxima: &Maxima<T>) {
+        self.length = sums.length;
+        self.area = sums.area;
+        self.energy = sums.energy;
+        self.k_min = -maxima.minus_k_min;
+        self.k_max = maxima.k_max;
+        self.mesh_ratio = maxima.longest / -maxima.minus_shortest;
+        self.metric_drift = maxima.drift;
+        self.turning = sums.turning;
+    }
+
     /// The same report in f64, exactly.
     pub fn widened(&self) -> Report<f64> {
         let numbers: Vec<f64> = self.to_numbers().into_iter().map(T::to_f64).collect();

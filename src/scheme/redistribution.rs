@@ -9,10 +9,7 @@
 //!   `r_i ← r_i·exp(-τ k_i β_i)`.
 
 use super::{Parameters, State, Workspace};
-use crate::{
-    number::{Mask, Number},
-    solver::Ring,
-};
+use crate::number::{Mask, Number};
 
 /// Fills β, r·k·β, α and the new r (with 1/r and 1/q) of `work`; returns the length `L = Σr` of the old state.
 pub fn redistribute<N: Number>(state: &State<N>, p: &Parameters<N>, work: &mut Workspace<N>) -> N {
@@ -34,11 +31,12 @@ pub fn redistribute<N: Number>(state: &State<N>, p: &Parameters<N>, work: &mut W
             work.r[i] = r * (p.tau * rate).exp();
         }
     } else {
-        work.alpha = Ring::zeros(n);
         for i in 0..n {
+            work.alpha[i] = N::of(0.0);
             work.r[i] = state.r[i] * (-(p.tau * (state.k[i] * work.beta[i]))).exp();
         }
     }
+    work.alpha.close();
     work.r.close();
     reciprocals(work);
     length
@@ -75,7 +73,6 @@ fn tangential_velocity<N: Number>(
         before += part;
     }
     work.alpha[state.len() - 1] = N::of(0.0);
-    work.alpha.close();
 }
 
 fn reciprocals<N: Number>(work: &mut Workspace<N>) {

@@ -29,11 +29,8 @@ const DISPATCH_LIMIT: Duration = Duration::from_secs(120);
 /// Slots at most; more members resident at once gain nothing.
 const MAX_SLOTS: usize = 8192;
 
-/// Fields that a traced kernel keeps per member, in the order of `shaders/step.wgsl`.
-pub const TRACE_FIELDS: [&str; 19] = [
-    "β", "α", "r", "a", "b", "d", "e", "weight", "rhs k", "δk", "𝓐", "𝓑", "𝓓", "𝓔", "weight x", "rhs x", "rhs y", "δx",
-    "δy",
-];
+/// Fields that a traced kernel keeps per member; `conformance::bounds::STAGES` names them in their order.
+pub const TRACE_FIELDS: usize = 19;
 
 /// Field names of what one dispatch asks for, in memory order.
 pub const DISPATCH_FIELDS: [&str; 3] = ["steps", "max_sweeps", "sweeps"];
@@ -106,7 +103,7 @@ impl<T: Real> Kernel<T> {
     pub fn new(gpu: &Gpu, blocks: Blocks, members: usize, max_sweeps: u32, variant: Variant) -> Result<Self> {
         let limits = gpu.limits();
         let state_bytes = STATE_FIELDS * blocks.n * size_of::<T>();
-        let trace_bytes = if variant.traced { TRACE_FIELDS.len() * blocks.n * size_of::<T>() } else { 0 };
+        let trace_bytes = if variant.traced { TRACE_FIELDS * blocks.n * size_of::<T>() } else { 0 };
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let fit = (binding / state_bytes.max(trace_bytes) as u64) as usize;
         let slots = members.min(fit).min(MAX_SLOTS).min(limits.max_compute_workgroups_per_dimension as usize).max(1);
@@ -276,7 +273,7 @@ impl<T: Real> Backend for Kernel<T> {
 
     fn aim(&mut self, slot: usize, goal: u32, tau: f64) {
         let fields = Parameters::<T>::FIELDS.len();
-        let at = Parameters::<T>::FIELDS.iter().position(|field| *field == "tau").expect("a field tau");
+        let at = std::mem::offset_of!(Parameters<T>, tau) / size_of::<T>();
         self.parameters[slot * fields + at] = T::of(tau);
         self.counters[slot].goal = goal;
         self.changed = true;
