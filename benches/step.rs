@@ -7,7 +7,6 @@ use curvelax::{
     number::Real,
     scheme::{
         Parameters, State, Workspace,
-        evolve::{Launch, Run},
         step::{self, Method},
     },
     solver::{Blocks, Order, Solver},
@@ -17,19 +16,12 @@ use glam::DVec2;
 /// The paper's ellipse after ten steps, when the increments no longer jump.
 fn ellipse<T: Real>(n: usize) -> (State<T>, Parameters<T>, Workspace<T>) {
     let node = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64) * DVec2::new(2.0, 1.0);
-    let launch = Launch {
-        nodes: (1..=n).map(node).collect(),
-        parameters: Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3),
-        goal: 0,
-        stop_when_relaxed: false,
-        excess: 0.2,
-        turning: 1,
-    };
-    let Run { mut state, parameters, .. } = Run::<T>::new(&launch);
+    let mut state = State::<T>::from_nodes(&(1..=n).map(node).collect::<Vec<_>>());
+    let parameters = Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3).convert();
     let mut work = Workspace::new(Blocks::new(n).expect("n is at least 6"));
     for _ in 0..10 {
-        step::step(&state, &parameters, &method(Solver::Direct), &mut work);
-        step::accept(&mut state, &mut work);
+        step::step(&state.curve, &mut state.increments, &parameters, &method(Solver::Direct), &mut work);
+        std::mem::swap(&mut state.curve, &mut work.new);
     }
     (state, parameters, work)
 }
@@ -41,9 +33,12 @@ fn method(solver: Solver) -> Method {
 fn step_in<T: Real>(c: &mut Criterion) {
     for n in [100, 200] {
         for (name, solver) in [("direct", Solver::Direct), ("gauss-seidel 1e-5", Solver::GaussSeidel)] {
-            let (state, parameters, mut work) = ellipse::<T>(n);
+            let (State { curve, increments, .. }, parameters, mut work) = ellipse::<T>(n);
             c.bench_function(&format!("step/{}/n={n}/{name}", T::NAME), |b| {
-                b.iter(|| step::step(&state, &parameters, &method(solver), &mut work));
+                b.iter(|| {
+                    let mut increments = increments.clone();
+                    step::step(&curve, &mut increments, &parameters, &method(solver), &mut work)
+                });
             });
         }
     }

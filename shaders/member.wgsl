@@ -1,21 +1,32 @@
 // The structs shared with the host, one entry a resident member. Twin of src/scheme/parameters.rs.
 
-/// Parameters of a member: coefficients of b(k), time step, redistribution, sweeps, thresholds.
+/// Parameters of a member: the law, the step, sweeps, thresholds, adaptive steps and their times.
 struct Parameters {
     c1: real, c2: real, c3: real, c4: real, c5: real, c6: real, c7: real, c8: real,
     tau: real,
     omega: real,
     redistribution: real,
+    pull: real,
     tolerance: real,
     sor: real,
     length_penalty: real,
     polygon_ratio: real,
     relax_at: real,
     half_at: real,
+    follow_to: real,
+    least_length: real,
+    look_at: real,
+    adaptive: real,
+    time_unit: real,
+    time_tick: real,
+    goal_high: real,
+    goal_low: real,
+    end_high: real,
+    end_low: real,
 }
 
-/// What a member reports when a dispatch ends.
-struct Report {
+/// Observables of one curve.
+struct Observed {
     length: real,
     area: real,
     excess: real,
@@ -24,15 +35,40 @@ struct Report {
     k_max: real,
     mesh_ratio: real,
     metric_drift: real,
+}
+
+/// Where a member is in time, and when its events were.
+struct Progress {
     turning: real,
+    travel: real,
+    time_high: real,
+    time_low: real,
+    taken: real,
+    next: real,
+    relax_high: real,
+    relax_low: real,
+    relax_length: real,
     relax_fraction: real,
+    half_high: real,
+    half_low: real,
+    half_length: real,
     half_fraction: real,
 }
 
-/// Integers of a member. `status` is 0 while it is running; `phase` and `solve_sweeps` say where a step was paused.
+/// What a member reports when a dispatch ends.
+struct Report {
+    before: Observed,
+    middle: Observed,
+    now: Observed,
+    progress: Progress,
+}
+
+/// Integers of a member. `status` is 0 while it is running; `phase` and `solve_sweeps` say where an attempt was paused.
 struct Counters {
     status: u32,
     steps: u32,
+    rejected: u32,
+    refused: u32,
     goal: u32,
     stop_when_relaxed: u32,
     relax_step: u32,
@@ -60,25 +96,33 @@ struct Dispatch {
     sweeps: u32,
 }
 
-const STATE_FIELDS = 7u;
+const STATE_FIELDS = 15u;
+/// Where in a state its curves begin, four fields each: x, y, k, r. The increments of k, x and y follow the first one.
+const CURVE = 0u;
+const INCREMENTS = 4u;
+/// The middle of the last adaptive step; during an attempt the result of its whole step.
+const MIDDLE = 7u;
+/// The curve before the last step; during an attempt the result of its first half step.
+const BEFORE = 11u;
 
 @group(0) @binding(0) var<uniform> dispatch: Dispatch;
 @group(0) @binding(1) var<storage, read> all_parameters: array<Parameters>;
 @group(0) @binding(2) var<storage, read_write> all_counters: array<Counters>;
 @group(0) @binding(3) var<storage, read_write> all_reports: array<Report>;
-/// Fields x, y, k, r and the last increments of k, x, y, NODES numbers each.
+/// STATE_FIELDS fields of NODES numbers each.
 @group(0) @binding(4) var<storage, read_write> all_states: array<real>;
 
 /// Index of this workgroup's member, and its parameters.
 var<private> member: u32;
 var<private> p: Parameters;
 var<private> counters: Counters;
-/// Its nodes in this thread's block: the state at the start of a step.
+var<private> report: Report;
+/// Its nodes in this thread's block: the curve at the start of a step.
 var<private> x: vec;
 var<private> y: vec;
 var<private> k: vec;
 var<private> r: vec;
-/// Increments of the last step: where the next solve starts.
+/// Increments: where the next solve starts, then its result.
 var<private> dk: vec;
 var<private> dx: vec;
 var<private> dy: vec;
@@ -89,6 +133,27 @@ fn load_field(field: u32) -> vec {
         all_states[base + near_low.z], all_states[base + near_low.w],
         all_states[base + near_high.x], all_states[base + near_high.y],
     );
+}
+
+/// Makes the curve at `base` the start of a step. Others have written what a block of three reads beyond its own.
+fn load_curve(base: u32) {
+    storageBarrier();
+    x = load_field(base);
+    y = load_field(base + 1u);
+    k = load_field(base + 2u);
+    r = load_field(base + 3u);
+}
+
+/// Stores the curve at the start of the step.
+fn store_curve(base: u32) {
+    store_fields(base, x, y, k, r);
+}
+
+fn store_fields(base: u32, xs: vec, ys: vec, ks: vec, rs: vec) {
+    store_field(base, xs);
+    store_field(base + 1u, ys);
+    store_field(base + 2u, ks);
+    store_field(base + 3u, rs);
 }
 
 fn store_field(field: u32, v: vec) {

@@ -6,17 +6,19 @@ const MAX_TURN = 2.0;
 const MIN_EDGE = 1e-5;
 /// Metric drift above which the scheme's lengths say nothing about the polygon.
 const MAX_DRIFT = 1.0;
+/// Gap between k and the polygon's turn above which the curvature says nothing about the polygon.
+const MAX_GAP = 2.0;
 const FOUR_PI = 12.566370614359172;
 
 /// Sums of the new curve: length, area, energy, turning.
 var<private> sums: vec;
 /// Maxima of the new curve: |k| r, metric drift, longest edge, minus the shortest edge.
 var<private> extremes: vec;
-/// Largest curvature and minus the smallest.
-var<private> k_range: vec2<real>;
+/// Largest curvature, minus the smallest, largest gap between k and the polygon's turn, largest way that a node went.
+var<private> others: vec;
 
-/// Observes the curve whose windows of x and y and nodes of k and r are given.
-fn observe(wx: Window, wy: Window, kh: vec, rh: vec) {
+/// Observes the curve whose windows of x and y and nodes of k and r are given; `moved` is how far its nodes went.
+fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     let ex = here(wx) - minus1(wx);
     let ey = here(wy) - minus1(wy);
     let fx = plus1(wx) - here(wx);
@@ -36,8 +38,18 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec) {
         block_max(bounded_abs(edge)),
         block_max_signed(shortest),
     ));
-    let range = ring_maxima(vec(block_max_signed(kh), block_max_signed(-kh), 0.0, 0.0));
-    k_range = range.xy;
+    let turned = turn(wx, wy);
+    let gap = bounded_abs(kh * turned.span - turned.angle);
+    others = ring_maxima(vec(
+        block_max_signed(kh), block_max_signed(-kh), block_max(gap), block_max(bounded_abs(moved)),
+    ));
+}
+
+/// What the last `observe` says of its curve.
+fn observed() -> Observed {
+    return Observed(
+        sums.x, sums.y, excess_of_sums(), sums.z, -others.y, others.x, extremes.z / -extremes.w, extremes.y,
+    );
 }
 
 /// Largest owned component, of either sign.
@@ -68,6 +80,7 @@ fn is_singular(turning: real) -> bool {
     let mean_edge = sums.x / real(NODES);
     let resolved = extremes.x <= real(MAX_TURN);
     let apart = real(MIN_EDGE) * mean_edge <= -extremes.w;
-    let measured = extremes.y <= real(MAX_DRIFT);
-    return !(resolved && apart && measured && sums.w == turning);
+    let measured = extremes.y <= real(MAX_DRIFT) && others.z <= real(MAX_GAP);
+    let extended = p.least_length <= sums.x;
+    return !(resolved && apart && measured && extended && sums.w == turning);
 }

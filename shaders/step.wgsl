@@ -1,29 +1,25 @@
-// One step of the paper's scheme, from the state in registers to the new one beside it. Twin of src/scheme/step.rs.
+// One step of the paper's scheme, from the curve in registers to the new one beside it. Twin of src/scheme/step.rs.
 
 /// Share of the rounding error of an unknown below which an error of its increment is not worth a sweep.
 const NEGLIGIBLE = 0.1;
 const HALF_OVER_PI = 0.15915494309189535;
 
-/// The new state, and the windows of its nodes.
+/// The new curve, with the windows of its nodes.
 var<private> new_k: vec;
+var<private> new_r: vec;
 var<private> new_x: Window;
 var<private> new_y: Window;
 
-/// Where a step goes on: values of `counters.phase`.
-const STEP_BEGINS = 0u;
-const CURVATURE_SOLVED = 1u;
-
-/// Computes the new state; returns how its solves ended. x, y, k and r stay until `accept`; the increments are where the
-/// next attempt starts.
+/// Computes the curve a time p.tau later; returns how its solves ended. An odd phase says that the curvature is solved.
 fn step() -> u32 {
     let length = redistribute();
     let radius = length * real(HALF_OVER_PI);
     let rounding = real(NEGLIGIBLE * EPSILON);
 
-    if uniform_decision(counters.phase) == STEP_BEGINS {
+    if uniform_decision(counters.phase & 1u) == 0u {
         let for_k = step_curvature(rounding / radius);
         if for_k != SOLVED { return for_k; }
-        counters.phase = CURVATURE_SOLVED;
+        counters.phase += 1u;
         counters.solve_sweeps = 0u;
     }
     new_k = k + dk;
@@ -32,6 +28,10 @@ fn step() -> u32 {
     share(x + dx, y + dy);
     new_x = read_a();
     new_y = read_b();
+    new_r = here(r_new);
+    if p.pull > real(0.0) { pull(); }
+    counters.phase += 1u;
+    counters.solve_sweeps = 0u;
     return SOLVED;
 }
 
@@ -72,11 +72,4 @@ fn trace_system(field: u32) {
     trace(field + 2u, row_of.d);
     trace(field + 3u, row_of.e);
     trace(field + 4u, row_of.weight);
-}
-
-fn accept() {
-    x = here(new_x);
-    y = here(new_y);
-    k = new_k;
-    r = here(r_new);
 }

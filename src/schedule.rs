@@ -1,4 +1,4 @@
-//! Time: the steps of a run with fixed τ, and the output times between them.
+//! Time: the clock of a run with fixed τ, that of adaptive steps, and the output times.
 
 /// Relative distance from a step at which an output time counts as on it.
 const ON_A_STEP: f64 = 1e-9;
@@ -43,49 +43,69 @@ impl Clock {
     pub fn last(&self) -> f64 {
         self.t_end - f64::from(self.steps - 1) * self.tau
     }
+
+    /// Where the output time `t` lies: the step that reaches it, and how far in that step, in (0, 1].
+    pub fn locate(&self, t: f64) -> (u32, f64) {
+        if t >= self.t_end * (1.0 - ON_A_STEP) {
+            return (self.steps, 1.0);
+        }
+        let ratio = t / self.tau;
+        let near = ratio.round();
+        // Where the last step is short, the step before it is the last that lies on a multiple of τ.
+        if (ratio - near).abs() <= ON_A_STEP * near.max(1.0) && near < f64::from(self.steps) {
+            return (near as u32, 1.0);
+        }
+        let step = (ratio.floor() as u32).min(self.steps - 1);
+        let inside = (t - self.time(step)) / (self.time(step + 1) - self.time(step));
+        (step + 1, inside.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON))
+    }
 }
 
-/// An output time, `fraction` of a step after `step` steps.
+/// How adaptive time is split into parts that both fit the precision, see [`scheme::pace`](crate::scheme::pace).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stop {
+pub struct Ticks {
+    /// Unit of the high part, a power of two.
+    pub unit: f64,
+    /// Unit of the low part, a power of two.
+    pub tick: f64,
+}
+
+impl Ticks {
+    /// Parts for a run to `t_end` in numbers of relative spacing `epsilon`: ticks of about 2ε² of the end.
+    pub fn new(t_end: f64, epsilon: f64) -> Ticks {
+        // The high part has to count to the end without rounding.
+        let unit = (2.0 * epsilon * t_end).log2().ceil().exp2();
+        Ticks { unit, tick: unit * epsilon }
+    }
+
+    /// High and low part of `t`, rounded up to a whole tick.
+    pub fn split(&self, t: f64) -> (f64, f64) {
+        let high = (t / self.unit).floor() * self.unit;
+        (high, ((t - high) / self.tick).ceil() * self.tick)
+    }
+}
+
+/// An output time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Output {
     /// The time.
     pub t: f64,
-    /// Steps before it.
-    pub step: u32,
-    /// Where in the next step it lies; 0 on a step.
-    pub fraction: f64,
     /// A row of `series.csv` is due.
     pub series: bool,
     /// A snapshot is due.
     pub snapshot: bool,
 }
 
-impl Stop {
-    fn new(clock: &Clock, t: f64, series: bool, snapshot: bool) -> Stop {
-        let at = |t, step, fraction| Stop { t, step, fraction, series, snapshot };
-        if t >= clock.t_end * (1.0 - ON_A_STEP) {
-            return at(clock.t_end, clock.steps, 0.0);
-        }
-        let ratio = t / clock.tau;
-        let near = ratio.round();
-        // Where the last step is short, the step before it is the last that lies on a multiple of τ.
-        if (ratio - near).abs() <= ON_A_STEP * near.max(1.0) && near < f64::from(clock.steps) {
-            return at(t, near as u32, 0.0);
-        }
-        let step = (ratio.floor() as u32).min(clock.steps - 1);
-        let inside = (t - clock.time(step)) / (clock.time(step + 1) - clock.time(step));
-        at(t, step, inside.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON))
-    }
-}
-
-/// The output times of a run, in order: every `series` from 0 on, and each of `snapshots`.
-pub fn stops(clock: &Clock, series: Option<f64>, snapshots: &[f64]) -> Vec<Stop> {
-    let rows = series.map_or(0, |dt| (clock.t_end / dt * (1.0 + ON_A_STEP)) as u64 + 1);
-    let series_times = (0..rows).map(|row| (row as f64 * series.unwrap_or(0.0)).min(clock.t_end));
-    let mut stops: Vec<Stop> = series_times.map(|t| Stop::new(clock, t, true, false)).collect();
-    stops.extend(snapshots.iter().map(|t| Stop::new(clock, *t, false, true)));
-    stops.sort_by(|a, b| a.t.total_cmp(&b.t));
-    stops.dedup_by(|later, earlier| {
+/// The output times of a run to `t_end`, in order: every `series` from 0 on, and each of `snapshots`.
+pub fn outputs(t_end: f64, series: Option<f64>, snapshots: &[f64]) -> Vec<Output> {
+    let rows = series.map_or(0, |dt| (t_end / dt * (1.0 + ON_A_STEP)) as u64 + 1);
+    let last = |t: f64| if t >= t_end * (1.0 - ON_A_STEP) { t_end } else { t };
+    let mut outputs: Vec<Output> = (0..rows)
+        .map(|row| Output { t: last(row as f64 * series.unwrap_or(0.0)), series: true, snapshot: false })
+        .chain(snapshots.iter().map(|t| Output { t: last(*t), series: false, snapshot: true }))
+        .collect();
+    outputs.sort_by(|a, b| a.t.total_cmp(&b.t));
+    outputs.dedup_by(|later, earlier| {
         let same = later.t == earlier.t;
         if same {
             earlier.series |= later.series;
@@ -93,7 +113,7 @@ pub fn stops(clock: &Clock, series: Option<f64>, snapshots: &[f64]) -> Vec<Stop>
         }
         same
     });
-    stops
+    outputs
 }
 
 #[cfg(test)]
@@ -114,21 +134,21 @@ mod tests {
     #[test]
     fn output_times_fall_on_steps_or_between_them() {
         let clock = Clock::new(0.1, 1.0);
-        let stops = stops(&clock, Some(0.25), &[0.3, 0.5, 1.0]);
-        let brief: Vec<_> = stops.iter().map(|s| (s.t, s.step, s.series, s.snapshot)).collect();
+        let outputs = outputs(1.0, Some(0.25), &[0.3, 0.5, 1.0]);
+        let brief: Vec<_> = outputs.iter().map(|o| (o.t, clock.locate(o.t).0, o.series, o.snapshot)).collect();
         assert_eq!(
             brief,
             [
                 (0.0, 0, true, false),
-                (0.25, 2, true, false),
+                (0.25, 3, true, false),
                 (0.3, 3, false, true),
                 (0.5, 5, true, true),
-                (0.75, 7, true, false),
+                (0.75, 8, true, false),
                 (1.0, 10, true, true)
             ]
         );
-        assert_eq!(stops[2].fraction, 0.0);
-        assert!((stops[1].fraction - 0.5).abs() < 1e-12);
+        assert_eq!(clock.locate(0.3).1, 1.0);
+        assert!((clock.locate(0.25).1 - 0.5).abs() < 1e-12);
     }
 
     #[test]
@@ -140,16 +160,18 @@ mod tests {
                     let t_end = tau * f64::from(steps);
                     let clock = Clock::new(tau, t_end);
                     let dt = t_end / f64::from(rows);
-                    let stops = stops(&clock, Some(dt), &[t_end, 0.5 * t_end]);
-                    for stop in &stops {
-                        assert!((0.0..1.0).contains(&stop.fraction), "tau {tau}, t_end {t_end}: {stop:?}");
-                        assert!(stop.step < clock.steps || stop.fraction == 0.0, "{stop:?}");
-                        let t = clock.inside(stop.step, stop.fraction);
-                        assert!((t - stop.t).abs() <= 1e-8 * tau.max(stop.t), "tau {tau}: {stop:?} is at {t}");
+                    let outputs = outputs(t_end, Some(dt), &[t_end, 0.5 * t_end]);
+                    for output in &outputs {
+                        let (step, fraction) = clock.locate(output.t);
+                        assert!(fraction > 0.0 && fraction <= 1.0, "tau {tau}, t_end {t_end}: {output:?}");
+                        assert!(step <= clock.steps, "{output:?}");
+                        let t = if step == 0 { 0.0 } else { clock.inside(step - 1, fraction) };
+                        assert!((t - output.t).abs() <= 1e-8 * tau.max(output.t), "tau {tau}: {output:?} is at {t}");
                     }
-                    let last = stops[stops.len() - 1];
-                    assert_eq!((last.t, last.step, last.series, last.snapshot), (t_end, clock.steps, true, true));
-                    assert_eq!(stops.iter().filter(|stop| stop.series).count(), rows as usize + 1);
+                    let last = outputs[outputs.len() - 1];
+                    assert_eq!((last.t, last.series, last.snapshot), (t_end, true, true));
+                    assert_eq!(clock.locate(last.t), (clock.steps, 1.0));
+                    assert_eq!(outputs.iter().filter(|output| output.series).count(), rows as usize + 1);
                 }
             }
         }
@@ -158,9 +180,22 @@ mod tests {
     #[test]
     fn an_output_time_in_the_short_last_step_is_inside_it() {
         let clock = Clock::new(0.3, 1.0);
-        let stop = Stop::new(&clock, 0.95, true, false);
-        assert_eq!(stop.step, 3);
-        assert!((stop.fraction - 0.5).abs() < 1e-12);
-        assert_eq!(Stop::new(&clock, 1.0, true, false).step, 4);
+        let (step, fraction) = clock.locate(0.95);
+        assert_eq!(step, 4);
+        assert!((fraction - 0.5).abs() < 1e-12);
+        assert_eq!(clock.locate(1.0), (4, 1.0));
+    }
+
+    #[test]
+    fn ticks_count_to_the_end_in_f32_and_f64() {
+        for t_end in [2.0, 1e6, 1e-20, 0.17] {
+            for epsilon in [f64::from(f32::EPSILON), f64::EPSILON] {
+                let ticks = Ticks::new(t_end, epsilon);
+                let (high, low) = ticks.split(t_end);
+                assert!(high / ticks.unit <= 1.0 / epsilon, "the end is {} units", high / ticks.unit);
+                assert!(low <= ticks.unit && (high + low - t_end).abs() <= ticks.tick.max(1e-15 * t_end));
+                assert_eq!(ticks.unit.log2().fract(), 0.0);
+            }
+        }
     }
 }

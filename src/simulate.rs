@@ -1,7 +1,7 @@
 //! The loop: fill slots with members, advance them, collect what they report, refill.
 //!
 //! Nothing here depends on where the members are advanced or on how many are resident: a member's steps are its
-//! own, its output times are reached by aiming at the steps around them, and rows leave in member order.
+//! own, its output times are reached by pausing it there, and rows leave in member order.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::{
     backend::Backend,
     ensemble::{Ended, Family, Sink, Spec, spec::Precision},
     error::Result,
-    schedule::{Clock, Stop, stops},
+    schedule::{Output, outputs},
     trajectory::Trajectory,
 };
 
@@ -27,8 +27,7 @@ pub fn simulate(
     portraits: usize,
     sink: &mut dyn Sink,
 ) -> Result<()> {
-    let clock = Clock::new(spec.tau, spec.t_end);
-    let stops = stops(&clock, spec.series, &spec.snapshots);
+    let outputs = outputs(spec.t_end, spec.series, &spec.snapshots);
     let mut waiting = spec.members().enumerate().peekable();
     // Members that end early wait for those before them: this bounds how many.
     let ahead = MEMBERS_AHEAD * backend.slots();
@@ -36,8 +35,7 @@ pub fn simulate(
         spec,
         family,
         precision,
-        clock,
-        stops: &stops,
+        outputs: &outputs,
         resident: (0..backend.slots()).map(|_| None).collect(),
         portraits,
     };
@@ -70,8 +68,7 @@ struct Pool<'a> {
     spec: &'a Spec,
     family: &'a Family,
     precision: Precision,
-    clock: Clock,
-    stops: &'a [Stop],
+    outputs: &'a [Output],
     resident: Vec<Option<(usize, Trajectory<'a>)>>,
     portraits: usize,
 }
@@ -80,7 +77,7 @@ impl Pool<'_> {
     /// Puts member `index`, the `rank`-th of this run, into a free slot; or ends it where there is nothing to do.
     fn admit(&mut self, backend: &mut dyn Backend, slot: usize, rank: usize, index: u64) -> Result<Option<Ended>> {
         let member = self.family.member(index)?;
-        let mut trajectory = Trajectory::new(member, self.spec, self.precision, self.clock, self.stops);
+        let mut trajectory = Trajectory::new(member, self.spec, self.precision, self.outputs);
         trajectory.keep_portrait(rank < self.portraits);
         if trajectory.is_over() {
             return Ok(Some(trajectory.end(None)));
@@ -100,8 +97,8 @@ impl Pool<'_> {
             trajectory.serve(None);
         }
         if !trajectory.is_over() {
-            if let Some((goal, tau)) = trajectory.next_goal() {
-                backend.aim(slot, goal, tau);
+            if let Some((goal, parameters)) = trajectory.next_aim() {
+                backend.aim(slot, goal, &parameters);
             }
             return Ok(None);
         }

@@ -1,18 +1,24 @@
-//! One member's way through a run, seen from the host: where it starts, which step it aims at, what it leaves.
+//! One member's way through a run, seen from the host: where it starts, where it pauses next, what it leaves.
+//!
+//! A member is advanced in units of its own size: lengths are divided by a power of two near its radius and times by
+//! the fourth power of that, which rounds nothing, so that no threshold of the scheme and no range of a precision
+//! depends on the unit in which a user measures.
 
 use glam::DVec2;
 
 use crate::{
-    curve::polygon,
-    ensemble::{Ended, Member, Observables, Outcome, Portrait, SeriesRow, Snapshot, Spec, Status, spec::Precision},
-    schedule::{Clock, Stop},
-    scheme::{
-        Parameters, State,
-        evolve::Launch,
-        observe::{self, Curve},
-        parameters::{Counters, NEVER, Report},
+    curve::{clearance, crossing, polygon},
+    ensemble::{
+        Ended, Member, Observables, Outcome, Portrait, SeriesRow, Snapshot, Spec, Status,
+        spec::{Pace, Precision, Pull},
     },
-    solver::{Blocks, Ring},
+    schedule::{Clock, Output, Ticks},
+    scheme::{
+        Curve, Parameters, State,
+        evolve::Run,
+        parameters::{Counters, NEVER, Observed, Report},
+    },
+    solver::Ring,
 };
 
 /// Excess below which a curve is a regular polygon to rounding: such a member is relaxed at time 0.
@@ -21,13 +27,24 @@ const ROUND: f64 = 1e-13;
 const RESOLUTION: f64 = 128.0;
 /// A threshold that no excess reaches.
 const NO_THRESHOLD: f64 = -1.0;
+/// Adaptive steps follow the shape until the excess is this fraction of its start, where the fit of the rate ends,
+/// or of the threshold.
+const FOLLOWED: f64 = 1e-3;
+/// A curve that has shrunk to this fraction of its length is gone.
+const SHRUNK: f64 = 1e-3;
+/// The first adaptive step in units of the fourth power of the shortest segment, the fastest time scale there is.
+const FIRST_STEP: f64 = 0.1;
+/// `--pull auto`: κ in units of the decay rate of the slowest mode's excess, 24/R⁴ for surface diffusion.
+const PULL_PER_RATE: f64 = 4.0;
+/// Ticks of the clock in the first adaptive step at least.
+const FIRST_TICKS: f64 = 16.0;
 
 /// What can be said of the relaxation of a member.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Course {
     /// Its excess is followed to the threshold.
     Followed,
-    /// It is a regular polygon from the start.
+    /// It is at or under the threshold from the start, or a regular polygon.
     Round,
     /// It is so nearly round that its threshold lies in the rounding of the precision.
     Unresolved,
@@ -35,83 +52,108 @@ enum Course {
     Immersed,
 }
 
+/// How the time of a member passes.
+#[derive(Clone, Copy, Debug)]
+enum Time {
+    Fixed(Clock),
+    Adaptive(Ticks),
+}
+
 /// A resident member.
 pub struct Trajectory<'a> {
     member: Member,
-    launch: Launch,
-    clock: Clock,
+    /// A power of two near the member's radius: the unit of length in which it is advanced.
+    unit: f64,
+    t_end: f64,
+    time: Time,
+    launch: Run<f64>,
     /// Output times still to come.
-    stops: &'a [Stop],
+    outputs: &'a [Output],
     counters: Counters,
+    report: Report<f64>,
     start: Observables,
-    now: Observables,
-    /// Observables, and the state where a snapshot will need it, at the step before the next output time.
-    before: Option<(Observables, Option<State<f64>>)>,
     series: Vec<SeriesRow>,
     snapshots: Vec<Snapshot>,
     sweeps: [u64; 2],
     course: Course,
-    /// Where inside their steps the member relaxed and its excess halved.
-    fractions: [f64; 2],
+    /// When the polygon was first seen to cross itself.
+    crossed: Option<f64>,
     portrait: bool,
 }
 
 impl<'a> Trajectory<'a> {
     /// A member at its start; serves the output times that are due there.
-    pub fn new(member: Member, spec: &Spec, precision: Precision, clock: Clock, stops: &'a [Stop]) -> Trajectory<'a> {
-        let mut parameters = parameters(spec, member.nodes.len(), spec.tolerance_at(precision));
-        let state = State::<f64>::from_nodes(&member.nodes);
-        let start = observe_start(&state, &parameters);
+    pub fn new(member: Member, spec: &Spec, precision: Precision, outputs: &'a [Output]) -> Trajectory<'a> {
+        let unit = unit_of(&member.nodes);
+        let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
+        let mut parameters = parameters(spec, &nodes, unit, spec.tolerance_at(precision));
+        let mut launch = Run::new(State::from_nodes(&nodes), parameters);
+        let turning = launch.report.progress.turning;
+        let start = Observables::new(&launch.report.now, turning, unit);
         let resolution = RESOLUTION * precision.epsilon();
-        let course = match spec.relax_to * start.excess {
+        let limit = spec.threshold(start.excess);
+        let course = match limit {
             _ if start.excess <= ROUND => Course::Round,
-            _ if start.turning.abs() != 1 => Course::Immersed,
-            threshold if threshold < resolution => Course::Unresolved,
+            _ if turning.abs() != 1.0 => Course::Immersed,
+            limit if start.excess <= limit => Course::Round,
+            limit if limit < resolution => Course::Unresolved,
             _ => Course::Followed,
         };
-        let reachable = !matches!(course, Course::Round | Course::Immersed);
+        let reachable = course != Course::Immersed && start.excess > ROUND;
         let threshold = |excess: f64| if reachable && excess >= resolution { excess } else { NO_THRESHOLD };
-        parameters.relax_at = threshold(spec.relax_to * start.excess);
+        parameters.relax_at = if course == Course::Followed { limit } else { NO_THRESHOLD };
         parameters.half_at = threshold(0.5 * start.excess);
-        let launch = Launch {
-            nodes: member.nodes.clone(),
-            parameters,
-            goal: 0,
-            stop_when_relaxed: spec.stop_when_relaxed,
-            excess: start.excess,
-            turning: start.turning,
+        parameters.follow_to = (FOLLOWED * start.excess).min(0.5 * limit).max(resolution);
+        parameters.least_length = SHRUNK * launch.report.now.length;
+        let time = match spec.pace() {
+            Pace::Fixed(tau) => Time::Fixed(Clock::new(tau, spec.t_end)),
+            Pace::Adaptive(tolerance) => {
+                let end = spec.t_end / unit.powi(4);
+                let ticks = Ticks::new(end, precision.epsilon());
+                parameters.adaptive = tolerance;
+                (parameters.time_unit, parameters.time_tick) = (ticks.unit, ticks.tick);
+                (parameters.end_high, parameters.end_low) = ticks.split(end);
+                let shortest = launch.state.curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
+                launch.report.progress.next = (FIRST_STEP * shortest.powi(4)).max(FIRST_TICKS * ticks.tick);
+                Time::Adaptive(ticks)
+            }
         };
-        let counters = Counters { relax_step: NEVER, half_step: NEVER, ..Counters::default() };
+        launch.parameters = parameters;
+        launch.counters.stop_when_relaxed = spec.stop_when_relaxed.into();
         let mut trajectory = Trajectory {
             member,
+            unit,
+            t_end: spec.t_end,
+            time,
+            outputs,
+            counters: launch.counters,
+            report: launch.report,
             launch,
-            clock,
-            stops,
-            counters,
             start,
-            now: start,
-            before: None,
             series: Vec::new(),
             snapshots: Vec::new(),
             sweeps: [0; 2],
             course,
-            fractions: [0.0; 2],
+            crossed: None,
             portrait: false,
         };
         if course == Course::Round && spec.stop_when_relaxed {
             trajectory.counters.status = Status::Relaxed as u32;
         }
+        let state = trajectory.launch.state.clone();
+        trajectory.look(&state.curve);
         trajectory.serve(Some(&state));
         trajectory
     }
 
     /// What the back end needs to start the member.
-    pub fn launch(&self) -> Launch {
-        let (goal, tau) = self.next_goal().unwrap_or((0, self.clock.tau));
-        let mut launch = self.launch.clone();
-        launch.goal = goal;
-        launch.parameters.tau = tau;
-        launch
+    pub fn launch(&self) -> Run<f64> {
+        let mut run = self.launch.clone();
+        if let Some((goal, parameters)) = self.next_aim() {
+            run.counters.goal = goal;
+            run.parameters = parameters;
+        }
+        run
     }
 
     /// Takes what the back end reports.
@@ -119,21 +161,38 @@ impl<'a> Trajectory<'a> {
         self.sweeps[0] += u64::from(counters.sweeps_k);
         self.sweeps[1] += u64::from(counters.sweeps_x);
         self.counters = counters;
-        // Until the first step is accepted the report holds nothing but its start.
+        // Until the first step is accepted the start is known better here, in f64.
         if counters.steps > 0 {
-            self.now = report.into();
+            self.report = *report;
         }
-        self.fractions = [report.relax_fraction, report.half_fraction];
     }
 
     /// Whether the member has ended.
     pub fn is_over(&self) -> bool {
-        self.counters.status != 0 || self.counters.steps >= self.clock.steps
+        self.counters.status != 0 || self.is_at_end()
     }
 
-    /// Share of its steps that are done.
+    fn is_at_end(&self) -> bool {
+        let (progress, p) = (&self.report.progress, &self.launch.parameters);
+        match self.time {
+            Time::Fixed(clock) => self.counters.steps >= clock.steps,
+            Time::Adaptive(_) => (progress.time_high, progress.time_low) == (p.end_high, p.end_low),
+        }
+    }
+
+    /// Time of the last accepted state.
+    pub fn now(&self) -> f64 {
+        let progress = &self.report.progress;
+        match self.time {
+            _ if self.is_at_end() => self.t_end,
+            Time::Fixed(clock) => clock.time(self.counters.steps),
+            Time::Adaptive(_) => (progress.time_high + progress.time_low) * self.unit.powi(4),
+        }
+    }
+
+    /// Share of its time that has passed.
     pub fn share(&self) -> f64 {
-        f64::from(self.counters.steps) / f64::from(self.clock.steps)
+        self.now() / self.t_end
     }
 
     /// Keeps the nodes at both ends of the run.
@@ -146,120 +205,174 @@ impl<'a> Trajectory<'a> {
         self.portrait
     }
 
-    /// Whether an output time that can be served now, or the one after this step, needs the state.
+    /// Whether [`Trajectory::serve`] needs the state: for a snapshot, or for a look at the curve.
     pub fn wants_state(&self) -> bool {
-        self.due().any(|stop| stop.snapshot)
+        let due = self.outputs.iter().take_while(|output| self.place(output.t).is_some());
+        self.is_look_due() || due.into_iter().any(|output| output.snapshot)
     }
 
-    /// Output times that need what is known after the current step: those behind it, and those in the next step.
-    fn due(&self) -> impl Iterator<Item = &Stop> {
-        self.stops.iter().take_while(|stop| stop.step <= self.counters.steps)
-    }
-
-    /// Serves the output times that the current step has reached; `state` is needed where one of them is a snapshot.
+    /// Serves the output times that the last step has reached, and looks at the curve where that is due; `state` is
+    /// needed if [`Trajectory::wants_state`].
     pub fn serve(&mut self, state: Option<&State<f64>>) {
-        let steps = self.counters.steps;
-        while let Some(stop) = self.stops.first().copied() {
-            if stop.fraction == 0.0 && stop.step == steps {
-                self.emit(&stop, self.now, state.cloned());
-            } else if stop.fraction > 0.0 && stop.step + 1 == steps {
-                self.emit_inside(&stop, state);
-            } else {
-                break;
+        if let (true, Some(state)) = (self.is_look_due(), state) {
+            self.look(&state.curve);
+        }
+        while let Some(output) = self.outputs.first()
+            && let Some(fraction) = self.place(output.t)
+        {
+            self.emit(output, fraction, state);
+            self.outputs = &self.outputs[1..];
+        }
+    }
+
+    /// How far in the last step the time `t` lies, in (0, 1]; none where the step has not reached it.
+    fn place(&self, t: f64) -> Option<f64> {
+        match self.time {
+            Time::Fixed(clock) => {
+                let (step, fraction) = clock.locate(t);
+                (step <= self.counters.steps).then_some(fraction)
             }
-            self.stops = &self.stops[1..];
-        }
-        if self.stops.first().is_some_and(|stop| stop.fraction > 0.0 && stop.step == steps) {
-            let keep = self.due().any(|stop| stop.snapshot);
-            self.before = Some((self.now, state.filter(|_| keep).cloned()));
+            Time::Adaptive(ticks) => {
+                let progress = &self.report.progress;
+                let (high, low) = ticks.split(t / self.unit.powi(4));
+                let past = (progress.time_high - high) + (progress.time_low - low);
+                let step = progress.taken.max(f64::MIN_POSITIVE);
+                (past >= 0.0 || self.is_at_end()).then(|| (1.0 - past / step).clamp(0.0, 1.0))
+            }
         }
     }
 
-    /// Linear interpolation between the steps around an output time: as accurate as the scheme, which is of first order.
-    fn emit_inside(&mut self, stop: &Stop, state: Option<&State<f64>>) {
-        let Some((before, state_before)) = &self.before else { return };
-        let between = |a: f64, b: f64| a + stop.fraction * (b - a);
-        let (a, b) = (before, &self.now);
-        let at = Observables {
-            length: between(a.length, b.length),
-            area: between(a.area, b.area),
-            excess: between(a.excess, b.excess),
-            energy: between(a.energy, b.energy),
-            k_min: between(a.k_min, b.k_min),
-            k_max: between(a.k_max, b.k_max),
-            mesh_ratio: between(a.mesh_ratio, b.mesh_ratio),
-            metric_drift: between(a.metric_drift, b.metric_drift),
-            turning: b.turning,
-        };
-        let inside = state_before.as_ref().zip(state).map(|(a, b)| {
-            let numbers: Vec<f64> =
-                a.to_numbers().into_iter().zip(b.to_numbers()).map(|(a, b)| between(a, b)).collect();
-            State::from_numbers(&numbers)
-        });
-        self.emit(stop, at, inside);
-    }
-
-    fn emit(&mut self, stop: &Stop, at: Observables, state: Option<State<f64>>) {
-        let (member, t) = (self.member.index, stop.t);
-        if stop.series {
+    fn emit(&mut self, output: &Output, fraction: f64, state: Option<&State<f64>>) {
+        let (member, t) = (self.member.index, output.t);
+        if output.series {
+            let Report { before, middle, now, progress } = &self.report;
+            let at = self.between(fraction, &before.to_numbers(), &middle.to_numbers(), &now.to_numbers());
+            let at = Observables::new(&Observed::from_numbers(&at), progress.turning, self.unit);
             self.series.push(SeriesRow { member, t, at });
         }
-        if let (true, Some(state)) = (stop.snapshot, state) {
-            let origin = self.member.origin;
-            let field = |ring: &Ring<f64>, offset: f64| ring.nodes().iter().map(|v| v + offset).collect();
-            self.snapshots.push(Snapshot {
+        if let (true, Some(state)) = (output.snapshot, state) {
+            let State { before, middle, curve, .. } = state;
+            let field = |of: fn(&Curve<f64>) -> &Ring<f64>, unit: f64, origin: f64| {
+                let nodes = self.between(fraction, of(before).nodes(), of(middle).nodes(), of(curve).nodes());
+                nodes.into_iter().map(|v| v * unit + origin).collect()
+            };
+            let (unit, origin) = (self.unit, self.member.origin);
+            let snapshot = Snapshot {
                 member,
                 t,
-                x: field(&state.x, origin.x),
-                y: field(&state.y, origin.y),
-                k: field(&state.k, 0.0),
-                r: field(&state.r, 0.0),
-            });
+                x: field(|curve| &curve.x, unit, origin.x),
+                y: field(|curve| &curve.y, unit, origin.y),
+                k: field(|curve| &curve.k, 1.0 / unit, 0.0),
+                r: field(|curve| &curve.r, unit, 0.0),
+            };
+            self.snapshots.push(snapshot);
         }
     }
 
-    /// The step to run to next, and the step length on the way; none where the current goal still stands.
-    pub fn next_goal(&self) -> Option<(u32, f64)> {
-        let (steps, total) = (self.counters.steps, self.clock.steps);
+    /// Values inside the last step, interpolated as accurately as the step itself: a fixed one, of first order, by a
+    /// straight line, an adaptive one by the parabola through its middle.
+    fn between(&self, fraction: f64, before: &[f64], middle: &[f64], now: &[f64]) -> Vec<f64> {
+        if fraction == 1.0 {
+            return now.to_vec();
+        }
+        let values = before.iter().zip(middle).zip(now);
+        let t = fraction;
+        match self.time {
+            Time::Fixed(_) => values.map(|((a, _), b)| a + t * (b - a)).collect(),
+            Time::Adaptive(_) => values
+                .map(|((a, m), b)| a + t * (4.0 * m - 3.0 * a - b) + 2.0 * t * t * (a - 2.0 * m + b))
+                .collect(),
+        }
+    }
+
+    fn is_look_due(&self) -> bool {
+        self.crossed.is_none()
+            && self.report.progress.travel >= self.launch.parameters.look_at
+            && self.report.now.k_min <= 0.0
+    }
+
+    /// Looks whether the polygon crosses itself, and sets how far its nodes may go before the next look.
+    ///
+    /// A curve whose tangent turns once and always to one side is simple, so the back end pauses only members whose
+    /// curvature changes sign.
+    fn look(&mut self, curve: &Curve<f64>) {
+        let progress = &self.report.progress;
+        let nodes: Vec<DVec2> = curve.positions().collect();
+        let changes_sign = self.report.now.k_min <= 0.0;
+        if progress.turning.abs() != 1.0 || (changes_sign && crossing(&nodes).is_some()) {
+            self.crossed = Some(self.now());
+            self.launch.parameters.look_at = crate::number::BIG;
+            return;
+        }
+        let length = self.report.now.length;
+        let far = if changes_sign { 0.5 * clearance(&nodes, length) } else { 0.0 };
+        // Never more often than every quarter of a spacing: what is nearer than that is not resolved.
+        self.launch.parameters.look_at = progress.travel + far.max(0.25 * length / nodes.len() as f64);
+    }
+
+    /// Where to run to next, as a number of steps and the parameters on the way; none where the goal still stands.
+    pub fn next_aim(&self) -> Option<(u32, Parameters<f64>)> {
+        let steps = self.counters.steps;
         if steps < self.counters.goal {
             return None;
         }
-        let output = self.stops.first().map_or(total, |stop| if stop.step > steps { stop.step } else { stop.step + 1 });
-        let goal = output.min(total);
-        if self.clock.ends_short() && goal == total {
-            return Some(if steps + 1 < total { (total - 1, self.clock.tau) } else { (total, self.clock.last()) });
-        }
-        Some((goal, self.clock.tau))
+        let mut parameters = self.launch.parameters;
+        let output = self.outputs.first().map(|output| output.t);
+        let goal = match self.time {
+            Time::Fixed(clock) => {
+                let goal = output.map_or(clock.steps, |t| clock.locate(t).0);
+                let ends_short = clock.ends_short() && goal == clock.steps;
+                let before_last = ends_short && steps + 1 < clock.steps;
+                let tau = if ends_short && !before_last { clock.last() } else { clock.tau };
+                parameters.tau = tau / self.unit.powi(4);
+                if before_last { clock.steps - 1 } else { goal }
+            }
+            Time::Adaptive(ticks) => {
+                let end = (parameters.end_high, parameters.end_low);
+                let split = |t: f64| if t >= self.t_end { end } else { ticks.split(t / self.unit.powi(4)) };
+                (parameters.goal_high, parameters.goal_low) = output.map_or(end, split);
+                u32::MAX
+            }
+        };
+        Some((goal, parameters))
     }
 
     /// What the member leaves; `last` is its last state, for the portrait.
     pub fn end(self, last: Option<&State<f64>>) -> Ended {
-        let event = |step: u32, fraction: f64| match (self.course, step) {
-            (Course::Round, _) => Some(0.0),
+        let progress = &self.report.progress;
+        let inside = |step: u32, [high, low, length, fraction]: [f64; 4]| match (self.time, step) {
             (_, NEVER) => None,
-            _ => Some(self.clock.inside(step, fraction)),
+            (Time::Fixed(clock), step) => Some(clock.inside(step, fraction)),
+            (Time::Adaptive(_), _) => Some((high + (low + fraction * length)) * self.unit.powi(4)),
         };
-        let t_relax = event(self.counters.relax_step, self.fractions[0]);
-        let t_half = event(self.counters.half_step, self.fractions[1]);
+        let p = progress;
+        let relaxed =
+            inside(self.counters.relax_step, [p.relax_high, p.relax_low, p.relax_length, p.relax_fraction]);
+        let halved = inside(self.counters.half_step, [p.half_high, p.half_low, p.half_length, p.half_fraction]);
+        let t_relax = if self.course == Course::Round { Some(0.0) } else { relaxed };
+        let t_half = if self.start.excess <= ROUND { Some(0.0) } else { halved };
         let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.counters.status);
         let status = failed.unwrap_or(if t_relax.is_some() { Status::Relaxed } else { Status::Unfinished });
-        let origin = self.member.origin;
+        let (origin, unit) = (self.member.origin, self.unit);
         let portrait = self.portrait.then(|| {
             let before: Vec<DVec2> = self.member.nodes.iter().map(|node| *node + origin).collect();
-            let after = last.map_or(before.clone(), |state| state.positions().map(|node| node + origin).collect());
+            let placed = |state: &State<f64>| state.curve.positions().map(|node| node * unit + origin).collect();
+            let after = last.map_or_else(|| before.clone(), placed);
             Portrait { before, after }
         });
         let outcome = Outcome {
             member: self.member.index,
             status,
-            t_end: self.clock.time(self.counters.steps),
+            t_end: self.now(),
             steps: self.counters.steps.into(),
+            rejected: self.counters.rejected.into(),
             sweeps_k: self.sweeps[0],
             sweeps_x: self.sweeps[1],
             t_relax,
             t_half,
             start: self.start,
-            end: self.now,
+            end: Observables::new(&self.report.now, progress.turning, unit),
+            self_crossing: self.crossed,
         };
         Ended {
             outcome,
@@ -272,24 +385,45 @@ impl<'a> Trajectory<'a> {
     }
 }
 
-/// The parameters of a member with `n` nodes, thresholds aside.
-fn parameters(spec: &Spec, n: usize, tolerance: f64) -> Parameters<f64> {
+/// The power of two next below the radius of the circle of the same length.
+fn unit_of(nodes: &[DVec2]) -> f64 {
+    (polygon::length(nodes) / std::f64::consts::TAU).log2().floor().exp2()
+}
+
+/// The parameters of a member in units of `unit`, thresholds and times aside.
+fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parameters<f64> {
+    let time = unit.powi(4);
+    let of_flow = Parameters::of_flow(&spec.flow, 1.0);
+    // b(k) has the dimension of 1/length³.
+    let law = |j: i32, c: f64| c * unit.powi(3 - j);
     Parameters {
-        omega: spec.omega,
+        c1: law(1, of_flow.c1),
+        c2: law(2, of_flow.c2),
+        c3: law(3, of_flow.c3),
+        c4: law(4, of_flow.c4),
+        c5: law(5, of_flow.c5),
+        c6: law(6, of_flow.c6),
+        c7: law(7, of_flow.c7),
+        c8: law(8, of_flow.c8),
+        omega: spec.omega * time,
         redistribution: f64::from(u8::from(!spec.no_redistribution)),
+        pull: match spec.pull {
+            Pull::Rate(rate) => rate * time,
+            Pull::Auto => PULL_PER_RATE * slowest_rate(nodes),
+        },
         tolerance,
         sor: spec.sor,
-        polygon_ratio: polygon::regular_ratio(n),
-        ..Parameters::of_flow(&spec.flow, spec.tau)
+        length_penalty: of_flow.length_penalty * unit * unit,
+        polygon_ratio: polygon::regular_ratio(nodes.len()),
+        ..of_flow
     }
 }
 
-/// Observables of the initial curve, in f64 whatever the precision of the run.
-fn observe_start(state: &State<f64>, p: &Parameters<f64>) -> Observables {
-    let blocks = Blocks::new(state.len()).expect("n was validated");
-    let curve = Curve { x: &state.x, y: &state.y, k: &state.k, r: &state.r };
-    let (sums, maxima) = (observe::sums(curve, p, blocks), observe::maxima(curve));
-    let mut report = Report { excess: observe::excess(&sums, p), ..Report::default() };
-    report.observe(&sums, &maxima);
-    Observables::from(&report)
+/// 24/R⁴, the rate at which the excess of a nearly round curve decays under surface diffusion, with R the radius of the
+/// circle of the same area; of the same length where the curve is not simple and its area says nothing.
+fn slowest_rate(nodes: &[DVec2]) -> f64 {
+    let by_length = polygon::length(nodes) / std::f64::consts::TAU;
+    let by_area = (polygon::signed_area(nodes).abs() / std::f64::consts::PI).sqrt();
+    let simple = polygon::turning_number(nodes).abs() == 1;
+    24.0 / (if simple { by_area } else { by_length }).powi(4)
 }

@@ -19,7 +19,7 @@ use curvelax::{
     number::Real,
     scheme::{
         State, Workspace,
-        evolve::{Launch, Run, evolve},
+        evolve::{Run, evolve},
         parameters::{Counters, NEVER},
         step::Method,
     },
@@ -152,7 +152,7 @@ fn a_moved_node_fails<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 fn permutation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let launches = members(n, 7, 20, 1e-4)?;
     let order = [3, 0, 6, 2, 5, 1, 4];
-    let permuted: Vec<Launch> = order.iter().map(|j| launches[*j].clone()).collect();
+    let permuted: Vec<Run<f64>> = order.iter().map(|j| launches[*j].clone()).collect();
     let plain = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(6))?;
     let shuffled = on_gpu::<T>(gpu, solver, n, &permuted, dispatches_of(6))?;
     for (slot, j) in order.iter().enumerate() {
@@ -189,17 +189,25 @@ fn dispatches<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     Ok(())
 }
 
+/// Starts `run` from other nodes.
+fn replace_nodes(run: &mut Run<f64>, change: impl FnOnce(&mut Vec<DVec2>)) {
+    let mut nodes: Vec<DVec2> = run.state.curve.positions().collect();
+    change(&mut nodes);
+    let counters = run.counters;
+    *run = Run { counters, ..Run::new(State::from_nodes(&nodes), run.parameters) };
+}
+
 /// One member of each bad end, at different places; the good ones must not notice.
 fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let good = members(n, 8, 20, 1e-4)?;
     let alone = on_gpu::<T>(gpu, solver, n, &good, dispatches_of(5))?;
     let mut mixed = good.clone();
-    mixed[1].nodes[n / 3] = DVec2::new(f64::NAN, 0.0);
-    mixed[3].nodes[5].x = 1e30;
+    replace_nodes(&mut mixed[1], |nodes| nodes[n / 3] = DVec2::new(f64::NAN, 0.0));
+    replace_nodes(&mut mixed[3], |nodes| nodes[5].x = 1e30);
     // Two neighbouring nodes in one place.
-    mixed[4].nodes[8] = mixed[4].nodes[7];
+    replace_nodes(&mut mixed[4], |nodes| nodes[8] = nodes[7]);
     // A turning number that the curve does not have.
-    mixed[6].turning = 2;
+    mixed[6].report.progress.turning = 2.0;
     let together = on_gpu::<T>(gpu, solver, n, &mixed, dispatches_of(5))?;
     let expected = [
         (1, vec![Status::Nonfinite]),
@@ -222,14 +230,14 @@ fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let mut launches = members(n, 5, 60, T::PRECISION.tolerance())?;
     for launch in &mut launches {
-        launch.stop_when_relaxed = true;
+        launch.counters.stop_when_relaxed = 1;
     }
     let ended = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(7))?;
     let blocks = Blocks::new(n).ok_or("n")?;
     let method = Method { solver, order: Order::Coloured, max_sweeps: 200_000 };
     let mut relaxed = 0;
     for (j, launch) in launches.iter().enumerate() {
-        let mut twin = Run::<T>::new(launch);
+        let mut twin: Run<T> = launch.convert();
         evolve(&mut twin, &method, &mut Workspace::new(blocks), 60);
         let (ours, theirs) = (ended[j].counters, twin.counters);
         let key = |c: Counters| (c.status, c.steps, c.relax_step, c.half_step);
@@ -237,7 +245,7 @@ fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
             return Err(format!("member {j}: {:?} on the GPU, {:?} on the CPU", key(ours), key(theirs)).into());
         }
         // Where inside the step: the rounding of an excess, over its change in the step.
-        let (a, b) = (ended[j].report, twin.report.widened());
+        let (a, b) = (ended[j].report.progress, twin.report.convert::<f64>().progress);
         for (a, b) in [(a.relax_fraction, b.relax_fraction), (a.half_fraction, b.half_fraction)] {
             let per_step = (launch.parameters.half_at - launch.parameters.relax_at) / f64::from(ours.steps);
             let bound = 64.0 * T::EPSILON / per_step;
@@ -263,7 +271,7 @@ fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     for (j, Left { state, counters, .. }) in
         on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(2))?.into_iter().enumerate()
     {
-        if (counters.status, counters.steps) != (0, 2) || !state.x.nodes().iter().all(|x| x.is_finite()) {
+        if (counters.status, counters.steps) != (0, 2) || !state.curve.x.nodes().iter().all(|x| x.is_finite()) {
             return Err(format!("member {j} of {n} points: {counters:?}").into());
         }
     }
@@ -358,16 +366,16 @@ fn program_refuses<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
 fn paper<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let node = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64) * DVec2::new(2.0, 1.0);
     let mut launch = members(n, 1, 2000, T::PRECISION.tolerance())?.remove(0);
-    launch.nodes = (1..=n).map(node).collect();
+    replace_nodes(&mut launch, |nodes| *nodes = (1..=n).map(node).collect());
     launch.parameters.tau = 1e-3;
-    let mut exact = Run::<f64>::new(&launch);
+    let mut exact = launch.clone();
     let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
     evolve(&mut exact, &method, &mut Workspace::new(Blocks::new(n).ok_or("n")?), 2000);
     let Left { state, counters, .. } = on_gpu::<T>(gpu, solver, n, &[launch], dispatches_of(50))?.remove(0);
     if (counters.steps, exact.counters.steps) != (2000, 2000) {
         return Err(format!("{counters:?} on the GPU, {:?} on the CPU", exact.counters).into());
     }
-    let error = state.positions().zip(exact.state.positions()).map(|(a, b)| (a - b).length()).fold(0.0, f64::max);
+    let error = state.curve.positions().zip(exact.state.curve.positions()).map(|(a, b)| (a - b).length()).fold(0.0, f64::max);
     println!("{}: paper's ellipse at t = 2, positions off by {error:.2e}", T::NAME);
     let bound = if T::PRECISION == Precision::F32 { 5e-4 } else { 1e-5 };
     if error > bound { Err(format!("positions off by {error:e}").into()) } else { Ok(()) }

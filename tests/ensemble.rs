@@ -8,7 +8,7 @@ use assert_cmd::Command;
 use curvelax::{
     backend::{Backend, cpu::CpuBackend},
     ensemble::{Family, Spec},
-    scheme::{Parameters, State, Status, evolve::Launch, parameters::Counters, step::Method},
+    scheme::{Parameters, State, Status, evolve::Run, parameters::Counters, step::Method},
     solver::Blocks,
 };
 use glam::DVec2;
@@ -188,8 +188,8 @@ fn run_quiet_with_warning(home: &Path, flags: &str, out: &str) -> Row {
 }
 
 /// Runs `launches` on the CPU until they end; their counters, and the states they end in.
-fn advance(launches: &[Launch], method: Method) -> Vec<(Counters, State<f64>)> {
-    let n = launches[0].nodes.len();
+fn advance(launches: &[Run<f64>], method: Method) -> Vec<(Counters, State<f64>)> {
+    let n = launches[0].state.curve.len();
     let mut backend = CpuBackend::<f64>::new(Blocks::new(n).unwrap(), method, 2).unwrap();
     for (slot, launch) in launches.iter().enumerate() {
         backend.load(slot, launch).unwrap();
@@ -204,25 +204,23 @@ fn advance(launches: &[Launch], method: Method) -> Vec<(Counters, State<f64>)> {
 #[test]
 fn a_poisoned_member_is_nonfinite_and_alone_in_it() {
     let family = Family::new(&Spec { points: 37, ..Spec::default() }).unwrap();
-    let launch = |j| Launch {
-        nodes: family.member(j).unwrap().nodes,
-        parameters: Parameters {
-            relax_at: -1.0,
-            half_at: -1.0,
-            ..Parameters::of_flow(&curvelax::flow::Flow::SurfaceDiffusion, 1e-3)
-        },
-        goal: 97,
-        stop_when_relaxed: false,
-        excess: 1.0,
-        turning: 1,
+    let launch = |nodes: &[DVec2]| {
+        let parameters = Parameters::of_flow(&curvelax::flow::Flow::SurfaceDiffusion, 1e-3);
+        let mut run =
+            Run::new(State::from_nodes(nodes), Parameters { relax_at: -1.0, half_at: -1.0, ..parameters });
+        run.counters.goal = 97;
+        run
     };
-    let healthy: Vec<Launch> = (0..7).map(launch).collect();
+    let curves: Vec<Vec<DVec2>> = (0..7).map(|j| family.member(j).unwrap().nodes).collect();
+    let healthy: Vec<Run<f64>> = curves.iter().map(|nodes| launch(nodes)).collect();
     for method in [SWEEPS, DIRECT] {
         let expected = advance(&healthy, method);
         assert!(expected.iter().all(|(counters, _)| (counters.status, counters.steps) == (0, 97)));
         for poison in [f64::NAN, f64::INFINITY, 1e200] {
             let mut sick = healthy.clone();
-            sick[3].nodes[11].x = poison;
+            let mut nodes = curves[3].clone();
+            nodes[11].x = poison;
+            sick[3] = launch(&nodes);
             let found = advance(&sick, method);
             let (counters, _) = &found[3];
             assert_eq!((counters.status, counters.steps), (Status::Nonfinite as u32, 0), "{poison}, {method:?}");

@@ -39,11 +39,11 @@ fn worst_deviation(name: &str, flow: Flow, tau: f64, redistribution: bool) -> f6
     let (mut steps, mut worst) = (0, 0.0_f64);
     for (t, rows) in &states {
         while steps < (t / tau).round() as u64 {
-            step::step(&state, &p, &method, &mut work);
-            step::accept(&mut state, &mut work);
+            step::step(&state.curve, &mut state.increments, &p, &method, &mut work);
+            std::mem::swap(&mut state.curve, &mut work.new);
             steps += 1;
         }
-        for (column, field) in [&state.x, &state.y, &state.k, &state.r].into_iter().enumerate() {
+        for (column, field) in state.curve.fields().into_iter().enumerate() {
             let scale = rows.iter().map(|row| row[column + 2].abs()).fold(0.0, f64::max);
             for (row, value) in rows.iter().zip(field.nodes()) {
                 worst = worst.max((row[column + 2] - value).abs() / scale);

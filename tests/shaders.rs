@@ -8,9 +8,10 @@ use curvelax::{
     ensemble::Status,
     number::{BIG, Real},
     scheme::{
-        observe::{MAX_DRIFT, MAX_TURN, MIN_EDGE},
-        parameters::{Counters, NEVER, Parameters, Report},
-        state::STATE_FIELDS,
+        observe::{MAX_DRIFT, MAX_GAP, MAX_TURN, MIN_EDGE},
+        pace,
+        parameters::{Counters, NEVER, Observed, Parameters, Progress, Report},
+        state::{CURVE_FIELDS, STATE_FIELDS},
         step::NEGLIGIBLE,
     },
     solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK},
@@ -70,8 +71,8 @@ fn every_shader_is_valid_in_both_precisions() {
 fn an_error_names_the_shader_file_and_line() {
     let source = shader::source::<f32>(SWEEPS).replacen("fn accept() {", "fn accept() { nonsense;", 1);
     let message = validated(&source, SWEEPS, Capabilities::empty()).unwrap_err();
-    let line = include_str!("../shaders/step.wgsl").lines().position(|line| line == "fn accept() {").unwrap() + 1;
-    assert!(message.starts_with(&format!("step.wgsl:{line}:")), "{message}");
+    let line = include_str!("../shaders/pull.wgsl").lines().position(|line| line == "fn pull() {").unwrap() + 1;
+    assert!(message.starts_with(&format!("pull.wgsl:{line}:")), "{message}");
 }
 
 #[test]
@@ -131,7 +132,12 @@ fn layouts_agree<T: Real>() {
         assert_eq!(found[name], (expected, fields.len() as u32 * step), "{name} in {}", T::NAME);
     };
     expect("Parameters", Parameters::<T>::FIELDS, number);
-    expect("Report", Report::<T>::FIELDS, number);
+    expect("Observed", Observed::<T>::FIELDS, number);
+    expect("Progress", Progress::<T>::FIELDS, number);
+    let observed = Observed::<T>::FIELDS.len() as u32 * number;
+    let parts = ["before", "middle", "now", "progress"];
+    let parts: Vec<_> = (0..).zip(parts).map(|(i, part)| (part.to_string(), i * observed)).collect();
+    assert_eq!(found["Report"], (parts, Report::<T>::LEN as u32 * number), "Report in {}", T::NAME);
     expect("Counters", &Counters::FIELDS, 4);
     expect("Dispatch", &kernel::DISPATCH_FIELDS, 4);
 }
@@ -142,10 +148,10 @@ fn the_structs_shared_with_the_host_have_its_layout() {
     layouts_agree::<f64>();
     use std::mem::offset_of;
     assert_eq!(size_of::<Counters>(), 4 * Counters::FIELDS.len());
-    assert_eq!(offset_of!(Counters, goal), 8);
-    assert_eq!(offset_of!(Counters, solve_sweeps), 4 * 9);
+    assert_eq!(offset_of!(Counters, goal), 16);
+    assert_eq!(offset_of!(Counters, solve_sweeps), 4 * 11);
     assert_eq!(offset_of!(Parameters<f64>, tau), 8 * 8);
-    assert_eq!(size_of::<Report<f32>>(), 4 * Report::<f32>::FIELDS.len());
+    assert_eq!(size_of::<Report<f32>>(), 4 * Report::<f32>::LEN);
 }
 
 #[test]
@@ -269,7 +275,15 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("MAX_TURN", MAX_TURN),
         ("MIN_EDGE", MIN_EDGE),
         ("MAX_DRIFT", MAX_DRIFT),
+        ("MAX_GAP", MAX_GAP),
+        ("SAFETY", pace::SAFETY),
+        ("MOST_GROWTH", pace::MOST_GROWTH),
+        ("LEAST_GROWTH", pace::LEAST_GROWTH),
+        ("LEAST_STEP", pace::LEAST_STEP),
         ("STATE_FIELDS", STATE_FIELDS as f64),
+        ("INCREMENTS", CURVE_FIELDS as f64),
+        ("MIDDLE", (CURVE_FIELDS + 3) as f64),
+        ("BEFORE", (2 * CURVE_FIELDS + 3) as f64),
         ("NEGLIGIBLE", NEGLIGIBLE),
         ("SWEEPS_PER_CHECK", f64::from(SWEEPS_PER_CHECK)),
         ("NEVER", f64::from(NEVER)),

@@ -13,7 +13,7 @@ use curvelax::{
     number::Real,
     scheme::{
         Parameters, State, Workspace, curvature,
-        evolve::{Launch, Run, evolve},
+        evolve::{Run, evolve},
         position, redistribution,
         step::{self, Method},
     },
@@ -49,7 +49,7 @@ fn decay_over_theory(flow: &Flow, radius: f64, m: u32, n: usize, steps: u32, mut
     let p = Parameters::of_flow(flow, end / f64::from(steps));
     let mut curve = Linear { state: State::from_nodes(&nodes), work: Workspace::new(Blocks::new(n).unwrap()), p };
     (0..steps).for_each(|_| step(&mut curve));
-    let after: Vec<DVec2> = curve.state.positions().collect();
+    let after: Vec<DVec2> = curve.state.curve.positions().collect();
     (mode(&nodes, m) / mode(&after, m)).ln() / linear_theory(flow, radius, m, end).1
 }
 
@@ -61,8 +61,8 @@ struct Linear {
 }
 
 fn correct_step(Linear { state, work, p }: &mut Linear) {
-    step::step(state, p, &DIRECT, work);
-    step::accept(state, work);
+    step::step(&state.curve, &mut state.increments, p, &DIRECT, work);
+    std::mem::swap(&mut state.curve, &mut work.new);
 }
 
 /// A step whose 𝓑_i has `φ(k_i) + φ(k_{i-1})`, as the paper prints it.

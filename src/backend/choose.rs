@@ -10,12 +10,12 @@ use super::{
 use crate::{
     ensemble::{
         Spec,
-        spec::{BackendChoice, Precision},
+        spec::{BackendChoice, Precision, SolverChoice},
     },
     error::{Error, Result},
     number::Real,
     scheme::step::Method,
-    solver::{Blocks, Order},
+    solver::{Blocks, Order, Solver},
 };
 
 /// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
@@ -125,10 +125,10 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
     check_precision(n, precision)?;
     let (fits, most) = match precision {
         Precision::F32 => (
-            capacity.check_size::<f32>(ring(n)?, spec.solver),
-            capacity.max_points::<f32>(spec.solver).min(MAX_POINTS_F32),
+            capacity.check_size::<f32>(ring(n)?, spec.solver()),
+            capacity.max_points::<f32>(spec.solver()).min(MAX_POINTS_F32),
         ),
-        Precision::F64 => (capacity.check_size::<f64>(ring(n)?, spec.solver), capacity.max_points::<f64>(spec.solver)),
+        Precision::F64 => (capacity.check_size::<f64>(ring(n)?, spec.solver()), capacity.max_points::<f64>(spec.solver())),
     };
     fits.map_err(|needs| {
         let problem = format!("a member needs {needs}");
@@ -157,16 +157,21 @@ impl Choice {
         self.precision
     }
 
-    /// One line: what was taken and why.
-    pub fn sentence(&self) -> String {
+    /// One line: what was taken and why, and which solver.
+    pub fn sentence(&self, spec: &Spec) -> String {
         let precision = match self.precision {
             Precision::F32 => "f32",
             Precision::F64 => "f64",
         };
-        match &self.gpu {
-            Some(gpu) => format!("back end: GPU {} ({}), {precision} ({})", gpu.name(), gpu.api(), self.reason),
-            None => format!("back end: CPU, {precision} ({})", self.reason),
-        }
+        let device = match &self.gpu {
+            Some(gpu) => format!("GPU {} ({})", gpu.name(), gpu.api()),
+            None => "CPU".into(),
+        };
+        let solver = match spec.solver() {
+            Solver::GaussSeidel => "Gauss-Seidel sweeps",
+            Solver::Direct => "direct solver",
+        };
+        format!("back end: {device}, {precision} ({}); {solver}", self.reason)
     }
 
     /// The spec with everything that this choice settled written out, so that it can be repeated as it is.
@@ -175,6 +180,10 @@ impl Choice {
         spec.adapter = self.gpu.as_ref().map(|gpu| gpu.name().to_string());
         spec.tolerance = Some(spec.tolerance_at(self.precision));
         spec.precision = Some(self.precision);
+        spec.solver = match spec.solver() {
+            Solver::GaussSeidel => SolverChoice::GaussSeidel,
+            Solver::Direct => SolverChoice::Direct,
+        };
     }
 
     /// Opens it for `members` members of `n` nodes.
@@ -198,7 +207,7 @@ impl Choice {
         };
         if let Some(gpu) = self.gpu {
             let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
-            let variant = Variant { solver: spec.solver, traced: false };
+            let variant = Variant { solver: spec.solver(), traced: false };
             let kernel = Kernel::<T>::new(&gpu, blocks, members, spec.max_sweeps, variant)?;
             platform.backend = "gpu".into();
             platform.adapter = Some(gpu.name().to_string());
@@ -206,7 +215,7 @@ impl Choice {
             platform.device_type = Some(gpu.device_type());
             return Ok((Box::new(kernel), platform));
         }
-        let method = Method { solver: spec.solver, order: spec.order, max_sweeps: spec.max_sweeps };
+        let method = Method { solver: spec.solver(), order: spec.order, max_sweeps: spec.max_sweeps };
         let backend = CpuBackend::<T>::new(blocks, method, spec.threads.unwrap_or(0))?;
         platform.threads = Some(backend.threads());
         Ok((Box::new(backend), platform))
@@ -245,7 +254,7 @@ mod tests {
     fn more_points_than_the_workgroup_holds_are_refused_with_the_largest_number_that_fits() {
         let capacity = Capacity { f64: true, ..LEAST };
         let spec = Spec { precision: Some(Precision::F64), ..Spec::default() };
-        let most = capacity.max_points::<f64>(spec.solver);
+        let most = capacity.max_points::<f64>(spec.solver());
         assert!(most >= 512, "{most}");
         fitting_precision(&spec, most, "toaster", &capacity).unwrap();
         let message = refused(Some(Precision::F64), most + 1, &capacity);

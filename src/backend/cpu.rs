@@ -7,8 +7,8 @@ use crate::{
     error::{Error, Result},
     number::Real,
     scheme::{
-        State, Workspace,
-        evolve::{Launch, Run, evolve},
+        Parameters, State, Workspace,
+        evolve::{Run, evolve},
         parameters::{Counters, Report},
         step::Method,
     },
@@ -57,8 +57,8 @@ impl<T: Real> Backend for CpuBackend<T> {
         self.slots.len()
     }
 
-    fn load(&mut self, slot: usize, launch: &Launch) -> Result<()> {
-        let run = Run::new(launch);
+    fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
+        let run = run.convert();
         match &mut self.slots[slot] {
             Some(slot) => slot.run = run,
             empty => *empty = Some(Box::new(Slot { run, work: Workspace::new(self.blocks) })),
@@ -66,10 +66,10 @@ impl<T: Real> Backend for CpuBackend<T> {
         Ok(())
     }
 
-    fn aim(&mut self, slot: usize, goal: u32, tau: f64) {
+    fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>) {
         let run = &mut self.slots[slot].as_mut().expect("an occupied slot").run;
         run.counters.goal = goal;
-        run.parameters.tau = T::of(tau);
+        run.parameters = parameters.convert();
     }
 
     fn clear(&mut self, slot: usize) {
@@ -92,10 +92,10 @@ impl<T: Real> Backend for CpuBackend<T> {
     }
 
     fn report(&self, slot: usize) -> Report<f64> {
-        self.run(slot).report.widened()
+        self.run(slot).report.convert()
     }
 
     fn state(&mut self, slot: usize) -> Result<State<f64>> {
-        Ok(self.run(slot).state.widened())
+        Ok(self.run(slot).state.convert())
     }
 }

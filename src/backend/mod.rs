@@ -12,8 +12,8 @@ pub use choose::{Choice, Platform, choose};
 use crate::{
     error::Result,
     scheme::{
-        State,
-        evolve::Launch,
+        Parameters, State,
+        evolve::Run,
         parameters::{Counters, Report},
     },
 };
@@ -24,10 +24,10 @@ pub trait Backend {
     fn slots(&self) -> usize;
 
     /// Puts a member into a slot, in place of whatever was there.
-    fn load(&mut self, slot: usize, launch: &Launch) -> Result<()>;
+    fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()>;
 
-    /// Lets the member in `slot` run until it has made `goal` steps, with step length `tau`.
-    fn aim(&mut self, slot: usize, goal: u32, tau: f64);
+    /// Lets the member in `slot` run on under `parameters` until it has made `goal` steps or pauses by itself.
+    fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>);
 
     /// Empties a slot.
     fn clear(&mut self, slot: usize);

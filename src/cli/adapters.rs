@@ -23,7 +23,7 @@ pub fn adapters(AdaptersArgs {}: AdaptersArgs) -> Result<()> {
         text += "no GPU adapter; Debian's software GPU is the package mesa-vulkan-drivers\n";
     }
     let choice = backend::choose(&spec, spec.points)?;
-    print(&format!("{text}\n--backend auto, for the default run: {}\n", choice.sentence()))
+    print(&format!("{text}\n--backend auto, for the default run: {}\n", choice.sentence(&spec)))
 }
 
 fn describe(gpu: &Gpu, spec: &Spec) -> String {
@@ -32,10 +32,10 @@ fn describe(gpu: &Gpu, spec: &Spec) -> String {
     let points = match gpu.has_f64() {
         true => format!(
             "{} in f32, {} in f64",
-            capacity.max_points::<f32>(spec.solver).min(MAX_POINTS_F32),
-            capacity.max_points::<f64>(spec.solver)
+            capacity.max_points::<f32>(spec.solver()).min(MAX_POINTS_F32),
+            capacity.max_points::<f64>(spec.solver())
         ),
-        false => format!("{} in f32", capacity.max_points::<f32>(spec.solver).min(MAX_POINTS_F32)),
+        false => format!("{} in f32", capacity.max_points::<f32>(spec.solver()).min(MAX_POINTS_F32)),
     };
     let rows = [
         ("kind", format!("{kind}, {}, {}", gpu.device_type(), gpu.api())),

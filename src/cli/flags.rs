@@ -10,13 +10,13 @@ use crate::{
     curve::{Modes, Sampling, Shape},
     ensemble::{
         Spec,
-        spec::{BackendChoice, Order, Precision, Solver},
+        spec::{BackendChoice, Order, Precision, Pull, SolverChoice},
     },
     flow::Flow,
 };
 
 const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
-const SOLVERS: &[&str] = &["gauss-seidel", "direct"];
+const SOLVERS: &[&str] = &["auto", "gauss-seidel", "direct"];
 const ORDERS: &[&str] = &["coloured", "lexicographic"];
 const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
 const PRECISIONS: &[&str] = &["f32", "f64"];
@@ -85,6 +85,12 @@ pub struct SpecFlags {
         long, value_name = "TAU", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION
     )]
     tau: Option<f64>,
+    /// Adaptive steps with this local error tolerance instead of --tau [default: off; 0.001 if no TOL is given]
+    #[arg(
+        long, value_name = "TOL", value_parser = real, allow_negative_numbers = true, num_args = 0..=1,
+        default_missing_value = "0.001", help_heading = EVOLUTION
+    )]
+    adaptive: Option<f64>,
     /// Final time [default: 2]
     #[arg(long, value_name = "T", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
     t_end: Option<f64>,
@@ -106,6 +112,11 @@ pub struct SpecFlags {
         help_heading = EVOLUTION
     )]
     relax_to: Option<f64>,
+    /// A member is relaxed at this excess, instead of --relax-to [default: off]
+    #[arg(
+        long, value_name = "EXCESS", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION
+    )]
+    relax_at: Option<f64>,
     /// End a member when it is relaxed [default: false]
     #[arg(
         long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
@@ -113,9 +124,14 @@ pub struct SpecFlags {
     )]
     stop_when_relaxed: Option<bool>,
 
-    /// Solver of the pentadiagonal systems [default: gauss-seidel]
-    #[arg(long, value_name = "SOLVER", value_parser = word::<Solver>(SOLVERS), help_heading = METHOD)]
-    solver: Option<Solver>,
+    /// Rate κ at which k and r are pulled to the polygon's own, a number or auto; 0 is the paper [default: 0]
+    #[arg(
+        long, value_name = "KAPPA", value_parser = text_of::<Pull>, allow_hyphen_values = true, help_heading = METHOD
+    )]
+    pull: Option<Pull>,
+    /// Solver of the pentadiagonal systems; auto is gauss-seidel with --tau, direct with --adaptive [default: auto]
+    #[arg(long, value_name = "SOLVER", value_parser = word::<SolverChoice>(SOLVERS), help_heading = METHOD)]
+    solver: Option<SolverChoice>,
     /// Order in which a sweep visits the nodes [default: coloured]
     #[arg(long, value_name = "ORDER", value_parser = word::<Order>(ORDERS), help_heading = METHOD)]
     order: Option<Order>,
@@ -171,6 +187,13 @@ pub const OUTPUT: &str = "Output";
 impl SpecFlags {
     /// Replaces in `spec` what was given as a flag.
     pub fn overlay(self, spec: &mut Spec) {
+        // A flag wins over the file: also over the key that it stands instead of.
+        if self.tau.is_some() || self.adaptive.is_some() {
+            (spec.tau, spec.adaptive) = (None, None);
+        }
+        if self.relax_to.is_some() || self.relax_at.is_some() {
+            (spec.relax_to, spec.relax_at) = (None, None);
+        }
         macro_rules! replace {
             ($($key:ident)*; $($optional:ident)*) => {{
                 // Names every field, so that a flag cannot be forgotten here.
@@ -180,9 +203,9 @@ impl SpecFlags {
             }};
         }
         replace! {
-            curves points seed shape sampling amplitude modes decay flow tau t_end omega no_redistribution solver
-            order sor max_sweeps backend relax_to stop_when_relaxed snapshots;
-            only tolerance adapter precision series threads
+            curves points seed shape sampling amplitude modes decay flow t_end omega no_redistribution pull solver
+            order sor max_sweeps backend stop_when_relaxed snapshots;
+            tau adaptive relax_to relax_at only tolerance adapter precision series threads
         }
     }
 }
@@ -198,6 +221,10 @@ fn whole<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
 
 fn text<T: TryFrom<String, Error = String>>(text: &str) -> Result<T, String> {
     T::try_from(text.to_owned())
+}
+
+fn text_of<T: std::str::FromStr<Err = String>>(text: &str) -> Result<T, String> {
+    text.parse()
 }
 
 /// One of `names`, with clap's listing and suggestions, read as the spec file is.
@@ -287,7 +314,7 @@ mod tests {
             let refused = T::deserialize(StrDeserializer::<serde::de::value::Error>::new("")).unwrap_err().to_string();
             refused.split('`').skip(3).step_by(2).map(str::to_owned).collect()
         }
-        assert_eq!(words::<Solver>(), SOLVERS);
+        assert_eq!(words::<SolverChoice>(), SOLVERS);
         assert_eq!(words::<Order>(), ORDERS);
         assert_eq!(words::<BackendChoice>(), BACKENDS);
         assert_eq!(words::<Precision>(), PRECISIONS);

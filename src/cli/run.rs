@@ -63,7 +63,7 @@ pub fn run(args: RunArgs) -> Result<()> {
         }
     };
     let folder = OutputFolder::open(&out, args.force)?;
-    say(&choice.sentence());
+    say(&choice.sentence(&spec));
     family.warnings().iter().for_each(|warning| say(&format!("warning: {warning}")));
     let precision = choice.precision();
     let (mut backend, platform) = choice.open(&spec, spec.points)?;

@@ -2,7 +2,7 @@
 
 use crate::{
     backend::gpu::kernel::TRACE_FIELDS,
-    scheme::{Parameters, State, Workspace},
+    scheme::{Curve, Parameters, Workspace},
     solver::Row as Coefficients,
 };
 
@@ -83,9 +83,8 @@ pub const FIELDS: [Bound; 4] = [
     bound("r", Scale::Length, 16.0, 64.0),
 ];
 
-/// What the members report after a run, in the order of `Report`'s fields; the two fractions are compared where
-/// events are.
-pub const REPORT: [Bound; 9] = [
+/// What the members report after a run: the fields of `Observed`, then the turning number and the travel.
+pub const REPORT: [Bound; 10] = [
     bound("length", Scale::Position, 16.0, 64.0),
     bound("area", Scale::Area, 16.0, 64.0),
     bound("excess", Scale::One, 16.0, 64.0),
@@ -95,6 +94,7 @@ pub const REPORT: [Bound; 9] = [
     bound("mesh ratio", Scale::Mesh, 16.0, 64.0),
     bound("metric drift", Scale::Mesh, 16.0, 64.0),
     bound("turning", Scale::One, 0.0, 0.0),
+    bound("travel", Scale::Position, 16.0, 64.0),
 ];
 
 impl Bound {
@@ -105,16 +105,16 @@ impl Bound {
 }
 
 impl Scale {
-    /// The scale of one member, from the state before the step and what the step computed.
-    pub fn of(self, state: &State<f64>, p: &Parameters<f64>, work: &Workspace<f64>) -> f64 {
+    /// The scale of one member, from the curve before the step and what the step computed.
+    pub fn of(self, curve: &Curve<f64>, p: &Parameters<f64>, work: &Workspace<f64>) -> f64 {
         let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-        let k = || largest(&mut state.k.nodes().iter().map(|k| k.abs()));
-        let longest = || largest(&mut state.r.nodes().iter().copied());
+        let k = || largest(&mut curve.k.nodes().iter().map(|k| k.abs()));
+        let longest = || largest(&mut curve.r.nodes().iter().copied());
         let weight = |rows: &[Coefficients<f64>]| largest(&mut rows.iter().map(|row| row.weight));
-        let length: f64 = state.r.nodes().iter().sum();
+        let length: f64 = curve.r.nodes().iter().sum();
         match self {
             Scale::Velocity => {
-                let shortest = state.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
+                let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
                 k() / (shortest * shortest) + p.b(k()).abs()
             }
             Scale::Tangential => work.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
@@ -126,11 +126,11 @@ impl Scale {
             Scale::Position => length / std::f64::consts::TAU,
             Scale::Area => length * length / (4.0 * std::f64::consts::PI),
             Scale::Energy => {
-                state.k.nodes().iter().zip(state.r.nodes()).map(|(k, r)| k * k * r).sum::<f64>()
+                curve.k.nodes().iter().zip(curve.r.nodes()).map(|(k, r)| k * k * r).sum::<f64>()
                     + p.length_penalty * length
             }
             Scale::Mesh => {
-                let shortest = state.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
+                let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
                 length / std::f64::consts::TAU / shortest
             }
             Scale::SolvedPosition => longest() * weight(&work.position.rows).sqrt(),

@@ -5,7 +5,7 @@ use crate::{
     ensemble::{Family, Spec},
     error::Result,
     flow::Flow,
-    scheme::{Parameters, evolve::Launch},
+    scheme::{Parameters, State, evolve::Run},
 };
 
 /// Members of the comparison: a prime number, so that nothing divides it.
@@ -17,8 +17,8 @@ fn tau(n: usize) -> f64 {
     1e-3 * (100.0 / n as f64).powi(4).min(20.0)
 }
 
-/// `count` different members of `n` nodes, each with its own curve, flow, τ and ω, to run `steps` steps.
-pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec<Launch>> {
+/// `count` different members of `n` nodes, each with its own curve, flow, τ, ω and κ, to run `steps` steps.
+pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec<Run<f64>>> {
     let amplitude = if n < 20 { 0.02 } else { 0.05 };
     let spec = Spec { points: n, amplitude, seed: 20, ..Spec::default() };
     let family = Family::new(&spec)?;
@@ -37,6 +37,8 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
                 omega: 1.0 + j as f64,
                 // One member in five keeps its nodes.
                 redistribution: if j % 5 == 3 { 0.0 } else { 1.0 },
+                // One member in three is pulled.
+                pull: if j % 3 == 1 { 50.0 } else { 0.0 },
                 tolerance,
                 sor: 1.0 + 0.07 * (j % 10) as f64,
                 polygon_ratio: polygon::regular_ratio(n),
@@ -44,8 +46,9 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
                 half_at: 0.95 * excess,
                 ..Parameters::of_flow(flow, tau(n) * (1.0 - 0.05 * j as f64))
             };
-            let turning = polygon::turning_number(&nodes);
-            Ok(Launch { nodes, parameters, goal: steps, stop_when_relaxed: false, excess, turning })
+            let mut run = Run::new(State::from_nodes(&nodes), parameters);
+            run.counters.goal = steps;
+            Ok(run)
         })
         .collect()
 }

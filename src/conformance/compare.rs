@@ -15,8 +15,8 @@ use crate::{
     error::{Error, Result},
     number::Real,
     scheme::{
-        Parameters, State, Workspace,
-        evolve::{Launch, Run, evolve},
+        Curve, Increments, Parameters, State, Workspace,
+        evolve::{Run, evolve},
         parameters::{Counters, Report},
         step::{self, Method},
     },
@@ -113,9 +113,13 @@ fn method(solver: Solver) -> Method {
 /// Sweeps at most in these comparisons.
 const MAX_SWEEPS: u32 = 200_000;
 
-fn tampered(mut launches: Vec<Launch>, tamper: Option<Tamper>) -> Vec<Launch> {
+fn tampered(mut launches: Vec<Run<f64>>, tamper: Option<Tamper>) -> Vec<Run<f64>> {
     if let Some(Tamper { member, node, by }) = tamper {
-        launches[member].nodes[node] *= 1.0 + by;
+        let curve = &mut launches[member].state.curve;
+        for coordinate in [&mut curve.x, &mut curve.y] {
+            coordinate[node] *= 1.0 + by;
+            coordinate.close();
+        }
     }
     launches
 }
@@ -138,10 +142,10 @@ pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Opt
     let trace = kernel.trace()?;
     let mut rows: Vec<Row> = STAGES.iter().map(|bound| Row::begin::<T>(bound, solver, n, 1)).collect();
     for (member, launch) in launches.iter().enumerate() {
-        let run = Run::<T>::new(launch);
+        let mut run: Run<T> = launch.convert();
         let mut work = Workspace::new(blocks(n)?);
-        step::step(&run.state, &run.parameters, &method(solver), &mut work);
-        let twin = traced(&work);
+        step::step(&run.state.curve, &mut run.state.increments, &run.parameters, &method(solver), &mut work);
+        let twin = traced(&work, &run.state.increments);
         let scales = Scales::of(launch)?;
         for (field, (row, bound)) in rows.iter_mut().zip(&STAGES).enumerate() {
             let at = (member * TRACE_FIELDS + field) * n;
@@ -167,7 +171,7 @@ pub fn runs<T: Real>(
     let quantities: Vec<Bound> = FIELDS.iter().chain(&REPORT).copied().collect();
     let mut rows: Vec<Row> = quantities.iter().map(|bound| Row::begin::<T>(bound, solver, n, steps)).collect();
     for (member, (launch, Left { state, counters, report })) in launches.iter().zip(&ours).enumerate() {
-        let mut twin = Run::<T>::new(launch);
+        let mut twin: Run<T> = launch.convert();
         evolve(&mut twin, &method(solver), &mut Workspace::new(blocks(n)?), steps);
         if (counters.status, counters.steps) != (twin.counters.status, twin.counters.steps) {
             return Err(Error::Failed(format!(
@@ -179,12 +183,12 @@ pub fn runs<T: Real>(
                 twin.counters.steps
             )));
         }
-        let widened = twin.state.widened();
-        let (our_report, their_report) = (report.to_numbers(), twin.report.widened().to_numbers());
-        let ours = state.fields().into_iter().take(FIELDS.len()).map(|field| field.nodes());
-        let ours: Vec<&[f64]> = ours.chain(our_report.chunks(1).take(REPORT.len())).collect();
-        let theirs = widened.fields().into_iter().take(FIELDS.len()).map(|field| field.nodes());
-        let theirs: Vec<&[f64]> = theirs.chain(their_report.chunks(1).take(REPORT.len())).collect();
+        let widened = twin.state.convert::<f64>();
+        let (our_report, their_report) = (reported(report), reported(&twin.report.convert()));
+        let ours = state.curve.fields().into_iter().map(|field| field.nodes());
+        let ours: Vec<&[f64]> = ours.chain(our_report.chunks(1)).collect();
+        let theirs = widened.curve.fields().into_iter().map(|field| field.nodes());
+        let theirs: Vec<&[f64]> = theirs.chain(their_report.chunks(1)).collect();
         let scales = Scales::of(launch)?;
         for (field, (row, bound)) in rows.iter_mut().zip(&quantities).enumerate() {
             let scale = scales.get(bound.scale);
@@ -193,6 +197,13 @@ pub fn runs<T: Real>(
         }
     }
     Ok(rows)
+}
+
+/// What of a report is compared, in the order of [`REPORT`].
+fn reported(report: &Report<f64>) -> Vec<f64> {
+    let mut numbers = report.now.to_numbers();
+    numbers.extend([report.progress.turning, report.progress.travel]);
+    numbers
 }
 
 /// How roundings add up over steps: like a random walk, since the flow itself damps what they leave.
@@ -216,7 +227,7 @@ pub fn on_gpu<T: Real>(
     adapter: &gpu::Gpu,
     solver: Solver,
     n: usize,
-    launches: &[Launch],
+    launches: &[Run<f64>],
     budget: Budget,
 ) -> Result<Vec<Left>> {
     let kernel =
@@ -238,37 +249,38 @@ fn unfinished(counters: Counters) -> bool {
 }
 
 /// The twin's side of the trace, in the order of [`STAGES`].
-fn traced<T: Real>(work: &Workspace<T>) -> Vec<Vec<f64>> {
+fn traced<T: Real>(work: &Workspace<T>, increments: &Increments<T>) -> Vec<Vec<f64>> {
     let wide = |values: &[T]| values.iter().map(|v| v.to_f64()).collect::<Vec<f64>>();
     let ring = |ring: &Ring<T>| wide(ring.nodes());
     let rows = |rows: &[crate::solver::Row<T>]| {
         let column = |entry: fn(&crate::solver::Row<T>) -> T| rows.iter().map(|row| entry(row).to_f64()).collect();
         [column(|row| row.a), column(|row| row.b), column(|row| row.d), column(|row| row.e), column(|row| row.weight)]
     };
-    let mut fields = vec![wide(&work.beta), ring(&work.alpha), ring(&work.r)];
+    let mut fields = vec![wide(&work.beta), ring(&work.alpha), ring(&work.new.r)];
     fields.extend(rows(&work.curvature.rows));
-    fields.extend([wide(&work.curvature.rhs[0]), ring(&work.dk)]);
+    fields.extend([wide(&work.curvature.rhs[0]), ring(&increments.k)]);
     fields.extend(rows(&work.position.rows));
-    fields.extend([wide(&work.position.rhs[0]), wide(&work.position.rhs[1]), ring(&work.dx), ring(&work.dy)]);
+    fields.extend([wide(&work.position.rhs[0]), wide(&work.position.rhs[1]), ring(&increments.x), ring(&increments.y)]);
     fields
 }
 
 /// Natural scales of one member, from its first step in f64.
 struct Scales {
-    state: State<f64>,
+    curve: Curve<f64>,
     parameters: Parameters<f64>,
     work: Workspace<f64>,
 }
 
 impl Scales {
-    fn of(launch: &Launch) -> Result<Scales> {
-        let run = Run::<f64>::new(launch);
-        let mut work = Workspace::new(blocks(launch.nodes.len())?);
-        step::step(&run.state, &run.parameters, &method(Solver::Direct), &mut work);
-        Ok(Scales { state: run.state, parameters: run.parameters, work })
+    fn of(launch: &Run<f64>) -> Result<Scales> {
+        let mut run = launch.clone();
+        let mut work = Workspace::new(blocks(run.state.curve.len())?);
+        let increments = &mut run.state.increments;
+        step::step(&run.state.curve, increments, &run.parameters, &method(Solver::Direct), &mut work);
+        Ok(Scales { curve: run.state.curve, parameters: run.parameters, work })
     }
 
     fn get(&self, scale: Scale) -> f64 {
-        scale.of(&self.state, &self.parameters, &self.work)
+        scale.of(&self.curve, &self.parameters, &self.work)
     }
 }

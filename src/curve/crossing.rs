@@ -22,6 +22,17 @@ pub fn crossing(points: &[DVec2]) -> Option<(usize, usize)> {
     tree.meeting_pair(1, 1, points)
 }
 
+/// How near two strands of the polygon come to each other that run in opposite directions, or `limit` if that is less.
+///
+/// A simple curve first touches itself where two strands of opposite directions meet, so until its nodes have gone half
+/// this far it stays simple, hairpins of less than three edges aside.
+pub fn clearance(points: &[DVec2], limit: f64) -> f64 {
+    let tree = BoxTree::over_edges(points);
+    let mut nearest = limit;
+    tree.nearest_opposed(1, 1, points, &mut nearest);
+    nearest
+}
+
 /// An axis-parallel box; empty while `low` exceeds `high`.
 #[derive(Clone, Copy)]
 struct Bounds {
@@ -34,6 +45,10 @@ impl Bounds {
 
     fn union(self, other: Bounds) -> Bounds {
         Bounds { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    fn distance(self, other: Bounds) -> f64 {
+        (self.low - other.high).max(other.low - self.high).max(DVec2::ZERO).length()
     }
 
     fn overlaps(self, other: Bounds) -> bool {
@@ -77,6 +92,37 @@ impl BoxTree {
             .or_else(|| within(2 * a, 2 * b + 1))
             .or_else(swapped)
     }
+
+    /// Lowers `nearest` to the distance of the opposed edges under `a` and `b`, two nodes of one level with `a <= b`.
+    fn nearest_opposed(&self, a: usize, b: usize, points: &[DVec2], nearest: &mut f64) {
+        // Empty boxes are infinitely far.
+        if !(self.boxes[a].distance(self.boxes[b]) < *nearest) {
+            return;
+        }
+        if a >= self.leaves {
+            let (i, j) = (a - self.leaves, b - self.leaves);
+            let apart = (j - i).min(i + points.len() - j);
+            let ((p, q), (r, s)) = (edge(points, i), edge(points, j));
+            if apart > 2 && (q - p).dot(s - r) < 0.0 {
+                let ends = [(p, r, s), (q, r, s), (r, p, q), (s, p, q)];
+                *nearest = ends.into_iter().map(|(x, y, z)| distance_to(x, y, z)).fold(*nearest, f64::min);
+            }
+            return;
+        }
+        self.nearest_opposed(2 * a, 2 * b, points, nearest);
+        self.nearest_opposed(2 * a + 1, 2 * b + 1, points, nearest);
+        self.nearest_opposed(2 * a, 2 * b + 1, points, nearest);
+        if a != b {
+            self.nearest_opposed(2 * a + 1, 2 * b, points, nearest);
+        }
+    }
+}
+
+/// Distance of a point from the segment `ab`.
+fn distance_to(point: DVec2, a: DVec2, b: DVec2) -> f64 {
+    let along = b - a;
+    let share = ((point - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+    point.distance(a + share * along)
 }
 
 fn edge(points: &[DVec2], i: usize) -> (DVec2, DVec2) {
@@ -119,6 +165,29 @@ mod tests {
 
     use super::*;
     use crate::ensemble::random::Stream;
+
+    #[test]
+    fn the_clearance_is_that_of_all_pairs() {
+        let seed = 20_261_121;
+        for member in 0..300 {
+            let points = random_polygon(seed, member);
+            let n = points.len();
+            let mut nearest = 10.0_f64;
+            for j in 0..n {
+                for i in 0..j {
+                    let ((p, q), (r, s)) = (edge(&points, i), edge(&points, j));
+                    if (j - i).min(i + n - j) > 2 && (q - p).dot(s - r) < 0.0 {
+                        for (x, y, z) in [(p, r, s), (q, r, s), (r, p, q), (s, p, q)] {
+                            nearest = nearest.min(distance_to(x, y, z));
+                        }
+                    }
+                }
+            }
+            assert_eq!(clearance(&points, 10.0), nearest, "member {member}");
+        }
+        let strip = polygon([(0.0, 0.0), (9.0, 0.0), (9.0, 0.5), (9.0, 1.0), (0.0, 1.0), (0.0, 0.5)]);
+        assert_eq!(clearance(&strip, 10.0), 1.0);
+    }
 
     fn polygon<const N: usize>(points: [(f64, f64); N]) -> Vec<DVec2> {
         points.map(DVec2::from).into()

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::Mollified;
 pub use crate::scheme::Status;
-use crate::{error::Result, scheme::parameters::Report};
+use crate::{error::Result, scheme::parameters::Observed};
 
 /// Scalar observables of one curve at one time (f64 whatever the precision of the run).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,18 +29,19 @@ pub struct Observables {
     pub turning: i32,
 }
 
-impl From<&Report<f64>> for Observables {
-    fn from(report: &Report<f64>) -> Observables {
+impl Observables {
+    /// In the user's unit, from what the scheme observed in lengths of `unit`.
+    pub fn new(observed: &Observed<f64>, turning: f64, unit: f64) -> Observables {
         Observables {
-            length: report.length,
-            area: report.area,
-            excess: report.excess,
-            energy: report.energy,
-            k_min: report.k_min,
-            k_max: report.k_max,
-            mesh_ratio: report.mesh_ratio,
-            metric_drift: report.metric_drift,
-            turning: report.turning as i32,
+            length: observed.length * unit,
+            area: observed.area * unit * unit,
+            excess: observed.excess,
+            energy: observed.energy / unit,
+            k_min: observed.k_min / unit,
+            k_max: observed.k_max / unit,
+            mesh_ratio: observed.mesh_ratio,
+            metric_drift: observed.metric_drift,
+            turning: turning as i32,
         }
     }
 }
@@ -56,6 +57,8 @@ pub struct Outcome {
     pub t_end: f64,
     /// Accepted steps.
     pub steps: u64,
+    /// Refused adaptive steps.
+    pub rejected: u64,
     /// Gauss–Seidel sweeps spent on curvature systems (0 with the direct solver).
     pub sweeps_k: u64,
     /// Gauss–Seidel sweeps spent on position systems.
@@ -68,6 +71,8 @@ pub struct Outcome {
     pub start: Observables,
     /// Observables of the last accepted state.
     pub end: Observables,
+    /// Time at which the polygon was first seen to cross itself.
+    pub self_crossing: Option<f64>,
 }
 
 /// One row of `series.csv`.

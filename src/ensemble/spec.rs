@@ -5,7 +5,7 @@
 
 use std::{fmt, marker::PhantomData, path::Path, str::FromStr};
 
-use serde::{Deserialize, Deserializer, Serialize, de};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use crate::{
     curve::{Modes, Sampling, Shape},
@@ -28,6 +28,37 @@ pub enum BackendChoice {
     Gpu,
     /// The CPU back end.
     Cpu,
+}
+
+/// The solver asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolverChoice {
+    /// Gauss–Seidel sweeps with a fixed τ, as in the paper; the direct solver with adaptive steps, whose sweeps would
+    /// grow in number as the steps grow in length.
+    Auto,
+    /// Gauss–Seidel sweeps.
+    GaussSeidel,
+    /// Periodic pentadiagonal elimination.
+    Direct,
+}
+
+/// How time is cut into steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pace {
+    /// Steps of this length.
+    Fixed(f64),
+    /// Extrapolated steps with this local error tolerance.
+    Adaptive(f64),
+}
+
+/// κ of the metric pull.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pull {
+    /// κ itself, in 1/time; 0 is the paper.
+    Rate(f64),
+    /// κ from each member's own relaxation time.
+    Auto,
 }
 
 /// A complete description of an ensemble and of the method that relaxes it.
@@ -54,16 +85,22 @@ pub struct Spec {
     pub decay: f64,
     /// The law of motion.
     pub flow: Flow,
-    /// Fixed time step.
-    pub tau: f64,
+    /// Fixed time step; [`DEFAULT_TAU`] if neither it nor `adaptive` is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tau: Option<f64>,
+    /// Local error tolerance of adaptive steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<f64>,
     /// Final time.
     pub t_end: f64,
     /// ω, speed of the redistribution towards equal spacing, in 1/time.
     pub omega: f64,
     /// No tangential redistribution (α = 0).
     pub no_redistribution: bool,
+    /// κ of the metric pull.
+    pub pull: Pull,
     /// Solver of the pentadiagonal systems.
-    pub solver: Solver,
+    pub solver: SolverChoice,
     /// Order of the sweeps.
     pub order: Order,
     /// Residual tolerance of the sweeps relative to the increment; by precision if absent.
@@ -81,8 +118,13 @@ pub struct Spec {
     /// Number type; f64 where the device has it if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub precision: Option<Precision>,
-    /// A member is relaxed when its excess is at most this fraction of its start.
-    pub relax_to: f64,
+    /// A member is relaxed when its excess is at most this fraction of its start; [`DEFAULT_RELAX_TO`] if neither it
+    /// nor `relax_at` is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relax_to: Option<f64>,
+    /// A member is relaxed when its excess is at most this.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relax_at: Option<f64>,
     /// End a member when it is relaxed.
     pub stop_when_relaxed: bool,
     /// Interval between rows of `series.csv`.
@@ -99,6 +141,13 @@ pub struct Spec {
     pub threads: Option<usize>,
 }
 
+/// The paper's time step.
+pub const DEFAULT_TAU: f64 = 1e-3;
+/// Tolerance of `--adaptive` without a value.
+pub const DEFAULT_ADAPTIVE: f64 = 1e-3;
+/// Fraction of the initial excess at which a member is relaxed.
+pub const DEFAULT_RELAX_TO: f64 = 0.01;
+
 impl Default for Spec {
     fn default() -> Spec {
         Spec {
@@ -111,11 +160,13 @@ impl Default for Spec {
             modes: Modes { low: 2, high: 8 },
             decay: 1.0,
             flow: Flow::SurfaceDiffusion,
-            tau: 1e-3,
+            tau: None,
+            adaptive: None,
             t_end: 2.0,
             omega: 1.0,
             no_redistribution: false,
-            solver: Solver::GaussSeidel,
+            pull: Pull::Rate(0.0),
+            solver: SolverChoice::Auto,
             order: Order::Coloured,
             tolerance: None,
             sor: 1.0,
@@ -123,7 +174,8 @@ impl Default for Spec {
             backend: BackendChoice::Auto,
             adapter: None,
             precision: None,
-            relax_to: 0.01,
+            relax_to: None,
+            relax_at: None,
             stop_when_relaxed: false,
             series: None,
             snapshots: Vec::new(),
@@ -172,6 +224,24 @@ impl Spec {
         self.only.as_ref().map_or(self.curves, |only| only.len() as u64)
     }
 
+    /// How time is cut into steps.
+    pub fn pace(&self) -> Pace {
+        self.adaptive.map_or(Pace::Fixed(self.tau.unwrap_or(DEFAULT_TAU)), Pace::Adaptive)
+    }
+
+    /// The solver in use.
+    pub fn solver(&self) -> Solver {
+        match (self.solver, self.pace()) {
+            (SolverChoice::GaussSeidel, _) | (SolverChoice::Auto, Pace::Fixed(_)) => Solver::GaussSeidel,
+            (SolverChoice::Direct, _) | (SolverChoice::Auto, Pace::Adaptive(_)) => Solver::Direct,
+        }
+    }
+
+    /// The excess at which a member that starts with `excess` is relaxed.
+    pub fn threshold(&self, excess: f64) -> f64 {
+        self.relax_at.unwrap_or(self.relax_to.unwrap_or(DEFAULT_RELAX_TO) * excess)
+    }
+
     /// The residual tolerance in use at `precision`.
     pub fn tolerance_at(&self, precision: Precision) -> f64 {
         self.tolerance.unwrap_or(precision.tolerance())
@@ -190,6 +260,58 @@ fn suggestion(message: &str) -> String {
 /// The parts of `text` between backticks.
 fn quoted(text: &str) -> impl Iterator<Item = &str> {
     text.split('`').skip(1).step_by(2)
+}
+
+impl FromStr for Pull {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Pull, String> {
+        match text.trim() {
+            "auto" => Ok(Pull::Auto),
+            text => text.parse().map(Pull::Rate).map_err(|_| format!("`{text}` is neither a number nor `auto`")),
+        }
+    }
+}
+
+impl Serialize for Pull {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Pull::Rate(rate) => serializer.serialize_f64(*rate),
+            Pull::Auto => serializer.serialize_str("auto"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Pull {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Pull, D::Error> {
+        deserializer.deserialize_any(PullVisitor)
+    }
+}
+
+struct PullVisitor;
+
+impl de::Visitor<'_> for PullVisitor {
+    type Value = Pull;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "a number or \"auto\"")
+    }
+
+    fn visit_f64<E: de::Error>(self, rate: f64) -> Result<Pull, E> {
+        Ok(Pull::Rate(rate))
+    }
+
+    fn visit_i64<E: de::Error>(self, rate: i64) -> Result<Pull, E> {
+        Ok(Pull::Rate(rate as f64))
+    }
+
+    fn visit_u64<E: de::Error>(self, rate: u64) -> Result<Pull, E> {
+        Ok(Pull::Rate(rate as f64))
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Pull, E> {
+        text.parse().map_err(E::custom)
+    }
 }
 
 /// A list as a TOML array, or as the comma-separated text that the flag takes.
@@ -242,7 +364,9 @@ mod tests {
     fn a_spec_reads_back_from_its_toml() {
         let spec = Spec {
             seed: u64::MAX,
-            tau: 1e-300,
+            tau: Some(1e-300),
+            relax_at: Some(0.01),
+            pull: Pull::Rate(0.1),
             omega: 0.1 + 0.2,
             flow: Flow::Polynomial(vec![0.5, 0.0, -0.25]),
             precision: Some(Precision::F32),
@@ -252,7 +376,8 @@ mod tests {
             only: Some(vec![0, 200]),
             ..Spec::default()
         };
-        for spec in [spec, Spec::default()] {
+        let adaptive = Spec { adaptive: Some(1e-3), pull: Pull::Auto, relax_to: Some(0.1), ..Spec::default() };
+        for spec in [spec, adaptive, Spec::default()] {
             let text = spec.to_toml().unwrap();
             assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");
         }
@@ -263,10 +388,12 @@ mod tests {
         let keys = Spec::keys();
         let written: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
         assert!(written.keys().all(|key| keys.contains(key)));
-        for optional in ["tolerance", "adapter", "precision", "series", "only", "threads"] {
-            assert!(keys.iter().any(|key| key == optional), "{optional}");
+        let optional = ["tau", "adaptive", "relax-to", "relax-at", "tolerance", "adapter", "precision", "series"];
+        let optional = [&optional[..], &["only", "threads"]].concat();
+        for key in &optional {
+            assert!(keys.iter().any(|known| known == key), "{key}");
         }
-        assert_eq!(keys.len(), written.len() + 6);
+        assert_eq!(keys.len(), written.len() + optional.len());
     }
 
     #[test]

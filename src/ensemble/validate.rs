@@ -3,7 +3,9 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that
 //! takes the file they come from; only the resolution of the highest mode is checked here.
 
-use super::spec::{BackendChoice, Order, Solver, Spec};
+use super::spec::{
+    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Solver, Spec,
+};
 use crate::error::{Error, Result};
 
 /// More members than this is a slip of the keyboard.
@@ -18,6 +20,8 @@ const MOST_SERIES_ROWS: f64 = 1e6;
 const MOST_SNAPSHOTS: usize = 10_000;
 /// The lengths approach their mean explicitly, by a factor 1 - ωτ a step.
 const MOST_OMEGA_TAU: f64 = 1.0;
+/// Above this local error a step says nothing about the curve.
+const LOOSEST_ADAPTIVE: f64 = 1.0;
 /// A sweep residual above this no longer says that a system is solved.
 const LOOSEST_TOLERANCE: f64 = 0.1;
 const MOST_SWEEPS: u32 = 100_000_000;
@@ -31,9 +35,20 @@ impl Spec {
         self.check_method()?;
         self.check_relaxation()?;
         self.check_combinations()?;
+        self.fill_defaults();
         self.tidy_snapshots()?;
         self.tidy_only()?;
         Ok(self)
+    }
+
+    /// Writes out the choices that were left open, so that a printed spec says them.
+    fn fill_defaults(&mut self) {
+        if let Pace::Fixed(tau) = self.pace() {
+            self.tau = Some(tau);
+        }
+        if self.relax_at.is_none() {
+            self.relax_to.get_or_insert(DEFAULT_RELAX_TO);
+        }
     }
 
     fn check_counts(&self) -> Result<()> {
@@ -60,23 +75,10 @@ impl Spec {
     }
 
     fn check_times(&self) -> Result<()> {
-        positive("tau", self.tau, "a time step", "0.001")?;
         positive("t-end", self.t_end, "a final time", "2")?;
-        let (tau, t_end) = (number(self.tau), number(self.t_end));
-        if self.tau > self.t_end {
-            let allowed = format!("take a step of at most {t_end}, or a later --t-end");
-            return Err(Error::value(
-                "tau",
-                tau,
-                &format!("the step is longer than the whole run of {t_end}"),
-                &allowed,
-            ));
-        }
-        let steps = self.t_end / self.tau;
-        if steps > MOST_STEPS {
-            let problem = format!("about {steps:.1e} steps of {tau} to --t-end {t_end}");
-            let allowed = format!("at most {MOST_STEPS:e} steps: take a larger --tau or an earlier --t-end");
-            return Err(Error::value("tau", tau, &problem, &allowed));
+        match self.pace() {
+            Pace::Fixed(tau) => self.check_fixed(tau)?,
+            Pace::Adaptive(tolerance) => self.check_adaptive(tolerance)?,
         }
         let Some(series) = self.series else { return Ok(()) };
         positive("series", series, "an interval of time", "0.01")?;
@@ -88,17 +90,64 @@ impl Spec {
         Ok(())
     }
 
+    fn check_fixed(&self, tau: f64) -> Result<()> {
+        positive("tau", tau, "a time step", "0.001")?;
+        let t_end = number(self.t_end);
+        if tau > self.t_end {
+            let problem = format!("the step is longer than the whole run of {t_end}");
+            let allowed = format!("take a step of at most {t_end}, or a later --t-end");
+            return Err(Error::value("tau", number(tau), &problem, &allowed));
+        }
+        let steps = self.t_end / tau;
+        if steps > MOST_STEPS {
+            let problem = format!("about {steps:.1e} steps of {} to --t-end {t_end}", number(tau));
+            let allowed = format!("at most {MOST_STEPS:e} steps: take a larger --tau or an earlier --t-end");
+            return Err(Error::value("tau", number(tau), &problem, &allowed));
+        }
+        Ok(())
+    }
+
+    fn check_adaptive(&self, tolerance: f64) -> Result<()> {
+        if let Some(tau) = self.tau {
+            let problem = format!("steps are either fixed or adaptive, and there is --adaptive {}", number(tolerance));
+            return Err(Error::value("tau", number(tau), &problem, "leave out one of the two"));
+        }
+        if !(tolerance > 0.0 && tolerance <= LOOSEST_ADAPTIVE) {
+            let allowed = format!("take a number above 0, up to {LOOSEST_ADAPTIVE}, for example {DEFAULT_ADAPTIVE}");
+            return Err(Error::value("adaptive", number(tolerance), "not a local error tolerance", &allowed));
+        }
+        let tightest = tightest_adaptive(self.precision.unwrap_or(Precision::F64));
+        if tolerance < tightest {
+            let problem = "the rounding of the precision is larger";
+            return Err(Error::value("adaptive", number(tolerance), problem, &format!("take {tightest:e} or more")));
+        }
+        Ok(())
+    }
+
+    fn check_pull(&self) -> Result<()> {
+        let Pull::Rate(rate) = self.pull else { return Ok(()) };
+        if !(rate.is_finite() && rate >= 0.0) {
+            let allowed = "take 0 for the paper's scheme, a positive number, or auto";
+            return Err(Error::value("pull", number(rate), "not a rate", allowed));
+        }
+        Ok(())
+    }
+
     fn check_method(&self) -> Result<()> {
         if !(self.omega.is_finite() && self.omega >= 0.0) {
             let allowed = "take 0 or any positive number, for example 1";
             return Err(Error::value("omega", number(self.omega), "not a redistribution speed", allowed));
         }
-        let turns = self.omega * self.tau;
-        if turns > MOST_OMEGA_TAU && !self.no_redistribution {
-            let problem = format!("omega tau = {}, and the redistribution overshoots above 1", number(turns));
-            let allowed = format!("it is a rate: take --omega {} or less", number(1.0 / self.tau));
+        if let Pace::Fixed(tau) = self.pace()
+            && self.omega * tau > MOST_OMEGA_TAU
+            && !self.no_redistribution
+        {
+            let turns = number(self.omega * tau);
+            let problem = format!("omega tau = {turns}, and the redistribution overshoots above 1");
+            let allowed = format!("it is a rate: take --omega {} or less", number(1.0 / tau));
             return Err(Error::value("omega", number(self.omega), &problem, &allowed));
         }
+        self.check_pull()?;
         if let Some(tolerance) = self.tolerance
             && !(tolerance > 0.0 && tolerance <= LOOSEST_TOLERANCE)
         {
@@ -136,16 +185,23 @@ impl Spec {
     }
 
     fn check_relaxation(&self) -> Result<()> {
-        if self.relax_to > 0.0 && self.relax_to < 1.0 {
-            return Ok(());
+        match (self.relax_to, self.relax_at) {
+            (Some(_), Some(excess)) => {
+                let problem = "a member is relaxed at a fraction of its excess or at an excess";
+                Err(Error::value("relax-at", number(excess), problem, "leave out --relax-to or --relax-at"))
+            }
+            (Some(fraction), None) if !(fraction > 0.0 && fraction < 1.0) => {
+                let allowed = "take a number between 0 and 1, both excluded, for example 0.01";
+                Err(Error::value("relax-to", number(fraction), "not a fraction of the initial excess", allowed))
+            }
+            (None, Some(excess)) => positive("relax-at", excess, "an excess", "0.01"),
+            _ => Ok(()),
         }
-        let allowed = "take a number between 0 and 1, both excluded, for example 0.01";
-        Err(Error::value("relax-to", number(self.relax_to), "not a fraction of the initial excess", allowed))
     }
 
     fn check_combinations(&self) -> Result<()> {
         let lexicographic = self.order == Order::Lexicographic;
-        if lexicographic && self.solver == Solver::Direct {
+        if lexicographic && self.solver() == Solver::Direct {
             let allowed = "leave out --order, or take --solver gauss-seidel";
             return Err(Error::value("order", "lexicographic", "the direct solver makes no sweeps to order", allowed));
         }
@@ -200,6 +256,14 @@ impl Spec {
         only.sort_unstable();
         only.dedup();
         Ok(())
+    }
+}
+
+/// The smallest tolerance of adaptive steps whose errors are not all rounding.
+fn tightest_adaptive(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 1e-4,
+        Precision::F64 => 1e-8,
     }
 }
 

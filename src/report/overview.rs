@@ -6,7 +6,10 @@ use super::{
     progress::duration,
     tally::{MollifiedMembers, Tally},
 };
-use crate::{backend::Platform, ensemble::Spec};
+use crate::{
+    backend::Platform,
+    ensemble::{Spec, spec::Pace},
+};
 
 /// A finished run at a glance; its `Display` is the text for stdout.
 pub struct Overview<'a> {
@@ -60,9 +63,13 @@ impl Overview<'_> {
     }
 
     fn ensemble(&self) -> String {
-        let Spec { flow, points, tau, t_end, seed, .. } = self.spec;
+        let Spec { flow, points, t_end, seed, .. } = self.spec;
+        let pace = match self.spec.pace() {
+            Pace::Fixed(tau) => format!("tau = {tau:?}"),
+            Pace::Adaptive(tolerance) => format!("adaptive {tolerance:?}"),
+        };
         let shape = String::from(self.spec.shape.clone());
-        format!("{shape}, {flow}, n = {points}, tau = {tau:?}, t-end = {t_end}, seed {seed}")
+        format!("{shape}, {flow}, n = {points}, {pace}, t-end = {t_end}, seed {seed}")
     }
 
     /// What was done to outlines whose corners the nodes do not resolve; empty where nothing was.

@@ -72,7 +72,7 @@ struct SummaryRow {
     status: &'static str,
     t_end: Option<f64>,
     steps: u64,
-    rejected: (),
+    rejected: u64,
     sweeps_k: u64,
     sweeps_x: u64,
     t_relax: Option<f64>,
@@ -92,7 +92,7 @@ struct SummaryRow {
     turning: i32,
     mesh_ratio: Option<f64>,
     metric_drift: Option<f64>,
-    self_crossing: (),
+    self_crossing: Option<f64>,
 }
 
 impl SummaryTable {
@@ -110,7 +110,7 @@ impl SummaryTable {
             status: member.status.name(),
             t_end: known(member.t_end),
             steps: member.steps,
-            rejected: (),
+            rejected: member.rejected,
             sweeps_k: member.sweeps_k,
             sweeps_x: member.sweeps_x,
             t_relax: member.t_relax.and_then(known),
@@ -130,7 +130,7 @@ impl SummaryTable {
             turning: end.turning,
             mesh_ratio: known(end.mesh_ratio),
             metric_drift: known(end.metric_drift),
-            self_crossing: (),
+            self_crossing: member.self_crossing.and_then(known),
         })
     }
 
@@ -206,12 +206,14 @@ mod tests {
             status: Status::Relaxed,
             t_end: 0.5,
             steps: 500,
+            rejected: 7,
             sweeps_k: 1234,
             sweeps_x: 987,
             t_relax: Some(0.1 + 0.2),
             t_half: None,
             start,
             end,
+            self_crossing: Some(0.25),
         }
     }
 
@@ -254,7 +256,7 @@ mod tests {
             "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
              length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
              mesh_ratio,metric_drift,self_crossing\n\
-             3,0,relaxed,0.5,500,,1234,987,0.30000000000000004,,,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,\n"
+             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25\n"
         );
     }
 

@@ -5,21 +5,21 @@
 //! old state is a sum of differences:
 //! `f - M k = ∂b + (r k β)_i k_i - Σ_j off_ij (k_j - k_i)`.
 
-use super::{Parameters, State, Workspace};
+use super::{Parameters, Curve, Workspace};
 use crate::{number::Number, solver::Row};
 
 /// Fills `work.curvature` from the old state and the new lengths.
-pub fn assemble<N: Number>(state: &State<N>, p: &Parameters<N>, work: &mut Workspace<N>) {
+pub fn assemble<N: Number>(old: &Curve<N>, p: &Parameters<N>, work: &mut Workspace<N>) {
     let rate = p.tau.recip();
-    for i in 0..state.len() {
+    for i in 0..old.len() {
         let (row, rhs) = row(
             p,
             rate,
-            state.k.window(i),
+            old.k.window(i),
             work.ir.window(i),
             work.iq.window(i),
             work.alpha.window(i),
-            [work.r[i], work.rkb[i]],
+            [work.new.r[i], work.rkb[i]],
         );
         work.curvature.rows[i] = row;
         work.curvature.rhs[0][i] = rhs;

@@ -12,20 +12,27 @@
 //! here is over i and i+1. Both systems are written for the increment δ over the step: the right-hand side is
 //! the residual of the old state in node differences, so no digits are lost to the size of x.
 //!
+//! With adaptive steps, [`extrapolation`] makes three of them, of τ, τ/2 and τ/2, into one of second order, and
+//! [`pace`] chooses its length and keeps the time.
+//!
 //! *Practice.* Node i = 1…n of the paper is index i-1 here. `k[i]` and `r[i]` live on the segment that ends at
-//! node i, `q[i]` between the middles of segments i and i+1. A [`State`] is a curve; a [`Workspace`] holds what
-//! a step computes on the way, and doubles as its trace for the conformance test.
+//! node i, `q[i]` between the middles of segments i and i+1. A [`Curve`] is x, y, k and r; a [`State`]
+//! is a curve with what the next step needs of the last one; a [`Workspace`] holds what a step computes on the way, and
+//! doubles as its trace for the conformance test.
 
 pub mod curvature;
 pub mod evolve;
+pub mod extrapolation;
 pub mod observe;
+pub mod pace;
 pub mod parameters;
 pub mod position;
+pub mod pull;
 pub mod redistribution;
 pub mod state;
 pub mod status;
 pub mod step;
 
 pub use parameters::Parameters;
-pub use state::{State, Workspace};
+pub use state::{Curve, Increments, State, Workspace};
 pub use status::Status;

@@ -3,11 +3,8 @@
 //!
 //! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r.
 
-use super::Parameters;
-use crate::{
-    number::Number,
-    solver::{Blocks, Ring},
-};
+use super::{Curve, Parameters, pull};
+use crate::{number::Number, solver::Blocks};
 
 /// `|k|·r` from which on a curve counts as not resolved: its tangent turns by 2 rad from segment to segment.
 pub const MAX_TURN: f64 = 2.0;
@@ -16,6 +13,8 @@ pub const MIN_EDGE: f64 = 1e-5;
 /// Metric drift above which the scheme's lengths say nothing about the polygon: with far too large a step k and r
 /// lose x, and the polygon shrinks to a point that would look round.
 pub const MAX_DRIFT: f64 = 1.0;
+/// Gap between k and the polygon's turn, in rad, above which the curvature says nothing about the polygon.
+pub const MAX_GAP: f64 = 2.0;
 
 /// The four sums, in the order of the kernel's `vec4`.
 #[derive(Clone, Copy, Debug)]
@@ -45,23 +44,13 @@ pub struct Maxima<N> {
     pub k_max: N,
     /// Minus the smallest curvature.
     pub minus_k_min: N,
-}
-
-/// The fields of a curve.
-#[derive(Clone, Copy)]
-pub struct Curve<'a, N> {
-    /// Nodes.
-    pub x: &'a Ring<N>,
-    /// Nodes.
-    pub y: &'a Ring<N>,
-    /// Curvatures.
-    pub k: &'a Ring<N>,
-    /// Lengths.
-    pub r: &'a Ring<N>,
+    /// Largest gap between the angle by which the curvature turns the tangent over a segment, from middle to middle of
+    /// its neighbours, and the angle by which the polygon turns there.
+    pub gap: N,
 }
 
 /// Sums over the ring.
-pub fn sums<N: Number>(curve: Curve<N>, p: &Parameters<N>, blocks: Blocks) -> Sums<N> {
+pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> Sums<N> {
     let half = N::of(0.5);
     Sums {
         length: blocks.sum(|i| edge(curve, i)[2]),
@@ -79,9 +68,9 @@ pub fn sums<N: Number>(curve: Curve<N>, p: &Parameters<N>, blocks: Blocks) -> Su
 }
 
 /// Maxima over the ring.
-pub fn maxima<N: Number>(curve: Curve<N>) -> Maxima<N> {
+pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
     let low = N::of(-2.0 * crate::number::BIG);
-    let mut m = Maxima { turn: low, drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
+    let mut m = Maxima { turn: low, drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low, gap: low };
     for i in 0..curve.x.len() {
         let (k, r, e) = (curve.k[i], curve.r[i], edge(curve, i)[2]);
         m.turn = m.turn.max((k * r).bounded_abs());
@@ -90,6 +79,8 @@ pub fn maxima<N: Number>(curve: Curve<N>) -> Maxima<N> {
         m.minus_shortest = m.minus_shortest.max(-e.bounded_abs());
         m.k_max = m.k_max.max(k);
         m.minus_k_min = m.minus_k_min.max(-k);
+        let [angle, span] = pull::turn(curve, i);
+        m.gap = m.gap.max((k * span - angle).bounded_abs());
     }
     m
 }
@@ -100,9 +91,19 @@ pub fn excess<N: Number>(sums: &Sums<N>, p: &Parameters<N>) -> N {
     sums.length * sums.length / (N::of(4.0 * std::f64::consts::PI) * sums.area.abs()) - p.polygon_ratio
 }
 
+/// Largest way that a node went from `old` to `new`.
+pub fn farthest<N: Number>(old: &Curve<N>, new: &Curve<N>) -> N {
+    let mut farthest = N::of(0.0);
+    for i in 0..old.len() {
+        let (dx, dy) = (new.x[i] - old.x[i], new.y[i] - old.y[i]);
+        farthest = farthest.max((dx * dx + dy * dy).sqrt().bounded_abs());
+    }
+    farthest
+}
+
 /// Edge that ends at node i: `[Δx, Δy, |e|]`.
 #[inline(always)]
-fn edge<N: Number>(curve: Curve<N>, i: usize) -> [N; 3] {
+pub fn edge<N: Number>(curve: &Curve<N>, i: usize) -> [N; 3] {
     let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
     let (dx, dy) = (x - xm, y - ym);
     [dx, dy, (dx * dx + dy * dy).sqrt()]
@@ -110,7 +111,7 @@ fn edge<N: Number>(curve: Curve<N>, i: usize) -> [N; 3] {
 
 /// +1 (-1) where the edge vector turns from `e_i` to `e_{i+1}` across the positive x axis, the short way round.
 #[inline(always)]
-fn winding<N: Number>(curve: Curve<N>, i: usize) -> N {
+fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
     let ([_, xm, x, xp, _], [_, ym, y, yp, _]) = (curve.x.window(i), curve.y.window(i));
     let (ex, ey, fx, fy) = (x - xm, y - ym, xp - x, yp - y);
     let (zero, one) = (N::of(0.0), N::of(1.0));

@@ -3,10 +3,10 @@
 //! Every field is one number of the run's precision, in declaration order, so that host and WGSL agree by
 //! construction; a test compares names and offsets with naga's view of `shaders/member.wgsl`.
 
-use super::observe::{Maxima, Sums};
+use super::observe::{self, Maxima, Sums};
 use crate::{
     flow::{Flow, MAX_DEGREE},
-    number::{Number, Real},
+    number::{BIG, Number, Real},
 };
 
 /// A struct of numbers of one type, convertible to and from an array in declaration order.
@@ -54,12 +54,14 @@ numbers! {
         c7,
         /// c₈.
         c8,
-        /// Time step τ.
+        /// Length τ of a fixed step; of the step under way where steps are adaptive.
         tau,
         /// ω of the redistribution, in 1/time.
         omega,
         /// 1 with redistribution, 0 without.
         redistribution,
+        /// κ of the metric pull, in 1/time.
+        pull,
         /// Tolerance of the sweeps.
         tolerance,
         /// Over-relaxation factor of the sweeps.
@@ -72,12 +74,32 @@ numbers! {
         relax_at,
         /// Half the excess at the start.
         half_at,
+        /// Excess down to which adaptive steps follow the shape, not only the size, of the curve.
+        follow_to,
+        /// Length below which the curve has shrunk to a point.
+        least_length,
+        /// Travel at which the member pauses to be looked at, if its curvature changes sign.
+        look_at,
+        /// Local error tolerance of adaptive steps; 0 for fixed ones.
+        adaptive,
+        /// Unit of the high part of an adaptive time, a power of two.
+        time_unit,
+        /// Unit of its low part.
+        time_tick,
+        /// Time at which the member pauses, high part.
+        goal_high,
+        /// Low part.
+        goal_low,
+        /// Final time, high part.
+        end_high,
+        /// Low part.
+        end_low,
     }
 }
 
 numbers! {
-    /// What a member reports when a dispatch ends: observables of its last accepted state, and its events.
-    Report {
+    /// Observables of one curve.
+    Observed {
         /// Length of the polygon.
         length,
         /// Signed area of the polygon.
@@ -94,13 +116,55 @@ numbers! {
         mesh_ratio,
         /// `max |r_i - |e_i|| / |e_i|`.
         metric_drift,
+    }
+}
+
+numbers! {
+    /// Where a member is in time, and when its events were.
+    Progress {
         /// Turning number.
         turning,
-        /// The relaxation event lies this fraction of a step after `Counters::relax_step`.
+        /// Sum over the steps of the largest way that a node went.
+        travel,
+        /// Time of the last accepted curve where steps are adaptive, high part.
+        time_high,
+        /// Low part.
+        time_low,
+        /// Length of the last adaptive step.
+        taken,
+        /// Length of the next one.
+        next,
+        /// Start of the step in which the member relaxed where steps are adaptive, high part.
+        relax_high,
+        /// Low part.
+        relax_low,
+        /// Length of that step.
+        relax_length,
+        /// Where in that step: as a fraction of it.
         relax_fraction,
-        /// The same for the halving of the excess.
+        /// Start of the step in which its excess halved, high part.
+        half_high,
+        /// Low part.
+        half_low,
+        /// Length of that step.
+        half_length,
+        /// Where in that step.
         half_fraction,
     }
+}
+
+/// What a member reports when a dispatch ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct Report<N> {
+    /// The curve before the last step.
+    pub before: Observed<N>,
+    /// The curve in the middle of the last adaptive step.
+    pub middle: Observed<N>,
+    /// The last accepted curve; only the excess is known before the first step.
+    pub now: Observed<N>,
+    /// Its time, its events.
+    pub progress: Progress<N>,
 }
 
 /// No such step.
@@ -114,7 +178,11 @@ pub struct Counters {
     pub status: u32,
     /// Accepted steps since the start.
     pub steps: u32,
-    /// Run until this many steps.
+    /// Refused adaptive steps since the start.
+    pub rejected: u32,
+    /// 1: the last adaptive step was refused.
+    pub refused: u32,
+    /// Run until this many steps; a member that pauses before sets it to its steps.
     pub goal: u32,
     /// 1: end the member when it is relaxed.
     pub stop_when_relaxed: u32,
@@ -126,19 +194,18 @@ pub struct Counters {
     pub sweeps_k: u32,
     /// Sweeps on position systems in this dispatch.
     pub sweeps_x: u32,
-    /// Where the kernel paused inside a step: 0 before or in the curvature solve, 1 after it. The CPU never pauses.
+    /// Where the kernel paused inside an attempt: twice the paper's steps that are done, one more after a curvature
+    /// solve. The CPU never pauses.
     pub phase: u32,
     /// Sweeps that the paused solve has made.
     pub solve_sweeps: u32,
 }
 
 impl Parameters<f64> {
-    /// The law of `flow` with step `tau`, the paper's ω = 1, redistribution and plain sweeps to 1e-5; no thresholds.
+    /// The law of `flow` with fixed steps `tau`, the paper's ω = 1, redistribution and plain sweeps to 1e-5; no pull
+    /// and no thresholds.
     pub fn of_flow(flow: &Flow, tau: f64) -> Parameters<f64> {
         let [c1, c2, c3, c4, c5, c6, c7, c8] = flow.coefficients();
-        let length_penalty = flow.length_penalty();
-        let (omega, redistribution, tolerance, sor) = (1.0, 1.0, 1e-5, 1.0);
-        let (polygon_ratio, relax_at, half_at) = (1.0, 0.0, 0.0);
         Parameters {
             c1,
             c2,
@@ -149,43 +216,80 @@ impl Parameters<f64> {
             c7,
             c8,
             tau,
-            omega,
-            redistribution,
-            tolerance,
-            sor,
-            length_penalty,
-            polygon_ratio,
-            relax_at,
-            half_at,
+            omega: 1.0,
+            redistribution: 1.0,
+            tolerance: 1e-5,
+            sor: 1.0,
+            length_penalty: flow.length_penalty(),
+            polygon_ratio: 1.0,
+            look_at: BIG,
+            time_unit: 1.0,
+            time_tick: 1.0,
+            ..Parameters::default()
+        }
+    }
+}
+
+impl<T: Real> Parameters<T> {
+    /// The same in another precision, rounded.
+    pub fn convert<U: Real>(&self) -> Parameters<U> {
+        Parameters::from_numbers(&convert(self.to_numbers()))
+    }
+}
+
+fn convert<T: Real, U: Real>(numbers: Vec<T>) -> Vec<U> {
+    numbers.into_iter().map(|v| U::of(v.to_f64())).collect()
+}
+
+impl<N: Number> Observed<N> {
+    /// What the sums and maxima of a curve say.
+    pub fn new(sums: &Sums<N>, maxima: &Maxima<N>, p: &Parameters<N>) -> Observed<N> {
+        Observed {
+            length: sums.length,
+            area: sums.area,
+            excess: observe::excess(sums, p),
+            energy: sums.energy,
+            k_min: -maxima.minus_k_min,
+            k_max: maxima.k_max,
+            mesh_ratio: maxima.longest / -maxima.minus_shortest,
+            metric_drift: maxima.drift,
         }
     }
 }
 
 impl<T: Real> Report<T> {
-    /// Takes what the sums and maxima of a curve say; the excess and the events are left alone.
-    pub fn observe(&mut self, sums: &Sums<T>, maxima: &Maxima<T>) {
-        self.length = sums.length;
-        self.area = sums.area;
-        self.energy = sums.energy;
-        self.k_min = -maxima.minus_k_min;
-        self.k_max = maxima.k_max;
-        self.mesh_ratio = maxima.longest / -maxima.minus_shortest;
-        self.metric_drift = maxima.drift;
-        self.turning = sums.turning;
+    /// All numbers in memory order.
+    pub fn to_numbers(&self) -> Vec<T> {
+        let Report { before, middle, now, progress } = self;
+        [before.to_numbers(), middle.to_numbers(), now.to_numbers(), progress.to_numbers()].concat()
     }
 
-    /// The same report in f64, exactly.
-    pub fn widened(&self) -> Report<f64> {
-        let numbers: Vec<f64> = self.to_numbers().into_iter().map(T::to_f64).collect();
-        Report::from_numbers(&numbers)
+    /// The inverse of [`Report::to_numbers`].
+    pub fn from_numbers(numbers: &[T]) -> Report<T> {
+        let observed = |j: usize| {
+            let fields = Observed::<T>::FIELDS.len();
+            Observed::from_numbers(&numbers[j * fields..(j + 1) * fields])
+        };
+        let progress = Progress::from_numbers(&numbers[3 * Observed::<T>::FIELDS.len()..]);
+        Report { before: observed(0), middle: observed(1), now: observed(2), progress }
+    }
+
+    /// How many numbers it is.
+    pub const LEN: usize = 3 * Observed::<T>::FIELDS.len() + Progress::<T>::FIELDS.len();
+
+    /// The same in another precision, rounded.
+    pub fn convert<U: Real>(&self) -> Report<U> {
+        Report::from_numbers(&convert(self.to_numbers()))
     }
 }
 
 impl Counters {
     /// Field names in memory order.
-    pub const FIELDS: [&'static str; 10] = [
+    pub const FIELDS: [&'static str; 12] = [
         "status",
         "steps",
+        "rejected",
+        "refused",
         "goal",
         "stop_when_relaxed",
         "relax_step",

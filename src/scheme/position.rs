@@ -5,22 +5,22 @@
 //! decay rates that do not converge (`docs/method.md`). `𝓒 = q_i/τ - (𝓐+𝓑+𝓓+𝓔)`, so the residual of the old
 //! state is `-Σ_j off_ij (x_j - x_i)`.
 
-use super::{Parameters, State, Workspace};
+use super::{Parameters, Curve, Workspace};
 use crate::{number::Number, solver::Row};
 
 /// Fills `work.position` from the old positions and the new lengths and curvatures.
-pub fn assemble<N: Number>(state: &State<N>, p: &Parameters<N>, work: &mut Workspace<N>) {
+pub fn assemble<N: Number>(old: &Curve<N>, p: &Parameters<N>, work: &mut Workspace<N>) {
     let rate = p.tau.recip();
-    for i in 0..state.len() {
-        let [_, _, r, rp, _] = work.r.window(i);
+    for i in 0..old.len() {
+        let [_, _, r, rp, _] = work.new.r.window(i);
         let q = (r + rp) * N::of(0.5);
-        let off = off_diagonals(p, work.k.window(i), work.ir.window(i), work.iq.window(i), work.alpha[i]);
+        let off = off_diagonals(p, work.new.k.window(i), work.ir.window(i), work.iq.window(i), work.alpha[i]);
         let [a, b, d, e] = off;
         let c = q * rate - (a + b + d + e);
         let (row, inverse) = Row::normalised(a, b, c, d, e, p.tau * work.iq[i]);
         work.position.rows[i] = row;
-        work.position.rhs[0][i] = residual(off, state.x.window(i)) * inverse;
-        work.position.rhs[1][i] = residual(off, state.y.window(i)) * inverse;
+        work.position.rhs[0][i] = residual(off, old.x.window(i)) * inverse;
+        work.position.rhs[1][i] = residual(off, old.y.window(i)) * inverse;
     }
 }
 

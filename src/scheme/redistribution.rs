@@ -8,36 +8,36 @@
 //! - `r_i ← r_i·exp(τ(-B + ω(M/r_i - 1)))`, eq. (3) for `η = ln r`; without redistribution α = 0 and
 //!   `r_i ← r_i·exp(-τ k_i β_i)`.
 
-use super::{Parameters, State, Workspace};
+use super::{Parameters, Curve, Workspace};
 use crate::number::{Mask, Number};
 
-/// Fills β, r·k·β, α and the new r (with 1/r and 1/q) of `work`; returns the length `L = Σr` of the old state.
-pub fn redistribute<N: Number>(state: &State<N>, p: &Parameters<N>, work: &mut Workspace<N>) -> N {
-    let n = state.len();
+/// Fills β, r·k·β, α and the new r (with 1/r and 1/q) of `work`; returns the length `L = Σr` of the old old.
+pub fn redistribute<N: Number>(old: &Curve<N>, p: &Parameters<N>, work: &mut Workspace<N>) -> N {
+    let n = old.len();
     for i in 0..n {
-        let beta = velocity(p, state.k.window(i), state.r.window(i));
+        let beta = velocity(p, old.k.window(i), old.r.window(i));
         work.beta[i] = beta;
-        work.rkb[i] = state.r[i] * state.k[i] * beta;
+        work.rkb[i] = old.r[i] * old.k[i] * beta;
     }
-    let length = work.blocks.sum(|i| state.r[i]);
+    let length = work.blocks.sum(|i| old.r[i]);
     let mean_rkb = work.blocks.sum(|i| work.rkb[i]) / length;
     let mean_length = length / N::of(n as f64);
     // Members side by side in lanes have it or not together.
     if N::of(0.5).le(p.redistribution).any() {
-        tangential_velocity(state, p, mean_rkb, mean_length, work);
+        tangential_velocity(old, p, mean_rkb, mean_length, work);
         for i in 0..n {
-            let r = state.r[i];
+            let r = old.r[i];
             let rate = p.omega * (mean_length / r - N::of(1.0)) - mean_rkb;
-            work.r[i] = r * (p.tau * rate).exp();
+            work.new.r[i] = r * (p.tau * rate).exp();
         }
     } else {
         for i in 0..n {
             work.alpha[i] = N::of(0.0);
-            work.r[i] = state.r[i] * (-(p.tau * (state.k[i] * work.beta[i]))).exp();
+            work.new.r[i] = old.r[i] * (-(p.tau * (old.k[i] * work.beta[i]))).exp();
         }
     }
     work.alpha.close();
-    work.r.close();
+    work.new.r.close();
     reciprocals(work);
     length
 }
@@ -52,14 +52,14 @@ fn velocity<N: Number>(p: &Parameters<N>, [_, km, k, kp, _]: [N; 5], [_, rm, r, 
 
 /// α by a running sum that restarts from the sum of whole blocks, as the kernel's prefix sum does.
 fn tangential_velocity<N: Number>(
-    state: &State<N>,
+    old: &Curve<N>,
     p: &Parameters<N>,
     mean_rkb: N,
     mean_length: N,
     work: &mut Workspace<N>,
 ) {
     let growth = |i: usize| {
-        let r = state.r[i];
+        let r = old.r[i];
         work.rkb[i] - r * mean_rkb + p.omega * (mean_length - r)
     };
     let mut before = N::of(0.0);
@@ -72,12 +72,12 @@ fn tangential_velocity<N: Number>(
         }
         before += part;
     }
-    work.alpha[state.len() - 1] = N::of(0.0);
+    work.alpha[old.len() - 1] = N::of(0.0);
 }
 
 fn reciprocals<N: Number>(work: &mut Workspace<N>) {
     for i in 0..work.blocks.n {
-        let [_, _, r, rp, _] = work.r.window(i);
+        let [_, _, r, rp, _] = work.new.r.window(i);
         work.ir[i] = r.recip();
         work.iq[i] = ((r + rp) * N::of(0.5)).recip();
     }

@@ -7,12 +7,14 @@ use crate::{
     solver::{Blocks, Ring, System},
 };
 
+/// Fields of a curve.
+pub const CURVE_FIELDS: usize = 4;
 /// Fields of a state, in the order of [`State::fields`].
-pub const STATE_FIELDS: usize = 7;
+pub const STATE_FIELDS: usize = 3 * CURVE_FIELDS + 3;
 
-/// A curve with `n` nodes and the increments of its last step.
+/// A polygon of `n` nodes with the scheme's own curvatures and lengths.
 #[derive(Clone, Debug, PartialEq)]
-pub struct State<N> {
+pub struct Curve<N> {
     /// Nodes, x coordinate.
     pub x: Ring<N>,
     /// Nodes, y coordinate.
@@ -21,19 +23,37 @@ pub struct State<N> {
     pub k: Ring<N>,
     /// Length of that segment, as the scheme evolves it.
     pub r: Ring<N>,
-    /// Last increment of k: where the next solve starts.
-    pub dk: Ring<N>,
-    /// Last increment of x.
-    pub dx: Ring<N>,
-    /// Last increment of y.
-    pub dy: Ring<N>,
 }
 
-impl<N: Number> State<N> {
-    /// A state of zeros, to be filled.
-    pub fn zeros(n: usize) -> State<N> {
+/// By how much a step changes k, x and y.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Increments<N> {
+    /// Of the curvatures.
+    pub k: Ring<N>,
+    /// Of the nodes, x coordinate.
+    pub x: Ring<N>,
+    /// Of the nodes, y coordinate.
+    pub y: Ring<N>,
+}
+
+/// A curve on its way: what a member is between two steps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State<N> {
+    /// The last accepted curve.
+    pub curve: Curve<N>,
+    /// Increments where the next solve starts: those of the last one, stretched to its step length.
+    pub increments: Increments<N>,
+    /// The curve in the middle of the last extrapolated step. During an attempt: the result of its whole step.
+    pub middle: Curve<N>,
+    /// The curve before the last step. During an attempt: the result of its first half step.
+    pub before: Curve<N>,
+}
+
+impl<N: Number> Curve<N> {
+    /// A curve of zeros, to be filled.
+    pub fn zeros(n: usize) -> Curve<N> {
         let ring = || Ring::zeros(n);
-        State { x: ring(), y: ring(), k: ring(), r: ring(), dk: ring(), dx: ring(), dy: ring() }
+        Curve { x: ring(), y: ring(), k: ring(), r: ring() }
     }
 
     /// Number of nodes.
@@ -47,18 +67,18 @@ impl<N: Number> State<N> {
     }
 }
 
-impl<T: Real> State<T> {
+impl<T: Real> Curve<T> {
     /// The nodes.
     pub fn positions(&self) -> impl Iterator<Item = DVec2> {
         self.x.nodes().iter().zip(self.y.nodes()).map(|(x, y)| DVec2::new(x.to_f64(), y.to_f64()))
     }
 
-    /// The initial state of the polygon `nodes` (n ≥ 6, counter-clockwise): `r_i = |R_i|` and
-    /// `k_i = angle(R_{i-1}, R_{i+1}) / 2r_i`, computed in f64 and rounded.
+    /// The initial curve through the polygon `nodes` (n ≥ 6): `r_i = |R_i|` and `k_i = angle(R_{i-1}, R_{i+1}) / 2r_i`,
+    /// computed in f64 and rounded.
     ///
     /// The angle is taken as the sum of the two vertex angles, so that a corner that turns by more than π over
     /// three segments keeps its sign.
-    pub fn from_nodes(nodes: &[DVec2]) -> State<T> {
+    pub fn from_nodes(nodes: &[DVec2]) -> Curve<T> {
         let n = nodes.len();
         let edge = |i: usize| nodes[i % n] - nodes[(i + n - 1) % n];
         let vertex_angle = |i: usize| {
@@ -66,27 +86,54 @@ impl<T: Real> State<T> {
             before.perp_dot(after).atan2(before.dot(after))
         };
         let ring = |value: &dyn Fn(usize) -> f64| Ring::from_nodes((0..n).map(|i| T::of(value(i))));
-        State {
+        Curve {
             x: ring(&|i| nodes[i].x),
             y: ring(&|i| nodes[i].y),
             k: ring(&|i| (vertex_angle(i + n - 1) + vertex_angle(i)) / (2.0 * edge(i).length())),
             r: ring(&|i| edge(i).length()),
-            ..State::zeros(n)
         }
     }
 
     /// The fields in the order in which the device stores them.
+    pub fn fields(&self) -> [&Ring<T>; CURVE_FIELDS] {
+        [&self.x, &self.y, &self.k, &self.r]
+    }
+}
+
+impl<N: Number> Increments<N> {
+    /// No change.
+    pub fn zeros(n: usize) -> Increments<N> {
+        Increments { k: Ring::zeros(n), x: Ring::zeros(n), y: Ring::zeros(n) }
+    }
+
+    /// Multiplies all by `factor`.
+    pub fn stretch(&mut self, factor: N) {
+        for ring in [&mut self.k, &mut self.x, &mut self.y] {
+            for i in 0..ring.len() {
+                ring[i] = ring[i] * factor;
+            }
+            ring.close();
+        }
+    }
+}
+
+impl<T: Real> State<T> {
+    /// The state before the first step.
+    pub fn from_nodes(nodes: &[DVec2]) -> State<T> {
+        let curve = Curve::from_nodes(nodes);
+        State { middle: curve.clone(), before: curve.clone(), increments: Increments::zeros(nodes.len()), curve }
+    }
+
+    /// The fields in the order in which the device stores them.
     pub fn fields(&self) -> [&Ring<T>; STATE_FIELDS] {
-        [&self.x, &self.y, &self.k, &self.r, &self.dk, &self.dx, &self.dy]
+        let Increments { k, x, y } = &self.increments;
+        let [a, b, c, d] = self.curve.fields();
+        let [e, f, g, h] = self.middle.fields();
+        let [l, m, n, o] = self.before.fields();
+        [a, b, c, d, k, x, y, e, f, g, h, l, m, n, o]
     }
 
-    /// The same state in f64, exactly.
-    pub fn widened(&self) -> State<f64> {
-        let numbers: Vec<f64> = self.to_numbers().into_iter().map(T::to_f64).collect();
-        State::from_numbers(&numbers)
-    }
-
-    /// All fields one after another, `7n` numbers.
+    /// All fields one after another, `15n` numbers.
     pub fn to_numbers(&self) -> Vec<T> {
         self.fields().into_iter().flat_map(|field| field.nodes().iter().copied()).collect()
     }
@@ -95,39 +142,39 @@ impl<T: Real> State<T> {
     pub fn from_numbers(numbers: &[T]) -> State<T> {
         let n = numbers.len() / STATE_FIELDS;
         let field = |f: usize| Ring::from_nodes(numbers[f * n..(f + 1) * n].iter().copied());
-        State { x: field(0), y: field(1), k: field(2), r: field(3), dk: field(4), dx: field(5), dy: field(6) }
+        let curve = |f: usize| Curve { x: field(f), y: field(f + 1), k: field(f + 2), r: field(f + 3) };
+        State {
+            curve: curve(0),
+            increments: Increments { k: field(4), x: field(5), y: field(6) },
+            middle: curve(7),
+            before: curve(11),
+        }
+    }
+
+    /// The same state in another precision, rounded to the nearest numbers.
+    pub fn convert<U: Real>(&self) -> State<U> {
+        let numbers: Vec<U> = self.to_numbers().into_iter().map(|v| U::of(v.to_f64())).collect();
+        State::from_numbers(&numbers)
     }
 }
 
-/// What a step computes on the way from the old state to the new one.
+/// What a step computes on the way from the old curve to the new one.
 #[derive(Clone, Debug)]
 pub struct Workspace<N> {
     /// The cut of the ring.
     pub blocks: Blocks,
-    /// Normal velocity β of the old state.
+    /// Normal velocity β of the old curve.
     pub beta: Vec<N>,
-    /// `r·k·β` of the old state.
+    /// `r·k·β` of the old curve.
     pub rkb: Vec<N>,
     /// Tangential velocity α at the nodes.
     pub alpha: Ring<N>,
-    /// New lengths.
-    pub r: Ring<N>,
-    /// New curvatures.
-    pub k: Ring<N>,
-    /// New positions.
-    pub x: Ring<N>,
-    /// New positions.
-    pub y: Ring<N>,
+    /// The new curve.
+    pub new: Curve<N>,
     /// 1/r of the new lengths.
     pub ir: Ring<N>,
     /// 1/q of the new lengths.
     pub iq: Ring<N>,
-    /// Increments, as solved.
-    pub dk: Ring<N>,
-    /// Increments, as solved.
-    pub dx: Ring<N>,
-    /// Increments, as solved.
-    pub dy: Ring<N>,
     /// Curvature system.
     pub curvature: System<N, 1>,
     /// Position system.
@@ -144,15 +191,9 @@ impl<N: Number> Workspace<N> {
             beta: vec![N::default(); n],
             rkb: vec![N::default(); n],
             alpha: ring(),
-            r: ring(),
-            k: ring(),
-            x: ring(),
-            y: ring(),
+            new: Curve::zeros(n),
             ir: ring(),
             iq: ring(),
-            dk: ring(),
-            dx: ring(),
-            dy: ring(),
             curvature: System::zeros(n),
             position: System::zeros(n),
         }

@@ -1,6 +1,6 @@
-//! One step of the paper's scheme, from an old state to the new one in the workspace. Twin of `shaders/step.wgsl`.
+//! One step of the paper's scheme, from an old curve to the new one in the workspace. Twin of `shaders/step.wgsl`.
 
-use super::{Parameters, State, Workspace, curvature, position, redistribution};
+use super::{Curve, Increments, Parameters, Workspace, curvature, position, pull, redistribution};
 use crate::{
     number::{Mask, Number},
     solver::{Order, Ring, Solver, System, direct, gauss_seidel},
@@ -33,23 +33,30 @@ pub struct Stepped<N: Number> {
 /// Share of the rounding error of an unknown below which an error of its increment is not worth a sweep.
 pub const NEGLIGIBLE: f64 = 0.1;
 
-/// Computes the new state into `work`; `state` stays as it is, so a step can be refused.
-pub fn step<N: Number>(state: &State<N>, p: &Parameters<N>, method: &Method, work: &mut Workspace<N>) -> Stepped<N> {
-    let length = redistribution::redistribute(state, p, work);
+/// Computes the curve a time `p.tau` after `old` into `work.new`; `increments` is where the solves start, and the result.
+pub fn step<N: Number>(
+    old: &Curve<N>,
+    increments: &mut Increments<N>,
+    p: &Parameters<N>,
+    method: &Method,
+    work: &mut Workspace<N>,
+) -> Stepped<N> {
+    let length = redistribution::redistribute(old, p, work);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
     let rounding = N::of(NEGLIGIBLE * N::EPSILON);
-
-    curvature::assemble(state, p, work);
     let blocks = work.blocks;
-    let for_k = solve(&work.curvature, [(&state.dk, &mut work.dk)], blocks, p, method, rounding / radius);
-    add(&state.k, &work.dk, &mut work.k);
 
-    position::assemble(state, p, work);
-    let unknowns = [(&state.dx, &mut work.dx), (&state.dy, &mut work.dy)];
+    curvature::assemble(old, p, work);
+    let for_k = solve(&work.curvature, [&mut increments.k], blocks, p, method, rounding / radius);
+    add(&old.k, &increments.k, &mut work.new.k);
+
+    position::assemble(old, p, work);
+    let unknowns = [&mut increments.x, &mut increments.y];
     let for_x = solve(&work.position, unknowns, blocks, p, method, rounding * radius);
-    add(&state.x, &work.dx, &mut work.x);
-    add(&state.y, &work.dy, &mut work.y);
+    add(&old.x, &increments.x, &mut work.new.x);
+    add(&old.y, &increments.y, &mut work.new.y);
+    pull::pull(&mut work.new, p);
 
     // What the second solve did counts only where the first one succeeded.
     Stepped {
@@ -60,30 +67,15 @@ pub fn step<N: Number>(state: &State<N>, p: &Parameters<N>, method: &Method, wor
     }
 }
 
-/// Takes the state that `step` computed.
-pub fn accept<N: Number>(state: &mut State<N>, work: &mut Workspace<N>) {
-    std::mem::swap(&mut state.x, &mut work.x);
-    std::mem::swap(&mut state.y, &mut work.y);
-    std::mem::swap(&mut state.k, &mut work.k);
-    std::mem::swap(&mut state.r, &mut work.r);
-    std::mem::swap(&mut state.dk, &mut work.dk);
-    std::mem::swap(&mut state.dx, &mut work.dx);
-    std::mem::swap(&mut state.dy, &mut work.dy);
-}
-
-/// Solves for the increments, sweeps starting from the previous step's.
+/// Solves for the increments, sweeps starting from where they are.
 fn solve<N: Number, const F: usize>(
     system: &System<N, F>,
-    unknowns: [(&Ring<N>, &mut Ring<N>); F],
+    unknowns: [&mut Ring<N>; F],
     blocks: crate::solver::Blocks,
     p: &Parameters<N>,
     method: &Method,
     negligible: N,
 ) -> gauss_seidel::Swept<N> {
-    let started = unknowns.map(|(previous, unknown)| {
-        unknown.clone_from(previous);
-        unknown
-    });
     match method.solver {
         Solver::GaussSeidel => {
             let control = gauss_seidel::Control {
@@ -93,12 +85,11 @@ fn solve<N: Number, const F: usize>(
                 max_sweeps: method.max_sweeps,
                 order: method.order,
             };
-            gauss_seidel::solve(system, started, blocks, &control)
+            gauss_seidel::solve(system, unknowns, blocks, &control)
         }
         Solver::Direct => {
-            direct::solve(system, started);
-            let yes = N::Mask::all_of(true);
-            gauss_seidel::Swept { sweeps: N::of(0.0), converged: yes, finite: yes }
+            let finite = direct::solve(system, unknowns);
+            gauss_seidel::Swept { sweeps: N::of(0.0), converged: finite, finite }
         }
     }
 }

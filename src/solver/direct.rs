@@ -6,7 +6,7 @@
 //! elimination without pivoting is stable. O(n), no branch on the values.
 
 use super::{ring::Ring, system::System};
-use crate::number::Number;
+use crate::number::{BIG, Number};
 
 /// A row of the triangular factor: `z_i + d·z_{i+1} + e·z_{i+2} = g`, `g` for the right-hand sides and the two
 /// border columns.
@@ -18,12 +18,13 @@ struct Eliminated<N, const F: usize> {
     border: [N; 2],
 }
 
-/// Writes the solution of `system` (n ≥ 6 rows) to `unknown`, one ring per right-hand side.
-pub fn solve<N: Number, const F: usize>(system: &System<N, F>, unknown: [&mut Ring<N>; F]) {
+/// Writes the solution of `system` (n ≥ 6 rows) to `unknown`, one ring per right-hand side; says whether it is finite.
+pub fn solve<N: Number, const F: usize>(system: &System<N, F>, unknown: [&mut Ring<N>; F]) -> N::Mask {
     let core = system.rows.len() - 2;
     let upper = eliminate(system, core);
     let solved = substitute_back(&upper);
     let last = border_unknowns(system, &solved);
+    let mut largest = N::of(0.0);
     for (f, u) in unknown.into_iter().enumerate() {
         for (i, row) in solved.iter().enumerate() {
             u[i] = row.g[f] - row.border[0] * last[f][0] - row.border[1] * last[f][1];
@@ -31,7 +32,11 @@ pub fn solve<N: Number, const F: usize>(system: &System<N, F>, unknown: [&mut Ri
         u[core] = last[f][0];
         u[core + 1] = last[f][1];
         u.close();
+        for i in 0..u.len() {
+            largest = largest.max(u[i].bounded_abs());
+        }
     }
+    largest.le(N::of(BIG))
 }
 
 /// The border column entries of core row `i`: what multiplies the last two unknowns.
@@ -131,7 +136,7 @@ mod tests {
                 let system = test_system(n, stiffness);
                 let mut u = [Ring::zeros(n), Ring::zeros(n)];
                 let [x, y] = &mut u;
-                solve(&system, [x, y]);
+                assert!(solve(&system, [x, y]));
                 for f in 0..2 {
                     let size = u[f].nodes().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
                     let worst = (0..n).map(|i| system.residual(f, i, &u[f]).abs()).fold(0.0, f64::max);

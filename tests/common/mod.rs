@@ -9,7 +9,7 @@ use curvelax::{
     number::Real,
     scheme::{
         Parameters, State, Workspace,
-        observe::{self, Curve, Sums},
+        observe::{self, Sums},
         step::{self, Method},
     },
     solver::{Blocks, Order, Solver},
@@ -44,11 +44,10 @@ pub struct Stepper<T: Real> {
 
 impl<T: Real> Stepper<T> {
     pub fn new(nodes: &[DVec2], p: &Parameters<f64>, method: Method) -> Stepper<T> {
-        let numbers: Vec<T> = p.to_numbers().into_iter().map(T::of).collect();
         Stepper {
             state: State::from_nodes(nodes),
             work: Workspace::new(Blocks::new(nodes.len()).unwrap()),
-            p: Parameters::from_numbers(&numbers),
+            p: p.convert(),
             method,
         }
     }
@@ -56,9 +55,15 @@ impl<T: Real> Stepper<T> {
     /// One step, which must succeed.
     #[track_caller]
     pub fn step(&mut self) {
-        let stepped = step::step(&self.state, &self.p, &self.method, &mut self.work);
+        let stepped = step::step(
+            &self.state.curve,
+            &mut self.state.increments,
+            &self.p,
+            &self.method,
+            &mut self.work,
+        );
         assert!(stepped.solved && stepped.finite, "a system was not solved");
-        step::accept(&mut self.state, &mut self.work);
+        std::mem::swap(&mut self.state.curve, &mut self.work.new);
     }
 
     #[track_caller]
@@ -68,12 +73,11 @@ impl<T: Real> Stepper<T> {
     }
 
     pub fn sums(&self) -> Sums<T> {
-        let State { x, y, k, r, .. } = &self.state;
-        observe::sums(Curve { x, y, k, r }, &self.p, self.work.blocks)
+        observe::sums(&self.state.curve, &self.p, self.work.blocks)
     }
 
     pub fn positions(&self) -> Vec<DVec2> {
-        self.state.positions().collect()
+        self.state.curve.positions().collect()
     }
 }
 

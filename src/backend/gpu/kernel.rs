@@ -15,7 +15,7 @@ use crate::{
     number::Real,
     scheme::{
         Parameters, State,
-        evolve::{Launch, Run},
+        evolve::Run,
         parameters::{Counters, Report},
         state::STATE_FIELDS,
     },
@@ -63,10 +63,11 @@ impl Budget {
         if gpu.is_hardware() {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
-        // A sweep is one iteration; a look at the residual walks over all blocks, and a step does so ten times.
+        // A sweep is one iteration; a look at the residual walks over all blocks, and an adaptive step, which is three of
+        // the paper's, does so some forty times.
         let walk = blocks.count() as u32 + 1;
         let sweeps = SOFTWARE_ITERATIONS / 2 * SWEEPS_PER_CHECK / (SWEEPS_PER_CHECK + walk);
-        Budget { steps: (SOFTWARE_ITERATIONS / 2 / (10 * walk)).max(1), sweeps: sweeps.max(SWEEPS_PER_CHECK) }
+        Budget { steps: (SOFTWARE_ITERATIONS / 2 / (40 * walk)).max(1), sweeps: sweeps.max(SWEEPS_PER_CHECK) }
     }
 }
 
@@ -161,6 +162,11 @@ impl<T: Real> Kernel<T> {
         Ok(numbers.into_iter().map(T::to_f64).collect())
     }
 
+    fn set_parameters<U: Real>(&mut self, slot: usize, parameters: &Parameters<U>) {
+        let fields = Parameters::<T>::FIELDS.len();
+        self.parameters[slot * fields..(slot + 1) * fields].copy_from_slice(&parameters.convert::<T>().to_numbers());
+    }
+
     fn upload(&mut self) {
         let Budget { steps, sweeps } = self.budget;
         let asked = Dispatch { steps, max_sweeps: self.max_sweeps, sweeps };
@@ -229,7 +235,8 @@ impl<T: Real> Kernel<T> {
     fn check_progress(&self, before: &[Counters]) -> Result<()> {
         let stuck = before.iter().zip(&self.counters).position(|(old, new)| {
             let due = old.status == 0 && old.steps < old.goal;
-            due && (old.status, old.steps, old.solve_sweeps) == (new.status, new.steps, new.solve_sweeps)
+            let position = |c: &Counters| (c.status, c.steps, c.rejected, c.phase, c.solve_sweeps);
+            due && position(old) == position(new)
                 && new.sweeps_k + new.sweeps_x == 0
         });
         match stuck {
@@ -258,23 +265,20 @@ impl<T: Real> Backend for Kernel<T> {
         self.counters.len()
     }
 
-    fn load(&mut self, slot: usize, launch: &Launch) -> Result<()> {
-        let run = Run::<T>::new(launch);
+    fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
+        let run: Run<T> = run.convert();
         let numbers = run.state.to_numbers();
         let offset = slot * numbers.len() * size_of::<T>();
         self.gpu.queue.write_buffer(&self.buffers.states, offset as u64, bytemuck::cast_slice(&numbers));
-        let fields = Parameters::<T>::FIELDS.len();
-        self.parameters[slot * fields..(slot + 1) * fields].copy_from_slice(&run.parameters.to_numbers());
+        self.set_parameters(slot, &run.parameters);
         self.counters[slot] = run.counters;
         self.reports[slot] = run.report;
         self.changed = true;
         self.gpu.check()
     }
 
-    fn aim(&mut self, slot: usize, goal: u32, tau: f64) {
-        let fields = Parameters::<T>::FIELDS.len();
-        let at = std::mem::offset_of!(Parameters<T>, tau) / size_of::<T>();
-        self.parameters[slot * fields + at] = T::of(tau);
+    fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>) {
+        self.set_parameters(slot, parameters);
         self.counters[slot].goal = goal;
         self.changed = true;
     }
@@ -297,7 +301,7 @@ impl<T: Real> Backend for Kernel<T> {
         let before = std::mem::replace(&mut self.counters, bytemuck::pod_collect_to_vec(counters));
         self.check_progress(&before)?;
         let numbers: Vec<T> = bytemuck::pod_collect_to_vec(reports);
-        self.reports = numbers.chunks_exact(Report::<T>::FIELDS.len()).map(Report::from_numbers).collect();
+        self.reports = numbers.chunks_exact(Report::<T>::LEN).map(Report::from_numbers).collect();
         Ok(())
     }
 
@@ -306,14 +310,14 @@ impl<T: Real> Backend for Kernel<T> {
     }
 
     fn report(&self, slot: usize) -> Report<f64> {
-        self.reports[slot].widened()
+        self.reports[slot].convert()
     }
 
     fn state(&mut self, slot: usize) -> Result<State<f64>> {
         let bytes = (STATE_FIELDS * self.blocks.n * size_of::<T>()) as u64;
         let states = self.buffers.states.clone();
         let numbers = self.read(&states, slot as u64 * bytes, bytes)?;
-        Ok(State::from_numbers(&numbers).widened())
+        Ok(State::from_numbers(&numbers).convert())
     }
 }
 
@@ -355,7 +359,7 @@ impl Buffers {
         };
         let storage = wgpu::BufferUsages::STORAGE;
         let counters = slots * size_of::<Counters>();
-        let reports = slots * Report::<f64>::FIELDS.len() * number;
+        let reports = slots * Report::<f64>::LEN * number;
         Buffers {
             dispatch: buffer("dispatch", size_of::<Dispatch>(), wgpu::BufferUsages::UNIFORM),
             parameters: buffer("parameters", slots * Parameters::<f64>::FIELDS.len() * number, storage),

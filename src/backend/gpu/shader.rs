@@ -43,7 +43,7 @@ impl Variant {
     }
 }
 
-const COMMON: [Part; 11] = parts![
+const COMMON: [Part; 14] = parts![
     "number.wgsl",
     "ring.wgsl",
     "member.wgsl",
@@ -52,8 +52,11 @@ const COMMON: [Part; 11] = parts![
     "system.wgsl",
     "curvature.wgsl",
     "position.wgsl",
+    "pull.wgsl",
     "observe.wgsl",
     "step.wgsl",
+    "pace.wgsl",
+    "extrapolation.wgsl",
     "evolve.wgsl",
 ];
 const GAUSS_SEIDEL: [Part; 1] = parts!["gauss_seidel.wgsl"];

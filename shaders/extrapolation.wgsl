@@ -1,0 +1,76 @@
+// The adaptive step: one step of the paper's scheme against two half ones. Twin of src/scheme/extrapolation.rs.
+
+/// Makes what is left of an attempt of length h: the whole step into MIDDLE, the first half into BEFORE, the second one
+/// into the registers of the new curve. Returns how the last solve ended.
+fn attempt(h: real) -> u32 {
+    for (var part = uniform_decision(counters.phase / 2u); part < 3u; part++) {
+        p.tau = select(real(0.5) * h, h, part == 0u);
+        load_curve(select(CURVE, BEFORE, part == 2u));
+        let ended = step();
+        if ended != SOLVED { return ended; }
+        if part == 0u {
+            store_fields(MIDDLE, here(new_x), here(new_y), new_k, new_r);
+            stretch(0.5);
+        }
+        if part == 1u { store_fields(BEFORE, here(new_x), here(new_y), new_k, new_r); }
+    }
+    return SOLVED;
+}
+
+/// Multiplies the increments by `factor`.
+fn stretch(factor: real) {
+    dk = dk * factor;
+    dx = dx * factor;
+    dy = dy * factor;
+}
+
+/// How far apart the whole step and the two half steps are.
+fn error_of_attempt() -> real {
+    storageBarrier();
+    let gap_k = bounded_abs(new_k - load_field(MIDDLE + 2u));
+    let gap_r = bounded_abs(new_r / load_field(MIDDLE + 3u) - vec(1.0));
+    let m = ring_maxima(vec(block_max(gap_k), block_max(gap_r), block_max_signed(new_k), block_max_signed(-new_k)));
+    let size = max(m.z, m.w);
+    let spread = min(m.z + m.w, size);
+    let scale = select(sqrt(size * spread), size, report.now.excess <= p.follow_to);
+    return max(bounded_abs(vec(m.x / scale)).x, m.y);
+}
+
+/// Puts the extrapolated curve into the registers of the new curve and the one in the middle of the step into MIDDLE.
+fn extrapolate() {
+    let gap_x = here(new_x) - load_field(MIDDLE);
+    let gap_y = here(new_y) - load_field(MIDDLE + 1u);
+    let gap_k = new_k - load_field(MIDDLE + 2u);
+    let whole_r = load_field(MIDDLE + 3u);
+    let gap_r = new_r - whole_r;
+    let middle_x = load_field(BEFORE) + real(0.5) * gap_x;
+    let middle_y = load_field(BEFORE + 1u) + real(0.5) * gap_y;
+    let middle_k = load_field(BEFORE + 2u) + real(0.5) * gap_k;
+    let middle_r = load_field(BEFORE + 3u) + real(0.5) * gap_r;
+    storageBarrier();
+    store_fields(MIDDLE, middle_x, middle_y, middle_k, middle_r);
+    new_k = new_k + gap_k;
+    new_r = new_r * new_r / whole_r;
+    share(here(new_x) + gap_x, here(new_y) + gap_y);
+    new_x = read_a();
+    new_y = read_b();
+}
+
+/// What the curve in the middle of the step is like; it has been extrapolated.
+fn observe_middle() -> Observed {
+    storageBarrier();
+    share(load_field(MIDDLE), load_field(MIDDLE + 1u));
+    observe(read_a(), read_b(), load_field(MIDDLE + 2u), load_field(MIDDLE + 3u), vec(0.0));
+    return observed();
+}
+
+/// Where in the step a quantity that goes from `start` over `middle` to `end` first falls to `at`, as a fraction.
+fn crossing(start: real, middle: real, end: real, at: real) -> real {
+    let above = start - at;
+    let slope = real(4.0) * middle - real(3.0) * start - end;
+    let bend = real(2.0) * (start - real(2.0) * middle + end);
+    let discriminant = slope * slope - real(4.0) * bend * above;
+    let root = real(2.0) * above / (sqrt(max(discriminant, real(0.0))) - slope);
+    let straight = above / (start - end);
+    return select(straight, root, real(0.0) <= discriminant && real(0.0) <= root && root <= real(1.0));
+}

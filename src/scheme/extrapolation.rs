@@ -1,0 +1,122 @@
+//! The adaptive step: one step of the paper's scheme against two half ones. Twin of `shaders/extrapolation.wgsl`.
+//!
+//! With A the result of one step of length h and B that of two steps of h/2, the scheme of first order makes errors
+//! `c h²` and `c h²/2`. So `A - B` measures the error, `2B - A` is of second order, and so is, in the middle,
+//! `B₁ + (B - A)/2` with B₁ the first half step. Every part is the paper's step; the lengths, which are positive, are
+//! extrapolated as `r_B²/r_A`.
+
+use super::{
+    Curve, Parameters, Workspace,
+    evolve::Run,
+    step::{self, Method, Stepped},
+};
+use crate::number::Real;
+
+/// Makes the three steps of an attempt of length `h`: the whole one into `state.middle`, the first half into
+/// `state.before`, the second half into `work.new`.
+///
+/// Stops at the first one that fails.
+pub fn attempt<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T>, h: T) -> Stepped<T> {
+    let half = T::of(0.5) * h;
+    let state = &mut run.state;
+    let mut of = |tau: T, curve: &Curve<T>, increments: &mut _, work: &mut Workspace<T>| {
+        run.parameters.tau = tau;
+        let stepped = step::step(curve, increments, &run.parameters, method, work);
+        run.counters.sweeps_k = run.counters.sweeps_k.saturating_add(stepped.sweeps_k.to_f64() as u32);
+        run.counters.sweeps_x = run.counters.sweeps_x.saturating_add(stepped.sweeps_x.to_f64() as u32);
+        stepped
+    };
+    let whole = of(h, &state.curve, &mut state.increments, work);
+    if !(whole.finite && whole.solved) {
+        return whole;
+    }
+    std::mem::swap(&mut state.middle, &mut work.new);
+    state.increments.stretch(T::of(0.5));
+    let first = of(half, &state.curve, &mut state.increments, work);
+    if !(first.finite && first.solved) {
+        return first;
+    }
+    std::mem::swap(&mut state.before, &mut work.new);
+    of(half, &state.before, &mut state.increments, work)
+}
+
+/// How far apart the whole step and the two half steps are: of k, and of ln r.
+///
+/// The gap in k is taken relative to the largest |k|. While the shape is followed, that is as long as the excess is
+/// not negligible, it is taken relative to the geometric mean of the largest |k| and the spread of k: a curve close to
+/// a circle must not lose its modes in a tolerance that is measured by the circle.
+pub fn error<T: Real>(whole: &Curve<T>, halves: &Curve<T>, followed: bool) -> T {
+    let low = T::of(-2.0 * crate::number::BIG);
+    let (mut gap_k, mut gap_r, mut k_max, mut minus_k_min) = (T::of(0.0), T::of(0.0), low, low);
+    for i in 0..whole.len() {
+        gap_k = gap_k.max((halves.k[i] - whole.k[i]).bounded_abs());
+        gap_r = gap_r.max((halves.r[i] / whole.r[i] - T::of(1.0)).bounded_abs());
+        k_max = k_max.max(halves.k[i]);
+        minus_k_min = minus_k_min.max(-halves.k[i]);
+    }
+    let size = k_max.max(minus_k_min);
+    let spread = (k_max + minus_k_min).min(size);
+    let scale = if followed { (size * spread).sqrt() } else { size };
+    (gap_k / scale).bounded_abs().max(gap_r)
+}
+
+/// Puts the extrapolated curve into `halves` and the one in the middle of the step into `whole`.
+pub fn extrapolate<T: Real>(whole: &mut Curve<T>, first: &Curve<T>, halves: &mut Curve<T>) {
+    let half = T::of(0.5);
+    for i in 0..whole.len() {
+        let one = |a: &mut T, b1: T, b: &mut T| {
+            let gap = *b - *a;
+            *a = b1 + half * gap;
+            *b += gap;
+        };
+        one(&mut whole.x[i], first.x[i], &mut halves.x[i]);
+        one(&mut whole.y[i], first.y[i], &mut halves.y[i]);
+        one(&mut whole.k[i], first.k[i], &mut halves.k[i]);
+        let (a, b) = (whole.r[i], halves.r[i]);
+        whole.r[i] = first.r[i] + half * (b - a);
+        halves.r[i] = b * b / a;
+    }
+    for curve in [whole, halves] {
+        curve.x.close();
+        curve.y.close();
+        curve.k.close();
+        curve.r.close();
+    }
+}
+
+/// Where in a step a quantity that goes from `start` over `middle` to `end` first falls to `target`, as a fraction of
+/// the step; `start > target >= end`.
+pub fn crossing<T: Real>(start: T, middle: T, end: T, target: T) -> T {
+    let (zero, two, four) = (T::of(0.0), T::of(2.0), T::of(4.0));
+    // The parabola through the three: above + slope θ + bend θ².
+    let above = start - target;
+    let slope = four * middle - T::of(3.0) * start - end;
+    let bend = two * (start - two * middle + end);
+    let discriminant = slope * slope - four * bend * above;
+    let root = two * above / (discriminant.max(zero).sqrt() - slope);
+    let straight = above / (start - end);
+    let inside = zero.le(discriminant) && zero.le(root) && root.le(T::of(1.0));
+    if inside { root } else { straight }
+}
+
+/// Whether the step so far still follows the shape: the excess is above the negligible.
+pub fn follows<T: Real>(excess: T, p: &Parameters<T>) -> bool {
+    !excess.le(p.follow_to)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_s_crossing_is_found_and_a_wild_one_falls_back_to_a_straight_line() {
+        let decay = |t: f64| (-0.5 * t).exp();
+        let at = crossing(1.0, decay(0.5), decay(1.0), decay(0.3));
+        assert!((at - 0.3).abs() < 2e-3, "{at}");
+        assert_eq!(crossing(1.0, 0.75, 0.5, 0.5), 1.0);
+        assert_eq!(crossing(2.0, 1.5, 1.0, 1.25), 0.75);
+        let wild = crossing(1.0, 9.0, 0.0, 0.5);
+        assert!((0.0..=1.0).contains(&wild), "{wild}");
+        assert_eq!(crossing(1.0, f64::NAN, 0.0, 0.5), 0.5);
+    }
+}

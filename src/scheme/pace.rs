@@ -1,0 +1,77 @@
+//! Adaptive time: the length of the next step, and a clock that loses nothing. Twin of `shaders/pace.wgsl`.
+//!
+//! A time is the sum of a high and a low part, both multiples of powers of two: the high part of `time_unit`, the low
+//! part, below `time_unit`, of `time_tick`. Steps are rounded down to multiples of `time_tick`, so both additions are
+//! exact in every precision, however many and however small the steps are. Nothing here relies on the order in which
+//! a compiler adds.
+
+use super::{Parameters, parameters::Progress};
+use crate::number::Real;
+
+/// Share of the step predicted to meet the tolerance that is taken.
+pub const SAFETY: f64 = 0.95;
+/// A step is at most this many times the one before,
+pub const MOST_GROWTH: f64 = 4.0;
+/// and at least this fraction of it; after a failure exactly this fraction.
+pub const LEAST_GROWTH: f64 = 0.25;
+/// A step below this many times `(L/n)⁴`, far below all time scales of a curve that n nodes resolve, ends the member.
+pub const LEAST_STEP: f64 = 1e-12;
+
+/// A step to be attempted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stride<T> {
+    /// Its length.
+    pub length: T,
+    /// Its high part.
+    pub high: T,
+    /// Its low part.
+    pub low: T,
+    /// It reaches the final time.
+    pub last: bool,
+}
+
+/// The next step: as long as asked for, or half of what is left or all of it.
+pub fn stride<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> Stride<T> {
+    let left = (p.end_high - progress.time_high) + (p.end_low - progress.time_low);
+    if left.le(progress.next) {
+        return Stride { length: left, high: T::of(0.0), low: T::of(0.0), last: true };
+    }
+    let half = T::of(0.5) * left;
+    let wanted = if half.le(progress.next) { half } else { progress.next };
+    let high = (wanted / p.time_unit).floor() * p.time_unit;
+    let low = ((wanted - high) / p.time_tick).floor() * p.time_tick;
+    Stride { length: high + low, high, low, last: false }
+}
+
+/// Moves the clock on by `stride`.
+pub fn pass<T: Real>(progress: &mut Progress<T>, stride: Stride<T>, p: &Parameters<T>) {
+    progress.taken = stride.length;
+    if stride.last {
+        (progress.time_high, progress.time_low) = (p.end_high, p.end_low);
+        return;
+    }
+    progress.time_high += stride.high;
+    progress.time_low += stride.low;
+    if p.time_unit.le(progress.time_low) {
+        progress.time_low += -p.time_unit;
+        progress.time_high += p.time_unit;
+    }
+}
+
+/// Whether the clock has reached the goal.
+pub fn at_goal<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> bool {
+    ((p.goal_high - progress.time_high) + (p.goal_low - progress.time_low)).le(T::of(0.0))
+}
+
+/// The step after one of `length` whose error was `error`; the error goes with the square of the length.
+pub fn next_length<T: Real>(length: T, error: T, most_growth: f64, p: &Parameters<T>) -> T {
+    // An error of nothing allows any growth.
+    let growth = T::of(SAFETY) * (p.adaptive / error.max(T::of(1e-6) * p.adaptive)).sqrt();
+    length * growth.max(T::of(LEAST_GROWTH)).min(T::of(most_growth))
+}
+
+/// The shortest step that is tried.
+pub fn least_step<T: Real>(length: T, n: T, p: &Parameters<T>) -> T {
+    let edge = length / n;
+    (T::of(LEAST_STEP) * (edge * edge) * (edge * edge)).max(p.time_tick)
+}
