@@ -16,10 +16,10 @@ use crate::{
 };
 
 const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
-const SOLVERS: &[&str] = &["gauss-seidel", "direct"];
+pub(super) const SOLVERS: &[&str] = &["gauss-seidel", "direct"];
 const ORDERS: &[&str] = &["coloured", "lexicographic"];
-const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
-const PRECISIONS: &[&str] = &["f32", "f64"];
+pub(super) const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
+pub(super) const PRECISIONS: &[&str] = &["f32", "f64"];
 
 /// One flag for each key of [`Spec`], none given unless the user gave it.
 ///
@@ -163,8 +163,8 @@ pub struct SpecFlags {
 
 const ENSEMBLE: &str = "Ensemble";
 const EVOLUTION: &str = "Evolution";
-const METHOD: &str = "Method";
-const MACHINE: &str = "Machine";
+pub(super) const METHOD: &str = "Method";
+pub(super) const MACHINE: &str = "Machine";
 /// Heading of the flags that say what is written and where.
 pub const OUTPUT: &str = "Output";
 
@@ -201,7 +201,7 @@ fn text<T: TryFrom<String, Error = String>>(text: &str) -> Result<T, String> {
 }
 
 /// One of `names`, with clap's listing and suggestions, read as the spec file is.
-fn word<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+pub(super) fn word<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
 where
     T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
 {
