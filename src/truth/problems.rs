@@ -211,7 +211,7 @@ fn modes(m: u32) -> Vec<Problem> {
             mistake,
             // The step is implicit: it misses half a step's worth of the decay, and the fourth differences miss O(m²h²).
             bound: Bound { space: 2.5e-3 + 8.7e-4 * m2, time: 6e-3, single: 4e-3 },
-            n: [66, 132, 198][(m as usize - 1) / 2],
+            n: if m < 4 { 66 } else { 198 },
             steps: 100,
         }
     };
