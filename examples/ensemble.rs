@@ -28,7 +28,7 @@ fn main() -> curvelax::Result<()> {
     let family = Family::new(&spec)?;
 
     let choice = backend::choose(&spec, family.points())?;
-    println!("{}", choice.sentence());
+    println!("{}", choice.sentence(&spec));
     let precision = choice.precision();
     let (mut backend, _) = choice.open(&spec, family.points())?;
 

@@ -26,7 +26,7 @@ fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
             if advance() != GO_ON { break; }
         }
         storageBarrier();
-        if p.adaptive <= real(0.0) { store_curve(CURVE); }
+        if !ADAPTIVE { store_curve(CURVE); }
         store_field(INCREMENTS, dk);
         store_field(INCREMENTS + 1u, dx);
         store_field(INCREMENTS + 2u, dy);
@@ -43,81 +43,83 @@ const GO_ON = 0u;
 const STOP = 1u;
 
 /// One attempt at a step and its consequences; returns whether to go on, the same in every thread.
+///
+/// A step and an observation are each called in one place only: compilers put every call's whole body there.
 fn advance() -> u32 {
-    if uniform_decision(select(0u, 1u, p.adaptive > real(0.0))) == 1u { return adaptive_step(); }
-    return fixed_step();
-}
-
-fn fixed_step() -> u32 {
-    let solved = step();
+    let by = stride();
+    let h = by.length;
+    let parts = select(1u, 3u, ADAPTIVE);
+    var solved = SOLVED;
+    for (var part = uniform_decision(counters.phase / 2u); part < parts && solved == SOLVED; part++) {
+        if ADAPTIVE { begin_part(part, h); }
+        solved = step();
+        if ADAPTIVE && solved == SOLVED { end_part(part); }
+    }
     if solved == PAUSED { return STOP; }
     counters.phase = 0u;
     counters.solve_sweeps = 0u;
-    if solved == SOLVED { observe_new(); }
+    var error = real(0.0);
+    if ADAPTIVE && solved == SOLVED {
+        error = error_of_attempt();
+        if uniform_decision(select(1u, 0u, error <= p.adaptive)) == 1u {
+            let next = next_length(h, error, 1.0);
+            stretch(next / (real(0.5) * h));
+            return refuse(next, STALLED);
+        }
+        extrapolate();
+        load_curve(CURVE);
+    }
+    var middle = report.now;
+    if solved == SOLVED { middle = observe_step(); }
     let failure = uniform_decision(failure_of_step(solved));
-    counters.status = failure;
-    if failure != RUNNING { return STOP; }
-    let before = report.now;
-    report.before = before;
+    if failure != RUNNING {
+        if ADAPTIVE { return refuse_failure(h, failure); }
+        counters.status = failure;
+        return STOP;
+    }
+    report.before = report.now;
+    report.middle = middle;
     report.now = observed();
-    let after = report.now.excess;
-    record_events(
-        0.0,
-        (before.excess - p.half_at) / (before.excess - after),
-        (before.excess - p.relax_at) / (before.excess - after),
-    );
-    // The curve before the last step towards a goal is kept: an output time may lie between the two.
-    if counters.steps + 1u == counters.goal { store_curve(BEFORE); }
+    record_events(h);
+    if ADAPTIVE {
+        let next = next_length(h, error, select(real(1.0), real(MOST_GROWTH), counters.refused == 0u));
+        report.progress.next = next;
+        stretch(next / (real(0.5) * h));
+        pass_time(by);
+        counters.refused = 0u;
+    }
+    // The curve before a fixed step is kept where an output time may lie between the two.
+    if ADAPTIVE || counters.steps + 1u == counters.goal { store_curve(BEFORE); }
     x = here(new_x);
     y = here(new_y);
     k = new_k;
     r = new_r;
+    if ADAPTIVE { store_curve(CURVE); }
     return accepted();
 }
 
-fn adaptive_step() -> u32 {
-    let by = stride();
-    let h = by.length;
-    let solved = attempt(h);
-    if solved == PAUSED { return STOP; }
-    counters.phase = 0u;
-    counters.solve_sweeps = 0u;
-    if solved != SOLVED { return refuse_failure(h, failure_of_step(solved)); }
-    let error = error_of_attempt();
-    if uniform_decision(select(1u, 0u, error <= p.adaptive)) == 1u {
-        let next = next_length(h, error, 1.0);
-        stretch(next / (real(0.5) * h));
-        return refuse(next, STALLED);
+/// Observes the middle of an adaptive step, which it returns, and then the new curve; x and y hold the curve before it.
+fn observe_step() -> Observed {
+    var middle = report.now;
+    for (var curve = select(1u, 0u, ADAPTIVE); curve < 2u; curve++) {
+        var wx = new_x;
+        var wy = new_y;
+        var kh = new_k;
+        var rh = new_r;
+        if curve == 0u {
+            storageBarrier();
+            share(load_field(MIDDLE), load_field(MIDDLE + 1u));
+            wx = read_a();
+            wy = read_b();
+            kh = load_field(MIDDLE + 2u);
+            rh = load_field(MIDDLE + 3u);
+        }
+        let moved_x = here(wx) - x;
+        let moved_y = here(wy) - y;
+        observe(wx, wy, kh, rh, sqrt(moved_x * moved_x + moved_y * moved_y));
+        if curve == 0u { middle = observed(); }
     }
-    extrapolate();
-    load_curve(CURVE);
-    observe_new();
-    let failure = uniform_decision(failure_of_step(SOLVED));
-    if failure != RUNNING { return refuse_failure(h, failure); }
-    report.before = report.now;
-    report.now = observed();
-    let moved = others.w;
-    report.middle = observe_middle();
-    others.w = moved;
-    let e = vec(report.before.excess, report.middle.excess, report.now.excess, 0.0);
-    record_events(h, crossing(e.x, e.y, e.z, p.half_at), crossing(e.x, e.y, e.z, p.relax_at));
-    let next = next_length(h, error, select(real(1.0), real(MOST_GROWTH), counters.refused == 0u));
-    report.progress.next = next;
-    stretch(next / (real(0.5) * h));
-    pass_time(by);
-    counters.refused = 0u;
-    store_curve(BEFORE);
-    store_fields(CURVE, here(new_x), here(new_y), new_k, new_r);
-    let on = accepted();
-    if is_at_goal() { counters.goal = counters.steps; }
-    return uniform_decision(max(on, select(GO_ON, STOP, counters.goal == counters.steps)));
-}
-
-/// Observes the new curve; x and y hold the curve before the step.
-fn observe_new() {
-    let moved_x = here(new_x) - x;
-    let moved_y = here(new_y) - y;
-    observe(new_x, new_y, new_k, new_r, sqrt(moved_x * moved_x + moved_y * moved_y));
+    return middle;
 }
 
 fn failure_of_step(solved: u32) -> u32 {
@@ -146,21 +148,30 @@ fn refuse_failure(h: real, cause: u32) -> u32 {
 }
 
 /// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.
-fn record_events(length: real, half_fraction: real, relax_fraction: real) {
+fn record_events(h: real) {
+    let length = select(real(0.0), h, ADAPTIVE);
     if counters.half_step == NEVER && report.now.excess <= p.half_at {
         counters.half_step = counters.steps;
         report.progress.half_high = report.progress.time_high;
         report.progress.half_low = report.progress.time_low;
         report.progress.half_length = length;
-        report.progress.half_fraction = half_fraction;
+        report.progress.half_fraction = fraction_at(p.half_at);
     }
     if counters.relax_step == NEVER && report.now.excess <= p.relax_at {
         counters.relax_step = counters.steps;
         report.progress.relax_high = report.progress.time_high;
         report.progress.relax_low = report.progress.time_low;
         report.progress.relax_length = length;
-        report.progress.relax_fraction = relax_fraction;
+        report.progress.relax_fraction = fraction_at(p.relax_at);
     }
+}
+
+/// Where in the last step the excess fell to `excess`.
+fn fraction_at(excess: real) -> real {
+    let before = report.before.excess;
+    let after = report.now.excess;
+    let straight = (before - excess) / (before - after);
+    return select(straight, crossing(before, report.middle.excess, after, excess), ADAPTIVE);
 }
 
 /// Counts the step that was taken; returns whether to go on.
@@ -169,6 +180,7 @@ fn accepted() -> u32 {
     counters.steps += 1u;
     if counters.relax_step != NEVER && counters.stop_when_relaxed != 0u { counters.status = RELAXED; }
     if p.look_at <= report.progress.travel && report.now.k_min <= real(0.0) { counters.goal = counters.steps; }
+    if ADAPTIVE && is_at_goal() { counters.goal = counters.steps; }
     let on = counters.status == RUNNING && counters.steps < counters.goal;
     return uniform_decision(select(STOP, GO_ON, on));
 }

@@ -1,20 +1,15 @@
 // The adaptive step: one step of the paper's scheme against two half ones. Twin of src/scheme/extrapolation.rs.
 
-/// Makes what is left of an attempt of length h: the whole step into MIDDLE, the first half into BEFORE, the second one
-/// into the registers of the new curve. Returns how the last solve ended.
-fn attempt(h: real) -> u32 {
-    for (var part = uniform_decision(counters.phase / 2u); part < 3u; part++) {
-        p.tau = select(real(0.5) * h, h, part == 0u);
-        load_curve(select(CURVE, BEFORE, part == 2u));
-        let ended = step();
-        if ended != SOLVED { return ended; }
-        if part == 0u {
-            store_fields(MIDDLE, here(new_x), here(new_y), new_k, new_r);
-            stretch(0.5);
-        }
-        if part == 1u { store_fields(BEFORE, here(new_x), here(new_y), new_k, new_r); }
-    }
-    return SOLVED;
+/// Prepares part 0, 1 or 2 of an attempt of length h: the whole step, the first half, the second half.
+fn begin_part(part: u32, h: real) {
+    p.tau = select(real(0.5) * h, h, part == 0u);
+    load_curve(select(CURVE, BEFORE, part == 2u));
+}
+
+/// Keeps what a part computed: the whole step in MIDDLE, the first half in BEFORE, the second one in the registers.
+fn end_part(part: u32) {
+    if part < 2u { store_fields(select(BEFORE, MIDDLE, part == 0u), here(new_x), here(new_y), new_k, new_r); }
+    if part == 0u { stretch(0.5); }
 }
 
 /// Multiplies the increments by `factor`.
@@ -54,14 +49,6 @@ fn extrapolate() {
     share(here(new_x) + gap_x, here(new_y) + gap_y);
     new_x = read_a();
     new_y = read_b();
-}
-
-/// What the curve in the middle of the step is like; it has been extrapolated.
-fn observe_middle() -> Observed {
-    storageBarrier();
-    share(load_field(MIDDLE), load_field(MIDDLE + 1u));
-    observe(read_a(), read_b(), load_field(MIDDLE + 2u), load_field(MIDDLE + 3u), vec(0.0));
-    return observed();
 }
 
 /// Where in the step a quantity that goes from `start` over `middle` to `end` first falls to `at`, as a fraction.

@@ -40,7 +40,6 @@ fn redistribute() -> real {
         next = r * exponential(-(p.tau * (k * beta)));
     }
     trace(1u, alpha);
-    trace(2u, next);
     share(next, next);
     r_new = read_a();
     reciprocals();

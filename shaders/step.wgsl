@@ -30,6 +30,8 @@ fn step() -> u32 {
     new_y = read_b();
     new_r = here(r_new);
     if p.pull > real(0.0) { pull(); }
+    trace(2u, new_r);
+    trace(19u, new_k);
     counters.phase += 1u;
     counters.solve_sweeps = 0u;
     return SOLVED;

@@ -3,7 +3,7 @@
 /// TRACE_FIELDS fields of NODES numbers a member; the host lists them in src/conformance/bounds.rs.
 @group(0) @binding(5) var<storage, read_write> traces: array<real>;
 
-const TRACE_FIELDS = 19u;
+const TRACE_FIELDS = 20u;
 
 fn trace(field: u32, value: vec) {
     let base = (member * TRACE_FIELDS + field) * NODES + first;

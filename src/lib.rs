@@ -37,6 +37,7 @@
 //! | [`ensemble`] | the spec, its members and their random numbers, what a member leaves |
 //! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
 //! | [`schedule`], [`trajectory`], [`simulate`] | steps and output times; one member's way; the loop over all |
+//! | [`truth`] | problems with exact solutions, and the error and order against them |
 //! | [`report`] | tables, plots, provenance |
 //! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
 //! | [`cli`] | the commands |
@@ -97,5 +98,6 @@ pub mod scheme;
 pub mod simulate;
 pub mod solver;
 pub mod trajectory;
+pub mod truth;
 
 pub use error::{Error, Result};

@@ -279,9 +279,9 @@ impl<'a> Trajectory<'a> {
         let t = fraction;
         match self.time {
             Time::Fixed(_) => values.map(|((a, _), b)| a + t * (b - a)).collect(),
-            Time::Adaptive(_) => values
-                .map(|((a, m), b)| a + t * (4.0 * m - 3.0 * a - b) + 2.0 * t * t * (a - 2.0 * m + b))
-                .collect(),
+            Time::Adaptive(_) => {
+                values.map(|((a, m), b)| a + t * (4.0 * m - 3.0 * a - b) + 2.0 * t * t * (a - 2.0 * m + b)).collect()
+            }
         }
     }
 
@@ -346,8 +346,7 @@ impl<'a> Trajectory<'a> {
             (Time::Adaptive(_), _) => Some((high + (low + fraction * length)) * self.unit.powi(4)),
         };
         let p = progress;
-        let relaxed =
-            inside(self.counters.relax_step, [p.relax_high, p.relax_low, p.relax_length, p.relax_fraction]);
+        let relaxed = inside(self.counters.relax_step, [p.relax_high, p.relax_low, p.relax_length, p.relax_fraction]);
         let halved = inside(self.counters.half_step, [p.half_high, p.half_low, p.half_length, p.half_fraction]);
         let t_relax = if self.course == Course::Round { Some(0.0) } else { relaxed };
         let t_half = if self.start.excess <= ROUND { Some(0.0) } else { halved };

@@ -277,7 +277,7 @@ fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     }
     let blocks = Blocks::new(most + 1).ok_or("n")?;
     if gpu.capacity().check_size::<T>(blocks, solver).is_ok()
-        || Kernel::<T>::new(gpu, blocks, 1, 1, Variant { solver, traced: false }).is_ok()
+        || Kernel::<T>::new(gpu, blocks, 1, 1, Variant::of(solver)).is_ok()
     {
         return Err("one point more was not refused".into());
     }
@@ -375,7 +375,8 @@ fn paper<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     if (counters.steps, exact.counters.steps) != (2000, 2000) {
         return Err(format!("{counters:?} on the GPU, {:?} on the CPU", exact.counters).into());
     }
-    let error = state.curve.positions().zip(exact.state.curve.positions()).map(|(a, b)| (a - b).length()).fold(0.0, f64::max);
+    let error =
+        state.curve.positions().zip(exact.state.curve.positions()).map(|(a, b)| (a - b).length()).fold(0.0, f64::max);
     println!("{}: paper's ellipse at t = 2, positions off by {error:.2e}", T::NAME);
     let bound = if T::PRECISION == Precision::F32 { 5e-4 } else { 1e-5 };
     if error > bound { Err(format!("positions off by {error:e}").into()) } else { Ok(()) }

@@ -206,8 +206,7 @@ fn a_poisoned_member_is_nonfinite_and_alone_in_it() {
     let family = Family::new(&Spec { points: 37, ..Spec::default() }).unwrap();
     let launch = |nodes: &[DVec2]| {
         let parameters = Parameters::of_flow(&curvelax::flow::Flow::SurfaceDiffusion, 1e-3);
-        let mut run =
-            Run::new(State::from_nodes(nodes), Parameters { relax_at: -1.0, half_at: -1.0, ..parameters });
+        let mut run = Run::new(State::from_nodes(nodes), Parameters { relax_at: -1.0, half_at: -1.0, ..parameters });
         run.counters.goal = 97;
         run
     };

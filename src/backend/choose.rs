@@ -10,7 +10,7 @@ use super::{
 use crate::{
     ensemble::{
         Spec,
-        spec::{BackendChoice, Precision, SolverChoice},
+        spec::{BackendChoice, Precision},
     },
     error::{Error, Result},
     number::Real,
@@ -128,7 +128,9 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
             capacity.check_size::<f32>(ring(n)?, spec.solver()),
             capacity.max_points::<f32>(spec.solver()).min(MAX_POINTS_F32),
         ),
-        Precision::F64 => (capacity.check_size::<f64>(ring(n)?, spec.solver()), capacity.max_points::<f64>(spec.solver())),
+        Precision::F64 => {
+            (capacity.check_size::<f64>(ring(n)?, spec.solver()), capacity.max_points::<f64>(spec.solver()))
+        }
     };
     fits.map_err(|needs| {
         let problem = format!("a member needs {needs}");
@@ -180,10 +182,7 @@ impl Choice {
         spec.adapter = self.gpu.as_ref().map(|gpu| gpu.name().to_string());
         spec.tolerance = Some(spec.tolerance_at(self.precision));
         spec.precision = Some(self.precision);
-        spec.solver = match spec.solver() {
-            Solver::GaussSeidel => SolverChoice::GaussSeidel,
-            Solver::Direct => SolverChoice::Direct,
-        };
+        spec.solver = spec.solver().into();
     }
 
     /// Opens it for `members` members of `n` nodes.
@@ -207,7 +206,7 @@ impl Choice {
         };
         if let Some(gpu) = self.gpu {
             let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
-            let variant = Variant { solver: spec.solver(), traced: false };
+            let variant = Variant { adaptive: spec.adaptive.is_some(), ..Variant::of(spec.solver()) };
             let kernel = Kernel::<T>::new(&gpu, blocks, members, spec.max_sweeps, variant)?;
             platform.backend = "gpu".into();
             platform.adapter = Some(gpu.name().to_string());

@@ -16,10 +16,10 @@ use crate::{
 };
 
 const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
-const SOLVERS: &[&str] = &["auto", "gauss-seidel", "direct"];
+pub(super) const SOLVERS: &[&str] = &["auto", "gauss-seidel", "direct"];
 const ORDERS: &[&str] = &["coloured", "lexicographic"];
-const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
-const PRECISIONS: &[&str] = &["f32", "f64"];
+pub(super) const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
+pub(super) const PRECISIONS: &[&str] = &["f32", "f64"];
 
 /// One flag for each key of [`Spec`], none given unless the user gave it.
 ///
@@ -179,8 +179,8 @@ pub struct SpecFlags {
 
 const ENSEMBLE: &str = "Ensemble";
 const EVOLUTION: &str = "Evolution";
-const METHOD: &str = "Method";
-const MACHINE: &str = "Machine";
+pub(super) const METHOD: &str = "Method";
+pub(super) const MACHINE: &str = "Machine";
 /// Heading of the flags that say what is written and where.
 pub const OUTPUT: &str = "Output";
 
@@ -228,7 +228,7 @@ fn text_of<T: std::str::FromStr<Err = String>>(text: &str) -> Result<T, String> 
 }
 
 /// One of `names`, with clap's listing and suggestions, read as the spec file is.
-fn word<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+pub(super) fn word<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
 where
     T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
 {
@@ -281,7 +281,8 @@ mod tests {
     fn every_flag_replaces_its_key() {
         let spec = parse(
             "--curves 3 --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --flow willmore \
-             --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --solver direct --order lexicographic --tolerance 1e-4 \
+             --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --pull 3 --solver direct --order lexicographic \
+             --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \
              --series 0.1 --snapshots 0,1 --only 1,2 --threads 2"
                 .split_whitespace()
@@ -292,7 +293,23 @@ mod tests {
         let default: BTreeSet<&str> = default.lines().filter(|line| !line.starts_with("shape")).collect();
         let kept: Vec<&str> = given.lines().filter(|line| default.contains(line)).collect();
         assert_eq!(kept, [""; 0]);
-        assert_eq!(given.lines().count(), Spec::keys().len());
+        // Either of the two that stand for one another.
+        assert_eq!(given.lines().count(), Spec::keys().len() - 2);
+    }
+
+    #[test]
+    fn a_flag_also_replaces_the_key_of_the_file_that_it_stands_instead_of() {
+        let file = || Spec::from_toml("tau = 1e-4\nrelax-to = 0.1").unwrap();
+        let overlaid = |arguments: &[&str], mut spec: Spec| {
+            let matches = command().no_binary_name(true).try_get_matches_from(arguments).unwrap();
+            SpecFlags::from_arg_matches(&matches).unwrap().overlay(&mut spec);
+            spec
+        };
+        let spec = overlaid(&["--adaptive", "--relax-at", "0.01"], file());
+        assert_eq!((spec.tau, spec.adaptive, spec.relax_to, spec.relax_at), (None, Some(1e-3), None, Some(0.01)));
+        let spec = overlaid(&["--tau", "1e-5", "--relax-to", "0.2"], spec);
+        assert_eq!((spec.tau, spec.adaptive, spec.relax_to, spec.relax_at), (Some(1e-5), None, Some(0.2), None));
+        assert_eq!(overlaid(&[], file()), file());
     }
 
     #[test]

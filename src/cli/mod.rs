@@ -5,6 +5,7 @@
 
 mod adapters;
 mod check;
+mod convergence;
 mod flags;
 mod run;
 
@@ -34,6 +35,7 @@ struct Cli {
 enum Command {
     Run(Box<run::RunArgs>),
     Check(check::CheckArgs),
+    Convergence(convergence::ConvergenceArgs),
     Adapters(adapters::AdaptersArgs),
 }
 
@@ -43,6 +45,7 @@ pub fn main() -> ExitCode {
     let done = match cli.command {
         Command::Run(args) => run::run(*args),
         Command::Check(args) => check::check(args),
+        Command::Convergence(args) => convergence::convergence(args),
         Command::Adapters(args) => adapters::adapters(args),
     };
     match done {

@@ -73,6 +73,7 @@ pub const STAGES: [Bound; TRACE_FIELDS] = [
     bound("right-hand side of y", Scale::Length, 8.0, 32.0),
     bound("δx", Scale::SolvedPosition, 16.0, 64.0),
     bound("δy", Scale::SolvedPosition, 16.0, 64.0),
+    bound("k", Scale::SolvedCurvature, 16.0, 64.0),
 ];
 
 /// The curve after a run.

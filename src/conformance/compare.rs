@@ -131,7 +131,13 @@ fn blocks(n: usize) -> Result<Blocks> {
 /// Everything that one step computes, stage by stage.
 pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Option<Tamper>) -> Result<Vec<Row>> {
     let launches = members(n, MEMBERS, 1, T::PRECISION.tolerance())?;
-    let mut kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, MEMBERS, MAX_SWEEPS, Variant { solver, traced: true })?;
+    let mut kernel = gpu::Kernel::<T>::new(
+        adapter,
+        blocks(n)?,
+        MEMBERS,
+        MAX_SWEEPS,
+        Variant { traced: true, ..Variant::of(solver) },
+    )?;
     for (slot, launch) in tampered(launches.clone(), tamper).iter().enumerate() {
         kernel.load(slot, launch)?;
     }
@@ -230,8 +236,9 @@ pub fn on_gpu<T: Real>(
     launches: &[Run<f64>],
     budget: Budget,
 ) -> Result<Vec<Left>> {
-    let kernel =
-        gpu::Kernel::<T>::new(adapter, blocks(n)?, launches.len(), MAX_SWEEPS, Variant { solver, traced: false })?;
+    let adaptive = launches.iter().any(|launch| launch.parameters.adaptive > 0.0);
+    let variant = Variant { adaptive, ..Variant::of(solver) };
+    let kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, launches.len(), MAX_SWEEPS, variant)?;
     let mut kernel = kernel.with_budget(budget);
     for (slot, launch) in launches.iter().enumerate() {
         kernel.load(slot, launch)?;
@@ -260,7 +267,13 @@ fn traced<T: Real>(work: &Workspace<T>, increments: &Increments<T>) -> Vec<Vec<f
     fields.extend(rows(&work.curvature.rows));
     fields.extend([wide(&work.curvature.rhs[0]), ring(&increments.k)]);
     fields.extend(rows(&work.position.rows));
-    fields.extend([wide(&work.position.rhs[0]), wide(&work.position.rhs[1]), ring(&increments.x), ring(&increments.y)]);
+    fields.extend([
+        wide(&work.position.rhs[0]),
+        wide(&work.position.rhs[1]),
+        ring(&increments.x),
+        ring(&increments.y),
+        ring(&work.new.k),
+    ]);
     fields
 }
 

@@ -11,7 +11,7 @@ use glam::DVec2;
 
 use super::{Mollified, Spec, mollifier::mollify, random::Stream};
 use crate::{
-    curve::{RadialFactor, RadialLaw, Sampler, Sampling, check_directions, polygon},
+    curve::{BaseCurve, RadialFactor, RadialLaw, Sampler, Sampling, check_directions, polygon},
     error::{Error, Result},
     solver::ring::MIN_POINTS,
 };
@@ -51,8 +51,15 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] when one of them, or the file of the shape, is wrong.
     pub fn new(spec: &Spec) -> Result<Family> {
+        Family::of(spec, spec.shape.resolve()?)
+    }
+
+    /// As [`Family::new`] with `curve` in place of the shape: any curve that has no name on the command line.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when one of the keys sampling, points, amplitude, modes and decay is wrong.
+    pub fn of(spec: &Spec, curve: BaseCurve) -> Result<Family> {
         let law = RadialLaw::new(spec.amplitude, spec.modes, spec.decay)?;
-        let curve = spec.shape.resolve()?;
         let outline = curve.outline();
         if let (Sampling::Points, Some(own)) = (spec.sampling, outline.map(|outline| outline.vertices().len())) {
             check_own_points(spec.points, own)?;

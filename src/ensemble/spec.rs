@@ -43,6 +43,15 @@ pub enum SolverChoice {
     Direct,
 }
 
+impl From<Solver> for SolverChoice {
+    fn from(solver: Solver) -> SolverChoice {
+        match solver {
+            Solver::GaussSeidel => SolverChoice::GaussSeidel,
+            Solver::Direct => SolverChoice::Direct,
+        }
+    }
+}
+
 /// How time is cut into steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {

@@ -3,9 +3,7 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that
 //! takes the file they come from; only the resolution of the highest mode is checked here.
 
-use super::spec::{
-    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Solver, Spec,
-};
+use super::spec::{BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Solver, Spec};
 use crate::error::{Error, Result};
 
 /// More members than this is a slip of the keyboard.

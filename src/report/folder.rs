@@ -15,13 +15,15 @@ pub const SUMMARY: &str = "summary.csv";
 pub const SERIES: &str = "series.csv";
 /// Nodes at given times.
 pub const SNAPSHOTS: &str = "snapshots.csv";
+/// Errors and orders against exact solutions.
+pub const CONVERGENCE: &str = "convergence.csv";
 /// How the run was made.
 pub const RUN: &str = "run.json";
 /// The first members before and after.
 pub const CURVES: &str = "plots/curves.svg";
 
-/// All files that a run may write, the one that vouches for the others first.
-const OWN: [&str; 5] = [RUN, SUMMARY, SERIES, SNAPSHOTS, CURVES];
+/// All files that a command may write, the one that vouches for the others first.
+const OWN: [&str; 6] = [RUN, SUMMARY, SERIES, SNAPSHOTS, CURVES, CONVERGENCE];
 
 /// The folder of the plots, the only one below that of the run.
 const PLOTS: &str = "plots";

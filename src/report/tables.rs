@@ -11,6 +11,7 @@ use super::folder::PartFile;
 use crate::{
     ensemble::{Outcome, SeriesRow, Snapshot},
     error::{Error, Result},
+    truth::Row,
 };
 
 const SUMMARY: &str = "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,\
@@ -18,6 +19,7 @@ const SUMMARY: &str = "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x
     mesh_ratio,metric_drift,self_crossing";
 const SERIES: &str = "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift";
 const SNAPSHOTS: &str = "member,t,i,x,y,k,r";
+const CONVERGENCE: &str = "problem,varied,n,tau,tolerance,error,order";
 
 /// Bytes gathered before they are written.
 const BUFFER: usize = 1 << 16;
@@ -186,6 +188,16 @@ impl SnapshotTable {
     }
 }
 
+/// `convergence.csv`, the whole table: one row a run, τ or the tolerance of adaptive steps empty.
+pub fn convergence(file: PartFile, rows: &[Row]) -> Result<PartFile> {
+    let mut table = Table::begin(file, CONVERGENCE)?;
+    for Row { problem, varied, at, error, order, .. } in rows {
+        let tau = at.tolerance.is_none().then_some(at.tau);
+        table.row((problem, varied.name(), at.n as u64, tau, at.tolerance, error, order))?;
+    }
+    table.ready()
+}
+
 fn known(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
@@ -284,6 +296,23 @@ mod tests {
             table.ready()
         });
         assert_eq!(text, "member,t,i,x,y,k,r\n1,0.25,1,1.0,3.0,5.0,7.0\n1,0.25,2,2.0,4.0,6.0,8.0\n");
+    }
+
+    #[test]
+    fn a_table_of_convergence_has_these_bytes() {
+        let row = |error, order| Row {
+            problem: "lemniscate".into(),
+            varied: crate::truth::Varied::Step,
+            at: crate::truth::Resolution { n: 100, tau: 0.25, tolerance: None },
+            status: Status::Unfinished,
+            error,
+            order,
+        };
+        let text = written("convergence.csv", |file| convergence(file, &[row(Some(-0.1), Some(1.5)), row(None, None)]));
+        assert_eq!(
+            text,
+            "problem,varied,n,tau,tolerance,error,order\nlemniscate,tau,100,0.25,,-0.1,1.5\nlemniscate,tau,100,0.25,,,\n"
+        );
     }
 
     #[test]

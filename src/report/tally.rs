@@ -137,7 +137,20 @@ pub(crate) mod tests {
 
     pub fn outcome(member: u64, status: Status, t_relax: Option<f64>) -> Outcome {
         let (start, end) = (Observables::default(), Observables::default());
-        Outcome { member, status, t_end: 2.0, steps: 10, sweeps_k: 20, sweeps_x: 5, t_relax, t_half: None, start, end }
+        Outcome {
+            member,
+            status,
+            t_end: 2.0,
+            steps: 10,
+            sweeps_k: 20,
+            sweeps_x: 5,
+            t_relax,
+            t_half: None,
+            start,
+            end,
+            rejected: 0,
+            self_crossing: None,
+        }
     }
 
     fn tally(times: &[f64], censored: u64) -> Tally {

@@ -5,7 +5,7 @@
 //! old state is a sum of differences:
 //! `f - M k = ∂b + (r k β)_i k_i - Σ_j off_ij (k_j - k_i)`.
 
-use super::{Parameters, Curve, Workspace};
+use super::{Curve, Parameters, Workspace};
 use crate::{number::Number, solver::Row};
 
 /// Fills `work.curvature` from the old state and the new lengths.

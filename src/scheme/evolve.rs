@@ -70,7 +70,9 @@ fn fixed_step<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T
         Ok((sums, maxima)) => {
             run.report.before = run.report.now;
             run.report.now = Observed::new(&sums, &maxima, &run.parameters);
-            record_events(run, T::of(0.0), |before, after, target| (before.excess - target) / (before.excess - after.excess));
+            record_events(run, T::of(0.0), |before, after, target| {
+                (before.excess - target) / (before.excess - after.excess)
+            });
             accept(run, work);
         }
         Err(status) => run.counters.status = status as u32,
@@ -104,9 +106,7 @@ fn adaptive_step<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspac
     report.middle = Observed::new(&middle_sums, &observe::maxima(middle), &run.parameters);
     report.now = Observed::new(&sums, &maxima, &run.parameters);
     let middle = report.middle.excess;
-    record_events(run, h, |before, after, target| {
-        extrapolation::crossing(before.excess, middle, after.excess, target)
-    });
+    record_events(run, h, |before, after, target| extrapolation::crossing(before.excess, middle, after.excess, target));
     let most_growth = if run.counters.refused == 0 { pace::MOST_GROWTH } else { 1.0 };
     let progress = &mut run.report.progress;
     progress.next = pace::next_length(h, error, most_growth, &run.parameters);
@@ -120,11 +120,7 @@ fn adaptive_step<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspac
 }
 
 /// The sums and maxima of the new curve, or why it is refused.
-fn observed<T: Real>(
-    run: &Run<T>,
-    work: &Workspace<T>,
-    stepped: Stepped<T>,
-) -> Result<(Sums<T>, Maxima<T>), Status> {
+fn observed<T: Real>(run: &Run<T>, work: &Workspace<T>, stepped: Stepped<T>) -> Result<(Sums<T>, Maxima<T>), Status> {
     let sums = observe::sums(&work.new, &run.parameters, work.blocks);
     let maxima = observe::maxima(&work.new);
     if !stepped.finite {

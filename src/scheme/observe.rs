@@ -70,7 +70,8 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> S
 /// Maxima over the ring.
 pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
     let low = N::of(-2.0 * crate::number::BIG);
-    let mut m = Maxima { turn: low, drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low, gap: low };
+    let mut m =
+        Maxima { turn: low, drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low, gap: low };
     for i in 0..curve.x.len() {
         let (k, r, e) = (curve.k[i], curve.r[i], edge(curve, i)[2]);
         m.turn = m.turn.max((k * r).bounded_abs());

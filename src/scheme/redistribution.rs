@@ -8,7 +8,7 @@
 //! - `r_i ← r_i·exp(τ(-B + ω(M/r_i - 1)))`, eq. (3) for `η = ln r`; without redistribution α = 0 and
 //!   `r_i ← r_i·exp(-τ k_i β_i)`.
 
-use super::{Parameters, Curve, Workspace};
+use super::{Curve, Parameters, Workspace};
 use crate::number::{Mask, Number};
 
 /// Fills β, r·k·β, α and the new r (with 1/r and 1/q) of `work`; returns the length `L = Σr` of the old old.

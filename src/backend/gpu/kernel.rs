@@ -30,7 +30,7 @@ const DISPATCH_LIMIT: Duration = Duration::from_secs(120);
 const MAX_SLOTS: usize = 8192;
 
 /// Fields that a traced kernel keeps per member; `conformance::bounds::STAGES` names them in their order.
-pub const TRACE_FIELDS: usize = 19;
+pub const TRACE_FIELDS: usize = 20;
 
 /// Field names of what one dispatch asks for, in memory order.
 pub const DISPATCH_FIELDS: [&str; 3] = ["steps", "max_sweeps", "sweeps"];
@@ -59,15 +59,16 @@ const SOFTWARE_ITERATIONS: u32 = 50_000;
 
 impl Budget {
     /// The most that one dispatch may do on this adapter.
-    fn most(gpu: &Gpu, blocks: Blocks) -> Budget {
+    fn most(gpu: &Gpu, blocks: Blocks, adaptive: bool) -> Budget {
         if gpu.is_hardware() {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
-        // A sweep is one iteration; a look at the residual walks over all blocks, and an adaptive step, which is three of
-        // the paper's, does so some forty times.
+        // A sweep is one iteration; a look at the residual walks over all blocks, and a step does so ten times, an adaptive
+        // one, which is three of the paper's, forty times.
         let walk = blocks.count() as u32 + 1;
+        let walks = if adaptive { 40 } else { 10 };
         let sweeps = SOFTWARE_ITERATIONS / 2 * SWEEPS_PER_CHECK / (SWEEPS_PER_CHECK + walk);
-        Budget { steps: (SOFTWARE_ITERATIONS / 2 / (40 * walk)).max(1), sweeps: sweeps.max(SWEEPS_PER_CHECK) }
+        Budget { steps: (SOFTWARE_ITERATIONS / 2 / (walks * walk)).max(1), sweeps: sweeps.max(SWEEPS_PER_CHECK) }
     }
 }
 
@@ -111,7 +112,7 @@ impl<T: Real> Kernel<T> {
         gpu.capacity()
             .check_size::<T>(blocks, variant.solver)
             .map_err(|e| Error::Request(format!("n = {} needs {e}", blocks.n)))?;
-        let most = Budget::most(gpu, blocks);
+        let most = Budget::most(gpu, blocks, variant.adaptive);
         let device = gpu.open()?;
         let pipeline = compile::<T>(&device.device, blocks, gpu.subgroup(), variant);
         let buffers = Buffers::new(&device.device, slots, state_bytes, trace_bytes, size_of::<T>());
@@ -236,8 +237,7 @@ impl<T: Real> Kernel<T> {
         let stuck = before.iter().zip(&self.counters).position(|(old, new)| {
             let due = old.status == 0 && old.steps < old.goal;
             let position = |c: &Counters| (c.status, c.steps, c.rejected, c.phase, c.solve_sweeps);
-            due && position(old) == position(new)
-                && new.sweeps_k + new.sweeps_x == 0
+            due && position(old) == position(new) && new.sweeps_k + new.sweeps_x == 0
         });
         match stuck {
             None => Ok(()),

@@ -1,4 +1,4 @@
-//! The kernel's source: a fixed list of WGSL files behind one line that chooses the number.
+//! The kernel's source: a fixed list of WGSL files behind one line that chooses the number and the kind of steps.
 
 use crate::{
     number::Real,
@@ -19,18 +19,27 @@ macro_rules! parts {
 pub struct Variant {
     /// Solver of the pentadiagonal systems.
     pub solver: Solver,
+    /// Makes adaptive steps. A constant, since a kernel with both kinds of steps takes compilers twice as long.
+    pub adaptive: bool,
     /// Keeps what every stage of a step computes.
     pub traced: bool,
 }
 
 impl Variant {
-    /// All of them.
-    pub const ALL: [Variant; 4] = [
-        Variant { solver: Solver::GaussSeidel, traced: false },
-        Variant { solver: Solver::GaussSeidel, traced: true },
-        Variant { solver: Solver::Direct, traced: false },
-        Variant { solver: Solver::Direct, traced: true },
+    /// All that are used; adaptive steps are made of traced ones.
+    pub const ALL: [Variant; 6] = [
+        Variant::of(Solver::GaussSeidel),
+        Variant { traced: true, ..Variant::of(Solver::GaussSeidel) },
+        Variant { adaptive: true, ..Variant::of(Solver::GaussSeidel) },
+        Variant::of(Solver::Direct),
+        Variant { traced: true, ..Variant::of(Solver::Direct) },
+        Variant { adaptive: true, ..Variant::of(Solver::Direct) },
     ];
+
+    /// The kernel of fixed steps.
+    pub const fn of(solver: Solver) -> Variant {
+        Variant { solver, adaptive: false, traced: false }
+    }
 
     /// The files of the kernel, in the order of the step.
     pub fn parts(self) -> impl Iterator<Item = Part> {
@@ -66,7 +75,9 @@ const TRACE_ON: [Part; 1] = parts!["trace_on.wgsl"];
 
 /// The whole source in precision `T`.
 pub fn source<T: Real>(variant: Variant) -> String {
-    let mut text = format!("alias real = {}; const EPSILON = {:e};\n", T::NAME, T::EPSILON);
+    let Variant { adaptive, .. } = variant;
+    let mut text =
+        format!("alias real = {}; const EPSILON = {:e}; const ADAPTIVE = {adaptive};\n", T::NAME, T::EPSILON);
     for (_, part) in variant.parts() {
         text.push_str(part);
         text.push('\n');

@@ -1,0 +1,30 @@
+//! Problems with an exact solution, the error of a run against it, and the order at which that error falls.
+//!
+//! # Theory
+//!
+//! Circles stay circles: `R' = -b(1/R)`, which is `R = (R₀⁴ + 2t)^(1/4)` under Willmore flow and rest at
+//! `R = 1/√(2λ)` under elastic flow. A small mode on a circle, `r = R + a·cos mθ`, has to first order in a
+//!
+//! ```text
+//! a' = -(m²-1)·(m²/R⁴ + b′(1/R)/R²)·a
+//! ```
+//!
+//! where a is the amplitude itself and not a/R: `β N` moves the radius by `-β`, and
+//! `k = 1/R + (m²-1)·a·cos mθ/R²` to first order. A lemniscate shrinks under surface diffusion without changing its
+//! shape. Surface diffusion keeps the area of every curve.
+//!
+//! # Practice
+//!
+//! A [`Problem`] is a value: flow, curve, final time, what is measured, what it should be, and how far off it may be.
+//! [`problems`] is the one table of them, for the tests on every back end and for `curvelax convergence`.
+//! [`Problem::solve`] takes it at a [`Resolution`] through the same way as any run; a [`Study`] refines one number.
+
+mod measure;
+mod problems;
+mod study;
+mod theory;
+
+pub use measure::{Measure, mode_amplitude};
+pub use problems::{Bound, Curve, LEMNISCATE_LIFE, Problem, problems};
+pub use study::{Resolution, Row, Solved, Study, Varied, studies};
+pub use theory::{CircleMode, circle_mode};

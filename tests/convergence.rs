@@ -1,0 +1,121 @@
+//! `curvelax convergence` from outside: its table, its file, its exit codes.
+
+use std::{fs, process::Output};
+
+use assert_cmd::Command;
+use tempfile::TempDir;
+
+fn convergence(home: &TempDir, arguments: &str) -> Output {
+    // Where this is not set, a layer of Mesa says so on stderr.
+    let mut command = Command::cargo_bin("curvelax").unwrap();
+    command.current_dir(home.path()).env("XDG_RUNTIME_DIR", home.path()).arg("convergence");
+    command.args(arguments.split_whitespace()).output().unwrap()
+}
+
+fn text(bytes: Vec<u8>) -> String {
+    String::from_utf8(bytes).unwrap()
+}
+
+/// Rows of `convergence.csv`.
+fn rows(home: &TempDir) -> Vec<csv::StringRecord> {
+    let mut reader = csv::Reader::from_path(home.path().join("out/convergence.csv")).unwrap();
+    assert_eq!(reader.headers().unwrap(), vec!["problem", "varied", "n", "tau", "tolerance", "error", "order"]);
+    reader.records().map(Result::unwrap).collect()
+}
+
+#[test]
+fn the_table_and_the_file_have_the_orders_of_the_scheme() {
+    let home = TempDir::new().unwrap();
+    let output = convergence(&home, "--problem willmore-circle --problem elastic-mode-3 --backend cpu --out out");
+    let (printed, said) = (text(output.stdout), text(output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert_eq!(said, "back end: CPU, f64 (asked for)\n");
+
+    let rows = rows(&home);
+    assert_eq!(rows.len(), 2 * (3 + 4));
+    for row in &rows {
+        let expected = if &row[1] == "n" { 2.0 } else { 1.0 };
+        if !row[6].is_empty() {
+            let order: f64 = row[6].parse().unwrap();
+            assert!((order - expected).abs() < 0.1, "{row:?}");
+        }
+        assert!(row[5].parse::<f64>().unwrap().abs() < 0.05 && row[4].is_empty(), "{row:?}");
+    }
+    assert_eq!(rows.iter().filter(|row| !row[6].is_empty()).count(), 2 * (2 + 2));
+
+    let lines: Vec<&str> = printed.lines().filter(|line| !line.is_empty()).collect();
+    assert_eq!(lines.len(), 1 + rows.len(), "{printed}");
+    let words: Vec<&str> = lines[0].split_whitespace().collect();
+    assert_eq!(words, ["problem", "varied", "n", "tau", "tolerance", "error", "order"]);
+    assert!(lines[1].starts_with("willmore-circle  n"), "{printed}");
+}
+
+#[test]
+fn every_problem_is_solved_by_default_with_and_without_a_file() {
+    let home = TempDir::new().unwrap();
+    let output = convergence(&home, "--backend cpu");
+    assert_eq!(output.status.code(), Some(0), "{}", text(output.stderr));
+    assert_eq!(fs::read_dir(home.path()).unwrap().count(), 0);
+    let printed = text(output.stdout);
+    for problem in curvelax::truth::problems() {
+        let of_it = printed.lines().filter(|line| line.split_whitespace().next() == Some(&problem.name));
+        assert_eq!(of_it.count(), 7, "{}", problem.name);
+    }
+}
+
+#[test]
+fn f32_and_sweeps_are_taken_where_asked_for() {
+    let home = TempDir::new().unwrap();
+    for (arguments, nodes) in [("--precision f32", "200"), ("--solver gauss-seidel", "100")] {
+        let output =
+            convergence(&home, &format!("--problem ellipse-area --backend cpu --quiet --force --out out {arguments}"));
+        assert_eq!(output.status.code(), Some(0), "{}", text(output.stderr));
+        assert_eq!((text(output.stdout).as_str(), text(output.stderr).as_str()), ("", ""));
+        let largest = rows(&home).into_iter().filter(|row| &row[1] == "n").map(|row| row[2].to_owned()).next_back();
+        assert_eq!(largest.as_deref(), Some(nodes), "{arguments}");
+    }
+}
+
+#[test]
+fn a_wrong_request_is_refused_by_name() {
+    let home = TempDir::new().unwrap();
+    fs::create_dir(home.path().join("old")).unwrap();
+    for (arguments, parts) in [
+        ("--problem lemniscat", ["error: --problem lemniscat: ", "did you mean `lemniscate`?"]),
+        ("--problem circle", ["error: --problem circle: ", "there are willmore-circle, "]),
+        ("--solver gauss", ["invalid value 'gauss'", "gauss-seidel"]),
+        ("--precision f16", ["invalid value 'f16'", "f32, f64"]),
+        ("--backend cuda", ["invalid value 'cuda'", "auto, gpu, cpu"]),
+        ("--adapter abacus --backend cpu", ["error: --adapter abacus: ", "leave out --adapter"]),
+        ("--adapter abacus", ["error: --adapter abacus: ", "curvelax adapters"]),
+        ("--problems lemniscate", ["--problems", "similar argument exists: '--problem'"]),
+        ("--backend cpu --out old", ["error: --out old: already exists", "--force"]),
+        ("lemniscate", ["unexpected argument 'lemniscate'", "Usage"]),
+    ] {
+        let output = convergence(&home, arguments);
+        let said = text(output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");
+        assert_eq!(text(output.stdout), "", "{arguments}");
+        for part in parts {
+            assert!(said.contains(part), "{arguments}: no {part:?} in: {said}");
+        }
+    }
+    assert_eq!(fs::read_dir(home.path().join("old")).unwrap().count(), 0);
+    assert_eq!(fs::read_dir(home.path()).unwrap().count(), 1);
+}
+
+/// With --force the files of an earlier run do not stay beside those of this command.
+#[test]
+fn a_folder_holds_the_files_of_one_command() {
+    let home = TempDir::new().unwrap();
+    fs::create_dir(home.path().join("out")).unwrap();
+    for name in ["run.json", "summary.csv", "mine.txt"] {
+        fs::write(home.path().join("out").join(name), "old").unwrap();
+    }
+    let output = convergence(&home, "--problem ellipse-area --backend cpu --quiet --force --out out");
+    assert_eq!(output.status.code(), Some(0), "{}", text(output.stderr));
+    let entries = fs::read_dir(home.path().join("out")).unwrap();
+    let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    assert_eq!(names, ["convergence.csv", "mine.txt"]);
+}
