@@ -31,6 +31,7 @@ pub struct Outline {
     vertices: Vec<DVec2>,
     /// Length from vertex 0 to each vertex; one entry more than vertices, the last is the whole length.
     reached: Vec<f64>,
+    simple: bool,
     warnings: Vec<String>,
 }
 
@@ -54,13 +55,18 @@ impl Outline {
     }
 
     /// The polygon through points that are known to be fit: counter-clockwise, no two neighbours the same.
-    fn through(vertices: Vec<DVec2>, warnings: Vec<String>) -> Outline {
+    fn through(vertices: Vec<DVec2>, crossed: Option<String>) -> Outline {
         let mut reached = vec![0.0];
         reached.extend(polygon::edges(&vertices).scan(0.0, |sum, edge| {
             *sum += edge.length();
             Some(*sum)
         }));
-        Outline { vertices, reached, warnings }
+        Outline { vertices, reached, simple: crossed.is_none(), warnings: crossed.into_iter().collect() }
+    }
+
+    /// Whether the polygon neither crosses nor touches itself.
+    pub fn is_simple(&self) -> bool {
+        self.simple
     }
 
     /// The vertices, without a repeated closing point.
@@ -144,11 +150,11 @@ impl Source<'_> {
             let problem = format!("the outline encloses no net area ({area:e} at a length of {length:e})");
             return Err(self.refusal(None, &problem, "give a closed curve with an inside"));
         }
-        let warnings = crossing(&points).map(|pair| self.crossing_warning(pair, &table.lines)).into_iter().collect();
+        let crossed = crossing(&points).map(|pair| self.crossing_warning(pair, &table.lines));
         if area < 0.0 {
             polygon::turn_round(&mut points);
         }
-        Ok(Outline::through(points, warnings))
+        Ok(Outline::through(points, crossed))
     }
 
     fn crossing_warning(&self, (i, j): (usize, usize), lines: &[usize]) -> String {

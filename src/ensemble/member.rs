@@ -11,7 +11,7 @@ use glam::DVec2;
 
 use super::{Mollified, Spec, mollifier::mollify, random::Stream};
 use crate::{
-    curve::{RadialFactor, RadialLaw, Sampler, Sampling, check_directions, polygon},
+    curve::{Outline, RadialFactor, RadialLaw, Sampler, Sampling, check_directions, polygon},
     error::{Error, Result},
     solver::ring::MIN_POINTS,
 };
@@ -43,6 +43,8 @@ pub struct Family {
     warnings: Vec<String>,
     /// An outline spaced equally: its corners may be too sharp for n nodes.
     has_corners: bool,
+    /// The outline, if there is one, does not cross itself.
+    simple: bool,
 }
 
 impl Family {
@@ -58,10 +60,11 @@ impl Family {
             check_own_points(spec.points, own)?;
         }
         let has_corners = outline.is_some() && spec.sampling == Sampling::Arclength && spec.points >= MIN_POINTS;
+        let simple = outline.is_some_and(Outline::is_simple);
         let warnings = outline.map_or(Vec::new(), |outline| outline.warnings().to_vec());
         let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
         let directions = check_directions(spec.modes.high);
-        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners })
+        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners, simple })
     }
 
     /// What the user should know about the curve, a sentence each.
@@ -81,7 +84,7 @@ impl Family {
     pub fn member(&self, index: u64) -> Result<Member> {
         let factor = self.radial_factor(index)?;
         let mut nodes = self.sampler.sample(&factor);
-        let mollified = if self.has_corners { mollify(&mut nodes) } else { Mollified::default() };
+        let mollified = if self.has_corners { mollify(&mut nodes, self.simple) } else { Mollified::default() };
         let length = polygon::length(&nodes);
         // Loops that cancel have an area of rounding only, whose sign must not decide the orientation.
         if polygon::signed_area(&nodes) < -polygon::NO_AREA * length * length {
