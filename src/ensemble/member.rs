@@ -11,7 +11,7 @@ use glam::DVec2;
 
 use super::{Mollified, Spec, mollifier::mollify, random::Stream};
 use crate::{
-    curve::{Outline, RadialFactor, RadialLaw, Sampler, Sampling, check_directions, polygon},
+    curve::{Outline, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions, polygon},
     error::{Error, Result},
     solver::ring::MIN_POINTS,
 };
@@ -19,6 +19,9 @@ use crate::{
 /// Draws of one member before giving up. By Rice's formula the harshest law that is admitted, a
 /// thousand modes of one size, still keeps two draws in a hundred.
 const MAX_ATTEMPTS: u32 = 1000;
+
+const NO_EXCESS: &str = "the loops of a lemniscate cancel: its area is next to nothing, and its excess, status and \
+                         relaxation times, which divide by it, mean nothing";
 
 /// One curve at the start of its run.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +64,10 @@ impl Family {
         }
         let has_corners = outline.is_some() && spec.sampling == Sampling::Arclength && spec.points >= MIN_POINTS;
         let simple = outline.is_some_and(Outline::is_simple);
-        let warnings = outline.map_or(Vec::new(), |outline| outline.warnings().to_vec());
+        let mut warnings = outline.map_or(Vec::new(), |outline| outline.warnings().to_vec());
+        if let Shape::Lemniscate { .. } = spec.shape {
+            warnings.push(NO_EXCESS.into());
+        }
         let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
         let directions = check_directions(spec.modes.high);
         Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners, simple })
@@ -135,7 +141,7 @@ fn check_own_points(asked: usize, own: usize) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::{Modes, Shape, crossing};
+    use crate::curve::{Modes, crossing};
 
     fn spec(shape: &str, sampling: Sampling, points: usize, amplitude: f64) -> Spec {
         Spec { shape: shape.parse::<Shape>().unwrap(), sampling, points, amplitude, ..Spec::default() }
@@ -289,6 +295,22 @@ mod tests {
         let crossed = family(&spec(&format!("file:{}", path.display()), Sampling::Arclength, 50, 0.0));
         assert!(crossed.warnings()[0].contains("crosses"), "{:?}", crossed.warnings());
         assert!(family(&Spec::default()).warnings().is_empty());
+    }
+
+    #[test]
+    fn a_lemniscate_keeps_its_loops_its_place_and_has_a_warning() {
+        for amplitude in [0.0, 0.05] {
+            let family = family(&spec("lemniscate:2", Sampling::Arclength, 101, amplitude));
+            assert!(family.warnings()[0].contains("excess"), "{:?}", family.warnings());
+            for j in 0..20 {
+                let member = family.member(j).unwrap();
+                assert_eq!(polygon::turning_number(&member.nodes), 0, "seed 1, member {j}");
+                assert!(member.origin.length() < 2.5, "seed 1, member {j}: {}", member.origin);
+                let area = polygon::signed_area(&member.nodes);
+                assert!(area >= -polygon::NO_AREA * 120.0, "seed 1, member {j}: {area}");
+                assert_eq!(member.mollified, Mollified::default());
+            }
+        }
     }
 
     #[test]

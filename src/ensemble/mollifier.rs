@@ -10,7 +10,7 @@
 //! A part of the outline that is thinner than the spacing cannot be had with equal spacing, small turns and no
 //! crossing at once. Then rounds stop before the first crossing, and what is wrong is reported: no turn above the
 //! bound and no crossing is left where parts that are four spacings apart along the outline are one spacing apart in
-//! the plane (measured on random polygons in `tests/polygons.rs`).
+//! the plane (checked on random polygons in `tests/polygons.rs`).
 
 use glam::DVec2;
 
