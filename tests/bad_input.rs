@@ -251,6 +251,12 @@ fn a_wrong_shape_is_refused_by_name() {
         ("ragged.csv", "0,0\n1\n1,1\n0,1\n"),
         ("same.csv", "2,2\n2,2\n2,2\n2,2\n"),
         ("twice.csv", "0,0\n1,0\n1,0\n1,1\n0,1\n"),
+        ("line.csv", "0,0\n1,1\n2,2\n3,3\n"),
+        ("no-area.csv", "0,0\n1,1\n1,0\n0,1\n"),
+        ("semicolon.csv", "x;y\n0;0\n1;0\n1;1\n"),
+        ("tab.csv", "\u{feff}x\ty\r\n0\t0\r\n1\t0\r\n1\t1\r\n"),
+        ("space.csv", "0 0\n1 0\n1 1\n"),
+        ("three.csv", "0,0,0\n1,0,0\n1,1,0\n"),
     ];
     for (name, _) in files.into_iter().chain([("absent.csv", "")]) {
         let shape = format!("file:{name}");
@@ -264,6 +270,9 @@ fn a_wrong_shape_is_refused_by_name() {
         ("--shape", "ellipse:2"),
         ("--shape", "circle:0"),
         ("--shape", "circle:inf"),
+        ("--shape", "astroid:1"),
+        ("--shape", "lemniscate"),
+        ("--shape", "lemniscate:-1"),
         ("--shape", "file:"),
         ("--sampling", "points"),
         ("--amplitude", "-1"),

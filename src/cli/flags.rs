@@ -44,7 +44,8 @@ pub struct SpecFlags {
         help_heading = ENSEMBLE
     )]
     seed: Option<u64>,
-    /// Curve that is perturbed [default: ellipse:2,1]
+    /// Curve that is perturbed: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],... or
+    /// file:PATH, a CSV file x,y; PATH is relative to the current folder, also in a spec file [default: ellipse:2,1]
     #[arg(
         long, value_name = "SHAPE", value_parser = text::<Shape>, allow_hyphen_values = true,
         help_heading = ENSEMBLE

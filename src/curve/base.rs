@@ -13,6 +13,7 @@ const CENTROID_SAMPLES: usize = 1 << 14;
 pub struct BaseCurve {
     kind: Kind,
     centroid: DVec2,
+    cusps: Vec<f64>,
 }
 
 enum Kind {
@@ -24,13 +25,21 @@ impl BaseCurve {
     /// The curve `u ↦ formula(u)`, of period 1.
     pub fn from_formula(formula: impl Fn(f64) -> DVec2 + Send + Sync + 'static) -> BaseCurve {
         let samples: Vec<DVec2> = (0..CENTROID_SAMPLES).map(|j| formula(j as f64 / CENTROID_SAMPLES as f64)).collect();
-        BaseCurve { kind: Kind::Formula(Box::new(formula)), centroid: polygon::area_centroid(&samples) }
+        let centroid = polygon::area_centroid(&samples);
+        BaseCurve { kind: Kind::Formula(Box::new(formula)), centroid, cusps: Vec::new() }
+    }
+
+    /// The same curve with cusps at the parameters `cusps`, increasing multiples of 1/32 between 0 and 1.
+    ///
+    /// Equal spacing makes a node of each: a cusp between two nodes would be cut off. `u = 0` is a node anyhow.
+    pub fn with_cusps(self, cusps: &[f64]) -> BaseCurve {
+        BaseCurve { cusps: cusps.to_vec(), ..self }
     }
 
     /// The closed polygon of a file; `u` is the share of its length from the first vertex on.
     pub fn from_outline(outline: Outline) -> BaseCurve {
         let centroid = polygon::area_centroid(outline.vertices());
-        BaseCurve { kind: Kind::Polygon(outline), centroid }
+        BaseCurve { kind: Kind::Polygon(outline), centroid, cusps: Vec::new() }
     }
 
     /// The point at `u ∈ [0, 1]`.
@@ -44,6 +53,11 @@ impl BaseCurve {
     /// Centroid of the enclosed area: exact for a polygon, to 1e-7 of its size for a formula.
     pub fn centroid(&self) -> DVec2 {
         self.centroid
+    }
+
+    /// Parameters between 0 and 1 that equal spacing makes nodes of.
+    pub fn cusps(&self) -> &[f64] {
+        &self.cusps
     }
 
     /// The polygon, if the curve is one.

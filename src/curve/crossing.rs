@@ -3,8 +3,9 @@
 //! Neighbouring edges of a curve lie near each other, so runs of consecutive edges make a good hierarchy without
 //! any sorting: the leaves are the boxes round single edges, every other box holds two runs of half its length.
 //! A search for meeting edges descends into a pair of runs only where their boxes overlap. Unlike a uniform grid
-//! this adapts to outlines with a million points in one bay and ten on the open coast. The worst case, many long
-//! edges all over each other, costs n², but there a meeting pair is found at once.
+//! this adapts to outlines with a million points in one bay and ten on the open coast. Many long edges all over each
+//! other cost n², but there a meeting pair is found at once. The worst case, n², are long edges side by side aslant,
+//! such as a comb of needles: [`crossing_within`] gives up on it.
 
 use glam::DVec2;
 
@@ -15,11 +16,29 @@ use glam::DVec2;
 /// fixed by the polygon but has no further meaning. The signs of areas are taken in f64 without error bounds, so
 /// a touch is exact only where its coordinates are.
 pub fn crossing(points: &[DVec2]) -> Option<(usize, usize)> {
-    if points.len() < 3 {
-        return None;
+    search(points, u64::MAX).0
+}
+
+/// As [`crossing`], or [`Undecided`] after comparing `comparisons` pairs of boxes, each some ten nanoseconds.
+pub fn crossing_within(points: &[DVec2], comparisons: u64) -> Result<Option<(usize, usize)>, Undecided> {
+    match search(points, comparisons) {
+        (None, 0) => Err(Undecided),
+        (found, _) => Ok(found),
     }
-    let tree = BoxTree::over_edges(points);
-    tree.meeting_pair(1, 1, points)
+}
+
+/// Nobody knows whether the polygon crosses itself: its edges are too many and too much side by side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Undecided;
+
+/// A meeting pair and the comparisons that are left; 0 says that the search was cut short.
+fn search(points: &[DVec2], comparisons: u64) -> (Option<(usize, usize)>, u64) {
+    let mut left = comparisons;
+    if points.len() < 3 {
+        return (None, left);
+    }
+    let found = BoxTree::over_edges(points).meeting_pair(1, 1, points, &mut left);
+    (found, left)
 }
 
 /// How near two strands of the polygon come to each other that run in opposite directions, or `limit` if that is less.
@@ -76,21 +95,19 @@ impl BoxTree {
         BoxTree { boxes, leaves }
     }
 
-    /// Searches the runs under `a` and `b`, two nodes of one level with `a <= b`.
-    fn meeting_pair(&self, a: usize, b: usize, points: &[DVec2]) -> Option<(usize, usize)> {
-        if !self.boxes[a].overlaps(self.boxes[b]) {
+    /// Searches the runs under `a` and `b`, two nodes of one level with `a <= b`, until no comparison is left.
+    fn meeting_pair(&self, a: usize, b: usize, points: &[DVec2], left: &mut u64) -> Option<(usize, usize)> {
+        *left = left.saturating_sub(1);
+        if *left == 0 || !self.boxes[a].overlaps(self.boxes[b]) {
             return None;
         }
         if a >= self.leaves {
             let (i, j) = (a - self.leaves, b - self.leaves);
             return (i != j && edges_meet(points, i, j)).then_some((i, j));
         }
-        let within = |x, y| self.meeting_pair(x, y, points);
-        let swapped = || if a == b { None } else { within(2 * a + 1, 2 * b) };
-        within(2 * a, 2 * b)
-            .or_else(|| within(2 * a + 1, 2 * b + 1))
-            .or_else(|| within(2 * a, 2 * b + 1))
-            .or_else(swapped)
+        let swapped = (a != b).then_some((2 * a + 1, 2 * b));
+        let pairs = [(2 * a, 2 * b), (2 * a + 1, 2 * b + 1), (2 * a, 2 * b + 1)].into_iter().chain(swapped);
+        pairs.into_iter().find_map(|(x, y)| self.meeting_pair(x, y, points, left))
     }
 
     /// Lowers `nearest` to the distance of the opposed edges under `a` and `b`, two nodes of one level with `a <= b`.
@@ -260,6 +277,26 @@ mod tests {
         assert_eq!(crossing(&closing_spike), Some((0, 4)));
         assert_eq!(crossing(&straight), None);
         assert_eq!(crossing(&polygon([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])), None);
+    }
+
+    /// Needles side by side at 45 degrees: no box is apart from any other.
+    fn aslant_comb(needles: usize) -> Vec<DVec2> {
+        let aslant = DVec2::from_angle(TAU / 8.0);
+        let teeth = (0..2 * needles).map(|i| DVec2::new(i as f64 / needles as f64, (i % 2) as f64));
+        let bar = [DVec2::new(2.0, -0.5), DVec2::new(0.0, -0.5)];
+        teeth.chain(bar).map(|p| p.rotate(aslant)).collect()
+    }
+
+    #[test]
+    fn a_search_ends_where_it_is_told_to() {
+        assert_eq!(crossing(&aslant_comb(300)), None);
+        assert_eq!(crossing_within(&aslant_comb(300), 10_000_000), Ok(None));
+        assert_eq!(crossing_within(&aslant_comb(300), 10_000), Err(Undecided));
+        let bow = polygon([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]);
+        assert_eq!(crossing_within(&bow, 1000), Ok(Some((0, 2))));
+        let start = std::time::Instant::now();
+        assert_eq!(crossing_within(&aslant_comb(500_000), 20_000_000), Err(Undecided));
+        assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
     }
 
     #[test]

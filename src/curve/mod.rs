@@ -16,7 +16,7 @@ mod sampling;
 mod shape;
 
 pub use base::BaseCurve;
-pub use crossing::{clearance, crossing};
+pub use crossing::{Undecided, clearance, crossing, crossing_within};
 pub use outline::{MAX_POINTS, Outline};
 pub use perturbation::{MIN_FACTOR, Modes, RadialFactor, RadialLaw, check_directions};
 pub use sampling::{Sampler, Sampling, resample};

@@ -1,15 +1,16 @@
 //! Outlines from files: a table of points becomes a closed counter-clockwise polygon, or a refusal that says why.
 //!
-//! The format is CSV: a point a line, `x,y`. Blank lines and lines that begin with `#` are skipped. A first line
+//! The format is CSV in UTF-8: a point a line, `x,y`, with a decimal point. Blank lines and lines that begin with `#` are skipped. A first line
 //! without any number is a header; it must name the columns `x` and `y`, and then further columns are ignored.
-//! The last point may repeat the first. Either orientation is accepted; a clockwise outline is turned round about
+//! The last point may repeat the first; other neighbours must differ, and points that are no neighbours may coincide,
+//! with the warning of a crossing, as may an edge that returns along another (a spike without width). Either orientation is accepted; a clockwise outline is turned round about
 //! its first point, which stays first.
 
 use std::{fs::File, io::Read, path::Path};
 
 use glam::DVec2;
 
-use super::{crossing, polygon};
+use super::{Undecided, crossing_within, polygon};
 use crate::error::{Error, Result};
 
 /// Largest number of points of an outline, and of nodes of a curve.
@@ -25,12 +26,17 @@ const MAX_COORDINATE: f64 = 1e30;
 /// 1e-16; an edge much shorter than this has no direction left.
 const COINCIDENT: f64 = 1e-12;
 
+/// Pairs of boxes compared before the search for a crossing is given up: a second. A million points of a
+/// coast take about 1e7.
+const MAX_COMPARISONS: u64 = 50_000_000;
+
 /// A closed counter-clockwise polygon, traversed by arclength.
 #[derive(Clone, Debug)]
 pub struct Outline {
     vertices: Vec<DVec2>,
     /// Length from vertex 0 to each vertex; one entry more than vertices, the last is the whole length.
     reached: Vec<f64>,
+    simple: bool,
     warnings: Vec<String>,
 }
 
@@ -50,17 +56,25 @@ impl Outline {
         if bytes.len() as u64 > MAX_BYTES {
             return Err(source.too_many(&format!("more than {MAX_BYTES} bytes")));
         }
+        if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+            return Err(source.refusal(None, "the file is in UTF-16", "save it in UTF-8"));
+        }
         source.outline(&String::from_utf8_lossy(&bytes))
     }
 
     /// The polygon through points that are known to be fit: counter-clockwise, no two neighbours the same.
-    fn through(vertices: Vec<DVec2>, warnings: Vec<String>) -> Outline {
+    fn through(vertices: Vec<DVec2>, not_simple: Option<String>) -> Outline {
         let mut reached = vec![0.0];
         reached.extend(polygon::edges(&vertices).scan(0.0, |sum, edge| {
             *sum += edge.length();
             Some(*sum)
         }));
-        Outline { vertices, reached, warnings }
+        Outline { vertices, reached, simple: not_simple.is_none(), warnings: not_simple.into_iter().collect() }
+    }
+
+    /// Whether the polygon neither crosses nor touches itself; false also where that could not be told.
+    pub fn is_simple(&self) -> bool {
+        self.simple
     }
 
     /// The vertices, without a repeated closing point.
@@ -144,11 +158,18 @@ impl Source<'_> {
             let problem = format!("the outline encloses no net area ({area:e} at a length of {length:e})");
             return Err(self.refusal(None, &problem, "give a closed curve with an inside"));
         }
-        let warnings = crossing(&points).map(|pair| self.crossing_warning(pair, &table.lines)).into_iter().collect();
+        let not_simple = match crossing_within(&points, MAX_COMPARISONS) {
+            Ok(found) => found.map(|pair| self.crossing_warning(pair, &table.lines)),
+            Err(Undecided) => Some(format!(
+                "{}: whether the outline crosses itself would take too long to find out; if it does, its area and \
+                 relaxation are those of an immersed curve",
+                self.path.display()
+            )),
+        };
         if area < 0.0 {
             polygon::turn_round(&mut points);
         }
-        Ok(Outline::through(points, warnings))
+        Ok(Outline::through(points, not_simple))
     }
 
     fn crossing_warning(&self, (i, j): (usize, usize), lines: &[usize]) -> String {
@@ -168,6 +189,9 @@ impl Source<'_> {
         let mut columns = None;
         let content = (1..).zip(text.lines().map(str::trim));
         for (line, content) in content.filter(|(_, content)| !content.is_empty() && !content.starts_with('#')) {
+            if !content.contains(',') {
+                self.refuse_separator(line, content, &SEPARATORS)?;
+            }
             let fields: Vec<&str> = fields(content).collect();
             if columns.is_none() && fields.iter().all(|field| field.parse::<f64>().is_err()) {
                 columns = Some(self.header(line, &fields)?);
@@ -175,6 +199,7 @@ impl Source<'_> {
             }
             let Columns { x, y, only } = *columns.get_or_insert(Columns { x: 0, y: 1, only: true });
             let (Some(x), Some(y), false) = (fields.get(x), fields.get(y), only && fields.len() > 2) else {
+                self.refuse_separator(line, content, &SEPARATORS[..2])?;
                 let problem = format!("the number of columns is {} where x,y is expected", fields.len());
                 let remedy = "separate by commas, and name further columns in a header";
                 return Err(self.refusal(Some(line), &problem, remedy));
@@ -186,6 +211,15 @@ impl Source<'_> {
             table.lines.push(line);
         }
         Ok(table)
+    }
+
+    /// Refuses a line with one of `separators` in it.
+    fn refuse_separator(&self, line: usize, content: &str, separators: &[(char, &str)]) -> Result<()> {
+        let Some((_, name)) = separators.iter().find(|(separator, _)| content.contains(*separator)) else {
+            return Ok(());
+        };
+        let problem = format!("the columns of `{}` are separated by {name}", shortened(content));
+        Err(self.refusal(Some(line), &problem, "separate them by a comma and write decimal points: 1.0,0.5"))
     }
 
     /// The columns of x and y that a header names.
@@ -255,6 +289,9 @@ fn fields(line: &str) -> impl Iterator<Item = &str> {
     line.split(separates).map(|field| field.trim().trim_matches('"').trim())
 }
 
+/// What else separates columns, of which a space may also follow a comma.
+const SEPARATORS: [(char, &str); 3] = [(';', "semicolons"), ('\t', "tabs"), (' ', "spaces")];
+
 /// At most 40 characters of foreign text, control characters escaped.
 fn shortened(text: &str) -> String {
     let mut shown: String = text.chars().take(40).flat_map(char::escape_debug).collect();
@@ -314,9 +351,61 @@ mod tests {
         assert_refused("0,0\n1e31,0\n1,1\n", &["line 2:", "`1e31` is too large"]);
         assert_refused("0,0\n1\n1,1\n", &["line 2:", "columns is 1 "]);
         assert_refused("0,0,7\n1,0,7\n1,1,7\n", &["line 1:", "columns is 3 ", "header"]);
-        assert_refused("0;0\n1;0\n", &["line 1:", "`0;0`", "x,y"]);
+        assert_refused("x,y\n0,0\n1\n", &["line 3:", "columns is 1 "]);
         assert_refused("lon,lat\n0,0\n1,0\n1,1\n", &["line 1:", "`lon,lat` names no columns x and y"]);
         assert_refused("x,y\nx,y\n0,0\n", &["line 2:", "`x` is not a number"]);
+    }
+
+    #[test]
+    fn other_separators_are_named() {
+        for (text, parts) in [
+            ("0;0\n1;0\n", ["line 1:", "columns of `0;0` are separated by semicolons; separate them by a comma"]),
+            ("x;y\n0;0\n", ["line 1:", "semicolons"]),
+            ("1,5;2,5\n1,5;3,5\n", ["line 1:", "semicolons"]),
+            ("0\t0\n1\t0\n", ["line 1:", r"`0\t0` are separated by tabs"]),
+            ("1,5\t2,5\n1,5\t3,5\n", ["line 1:", "tabs"]),
+            ("x y\n0 0\n1 0\n", ["line 1:", "`x y` are separated by spaces"]),
+            ("0,0\n1,0\n1 1\n", ["line 3:", "spaces"]),
+        ] {
+            assert_refused(text, &parts);
+        }
+        assert_refused("0, 0, 0\n1, 0, 0\n", &["columns is 3"]);
+    }
+
+    #[test]
+    fn an_outline_that_touches_itself_or_has_a_spike_without_width_is_accepted_with_a_warning() {
+        for text in [
+            "0,0\n2,0\n2,2\n1,0\n0,2\n",
+            "0,0\n2,-1\n2,1\n0,0\n-2,1\n-2,-1\n",
+            "0,0\n1,0\n3,0\n1,0\n0,1\n",
+            "0,0\n1,0\n1,1\n0.5,1\n0.5,3\n0.5,1\n0,1\n",
+        ] {
+            let touching = outline(text).unwrap();
+            assert!(touching.warnings()[0].contains("crosses or touches itself"), "{text}");
+            assert!(!touching.is_simple() && outline(SQUARE).unwrap().is_simple());
+        }
+    }
+
+    #[test]
+    fn a_utf_16_file_is_named_as_such() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let text: Vec<u8> = format!("\u{feff}{SQUARE}").encode_utf16().flat_map(u16::to_le_bytes).collect();
+        std::fs::write(file.path(), text).unwrap();
+        let message = Outline::read(file.path()).unwrap_err().to_string();
+        assert!(message.contains("in UTF-16; save it in UTF-8"), "{message}");
+    }
+
+    #[test]
+    fn needles_side_by_side_that_no_search_can_tell_apart_are_accepted_with_a_warning() {
+        let aslant = DVec2::from_angle(0.7);
+        let needles = (0..100_000).map(|i| DVec2::new(f64::from(i) * 1e-5, f64::from(i % 2)));
+        let bar = [DVec2::new(2.0, -0.5), DVec2::new(0.0, -0.5)];
+        let points = needles.chain(bar).map(|p| p.rotate(aslant));
+        let text: String = points.map(|p| format!("{},{}\n", p.x, p.y)).collect();
+        let start = std::time::Instant::now();
+        let comb = outline(&text).unwrap();
+        assert!(comb.warnings()[0].contains("would take too long") && !comb.is_simple());
+        assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
     }
 
     #[test]

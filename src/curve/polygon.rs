@@ -35,16 +35,26 @@ fn fan(points: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
 
 /// Centroid of the enclosed area, each part counted as often as the polygon winds round it.
 ///
-/// A figure-eight whose loops cancel has no area and so no such centroid; then the centroid of the line itself.
+/// A figure-eight whose loops cancel has no area and so no such centroid, and where they nearly cancel it lies far
+/// away; then, whenever it is outside the box round the points, the centroid of the line itself.
 pub fn area_centroid(points: &[DVec2]) -> DVec2 {
     let length = length(points);
     let double_area = 2.0 * signed_area(points);
     if double_area.abs() > 2.0 * NO_AREA * length * length {
         let moment: DVec2 = fan(points).map(|(a, b)| a.perp_dot(b) * (a + b)).sum();
-        return points[0] + moment / (3.0 * double_area);
+        let centroid = points[0] + moment / (3.0 * double_area);
+        let (low, high) = bounds(points);
+        if centroid.clamp(low, high) == centroid {
+            return centroid;
+        }
     }
     let moment: DVec2 = points.iter().zip(edges(points)).map(|(p, e)| e.length() * (*p - points[0] + 0.5 * e)).sum();
     if length > 0.0 { points[0] + moment / length } else { points[0] }
+}
+
+/// Lower left and upper right corner of the box round the points.
+pub fn bounds(points: &[DVec2]) -> (DVec2, DVec2) {
+    points.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)))
 }
 
 /// Excess `L²/(4πA) - (n/π)·tan(π/n)`: 0 on the regular n-gon, the rounder of all n-gons, and > 0 on every other
@@ -155,6 +165,14 @@ mod tests {
         assert_eq!(turning_number(&eight), 0);
         assert_near(signed_area(&eight), 0.0, 1e-14);
         assert_near(area_centroid(&eight).distance(DVec2::new(3.0, 1.0)), 0.0, 1e-13);
+    }
+
+    #[test]
+    fn loops_that_nearly_cancel_have_the_centroid_of_their_line() {
+        let eight = |bulge: f64| sampled(1001, |t| (t.sin() * (1.0 + bulge * t.sin()), t.sin() * t.cos()));
+        let slightly = eight(1e-6);
+        assert!(signed_area(&slightly).abs() > NO_AREA * length(&slightly).powi(2));
+        assert!(area_centroid(&slightly).length() < 1e-5, "{}", area_centroid(&slightly));
     }
 
     #[test]

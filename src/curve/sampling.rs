@@ -5,7 +5,11 @@
 //!
 //! Equal spacing is found by inverting the cumulated chord length of the *perturbed* samples. Within a piece the
 //! parameter is interpolated linearly, and the curve itself is evaluated there: so nodes lie on the curve to the
-//! rounding, and only their spacing is approximate (to 5e-4 of itself on the shapes that have a formula).
+//! rounding, and only their spacing is approximate (to 5e-4 of itself on the smooth shapes that have a formula).
+//!
+//! Each cusp of a formula is made a node. Every arc between cusps has its share of the n nodes, rounded, equally
+//! spaced; so spacings differ by half a node an arc at most, and by nothing where the arcs are equal and their
+//! number divides n.
 
 use std::{fmt, str::FromStr};
 
@@ -144,10 +148,14 @@ impl Sampler {
     fn equally_spaced(&self, samples: &[Sample], factor: &RadialFactor) -> Vec<DVec2> {
         let centre = self.curve.centroid();
         let reached = cumulated_length(samples.iter().map(|s| factor.apply_towards(s.direction, centre, s.point)));
-        let spacing = reached[samples.len() - 1] / self.nodes as f64;
-        let mut piece = 0;
+        let arcs = self.arcs(samples, &reached);
+        let (mut piece, mut arc) = (0, 0);
         let parameter = |i: usize| {
-            let target = i as f64 * spacing;
+            while arcs[arc + 1].0 <= i {
+                arc += 1;
+            }
+            let [(first, start), (last, end)] = [arcs[arc], arcs[arc + 1]];
+            let target = start + (i - first) as f64 * ((end - start) / (last - first) as f64);
             while piece + 2 < samples.len() && reached[piece + 1] < target {
                 piece += 1;
             }
@@ -155,6 +163,24 @@ impl Sampler {
             samples[piece].u + share * (samples[piece + 1].u - samples[piece].u)
         };
         (1..self.nodes).map(parameter).chain([0.0]).map(|u| factor.apply(centre, self.curve.point(u))).collect()
+    }
+}
+
+impl Sampler {
+    /// Node number and length at the start, at each cusp and at the end, where node n is node 0 again.
+    fn arcs(&self, samples: &[Sample], reached: &[f64]) -> Vec<(usize, f64)> {
+        let (n, length) = (self.nodes, reached[samples.len() - 1]);
+        let cusps = self.curve.cusps();
+        let mut arcs = vec![(0, 0.0)];
+        // With fewer nodes than arcs the cusps cannot all be nodes.
+        for (left, cusp) in (1..=cusps.len()).rev().zip(cusps).filter(|_| n > cusps.len()) {
+            let start = reached[samples.partition_point(|sample| sample.u < *cusp)];
+            let (previous, _) = arcs[arcs.len() - 1];
+            let node = (start / length * n as f64).round() as usize;
+            arcs.push((node.clamp(previous + 1, n - left), start));
+        }
+        arcs.push((n, length));
+        arcs
     }
 }
 
@@ -256,6 +282,31 @@ mod tests {
             assert!(gap.abs() < 1e-13, "{gap:e} at {node}");
         }
         assert!(nodes[96].distance(DVec2::new(2.0 * (1.0 + 0.2 * 0.5_f64.cos()), 0.0)) < 1e-14);
+    }
+
+    #[test]
+    fn each_cusp_of_an_astroid_is_a_node_whatever_their_number_and_its_perturbation() {
+        let cusps = [DVec2::Y, -DVec2::X, -DVec2::Y, DVec2::X];
+        for n in [6, 64, 97, 100, 101, 102, 103, 256, 1001] {
+            let astroid = sampler("astroid", Sampling::Arclength, n);
+            let nodes = astroid.sample(&RadialFactor::default());
+            for (j, cusp) in (1..).zip(cusps) {
+                let near = (0..n).min_by(|a, b| nodes[*a].distance(cusp).total_cmp(&nodes[*b].distance(cusp))).unwrap();
+                assert!(nodes[near].distance(cusp) < 1e-15, "{n}: {} misses {cusp}", nodes[near]);
+                assert!((near + 1).abs_diff(j * n / 4) <= 1, "{n}: cusp {j} is node {}", near + 1);
+            }
+            let ratio = polygon::mesh_ratio(&nodes);
+            let unequal = if n.is_multiple_of(4) { 0.0 } else { 8.0 / n as f64 };
+            assert!(n < 50 || ratio < 1.01 + unequal, "{n}: {ratio}");
+            let factor = RadialFactor::new(2, [(0.2, 1.0), (0.3, 2.0)]);
+            let stretched = astroid.sample(&factor);
+            for cusp in cusps.map(|cusp| factor.apply(DVec2::ZERO, cusp)) {
+                assert!(stretched.iter().any(|node| node.distance(cusp) < 1e-14), "{n}: {cusp}");
+            }
+        }
+        assert_eq!(sampler("astroid", Sampling::Arclength, 3).sample(&RadialFactor::default()).len(), 3);
+        let own = sampler("astroid", Sampling::Parameter, 102).sample(&RadialFactor::default());
+        assert!(own.iter().all(|node| node.distance(DVec2::Y) > 1e-4));
     }
 
     #[test]

@@ -29,6 +29,14 @@ pub enum Shape {
     },
     /// The paper's curve with three bays, of length 9.168307 and area 0.7π.
     Nonconvex,
+    /// `(cos³ 2πu, sin³ 2πu)`, of length 6 and area 3π/8, with cusps at u = 0, ¼, ½ and ¾.
+    Astroid,
+    /// Bernoulli's lemniscate `(cos, sin·cos)·A/(1 + sin²)` of 2πu, a figure-eight of length 5.2441151 A whose
+    /// curvature is 3/A at its two ends. It has no area and no sense, and its centre is its double point.
+    Lemniscate {
+        /// Half-width A.
+        half_width: f64,
+    },
     /// `r(θ) = 1 + Σ a_m cos(mθ + φ_m)` in polar coordinates, θ = 2πu.
     Flower(Vec<FlowerMode>),
     /// A closed polygon read from a table of points; `u` is the share of its length, see [`Outline`].
@@ -46,8 +54,8 @@ pub struct FlowerMode {
     pub phase: f64,
 }
 
-const NAMES: [&str; 5] = ["ellipse", "circle", "nonconvex", "flower", "file"];
-const FORMS: &str = "one of ellipse:A,B, circle:R, nonconvex, flower:M:A[:PHASE],..., file:PATH";
+const NAMES: [&str; 7] = ["ellipse", "circle", "nonconvex", "astroid", "lemniscate", "flower", "file"];
+const FORMS: &str = "one of ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],..., file:PATH";
 
 /// Range of lengths. Within it the fourth powers that times are measured in, and their inverses, stay finite.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
@@ -63,6 +71,8 @@ impl Shape {
             Shape::Ellipse { a, b } => BaseCurve::from_formula(move |u| ellipse(a, b, u)),
             Shape::Circle { radius } => BaseCurve::from_formula(move |u| ellipse(radius, radius, u)),
             Shape::Nonconvex => BaseCurve::from_formula(nonconvex),
+            Shape::Astroid => BaseCurve::from_formula(astroid).with_cusps(&[0.25, 0.5, 0.75]),
+            Shape::Lemniscate { half_width } => BaseCurve::from_formula(move |u| lemniscate(half_width, u)),
             Shape::Flower(modes) => BaseCurve::from_formula(move |u| flower(&modes, u)),
             Shape::File(path) => BaseCurve::from_outline(Outline::read(&path)?),
         })
@@ -81,7 +91,8 @@ impl Shape {
         match self {
             Shape::Ellipse { a, b } => check_size("half-axis", *a).and(check_size("half-axis", *b)),
             Shape::Circle { radius } => check_size("radius", *radius),
-            Shape::Nonconvex => Ok(()),
+            Shape::Nonconvex | Shape::Astroid => Ok(()),
+            Shape::Lemniscate { half_width } => check_size("half-width", *half_width),
             Shape::Flower(modes) => check_flower(modes),
             Shape::File(path) if path.as_os_str().is_empty() => Err(MISSING_PATH.into()),
             Shape::File(_) => Ok(()),
@@ -98,6 +109,16 @@ fn nonconvex(u: f64) -> DVec2 {
     let (sin, cos) = (TAU * u).sin_cos();
     let ripple = (3.0 * TAU * u).sin().powi(2);
     DVec2::new(cos, 0.5 * sin + cos.sin() + sin * (0.2 + sin * ripple))
+}
+
+fn astroid(u: f64) -> DVec2 {
+    let (sin, cos) = (TAU * u).sin_cos();
+    DVec2::new(cos.powi(3), sin.powi(3))
+}
+
+fn lemniscate(half_width: f64, u: f64) -> DVec2 {
+    let (sin, cos) = (TAU * u).sin_cos();
+    half_width * cos / (1.0 + sin * sin) * DVec2::new(1.0, sin)
 }
 
 fn flower(modes: &[FlowerMode], u: f64) -> DVec2 {
@@ -142,6 +163,8 @@ impl fmt::Display for Shape {
             Shape::Ellipse { a, b } => write!(f, "ellipse:{a},{b}"),
             Shape::Circle { radius } => write!(f, "circle:{radius}"),
             Shape::Nonconvex => write!(f, "nonconvex"),
+            Shape::Astroid => write!(f, "astroid"),
+            Shape::Lemniscate { half_width } => write!(f, "lemniscate:{half_width}"),
             Shape::Flower(modes) => {
                 let terms: Vec<String> = modes.iter().map(FlowerMode::to_string).collect();
                 write!(f, "flower:{}", terms.join(","))
@@ -186,7 +209,12 @@ impl FromStr for Shape {
                 Shape::Circle { radius }
             }
             "nonconvex" if arguments.is_none() => Shape::Nonconvex,
-            "nonconvex" => return Err("nonconvex takes no argument".into()),
+            "astroid" if arguments.is_none() => Shape::Astroid,
+            "nonconvex" | "astroid" => return Err(format!("{name} takes no argument")),
+            "lemniscate" => {
+                let [half_width] = numbers(arguments, "lemniscate takes its half-width, for example lemniscate:1")?;
+                Shape::Lemniscate { half_width }
+            }
             "flower" => Shape::Flower(flower_modes(arguments.unwrap_or_default())?),
             "file" => Shape::File(arguments.ok_or(MISSING_PATH)?.into()),
             _ => return Err(format!("unknown shape `{name}`{}; {FORMS}", did_you_mean(name, NAMES))),
@@ -226,7 +254,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::curve::polygon;
+    use crate::curve::{crossing, polygon};
 
     fn shape(text: &str) -> Shape {
         text.parse().unwrap()
@@ -248,6 +276,8 @@ mod tests {
             "ellipse:0.1,1234567.875",
             "circle:0.30000000000000004",
             "nonconvex",
+            "astroid",
+            "lemniscate:0.75",
             "flower:3:0.2",
             "flower:2:-0.3,5:0.1:1.5",
             "file:some folder/a:b,c.csv",
@@ -263,7 +293,10 @@ mod tests {
         let message = refusal("elipse:2,1");
         assert!(message.contains("did you mean `ellipse`?") && message.contains(FORMS), "{message}");
         assert!(refusal("").contains(FORMS));
-        assert!(refusal("astroid").contains("unknown shape `astroid`"));
+        assert!(refusal("deltoid").contains("unknown shape `deltoid`; one of"));
+        for name in NAMES {
+            assert!(FORMS.contains(name), "{name}");
+        }
     }
 
     #[test]
@@ -273,6 +306,9 @@ mod tests {
             ("ellipse:1,-2", "-2"),
             ("ellipse:NaN,1", "NaN"),
             ("circle:inf", "inf"),
+            ("lemniscate:0", "0"),
+            ("lemniscate:-1", "-1"),
+            ("lemniscate:nan", "NaN"),
             ("circle:1e101", "1000000"),
             ("flower:0:0.1", "mode 0"),
             ("flower:1001:0.1", "mode 1001"),
@@ -294,7 +330,11 @@ mod tests {
             ("ellipse:2,1,1", "ellipse:2,1"),
             ("ellipse:2,one", "ellipse:2,1"),
             ("circle:", "circle:1"),
-            ("nonconvex:1", "no argument"),
+            ("nonconvex:1", "nonconvex takes no argument"),
+            ("astroid:1", "astroid takes no argument"),
+            ("lemniscate", "lemniscate:1"),
+            ("lemniscate:1,2", "lemniscate:1"),
+            ("lemniscate:wide", "lemniscate:1"),
             ("flower", "flower:3:0.2"),
             ("flower:", "flower:3:0.2"),
             ("flower:3", "3:0.2"),
@@ -323,6 +363,39 @@ mod tests {
     }
 
     #[test]
+    fn the_astroid_has_its_length_area_and_four_cusps() {
+        let curve = points("astroid", 20_000);
+        assert!((polygon::length(&curve) - 6.0).abs() < 1e-6);
+        assert!((polygon::signed_area(&curve) - 0.375 * PI).abs() < 1e-6);
+        assert_eq!((polygon::turning_number(&curve), crossing(&curve)), (1, None));
+        for (j, cusp) in [DVec2::X, DVec2::Y, -DVec2::X, -DVec2::Y].into_iter().enumerate() {
+            let base = shape("astroid").resolve().unwrap();
+            assert!(base.point(0.25 * j as f64).distance(cusp) < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_lemniscate_has_its_length_its_curvature_and_no_sense() {
+        let (n, a) = (20_000, 0.75);
+        let curve = points("lemniscate:0.75", n);
+        assert!((polygon::length(&curve) / a - 5.244_115_1).abs() < 1e-6);
+        assert!(polygon::signed_area(&curve).abs() < 1e-14);
+        assert_eq!(polygon::turning_number(&curve), 0);
+        assert!(crossing(&curve).is_some());
+        for p in &curve {
+            let (square, across) = (p.length_squared(), p.x * p.x - p.y * p.y);
+            assert!((square * square - a * a * across).abs() < 1e-14, "{p}");
+        }
+        // Both ends bend by 3/A, one to either side; node n is the right one.
+        for (end, sense) in [(n, 1.0), (n / 2, -1.0)] {
+            let [before, at, after] = [end - 1, end, end + 1].map(|i| curve[(i + n - 1) % n]);
+            let curvature = (at - before).angle_to(after - at) / at.distance(after);
+            assert!((curvature - sense * 3.0 / a).abs() < 1e-5, "{curvature}");
+        }
+        assert!(shape("lemniscate:0.75").resolve().unwrap().centroid().length() < 1e-13);
+    }
+
+    #[test]
     fn a_flower_has_its_radius_at_each_angle_and_its_area() {
         let curve = points("flower:2:0.2,3:-0.1:0.5", 20_000);
         for p in curve.iter().step_by(777) {
@@ -335,7 +408,7 @@ mod tests {
 
     #[test]
     fn every_formula_is_counter_clockwise_and_closed() {
-        for text in ["ellipse:2,1", "circle:3", "nonconvex", "flower:3:0.5,7:0.4:1"] {
+        for text in ["ellipse:2,1", "circle:3", "nonconvex", "astroid", "flower:3:0.5,7:0.4:1"] {
             assert!(polygon::signed_area(&points(text, 500)) > 0.0, "{text}");
             let curve = shape(text).resolve().unwrap();
             assert!(curve.point(0.0).distance(curve.point(1.0)) < 1e-14, "{text}");

@@ -11,7 +11,7 @@ use glam::DVec2;
 
 use super::{Mollified, Spec, mollifier::mollify, random::Stream};
 use crate::{
-    curve::{BaseCurve, RadialFactor, RadialLaw, Sampler, Sampling, check_directions, polygon},
+    curve::{BaseCurve, Outline, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions, polygon},
     error::{Error, Result},
     solver::ring::MIN_POINTS,
 };
@@ -19,6 +19,9 @@ use crate::{
 /// Draws of one member before giving up. By Rice's formula the harshest law that is admitted, a
 /// thousand modes of one size, still keeps two draws in a hundred.
 const MAX_ATTEMPTS: u32 = 1000;
+
+const NO_EXCESS: &str = "the loops of a lemniscate cancel: its area is next to nothing, and its excess, status and \
+                         relaxation times, which divide by it, mean nothing";
 
 /// One curve at the start of its run.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +46,8 @@ pub struct Family {
     warnings: Vec<String>,
     /// An outline spaced equally: its corners may be too sharp for n nodes.
     has_corners: bool,
+    /// The outline, if there is one, does not cross itself.
+    simple: bool,
 }
 
 impl Family {
@@ -65,10 +70,14 @@ impl Family {
             check_own_points(spec.points, own)?;
         }
         let has_corners = outline.is_some() && spec.sampling == Sampling::Arclength && spec.points >= MIN_POINTS;
-        let warnings = outline.map_or(Vec::new(), |outline| outline.warnings().to_vec());
+        let simple = outline.is_some_and(Outline::is_simple);
+        let mut warnings = outline.map_or(Vec::new(), |outline| outline.warnings().to_vec());
+        if let Shape::Lemniscate { .. } = spec.shape {
+            warnings.push(NO_EXCESS.into());
+        }
         let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
         let directions = check_directions(spec.modes.high);
-        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners })
+        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners, simple })
     }
 
     /// What the user should know about the curve, a sentence each.
@@ -88,7 +97,7 @@ impl Family {
     pub fn member(&self, index: u64) -> Result<Member> {
         let factor = self.radial_factor(index)?;
         let mut nodes = self.sampler.sample(&factor);
-        let mollified = if self.has_corners { mollify(&mut nodes) } else { Mollified::default() };
+        let mollified = if self.has_corners { mollify(&mut nodes, self.simple) } else { Mollified::default() };
         let length = polygon::length(&nodes);
         // Loops that cancel have an area of rounding only, whose sign must not decide the orientation.
         if polygon::signed_area(&nodes) < -polygon::NO_AREA * length * length {
@@ -139,7 +148,7 @@ fn check_own_points(asked: usize, own: usize) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::{Modes, Shape, crossing};
+    use crate::curve::{Modes, crossing};
 
     fn spec(shape: &str, sampling: Sampling, points: usize, amplitude: f64) -> Spec {
         Spec { shape: shape.parse::<Shape>().unwrap(), sampling, points, amplitude, ..Spec::default() }
@@ -293,6 +302,22 @@ mod tests {
         let crossed = family(&spec(&format!("file:{}", path.display()), Sampling::Arclength, 50, 0.0));
         assert!(crossed.warnings()[0].contains("crosses"), "{:?}", crossed.warnings());
         assert!(family(&Spec::default()).warnings().is_empty());
+    }
+
+    #[test]
+    fn a_lemniscate_keeps_its_loops_its_place_and_has_a_warning() {
+        for amplitude in [0.0, 0.05] {
+            let family = family(&spec("lemniscate:2", Sampling::Arclength, 101, amplitude));
+            assert!(family.warnings()[0].contains("excess"), "{:?}", family.warnings());
+            for j in 0..20 {
+                let member = family.member(j).unwrap();
+                assert_eq!(polygon::turning_number(&member.nodes), 0, "seed 1, member {j}");
+                assert!(member.origin.length() < 2.5, "seed 1, member {j}: {}", member.origin);
+                let area = polygon::signed_area(&member.nodes);
+                assert!(area >= -polygon::NO_AREA * 120.0, "seed 1, member {j}: {area}");
+                assert_eq!(member.mollified, Mollified::default());
+            }
+        }
     }
 
     #[test]

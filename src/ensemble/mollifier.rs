@@ -6,11 +6,16 @@
 //! followed by spacing the nodes equally again, until no node turns by more than [`MAX_VERTEX_TURN`]. Without the
 //! new spacing nodes would crowd at a tip and a sharp one would take hundreds of rounds. The effect reaches a few
 //! spacings far, so it vanishes as n grows; the rounds and the change of area are reported.
+//!
+//! A part of the outline that is thinner than the spacing cannot be had with equal spacing, small turns and no
+//! crossing at once. Then rounds stop before the first crossing, and what is wrong is reported: no turn above the
+//! bound and no crossing is left where parts that are four spacings apart along the outline are one spacing apart in
+//! the plane (checked on random polygons in `tests/polygons.rs`).
 
 use glam::DVec2;
 
 use crate::{
-    curve::{polygon, resample},
+    curve::{crossing, polygon, resample},
     solver::{Ring, Row, System, direct},
 };
 
@@ -28,16 +33,38 @@ pub struct Mollified {
     pub rounds: u32,
     /// Relative change of its area.
     pub area_change: f64,
+    /// A node still turns by more than [`MAX_VERTEX_TURN`].
+    pub sharp: bool,
+    /// The nodes cross themselves, though the outline does not.
+    pub crossed: bool,
 }
 
-/// Rounds off the corners of `nodes` (n ≥ 6) where they are too sharp for it.
-pub fn mollify(nodes: &mut Vec<DVec2>) -> Mollified {
+impl Mollified {
+    /// Relative change of area above which the curve is another one.
+    pub const DISTORTED: f64 = 0.1;
+
+    /// Whether the change of area is above [`Mollified::DISTORTED`].
+    pub fn distorted(&self) -> bool {
+        self.area_change.abs() > Mollified::DISTORTED
+    }
+}
+
+/// Rounds off the corners of `nodes` (n ≥ 6) where they are too sharp for it; `simple` says that the outline does
+/// not cross itself, so neither should they.
+pub fn mollify(nodes: &mut Vec<DVec2>, simple: bool) -> Mollified {
     let area = polygon::signed_area(nodes);
-    let mut done = Mollified::default();
-    while done.rounds < MAX_ROUNDS && sharpest_turn(nodes) > MAX_VERTEX_TURN {
-        *nodes = resample(&smoothed(nodes));
-        done.rounds += 1;
-        done.area_change = polygon::signed_area(nodes) / area - 1.0;
+    let crosses = |nodes: &[DVec2]| simple && crossing(nodes).is_some();
+    let sharp = |nodes: &[DVec2]| sharpest_turn(nodes) > MAX_VERTEX_TURN;
+    let mut done = Mollified { sharp: sharp(nodes), crossed: crosses(nodes), ..Mollified::default() };
+    while (done.sharp || done.crossed) && done.rounds < MAX_ROUNDS {
+        let next = resample(&smoothed(nodes));
+        let crossed = crosses(&next);
+        if crossed && !done.crossed {
+            break;
+        }
+        *nodes = next;
+        let area_change = polygon::signed_area(nodes) / area - 1.0;
+        done = Mollified { rounds: done.rounds + 1, area_change, sharp: sharp(nodes), crossed };
     }
     done
 }
@@ -83,7 +110,7 @@ mod tests {
         let mut circle: Vec<DVec2> =
             (0..50).map(|i| DVec2::from_angle(0.04 * std::f64::consts::PI * i as f64)).collect();
         let before = circle.clone();
-        assert_eq!(mollify(&mut circle), Mollified::default());
+        assert_eq!(mollify(&mut circle, true), Mollified::default());
         assert_eq!(circle, before);
     }
 
@@ -92,12 +119,52 @@ mod tests {
         let change = |n| {
             let mut nodes = star(5, n);
             assert!(sharpest_turn(&nodes) > 2.0);
-            let done = mollify(&mut nodes);
+            let done = mollify(&mut nodes, true);
+            assert!(!done.sharp && !done.crossed && done.distorted() == (done.area_change.abs() > 0.1));
             assert!(done.rounds > 0 && sharpest_turn(&nodes) <= MAX_VERTEX_TURN);
             assert_eq!(nodes.len(), n);
             done.area_change.abs()
         };
         let (coarse, fine) = (change(100), change(400));
         assert!(coarse < 0.1 && fine < 0.25 * coarse, "{coarse} {fine}");
+    }
+
+    /// A strip 1 long with square ends whose `n` nodes start a share of an edge after its corner.
+    fn strip(width: f64, n: usize) -> Vec<DVec2> {
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, width), (0.0, width)].map(DVec2::from);
+        let fine: Vec<DVec2> = (0..4)
+            .flat_map(|j| (0..5000).map(move |i| corners[j].lerp(corners[(j + 1) % 4], f64::from(i) / 5000.0)))
+            .collect();
+        resample(&fine).into_iter().skip(77).step_by(20_000 / n).collect()
+    }
+
+    #[test]
+    fn a_strip_thinner_than_the_spacing_is_reported_and_not_crossed() {
+        for n in [50, 100] {
+            let spacing = 2.0 / n as f64;
+            let mut thin = strip(0.1 * spacing, n);
+            let done = mollify(&mut thin, true);
+            assert!(done.sharp && sharpest_turn(&thin) > MAX_VERTEX_TURN, "{n}: {done:?}");
+            assert!(!done.crossed && crossing(&thin).is_none(), "{n}: {done:?}");
+            let mut wide = strip(2.0 * spacing, n);
+            let done = mollify(&mut wide, true);
+            assert!(!done.sharp && !done.crossed && crossing(&wide).is_none(), "{n}: {done:?}");
+        }
+    }
+
+    #[test]
+    fn nodes_that_cross_are_told_from_an_outline_that_does() {
+        let bow = |n: i32| {
+            let corners = [(0.0, 0.0), (3.0, 3.0), (3.0, 0.0), (0.0, 1.0)].map(DVec2::from);
+            (0..4 * n).map(move |i| {
+                let (j, share) = ((i / n) as usize, f64::from(i % n) / f64::from(n));
+                corners[j].lerp(corners[(j + 1) % 4], share)
+            })
+        };
+        let mut nodes: Vec<DVec2> = bow(20).collect();
+        assert!(!mollify(&mut nodes, false).crossed && crossing(&nodes).is_some());
+        let mut nodes: Vec<DVec2> = bow(20).collect();
+        let done = mollify(&mut nodes, true);
+        assert!(done.crossed == crossing(&nodes).is_some(), "{done:?}");
     }
 }

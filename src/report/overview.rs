@@ -74,7 +74,7 @@ impl Overview<'_> {
 
     /// What was done to outlines whose corners the nodes do not resolve; empty where nothing was.
     fn corners(&self) -> String {
-        let MollifiedMembers { members, most_rounds, largest_area_change } = self.tally.mollified;
+        let MollifiedMembers { members, most_rounds, largest_area_change, .. } = self.tally.mollified;
         if members == 0 {
             return String::new();
         }

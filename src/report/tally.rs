@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::ensemble::{Mollified, Outcome, Status};
+use crate::ensemble::{Mollified, Outcome, Status, mollifier::MAX_VERTEX_TURN};
 
 /// Counts and sums over the members that ended.
 #[derive(Clone, Debug, Default)]
@@ -35,6 +35,14 @@ pub struct MollifiedMembers {
     pub most_rounds: u32,
     /// Largest relative change of area.
     pub largest_area_change: f64,
+    /// How many are not resolved: one of the next three.
+    pub unresolved: u64,
+    /// How many cross themselves at the start, though the outline does not.
+    pub crossed: u64,
+    /// How many start with a node that turns by more than 1.5 rad.
+    pub sharp: u64,
+    /// How many changed their area by more than a tenth.
+    pub distorted: u64,
 }
 
 impl MollifiedMembers {
@@ -43,6 +51,30 @@ impl MollifiedMembers {
         self.members += u64::from(mollified.rounds > 0);
         self.most_rounds = self.most_rounds.max(mollified.rounds);
         self.largest_area_change = self.largest_area_change.max(mollified.area_change.abs());
+        let faults = [mollified.crossed, mollified.sharp, mollified.distorted()];
+        self.unresolved += u64::from(faults.contains(&true));
+        for (count, fault) in [&mut self.crossed, &mut self.sharp, &mut self.distorted].into_iter().zip(faults) {
+            *count += u64::from(fault);
+        }
+    }
+
+    /// What the user should know, unless all is well.
+    fn warning(&self, all: u64) -> Option<String> {
+        let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = self;
+        (*unresolved > 0).then(|| {
+            let parts = [
+                (crossed, "cross themselves although the outline does not".to_owned()),
+                (sharp, format!("keep a turn above {MAX_VERTEX_TURN} rad")),
+                (distorted, format!("changed their area by more than {} %", 100.0 * Mollified::DISTORTED)),
+            ];
+            let parts = parts.into_iter().filter(|(count, _)| **count > 0);
+            let parts: Vec<String> = parts.map(|(count, what)| format!("{count} {what}")).collect();
+            format!(
+                "{unresolved} of {all} members start from an outline with parts thinner than the spacing of their \
+                 nodes: {}; take more --points or a simpler outline",
+                parts.join(", ")
+            )
+        })
     }
 }
 
@@ -70,7 +102,7 @@ impl Tally {
     /// What the user should know about the results, a sentence each.
     pub fn warnings(&self) -> Vec<String> {
         let members = self.members();
-        let mut warnings = Vec::new();
+        let mut warnings: Vec<String> = self.mollified.warning(members).into_iter().collect();
         let failed: u64 = self.counts().filter(|(status, _)| status.is_failure()).map(|(_, count)| count).sum();
         if failed > 0 {
             warnings.push(format!(
@@ -173,6 +205,24 @@ pub(crate) mod tests {
         assert_eq!(tally(&[], 2).relaxation(), None);
         assert_eq!(tally(&[9.0, 1.0, 2.0], 1).relaxation(), Some(Relaxation { count: 3, mean: 4.0, median: 2.0 }));
         assert_eq!(tally(&[9.0, 1.0, 2.0, 4.0], 0).relaxation().unwrap().median, 3.0);
+    }
+
+    #[test]
+    fn outlines_that_the_nodes_do_not_resolve_are_warned_of() {
+        let mut tally = tally(&[1.0, 2.0, 3.0, 4.0], 0);
+        let well = Mollified { rounds: 7, area_change: -0.05, ..Mollified::default() };
+        tally.add_aside(&well, false);
+        assert_eq!((tally.warnings(), tally.mollified.members), (vec![], 1));
+        tally.add_aside(&Mollified { crossed: true, sharp: true, ..well }, false);
+        tally.add_aside(&Mollified { area_change: -0.2, ..well }, false);
+        let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = tally.mollified;
+        assert_eq!((unresolved, crossed, sharp, distorted), (2, 1, 1, 1));
+        let warnings = tally.warnings();
+        assert!(warnings[0].starts_with("2 of 4 members start from an outline with parts thinner"), "{warnings:?}");
+        let parts = "1 cross themselves although the outline does not, 1 keep a turn above 1.5 rad, 1 changed";
+        assert!(warnings[0].contains(parts) && warnings[0].contains("more than 10 %; take more --points"));
+        tally.mollified.crossed = 0;
+        assert!(!tally.warnings()[0].contains("cross"));
     }
 
     #[test]

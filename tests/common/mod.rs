@@ -1,6 +1,7 @@
 //! What the integration tests share: a curve that is stepped by hand, and measures of it.
 #![allow(dead_code, missing_docs)] // every test file takes its own part of it
 
+pub mod polygons;
 pub mod program;
 
 use std::f64::consts::TAU;
