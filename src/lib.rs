@@ -38,6 +38,7 @@
 //! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
 //! | [`schedule`], [`trajectory`], [`simulate`] | steps and output times; one member's way; the loop over all |
 //! | [`report`] | tables, plots, provenance |
+//! | [`figures`] | the paper's figures, as data |
 //! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
 //! | [`cli`] | the commands |
 //!
@@ -89,6 +90,7 @@ pub mod conformance;
 pub mod curve;
 pub mod ensemble;
 pub mod error;
+pub mod figures;
 pub mod flow;
 pub mod number;
 pub mod report;

@@ -5,6 +5,7 @@
 
 mod adapters;
 mod check;
+mod figure;
 mod flags;
 mod run;
 
@@ -34,6 +35,7 @@ struct Cli {
 enum Command {
     Run(Box<run::RunArgs>),
     Check(check::CheckArgs),
+    Figure(figure::FigureArgs),
     Adapters(adapters::AdaptersArgs),
 }
 
@@ -43,6 +45,7 @@ pub fn main() -> ExitCode {
     let done = match cli.command {
         Command::Run(args) => run::run(*args),
         Command::Check(args) => check::check(args),
+        Command::Figure(args) => figure::figure(args),
         Command::Adapters(args) => adapters::adapters(args),
     };
     match done {
