@@ -158,8 +158,10 @@ fn without_redistribution_nodes_gather_and_with_it_they_spread() {
     assert!(without > 3.5 && with < 1.3, "{without} {with}");
 }
 
+/// To the last time but one: at rest sweeps take long to agree on increments that are next to nothing.
 fn ended(figure: &Figure, solver: Solver) -> Ended {
-    let spec = Spec { solver, ..figure.spec().unwrap() };
+    let times = &figure.times[..figure.times.len() - 1];
+    let spec = Spec { solver, t_end: times[times.len() - 1], snapshots: times.into(), ..figure.spec().unwrap() };
     figure.simulate(&spec.validate().unwrap(), Progress::Quiet).unwrap()
 }
 
@@ -182,7 +184,7 @@ fn sweeps_would_draw_the_same_picture() {
         // A hundredth of a pixel, to which coordinates are written, is 7e-5.
         assert!(apart > 0.0 && apart < 7e-5, "{}: {apart:e}", figure.name);
     }
-    assert!(distance(&ended(a, Solver::Direct), &ended(b, Solver::Direct)) > 0.1);
+    assert!(distance(&ended(a, Solver::Direct), &ended(b, Solver::Direct)) > 0.03);
 }
 
 #[test]
