@@ -157,7 +157,8 @@ fn record_events(h: real) {
         report.progress.half_length = length;
         report.progress.half_fraction = fraction_at(p.half_at);
     }
-    if counters.relax_step == NEVER && report.now.excess <= p.relax_at {
+    let coupled = others.z <= real(MAX_GAP);
+    if counters.relax_step == NEVER && report.now.excess <= p.relax_at && coupled {
         counters.relax_step = counters.steps;
         report.progress.relax_high = report.progress.time_high;
         report.progress.relax_low = report.progress.time_low;
@@ -169,6 +170,7 @@ fn record_events(h: real) {
 /// Where in the last step the excess fell to `excess`.
 fn fraction_at(excess: real) -> real {
     let before = report.before.excess;
+    if before <= excess { return real(1.0); }
     let after = report.now.excess;
     let straight = (before - excess) / (before - after);
     return select(straight, crossing(before, report.middle.excess, after, excess), ADAPTIVE);

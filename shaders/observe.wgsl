@@ -6,8 +6,8 @@ const MAX_TURN = 2.0;
 const MIN_EDGE = 1e-5;
 /// Metric drift above which the scheme's lengths say nothing about the polygon.
 const MAX_DRIFT = 1.0;
-/// Gap between k and the polygon's turn above which the curvature says nothing about the polygon.
-const MAX_GAP = 2.0;
+/// Gap between k and the polygon's turn above which no member counts as relaxed.
+const MAX_GAP = 0.5;
 const FOUR_PI = 12.566370614359172;
 
 /// Sums of the new curve: length, area, energy, turning.
@@ -80,7 +80,7 @@ fn is_singular(turning: real) -> bool {
     let mean_edge = sums.x / real(NODES);
     let resolved = extremes.x <= real(MAX_TURN);
     let apart = real(MIN_EDGE) * mean_edge <= -extremes.w;
-    let measured = extremes.y <= real(MAX_DRIFT) && others.z <= real(MAX_GAP);
+    let measured = extremes.y <= real(MAX_DRIFT);
     let extended = p.least_length <= sums.x;
     return !(resolved && apart && measured && extended && sums.w == turning);
 }

@@ -39,6 +39,7 @@
 //! | [`schedule`], [`trajectory`], [`simulate`] | steps and output times; one member's way; the loop over all |
 //! | [`truth`] | problems with exact solutions, and the error and order against them |
 //! | [`report`] | tables, plots, provenance |
+//! | [`figures`] | the paper's figures, as data |
 //! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
 //! | [`cli`] | the commands |
 //!
@@ -90,6 +91,7 @@ pub mod conformance;
 pub mod curve;
 pub mod ensemble;
 pub mod error;
+pub mod figures;
 pub mod flow;
 pub mod number;
 pub mod report;

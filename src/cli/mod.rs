@@ -6,6 +6,7 @@
 mod adapters;
 mod check;
 mod convergence;
+mod figure;
 mod flags;
 mod run;
 
@@ -36,6 +37,7 @@ enum Command {
     Run(Box<run::RunArgs>),
     Check(check::CheckArgs),
     Convergence(convergence::ConvergenceArgs),
+    Figure(figure::FigureArgs),
     Adapters(adapters::AdaptersArgs),
 }
 
@@ -46,6 +48,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(*args),
         Command::Check(args) => check::check(args),
         Command::Convergence(args) => convergence::convergence(args),
+        Command::Figure(args) => figure::figure(args),
         Command::Adapters(args) => adapters::adapters(args),
     };
     match done {

@@ -260,7 +260,7 @@ impl Spec {
 /// The smallest tolerance of adaptive steps whose errors are not all rounding.
 fn tightest_adaptive(precision: Precision) -> f64 {
     match precision {
-        Precision::F32 => 1e-4,
+        Precision::F32 => 1e-5,
         Precision::F64 => 1e-8,
     }
 }

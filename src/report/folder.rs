@@ -41,16 +41,25 @@ pub struct OutputFolder {
     made: Vec<PathBuf>,
     new_plots: bool,
     lock: Option<File>,
+    /// The files that may be written.
+    names: Vec<String>,
 }
 
 impl OutputFolder {
-    /// Makes the folder and its parents. One that exists is refused unless `force` allows to replace in it the files
-    /// of an earlier run; so is a place that cannot be written, or where another run is writing.
+    /// The folder of a run, as [`OutputFolder::open_for`] makes it.
     pub fn open(path: &Path, force: bool) -> Result<OutputFolder> {
+        OutputFolder::open_for(path, force, OWN.map(String::from).into())
+    }
+
+    /// Makes the folder and its parents, to write the files `names` into. One that exists is refused unless `force`
+    /// allows to replace in it the files of an earlier run; so is a place that cannot be written, or where another run
+    /// is writing.
+    pub fn open_for(path: &Path, force: bool, names: Vec<String>) -> Result<OutputFolder> {
         let refuse = |e: io::Error| {
             Error::Request(format!("--out {}: cannot be written ({e}); name a folder that can", path.display()))
         };
-        let mut folder = OutputFolder { path: path.to_path_buf(), made: Vec::new(), new_plots: false, lock: None };
+        let mut folder =
+            OutputFolder { path: path.to_path_buf(), made: Vec::new(), new_plots: false, lock: None, names };
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             if parent.exists() && !parent.is_dir() {
                 let problem = format!("{} is no folder", parent.display());
@@ -78,7 +87,7 @@ impl OutputFolder {
         let probe = path.join(".curvelax.part");
         create(&probe).and_then(|_| fs::remove_file(&probe)).map_err(refuse)?;
         // What an interrupted run left; its lock is gone, so it is no longer writing.
-        OWN.iter().try_for_each(|name| remove(&folder.part(name))).map_err(refuse)?;
+        folder.names.iter().try_for_each(|name| remove(&folder.part(name))).map_err(refuse)?;
         Ok(folder)
     }
 
@@ -118,6 +127,11 @@ impl OutputFolder {
         run.finish()
     }
 
+    /// Gives complete files their final names, and touches no others.
+    pub fn publish_all(&self, files: Vec<PartFile>) -> Result<()> {
+        files.into_iter().try_for_each(PartFile::finish)
+    }
+
     fn remove_own(&self, name: &str) -> Result<()> {
         let path = self.path.join(name);
         remove(&path).map_err(Error::io("cannot remove", &path))
@@ -150,11 +164,12 @@ impl OutputFolder {
             Err(Error::value("out", self.path.display(), &problem, "move it away, or name another folder"))
         };
         let plots = self.path.join(PLOTS);
-        let new_plots = plots.symlink_metadata().is_err();
-        if !new_plots && !plots.is_dir() {
+        let needed = self.names.iter().any(|name| Path::new(name).starts_with(PLOTS));
+        let new_plots = needed && plots.symlink_metadata().is_err();
+        if needed && !new_plots && !plots.is_dir() {
             return in_the_way(&plots, "no folder");
         }
-        for name in OWN {
+        for name in &self.names {
             for path in [self.path.join(name), self.part(name)] {
                 if path.is_dir() {
                     return in_the_way(&path, "a folder");
@@ -357,6 +372,22 @@ mod tests {
         for (name, text) in [(SUMMARY, "new"), (RUN, "new"), ("notes.txt", "old")] {
             assert_eq!(fs::read_to_string(home.path().join(name)).unwrap(), text, "{name}");
         }
+    }
+
+    #[test]
+    fn a_folder_of_other_files_leaves_those_of_a_run_alone() {
+        let home = tempfile::tempdir().unwrap();
+        for name in [RUN, "plots", ".summary.csv.part", ".a.svg.part", "b.svg"] {
+            fs::write(home.path().join(name), "old").unwrap();
+        }
+        let folder = OutputFolder::open_for(home.path(), true, vec!["a.svg".into()]).unwrap();
+        let file = folder.write("a.svg", "new").unwrap();
+        folder.publish_all(vec![file]).unwrap();
+        drop(folder);
+        assert_eq!(names(home.path()), [".summary.csv.part", "a.svg", "b.svg", "plots", RUN]);
+        fs::create_dir(home.path().join("c.svg")).unwrap();
+        let error = OutputFolder::open_for(home.path(), true, vec!["c.svg".into()]).unwrap_err();
+        assert!(error.to_string().contains("c.svg is a folder"), "{error}");
     }
 
     #[test]

@@ -6,6 +6,7 @@
 pub mod folder;
 pub mod gallery;
 pub mod overview;
+pub mod plot;
 pub mod progress;
 pub mod provenance;
 pub mod svg;

@@ -70,9 +70,7 @@ fn fixed_step<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T
         Ok((sums, maxima)) => {
             run.report.before = run.report.now;
             run.report.now = Observed::new(&sums, &maxima, &run.parameters);
-            record_events(run, T::of(0.0), |before, after, target| {
-                (before.excess - target) / (before.excess - after.excess)
-            });
+            record_events(run, T::of(0.0), maxima.gap);
             accept(run, work);
         }
         Err(status) => run.counters.status = status as u32,
@@ -105,8 +103,7 @@ fn adaptive_step<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspac
     report.before = report.now;
     report.middle = Observed::new(&middle_sums, &observe::maxima(middle), &run.parameters);
     report.now = Observed::new(&sums, &maxima, &run.parameters);
-    let middle = report.middle.excess;
-    record_events(run, h, |before, after, target| extrapolation::crossing(before.excess, middle, after.excess, target));
+    record_events(run, h, maxima.gap);
     let most_growth = if run.counters.refused == 0 { pace::MOST_GROWTH } else { 1.0 };
     let progress = &mut run.report.progress;
     progress.next = pace::next_length(h, error, most_growth, &run.parameters);
@@ -145,7 +142,7 @@ fn is_singular<T: Real>(sums: &Sums<T>, maxima: &Maxima<T>, run: &Run<T>, n: T) 
     let mean_edge = sums.length / n;
     let resolved = maxima.turn.le(T::of(observe::MAX_TURN));
     let apart = (T::of(observe::MIN_EDGE) * mean_edge).le(-maxima.minus_shortest);
-    let measured = maxima.drift.le(T::of(observe::MAX_DRIFT)) && maxima.gap.le(T::of(observe::MAX_GAP));
+    let measured = maxima.drift.le(T::of(observe::MAX_DRIFT));
     let extended = run.parameters.least_length.le(sums.length);
     !(resolved && apart && measured && extended && sums.turning == run.report.progress.turning)
 }
@@ -168,19 +165,35 @@ fn refuse_failure<T: Real>(run: &mut Run<T>, work: &Workspace<T>, h: T, cause: S
 }
 
 /// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.
-fn record_events<T: Real>(run: &mut Run<T>, length: T, fraction: impl Fn(&Observed<T>, &Observed<T>, T) -> T) {
-    let Run { report: Report { before, now, progress, .. }, counters, parameters, .. } = run;
-    if counters.half_step == NEVER && now.excess.le(parameters.half_at) {
+/// `gap` is that between the new curvature and the new polygon.
+fn record_events<T: Real>(run: &mut Run<T>, length: T, gap: T) {
+    let Run { report, counters, parameters, .. } = run;
+    let excess = report.now.excess;
+    let half = fraction_at(report, parameters.half_at, parameters);
+    let relaxed = fraction_at(report, parameters.relax_at, parameters);
+    let progress = &mut report.progress;
+    if counters.half_step == NEVER && excess.le(parameters.half_at) {
         counters.half_step = counters.steps;
         (progress.half_high, progress.half_low) = (progress.time_high, progress.time_low);
-        progress.half_length = length;
-        progress.half_fraction = fraction(before, now, parameters.half_at);
+        (progress.half_length, progress.half_fraction) = (length, half);
     }
-    if counters.relax_step == NEVER && now.excess.le(parameters.relax_at) {
+    let coupled = gap.le(T::of(observe::MAX_GAP));
+    if counters.relax_step == NEVER && excess.le(parameters.relax_at) && coupled {
         counters.relax_step = counters.steps;
         (progress.relax_high, progress.relax_low) = (progress.time_high, progress.time_low);
-        progress.relax_length = length;
-        progress.relax_fraction = fraction(before, now, parameters.relax_at);
+        (progress.relax_length, progress.relax_fraction) = (length, relaxed);
+    }
+}
+
+/// Where in the last step the excess fell to `excess`; at its end if it was there before.
+fn fraction_at<T: Real>(report: &Report<T>, excess: T, p: &Parameters<T>) -> T {
+    let (before, middle, after) = (report.before.excess, report.middle.excess, report.now.excess);
+    if before.le(excess) {
+        T::of(1.0)
+    } else if p.adaptive.le(T::of(0.0)) {
+        (before - excess) / (before - after)
+    } else {
+        extrapolation::crossing(before, middle, after, excess)
     }
 }
 

@@ -13,8 +13,9 @@ pub const MIN_EDGE: f64 = 1e-5;
 /// Metric drift above which the scheme's lengths say nothing about the polygon: with far too large a step k and r
 /// lose x, and the polygon shrinks to a point that would look round.
 pub const MAX_DRIFT: f64 = 1.0;
-/// Gap between k and the polygon's turn, in rad, above which the curvature says nothing about the polygon.
-pub const MAX_GAP: f64 = 2.0;
+/// Gap between k and the polygon's turn, in rad, above which no member counts as relaxed: its curvature, which moves it,
+/// is not that of the polygon, which looks round.
+pub const MAX_GAP: f64 = 0.5;
 
 /// The four sums, in the order of the kernel's `vec4`.
 #[derive(Clone, Copy, Debug)]

@@ -170,7 +170,7 @@ const FIXED_NODES: usize = 100;
 const STEPS: [u32; 4] = [50, 100, 200, 400];
 
 /// Tolerances of a study in adaptive steps.
-const TOLERANCES: [f64; 4] = [4e-3, 1e-3, 2.5e-4, 6.25e-5];
+const TOLERANCES: [f64; 4] = [6.4e-4, 1.6e-4, 4e-5, 1e-5];
 
 /// Change of the relative error, in ε, below which there is rounding only and no order to be seen.
 const ROUNDING: f64 = 1e3;
