@@ -10,6 +10,7 @@ use crate::{
     curve::{clearance, crossing, polygon},
     ensemble::{
         Ended, Member, Observables, Outcome, Portrait, SeriesRow, Snapshot, Spec, Status,
+        member::relaxation_rate,
         spec::{Pace, Precision, Pull},
     },
     schedule::{Clock, Output, Ticks},
@@ -34,7 +35,7 @@ const FOLLOWED: f64 = 1e-3;
 const SHRUNK: f64 = 1e-3;
 /// The first adaptive step in units of the fourth power of the shortest segment, the fastest time scale there is.
 const FIRST_STEP: f64 = 0.1;
-/// `--pull auto`: κ in units of the decay rate of the slowest mode's excess, 24/R⁴ for surface diffusion.
+/// `--pull auto`: κ in units of the member's relaxation rate.
 const PULL_PER_RATE: f64 = 4.0;
 /// Ticks of the clock in the first adaptive step at least.
 const FIRST_TICKS: f64 = 16.0;
@@ -408,7 +409,7 @@ fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parame
         redistribution: f64::from(u8::from(!spec.no_redistribution)),
         pull: match spec.pull {
             Pull::Rate(rate) => rate * time,
-            Pull::Auto => PULL_PER_RATE * slowest_rate(nodes),
+            Pull::Auto => PULL_PER_RATE * relaxation_rate(nodes),
         },
         tolerance,
         sor: spec.sor,
@@ -416,13 +417,4 @@ fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parame
         polygon_ratio: polygon::regular_ratio(nodes.len()),
         ..of_flow
     }
-}
-
-/// 24/R⁴, the rate at which the excess of a nearly round curve decays under surface diffusion, with R the radius of the
-/// circle of the same area; of the same length where the curve is not simple and its area says nothing.
-fn slowest_rate(nodes: &[DVec2]) -> f64 {
-    let by_length = polygon::length(nodes) / std::f64::consts::TAU;
-    let by_area = (polygon::signed_area(nodes).abs() / std::f64::consts::PI).sqrt();
-    let simple = polygon::turning_number(nodes).abs() == 1;
-    24.0 / (if simple { by_area } else { by_length }).powi(4)
 }

@@ -180,7 +180,9 @@ impl Choice {
     pub fn settle(&self, spec: &mut Spec) {
         spec.backend = if self.gpu.is_some() { BackendChoice::Gpu } else { BackendChoice::Cpu };
         spec.adapter = self.gpu.as_ref().map(|gpu| gpu.name().to_string());
-        spec.tolerance = Some(spec.tolerance_at(self.precision));
+        if spec.solver() == Solver::GaussSeidel {
+            spec.tolerance = Some(spec.tolerance_at(self.precision));
+        }
         spec.precision = Some(self.precision);
         spec.solver = spec.solver().into();
     }

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::{Mollified, Spec, mollifier::mollify, random::Stream};
+use super::{Mollified, Spec, mollifier::mollify, random::Stream, spec::Pull};
 use crate::{
     curve::{BaseCurve, Outline, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions, polygon},
     error::{Error, Result},
@@ -22,6 +22,10 @@ const MAX_ATTEMPTS: u32 = 1000;
 
 const NO_EXCESS: &str = "the loops of a lemniscate cancel: its area is next to nothing, and its excess, status and \
                          relaxation times, which divide by it, mean nothing";
+
+/// Largest κ in units of the relaxation rate: at n = 64 the nonconvex curve loses its mesh from 50 on, at n = 100 from
+/// 100 on (docs/method.md).
+const MOST_PULL: f64 = 40.0;
 
 /// One curve at the start of its run.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,6 +80,7 @@ impl Family {
             warnings.push(NO_EXCESS.into());
         }
         let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
+        check_pull(spec.pull, &sampler.sample(&RadialFactor::default()))?;
         let directions = check_directions(spec.modes.high);
         Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners, simple })
     }
@@ -128,6 +133,27 @@ impl Family {
             (self.law.deviation(m) * stream.normal(2 * m), TAU * turn)
         };
         RadialFactor::new(modes.low, (modes.low..=modes.high).map(amplitude_and_phase))
+    }
+}
+
+/// 24/R⁴, the rate at which the excess of a nearly round curve decays under surface diffusion, with R the radius of the
+/// circle of the same area; of the same length where the curve is not simple and its area says nothing.
+pub fn relaxation_rate(nodes: &[DVec2]) -> f64 {
+    let by_length = polygon::length(nodes) / TAU;
+    let by_area = (polygon::signed_area(nodes).abs() / std::f64::consts::PI).sqrt();
+    let simple = polygon::turning_number(nodes).abs() == 1;
+    24.0 / (if simple { by_area } else { by_length }).powi(4)
+}
+
+/// A pull that is strong compared with the relaxation undoes what the redistribution does, and the mesh falls apart.
+fn check_pull(pull: Pull, nodes: &[DVec2]) -> Result<()> {
+    let most = MOST_PULL * relaxation_rate(nodes);
+    match pull {
+        Pull::Rate(rate) if rate > most => {
+            let problem = format!("stronger than {MOST_PULL} times this curve's relaxation rate, it destroys the mesh");
+            Err(Error::value("pull", rate, &problem, &format!("take {most:.3} or less, or auto")))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -327,6 +353,7 @@ mod tests {
             (Spec { modes: Modes { low: 0, high: 3 }, ..Spec::default() }, "--modes `0..=3`"),
             (Spec { decay: f64::NAN, ..Spec::default() }, "--decay NaN"),
             (Spec { points: 2, ..Spec::default() }, "--points 2"),
+            (Spec { pull: Pull::Rate(300.0), ..Spec::default() }, "--pull 300"),
             (Spec { sampling: Sampling::Points, ..Spec::default() }, "--sampling points"),
             (Spec { shape: Shape::Circle { radius: 0.0 }, ..Spec::default() }, "--shape circle:0"),
             (Spec { shape: Shape::File("none.csv".into()), ..Spec::default() }, "--shape file:none.csv"),

@@ -18,6 +18,8 @@ const MOST_SERIES_ROWS: f64 = 1e6;
 const MOST_SNAPSHOTS: usize = 10_000;
 /// The lengths approach their mean explicitly, by a factor 1 - ωτ a step.
 const MOST_OMEGA_TAU: f64 = 1.0;
+/// Adaptive steps that the redistribution asks for at most.
+const MOST_OMEGA_TIME: f64 = 1e6;
 /// Above this local error a step says nothing about the curve.
 const LOOSEST_ADAPTIVE: f64 = 1.0;
 /// A sweep residual above this no longer says that a system is solved.
@@ -145,6 +147,16 @@ impl Spec {
             let allowed = format!("it is a rate: take --omega {} or less", number(1.0 / tau));
             return Err(Error::value("omega", number(self.omega), &problem, &allowed));
         }
+        if let Pace::Adaptive(_) = self.pace()
+            && self.omega * self.t_end > MOST_OMEGA_TIME
+            && !self.no_redistribution
+        {
+            let problem =
+                format!("adaptive steps are at most about 1/omega long, and --t-end is {}", number(self.t_end));
+            let allowed =
+                format!("take --omega {} or less, or an earlier --t-end", number(MOST_OMEGA_TIME / self.t_end));
+            return Err(Error::value("omega", number(self.omega), &problem, &allowed));
+        }
         self.check_pull()?;
         if let Some(tolerance) = self.tolerance
             && !(tolerance > 0.0 && tolerance <= LOOSEST_TOLERANCE)
@@ -199,9 +211,8 @@ impl Spec {
 
     fn check_combinations(&self) -> Result<()> {
         let lexicographic = self.order == Order::Lexicographic;
-        if lexicographic && self.solver() == Solver::Direct {
-            let allowed = "leave out --order, or take --solver gauss-seidel";
-            return Err(Error::value("order", "lexicographic", "the direct solver makes no sweeps to order", allowed));
+        if self.solver() == Solver::Direct {
+            self.check_no_sweeps()?;
         }
         if self.backend == BackendChoice::Gpu {
             let cpu = "take --backend cpu";
@@ -219,6 +230,24 @@ impl Spec {
                 Err(Error::value("adapter", "''", "an empty name", "see `curvelax adapters` for the names"))
             }
             _ => Ok(()),
+        }
+    }
+
+    /// The direct solver makes no sweeps, so nothing about them may be asked for.
+    fn check_no_sweeps(&self) -> Result<()> {
+        let default = Spec::default();
+        let asked = [
+            (self.order != default.order).then(|| ("order", "lexicographic".to_string())),
+            self.tolerance.map(|tolerance| ("tolerance", number(tolerance))),
+            (self.sor != default.sor).then(|| ("sor", number(self.sor))),
+            (self.max_sweeps != default.max_sweeps).then(|| ("max-sweeps", self.max_sweeps.to_string())),
+        ];
+        match asked.into_iter().flatten().next() {
+            None => Ok(()),
+            Some((key, value)) => {
+                let allowed = format!("leave out --{key}, or take --solver gauss-seidel");
+                Err(Error::value(key, value, "the direct solver makes no sweeps", &allowed))
+            }
         }
     }
 
@@ -345,7 +374,25 @@ mod tests {
         ("modes = '2..=26'", "--modes 2..=26: 100 nodes resolve no mode above 25; take --points 104"),
         ("points = 31", "--modes 2..=8: 31 nodes resolve no mode above 7"),
         ("order = 'lexicographic'\nbackend = 'gpu'", "--order lexicographic: "),
-        ("order = 'lexicographic'\nsolver = 'direct'", "--order lexicographic: "),
+        ("order = 'lexicographic'\nsolver = 'direct'", "--order lexicographic: the direct solver makes no sweeps; "),
+        ("order = 'lexicographic'\nadaptive = 0.001", "--order lexicographic: the direct solver makes no sweeps; "),
+        ("tolerance = 1e-4\nadaptive = 0.001", "--tolerance 0.0001: the direct solver makes no sweeps; "),
+        ("sor = 1.5\nsolver = 'direct'", "--sor 1.5: the direct solver makes no sweeps; "),
+        ("max-sweeps = 9\nsolver = 'direct'", "--max-sweeps 9: the direct solver makes no sweeps; "),
+        ("adaptive = 0", "--adaptive 0: not a local error tolerance; take a number above 0, up to 1"),
+        ("adaptive = -1", "--adaptive -1: "),
+        ("adaptive = nan", "--adaptive NaN: "),
+        ("adaptive = 1.001", "--adaptive 1.001: "),
+        ("adaptive = 9e-9", "--adaptive 9e-9: the rounding of the precision is larger; take 1e-8"),
+        ("adaptive = 9e-6\nprecision = 'f32'", "--adaptive 9e-6: the rounding of the precision is larger; take 1e-5"),
+        ("adaptive = 0.001\ntau = 0.001", "--tau 0.001: steps are either fixed or adaptive"),
+        ("adaptive = 0.001\nomega = 1e6", "--omega 1000000: adaptive steps are at most about 1/omega long"),
+        ("pull = -1", "--pull -1: not a rate"),
+        ("pull = nan", "--pull NaN: "),
+        ("pull = inf", "--pull inf: "),
+        ("relax-at = 0", "--relax-at 0: "),
+        ("relax-at = nan", "--relax-at NaN: "),
+        ("relax-at = 0.1\nrelax-to = 0.1", "--relax-at 0.1: a member is relaxed at a fraction"),
         ("adapter = 'llvmpipe'\nbackend = 'cpu'", "--adapter llvmpipe: "),
         ("adapter = ' '", "--adapter '': "),
     ];
@@ -380,6 +427,13 @@ mod tests {
         "order = 'lexicographic'",
         "order = 'lexicographic'\nbackend = 'cpu'",
         "solver = 'direct'\nbackend = 'cpu'",
+        "adaptive = 1",
+        "adaptive = 1e-8",
+        "adaptive = 1e-5\nprecision = 'f32'",
+        "adaptive = 0.001\nsolver = 'gauss-seidel'\ntolerance = 1e-6\nmax-sweeps = 9",
+        "pull = 0",
+        "pull = 'auto'",
+        "relax-at = 3",
         "adapter = 'llvmpipe'",
     ];
 
@@ -403,7 +457,20 @@ mod tests {
 
     #[test]
     fn every_number_has_a_case() {
-        let numbers = ["curves", "points", "tau", "t-end", "omega", "tolerance", "sor", "max-sweeps", "relax-to"];
+        let numbers = [
+            "curves",
+            "points",
+            "tau",
+            "t-end",
+            "omega",
+            "tolerance",
+            "sor",
+            "max-sweeps",
+            "relax-to",
+            "relax-at",
+            "adaptive",
+            "pull",
+        ];
         for key in numbers.into_iter().chain(["series", "snapshots", "only", "threads"]) {
             assert!(REFUSED.iter().any(|(_, start)| start.starts_with(&format!("--{key} "))), "{key}");
         }

@@ -10,7 +10,10 @@ use serde::Serialize;
 use super::tally::{MollifiedMembers, Tally};
 use crate::{
     backend::Platform,
-    ensemble::{Spec, spec::Precision},
+    ensemble::{
+        Spec,
+        spec::{Precision, Solver},
+    },
     error::{Error, Result},
 };
 
@@ -20,7 +23,8 @@ pub struct Provenance<'a> {
     curvelax: &'static str,
     seed: u64,
     precision: Precision,
-    tolerance: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tolerance: Option<f64>,
     spec: &'a Spec,
     platform: &'a Platform,
     members: u64,
@@ -48,7 +52,7 @@ impl<'a> Provenance<'a> {
             curvelax: env!("CARGO_PKG_VERSION"),
             seed: spec.seed,
             precision: platform.precision,
-            tolerance: spec.tolerance_at(platform.precision),
+            tolerance: (spec.solver() == Solver::GaussSeidel).then(|| spec.tolerance_at(platform.precision)),
             spec,
             platform,
             members: tally.members(),
