@@ -12,7 +12,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, Shape, polygon},
     ensemble::{
         Ended, Family, Outcome, Sink, Spec, Status,
-        spec::{BackendChoice, Precision, Solver},
+        spec::{BackendChoice, Precision, Pull, Solver, SolverChoice},
     },
     flow::Flow,
     number::Real,
@@ -164,6 +164,39 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
     }
 }
 
+/// Adaptive steps and the pull choose their lengths and rates by the curve's own scale, and go through the same motions.
+#[test]
+fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
+    for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-4)] {
+        let fixed = method(precision, Solver::Direct);
+        let spec = Spec { tau: None, adaptive: Some(1e-3), pull: Pull::Auto, t_end: 0.1, relax_to: Some(0.5), ..fixed };
+        let (outcome, plain) = relaxed(&spec, potato);
+        assert!(outcome.steps > 20 && outcome.t_relax.is_some());
+        for c in [2.0_f64, 0.25, 3.0] {
+            let flow = Flow::Elastic(0.4 / (c * c));
+            let (t_end, omega) = (spec.t_end * c.powi(4), spec.omega / c.powi(4));
+            let (large, nodes) = relaxed(&Spec { t_end, omega, flow, ..spec.clone() }, move |u| c * potato(u));
+            let expected: Vec<DVec2> = plain.iter().map(|node| *node * c).collect();
+            let rounding = if c == 3.0 { bound * c } else { 0.0 };
+            assert_moved(&format!("{precision:?} adaptive, scaled by {c}"), &expected, &nodes, &plain, rounding);
+            let [a, b] = [outcome.t_relax, large.t_relax.map(|t| t / c.powi(4))].map(Option::unwrap);
+            assert!((a - b).abs() <= rounding, "{a} and {b}");
+            assert_eq!(large.steps, outcome.steps);
+        }
+        // The negative control: a pull that is not scaled is another one.
+        let rate = Pull::Rate(40.0);
+        let (_, pulled) = relaxed(&Spec { pull: rate, ..spec.clone() }, potato);
+        let (t_end, omega, flow) = (16.0 * spec.t_end, spec.omega / 16.0, Flow::Elastic(0.1));
+        let (_, large) = relaxed(&Spec { t_end, omega, flow, pull: rate, ..spec.clone() }, |u| 2.0 * potato(u));
+        assert!(distance(&pulled, &large.iter().map(|node| *node / 2.0).collect::<Vec<_>>()) > 1e-6);
+
+        let spin = DVec2::from_angle(0.7);
+        let (_, nodes) = relaxed(&spec, move |u| spin.rotate(potato(u)) + DVec2::new(30.0, -7.0));
+        let expected: Vec<DVec2> = plain.iter().map(|node| spin.rotate(*node) + DVec2::new(30.0, -7.0)).collect();
+        assert_moved(&format!("{precision:?} adaptive, moved"), &expected, &nodes, &plain, bound);
+    }
+}
+
 /// Which node is the first matters to α alone, which moves nodes along the curve: without it not at all, with it by the
 /// error of the scheme, which falls with h².
 #[test]
@@ -201,6 +234,9 @@ fn the_work_of_a_run_is_what_it_was() {
         ..method(Precision::F64, Solver::GaussSeidel)
     };
     let direct = Spec { solver: Solver::Direct.into(), ..spec(Flow::Willmore, 61, 1.0) };
+    let adaptive =
+        Spec { tau: None, adaptive: Some(1e-3), solver: SolverChoice::Auto, ..spec(Flow::Willmore, 61, 1.0) };
+    let swept = Spec { solver: SolverChoice::GaussSeidel, ..adaptive.clone() };
     let stops = Spec { stop_when_relaxed: true, t_end: 2.0, ..spec(Flow::SurfaceDiffusion, 50, 1.7) };
     for (name, spec, expected) in [
         ("surface diffusion", spec(Flow::SurfaceDiffusion, 100, 1.0), [100, 416144, 407104]),
@@ -212,6 +248,8 @@ fn the_work_of_a_run_is_what_it_was() {
         ),
         ("until relaxed", stops, [192, 19744, 18592]),
         ("direct", direct, [100, 0, 0]),
+        ("adaptive", adaptive, [71, 0, 0]),
+        ("adaptive, by sweeps", swept, [71, 97568, 92648]),
     ] {
         let (outcome, _) = relaxed(&spec, potato);
         let work = [outcome.steps, outcome.sweeps_k, outcome.sweeps_x];
