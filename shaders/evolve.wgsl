@@ -64,7 +64,7 @@ fn advance() -> u32 {
         if uniform_decision(select(1u, 0u, error <= p.adaptive)) == 1u {
             let next = next_length(h, error, 1.0);
             stretch(next / (real(0.5) * h));
-            return refuse(next, STALLED);
+            return refuse(next, real(LEAST_STEP), SINGULAR);
         }
         extrapolate();
         load_curve(CURVE);
@@ -130,12 +130,12 @@ fn failure_of_step(solved: u32) -> u32 {
     return RUNNING;
 }
 
-/// Tries again with a step of length `next`, or gives the member up for `cause`.
-fn refuse(next: real, cause: u32) -> u32 {
+/// Tries again with a step of length `next`, or gives the member up for `cause` where that is below `least` of `(L/n)⁴`.
+fn refuse(next: real, least: real, cause: u32) -> u32 {
     counters.rejected += 1u;
     counters.refused = 1u;
     report.progress.next = next;
-    if !(least_step() <= next) { counters.status = cause; }
+    if !(least_step(least) <= next) { counters.status = cause; }
     return uniform_decision(select(STOP, GO_ON, counters.status == RUNNING));
 }
 
@@ -144,7 +144,7 @@ fn refuse_failure(h: real, cause: u32) -> u32 {
     dk = vec(0.0);
     dx = vec(0.0);
     dy = vec(0.0);
-    return refuse(real(LEAST_GROWTH) * h, cause);
+    return refuse(real(LEAST_GROWTH) * h, select(real(LEAST_STEP), real(LEAST_TO_SINGULAR), cause == SINGULAR), cause);
 }
 
 /// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.

@@ -4,6 +4,7 @@ const SAFETY = 0.95;
 const MOST_GROWTH = 4.0;
 const LEAST_GROWTH = 0.25;
 const LEAST_STEP = 1e-12;
+const LEAST_TO_SINGULAR = 1e-6;
 
 /// A step to be attempted: its length, the high and the low part of that, and whether it reaches the final time.
 struct Stride { length: real, high: real, low: real, last: bool }
@@ -14,7 +15,8 @@ fn stride() -> Stride {
     let left = (p.end_high - report.progress.time_high) + (p.end_low - report.progress.time_low);
     if left <= next { return Stride(left, 0.0, 0.0, true); }
     let half = real(0.5) * left;
-    let wanted = select(next, half, half <= next);
+    // An accepted step of one tick may ask for a little less.
+    let wanted = max(select(next, half, half <= next), p.time_tick);
     let high = floor(wanted / p.time_unit) * p.time_unit;
     let low = floor((wanted - high) / p.time_tick) * p.time_tick;
     return Stride(high + low, high, low, false);
@@ -46,8 +48,8 @@ fn next_length(length: real, error: real, most_growth: real) -> real {
     return length * min(max(growth, real(LEAST_GROWTH)), most_growth);
 }
 
-/// The shortest step that is tried.
-fn least_step() -> real {
+/// The shortest step that is tried, `share` of `(L/n)⁴`.
+fn least_step(share: real) -> real {
     let edge = report.now.length / real(NODES);
-    return max(real(LEAST_STEP) * (edge * edge) * (edge * edge), p.time_tick);
+    return max(share * (edge * edge) * (edge * edge), p.time_tick);
 }

@@ -37,6 +37,11 @@ const SHRUNK: f64 = 1e-3;
 const FIRST_STEP: f64 = 0.1;
 /// `--pull auto`: κ in units of the member's relaxation rate.
 const PULL_PER_RATE: f64 = 4.0;
+/// Adaptive steps to a tolerance of 1 after which a member is stalled; their number goes with its root. Curves that
+/// relax take some 3 to 30; one that creeps, because only tiny steps can be solved, would never end.
+const MOST_STEPS: f64 = 1000.0;
+/// Shares of a spacing that nodes go at most between two looks at a curve about to cross itself.
+const LOOKS_PER_SPACING: f64 = 16.0;
 /// Ticks of the clock in the first adaptive step at least.
 const FIRST_TICKS: f64 = 16.0;
 
@@ -165,6 +170,17 @@ impl<'a> Trajectory<'a> {
         // Until the first step is accepted the start is known better here, in f64.
         if counters.steps > 0 {
             self.report = *report;
+        }
+        if self.counters.status == 0 && !self.is_at_end() && counters.steps >= self.most_steps() {
+            self.counters.status = Status::Stalled as u32;
+        }
+    }
+
+    /// Accepted steps after which the member has stalled.
+    fn most_steps(&self) -> u32 {
+        match self.time {
+            Time::Fixed(_) => u32::MAX,
+            Time::Adaptive(_) => (MOST_STEPS / self.launch.parameters.adaptive.sqrt()).ceil() as u32,
         }
     }
 
@@ -307,8 +323,8 @@ impl<'a> Trajectory<'a> {
         }
         let length = self.report.now.length;
         let far = if changes_sign { 0.5 * clearance(&nodes, length) } else { 0.0 };
-        // Never more often than every quarter of a spacing: what is nearer than that is not resolved.
-        self.launch.parameters.look_at = progress.travel + far.max(0.25 * length / nodes.len() as f64);
+        let least = length / (LOOKS_PER_SPACING * nodes.len() as f64);
+        self.launch.parameters.look_at = progress.travel + far.max(least);
     }
 
     /// Where to run to next, as a number of steps and the parameters on the way; none where the goal still stands.
@@ -332,7 +348,7 @@ impl<'a> Trajectory<'a> {
                 let end = (parameters.end_high, parameters.end_low);
                 let split = |t: f64| if t >= self.t_end { end } else { ticks.split(t / self.unit.powi(4)) };
                 (parameters.goal_high, parameters.goal_low) = output.map_or(end, split);
-                u32::MAX
+                self.most_steps()
             }
         };
         Some((goal, parameters))

@@ -48,7 +48,8 @@ impl<T: Real> Run<T> {
 /// Advances a running member by at most `attempts` steps, refused ones included, towards its goal.
 ///
 /// A fixed step that fails (stalled, not finite, singular) ends the member in its last good state. An adaptive one
-/// is tried again with a shorter step, until that is too short to mean anything.
+/// is tried again with a shorter step, until that is too short to mean anything; one that is too inaccurate at every
+/// length follows a curve that n nodes do not resolve, which is singular.
 pub fn evolve<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T>, attempts: u32) {
     run.counters.sweeps_k = 0;
     run.counters.sweeps_x = 0;
@@ -90,7 +91,7 @@ fn adaptive_step<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspac
     if !error.le(run.parameters.adaptive) {
         let next = pace::next_length(h, error, 1.0, &run.parameters);
         run.state.increments.stretch(next / (T::of(0.5) * h));
-        return refuse(run, work, next, Status::Stalled);
+        return refuse(run, work, next, pace::LEAST_STEP, Status::Singular);
     }
     extrapolation::extrapolate(&mut run.state.middle, &run.state.before, &mut work.new);
     let (sums, maxima) = match observed(run, work, stepped) {
@@ -147,12 +148,12 @@ fn is_singular<T: Real>(sums: &Sums<T>, maxima: &Maxima<T>, run: &Run<T>, n: T) 
     !(resolved && apart && measured && extended && sums.turning == run.report.progress.turning)
 }
 
-/// Tries again with a step of length `next`, or gives the member up for `cause`.
-fn refuse<T: Real>(run: &mut Run<T>, work: &Workspace<T>, next: T, cause: Status) {
+/// Tries again with a step of length `next`, or gives the member up for `cause` where that is below `least` of `(L/n)⁴`.
+fn refuse<T: Real>(run: &mut Run<T>, work: &Workspace<T>, next: T, least: f64, cause: Status) {
     run.counters.rejected += 1;
     run.counters.refused = 1;
     run.report.progress.next = next;
-    let least = pace::least_step(run.report.now.length, T::of(work.blocks.n as f64), &run.parameters);
+    let least = pace::least_step(run.report.now.length, T::of(work.blocks.n as f64), least, &run.parameters);
     if !least.le(next) {
         run.counters.status = cause as u32;
     }
@@ -161,7 +162,8 @@ fn refuse<T: Real>(run: &mut Run<T>, work: &Workspace<T>, next: T, cause: Status
 /// Refuses a step of length `h` that failed outright; after that the increments may be anything.
 fn refuse_failure<T: Real>(run: &mut Run<T>, work: &Workspace<T>, h: T, cause: Status) {
     run.state.increments = Increments::zeros(work.blocks.n);
-    refuse(run, work, T::of(pace::LEAST_GROWTH) * h, cause);
+    let least = if cause == Status::Singular { pace::LEAST_TO_SINGULAR } else { pace::LEAST_STEP };
+    refuse(run, work, T::of(pace::LEAST_GROWTH) * h, least, cause);
 }
 
 /// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.

@@ -16,6 +16,9 @@ pub const MOST_GROWTH: f64 = 4.0;
 pub const LEAST_GROWTH: f64 = 0.25;
 /// A step below this many times `(L/n)⁴`, far below all time scales of a curve that n nodes resolve, ends the member.
 pub const LEAST_STEP: f64 = 1e-12;
+/// The same for a step that is accurate but ends in a singular curve: shorter ones only creep towards the bound that it
+/// passed, until rounding lets them stay beside it.
+pub const LEAST_TO_SINGULAR: f64 = 1e-6;
 
 /// A step to be attempted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +40,8 @@ pub fn stride<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> Stride<T> {
         return Stride { length: left, high: T::of(0.0), low: T::of(0.0), last: true };
     }
     let half = T::of(0.5) * left;
-    let wanted = if half.le(progress.next) { half } else { progress.next };
+    // An accepted step of one tick may ask for a little less.
+    let wanted = (if half.le(progress.next) { half } else { progress.next }).max(p.time_tick);
     let high = (wanted / p.time_unit).floor() * p.time_unit;
     let low = ((wanted - high) / p.time_tick).floor() * p.time_tick;
     Stride { length: high + low, high, low, last: false }
@@ -70,8 +74,8 @@ pub fn next_length<T: Real>(length: T, error: T, most_growth: f64, p: &Parameter
     length * growth.max(T::of(LEAST_GROWTH)).min(T::of(most_growth))
 }
 
-/// The shortest step that is tried.
-pub fn least_step<T: Real>(length: T, n: T, p: &Parameters<T>) -> T {
+/// The shortest step that is tried, `share` of `(L/n)⁴`.
+pub fn least_step<T: Real>(length: T, n: T, share: f64, p: &Parameters<T>) -> T {
     let edge = length / n;
-    (T::of(LEAST_STEP) * (edge * edge) * (edge * edge)).max(p.time_tick)
+    (T::of(share) * (edge * edge) * (edge * edge)).max(p.time_tick)
 }

@@ -8,11 +8,12 @@ pub enum Status {
     Relaxed = 1,
     /// The final time came first.
     Unfinished = 2,
-    /// Curvature times spacing too large, an edge vanished, the metric was lost, or the turning number.
+    /// Curvature times spacing too large, an edge vanished, the metric was lost, or the turning number; or no adaptive
+    /// step was short enough for the tolerance.
     Singular = 3,
     /// A value was not finite.
     Nonfinite = 4,
-    /// The sweep cap was reached, or the sweeps diverged.
+    /// The sweep cap was reached, or the sweeps diverged; or adaptive steps stayed so short that it would never end.
     Stalled = 5,
 }
 
