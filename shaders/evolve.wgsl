@@ -157,8 +157,10 @@ fn record_events(h: real) {
         report.progress.half_length = length;
         report.progress.half_fraction = fraction_at(p.half_at);
     }
-    let coupled = others.z <= real(MAX_GAP);
-    if counters.relax_step == NEVER && report.now.excess <= p.relax_at && coupled {
+    // A curve whose curvature is not that of its polygon does not count as relaxed.
+    let due = counters.relax_step == NEVER && report.now.excess <= p.relax_at;
+    if uniform_decision(select(0u, 1u, due)) == 0u { return; }
+    if gap_of_new() <= real(MAX_GAP) {
         counters.relax_step = counters.steps;
         report.progress.relax_high = report.progress.time_high;
         report.progress.relax_low = report.progress.time_low;
@@ -178,7 +180,7 @@ fn fraction_at(excess: real) -> real {
 
 /// Counts the step that was taken; returns whether to go on.
 fn accepted() -> u32 {
-    report.progress.travel += others.w;
+    report.progress.travel += others.z;
     counters.steps += 1u;
     if counters.relax_step != NEVER && counters.stop_when_relaxed != 0u { counters.status = RELAXED; }
     if p.look_at <= report.progress.travel && report.now.k_min <= real(0.0) { counters.goal = counters.steps; }

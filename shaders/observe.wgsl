@@ -14,7 +14,7 @@ const FOUR_PI = 12.566370614359172;
 var<private> sums: vec;
 /// Maxima of the new curve: |k| r, metric drift, longest edge, minus the shortest edge.
 var<private> extremes: vec;
-/// Largest curvature, minus the smallest, largest gap between k and the polygon's turn, largest way that a node went.
+/// Largest curvature, minus the smallest, largest way that a node went.
 var<private> others: vec;
 
 /// Observes the curve whose windows of x and y and nodes of k and r are given; `moved` is how far its nodes went.
@@ -38,11 +38,15 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
         block_max(bounded_abs(edge)),
         block_max_signed(shortest),
     ));
-    let turned = turn(wx, wy);
-    let gap = bounded_abs(kh * turned.span - turned.angle);
-    others = ring_maxima(vec(
-        block_max_signed(kh), block_max_signed(-kh), block_max(gap), block_max(bounded_abs(moved)),
-    ));
+    others = ring_maxima(vec(block_max_signed(kh), block_max_signed(-kh), block_max(bounded_abs(moved)), 0.0));
+}
+
+/// Largest gap between the angle by which the new curvature turns the tangent over a segment and the angle by which the
+/// new polygon turns there.
+fn gap_of_new() -> real {
+    let turned = turn(new_x, new_y);
+    let gap = bounded_abs(new_k * turned.span - turned.angle);
+    return ring_maxima(vec(block_max(gap), 0.0, 0.0, 0.0)).x;
 }
 
 /// What the last `observe` says of its curve.

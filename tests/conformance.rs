@@ -11,8 +11,8 @@ use curvelax::{
         gpu::{Gpu, Kernel, Variant, kernel::Budget},
     },
     conformance::{
-        Row, Tamper,
-        compare::{Left, on_gpu, runs, stages},
+        Row, Tamper, adaptive_members,
+        compare::{Left, adaptive, on_gpu, runs, stages},
         members,
     },
     ensemble::{Status, spec::Precision},
@@ -31,6 +31,9 @@ use libtest_mimic::{Arguments, Failed, Trial};
 /// The sizes: the two smallest, a power of two, divisible by 3, by 4, prime, every remainder by 4 (the number of blocks
 /// of three), and one beyond 64 threads.
 const SIZES: [usize; 8] = [6, 7, 64, 99, 100, 101, 102, 257];
+
+/// Sizes of the adaptive comparison.
+const ADAPTIVE_SIZES: [usize; 3] = [7, 64, 101];
 
 type Outcome = Result<(), Failed>;
 
@@ -78,6 +81,17 @@ fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
             add(format!("every stage of a step agrees, n = {n}"), stages_agree::<T>, n);
             add(format!("the curve agrees after 1 and 100 steps, n = {n}"), runs_agree::<T>, n);
         }
+        for n in ADAPTIVE_SIZES {
+            add(format!("the curve agrees after adaptive steps, n = {n}"), adaptive_agree::<T>, n);
+        }
+        add("a moved node fails the comparison after adaptive steps".into(), a_moved_node_fails_adaptive::<T>, 64);
+        add(
+            "adaptive: where a dispatch ends or pauses, or a member lies, changes no bit".into(),
+            adaptive_bits::<T>,
+            31,
+        );
+        add("adaptive: members that end badly leave the others untouched".into(), adaptive_bad_members::<T>, 31);
+        add("adaptive: the program writes the same tables on both back ends".into(), adaptive_programs_agree::<T>, 61);
         for n in [7, 100] {
             add(format!("a moved node fails both comparisons by name, n = {n}"), a_moved_node_fails::<T>, n);
         }
@@ -108,7 +122,7 @@ fn check(rows: &[Row]) -> Outcome {
 }
 
 fn line(row: &Row) -> String {
-    let Row { quantity, solver, precision, n, steps, scale, error, bound, at } = row;
+    let Row { quantity, solver, precision, n, steps, scale, error, bound, at, .. } = row;
     let (member, node) = at;
     let share = row.share();
     format!(
@@ -124,6 +138,70 @@ fn stages_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 fn runs_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     check(&runs::<T>(gpu, solver, n, 1, dispatches_of(1), None)?)?;
     check(&runs::<T>(gpu, solver, n, 100, dispatches_of(7), None)?)
+}
+
+fn adaptive_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    let rows = adaptive::<T>(gpu, solver, n, dispatches_of(7), None)?;
+    if rows.iter().any(|row| row.steps < 5) {
+        return Err("too few steps to compare".into());
+    }
+    check(&rows)
+}
+
+fn a_moved_node_fails_adaptive<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    let tamper = Tamper { member: 4, node: n / 2, by: 65536.0 * T::EPSILON };
+    // Either a row fails, or the member takes other steps.
+    match adaptive::<T>(gpu, solver, n, dispatches_of(7), Some(tamper)) {
+        Ok(rows) if rows.iter().all(Row::passes) => Err("a moved node was not noticed".into()),
+        Ok(rows) => match rows.iter().find(|row| !row.passes() && row.at.0 != tamper.member) {
+            Some(row) => Err(format!("the wrong member was named: {}", line(row)).into()),
+            None => Ok(()),
+        },
+        Err(error) if error.to_string().contains("member 4") => Ok(()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn adaptive_bits<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    let launches = adaptive_members(n, 5, 20, 1e-3, T::EPSILON)?;
+    let at_once = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(1000))?;
+    let budgets = [dispatches_of(1), dispatches_of(3), Budget { steps: 1000, sweeps: 24 }];
+    for budget in budgets {
+        let in_parts = on_gpu::<T>(gpu, solver, n, &launches, budget)?;
+        for j in 0..launches.len() {
+            same(&in_parts[j], &at_once[j], &format!("member {j} with {budget:?}"))?;
+        }
+    }
+    let reversed: Vec<Run<f64>> = launches.iter().rev().cloned().collect();
+    let reversed = on_gpu::<T>(gpu, solver, n, &reversed, dispatches_of(5))?;
+    for (j, left) in reversed.iter().rev().enumerate() {
+        same(left, &at_once[j], &format!("member {j} in reversed order"))?;
+    }
+    // The negative control: another tolerance takes other steps.
+    let other = on_gpu::<T>(gpu, solver, n, &adaptive_members(n, 5, 20, 2e-3, T::EPSILON)?, dispatches_of(1000))?;
+    if same(&other[0], &at_once[0], "").is_ok() {
+        return Err("another tolerance changed nothing".into());
+    }
+    Ok(())
+}
+
+fn adaptive_bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    let good = adaptive_members(n, 5, 20, 1e-3, T::EPSILON)?;
+    let alone = on_gpu::<T>(gpu, solver, n, &good, dispatches_of(5))?;
+    let mut mixed = good.clone();
+    replace_nodes(&mut mixed[1], |nodes| nodes[n / 3] = DVec2::new(f64::NAN, 0.0));
+    mixed[3].report.progress.turning = 2.0;
+    let together = on_gpu::<T>(gpu, solver, n, &mixed, dispatches_of(5))?;
+    for (j, status) in [(1, Status::Nonfinite), (3, Status::Singular)] {
+        let Counters { status: ended, steps, rejected, .. } = together[j].counters;
+        if (ended, steps) != (status as u32, 0) || rejected == 0 {
+            return Err(format!("member {j}: status {ended} after {steps} steps and {rejected} refused").into());
+        }
+    }
+    for j in [0, 2, 4] {
+        same(&together[j], &alone[j], &format!("good member {j}"))?;
+    }
+    Ok(())
 }
 
 /// The negative control: a displacement far below anything visible must fail, and the row must name the member.
@@ -285,24 +363,13 @@ fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
 }
 
 /// Numbers of the tables that the program writes, with the statuses in front.
-fn tables<T: Real>(backend: &str, solver: Solver, n: usize) -> Result<(Vec<String>, Vec<f64>), Failed> {
+fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Result<(Vec<String>, Vec<f64>), Failed> {
     let folder = tempfile::tempdir()?;
     let solver = if solver == Solver::Direct { "direct" } else { "gauss-seidel" };
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
     command.current_dir(&folder).env("XDG_RUNTIME_DIR", folder.path());
     // A short last step, output times inside steps, and members that stop when they are relaxed.
-    command.args([
-        "run",
-        "--curves",
-        "7",
-        "--tau",
-        "0.003",
-        "--t-end",
-        "0.4",
-        "--relax-to",
-        "0.3",
-        "--stop-when-relaxed",
-    ]);
+    command.args(["run", "--curves", "7", "--t-end", "0.4", "--stop-when-relaxed"]).args(pace);
     command.args(["--series", "0.07", "--snapshots", "0,0.1,0.2", "--backend", backend, "--solver", solver]);
     let output = command.args(["--precision", T::NAME, "--points", &n.to_string(), "--out", "out"]).output()?;
     if !output.status.success() {
@@ -328,7 +395,20 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize) -> Result<(Vec<Strin
 
 /// The program from outside: statuses equal, numbers within what their solves resolve.
 fn programs_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
-    let (gpu, cpu) = (tables::<T>("gpu", solver, n)?, tables::<T>("cpu", solver, n)?);
+    tables_agree::<T>(solver, n, &["--tau", "0.003", "--relax-to", "0.3"])
+}
+
+/// Adaptive steps: output times and events inside them, refused ones, self-crossing outlines among the members.
+fn adaptive_programs_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
+    tables_agree::<T>(solver, n, &["--adaptive", "--pull", "auto", "--relax-at", "0.05"])?;
+    if solver == Solver::Direct {
+        tables_agree::<T>(solver, n, &["--adaptive", "--pull", "auto", "--shape", "nonconvex", "--amplitude", "0.1"])?;
+    }
+    Ok(())
+}
+
+fn tables_agree<T: Real>(solver: Solver, n: usize, pace: &[&str]) -> Outcome {
+    let (gpu, cpu) = (tables::<T>("gpu", solver, n, pace)?, tables::<T>("cpu", solver, n, pace)?);
     if gpu.0 != cpu.0 || gpu.1.len() != cpu.1.len() || gpu.1.len() < 1000 {
         return Err(format!("{:?} on the GPU, {:?} on the CPU", gpu.0, cpu.0).into());
     }

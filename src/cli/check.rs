@@ -6,7 +6,7 @@ use crate::{
         choose::no_adapter,
         gpu::{Gpu, kernel::Budget},
     },
-    conformance::{Row, compare::MEMBERS, runs, stages},
+    conformance::{Row, adaptive, compare::MEMBERS, runs, stages},
     error::{Error, Result},
     number::Real,
     solver::Solver,
@@ -81,6 +81,7 @@ fn compare<T: Real>(gpu: &Gpu, solver: Solver) -> Result<Vec<Row>> {
         for steps in STEPS {
             rows.extend(runs::<T>(gpu, solver, n, steps, Budget { steps: 16, sweeps: u32::MAX }, None)?);
         }
+        rows.extend(adaptive::<T>(gpu, solver, n, Budget { steps: 16, sweeps: u32::MAX }, None)?);
         match worst.is_empty() {
             true => worst = rows,
             false => worst.iter_mut().zip(rows).for_each(|(worst, row)| {
@@ -109,7 +110,8 @@ fn table(gpu: &Gpu, rows: &[Row]) -> String {
         "verdict",
     );
     for row in rows {
-        let Row { quantity, solver, precision, n, steps, scale, error, bound, at: (member, node) } = row;
+        let Row { quantity, solver, precision, n, steps, adaptive, scale, error, bound, at: (member, node) } = row;
+        let steps = format!("{}{steps}", if *adaptive { "~" } else { "" });
         let solver = if *solver == Solver::Direct { "direct" } else { "sweeps" };
         let verdict = if row.passes() { "ok" } else { "FAILED" };
         let place = if *error == 0.0 { "bit for bit".into() } else { format!("n {n}, member {member}, node {node}") };
@@ -117,5 +119,5 @@ fn table(gpu: &Gpu, rows: &[Row]) -> String {
             "{precision:<5}{solver:<8}{steps:>5}  {quantity:<24}{scale:>10.2e}{error:>13.2e}{bound:>10.2e}  {verdict:<8}{place}\n"
         );
     }
-    text
+    text + "~ adaptive steps\n"
 }

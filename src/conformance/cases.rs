@@ -5,6 +5,7 @@ use crate::{
     ensemble::{Family, Spec},
     error::Result,
     flow::Flow,
+    schedule::Ticks,
     scheme::{Parameters, State, evolve::Run},
 };
 
@@ -52,3 +53,25 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
         })
         .collect()
 }
+
+/// The same members with adaptive steps of `tolerance` to the time of `steps` of their own fixed ones, for a run in
+/// numbers of relative spacing `epsilon`.
+pub fn adaptive_members(n: usize, count: usize, steps: u32, tolerance: f64, epsilon: f64) -> Result<Vec<Run<f64>>> {
+    let mut runs = members(n, count, steps, SWEEPS)?;
+    for run in &mut runs {
+        let (p, progress) = (&mut run.parameters, &mut run.report.progress);
+        let end = p.tau * f64::from(steps);
+        let ticks = Ticks::new(end, epsilon);
+        p.adaptive = tolerance;
+        p.follow_to = 1e-3 * run.report.now.excess;
+        (p.time_unit, p.time_tick) = (ticks.unit, ticks.tick);
+        (p.end_high, p.end_low) = ticks.split(end);
+        (p.goal_high, p.goal_low) = (p.end_high, p.end_low);
+        progress.next = 0.05 * p.tau;
+        run.counters.goal = u32::MAX;
+    }
+    Ok(runs)
+}
+
+/// Tolerance of the sweeps in adaptive runs: an error estimate must not be made of what sweeps leave.
+const SWEEPS: f64 = 1e-6;

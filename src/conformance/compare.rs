@@ -2,7 +2,7 @@
 
 use super::{
     bounds::{Bound, FIELDS, REPORT, STAGES, Scale},
-    members,
+    cases::{adaptive_members, members},
 };
 use crate::{
     backend::{
@@ -17,7 +17,7 @@ use crate::{
     scheme::{
         Curve, Increments, Parameters, State, Workspace,
         evolve::{Run, evolve},
-        parameters::{Counters, Report},
+        parameters::{Counters, Progress, Report},
         step::{self, Method},
     },
     solver::{Blocks, Order, Ring, Solver},
@@ -52,8 +52,10 @@ pub struct Row {
     pub precision: &'static str,
     /// Nodes per member.
     pub n: usize,
-    /// Steps after which it was compared.
+    /// Steps after which it was compared; of adaptive ones the most that a member took.
     pub steps: u32,
+    /// The steps were adaptive.
+    pub adaptive: bool,
     /// Natural scale where the error is worst.
     pub scale: f64,
     /// The difference that takes the largest share of its bound.
@@ -82,6 +84,7 @@ impl Row {
             precision: T::NAME,
             n,
             steps,
+            adaptive: false,
             scale: 1.0,
             error: f64::NAN,
             bound: f64::INFINITY,
@@ -173,21 +176,62 @@ pub fn runs<T: Real>(
     tamper: Option<Tamper>,
 ) -> Result<Vec<Row>> {
     let launches = members(n, MEMBERS, steps, T::PRECISION.tolerance())?;
+    ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
+}
+
+/// Tolerance of adaptive steps in the comparison.
+const ADAPTIVE: f64 = 1e-3;
+/// Fixed steps of a member in whose time it is compared with adaptive ones.
+pub const ADAPTIVE_STEPS: u32 = 40;
+
+/// The curve after adaptive steps to the same time, in dispatches of `budget`.
+///
+/// What rounding changes in a step length is what it changes in the error estimate, relative to the tolerance; what a
+/// changed length changes in the curve is the tolerance times that. So rounding changes the curve no more than with fixed
+/// steps of the longest length taken, and the bounds are the same.
+pub fn adaptive<T: Real>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    budget: Budget,
+    tamper: Option<Tamper>,
+) -> Result<Vec<Row>> {
+    let launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::EPSILON)?;
+    let mut rows = ends_agree::<T>(adapter, solver, n, launches, budget, tamper)?;
+    rows.iter_mut().for_each(|row| row.adaptive = true);
+    Ok(rows)
+}
+
+/// Both sides of `launches` at their ends.
+fn ends_agree<T: Real>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    launches: Vec<Run<f64>>,
+    budget: Budget,
+    tamper: Option<Tamper>,
+) -> Result<Vec<Row>> {
     let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
+    let steps = ours.iter().map(|left| left.counters.steps).max().unwrap_or(0);
     let quantities: Vec<Bound> = FIELDS.iter().chain(&REPORT).copied().collect();
     let mut rows: Vec<Row> = quantities.iter().map(|bound| Row::begin::<T>(bound, solver, n, steps)).collect();
     for (member, (launch, Left { state, counters, report })) in launches.iter().zip(&ours).enumerate() {
         let mut twin: Run<T> = launch.convert();
-        evolve(&mut twin, &method(solver), &mut Workspace::new(blocks(n)?), steps);
-        if (counters.status, counters.steps) != (twin.counters.status, twin.counters.steps) {
-            return Err(Error::Failed(format!(
-                "{} n = {n}, member {member}: status {} after {} steps on the GPU, {} after {} on the CPU",
-                T::NAME,
-                counters.status,
-                counters.steps,
-                twin.counters.status,
-                twin.counters.steps
-            )));
+        let mut longest = 0.0_f64;
+        let mut work = Workspace::new(blocks(n)?);
+        while unfinished(twin.counters) {
+            evolve(&mut twin, &method(solver), &mut work, 1);
+            longest = longest.max(twin.report.progress.taken.to_f64());
+        }
+        let end = |counters: &Counters, report: &Report<f64>| {
+            let Counters { status, steps, rejected, .. } = *counters;
+            let Progress { time_high, time_low, .. } = report.progress;
+            format!("status {status} after {steps} steps and {rejected} refused at t = {time_high:e} + {time_low:e}")
+        };
+        let (on_gpu, on_cpu) = (end(counters, report), end(&twin.counters, &twin.report.convert()));
+        if on_gpu != on_cpu {
+            let place = format!("{} n = {n}, member {member}", T::NAME);
+            return Err(Error::Failed(format!("{place}: {on_gpu} on the GPU, {on_cpu} on the CPU")));
         }
         let widened = twin.state.convert::<f64>();
         let (our_report, their_report) = (reported(report), reported(&twin.report.convert()));
@@ -195,7 +239,9 @@ pub fn runs<T: Real>(
         let ours: Vec<&[f64]> = ours.chain(our_report.chunks(1)).collect();
         let theirs = widened.curve.fields().into_iter().map(|field| field.nodes());
         let theirs: Vec<&[f64]> = theirs.chain(their_report.chunks(1)).collect();
-        let scales = Scales::of(launch)?;
+        let mut at = launch.clone();
+        at.parameters.tau = at.parameters.tau.max(longest);
+        let scales = Scales::of(&at)?;
         for (field, (row, bound)) in rows.iter_mut().zip(&quantities).enumerate() {
             let scale = scales.get(bound.scale);
             let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale * growth(steps);

@@ -4,7 +4,8 @@
 //! fuses or reassociates: by a few roundings of each quantity's natural scale. A bound is `k · ε · scale`; the
 //! factors stand in one table ([`bounds`]), with the reason for each scale.
 //!
-//! *Practice.* [`stages`] compares everything that one step computes, [`runs`] the curve after many steps. Both take
+//! *Practice.* [`stages`] compares everything that one step computes, [`runs`] the curve after many
+//! steps, [`adaptive`] after adaptive ones. Both take
 //! an ensemble in which every member has its own curve, flow, τ and ω ([`members`]). `curvelax check` prints the
 //! table, `tests/conformance.rs` asserts it, with a negative control for each comparison.
 
@@ -12,5 +13,5 @@ pub mod bounds;
 pub mod cases;
 pub mod compare;
 
-pub use cases::members;
-pub use compare::{Row, Tamper, runs, stages};
+pub use cases::{adaptive_members, members};
+pub use compare::{Row, Tamper, adaptive, runs, stages};

@@ -1,7 +1,7 @@
 //! A member's run: steps, acceptance, status and relaxation events. Twin of `shaders/evolve.wgsl`.
 
 use super::{
-    Increments, Parameters, State, Status, Workspace, extrapolation,
+    Curve, Increments, Parameters, State, Status, Workspace, extrapolation,
     observe::{self, Maxima, Sums},
     pace,
     parameters::{Counters, NEVER, Observed, Report},
@@ -71,7 +71,7 @@ fn fixed_step<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T
         Ok((sums, maxima)) => {
             run.report.before = run.report.now;
             run.report.now = Observed::new(&sums, &maxima, &run.parameters);
-            record_events(run, T::of(0.0), maxima.gap);
+            record_events(run, T::of(0.0), &work.new);
             accept(run, work);
         }
         Err(status) => run.counters.status = status as u32,
@@ -104,7 +104,7 @@ fn adaptive_step<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspac
     report.before = report.now;
     report.middle = Observed::new(&middle_sums, &observe::maxima(middle), &run.parameters);
     report.now = Observed::new(&sums, &maxima, &run.parameters);
-    record_events(run, h, maxima.gap);
+    record_events(run, h, &work.new);
     let most_growth = if run.counters.refused == 0 { pace::MOST_GROWTH } else { 1.0 };
     let progress = &mut run.report.progress;
     progress.next = pace::next_length(h, error, most_growth, &run.parameters);
@@ -167,8 +167,8 @@ fn refuse_failure<T: Real>(run: &mut Run<T>, work: &Workspace<T>, h: T, cause: S
 }
 
 /// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.
-/// `gap` is that between the new curvature and the new polygon.
-fn record_events<T: Real>(run: &mut Run<T>, length: T, gap: T) {
+/// A curve whose curvature is not that of its polygon does not count as relaxed.
+fn record_events<T: Real>(run: &mut Run<T>, length: T, new: &Curve<T>) {
     let Run { report, counters, parameters, .. } = run;
     let excess = report.now.excess;
     let half = fraction_at(report, parameters.half_at, parameters);
@@ -179,8 +179,8 @@ fn record_events<T: Real>(run: &mut Run<T>, length: T, gap: T) {
         (progress.half_high, progress.half_low) = (progress.time_high, progress.time_low);
         (progress.half_length, progress.half_fraction) = (length, half);
     }
-    let coupled = gap.le(T::of(observe::MAX_GAP));
-    if counters.relax_step == NEVER && excess.le(parameters.relax_at) && coupled {
+    let due = counters.relax_step == NEVER && excess.le(parameters.relax_at);
+    if due && observe::gap(new).le(T::of(observe::MAX_GAP)) {
         counters.relax_step = counters.steps;
         (progress.relax_high, progress.relax_low) = (progress.time_high, progress.time_low);
         (progress.relax_length, progress.relax_fraction) = (length, relaxed);

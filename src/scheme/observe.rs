@@ -45,9 +45,6 @@ pub struct Maxima<N> {
     pub k_max: N,
     /// Minus the smallest curvature.
     pub minus_k_min: N,
-    /// Largest gap between the angle by which the curvature turns the tangent over a segment, from middle to middle of
-    /// its neighbours, and the angle by which the polygon turns there.
-    pub gap: N,
 }
 
 /// Sums over the ring.
@@ -71,8 +68,7 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> S
 /// Maxima over the ring.
 pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
     let low = N::of(-2.0 * crate::number::BIG);
-    let mut m =
-        Maxima { turn: low, drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low, gap: low };
+    let mut m = Maxima { turn: low, drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
     for i in 0..curve.x.len() {
         let (k, r, e) = (curve.k[i], curve.r[i], edge(curve, i)[2]);
         m.turn = m.turn.max((k * r).bounded_abs());
@@ -81,8 +77,6 @@ pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
         m.minus_shortest = m.minus_shortest.max(-e.bounded_abs());
         m.k_max = m.k_max.max(k);
         m.minus_k_min = m.minus_k_min.max(-k);
-        let [angle, span] = pull::turn(curve, i);
-        m.gap = m.gap.max((k * span - angle).bounded_abs());
     }
     m
 }
@@ -91,6 +85,17 @@ pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
 #[inline(always)]
 pub fn excess<N: Number>(sums: &Sums<N>, p: &Parameters<N>) -> N {
     sums.length * sums.length / (N::of(4.0 * std::f64::consts::PI) * sums.area.abs()) - p.polygon_ratio
+}
+
+/// Largest gap between the angle by which the curvature turns the tangent over a segment, from middle to middle of its
+/// neighbours, and the angle by which the polygon turns there.
+pub fn gap<N: Number>(curve: &Curve<N>) -> N {
+    let mut gap = N::of(0.0);
+    for i in 0..curve.len() {
+        let [angle, span] = pull::turn(curve, i);
+        gap = gap.max((curve.k[i] * span - angle).bounded_abs());
+    }
+    gap
 }
 
 /// Largest way that a node went from `old` to `new`.
