@@ -32,6 +32,12 @@ fn exponential(v: vec) -> vec {
     return ldexp(sum, vec4<i32>(n));
 }
 
+/// Twice the sine of half the angle whose half has the tangent v.
+fn twice_sin_atan(v: vec) -> vec {
+    let t = min(max(v, vec(-1e9)), vec(1e9));
+    return real(2.0) * (t / sqrt(vec(1.0) + t * t));
+}
+
 /// The angle in (-pi, pi) whose half has the tangent v: three halvings of the angle, then the series.
 fn twice_atan(v: vec) -> vec {
     let t = halve_angle(halve_angle(halve_angle(min(max(v, vec(-1e9)), vec(1e9)))));

@@ -1,6 +1,6 @@
-// The angle by which the polygon turns, and the pull of k and r towards it. Twin of src/scheme/pull.rs.
+// How the polygon turns, and the pull of k and r towards it. Twin of src/scheme/pull.rs.
 
-/// By which angle the polygon turns at both ends of a segment together, over which length, and the segment's own.
+/// By how much the polygon turns at both ends of a segment together, over which length, and the segment's own.
 struct Turn { angle: vec, span: vec, edge: vec }
 
 fn turn(wx: Window, wy: Window) -> Turn {
@@ -14,8 +14,8 @@ fn turn(wx: Window, wy: Window) -> Turn {
     let d = sqrt(dx * dx + dy * dy);
     let e = sqrt(ex * ex + ey * ey);
     let f = sqrt(fx * fx + fy * fy);
-    let before = twice_atan((dx * ey - dy * ex) / (d * e + (dx * ex + dy * ey)));
-    let after = twice_atan((ex * fy - ey * fx) / (e * f + (ex * fx + ey * fy)));
+    let before = twice_sin_atan((dx * ey - dy * ex) / (d * e + (dx * ex + dy * ey)));
+    let after = twice_sin_atan((ex * fy - ey * fx) / (e * f + (ex * fx + ey * fy)));
     return Turn(before + after, real(0.5) * d + e + real(0.5) * f, e);
 }
 

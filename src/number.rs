@@ -125,6 +125,13 @@ pub trait Number:
         }
         Self::of(16.0) * (sum * t)
     }
+
+    /// `2 sin(θ/2)` of that angle θ.
+    #[inline(always)]
+    fn twice_sin_atan(self) -> Self {
+        let t = self.max(Self::of(-STEEPEST)).min(Self::of(STEEPEST));
+        Self::of(2.0) * (t / (Self::of(1.0) + t * t).sqrt())
+    }
 }
 
 /// A tangent of half an angle that is as good as infinite, and whose square is finite in `f32`.

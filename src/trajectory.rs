@@ -40,6 +40,8 @@ const PULL_PER_RATE: f64 = 4.0;
 /// Adaptive steps to a tolerance of 1 after which a member is stalled; their number goes with its root. Curves that
 /// relax take some 3 to 30; one that creeps, because only tiny steps can be solved, would never end.
 const MOST_STEPS: f64 = 1000.0;
+/// Steps in a time 1/ω besides: a curve at rest takes one or two, since lengths approach their mean explicitly.
+const MOST_STEPS_AT_REST: f64 = 4.0;
 /// Shares of a spacing that nodes go at most between two looks at a curve about to cross itself.
 const LOOKS_PER_SPACING: f64 = 16.0;
 /// Ticks of the clock in the first adaptive step at least.
@@ -180,7 +182,11 @@ impl<'a> Trajectory<'a> {
     fn most_steps(&self) -> u32 {
         match self.time {
             Time::Fixed(_) => u32::MAX,
-            Time::Adaptive(_) => (MOST_STEPS / self.launch.parameters.adaptive.sqrt()).ceil() as u32,
+            Time::Adaptive(_) => {
+                let p = &self.launch.parameters;
+                let turnovers = p.redistribution * p.omega * (p.end_high + p.end_low);
+                (MOST_STEPS / p.adaptive.sqrt() + MOST_STEPS_AT_REST * turnovers).ceil() as u32
+            }
         }
     }
 

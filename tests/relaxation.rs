@@ -308,26 +308,20 @@ fn a_step_below_a_tick_moves_the_clock_by_one() {
     }
 }
 
-/// In f32 the rounding of a circle at rest bounds the step, so a run to 10⁶ does not get there; it ends all the same.
+/// A step is at most about 1/ω long, since lengths approach their mean explicitly.
 #[test]
-fn a_long_run_ends_in_either_precision() {
-    let spec = Spec { pull: Pull::Auto, ..adaptive("ellipse:2,1", 100) };
-    let to = |t_end, precision| one(&Spec { t_end, precision: Some(precision), ..spec.clone() });
-    let [double, single, longer] =
-        [(1e6, Precision::F64), (1e3, Precision::F32), (1e6, Precision::F32)].map(|(t, p)| to(t, p));
-    for outcome in [&double, &single, &longer] {
-        println!(
-            "{} at {} after {} steps, area {}",
-            outcome.status.name(),
-            outcome.t_end,
-            outcome.steps,
-            outcome.end.area
-        );
-        assert!(near(outcome.t_relax, double.t_relax.unwrap(), 1e-3), "{outcome:?}");
+fn a_circle_stays_at_rest_through_a_long_run_in_either_precision() {
+    let spec = Spec { pull: Pull::Auto, t_end: 1e4, ..adaptive("ellipse:2,1", 100) };
+    for precision in [Precision::F64, Precision::F32] {
+        let outcome = one(&Spec { precision: Some(precision), ..spec.clone() });
+        let Outcome { status, steps, end, start, .. } = &outcome;
+        println!("{precision:?}: {steps} steps, area {}", end.area / start.area);
+        assert!((*status, outcome.t_end) == (Status::Relaxed, 1e4) && *steps < 12_000, "{outcome:?}");
+        assert!(near(Some(end.area), start.area, 0.01), "{outcome:?}");
+        // A curvature of θ/e instead of 2 sin(θ/2)/e lets R⁴ grow at the rate θ²/3.
+        let growing = (1.0 + 1e4 / 4.0 * (TAU / 100.0).powi(2) / 3.0).sqrt();
+        assert!(!near(Some(growing), 1.0, 0.01), "the control passes");
     }
-    assert_eq!((double.status, double.t_end), (Status::Relaxed, 1e6));
-    assert_eq!((single.status, single.t_end), (Status::Relaxed, 1e3));
-    assert!(longer.status == Status::Stalled && longer.steps == 31_623, "{longer:?}");
 }
 
 #[test]
@@ -371,7 +365,7 @@ fn one_sweep_is_too_few_and_the_member_stalls_in_finite_time() {
     let outcome = one(&spec);
     assert_eq!((outcome.status, outcome.t_relax), (Status::Stalled, None));
     // Steps of any length are solved once they are short enough; the member creeps on until it has made its share.
-    assert!(outcome.steps == 31_623 && outcome.t_end < 0.1, "{outcome:?}");
+    assert!(outcome.steps == 31_631 && outcome.t_end < 0.1, "{outcome:?}");
     assert_eq!(one(&Spec { max_sweeps: 200_000, sor: 1.7, ..spec }).status, Status::Relaxed);
 }
 
@@ -450,12 +444,10 @@ fn random_polygons_relax_unless_128_nodes_do_not_resolve_them() {
         let line = format!("{} {:?}: {outcome:?}, {mollified:?}, gap {}", r.index, r.family, r.gap);
         match outcome.status {
             Status::Relaxed => assert!(r.gap <= observe::MAX_GAP && outcome.t_relax.is_some(), "{line}"),
-            // Creeps along the bound of the metric drift after a start that crosses itself.
-            Status::Stalled => assert!(mollified.crossed || mollified.sharp, "{line}"),
             Status::Singular => {
                 assert!(mollified.sharp || mollified.crossed || outcome.self_crossing.is_some(), "{line}");
             }
-            Status::Nonfinite | Status::Unfinished => panic!("{line}"),
+            Status::Stalled | Status::Nonfinite | Status::Unfinished => panic!("{line}"),
         }
     }
     let relaxed =

@@ -3,25 +3,27 @@
 //! The scheme's three unknowns r, k and x drift apart, since each has an equation of its own, and nothing in the
 //! paper brings them together again. After a step of length τ the pull takes
 //! `k_i ← (k_i + κτ·k_i(x))/(1 + κτ)` and `r_i ← (r_i + κτ·|e_i|)/(1 + κτ)`, an implicit step of `k̇ = κ(k(x) - k)`,
-//! with `k_i(x)` the angle by which the polygon turns between the neighbours of segment i over
-//! `|e_{i-1}|/2 + |e_i| + |e_{i+1}|/2`. κ = 0 is the paper.
+//! with `k_i(x)` the turn of the polygon between the neighbours of segment i over `|e_{i-1}|/2 + |e_i| + |e_{i+1}|/2`.
+//! A vertex of angle θ turns by 2 sin(θ/2): then a regular polygon has the curvature 1/R of its corners' circle, with
+//! which the position equation leaves it at rest. With θ itself k is larger by θ²/24 and circles grow for ever.
+//! κ = 0 is the paper.
 
 use super::{Curve, Parameters, observe::edge};
 use crate::number::{Mask, Number};
 
-/// The angle by which the polygon turns at both ends of segment i together, and the length it turns over.
+/// By how much the polygon turns at both ends of segment i together, and the length it turns over.
 #[inline(always)]
 pub fn turn<N: Number>(curve: &Curve<N>, i: usize) -> [N; 2] {
     let n = curve.len();
     let (before, own, after) = (edge(curve, (i + n - 1) % n), edge(curve, i), edge(curve, (i + 1) % n));
     let half = N::of(0.5);
-    [vertex_angle(before, own) + vertex_angle(own, after), half * before[2] + own[2] + half * after[2]]
+    [vertex_turn(before, own) + vertex_turn(own, after), half * before[2] + own[2] + half * after[2]]
 }
 
-/// The angle from edge `[x, y, length]` to the next one, in (-π, π).
+/// Twice the sine of half the angle from edge `[x, y, length]` to the next one: the gap between the unit tangents.
 #[inline(always)]
-fn vertex_angle<N: Number>([ex, ey, e]: [N; 3], [fx, fy, f]: [N; 3]) -> N {
-    ((ex * fy - ey * fx) / (e * f + (ex * fx + ey * fy))).twice_atan()
+fn vertex_turn<N: Number>([ex, ey, e]: [N; 3], [fx, fy, f]: [N; 3]) -> N {
+    ((ex * fy - ey * fx) / (e * f + (ex * fx + ey * fy))).twice_sin_atan()
 }
 
 /// Pulls the new k and r of a step towards `curve`'s polygon.
