@@ -37,26 +37,3 @@ fn twice_sin_atan(v: vec) -> vec {
     let t = min(max(v, vec(-1e9)), vec(1e9));
     return real(2.0) * (t / sqrt(vec(1.0) + t * t));
 }
-
-/// The angle in (-pi, pi) whose half has the tangent v: three halvings of the angle, then the series.
-fn twice_atan(v: vec) -> vec {
-    let t = halve_angle(halve_angle(halve_angle(min(max(v, vec(-1e9)), vec(1e9)))));
-    let square = t * t;
-    var sum = vec(1.0 / 21.0);
-    sum = sum * square + vec(-1.0 / 19.0);
-    sum = sum * square + vec(1.0 / 17.0);
-    sum = sum * square + vec(-1.0 / 15.0);
-    sum = sum * square + vec(1.0 / 13.0);
-    sum = sum * square + vec(-1.0 / 11.0);
-    sum = sum * square + vec(1.0 / 9.0);
-    sum = sum * square + vec(-1.0 / 7.0);
-    sum = sum * square + vec(0.2);
-    sum = sum * square + vec(-1.0 / 3.0);
-    sum = sum * square + vec(1.0);
-    return real(16.0) * (sum * t);
-}
-
-/// The tangent of half the angle whose tangent is t.
-fn halve_angle(t: vec) -> vec {
-    return t / (vec(1.0) + sqrt(vec(1.0) + t * t));
-}

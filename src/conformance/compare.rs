@@ -176,7 +176,7 @@ pub fn runs<T: Real>(
     tamper: Option<Tamper>,
 ) -> Result<Vec<Row>> {
     let launches = members(n, MEMBERS, steps, T::PRECISION.tolerance())?;
-    ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
+    ends_agree::<T>(adapter, solver, n, launches, budget, tamper, 1.0)
 }
 
 /// Tolerance of adaptive steps in the comparison.
@@ -187,8 +187,9 @@ pub const ADAPTIVE_STEPS: u32 = 40;
 /// The curve after adaptive steps to the same time, in dispatches of `budget`.
 ///
 /// What rounding changes in a step length is what it changes in the error estimate, relative to the tolerance; what a
-/// changed length changes in the curve is the tolerance times that. So rounding changes the curve no more than with fixed
-/// steps of the longest length taken, and the bounds are the same.
+/// changed length changes in the curve is the tolerance times that, no more than the rounding of one step. An extrapolated
+/// step is that of two half steps twice less that of the whole one: √(2·2² + 1) = 3 times the rounding of a fixed step of
+/// the longest length taken.
 pub fn adaptive<T: Real>(
     adapter: &gpu::Gpu,
     solver: Solver,
@@ -197,12 +198,12 @@ pub fn adaptive<T: Real>(
     tamper: Option<Tamper>,
 ) -> Result<Vec<Row>> {
     let launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::EPSILON)?;
-    let mut rows = ends_agree::<T>(adapter, solver, n, launches, budget, tamper)?;
+    let mut rows = ends_agree::<T>(adapter, solver, n, launches, budget, tamper, 3.0)?;
     rows.iter_mut().for_each(|row| row.adaptive = true);
     Ok(rows)
 }
 
-/// Both sides of `launches` at their ends.
+/// Both sides of `launches` at their ends; a step rounds `amplified` times as much as the paper's.
 fn ends_agree<T: Real>(
     adapter: &gpu::Gpu,
     solver: Solver,
@@ -210,6 +211,7 @@ fn ends_agree<T: Real>(
     launches: Vec<Run<f64>>,
     budget: Budget,
     tamper: Option<Tamper>,
+    amplified: f64,
 ) -> Result<Vec<Row>> {
     let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
     let steps = ours.iter().map(|left| left.counters.steps).max().unwrap_or(0);
@@ -244,7 +246,7 @@ fn ends_agree<T: Real>(
         let scales = Scales::of(&at)?;
         for (field, (row, bound)) in rows.iter_mut().zip(&quantities).enumerate() {
             let scale = scales.get(bound.scale);
-            let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale * growth(steps);
+            let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale * growth(steps) * amplified;
             row.add(member, scale, limit, Gpu(ours[field]), Cpu(theirs[field]));
         }
     }

@@ -18,8 +18,6 @@ const MOST_SERIES_ROWS: f64 = 1e6;
 const MOST_SNAPSHOTS: usize = 10_000;
 /// The lengths approach their mean explicitly, by a factor 1 - ωτ a step.
 const MOST_OMEGA_TAU: f64 = 1.0;
-/// Adaptive steps that the redistribution asks for at most.
-const MOST_OMEGA_TIME: f64 = 1e6;
 /// Above this local error a step says nothing about the curve.
 const LOOSEST_ADAPTIVE: f64 = 1.0;
 /// A sweep residual above this no longer says that a system is solved.
@@ -148,13 +146,12 @@ impl Spec {
             return Err(Error::value("omega", number(self.omega), &problem, &allowed));
         }
         if let Pace::Adaptive(_) = self.pace()
-            && self.omega * self.t_end > MOST_OMEGA_TIME
+            && self.omega * self.t_end > MOST_STEPS
             && !self.no_redistribution
         {
             let problem =
                 format!("adaptive steps are at most about 1/omega long, and --t-end is {}", number(self.t_end));
-            let allowed =
-                format!("take --omega {} or less, or an earlier --t-end", number(MOST_OMEGA_TIME / self.t_end));
+            let allowed = format!("take --omega {} or less, or an earlier --t-end", number(MOST_STEPS / self.t_end));
             return Err(Error::value("omega", number(self.omega), &problem, &allowed));
         }
         self.check_pull()?;
@@ -386,7 +383,7 @@ mod tests {
         ("adaptive = 9e-9", "--adaptive 9e-9: the rounding of the precision is larger; take 1e-8"),
         ("adaptive = 9e-6\nprecision = 'f32'", "--adaptive 9e-6: the rounding of the precision is larger; take 1e-5"),
         ("adaptive = 0.001\ntau = 0.001", "--tau 0.001: steps are either fixed or adaptive"),
-        ("adaptive = 0.001\nomega = 1e6", "--omega 1000000: adaptive steps are at most about 1/omega long"),
+        ("adaptive = 0.001\nomega = 1e9", "--omega 1000000000: adaptive steps are at most about 1/omega long"),
         ("pull = -1", "--pull -1: not a rate"),
         ("pull = nan", "--pull NaN: "),
         ("pull = inf", "--pull inf: "),
