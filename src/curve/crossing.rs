@@ -113,7 +113,7 @@ impl BoxTree {
     /// Lowers `nearest` to the distance of the opposed edges under `a` and `b`, two nodes of one level with `a <= b`.
     fn nearest_opposed(&self, a: usize, b: usize, points: &[DVec2], nearest: &mut f64) {
         // Empty boxes are infinitely far.
-        if !(self.boxes[a].distance(self.boxes[b]) < *nearest) {
+        if self.boxes[a].distance(self.boxes[b]) >= *nearest {
             return;
         }
         if a >= self.leaves {
