@@ -326,13 +326,23 @@ fn a_circle_stays_at_rest_through_a_long_run_in_either_precision() {
 
 #[test]
 fn a_lemniscate_is_singular_when_its_life_is_over_with_both_solvers() {
-    for (solver, size) in
-        [(SolverChoice::Direct, 1.0_f64), (SolverChoice::Direct, 0.1), (SolverChoice::GaussSeidel, 1.0)]
-    {
+    let (direct, sweeps) = (SolverChoice::Direct, SolverChoice::GaussSeidel);
+    for (solver, size, precision) in [
+        (direct, 1.0_f64, Precision::F64),
+        (direct, 0.1, Precision::F64),
+        (direct, 1.0, Precision::F32),
+        (sweeps, 1.0, Precision::F64),
+    ] {
         let life = size.powi(4) * LEMNISCATE_LIFE;
         let shape = format!("lemniscate:{size}");
-        let outcome = one(&Spec { solver, t_end: 1.2 * life, max_sweeps: 20_000, ..adaptive(&shape, 66) });
-        println!("{solver:?}: {} after {:.4} of its life", outcome.status.name(), outcome.t_end / life);
+        let outcome = one(&Spec {
+            solver,
+            precision: Some(precision),
+            t_end: 1.2 * life,
+            max_sweeps: 20_000,
+            ..adaptive(&shape, 66)
+        });
+        println!("{solver:?}, {precision:?}: {} after {:.4} of its life", outcome.status.name(), outcome.t_end / life);
         assert_eq!((outcome.status, outcome.t_relax), (Status::Singular, None));
         assert!(near(Some(outcome.t_end), life, 0.01) && !near(Some(outcome.t_end), 1.2 * life, 0.01));
         assert_eq!(outcome.self_crossing, Some(0.0));
