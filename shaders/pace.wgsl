@@ -4,7 +4,7 @@ const SAFETY = 0.95;
 const MOST_GROWTH = 4.0;
 const LEAST_GROWTH = 0.25;
 const LEAST_STEP = 1e-12;
-const LEAST_TO_SINGULAR = 1e-6;
+const LEAST_TO_SINGULAR = 1e-3;
 
 /// A step to be attempted: its length, the high and the low part of that, and whether it reaches the final time.
 struct Stride { length: real, high: real, low: real, last: bool }

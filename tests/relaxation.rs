@@ -26,7 +26,7 @@ use curvelax::{
         step::Method,
     },
     simulate::simulate,
-    solver::{Blocks, Order},
+    solver::{Blocks, Order, Solver},
     trajectory::Trajectory,
     truth::LEMNISCATE_LIFE,
 };
@@ -326,14 +326,19 @@ fn a_circle_stays_at_rest_through_a_long_run_in_either_precision() {
 
 #[test]
 fn a_lemniscate_is_singular_when_its_life_is_over_with_both_solvers() {
-    for (solver, size) in
-        [(SolverChoice::Direct, 1.0_f64), (SolverChoice::Direct, 0.1), (SolverChoice::GaussSeidel, 1.0)]
-    {
+    let (direct, sweeps) = (SolverChoice::Direct, SolverChoice::GaussSeidel);
+    for (solver, size, precision) in [
+        (direct, 1.0_f64, Precision::F64),
+        (direct, 0.1, Precision::F64),
+        (direct, 1.0, Precision::F32),
+        (sweeps, 1.0, Precision::F64),
+    ] {
         let life = size.powi(4) * LEMNISCATE_LIFE;
         let shape = format!("lemniscate:{size}");
-        let max_sweeps = if solver == SolverChoice::GaussSeidel { 20_000 } else { Spec::default().max_sweeps };
-        let outcome = one(&Spec { solver, t_end: 1.2 * life, max_sweeps, ..adaptive(&shape, 66) });
-        println!("{solver:?}: {} after {:.4} of its life", outcome.status.name(), outcome.t_end / life);
+        let max_sweeps = if solver == sweeps { 20_000 } else { Spec::default().max_sweeps };
+        let precision = Some(precision);
+        let outcome = one(&Spec { solver, precision, t_end: 1.2 * life, max_sweeps, ..adaptive(&shape, 66) });
+        println!("{solver:?}, {precision:?}: {} after {:.4} of its life", outcome.status.name(), outcome.t_end / life);
         assert_eq!((outcome.status, outcome.t_relax), (Status::Singular, None));
         assert!(near(Some(outcome.t_end), life, 0.01) && !near(Some(outcome.t_end), 1.2 * life, 0.01));
         assert_eq!(outcome.self_crossing, Some(0.0));
@@ -569,5 +574,25 @@ fn extrapolated_steps_are_of_order_two_and_their_halves_alone_of_order_one() {
             println!("{name}: order {found:.3}");
             assert!((found - order).abs() < 0.1, "{name}: order {found} instead of {order}");
         }
+    }
+}
+
+/// The check itself: a round polygon under a curvature that is not its own, which no run was found to reach.
+#[test]
+fn a_round_polygon_under_a_foreign_curvature_does_not_count_as_relaxed() {
+    for (foreign, relaxes) in [(1.0, true), (8.0, false)] {
+        let nodes: Vec<DVec2> = (0..50).map(|i| DVec2::from_angle(TAU * f64::from(i) / 50.0)).collect();
+        let mut state = State::<f64>::from_nodes(&nodes);
+        for i in 0..50 {
+            state.curve.k[i] *= foreign;
+        }
+        state.curve.k.close();
+        let p = Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-12);
+        let mut run = Run::new(state, Parameters { polygon_ratio: 1.0, relax_at: 0.1, ..p });
+        run.counters.goal = 1;
+        let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
+        evolve::evolve(&mut run, &method, &mut Workspace::new(Blocks::new(50).unwrap()), 1);
+        assert_eq!((run.counters.status, run.counters.steps), (0, 1));
+        assert_eq!(run.counters.relax_step == 0, relaxes, "curvature {foreign} times the polygon's");
     }
 }

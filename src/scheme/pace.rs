@@ -18,7 +18,7 @@ pub const LEAST_GROWTH: f64 = 0.25;
 pub const LEAST_STEP: f64 = 1e-12;
 /// The same for a step that is accurate but ends in a singular curve: shorter ones only creep towards the bound that it
 /// passed, until rounding lets them stay beside it.
-pub const LEAST_TO_SINGULAR: f64 = 1e-6;
+pub const LEAST_TO_SINGULAR: f64 = 1e-3;
 
 /// A step to be attempted.
 #[derive(Clone, Copy, Debug, PartialEq)]
