@@ -10,7 +10,7 @@ use crate::{
     curve::{clearance, crossing, polygon},
     ensemble::{
         Ended, Member, Observables, Outcome, Portrait, SeriesRow, Snapshot, Spec, Status,
-        member::relaxation_rate,
+        member::{relaxation_rate, strongest_pull},
         spec::{Pace, Precision, Pull},
     },
     schedule::{Clock, Output, Ticks},
@@ -431,7 +431,7 @@ fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parame
         redistribution: f64::from(u8::from(!spec.no_redistribution)),
         pull: match spec.pull {
             Pull::Rate(rate) => rate * time,
-            Pull::Auto => PULL_PER_RATE * relaxation_rate(nodes),
+            Pull::Auto => (PULL_PER_RATE * relaxation_rate(nodes)).min(strongest_pull(nodes)),
         },
         tolerance,
         sor: spec.sor,

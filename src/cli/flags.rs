@@ -86,7 +86,8 @@ pub struct SpecFlags {
         long, value_name = "TAU", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION
     )]
     tau: Option<f64>,
-    /// Adaptive steps with this local error tolerance instead of --tau [default: off; 0.001 if no TOL is given]
+    /// Steps that adapt to this local error instead of --tau; alone it means 0.001, before SPEC.toml write --adaptive=TOL
+    /// [default: off]
     #[arg(
         long, value_name = "TOL", value_parser = real, allow_negative_numbers = true, num_args = 0..=1,
         default_missing_value = "0.001", help_heading = EVOLUTION
@@ -113,7 +114,8 @@ pub struct SpecFlags {
         help_heading = EVOLUTION
     )]
     relax_to: Option<f64>,
-    /// A member is relaxed at this excess, instead of --relax-to [default: off]
+    /// A member is relaxed at this excess L^2/(4 pi A) over the regular polygon's, instead of --relax-to; the choice for
+    /// rough outlines [default: off]
     #[arg(
         long, value_name = "EXCESS", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION
     )]
@@ -125,7 +127,8 @@ pub struct SpecFlags {
     )]
     stop_when_relaxed: Option<bool>,
 
-    /// Rate κ at which k and r are pulled to the polygon's own, a number or auto; 0 is the paper [default: 0]
+    /// Rate κ, in 1/time, at which the scheme's k and r are drawn to the polygon's; auto is 4 x 24/R^4 for each member, 0
+    /// the paper [default: 0]
     #[arg(
         long, value_name = "KAPPA", value_parser = text_of::<Pull>, allow_hyphen_values = true, help_heading = METHOD
     )]
@@ -136,7 +139,7 @@ pub struct SpecFlags {
     /// Order in which a sweep visits the nodes [default: coloured]
     #[arg(long, value_name = "ORDER", value_parser = word::<Order>(ORDERS), help_heading = METHOD)]
     order: Option<Order>,
-    /// Residual tolerance of the sweeps [default: 1e-3 in f32, 1e-5 in f64]
+    /// Residual tolerance of the sweeps (only of them) [default: 1e-3 in f32, 1e-5 in f64]
     #[arg(long, value_name = "TOL", value_parser = real, allow_hyphen_values = true, help_heading = METHOD)]
     tolerance: Option<f64>,
     /// Over-relaxation of the sweeps, 1 is plain Gauss-Seidel [default: 1]

@@ -16,6 +16,8 @@ Examples:
   curvelax run --out ellipses
       256 perturbed 2:1 ellipses under surface diffusion, with the paper's n, τ and ω
   curvelax run --flow willmore --curves 10000 --stop-when-relaxed --out willmore
+  curvelax run --adaptive --pull auto --relax-at 0.01 --shape file:island.csv --out island
+      relaxation times of an outline, with steps of the right length
   curvelax run --curves 8 --tau 1e-4 --print-spec > spec.toml
   curvelax run spec.toml --seed 2 --out second
 

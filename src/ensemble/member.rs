@@ -23,10 +23,6 @@ const MAX_ATTEMPTS: u32 = 1000;
 const NO_EXCESS: &str = "the loops of a lemniscate cancel: its area is next to nothing, and its excess, status and \
                          relaxation times, which divide by it, mean nothing";
 
-/// Largest κ in units of the relaxation rate: at n = 64 the nonconvex curve loses its mesh from 50 on, at n = 100 from
-/// 100 on (docs/method.md).
-const MOST_PULL: f64 = 40.0;
-
 /// One curve at the start of its run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Member {
@@ -145,12 +141,19 @@ pub fn relaxation_rate(nodes: &[DVec2]) -> f64 {
     24.0 / (if simple { by_area } else { by_length }).powi(4)
 }
 
-/// A pull that is strong compared with the relaxation undoes what the redistribution does, and the mesh falls apart.
+/// The largest κ that is admitted: n²/100 times the relaxation rate.
+///
+/// A pull that is strong compared with the relaxation undoes what the redistribution does, and the mesh falls apart: that
+/// of the nonconvex curve at 20, 60 and 200 times the rate for n = 32, 64 and 100 (docs/method.md).
+pub fn strongest_pull(nodes: &[DVec2]) -> f64 {
+    (nodes.len() as f64 / 10.0).powi(2) * relaxation_rate(nodes)
+}
+
 fn check_pull(pull: Pull, nodes: &[DVec2]) -> Result<()> {
-    let most = MOST_PULL * relaxation_rate(nodes);
+    let most = strongest_pull(nodes);
     match pull {
         Pull::Rate(rate) if rate > most => {
-            let problem = format!("stronger than {MOST_PULL} times this curve's relaxation rate, it destroys the mesh");
+            let problem = format!("so strong that it destroys the mesh of {} nodes on this curve", nodes.len());
             Err(Error::value("pull", rate, &problem, &format!("take {most:.3} or less, or auto")))
         }
         _ => Ok(()),
@@ -353,7 +356,7 @@ mod tests {
             (Spec { modes: Modes { low: 0, high: 3 }, ..Spec::default() }, "--modes `0..=3`"),
             (Spec { decay: f64::NAN, ..Spec::default() }, "--decay NaN"),
             (Spec { points: 2, ..Spec::default() }, "--points 2"),
-            (Spec { pull: Pull::Rate(300.0), ..Spec::default() }, "--pull 300"),
+            (Spec { pull: Pull::Rate(700.0), ..Spec::default() }, "--pull 700"),
             (Spec { sampling: Sampling::Points, ..Spec::default() }, "--sampling points"),
             (Spec { shape: Shape::Circle { radius: 0.0 }, ..Spec::default() }, "--shape circle:0"),
             (Spec { shape: Shape::File("none.csv".into()), ..Spec::default() }, "--shape file:none.csv"),

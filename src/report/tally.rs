@@ -107,7 +107,7 @@ impl Tally {
         if failed > 0 {
             warnings.push(format!(
                 "{failed} of {members} members ended badly (see `status`); unless the flow itself goes wrong there, a \
-                 smaller --tau or more --points helps"
+                 smaller --tau or --adaptive, or more --points, helps"
             ));
         }
         if self.unresolved > 0 {
@@ -121,7 +121,8 @@ impl Tally {
         if drifted > 0 {
             warnings.push(format!(
                 "{drifted} of {members} members ended with a metric drift above {DISTRUSTED_DRIFT} (worst {worst:.2}): \
-                 their times and areas are not to be trusted; take a smaller --tau or more --points"
+                 their times and areas are not to be trusted; take --pull auto, a smaller --tau or --adaptive, or \
+                 more --points"
             ));
         }
         warnings
