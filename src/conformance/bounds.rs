@@ -98,6 +98,20 @@ pub const REPORT: [Bound; 10] = [
     bound("travel", Scale::Position, 16.0, 64.0),
 ];
 
+/// What adaptive runs leave besides their ends: the last step's start and middle, how long steps are, when events were.
+///
+/// All of it lies where a step happened to begin or end. The error estimate is off by a rounding of the solve, ε·√w with
+/// w the largest weight, so relative to the tolerance by ε·√w/tolerance, and a step length by half of that. What lies
+/// inside the run is off by as much of what it changes in a step, on top of what its own scale says.
+pub const PACE: [Bound; 6] = [
+    bound("last step's start", Scale::Position, 16.0, 64.0),
+    bound("its middle", Scale::Position, 16.0, 64.0),
+    bound("their reports", Scale::One, 16.0, 64.0),
+    bound("last step", Scale::One, 4.0, 16.0),
+    bound("next step", Scale::One, 4.0, 16.0),
+    bound("t_half, t_relax", Scale::One, 1.0, 4.0),
+];
+
 impl Bound {
     /// The factor k for an adapter of this kind.
     pub fn factor(&self, hardware: bool) -> f64 {

@@ -1,7 +1,7 @@
 //! The two comparisons, and their rows.
 
 use super::{
-    bounds::{Bound, FIELDS, REPORT, STAGES, Scale},
+    bounds::{Bound, FIELDS, PACE, REPORT, STAGES, Scale},
     cases::{adaptive_members, members},
 };
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
     scheme::{
         Curve, Increments, Parameters, State, Workspace,
         evolve::{Run, evolve},
-        parameters::{Counters, Progress, Report},
+        parameters::{Counters, NEVER, Progress, Report},
         step::{self, Method},
     },
     solver::{Blocks, Order, Ring, Solver},
@@ -176,7 +176,7 @@ pub fn runs<T: Real>(
     tamper: Option<Tamper>,
 ) -> Result<Vec<Row>> {
     let launches = members(n, MEMBERS, steps, T::PRECISION.tolerance())?;
-    ends_agree::<T>(adapter, solver, n, launches, budget, tamper, 1.0)
+    ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
 }
 
 /// Tolerance of adaptive steps in the comparison.
@@ -187,9 +187,9 @@ pub const ADAPTIVE_STEPS: u32 = 40;
 /// The curve after adaptive steps to the same time, in dispatches of `budget`.
 ///
 /// What rounding changes in a step length is what it changes in the error estimate, relative to the tolerance; what a
-/// changed length changes in the curve is the tolerance times that, no more than the rounding of one step. An extrapolated
-/// step is that of two half steps twice less that of the whole one: √(2·2² + 1) = 3 times the rounding of a fixed step of
-/// the longest length taken.
+/// changed length changes in the curve is the tolerance times that. So rounding changes the curve no more than with fixed
+/// steps of the longest length taken, five of them a step, and the bounds are the same. Those of what lies inside the run
+/// are in [`PACE`].
 pub fn adaptive<T: Real>(
     adapter: &gpu::Gpu,
     solver: Solver,
@@ -198,12 +198,10 @@ pub fn adaptive<T: Real>(
     tamper: Option<Tamper>,
 ) -> Result<Vec<Row>> {
     let launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::EPSILON)?;
-    let mut rows = ends_agree::<T>(adapter, solver, n, launches, budget, tamper, 3.0)?;
-    rows.iter_mut().for_each(|row| row.adaptive = true);
-    Ok(rows)
+    ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
 }
 
-/// Both sides of `launches` at their ends; a step rounds `amplified` times as much as the paper's.
+/// Both sides of `launches` at their ends.
 fn ends_agree<T: Real>(
     adapter: &gpu::Gpu,
     solver: Solver,
@@ -211,13 +209,16 @@ fn ends_agree<T: Real>(
     launches: Vec<Run<f64>>,
     budget: Budget,
     tamper: Option<Tamper>,
-    amplified: f64,
 ) -> Result<Vec<Row>> {
     let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
     let steps = ours.iter().map(|left| left.counters.steps).max().unwrap_or(0);
+    let adaptive = launches.iter().all(|launch| launch.parameters.adaptive > 0.0);
     let quantities: Vec<Bound> = FIELDS.iter().chain(&REPORT).copied().collect();
-    let mut rows: Vec<Row> = quantities.iter().map(|bound| Row::begin::<T>(bound, solver, n, steps)).collect();
-    for (member, (launch, Left { state, counters, report })) in launches.iter().zip(&ours).enumerate() {
+    let inside: &[Bound] = if adaptive { &PACE } else { &[] };
+    let begin = |bound| Row { adaptive, ..Row::begin::<T>(bound, solver, n, steps) };
+    let mut rows: Vec<Row> = quantities.iter().chain(inside).map(begin).collect();
+    for (member, (launch, left)) in launches.iter().zip(&ours).enumerate() {
+        let Left { state, counters, report } = left;
         let mut twin: Run<T> = launch.convert();
         let mut longest = 0.0_f64;
         let mut work = Workspace::new(blocks(n)?);
@@ -226,9 +227,12 @@ fn ends_agree<T: Real>(
             longest = longest.max(twin.report.progress.taken.to_f64());
         }
         let end = |counters: &Counters, report: &Report<f64>| {
-            let Counters { status, steps, rejected, .. } = *counters;
+            let Counters { status, steps, rejected, half_step, relax_step, .. } = *counters;
             let Progress { time_high, time_low, .. } = report.progress;
-            format!("status {status} after {steps} steps and {rejected} refused at t = {time_high:e} + {time_low:e}")
+            format!(
+                "status {status} after {steps} steps and {rejected} refused at t = {time_high:e} + {time_low:e}, events \
+                 in steps {half_step} and {relax_step}"
+            )
         };
         let (on_gpu, on_cpu) = (end(counters, report), end(&twin.counters, &twin.report.convert()));
         if on_gpu != on_cpu {
@@ -244,13 +248,82 @@ fn ends_agree<T: Real>(
         let mut at = launch.clone();
         at.parameters.tau = at.parameters.tau.max(longest);
         let scales = Scales::of(&at)?;
+        // 2B - A takes the roundings of both half steps twice and those of the whole one once.
+        let roundings = growth(twin.counters.steps) * if adaptive { 5.0 } else { 1.0 };
         for (field, (row, bound)) in rows.iter_mut().zip(&quantities).enumerate() {
             let scale = scales.get(bound.scale);
-            let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale * growth(steps) * amplified;
+            let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale * roundings;
             row.add(member, scale, limit, Gpu(ours[field]), Cpu(theirs[field]));
+        }
+        if adaptive {
+            let twin = Left { state: widened, counters: twin.counters, report: twin.report.convert() };
+            let rounding = T::EPSILON * roundings;
+            let estimate = T::EPSILON * growth(twin.counters.steps) * scales.stiffness() / launch.parameters.adaptive;
+            let factors = PACE.map(|bound| bound.factor(adapter.is_hardware()));
+            let inside = &mut rows[quantities.len()..];
+            insides_agree(inside, member, &scales, factors, [rounding, estimate], Gpu(left), Cpu(&twin));
         }
     }
     Ok(rows)
+}
+
+fn before(state: &State<f64>) -> &Curve<f64> {
+    &state.before
+}
+
+fn between(state: &State<f64>) -> &Curve<f64> {
+    &state.middle
+}
+
+/// What a member's run leaves besides its end, see [`PACE`]. `rounding` is what rounding does relative to a scale,
+/// `estimate` what it does to a step length, relative to it.
+fn insides_agree(
+    rows: &mut [Row],
+    member: usize,
+    scales: &Scales,
+    factors: [f64; 6],
+    [rounding, estimate]: [f64; 2],
+    ours: Gpu<&Left>,
+    theirs: Cpu<&Left>,
+) {
+    let (Gpu(ours), Cpu(theirs)) = (ours, theirs);
+    let [start, middle, reports, last, next, events] = rows else { panic!("{} rows of PACE", rows.len()) };
+    let (a, b) = (&ours.report, &theirs.report);
+    // Of a quantity that changes by `change` in a step.
+    let inside = |scale: f64, change: f64| rounding * scale + estimate * change;
+    let largest = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let bounds = FIELDS.map(|bound| scales.get(bound.scale));
+    let curves = [(start, factors[0], before as fn(&State<f64>) -> &Curve<f64>), (middle, factors[1], between)];
+    for (row, factor, of) in curves {
+        let (a, b) = (of(&ours.state).fields(), of(&theirs.state).fields());
+        let fields = a.into_iter().zip(b).zip(theirs.state.curve.fields()).zip(bounds);
+        for (((a, b), end), scale) in fields {
+            let bound = factor * inside(scale, largest(end.nodes(), b.nodes()));
+            row.add(member, scale, bound, Gpu(a.nodes()), Cpu(b.nodes()));
+        }
+    }
+    for (a, b) in [(&a.before, &b.before), (&a.middle, &b.middle)] {
+        let (a, b, end) = (a.to_numbers(), b.to_numbers(), theirs.report.now.to_numbers());
+        for (j, bound) in REPORT.iter().take(a.len()).enumerate() {
+            let scale = scales.get(bound.scale);
+            let bound = factors[2] * inside(scale, (b[j] - end[j]).abs());
+            reports.add(member, scale, bound, Gpu(&a[j..=j]), Cpu(&b[j..=j]));
+        }
+    }
+    let (a, b) = (&a.progress, &b.progress);
+    // The last step reaches the final time, so its length is off by what the ones before it were off together.
+    let longest = scales.parameters.tau;
+    last.add(member, longest, factors[3] * estimate * longest, Gpu(&[a.taken]), Cpu(&[b.taken]));
+    next.add(member, b.next, factors[4] * estimate * b.next, Gpu(&[a.next]), Cpu(&[b.next]));
+    let half = |p: &Progress<f64>| p.half_high + (p.half_low + p.half_fraction * p.half_length);
+    let relaxed = |p: &Progress<f64>| p.relax_high + (p.relax_low + p.relax_fraction * p.relax_length);
+    if theirs.counters.half_step != NEVER && theirs.counters.relax_step != NEVER {
+        // The rounding of an excess over the rate at which it falls, and what the place of a parabola inside its step does.
+        let p = &scales.parameters;
+        let rate = (p.half_at - p.relax_at) / (relaxed(b) - half(b));
+        let bound = factors[5] * (rounding / rate + estimate * b.half_length.max(b.relax_length));
+        events.add(member, b.relax_length, bound, Gpu(&[half(a), relaxed(a)]), Cpu(&[half(b), relaxed(b)]));
+    }
 }
 
 /// What of a report is compared, in the order of [`REPORT`].
@@ -339,6 +412,11 @@ impl Scales {
         let increments = &mut run.state.increments;
         step::step(&run.state.curve, increments, &run.parameters, &method(Solver::Direct), &mut work);
         Ok(Scales { curve: run.state.curve, parameters: run.parameters, work })
+    }
+
+    /// How much a solve passes rounding on: the root of the largest weight.
+    fn stiffness(&self) -> f64 {
+        (self.get(Scale::SolvedCurvature) / self.get(Scale::Curvature)).max(1.0)
     }
 
     fn get(&self, scale: Scale) -> f64 {
