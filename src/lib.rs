@@ -72,7 +72,7 @@
 //!     curves: 1,
 //!     amplitude: 0.0,
 //!     t_end: 0.2,
-//!     solver: Solver::Direct,
+//!     solver: Solver::Direct.into(),
 //!     backend: BackendChoice::Cpu,
 //!     ..Spec::default()
 //! };
