@@ -20,7 +20,7 @@ fn ellipse<T: Real>(n: usize) -> (State<T>, Parameters<T>, Workspace<T>) {
     let parameters = Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3).convert();
     let mut work = Workspace::new(Blocks::new(n).expect("n is at least 6"));
     for _ in 0..10 {
-        step::step(&state.curve, &mut state.increments, &parameters, &method(Solver::Direct), &mut work);
+        step::step(&state.curve, &mut state.increments, &parameters, true, &method(Solver::Direct), &mut work);
         std::mem::swap(&mut state.curve, &mut work.new);
     }
     (state, parameters, work)
@@ -37,7 +37,7 @@ fn step_in<T: Real>(c: &mut Criterion) {
             c.bench_function(&format!("step/{}/n={n}/{name}", T::NAME), |b| {
                 b.iter(|| {
                     let mut increments = increments.clone();
-                    step::step(&curve, &mut increments, &parameters, &method(solver), &mut work)
+                    step::step(&curve, &mut increments, &parameters, true, &method(solver), &mut work)
                 });
             });
         }

@@ -5,23 +5,21 @@ var<private> rkb: vec;
 /// Tangential velocity at the nodes, and at the nodes before them.
 var<private> alpha: vec;
 var<private> alpha_before: vec;
-/// New lengths, 1/r and 1/q on the window of the block.
+/// New lengths on the window of the block.
 var<private> r_new: Window;
+/// 1/r and 1/q there, of the old lengths, then of the new ones.
 var<private> ir: Window;
 var<private> iq: Window;
 
-fn velocity(wk: Window, wr: Window) -> vec {
-    let q = (here(wr) + plus1(wr)) * real(0.5);
-    let qm = (minus1(wr) + here(wr)) * real(0.5);
-    let up = (plus1(wk) - k) / q;
-    let down = (k - minus1(wk)) / qm;
-    return b(k) - (up - down) / r;
+fn velocity(wk: Window) -> vec {
+    return b(k) - ((plus1(wk) - k) * here(iq) - (k - minus1(wk)) * minus1(iq)) * here(ir);
 }
 
 /// Fills the variables above; returns the length L of the old state.
 fn redistribute() -> real {
     share(k, r);
-    let beta = velocity(read_a(), read_b());
+    reciprocals(read_b());
+    let beta = velocity(read_a());
     trace(0u, beta);
     rkb = r * k * beta;
     var unused = vec(0.0);
@@ -32,7 +30,7 @@ fn redistribute() -> real {
     var next: vec;
     if p.redistribution > real(0.5) {
         tangential_velocity(mean_rkb, mean_length);
-        let rate = p.omega * (vec(mean_length) / r - vec(1.0)) - vec(mean_rkb);
+        let rate = p.omega * (mean_length * here(ir) - vec(1.0)) - vec(mean_rkb);
         next = r * exponential(p.tau * rate);
     } else {
         alpha = vec(0.0);
@@ -42,7 +40,7 @@ fn redistribute() -> real {
     trace(1u, alpha);
     share(next, next);
     r_new = read_a();
-    reciprocals();
+    reciprocals(r_new);
     return length;
 }
 
@@ -61,10 +59,13 @@ fn tangential_velocity(mean_rkb: real, mean_length: real) {
     }
 }
 
-fn reciprocals() {
-    ir = Window(vec(1.0) / r_new.low, vec(1.0) / r_new.high);
-    let low = (r_new.low + minus1(r_new)) * real(0.5);
-    // The last q would need first+6; no row asks for it.
-    let high = (r_new.high + vec(r_new.high.yzw, r_new.high.w)) * real(0.5);
-    iq = Window(vec(1.0) / low, vec(1.0) / high);
+/// 1/r and 1/q from one division: of the two, which are of one size, 1/(r q).
+fn reciprocals(w: Window) {
+    let low_q = (w.low + minus1(w)) * real(0.5);
+    // The last q would need first+6; no row asks for it, and its r serves as well.
+    let high_q = (w.high + vec(w.high.yzw, w.high.w)) * real(0.5);
+    let low = vec(1.0) / (w.low * low_q);
+    let high = vec(1.0) / (w.high * high_q);
+    ir = Window(low * low_q, high * high_q);
+    iq = Window(low * w.low, high * w.high);
 }

@@ -18,8 +18,8 @@ use curvelax::{
     ensemble::{Status, spec::Precision},
     number::Real,
     scheme::{
-        State, Workspace,
-        evolve::{Run, evolve},
+        State,
+        evolve::{Run, Team, evolve},
         parameters::{Counters, NEVER},
         step::Method,
     },
@@ -332,7 +332,7 @@ fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let mut relaxed = 0;
     for (j, launch) in launches.iter().enumerate() {
         let mut twin: Run<T> = launch.convert();
-        evolve(&mut twin, &method, &mut Workspace::new(blocks), 60);
+        evolve(&mut twin, &method, &mut Team::new(blocks), 60);
         let (ours, theirs) = (ended[j].counters, twin.counters);
         let key = |c: Counters| (c.status, c.steps, c.relax_step, c.half_step);
         if key(ours) != key(theirs) {
@@ -506,7 +506,7 @@ fn paper<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     launch.parameters.tau = 1e-3;
     let mut exact = launch.clone();
     let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
-    evolve(&mut exact, &method, &mut Workspace::new(Blocks::new(n).ok_or("n")?), 2000);
+    evolve(&mut exact, &method, &mut Team::new(Blocks::new(n).ok_or("n")?), 2000);
     let Left { state, counters, .. } = on_gpu::<T>(gpu, solver, n, &[launch], dispatches_of(50))?.remove(0);
     if (counters.steps, exact.counters.steps) != (2000, 2000) {
         return Err(format!("{counters:?} on the GPU, {:?} on the CPU", exact.counters).into());

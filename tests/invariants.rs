@@ -17,8 +17,8 @@ use curvelax::{
     flow::Flow,
     number::Real,
     scheme::{
-        Parameters, State, Workspace,
-        evolve::{Run, evolve},
+        Parameters, State,
+        evolve::{Run, Team, evolve},
         step::Method,
     },
     simulate::simulate,
@@ -349,7 +349,7 @@ fn relaxed_ellipse<T: Real>(n: usize, method: &Method, tolerance: f64) -> (Vec<D
     };
     let mut run: Run<T> = Run::<f64>::new(State::from_nodes(&nodes), parameters).convert();
     run.counters.goal = 1000;
-    let mut work = Workspace::new(Blocks::new(n).unwrap());
+    let mut work = Team::new(Blocks::new(n).unwrap());
     evolve(&mut run, method, &mut work, 1000);
     assert_eq!((run.counters.status, run.counters.steps), (0, 1000), "n = {n}");
     let t_relax = (f64::from(run.counters.relax_step) + run.report.progress.relax_fraction.to_f64()) * 1e-3;

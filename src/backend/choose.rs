@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{
     Backend,
-    cpu::CpuBackend,
+    cpu::{CpuBackend, Vectorised},
     gpu::{Capacity, Gpu, Kernel, Variant},
 };
 use crate::{
@@ -13,7 +13,6 @@ use crate::{
         spec::{BackendChoice, Precision},
     },
     error::{Error, Result},
-    number::Real,
     scheme::step::Method,
     solver::{Blocks, Order, Solver},
 };
@@ -195,7 +194,7 @@ impl Choice {
         }
     }
 
-    fn open_in<T: Real>(self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+    fn open_in<T: Vectorised>(self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         let blocks = ring(n)?;
         let mut platform = Platform {
             backend: "cpu".into(),

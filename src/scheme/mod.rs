@@ -34,5 +34,5 @@ pub mod status;
 pub mod step;
 
 pub use parameters::Parameters;
-pub use state::{Curve, Increments, State, Workspace};
+pub use state::{Curve, Increments, Motion, State, Workspace};
 pub use status::Status;

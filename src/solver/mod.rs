@@ -8,8 +8,8 @@ pub mod system;
 use serde::{Deserialize, Serialize};
 
 pub use gauss_seidel::Order;
-pub use ring::{Blocks, Ring};
-pub use system::{Row, System};
+pub use ring::{Blocks, Ring, Sums};
+pub use system::{Equation, Equations, Row, System};
 
 /// Which solver takes the periodic pentadiagonal systems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
