@@ -1,11 +1,11 @@
-use curvelax::{backend::{Backend, cpu::{CpuBackend, Vectorised, Vectors}}, ensemble::{Family, Spec}, number::Real, scheme::{evolve::Run, step::Method, State, Parameters}, solver::{Blocks, Order, Solver}, flow::Flow};
+use curvelax::{backend::{Backend, cpu::{CpuBackend, Vectorised, Vectors}}, ensemble::{Family, Spec}, scheme::{evolve::Run, step::Method, State, Parameters}, solver::{Blocks, Order, Solver}, flow::Flow};
 use std::time::Instant;
 fn go<T: Vectorised>(solver: Solver, n: usize, adaptive: f64, steps: u32) {
     let spec = Spec { points: n, ..Spec::default() };
     let family = Family::new(&spec).unwrap();
     let mut reference: Vec<Vec<f64>> = vec![];
     for v in Vectors::ALL {
-        if !v.are_available() { continue; }
+        if !v.are_available() || std::env::var("ONLY").is_ok_and(|o| o != format!("{v:?}{}", T::NAME)) { continue; }
         let method = Method { solver, order: Order::Coloured, max_sweeps: 200000 };
         let blocks = Blocks::new(n).unwrap();
         let mut b = CpuBackend::<T>::with_vectors(blocks, method, 1, v).unwrap();

@@ -1,5 +1,5 @@
-//! The number that the scheme is generic over: `f64` is the reference, `f32` mirrors the kernel, [`Lanes`] are several
-//! of either side by side.
+//! The number that the scheme is generic over: `f64` is the reference, `f32` mirrors the kernel, lanes are several of
+//! either side by side.
 //!
 //! [`Number`] asks only for what SIMD lanes can give: arithmetic, and comparisons that return masks instead of steering
 //! branches. [`Real`] is a single number. Rust never contracts `a*b + c`, so every expression rounds as written, in
@@ -10,7 +10,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 mod lanes;
 
-pub use lanes::Lanes;
+pub(crate) use lanes::{Element, Instructions, Lanes};
 
 /// Values above this bound count as not finite; far below the overflow of `f32`, so that squares survive.
 pub const BIG: f64 = 1e18;
@@ -92,6 +92,8 @@ pub trait Number:
     const LANES: usize;
     /// Machine epsilon.
     const EPSILON: f64;
+    /// 1.5 times the number from which on there are no fractions.
+    const WHOLE: f64;
 
     /// The number nearest to `value`, in every lane.
     fn of(value: f64) -> Self;
@@ -107,14 +109,21 @@ pub trait Number:
     fn max(self, other: Self) -> Self;
     /// The smaller one; arguments must not be NaN.
     fn min(self, other: Self) -> Self;
-    /// Largest integer not above, for numbers below 2²¹ in size.
-    fn small_floor(self) -> Self;
     /// `2^self` for an integral `self` in [-126, 127].
     fn exp2_integral(self) -> Self;
     /// `self <= other`; false where either is NaN.
     fn le(self, other: Self) -> Self::Mask;
     /// `yes` where the mask holds, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+
+    /// Largest integer not above, for numbers below 2²¹ in size. No instruction of SSE2 rounds, and a call would cost more
+    /// than the exponential that asks.
+    #[inline(always)]
+    fn small_floor(self) -> Self {
+        let whole = Self::of(Self::WHOLE);
+        let nearest = (self + whole) - whole;
+        Self::select(nearest.le(self), nearest, nearest - Self::of(1.0))
+    }
 
     /// 1/self.
     #[inline(always)]
@@ -225,6 +234,7 @@ macro_rules! real {
             type Mask = bool;
             const LANES: usize = 1;
             const EPSILON: f64 = <$type>::EPSILON as f64;
+            const WHOLE: f64 = $whole;
             #[inline(always)]
             fn of(value: f64) -> Self {
                 value as $type
@@ -254,15 +264,9 @@ macro_rules! real {
                 if self < other { self } else { other }
             }
             #[inline(always)]
-            fn small_floor(self) -> Self {
-                // No instruction of SSE2 rounds, and a call would cost more than the exponential that asks.
-                let nearest = (self + $whole) - $whole;
-                if nearest > self { nearest - 1.0 } else { nearest }
-            }
-            #[inline(always)]
             fn exp2_integral(self) -> Self {
                 // The lowest bits of the sum hold the integer; the shift drops the others.
-                let integer = (self + $whole).to_bits();
+                let integer = (self + $whole as $type).to_bits();
                 <$type>::from_bits((integer << $mantissa).wrapping_add($bias << $mantissa))
             }
             #[inline(always)]
@@ -288,7 +292,6 @@ macro_rules! real {
     };
 }
 
-// The last ones are 1.5 times the number from which on there are no fractions.
 real!(f64, F64, "f64", 52, 1023, 6_755_399_441_055_744.0);
 real!(f32, F32, "f32", 23, 127, 12_582_912.0);
 

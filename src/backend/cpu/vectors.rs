@@ -2,11 +2,11 @@
 
 use std::sync::Mutex;
 
-use pulp::{NullaryFnOnce, Scalar, Simd};
+use pulp::{NullaryFnOnce, Simd};
 
 use crate::{
     error::{Error, Result},
-    number::{Lanes, Number, Real},
+    number::{Element, Instructions, Lanes, Number, Real},
     scheme::{
         evolve::{Run, Team, evolve_abreast},
         step::Method,
@@ -19,29 +19,35 @@ use crate::{
 pub enum Vectors {
     /// One member at a time: the reference.
     None,
-    /// What every processor of the kind has: SSE2, NEON.
-    Baseline,
-    /// 256 bits, on x86-64.
-    Avx2,
-    /// 512 bits, on x86-64.
-    Avx512,
+    /// 128 bits: SSE4.2 on x86-64, NEON on aarch64.
+    Bits128,
+    /// 256 bits: AVX2.
+    Bits256,
+    /// 512 bits: AVX-512.
+    Bits512,
 }
 
 impl Vectors {
     /// All of them, the widest last.
-    pub const ALL: [Vectors; 4] = [Vectors::None, Vectors::Baseline, Vectors::Avx2, Vectors::Avx512];
+    pub const ALL: [Vectors; 4] = [Vectors::None, Vectors::Bits128, Vectors::Bits256, Vectors::Bits512];
 
     /// Whether this processor has them.
     pub fn are_available(self) -> bool {
+        #[cfg(target_arch = "x86_64")]
         match self {
-            Vectors::None | Vectors::Baseline => true,
-            #[cfg(target_arch = "x86_64")]
-            Vectors::Avx2 => pulp::x86::V3::try_new().is_some(),
-            #[cfg(target_arch = "x86_64")]
-            Vectors::Avx512 => pulp::x86::V4::try_new().is_some(),
-            #[cfg(not(target_arch = "x86_64"))]
-            Vectors::Avx2 | Vectors::Avx512 => false,
+            Vectors::None => true,
+            Vectors::Bits128 => pulp::x86::V2::is_available(),
+            Vectors::Bits256 => pulp::x86::V3::is_available(),
+            Vectors::Bits512 => pulp::x86::V4::is_available(),
         }
+        #[cfg(target_arch = "aarch64")]
+        match self {
+            Vectors::None => true,
+            Vectors::Bits128 => pulp::aarch64::Neon::is_available(),
+            Vectors::Bits256 | Vectors::Bits512 => false,
+        }
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        matches!(self, Vectors::None)
     }
 
     /// The widest that this processor has.
@@ -58,37 +64,44 @@ pub trait Vectorised: Real {
     fn crew(vectors: Vectors, blocks: Blocks, threads: usize) -> Result<Box<dyn Crew<Self>>>;
 }
 
-/// Members abreast: two registers of the instructions, so that one waits for the other's results as little as possible.
+/// How many registers a number takes, for each of the instructions.
 macro_rules! vectorised {
-    ($real:ident, $baseline:literal, $avx2:literal, $avx512:literal) => {
+    ($real:ident, $of128:literal, $of256:literal, $of512:literal) => {
         impl Vectorised for $real {
             fn crew(vectors: Vectors, blocks: Blocks, threads: usize) -> Result<Box<dyn Crew<$real>>> {
-                let missing = || Error::Failed(format!("this processor has no {vectors:?} instructions"));
-                Ok(match vectors {
-                    Vectors::None => Group::<_, $real>::crew(Scalar::new(), blocks, threads),
-                    Vectors::Baseline => Group::<_, Lanes<$real, $baseline>>::crew(Scalar::new(), blocks, threads),
+                let crew = match vectors {
+                    Vectors::None => Some(Group::<_, $real>::crew(pulp::Scalar::new(), blocks, threads)),
                     #[cfg(target_arch = "x86_64")]
-                    Vectors::Avx2 => {
-                        let simd = pulp::x86::V3::try_new().ok_or_else(missing)?;
-                        Group::<_, Lanes<$real, $avx2>>::crew(simd, blocks, threads)
-                    }
+                    Vectors::Bits128 => abreast::<_, $real, $of128>(pulp::x86::V2::try_new(), blocks, threads),
+                    #[cfg(target_arch = "aarch64")]
+                    Vectors::Bits128 => abreast::<_, $real, $of128>(pulp::aarch64::Neon::try_new(), blocks, threads),
                     #[cfg(target_arch = "x86_64")]
-                    Vectors::Avx512 => {
-                        let simd = pulp::x86::V4::try_new().ok_or_else(missing)?;
-                        Group::<_, Lanes<$real, $avx512>>::crew(simd, blocks, threads)
-                    }
-                    #[cfg(not(target_arch = "x86_64"))]
-                    Vectors::Avx2 | Vectors::Avx512 => return Err(missing()),
-                })
+                    Vectors::Bits256 => abreast::<_, $real, $of256>(pulp::x86::V3::try_new(), blocks, threads),
+                    #[cfg(target_arch = "x86_64")]
+                    Vectors::Bits512 => abreast::<_, $real, $of512>(pulp::x86::V4::try_new(), blocks, threads),
+                    #[allow(unreachable_patterns)]
+                    _ => None,
+                };
+                crew.ok_or_else(|| Error::Failed(format!("this processor has no vector instructions of {vectors:?}")))
             }
         }
     };
 }
 
-vectorised!(f64, 4, 8, 8);
-vectorised!(f32, 8, 16, 16);
+vectorised!(f64, 2, 2, 1);
+vectorised!(f32, 2, 2, 1);
+
+/// A crew whose members go abreast in `R` registers of the instructions, if the processor has them.
+fn abreast<S: Instructions, T: Element<S>, const R: usize>(
+    simd: Option<S>,
+    blocks: Blocks,
+    threads: usize,
+) -> Option<Box<dyn Crew<T>>> {
+    simd.map(|simd| Group::<S, Lanes<S, T, R>>::crew(simd, blocks, threads))
+}
 
 /// Threads that advance groups of members.
+#[doc(hidden)]
 pub trait Crew<T>: Send + Sync {
     /// Members abreast in a group.
     fn lanes(&self) -> usize;
@@ -97,14 +110,14 @@ pub trait Crew<T>: Send + Sync {
     fn advance(&self, runs: &mut [&mut Run<T>], method: &Method, attempts: u32);
 }
 
-/// Lanes of `N` in instructions `S`; a team for each thread.
+/// Lanes of `N` in instructions `S`, which the token proves to be there; a team for each thread.
 struct Group<S, N: Number> {
     simd: S,
     teams: Vec<Mutex<Team<N>>>,
 }
 
-impl<S: Simd, N: Number> Group<S, N> {
-    fn crew(simd: S, blocks: Blocks, threads: usize) -> Box<dyn Crew<N::Real>> {
+impl<S: Simd, T: Real, N: Number<Real = T>> Group<S, N> {
+    fn crew(simd: S, blocks: Blocks, threads: usize) -> Box<dyn Crew<T>> {
         Box::new(Group { simd, teams: (0..threads).map(|_| Mutex::new(Team::<N>::new(blocks))).collect() })
     }
 }
