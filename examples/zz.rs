@@ -32,8 +32,8 @@ fn go<T: Vectorised>(solver: Solver, n: usize, adaptive: f64, steps: u32) {
 fn main() {
     let a: Vec<String> = std::env::args().collect();
     let n = a.get(1).map_or(100, |s| s.parse().unwrap());
-    go::<f64>(Solver::Direct, n, 0.0, 2000);
-    go::<f32>(Solver::Direct, n, 0.0, 2000);
+    go::<f64>(Solver::Direct, n, 0.0, 10000);
+    go::<f32>(Solver::Direct, n, 0.0, 10000);
     if a.len() > 2 {
     go::<f64>(Solver::Direct, n, 1e-3, 60);
     go::<f64>(Solver::GaussSeidel, n, 0.0, 20);
