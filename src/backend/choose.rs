@@ -171,6 +171,7 @@ impl Choice {
         };
         let solver = match spec.solver() {
             Solver::GaussSeidel => "Gauss-Seidel sweeps",
+            Solver::Multigrid => "multigrid",
             Solver::Direct => "direct solver",
         };
         format!("back end: {device}, {precision} ({}); {solver}", self.reason)

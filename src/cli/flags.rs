@@ -16,7 +16,7 @@ use crate::{
 };
 
 const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
-pub(super) const SOLVERS: &[&str] = &["auto", "gauss-seidel", "direct"];
+pub(super) const SOLVERS: &[&str] = &["auto", "gauss-seidel", "multigrid", "direct"];
 const ORDERS: &[&str] = &["coloured", "lexicographic"];
 pub(super) const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
 pub(super) const PRECISIONS: &[&str] = &["f32", "f64"];
@@ -133,7 +133,8 @@ pub struct SpecFlags {
         long, value_name = "KAPPA", value_parser = text_of::<Pull>, allow_hyphen_values = true, help_heading = METHOD
     )]
     pull: Option<Pull>,
-    /// Solver of the pentadiagonal systems; auto is gauss-seidel with --tau, direct with --adaptive [default: auto]
+    /// Solver of the pentadiagonal systems; multigrid is gauss-seidel inside V-cycles, auto is gauss-seidel with --tau,
+    /// direct with --adaptive [default: auto]
     #[arg(long, value_name = "SOLVER", value_parser = word::<SolverChoice>(SOLVERS), help_heading = METHOD)]
     solver: Option<SolverChoice>,
     /// Order in which a sweep visits the nodes [default: coloured]

@@ -39,6 +39,8 @@ pub enum SolverChoice {
     Auto,
     /// Gauss–Seidel sweeps.
     GaussSeidel,
+    /// The same sweeps inside V-cycles, whose number hardly depends on the length of a step.
+    Multigrid,
     /// Periodic pentadiagonal elimination.
     Direct,
 }
@@ -47,6 +49,7 @@ impl From<Solver> for SolverChoice {
     fn from(solver: Solver) -> SolverChoice {
         match solver {
             Solver::GaussSeidel => SolverChoice::GaussSeidel,
+            Solver::Multigrid => SolverChoice::Multigrid,
             Solver::Direct => SolverChoice::Direct,
         }
     }
@@ -242,6 +245,7 @@ impl Spec {
     pub fn solver(&self) -> Solver {
         match (self.solver, self.pace()) {
             (SolverChoice::GaussSeidel, _) | (SolverChoice::Auto, Pace::Fixed(_)) => Solver::GaussSeidel,
+            (SolverChoice::Multigrid, _) => Solver::Multigrid,
             (SolverChoice::Direct, _) | (SolverChoice::Auto, Pace::Adaptive(_)) => Solver::Direct,
         }
     }

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::{
     number::{Number, Real},
-    solver::{Blocks, Ring, System},
+    solver::{Blocks, Ring, System, multigrid::Levels},
 };
 
 /// Fields of a curve.
@@ -179,6 +179,10 @@ pub struct Workspace<N> {
     pub curvature: System<N, 1>,
     /// Position system.
     pub position: System<N, 2>,
+    /// Its coarser levels, and those of the curvature system, for multigrid.
+    pub position_levels: Levels<N, 2>,
+    /// The latter.
+    pub curvature_levels: Levels<N, 1>,
 }
 
 impl<N: Number> Workspace<N> {
@@ -196,6 +200,8 @@ impl<N: Number> Workspace<N> {
             iq: ring(),
             curvature: System::zeros(n),
             position: System::zeros(n),
+            position_levels: Levels::new(n),
+            curvature_levels: Levels::new(n),
         }
     }
 }

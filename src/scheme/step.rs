@@ -1,9 +1,9 @@
 //! One step of the paper's scheme, from an old curve to the new one in the workspace. Twin of `shaders/step.wgsl`.
 
-use super::{Curve, Increments, Parameters, Workspace, curvature, position, pull, redistribution};
+use super::{Curve, Increments, Parameters, Workspace, coarse, curvature, position, pull, redistribution};
 use crate::{
     number::{Mask, Number},
-    solver::{Order, Ring, Solver, System, direct, gauss_seidel},
+    solver::{Order, Ring, Solver, System, direct, gauss_seidel, multigrid},
 };
 
 /// What the members of a run have in common.
@@ -48,12 +48,20 @@ pub fn step<N: Number>(
     let blocks = work.blocks;
 
     curvature::assemble(old, p, work);
-    let for_k = solve(&work.curvature, [&mut increments.k], blocks, p, method, rounding / radius);
+    if method.solver == Solver::Multigrid {
+        coarse::curvature(old, p, work);
+    }
+    let Workspace { curvature, curvature_levels, .. } = work;
+    let for_k = solve(curvature, [&mut increments.k], blocks, p, method, rounding / radius, curvature_levels);
     add(&old.k, &increments.k, &mut work.new.k);
 
     position::assemble(old, p, work);
+    if method.solver == Solver::Multigrid {
+        coarse::position(p, work);
+    }
     let unknowns = [&mut increments.x, &mut increments.y];
-    let for_x = solve(&work.position, unknowns, blocks, p, method, rounding * radius);
+    let Workspace { position, position_levels, .. } = work;
+    let for_x = solve(position, unknowns, blocks, p, method, rounding * radius, position_levels);
     add(&old.x, &increments.x, &mut work.new.x);
     add(&old.y, &increments.y, &mut work.new.y);
     pull::pull(&mut work.new, p);
@@ -75,18 +83,18 @@ fn solve<N: Number, const F: usize>(
     p: &Parameters<N>,
     method: &Method,
     negligible: N,
+    levels: &mut multigrid::Levels<N, F>,
 ) -> gauss_seidel::Swept<N> {
+    let control = gauss_seidel::Control {
+        tolerance: p.tolerance,
+        negligible,
+        sor: p.sor,
+        max_sweeps: method.max_sweeps,
+        order: method.order,
+    };
     match method.solver {
-        Solver::GaussSeidel => {
-            let control = gauss_seidel::Control {
-                tolerance: p.tolerance,
-                negligible,
-                sor: p.sor,
-                max_sweeps: method.max_sweeps,
-                order: method.order,
-            };
-            gauss_seidel::solve(system, unknowns, blocks, &control)
-        }
+        Solver::GaussSeidel => gauss_seidel::solve(system, unknowns, blocks, &control),
+        Solver::Multigrid => multigrid::solve(system, unknowns, blocks, &control, levels),
         Solver::Direct => {
             let finite = direct::solve(system, unknowns);
             gauss_seidel::Swept { sweeps: N::of(0.0), converged: finite, finite }

@@ -90,7 +90,7 @@ pub fn solve<N: Number, const F: usize>(
 }
 
 #[inline(always)]
-fn coloured_sweep<N: Number, const F: usize>(
+pub(super) fn coloured_sweep<N: Number, const F: usize>(
     system: &System<N, F>,
     unknown: &mut [&mut Ring<N>; F],
     blocks: Blocks,
@@ -142,7 +142,7 @@ fn relax<N: Number, const F: usize>(
 ///
 /// Times ε it is the tolerance below which a scaled residual is rounding error: no sweep, and no direct solve, gets
 /// further.
-fn size<N: Number, const F: usize>(system: &System<N, F>) -> N {
+pub(super) fn size<N: Number, const F: usize>(system: &System<N, F>) -> N {
     let mut largest = N::of(0.0);
     for (i, row) in system.rows.iter().enumerate() {
         let terms = N::of(1.0) + row.a.abs() + row.b.abs() + row.d.abs() + row.e.abs();

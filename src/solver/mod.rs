@@ -1,7 +1,8 @@
-//! Periodic pentadiagonal systems on a ring of nodes: the rows, Gauss–Seidel sweeps, and a direct solve.
+//! Periodic pentadiagonal systems on a ring of nodes: the rows, Gauss–Seidel sweeps, alone or in V-cycles, and a direct solve.
 
 pub mod direct;
 pub mod gauss_seidel;
+pub mod multigrid;
 pub mod ring;
 pub mod system;
 
@@ -17,6 +18,8 @@ pub use system::{Row, System};
 pub enum Solver {
     /// Gauss–Seidel sweeps, the paper's.
     GaussSeidel,
+    /// The same sweeps inside V-cycles.
+    Multigrid,
     /// Periodic pentadiagonal elimination.
     Direct,
 }

@@ -126,7 +126,7 @@ impl<T: Real> Kernel<T> {
             blocks,
             max_sweeps,
             budget: match variant.solver {
-                Solver::GaussSeidel => Budget { sweeps: 256, ..most },
+                Solver::GaussSeidel | Solver::Multigrid => Budget { sweeps: 256, ..most },
                 Solver::Direct => Budget { steps: 1, ..most },
             },
             solver: variant.solver,
@@ -254,7 +254,7 @@ impl<T: Real> Kernel<T> {
         let next = |now: u32, most: u32| ((f64::from(now) * share) as u32).clamp(1, 2 * now).min(most);
         match self.solver {
             _ if self.fixed => {}
-            Solver::GaussSeidel => self.budget.sweeps = next(self.budget.sweeps, self.most.sweeps),
+            Solver::GaussSeidel | Solver::Multigrid => self.budget.sweeps = next(self.budget.sweeps, self.most.sweeps),
             Solver::Direct => self.budget.steps = next(self.budget.steps, self.most.steps),
         }
     }

@@ -44,7 +44,7 @@ impl Variant {
     /// The files of the kernel, in the order of the step.
     pub fn parts(self) -> impl Iterator<Item = Part> {
         let solver = match self.solver {
-            Solver::GaussSeidel => GAUSS_SEIDEL,
+            Solver::GaussSeidel | Solver::Multigrid => GAUSS_SEIDEL,
             Solver::Direct => DIRECT,
         };
         let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
