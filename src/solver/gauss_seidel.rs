@@ -98,10 +98,12 @@ pub(super) fn coloured_sweep<N: Number, const F: usize>(
     active: N::Mask,
 ) {
     for colour in 0..COLOURS {
-        for (f, u) in unknown.iter_mut().enumerate() {
-            blocks.of_colour(colour, |i| relax(system, f, i, u, sor, active));
-            u.close();
-        }
+        blocks.of_colour(colour, |i| {
+            for (f, u) in unknown.iter_mut().enumerate() {
+                relax(system, f, i, u, sor, active);
+            }
+        });
+        unknown.iter_mut().for_each(|u| u.close());
     }
 }
 
