@@ -10,7 +10,7 @@ use crate::{
     curve::{Modes, Sampling, Shape},
     ensemble::{
         Spec,
-        spec::{BackendChoice, Order, Precision, Pull, SolverChoice},
+        spec::{BackendChoice, Order, Precision, Pull, SolverChoice, Sor},
     },
     flow::Flow,
 };
@@ -143,11 +143,12 @@ pub struct SpecFlags {
     /// Residual tolerance of the sweeps (only of them) [default: 1e-3 in f32, 1e-5 in f64]
     #[arg(long, value_name = "TOL", value_parser = real, allow_hyphen_values = true, help_heading = METHOD)]
     tolerance: Option<f64>,
-    /// Over-relaxation of the sweeps, 1 is plain Gauss-Seidel [default: 1]
+    /// Over-relaxation of the sweeps of gauss-seidel; 1 is the paper's, auto follows the stiffness of each system
+    /// [default: 1]
     #[arg(
-        long, value_name = "FACTOR", value_parser = real, allow_hyphen_values = true, help_heading = METHOD
+        long, value_name = "FACTOR", value_parser = text_of::<Sor>, allow_hyphen_values = true, help_heading = METHOD
     )]
-    sor: Option<f64>,
+    sor: Option<Sor>,
     /// Sweeps per system after which a member has stalled [default: 200000]
     #[arg(
         long, value_name = "COUNT", value_parser = whole::<u32>, allow_hyphen_values = true,

@@ -12,7 +12,7 @@ use crate::{
     backend::Platform,
     ensemble::{
         Spec,
-        spec::{Precision, Solver},
+        spec::Precision,
     },
     error::{Error, Result},
 };
@@ -52,7 +52,7 @@ impl<'a> Provenance<'a> {
             curvelax: env!("CARGO_PKG_VERSION"),
             seed: spec.seed,
             precision: platform.precision,
-            tolerance: (spec.solver() == Solver::GaussSeidel).then(|| spec.tolerance_at(platform.precision)),
+            tolerance: spec.solver().sweeps().then(|| spec.tolerance_at(platform.precision)),
             spec,
             platform,
             members: tally.members(),

@@ -64,7 +64,7 @@ numbers! {
         pull,
         /// Tolerance of the sweeps.
         tolerance,
-        /// Over-relaxation factor of the sweeps.
+        /// Over-relaxation factor of the sweeps; 0 to choose it by the stiffness of each system.
         sor,
         /// λ of the energy `∮(½k² + λ) ds`.
         length_penalty,

@@ -23,3 +23,22 @@ pub enum Solver {
     /// Periodic pentadiagonal elimination.
     Direct,
 }
+
+impl Solver {
+    /// All of them.
+    pub const ALL: [Solver; 3] = [Solver::GaussSeidel, Solver::Multigrid, Solver::Direct];
+
+    /// As in flags and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Solver::GaussSeidel => "gauss-seidel",
+            Solver::Multigrid => "multigrid",
+            Solver::Direct => "direct",
+        }
+    }
+
+    /// Whether it sweeps until a tolerance is met.
+    pub fn sweeps(self) -> bool {
+        self != Solver::Direct
+    }
+}

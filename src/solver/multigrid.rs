@@ -128,21 +128,25 @@ fn average<N: Number>(field: &Ring<N>, i: usize) -> N {
     N::of(0.25) * (before + after) + N::of(0.5) * here
 }
 
+/// Sizes of the rings below one of `n` nodes, the finest first.
+fn sizes(n: usize) -> impl Iterator<Item = usize> {
+    std::iter::successors(Some(n / 2), |m| (*m > COARSEST).then_some(m / 2))
+}
+
+/// Nodes of all rings below one of `n` nodes.
+pub fn coarse_nodes(n: usize) -> usize {
+    sizes(n).sum()
+}
+
 impl<N: Number, const F: usize> Levels<N, F> {
     /// Room for the levels below a ring of `n` nodes.
     pub fn new(n: usize) -> Self {
-        let mut sizes = vec![n / 2];
-        while let Some(&m) = sizes.last()
-            && m > COARSEST
-        {
-            sizes.push(m / 2);
-        }
-        let coarsest = sizes[sizes.len() - 1];
+        let coarsest = sizes(n).last().unwrap_or(0);
         Levels {
             terms: Terms::zeros(n),
             rate: N::default(),
             transfer: Transfer::zeros(n),
-            coarse: sizes.into_iter().map(Level::zeros).collect(),
+            coarse: sizes(n).map(Level::zeros).collect(),
             inverse: vec![N::default(); coarsest * coarsest],
         }
     }
