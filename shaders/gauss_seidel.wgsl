@@ -2,6 +2,12 @@
 
 const SWEEPS_PER_CHECK = 8u;
 
+/// Sweeps `u` for rhs_x and, if `both`, `v` for rhs_y; returns how it ended.
+fn solve(both: bool, negligible: real) -> u32 {
+    if both { return solve_two(negligible); }
+    return solve_one(negligible);
+}
+
 /// Sweeps `u` for rhs_x; returns how it ended.
 fn solve_one(negligible: real) -> u32 {
     share(u, u);

@@ -8,7 +8,7 @@ const SWEEPS_PER_CYCLE = 2u;
 const COARSE_SWEEPS = 4u;
 const COARSEST = 5u;
 /// Levels at most: enough for any ring that fits.
-const LEVELS = 12u;
+const LEVELS = 8u;
 
 alias pair = vec2<real>;
 
@@ -23,25 +23,19 @@ var<workgroup> coarse_held: array<pair, COARSE>;
 var<workgroup> coarse_weights: array<vec, COARSE>;
 /// The same for the last node of an odd ring, by level of that ring.
 var<workgroup> odd_weights: array<vec, LEVELS>;
-/// Inverse of the coarsest matrix, row by row.
-var<workgroup> inverse_matrix: array<real, 25>;
+/// Inverse of the coarsest matrix, row by row; every thread has its own.
+var<private> inverse_matrix: array<real, 25>;
 
-/// Solves for `u` alone.
-fn solve_one(negligible: real) -> u32 {
-    curvature_terms();
-    rhs_y = vec(0.0);
-    v = vec(0.0);
-    return solve_pair(negligible);
-}
-
-/// Solves for `u` and `v`.
-fn solve_two(negligible: real) -> u32 {
-    share(new_k, new_k);
-    position_terms(read_a());
-    return solve_pair(negligible);
-}
-
-fn solve_pair(negligible: real) -> u32 {
+/// Sweeps `u` for rhs_x and, if `both`, `v` for rhs_y; returns how it ended.
+fn solve(both: bool, negligible: real) -> u32 {
+    if both {
+        share(new_k, new_k);
+        position_terms(read_a());
+    } else {
+        curvature_terms();
+        rhs_y = vec(0.0);
+        v = vec(0.0);
+    }
     sweeps = counters.solve_sweeps;
     sor = real(1.0);
     let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
@@ -67,6 +61,19 @@ fn solve_pair(negligible: real) -> u32 {
     return paused_or(ended);
 }
 
+/// Coarse rings below the finest one.
+fn depth_of_rings() -> u32 {
+    var depth = 1u;
+    while (NODES >> depth) > COARSEST { depth++; }
+    return depth;
+}
+
+/// `count`, in a way that compilers cannot know before: they would unroll the loops over levels, nodes and colours one
+/// inside the other, and take up to a minute.
+fn at_run_time(count: u32) -> u32 {
+    return select(count, 0u, dispatch.max_sweeps == 0u);
+}
+
 /// Two fields of a level, the finest from the rings.
 fn terms_at(level: u32, above: u32, i: u32) -> pair {
     if level == 0u { return pair(ring_a[i], ring_b[i]); }
@@ -88,7 +95,8 @@ fn build() {
     var above = 0u;
     var below = 0u;
     var level = 0u;
-    while (NODES >> level) > COARSEST {
+    let depth = at_run_time(depth_of_rings());
+    while level < depth {
         let size = NODES >> level;
         let fewer = size / 2u;
         for (var j = lane; j < fewer; j += THREADS) { coarsen(level, above, below, size, j); }
@@ -102,8 +110,7 @@ fn build() {
         level++;
     }
     workgroupBarrier();
-    if lane == 0u { invert_matrix(above, NODES >> level); }
-    workgroupBarrier();
+    invert_matrix(above, NODES >> level);
 }
 
 fn average(before: pair, own: pair, behind: pair) -> pair {
@@ -130,10 +137,12 @@ fn weigh(level: u32, above: u32, below: u32, size: u32, j: u32) {
     let before = coarse_value[below + (j + fewer - 1u) % fewer].x;
     let gap = coarse_value[below + j].x;
     let behind = coarse_value[below + (j + 1u) % fewer].x;
-    coarse_weights[below + j] = lagrange(terms_at(level, above, 2u * j).x, before, gap, behind);
-    if size % 2u == 1u && j == fewer - 1u {
-        let way = terms_at(level, above, size - 3u).x + terms_at(level, above, size - 2u).x;
-        odd_weights[level] = lagrange(way, before, gap, behind);
+    var way = terms_at(level, above, 2u * j).x;
+    let points = select(1u, 2u, size % 2u == 1u && j == fewer - 1u);
+    for (var point = 0u; point < points; point++) {
+        let weights = lagrange(way, before, gap, behind);
+        if point == 0u { coarse_weights[below + j] = weights; } else { odd_weights[level] = weights; }
+        way += terms_at(level, above, 2u * j + 1u).x;
     }
 }
 
@@ -182,7 +191,7 @@ fn discretise(at: u32, size: u32, j: u32) {
     coarse_share[at + j] = over_c * (real(1.0) / p.tau);
 }
 
-/// The inverse of the coarsest matrix by Gauss and Jordan, in one thread.
+/// The inverse of the coarsest matrix by Gauss and Jordan.
 fn invert_matrix(at: u32, n: u32) {
     for (var l = 0u; l < n * n; l++) { inverse_matrix[l] = real(0.0); }
     for (var j = 0u; j < n; j++) {
@@ -212,7 +221,8 @@ fn correct() {
     var above = 0u;
     var below = 0u;
     var level = 0u;
-    while (NODES >> level) > COARSEST {
+    let depth = at_run_time(depth_of_rings());
+    while level < depth {
         let size = NODES >> level;
         let fewer = size / 2u;
         for (var j = lane; j < fewer; j += THREADS) { coarse_held[below + j] = restricted(level, above, below, size, j); }
@@ -239,14 +249,13 @@ fn correct() {
             coarse_value[above + i] = interpolated(level, below, size, i);
         }
         workgroupBarrier();
-        for (var s = 0u; s < COARSE_SWEEPS; s++) { sweep_coarse(above, size); }
+        sweep_coarse(above, size);
     }
-    let c0 = interpolated(0u, 0u, NODES, near_low.z);
-    let c1 = interpolated(0u, 0u, NODES, near_low.w);
-    let c2 = interpolated(0u, 0u, NODES, near_high.x);
-    let c3 = interpolated(0u, 0u, NODES, near_high.y);
-    u = u + vec(c0.x, c1.x, c2.x, c3.x);
-    v = v + vec(c0.y, c1.y, c2.y, c3.y);
+    for (var c = 0u; c < at_run_time(4u); c++) {
+        let correction = interpolated(0u, 0u, NODES, (first + c) % NODES);
+        u[c] += correction.x;
+        v[c] += correction.y;
+    }
 }
 
 /// Residuals at coarse node j, integrated over its cell.
@@ -271,9 +280,12 @@ fn restricted(level: u32, above: u32, below: u32, size: u32, j: u32) -> pair {
 /// The values of the coarse ring at node i of the ring of `size` nodes above it.
 fn interpolated(level: u32, below: u32, size: u32, i: u32) -> pair {
     let fewer = size / 2u;
-    if i == 2u * fewer { return blend(odd_weights[level], below, fewer, fewer - 1u); }
-    if i % 2u == 0u { return coarse_value[below + i / 2u]; }
-    return blend(coarse_weights[below + i / 2u], below, fewer, i / 2u);
+    let last = i == 2u * fewer;
+    let j = select(i / 2u, fewer - 1u, last);
+    if i % 2u == 0u && !last { return coarse_value[below + j]; }
+    var w = coarse_weights[below + j];
+    if last { w = odd_weights[level]; }
+    return blend(w, below, fewer, j);
 }
 
 /// The cubic with weights w through coarse nodes j-1 ... j+2.
@@ -283,13 +295,14 @@ fn blend(w: vec, at: u32, size: u32, j: u32) -> pair {
     return near + far;
 }
 
-/// One sweep of a coarse level of `size` nodes.
+/// Sweeps a coarse level of `size` nodes, colour by colour.
 fn sweep_coarse(at: u32, size: u32) {
     let threes = (4u - size % 4u) % 4u;
     let fours = (size - 3u * threes) / 4u;
     let start = select(3u * lane + fours, 4u * lane, lane < fours);
     let nodes = select(select(0u, 3u, lane < fours + threes), 4u, lane < fours);
-    for (var colour = 0u; colour < 4u; colour++) {
+    for (var phase = 0u; phase < at_run_time(4u * COARSE_SWEEPS); phase++) {
+        let colour = phase % 4u;
         if colour < nodes { relax_coarse(at, size, start + colour); }
         workgroupBarrier();
     }

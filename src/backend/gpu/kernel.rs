@@ -56,7 +56,7 @@ pub struct Budget {
 
 /// Iterations of all loops in a cycle of multigrid, besides looks at the residual: over 11 levels at most of 4 colours.
 const ITERATIONS_PER_CYCLE: u32 = 300;
-/// And where its levels are built: one thread inverts a matrix of 5 rows.
+/// And where its levels are built, down to the inverse of a matrix of 5 rows.
 const ITERATIONS_PER_BUILD: u32 = 300;
 /// llvmpipe leaves all loops of a shader, without a word, once they have made 65 535 iterations together.
 const SOFTWARE_ITERATIONS: u32 = 50_000;

@@ -4,7 +4,7 @@ use crate::{
     number::Real,
     solver::{
         Blocks, Solver,
-        multigrid::{COARSEST, coarse_nodes},
+        multigrid::coarse_nodes,
     },
 };
 
@@ -107,7 +107,7 @@ pub fn locate(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
 }
 
 /// Levels of multigrid at most, in the kernel.
-pub const LEVELS: usize = 12;
+pub const LEVELS: usize = 8;
 
 /// Threads of a workgroup: one a block, filled up to whole subgroups of `subgroup` threads.
 pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
@@ -126,16 +126,16 @@ pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 5] {
 }
 
 /// Bytes of workgroup memory that the kernel takes: two rings, a row of four per block, one decision; for the direct
-/// solve four more rows per block, for multigrid 13 numbers a coarse node, 12 rows of weights and the coarsest inverse.
+/// solve four more rows per block, for multigrid 13 numbers a coarse node and 8 rows of weights.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
 pub fn workgroup_bytes<T: Real>(blocks: Blocks, solver: Solver) -> usize {
     let more = match solver {
         Solver::GaussSeidel => 0,
-        Solver::Multigrid => 13 * coarse_nodes(blocks.n) + 4 * LEVELS + COARSEST * COARSEST,
+        Solver::Multigrid => 13 * coarse_nodes(blocks.n) + 4 * LEVELS,
         Solver::Direct => 16 * blocks.count(),
     };
-    (2 * blocks.n + 4 * blocks.count() + more) * size_of::<T>() + 32
+    (2 * blocks.n + 4 * blocks.count() + more) * size_of::<T>() + 16
 }
 
 #[cfg(test)]
