@@ -162,6 +162,13 @@ fn lagrange(l: real, before: real, gap: real, behind: real) -> vec {
     );
 }
 
+/// The coefficient p of the second derivative for a level with cells of this length.
+fn balanced(p_of: real, cell: real) -> real {
+    return p_of / (real(1.0) + real(BALANCE) * (max(p_of, real(0.0)) * (cell * cell)));
+}
+
+const BALANCE = 0.1111111111111111;
+
 /// Row j of a coarse level of `size` nodes, integrated over its cell and divided by its diagonal entry.
 fn discretise(at: u32, size: u32, j: u32) {
     let dmm = coarse_value[at + (j + size - 2u) % size].x;
@@ -176,7 +183,7 @@ fn discretise(at: u32, size: u32, j: u32) {
     let ivm = real(1.0) / (real(0.5) * (dmm + dm));
     let iv = real(1.0) / cell;
     let ivp = real(1.0) / (real(0.5) * (own.x + dp));
-    let second = coarse_held[at + j].x;
+    let second = balanced(coarse_held[at + j].x, cell);
     let drift = real(0.5) * coarse_held[at + j].y;
     let row_a = idm * ivm * idmm;
     let row_e = id * ivp * idp;

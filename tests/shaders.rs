@@ -293,6 +293,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("AUTO_SCALE", AUTO_SCALE),
         ("SWEEPS_PER_CYCLE", f64::from(multigrid::SWEEPS_PER_CYCLE)),
         ("COARSE_SWEEPS", f64::from(multigrid::COARSE_SWEEPS)),
+        ("BALANCE", multigrid::BALANCE),
         ("COARSEST", multigrid::COARSEST as f64),
         ("LEVELS", shader::LEVELS as f64),
         ("NEVER", f64::from(NEVER)),

@@ -414,7 +414,8 @@ mod tests {
             only: Some(vec![0, 200]),
             ..Spec::default()
         };
-        let adaptive = Spec { adaptive: Some(1e-3), pull: Pull::Auto, sor: Sor::Auto, relax_to: Some(0.1), ..Spec::default() };
+        let adaptive =
+            Spec { adaptive: Some(1e-3), pull: Pull::Auto, sor: Sor::Auto, relax_to: Some(0.1), ..Spec::default() };
         for spec in [spec, adaptive, Spec::default()] {
             let text = spec.to_toml().unwrap();
             assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");

@@ -10,10 +10,7 @@ use serde::Serialize;
 use super::tally::{MollifiedMembers, Tally};
 use crate::{
     backend::Platform,
-    ensemble::{
-        Spec,
-        spec::Precision,
-    },
+    ensemble::{Spec, spec::Precision},
     error::{Error, Result},
 };
 

@@ -216,6 +216,25 @@ mod tests {
     }
 
     #[test]
+    fn over_relaxation_of_its_own_choice_is_near_the_best_one() {
+        for stiffness in [0.1, 1.0, 10.0, 100.0, 1000.0] {
+            let system = test_system(100, stiffness);
+            let sweeps = |sor| {
+                let mut u = [Ring::zeros(100), Ring::zeros(100)];
+                let control = Control { tolerance: 1e-5, ..control(Order::Coloured, sor) };
+                let swept = solve(&system, u.each_mut(), Blocks::new(100).unwrap(), &control);
+                assert!(swept.converged, "stiffness {stiffness}, sor {sor}");
+                swept.sweeps
+            };
+            let best = (20..39).map(|j| sweeps(0.05 * f64::from(j))).fold(f64::INFINITY, f64::min);
+            let (own, plain) = (sweeps(0.0), sweeps(1.0));
+            println!("stiffness {stiffness}: {own} sweeps, {best} at best, {plain} plain");
+            assert!(own <= 1.5 * best + 8.0, "stiffness {stiffness}: {own} sweeps, {best} at best");
+            assert!(own <= plain);
+        }
+    }
+
+    #[test]
     fn the_cap_is_reported_as_not_converged() {
         let system = test_system(64, 30.0);
         let mut u = [Ring::zeros(64), Ring::zeros(64)];

@@ -2,10 +2,7 @@
 
 use crate::{
     number::Real,
-    solver::{
-        Blocks, Solver,
-        multigrid::coarse_nodes,
-    },
+    solver::{Blocks, Solver, multigrid::coarse_nodes},
 };
 
 /// A part of the source: its file name in `shaders/` and its text.
