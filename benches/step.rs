@@ -20,7 +20,7 @@ fn ellipse<T: Real>(n: usize) -> (State<T>, Parameters<T>, Workspace<T>) {
     let parameters = Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3).convert();
     let mut work = Workspace::new(Blocks::new(n).expect("n is at least 6"));
     for _ in 0..10 {
-        step::step(&state.curve, &mut state.increments, &parameters, true, &method(Solver::Direct), &mut work);
+        step::step(&state.curve, &mut state.increments, &parameters, &method(Solver::Direct), &mut work);
         std::mem::swap(&mut state.curve, &mut work.new);
     }
     (state, parameters, work)
@@ -32,12 +32,16 @@ fn method(solver: Solver) -> Method {
 
 fn step_in<T: Real>(c: &mut Criterion) {
     for n in [100, 200] {
-        for (name, solver) in [("direct", Solver::Direct), ("gauss-seidel 1e-5", Solver::GaussSeidel)] {
+        for (name, solver) in [
+            ("direct", Solver::Direct),
+            ("multigrid 1e-5", Solver::Multigrid),
+            ("gauss-seidel 1e-5", Solver::GaussSeidel),
+        ] {
             let (State { curve, increments, .. }, parameters, mut work) = ellipse::<T>(n);
             c.bench_function(&format!("step/{}/n={n}/{name}", T::NAME), |b| {
                 b.iter(|| {
                     let mut increments = increments.clone();
-                    step::step(&curve, &mut increments, &parameters, true, &method(solver), &mut work)
+                    step::step(&curve, &mut increments, &parameters, &method(solver), &mut work)
                 });
             });
         }

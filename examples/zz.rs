@@ -36,6 +36,8 @@ fn main() {
     go::<f32>(Solver::Direct, n, 0.0, 10000);
     if a.len() > 2 {
     go::<f64>(Solver::Direct, n, 1e-3, 60);
+    go::<f64>(Solver::Multigrid, n, 0.0, 100);
+    go::<f32>(Solver::Multigrid, n, 0.0, 100);
     go::<f64>(Solver::GaussSeidel, n, 0.0, 20);
     go::<f32>(Solver::GaussSeidel, n, 0.0, 20);
     }

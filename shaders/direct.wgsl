@@ -31,14 +31,9 @@ fn invert(m: vec) -> vec {
     return vec(m.w, -m.y, -m.z, m.x) / (m.x * m.w - m.y * m.z);
 }
 
-/// Solves for `u` alone.
-fn solve_one(negligible: real) -> u32 {
-    rhs_y = vec(0.0);
-    return solve_two(negligible);
-}
-
-/// Solves for `u` and `v`.
-fn solve_two(negligible: real) -> u32 {
+/// Solves for `u` alone, or for `u` and `v`.
+fn solve(both: bool, negligible: real) -> u32 {
+    if !both { rhs_y = vec(0.0); }
     sweeps = 0u;
     let interior = eliminate_interior();
     let row = pair_row(interior);

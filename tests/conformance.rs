@@ -72,7 +72,8 @@ fn record(cases: u64) {
 }
 
 fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
-    for (solver, word) in [(Solver::GaussSeidel, "sweeps"), (Solver::Direct, "direct")] {
+    for solver in Solver::ALL {
+        let word = solver.name();
         let mut add = |name: String, case: fn(&Gpu, Solver, usize) -> Outcome, n: usize| {
             let name = format!("{} {word} adapter {index}: {name}", T::NAME);
             trials.push(Trial::test(name, move || case(&Gpu::list()[index], solver, n)));
@@ -396,7 +397,7 @@ fn adaptive_largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
 /// Numbers of the tables that the program writes, with the statuses in front.
 fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Result<(Vec<String>, Vec<f64>), Failed> {
     let folder = tempfile::tempdir()?;
-    let solver = if solver == Solver::Direct { "direct" } else { "gauss-seidel" };
+    let solver = solver.name();
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
     command.current_dir(&folder).env("XDG_RUNTIME_DIR", folder.path());
     let shape = folder.path().join("dumbbell.csv");
@@ -480,7 +481,7 @@ fn program_refuses<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let folder = tempfile::tempdir()?;
     let points = (most + 1).to_string();
     let arguments = ["run", "--backend", "gpu", "--adapter", gpu.name(), "--precision", T::NAME, "--points", &points];
-    let solver = if solver == Solver::Direct { "direct" } else { "gauss-seidel" };
+    let solver = solver.name();
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
     command
         .current_dir(&folder)

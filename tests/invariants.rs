@@ -12,7 +12,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, Shape, polygon},
     ensemble::{
         Ended, Family, Outcome, Sink, Spec, Status,
-        spec::{BackendChoice, Precision, Pull, Solver, SolverChoice},
+        spec::{BackendChoice, Precision, Pull, Solver, SolverChoice, Sor},
     },
     flow::Flow,
     number::Real,
@@ -228,7 +228,7 @@ fn the_work_of_a_run_is_what_it_was() {
     let spec = |flow, n, sor| Spec {
         points: n,
         flow,
-        sor,
+        sor: Sor::Factor(sor),
         tau: Some(1e-3),
         t_end: 0.1,
         ..method(Precision::F64, Solver::GaussSeidel)

@@ -12,7 +12,7 @@ use curvelax::{
     curve::{BaseCurve, Outline, Sampling, crossing, polygon},
     ensemble::{
         Ended, Family, Member, Observables, Outcome, Sink, Snapshot, Spec, Status,
-        spec::{BackendChoice, Precision, Pull, SolverChoice},
+        spec::{BackendChoice, Precision, Pull, SolverChoice, Sor},
     },
     error::Result,
     flow::Flow,
@@ -377,7 +377,7 @@ fn one_sweep_is_too_few_and_the_member_stalls_in_finite_time() {
     assert_eq!((outcome.status, outcome.t_relax), (Status::Stalled, None));
     // Steps of any length are solved once they are short enough; the member creeps on until it has made its share.
     assert!(outcome.steps == 31_631 && outcome.t_end < 0.1, "{outcome:?}");
-    assert_eq!(one(&Spec { max_sweeps: 200_000, sor: 1.7, ..spec }).status, Status::Relaxed);
+    assert_eq!(one(&Spec { max_sweeps: 200_000, sor: Sor::Factor(1.7), ..spec }).status, Status::Relaxed);
 }
 
 /// Two unit discs joined by a bar.

@@ -39,7 +39,7 @@ fn main() {
             if on_gpu && precision == Precision::F64 && gpu.as_ref().is_some_and(|gpu| !gpu.has_f64()) {
                 continue;
             }
-            for solver in [Solver::Direct, Solver::GaussSeidel] {
+            for solver in Solver::ALL {
                 let method = Spec { backend, precision: Some(precision), solver: solver.into(), ..Spec::default() };
                 for problem in problems() {
                     let name = format!("{backend:?} {precision:?} {solver:?}: {}", problem.name).to_lowercase();
@@ -172,7 +172,7 @@ struct Linear {
 }
 
 fn correct_step(Linear { state, work, p }: &mut Linear) {
-    step::step(&state.curve, &mut state.increments, p, true, &DIRECT, work);
+    step::step(&state.curve, &mut state.increments, p, &DIRECT, work);
     std::mem::swap(&mut state.curve, &mut work.new);
 }
 

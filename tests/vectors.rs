@@ -101,7 +101,7 @@ fn same_bits<T: Vectorised>(name: &str, spec: &Spec) {
 
 #[test]
 fn fixed_steps_give_the_same_bits_in_every_vector() {
-    for solver in [Solver::Direct, Solver::GaussSeidel] {
+    for solver in Solver::ALL {
         for n in [32, 37] {
             let fixed = Spec { tau: Some(1e-3), t_end: 0.3, points: n, solver: solver.into(), ..Spec::default() };
             let spec = spec("ellipse:2,1", Spec { stop_when_relaxed: true, relax_to: Some(0.5), ..fixed });
@@ -113,7 +113,7 @@ fn fixed_steps_give_the_same_bits_in_every_vector() {
 
 #[test]
 fn adaptive_steps_give_the_same_bits_in_every_vector() {
-    for solver in [Solver::Direct, Solver::GaussSeidel] {
+    for solver in Solver::ALL {
         let adaptive = Spec { adaptive: Some(1e-2), t_end: 0.4, points: 33, solver: solver.into(), ..Spec::default() };
         let spec = spec("flower:3:0.3", Spec { stop_when_relaxed: true, ..adaptive });
         same_bits::<f64>(&format!("{solver:?}, adaptive"), &spec);

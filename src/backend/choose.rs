@@ -170,6 +170,7 @@ impl Choice {
         };
         let solver = match spec.solver() {
             Solver::GaussSeidel => "Gauss-Seidel sweeps",
+            Solver::Multigrid => "sweeps inside multigrid",
             Solver::Direct => "direct solver",
         };
         format!("back end: {device}, {precision} ({}); {solver}", self.reason)
@@ -179,7 +180,7 @@ impl Choice {
     pub fn settle(&self, spec: &mut Spec) {
         spec.backend = if self.gpu.is_some() { BackendChoice::Gpu } else { BackendChoice::Cpu };
         spec.adapter = self.gpu.as_ref().map(|gpu| gpu.name().to_string());
-        if spec.solver() == Solver::GaussSeidel {
+        if spec.solver().sweeps() {
             spec.tolerance = Some(spec.tolerance_at(self.precision));
         }
         spec.precision = Some(self.precision);

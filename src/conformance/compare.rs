@@ -159,7 +159,7 @@ pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Opt
         let mut run: Run<T> = launch.convert();
         let mut work = traced_workspace(n)?;
         let Run { state, parameters, .. } = &mut run;
-        step::step(&state.curve, &mut state.increments, parameters, true, &method(solver), &mut work);
+        step::step(&state.curve, &mut state.increments, parameters, &method(solver), &mut work);
         let twin = traced(&work, &run.state.increments);
         let scales = Scales::of(launch)?;
         for (field, (row, bound)) in rows.iter_mut().zip(&STAGES).enumerate() {
@@ -416,7 +416,7 @@ impl Scales {
         let mut run = launch.clone();
         let mut work = traced_workspace(run.state.curve.len())?;
         let increments = &mut run.state.increments;
-        step::step(&run.state.curve, increments, &run.parameters, true, &method(Solver::Direct), &mut work);
+        step::step(&run.state.curve, increments, &run.parameters, &method(Solver::Direct), &mut work);
         Ok(Scales { curve: run.state.curve, parameters: run.parameters, work })
     }
 

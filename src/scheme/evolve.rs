@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     number::{Mask, Number, Real},
-    solver::Blocks,
+    solver::{Blocks, Cycles, Elimination, Solver, Solves, Sweeps},
 };
 
 /// One member on its way: everything that a dispatch reads and writes.
@@ -33,12 +33,20 @@ impl<T: Real> Run<T> {
     /// A member at its start, with no step to make and no events behind it.
     pub fn new(state: State<T>, parameters: Parameters<T>) -> Run<T> {
         let blocks = Blocks::new(state.curve.len()).expect("a ring of 6 nodes or more");
-        let sums = observe::sums(&state.curve, &parameters, blocks);
-        let now = Observed::new(&sums, &observe::maxima(&state.curve), &parameters);
+        let now = Observed::of(&state.curve, &parameters, blocks);
         let mut report = Report { before: now, middle: now, now, ..Report::default() };
-        report.progress.turning = sums.turning;
+        report.progress.turning = observe::sums(&state.curve, &parameters, blocks).turning;
         let counters = Counters { relax_step: NEVER, half_step: NEVER, ..Counters::default() };
         Run { state, parameters, counters, report }
+    }
+
+    /// Reports what its curves are; not compiled into the vector code, since it is one member's.
+    #[inline(never)]
+    fn report_on(&mut self, blocks: Blocks, adaptive: bool) {
+        let Run { state, parameters, report, .. } = self;
+        report.before = Observed::of(&state.before, parameters, blocks);
+        report.now = Observed::of(&state.curve, parameters, blocks);
+        report.middle = if adaptive { Observed::of(&state.middle, parameters, blocks) } else { report.before };
     }
 
     /// The same member in another precision, rounded.
@@ -81,13 +89,17 @@ struct Attempt<N: Number> {
 /// is tried again with a shorter step, until that is too short to mean anything; one that is too inaccurate at every
 /// length follows a curve that n nodes do not resolve, which is singular.
 pub fn evolve<T: Real>(run: &mut Run<T>, method: &Method, team: &mut Team<T>, attempts: u32) {
-    evolve_abreast(&mut [run], method, team, attempts);
+    match method.solver {
+        Solver::GaussSeidel => evolve_abreast::<T, Sweeps>(&mut [run], method, team, attempts),
+        Solver::Multigrid => evolve_abreast::<T, Cycles>(&mut [run], method, team, attempts),
+        Solver::Direct => evolve_abreast::<T, Elimination>(&mut [run], method, team, attempts),
+    }
 }
 
-/// Advances up to as many members as there are lanes, all with fixed or all with adaptive steps, and returns earlier
-/// when less than half of them are still running: the others would pay for lanes that are idle.
+/// Advances up to as many members as there are lanes, all with fixed or all with adaptive steps, by the solver `S`; returns
+/// earlier when less than half of them are still running: the others would pay for lanes that are idle.
 #[inline(always)]
-pub fn evolve_abreast<N: Number>(
+pub fn evolve_abreast<N: Number, S: Solves>(
     runs: &mut [&mut Run<N::Real>],
     method: &Method,
     team: &mut Team<N>,
@@ -109,23 +121,20 @@ pub fn evolve_abreast<N: Number>(
         team.take_in(lane, if live.lane(lane) { &*runs[lane] } else { &*runs[first] });
     }
     let enough = running.div_ceil(2);
-    for _ in 0..attempts {
-        if running < enough {
-            break;
-        }
-        let attempt = team.attempt(runs, live, adaptive, method);
+    let mut left = attempts;
+    while left > 0 {
+        left -= 1;
+        let attempt = team.attempt::<S>(runs, live, adaptive, method);
         team.conclude(runs, live, adaptive, &attempt);
+        let all_leave = left == 0 || runs.iter().filter(|run| is_running(&run.counters)).count() < enough;
         for lane in 0..runs.len() {
-            if live.lane(lane) && !is_running(&runs[lane].counters) {
+            if live.lane(lane) && (all_leave || !is_running(&runs[lane].counters)) {
                 team.let_out(lane, runs[lane], adaptive);
                 live.set_lane(lane, false);
-                running -= 1;
             }
         }
-    }
-    for lane in 0..runs.len() {
-        if live.lane(lane) {
-            team.let_out(lane, runs[lane], adaptive);
+        if all_leave {
+            return;
         }
     }
 }
@@ -173,20 +182,14 @@ impl<N: Number> Team<N> {
             }
             to.close();
         }
-        let Run { state, parameters, report, .. } = run;
-        let observed = |curve: &Curve<N::Real>| {
-            Observed::new(&observe::sums(curve, parameters, self.work.blocks), &observe::maxima(curve), parameters)
-        };
-        report.before = observed(&state.before);
-        report.now = observed(&state.curve);
-        report.middle = if adaptive { observed(&state.middle) } else { report.before };
+        run.report_on(self.work.blocks, adaptive);
     }
 
     /// Makes a fixed step, or the three steps of an adaptive one, in all lanes.
     ///
     /// A step is called in one place only, since its whole body is compiled there.
     #[inline(always)]
-    fn attempt(
+    fn attempt<S: Solves>(
         &mut self,
         runs: &mut [&mut Run<N::Real>],
         live: N::Mask,
@@ -208,7 +211,7 @@ impl<N: Number> Team<N> {
         for part in 0..if adaptive { 3 } else { 1 } {
             parameters.tau = if part == 0 { h } else { half * h };
             let from = if part == 2 { &state.before } else { &state.curve };
-            let stepped = step::step(from, &mut state.increments, parameters, ok, method, work);
+            let stepped = step::step_by::<N, S>(from, &mut state.increments, parameters, ok, method, work);
             // What failed before says why, and makes no more sweeps.
             all.finite = all.finite.and(stepped.finite.or(ok.not()));
             all.solved = all.solved.and(stepped.solved.or(ok.not()));

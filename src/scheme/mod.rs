@@ -20,6 +20,7 @@
 //! is a curve with what the next step needs of the last one; a [`Workspace`] holds what a step computes on the way, and
 //! doubles as its trace for the conformance test.
 
+pub mod coarse;
 pub mod curvature;
 pub mod evolve;
 pub mod extrapolation;

@@ -131,7 +131,6 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> S
 }
 
 /// Maxima over the ring.
-#[inline(always)]
 pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
     let low = N::of(-2.0 * BIG);
     let mut m = Maxima { turn: low, drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };

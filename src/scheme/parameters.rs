@@ -3,10 +3,11 @@
 //! Every field is one number of the run's precision, in declaration order, so that host and WGSL agree by
 //! construction; a test compares names and offsets with naga's view of `shaders/member.wgsl`.
 
-use super::observe::{self, Maxima, Sums};
+use super::{Curve, observe};
 use crate::{
     flow::{Flow, MAX_DEGREE},
     number::{BIG, Mask, Number, Real},
+    solver::Blocks,
 };
 
 /// A struct of numbers of one type, convertible to and from an array in declaration order.
@@ -71,7 +72,7 @@ numbers! {
         pull,
         /// Tolerance of the sweeps.
         tolerance,
-        /// Over-relaxation factor of the sweeps.
+        /// Over-relaxation factor of the sweeps; 0 to choose it by the stiffness of each system.
         sor,
         /// λ of the energy `∮(½k² + λ) ds`.
         length_penalty,
@@ -248,9 +249,11 @@ fn convert<T: Real, U: Real>(numbers: Vec<T>) -> Vec<U> {
     numbers.into_iter().map(|v| U::of(v.to_f64())).collect()
 }
 
-impl<N: Number> Observed<N> {
-    /// What the sums and maxima of a curve say.
-    pub fn new(sums: &Sums<N>, maxima: &Maxima<N>, p: &Parameters<N>) -> Observed<N> {
+impl<T: Real> Observed<T> {
+    /// What can be observed of a curve.
+    #[inline(never)]
+    pub fn of(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
+        let (sums, maxima) = (observe::sums(curve, p, blocks), observe::maxima(curve));
         Observed {
             length: sums.length,
             area: sums.area,

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::{
     number::{Number, Real},
-    solver::{Blocks, Ring, System, direct::Factor},
+    solver::{Blocks, Ring, System, direct::Factor, multigrid::Levels},
 };
 
 /// Fields of a curve.
@@ -230,6 +230,8 @@ pub struct Workspace<N> {
     pub traced: bool,
     /// Triangular factors of the two systems.
     pub factors: (Factor<N, 1>, Factor<N, 2>),
+    /// Coarser levels of the two systems.
+    pub levels: (Levels<N, 1>, Levels<N, 2>),
 }
 
 impl<N: Number> Workspace<N> {
@@ -246,6 +248,7 @@ impl<N: Number> Workspace<N> {
             position: System::zeros(n),
             traced: false,
             factors: (Factor::new(n), Factor::new(n)),
+            levels: (Levels::new(n), Levels::new(n)),
         }
     }
 }

@@ -1,13 +1,14 @@
 //! One step of the paper's scheme, from an old curve to the new one in the workspace. Twin of `shaders/step.wgsl`.
 
 use super::{
-    Curve, Increments, Parameters, Workspace, curvature::Curvature, position::Position, pull, redistribution,
+    Curve, Increments, Parameters, Workspace, coarse, curvature::Curvature, position::Position, pull, redistribution,
 };
 use crate::{
-    number::{Mask, Number},
+    number::{Mask, Number, Real},
     solver::{
-        Order, Ring, Solver, direct,
+        Cycles, Elimination, Order, Ring, Solver, Solves, Sweeps, direct,
         gauss_seidel::{self, Swept},
+        multigrid,
     },
 };
 
@@ -39,9 +40,24 @@ pub struct Stepped<N: Number> {
 pub const NEGLIGIBLE: f64 = 0.1;
 
 /// Computes the curve a time `p.tau` after `old` into `work.new`; `increments` is where the solves start, and the result.
-/// Lanes that are not `live` cost no sweeps and mean nothing afterwards.
+pub fn step<T: Real>(
+    old: &Curve<T>,
+    increments: &mut Increments<T>,
+    p: &Parameters<T>,
+    method: &Method,
+    work: &mut Workspace<T>,
+) -> Stepped<T> {
+    match method.solver {
+        Solver::GaussSeidel => step_by::<T, Sweeps>(old, increments, p, true, method, work),
+        Solver::Multigrid => step_by::<T, Cycles>(old, increments, p, true, method, work),
+        Solver::Direct => step_by::<T, Elimination>(old, increments, p, true, method, work),
+    }
+}
+
+/// The same for members side by side, by the solver `S`. Lanes that are not `live` cost no sweeps and mean nothing
+/// afterwards.
 #[inline(always)]
-pub fn step<N: Number>(
+pub fn step_by<N: Number, S: Solves>(
     old: &Curve<N>,
     increments: &mut Increments<N>,
     p: &Parameters<N>,
@@ -49,39 +65,47 @@ pub fn step<N: Number>(
     method: &Method,
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
-    let Workspace { blocks, motion, new, curvature, position, traced, factors } = work;
+    let Workspace { blocks, motion, new, curvature, position, traced, factors, levels } = work;
     let length = redistribution::redistribute(old, p, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
     let rounding = N::of(NEGLIGIBLE * N::EPSILON);
-    let control = |negligible: N| gauss_seidel::Control {
+    let control = gauss_seidel::Control {
         tolerance: p.tolerance,
-        negligible,
+        negligible: rounding / radius,
         sor: p.sor,
         max_sweeps: method.max_sweeps,
         order: method.order,
     };
 
     let equations = Curvature::new(old, new, motion, p);
-    if method.solver == Solver::GaussSeidel || *traced {
+    if S::SOLVER.sweeps() || *traced {
         curvature.assemble(&equations);
     }
-    let for_k = match method.solver {
-        Solver::Direct => unswept(direct::solve(&equations, [&mut increments.k], &mut factors.0)),
-        Solver::GaussSeidel => {
-            gauss_seidel::solve(curvature, [&mut increments.k], *blocks, &control(rounding / radius), live)
+    let unknown = [&mut increments.k];
+    let for_k = match S::SOLVER {
+        Solver::Direct => unswept(direct::solve(&equations, unknown, &mut factors.0)),
+        Solver::GaussSeidel => gauss_seidel::solve(curvature, unknown, *blocks, &control, live),
+        Solver::Multigrid => {
+            coarse::curvature(motion, &new.r, p, &mut levels.0);
+            multigrid::solve(curvature, unknown, *blocks, &control, live, &mut levels.0)
         }
     };
     add(&old.k, &increments.k, &mut new.k);
 
     let equations = Position::new(old, new, motion, p);
-    if method.solver == Solver::GaussSeidel || *traced {
+    if S::SOLVER.sweeps() || *traced {
         position.assemble(&equations);
     }
+    let control = gauss_seidel::Control { negligible: rounding * radius, ..control };
     let unknowns = [&mut increments.x, &mut increments.y];
-    let for_x = match method.solver {
+    let for_x = match S::SOLVER {
         Solver::Direct => unswept(direct::solve(&equations, unknowns, &mut factors.1)),
-        Solver::GaussSeidel => gauss_seidel::solve(position, unknowns, *blocks, &control(rounding * radius), live),
+        Solver::GaussSeidel => gauss_seidel::solve(position, unknowns, *blocks, &control, live),
+        Solver::Multigrid => {
+            coarse::position(motion, &new.r, &new.k, p, &mut levels.1);
+            multigrid::solve(position, unknowns, *blocks, &control, live, &mut levels.1)
+        }
     };
     add(&old.x, &increments.x, &mut new.x);
     add(&old.y, &increments.y, &mut new.y);

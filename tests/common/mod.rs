@@ -56,7 +56,7 @@ impl<T: Real> Stepper<T> {
     /// One step, which must succeed.
     #[track_caller]
     pub fn step(&mut self) {
-        let stepped = step::step(&self.state.curve, &mut self.state.increments, &self.p, true, &self.method, &mut self.work);
+        let stepped = step::step(&self.state.curve, &mut self.state.increments, &self.p, &self.method, &mut self.work);
         assert!(stepped.solved && stepped.finite, "a system was not solved");
         std::mem::swap(&mut self.state.curve, &mut self.work.new);
     }

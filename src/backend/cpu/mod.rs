@@ -32,7 +32,7 @@ const SLOTS_PER_THREAD: usize = 16;
 fn steps_per_advance(solver: Solver) -> u32 {
     match solver {
         Solver::Direct => 256,
-        Solver::GaussSeidel => 64,
+        Solver::GaussSeidel | Solver::Multigrid => 64,
     }
 }
 
@@ -55,7 +55,7 @@ impl<T: Vectorised> CpuBackend<T> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}; try --threads 1")))?;
         let threads = pool.current_num_threads();
-        let crew = T::crew(vectors, blocks, threads)?;
+        let crew = T::crew(vectors, method.solver, blocks, threads)?;
         let slots = threads * SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * crew.lanes());
         Ok(CpuBackend { slots: (0..slots).map(|_| None).collect(), method, crew, pool })
     }

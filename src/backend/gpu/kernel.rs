@@ -19,7 +19,7 @@ use crate::{
         parameters::{Counters, Report},
         state::STATE_FIELDS,
     },
-    solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK},
+    solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK, multigrid::SWEEPS_PER_CYCLE},
 };
 
 /// A dispatch aims to last this long: short enough for every watchdog, long enough to hide its overhead.
@@ -54,12 +54,16 @@ pub struct Budget {
     pub sweeps: u32,
 }
 
+/// Iterations of all loops in a cycle of multigrid, besides looks at the residual: over 11 levels at most of 4 colours.
+const ITERATIONS_PER_CYCLE: u32 = 300;
+/// And where its levels are built, down to the inverse of a matrix of 5 rows.
+const ITERATIONS_PER_BUILD: u32 = 300;
 /// llvmpipe leaves all loops of a shader, without a word, once they have made 65 535 iterations together.
 const SOFTWARE_ITERATIONS: u32 = 50_000;
 
 impl Budget {
     /// The most that one dispatch may do on this adapter.
-    fn most(gpu: &Gpu, blocks: Blocks, adaptive: bool) -> Budget {
+    fn most(gpu: &Gpu, blocks: Blocks, Variant { solver, adaptive, .. }: Variant) -> Budget {
         if gpu.is_hardware() {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
@@ -67,8 +71,15 @@ impl Budget {
         // one, which is three of the paper's, forty times.
         let walk = blocks.count() as u32 + 1;
         let walks = if adaptive { 40 } else { 10 };
-        let sweeps = SOFTWARE_ITERATIONS / 2 * SWEEPS_PER_CHECK / (SWEEPS_PER_CHECK + walk);
-        Budget { steps: (SOFTWARE_ITERATIONS / 2 / (walks * walk)).max(1), sweeps: sweeps.max(SWEEPS_PER_CHECK) }
+        // The rings below the finest one are walked over in every cycle, and built twice in each of the paper's steps.
+        let (sweeps, cycle, build) = match solver {
+            Solver::Multigrid => (SWEEPS_PER_CYCLE, ITERATIONS_PER_CYCLE, walks / 5 * ITERATIONS_PER_BUILD),
+            Solver::GaussSeidel | Solver::Direct => (SWEEPS_PER_CHECK, SWEEPS_PER_CHECK, 0),
+        };
+        Budget {
+            steps: (SOFTWARE_ITERATIONS / 2 / (walks * walk + build)).max(1),
+            sweeps: (SOFTWARE_ITERATIONS / 2 / (cycle + walk) * sweeps).max(sweeps),
+        }
     }
 }
 
@@ -112,7 +123,7 @@ impl<T: Real> Kernel<T> {
         gpu.capacity()
             .check_size::<T>(blocks, variant.solver)
             .map_err(|e| Error::Request(format!("n = {} needs {e}", blocks.n)))?;
-        let most = Budget::most(gpu, blocks, variant.adaptive);
+        let most = Budget::most(gpu, blocks, variant);
         let device = gpu.open()?;
         let pipeline = compile::<T>(&device.device, blocks, gpu.subgroup(), variant);
         let buffers = Buffers::new(&device.device, slots, state_bytes, trace_bytes, size_of::<T>());
@@ -126,7 +137,7 @@ impl<T: Real> Kernel<T> {
             blocks,
             max_sweeps,
             budget: match variant.solver {
-                Solver::GaussSeidel => Budget { sweeps: 256, ..most },
+                Solver::GaussSeidel | Solver::Multigrid => Budget { sweeps: most.sweeps.min(256), ..most },
                 Solver::Direct => Budget { steps: 1, ..most },
             },
             solver: variant.solver,
@@ -254,7 +265,7 @@ impl<T: Real> Kernel<T> {
         let next = |now: u32, most: u32| ((f64::from(now) * share) as u32).clamp(1, 2 * now).min(most);
         match self.solver {
             _ if self.fixed => {}
-            Solver::GaussSeidel => self.budget.sweeps = next(self.budget.sweeps, self.most.sweeps),
+            Solver::GaussSeidel | Solver::Multigrid => self.budget.sweeps = next(self.budget.sweeps, self.most.sweeps),
             Solver::Direct => self.budget.steps = next(self.budget.steps, self.most.steps),
         }
     }

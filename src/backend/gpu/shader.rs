@@ -2,7 +2,7 @@
 
 use crate::{
     number::Real,
-    solver::{Blocks, Solver},
+    solver::{Blocks, Solver, multigrid::coarse_nodes},
 };
 
 /// A part of the source: its file name in `shaders/` and its text.
@@ -27,10 +27,13 @@ pub struct Variant {
 
 impl Variant {
     /// All that are used; adaptive steps are made of traced ones.
-    pub const ALL: [Variant; 6] = [
+    pub const ALL: [Variant; 9] = [
         Variant::of(Solver::GaussSeidel),
         Variant { traced: true, ..Variant::of(Solver::GaussSeidel) },
         Variant { adaptive: true, ..Variant::of(Solver::GaussSeidel) },
+        Variant::of(Solver::Multigrid),
+        Variant { traced: true, ..Variant::of(Solver::Multigrid) },
+        Variant { adaptive: true, ..Variant::of(Solver::Multigrid) },
         Variant::of(Solver::Direct),
         Variant { traced: true, ..Variant::of(Solver::Direct) },
         Variant { adaptive: true, ..Variant::of(Solver::Direct) },
@@ -43,12 +46,13 @@ impl Variant {
 
     /// The files of the kernel, in the order of the step.
     pub fn parts(self) -> impl Iterator<Item = Part> {
-        let solver = match self.solver {
-            Solver::GaussSeidel => GAUSS_SEIDEL,
-            Solver::Direct => DIRECT,
+        let solver: &[Part] = match self.solver {
+            Solver::GaussSeidel => &GAUSS_SEIDEL,
+            Solver::Multigrid => &MULTIGRID,
+            Solver::Direct => &DIRECT,
         };
         let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
-        COMMON.into_iter().chain(solver).chain(trace)
+        COMMON.into_iter().chain(solver.iter().copied()).chain(trace)
     }
 }
 
@@ -68,7 +72,8 @@ const COMMON: [Part; 14] = parts![
     "extrapolation.wgsl",
     "evolve.wgsl",
 ];
-const GAUSS_SEIDEL: [Part; 1] = parts!["gauss_seidel.wgsl"];
+const GAUSS_SEIDEL: [Part; 2] = parts!["sweeps.wgsl", "gauss_seidel.wgsl"];
+const MULTIGRID: [Part; 3] = parts!["sweeps.wgsl", "coarse.wgsl", "multigrid.wgsl"];
 const DIRECT: [Part; 1] = parts!["direct.wgsl"];
 const TRACE_OFF: [Part; 1] = parts!["trace_off.wgsl"];
 const TRACE_ON: [Part; 1] = parts!["trace_on.wgsl"];
@@ -98,28 +103,36 @@ pub fn locate(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
     None
 }
 
+/// Levels of multigrid at most, in the kernel.
+pub const LEVELS: usize = 8;
+
 /// Threads of a workgroup: one a block, filled up to whole subgroups of `subgroup` threads.
 pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
     blocks.count().next_multiple_of(subgroup as usize)
 }
 
 /// The `override` constants that size the kernel.
-pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 4] {
+pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 5] {
     [
         ("NODES", blocks.n as f64),
         ("FOURS", blocks.fours as f64),
         ("BLOCKS", blocks.count() as f64),
         ("THREADS", threads(blocks, subgroup) as f64),
+        ("COARSE", coarse_nodes(blocks.n) as f64),
     ]
 }
 
-/// Bytes of workgroup memory that the kernel takes: two rings, a row of four per block, for the direct solve four more
-/// rows per block, one decision.
+/// Bytes of workgroup memory that the kernel takes: two rings, a row of four per block, one decision; for the direct
+/// solve four more rows per block, for multigrid 13 numbers a coarse node and 8 rows of weights.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
 pub fn workgroup_bytes<T: Real>(blocks: Blocks, solver: Solver) -> usize {
-    let rows = if solver == Solver::Direct { 5 } else { 1 };
-    (2 * blocks.n + 4 * rows * blocks.count()) * size_of::<T>() + 16
+    let more = match solver {
+        Solver::GaussSeidel => 0,
+        Solver::Multigrid => 13 * coarse_nodes(blocks.n) + 4 * LEVELS,
+        Solver::Direct => 16 * blocks.count(),
+    };
+    (2 * blocks.n + 4 * blocks.count() + more) * size_of::<T>() + 16
 }
 
 #[cfg(test)]
