@@ -306,7 +306,8 @@ fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let together = on_gpu::<T>(gpu, solver, n, &mixed, dispatches_of(5))?;
     let expected = [
         (1, vec![Status::Nonfinite]),
-        (3, vec![Status::Nonfinite, Status::Singular]),
+        // V-cycles diverge where sweeps would overflow.
+        (3, vec![Status::Nonfinite, Status::Singular, Status::Stalled]),
         (4, vec![Status::Nonfinite, Status::Singular, Status::Stalled]),
         (6, vec![Status::Singular]),
     ];
