@@ -306,7 +306,8 @@ fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let together = on_gpu::<T>(gpu, solver, n, &mixed, dispatches_of(5))?;
     let expected = [
         (1, vec![Status::Nonfinite]),
-        (3, vec![Status::Nonfinite, Status::Singular]),
+        // V-cycles diverge where sweeps would overflow.
+        (3, vec![Status::Nonfinite, Status::Singular, Status::Stalled]),
         (4, vec![Status::Nonfinite, Status::Singular, Status::Stalled]),
         (6, vec![Status::Singular]),
     ];
@@ -359,7 +360,9 @@ fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let most = gpu.capacity().max_points::<T>(solver);
     let n = most.min(1024);
-    if n < 512 {
+    // The rings below take twice as much again and more.
+    let least = if solver == Solver::Multigrid { 256 } else { 512 };
+    if n < least {
         return Err(format!("only {n} points fit").into());
     }
     let launches = members(n, 2, 2, 1e-3)?;

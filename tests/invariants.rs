@@ -237,6 +237,9 @@ fn the_work_of_a_run_is_what_it_was() {
     let adaptive =
         Spec { tau: None, adaptive: Some(1e-3), solver: SolverChoice::Auto, ..spec(Flow::Willmore, 61, 1.0) };
     let swept = Spec { solver: SolverChoice::GaussSeidel, ..adaptive.clone() };
+    let automatic = Spec { sor: Sor::Auto, ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
+    let cycles = Spec { solver: SolverChoice::Multigrid, ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
+    let adaptive_cycles = Spec { solver: SolverChoice::Multigrid, ..adaptive.clone() };
     let stops = Spec { stop_when_relaxed: true, t_end: 2.0, ..spec(Flow::SurfaceDiffusion, 50, 1.7) };
     for (name, spec, expected) in [
         ("surface diffusion", spec(Flow::SurfaceDiffusion, 100, 1.0), [100, 416144, 407104]),
@@ -248,6 +251,9 @@ fn the_work_of_a_run_is_what_it_was() {
         ),
         ("until relaxed", stops, [192, 19744, 18592]),
         ("direct", direct, [100, 0, 0]),
+        ("over-relaxed as it chooses", automatic, [100, 69072, 67320]),
+        ("multigrid", cycles, [100, 1080, 966]),
+        ("multigrid, adaptive", adaptive_cycles, [71, 2072, 1880]),
         ("adaptive", adaptive, [71, 0, 0]),
         ("adaptive, by sweeps", swept, [71, 97568, 92648]),
     ] {
