@@ -329,6 +329,7 @@ fn precision_name(precision: Precision) -> &'static str {
 fn table(rows: &[Row]) -> String {
     let place = |row: &Row| match (&row.adapter, row.threads) {
         (Some(adapter), _) => adapter.clone(),
+        (None, Some(1)) => "cpu, 1 thread".into(),
         (None, Some(threads)) => format!("cpu, {threads} threads"),
         (None, None) => "cpu".into(),
     };
