@@ -190,3 +190,112 @@ fn is_at_end(run: &Run<f64>, counters: &Counters, report: &Report<f64>) -> bool 
         false => counters.steps >= run.counters.goal,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{cell::Cell, rc::Rc};
+
+    use super::*;
+    use crate::{
+        number::Precision,
+        scheme::{Parameters, State},
+    };
+
+    /// Makes at most five steps a call, with 9 sweeps each, and tells how many it made and loaded.
+    struct Fives {
+        counters: [Counters; 2],
+        steps: Rc<Cell<u64>>,
+        loads: Rc<Cell<u32>>,
+    }
+
+    impl Backend for Fives {
+        fn slots(&self) -> usize {
+            2
+        }
+        fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
+            self.counters[slot] = run.counters;
+            self.loads.set(self.loads.get() + 1);
+            Ok(())
+        }
+        fn aim(&mut self, slot: usize, goal: u32, _: &Parameters<f64>) {
+            self.counters[slot].goal = goal;
+        }
+        fn clear(&mut self, _: usize) {}
+        fn advance(&mut self) -> Result<()> {
+            for counters in &mut self.counters {
+                let steps = (counters.goal - counters.steps).min(5);
+                counters.steps += steps;
+                (counters.sweeps_k, counters.sweeps_x) = (4 * steps, 5 * steps);
+                self.steps.set(self.steps.get() + u64::from(steps));
+            }
+            Ok(())
+        }
+        fn counters(&self, slot: usize) -> Counters {
+            self.counters[slot]
+        }
+        fn report(&self, _: usize) -> Report<f64> {
+            Report::default()
+        }
+        fn state(&mut self, _: usize) -> Result<State<f64>> {
+            unreachable!("a measurement reads no states")
+        }
+    }
+
+    /// A bench over [`Fives`] whose members end after 12 steps, with the steps and the loads that it made.
+    fn fives(stride: u32) -> (Bench, Rc<Cell<u64>>, Rc<Cell<u32>>) {
+        let spec = spec(32, Spec { t_end: 0.012, curves: 2, ..Spec::default() }).unwrap();
+        let member = Family::new(&spec).unwrap().member(0).unwrap();
+        let run = Trajectory::new(member, &spec, Precision::F64, &[]).launch();
+        let (steps, loads) = (Rc::default(), Rc::default());
+        let backend = Fives { counters: [Counters::default(); 2], steps: Rc::clone(&steps), loads: Rc::clone(&loads) };
+        let platform = Platform {
+            backend: "cpu".into(),
+            adapter: None,
+            driver: None,
+            device_type: None,
+            precision: Precision::F64,
+            reason: "a test".into(),
+            threads: None,
+        };
+        let (members, start_up) = (vec![run], Duration::ZERO);
+        let mut bench = Bench { backend: Box::new(backend), platform, members, made: vec![0; 2], stride, start_up };
+        bench.load(0).unwrap();
+        bench.load(1).unwrap();
+        (bench, steps, loads)
+    }
+
+    #[test]
+    fn what_is_counted_is_what_was_made_also_over_the_ends_of_members() {
+        for stride in [1, 3, 4, u32::MAX] {
+            let (mut bench, steps, loads) = fives(stride);
+            let mut total = Sample::default();
+            for _ in 0..100 {
+                let sample = bench.advance().unwrap();
+                total.steps += sample.steps;
+                total.sweeps += sample.sweeps;
+                assert_eq!(sample.paused, stride == u32::MAX && sample.steps == 10, "{sample:?}");
+            }
+            assert_eq!((total.steps, total.sweeps), (steps.get(), 9 * steps.get()), "stride {stride}");
+            assert_eq!(u64::from(loads.get()), 2 + steps.get() / 12, "stride {stride}");
+            assert!(loads.get() > 10);
+        }
+    }
+
+    #[test]
+    fn a_back_end_that_pauses_by_itself_is_left_to_its_own_pace() {
+        let (mut bench, steps, _) = fives(1);
+        bench.find_stride(Duration::from_secs(1000)).unwrap();
+        assert_eq!(bench.stride, u32::MAX);
+        assert!(steps.get() <= 50, "it was asked for more and more over {} steps", steps.get());
+    }
+
+    #[test]
+    fn a_member_that_fails_ends_the_measurement_by_name() {
+        let (mut bench, ..) = fives(1);
+        let mut run = bench.members[0].clone();
+        run.counters.status = Status::Singular as u32;
+        bench.backend.load(1, &run).unwrap();
+        let message = bench.advance().unwrap_err().to_string();
+        assert!(message.starts_with("member 0 ended singular after 5 steps"), "{message}");
+    }
+}
