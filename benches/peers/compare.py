@@ -163,7 +163,7 @@ def main():
             rates[group.name].append(group.rate(args.seconds))
     for group in workers:
         group.send(None)
-    print(f"n = {POINTS}, tau = {TAU}, direct solves, f64, {args.cores} cores, medians of {args.repeats} rounds\n")
+    print(f"n = {POINTS}, tau = {TAU}, direct solves, f64, cores: {args.cores}, medians of {args.repeats} rounds\n")
     print(table(rates, errors))
 
 
