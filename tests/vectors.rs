@@ -86,7 +86,12 @@ fn same_bits<T: Vectorised>(name: &str, spec: &Spec) {
             for (one, other) in alone.iter().zip(&abreast) {
                 // Debug prints every bit of a float, and NaN equal to NaN.
                 let member = one.outcome.member;
-                assert_eq!(format!("{one:?}"), format!("{other:?}"), "{name}, {} {vectors:?}, member {member}", T::NAME);
+                assert_eq!(
+                    format!("{one:?}"),
+                    format!("{other:?}"),
+                    "{name}, {} {vectors:?}, member {member}",
+                    T::NAME
+                );
             }
             compared += abreast.len();
             wider += usize::from(vectors != Vectors::None);

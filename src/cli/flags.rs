@@ -216,11 +216,11 @@ impl SpecFlags {
     }
 }
 
-fn real(text: &str) -> Result<f64, String> {
+pub(super) fn real(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "not a number".into())
 }
 
-fn whole<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
+pub(super) fn whole<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
     let value = text.trim().parse::<u64>().ok().and_then(|value| T::try_from(value).ok());
     value.ok_or_else(|| format!("not a whole number from 0 to {}", u128::MAX >> (128 - 8 * size_of::<T>())))
 }

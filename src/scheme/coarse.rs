@@ -28,13 +28,7 @@ pub fn curvature<N: Number>(motion: &Motion<N>, r: &Ring<N>, p: &Parameters<N>, 
 
 /// The terms of the position system, from the motion of the old curve and the new lengths and curvatures.
 #[inline(always)]
-pub fn position<N: Number>(
-    motion: &Motion<N>,
-    r: &Ring<N>,
-    k: &Ring<N>,
-    p: &Parameters<N>,
-    levels: &mut Levels<N, 2>,
-) {
+pub fn position<N: Number>(motion: &Motion<N>, r: &Ring<N>, k: &Ring<N>, p: &Parameters<N>, levels: &mut Levels<N, 2>) {
     levels.rate = p.tau.recip();
     let law = p.law();
     for i in 0..r.len() {

@@ -4,7 +4,7 @@
 //! plain `f64` it is one member alone, the reference; no bit of a member depends on who goes beside it.
 
 use super::{
-    Curve, Parameters, State, Status, Workspace, extrapolation,
+    Parameters, State, Status, Workspace, extrapolation,
     observe::{self, Glance},
     pace::{self, Stride},
     parameters::{Counters, NEVER, Observed, Report},

@@ -89,7 +89,8 @@ fn eliminate<N: Number, const F: usize>(
             own.b = if i == 0 { zero } else { own.b };
         }
         if i + 2 >= core {
-            border = if i + 2 == core { [border[0] + own.e, border[1]] } else { [border[0] + own.d, border[1] + own.e] };
+            border =
+                if i + 2 == core { [border[0] + own.e, border[1]] } else { [border[0] + own.d, border[1] + own.e] };
             own.d = if i + 1 == core { zero } else { own.d };
             own.e = zero;
         }

@@ -92,11 +92,7 @@ vectorised!(f64 f32);
 ///
 /// An elimination is a chain of results that wait for each other, so two registers of them go in turn. Sweeps wait for
 /// nothing, and go over their rows so often that these have to stay in the nearest cache: fewer members go abreast.
-fn crew_by<M: Solves + 'static, T: Lane>(
-    vectors: Vectors,
-    blocks: Blocks,
-    threads: usize,
-) -> Option<Box<dyn Crew<T>>> {
+fn crew_by<M: Solves + 'static, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Crew<T>>> {
     match vectors {
         Vectors::None => Some(Group::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
         #[cfg(target_arch = "x86_64")]
