@@ -26,8 +26,8 @@ fn main() {
 }
 
 fn measure<T: Real>(gpu: &Gpu, n: usize) {
-    let (kernel, start) = start::<T>(gpu, n, Variant::of(Solver::GaussSeidel));
-    let (one, two) = (sweeps(kernel, n, 0), sweeps(self::start::<T>(gpu, n, Variant::of(Solver::GaussSeidel)).0, n, 1));
+    let (kernel, start) = start::<T>(gpu, n, gpu.capacity().variant(Blocks::new(n).unwrap(), Solver::GaussSeidel));
+    let (one, two) = (sweeps(kernel, n, 0), sweeps(self::start::<T>(gpu, n, gpu.capacity().variant(Blocks::new(n).unwrap(), Solver::GaussSeidel)).0, n, 1));
     println!("{} n = {n}: start {start:.2} s; ns per sweep, system and node: k {one:.2}, x and y {:.2}", T::NAME, two / 2.0);
     let (kernel, start) = self::start::<T>(gpu, n, Variant::of(Solver::Direct));
     println!("{} n = {n}: start {start:.2} s; µs per direct step {:.2}", T::NAME, direct(kernel, n));

@@ -1,14 +1,20 @@
 // Coloured Gauss–Seidel sweeps to a residual. Twin of src/solver/gauss_seidel.rs.
 //
-// Rows and right-hand sides stay in registers; only the unknowns are in workgroup memory. In phase c every thread
-// updates the node of colour c in its block; a barrier ends the phase. A neighbour value is read once a sweep where
-// no phase in between can have changed it.
+// Rows, right-hand sides and unknowns stay in registers. Of a block of four, neighbours need the first two nodes (its front)
+// and the last two (its tail), and the first two need none of another block's first two: so colours 0 and 1 are one
+// phase, colours 2 and 3 another, and a sweep has two exchanges, with the results of four. Only a block of three
+// needs the front after it between its first and its second node: a third exchange where there is one.
 
 const SWEEPS_PER_CHECK = 8u;
 
+/// The tails of the block before, of u and v, and the fronts of the block after, at the present stage of a sweep.
+var<private> behind: vec;
+var<private> ahead: vec;
+
 /// Sweeps `u` for rhs_x; returns how it ended.
 fn solve_one(negligible: real) -> u32 {
-    share(u, u);
+    v = vec(0.0);
+    start_sweeps();
     sweeps = counters.solve_sweeps;
     let size = system_size(rhs_x);
     let tolerance = max(p.tolerance, real(EPSILON) * size);
@@ -18,7 +24,7 @@ fn solve_one(negligible: real) -> u32 {
         for (var s = 0u; s < batch; s++) { sweep_one(); }
         sweeps += batch;
         budget -= min(budget, batch);
-        let error = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
+        let error = bounded_abs(row_of.weight * residual(rhs_x, swept(behind.xy, u, ahead.xy)));
         ended = judge(block_max(error), block_max(bounded_abs(u)), tolerance, negligible);
     }
     return paused_or(ended);
@@ -26,7 +32,7 @@ fn solve_one(negligible: real) -> u32 {
 
 /// Sweeps `u` for rhs_x and `v` for rhs_y, with the barriers of one; returns how it ended.
 fn solve_two(negligible: real) -> u32 {
-    share(u, v);
+    start_sweeps();
     sweeps = counters.solve_sweeps;
     let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
     let tolerance = max(p.tolerance, real(EPSILON) * size);
@@ -36,12 +42,17 @@ fn solve_two(negligible: real) -> u32 {
         for (var s = 0u; s < batch; s++) { sweep_two(); }
         sweeps += batch;
         budget -= min(budget, batch);
-        let error_u = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
-        let error_v = bounded_abs(row_of.weight * residual(rhs_y, read_b()));
+        let error_u = bounded_abs(row_of.weight * residual(rhs_x, swept(behind.xy, u, ahead.xy)));
+        let error_v = bounded_abs(row_of.weight * residual(rhs_y, swept(behind.zw, v, ahead.zw)));
         let increment = max(bounded_abs(u), bounded_abs(v));
         ended = judge(block_max(max(error_u, error_v)), block_max(increment), tolerance, negligible);
     }
     return paused_or(ended);
+}
+
+fn start_sweeps() {
+    let start = windows(u, v);
+    behind = vec(start.a.low.xy, start.b.low.xy);
 }
 
 /// A solve that neither ended nor reached the cap has run out of this dispatch's sweeps.
@@ -76,63 +87,37 @@ fn judge(error: real, increment: real, tolerance: real, negligible: real) -> u32
     return uniform_decision(ended);
 }
 
-/// One sweep over ring_a.
-fn sweep_one() {
-    let um1 = ring_a[near_low.y];
-    u.x = relax(0u, rhs_x.x, ring_a[near_low.x], um1, u.x, u.y, u.z);
-    if owns > 0u { ring_a[first] = u.x; }
-    workgroupBarrier();
-    let up3 = ring_a[near_high.y];
-    u.y = relax(1u, rhs_x.y, um1, u.x, u.y, u.z, up3);
-    if owns > 0u { ring_a[first + 1u] = u.y; }
-    workgroupBarrier();
-    let up4 = ring_a[near_high.z];
-    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, up3, up4);
-    if owns > 0u { ring_a[first + 2u] = u.z; }
-    workgroupBarrier();
-    if owns == 4u {
-        u.w = relax(3u, rhs_x.w, u.y, u.z, u.w, up4, ring_a[near_high.w]);
-        ring_a[first + 3u] = u.w;
-    }
-    workgroupBarrier();
+/// The window of an unknown after a sweep.
+fn swept(tail: vec2<real>, own: vec, front: vec2<real>) -> Window {
+    return window(vec(tail, tail).xxyy, own, vec(front, front));
 }
 
-/// One sweep over ring_a and ring_b.
+/// One sweep over u.
+fn sweep_one() {
+    u.x = relax(0u, rhs_x.x, behind.x, behind.y, u.x, u.y, u.z);
+    if has_threes() { ahead = pass_down_early(vec(u.xy, v.xy)); }
+    u.y = relax(1u, rhs_x.y, behind.y, u.x, u.y, u.z, select(ahead.x, u.w, is_four));
+    ahead = pass_down(vec(u.xy, v.xy));
+    let next = select(ahead.xy, vec2(u.w, ahead.x), is_four);
+    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, next.x, next.y);
+    u.w = select(u.w, relax(3u, rhs_x.w, u.y, u.z, u.w, ahead.x, ahead.y), is_four);
+    behind = pass_up(tails(u, v));
+}
+
+/// One sweep over u and v, with the exchanges of one.
 fn sweep_two() {
-    let um1 = ring_a[near_low.y];
-    let vm1 = ring_b[near_low.y];
-    u.x = relax(0u, rhs_x.x, ring_a[near_low.x], um1, u.x, u.y, u.z);
-    v.x = relax(0u, rhs_y.x, ring_b[near_low.x], vm1, v.x, v.y, v.z);
-    if owns > 0u {
-        ring_a[first] = u.x;
-        ring_b[first] = v.x;
-    }
-    workgroupBarrier();
-    let up3 = ring_a[near_high.y];
-    let vp3 = ring_b[near_high.y];
-    u.y = relax(1u, rhs_x.y, um1, u.x, u.y, u.z, up3);
-    v.y = relax(1u, rhs_y.y, vm1, v.x, v.y, v.z, vp3);
-    if owns > 0u {
-        ring_a[first + 1u] = u.y;
-        ring_b[first + 1u] = v.y;
-    }
-    workgroupBarrier();
-    let up4 = ring_a[near_high.z];
-    let vp4 = ring_b[near_high.z];
-    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, up3, up4);
-    v.z = relax(2u, rhs_y.z, v.x, v.y, v.z, vp3, vp4);
-    if owns > 0u {
-        ring_a[first + 2u] = u.z;
-        ring_b[first + 2u] = v.z;
-    }
-    workgroupBarrier();
-    if owns == 4u {
-        u.w = relax(3u, rhs_x.w, u.y, u.z, u.w, up4, ring_a[near_high.w]);
-        v.w = relax(3u, rhs_y.w, v.y, v.z, v.w, vp4, ring_b[near_high.w]);
-        ring_a[first + 3u] = u.w;
-        ring_b[first + 3u] = v.w;
-    }
-    workgroupBarrier();
+    u.x = relax(0u, rhs_x.x, behind.x, behind.y, u.x, u.y, u.z);
+    v.x = relax(0u, rhs_y.x, behind.z, behind.w, v.x, v.y, v.z);
+    if has_threes() { ahead = pass_down_early(vec(u.xy, v.xy)); }
+    u.y = relax(1u, rhs_x.y, behind.y, u.x, u.y, u.z, select(ahead.x, u.w, is_four));
+    v.y = relax(1u, rhs_y.y, behind.w, v.x, v.y, v.z, select(ahead.z, v.w, is_four));
+    ahead = pass_down(vec(u.xy, v.xy));
+    let next = select(ahead, vec(u.w, ahead.x, v.w, ahead.z), is_four);
+    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, next.x, next.y);
+    v.z = relax(2u, rhs_y.z, v.x, v.y, v.z, next.z, next.w);
+    u.w = select(u.w, relax(3u, rhs_x.w, u.y, u.z, u.w, ahead.x, ahead.y), is_four);
+    v.w = select(v.w, relax(3u, rhs_y.w, v.y, v.z, v.w, ahead.z, ahead.w), is_four);
+    behind = pass_up(tails(u, v));
 }
 
 /// own + sor (rhs - row . u) for the node in component j of the block.

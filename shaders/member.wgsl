@@ -94,6 +94,8 @@ struct Dispatch {
     max_sweeps: u32,
     /// Sweeps after which the dispatch pauses, in the middle of a solve if need be.
     sweeps: u32,
+    /// BLOCKS, as a number that compilers do not know: they would unroll every loop over the blocks.
+    blocks: u32,
 }
 
 const STATE_FIELDS = 15u;
@@ -130,8 +132,8 @@ var<private> dy: vec;
 fn load_field(field: u32) -> vec {
     let base = (member * STATE_FIELDS + field) * NODES;
     return vec(
-        all_states[base + near_low.z], all_states[base + near_low.w],
-        all_states[base + near_high.x], all_states[base + near_high.y],
+        all_states[base + first], all_states[base + first + 1u],
+        all_states[base + first + 2u], all_states[base + (first + 3u) % NODES],
     );
 }
 

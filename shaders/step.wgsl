@@ -25,9 +25,9 @@ fn step() -> u32 {
     new_k = k + dk;
     let for_x = step_position(rounding * radius);
     if for_x != SOLVED { return for_x; }
-    share(x + dx, y + dy);
-    new_x = read_a();
-    new_y = read_b();
+    let moved = windows(x + dx, y + dy);
+    new_x = moved.a;
+    new_y = moved.b;
     new_r = here(r_new);
     if p.pull > real(0.0) { pull(); }
     trace(2u, new_r);
@@ -51,8 +51,8 @@ fn step_curvature(negligible: real) -> u32 {
 }
 
 fn step_position(negligible: real) -> u32 {
-    share(new_k, new_k);
-    assemble_position(read_a());
+    let exchanged = windows(new_k, y);
+    assemble_position(exchanged.a, exchanged.b);
     trace_system(10u);
     trace(15u, rhs_x);
     trace(16u, rhs_y);

@@ -30,7 +30,8 @@ fn all_sources<T: Real>() -> String {
 }
 
 fn capabilities<T: Real>() -> Capabilities {
-    if T::NAME == "f64" { Capabilities::FLOAT64 } else { Capabilities::empty() }
+    let f64 = if T::NAME == "f64" { Capabilities::FLOAT64 } else { Capabilities::empty() };
+    f64 | Capabilities::SUBGROUP
 }
 
 /// Parses and validates a source; an error names the shader's own file and line.
@@ -60,8 +61,8 @@ fn sized<T: Real>(n: usize, variant: Variant) -> (Module, ModuleInfo) {
 #[test]
 fn every_shader_is_valid_in_both_precisions() {
     for variant in Variant::ALL {
-        validated(&shader::source::<f32>(variant), variant, Capabilities::empty()).unwrap();
-        validated(&shader::source::<f64>(variant), variant, Capabilities::FLOAT64).unwrap();
+        validated(&shader::source::<f32>(variant), variant, capabilities::<f32>()).unwrap();
+        validated(&shader::source::<f64>(variant), variant, capabilities::<f64>()).unwrap();
     }
     // Negative control: f64 is refused where it is not asked for.
     assert!(validated(&shader::source::<f64>(SWEEPS), SWEEPS, Capabilities::empty()).is_err());
@@ -157,7 +158,7 @@ fn the_structs_shared_with_the_host_have_its_layout() {
 #[test]
 fn bindings_are_found_by_name_where_the_host_puts_them() {
     for variant in Variant::ALL {
-        let (module, _) = validated(&shader::source::<f32>(variant), variant, Capabilities::empty()).unwrap();
+        let (module, _) = validated(&shader::source::<f32>(variant), variant, capabilities::<f32>()).unwrap();
         let mut bound = BTreeMap::new();
         for (_, variable) in module.global_variables.iter() {
             if let Some(binding) = &variable.binding {
@@ -182,7 +183,7 @@ fn workgroup_memory_is_what_the_host_counts() {
         layouter.update(module.to_ctx()).unwrap();
         let in_workgroup = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);
         let bytes: u32 = in_workgroup.map(|(_, v)| layouter[v.ty].size).sum();
-        let counted = shader::workgroup_bytes::<f64>(blocks, variant.solver);
+        let counted = shader::workgroup_bytes::<f64>(blocks, variant);
         assert!(bytes as usize <= counted && counted <= bytes as usize + 16, "n = {n}: {bytes}, counted {counted}");
         if n <= 512 && variant.solver == Solver::GaussSeidel {
             assert!(counted <= 16_384, "n = {n} exceeds what every WebGPU device has: {counted}");
@@ -234,7 +235,7 @@ fn transcendental(module: &Module) -> Option<naga::MathFunction> {
 #[test]
 fn no_transcendental_function_is_used() {
     for variant in Variant::ALL {
-        let (module, _) = validated(&shader::source::<f64>(variant), variant, Capabilities::FLOAT64).unwrap();
+        let (module, _) = validated(&shader::source::<f64>(variant), variant, capabilities::<f64>()).unwrap();
         assert_eq!(transcendental(&module), None);
     }
     // Negative control.

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use crate::{
-    backend::gpu::shader,
+    backend::gpu::{Variant, shader},
     error::{Error, Result},
     number::{Precision, Real},
     solver::{Blocks, Solver, ring::MIN_POINTS},
@@ -31,8 +31,10 @@ pub struct Capacity {
     pub threads: usize,
     /// Bytes of workgroup memory at most.
     pub workgroup_bytes: usize,
-    /// Threads of a subgroup.
+    /// Threads of the largest subgroup.
     pub subgroup: u32,
+    /// Threads of the smallest subgroup, 0 where shaders may not use subgroups.
+    pub least_subgroup: u32,
 }
 
 impl Capacity {
@@ -53,11 +55,17 @@ impl Capacity {
         if threads > self.threads {
             return Err(format!("{threads} threads a workgroup, and the adapter has {}", self.threads));
         }
-        let bytes = shader::workgroup_bytes::<T>(blocks, solver);
+        let bytes = shader::workgroup_bytes::<T>(blocks, Variant::of(solver));
         if bytes > self.workgroup_bytes {
             return Err(format!("{bytes} bytes of workgroup memory, and the adapter has {}", self.workgroup_bytes));
         }
         Ok(())
+    }
+
+    /// The kernel of fixed steps that suits a ring: sweeps by shuffles where every subgroup there may be holds it.
+    pub fn variant(&self, blocks: Blocks, solver: Solver) -> Variant {
+        let subgroup = solver == Solver::GaussSeidel && blocks.count() <= self.least_subgroup as usize;
+        Variant { subgroup, ..Variant::of(solver) }
     }
 }
 
@@ -127,27 +135,30 @@ impl Gpu {
         self.adapter.limits()
     }
 
-    /// Threads of a subgroup; a workgroup is a whole number of them.
-    pub fn subgroup(&self) -> u32 {
-        self.info.subgroup_max_size.clamp(1, 64)
+    /// Threads of the smallest and of the largest subgroup that a shader may meet.
+    pub fn subgroups(&self) -> [u32; 2] {
+        [self.info.subgroup_min_size, self.info.subgroup_max_size].map(|size| size.clamp(1, 64))
     }
 
     /// What decides whether a run fits.
     pub fn capacity(&self) -> Capacity {
         let limits = self.limits();
+        let [least, most] = self.subgroups();
+        let usable = self.adapter.features().contains(wgpu::Features::SUBGROUP);
         Capacity {
             f64: self.has_f64(),
             threads: limits.max_compute_invocations_per_workgroup.min(limits.max_compute_workgroup_size_x) as usize,
             workgroup_bytes: limits.max_compute_workgroup_storage_size as usize,
-            subgroup: self.subgroup(),
+            subgroup: most,
+            least_subgroup: if usable { least } else { 0 },
         }
     }
 
-    /// Opens the adapter with all its limits, and with f64 where it has it.
+    /// Opens the adapter with all its limits, and with f64 and subgroups where it has them.
     pub fn open(&self) -> Result<Device> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("curvelax"),
-            required_features: self.adapter.features() & wgpu::Features::SHADER_F64,
+            required_features: self.adapter.features() & (wgpu::Features::SHADER_F64 | wgpu::Features::SUBGROUP),
             required_limits: self.adapter.limits(),
             ..Default::default()
         };

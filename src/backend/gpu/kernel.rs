@@ -33,7 +33,7 @@ const MAX_SLOTS: usize = 8192;
 pub const TRACE_FIELDS: usize = 20;
 
 /// Field names of what one dispatch asks for, in memory order.
-pub const DISPATCH_FIELDS: [&str; 3] = ["steps", "max_sweeps", "sweeps"];
+pub const DISPATCH_FIELDS: [&str; 4] = ["steps", "max_sweeps", "sweeps", "blocks"];
 
 /// What one dispatch asks for.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -42,6 +42,7 @@ struct Dispatch {
     steps: u32,
     max_sweeps: u32,
     sweeps: u32,
+    blocks: u32,
 }
 
 /// How much one dispatch may do. No bit of a result depends on it: a dispatch that runs out pauses, even inside a
@@ -114,7 +115,7 @@ impl<T: Real> Kernel<T> {
             .map_err(|e| Error::Request(format!("n = {} needs {e}", blocks.n)))?;
         let most = Budget::most(gpu, blocks, variant.adaptive);
         let device = gpu.open()?;
-        let pipeline = compile::<T>(&device.device, blocks, gpu.subgroup(), variant);
+        let pipeline = compile::<T>(&device.device, blocks, gpu.subgroups()[usize::from(!variant.subgroup)], variant);
         let buffers = Buffers::new(&device.device, slots, state_bytes, trace_bytes, size_of::<T>());
         let bindings = buffers.bind(&device.device, &pipeline);
         device.check()?;
@@ -170,7 +171,7 @@ impl<T: Real> Kernel<T> {
 
     fn upload(&mut self) {
         let Budget { steps, sweeps } = self.budget;
-        let asked = Dispatch { steps, max_sweeps: self.max_sweeps, sweeps };
+        let asked = Dispatch { steps, max_sweeps: self.max_sweeps, sweeps, blocks: self.blocks.count() as u32 };
         self.gpu.queue.write_buffer(&self.buffers.dispatch, 0, bytemuck::bytes_of(&asked));
         if std::mem::take(&mut self.changed) {
             let reports: Vec<T> = self.reports.iter().flat_map(Report::to_numbers).collect();
