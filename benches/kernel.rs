@@ -19,7 +19,8 @@ fn main() {
     let gpus = Gpu::list();
     let Some(gpu) = gpus.first() else { return println!("no adapter") };
     println!("{} ({})", gpu.name(), gpu.driver());
-    for n in [32, 100] {
+    let sizes: Vec<usize> = std::env::args().filter_map(|size| size.parse().ok()).collect();
+    for n in if sizes.is_empty() { vec![32, 100] } else { sizes } {
         measure::<f32>(gpu, n);
         measure::<f64>(gpu, n);
     }
@@ -27,8 +28,15 @@ fn main() {
 
 fn measure<T: Real>(gpu: &Gpu, n: usize) {
     let (kernel, start) = start::<T>(gpu, n, gpu.capacity().variant(Blocks::new(n).unwrap(), Solver::GaussSeidel));
-    let (one, two) = (sweeps(kernel, n, 0), sweeps(self::start::<T>(gpu, n, gpu.capacity().variant(Blocks::new(n).unwrap(), Solver::GaussSeidel)).0, n, 1));
-    println!("{} n = {n}: start {start:.2} s; ns per sweep, system and node: k {one:.2}, x and y {:.2}", T::NAME, two / 2.0);
+    let (one, two) = (
+        sweeps(kernel, n, 0),
+        sweeps(self::start::<T>(gpu, n, gpu.capacity().variant(Blocks::new(n).unwrap(), Solver::GaussSeidel)).0, n, 1),
+    );
+    println!(
+        "{} n = {n}: start {start:.2} s; ns per sweep, system and node: k {one:.2}, x and y {:.2}",
+        T::NAME,
+        two / 2.0
+    );
     let (kernel, start) = self::start::<T>(gpu, n, Variant::of(Solver::Direct));
     println!("{} n = {n}: start {start:.2} s; µs per direct step {:.2}", T::NAME, direct(kernel, n));
     let (kernel, start) = self::start::<T>(gpu, n, Variant { adaptive: true, ..Variant::of(Solver::Direct) });
@@ -40,7 +48,8 @@ fn measure<T: Real>(gpu: &Gpu, n: usize) {
 fn now() -> f64 {
     let ticks = || {
         let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-        let fields: Vec<f64> = text.rsplit(')').next()?.split_whitespace().skip(11).take(2).map_while(|f| f.parse().ok()).collect();
+        let fields: Vec<f64> =
+            text.rsplit(')').next()?.split_whitespace().skip(11).take(2).map_while(|f| f.parse().ok()).collect();
         Some(fields.iter().sum::<f64>() / 100.0)
     };
     ticks().unwrap_or(0.0)
@@ -77,8 +86,11 @@ fn sweeps<T: Real>(kernel: Kernel<T>, n: usize, phase: u32) -> f64 {
         }
         seconds.push(dispatch(&mut kernel));
     }
-    let still = (0..MEMBERS).filter(|slot| kernel.counters(*slot).status == 0 && kernel.counters(*slot).steps == 0).count();
-    if still < MEMBERS { println!("only {still} members still sweep"); }
+    let still =
+        (0..MEMBERS).filter(|slot| kernel.counters(*slot).status == 0 && kernel.counters(*slot).steps == 0).count();
+    if still < MEMBERS {
+        println!("only {still} members still sweep");
+    }
     (seconds[1] - seconds[0]) * 1e9 / (800 * MEMBERS * n) as f64
 }
 

@@ -115,7 +115,8 @@ fn solve_ring(row: PairRow) -> vec {
     var stride = 1u;
     // The bound is BLOCKS, see `ring_sums`.
     for (; stride < dispatch.blocks; stride = 2u * stride) {
-        if block % (2u * stride) == stride {
+        let place = block % (2u * stride);
+        if place == stride {
             let inverse = invert(own);
             low = multiply(inverse, low);
             high = multiply(inverse, high);
@@ -127,7 +128,7 @@ fn solve_ring(row: PairRow) -> vec {
             }
         }
         workgroupBarrier();
-        if block % (2u * stride) == 0u {
+        if place == 0u {
             let last = (BLOCKS - 1u) / stride;
             if block > 0u || last % 2u == 1u {
                 let at = select(block - stride, last * stride, block == 0u);
@@ -148,7 +149,8 @@ fn solve_ring(row: PairRow) -> vec {
     if lane == 0u { ring_rhs[0] = rhs; }
     for (stride = stride / 2u; stride > 0u; stride = stride / 2u) {
         workgroupBarrier();
-        if block % (2u * stride) == stride {
+        let place = block % (2u * stride);
+        if place == stride {
             let up = block + stride;
             rhs = rhs - apply(low, ring_rhs[block - stride]) - apply(high, ring_rhs[select(0u, up, up < BLOCKS)]);
             if owns > 0u { ring_rhs[lane] = rhs; }

@@ -6,7 +6,7 @@
 // next dispatch computes the same rows again and sweeps on, so that no bit depends on where a dispatch ended.
 
 fn take_member(index: u32) {
-    member = index;
+    member = all_due[index];
     p = all_parameters[member];
     counters = all_counters[member];
     report = all_reports[member];

@@ -46,14 +46,21 @@ fn pass_up(tail: vec) -> vec {
     return ring_b[before];
 }
 
-/// Four maxima over the ring from the maxima over each block.
+/// Four maxima over the ring from the maxima over each block: first over every `groups`-th block, then over those, which
+/// reads 2 sqrt(BLOCKS) rows instead of BLOCKS.
 fn ring_maxima(part: vec) -> vec {
     workgroupBarrier();
     if owns > 0u { partials[lane] = part; }
     workgroupBarrier();
-    var largest = partials[0];
-    for (var t = 1u; t < dispatch.blocks; t++) {
-        largest = max(largest, partials[t]);
+    var some = part;
+    for (var t = block % dispatch.groups; t < dispatch.blocks; t += dispatch.groups) {
+        some = max(some, partials[t]);
+    }
+    if owns > 0u { ring_a[lane] = some; }
+    workgroupBarrier();
+    var largest = some;
+    for (var t = 0u; t < dispatch.groups; t++) {
+        largest = max(largest, ring_a[t]);
     }
     return largest;
 }

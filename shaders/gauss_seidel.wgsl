@@ -89,7 +89,7 @@ fn judge(error: real, increment: real, tolerance: real, negligible: real) -> u32
 
 /// The window of an unknown after a sweep.
 fn swept(tail: vec2<real>, own: vec, front: vec2<real>) -> Window {
-    return window(vec(tail, tail).xxyy, own, vec(front, front));
+    return Window(vec(tail, own.xy), select(vec(own.z, front, front.y), vec(own.zw, front), is_four));
 }
 
 /// One sweep over u.

@@ -96,6 +96,8 @@ struct Dispatch {
     sweeps: u32,
     /// BLOCKS, as a number that compilers do not know: they would unroll every loop over the blocks.
     blocks: u32,
+    /// Groups in which maxima are taken: about the root of BLOCKS.
+    groups: u32,
 }
 
 const STATE_FIELDS = 15u;
@@ -113,6 +115,9 @@ const BEFORE = 11u;
 @group(0) @binding(3) var<storage, read_write> all_reports: array<Report>;
 /// STATE_FIELDS fields of NODES numbers each.
 @group(0) @binding(4) var<storage, read_write> all_states: array<real>;
+
+/// The members that this dispatch advances, one a workgroup.
+@group(0) @binding(5) var<storage, read> all_due: array<u32>;
 
 /// Index of this workgroup's member, and its parameters.
 var<private> member: u32;

@@ -19,7 +19,7 @@ use curvelax::{
 use naga::{
     AddressSpace, Module, TypeInner,
     back::{hlsl, msl, spv},
-    valid::{Capabilities, ModuleInfo, ValidationFlags, Validator},
+    valid::{Capabilities, ModuleInfo, ShaderStages, SubgroupOperationSet, ValidationFlags, Validator},
 };
 
 const SWEEPS: Variant = Variant::of(Solver::GaussSeidel);
@@ -42,7 +42,9 @@ fn validated(source: &str, variant: Variant, capabilities: Capabilities) -> Resu
         let line = error.location(source).map_or(0, |location| location.line_number as usize);
         format!("{}{}", at(line), error.message())
     })?;
-    let info = Validator::new(ValidationFlags::all(), capabilities).validate(&module).map_err(|error| {
+    let mut validator = Validator::new(ValidationFlags::all(), capabilities);
+    validator.subgroup_stages(ShaderStages::COMPUTE).subgroup_operations(SubgroupOperationSet::all());
+    let info = validator.validate(&module).map_err(|error| {
         let line = error.location(source).map_or(0, |location| location.line_number as usize);
         format!("{}{}", at(line), error.emit_to_string(source))
     })?;
@@ -98,12 +100,13 @@ fn f32_translates_for_every_api_and_f64_for_vulkan() {
         msl::write_string(
             &module,
             &info,
-            &msl::Options { fake_missing_bindings: true, ..Default::default() },
+            &msl::Options { fake_missing_bindings: true, lang_version: (2, 4), ..Default::default() },
             &Default::default(),
         )
         .unwrap();
         let mut text = String::new();
-        let options = hlsl::Options { fake_missing_bindings: true, ..Default::default() };
+        let shader_model = hlsl::ShaderModel::V6_0;
+        let options = hlsl::Options { fake_missing_bindings: true, shader_model, ..Default::default() };
         hlsl::Writer::new(&mut text, &options, &Default::default()).write(&module, &info, None).unwrap();
         assert!(text.contains("evolve"));
 
@@ -166,7 +169,7 @@ fn bindings_are_found_by_name_where_the_host_puts_them() {
                 bound.insert(binding.binding, variable.name.clone().unwrap());
             }
         }
-        let mut expected = vec!["dispatch", "all_parameters", "all_counters", "all_reports", "all_states"];
+        let mut expected = vec!["dispatch", "all_parameters", "all_counters", "all_reports", "all_states", "all_due"];
         if variant.traced {
             expected.push("traces");
         }
@@ -309,7 +312,7 @@ fn noop_device() -> wgpu::Device {
     let instance = wgpu::Instance::new(descriptor);
     let adapter = pollster::block_on(instance.request_adapter(&Default::default())).unwrap();
     let asked = wgpu::DeviceDescriptor {
-        required_features: adapter.features() & wgpu::Features::SHADER_F64,
+        required_features: adapter.features() & (wgpu::Features::SHADER_F64 | wgpu::Features::SUBGROUP),
         // WebGPU's default limits, which every device has.
         ..Default::default()
     };
@@ -338,7 +341,7 @@ fn pipelines_are_built_and_bound_without_any_gpu() {
     assert!(device.features().contains(wgpu::Features::SHADER_F64));
     for n in [6, 7, 64, 100, 257] {
         for variant in Variant::ALL {
-            let buffers = 4 + u32::from(variant.traced);
+            let buffers = 5 + u32::from(variant.traced);
             assert_eq!(pipeline_error::<f32>(&device, n, variant, buffers), None, "f32, n = {n}");
             assert_eq!(pipeline_error::<f64>(&device, n, variant, buffers), None, "f64, n = {n}");
             // Negative control: a buffer too few is noticed.

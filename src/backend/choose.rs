@@ -229,7 +229,8 @@ mod tests {
     use super::*;
 
     /// What every WebGPU device has at least.
-    const LEAST: Capacity = Capacity { f64: false, threads: 256, workgroup_bytes: 16_384, subgroup: 32, least_subgroup: 0 };
+    const LEAST: Capacity =
+        Capacity { f64: false, threads: 256, workgroup_bytes: 16_384, subgroup: 32, least_subgroup: 0 };
 
     fn refused(precision: Option<Precision>, n: usize, capacity: &Capacity) -> String {
         let spec = Spec { precision, ..Spec::default() };

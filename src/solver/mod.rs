@@ -12,7 +12,7 @@ pub use ring::{Blocks, Ring};
 pub use system::{Row, System};
 
 /// Which solver takes the periodic pentadiagonal systems.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Solver {
     /// Gauss–Seidel sweeps, the paper's.

@@ -1,9 +1,16 @@
 //! Adapters: what is there, what each can do, and which one to take.
 
-use std::sync::{Arc, Mutex};
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use crate::{
-    backend::gpu::{Variant, shader},
+    backend::gpu::{
+        Variant,
+        pipeline::{self, Key},
+        shader,
+    },
     error::{Error, Result},
     number::{Precision, Real},
     solver::{Blocks, Solver, ring::MIN_POINTS},
@@ -13,9 +20,12 @@ use crate::{
 pub struct Gpu {
     adapter: wgpu::Adapter,
     info: wgpu::AdapterInfo,
+    /// The device and its pipelines, once one was needed.
+    opened: Mutex<Option<(Device, HashMap<Key, wgpu::ComputePipeline>)>>,
 }
 
 /// An opened device: where kernels are made and run.
+#[derive(Clone)]
 pub struct Device {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
@@ -77,8 +87,10 @@ impl Gpu {
         descriptor.backends = wgpu::Backends::PRIMARY;
         let instance = wgpu::Instance::new(descriptor);
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
-        let mut found: Vec<Gpu> =
-            adapters.into_iter().map(|adapter| Gpu { info: adapter.get_info(), adapter }).collect();
+        let mut found: Vec<Gpu> = adapters
+            .into_iter()
+            .map(|adapter| Gpu { info: adapter.get_info(), adapter, opened: Mutex::default() })
+            .collect();
         // The no-op back end computes nothing but calls itself a CPU device.
         found.retain(|gpu| gpu.info.backend != wgpu::Backend::Noop);
         found.sort_by_key(|gpu| gpu.rank());
@@ -154,8 +166,23 @@ impl Gpu {
         }
     }
 
+    /// The pipeline for a ring and a variant, compiled once, and the device that it is for, opened once.
+    pub fn pipeline<T: Real>(&self, blocks: Blocks, variant: Variant) -> Result<(Device, wgpu::ComputePipeline)> {
+        let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        let (device, pipelines) = match &mut *opened {
+            Some(opened) => opened,
+            none => none.insert((self.open()?, HashMap::new())),
+        };
+        let [least, most] = self.subgroups();
+        let subgroup = if variant.subgroup { least } else { most };
+        let pipeline = pipelines
+            .entry((blocks.n, T::NAME, variant))
+            .or_insert_with(|| pipeline::compile::<T>(&device.device, blocks, subgroup, variant));
+        Ok((device.clone(), pipeline.clone()))
+    }
+
     /// Opens the adapter with all its limits, and with f64 and subgroups where it has them.
-    pub fn open(&self) -> Result<Device> {
+    fn open(&self) -> Result<Device> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("curvelax"),
             required_features: self.adapter.features() & (wgpu::Features::SHADER_F64 | wgpu::Features::SUBGROUP),
