@@ -310,8 +310,8 @@ fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
         curves: 13,
         points: n,
         t_end: 0.1,
-        tau: 1e-3,
-        relax_to: 0.5,
+        tau: Some(1e-3),
+        relax_to: Some(0.5),
         stop_when_relaxed: true,
         series: Some(0.03),
         snapshots: vec![0.0505],
@@ -335,7 +335,7 @@ fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
         }
     }
     // The negative control: another step is noticed.
-    if whole.len() != 13 || run([1, 13], &Spec { tau: 1.1e-3, ..spec.clone() })? == whole {
+    if whole.len() != 13 || run([1, 13], &Spec { tau: Some(1.1e-3), ..spec.clone() })? == whole {
         return Err("another step changed nothing".into());
     }
     Ok(())
