@@ -31,16 +31,12 @@ fn invert(m: vec) -> vec {
     return vec(m.w, -m.y, -m.z, m.x) / (m.x * m.w - m.y * m.z);
 }
 
-/// Solves for `u` alone. Whether that is finite is judged with the positions: it spares a look at all blocks.
-fn solve_one(negligible: real) -> u32 {
-    rhs_y = vec(0.0);
+/// Solves for `u` alone, or for `u` and `v`. Whether `u` alone is finite is judged with the positions: it spares a look at
+/// all blocks.
+fn solve(both: bool, negligible: real) -> u32 {
+    if !both { rhs_y = vec(0.0); }
     solve_rows();
-    return SOLVED;
-}
-
-/// Solves for `u` and `v`.
-fn solve_two(negligible: real) -> u32 {
-    solve_rows();
+    if !both { return SOLVED; }
     let size = max(block_max(bounded_abs(dk)), max(block_max(bounded_abs(u)), block_max(bounded_abs(v))));
     let largest = ring_maxima(vec(size, 0.0, 0.0, 0.0));
     return uniform_decision(select(NOT_FINITE, SOLVED, largest.x <= real(BIG)));

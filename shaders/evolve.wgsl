@@ -123,7 +123,7 @@ fn observe_step() -> Observed {
 fn failure_of_step(solved: u32) -> u32 {
     if solved == NOT_FINITE { return NONFINITE; }
     if solved != SOLVED { return STALLED; }
-    if !sums_are_finite() { return NONFINITE; }
+    if !is_finite() { return NONFINITE; }
     if is_singular(report.progress.turning) { return SINGULAR; }
     return RUNNING;
 }

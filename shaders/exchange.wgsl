@@ -13,14 +13,19 @@ fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     take_member(group.x);
 }
 
-/// The windows of two fields. Two barriers: earlier readers are done, and all have written.
-fn windows(a: vec, b: vec) -> Windows {
+/// Writes two fields for all to read. Two barriers: earlier readers are done, and all have written.
+fn share(a: vec, b: vec) {
     workgroupBarrier();
     if owns > 0u {
         ring_a[lane] = a;
         ring_b[lane] = b;
     }
     workgroupBarrier();
+}
+
+/// The windows of two fields.
+fn windows(a: vec, b: vec) -> Windows {
+    share(a, b);
     return Windows(window(ring_a[before], a, ring_a[after]), window(ring_b[before], b, ring_b[after]));
 }
 

@@ -1,15 +1,12 @@
-// Coloured Gauss–Seidel sweeps to a residual. Twin of src/solver/gauss_seidel.rs.
-//
-// Rows, right-hand sides and unknowns stay in registers. Of a block of four, neighbours need the first two nodes (its front)
-// and the last two (its tail), and the first two need none of another block's first two: so colours 0 and 1 are one
-// phase, colours 2 and 3 another, and a sweep has two exchanges, with the results of four. Only a block of three
-// needs the front after it between its first and its second node: a third exchange where there is one.
+// Coloured Gauss–Seidel sweeps to a residual. Twin of src/solver/gauss_seidel.rs; the sweeps are in sweeps.wgsl.
 
 const SWEEPS_PER_CHECK = 8u;
 
-/// The tails of the block before, of u and v, and the fronts of the block after, at the present stage of a sweep.
-var<private> behind: vec;
-var<private> ahead: vec;
+/// Sweeps `u` for rhs_x and, if `both`, `v` for rhs_y; returns how it ended.
+fn solve(both: bool, negligible: real) -> u32 {
+    if both { return solve_two(negligible); }
+    return solve_one(negligible);
+}
 
 /// Sweeps `u` for rhs_x; returns how it ended.
 fn solve_one(negligible: real) -> u32 {
@@ -17,6 +14,7 @@ fn solve_one(negligible: real) -> u32 {
     start_sweeps();
     sweeps = counters.solve_sweeps;
     let size = system_size(rhs_x);
+    sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));
     let tolerance = max(p.tolerance, real(EPSILON) * size);
     var ended = finite_or_not(size);
     while ended == UNSOLVED && sweeps < dispatch.max_sweeps && budget > 0u {
@@ -35,6 +33,7 @@ fn solve_two(negligible: real) -> u32 {
     start_sweeps();
     sweeps = counters.solve_sweeps;
     let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
+    sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));
     let tolerance = max(p.tolerance, real(EPSILON) * size);
     var ended = finite_or_not(size);
     while ended == UNSOLVED && sweeps < dispatch.max_sweeps && budget > 0u {
@@ -50,78 +49,10 @@ fn solve_two(negligible: real) -> u32 {
     return paused_or(ended);
 }
 
-fn start_sweeps() {
-    let start = windows(u, v);
-    behind = vec(start.a.low.xy, start.b.low.xy);
+/// The over-relaxation that needs about the fewest sweeps for a system of this size.
+fn over_relaxation(size: real) -> real {
+    let g = sqrt(sqrt(real(AUTO_SCALE) * size));
+    return max(real(2.0) * (g / (real(1.0) + g)), real(1.0));
 }
 
-/// A solve that neither ended nor reached the cap has run out of this dispatch's sweeps.
-fn paused_or(ended: u32) -> u32 {
-    if ended != UNSOLVED || sweeps >= dispatch.max_sweeps { return ended; }
-    counters.solve_sweeps = sweeps;
-    return PAUSED;
-}
-
-/// Largest scaled row sum; more than BIG where an entry or a right-hand side is not finite. Times EPSILON it is the
-/// tolerance below which a scaled residual is rounding error.
-fn system_size(rhs: vec) -> real {
-    let terms = vec(1.0) + abs(row_of.a) + abs(row_of.b) + abs(row_of.d) + abs(row_of.e);
-    let finite = bounded_abs(rhs) <= vec(BIG);
-    let sizes = select(vec(2.0 * BIG), bounded_abs(row_of.weight * terms), finite);
-    return ring_maxima(vec(block_max(sizes), 0.0, 0.0, 0.0)).x;
-}
-
-fn finite_or_not(size: real) -> u32 {
-    return uniform_decision(select(NOT_FINITE, UNSOLVED, size <= real(BIG)));
-}
-
-fn judge(error: real, increment: real, tolerance: real, negligible: real) -> u32 {
-    let norms = ring_maxima(vec(error, increment, 0.0, 0.0));
-    let bound = max(tolerance * norms.y, negligible);
-    var ended = UNSOLVED;
-    if !(norms.x <= real(BIG)) {
-        ended = DIVERGED;
-    } else if norms.x <= bound {
-        ended = SOLVED;
-    }
-    return uniform_decision(ended);
-}
-
-/// The window of an unknown after a sweep.
-fn swept(tail: vec2<real>, own: vec, front: vec2<real>) -> Window {
-    return Window(vec(tail, own.xy), select(vec(own.z, front, front.y), vec(own.zw, front), is_four));
-}
-
-/// One sweep over u.
-fn sweep_one() {
-    u.x = relax(0u, rhs_x.x, behind.x, behind.y, u.x, u.y, u.z);
-    if has_threes() { ahead = pass_down_early(vec(u.xy, v.xy)); }
-    u.y = relax(1u, rhs_x.y, behind.y, u.x, u.y, u.z, select(ahead.x, u.w, is_four));
-    ahead = pass_down(vec(u.xy, v.xy));
-    let next = select(ahead.xy, vec2(u.w, ahead.x), is_four);
-    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, next.x, next.y);
-    u.w = select(u.w, relax(3u, rhs_x.w, u.y, u.z, u.w, ahead.x, ahead.y), is_four);
-    behind = pass_up(tails(u, v));
-}
-
-/// One sweep over u and v, with the exchanges of one.
-fn sweep_two() {
-    u.x = relax(0u, rhs_x.x, behind.x, behind.y, u.x, u.y, u.z);
-    v.x = relax(0u, rhs_y.x, behind.z, behind.w, v.x, v.y, v.z);
-    if has_threes() { ahead = pass_down_early(vec(u.xy, v.xy)); }
-    u.y = relax(1u, rhs_x.y, behind.y, u.x, u.y, u.z, select(ahead.x, u.w, is_four));
-    v.y = relax(1u, rhs_y.y, behind.w, v.x, v.y, v.z, select(ahead.z, v.w, is_four));
-    ahead = pass_down(vec(u.xy, v.xy));
-    let next = select(ahead, vec(u.w, ahead.x, v.w, ahead.z), is_four);
-    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, next.x, next.y);
-    v.z = relax(2u, rhs_y.z, v.x, v.y, v.z, next.z, next.w);
-    u.w = select(u.w, relax(3u, rhs_x.w, u.y, u.z, u.w, ahead.x, ahead.y), is_four);
-    v.w = select(v.w, relax(3u, rhs_y.w, v.y, v.z, v.w, ahead.z, ahead.w), is_four);
-    behind = pass_up(tails(u, v));
-}
-
-/// own + sor (rhs - row . u) for the node in component j of the block.
-fn relax(j: u32, rhs: real, m2: real, m1: real, own: real, p1: real, p2: real) -> real {
-    let left = rhs - row_of.a[j] * m2 - row_of.b[j] * m1 - row_of.d[j] * p1 - row_of.e[j] * p2 - own;
-    return own + p.sor * left;
-}
+const AUTO_SCALE = 0.625;

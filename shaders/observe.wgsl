@@ -70,9 +70,9 @@ fn excess_of_sums() -> real {
     return sums.x * sums.x / (real(FOUR_PI) * abs(sums.y)) - p.polygon_ratio;
 }
 
-fn sums_are_finite() -> bool {
+fn is_finite() -> bool {
     let big = real(BIG);
-    return sums.x <= big && abs(sums.y) <= big && abs(sums.z) <= big;
+    return sums.x <= big && abs(sums.y) <= big && extremes.x <= big;
 }
 
 fn is_singular(turning: real) -> bool {

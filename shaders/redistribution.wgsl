@@ -5,27 +5,26 @@ var<private> rkb: vec;
 /// Tangential velocity at the nodes, and at the nodes before them.
 var<private> alpha: vec;
 var<private> alpha_before: vec;
-/// The old k and x on the window of the block: exchanged together with lengths, used by the systems.
+/// The curvatures on the window of the block: the old ones, exchanged together with lengths; for the positions the new ones.
 var<private> k_window: Window;
+/// The old x there.
 var<private> x_window: Window;
-/// New lengths, 1/r and 1/q on the window of the block.
+/// New lengths on the window of the block.
 var<private> r_new: Window;
+/// 1/r and 1/q there, of the old lengths, then of the new ones.
 var<private> ir: Window;
 var<private> iq: Window;
 
-fn velocity(wk: Window, wr: Window) -> vec {
-    let q = (here(wr) + plus1(wr)) * real(0.5);
-    let qm = (minus1(wr) + here(wr)) * real(0.5);
-    let up = (plus1(wk) - k) / q;
-    let down = (k - minus1(wk)) / qm;
-    return b(k) - (up - down) / r;
+fn velocity(wk: Window) -> vec {
+    return b(k) - ((plus1(wk) - k) * here(iq) - (k - minus1(wk)) * minus1(iq)) * here(ir);
 }
 
 /// Fills the variables above; returns the length L of the old state.
 fn redistribute() -> real {
     let old = windows(k, r);
     k_window = old.a;
-    let beta = velocity(old.a, old.b);
+    reciprocals(old.b);
+    let beta = velocity(k_window);
     trace(0u, beta);
     rkb = r * k * beta;
     let sums = ring_sums(vec(block_sum(r), block_sum(rkb), 0.0, 0.0)).all;
@@ -35,7 +34,7 @@ fn redistribute() -> real {
     var growth = -(p.tau * (k * beta));
     if p.redistribution > real(0.5) {
         tangential_velocity(mean_rkb, mean_length);
-        let rate = p.omega * (vec(mean_length) / r - vec(1.0)) - vec(mean_rkb);
+        let rate = p.omega * (mean_length * here(ir) - vec(1.0)) - vec(mean_rkb);
         growth = p.tau * rate;
     } else {
         alpha = vec(0.0);
@@ -45,7 +44,7 @@ fn redistribute() -> real {
     let next = windows(r * exponential(growth), x);
     r_new = next.a;
     x_window = next.b;
-    reciprocals();
+    reciprocals(r_new);
     return length;
 }
 
@@ -62,10 +61,13 @@ fn tangential_velocity(mean_rkb: real, mean_length: real) {
     }
 }
 
-fn reciprocals() {
-    ir = Window(vec(1.0) / r_new.low, vec(1.0) / r_new.high);
-    let low = (r_new.low + minus1(r_new)) * real(0.5);
-    // The last q would need first+6; no row asks for it.
-    let high = (r_new.high + vec(r_new.high.yzw, r_new.high.w)) * real(0.5);
-    iq = Window(vec(1.0) / low, vec(1.0) / high);
+/// 1/r and 1/q from one division: of the two, which are of one size, 1/(r q).
+fn reciprocals(w: Window) {
+    let low_q = (w.low + minus1(w)) * real(0.5);
+    // The last q would need first+6; no row asks for it, and its r serves as well.
+    let high_q = (w.high + vec(w.high.yzw, w.high.w)) * real(0.5);
+    let low = vec(1.0) / (w.low * low_q);
+    let high = vec(1.0) / (w.high * high_q);
+    ir = Window(low * low_q, high * high_q);
+    iq = Window(low * w.low, high * w.high);
 }

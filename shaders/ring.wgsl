@@ -14,6 +14,8 @@ override FOURS: u32;
 override BLOCKS: u32;
 /// Threads: at least one a block, in whole subgroups.
 override THREADS: u32;
+/// Nodes of all coarser rings together, for multigrid.
+override COARSE: u32;
 
 /// One row a block, for sums over the ring.
 var<workgroup> partials: array<vec, BLOCKS>;

@@ -16,15 +16,17 @@ fn step() -> u32 {
     let radius = length * real(HALF_OVER_PI);
     let rounding = real(NEGLIGIBLE * EPSILON);
 
-    if uniform_decision(counters.phase & 1u) == 0u {
-        let for_k = step_curvature(rounding / radius);
-        if for_k != SOLVED { return for_k; }
+    // The two solves share a call: compilers put the body of every call in its place.
+    for (var part = uniform_decision(counters.phase & 1u); part < 2u; part++) {
+        let positions = part == 1u;
+        if positions { begin_positions(); } else { begin_curvature(); }
+        let before = counters.solve_sweeps;
+        let ended = solve(positions, select(rounding / radius, rounding * radius, positions));
+        if positions { end_positions(sweeps - before); } else { end_curvature(sweeps - before); }
+        if ended != SOLVED { return ended; }
         counters.phase += 1u;
         counters.solve_sweeps = 0u;
     }
-    new_k = k + dk;
-    let for_x = step_position(rounding * radius);
-    if for_x != SOLVED { return for_x; }
     let moved = windows(x + dx, y + dy);
     new_x = moved.a;
     new_y = moved.b;
@@ -32,40 +34,40 @@ fn step() -> u32 {
     if p.pull > real(0.0) { pull(); }
     trace(2u, new_r);
     trace(19u, new_k);
-    counters.phase += 1u;
-    counters.solve_sweeps = 0u;
     return SOLVED;
 }
 
-fn step_curvature(negligible: real) -> u32 {
+fn begin_curvature() {
     assemble_curvature();
     trace_system(3u);
     trace(8u, rhs_x);
-    let before = counters.solve_sweeps;
     u = dk;
-    let ended = solve_one(negligible);
-    dk = u;
-    counters.sweeps_k += sweeps - before;
-    trace(9u, dk);
-    return ended;
 }
 
-fn step_position(negligible: real) -> u32 {
+fn end_curvature(made: u32) {
+    dk = u;
+    counters.sweeps_k += made;
+    trace(9u, dk);
+}
+
+fn begin_positions() {
+    new_k = k + dk;
     let exchanged = windows(new_k, y);
-    assemble_position(exchanged.a, exchanged.b);
+    k_window = exchanged.a;
+    assemble_position(k_window, exchanged.b);
     trace_system(10u);
     trace(15u, rhs_x);
     trace(16u, rhs_y);
-    let before = counters.solve_sweeps;
     u = dx;
     v = dy;
-    let ended = solve_two(negligible);
+}
+
+fn end_positions(made: u32) {
     dx = u;
     dy = v;
-    counters.sweeps_x += sweeps - before;
+    counters.sweeps_x += made;
     trace(17u, dx);
     trace(18u, dy);
-    return ended;
 }
 
 fn trace_system(field: u32) {

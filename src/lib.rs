@@ -40,6 +40,7 @@
 //! | [`truth`] | problems with exact solutions, and the error and order against them |
 //! | [`report`] | tables, plots, provenance |
 //! | [`figures`] | the paper's figures, as data |
+//! | [`mod@bench`] | how fast a back end advances members |
 //! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
 //! | [`cli`] | the commands |
 //!
@@ -86,6 +87,7 @@
 //! ```
 
 pub mod backend;
+pub mod bench;
 pub mod cli;
 pub mod conformance;
 pub mod curve;

@@ -1,11 +1,16 @@
-//! The number that the scheme is generic over: `f64` is the reference, `f32` mirrors the kernel.
+//! The number that the scheme is generic over: `f64` is the reference, `f32` mirrors the kernel, lanes are several of
+//! either side by side.
 //!
-//! [`Number`] asks only for what a group of SIMD lanes can also give: arithmetic, and comparisons that return
-//! masks instead of steering branches. [`Real`] is a single number. Rust never contracts `a*b + c`, so every
-//! expression rounds as written, on every machine.
+//! [`Number`] asks only for what SIMD lanes can give: arithmetic, and comparisons that return masks instead of steering
+//! branches. [`Real`] is a single number. Rust never contracts `a*b + c`, so every expression rounds as written, in
+//! every lane and on every machine.
 
 use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+
+mod lanes;
+
+pub(crate) use lanes::{Element, Instructions, Lanes};
 
 /// Values above this bound count as not finite; far below the overflow of `f32`, so that squares survive.
 pub const BIG: f64 = 1e18;
@@ -22,23 +27,46 @@ pub trait Mask: Copy {
     fn or(self, other: Self) -> Self;
     /// Lane-wise negation.
     fn not(self) -> Self;
+    /// The value of one lane.
+    fn lane(self, lane: usize) -> bool;
+    /// Sets one lane.
+    fn set_lane(&mut self, lane: usize, value: bool);
+
+    /// True in every lane.
+    #[inline(always)]
+    fn all(self) -> bool {
+        !self.not().any()
+    }
 }
 
 impl Mask for bool {
+    #[inline(always)]
     fn all_of(value: bool) -> bool {
         value
     }
+    #[inline(always)]
     fn any(self) -> bool {
         self
     }
+    #[inline(always)]
     fn and(self, other: bool) -> bool {
         self & other
     }
+    #[inline(always)]
     fn or(self, other: bool) -> bool {
         self | other
     }
+    #[inline(always)]
     fn not(self) -> bool {
         !self
+    }
+    #[inline(always)]
+    fn lane(self, _lane: usize) -> bool {
+        self
+    }
+    #[inline(always)]
+    fn set_lane(&mut self, _lane: usize, value: bool) {
+        *self = value;
     }
 }
 
@@ -56,13 +84,23 @@ pub trait Number:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
+    /// The number in a lane.
+    type Real: Real;
     /// Result of a comparison.
     type Mask: Mask;
+    /// How many numbers stand side by side.
+    const LANES: usize;
     /// Machine epsilon.
     const EPSILON: f64;
+    /// 1.5 times the number from which on there are no fractions.
+    const WHOLE: f64;
 
     /// The number nearest to `value`, in every lane.
     fn of(value: f64) -> Self;
+    /// The number in one lane.
+    fn lane(&self, lane: usize) -> Self::Real;
+    /// Sets one lane.
+    fn set_lane(&mut self, lane: usize, value: Self::Real);
     /// Square root, correctly rounded.
     fn sqrt(self) -> Self;
     /// Absolute value.
@@ -71,14 +109,21 @@ pub trait Number:
     fn max(self, other: Self) -> Self;
     /// The smaller one; arguments must not be NaN.
     fn min(self, other: Self) -> Self;
-    /// Largest integer not above.
-    fn floor(self) -> Self;
     /// `2^self` for an integral `self` in [-126, 127].
     fn exp2_integral(self) -> Self;
     /// `self <= other`; false where either is NaN.
     fn le(self, other: Self) -> Self::Mask;
     /// `yes` where the mask holds, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+
+    /// Largest integer not above, for numbers below 2²¹ in size. No instruction of SSE2 rounds, and a call would cost more
+    /// than the exponential that asks.
+    #[inline(always)]
+    fn small_floor(self) -> Self {
+        let whole = Self::of(Self::WHOLE);
+        let nearest = (self + whole) - whole;
+        Self::select(nearest.le(self), nearest, nearest - Self::of(1.0))
+    }
 
     /// 1/self.
     #[inline(always)]
@@ -99,7 +144,7 @@ pub trait Number:
     #[inline(always)]
     fn exp(self) -> Self {
         let x = self.max(Self::of(-40.0)).min(Self::of(40.0));
-        let n = (x * Self::of(std::f64::consts::LOG2_E) + Self::of(0.5)).floor();
+        let n = (x * Self::of(std::f64::consts::LOG2_E) + Self::of(0.5)).small_floor();
         let reduced = (x - n * Self::of(LN2_HIGH)) - n * Self::of(LN2_LOW);
         let mut sum = Self::of(EXP_SERIES[0]);
         for coefficient in &EXP_SERIES[1..] {
@@ -141,13 +186,17 @@ const EXP_SERIES: [f64; 14] = [
 ];
 
 /// A single number that can be copied to and from a device.
-pub trait Real: Number<Mask = bool> + bytemuck::Pod + PartialOrd + std::fmt::Display + std::fmt::Debug {
+pub trait Real:
+    Number<Real = Self, Mask = bool> + bytemuck::Pod + PartialOrd + std::fmt::Display + std::fmt::Debug
+{
     /// Its name in WGSL.
     const NAME: &'static str;
     /// Which of the two it is.
     const PRECISION: Precision;
     /// Exact conversion.
     fn to_f64(self) -> f64;
+    /// Largest integer not above.
+    fn floor(self) -> Self;
 }
 
 /// The number type of the state and of all arithmetic on it.
@@ -179,13 +228,24 @@ impl Precision {
 }
 
 macro_rules! real {
-    ($type:ty, $precision:ident, $name:literal, $bits:ty, $mantissa:expr, $bias:expr) => {
+    ($type:ident, $precision:ident, $name:literal, $mantissa:expr, $bias:expr, $whole:expr) => {
         impl Number for $type {
+            type Real = $type;
             type Mask = bool;
+            const LANES: usize = 1;
             const EPSILON: f64 = <$type>::EPSILON as f64;
+            const WHOLE: f64 = $whole;
             #[inline(always)]
             fn of(value: f64) -> Self {
                 value as $type
+            }
+            #[inline(always)]
+            fn lane(&self, _lane: usize) -> Self {
+                *self
+            }
+            #[inline(always)]
+            fn set_lane(&mut self, _lane: usize, value: Self) {
+                *self = value;
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
@@ -204,12 +264,10 @@ macro_rules! real {
                 if self < other { self } else { other }
             }
             #[inline(always)]
-            fn floor(self) -> Self {
-                <$type>::floor(self)
-            }
-            #[inline(always)]
             fn exp2_integral(self) -> Self {
-                <$type>::from_bits(((self as i64 + $bias) as $bits) << $mantissa)
+                // The lowest bits of the sum hold the integer; the shift drops the others.
+                let integer = (self + $whole as $type).to_bits();
+                <$type>::from_bits((integer << $mantissa).wrapping_add($bias << $mantissa))
             }
             #[inline(always)]
             fn le(self, other: Self) -> bool {
@@ -227,12 +285,15 @@ macro_rules! real {
             fn to_f64(self) -> f64 {
                 self.into()
             }
+            fn floor(self) -> Self {
+                <$type>::floor(self)
+            }
         }
     };
 }
 
-real!(f64, F64, "f64", u64, 52, 1023);
-real!(f32, F32, "f32", u32, 23, 127);
+real!(f64, F64, "f64", 52, 1023, 6_755_399_441_055_744.0);
+real!(f32, F32, "f32", 23, 127, 12_582_912.0);
 
 #[cfg(test)]
 mod tests {

@@ -11,7 +11,7 @@ use crate::{
     ensemble::{
         Ended, Member, Observables, Outcome, Portrait, SeriesRow, Snapshot, Spec, Status,
         member::{relaxation_rate, strongest_pull},
-        spec::{Pace, Precision, Pull},
+        spec::{Pace, Precision, Pull, Sor},
     },
     schedule::{Clock, Output, Ticks},
     scheme::{
@@ -434,7 +434,10 @@ fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parame
             Pull::Auto => (PULL_PER_RATE * relaxation_rate(nodes)).min(strongest_pull(nodes)),
         },
         tolerance,
-        sor: spec.sor,
+        sor: match spec.sor {
+            Sor::Factor(factor) => factor,
+            Sor::Auto => 0.0,
+        },
         length_penalty: of_flow.length_penalty * unit * unit,
         polygon_ratio: polygon::regular_ratio(nodes.len()),
         ..of_flow

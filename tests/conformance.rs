@@ -18,8 +18,8 @@ use curvelax::{
     ensemble::{Ended, Family, Sink, Spec, Status, spec::Precision},
     number::Real,
     scheme::{
-        State, Workspace,
-        evolve::{Run, evolve},
+        State,
+        evolve::{Run, Team, evolve},
         parameters::{Counters, NEVER},
         step::Method,
     },
@@ -77,7 +77,8 @@ fn record(cases: u64) {
 }
 
 fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
-    for (solver, word) in [(Solver::GaussSeidel, "sweeps"), (Solver::Direct, "direct")] {
+    for solver in Solver::ALL {
+        let word = solver.name();
         let mut add = |name: String, case: fn(&Gpu, Solver, usize) -> Outcome, n: usize| {
             let name = format!("{} {word} adapter {index}: {name}", T::NAME);
             trials.push(Trial::test(name, move || case(&Gpu::list()[index], solver, n)));
@@ -384,7 +385,8 @@ fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let together = on_gpu::<T>(gpu, solver, n, &mixed, dispatches_of(5))?;
     let expected = [
         (1, vec![Status::Nonfinite]),
-        (3, vec![Status::Nonfinite, Status::Singular]),
+        // V-cycles diverge where sweeps would overflow.
+        (3, vec![Status::Nonfinite, Status::Singular, Status::Stalled]),
         (4, vec![Status::Nonfinite, Status::Singular, Status::Stalled]),
         (6, vec![Status::Singular]),
     ];
@@ -411,7 +413,7 @@ fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let mut relaxed = 0;
     for (j, launch) in launches.iter().enumerate() {
         let mut twin: Run<T> = launch.convert();
-        evolve(&mut twin, &method, &mut Workspace::new(blocks), 60);
+        evolve(&mut twin, &method, &mut Team::new(blocks), 60);
         let (ours, theirs) = (ended[j].counters, twin.counters);
         let key = |c: Counters| (c.status, c.steps, c.relax_step, c.half_step);
         if key(ours) != key(theirs) {
@@ -437,7 +439,9 @@ fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let most = gpu.capacity().max_points::<T>(solver);
     let n = most.min(1024);
-    if n < 512 {
+    // The rings below take twice as much again and more.
+    let least = if solver == Solver::Multigrid { 256 } else { 512 };
+    if n < least {
         return Err(format!("only {n} points fit").into());
     }
     let launches = members(n, 2, 2, 1e-3)?;
@@ -475,7 +479,7 @@ fn adaptive_largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
 /// Numbers of the tables that the program writes, with the statuses in front.
 fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Result<(Vec<String>, Vec<f64>), Failed> {
     let folder = tempfile::tempdir()?;
-    let solver = if solver == Solver::Direct { "direct" } else { "gauss-seidel" };
+    let solver = solver.name();
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
     command.current_dir(&folder).env("XDG_RUNTIME_DIR", folder.path());
     let shape = folder.path().join("dumbbell.csv");
@@ -559,7 +563,7 @@ fn program_refuses<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let folder = tempfile::tempdir()?;
     let points = (most + 1).to_string();
     let arguments = ["run", "--backend", "gpu", "--adapter", gpu.name(), "--precision", T::NAME, "--points", &points];
-    let solver = if solver == Solver::Direct { "direct" } else { "gauss-seidel" };
+    let solver = solver.name();
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
     command
         .current_dir(&folder)
@@ -585,7 +589,7 @@ fn paper<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     launch.parameters.tau = 1e-3;
     let mut exact = launch.clone();
     let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
-    evolve(&mut exact, &method, &mut Workspace::new(Blocks::new(n).ok_or("n")?), 2000);
+    evolve(&mut exact, &method, &mut Team::new(Blocks::new(n).ok_or("n")?), 2000);
     let Left { state, counters, .. } = on_gpu::<T>(gpu, solver, n, &[launch], dispatches_of(50))?.remove(0);
     if (counters.steps, exact.counters.steps) != (2000, 2000) {
         return Err(format!("{counters:?} on the GPU, {:?} on the CPU", exact.counters).into());

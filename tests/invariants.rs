@@ -12,13 +12,13 @@ use curvelax::{
     curve::{BaseCurve, Sampling, Shape, polygon},
     ensemble::{
         Ended, Family, Outcome, Sink, Spec, Status,
-        spec::{BackendChoice, Precision, Pull, Solver, SolverChoice},
+        spec::{BackendChoice, Precision, Pull, Solver, SolverChoice, Sor},
     },
     flow::Flow,
     number::Real,
     scheme::{
-        Parameters, State, Workspace,
-        evolve::{Run, evolve},
+        Parameters, State,
+        evolve::{Run, Team, evolve},
         step::Method,
     },
     simulate::simulate,
@@ -228,7 +228,7 @@ fn the_work_of_a_run_is_what_it_was() {
     let spec = |flow, n, sor| Spec {
         points: n,
         flow,
-        sor,
+        sor: Sor::Factor(sor),
         tau: Some(1e-3),
         t_end: 0.1,
         ..method(Precision::F64, Solver::GaussSeidel)
@@ -237,6 +237,9 @@ fn the_work_of_a_run_is_what_it_was() {
     let adaptive =
         Spec { tau: None, adaptive: Some(1e-3), solver: SolverChoice::Auto, ..spec(Flow::Willmore, 61, 1.0) };
     let swept = Spec { solver: SolverChoice::GaussSeidel, ..adaptive.clone() };
+    let automatic = Spec { sor: Sor::Auto, ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
+    let cycles = Spec { solver: SolverChoice::Multigrid, ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
+    let adaptive_cycles = Spec { solver: SolverChoice::Multigrid, ..adaptive.clone() };
     let stops = Spec { stop_when_relaxed: true, t_end: 2.0, ..spec(Flow::SurfaceDiffusion, 50, 1.7) };
     for (name, spec, expected) in [
         ("surface diffusion", spec(Flow::SurfaceDiffusion, 100, 1.0), [100, 416144, 407104]),
@@ -248,6 +251,9 @@ fn the_work_of_a_run_is_what_it_was() {
         ),
         ("until relaxed", stops, [192, 19744, 18592]),
         ("direct", direct, [100, 0, 0]),
+        ("over-relaxed as it chooses", automatic, [100, 69072, 67320]),
+        ("multigrid", cycles, [100, 1080, 966]),
+        ("multigrid, adaptive", adaptive_cycles, [71, 2072, 1880]),
         ("adaptive", adaptive, [71, 0, 0]),
         ("adaptive, by sweeps", swept, [71, 97568, 92648]),
     ] {
@@ -349,7 +355,7 @@ fn relaxed_ellipse<T: Real>(n: usize, method: &Method, tolerance: f64) -> (Vec<D
     };
     let mut run: Run<T> = Run::<f64>::new(State::from_nodes(&nodes), parameters).convert();
     run.counters.goal = 1000;
-    let mut work = Workspace::new(Blocks::new(n).unwrap());
+    let mut work = Team::new(Blocks::new(n).unwrap());
     evolve(&mut run, method, &mut work, 1000);
     assert_eq!((run.counters.status, run.counters.steps), (0, 1000), "n = {n}");
     let t_relax = (f64::from(run.counters.relax_step) + run.report.progress.relax_fraction.to_f64()) * 1e-3;

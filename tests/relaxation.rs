@@ -12,14 +12,14 @@ use curvelax::{
     curve::{BaseCurve, Outline, Sampling, crossing, polygon},
     ensemble::{
         Ended, Family, Member, Observables, Outcome, Sink, Snapshot, Spec, Status,
-        spec::{BackendChoice, Precision, Pull, SolverChoice},
+        spec::{BackendChoice, Precision, Pull, SolverChoice, Sor},
     },
     error::Result,
     flow::Flow,
     number::Real,
     schedule::{Ticks, outputs},
     scheme::{
-        Parameters, State, Workspace,
+        Parameters, State,
         evolve::{self, Run},
         observe, pace,
         parameters::Progress,
@@ -94,7 +94,7 @@ fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let outputs = outputs(spec.t_end, spec.series, &spec.snapshots);
     let mut trajectory = Trajectory::new(member, spec, T::PRECISION, &outputs);
     let mut run = trajectory.launch().convert::<T>();
-    let mut work = Workspace::new(Blocks::new(n).unwrap());
+    let mut work = evolve::Team::new(Blocks::new(n).unwrap());
     let method = Method { solver: spec.solver(), order: Order::Coloured, max_sweeps: spec.max_sweeps };
     while !trajectory.is_over() {
         evolve::evolve(&mut run, &method, &mut work, 64);
@@ -377,7 +377,7 @@ fn one_sweep_is_too_few_and_the_member_stalls_in_finite_time() {
     assert_eq!((outcome.status, outcome.t_relax), (Status::Stalled, None));
     // Steps of any length are solved once they are short enough; the member creeps on until it has made its share.
     assert!(outcome.steps == 31_631 && outcome.t_end < 0.1, "{outcome:?}");
-    assert_eq!(one(&Spec { max_sweeps: 200_000, sor: 1.7, ..spec }).status, Status::Relaxed);
+    assert_eq!(one(&Spec { max_sweeps: 200_000, sor: Sor::Factor(1.7), ..spec }).status, Status::Relaxed);
 }
 
 /// Two unit discs joined by a bar.
@@ -470,7 +470,7 @@ fn random_polygons_relax_unless_128_nodes_do_not_resolve_them() {
 #[test]
 #[ignore = "minutes; prints the table"]
 fn a_thousand_random_polygons() {
-    for omega in [10.0, 1.0, 100.0] {
+    for omega in [10.0, 1.0] {
         println!("omega = {omega}");
         let all = relax_polygons(1000, &for_polygons(omega));
         tabulate(&all);
@@ -526,7 +526,7 @@ fn unbounded(nodes: &[DVec2], flow: &Flow) -> Run<f64> {
 
 /// `steps` extrapolated steps over the time `t`.
 fn extrapolate(run: &mut Run<f64>, t: f64, steps: u32) {
-    let mut work = Workspace::new(Blocks::new(run.state.curve.len()).unwrap());
+    let mut work = evolve::Team::new(Blocks::new(run.state.curve.len()).unwrap());
     let before = run.counters.steps;
     for _ in 0..steps {
         run.report.progress.next = t / f64::from(steps);
@@ -591,7 +591,7 @@ fn a_round_polygon_under_a_foreign_curvature_does_not_count_as_relaxed() {
         let mut run = Run::new(state, Parameters { polygon_ratio: 1.0, relax_at: 0.1, ..p });
         run.counters.goal = 1;
         let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
-        evolve::evolve(&mut run, &method, &mut Workspace::new(Blocks::new(50).unwrap()), 1);
+        evolve::evolve(&mut run, &method, &mut evolve::Team::new(Blocks::new(50).unwrap()), 1);
         assert_eq!((run.counters.status, run.counters.steps), (0, 1));
         assert_eq!(run.counters.relax_step == 0, relaxes, "curvature {foreign} times the polygon's");
     }

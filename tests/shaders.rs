@@ -14,7 +14,11 @@ use curvelax::{
         state::{CURVE_FIELDS, STATE_FIELDS},
         step::NEGLIGIBLE,
     },
-    solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK},
+    solver::{
+        Blocks, Solver,
+        gauss_seidel::{AUTO_SCALE, SWEEPS_PER_CHECK},
+        multigrid,
+    },
 };
 use naga::{
     AddressSpace, Module, TypeInner,
@@ -290,6 +294,12 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("BEFORE", (2 * CURVE_FIELDS + 3) as f64),
         ("NEGLIGIBLE", NEGLIGIBLE),
         ("SWEEPS_PER_CHECK", f64::from(SWEEPS_PER_CHECK)),
+        ("AUTO_SCALE", AUTO_SCALE),
+        ("SWEEPS_PER_CYCLE", f64::from(multigrid::SWEEPS_PER_CYCLE)),
+        ("COARSE_SWEEPS", f64::from(multigrid::COARSE_SWEEPS)),
+        ("BALANCE", multigrid::BALANCE),
+        ("COARSEST", multigrid::COARSEST as f64),
+        ("LEVELS", shader::LEVELS as f64),
         ("NEVER", f64::from(NEVER)),
         ("RUNNING", 0.0),
         ("RELAXED", f64::from(Status::Relaxed as u32)),

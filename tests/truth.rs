@@ -13,7 +13,7 @@ use curvelax::{
         spec::{BackendChoice, Precision, Solver},
     },
     flow::Flow,
-    scheme::{Parameters, State, Workspace, curvature, position, redistribution, step},
+    scheme::{Parameters, State, Workspace, curvature::Curvature, position::Position, redistribution, step},
     solver::{Blocks, direct},
     truth::{LEMNISCATE_LIFE, Measure, Problem, Solved, Varied, problems, studies},
 };
@@ -39,7 +39,7 @@ fn main() {
             if on_gpu && precision == Precision::F64 && gpu.as_ref().is_some_and(|gpu| !gpu.has_f64()) {
                 continue;
             }
-            for solver in [Solver::Direct, Solver::GaussSeidel] {
+            for solver in Solver::ALL {
                 let method = Spec { backend, precision: Some(precision), solver: solver.into(), ..Spec::default() };
                 for problem in problems() {
                     let name = format!("{backend:?} {precision:?} {solver:?}: {}", problem.name).to_lowercase();
@@ -179,33 +179,34 @@ fn correct_step(Linear { state, work, p }: &mut Linear) {
 /// A step whose 𝓑_i has `φ(k_i) + φ(k_{i-1})`, as the paper prints it.
 fn misprinted_step(Linear { state, work, p }: &mut Linear) {
     let State { curve, increments, .. } = state;
-    redistribution::redistribute(curve, p, work);
-    curvature::assemble(curve, p, work);
-    direct::solve(&work.curvature, [&mut increments.k]);
-    (0..curve.len()).for_each(|i| work.new.k[i] = curve.k[i] + increments.k[i]);
-    work.new.k.close();
+    let Workspace { blocks, motion, new, curvature, position, factors, .. } = work;
+    redistribution::redistribute(curve, p, *blocks, motion, &mut new.r);
+    curvature.assemble(&Curvature::new(curve, new, motion, p));
+    direct::solve(curvature, [&mut increments.k], &mut factors.0);
+    (0..curve.len()).for_each(|i| new.k[i] = curve.k[i] + increments.k[i]);
+    new.k.close();
 
-    position::assemble(curve, p, work);
+    position.assemble(&Position::new(curve, new, motion, p));
     for i in 0..curve.len() {
-        let ([_, before, _, after, _], ir) = (work.new.k.window(i), work.ir[i]);
-        let change = 0.5 * (p.phi(before) - p.phi(after)) * ir;
-        let row = &mut work.position.rows[i];
+        let ([_, before, _, after, _], ir) = (new.k.window(i), motion.ir[i]);
+        let change = 0.5 * (p.law().phi(before) - p.law().phi(after)) * ir;
+        let row = &mut position.rows[i];
         // The diagonal is q/τ minus the other entries, so it changes by as much the other way.
-        let c = row.weight / (p.tau * work.iq[i]);
+        let c = row.weight / (p.tau * motion.iq[i]);
         let rescale = c / (c - change);
-        for (rhs, old) in work.position.rhs.iter_mut().zip([&curve.x, &curve.y]) {
+        for (rhs, old) in position.rhs.iter_mut().zip([&curve.x, &curve.y]) {
             let [_, before, here, ..] = old.window(i);
             rhs[i] = (rhs[i] - change / c * (before - here)) * rescale;
         }
         row.b += change / c;
         [row.a, row.b, row.d, row.e] = [row.a, row.b, row.d, row.e].map(|entry| entry * rescale);
     }
-    direct::solve(&work.position, [&mut increments.x, &mut increments.y]);
+    direct::solve(position, [&mut increments.x, &mut increments.y], &mut factors.1);
     for i in 0..curve.len() {
-        work.new.x[i] = curve.x[i] + increments.x[i];
-        work.new.y[i] = curve.y[i] + increments.y[i];
+        new.x[i] = curve.x[i] + increments.x[i];
+        new.y[i] = curve.y[i] + increments.y[i];
     }
-    work.new.x.close();
-    work.new.y.close();
-    std::mem::swap(curve, &mut work.new);
+    new.x.close();
+    new.y.close();
+    std::mem::swap(curve, new);
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{
     Backend,
-    cpu::CpuBackend,
+    cpu::{CpuBackend, Vectorised},
     gpu::{Capacity, Gpu, Kernel, Variant},
 };
 use crate::{
@@ -13,7 +13,6 @@ use crate::{
         spec::{BackendChoice, Precision},
     },
     error::{Error, Result},
-    number::Real,
     scheme::step::Method,
     solver::{Blocks, Order, Solver},
 };
@@ -171,6 +170,7 @@ impl Choice {
         };
         let solver = match spec.solver() {
             Solver::GaussSeidel => "Gauss-Seidel sweeps",
+            Solver::Multigrid => "sweeps inside multigrid",
             Solver::Direct => "direct solver",
         };
         format!("back end: {device}, {precision} ({}); {solver}", self.reason)
@@ -180,7 +180,7 @@ impl Choice {
     pub fn settle(&self, spec: &mut Spec) {
         spec.backend = if self.gpu.is_some() { BackendChoice::Gpu } else { BackendChoice::Cpu };
         spec.adapter = self.gpu.as_ref().map(|gpu| gpu.name().to_string());
-        if spec.solver() == Solver::GaussSeidel {
+        if spec.solver().sweeps() {
             spec.tolerance = Some(spec.tolerance_at(self.precision));
         }
         spec.precision = Some(self.precision);
@@ -195,7 +195,7 @@ impl Choice {
         }
     }
 
-    fn open_in<T: Real>(self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+    fn open_in<T: Vectorised>(self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         let blocks = ring(n)?;
         let mut platform = Platform {
             backend: "cpu".into(),

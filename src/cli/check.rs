@@ -56,12 +56,15 @@ pub fn check(args: CheckArgs) -> Result<()> {
             }
         };
         say("f32");
-        let mut rows = compare::<f32>(gpu, Solver::GaussSeidel)?;
-        rows.extend(compare::<f32>(gpu, Solver::Direct)?);
+        let mut rows = Vec::new();
+        for solver in Solver::ALL {
+            rows.extend(compare::<f32>(gpu, solver)?);
+        }
         if gpu.has_f64() {
             say("f64");
-            rows.extend(compare::<f64>(gpu, Solver::GaussSeidel)?);
-            rows.extend(compare::<f64>(gpu, Solver::Direct)?);
+            for solver in Solver::ALL {
+                rows.extend(compare::<f64>(gpu, solver)?);
+            }
         }
         failed += rows.iter().filter(|row| !row.passes()).count();
         print(&table(gpu, &rows))?;
@@ -72,7 +75,7 @@ pub fn check(args: CheckArgs) -> Result<()> {
     }
 }
 
-/// The worst row of every quantity over all sizes; of the direct solver what does not come before a solve.
+/// The worst row of every quantity over all sizes; of all solvers but the first what does not come before a solve.
 fn compare<T: Real>(gpu: &Gpu, solver: Solver) -> Result<Vec<Row>> {
     let mut worst: Vec<Row> = Vec::new();
     for n in SIZES {
@@ -97,7 +100,7 @@ fn compare<T: Real>(gpu: &Gpu, solver: Solver) -> Result<Vec<Row>> {
 fn table(gpu: &Gpu, rows: &[Row]) -> String {
     let sizes = SIZES.map(|n| n.to_string()).join(", ");
     let mut text = format!(
-        "{} ({}): {MEMBERS} members, n = {sizes}\n\n{:<5}{:<8}{:>5}  {:<24}{:>10}{:>13}{:>10}  {:<8}at\n",
+        "{} ({}): {MEMBERS} members, n = {sizes}\n\n{:<5}{:<13}{:>5}  {:<24}{:>10}{:>13}{:>10}  {:<8}at\n",
         gpu.name(),
         gpu.driver(),
         "",
@@ -112,11 +115,11 @@ fn table(gpu: &Gpu, rows: &[Row]) -> String {
     for row in rows {
         let Row { quantity, solver, precision, n, steps, adaptive, scale, error, bound, at: (member, node) } = row;
         let steps = format!("{}{steps}", if *adaptive { "~" } else { "" });
-        let solver = if *solver == Solver::Direct { "direct" } else { "sweeps" };
+        let solver = solver.name();
         let verdict = if row.passes() { "ok" } else { "FAILED" };
         let place = if *error == 0.0 { "bit for bit".into() } else { format!("n {n}, member {member}, node {node}") };
         text += &format!(
-            "{precision:<5}{solver:<8}{steps:>5}  {quantity:<24}{scale:>10.2e}{error:>13.2e}{bound:>10.2e}  {verdict:<8}{place}\n"
+            "{precision:<5}{solver:<13}{steps:>5}  {quantity:<24}{scale:>10.2e}{error:>13.2e}{bound:>10.2e}  {verdict:<8}{place}\n"
         );
     }
     text + "~ adaptive steps\n"

@@ -10,13 +10,13 @@ use crate::{
     curve::{Modes, Sampling, Shape},
     ensemble::{
         Spec,
-        spec::{BackendChoice, Order, Precision, Pull, SolverChoice},
+        spec::{BackendChoice, Order, Precision, Pull, SolverChoice, Sor},
     },
     flow::Flow,
 };
 
 const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
-pub(super) const SOLVERS: &[&str] = &["auto", "gauss-seidel", "direct"];
+pub(super) const SOLVERS: &[&str] = &["auto", "gauss-seidel", "multigrid", "direct"];
 const ORDERS: &[&str] = &["coloured", "lexicographic"];
 pub(super) const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
 pub(super) const PRECISIONS: &[&str] = &["f32", "f64"];
@@ -133,7 +133,8 @@ pub struct SpecFlags {
         long, value_name = "KAPPA", value_parser = text_of::<Pull>, allow_hyphen_values = true, help_heading = METHOD
     )]
     pull: Option<Pull>,
-    /// Solver of the pentadiagonal systems; auto is gauss-seidel with --tau, direct with --adaptive [default: auto]
+    /// Solver of the pentadiagonal systems; multigrid is gauss-seidel inside V-cycles, auto is gauss-seidel with --tau,
+    /// direct with --adaptive [default: auto]
     #[arg(long, value_name = "SOLVER", value_parser = word::<SolverChoice>(SOLVERS), help_heading = METHOD)]
     solver: Option<SolverChoice>,
     /// Order in which a sweep visits the nodes [default: coloured]
@@ -142,11 +143,12 @@ pub struct SpecFlags {
     /// Residual tolerance of the sweeps (only of them) [default: 1e-3 in f32, 1e-5 in f64]
     #[arg(long, value_name = "TOL", value_parser = real, allow_hyphen_values = true, help_heading = METHOD)]
     tolerance: Option<f64>,
-    /// Over-relaxation of the sweeps, 1 is plain Gauss-Seidel [default: 1]
+    /// Over-relaxation of the sweeps of gauss-seidel; 1 is the paper's, auto follows the stiffness of each system
+    /// [default: 1]
     #[arg(
-        long, value_name = "FACTOR", value_parser = real, allow_hyphen_values = true, help_heading = METHOD
+        long, value_name = "FACTOR", value_parser = text_of::<Sor>, allow_hyphen_values = true, help_heading = METHOD
     )]
-    sor: Option<f64>,
+    sor: Option<Sor>,
     /// Sweeps per system after which a member has stalled [default: 200000]
     #[arg(
         long, value_name = "COUNT", value_parser = whole::<u32>, allow_hyphen_values = true,
@@ -214,11 +216,11 @@ impl SpecFlags {
     }
 }
 
-fn real(text: &str) -> Result<f64, String> {
+pub(super) fn real(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "not a number".into())
 }
 
-fn whole<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
+pub(super) fn whole<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
     let value = text.trim().parse::<u64>().ok().and_then(|value| T::try_from(value).ok());
     value.ok_or_else(|| format!("not a whole number from 0 to {}", u128::MAX >> (128 - 8 * size_of::<T>())))
 }

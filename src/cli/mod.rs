@@ -4,6 +4,7 @@
 //! ends the program quietly.
 
 mod adapters;
+mod bench;
 mod check;
 mod convergence;
 mod figure;
@@ -36,6 +37,7 @@ struct Cli {
 enum Command {
     Run(Box<run::RunArgs>),
     Check(check::CheckArgs),
+    Bench(bench::BenchArgs),
     Convergence(convergence::ConvergenceArgs),
     Figure(figure::FigureArgs),
     Adapters(adapters::AdaptersArgs),
@@ -47,6 +49,7 @@ pub fn main() -> ExitCode {
     let done = match cli.command {
         Command::Run(args) => run::run(*args),
         Command::Check(args) => check::check(args),
+        Command::Bench(args) => bench::bench(args),
         Command::Convergence(args) => convergence::convergence(args),
         Command::Figure(args) => figure::figure(args),
         Command::Adapters(args) => adapters::adapters(args),

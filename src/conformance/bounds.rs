@@ -130,9 +130,9 @@ impl Scale {
         match self {
             Scale::Velocity => {
                 let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
-                k() / (shortest * shortest) + p.b(k()).abs()
+                k() / (shortest * shortest) + p.law().b(k()).abs()
             }
-            Scale::Tangential => work.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
+            Scale::Tangential => work.motion.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
             Scale::Length => longest(),
             Scale::One => 1.0,
             Scale::Weight => weight(&work.curvature.rows).max(weight(&work.position.rows)),

@@ -41,7 +41,8 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
                 // One member in three is pulled.
                 pull: if j % 3 == 1 { 50.0 } else { 0.0 },
                 tolerance,
-                sor: 1.0 + 0.07 * (j % 10) as f64,
+                // One member in seven chooses its own.
+                sor: if j % 7 == 5 { 0.0 } else { 1.0 + 0.07 * (j % 10) as f64 },
                 polygon_ratio: polygon::regular_ratio(n),
                 relax_at: 0.9 * excess,
                 half_at: 0.95 * excess,

@@ -16,7 +16,7 @@ use crate::{
     number::Real,
     scheme::{
         Curve, Increments, Parameters, State, Workspace,
-        evolve::{Run, evolve},
+        evolve::{Run, Team, evolve},
         parameters::{Counters, NEVER, Progress, Report},
         step::{self, Method},
     },
@@ -131,6 +131,11 @@ fn blocks(n: usize) -> Result<Blocks> {
     Blocks::new(n).ok_or_else(|| Error::Failed(format!("n = {n}: a ring has at least 6 nodes")))
 }
 
+/// A workspace that keeps the systems, whatever the solver.
+fn traced_workspace<T: Real>(n: usize) -> Result<Workspace<T>> {
+    Ok(Workspace { traced: true, ..Workspace::new(blocks(n)?) })
+}
+
 /// Everything that one step computes, stage by stage.
 pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Option<Tamper>) -> Result<Vec<Row>> {
     let launches = members(n, MEMBERS, 1, T::PRECISION.tolerance())?;
@@ -152,8 +157,9 @@ pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Opt
     let mut rows: Vec<Row> = STAGES.iter().map(|bound| Row::begin::<T>(bound, solver, n, 1)).collect();
     for (member, launch) in launches.iter().enumerate() {
         let mut run: Run<T> = launch.convert();
-        let mut work = Workspace::new(blocks(n)?);
-        step::step(&run.state.curve, &mut run.state.increments, &run.parameters, &method(solver), &mut work);
+        let mut work = traced_workspace(n)?;
+        let Run { state, parameters, .. } = &mut run;
+        step::step(&state.curve, &mut state.increments, parameters, &method(solver), &mut work);
         let twin = traced(&work, &run.state.increments);
         let scales = Scales::of(launch)?;
         for (field, (row, bound)) in rows.iter_mut().zip(&STAGES).enumerate() {
@@ -221,7 +227,7 @@ fn ends_agree<T: Real>(
         let Left { state, counters, report } = left;
         let mut twin: Run<T> = launch.convert();
         let mut longest = 0.0_f64;
-        let mut work = Workspace::new(blocks(n)?);
+        let mut work = Team::new(blocks(n)?);
         while unfinished(twin.counters) {
             evolve(&mut twin, &method(solver), &mut work, 1);
             longest = longest.max(twin.report.progress.taken.to_f64());
@@ -395,7 +401,7 @@ fn traced<T: Real>(work: &Workspace<T>, increments: &Increments<T>) -> Vec<Vec<f
         let column = |entry: fn(&crate::solver::Row<T>) -> T| rows.iter().map(|row| entry(row).to_f64()).collect();
         [column(|row| row.a), column(|row| row.b), column(|row| row.d), column(|row| row.e), column(|row| row.weight)]
     };
-    let mut fields = vec![wide(&work.beta), ring(&work.alpha), ring(&work.new.r)];
+    let mut fields = vec![wide(&work.motion.beta), ring(&work.motion.alpha), ring(&work.new.r)];
     fields.extend(rows(&work.curvature.rows));
     fields.extend([wide(&work.curvature.rhs[0]), ring(&increments.k)]);
     fields.extend(rows(&work.position.rows));
@@ -419,7 +425,7 @@ struct Scales {
 impl Scales {
     fn of(launch: &Run<f64>) -> Result<Scales> {
         let mut run = launch.clone();
-        let mut work = Workspace::new(blocks(run.state.curve.len())?);
+        let mut work = traced_workspace(run.state.curve.len())?;
         let increments = &mut run.state.increments;
         step::step(&run.state.curve, increments, &run.parameters, &method(Solver::Direct), &mut work);
         Ok(Scales { curve: run.state.curve, parameters: run.parameters, work })

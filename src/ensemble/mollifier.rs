@@ -80,10 +80,11 @@ fn sharpest_turn(nodes: &[DVec2]) -> f64 {
 fn smoothed(nodes: &[DVec2]) -> Vec<DVec2> {
     let n = nodes.len();
     let (outer, inner) = (STRENGTH, -4.0 * STRENGTH);
-    let (row, inverse) = Row::normalised(outer, inner, 1.0 + 6.0 * STRENGTH, inner, outer, 1.0);
-    let rhs = [nodes.iter().map(|p| p.x * inverse).collect(), nodes.iter().map(|p| p.y * inverse).collect()];
+    let diagonal = 1.0 + 6.0 * STRENGTH;
+    let row = Row { a: outer / diagonal, b: inner / diagonal, d: inner / diagonal, e: outer / diagonal, weight: 1.0 };
+    let rhs = [nodes.iter().map(|p| p.x / diagonal).collect(), nodes.iter().map(|p| p.y / diagonal).collect()];
     let (mut x, mut y) = (Ring::zeros(n), Ring::zeros(n));
-    direct::solve(&System { rows: vec![row; n], rhs }, [&mut x, &mut y]);
+    direct::solve(&System { rows: vec![row; n], rhs }, [&mut x, &mut y], &mut direct::Factor::new(n));
     x.nodes().iter().zip(y.nodes()).map(|(x, y)| DVec2::new(*x, *y)).collect()
 }
 

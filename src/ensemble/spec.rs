@@ -39,6 +39,8 @@ pub enum SolverChoice {
     Auto,
     /// Gauss–Seidel sweeps.
     GaussSeidel,
+    /// The same sweeps inside V-cycles, whose number hardly depends on the length of a step.
+    Multigrid,
     /// Periodic pentadiagonal elimination.
     Direct,
 }
@@ -47,6 +49,7 @@ impl From<Solver> for SolverChoice {
     fn from(solver: Solver) -> SolverChoice {
         match solver {
             Solver::GaussSeidel => SolverChoice::GaussSeidel,
+            Solver::Multigrid => SolverChoice::Multigrid,
             Solver::Direct => SolverChoice::Direct,
         }
     }
@@ -67,6 +70,15 @@ pub enum Pull {
     /// κ itself, in 1/time; 0 is the paper.
     Rate(f64),
     /// κ from each member's own relaxation time.
+    Auto,
+}
+
+/// ω_SOR of the sweeps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sor {
+    /// The factor itself; 1 is the paper's.
+    Factor(f64),
+    /// From the stiffness of each system.
     Auto,
 }
 
@@ -115,8 +127,8 @@ pub struct Spec {
     /// Residual tolerance of the sweeps relative to the increment; by precision if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// Over-relaxation factor; 1 is plain Gauss–Seidel.
-    pub sor: f64,
+    /// Over-relaxation; 1 is plain Gauss–Seidel.
+    pub sor: Sor,
     /// Sweeps per system after which a member is `stalled`.
     pub max_sweeps: u32,
     /// Where to run.
@@ -178,7 +190,7 @@ impl Default for Spec {
             solver: SolverChoice::Auto,
             order: Order::Coloured,
             tolerance: None,
-            sor: 1.0,
+            sor: Sor::Factor(1.0),
             max_sweeps: 200_000,
             backend: BackendChoice::Auto,
             adapter: None,
@@ -242,6 +254,7 @@ impl Spec {
     pub fn solver(&self) -> Solver {
         match (self.solver, self.pace()) {
             (SolverChoice::GaussSeidel, _) | (SolverChoice::Auto, Pace::Fixed(_)) => Solver::GaussSeidel,
+            (SolverChoice::Multigrid, _) => Solver::Multigrid,
             (SolverChoice::Direct, _) | (SolverChoice::Auto, Pace::Adaptive(_)) => Solver::Direct,
         }
     }
@@ -271,54 +284,70 @@ fn quoted(text: &str) -> impl Iterator<Item = &str> {
     text.split('`').skip(1).step_by(2)
 }
 
-impl FromStr for Pull {
-    type Err = String;
+/// Reads and writes `$kind` as a number, `$kind::$number`, or as the word `auto`.
+macro_rules! number_or_auto {
+    ($kind:ident, $number:ident) => {
+        impl FromStr for $kind {
+            type Err = String;
 
-    fn from_str(text: &str) -> Result<Pull, String> {
-        match text.trim() {
-            "auto" => Ok(Pull::Auto),
-            text => text.parse().map(Pull::Rate).map_err(|_| format!("`{text}` is neither a number nor `auto`")),
+            fn from_str(text: &str) -> Result<$kind, String> {
+                match text.trim() {
+                    "auto" => Ok($kind::Auto),
+                    text => {
+                        text.parse().map($kind::$number).map_err(|_| format!("`{text}` is neither a number nor `auto`"))
+                    }
+                }
+            }
         }
-    }
-}
 
-impl Serialize for Pull {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Pull::Rate(rate) => serializer.serialize_f64(*rate),
-            Pull::Auto => serializer.serialize_str("auto"),
+        impl From<f64> for $kind {
+            fn from(number: f64) -> $kind {
+                $kind::$number(number)
+            }
         }
-    }
+
+        impl Serialize for $kind {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                match self {
+                    $kind::$number(number) => serializer.serialize_f64(*number),
+                    $kind::Auto => serializer.serialize_str("auto"),
+                }
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $kind {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<$kind, D::Error> {
+                deserializer.deserialize_any(OrAuto(PhantomData))
+            }
+        }
+    };
 }
 
-impl<'de> Deserialize<'de> for Pull {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Pull, D::Error> {
-        deserializer.deserialize_any(PullVisitor)
-    }
-}
+number_or_auto!(Pull, Rate);
+number_or_auto!(Sor, Factor);
 
-struct PullVisitor;
+struct OrAuto<T>(PhantomData<T>);
 
-impl de::Visitor<'_> for PullVisitor {
-    type Value = Pull;
+impl<T: From<f64> + FromStr<Err = String>> de::Visitor<'_> for OrAuto<T> {
+    type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "a number or \"auto\"")
     }
 
-    fn visit_f64<E: de::Error>(self, rate: f64) -> Result<Pull, E> {
-        Ok(Pull::Rate(rate))
+    fn visit_f64<E: de::Error>(self, number: f64) -> Result<T, E> {
+        Ok(number.into())
     }
 
-    fn visit_i64<E: de::Error>(self, rate: i64) -> Result<Pull, E> {
-        Ok(Pull::Rate(rate as f64))
+    fn visit_i64<E: de::Error>(self, number: i64) -> Result<T, E> {
+        Ok((number as f64).into())
     }
 
-    fn visit_u64<E: de::Error>(self, rate: u64) -> Result<Pull, E> {
-        Ok(Pull::Rate(rate as f64))
+    fn visit_u64<E: de::Error>(self, number: u64) -> Result<T, E> {
+        Ok((number as f64).into())
     }
 
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<Pull, E> {
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<T, E> {
         text.parse().map_err(E::custom)
     }
 }
@@ -385,7 +414,8 @@ mod tests {
             only: Some(vec![0, 200]),
             ..Spec::default()
         };
-        let adaptive = Spec { adaptive: Some(1e-3), pull: Pull::Auto, relax_to: Some(0.1), ..Spec::default() };
+        let adaptive =
+            Spec { adaptive: Some(1e-3), pull: Pull::Auto, sor: Sor::Auto, relax_to: Some(0.1), ..Spec::default() };
         for spec in [spec, adaptive, Spec::default()] {
             let text = spec.to_toml().unwrap();
             assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");

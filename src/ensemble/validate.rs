@@ -3,7 +3,7 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that
 //! takes the file they come from; only the resolution of the highest mode is checked here.
 
-use super::spec::{BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Solver, Spec};
+use super::spec::{BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Solver, Sor, Spec};
 use crate::error::{Error, Result};
 
 /// More members than this is a slip of the keyboard.
@@ -161,14 +161,12 @@ impl Spec {
             let allowed = format!("take a number above 0, up to {LOOSEST_TOLERANCE}, for example 1e-5");
             return Err(Error::value("tolerance", number(tolerance), "not a residual tolerance", &allowed));
         }
-        if !(self.sor > 0.0 && self.sor < 2.0) {
-            let allowed = "take a number between 0 and 2, both excluded; 1 is plain Gauss-Seidel";
-            return Err(Error::value(
-                "sor",
-                number(self.sor),
-                "sweeps do not converge with this over-relaxation",
-                allowed,
-            ));
+        if let Sor::Factor(factor) = self.sor
+            && !(factor > 0.0 && factor < 2.0)
+        {
+            let problem = "sweeps do not converge with this over-relaxation";
+            let allowed = "take a number between 0 and 2, both excluded, or auto; 1 is plain Gauss-Seidel";
+            return Err(Error::value("sor", number(factor), problem, allowed));
         }
         if !(1..=MOST_SWEEPS).contains(&self.max_sweeps) {
             let problem = if self.max_sweeps == 0 { "no sweep to solve with" } else { "too many sweeps" };
@@ -208,9 +206,7 @@ impl Spec {
 
     fn check_combinations(&self) -> Result<()> {
         let lexicographic = self.order == Order::Lexicographic;
-        if self.solver() == Solver::Direct {
-            self.check_no_sweeps()?;
-        }
+        self.check_sweeps()?;
         if self.backend == BackendChoice::Gpu {
             let cpu = "take --backend cpu";
             if lexicographic {
@@ -230,20 +226,26 @@ impl Spec {
         }
     }
 
-    /// The direct solver makes no sweeps, so nothing about them may be asked for.
-    fn check_no_sweeps(&self) -> Result<()> {
+    /// Nothing may be asked for that the solver does not do: the direct one makes no sweeps, and multigrid makes its own.
+    fn check_sweeps(&self) -> Result<()> {
         let default = Spec::default();
-        let asked = [
-            (self.order != default.order).then(|| ("order", "lexicographic".to_string())),
-            self.tolerance.map(|tolerance| ("tolerance", number(tolerance))),
-            (self.sor != default.sor).then(|| ("sor", number(self.sor))),
-            (self.max_sweeps != default.max_sweeps).then(|| ("max-sweeps", self.max_sweeps.to_string())),
-        ];
+        let order = (self.order != default.order).then(|| ("order", "lexicographic".to_string()));
+        let sor = (self.sor != default.sor).then(|| match self.sor {
+            Sor::Factor(factor) => ("sor", number(factor)),
+            Sor::Auto => ("sor", "auto".to_string()),
+        });
+        let tolerance = self.tolerance.map(|tolerance| ("tolerance", number(tolerance)));
+        let most = (self.max_sweeps != default.max_sweeps).then(|| ("max-sweeps", self.max_sweeps.to_string()));
+        let (asked, problem) = match self.solver() {
+            Solver::GaussSeidel => return Ok(()),
+            Solver::Multigrid => (vec![order, sor], "multigrid sweeps by colours and without over-relaxation"),
+            Solver::Direct => (vec![order, tolerance, sor, most], "the direct solver makes no sweeps"),
+        };
         match asked.into_iter().flatten().next() {
             None => Ok(()),
             Some((key, value)) => {
                 let allowed = format!("leave out --{key}, or take --solver gauss-seidel");
-                Err(Error::value(key, value, "the direct solver makes no sweeps", &allowed))
+                Err(Error::value(key, value, problem, &allowed))
             }
         }
     }

@@ -10,10 +10,7 @@ use serde::Serialize;
 use super::tally::{MollifiedMembers, Tally};
 use crate::{
     backend::Platform,
-    ensemble::{
-        Spec,
-        spec::{Precision, Solver},
-    },
+    ensemble::{Spec, spec::Precision},
     error::{Error, Result},
 };
 
@@ -52,7 +49,7 @@ impl<'a> Provenance<'a> {
             curvelax: env!("CARGO_PKG_VERSION"),
             seed: spec.seed,
             precision: platform.precision,
-            tolerance: (spec.solver() == Solver::GaussSeidel).then(|| spec.tolerance_at(platform.precision)),
+            tolerance: spec.solver().sweeps().then(|| spec.tolerance_at(platform.precision)),
             spec,
             platform,
             members: tally.members(),

@@ -5,49 +5,49 @@
 //! old state is a sum of differences:
 //! `f - M k = ∂b + (r k β)_i k_i - Σ_j off_ij (k_j - k_i)`.
 
-use super::{Curve, Parameters, Workspace};
-use crate::{number::Number, solver::Row};
+use super::{Curve, Parameters, state::Motion};
+use crate::{
+    number::Number,
+    solver::{Equation, Equations},
+};
 
-/// Fills `work.curvature` from the old state and the new lengths.
-pub fn assemble<N: Number>(old: &Curve<N>, p: &Parameters<N>, work: &mut Workspace<N>) {
-    let rate = p.tau.recip();
-    for i in 0..old.len() {
-        let (row, rhs) = row(
-            p,
-            rate,
-            old.k.window(i),
-            work.ir.window(i),
-            work.iq.window(i),
-            work.alpha.window(i),
-            [work.new.r[i], work.rkb[i]],
-        );
-        work.curvature.rows[i] = row;
-        work.curvature.rhs[0][i] = rhs;
+/// The equations, from the old curve, its motion and the new lengths.
+pub struct Curvature<'a, N> {
+    old: &'a Curve<N>,
+    new: &'a Curve<N>,
+    motion: &'a Motion<N>,
+    tau: N,
+    rate: N,
+}
+
+impl<'a, N: Number> Curvature<'a, N> {
+    /// The system of a step of `p.tau` from `old`, with the lengths of `new`.
+    #[inline(always)]
+    pub fn new(old: &'a Curve<N>, new: &'a Curve<N>, motion: &'a Motion<N>, p: &Parameters<N>) -> Self {
+        Curvature { old, new, motion, tau: p.tau, rate: p.tau.recip() }
     }
 }
 
-#[inline(always)]
-fn row<N: Number>(
-    p: &Parameters<N>,
-    rate: N,
-    [kmm, km, k, kp, kpp]: [N; 5],
-    [_, irm, ir, irp, _]: [N; 5],
-    [iqmm, iqm, iq, iqp, _]: [N; 5],
-    [_, alpha_m, alpha, _, _]: [N; 5],
-    [r, rkb]: [N; 2],
-) -> (Row<N>, N) {
-    let half = N::of(0.5);
-    let a = iqm * irm * iqmm;
-    let e = iq * irp * iqp;
-    let middle = ir * iq * iqm;
-    let low = iqm * iqm * (ir + irm);
-    let high = iq * iq * (ir + irp);
-    let b = half * alpha_m - (middle + low + a);
-    let d = -(half * alpha) - (middle + high + e);
-    let c = (r * rate - rkb) - (a + b + d + e);
-    let bk = p.b(k);
-    let forcing = (p.b(kp) - bk) * iq - (bk - p.b(km)) * iqm;
-    let stiff = a * (kmm - k) + b * (km - k) + d * (kp - k) + e * (kpp - k);
-    let (row, inverse) = Row::normalised(a, b, c, d, e, p.tau * ir);
-    (row, (forcing + rkb * k - stiff) * inverse)
+impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
+    #[inline(always)]
+    fn equation(&self, i: usize) -> Equation<N, 1> {
+        let [kmm, km, k, kp, kpp] = self.old.k.window(i);
+        let [_, irm, ir, irp, _] = self.motion.ir.window(i);
+        let [iqmm, iqm, iq, iqp, _] = self.motion.iq.window(i);
+        let [_, alpha_m, alpha, _, _] = self.motion.alpha.window(i);
+        let [_, bm, b_of_k, bp, _] = self.motion.b.window(i);
+        let (r, rkb) = (self.new.r[i], self.motion.rkb[i]);
+        let half = N::of(0.5);
+        let a = iqm * irm * iqmm;
+        let e = iq * irp * iqp;
+        let middle = ir * iq * iqm;
+        let low = iqm * iqm * (ir + irm);
+        let high = iq * iq * (ir + irp);
+        let b = half * alpha_m - (middle + low + a);
+        let d = -(half * alpha) - (middle + high + e);
+        let c = (r * self.rate - rkb) - (a + b + d + e);
+        let forcing = (bp - b_of_k) * iq - (b_of_k - bm) * iqm;
+        let stiff = a * (kmm - k) + b * (km - k) + d * (kp - k) + e * (kpp - k);
+        Equation { a, b, c, d, e, rhs: [forcing + rkb * k - stiff], time_over_length: self.tau * ir }
+    }
 }

@@ -1,13 +1,20 @@
 //! A member's run: steps, acceptance, status and relaxation events. Twin of `shaders/evolve.wgsl`.
+//!
+//! Members go abreast, one a lane of a number: what they compute is common, what is decided is decided for each. With a
+//! plain `f64` it is one member alone, the reference; no bit of a member depends on who goes beside it.
 
 use super::{
-    Curve, Increments, Parameters, State, Status, Workspace, extrapolation,
-    observe::{self, Maxima, Sums},
-    pace,
+    Parameters, State, Status, Workspace, extrapolation,
+    observe::{self, Glance},
+    pace::{self, Stride},
     parameters::{Counters, NEVER, Observed, Report},
+    state,
     step::{self, Method, Stepped},
 };
-use crate::number::{BIG, Real};
+use crate::{
+    number::{Mask, Number, Real},
+    solver::{Blocks, Cycles, Elimination, Solver, Solves, Sweeps},
+};
 
 /// One member on its way: everything that a dispatch reads and writes.
 #[derive(Clone, Debug)]
@@ -25,13 +32,21 @@ pub struct Run<T> {
 impl<T: Real> Run<T> {
     /// A member at its start, with no step to make and no events behind it.
     pub fn new(state: State<T>, parameters: Parameters<T>) -> Run<T> {
-        let blocks = crate::solver::Blocks::new(state.curve.len()).expect("a ring of 6 nodes or more");
-        let sums = observe::sums(&state.curve, &parameters, blocks);
-        let now = Observed::new(&sums, &observe::maxima(&state.curve), &parameters);
+        let blocks = Blocks::new(state.curve.len()).expect("a ring of 6 nodes or more");
+        let now = Observed::of(&state.curve, &parameters, blocks);
         let mut report = Report { before: now, middle: now, now, ..Report::default() };
-        report.progress.turning = sums.turning;
+        report.progress.turning = observe::sums(&state.curve, &parameters, blocks).turning;
         let counters = Counters { relax_step: NEVER, half_step: NEVER, ..Counters::default() };
         Run { state, parameters, counters, report }
+    }
+
+    /// Reports what its curves are; not compiled into the vector code, since it is one member's.
+    #[inline(never)]
+    fn report_on(&mut self, blocks: Blocks, adaptive: bool) {
+        let Run { state, parameters, report, .. } = self;
+        report.before = Observed::of(&state.before, parameters, blocks);
+        report.now = Observed::of(&state.curve, parameters, blocks);
+        report.middle = if adaptive { Observed::of(&state.middle, parameters, blocks) } else { report.before };
     }
 
     /// The same member in another precision, rounded.
@@ -45,171 +60,333 @@ impl<T: Real> Run<T> {
     }
 }
 
+/// Members abreast: one a lane.
+pub struct Team<N: Number> {
+    state: State<N>,
+    parameters: Parameters<N>,
+    /// Excess of `state.curve`.
+    excess: N,
+    /// Turning number at the start.
+    turning: N,
+    strides: Vec<Stride<N::Real>>,
+    work: Workspace<N>,
+}
+
+/// What an attempt at a step led to.
+struct Attempt<N: Number> {
+    stepped: Stepped<N>,
+    /// Error of an adaptive step; 0 of a fixed one.
+    error: N,
+    /// Excess in the middle of an adaptive step.
+    middle: N,
+    seen: Glance<N>,
+    excess: N,
+}
+
 /// Advances a running member by at most `attempts` steps, refused ones included, towards its goal.
 ///
 /// A fixed step that fails (stalled, not finite, singular) ends the member in its last good state. An adaptive one
 /// is tried again with a shorter step, until that is too short to mean anything; one that is too inaccurate at every
 /// length follows a curve that n nodes do not resolve, which is singular.
-pub fn evolve<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T>, attempts: u32) {
-    run.counters.sweeps_k = 0;
-    run.counters.sweeps_x = 0;
-    let adaptive = !run.parameters.adaptive.le(T::of(0.0));
-    for _ in 0..attempts {
-        if run.counters.status != 0 || run.counters.steps >= run.counters.goal {
-            break;
+pub fn evolve<T: Real>(run: &mut Run<T>, method: &Method, team: &mut Team<T>, attempts: u32) {
+    match method.solver {
+        Solver::GaussSeidel => evolve_abreast::<T, Sweeps>(&mut [run], method, team, attempts),
+        Solver::Multigrid => evolve_abreast::<T, Cycles>(&mut [run], method, team, attempts),
+        Solver::Direct => evolve_abreast::<T, Elimination>(&mut [run], method, team, attempts),
+    }
+}
+
+/// Advances up to as many members as there are lanes, all with fixed or all with adaptive steps, by the solver `S`; returns
+/// earlier when less than half of them are still running: the others would pay for lanes that are idle.
+#[inline(always)]
+pub fn evolve_abreast<N: Number, S: Solves>(
+    runs: &mut [&mut Run<N::Real>],
+    method: &Method,
+    team: &mut Team<N>,
+    attempts: u32,
+) {
+    let mut live = N::Mask::all_of(false);
+    let mut running = 0;
+    for (lane, run) in runs.iter_mut().enumerate() {
+        run.counters.sweeps_k = 0;
+        run.counters.sweeps_x = 0;
+        let runs = is_running(&run.counters);
+        live.set_lane(lane, runs);
+        running += usize::from(runs);
+    }
+    let Some(first) = runs.iter().position(|run| is_running(&run.counters)) else { return };
+    let adaptive = !runs[first].parameters.adaptive.le(N::Real::of(0.0));
+    for lane in 0..N::LANES {
+        // A lane without a member goes along with the first one.
+        team.take_in(lane, if live.lane(lane) { &*runs[lane] } else { &*runs[first] });
+    }
+    let enough = running.div_ceil(2);
+    let mut left = attempts;
+    while left > 0 {
+        left -= 1;
+        let attempt = team.attempt::<S>(runs, live, adaptive, method);
+        team.conclude(runs, live, adaptive, &attempt);
+        let all_leave = left == 0 || runs.iter().filter(|run| is_running(&run.counters)).count() < enough;
+        for lane in 0..runs.len() {
+            if live.lane(lane) && (all_leave || !is_running(&runs[lane].counters)) {
+                team.let_out(lane, runs[lane], adaptive);
+                live.set_lane(lane, false);
+            }
         }
-        if adaptive { adaptive_step(run, method, work) } else { fixed_step(run, method, work) }
-    }
-}
-
-fn fixed_step<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T>) {
-    let Run { state, parameters, counters, .. } = run;
-    let stepped = step::step(&state.curve, &mut state.increments, parameters, method, work);
-    counters.sweeps_k = counters.sweeps_k.saturating_add(stepped.sweeps_k.to_f64() as u32);
-    counters.sweeps_x = counters.sweeps_x.saturating_add(stepped.sweeps_x.to_f64() as u32);
-    match observed(run, work, stepped) {
-        Ok((sums, maxima)) => {
-            run.report.before = run.report.now;
-            run.report.now = Observed::new(&sums, &maxima, &run.parameters);
-            record_events(run, T::of(0.0), &work.new);
-            accept(run, work);
+        if all_leave {
+            return;
         }
-        Err(status) => run.counters.status = status as u32,
     }
 }
 
-fn adaptive_step<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T>) {
-    let stride = pace::stride(&run.report.progress, &run.parameters);
-    let h = stride.length;
-    let stepped = extrapolation::attempt(run, method, work, h);
-    if !(stepped.finite && stepped.solved) {
-        let cause = if stepped.finite { Status::Stalled } else { Status::Nonfinite };
-        return refuse_failure(run, work, h, cause);
-    }
-    let followed = extrapolation::follows(run.report.now.excess, &run.parameters);
-    let error = extrapolation::error(&run.state.middle, &work.new, followed);
-    if !error.le(run.parameters.adaptive) {
-        let next = pace::next_length(h, error, 1.0, &run.parameters);
-        run.state.increments.stretch(next / (T::of(0.5) * h));
-        return refuse(run, work, next, pace::LEAST_STEP, Status::Singular);
-    }
-    extrapolation::extrapolate(&mut run.state.middle, &run.state.before, &mut work.new);
-    let (sums, maxima) = match observed(run, work, stepped) {
-        Ok(observed) => observed,
-        Err(cause) => return refuse_failure(run, work, h, cause),
-    };
-    let middle = &run.state.middle;
-    let middle_sums = observe::sums(middle, &run.parameters, work.blocks);
-    let report = &mut run.report;
-    report.before = report.now;
-    report.middle = Observed::new(&middle_sums, &observe::maxima(middle), &run.parameters);
-    report.now = Observed::new(&sums, &maxima, &run.parameters);
-    record_events(run, h, &work.new);
-    let most_growth = if run.counters.refused == 0 { pace::MOST_GROWTH } else { 1.0 };
-    let progress = &mut run.report.progress;
-    progress.next = pace::next_length(h, error, most_growth, &run.parameters);
-    run.state.increments.stretch(progress.next / (T::of(0.5) * h));
-    pace::pass(progress, stride, &run.parameters);
-    run.counters.refused = 0;
-    accept(run, work);
-    if pace::at_goal(&run.report.progress, &run.parameters) {
-        run.counters.goal = run.counters.steps;
-    }
+/// Whether a member has steps to make.
+pub fn is_running(counters: &Counters) -> bool {
+    counters.status == 0 && counters.steps < counters.goal
 }
 
-/// The sums and maxima of the new curve, or why it is refused.
-fn observed<T: Real>(run: &Run<T>, work: &Workspace<T>, stepped: Stepped<T>) -> Result<(Sums<T>, Maxima<T>), Status> {
-    let sums = observe::sums(&work.new, &run.parameters, work.blocks);
-    let maxima = observe::maxima(&work.new);
-    if !stepped.finite {
-        Err(Status::Nonfinite)
-    } else if !stepped.solved {
-        Err(Status::Stalled)
-    } else if !is_finite(&sums) {
-        Err(Status::Nonfinite)
-    } else if is_singular(&sums, &maxima, run, T::of(work.blocks.n as f64)) {
-        Err(Status::Singular)
-    } else {
-        Ok((sums, maxima))
+impl<N: Number> Team<N> {
+    /// Room for members whose rings are cut by `blocks`.
+    pub fn new(blocks: Blocks) -> Team<N> {
+        let stride = Stride { length: N::Real::of(0.0), high: N::Real::of(0.0), low: N::Real::of(0.0), last: false };
+        Team {
+            state: State::zeros(blocks.n),
+            parameters: Parameters::default(),
+            excess: N::default(),
+            turning: N::default(),
+            strides: vec![stride; N::LANES],
+            work: Workspace::new(blocks),
+        }
     }
-}
 
-fn is_finite<T: Real>(sums: &Sums<T>) -> bool {
-    let big = T::of(BIG);
-    sums.length.le(big) && sums.area.abs().le(big) && sums.energy.abs().le(big)
-}
+    /// Puts a member into a lane.
+    #[inline(always)]
+    fn take_in(&mut self, lane: usize, run: &Run<N::Real>) {
+        let from = run.state.fields();
+        for (to, from) in self.state.fields_mut().into_iter().zip(from).take(state::NEEDED_FIELDS) {
+            for i in 0..from.len() {
+                to[i].set_lane(lane, from[i]);
+            }
+            to.close();
+        }
+        self.parameters.set_lane(lane, &run.parameters);
+        self.excess.set_lane(lane, run.report.now.excess);
+        self.turning.set_lane(lane, run.report.progress.turning);
+    }
 
-fn is_singular<T: Real>(sums: &Sums<T>, maxima: &Maxima<T>, run: &Run<T>, n: T) -> bool {
-    let mean_edge = sums.length / n;
-    let resolved = maxima.turn.le(T::of(observe::MAX_TURN));
-    let apart = (T::of(observe::MIN_EDGE) * mean_edge).le(-maxima.minus_shortest);
-    let measured = maxima.drift.le(T::of(observe::MAX_DRIFT));
-    let extended = run.parameters.least_length.le(sums.length);
-    !(resolved && apart && measured && extended && sums.turning == run.report.progress.turning)
+    /// Hands a member back as it is now, with its report.
+    #[inline(always)]
+    fn let_out(&self, lane: usize, run: &mut Run<N::Real>, adaptive: bool) {
+        for (from, to) in self.state.fields().into_iter().zip(run.state.fields_mut()) {
+            for i in 0..from.len() {
+                to[i] = from[i].lane(lane);
+            }
+            to.close();
+        }
+        run.report_on(self.work.blocks, adaptive);
+    }
+
+    /// Makes a fixed step, or the three steps of an adaptive one, in all lanes.
+    ///
+    /// A step is called in one place only, since its whole body is compiled there.
+    #[inline(always)]
+    fn attempt<S: Solves>(
+        &mut self,
+        runs: &mut [&mut Run<N::Real>],
+        live: N::Mask,
+        adaptive: bool,
+        method: &Method,
+    ) -> Attempt<N> {
+        let Team { state, parameters, excess, strides, work, .. } = self;
+        let mut h = parameters.tau;
+        if adaptive {
+            for (lane, run) in runs.iter().enumerate() {
+                strides[lane] = pace::stride(&run.report.progress, &run.parameters);
+                h.set_lane(lane, strides[lane].length);
+            }
+        }
+        let half = N::of(0.5);
+        let mut ok = live;
+        let none = N::of(0.0);
+        let mut all = Stepped { sweeps_k: none, sweeps_x: none, solved: live, finite: live };
+        for part in 0..if adaptive { 3 } else { 1 } {
+            parameters.tau = if part == 0 { h } else { half * h };
+            let from = if part == 2 { &state.before } else { &state.curve };
+            let stepped = step::step_by::<N, S>(from, &mut state.increments, parameters, ok, method, work);
+            // What failed before says why, and makes no more sweeps.
+            all.finite = all.finite.and(stepped.finite.or(ok.not()));
+            all.solved = all.solved.and(stepped.solved.or(ok.not()));
+            all.sweeps_k += N::select(ok, stepped.sweeps_k, none);
+            all.sweeps_x += N::select(ok, stepped.sweeps_x, none);
+            ok = all.finite.and(all.solved);
+            if !ok.any() {
+                break;
+            }
+            match (adaptive, part) {
+                (true, 0) => {
+                    std::mem::swap(&mut state.middle, &mut work.new);
+                    state.increments.stretch(half);
+                }
+                (true, 1) => std::mem::swap(&mut state.before, &mut work.new),
+                _ => {}
+            }
+        }
+        parameters.tau = h;
+        let (mut error, mut middle) = (none, none);
+        if adaptive {
+            let followed = excess.le(parameters.follow_to).not();
+            error = extrapolation::error(&state.middle, &work.new, followed);
+            extrapolation::extrapolate(&mut state.middle, &state.before, &mut work.new);
+            let sums = observe::sums(&state.middle, parameters, work.blocks);
+            middle = observe::excess(sums.length, sums.area, parameters);
+        }
+        let seen = observe::glance(&state.curve, &work.new, work.blocks);
+        let excess = observe::excess(seen.length, seen.area, parameters);
+        Attempt { stepped: all, error, middle, seen, excess }
+    }
+
+    /// Decides for every member whether it takes the step, and notes what came with it.
+    #[inline(always)]
+    fn conclude(&mut self, runs: &mut [&mut Run<N::Real>], live: N::Mask, adaptive: bool, attempt: &Attempt<N>) {
+        let Attempt { stepped, error, middle, seen, excess } = attempt;
+        let (zero, half) = (N::Real::of(0.0), N::Real::of(0.5));
+        let n = self.work.blocks.n;
+        let exact = error.le(self.parameters.adaptive.max(N::of(0.0)));
+        let finite = seen.is_finite();
+        let singular = seen.is_singular(self.turning, &self.parameters, n);
+        let at_threshold = excess.le(self.parameters.relax_at).and(live);
+        let gap = if at_threshold.any() { observe::gap(&self.work.new) } else { N::of(0.0) };
+        let mut kept = N::Mask::all_of(false);
+        let mut stretch = N::of(1.0);
+        for (lane, run) in runs.iter_mut().enumerate() {
+            if !live.lane(lane) {
+                continue;
+            }
+            let counters = &mut run.counters;
+            counters.sweeps_k = counters.sweeps_k.saturating_add(stepped.sweeps_k.lane(lane).to_f64() as u32);
+            counters.sweeps_x = counters.sweeps_x.saturating_add(stepped.sweeps_x.lane(lane).to_f64() as u32);
+            let (h, error) = (self.strides[lane].length, error.lane(lane));
+            let of_step = match (stepped.finite.lane(lane), stepped.solved.lane(lane)) {
+                (false, _) => Some(Status::Nonfinite),
+                (true, false) => Some(Status::Stalled),
+                (true, true) => None,
+            };
+            if adaptive && of_step.is_none() && !exact.lane(lane) {
+                let next = pace::next_length(h, error, 1.0, &run.parameters);
+                refuse(run, n, next, pace::LEAST_STEP, Status::Singular);
+                stretch.set_lane(lane, next / (half * h));
+                kept.set_lane(lane, true);
+                continue;
+            }
+            let failure = of_step.or(match (finite.lane(lane), singular.lane(lane)) {
+                (false, _) => Some(Status::Nonfinite),
+                (true, true) => Some(Status::Singular),
+                (true, false) => None,
+            });
+            if let Some(cause) = failure {
+                kept.set_lane(lane, true);
+                if adaptive {
+                    let least = if cause == Status::Singular { pace::LEAST_TO_SINGULAR } else { pace::LEAST_STEP };
+                    refuse(run, n, N::Real::of(pace::LEAST_GROWTH) * h, least, cause);
+                    // After that the increments may be anything.
+                    stretch.set_lane(lane, zero);
+                } else {
+                    run.counters.status = cause as u32;
+                }
+                continue;
+            }
+            let taken = Taken {
+                h: if adaptive { h } else { zero },
+                before: self.excess.lane(lane),
+                middle: middle.lane(lane),
+                after: excess.lane(lane),
+                gap: gap.lane(lane),
+            };
+            record_events(run, &taken);
+            let Run { parameters, counters, report, .. } = &mut **run;
+            let progress = &mut report.progress;
+            if adaptive {
+                let most_growth = if counters.refused == 0 { pace::MOST_GROWTH } else { 1.0 };
+                progress.next = pace::next_length(h, error, most_growth, parameters);
+                stretch.set_lane(lane, progress.next / (half * h));
+                pace::pass(progress, self.strides[lane], parameters);
+                counters.refused = 0;
+            }
+            (report.now.excess, report.now.length) = (taken.after, seen.length.lane(lane));
+            counters.steps += 1;
+            progress.travel += seen.farthest.lane(lane);
+            if counters.relax_step != NEVER && counters.stop_when_relaxed != 0 {
+                counters.status = Status::Relaxed as u32;
+            }
+            let concave = zero.le(seen.minus_k_min.lane(lane));
+            let looked_at = parameters.look_at.le(progress.travel) && concave;
+            if looked_at || (adaptive && pace::at_goal(progress, parameters)) {
+                counters.goal = counters.steps;
+            }
+        }
+        if adaptive {
+            self.state.increments.stretch(stretch);
+        }
+        self.accept(kept, *excess);
+    }
+
+    /// Takes the new curves, but not in the lanes whose curve is kept.
+    #[inline(always)]
+    fn accept(&mut self, kept: N::Mask, excess: N) {
+        let Team { state, work, .. } = self;
+        if kept.any() {
+            work.new.put(kept, &state.curve);
+        }
+        self.excess = N::select(kept, self.excess, excess);
+        std::mem::swap(&mut state.before, &mut state.curve);
+        std::mem::swap(&mut state.curve, &mut work.new);
+    }
 }
 
 /// Tries again with a step of length `next`, or gives the member up for `cause` where that is below `least` of `(L/n)⁴`.
-fn refuse<T: Real>(run: &mut Run<T>, work: &Workspace<T>, next: T, least: f64, cause: Status) {
+fn refuse<T: Real>(run: &mut Run<T>, n: usize, next: T, least: f64, cause: Status) {
     run.counters.rejected += 1;
     run.counters.refused = 1;
     run.report.progress.next = next;
-    let least = pace::least_step(run.report.now.length, T::of(work.blocks.n as f64), least, &run.parameters);
+    let least = pace::least_step(run.report.now.length, T::of(n as f64), least, &run.parameters);
     if !least.le(next) {
         run.counters.status = cause as u32;
     }
 }
 
-/// Refuses a step of length `h` that failed outright; after that the increments may be anything.
-fn refuse_failure<T: Real>(run: &mut Run<T>, work: &Workspace<T>, h: T, cause: Status) {
-    run.state.increments = Increments::zeros(work.blocks.n);
-    let least = if cause == Status::Singular { pace::LEAST_TO_SINGULAR } else { pace::LEAST_STEP };
-    refuse(run, work, T::of(pace::LEAST_GROWTH) * h, least, cause);
+/// A step that is taken: its length where it is adaptive, the excess on its way, and the gap between k and the polygon.
+struct Taken<T> {
+    h: T,
+    before: T,
+    middle: T,
+    after: T,
+    gap: T,
 }
 
 /// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.
 /// A curve whose curvature is not that of its polygon does not count as relaxed.
-fn record_events<T: Real>(run: &mut Run<T>, length: T, new: &Curve<T>) {
-    let Run { report, counters, parameters, .. } = run;
-    let excess = report.now.excess;
-    let half = fraction_at(report, parameters.half_at, parameters);
-    let relaxed = fraction_at(report, parameters.relax_at, parameters);
+fn record_events<T: Real>(run: &mut Run<T>, taken: &Taken<T>) {
+    let Run { report, counters, parameters: p, .. } = run;
     let progress = &mut report.progress;
-    if counters.half_step == NEVER && excess.le(parameters.half_at) {
+    if counters.half_step == NEVER && taken.after.le(p.half_at) {
         counters.half_step = counters.steps;
         (progress.half_high, progress.half_low) = (progress.time_high, progress.time_low);
-        (progress.half_length, progress.half_fraction) = (length, half);
+        (progress.half_length, progress.half_fraction) = (taken.h, fraction_at(taken, p.half_at, p));
     }
-    let due = counters.relax_step == NEVER && excess.le(parameters.relax_at);
-    if due && observe::gap(new).le(T::of(observe::MAX_GAP)) {
+    let due = counters.relax_step == NEVER && taken.after.le(p.relax_at);
+    if due && taken.gap.le(T::of(observe::MAX_GAP)) {
         counters.relax_step = counters.steps;
         (progress.relax_high, progress.relax_low) = (progress.time_high, progress.time_low);
-        (progress.relax_length, progress.relax_fraction) = (length, relaxed);
+        (progress.relax_length, progress.relax_fraction) = (taken.h, fraction_at(taken, p.relax_at, p));
     }
 }
 
 /// Where in the last step the excess fell to `excess`; at its end if it was there before.
-fn fraction_at<T: Real>(report: &Report<T>, excess: T, p: &Parameters<T>) -> T {
-    let (before, middle, after) = (report.before.excess, report.middle.excess, report.now.excess);
+fn fraction_at<T: Real>(&Taken { before, middle, after, .. }: &Taken<T>, excess: T, p: &Parameters<T>) -> T {
     if before.le(excess) {
         T::of(1.0)
     } else if p.adaptive.le(T::of(0.0)) {
         (before - excess) / (before - after)
     } else {
         extrapolation::crossing(before, middle, after, excess)
-    }
-}
-
-/// Takes the curve that the step computed.
-fn accept<T: Real>(run: &mut Run<T>, work: &mut Workspace<T>) {
-    let Run { state, parameters, counters, report } = run;
-    report.progress.travel += observe::farthest(&state.curve, &work.new);
-    std::mem::swap(&mut state.before, &mut state.curve);
-    std::mem::swap(&mut state.curve, &mut work.new);
-    counters.steps += 1;
-    if counters.relax_step != NEVER && counters.stop_when_relaxed != 0 {
-        counters.status = Status::Relaxed as u32;
-    }
-    if parameters.look_at.le(report.progress.travel) && report.now.k_min.le(T::of(0.0)) {
-        counters.goal = counters.steps;
     }
 }

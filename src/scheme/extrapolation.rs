@@ -5,73 +5,38 @@
 //! `B₁ + (B - A)/2` with B₁ the first half step. Every part is the paper's step; the lengths, which are positive, are
 //! extrapolated as `r_B²/r_A`.
 
-use super::{
-    Curve, Parameters, Workspace,
-    evolve::Run,
-    step::{self, Method, Stepped},
-};
-use crate::number::Real;
-
-/// Makes the three steps of an attempt of length `h`: the whole one into `state.middle`, the first half into
-/// `state.before`, the second half into `work.new`.
-///
-/// Stops at the first one that fails.
-pub fn attempt<T: Real>(run: &mut Run<T>, method: &Method, work: &mut Workspace<T>, h: T) -> Stepped<T> {
-    let half = T::of(0.5) * h;
-    let state = &mut run.state;
-    let mut of = |tau: T, curve: &Curve<T>, increments: &mut _, work: &mut Workspace<T>| {
-        run.parameters.tau = tau;
-        let stepped = step::step(curve, increments, &run.parameters, method, work);
-        run.counters.sweeps_k = run.counters.sweeps_k.saturating_add(stepped.sweeps_k.to_f64() as u32);
-        run.counters.sweeps_x = run.counters.sweeps_x.saturating_add(stepped.sweeps_x.to_f64() as u32);
-        stepped
-    };
-    let whole = of(h, &state.curve, &mut state.increments, work);
-    if !(whole.finite && whole.solved) {
-        return whole;
-    }
-    std::mem::swap(&mut state.middle, &mut work.new);
-    state.increments.stretch(T::of(0.5));
-    let first = of(half, &state.curve, &mut state.increments, work);
-    if !(first.finite && first.solved) {
-        return first;
-    }
-    std::mem::swap(&mut state.before, &mut work.new);
-    of(half, &state.before, &mut state.increments, work)
-}
+use super::Curve;
+use crate::number::{BIG, Number, Real};
 
 /// How far apart the whole step and the two half steps are: of k, and of ln r.
 ///
 /// The gap in k is taken relative to the largest |k|. While the shape is followed, that is as long as the excess is
 /// not negligible, it is taken relative to the geometric mean of the largest |k| and the spread of k: a curve close to
 /// a circle must not lose its modes in a tolerance that is measured by the circle.
-pub fn error<T: Real>(whole: &Curve<T>, halves: &Curve<T>, followed: bool) -> T {
-    let low = T::of(-2.0 * crate::number::BIG);
-    let (mut gap_k, mut gap_r, mut k_max, mut minus_k_min) = (T::of(0.0), T::of(0.0), low, low);
+#[inline(always)]
+pub fn error<N: Number>(whole: &Curve<N>, halves: &Curve<N>, followed: N::Mask) -> N {
+    let low = N::of(-2.0 * BIG);
+    let (mut gap_k, mut gap_r, mut k_max, mut minus_k_min) = (N::of(0.0), N::of(0.0), low, low);
     for i in 0..whole.len() {
         gap_k = gap_k.max((halves.k[i] - whole.k[i]).bounded_abs());
-        gap_r = gap_r.max((halves.r[i] / whole.r[i] - T::of(1.0)).bounded_abs());
+        gap_r = gap_r.max((halves.r[i] / whole.r[i] - N::of(1.0)).bounded_abs());
         k_max = k_max.max(halves.k[i]);
         minus_k_min = minus_k_min.max(-halves.k[i]);
     }
     let size = k_max.max(minus_k_min);
     let spread = (k_max + minus_k_min).min(size);
-    let scale = if followed { (size * spread).sqrt() } else { size };
+    let scale = N::select(followed, (size * spread).sqrt(), size);
     (gap_k / scale).bounded_abs().max(gap_r)
 }
 
 /// Puts the extrapolated curve into `halves` and the one in the middle of the step into `whole`.
-pub fn extrapolate<T: Real>(whole: &mut Curve<T>, first: &Curve<T>, halves: &mut Curve<T>) {
-    let half = T::of(0.5);
+#[inline(always)]
+pub fn extrapolate<N: Number>(whole: &mut Curve<N>, first: &Curve<N>, halves: &mut Curve<N>) {
+    let half = N::of(0.5);
     for i in 0..whole.len() {
-        let one = |a: &mut T, b1: T, b: &mut T| {
-            let gap = *b - *a;
-            *a = b1 + half * gap;
-            *b += gap;
-        };
-        one(&mut whole.x[i], first.x[i], &mut halves.x[i]);
-        one(&mut whole.y[i], first.y[i], &mut halves.y[i]);
-        one(&mut whole.k[i], first.k[i], &mut halves.k[i]);
+        between(&mut whole.x[i], first.x[i], &mut halves.x[i]);
+        between(&mut whole.y[i], first.y[i], &mut halves.y[i]);
+        between(&mut whole.k[i], first.k[i], &mut halves.k[i]);
         let (a, b) = (whole.r[i], halves.r[i]);
         whole.r[i] = first.r[i] + half * (b - a);
         halves.r[i] = b * b / a;
@@ -82,6 +47,14 @@ pub fn extrapolate<T: Real>(whole: &mut Curve<T>, first: &Curve<T>, halves: &mut
         curve.k.close();
         curve.r.close();
     }
+}
+
+/// Makes of A, B₁ and B the value in the middle of the step, in place of A, and the one at its end, in place of B.
+#[inline(always)]
+fn between<N: Number>(a: &mut N, b1: N, b: &mut N) {
+    let gap = *b - *a;
+    *a = b1 + N::of(0.5) * gap;
+    *b += gap;
 }
 
 /// Where in a step a quantity that goes from `start` over `middle` to `end` first falls to `target`, as a fraction of
@@ -97,11 +70,6 @@ pub fn crossing<T: Real>(start: T, middle: T, end: T, target: T) -> T {
     let straight = above / (start - end);
     let inside = zero.le(discriminant) && zero.le(root) && root.le(T::of(1.0));
     if inside { root } else { straight }
-}
-
-/// Whether the step so far still follows the shape: the excess is above the negligible.
-pub fn follows<T: Real>(excess: T, p: &Parameters<T>) -> bool {
-    !excess.le(p.follow_to)
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@
 //! is a curve with what the next step needs of the last one; a [`Workspace`] holds what a step computes on the way, and
 //! doubles as its trace for the conformance test.
 
+pub mod coarse;
 pub mod curvature;
 pub mod evolve;
 pub mod extrapolation;
@@ -34,5 +35,5 @@ pub mod status;
 pub mod step;
 
 pub use parameters::Parameters;
-pub use state::{Curve, Increments, State, Workspace};
+pub use state::{Curve, Increments, Motion, State, Workspace};
 pub use status::Status;

@@ -4,7 +4,10 @@
 //! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r.
 
 use super::{Curve, Parameters, pull};
-use crate::{number::Number, solver::Blocks};
+use crate::{
+    number::{BIG, Mask, Number},
+    solver::{self, Blocks},
+};
 
 /// `|k|·r` from which on a curve counts as not resolved: its tangent turns by 2 rad from segment to segment.
 pub const MAX_TURN: f64 = 2.0;
@@ -47,27 +50,89 @@ pub struct Maxima<N> {
     pub minus_k_min: N,
 }
 
+/// What every step is judged by: the part of the sums and maxima that decides, without a division.
+#[derive(Clone, Copy, Debug)]
+pub struct Glance<N> {
+    /// `Σ |e_i|`.
+    pub length: N,
+    /// `½ Σ x_{i-1} × x_i`.
+    pub area: N,
+    /// Windings of the edge vector round the origin.
+    pub turning: N,
+    /// `max |k_i| r_i`; not finite shows as more than [`BIG`].
+    pub turn: N,
+    /// `max (|r_i - |e_i|| - MAX_DRIFT·|e_i|)`, positive where the metric drift is above [`MAX_DRIFT`].
+    pub slack: N,
+    /// Minus the shortest edge.
+    pub minus_shortest: N,
+    /// Minus the smallest curvature.
+    pub minus_k_min: N,
+    /// Largest way that a node went from the old curve.
+    pub farthest: N,
+}
+
+/// Looks at the curve that a step made of `old`.
+#[inline(always)]
+pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, blocks: Blocks) -> Glance<N> {
+    let low = N::of(-2.0 * BIG);
+    let (mut turn, mut slack, mut minus_shortest, mut minus_k_min, mut farthest) = (low, low, low, low, N::of(0.0));
+    let mut sums = solver::Sums::new(blocks);
+    for i in 0..new.len() {
+        let ([_, xm, x, ..], [_, ym, y, ..]) = (new.x.window(i), new.y.window(i));
+        let (k, r, e) = (new.k[i], new.r[i], edge(new, i)[2]);
+        turn = turn.max((k * r).bounded_abs());
+        slack = slack.max((r - e).bounded_abs() - N::of(MAX_DRIFT) * e);
+        minus_shortest = minus_shortest.max(-e.bounded_abs());
+        minus_k_min = minus_k_min.max(-k);
+        let (dx, dy) = (x - old.x[i], y - old.y[i]);
+        farthest = farthest.max((dx * dx + dy * dy).bounded_abs());
+        sums.add(i, [e, xm * y - x * ym, winding(new, i)]);
+    }
+    let [length, area, turning] = sums.totals();
+    let area = N::of(0.5) * area;
+    Glance { length, area, turning, turn, slack, minus_shortest, minus_k_min, farthest: farthest.sqrt() }
+}
+
+impl<N: Number> Glance<N> {
+    /// Whether the sums and the curvature are finite.
+    #[inline(always)]
+    pub fn is_finite(&self) -> N::Mask {
+        let big = N::of(BIG);
+        self.length.le(big).and(self.area.abs().le(big)).and(self.turn.le(big))
+    }
+
+    /// Whether the curve has become singular: it is not resolved, an edge has vanished, its lengths say nothing, it has
+    /// shrunk, or its turning number is no longer `turning`.
+    #[inline(always)]
+    pub fn is_singular(&self, turning: N, p: &Parameters<N>, n: usize) -> N::Mask {
+        let mean_edge = self.length / N::of(n as f64);
+        let resolved = self.turn.le(N::of(MAX_TURN));
+        let apart = (N::of(MIN_EDGE) * mean_edge).le(-self.minus_shortest);
+        let measured = self.slack.le(N::of(0.0));
+        let extended = p.least_length.le(self.length);
+        let winds = self.turning.le(turning).and(turning.le(self.turning));
+        resolved.and(apart).and(measured).and(extended).and(winds).not()
+    }
+}
+
 /// Sums over the ring.
+#[inline(always)]
 pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> Sums<N> {
     let half = N::of(0.5);
-    Sums {
-        length: blocks.sum(|i| edge(curve, i)[2]),
-        area: half
-            * blocks.sum(|i| {
-                let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
-                xm * y - x * ym
-            }),
-        energy: blocks.sum(|i| {
-            let k = curve.k[i];
-            (half * (k * k) + p.length_penalty) * curve.r[i]
-        }),
-        turning: blocks.sum(|i| winding(curve, i)),
+    let mut sums = solver::Sums::new(blocks);
+    for i in 0..curve.len() {
+        let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
+        let k = curve.k[i];
+        let energy = (half * (k * k) + p.length_penalty) * curve.r[i];
+        sums.add(i, [edge(curve, i)[2], xm * y - x * ym, energy, winding(curve, i)]);
     }
+    let [length, area, energy, turning] = sums.totals();
+    Sums { length, area: half * area, energy, turning }
 }
 
 /// Maxima over the ring.
 pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
-    let low = N::of(-2.0 * crate::number::BIG);
+    let low = N::of(-2.0 * BIG);
     let mut m = Maxima { turn: low, drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
     for i in 0..curve.x.len() {
         let (k, r, e) = (curve.k[i], curve.r[i], edge(curve, i)[2]);
@@ -83,12 +148,13 @@ pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
 
 /// `L²/(4π|A|)` above that of the regular polygon.
 #[inline(always)]
-pub fn excess<N: Number>(sums: &Sums<N>, p: &Parameters<N>) -> N {
-    sums.length * sums.length / (N::of(4.0 * std::f64::consts::PI) * sums.area.abs()) - p.polygon_ratio
+pub fn excess<N: Number>(length: N, area: N, p: &Parameters<N>) -> N {
+    length * length / (N::of(4.0 * std::f64::consts::PI) * area.abs()) - p.polygon_ratio
 }
 
 /// Largest gap between the angle by which the curvature turns the tangent over a segment, from middle to middle of its
 /// neighbours, and the angle by which the polygon turns there.
+#[inline(always)]
 pub fn gap<N: Number>(curve: &Curve<N>) -> N {
     let mut gap = N::of(0.0);
     for i in 0..curve.len() {
@@ -96,16 +162,6 @@ pub fn gap<N: Number>(curve: &Curve<N>) -> N {
         gap = gap.max((curve.k[i] * span - angle).bounded_abs());
     }
     gap
-}
-
-/// Largest way that a node went from `old` to `new`.
-pub fn farthest<N: Number>(old: &Curve<N>, new: &Curve<N>) -> N {
-    let mut farthest = N::of(0.0);
-    for i in 0..old.len() {
-        let (dx, dy) = (new.x[i] - old.x[i], new.y[i] - old.y[i]);
-        farthest = farthest.max((dx * dx + dy * dy).sqrt().bounded_abs());
-    }
-    farthest
 }
 
 /// Edge that ends at node i: `[Δx, Δy, |e|]`.
@@ -123,10 +179,7 @@ fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
     let (ex, ey, fx, fy) = (x - xm, y - ym, xp - x, yp - y);
     let (zero, one) = (N::of(0.0), N::of(1.0));
     let side = ex * fy - fx * ey;
-    let e_below = N::select(ey.le(zero), one, zero);
-    let f_below = N::select(fy.le(zero), one, zero);
-    let left = N::select(side.le(zero), zero, one);
-    let right = N::select(zero.le(side), zero, one);
-    // Upwards across the axis with the origin on the left, or downwards with it on the right.
-    e_below * (one - f_below) * left - (one - e_below) * f_below * right
+    // +1 upwards across the axis, which counts with the origin on the left; -1 downwards, with it on the right.
+    let across = N::select(fy.le(zero), zero, one) - N::select(ey.le(zero), zero, one);
+    N::select((across * side).le(zero), zero, across)
 }

@@ -3,10 +3,11 @@
 //! Every field is one number of the run's precision, in declaration order, so that host and WGSL agree by
 //! construction; a test compares names and offsets with naga's view of `shaders/member.wgsl`.
 
-use super::observe::{self, Maxima, Sums};
+use super::{Curve, observe};
 use crate::{
     flow::{Flow, MAX_DEGREE},
-    number::{BIG, Number, Real},
+    number::{BIG, Mask, Number, Real},
+    solver::Blocks,
 };
 
 /// A struct of numbers of one type, convertible to and from an array in declaration order.
@@ -30,6 +31,13 @@ macro_rules! numbers {
             pub fn from_numbers(numbers: &[N]) -> Self {
                 let [$($field),+] = *numbers else { panic!("{} numbers for {}", numbers.len(), stringify!($name)) };
                 $name { $($field),+ }
+            }
+        }
+
+        impl<N: Number> $name<N> {
+            /// Sets one lane of every field.
+            pub fn set_lane(&mut self, lane: usize, values: &$name<N::Real>) {
+                $(self.$field.set_lane(lane, values.$field);)+
             }
         }
     };
@@ -64,7 +72,7 @@ numbers! {
         pull,
         /// Tolerance of the sweeps.
         tolerance,
-        /// Over-relaxation factor of the sweeps.
+        /// Over-relaxation factor of the sweeps; 0 to choose it by the stiffness of each system.
         sor,
         /// λ of the energy `∮(½k² + λ) ds`.
         length_penalty,
@@ -241,13 +249,15 @@ fn convert<T: Real, U: Real>(numbers: Vec<T>) -> Vec<U> {
     numbers.into_iter().map(|v| U::of(v.to_f64())).collect()
 }
 
-impl<N: Number> Observed<N> {
-    /// What the sums and maxima of a curve say.
-    pub fn new(sums: &Sums<N>, maxima: &Maxima<N>, p: &Parameters<N>) -> Observed<N> {
+impl<T: Real> Observed<T> {
+    /// What can be observed of a curve.
+    #[inline(never)]
+    pub fn of(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
+        let (sums, maxima) = (observe::sums(curve, p, blocks), observe::maxima(curve));
         Observed {
             length: sums.length,
             area: sums.area,
-            excess: observe::excess(sums, p),
+            excess: observe::excess(sums.length, sums.area, p),
             energy: sums.energy,
             k_min: -maxima.minus_k_min,
             k_max: maxima.k_max,
@@ -302,12 +312,28 @@ impl Counters {
 }
 
 impl<N: Number> Parameters<N> {
-    /// The law's coefficients, `c₁` first.
+    /// The law.
     #[inline(always)]
-    pub fn coefficients(&self) -> [N; MAX_DEGREE] {
-        [self.c1, self.c2, self.c3, self.c4, self.c5, self.c6, self.c7, self.c8]
+    pub fn law(&self) -> Law<N> {
+        let coefficients = [self.c1, self.c2, self.c3, self.c4, self.c5, self.c6, self.c7, self.c8];
+        let (zero, mut degree) = (N::of(0.0), 0);
+        for (j, c) in coefficients.into_iter().enumerate() {
+            if !c.le(zero).and(zero.le(c)).all() {
+                degree = j + 1;
+            }
+        }
+        Law { coefficients, degree }
     }
+}
 
+/// `b(k) = c₁k + c₂k² + …`, up to the highest power that any lane has: those above would add zeros.
+#[derive(Clone, Copy, Debug)]
+pub struct Law<N> {
+    coefficients: [N; MAX_DEGREE],
+    degree: usize,
+}
+
+impl<N: Number> Law<N> {
     /// `b(k)` by Horner's rule.
     #[inline(always)]
     pub fn b(&self, k: N) -> N {
@@ -322,10 +348,9 @@ impl<N: Number> Parameters<N> {
 
     #[inline(always)]
     fn b_over_k(&self, k: N) -> N {
-        let c = self.coefficients();
-        let mut sum = c[MAX_DEGREE - 1];
-        for j in (0..MAX_DEGREE - 1).rev() {
-            sum = sum * k + c[j];
+        let mut sum = N::of(0.0);
+        for c in self.coefficients[..self.degree].iter().rev() {
+            sum = sum * k + *c;
         }
         sum
     }

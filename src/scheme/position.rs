@@ -5,44 +5,53 @@
 //! decay rates that do not converge (`docs/method.md`). `𝓒 = q_i/τ - (𝓐+𝓑+𝓓+𝓔)`, so the residual of the old
 //! state is `-Σ_j off_ij (x_j - x_i)`.
 
-use super::{Curve, Parameters, Workspace};
-use crate::{number::Number, solver::Row};
+use super::{Curve, Parameters, parameters::Law, state::Motion};
+use crate::{
+    number::Number,
+    solver::{Equation, Equations},
+};
 
-/// Fills `work.position` from the old positions and the new lengths and curvatures.
-pub fn assemble<N: Number>(old: &Curve<N>, p: &Parameters<N>, work: &mut Workspace<N>) {
-    let rate = p.tau.recip();
-    for i in 0..old.len() {
-        let [_, _, r, rp, _] = work.new.r.window(i);
-        let q = (r + rp) * N::of(0.5);
-        let off = off_diagonals(p, work.new.k.window(i), work.ir.window(i), work.iq.window(i), work.alpha[i]);
-        let [a, b, d, e] = off;
-        let c = q * rate - (a + b + d + e);
-        let (row, inverse) = Row::normalised(a, b, c, d, e, p.tau * work.iq[i]);
-        work.position.rows[i] = row;
-        work.position.rhs[0][i] = residual(off, old.x.window(i)) * inverse;
-        work.position.rhs[1][i] = residual(off, old.y.window(i)) * inverse;
+/// The equations, from the old positions and the new lengths and curvatures.
+pub struct Position<'a, N> {
+    old: &'a Curve<N>,
+    new: &'a Curve<N>,
+    motion: &'a Motion<N>,
+    law: Law<N>,
+    tau: N,
+    rate: N,
+}
+
+impl<'a, N: Number> Position<'a, N> {
+    /// The system of a step of `p.tau` from `old`, with the lengths and curvatures of `new`.
+    #[inline(always)]
+    pub fn new(old: &'a Curve<N>, new: &'a Curve<N>, motion: &'a Motion<N>, p: &Parameters<N>) -> Self {
+        Position { old, new, motion, law: p.law(), tau: p.tau, rate: p.tau.recip() }
     }
 }
 
-#[inline(always)]
-fn off_diagonals<N: Number>(
-    p: &Parameters<N>,
-    [_, _, k, kp, _]: [N; 5],
-    [_, irm, ir, irp, irpp]: [N; 5],
-    [_, iqm, iq, iqp, _]: [N; 5],
-    alpha: N,
-) -> [N; 4] {
-    let half = N::of(0.5);
-    let a = ir * iqm * irm;
-    let e = irp * iqp * irpp;
-    let middle = ir * iq * irp;
-    let low = ir * ir * (iqm + iq);
-    let high = irp * irp * (iq + iqp);
-    let phi = half * (p.phi(k) + p.phi(kp));
-    let drift = half * alpha - N::of(0.75) * ((kp * kp - k * k) * iq);
-    let b = (phi * ir + drift) - (middle + low + a);
-    let d = (phi * irp - drift) - (middle + high + e);
-    [a, b, d, e]
+impl<N: Number> Equations<N, 2> for Position<'_, N> {
+    #[inline(always)]
+    fn equation(&self, i: usize) -> Equation<N, 2> {
+        let [_, _, r, rp, _] = self.new.r.window(i);
+        let [_, _, k, kp, _] = self.new.k.window(i);
+        let [_, irm, ir, irp, irpp] = self.motion.ir.window(i);
+        let [_, iqm, iq, iqp, _] = self.motion.iq.window(i);
+        let half = N::of(0.5);
+        let q = (r + rp) * half;
+        let a = ir * iqm * irm;
+        let e = irp * iqp * irpp;
+        let middle = ir * iq * irp;
+        let low = ir * ir * (iqm + iq);
+        let high = irp * irp * (iq + iqp);
+        let phi = half * (self.law.phi(k) + self.law.phi(kp));
+        let drift = half * self.motion.alpha[i] - N::of(0.75) * ((kp * kp - k * k) * iq);
+        let b = (phi * ir + drift) - (middle + low + a);
+        let d = (phi * irp - drift) - (middle + high + e);
+        let c = q * self.rate - (a + b + d + e);
+        let off = [a, b, d, e];
+        let rhs = [residual(off, self.old.x.window(i)), residual(off, self.old.y.window(i))];
+        Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }
+    }
 }
 
 #[inline(always)]

@@ -27,6 +27,7 @@ fn vertex_turn<N: Number>([ex, ey, e]: [N; 3], [fx, fy, f]: [N; 3]) -> N {
 }
 
 /// Pulls the new k and r of a step towards `curve`'s polygon.
+#[inline(always)]
 pub fn pull<N: Number>(curve: &mut Curve<N>, p: &Parameters<N>) {
     // Members side by side in lanes have it or not together.
     if !p.pull.le(N::of(0.0)).not().any() {

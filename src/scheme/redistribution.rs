@@ -8,79 +8,92 @@
 //! - `r_i ← r_i·exp(τ(-B + ω(M/r_i - 1)))`, eq. (3) for `η = ln r`; without redistribution α = 0 and
 //!   `r_i ← r_i·exp(-τ k_i β_i)`.
 
-use super::{Curve, Parameters, Workspace};
-use crate::number::{Mask, Number};
+use super::{Curve, Parameters, state::Motion};
+use crate::{
+    number::{Mask, Number},
+    solver::{Blocks, Ring, Sums},
+};
 
-/// Fills β, r·k·β, α and the new r (with 1/r and 1/q) of `work`; returns the length `L = Σr` of the old old.
-pub fn redistribute<N: Number>(old: &Curve<N>, p: &Parameters<N>, work: &mut Workspace<N>) -> N {
-    let n = old.len();
-    for i in 0..n {
-        let beta = velocity(p, old.k.window(i), old.r.window(i));
-        work.beta[i] = beta;
-        work.rkb[i] = old.r[i] * old.k[i] * beta;
+/// Fills `motion` and the lengths `r` from the old curve; returns its length `L = Σr`.
+#[inline(always)]
+pub fn redistribute<N: Number>(
+    old: &Curve<N>,
+    p: &Parameters<N>,
+    blocks: Blocks,
+    motion: &mut Motion<N>,
+    r: &mut Ring<N>,
+) -> N {
+    let n = N::of(old.len() as f64);
+    reciprocals(&old.r, motion);
+    let law = p.law();
+    for i in 0..old.len() {
+        motion.b[i] = law.b(old.k[i]);
     }
-    let length = work.blocks.sum(|i| old.r[i]);
-    let mean_rkb = work.blocks.sum(|i| work.rkb[i]) / length;
-    let mean_length = length / N::of(n as f64);
+    motion.b.close();
+    let mut sums = Sums::new(blocks);
+    for i in 0..old.len() {
+        let beta = velocity(motion, old.k.window(i), i);
+        let rkb = old.r[i] * old.k[i] * beta;
+        motion.beta[i] = beta;
+        motion.rkb[i] = rkb;
+        sums.add(i, [old.r[i], rkb]);
+    }
+    let [length, sum_rkb] = sums.totals();
+    let (mean_rkb, mean_length) = (sum_rkb / length, length / n);
     // Members side by side in lanes have it or not together.
     if N::of(0.5).le(p.redistribution).any() {
-        tangential_velocity(old, p, mean_rkb, mean_length, work);
-        for i in 0..n {
-            let r = old.r[i];
-            let rate = p.omega * (mean_length / r - N::of(1.0)) - mean_rkb;
-            work.new.r[i] = r * (p.tau * rate).exp();
+        tangential_velocity(old, p, [mean_rkb, mean_length], blocks, motion);
+        for i in 0..old.len() {
+            let rate = p.omega * (mean_length * motion.ir[i] - N::of(1.0)) - mean_rkb;
+            r[i] = old.r[i] * (p.tau * rate).exp();
         }
     } else {
-        for i in 0..n {
-            work.alpha[i] = N::of(0.0);
-            work.new.r[i] = old.r[i] * (-(p.tau * (old.k[i] * work.beta[i]))).exp();
+        for i in 0..old.len() {
+            motion.alpha[i] = N::of(0.0);
+            r[i] = old.r[i] * (-(p.tau * (old.k[i] * motion.beta[i]))).exp();
         }
     }
-    work.alpha.close();
-    work.new.r.close();
-    reciprocals(work);
+    motion.alpha.close();
+    r.close();
+    reciprocals(r, motion);
     length
 }
 
+/// `β_i` of the curve whose reciprocal lengths and `b(k)` are in `motion`.
 #[inline(always)]
-fn velocity<N: Number>(p: &Parameters<N>, [_, km, k, kp, _]: [N; 5], [_, rm, r, rp, _]: [N; 5]) -> N {
-    let half = N::of(0.5);
-    let q = (r + rp) * half;
-    let qm = (rm + r) * half;
-    p.b(k) - ((kp - k) / q - (k - km) / qm) / r
+fn velocity<N: Number>(motion: &Motion<N>, [_, km, k, kp, _]: [N; 5], i: usize) -> N {
+    let [_, iqm, iq, _, _] = motion.iq.window(i);
+    motion.b[i] - ((kp - k) * iq - (k - km) * iqm) * motion.ir[i]
 }
 
 /// α by a running sum that restarts from the sum of whole blocks, as the kernel's prefix sum does.
+#[inline(always)]
 fn tangential_velocity<N: Number>(
     old: &Curve<N>,
     p: &Parameters<N>,
-    mean_rkb: N,
-    mean_length: N,
-    work: &mut Workspace<N>,
+    [mean_rkb, mean_length]: [N; 2],
+    blocks: Blocks,
+    motion: &mut Motion<N>,
 ) {
-    let growth = |i: usize| {
+    let mut sum = Sums::new(blocks);
+    for i in 0..old.len() {
         let r = old.r[i];
-        work.rkb[i] - r * mean_rkb + p.omega * (mean_length - r)
-    };
-    let mut before = N::of(0.0);
-    for (start, length) in work.blocks.iter() {
-        let mut part = growth(start);
-        work.alpha[start] = before + part;
-        for i in start + 1..start + length {
-            part += growth(i);
-            work.alpha[i] = before + part;
-        }
-        before += part;
+        sum.add(i, [motion.rkb[i] - r * mean_rkb + p.omega * (mean_length - r)]);
+        [motion.alpha[i]] = sum.so_far();
     }
-    work.alpha[old.len() - 1] = N::of(0.0);
+    motion.alpha[old.len() - 1] = N::of(0.0);
 }
 
-fn reciprocals<N: Number>(work: &mut Workspace<N>) {
-    for i in 0..work.blocks.n {
-        let [_, _, r, rp, _] = work.new.r.window(i);
-        work.ir[i] = r.recip();
-        work.iq[i] = ((r + rp) * N::of(0.5)).recip();
+/// `1/r` and `1/q` from one division: of the two, which are of one size, `1/(r q)`.
+#[inline(always)]
+fn reciprocals<N: Number>(r: &Ring<N>, motion: &mut Motion<N>) {
+    for i in 0..r.len() {
+        let [_, _, own, next, _] = r.window(i);
+        let q = (own + next) * N::of(0.5);
+        let inverse = (own * q).recip();
+        motion.ir[i] = inverse * q;
+        motion.iq[i] = inverse * own;
     }
-    work.ir.close();
-    work.iq.close();
+    motion.ir.close();
+    motion.iq.close();
 }

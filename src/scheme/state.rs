@@ -4,13 +4,15 @@ use glam::DVec2;
 
 use crate::{
     number::{Number, Real},
-    solver::{Blocks, Ring, System},
+    solver::{Blocks, Ring, System, direct::Factor, multigrid::Levels},
 };
 
 /// Fields of a curve.
 pub const CURVE_FIELDS: usize = 4;
 /// Fields of a state, in the order of [`State::fields`].
 pub const STATE_FIELDS: usize = 3 * CURVE_FIELDS + 3;
+/// Fields of a state that the next step reads, which come first: the curve and the increments.
+pub const NEEDED_FIELDS: usize = CURVE_FIELDS + 3;
 
 /// A polygon of `n` nodes with the scheme's own curvatures and lengths.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +67,27 @@ impl<N: Number> Curve<N> {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// The fields in the order in which the device stores them.
+    pub fn fields(&self) -> [&Ring<N>; CURVE_FIELDS] {
+        [&self.x, &self.y, &self.k, &self.r]
+    }
+
+    /// The same, to be changed.
+    pub fn fields_mut(&mut self) -> [&mut Ring<N>; CURVE_FIELDS] {
+        [&mut self.x, &mut self.y, &mut self.k, &mut self.r]
+    }
+
+    /// Takes over `other` in the lanes of `mask`.
+    #[inline(always)]
+    pub fn put(&mut self, mask: N::Mask, other: &Curve<N>) {
+        for (own, other) in self.fields_mut().into_iter().zip(other.fields()) {
+            for i in 0..other.len() {
+                own[i] = N::select(mask, other[i], own[i]);
+            }
+            own.close();
+        }
+    }
 }
 
 impl<T: Real> Curve<T> {
@@ -93,11 +116,6 @@ impl<T: Real> Curve<T> {
             r: ring(&|i| edge(i).length()),
         }
     }
-
-    /// The fields in the order in which the device stores them.
-    pub fn fields(&self) -> [&Ring<T>; CURVE_FIELDS] {
-        [&self.x, &self.y, &self.k, &self.r]
-    }
 }
 
 impl<N: Number> Increments<N> {
@@ -106,14 +124,43 @@ impl<N: Number> Increments<N> {
         Increments { k: Ring::zeros(n), x: Ring::zeros(n), y: Ring::zeros(n) }
     }
 
-    /// Multiplies all by `factor`.
+    /// Multiplies all by `factor`; what is not finite becomes 0 where that is 0.
+    #[inline(always)]
     pub fn stretch(&mut self, factor: N) {
+        let zero = N::of(0.0);
+        let vanishes = factor.le(zero);
         for ring in [&mut self.k, &mut self.x, &mut self.y] {
             for i in 0..ring.len() {
-                ring[i] = ring[i] * factor;
+                ring[i] = N::select(vanishes, zero, ring[i] * factor);
             }
             ring.close();
         }
+    }
+}
+
+impl<N: Number> State<N> {
+    /// A state of zeros, to be filled.
+    pub fn zeros(n: usize) -> State<N> {
+        let curve = || Curve::zeros(n);
+        State { curve: curve(), increments: Increments::zeros(n), middle: curve(), before: curve() }
+    }
+
+    /// The fields in the order in which the device stores them.
+    pub fn fields(&self) -> [&Ring<N>; STATE_FIELDS] {
+        let Increments { k, x, y } = &self.increments;
+        let [a, b, c, d] = self.curve.fields();
+        let [e, f, g, h] = self.middle.fields();
+        let [l, m, n, o] = self.before.fields();
+        [a, b, c, d, k, x, y, e, f, g, h, l, m, n, o]
+    }
+
+    /// The same, to be changed.
+    pub fn fields_mut(&mut self) -> [&mut Ring<N>; STATE_FIELDS] {
+        let Increments { k, x, y } = &mut self.increments;
+        let [a, b, c, d] = self.curve.fields_mut();
+        let [e, f, g, h] = self.middle.fields_mut();
+        let [l, m, n, o] = self.before.fields_mut();
+        [a, b, c, d, k, x, y, e, f, g, h, l, m, n, o]
     }
 }
 
@@ -122,15 +169,6 @@ impl<T: Real> State<T> {
     pub fn from_nodes(nodes: &[DVec2]) -> State<T> {
         let curve = Curve::from_nodes(nodes);
         State { middle: curve.clone(), before: curve.clone(), increments: Increments::zeros(nodes.len()), curve }
-    }
-
-    /// The fields in the order in which the device stores them.
-    pub fn fields(&self) -> [&Ring<T>; STATE_FIELDS] {
-        let Increments { k, x, y } = &self.increments;
-        let [a, b, c, d] = self.curve.fields();
-        let [e, f, g, h] = self.middle.fields();
-        let [l, m, n, o] = self.before.fields();
-        [a, b, c, d, k, x, y, e, f, g, h, l, m, n, o]
     }
 
     /// All fields one after another, `15n` numbers.
@@ -158,27 +196,42 @@ impl<T: Real> State<T> {
     }
 }
 
+/// How the old curve moves, and the reciprocals of its lengths, then of the new ones.
+#[derive(Clone, Debug)]
+pub struct Motion<N> {
+    /// `b(k)`.
+    pub b: Ring<N>,
+    /// Normal velocity β.
+    pub beta: Vec<N>,
+    /// `r·k·β`.
+    pub rkb: Vec<N>,
+    /// Tangential velocity α at the nodes.
+    pub alpha: Ring<N>,
+    /// 1/r.
+    pub ir: Ring<N>,
+    /// 1/q.
+    pub iq: Ring<N>,
+}
+
 /// What a step computes on the way from the old curve to the new one.
 #[derive(Clone, Debug)]
 pub struct Workspace<N> {
     /// The cut of the ring.
     pub blocks: Blocks,
-    /// Normal velocity β of the old curve.
-    pub beta: Vec<N>,
-    /// `r·k·β` of the old curve.
-    pub rkb: Vec<N>,
-    /// Tangential velocity α at the nodes.
-    pub alpha: Ring<N>,
+    /// How the old curve moves.
+    pub motion: Motion<N>,
     /// The new curve.
     pub new: Curve<N>,
-    /// 1/r of the new lengths.
-    pub ir: Ring<N>,
-    /// 1/q of the new lengths.
-    pub iq: Ring<N>,
-    /// Curvature system.
+    /// Curvature system, as sweeps take it.
     pub curvature: System<N, 1>,
-    /// Position system.
+    /// Position system, as sweeps take it.
     pub position: System<N, 2>,
+    /// Fill the systems also where a direct solve does not need them.
+    pub traced: bool,
+    /// Triangular factors of the two systems.
+    pub factors: (Factor<N, 1>, Factor<N, 2>),
+    /// Coarser levels of the two systems.
+    pub levels: (Levels<N, 1>, Levels<N, 2>),
 }
 
 impl<N: Number> Workspace<N> {
@@ -186,16 +239,16 @@ impl<N: Number> Workspace<N> {
     pub fn new(blocks: Blocks) -> Workspace<N> {
         let n = blocks.n;
         let ring = || Ring::zeros(n);
+        let nodes = || vec![N::default(); n];
         Workspace {
             blocks,
-            beta: vec![N::default(); n],
-            rkb: vec![N::default(); n],
-            alpha: ring(),
+            motion: Motion { b: ring(), beta: nodes(), rkb: nodes(), alpha: ring(), ir: ring(), iq: ring() },
             new: Curve::zeros(n),
-            ir: ring(),
-            iq: ring(),
             curvature: System::zeros(n),
             position: System::zeros(n),
+            traced: false,
+            factors: (Factor::new(n), Factor::new(n)),
+            levels: (Levels::new(n), Levels::new(n)),
         }
     }
 }

@@ -1,9 +1,15 @@
 //! One step of the paper's scheme, from an old curve to the new one in the workspace. Twin of `shaders/step.wgsl`.
 
-use super::{Curve, Increments, Parameters, Workspace, curvature, position, pull, redistribution};
+use super::{
+    Curve, Increments, Parameters, Workspace, coarse, curvature::Curvature, position::Position, pull, redistribution,
+};
 use crate::{
-    number::{Mask, Number},
-    solver::{Order, Ring, Solver, System, direct, gauss_seidel},
+    number::{Mask, Number, Real},
+    solver::{
+        Cycles, Elimination, Order, Ring, Solver, Solves, Sweeps, direct,
+        gauss_seidel::{self, Swept},
+        multigrid,
+    },
 };
 
 /// What the members of a run have in common.
@@ -34,29 +40,76 @@ pub struct Stepped<N: Number> {
 pub const NEGLIGIBLE: f64 = 0.1;
 
 /// Computes the curve a time `p.tau` after `old` into `work.new`; `increments` is where the solves start, and the result.
-pub fn step<N: Number>(
+pub fn step<T: Real>(
+    old: &Curve<T>,
+    increments: &mut Increments<T>,
+    p: &Parameters<T>,
+    method: &Method,
+    work: &mut Workspace<T>,
+) -> Stepped<T> {
+    match method.solver {
+        Solver::GaussSeidel => step_by::<T, Sweeps>(old, increments, p, true, method, work),
+        Solver::Multigrid => step_by::<T, Cycles>(old, increments, p, true, method, work),
+        Solver::Direct => step_by::<T, Elimination>(old, increments, p, true, method, work),
+    }
+}
+
+/// The same for members side by side, by the solver `S`. Lanes that are not `live` cost no sweeps and mean nothing
+/// afterwards.
+#[inline(always)]
+pub fn step_by<N: Number, S: Solves>(
     old: &Curve<N>,
     increments: &mut Increments<N>,
     p: &Parameters<N>,
+    live: N::Mask,
     method: &Method,
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
-    let length = redistribution::redistribute(old, p, work);
+    let Workspace { blocks, motion, new, curvature, position, traced, factors, levels } = work;
+    let length = redistribution::redistribute(old, p, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
     let rounding = N::of(NEGLIGIBLE * N::EPSILON);
-    let blocks = work.blocks;
+    let control = gauss_seidel::Control {
+        tolerance: p.tolerance,
+        negligible: rounding / radius,
+        sor: p.sor,
+        max_sweeps: method.max_sweeps,
+        order: method.order,
+    };
 
-    curvature::assemble(old, p, work);
-    let for_k = solve(&work.curvature, [&mut increments.k], blocks, p, method, rounding / radius);
-    add(&old.k, &increments.k, &mut work.new.k);
+    let equations = Curvature::new(old, new, motion, p);
+    if S::SOLVER.sweeps() || *traced {
+        curvature.assemble(&equations);
+    }
+    let unknown = [&mut increments.k];
+    let for_k = match S::SOLVER {
+        Solver::Direct => unswept(direct::solve(&equations, unknown, &mut factors.0)),
+        Solver::GaussSeidel => gauss_seidel::solve(curvature, unknown, *blocks, &control, live),
+        Solver::Multigrid => {
+            coarse::curvature(motion, &new.r, p, &mut levels.0);
+            multigrid::solve(curvature, unknown, *blocks, &control, live, &mut levels.0)
+        }
+    };
+    add(&old.k, &increments.k, &mut new.k);
 
-    position::assemble(old, p, work);
+    let equations = Position::new(old, new, motion, p);
+    if S::SOLVER.sweeps() || *traced {
+        position.assemble(&equations);
+    }
+    let control = gauss_seidel::Control { negligible: rounding * radius, ..control };
     let unknowns = [&mut increments.x, &mut increments.y];
-    let for_x = solve(&work.position, unknowns, blocks, p, method, rounding * radius);
-    add(&old.x, &increments.x, &mut work.new.x);
-    add(&old.y, &increments.y, &mut work.new.y);
-    pull::pull(&mut work.new, p);
+    let for_x = match S::SOLVER {
+        Solver::Direct => unswept(direct::solve(&equations, unknowns, &mut factors.1)),
+        Solver::GaussSeidel => gauss_seidel::solve(position, unknowns, *blocks, &control, live),
+        Solver::Multigrid => {
+            coarse::position(motion, &new.r, &new.k, p, &mut levels.1);
+            multigrid::solve(position, unknowns, *blocks, &control, live, &mut levels.1)
+        }
+    };
+    add(&old.x, &increments.x, &mut new.x);
+    add(&old.y, &increments.y, &mut new.y);
+    pull::pull(new, p);
 
     // What the second solve did counts only where the first one succeeded.
     Stepped {
@@ -67,33 +120,13 @@ pub fn step<N: Number>(
     }
 }
 
-/// Solves for the increments, sweeps starting from where they are.
-fn solve<N: Number, const F: usize>(
-    system: &System<N, F>,
-    unknowns: [&mut Ring<N>; F],
-    blocks: crate::solver::Blocks,
-    p: &Parameters<N>,
-    method: &Method,
-    negligible: N,
-) -> gauss_seidel::Swept<N> {
-    match method.solver {
-        Solver::GaussSeidel => {
-            let control = gauss_seidel::Control {
-                tolerance: p.tolerance,
-                negligible,
-                sor: p.sor,
-                max_sweeps: method.max_sweeps,
-                order: method.order,
-            };
-            gauss_seidel::solve(system, unknowns, blocks, &control)
-        }
-        Solver::Direct => {
-            let finite = direct::solve(system, unknowns);
-            gauss_seidel::Swept { sweeps: N::of(0.0), converged: finite, finite }
-        }
-    }
+/// What a direct solve says, in the words of the sweeps.
+#[inline(always)]
+fn unswept<N: Number>(finite: N::Mask) -> Swept<N> {
+    Swept { sweeps: N::of(0.0), converged: finite, finite }
 }
 
+#[inline(always)]
 fn add<N: Number>(old: &Ring<N>, increment: &Ring<N>, new: &mut Ring<N>) {
     for i in 0..old.len() {
         new[i] = old[i] + increment[i];

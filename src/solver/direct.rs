@@ -4,13 +4,18 @@
 //! elimination without pivoting solves for `f` and the two columns of `U` together; the last two rows then give
 //! a 2×2 system for `s`. The systems of the scheme are perturbations of `1 + (positive) D⁴`, for which
 //! elimination without pivoting is stable. O(n), no branch on the values.
+//!
+//! *Practice.* Equations are asked for one after another and never stored: what limits a step is memory traffic.
 
-use super::{ring::Ring, system::System};
+use super::{
+    ring::Ring,
+    system::{Equation, Equations},
+};
 use crate::number::{BIG, Number};
 
 /// A row of the triangular factor: `z_i + d·z_{i+1} + e·z_{i+2} = g`, `g` for the right-hand sides and the two
 /// border columns.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Eliminated<N, const F: usize> {
     d: N,
     e: N,
@@ -18,110 +23,133 @@ struct Eliminated<N, const F: usize> {
     border: [N; 2],
 }
 
-/// Writes the solution of `system` (n ≥ 6 rows) to `unknown`, one ring per right-hand side; says whether it is finite.
-pub fn solve<N: Number, const F: usize>(system: &System<N, F>, unknown: [&mut Ring<N>; F]) -> N::Mask {
-    let core = system.rows.len() - 2;
-    let upper = eliminate(system, core);
-    let solved = substitute_back(&upper);
-    let last = border_unknowns(system, &solved);
+/// Where an elimination keeps its triangular factor: `n-2` rows.
+#[derive(Clone, Debug)]
+pub struct Factor<N, const F: usize>(Vec<Eliminated<N, F>>);
+
+impl<N: Number, const F: usize> Factor<N, F> {
+    /// Room for systems of `n` ≥ 6 equations.
+    pub fn new(n: usize) -> Self {
+        let zero = N::default();
+        Factor(vec![Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] }; n - 2])
+    }
+}
+
+/// Writes the solution of `equations` to `unknown`, one ring of n ≥ 6 nodes per right-hand side; says whether it is
+/// finite.
+#[inline(always)]
+pub fn solve<N: Number, const F: usize>(
+    equations: &impl Equations<N, F>,
+    unknown: [&mut Ring<N>; F],
+    factor: &mut Factor<N, F>,
+) -> N::Mask {
+    let core = factor.0.len();
+    let rows = &mut factor.0[..];
+    let [p, q] = eliminate(equations, rows);
+    substitute_back(rows);
+    let last = border_unknowns(&p, &q, rows);
     let mut largest = N::of(0.0);
     for (f, u) in unknown.into_iter().enumerate() {
-        for (i, row) in solved.iter().enumerate() {
-            u[i] = row.g[f] - row.border[0] * last[f][0] - row.border[1] * last[f][1];
+        for (i, row) in rows.iter().enumerate() {
+            let value = row.g[f] - row.border[0] * last[f][0] - row.border[1] * last[f][1];
+            u[i] = value;
+            largest = largest.max(value.bounded_abs());
         }
-        u[core] = last[f][0];
-        u[core + 1] = last[f][1];
+        for (c, value) in last[f].into_iter().enumerate() {
+            u[core + c] = value;
+            largest = largest.max(value.bounded_abs());
+        }
         u.close();
-        for i in 0..u.len() {
-            largest = largest.max(u[i].bounded_abs());
-        }
     }
     largest.le(N::of(BIG))
 }
 
-/// The border column entries of core row `i`: what multiplies the last two unknowns.
+/// Fills `rows`; returns the last two equations.
 #[inline(always)]
-fn border<N: Number, const F: usize>(system: &System<N, F>, i: usize, core: usize) -> [N; 2] {
-    let row = &system.rows[i];
-    let zero = N::of(0.0);
-    let mut columns = [zero, zero];
-    match i {
-        0 => columns = [row.a, row.b],
-        1 => columns = [zero, row.a],
-        _ => {}
-    }
-    if i + 2 == core {
-        columns[0] += row.e;
-    } else if i + 1 == core {
-        columns[0] += row.d;
-        columns[1] += row.e;
-    }
-    columns
-}
-
-fn eliminate<N: Number, const F: usize>(system: &System<N, F>, core: usize) -> Vec<Eliminated<N, F>> {
+fn eliminate<N: Number, const F: usize>(
+    equations: &impl Equations<N, F>,
+    rows: &mut [Eliminated<N, F>],
+) -> [Equation<N, F>; 2] {
+    let core = rows.len();
     let zero = N::of(0.0);
     let none = Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] };
-    let mut upper: Vec<Eliminated<N, F>> = Vec::with_capacity(core);
     let (mut above2, mut above1) = (none, none);
-    for i in 0..core {
-        let row = &system.rows[i];
-        let a = if i >= 2 { row.a } else { zero };
-        let b = if i >= 1 { row.b } else { zero };
-        let d = if i + 1 < core { row.d } else { zero };
-        let e = if i + 2 < core { row.e } else { zero };
-        let columns = border(system, i, core);
+    let mut last = [equations.equation(core); 2];
+    for i in 0..core + 2 {
+        let mut own = equations.equation(i);
+        if i >= core {
+            last[i - core] = own;
+            continue;
+        }
+        // What a row has outside the core stands in its border columns: of the last two unknowns.
+        let mut border = [zero; 2];
+        if i < 2 {
+            border = if i == 0 { [own.a, own.b] } else { [zero, own.a] };
+            own.a = zero;
+            own.b = if i == 0 { zero } else { own.b };
+        }
+        if i + 2 >= core {
+            border =
+                if i + 2 == core { [border[0] + own.e, border[1]] } else { [border[0] + own.d, border[1] + own.e] };
+            own.d = if i + 1 == core { zero } else { own.d };
+            own.e = zero;
+        }
         // Row i minus a times the row two above leaves b' on z_{i-1}; minus b' times the row above leaves the pivot.
-        let b = b - a * above2.d;
-        let pivot = (N::of(1.0) - a * above2.e - b * above1.d).recip();
-        let reduce = |own: N, two_above: N, one_above: N| (own - a * two_above - b * one_above) * pivot;
-        let eliminated = Eliminated {
-            d: (d - b * above1.e) * pivot,
-            e: e * pivot,
-            g: std::array::from_fn(|f| reduce(system.rhs[f][i], above2.g[f], above1.g[f])),
-            border: std::array::from_fn(|c| reduce(columns[c], above2.border[c], above1.border[c])),
-        };
-        upper.push(eliminated);
-        (above2, above1) = (above1, eliminated);
+        let b = own.b - own.a * above2.d;
+        let pivot = (own.c - own.a * above2.e - b * above1.d).recip();
+        let mut row = Eliminated { d: (own.d - b * above1.e) * pivot, e: own.e * pivot, g: own.rhs, border };
+        for f in 0..F {
+            row.g[f] = (own.rhs[f] - own.a * above2.g[f] - b * above1.g[f]) * pivot;
+        }
+        for c in 0..2 {
+            row.border[c] = (border[c] - own.a * above2.border[c] - b * above1.border[c]) * pivot;
+        }
+        rows[i] = row;
+        (above2, above1) = (above1, row);
     }
-    upper
+    last
 }
 
-fn substitute_back<N: Number, const F: usize>(upper: &[Eliminated<N, F>]) -> Vec<Eliminated<N, F>> {
-    let mut solved = upper.to_vec();
-    let core = upper.len();
-    for i in (0..core - 1).rev() {
-        let below1 = solved[i + 1];
-        let below2 = solved[(i + 2).min(core - 1)];
-        let row = &mut solved[i];
-        // In the last but one row e is zero, so the repeated row below does not matter.
+#[inline(always)]
+fn substitute_back<N: Number, const F: usize>(rows: &mut [Eliminated<N, F>]) {
+    let core = rows.len();
+    // The entries e of the last row but one, and d and e of the last one, are zero.
+    let (mut below1, mut below2) = (rows[core - 1], rows[core - 1]);
+    for row in rows[..core - 1].iter_mut().rev() {
         for f in 0..F {
             row.g[f] = row.g[f] - row.d * below1.g[f] - row.e * below2.g[f];
         }
         for c in 0..2 {
             row.border[c] = row.border[c] - row.d * below1.border[c] - row.e * below2.border[c];
         }
+        (below2, below1) = (below1, *row);
     }
-    solved
 }
 
-/// The last two unknowns for each right-hand side, from the last two rows with `z = g - border·s` put in.
-fn border_unknowns<N: Number, const F: usize>(system: &System<N, F>, solved: &[Eliminated<N, F>]) -> [[N; 2]; F] {
+/// The last two unknowns for each right-hand side, from the last two equations with `z = g - border·s` put in.
+#[inline(always)]
+fn border_unknowns<N: Number, const F: usize>(
+    p: &Equation<N, F>,
+    q: &Equation<N, F>,
+    solved: &[Eliminated<N, F>],
+) -> [[N; 2]; F] {
     let core = solved.len();
-    let (p, q) = (&system.rows[core], &system.rows[core + 1]);
     let (first, second) = (&solved[0], &solved[1]);
     let (before2, before1) = (&solved[core - 2], &solved[core - 1]);
-    let coupling_p = |c: usize| p.a * before2.border[c] + p.b * before1.border[c] + p.e * first.border[c];
-    let coupling_q = |c: usize| q.a * before1.border[c] + q.d * first.border[c] + q.e * second.border[c];
-    let one = N::of(1.0);
-    let [m00, m01] = [one - coupling_p(0), p.d - coupling_p(1)];
-    let [m10, m11] = [q.b - coupling_q(0), one - coupling_q(1)];
+    let (mut m, mut last) = ([[N::of(0.0); 2]; 2], [[N::of(0.0); 2]; F]);
+    for c in 0..2 {
+        m[0][c] = p.a * before2.border[c] + p.b * before1.border[c] + p.e * first.border[c];
+        m[1][c] = q.a * before1.border[c] + q.d * first.border[c] + q.e * second.border[c];
+    }
+    let [m00, m01] = [p.c - m[0][0], p.d - m[0][1]];
+    let [m10, m11] = [q.b - m[1][0], q.c - m[1][1]];
     let inverse = (m00 * m11 - m01 * m10).recip();
-    std::array::from_fn(|f| {
-        let rp = system.rhs[f][core] - p.a * before2.g[f] - p.b * before1.g[f] - p.e * first.g[f];
-        let rq = system.rhs[f][core + 1] - q.a * before1.g[f] - q.d * first.g[f] - q.e * second.g[f];
-        [(rp * m11 - rq * m01) * inverse, (rq * m00 - rp * m10) * inverse]
-    })
+    for f in 0..F {
+        let rp = p.rhs[f] - p.a * before2.g[f] - p.b * before1.g[f] - p.e * first.g[f];
+        let rq = q.rhs[f] - q.a * before1.g[f] - q.d * first.g[f] - q.e * second.g[f];
+        last[f] = [(rp * m11 - rq * m01) * inverse, (rq * m00 - rp * m10) * inverse];
+    }
+    last
 }
 
 #[cfg(test)]
@@ -136,7 +164,7 @@ mod tests {
                 let system = test_system(n, stiffness);
                 let mut u = [Ring::zeros(n), Ring::zeros(n)];
                 let [x, y] = &mut u;
-                assert!(solve(&system, [x, y]));
+                assert!(solve(&system, [x, y], &mut Factor::new(n)));
                 for f in 0..2 {
                     let size = u[f].nodes().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
                     let worst = (0..n).map(|i| system.residual(f, i, &u[f]).abs()).fold(0.0, f64::max);

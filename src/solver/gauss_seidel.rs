@@ -39,7 +39,7 @@ pub struct Control<N> {
     pub tolerance: N,
     /// Absolute error that is not worth a sweep: a fraction of the rounding error of the unknown.
     pub negligible: N,
-    /// ω_SOR.
+    /// ω_SOR; 0 for [`over_relaxation`].
     pub sor: N,
     /// Sweeps after which the solve gives up.
     pub max_sweeps: u32,
@@ -58,25 +58,29 @@ pub struct Swept<N: Number> {
     pub finite: N::Mask,
 }
 
-/// Sweeps `unknown` (one ring per right-hand side) until its residual is small. Lanes that are done stay as they are.
+/// Sweeps `unknown` (one ring per right-hand side) until its residual is small, in the lanes that are `live`. Lanes that are
+/// done stay as they are.
+#[inline(always)]
 pub fn solve<N: Number, const F: usize>(
     system: &System<N, F>,
     mut unknown: [&mut Ring<N>; F],
     blocks: Blocks,
     control: &Control<N>,
+    live: N::Mask,
 ) -> Swept<N> {
     let size = size(system);
     let tolerance = control.tolerance.max(N::of(N::EPSILON) * size);
     let finite = size.le(N::of(BIG));
-    let mut active = finite;
+    let sor = N::select(control.sor.le(N::of(0.0)), over_relaxation(size), control.sor);
+    let mut active = live.and(finite);
     let mut swept = Swept { sweeps: N::of(0.0), converged: N::Mask::all_of(false), finite };
     let mut done = 0;
     while done < control.max_sweeps && active.any() {
         let sweeps = SWEEPS_PER_CHECK.min(control.max_sweeps - done);
         for _ in 0..sweeps {
             match control.order {
-                Order::Coloured => coloured_sweep(system, &mut unknown, blocks, control.sor, active),
-                Order::Lexicographic => lexicographic_sweep(system, &mut unknown, control.sor, active),
+                Order::Coloured => coloured_sweep(system, &mut unknown, blocks, sor, active),
+                Order::Lexicographic => lexicographic_sweep(system, &mut unknown, sor, active),
             }
         }
         done += sweeps;
@@ -89,8 +93,19 @@ pub fn solve<N: Number, const F: usize>(
     swept
 }
 
+/// The over-relaxation that needs about the fewest sweeps for a system of this [`size`]: 2g/(1 + g) with
+/// g = (⅝·size)^¼, about (10 τ/h⁴)^¼, measured (`docs/method.md`).
 #[inline(always)]
-fn coloured_sweep<N: Number, const F: usize>(
+fn over_relaxation<N: Number>(size: N) -> N {
+    let g = (N::of(AUTO_SCALE) * size).sqrt().sqrt();
+    (N::of(2.0) * (g / (N::of(1.0) + g))).max(N::of(1.0))
+}
+
+/// See [`over_relaxation`].
+pub const AUTO_SCALE: f64 = 0.625;
+
+#[inline(always)]
+pub(super) fn coloured_sweep<N: Number, const F: usize>(
     system: &System<N, F>,
     unknown: &mut [&mut Ring<N>; F],
     blocks: Blocks,
@@ -98,8 +113,12 @@ fn coloured_sweep<N: Number, const F: usize>(
     active: N::Mask,
 ) {
     for colour in 0..COLOURS {
-        for (f, u) in unknown.iter_mut().enumerate() {
-            blocks.of_colour(colour, |i| relax(system, f, i, u, sor, active));
+        for i in blocks.of_colour(colour) {
+            for (f, u) in unknown.iter_mut().enumerate() {
+                relax(system, f, i, u, sor, active);
+            }
+        }
+        for u in unknown.iter_mut() {
             u.close();
         }
     }
@@ -142,7 +161,8 @@ fn relax<N: Number, const F: usize>(
 ///
 /// Times ε it is the tolerance below which a scaled residual is rounding error: no sweep, and no direct solve, gets
 /// further.
-fn size<N: Number, const F: usize>(system: &System<N, F>) -> N {
+#[inline(always)]
+pub(super) fn size<N: Number, const F: usize>(system: &System<N, F>) -> N {
     let mut largest = N::of(0.0);
     for (i, row) in system.rows.iter().enumerate() {
         let terms = N::of(1.0) + row.a.abs() + row.b.abs() + row.d.abs() + row.e.abs();
@@ -156,6 +176,7 @@ fn size<N: Number, const F: usize>(system: &System<N, F>) -> N {
 }
 
 /// `[max weight·|residual|, max |u|]` over nodes and right-hand sides; not finite shows as more than [`BIG`].
+#[inline(always)]
 fn norms<N: Number, const F: usize>(system: &System<N, F>, unknown: &[&mut Ring<N>; F]) -> [N; 2] {
     let mut norms = [N::of(0.0); 2];
     for (f, u) in unknown.iter().enumerate() {
@@ -181,10 +202,10 @@ mod tests {
         let blocks = Blocks::new(n).unwrap();
         let mut exact = [Ring::zeros(n), Ring::zeros(n)];
         let [x, y] = &mut exact;
-        direct::solve(&system, [x, y]);
+        direct::solve(&system, [x, y], &mut direct::Factor::new(n));
         let mut swept = [Ring::zeros(n), Ring::zeros(n)];
         let [u, v] = &mut swept;
-        assert!(solve(&system, [u, v], blocks, &control(order, sor)).converged);
+        assert!(solve(&system, [u, v], blocks, &control(order, sor), true).converged);
         (0..2)
             .flat_map(|f| (0..n).map(move |i| (f, i)))
             .map(|(f, i)| (swept[f][i] - exact[f][i]).abs())
@@ -202,12 +223,31 @@ mod tests {
     }
 
     #[test]
+    fn over_relaxation_of_its_own_choice_is_near_the_best_one() {
+        for stiffness in [0.1, 1.0, 10.0, 100.0, 1000.0] {
+            let system = test_system(100, stiffness);
+            let sweeps = |sor| {
+                let mut u = [Ring::zeros(100), Ring::zeros(100)];
+                let control = Control { tolerance: 1e-5, ..control(Order::Coloured, sor) };
+                let swept = solve(&system, u.each_mut(), Blocks::new(100).unwrap(), &control, true);
+                assert!(swept.converged, "stiffness {stiffness}, sor {sor}");
+                swept.sweeps
+            };
+            let best = (20..39).map(|j| sweeps(0.05 * f64::from(j))).fold(f64::INFINITY, f64::min);
+            let (own, plain) = (sweeps(0.0), sweeps(1.0));
+            println!("stiffness {stiffness}: {own} sweeps, {best} at best, {plain} plain");
+            assert!(own <= 1.5 * best + 8.0, "stiffness {stiffness}: {own} sweeps, {best} at best");
+            assert!(own <= plain);
+        }
+    }
+
+    #[test]
     fn the_cap_is_reported_as_not_converged() {
         let system = test_system(64, 30.0);
         let mut u = [Ring::zeros(64), Ring::zeros(64)];
         let [x, y] = &mut u;
         let control = Control { max_sweeps: 6, ..control(Order::Coloured, 1.0) };
-        let swept = solve(&system, [x, y], Blocks::new(64).unwrap(), &control);
+        let swept = solve(&system, [x, y], Blocks::new(64).unwrap(), &control, true);
         assert!(!swept.converged && swept.finite);
         assert_eq!(swept.sweeps, 6.0);
     }
@@ -217,7 +257,7 @@ mod tests {
         let system = test_system(64, 3.0);
         let mut u = [Ring::zeros(64), Ring::zeros(64)];
         let [x, y] = &mut u;
-        let swept = solve(&system, [x, y], Blocks::new(64).unwrap(), &control(Order::Coloured, 2.5));
+        let swept = solve(&system, [x, y], Blocks::new(64).unwrap(), &control(Order::Coloured, 2.5), true);
         assert!(!swept.converged && swept.finite);
         assert!(swept.sweeps < 10_000.0, "{} sweeps", swept.sweeps);
     }
@@ -228,7 +268,7 @@ mod tests {
         system.rhs[1][17] = f64::NAN;
         let mut u = [Ring::zeros(64), Ring::zeros(64)];
         let [x, y] = &mut u;
-        let swept = solve(&system, [x, y], Blocks::new(64).unwrap(), &control(Order::Coloured, 1.0));
+        let swept = solve(&system, [x, y], Blocks::new(64).unwrap(), &control(Order::Coloured, 1.0), true);
         assert!(!swept.converged && !swept.finite);
         assert_eq!(swept.sweeps, 0.0);
     }

@@ -48,31 +48,61 @@ impl Blocks {
         fours.chain((0..self.threes).map(move |block| (after_fours + 3 * block, 3)))
     }
 
-    /// Σ value(i) over the ring, summed within blocks first.
+    /// The nodes of `colour` (0…3), in the order of the blocks.
     #[inline(always)]
-    pub fn sum<N: Number>(self, value: impl Fn(usize) -> N) -> N {
-        let mut total = N::of(0.0);
-        for (start, length) in self.iter() {
-            let mut part = value(start);
-            for i in start + 1..start + length {
-                part += value(i);
-            }
-            total += part;
-        }
-        total
+    pub fn of_colour(self, colour: usize) -> impl Iterator<Item = usize> {
+        let after_fours = 4 * self.fours;
+        let threes = if colour < 3 { after_fours + colour..self.n } else { 0..0 };
+        (colour..after_fours).step_by(4).chain(threes.step_by(3))
+    }
+}
+
+/// `M` sums over a ring, node after node, taken within blocks first.
+pub struct Sums<N, const M: usize> {
+    totals: [N; M],
+    parts: [N; M],
+    fours: usize,
+    /// Where the present block ends.
+    end: usize,
+}
+
+impl<N: Number, const M: usize> Sums<N, M> {
+    /// Sums of nothing, over a ring that is cut by `blocks`.
+    #[inline(always)]
+    pub fn new(blocks: Blocks) -> Self {
+        let zero = [N::of(0.0); M];
+        Sums { totals: zero, parts: zero, fours: 4 * blocks.fours, end: if blocks.fours > 0 { 4 } else { 3 } }
     }
 
-    /// Calls `visit` for every node of `colour` (0…3), in the order of the blocks.
+    /// Adds the terms of node `i`, the one after the last.
     #[inline(always)]
-    pub fn of_colour(self, colour: usize, mut visit: impl FnMut(usize)) {
-        for block in 0..self.fours {
-            visit(4 * block + colour);
+    pub fn add(&mut self, i: usize, terms: [N; M]) {
+        for m in 0..M {
+            self.parts[m] += terms[m];
         }
-        if colour < 3 {
-            for block in 0..self.threes {
-                visit(4 * self.fours + 3 * block + colour);
+        if i + 1 == self.end {
+            for m in 0..M {
+                self.totals[m] += self.parts[m];
+                self.parts[m] = N::of(0.0);
             }
+            self.end += if self.end < self.fours { 4 } else { 3 };
         }
+    }
+
+    /// The sums up to the last node added: of whole blocks, and of what came after them.
+    #[inline(always)]
+    pub fn so_far(&self) -> [N; M] {
+        let mut sums = self.totals;
+        for m in 0..M {
+            sums[m] += self.parts[m];
+        }
+        sums
+    }
+
+    /// The sums after the last node.
+    #[inline(always)]
+    pub fn totals(self) -> [N; M] {
+        self.totals
     }
 }
 
@@ -159,10 +189,10 @@ mod tests {
             let blocks = Blocks::new(n).unwrap();
             let mut colours = vec![usize::MAX; n];
             for colour in 0..COLOURS {
-                blocks.of_colour(colour, |i| {
+                for i in blocks.of_colour(colour) {
                     assert_eq!(colours[i], usize::MAX, "n = {n}: node {i} has two colours");
                     colours[i] = colour;
-                });
+                }
             }
             for i in 0..n {
                 assert!(colours[i] < COLOURS, "n = {n}: node {i} has no colour");
@@ -185,7 +215,9 @@ mod tests {
             }
             assert_eq!(next, n);
             assert_eq!(blocks.iter().count(), blocks.count());
-            assert_eq!(blocks.sum(|i| i as f64), (n * (n - 1) / 2) as f64);
+            let mut sums = Sums::new(blocks);
+            (0..n).for_each(|i| sums.add(i, [i as f64]));
+            assert_eq!(sums.totals(), [(n * (n - 1) / 2) as f64]);
         }
     }
 

@@ -1,9 +1,35 @@
-//! A periodic pentadiagonal system with `F` right-hand sides, every row divided by its diagonal entry.
+//! A periodic pentadiagonal system with `F` right-hand sides: one equation a node, and the rows that sweeps take.
 
 use super::ring::Ring;
 use crate::number::Number;
 
-/// Row i: `a·u_{i-2} + b·u_{i-1} + u_i + d·u_{i+1} + e·u_{i+2} = rhs`, the diagonal entry being 1.
+/// Equation i: `a·u_{i-2} + b·u_{i-1} + c·u_i + d·u_{i+1} + e·u_{i+2} = rhs`, for each right-hand side.
+#[derive(Clone, Copy, Debug)]
+pub struct Equation<N, const F: usize> {
+    /// Coefficient of `u_{i-2}`.
+    pub a: N,
+    /// Coefficient of `u_{i-1}`.
+    pub b: N,
+    /// Diagonal entry.
+    pub c: N,
+    /// Coefficient of `u_{i+1}`.
+    pub d: N,
+    /// Coefficient of `u_{i+2}`.
+    pub e: N,
+    /// Right-hand sides.
+    pub rhs: [N; F],
+    /// τ/q, with `q` the length that stands in the diagonal entry as `q/τ`.
+    pub time_over_length: N,
+}
+
+/// Something that has the equations of a system. A trait, not a closure: its methods are compiled into the vector code
+/// that asks.
+pub trait Equations<N, const F: usize> {
+    /// Equation `i`.
+    fn equation(&self, i: usize) -> Equation<N, F>;
+}
+
+/// Row i: an equation divided by its diagonal entry, `a·u_{i-2} + b·u_{i-1} + u_i + d·u_{i+1} + e·u_{i+2} = rhs`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Row<N> {
     /// Coefficient of `u_{i-2}`.
@@ -14,20 +40,11 @@ pub struct Row<N> {
     pub d: N,
     /// Coefficient of `u_{i+2}`.
     pub e: N,
-    /// Factor from the residual of this row to a bound of the error in slow modes: `(τ/q)·c`, with `c` the
-    /// diagonal entry before the division and `q` the length that stands in `q/τ`.
+    /// Factor from the residual of this row to a bound of the error in slow modes: `(τ/q)·c`.
     pub weight: N,
 }
 
 impl<N: Number> Row<N> {
-    /// Divides a row by its diagonal entry `c`; `time_over_length` is τ/q. Returns the row and 1/c.
-    #[inline(always)]
-    pub fn normalised(a: N, b: N, c: N, d: N, e: N, time_over_length: N) -> (Row<N>, N) {
-        let inverse = c.recip();
-        let row = Row { a: a * inverse, b: b * inverse, d: d * inverse, e: e * inverse, weight: time_over_length * c };
-        (row, inverse)
-    }
-
     /// `rhs - (row · u)` at the centre of a window of `u`.
     #[inline(always)]
     pub fn residual(&self, rhs: N, [m2, m1, u, p1, p2]: [N; 5]) -> N {
@@ -50,10 +67,34 @@ impl<N: Number, const F: usize> System<N, F> {
         System { rows: vec![Row::default(); n], rhs: std::array::from_fn(|_| vec![N::default(); n]) }
     }
 
+    /// Fills it with `equations`, divided by their diagonal entries.
+    #[inline(always)]
+    pub fn assemble(&mut self, equations: &impl Equations<N, F>) {
+        for i in 0..self.rows.len() {
+            let Equation { a, b, c, d, e, rhs, time_over_length } = equations.equation(i);
+            let inverse = c.recip();
+            let weight = time_over_length * c;
+            self.rows[i] = Row { a: a * inverse, b: b * inverse, d: d * inverse, e: e * inverse, weight };
+            for f in 0..F {
+                self.rhs[f][i] = rhs[f] * inverse;
+            }
+        }
+    }
+
     /// Residual of row `i` for right-hand side `f`.
     #[inline(always)]
     pub fn residual(&self, f: usize, i: usize, u: &Ring<N>) -> N {
         self.rows[i].residual(self.rhs[f][i], u.window(i))
+    }
+}
+
+/// The equations as they are stored, with a diagonal entry of 1.
+impl<N: Number, const F: usize> Equations<N, F> for System<N, F> {
+    #[inline(always)]
+    fn equation(&self, i: usize) -> Equation<N, F> {
+        let Row { a, b, d, e, weight } = self.rows[i];
+        let rhs = std::array::from_fn(|f| self.rhs[f][i]);
+        Equation { a, b, c: N::of(1.0), d, e, rhs, time_over_length: weight }
     }
 }
 
@@ -62,16 +103,21 @@ pub(crate) mod tests {
     use super::*;
 
     /// `(1 + stiffness·(1 + variation)·D⁴) u = rhs`, unsymmetric, diagonally far from dominant.
+    struct Stiff(f64);
+
+    impl Equations<f64, 2> for Stiff {
+        fn equation(&self, i: usize) -> Equation<f64, 2> {
+            let s = self.0 * (1.0 + 0.3 * (1.7 * i as f64).sin());
+            let skew = 0.1 * (0.9 * i as f64).cos();
+            let rhs = [(0.3 * i as f64).sin(), (1.1 * i as f64 + 0.5).cos()];
+            let (b, d) = (-4.0 * s + skew, -4.0 * s - skew);
+            Equation { a: s, b, c: 1.0 + 6.0 * s, d, e: s, rhs, time_over_length: 1.0 }
+        }
+    }
+
     pub(crate) fn test_system(n: usize, stiffness: f64) -> System<f64, 2> {
         let mut system = System::zeros(n);
-        for i in 0..n {
-            let s = stiffness * (1.0 + 0.3 * (1.7 * i as f64).sin());
-            let skew = 0.1 * (0.9 * i as f64).cos();
-            let (row, inverse) = Row::normalised(s, -4.0 * s + skew, 1.0 + 6.0 * s, -4.0 * s - skew, s, 1.0);
-            system.rows[i] = row;
-            system.rhs[0][i] = (0.3 * i as f64).sin() * inverse;
-            system.rhs[1][i] = (1.1 * i as f64 + 0.5).cos() * inverse;
-        }
+        system.assemble(&Stiff(stiffness));
         system
     }
 }

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use super::adapter::Gpu;
-use crate::solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK};
+use super::{adapter::Gpu, shader::Variant};
+use crate::solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK, multigrid::SWEEPS_PER_CYCLE};
 
 /// A dispatch aims to last this long: short enough for every watchdog, long enough to hide its overhead, some 0.1 ms.
 const DISPATCH_TIME: Duration = Duration::from_millis(40);
@@ -18,12 +18,16 @@ pub struct Budget {
     pub sweeps: u32,
 }
 
+/// Iterations of all loops in a cycle of multigrid, besides looks at the residual: over 11 levels at most of 4 colours.
+const ITERATIONS_PER_CYCLE: u32 = 300;
+/// And where its levels are built, down to the inverse of a matrix of 5 rows.
+const ITERATIONS_PER_BUILD: u32 = 300;
 /// llvmpipe leaves all loops of a shader, without a word, once they have made 65 535 iterations together.
 const SOFTWARE_ITERATIONS: u32 = 50_000;
 
 impl Budget {
     /// The most that one dispatch may do on this adapter.
-    pub(super) fn most(gpu: &Gpu, blocks: Blocks, adaptive: bool) -> Budget {
+    pub(super) fn most(gpu: &Gpu, blocks: Blocks, Variant { solver, adaptive, .. }: Variant) -> Budget {
         if gpu.is_hardware() {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
@@ -31,14 +35,21 @@ impl Budget {
         // adaptive one, which is three of the paper's, forty times.
         let walk = blocks.count() as u32 + 1;
         let walks = if adaptive { 40 } else { 10 };
-        let sweeps = SOFTWARE_ITERATIONS / 2 * SWEEPS_PER_CHECK / (SWEEPS_PER_CHECK + walk);
-        Budget { steps: (SOFTWARE_ITERATIONS / 2 / (walks * walk)).max(1), sweeps: sweeps.max(SWEEPS_PER_CHECK) }
+        // The rings below the finest one are walked over in every cycle, and built twice in each of the paper's steps.
+        let (sweeps, cycle, build) = match solver {
+            Solver::Multigrid => (SWEEPS_PER_CYCLE, ITERATIONS_PER_CYCLE, walks / 5 * ITERATIONS_PER_BUILD),
+            Solver::GaussSeidel | Solver::Direct => (SWEEPS_PER_CHECK, SWEEPS_PER_CHECK, 0),
+        };
+        Budget {
+            steps: (SOFTWARE_ITERATIONS / 2 / (walks * walk + build)).max(1),
+            sweeps: (SOFTWARE_ITERATIONS / 2 / (cycle + walk) * sweeps).max(sweeps),
+        }
     }
 
     /// Of the first dispatch: certainly little.
     pub(super) fn first(solver: Solver, most: Budget) -> Budget {
         match solver {
-            Solver::GaussSeidel => Budget { sweeps: most.sweeps.min(256), ..most },
+            Solver::GaussSeidel | Solver::Multigrid => Budget { sweeps: most.sweeps.min(256), ..most },
             Solver::Direct => Budget { steps: 1, ..most },
         }
     }
@@ -48,7 +59,7 @@ impl Budget {
         let share = DISPATCH_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
         let next = |now: u32, most: u32| ((f64::from(now) * share) as u32).clamp(1, 2 * now).min(most);
         match solver {
-            Solver::GaussSeidel => Budget { sweeps: next(self.sweeps, most.sweeps), ..self },
+            Solver::GaussSeidel | Solver::Multigrid => Budget { sweeps: next(self.sweeps, most.sweeps), ..self },
             Solver::Direct => Budget { steps: next(self.steps, most.steps), ..self },
         }
     }
@@ -61,7 +72,7 @@ mod tests {
     #[test]
     fn the_work_of_a_dispatch_settles_at_its_time() {
         let most = Budget { steps: 1 << 20, sweeps: 1 << 24 };
-        for solver in [Solver::GaussSeidel, Solver::Direct] {
+        for solver in Solver::ALL {
             for nanoseconds_per_unit in [3_u32, 700, 90_000, 3_000_000] {
                 let units = |b: Budget| if solver == Solver::Direct { b.steps } else { b.sweeps };
                 let time = |b: Budget| Duration::from_nanos(u64::from(nanoseconds_per_unit)) * units(b);

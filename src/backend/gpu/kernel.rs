@@ -72,7 +72,7 @@ impl<T: Real> Kernel<T> {
         gpu.capacity()
             .check_size::<T>(blocks, variant.solver)
             .map_err(|e| Error::Request(format!("n = {} needs {e}", blocks.n)))?;
-        let most = Budget::most(gpu, blocks, variant.adaptive);
+        let most = Budget::most(gpu, blocks, variant);
         let (device, pipeline) = gpu.pipeline::<T>(blocks, variant)?;
         let batch = || Batch::new(&device, &pipeline, blocks, slots, variant.traced);
         let batches = (0..batches).map(|_| batch()).collect();

@@ -2,7 +2,7 @@
 
 use crate::{
     number::Real,
-    solver::{Blocks, Solver},
+    solver::{Blocks, Solver, multigrid::coarse_nodes},
 };
 
 /// A part of the source: its file name in `shaders/` and its text.
@@ -29,13 +29,16 @@ pub struct Variant {
 
 impl Variant {
     /// All that are used; adaptive steps are made of traced ones.
-    pub const ALL: [Variant; 9] = [
+    pub const ALL: [Variant; 12] = [
         Variant::of(Solver::GaussSeidel),
         Variant { traced: true, ..Variant::of(Solver::GaussSeidel) },
         Variant { adaptive: true, ..Variant::of(Solver::GaussSeidel) },
         Variant { subgroup: true, ..Variant::of(Solver::GaussSeidel) },
         Variant { subgroup: true, traced: true, ..Variant::of(Solver::GaussSeidel) },
         Variant { subgroup: true, adaptive: true, ..Variant::of(Solver::GaussSeidel) },
+        Variant::of(Solver::Multigrid),
+        Variant { traced: true, ..Variant::of(Solver::Multigrid) },
+        Variant { adaptive: true, ..Variant::of(Solver::Multigrid) },
         Variant::of(Solver::Direct),
         Variant { traced: true, ..Variant::of(Solver::Direct) },
         Variant { adaptive: true, ..Variant::of(Solver::Direct) },
@@ -48,13 +51,14 @@ impl Variant {
 
     /// The files of the kernel, in the order of the step.
     pub fn parts(self) -> impl Iterator<Item = Part> {
-        let solver = match self.solver {
-            Solver::GaussSeidel => GAUSS_SEIDEL,
-            Solver::Direct => DIRECT,
+        let solver: &[Part] = match self.solver {
+            Solver::GaussSeidel => &GAUSS_SEIDEL,
+            Solver::Multigrid => &MULTIGRID,
+            Solver::Direct => &DIRECT,
         };
         let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
         let exchange = if self.subgroup { EXCHANGE_SUBGROUP } else { EXCHANGE };
-        COMMON.into_iter().chain(exchange).chain(solver).chain(trace)
+        COMMON.into_iter().chain(exchange).chain(solver.iter().copied()).chain(trace)
     }
 }
 
@@ -76,7 +80,8 @@ const COMMON: [Part; 14] = parts![
 ];
 const EXCHANGE: [Part; 1] = parts!["exchange.wgsl"];
 const EXCHANGE_SUBGROUP: [Part; 1] = parts!["exchange_subgroup.wgsl"];
-const GAUSS_SEIDEL: [Part; 1] = parts!["gauss_seidel.wgsl"];
+const GAUSS_SEIDEL: [Part; 2] = parts!["sweeps.wgsl", "gauss_seidel.wgsl"];
+const MULTIGRID: [Part; 3] = parts!["sweeps.wgsl", "coarse.wgsl", "multigrid.wgsl"];
 const DIRECT: [Part; 1] = parts!["direct.wgsl"];
 const TRACE_OFF: [Part; 1] = parts!["trace_off.wgsl"];
 const TRACE_ON: [Part; 1] = parts!["trace_on.wgsl"];
@@ -106,6 +111,9 @@ pub fn locate(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
     None
 }
 
+/// Levels of multigrid at most, in the kernel.
+pub const LEVELS: usize = 8;
+
 /// Threads of a workgroup: one a block, filled up to whole subgroups of `subgroup` threads; the kernel that is one
 /// subgroup wants the smallest subgroup there is.
 pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
@@ -113,25 +121,28 @@ pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
 }
 
 /// The `override` constants that size the kernel.
-pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 4] {
+pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 5] {
     [
         ("NODES", blocks.n as f64),
         ("FOURS", blocks.fours as f64),
         ("BLOCKS", blocks.count() as f64),
         ("THREADS", threads(blocks, subgroup) as f64),
+        ("COARSE", coarse_nodes(blocks.n) as f64),
     ]
 }
 
-/// Bytes of workgroup memory that the kernel takes: rows of four numbers a block, and one decision.
+/// Bytes of workgroup memory that the kernel takes: rows of four numbers a block, and one decision; for multigrid 13 numbers
+/// a coarse node and a row a level besides.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
 pub fn workgroup_bytes<T: Real>(blocks: Blocks, variant: Variant) -> usize {
     let rows = match variant {
         Variant { subgroup: true, .. } => 1,
-        Variant { solver: Solver::GaussSeidel, .. } => 3,
+        Variant { solver: Solver::GaussSeidel | Solver::Multigrid, .. } => 3,
         Variant { solver: Solver::Direct, .. } => 6,
     };
-    4 * rows * blocks.count() * size_of::<T>() + 16
+    let coarse = if variant.solver == Solver::Multigrid { 13 * coarse_nodes(blocks.n) + 4 * LEVELS } else { 0 };
+    (4 * rows * blocks.count() + coarse) * size_of::<T>() + 16
 }
 
 #[cfg(test)]

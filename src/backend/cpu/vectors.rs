@@ -1,0 +1,190 @@
+//! Vector instructions, chosen at run time: the same source, compiled once for each.
+
+use std::{marker::PhantomData, sync::Mutex};
+
+use pulp::{NullaryFnOnce, Simd};
+
+use crate::{
+    error::{Error, Result},
+    number::{Element, Instructions, Lanes, Number, Real},
+    scheme::{
+        evolve::{Run, Team, evolve_abreast},
+        step::Method,
+    },
+    solver::{Blocks, Cycles, Elimination, Solver, Solves, Sweeps},
+};
+
+/// Instructions for members side by side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Vectors {
+    /// One member at a time: the reference.
+    None,
+    /// 128 bits: SSE4.2 on x86-64, NEON on aarch64.
+    Bits128,
+    /// 256 bits: AVX2.
+    Bits256,
+    /// 512 bits: AVX-512.
+    Bits512,
+}
+
+impl Vectors {
+    /// All of them, the widest last.
+    pub const ALL: [Vectors; 4] = [Vectors::None, Vectors::Bits128, Vectors::Bits256, Vectors::Bits512];
+
+    /// Whether this processor has them.
+    pub fn are_available(self) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        match self {
+            Vectors::None => true,
+            Vectors::Bits128 => pulp::x86::V2::is_available(),
+            Vectors::Bits256 => pulp::x86::V3::is_available(),
+            Vectors::Bits512 => pulp::x86::V4::is_available(),
+        }
+        #[cfg(target_arch = "aarch64")]
+        match self {
+            Vectors::None => true,
+            Vectors::Bits128 => pulp::aarch64::Neon::is_available(),
+            Vectors::Bits256 | Vectors::Bits512 => false,
+        }
+        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+        matches!(self, Vectors::None)
+    }
+
+    /// The widest that this processor has.
+    pub fn widest() -> Vectors {
+        Self::ALL.into_iter().rfind(|vectors| vectors.are_available()).unwrap_or(Vectors::None)
+    }
+}
+
+/// A number with vector code. Implemented for each number by name, so that the code is compiled here, once, and not again
+/// in every program that uses a back end.
+pub trait Vectorised: Real {
+    /// A crew of `threads` threads for rings cut by `blocks`.
+    #[doc(hidden)]
+    fn crew(vectors: Vectors, solver: Solver, blocks: Blocks, threads: usize) -> Result<Box<dyn Crew<Self>>>;
+}
+
+macro_rules! vectorised {
+    ($($real:ident)*) => {
+        $(
+            impl Vectorised for $real {
+                fn crew(
+                    vectors: Vectors,
+                    solver: Solver,
+                    blocks: Blocks,
+                    threads: usize,
+                ) -> Result<Box<dyn Crew<$real>>> {
+                    let crew = match solver {
+                        Solver::GaussSeidel => crew_by::<Sweeps, $real>(vectors, blocks, threads),
+                        Solver::Multigrid => crew_by::<Cycles, $real>(vectors, blocks, threads),
+                        Solver::Direct => crew_by::<Elimination, $real>(vectors, blocks, threads),
+                    };
+                    crew.ok_or_else(|| Error::Failed(format!("this processor has no vectors of {vectors:?}")))
+                }
+            }
+        )*
+    };
+}
+
+vectorised!(f64 f32);
+
+/// A crew for the solver `M`, if the processor has the vectors.
+///
+/// An elimination is a chain of results that wait for each other, so two registers of them go in turn. Sweeps wait for
+/// nothing, and go over their rows so often that these have to stay in the nearest cache: fewer members go abreast.
+fn crew_by<M: Solves + 'static, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Crew<T>>> {
+    match vectors {
+        Vectors::None => Some(Group::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
+        #[cfg(target_arch = "x86_64")]
+        Vectors::Bits128 => abreast::<_, M, T, 2>(pulp::x86::V2::try_new(), blocks, threads),
+        #[cfg(target_arch = "aarch64")]
+        Vectors::Bits128 => abreast::<_, M, T, 2>(pulp::aarch64::Neon::try_new(), blocks, threads),
+        #[cfg(target_arch = "x86_64")]
+        Vectors::Bits256 | Vectors::Bits512 if M::SOLVER.sweeps() => {
+            abreast::<_, M, T, 1>(pulp::x86::V3::try_new(), blocks, threads)
+        }
+        #[cfg(target_arch = "x86_64")]
+        Vectors::Bits256 => abreast::<_, M, T, 2>(pulp::x86::V3::try_new(), blocks, threads),
+        #[cfg(target_arch = "x86_64")]
+        Vectors::Bits512 => abreast::<_, M, T, 1>(pulp::x86::V4::try_new(), blocks, threads),
+        #[allow(unreachable_patterns)]
+        _ => None,
+    }
+}
+
+/// A crew whose members go abreast in `R` registers of the instructions, if the processor has them.
+fn abreast<S: Instructions, M: Solves + 'static, T: Element<S>, const R: usize>(
+    simd: Option<S>,
+    blocks: Blocks,
+    threads: usize,
+) -> Option<Box<dyn Crew<T>>> {
+    simd.map(|simd| Group::<S, M, Lanes<S, T, R>>::crew(simd, blocks, threads))
+}
+
+/// A number that fits into all vectors of this kind of processor.
+#[cfg(target_arch = "x86_64")]
+trait Lane: Element<pulp::x86::V2> + Element<pulp::x86::V3> + Element<pulp::x86::V4> {}
+#[cfg(target_arch = "x86_64")]
+impl<T: Element<pulp::x86::V2> + Element<pulp::x86::V3> + Element<pulp::x86::V4>> Lane for T {}
+#[cfg(target_arch = "aarch64")]
+trait Lane: Element<pulp::aarch64::Neon> {}
+#[cfg(target_arch = "aarch64")]
+impl<T: Element<pulp::aarch64::Neon>> Lane for T {}
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+use Real as Lane;
+
+/// Threads that advance groups of members.
+#[doc(hidden)]
+pub trait Crew<T>: Send + Sync {
+    /// Members abreast in a group.
+    fn lanes(&self) -> usize;
+
+    /// Takes a group of at most that many members some steps further, in a thread of the pool.
+    fn advance(&self, runs: &mut [&mut Run<T>], method: &Method, attempts: u32);
+}
+
+/// Lanes of `N` in instructions `S`, which the token proves to be there, for the solver `M`; a team for each thread.
+struct Group<S, M, N: Number> {
+    simd: S,
+    solver: PhantomData<fn() -> M>,
+    teams: Vec<Mutex<Team<N>>>,
+}
+
+impl<S: Simd, M: Solves + 'static, T: Real, N: Number<Real = T>> Group<S, M, N> {
+    fn crew(simd: S, blocks: Blocks, threads: usize) -> Box<dyn Crew<T>> {
+        let teams = (0..threads).map(|_| Mutex::new(Team::<N>::new(blocks))).collect();
+        Box::new(Group { simd, solver: PhantomData::<fn() -> M>, teams })
+    }
+}
+
+impl<S: Simd, M: Solves, N: Number> Crew<N::Real> for Group<S, M, N> {
+    fn lanes(&self) -> usize {
+        N::LANES
+    }
+
+    fn advance(&self, runs: &mut [&mut Run<N::Real>], method: &Method, attempts: u32) {
+        let thread = rayon::current_thread_index().unwrap_or(0);
+        // A team that a panic left behind is taken over: members overwrite all of it.
+        let mut team = self.teams[thread].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        self.simd.vectorize(Advance { runs, solver: self.solver, method, team: &mut team, attempts });
+    }
+}
+
+/// The call that is compiled for the instructions.
+struct Advance<'a, 'b, M, N: Number> {
+    runs: &'a mut [&'b mut Run<N::Real>],
+    solver: PhantomData<fn() -> M>,
+    method: &'a Method,
+    team: &'a mut Team<N>,
+    attempts: u32,
+}
+
+impl<M: Solves, N: Number> NullaryFnOnce for Advance<'_, '_, M, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Advance { runs, solver: PhantomData, method, team, attempts } = self;
+        evolve_abreast::<N, M>(runs, method, team, attempts);
+    }
+}

@@ -1,0 +1,359 @@
+//! `curvelax bench`: curve-steps per second of each back end, solver, precision and number of nodes.
+
+use std::{collections::HashSet, time::Duration};
+
+use serde::Serialize;
+
+use super::{flags, note, print};
+use crate::{
+    backend::{choose::no_adapter, gpu::Gpu},
+    bench::{self, Bench, Sample},
+    ensemble::{
+        Spec,
+        spec::{BackendChoice, Precision, Solver},
+    },
+    error::{Error, Result},
+};
+
+const EXAMPLES: &str = "\
+Examples:
+  curvelax bench
+  curvelax bench --backend cpu --solver direct --points 100,200,400
+  curvelax bench --adapter llvmpipe --precision f32 --json > bench.json
+
+A curve-step is one step of the paper's scheme for one curve; an adaptive attempt makes three. Members of the default
+ensemble (perturbed 2:1 ellipses, surface diffusion, tau = 0.001) go forward as in a run, the cases taking turns, so
+that what else the machine does meets all of them. Start-up is the time to open the back end and make the first step,
+in which kernels are compiled; it is not in the rates, nor is a warm-up. The default takes less than a minute.";
+
+/// Names of the back ends that can be asked for.
+const BACKENDS: &[&str] = &["cpu", "gpu"];
+/// Names of the solvers that can be asked for.
+const SOLVERS: &[&str] = &["gauss-seidel", "multigrid", "direct"];
+/// Members at once on hardware: enough to fill it.
+const CURVES: u64 = 8192;
+/// Members at once elsewhere: the CPU back end has fewer slots, and a software GPU as few cores.
+const CURVES_IN_SOFTWARE: u64 = 32;
+const MOST_SECONDS: f64 = 3600.0;
+const MOST_REPEATS: usize = 1000;
+
+/// Measure curve-steps per second on this machine, as a table.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct BenchArgs {
+    /// Nodes per member, n; several in turn [default: 100]
+    #[arg(long, value_name = "N1,N2,...", value_delimiter = ',', value_parser = flags::whole::<usize>, allow_hyphen_values = true)]
+    points: Vec<usize>,
+    /// Members at once, as far as the back end has slots [default: 8192 on hardware GPUs, 32 on software ones, all
+    /// slots of the CPU]
+    #[arg(long, value_name = "COUNT", value_parser = flags::whole::<u64>, allow_hyphen_values = true)]
+    curves: Option<u64>,
+    /// Measuring time of each case, in seconds [default: 2]
+    #[arg(long, value_name = "SECONDS", value_parser = flags::real, allow_hyphen_values = true)]
+    seconds: Option<f64>,
+    /// Windows into which this time is cut; the table has their median, least and most [default: 5]
+    #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true)]
+    repeats: Option<usize>,
+    /// Solvers of the pentadiagonal systems [default: all; direct and multigrid with --adaptive]
+    #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = flags::word::<Solver>(SOLVERS), help_heading = flags::METHOD)]
+    solver: Vec<Solver>,
+    /// Steps that adapt to this local error; alone it means 0.001 [default: fixed steps]
+    #[arg(
+        long, value_name = "TOL", value_parser = flags::real, allow_negative_numbers = true, num_args = 0..=1,
+        default_missing_value = "0.001", help_heading = flags::METHOD
+    )]
+    adaptive: Option<f64>,
+    /// Back ends [default: the CPU and every GPU adapter, software ones included]
+    #[arg(long, value_name = "WHERE,...", value_delimiter = ',', value_parser = flags::word::<BackendChoice>(BACKENDS), help_heading = flags::MACHINE)]
+    backend: Vec<BackendChoice>,
+    /// Part of the name of the GPU adapters to measure; with it the CPU only if --backend says so [default: all]
+    #[arg(long, value_name = "NAME", help_heading = flags::MACHINE)]
+    adapter: Option<String>,
+    /// Number types [default: f64,f32]
+    #[arg(long, value_name = "TYPE,...", value_delimiter = ',', value_parser = flags::word::<Precision>(flags::PRECISIONS), help_heading = flags::MACHINE)]
+    precision: Vec<Precision>,
+    /// Threads of the CPU back end [default: all cores]
+    #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true, help_heading = flags::MACHINE)]
+    threads: Option<usize>,
+    /// The rows as JSON, with every window, instead of the table
+    #[arg(long, help_heading = flags::OUTPUT)]
+    json: bool,
+    /// No notes on stderr
+    #[arg(long, help_heading = flags::OUTPUT)]
+    quiet: bool,
+}
+
+/// A line of the table. Unknown is none: a case that failed has its reason instead of numbers.
+#[derive(Serialize)]
+struct Row {
+    backend: &'static str,
+    adapter: Option<String>,
+    driver: Option<String>,
+    device_type: Option<String>,
+    threads: Option<usize>,
+    solver: Solver,
+    precision: Precision,
+    points: usize,
+    adaptive: Option<f64>,
+    curves: Option<usize>,
+    start_up_seconds: Option<f64>,
+    curve_steps: u64,
+    sweeps_per_step: Option<f64>,
+    steps_per_second: Option<Spread>,
+    nanoseconds_per_node: Option<f64>,
+    failed: Option<String>,
+}
+
+/// Rates over the windows, in their order.
+#[derive(Serialize)]
+struct Spread {
+    median: f64,
+    min: f64,
+    max: f64,
+    windows: Vec<f64>,
+}
+
+/// All rows, and what they have in common.
+#[derive(Serialize)]
+struct Benches<'a> {
+    curvelax: &'static str,
+    seconds: f64,
+    repeats: usize,
+    rows: &'a [Row],
+}
+
+/// Runs the measurements and prints their table.
+pub fn bench(args: BenchArgs) -> Result<()> {
+    let (seconds, repeats) = (args.seconds.unwrap_or(2.0), args.repeats.unwrap_or(5));
+    if !(seconds > 0.0 && seconds <= MOST_SECONDS) {
+        return Err(Error::value("seconds", seconds, "no time to measure in", &format!("take up to {MOST_SECONDS}")));
+    }
+    if !(1..=MOST_REPEATS).contains(&repeats) {
+        return Err(Error::value("repeats", repeats, "no number of windows", &format!("take 1 to {MOST_REPEATS}")));
+    }
+    let window = Duration::from_secs_f64(seconds / repeats as f64);
+    let mut cases = cases(&args)?.into_iter().map(Case::new).collect::<Vec<_>>();
+    for case in &mut cases {
+        if !args.quiet {
+            note(&format!("starting {}", case.name()));
+        }
+        case.bench = Bench::open(&case.spec, window);
+    }
+    if cases.iter().all(|case| case.bench.is_err())
+        && let Some(Err(error)) = cases.pop().map(|case| case.bench)
+    {
+        return Err(error);
+    }
+    for repeat in 1..=repeats {
+        if !args.quiet {
+            note(&format!("measuring, {repeat} of {repeats}"));
+        }
+        cases.iter_mut().for_each(|case| case.measure(window));
+    }
+    let rows: Vec<Row> = cases.iter().map(Case::row).collect();
+    if args.json {
+        let benches = Benches { curvelax: env!("CARGO_PKG_VERSION"), seconds, repeats, rows: &rows };
+        let text =
+            serde_json::to_string_pretty(&benches).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
+        return print(&(text + "\n"));
+    }
+    print(&table(&rows))
+}
+
+/// The specs of all cases, checked: a wrong key ends the command before anything is started.
+fn cases(args: &BenchArgs) -> Result<Vec<Spec>> {
+    fn or<T: Copy>(given: &[T], all: &[T]) -> Vec<T> {
+        if given.is_empty() { all.to_vec() } else { given.to_vec() }
+    }
+    let base = Spec { adaptive: args.adaptive, threads: args.threads, ..Spec::default() };
+    let solvers = match args.adaptive {
+        Some(_) => or(&args.solver, &[Solver::Direct, Solver::Multigrid]),
+        None => or(&args.solver, &[Solver::Direct, Solver::Multigrid, Solver::GaussSeidel]),
+    };
+    let mut cases = Vec::new();
+    for place in places(args)? {
+        for points in or(&args.points, &[base.points]) {
+            for &solver in &solvers {
+                for precision in or(&args.precision, &[Precision::F64, Precision::F32]) {
+                    let solver = solver.into();
+                    cases.push(bench::spec(
+                        points,
+                        Spec { solver, precision: Some(precision), ..place.clone().over(&base) },
+                    )?);
+                }
+            }
+        }
+    }
+    Ok(cases)
+}
+
+/// Where a case runs: the CPU, or the adapter of this name, and with how many members.
+#[derive(Clone)]
+struct Place {
+    backend: BackendChoice,
+    adapter: Option<String>,
+    curves: u64,
+}
+
+impl Place {
+    fn over(self, base: &Spec) -> Spec {
+        Spec { backend: self.backend, adapter: self.adapter, curves: self.curves, ..base.clone() }
+    }
+}
+
+/// The back ends asked for. An adapter that several interfaces list is measured once, through the first.
+fn places(args: &BenchArgs) -> Result<Vec<Place>> {
+    let asked = |backend| args.backend.contains(&backend);
+    let mut places = Vec::new();
+    if asked(BackendChoice::Cpu) || (args.backend.is_empty() && args.adapter.is_none()) {
+        let curves = args.curves.unwrap_or(CURVES);
+        places.push(Place { backend: BackendChoice::Cpu, adapter: None, curves });
+    }
+    if !args.backend.is_empty() && !asked(BackendChoice::Gpu) {
+        return match &args.adapter {
+            Some(name) => Err(Error::value("adapter", name, "the CPU has no adapters", "leave out --adapter")),
+            None => Ok(places),
+        };
+    }
+    let found = Gpu::list();
+    let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
+    let mut seen = HashSet::new();
+    for gpu in found.iter().filter(|gpu| gpu.matches(args.adapter.as_deref())) {
+        if seen.insert(gpu.name()) {
+            let enough = if gpu.is_hardware() { CURVES } else { CURVES_IN_SOFTWARE };
+            let (adapter, curves) = (Some(gpu.name().to_string()), args.curves.unwrap_or(enough));
+            places.push(Place { backend: BackendChoice::Gpu, adapter, curves });
+        }
+    }
+    if seen.is_empty() && (args.adapter.is_some() || asked(BackendChoice::Gpu)) {
+        return Err(no_adapter(args.adapter.as_deref(), &names));
+    }
+    Ok(places)
+}
+
+/// A case on its way to a row.
+struct Case {
+    spec: Spec,
+    bench: Result<Bench>,
+    samples: Vec<Sample>,
+}
+
+impl Case {
+    fn new(spec: Spec) -> Case {
+        Case { spec, bench: Err(Error::Failed("not started".into())), samples: Vec::new() }
+    }
+
+    /// Measures a window; a case that has failed stays failed.
+    fn measure(&mut self, window: Duration) {
+        if let Ok(bench) = &mut self.bench {
+            match bench.sample(window) {
+                Ok(sample) => self.samples.push(sample),
+                Err(error) => self.bench = Err(error),
+            }
+        }
+    }
+
+    fn name(&self) -> String {
+        let Spec { adapter, points, .. } = &self.spec;
+        let place = adapter.as_deref().unwrap_or("cpu");
+        let (solver, precision) = (self.spec.solver().name(), precision_name(self.precision()));
+        format!("{place}, {solver}, {precision}, n = {points}")
+    }
+
+    fn precision(&self) -> Precision {
+        self.spec.precision.unwrap_or(Precision::F64)
+    }
+
+    fn row(&self) -> Row {
+        let bench = self.bench.as_ref().ok();
+        let platform = bench.map(Bench::platform);
+        let steps: u64 = self.samples.iter().map(|sample| sample.steps).sum();
+        let sweeps: u64 = self.samples.iter().map(|sample| sample.sweeps).sum();
+        let rates: Vec<f64> =
+            self.samples.iter().map(|sample| sample.steps as f64 / sample.elapsed.as_secs_f64()).collect();
+        let spread = bench.and_then(|_| Spread::of(rates));
+        let failed = match &self.bench {
+            Err(error) => Some(error.to_string()),
+            Ok(_) if steps == 0 => Some("no step was finished in this time; take more --seconds".into()),
+            Ok(_) => None,
+        };
+        Row {
+            backend: if self.spec.backend == BackendChoice::Cpu { "cpu" } else { "gpu" },
+            adapter: self.spec.adapter.clone(),
+            driver: platform.and_then(|platform| platform.driver.clone()),
+            device_type: platform.and_then(|platform| platform.device_type.clone()),
+            threads: platform.and_then(|platform| platform.threads),
+            solver: self.spec.solver(),
+            precision: self.precision(),
+            points: self.spec.points,
+            adaptive: self.spec.adaptive,
+            curves: bench.map(Bench::curves),
+            start_up_seconds: bench.map(|bench| bench.start_up().as_secs_f64()),
+            curve_steps: steps,
+            sweeps_per_step: (failed.is_none() && sweeps > 0).then(|| sweeps as f64 / steps as f64),
+            nanoseconds_per_node: (failed.is_none())
+                .then_some(spread.as_ref())
+                .flatten()
+                .map(|spread| 1e9 / (spread.median * self.spec.points as f64)),
+            steps_per_second: spread.filter(|_| failed.is_none()),
+            failed,
+        }
+    }
+}
+
+impl Spread {
+    fn of(windows: Vec<f64>) -> Option<Spread> {
+        let mut sorted = windows.clone();
+        sorted.sort_by(f64::total_cmp);
+        let (min, max) = (*sorted.first()?, *sorted.last()?);
+        let median = 0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]);
+        Some(Spread { median, min, max, windows })
+    }
+}
+
+fn precision_name(precision: Precision) -> &'static str {
+    match precision {
+        Precision::F32 => "f32",
+        Precision::F64 => "f64",
+    }
+}
+
+/// Aligned; a case that failed has the reason in place of its numbers.
+fn table(rows: &[Row]) -> String {
+    let place = |row: &Row| match (&row.adapter, row.threads) {
+        (Some(adapter), _) => adapter.clone(),
+        (None, Some(1)) => "cpu, 1 thread".into(),
+        (None, Some(threads)) => format!("cpu, {threads} threads"),
+        (None, None) => "cpu".into(),
+    };
+    let width = rows.iter().map(|row| place(row).len()).max().unwrap_or(0).max("back end".len());
+    let mut text = format!(
+        "{:<width$}  {:<13}{:<5}{:>6}{:>8}{:>17}{:>22}{:>14}{:>13}{:>11}\n",
+        "back end",
+        "solver",
+        "type",
+        "n",
+        "curves",
+        "curve-steps/s",
+        "min..max",
+        "ns/step/node",
+        "sweeps/step",
+        "start-up"
+    );
+    for row in rows {
+        let (solver, precision, n) = (row.solver.name(), precision_name(row.precision), row.points);
+        text += &format!("{:<width$}  {solver:<13}{precision:<5}{n:>6}", place(row));
+        text += &match (&row.failed, &row.steps_per_second) {
+            (None, Some(Spread { median, min, max, .. })) => {
+                let curves = row.curves.map_or(String::new(), |curves| curves.to_string());
+                let spread = format!("{min:.2e}..{max:.2e}");
+                let node = row.nanoseconds_per_node.map_or(String::new(), |ns| format!("{ns:.2}"));
+                let sweeps = row.sweeps_per_step.map_or("-".into(), |sweeps| format!("{sweeps:.0}"));
+                let start_up = row.start_up_seconds.map_or(String::new(), |s| format!("{s:.3} s"));
+                format!("{curves:>8}{median:>17.3e}{spread:>22}{node:>14}{sweeps:>13}{start_up:>11}\n")
+            }
+            (reason, _) => format!("  failed: {}\n", reason.as_deref().unwrap_or("nothing was measured")),
+        };
+    }
+    text
+}

@@ -1,0 +1,151 @@
+//! Members abreast in vector instructions against one member at a time: the same bits, whatever goes beside a member, on
+//! however many threads. Each comparison has a negative control.
+
+use curvelax::{
+    Result,
+    backend::{
+        Backend,
+        cpu::{CpuBackend, Vectorised, Vectors},
+    },
+    ensemble::{Ended, Family, Sink, Spec, Status, spec::Solver},
+    scheme::{
+        Parameters, State,
+        evolve::Run,
+        parameters::{Counters, Report},
+        step::Method,
+    },
+    simulate::simulate,
+    solver::{Blocks, Order},
+};
+
+/// Everything that the members of a run leave.
+#[derive(Default)]
+struct All(Vec<Ended>);
+
+impl Sink for All {
+    fn member(&mut self, ended: &Ended) -> Result<()> {
+        self.0.push(ended.clone());
+        Ok(())
+    }
+    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
+}
+
+/// A back end with fewer slots, so that members meet others.
+struct Fewer(Box<dyn Backend>, usize);
+
+impl Backend for Fewer {
+    fn slots(&self) -> usize {
+        self.1.min(self.0.slots())
+    }
+    fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
+        self.0.load(slot, run)
+    }
+    fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>) {
+        self.0.aim(slot, goal, parameters);
+    }
+    fn clear(&mut self, slot: usize) {
+        self.0.clear(slot);
+    }
+    fn advance(&mut self) -> Result<()> {
+        self.0.advance()
+    }
+    fn counters(&self, slot: usize) -> Counters {
+        self.0.counters(slot)
+    }
+    fn report(&self, slot: usize) -> Report<f64> {
+        self.0.report(slot)
+    }
+    fn state(&mut self, slot: usize) -> Result<State<f64>> {
+        self.0.state(slot)
+    }
+}
+
+/// Members of all fates, with output times, some of which lie between steps.
+fn spec(shape: &str, more: Spec) -> Spec {
+    let shape = shape.parse().unwrap();
+    Spec { shape, curves: 37, series: Some(0.013), snapshots: vec![0.0, 0.02], ..more }.validate().unwrap()
+}
+
+fn run<T: Vectorised>(spec: &Spec, vectors: Vectors, threads: usize, slots: usize) -> Vec<Ended> {
+    let method = Method { solver: spec.solver(), order: Order::Coloured, max_sweeps: spec.max_sweeps };
+    let blocks = Blocks::new(spec.points).unwrap();
+    let backend = CpuBackend::<T>::with_vectors(blocks, method, threads, vectors).unwrap();
+    let mut all = All::default();
+    let family = Family::new(spec).unwrap();
+    simulate(spec, &family, T::PRECISION, &mut Fewer(Box::new(backend), slots), 2, &mut all).unwrap();
+    all.0
+}
+
+fn same_bits<T: Vectorised>(name: &str, spec: &Spec) {
+    let alone = run::<T>(spec, Vectors::None, 1, 16);
+    assert_eq!(alone.len(), spec.curves as usize);
+    let (mut compared, mut wider) = (0, 0);
+    for vectors in Vectors::ALL.into_iter().filter(|vectors| vectors.are_available()) {
+        for (threads, slots) in [(1, 1000), (2, 11)] {
+            let abreast = run::<T>(spec, vectors, threads, slots);
+            for (one, other) in alone.iter().zip(&abreast) {
+                // Debug prints every bit of a float, and NaN equal to NaN.
+                let member = one.outcome.member;
+                assert_eq!(
+                    format!("{one:?}"),
+                    format!("{other:?}"),
+                    "{name}, {} {vectors:?}, member {member}",
+                    T::NAME
+                );
+            }
+            compared += abreast.len();
+            wider += usize::from(vectors != Vectors::None);
+        }
+    }
+    assert!(compared > 0);
+    println!("{name}, {}: {compared} members, {wider} runs in vectors", T::NAME);
+    // Negative control: a member of another seed has other bits.
+    let other = run::<T>(&Spec { seed: spec.seed + 1, ..spec.clone() }, Vectors::widest(), 1, 1000);
+    assert_ne!(format!("{:?}", alone[5]), format!("{:?}", other[5]));
+}
+
+#[test]
+fn fixed_steps_give_the_same_bits_in_every_vector() {
+    for solver in Solver::ALL {
+        for n in [32, 37] {
+            let fixed = Spec { tau: Some(1e-3), t_end: 0.3, points: n, solver: solver.into(), ..Spec::default() };
+            let spec = spec("ellipse:2,1", Spec { stop_when_relaxed: true, relax_to: Some(0.5), ..fixed });
+            same_bits::<f64>(&format!("{solver:?}, n = {n}"), &spec);
+            same_bits::<f32>(&format!("{solver:?}, n = {n}"), &spec);
+        }
+    }
+}
+
+#[test]
+fn adaptive_steps_give_the_same_bits_in_every_vector() {
+    for solver in Solver::ALL {
+        let adaptive = Spec { adaptive: Some(1e-2), t_end: 0.4, points: 33, solver: solver.into(), ..Spec::default() };
+        let spec = spec("flower:3:0.3", Spec { stop_when_relaxed: true, ..adaptive });
+        same_bits::<f64>(&format!("{solver:?}, adaptive"), &spec);
+        same_bits::<f32>(&format!("{solver:?}, adaptive"), &spec);
+    }
+}
+
+#[test]
+fn members_that_fail_leave_the_lanes_to_others() {
+    let base = Spec { t_end: 0.5, points: 40, solver: Solver::Direct.into(), amplitude: 0.3, ..Spec::default() };
+    let fixed = spec("lemniscate:1", Spec { tau: Some(1e-3), ..base.clone() });
+    let adaptive = spec("lemniscate:1", Spec { adaptive: Some(1e-3), ..base });
+    for spec in [&fixed, &adaptive] {
+        let all = run::<f64>(spec, Vectors::widest(), 2, 1000);
+        let singular = all.iter().filter(|ended| ended.outcome.status == Status::Singular).count();
+        let first = all[0].outcome.steps;
+        assert!(singular > 9 && all.iter().any(|ended| ended.outcome.steps != first), "{singular} end badly");
+    }
+    same_bits::<f64>("fixed steps that fail", &fixed);
+    same_bits::<f32>("fixed steps that fail", &fixed);
+    same_bits::<f64>("adaptive steps that fail", &adaptive);
+    same_bits::<f32>("adaptive steps that fail", &adaptive);
+}
+
+#[test]
+fn the_widest_vectors_are_chosen() {
+    assert!(Vectors::widest().are_available());
+    let all: Vec<bool> = Vectors::ALL.map(Vectors::are_available).to_vec();
+    assert_eq!(all.iter().rposition(|has| *has), Vectors::ALL.iter().position(|v| *v == Vectors::widest()));
+}
