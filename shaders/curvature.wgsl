@@ -1,8 +1,7 @@
 // Rows of the system for the increment of k. Twin of src/scheme/curvature.rs.
 
 fn assemble_curvature() {
-    share(k, k);
-    let wk = read_a();
+    let wk = k_window;
     let irm = minus1(ir);
     let irh = here(ir);
     let irp = plus1(ir);

@@ -2,16 +2,16 @@
 //
 // Every block keeps its last two unknowns `s` and eliminates the others: its first two nodes become
 // `m = c - P p - S s`, with `p` the last two unknowns of the block before. What remains is a ring of pairs,
-// `L p + D s + U s' = g`. The last pair borders a chain of the others, which parallel cyclic reduction solves in
-// log2(BLOCKS) rounds: in each, every pair eliminates its neighbours at the current stride. No pivoting: the systems
-// are perturbations of 1 + (positive) D^4.
+// `L p + D s + U s' = g`. Cyclic reduction solves it: in a round every second pair of the ring eliminates itself from its
+// neighbours, in ceil(log2(BLOCKS)) rounds one is left, and as many rounds back give the others. A ring of an odd number
+// keeps its first and its last pair, which go on as neighbours, so that it needs no border and no padding. No pivoting: the
+// systems are perturbations of 1 + (positive) D^4.
 
 /// 2x2 matrices are kept as (m00, m01, m10, m11), pairs for x and y together as (x0, x1, y0, y1).
-/// Chain coefficients of every pair, divided by its own: towards lower and higher blocks, right-hand sides, border.
-var<workgroup> chain_low: array<vec, BLOCKS>;
-var<workgroup> chain_high: array<vec, BLOCKS>;
-var<workgroup> chain_rhs: array<vec, BLOCKS>;
-var<workgroup> chain_border: array<vec, BLOCKS>;
+/// The rows of pairs that have left the ring, divided by their own matrix; in the end all pairs in `ring_rhs`.
+var<workgroup> ring_low: array<vec, BLOCKS>;
+var<workgroup> ring_high: array<vec, BLOCKS>;
+var<workgroup> ring_rhs: array<vec, BLOCKS>;
 
 /// The first two nodes of the block as a function of the pairs around them.
 struct Interior { c: vec, p: vec, s: vec }
@@ -31,37 +31,24 @@ fn invert(m: vec) -> vec {
     return vec(m.w, -m.y, -m.z, m.x) / (m.x * m.w - m.y * m.z);
 }
 
-/// Solves for `u` alone, or for `u` and `v`.
+/// Solves for `u` alone, or for `u` and `v`. Whether `u` alone is finite is judged with the positions: it spares a look at
+/// all blocks.
 fn solve(both: bool, negligible: real) -> u32 {
     if !both { rhs_y = vec(0.0); }
-    sweeps = 0u;
-    let interior = eliminate_interior();
-    let row = pair_row(interior);
-    let own = solve_pairs(row);
-    workgroupBarrier();
-    if owns == 4u { put_pair(2u, own); }
-    if owns == 3u { put_pair(1u, own); }
-    workgroupBarrier();
-    let before = vec(ring_a[near_low.x], ring_a[near_low.y], ring_b[near_low.x], ring_b[near_low.y]);
-    let m = interior.c - apply(interior.p, before) - apply(interior.s, own);
-    let four = is_four();
-    u = select(vec(m.x, own.xy, 0.0), vec(m.xy, own.xy), four);
-    v = select(vec(m.z, own.zw, 0.0), vec(m.zw, own.zw), four);
-    let size = max(block_max(bounded_abs(u)), block_max(bounded_abs(v)));
+    solve_rows();
+    if !both { return SOLVED; }
+    let size = max(block_max(bounded_abs(dk)), max(block_max(bounded_abs(u)), block_max(bounded_abs(v))));
     let largest = ring_maxima(vec(size, 0.0, 0.0, 0.0));
     return uniform_decision(select(NOT_FINITE, SOLVED, largest.x <= real(BIG)));
 }
 
-/// Whether the block has four nodes; a spare thread computes along with the last block.
-fn is_four() -> bool {
-    return min(lane, BLOCKS - 1u) < FOURS;
-}
-
-fn put_pair(at: u32, pair: vec) {
-    ring_a[first + at] = pair.x;
-    ring_a[first + at + 1u] = pair.y;
-    ring_b[first + at] = pair.z;
-    ring_b[first + at + 1u] = pair.w;
+fn solve_rows() {
+    sweeps = 0u;
+    let interior = eliminate_interior();
+    let own = solve_ring(pair_row(interior));
+    let m = interior.c - apply(interior.p, ring_rhs[before]) - apply(interior.s, own);
+    u = select(vec(m.x, own.xy, 0.0), vec(m.xy, own.xy), is_four);
+    v = select(vec(m.z, own.zw, 0.0), vec(m.zw, own.zw), is_four);
 }
 
 fn eliminate_interior() -> Interior {
@@ -69,7 +56,7 @@ fn eliminate_interior() -> Interior {
     let b = row_of.b;
     let d = row_of.d;
     let e = row_of.e;
-    if is_four() {
+    if is_four {
         let inverse = invert(vec(1.0, d.x, b.y, 1.0));
         return Interior(
             apply(inverse, vec(rhs_x.xy, rhs_y.xy)),
@@ -92,7 +79,7 @@ fn pair_row(interior: Interior) -> PairRow {
     var own = vec(1.0, d.y, b.z, 1.0);
     var from_next = vec(e.y, 0.0, d.z, e.z);
     var rhs = vec(rhs_x.yz, rhs_y.yz);
-    if is_four() {
+    if is_four {
         from_before = vec(0.0);
         from_interior = vec(a.z, b.z, 0.0, a.w);
         own = vec(1.0, d.z, b.w, 1.0);
@@ -101,81 +88,70 @@ fn pair_row(interior: Interior) -> PairRow {
     }
     workgroupBarrier();
     if owns > 0u {
-        chain_low[lane] = interior.p;
-        chain_high[lane] = interior.s;
-        chain_rhs[lane] = interior.c;
+        ring_a[lane] = interior.p;
+        ring_b[lane] = interior.s;
+        partials[lane] = interior.c;
     }
     workgroupBarrier();
-    let next = (min(lane, BLOCKS - 1u) + 1u) % BLOCKS;
-    let row = PairRow(
+    return PairRow(
         from_before - multiply(from_interior, interior.p),
-        own - multiply(from_interior, interior.s) - multiply(from_next, chain_low[next]),
-        -multiply(from_next, chain_high[next]),
-        rhs - apply(from_interior, interior.c) - apply(from_next, chain_rhs[next]),
+        own - multiply(from_interior, interior.s) - multiply(from_next, ring_a[after]),
+        -multiply(from_next, ring_b[after]),
+        rhs - apply(from_interior, interior.c) - apply(from_next, partials[after]),
     );
-    workgroupBarrier();
-    return row;
 }
 
-/// The pair of this block: the chain of all but the last block by cyclic reduction, then the last one as its border.
-fn solve_pairs(row: PairRow) -> vec {
-    let last = BLOCKS - 1u;
-    let inverse = invert(row.own);
-    var low = multiply(inverse, row.low);
-    var high = multiply(inverse, row.high);
-    var rhs = apply(inverse, row.rhs);
-    var border = vec(0.0);
-    if lane == 0u {
-        border = low;
-        low = vec(0.0);
-    }
-    if lane + 1u == last {
-        border = border + high;
-        high = vec(0.0);
-    }
-    if lane < last { put_chain(low, high, rhs, border); }
-    for (var stride = 1u; stride < last; stride = 2u * stride) {
-        workgroupBarrier();
-        var reduced = vec(1.0, 0.0, 0.0, 1.0);
-        var new_low = vec(0.0);
-        var new_high = vec(0.0);
-        if lane < last && lane >= stride {
-            let at = lane - stride;
-            reduced = reduced - multiply(low, chain_high[at]);
-            new_low = -multiply(low, chain_low[at]);
-            rhs = rhs - apply(low, chain_rhs[at]);
-            border = border - multiply(low, chain_border[at]);
+/// The pair of this block, once all are in `ring_rhs`. One barrier a round: a pair is written once as a row, when it leaves
+/// the ring, and once as a solution, and nobody reads it in a round in which it is written.
+fn solve_ring(row: PairRow) -> vec {
+    var low = row.low;
+    var own = row.own;
+    var high = row.high;
+    var rhs = row.rhs;
+    var stride = 1u;
+    // The bound is BLOCKS, see `ring_sums`.
+    for (; stride < dispatch.blocks; stride = 2u * stride) {
+        let place = block % (2u * stride);
+        if place == stride {
+            let inverse = invert(own);
+            low = multiply(inverse, low);
+            high = multiply(inverse, high);
+            rhs = apply(inverse, rhs);
+            if owns > 0u {
+                ring_low[lane] = low;
+                ring_high[lane] = high;
+                ring_rhs[lane] = rhs;
+            }
         }
-        if lane + stride < last {
-            let at = lane + stride;
-            reduced = reduced - multiply(high, chain_low[at]);
-            new_high = -multiply(high, chain_high[at]);
-            rhs = rhs - apply(high, chain_rhs[at]);
-            border = border - multiply(high, chain_border[at]);
-        }
-        let scale = invert(reduced);
-        low = multiply(scale, new_low);
-        high = multiply(scale, new_high);
-        rhs = apply(scale, rhs);
-        border = multiply(scale, border);
         workgroupBarrier();
-        if lane < last { put_chain(low, high, rhs, border); }
+        if place == 0u {
+            let last = (BLOCKS - 1u) / stride;
+            if block > 0u || last % 2u == 1u {
+                let at = select(block - stride, last * stride, block == 0u);
+                own = own - multiply(low, ring_high[at]);
+                rhs = rhs - apply(low, ring_rhs[at]);
+                low = -multiply(low, ring_low[at]);
+            }
+            if block + stride < BLOCKS {
+                let at = block + stride;
+                own = own - multiply(high, ring_low[at]);
+                rhs = rhs - apply(high, ring_rhs[at]);
+                high = -multiply(high, ring_high[at]);
+            }
+        }
+    }
+    // The last pair is its own neighbour.
+    if block == 0u { rhs = apply(invert(own + low + high), rhs); }
+    if lane == 0u { ring_rhs[0] = rhs; }
+    for (stride = stride / 2u; stride > 0u; stride = stride / 2u) {
+        workgroupBarrier();
+        let place = block % (2u * stride);
+        if place == stride {
+            let up = block + stride;
+            rhs = rhs - apply(low, ring_rhs[block - stride]) - apply(high, ring_rhs[select(0u, up, up < BLOCKS)]);
+            if owns > 0u { ring_rhs[lane] = rhs; }
+        }
     }
     workgroupBarrier();
-    if lane == last {
-        let before = last - 1u;
-        let own = row.own - multiply(row.low, chain_border[before]) - multiply(row.high, chain_border[0]);
-        let left = row.rhs - apply(row.low, chain_rhs[before]) - apply(row.high, chain_rhs[0]);
-        chain_rhs[last] = apply(invert(own), left);
-    }
-    workgroupBarrier();
-    let end = chain_rhs[last];
-    return select(rhs - apply(border, end), end, lane >= last);
-}
-
-fn put_chain(low: vec, high: vec, rhs: vec, border: vec) {
-    chain_low[lane] = low;
-    chain_high[lane] = high;
-    chain_rhs[lane] = rhs;
-    chain_border[lane] = border;
+    return rhs;
 }

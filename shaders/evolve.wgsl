@@ -1,14 +1,12 @@
-// The entry point: one workgroup takes one member through up to `dispatch.steps` steps towards its goal. Twin of
+// What the entry point does: one workgroup takes one member through up to `dispatch.steps` steps towards its goal. Twin of
 // src/scheme/evolve.rs. A fixed step that fails is not accepted: the member ends in its last good state. An adaptive one
 // is tried again with a shorter step, until that is too short to mean anything.
 //
 // A dispatch also ends when its sweeps are used up. The attempt then pauses: the increments so far are stored, and the
 // next dispatch computes the same rows again and sweeps on, so that no bit depends on where a dispatch ended.
 
-@compute @workgroup_size(THREADS)
-fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    member = group.x;
-    take_block(thread);
+fn take_member(index: u32) {
+    member = all_due[index];
     p = all_parameters[member];
     counters = all_counters[member];
     report = all_reports[member];
@@ -108,9 +106,9 @@ fn observe_step() -> Observed {
         var rh = new_r;
         if curve == 0u {
             storageBarrier();
-            share(load_field(MIDDLE), load_field(MIDDLE + 1u));
-            wx = read_a();
-            wy = read_b();
+            let middle = windows(load_field(MIDDLE), load_field(MIDDLE + 1u));
+            wx = middle.a;
+            wy = middle.b;
             kh = load_field(MIDDLE + 2u);
             rh = load_field(MIDDLE + 3u);
         }

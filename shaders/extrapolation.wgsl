@@ -46,9 +46,9 @@ fn extrapolate() {
     store_fields(MIDDLE, middle_x, middle_y, middle_k, middle_r);
     new_k = new_k + gap_k;
     new_r = new_r * new_r / whole_r;
-    share(here(new_x) + gap_x, here(new_y) + gap_y);
-    new_x = read_a();
-    new_y = read_b();
+    let moved = windows(here(new_x) + gap_x, here(new_y) + gap_y);
+    new_x = moved.a;
+    new_y = moved.b;
 }
 
 /// Where in the step a quantity that goes from `start` over `middle` to `end` first falls to `at`, as a fraction.

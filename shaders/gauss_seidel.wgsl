@@ -10,7 +10,8 @@ fn solve(both: bool, negligible: real) -> u32 {
 
 /// Sweeps `u` for rhs_x; returns how it ended.
 fn solve_one(negligible: real) -> u32 {
-    share(u, u);
+    v = vec(0.0);
+    start_sweeps();
     sweeps = counters.solve_sweeps;
     let size = system_size(rhs_x);
     sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));
@@ -21,7 +22,7 @@ fn solve_one(negligible: real) -> u32 {
         for (var s = 0u; s < batch; s++) { sweep_one(); }
         sweeps += batch;
         budget -= min(budget, batch);
-        let error = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
+        let error = bounded_abs(row_of.weight * residual(rhs_x, swept(behind.xy, u, ahead.xy)));
         ended = judge(block_max(error), block_max(bounded_abs(u)), tolerance, negligible);
     }
     return paused_or(ended);
@@ -29,7 +30,7 @@ fn solve_one(negligible: real) -> u32 {
 
 /// Sweeps `u` for rhs_x and `v` for rhs_y, with the barriers of one; returns how it ended.
 fn solve_two(negligible: real) -> u32 {
-    share(u, v);
+    start_sweeps();
     sweeps = counters.solve_sweeps;
     let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
     sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));
@@ -40,8 +41,8 @@ fn solve_two(negligible: real) -> u32 {
         for (var s = 0u; s < batch; s++) { sweep_two(); }
         sweeps += batch;
         budget -= min(budget, batch);
-        let error_u = bounded_abs(row_of.weight * residual(rhs_x, read_a()));
-        let error_v = bounded_abs(row_of.weight * residual(rhs_y, read_b()));
+        let error_u = bounded_abs(row_of.weight * residual(rhs_x, swept(behind.xy, u, ahead.xy)));
+        let error_v = bounded_abs(row_of.weight * residual(rhs_y, swept(behind.zw, v, ahead.zw)));
         let increment = max(bounded_abs(u), bounded_abs(v));
         ended = judge(block_max(max(error_u, error_v)), block_max(increment), tolerance, negligible);
     }

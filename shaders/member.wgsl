@@ -94,6 +94,10 @@ struct Dispatch {
     max_sweeps: u32,
     /// Sweeps after which the dispatch pauses, in the middle of a solve if need be.
     sweeps: u32,
+    /// BLOCKS, as a number that compilers do not know: they would unroll every loop over the blocks.
+    blocks: u32,
+    /// Groups in which maxima are taken: about the root of BLOCKS.
+    groups: u32,
 }
 
 const STATE_FIELDS = 15u;
@@ -111,6 +115,9 @@ const BEFORE = 11u;
 @group(0) @binding(3) var<storage, read_write> all_reports: array<Report>;
 /// STATE_FIELDS fields of NODES numbers each.
 @group(0) @binding(4) var<storage, read_write> all_states: array<real>;
+
+/// The members that this dispatch advances, one a workgroup.
+@group(0) @binding(5) var<storage, read> all_due: array<u32>;
 
 /// Index of this workgroup's member, and its parameters.
 var<private> member: u32;
@@ -130,8 +137,8 @@ var<private> dy: vec;
 fn load_field(field: u32) -> vec {
     let base = (member * STATE_FIELDS + field) * NODES;
     return vec(
-        all_states[base + near_low.z], all_states[base + near_low.w],
-        all_states[base + near_high.x], all_states[base + near_high.y],
+        all_states[base + first], all_states[base + first + 1u],
+        all_states[base + first + 2u], all_states[base + (first + 3u) % NODES],
     );
 }
 

@@ -1,7 +1,7 @@
 // Coloured sweeps inside V-cycles on the ring. Twin of src/solver/multigrid.rs; the sweeps are in sweeps.wgsl.
 //
-// Level l is a ring of NODES >> l nodes, down to COARSEST or fewer. The finest one stays in registers and in the rings;
-// the coarser ones lie one behind the other in the arrays below, and the nodes of each are dealt out to all threads. What
+// Level l is a ring of NODES >> l nodes, down to COARSEST or fewer. The finest one stays in registers, block by block, and
+// its fields are shared in the rings for the way down; the coarser ones lie one behind the other in the arrays below, and the nodes of each are dealt out to all threads. What
 // belongs to the way between two levels lies with the coarser one.
 
 const SWEEPS_PER_CYCLE = 2u;
@@ -29,8 +29,7 @@ var<private> inverse_matrix: array<real, 25>;
 /// Sweeps `u` for rhs_x and, if `both`, `v` for rhs_y; returns how it ended.
 fn solve(both: bool, negligible: real) -> u32 {
     if both {
-        share(new_k, new_k);
-        position_terms(read_a());
+        position_terms(k_window);
     } else {
         curvature_terms();
         rhs_y = vec(0.0);
@@ -41,18 +40,19 @@ fn solve(both: bool, negligible: real) -> u32 {
     let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
     let tolerance = max(p.tolerance, real(EPSILON) * size);
     build();
-    share(u, v);
+    start_sweeps();
     var ended = finite_or_not(size);
     while ended == UNSOLVED {
-        let error_u = row_of.weight * residual(rhs_x, read_a());
-        let error_v = row_of.weight * residual(rhs_y, read_b());
+        let error_u = row_of.weight * residual(rhs_x, swept(behind.xy, u, ahead.xy));
+        let error_v = row_of.weight * residual(rhs_y, swept(behind.zw, v, ahead.zw));
         let error = max(bounded_abs(error_u), bounded_abs(error_v));
         let increment = max(bounded_abs(u), bounded_abs(v));
         ended = judge(block_max(error), block_max(increment), tolerance, negligible);
         if ended != UNSOLVED || sweeps >= dispatch.max_sweeps || budget == 0u { break; }
         share(term_cell * error_u, term_cell * error_v);
         correct();
-        share(u, v);
+        // A barrier of the way down separates this from the readers of the residuals.
+        behind = pass_up(tails(u, v));
         let batch = min(SWEEPS_PER_CYCLE, dispatch.max_sweeps - sweeps);
         for (var s = 0u; s < batch; s++) { sweep_two(); }
         sweeps += batch;
@@ -74,14 +74,22 @@ fn at_run_time(count: u32) -> u32 {
     return select(count, 0u, dispatch.max_sweeps == 0u);
 }
 
+/// Two shared fields at node i of the finest level.
+fn shared_at(i: u32) -> pair {
+    let four = i < 4u * FOURS;
+    let at = select((i - FOURS) / 3u, i / 4u, four);
+    let colour = select((i - FOURS) % 3u, i % 4u, four);
+    return pair(ring_a[at][colour], ring_b[at][colour]);
+}
+
 /// Two fields of a level, the finest from the rings.
 fn terms_at(level: u32, above: u32, i: u32) -> pair {
-    if level == 0u { return pair(ring_a[i], ring_b[i]); }
+    if level == 0u { return shared_at(i); }
     return coarse_value[above + i];
 }
 
 fn held_at(level: u32, above: u32, i: u32) -> pair {
-    if level == 0u { return pair(ring_a[i], ring_b[i]); }
+    if level == 0u { return shared_at(i); }
     return coarse_held[above + i];
 }
 

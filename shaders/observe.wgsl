@@ -27,18 +27,18 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     let cross = minus1(wx) * here(wy) - here(wx) * minus1(wy);
     let energy = (real(0.5) * (kh * kh) + vec(p.length_penalty)) * rh;
     let part = vec(block_sum(edge), block_sum(cross), block_sum(energy), block_sum(winding(ex, ey, fx, fy)));
-    var unused = vec(0.0);
-    sums = ring_sums(part, &unused);
-    sums.y = real(0.5) * sums.y;
-
     let shortest = -bounded_abs(edge);
-    extremes = ring_maxima(vec(
+    let extremes_of_block = vec(
         block_max(bounded_abs(kh * rh)),
         block_max(bounded_abs((rh - edge) / edge)),
         block_max(bounded_abs(edge)),
         block_max_signed(shortest),
-    ));
-    others = ring_maxima(vec(block_max_signed(kh), block_max_signed(-kh), block_max(bounded_abs(moved)), 0.0));
+    );
+    let others_of_block = vec(block_max_signed(kh), block_max_signed(-kh), block_max(bounded_abs(moved)), 0.0);
+    let all = ring_summary(part, extremes_of_block, others_of_block);
+    sums = vec(all.sums.x, real(0.5) * all.sums.y, all.sums.zw);
+    extremes = all.extremes;
+    others = all.others;
 }
 
 /// Largest gap between the angle by which the new curvature turns the tangent over a segment and the angle by which the
@@ -54,11 +54,6 @@ fn observed() -> Observed {
     return Observed(
         sums.x, sums.y, excess_of_sums(), sums.z, -others.y, others.x, extremes.z / -extremes.w, extremes.y,
     );
-}
-
-/// Largest owned component, of either sign.
-fn block_max_signed(v: vec) -> real {
-    return max(max(v.x, v.y), select(v.z, max(v.z, v.w), owns == 4u));
 }
 
 /// +1 (-1) where the edge vector turns from e to f across the positive x axis, the short way round.

@@ -1,7 +1,7 @@
 // Rows of the system for the increments of x and y. Twin of src/scheme/position.rs.
 
-/// `wk`: the new curvatures.
-fn assemble_position(wk: Window) {
+/// `wk`: the new curvatures; `wy`: the old y.
+fn assemble_position(wk: Window, wy: Window) {
     let kh = here(wk);
     let kp = plus1(wk);
     let irm = minus1(ir);
@@ -24,9 +24,8 @@ fn assemble_position(wk: Window) {
     let rate = real(1.0) / p.tau;
     let row_c = q * rate - (row_a + row_b + row_d + row_e);
     normalise(row_a, row_b, row_c, row_d, row_e, p.tau * iqh);
-    share(x, y);
-    rhs_x = residual_of_old(row_a, row_b, row_d, row_e, read_a()) * inverse;
-    rhs_y = residual_of_old(row_a, row_b, row_d, row_e, read_b()) * inverse;
+    rhs_x = residual_of_old(row_a, row_b, row_d, row_e, x_window) * inverse;
+    rhs_y = residual_of_old(row_a, row_b, row_d, row_e, wy) * inverse;
 }
 
 fn residual_of_old(a: vec, b: vec, d: vec, e: vec, w: Window) -> vec {

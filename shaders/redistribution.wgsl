@@ -5,6 +5,10 @@ var<private> rkb: vec;
 /// Tangential velocity at the nodes, and at the nodes before them.
 var<private> alpha: vec;
 var<private> alpha_before: vec;
+/// The curvatures on the window of the block: the old ones, exchanged together with lengths; for the positions the new ones.
+var<private> k_window: Window;
+/// The old x there.
+var<private> x_window: Window;
 /// New lengths on the window of the block.
 var<private> r_new: Window;
 /// 1/r and 1/q there, of the old lengths, then of the new ones.
@@ -17,29 +21,29 @@ fn velocity(wk: Window) -> vec {
 
 /// Fills the variables above; returns the length L of the old state.
 fn redistribute() -> real {
-    share(k, r);
-    reciprocals(read_b());
-    let beta = velocity(read_a());
+    let old = windows(k, r);
+    k_window = old.a;
+    reciprocals(old.b);
+    let beta = velocity(k_window);
     trace(0u, beta);
     rkb = r * k * beta;
-    var unused = vec(0.0);
-    let sums = ring_sums(vec(block_sum(r), block_sum(rkb), 0.0, 0.0), &unused);
+    let sums = ring_sums(vec(block_sum(r), block_sum(rkb), 0.0, 0.0)).all;
     let length = sums.x;
     let mean_rkb = sums.y / length;
     let mean_length = length / real(NODES);
-    var next: vec;
+    var growth = -(p.tau * (k * beta));
     if p.redistribution > real(0.5) {
         tangential_velocity(mean_rkb, mean_length);
         let rate = p.omega * (mean_length * here(ir) - vec(1.0)) - vec(mean_rkb);
-        next = r * exponential(p.tau * rate);
+        growth = p.tau * rate;
     } else {
         alpha = vec(0.0);
         alpha_before = vec(0.0);
-        next = r * exponential(-(p.tau * (k * beta)));
     }
     trace(1u, alpha);
-    share(next, next);
-    r_new = read_a();
+    let next = windows(r * exponential(growth), x);
+    r_new = next.a;
+    x_window = next.b;
     reciprocals(r_new);
     return length;
 }
@@ -47,15 +51,13 @@ fn redistribute() -> real {
 /// alpha by a running sum that restarts from the sum of whole blocks.
 fn tangential_velocity(mean_rkb: real, mean_length: real) {
     let growth = rkb - r * mean_rkb + p.omega * (vec(mean_length) - r);
-    var earlier = vec(0.0);
-    ring_sums(vec(block_sum(growth), 0.0, 0.0, 0.0), &earlier);
-    let before = earlier.x;
+    let start = ring_sums(vec(block_sum(growth), 0.0, 0.0, 0.0)).earlier.x;
     let two = growth.x + growth.y;
     let three = two + growth.z;
-    alpha = vec(before + growth.x, before + two, before + three, before + (three + growth.w));
-    alpha_before = vec(before, alpha.xyz);
-    if lane == BLOCKS - 1u {
-        if owns == 4u { alpha.w = real(0.0); } else { alpha.z = real(0.0); }
+    alpha = vec(start + growth.x, start + two, start + three, start + (three + growth.w));
+    alpha_before = vec(start, alpha.xyz);
+    if block == BLOCKS - 1u {
+        if is_four { alpha.w = real(0.0); } else { alpha.z = real(0.0); }
     }
 }
 

@@ -1,4 +1,4 @@
-// The ring of nodes: the only index arithmetic, and the exchange between threads. Twin of src/solver/ring.rs.
+// The ring of nodes: the only index arithmetic, and what a thread knows of its neighbours. Twin of src/solver/ring.rs.
 //
 // A thread owns one block of four or three consecutive nodes, kept in the components of a `vec`; a node's colour is
 // its place in the block. For a block of three the fourth component repeats the first node of the next block: it is
@@ -17,34 +17,43 @@ override THREADS: u32;
 /// Nodes of all coarser rings together, for multigrid.
 override COARSE: u32;
 
-/// Fields that neighbours need, one value a node.
-var<workgroup> ring_a: array<real, NODES>;
-var<workgroup> ring_b: array<real, NODES>;
-/// One row a block, for sums and maxima over the ring.
+/// One row a block, for sums over the ring.
 var<workgroup> partials: array<vec, BLOCKS>;
-/// A decision for the whole workgroup.
-var<workgroup> verdict: u32;
 
-/// This thread, and the first node of its block.
+/// This thread, its block, and the first node of that.
 var<private> lane: u32;
+var<private> block: u32;
 var<private> first: u32;
 /// Nodes that it owns: 4, 3, or 0 for a spare thread.
 var<private> owns: u32;
-/// Nodes first-2 ... first+1 and first+2 ... first+5, wrapped.
-var<private> near_low: vec4<u32>;
-var<private> near_high: vec4<u32>;
+/// Whether its block and the one before have four nodes.
+var<private> is_four: bool;
+var<private> before_is_four: bool;
+/// The blocks on either side.
+var<private> before: u32;
+var<private> after: u32;
 
 fn take_block(thread: u32) {
     lane = thread;
-    let block = min(thread, BLOCKS - 1u);
-    first = select(3u * block + FOURS, 4u * block, block < FOURS);
-    owns = select(0u, select(3u, 4u, block < FOURS), thread < BLOCKS);
-    near_low = (vec4<u32>(0u, 1u, 2u, 3u) + vec4<u32>(first + NODES - 2u)) % vec4<u32>(NODES);
-    near_high = (vec4<u32>(2u, 3u, 4u, 5u) + vec4<u32>(first)) % vec4<u32>(NODES);
+    block = min(thread, BLOCKS - 1u);
+    before = (block + BLOCKS - 1u) % BLOCKS;
+    after = (block + 1u) % BLOCKS;
+    is_four = block < FOURS;
+    before_is_four = before < FOURS;
+    first = select(3u * block + FOURS, 4u * block, is_four);
+    owns = select(0u, select(3u, 4u, is_four), thread < BLOCKS);
+}
+
+/// Whether any block has three nodes.
+fn has_threes() -> bool {
+    return FOURS < BLOCKS;
 }
 
 /// A field on the nodes first-2 ... first+5.
 struct Window { low: vec, high: vec }
+
+/// The windows of two fields.
+struct Windows { a: Window, b: Window }
 
 /// The field at i-2, i-1, i, i+1, i+2 for the four nodes i of the block.
 fn minus2(w: Window) -> vec { return w.low; }
@@ -53,42 +62,16 @@ fn here(w: Window) -> vec { return vec(w.low.zw, w.high.xy); }
 fn plus1(w: Window) -> vec { return vec(w.low.w, w.high.xyz); }
 fn plus2(w: Window) -> vec { return w.high; }
 
-fn read_a() -> Window {
-    return Window(
-        vec(ring_a[near_low.x], ring_a[near_low.y], ring_a[near_low.z], ring_a[near_low.w]),
-        vec(ring_a[near_high.x], ring_a[near_high.y], ring_a[near_high.z], ring_a[near_high.w]),
-    );
+/// The window of a block between the blocks before and after it.
+fn window(of_before: vec, own: vec, of_after: vec) -> Window {
+    let tail = select(of_before.yz, of_before.zw, before_is_four);
+    let high = select(vec(own.z, of_after.xyz), vec(own.zw, of_after.xy), is_four);
+    return Window(vec(tail, own.xy), high);
 }
 
-fn read_b() -> Window {
-    return Window(
-        vec(ring_b[near_low.x], ring_b[near_low.y], ring_b[near_low.z], ring_b[near_low.w]),
-        vec(ring_b[near_high.x], ring_b[near_high.y], ring_b[near_high.z], ring_b[near_high.w]),
-    );
-}
-
-fn write_a(v: vec) {
-    if owns == 0u { return; }
-    ring_a[first] = v.x;
-    ring_a[first + 1u] = v.y;
-    ring_a[first + 2u] = v.z;
-    if owns == 4u { ring_a[first + 3u] = v.w; }
-}
-
-fn write_b(v: vec) {
-    if owns == 0u { return; }
-    ring_b[first] = v.x;
-    ring_b[first + 1u] = v.y;
-    ring_b[first + 2u] = v.z;
-    if owns == 4u { ring_b[first + 3u] = v.w; }
-}
-
-/// Shares two fields: afterwards read_a and read_b see them, and earlier readers are done.
-fn share(a: vec, b: vec) {
-    workgroupBarrier();
-    write_a(a);
-    write_b(b);
-    workgroupBarrier();
+/// The last two nodes of the block, of two fields.
+fn tails(a: vec, b: vec) -> vec {
+    return select(vec(a.yz, b.yz), vec(a.zw, b.zw), is_four);
 }
 
 /// `v` with the component that is not owned set to zero.
@@ -108,34 +91,29 @@ fn block_max(v: vec) -> real {
     return max(max(own.x, own.y), max(own.z, own.w));
 }
 
-/// Four sums over the ring from the sums over each block, added in block order; `before` gets those of earlier blocks.
-fn ring_sums(part: vec, before: ptr<function, vec>) -> vec {
+/// Largest owned component, of either sign.
+fn block_max_signed(v: vec) -> real {
+    return max(max(v.x, v.y), select(v.z, max(v.z, v.w), owns == 4u));
+}
+
+/// What is summed over the ring: the blocks before this one, and all.
+struct Sums { earlier: vec, all: vec }
+
+/// What is known of a curve after its new nodes are.
+struct Summary { sums: vec, extremes: vec, others: vec }
+
+/// Four sums over the ring from the sums over each block, added in block order.
+///
+/// The bound of the loop is read from the dispatch: a constant one is unrolled, which takes lavapipe's compiler as long as
+/// everything else together, and runs no faster.
+fn ring_sums(part: vec) -> Sums {
     workgroupBarrier();
     if owns > 0u { partials[lane] = part; }
     workgroupBarrier();
-    var total = vec(0.0);
-    for (var t = 0u; t < BLOCKS; t++) {
-        if t == lane { *before = total; }
-        total = total + partials[t];
+    var sums = Sums(vec(0.0), vec(0.0));
+    for (var t = 0u; t < dispatch.blocks; t++) {
+        sums.earlier = select(sums.earlier, sums.all, t == block);
+        sums.all = sums.all + partials[t];
     }
-    return total;
-}
-
-/// Four maxima over the ring from the maxima over each block.
-fn ring_maxima(part: vec) -> vec {
-    workgroupBarrier();
-    if owns > 0u { partials[lane] = part; }
-    workgroupBarrier();
-    var largest = partials[0];
-    for (var t = 1u; t < BLOCKS; t++) {
-        largest = max(largest, partials[t]);
-    }
-    return largest;
-}
-
-/// The value that thread 0 holds, for every thread, in a way that control flow may depend on.
-fn uniform_decision(value: u32) -> u32 {
-    workgroupBarrier();
-    if lane == 0u { verdict = value; }
-    return workgroupUniformLoad(&verdict);
+    return sums;
 }

@@ -27,9 +27,9 @@ fn step() -> u32 {
         counters.phase += 1u;
         counters.solve_sweeps = 0u;
     }
-    share(x + dx, y + dy);
-    new_x = read_a();
-    new_y = read_b();
+    let moved = windows(x + dx, y + dy);
+    new_x = moved.a;
+    new_y = moved.b;
     new_r = here(r_new);
     if p.pull > real(0.0) { pull(); }
     trace(2u, new_r);
@@ -52,8 +52,9 @@ fn end_curvature(made: u32) {
 
 fn begin_positions() {
     new_k = k + dk;
-    share(new_k, new_k);
-    assemble_position(read_a());
+    let exchanged = windows(new_k, y);
+    k_window = exchanged.a;
+    assemble_position(k_window, exchanged.b);
     trace_system(10u);
     trace(15u, rhs_x);
     trace(16u, rhs_y);

@@ -1,12 +1,23 @@
 // Coloured Gauss–Seidel sweeps, and when they have done enough. Twin of what src/solver/gauss_seidel.rs shares with
 // src/solver/multigrid.rs.
 //
-// Rows and right-hand sides stay in registers; only the unknowns are in workgroup memory. In phase c every thread
-// updates the node of colour c in its block; a barrier ends the phase. A neighbour value is read once a sweep where
-// no phase in between can have changed it.
+// Rows, right-hand sides and unknowns stay in registers. Of a block of four, neighbours need the first two nodes (its front)
+// and the last two (its tail), and the first two need none of another block's first two: so colours 0 and 1 are one
+// phase, colours 2 and 3 another, and a sweep has two exchanges, with the results of four. Only a block of three
+// needs the front after it between its first and its second node: a third exchange where there is one.
 
 /// Over-relaxation of the solve at hand.
 var<private> sor: real;
+/// The tails of the block before, of u and v, and the fronts of the block after, at the present stage of a sweep.
+var<private> behind: vec;
+var<private> ahead: vec;
+
+/// Begins sweeps from `u` and `v`: what the blocks around have of them.
+fn start_sweeps() {
+    let start = windows(u, v);
+    behind = vec(start.a.low.xy, start.b.low.xy);
+    ahead = tails(start.a.high, start.b.high);
+}
 
 /// A solve that neither ended nor reached the cap has run out of this dispatch's sweeps.
 fn paused_or(ended: u32) -> u32 {
@@ -40,63 +51,37 @@ fn judge(error: real, increment: real, tolerance: real, negligible: real) -> u32
     return uniform_decision(ended);
 }
 
-/// One sweep over ring_a.
-fn sweep_one() {
-    let um1 = ring_a[near_low.y];
-    u.x = relax(0u, rhs_x.x, ring_a[near_low.x], um1, u.x, u.y, u.z);
-    if owns > 0u { ring_a[first] = u.x; }
-    workgroupBarrier();
-    let up3 = ring_a[near_high.y];
-    u.y = relax(1u, rhs_x.y, um1, u.x, u.y, u.z, up3);
-    if owns > 0u { ring_a[first + 1u] = u.y; }
-    workgroupBarrier();
-    let up4 = ring_a[near_high.z];
-    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, up3, up4);
-    if owns > 0u { ring_a[first + 2u] = u.z; }
-    workgroupBarrier();
-    if owns == 4u {
-        u.w = relax(3u, rhs_x.w, u.y, u.z, u.w, up4, ring_a[near_high.w]);
-        ring_a[first + 3u] = u.w;
-    }
-    workgroupBarrier();
+/// The window of an unknown after a sweep.
+fn swept(tail: vec2<real>, own: vec, front: vec2<real>) -> Window {
+    return Window(vec(tail, own.xy), select(vec(own.z, front, front.y), vec(own.zw, front), is_four));
 }
 
-/// One sweep over ring_a and ring_b.
+/// One sweep over u.
+fn sweep_one() {
+    u.x = relax(0u, rhs_x.x, behind.x, behind.y, u.x, u.y, u.z);
+    if has_threes() { ahead = pass_down_early(vec(u.xy, v.xy)); }
+    u.y = relax(1u, rhs_x.y, behind.y, u.x, u.y, u.z, select(ahead.x, u.w, is_four));
+    ahead = pass_down(vec(u.xy, v.xy));
+    let next = select(ahead.xy, vec2(u.w, ahead.x), is_four);
+    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, next.x, next.y);
+    u.w = select(u.w, relax(3u, rhs_x.w, u.y, u.z, u.w, ahead.x, ahead.y), is_four);
+    behind = pass_up(tails(u, v));
+}
+
+/// One sweep over u and v, with the exchanges of one.
 fn sweep_two() {
-    let um1 = ring_a[near_low.y];
-    let vm1 = ring_b[near_low.y];
-    u.x = relax(0u, rhs_x.x, ring_a[near_low.x], um1, u.x, u.y, u.z);
-    v.x = relax(0u, rhs_y.x, ring_b[near_low.x], vm1, v.x, v.y, v.z);
-    if owns > 0u {
-        ring_a[first] = u.x;
-        ring_b[first] = v.x;
-    }
-    workgroupBarrier();
-    let up3 = ring_a[near_high.y];
-    let vp3 = ring_b[near_high.y];
-    u.y = relax(1u, rhs_x.y, um1, u.x, u.y, u.z, up3);
-    v.y = relax(1u, rhs_y.y, vm1, v.x, v.y, v.z, vp3);
-    if owns > 0u {
-        ring_a[first + 1u] = u.y;
-        ring_b[first + 1u] = v.y;
-    }
-    workgroupBarrier();
-    let up4 = ring_a[near_high.z];
-    let vp4 = ring_b[near_high.z];
-    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, up3, up4);
-    v.z = relax(2u, rhs_y.z, v.x, v.y, v.z, vp3, vp4);
-    if owns > 0u {
-        ring_a[first + 2u] = u.z;
-        ring_b[first + 2u] = v.z;
-    }
-    workgroupBarrier();
-    if owns == 4u {
-        u.w = relax(3u, rhs_x.w, u.y, u.z, u.w, up4, ring_a[near_high.w]);
-        v.w = relax(3u, rhs_y.w, v.y, v.z, v.w, vp4, ring_b[near_high.w]);
-        ring_a[first + 3u] = u.w;
-        ring_b[first + 3u] = v.w;
-    }
-    workgroupBarrier();
+    u.x = relax(0u, rhs_x.x, behind.x, behind.y, u.x, u.y, u.z);
+    v.x = relax(0u, rhs_y.x, behind.z, behind.w, v.x, v.y, v.z);
+    if has_threes() { ahead = pass_down_early(vec(u.xy, v.xy)); }
+    u.y = relax(1u, rhs_x.y, behind.y, u.x, u.y, u.z, select(ahead.x, u.w, is_four));
+    v.y = relax(1u, rhs_y.y, behind.w, v.x, v.y, v.z, select(ahead.z, v.w, is_four));
+    ahead = pass_down(vec(u.xy, v.xy));
+    let next = select(ahead, vec(u.w, ahead.x, v.w, ahead.z), is_four);
+    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, next.x, next.y);
+    v.z = relax(2u, rhs_y.z, v.x, v.y, v.z, next.z, next.w);
+    u.w = select(u.w, relax(3u, rhs_x.w, u.y, u.z, u.w, ahead.x, ahead.y), is_four);
+    v.w = select(v.w, relax(3u, rhs_y.w, v.y, v.z, v.w, ahead.z, ahead.w), is_four);
+    behind = pass_up(tails(u, v));
 }
 
 /// own + sor (rhs - row . u) for the node in component j of the block.

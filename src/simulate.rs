@@ -3,7 +3,7 @@
 //! Nothing here depends on where the members are advanced or on how many are resident: a member's steps are its
 //! own, its output times are reached by pausing it there, and rows leave in member order.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::Range};
 
 use crate::{
     backend::Backend,
@@ -40,8 +40,17 @@ pub fn simulate(
         portraits,
     };
     let mut queue = Queue { total: spec.member_count(), ended: 0, next: 0, early: BTreeMap::new() };
-    loop {
-        for slot in 0..pool.resident.len() {
+    // Where there are two batches, one of them is on its way while the other one is looked after.
+    let size = backend.slots() / backend.batches();
+    for batch in (0..backend.batches()).cycle() {
+        let slots = batch * size..(batch + 1) * size;
+        if pool.resident[slots.clone()].iter().any(Option::is_some) {
+            backend.finish(batch)?;
+            for (rank, ended) in pool.collect(backend, slots.clone())? {
+                queue.leave(rank, ended, sink)?;
+            }
+        }
+        for slot in slots.clone() {
             while pool.resident[slot].is_none() {
                 let Some((rank, index)) = waiting.next_if(|(rank, _)| *rank < queue.next + ahead) else { break };
                 if let Some(ended) = pool.admit(backend, slot, rank, index)? {
@@ -49,18 +58,16 @@ pub fn simulate(
                 }
             }
         }
+        if pool.resident[slots].iter().any(Option::is_some) {
+            backend.start(batch)?;
+        }
         let work = queue.ended as f64 + pool.share();
         sink.progress(queue.ended, queue.total, work / queue.total as f64);
         if pool.resident.iter().all(Option::is_none) {
-            return Ok(());
-        }
-        backend.advance()?;
-        for slot in 0..pool.resident.len() {
-            if let Some((rank, ended)) = pool.collect(backend, slot)? {
-                queue.leave(rank, ended, sink)?;
-            }
+            break;
         }
     }
+    Ok(())
 }
 
 /// The resident members of a run.
@@ -87,24 +94,33 @@ impl Pool<'_> {
         Ok(None)
     }
 
-    /// Looks at the member in `slot`: serves its output times, aims it further, or ends it.
-    fn collect(&mut self, backend: &mut dyn Backend, slot: usize) -> Result<Option<(usize, Ended)>> {
-        let Some((_, trajectory)) = &mut self.resident[slot] else { return Ok(None) };
-        trajectory.observe(backend.counters(slot), &backend.report(slot));
-        if trajectory.wants_state() {
-            trajectory.serve(Some(&backend.state(slot)?));
-        } else {
-            trajectory.serve(None);
-        }
-        if !trajectory.is_over() {
-            if let Some((goal, parameters)) = trajectory.next_aim() {
-                backend.aim(slot, goal, &parameters);
+    /// Looks at the members in `slots`: serves their output times, and aims them further or ends them, which are returned.
+    fn collect(&mut self, backend: &mut dyn Backend, slots: Range<usize>) -> Result<Vec<(usize, Ended)>> {
+        let mut wanted = Vec::new();
+        for slot in slots.clone() {
+            let Some((_, trajectory)) = &mut self.resident[slot] else { continue };
+            trajectory.observe(backend.counters(slot), &backend.report(slot));
+            if trajectory.wants_state() || (trajectory.is_over() && trajectory.keeps_portrait()) {
+                wanted.push(slot);
             }
-            return Ok(None);
         }
-        let last = if trajectory.keeps_portrait() { Some(backend.state(slot)?) } else { None };
-        backend.clear(slot);
-        Ok(self.resident[slot].take().map(|(rank, trajectory)| (rank, trajectory.end(last.as_ref()))))
+        // One transfer for all.
+        let mut states = wanted.iter().copied().zip(backend.states(&wanted)?).collect::<BTreeMap<_, _>>();
+        let mut over = Vec::new();
+        for slot in slots {
+            let Some((_, trajectory)) = &mut self.resident[slot] else { continue };
+            let state = states.remove(&slot);
+            trajectory.serve(state.as_ref());
+            if !trajectory.is_over() {
+                if let Some((goal, parameters)) = trajectory.next_aim() {
+                    backend.aim(slot, goal, &parameters);
+                }
+                continue;
+            }
+            backend.clear(slot);
+            over.extend(self.resident[slot].take().map(|(rank, trajectory)| (rank, trajectory.end(state.as_ref()))));
+        }
+        Ok(over)
     }
 
     /// Work done on the resident members, in members.

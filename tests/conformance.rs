@@ -12,10 +12,10 @@ use curvelax::{
     },
     conformance::{
         Row, Tamper, adaptive_members,
-        compare::{Left, adaptive, on_gpu, runs, stages},
+        compare::{Left, adaptive, on_gpu, on_gpu_by, runs, stages},
         members,
     },
-    ensemble::{Status, spec::Precision},
+    ensemble::{Ended, Family, Sink, Spec, Status, spec::Precision},
     number::Real,
     scheme::{
         State,
@@ -23,6 +23,7 @@ use curvelax::{
         parameters::{Counters, NEVER},
         step::Method,
     },
+    simulate::simulate,
     solver::{Blocks, Order, Solver},
 };
 use glam::DVec2;
@@ -34,6 +35,10 @@ const SIZES: [usize; 8] = [6, 7, 64, 99, 100, 101, 102, 257];
 
 /// Sizes of the adaptive comparison.
 const ADAPTIVE_SIZES: [usize; 3] = [7, 64, 101];
+
+/// Sizes at which the exchange by shuffles is compared with that by barriers: every number of blocks of three, and the
+/// largest ring that eight threads hold.
+const ONE_SUBGROUP: [usize; 5] = [6, 7, 29, 30, 32];
 
 type Outcome = Result<(), Failed>;
 
@@ -97,8 +102,12 @@ fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
         for n in [7, 100] {
             add(format!("a moved node fails both comparisons by name, n = {n}"), a_moved_node_fails::<T>, n);
         }
+        add("how many slots there are, in how many batches, changes no bit".into(), slots::<T>, 23);
         add("permuted members give permuted results, bit for bit".into(), permutation::<T>, 101);
         add("where a dispatch ends or pauses changes no bit".into(), dispatches::<T>, 64);
+        for n in ONE_SUBGROUP.into_iter().filter(|_| solver == Solver::GaussSeidel) {
+            add(format!("shuffles and barriers give the same bits, n = {n}"), exchanges::<T>, n);
+        }
         add("members that end badly leave the others untouched".into(), bad_members::<T>, 99);
         add("relaxed members stop, at the step and in the place the CPU finds".into(), relaxation::<T>, 64);
         add("the largest n that fits the adapter runs".into(), largest::<T>, 0);
@@ -280,6 +289,76 @@ fn dispatches<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let paused = on_gpu::<T>(gpu, solver, n, &launches, Budget { steps: 50, sweeps: 24 })?;
     for j in 0..launches.len() {
         same(&paused[j], &at_once[j], &format!("member {j}, paused every 24 sweeps,"))?;
+    }
+    Ok(())
+}
+
+/// What a run hands out.
+#[derive(Default)]
+struct Outcomes(Vec<String>);
+
+impl Sink for Outcomes {
+    fn member(&mut self, Ended { outcome, series, snapshots, .. }: &Ended) -> curvelax::Result<()> {
+        self.0.push(format!("{outcome:?} {series:?} {snapshots:?}"));
+        Ok(())
+    }
+    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
+}
+
+/// Members that end at their own times, looked at on the way, refilled into slots of two batches.
+fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    let spec = Spec {
+        curves: 13,
+        points: n,
+        t_end: 0.1,
+        tau: Some(1e-3),
+        relax_to: Some(0.5),
+        stop_when_relaxed: true,
+        series: Some(0.03),
+        snapshots: vec![0.0505],
+        solver: solver.into(),
+        precision: Some(T::PRECISION),
+        ..Spec::default()
+    };
+    let family = Family::new(&spec)?;
+    let blocks = Blocks::new(n).ok_or("n")?;
+    let variant = gpu.capacity().variant(blocks, solver);
+    let run = |batches: [usize; 2], spec: &Spec| -> Result<Vec<String>, Failed> {
+        let mut kernel = Kernel::<T>::in_batches(gpu, blocks, batches, spec.max_sweeps, variant)?;
+        let mut outcomes = Outcomes::default();
+        simulate(spec, &family, T::PRECISION, &mut kernel, 0, &mut outcomes)?;
+        Ok(outcomes.0)
+    };
+    let whole = run([1, 13], &spec)?;
+    for batches in [[1, 1], [1, 5], [2, 1], [2, 3], [2, 13], [3, 2]] {
+        if run(batches, &spec)? != whole {
+            return Err(format!("{batches:?} batches and slots give other results").into());
+        }
+    }
+    // The negative control: another step is noticed.
+    if whole.len() != 13 || run([1, 13], &Spec { tau: Some(1.1e-3), ..spec.clone() })? == whole {
+        return Err("another step changed nothing".into());
+    }
+    Ok(())
+}
+
+/// The kernel whose workgroup is one subgroup, bit for bit that of any size; where the adapter's subgroups hold the ring.
+fn exchanges<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    let by_shuffles = gpu.capacity().variant(Blocks::new(n).ok_or("n")?, solver);
+    if by_shuffles.subgroup != (gpu.capacity().least_subgroup >= 8) {
+        return Err(format!("{by_shuffles:?} on subgroups of {}", gpu.capacity().least_subgroup).into());
+    }
+    let launches = members(n, 5, 50, 1e-4)?;
+    let adaptive_launches = adaptive_members(n, 5, 20, 1e-3, T::EPSILON)?;
+    for (adaptive, launches) in [(false, launches), (true, adaptive_launches)] {
+        let by_shuffles = Variant { adaptive, ..by_shuffles };
+        let by_barriers = Variant { subgroup: false, ..by_shuffles };
+        let [shuffled, waited] = [by_shuffles, by_barriers]
+            .map(|variant| on_gpu_by::<T>(gpu, variant, n, &launches, Budget { steps: 50, sweeps: 1000 }));
+        let (shuffled, waited) = (shuffled?, waited?);
+        for j in 0..launches.len() {
+            same(&shuffled[j], &waited[j], &format!("member {j}, adaptive: {adaptive},"))?;
+        }
     }
     Ok(())
 }

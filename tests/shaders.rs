@@ -23,7 +23,7 @@ use curvelax::{
 use naga::{
     AddressSpace, Module, TypeInner,
     back::{hlsl, msl, spv},
-    valid::{Capabilities, ModuleInfo, ValidationFlags, Validator},
+    valid::{Capabilities, ModuleInfo, ShaderStages, SubgroupOperationSet, ValidationFlags, Validator},
 };
 
 const SWEEPS: Variant = Variant::of(Solver::GaussSeidel);
@@ -34,7 +34,8 @@ fn all_sources<T: Real>() -> String {
 }
 
 fn capabilities<T: Real>() -> Capabilities {
-    if T::NAME == "f64" { Capabilities::FLOAT64 } else { Capabilities::empty() }
+    let f64 = if T::NAME == "f64" { Capabilities::FLOAT64 } else { Capabilities::empty() };
+    f64 | Capabilities::SUBGROUP
 }
 
 /// Parses and validates a source; an error names the shader's own file and line.
@@ -45,7 +46,9 @@ fn validated(source: &str, variant: Variant, capabilities: Capabilities) -> Resu
         let line = error.location(source).map_or(0, |location| location.line_number as usize);
         format!("{}{}", at(line), error.message())
     })?;
-    let info = Validator::new(ValidationFlags::all(), capabilities).validate(&module).map_err(|error| {
+    let mut validator = Validator::new(ValidationFlags::all(), capabilities);
+    validator.subgroup_stages(ShaderStages::COMPUTE).subgroup_operations(SubgroupOperationSet::all());
+    let info = validator.validate(&module).map_err(|error| {
         let line = error.location(source).map_or(0, |location| location.line_number as usize);
         format!("{}{}", at(line), error.emit_to_string(source))
     })?;
@@ -64,8 +67,8 @@ fn sized<T: Real>(n: usize, variant: Variant) -> (Module, ModuleInfo) {
 #[test]
 fn every_shader_is_valid_in_both_precisions() {
     for variant in Variant::ALL {
-        validated(&shader::source::<f32>(variant), variant, Capabilities::empty()).unwrap();
-        validated(&shader::source::<f64>(variant), variant, Capabilities::FLOAT64).unwrap();
+        validated(&shader::source::<f32>(variant), variant, capabilities::<f32>()).unwrap();
+        validated(&shader::source::<f64>(variant), variant, capabilities::<f64>()).unwrap();
     }
     // Negative control: f64 is refused where it is not asked for.
     assert!(validated(&shader::source::<f64>(SWEEPS), SWEEPS, Capabilities::empty()).is_err());
@@ -101,12 +104,13 @@ fn f32_translates_for_every_api_and_f64_for_vulkan() {
         msl::write_string(
             &module,
             &info,
-            &msl::Options { fake_missing_bindings: true, ..Default::default() },
+            &msl::Options { fake_missing_bindings: true, lang_version: (2, 4), ..Default::default() },
             &Default::default(),
         )
         .unwrap();
         let mut text = String::new();
-        let options = hlsl::Options { fake_missing_bindings: true, ..Default::default() };
+        let shader_model = hlsl::ShaderModel::V6_0;
+        let options = hlsl::Options { fake_missing_bindings: true, shader_model, ..Default::default() };
         hlsl::Writer::new(&mut text, &options, &Default::default()).write(&module, &info, None).unwrap();
         assert!(text.contains("evolve"));
 
@@ -161,7 +165,7 @@ fn the_structs_shared_with_the_host_have_its_layout() {
 #[test]
 fn bindings_are_found_by_name_where_the_host_puts_them() {
     for variant in Variant::ALL {
-        let (module, _) = validated(&shader::source::<f32>(variant), variant, Capabilities::empty()).unwrap();
+        let (module, _) = validated(&shader::source::<f32>(variant), variant, capabilities::<f32>()).unwrap();
         let mut bound = BTreeMap::new();
         for (_, variable) in module.global_variables.iter() {
             if let Some(binding) = &variable.binding {
@@ -169,7 +173,7 @@ fn bindings_are_found_by_name_where_the_host_puts_them() {
                 bound.insert(binding.binding, variable.name.clone().unwrap());
             }
         }
-        let mut expected = vec!["dispatch", "all_parameters", "all_counters", "all_reports", "all_states"];
+        let mut expected = vec!["dispatch", "all_parameters", "all_counters", "all_reports", "all_states", "all_due"];
         if variant.traced {
             expected.push("traces");
         }
@@ -186,7 +190,7 @@ fn workgroup_memory_is_what_the_host_counts() {
         layouter.update(module.to_ctx()).unwrap();
         let in_workgroup = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);
         let bytes: u32 = in_workgroup.map(|(_, v)| layouter[v.ty].size).sum();
-        let counted = shader::workgroup_bytes::<f64>(blocks, variant.solver);
+        let counted = shader::workgroup_bytes::<f64>(blocks, variant);
         assert!(bytes as usize <= counted && counted <= bytes as usize + 16, "n = {n}: {bytes}, counted {counted}");
         if n <= 512 && variant.solver == Solver::GaussSeidel {
             assert!(counted <= 16_384, "n = {n} exceeds what every WebGPU device has: {counted}");
@@ -238,7 +242,7 @@ fn transcendental(module: &Module) -> Option<naga::MathFunction> {
 #[test]
 fn no_transcendental_function_is_used() {
     for variant in Variant::ALL {
-        let (module, _) = validated(&shader::source::<f64>(variant), variant, Capabilities::FLOAT64).unwrap();
+        let (module, _) = validated(&shader::source::<f64>(variant), variant, capabilities::<f64>()).unwrap();
         assert_eq!(transcendental(&module), None);
     }
     // Negative control.
@@ -318,7 +322,7 @@ fn noop_device() -> wgpu::Device {
     let instance = wgpu::Instance::new(descriptor);
     let adapter = pollster::block_on(instance.request_adapter(&Default::default())).unwrap();
     let asked = wgpu::DeviceDescriptor {
-        required_features: adapter.features() & wgpu::Features::SHADER_F64,
+        required_features: adapter.features() & (wgpu::Features::SHADER_F64 | wgpu::Features::SUBGROUP),
         // WebGPU's default limits, which every device has.
         ..Default::default()
     };
@@ -347,7 +351,7 @@ fn pipelines_are_built_and_bound_without_any_gpu() {
     assert!(device.features().contains(wgpu::Features::SHADER_F64));
     for n in [6, 7, 64, 100, 257] {
         for variant in Variant::ALL {
-            let buffers = 4 + u32::from(variant.traced);
+            let buffers = 5 + u32::from(variant.traced);
             assert_eq!(pipeline_error::<f32>(&device, n, variant, buffers), None, "f32, n = {n}");
             assert_eq!(pipeline_error::<f64>(&device, n, variant, buffers), None, "f64, n = {n}");
             // Negative control: a buffer too few is noticed.

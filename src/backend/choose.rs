@@ -208,7 +208,8 @@ impl Choice {
         };
         if let Some(gpu) = self.gpu {
             let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
-            let variant = Variant { adaptive: spec.adaptive.is_some(), ..Variant::of(spec.solver()) };
+            let variant = gpu.capacity().variant(blocks, spec.solver());
+            let variant = Variant { adaptive: spec.adaptive.is_some(), ..variant };
             let kernel = Kernel::<T>::new(&gpu, blocks, members, spec.max_sweeps, variant)?;
             platform.backend = "gpu".into();
             platform.adapter = Some(gpu.name().to_string());
@@ -228,7 +229,8 @@ mod tests {
     use super::*;
 
     /// What every WebGPU device has at least.
-    const LEAST: Capacity = Capacity { f64: false, threads: 256, workgroup_bytes: 16_384, subgroup: 32 };
+    const LEAST: Capacity =
+        Capacity { f64: false, threads: 256, workgroup_bytes: 16_384, subgroup: 32, least_subgroup: 0 };
 
     fn refused(precision: Option<Precision>, n: usize, capacity: &Capacity) -> String {
         let spec = Spec { precision, ..Spec::default() };

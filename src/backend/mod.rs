@@ -35,6 +35,22 @@ pub trait Backend {
     /// Takes every member that is running and short of its goal some steps further.
     fn advance(&mut self) -> Result<()>;
 
+    /// Equal parts of the slots, one after the other, that can be advanced on their own: while one is on its way, the host
+    /// has time for another.
+    fn batches(&self) -> usize {
+        1
+    }
+
+    /// Begins to advance a batch; until `finish` its slots are left alone.
+    fn start(&mut self, _batch: usize) -> Result<()> {
+        Ok(())
+    }
+
+    /// Waits until the batch has advanced.
+    fn finish(&mut self, _batch: usize) -> Result<()> {
+        self.advance()
+    }
+
     /// Counters after the last `advance`; the sweeps are those of that call.
     fn counters(&self, slot: usize) -> Counters;
 
@@ -43,4 +59,9 @@ pub trait Backend {
 
     /// The state of a member, read back and widened.
     fn state(&mut self, slot: usize) -> Result<State<f64>>;
+
+    /// The states of several members of a batch that is not on its way.
+    fn states(&mut self, slots: &[usize]) -> Result<Vec<State<f64>>> {
+        slots.iter().map(|slot| self.state(*slot)).collect()
+    }
 }

@@ -144,7 +144,7 @@ pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Opt
         blocks(n)?,
         MEMBERS,
         MAX_SWEEPS,
-        Variant { traced: true, ..Variant::of(solver) },
+        Variant { traced: true, ..adapter.capacity().variant(blocks(n)?, solver) },
     )?;
     for (slot, launch) in tampered(launches.clone(), tamper).iter().enumerate() {
         kernel.load(slot, launch)?;
@@ -364,7 +364,18 @@ pub fn on_gpu<T: Real>(
     budget: Budget,
 ) -> Result<Vec<Left>> {
     let adaptive = launches.iter().any(|launch| launch.parameters.adaptive > 0.0);
-    let variant = Variant { adaptive, ..Variant::of(solver) };
+    let variant = Variant { adaptive, ..adapter.capacity().variant(blocks(n)?, solver) };
+    on_gpu_by::<T>(adapter, variant, n, launches, budget)
+}
+
+/// The same by a kernel of choice.
+pub fn on_gpu_by<T: Real>(
+    adapter: &gpu::Gpu,
+    variant: Variant,
+    n: usize,
+    launches: &[Run<f64>],
+    budget: Budget,
+) -> Result<Vec<Left>> {
     let kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, launches.len(), MAX_SWEEPS, variant)?;
     let mut kernel = kernel.with_budget(budget);
     for (slot, launch) in launches.iter().enumerate() {

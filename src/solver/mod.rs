@@ -13,7 +13,7 @@ pub use ring::{Blocks, Ring, Sums};
 pub use system::{Equation, Equations, Row, System};
 
 /// Which solver takes the periodic pentadiagonal systems.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Solver {
     /// Gauss–Seidel sweeps, the paper's.

@@ -1,9 +1,16 @@
 //! Adapters: what is there, what each can do, and which one to take.
 
-use std::sync::{Arc, Mutex};
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use crate::{
-    backend::gpu::shader,
+    backend::gpu::{
+        Variant,
+        pipeline::{self, Key},
+        shader,
+    },
     error::{Error, Result},
     number::{Precision, Real},
     solver::{Blocks, Solver, ring::MIN_POINTS},
@@ -13,9 +20,12 @@ use crate::{
 pub struct Gpu {
     adapter: wgpu::Adapter,
     info: wgpu::AdapterInfo,
+    /// The device and its pipelines, once one was needed.
+    opened: Mutex<Option<(Device, HashMap<Key, wgpu::ComputePipeline>)>>,
 }
 
 /// An opened device: where kernels are made and run.
+#[derive(Clone)]
 pub struct Device {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
@@ -31,8 +41,10 @@ pub struct Capacity {
     pub threads: usize,
     /// Bytes of workgroup memory at most.
     pub workgroup_bytes: usize,
-    /// Threads of a subgroup.
+    /// Threads of the largest subgroup.
     pub subgroup: u32,
+    /// Threads of the smallest subgroup, 0 where shaders may not use subgroups.
+    pub least_subgroup: u32,
 }
 
 impl Capacity {
@@ -53,11 +65,17 @@ impl Capacity {
         if threads > self.threads {
             return Err(format!("{threads} threads a workgroup, and the adapter has {}", self.threads));
         }
-        let bytes = shader::workgroup_bytes::<T>(blocks, solver);
+        let bytes = shader::workgroup_bytes::<T>(blocks, Variant::of(solver));
         if bytes > self.workgroup_bytes {
             return Err(format!("{bytes} bytes of workgroup memory, and the adapter has {}", self.workgroup_bytes));
         }
         Ok(())
+    }
+
+    /// The kernel of fixed steps that suits a ring: sweeps by shuffles where every subgroup there may be holds it.
+    pub fn variant(&self, blocks: Blocks, solver: Solver) -> Variant {
+        let subgroup = solver == Solver::GaussSeidel && blocks.count() <= self.least_subgroup as usize;
+        Variant { subgroup, ..Variant::of(solver) }
     }
 }
 
@@ -69,8 +87,10 @@ impl Gpu {
         descriptor.backends = wgpu::Backends::PRIMARY;
         let instance = wgpu::Instance::new(descriptor);
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
-        let mut found: Vec<Gpu> =
-            adapters.into_iter().map(|adapter| Gpu { info: adapter.get_info(), adapter }).collect();
+        let mut found: Vec<Gpu> = adapters
+            .into_iter()
+            .map(|adapter| Gpu { info: adapter.get_info(), adapter, opened: Mutex::default() })
+            .collect();
         // The no-op back end computes nothing but calls itself a CPU device.
         found.retain(|gpu| gpu.info.backend != wgpu::Backend::Noop);
         found.sort_by_key(|gpu| gpu.rank());
@@ -127,27 +147,45 @@ impl Gpu {
         self.adapter.limits()
     }
 
-    /// Threads of a subgroup; a workgroup is a whole number of them.
-    pub fn subgroup(&self) -> u32 {
-        self.info.subgroup_max_size.clamp(1, 64)
+    /// Threads of the smallest and of the largest subgroup that a shader may meet.
+    pub fn subgroups(&self) -> [u32; 2] {
+        [self.info.subgroup_min_size, self.info.subgroup_max_size].map(|size| size.clamp(1, 64))
     }
 
     /// What decides whether a run fits.
     pub fn capacity(&self) -> Capacity {
         let limits = self.limits();
+        let [least, most] = self.subgroups();
+        let usable = self.adapter.features().contains(wgpu::Features::SUBGROUP);
         Capacity {
             f64: self.has_f64(),
             threads: limits.max_compute_invocations_per_workgroup.min(limits.max_compute_workgroup_size_x) as usize,
             workgroup_bytes: limits.max_compute_workgroup_storage_size as usize,
-            subgroup: self.subgroup(),
+            subgroup: most,
+            least_subgroup: if usable { least } else { 0 },
         }
     }
 
-    /// Opens the adapter with all its limits, and with f64 where it has it.
-    pub fn open(&self) -> Result<Device> {
+    /// The pipeline for a ring and a variant, compiled once, and the device that it is for, opened once.
+    pub fn pipeline<T: Real>(&self, blocks: Blocks, variant: Variant) -> Result<(Device, wgpu::ComputePipeline)> {
+        let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        let (device, pipelines) = match &mut *opened {
+            Some(opened) => opened,
+            none => none.insert((self.open()?, HashMap::new())),
+        };
+        let [least, most] = self.subgroups();
+        let subgroup = if variant.subgroup { least } else { most };
+        let pipeline = pipelines
+            .entry((blocks.n, T::NAME, variant))
+            .or_insert_with(|| pipeline::compile::<T>(&device.device, blocks, subgroup, variant));
+        Ok((device.clone(), pipeline.clone()))
+    }
+
+    /// Opens the adapter with all its limits, and with f64 and subgroups where it has them.
+    fn open(&self) -> Result<Device> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("curvelax"),
-            required_features: self.adapter.features() & wgpu::Features::SHADER_F64,
+            required_features: self.adapter.features() & (wgpu::Features::SHADER_F64 | wgpu::Features::SUBGROUP),
             required_limits: self.adapter.limits(),
             ..Default::default()
         };

@@ -1,7 +1,10 @@
-//! The GPU back end: adapters, the assembled shaders, the kernel with its buffers. The only place that names wgpu.
+//! The GPU back end: adapters, the assembled shaders, the kernel with its batches of slots. The only place that names wgpu.
 
 pub mod adapter;
+mod batch;
+mod budget;
 pub mod kernel;
+mod pipeline;
 pub mod shader;
 
 pub use adapter::{Capacity, Gpu};

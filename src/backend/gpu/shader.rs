@@ -15,7 +15,7 @@ macro_rules! parts {
 }
 
 /// What a kernel is made for, besides its number and sizes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
     /// Solver of the pentadiagonal systems.
     pub solver: Solver,
@@ -23,14 +23,19 @@ pub struct Variant {
     pub adaptive: bool,
     /// Keeps what every stage of a step computes.
     pub traced: bool,
+    /// A workgroup is one subgroup, whose threads exchange by shuffles instead of barriers.
+    pub subgroup: bool,
 }
 
 impl Variant {
     /// All that are used; adaptive steps are made of traced ones.
-    pub const ALL: [Variant; 9] = [
+    pub const ALL: [Variant; 12] = [
         Variant::of(Solver::GaussSeidel),
         Variant { traced: true, ..Variant::of(Solver::GaussSeidel) },
         Variant { adaptive: true, ..Variant::of(Solver::GaussSeidel) },
+        Variant { subgroup: true, ..Variant::of(Solver::GaussSeidel) },
+        Variant { subgroup: true, traced: true, ..Variant::of(Solver::GaussSeidel) },
+        Variant { subgroup: true, adaptive: true, ..Variant::of(Solver::GaussSeidel) },
         Variant::of(Solver::Multigrid),
         Variant { traced: true, ..Variant::of(Solver::Multigrid) },
         Variant { adaptive: true, ..Variant::of(Solver::Multigrid) },
@@ -41,7 +46,7 @@ impl Variant {
 
     /// The kernel of fixed steps.
     pub const fn of(solver: Solver) -> Variant {
-        Variant { solver, adaptive: false, traced: false }
+        Variant { solver, adaptive: false, traced: false, subgroup: false }
     }
 
     /// The files of the kernel, in the order of the step.
@@ -52,7 +57,8 @@ impl Variant {
             Solver::Direct => &DIRECT,
         };
         let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
-        COMMON.into_iter().chain(solver.iter().copied()).chain(trace)
+        let exchange = if self.subgroup { EXCHANGE_SUBGROUP } else { EXCHANGE };
+        COMMON.into_iter().chain(exchange).chain(solver.iter().copied()).chain(trace)
     }
 }
 
@@ -72,6 +78,8 @@ const COMMON: [Part; 14] = parts![
     "extrapolation.wgsl",
     "evolve.wgsl",
 ];
+const EXCHANGE: [Part; 1] = parts!["exchange.wgsl"];
+const EXCHANGE_SUBGROUP: [Part; 1] = parts!["exchange_subgroup.wgsl"];
 const GAUSS_SEIDEL: [Part; 2] = parts!["sweeps.wgsl", "gauss_seidel.wgsl"];
 const MULTIGRID: [Part; 3] = parts!["sweeps.wgsl", "coarse.wgsl", "multigrid.wgsl"];
 const DIRECT: [Part; 1] = parts!["direct.wgsl"];
@@ -106,7 +114,8 @@ pub fn locate(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
 /// Levels of multigrid at most, in the kernel.
 pub const LEVELS: usize = 8;
 
-/// Threads of a workgroup: one a block, filled up to whole subgroups of `subgroup` threads.
+/// Threads of a workgroup: one a block, filled up to whole subgroups of `subgroup` threads; the kernel that is one
+/// subgroup wants the smallest subgroup there is.
 pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
     blocks.count().next_multiple_of(subgroup as usize)
 }
@@ -122,17 +131,18 @@ pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 5] {
     ]
 }
 
-/// Bytes of workgroup memory that the kernel takes: two rings, a row of four per block, one decision; for the direct
-/// solve four more rows per block, for multigrid 13 numbers a coarse node and 8 rows of weights.
+/// Bytes of workgroup memory that the kernel takes: rows of four numbers a block, and one decision; for multigrid 13 numbers
+/// a coarse node and a row a level besides.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
-pub fn workgroup_bytes<T: Real>(blocks: Blocks, solver: Solver) -> usize {
-    let more = match solver {
-        Solver::GaussSeidel => 0,
-        Solver::Multigrid => 13 * coarse_nodes(blocks.n) + 4 * LEVELS,
-        Solver::Direct => 16 * blocks.count(),
+pub fn workgroup_bytes<T: Real>(blocks: Blocks, variant: Variant) -> usize {
+    let rows = match variant {
+        Variant { subgroup: true, .. } => 1,
+        Variant { solver: Solver::GaussSeidel | Solver::Multigrid, .. } => 3,
+        Variant { solver: Solver::Direct, .. } => 6,
     };
-    (2 * blocks.n + 4 * blocks.count() + more) * size_of::<T>() + 16
+    let coarse = if variant.solver == Solver::Multigrid { 13 * coarse_nodes(blocks.n) + 4 * LEVELS } else { 0 };
+    (4 * rows * blocks.count() + coarse) * size_of::<T>() + 16
 }
 
 #[cfg(test)]

@@ -1,0 +1,95 @@
+// Exchange between the threads of a workgroup of any size, through workgroup memory and barriers. exchange_subgroup.wgsl
+// has the same functions with the same results for workgroups of one subgroup.
+
+/// Fields that neighbours need, one block an entry.
+var<workgroup> ring_a: array<vec, BLOCKS>;
+var<workgroup> ring_b: array<vec, BLOCKS>;
+/// A decision for the whole workgroup.
+var<workgroup> verdict: u32;
+
+@compute @workgroup_size(THREADS)
+fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    take_block(thread);
+    take_member(group.x);
+}
+
+/// Writes two fields for all to read. Two barriers: earlier readers are done, and all have written.
+fn share(a: vec, b: vec) {
+    workgroupBarrier();
+    if owns > 0u {
+        ring_a[lane] = a;
+        ring_b[lane] = b;
+    }
+    workgroupBarrier();
+}
+
+/// The windows of two fields.
+fn windows(a: vec, b: vec) -> Windows {
+    share(a, b);
+    return Windows(window(ring_a[before], a, ring_a[after]), window(ring_b[before], b, ring_b[after]));
+}
+
+/// Hands the fronts of the blocks to the blocks before them. One barrier, here and in the next two: each has an array of its
+/// own, so that whoever still reads one is separated from its next writer by the barrier of another.
+fn pass_down(front: vec) -> vec {
+    if owns > 0u { ring_a[lane] = front; }
+    workgroupBarrier();
+    return ring_a[after];
+}
+
+/// The same in the middle of a sweep, where blocks of three need the first nodes after them.
+fn pass_down_early(front: vec) -> vec {
+    if owns > 0u { partials[lane] = front; }
+    workgroupBarrier();
+    return partials[after];
+}
+
+/// Hands the tails of the blocks to the blocks after them.
+fn pass_up(tail: vec) -> vec {
+    if owns > 0u { ring_b[lane] = tail; }
+    workgroupBarrier();
+    return ring_b[before];
+}
+
+/// Four maxima over the ring from the maxima over each block: first over every `groups`-th block, then over those, which
+/// reads 2 sqrt(BLOCKS) rows instead of BLOCKS.
+fn ring_maxima(part: vec) -> vec {
+    workgroupBarrier();
+    if owns > 0u { partials[lane] = part; }
+    workgroupBarrier();
+    var some = part;
+    for (var t = block % dispatch.groups; t < dispatch.blocks; t += dispatch.groups) {
+        some = max(some, partials[t]);
+    }
+    if owns > 0u { ring_a[lane] = some; }
+    workgroupBarrier();
+    var largest = some;
+    for (var t = 0u; t < dispatch.groups; t++) {
+        largest = max(largest, ring_a[t]);
+    }
+    return largest;
+}
+
+/// Four sums in block order and twice four maxima over the ring.
+fn ring_summary(sum: vec, extreme: vec, other: vec) -> Summary {
+    workgroupBarrier();
+    if owns > 0u {
+        partials[lane] = sum;
+        ring_a[lane] = extreme;
+        ring_b[lane] = other;
+    }
+    workgroupBarrier();
+    var all = Summary(vec(0.0), ring_a[0], ring_b[0]);
+    for (var t = 0u; t < dispatch.blocks; t++) {
+        all.sums = all.sums + partials[t];
+        all.extremes = max(all.extremes, ring_a[t]);
+        all.others = max(all.others, ring_b[t]);
+    }
+    return all;
+}
+
+/// The value that thread 0 holds, for every thread, in a way that control flow may depend on.
+fn uniform_decision(value: u32) -> u32 {
+    if lane == 0u { verdict = value; }
+    return workgroupUniformLoad(&verdict);
+}

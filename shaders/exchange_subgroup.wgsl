@@ -1,0 +1,40 @@
+// Exchange between the threads of a workgroup that is one subgroup: by shuffles, without barriers. exchange.wgsl has the
+// same functions with the same results for workgroups of any size.
+
+@compute @workgroup_size(THREADS)
+fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(subgroup_invocation_id) thread: u32) {
+    take_block(thread);
+    take_member(group.x);
+}
+
+fn windows(a: vec, b: vec) -> Windows {
+    return Windows(
+        window(subgroupShuffle(a, before), a, subgroupShuffle(a, after)),
+        window(subgroupShuffle(b, before), b, subgroupShuffle(b, after)),
+    );
+}
+
+fn pass_down(front: vec) -> vec {
+    return subgroupShuffle(front, after);
+}
+
+fn pass_down_early(front: vec) -> vec {
+    return subgroupShuffle(front, after);
+}
+
+fn pass_up(tail: vec) -> vec {
+    return subgroupShuffle(tail, before);
+}
+
+/// Spare threads repeat the last block and change no maximum.
+fn ring_maxima(part: vec) -> vec {
+    return subgroupMax(part);
+}
+
+fn ring_summary(sum: vec, extreme: vec, other: vec) -> Summary {
+    return Summary(ring_sums(sum).all, subgroupMax(extreme), subgroupMax(other));
+}
+
+fn uniform_decision(value: u32) -> u32 {
+    return subgroupBroadcastFirst(value);
+}

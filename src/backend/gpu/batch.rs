@@ -1,0 +1,300 @@
+//! A batch of slots: its buffers, the host's mirror of the small ones, and at most one dispatch on its way.
+//!
+//! Before a dispatch what changed in the mirror is uploaded, and with it the list of members that are due: only they get a
+//! workgroup. After it their counters and reports come back.
+
+use std::{
+    sync::mpsc::{Receiver, channel},
+    time::{Duration, Instant},
+};
+
+use super::{adapter::Device, budget::Budget, kernel::TRACE_FIELDS};
+use crate::{
+    error::{Error, Result},
+    number::Real,
+    scheme::{
+        Parameters,
+        evolve::Run,
+        parameters::{Counters, Report},
+        state::STATE_FIELDS,
+    },
+    solver::Blocks,
+};
+
+/// A dispatch that takes longer than this is given up.
+const DISPATCH_LIMIT: Duration = Duration::from_secs(120);
+
+/// Field names of what one dispatch asks for, in memory order.
+pub const DISPATCH_FIELDS: [&str; 5] = ["steps", "max_sweeps", "sweeps", "blocks", "groups"];
+
+/// What one dispatch asks for.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Dispatch {
+    steps: u32,
+    max_sweeps: u32,
+    sweeps: u32,
+    blocks: u32,
+    groups: u32,
+}
+
+/// Slots side by side in one dispatch.
+pub(super) struct Batch<T> {
+    buffers: Buffers,
+    bindings: wgpu::BindGroup,
+    blocks: Blocks,
+    parameters: Vec<T>,
+    counters: Vec<Counters>,
+    reports: Vec<Report<T>>,
+    changed: Vec<bool>,
+    due: Vec<u32>,
+    flight: Option<Flight>,
+}
+
+/// A dispatch on its way.
+struct Flight {
+    since: Instant,
+    back: Reading,
+}
+
+/// A copy to the host on its way.
+pub(super) struct Reading {
+    submission: wgpu::SubmissionIndex,
+    staging: wgpu::Buffer,
+    bytes: u64,
+    mapped: Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
+}
+
+struct Buffers {
+    dispatch: wgpu::Buffer,
+    parameters: wgpu::Buffer,
+    counters: wgpu::Buffer,
+    reports: wgpu::Buffer,
+    states: wgpu::Buffer,
+    due: wgpu::Buffer,
+    trace: Option<wgpu::Buffer>,
+    staging: wgpu::Buffer,
+}
+
+impl<T: Real> Batch<T> {
+    /// Room for `slots` members.
+    pub fn new(device: &Device, pipeline: &wgpu::ComputePipeline, blocks: Blocks, slots: usize, traced: bool) -> Self {
+        let buffers = Buffers::new::<T>(&device.device, blocks.n, slots, traced);
+        Batch {
+            bindings: buffers.bind(&device.device, pipeline),
+            buffers,
+            blocks,
+            parameters: vec![T::of(0.0); slots * Parameters::<T>::FIELDS.len()],
+            counters: vec![Counters::default(); slots],
+            reports: vec![Report::default(); slots],
+            changed: vec![true; slots],
+            due: Vec::new(),
+            flight: None,
+        }
+    }
+
+    pub fn counters(&self, slot: usize) -> Counters {
+        self.counters[slot]
+    }
+
+    pub fn report(&self, slot: usize) -> &Report<T> {
+        &self.reports[slot]
+    }
+
+    /// Where the state of `slot` lies.
+    pub fn state_at(&self, slot: usize) -> (&wgpu::Buffer, u64, u64) {
+        let bytes = (STATE_FIELDS * self.blocks.n * size_of::<T>()) as u64;
+        (&self.buffers.states, slot as u64 * bytes, bytes)
+    }
+
+    pub fn trace(&self) -> Option<&wgpu::Buffer> {
+        self.buffers.trace.as_ref()
+    }
+
+    pub fn load(&mut self, device: &Device, slot: usize, run: &Run<T>) {
+        let (states, offset, _) = self.state_at(slot);
+        device.queue.write_buffer(states, offset, bytemuck::cast_slice(&run.state.to_numbers()));
+        self.counters[slot] = run.counters;
+        self.reports[slot] = run.report;
+        self.set_parameters(slot, &run.parameters);
+    }
+
+    pub fn set_parameters(&mut self, slot: usize, parameters: &Parameters<T>) {
+        let fields = Parameters::<T>::FIELDS.len();
+        self.parameters[slot * fields..(slot + 1) * fields].copy_from_slice(&parameters.to_numbers());
+        self.changed[slot] = true;
+    }
+
+    pub fn set_counters(&mut self, slot: usize, change: impl FnOnce(&mut Counters)) {
+        change(&mut self.counters[slot]);
+        self.changed[slot] = true;
+    }
+
+    /// Sends the members that are due on their way, if any are.
+    pub fn start(&mut self, device: &Device, pipeline: &wgpu::ComputePipeline, budget: Budget, max_sweeps: u32) {
+        self.due.clear();
+        self.due.extend((0..).zip(&self.counters).filter(|(_, counters)| is_due(counters)).map(|(slot, _)| slot));
+        if self.due.is_empty() {
+            return;
+        }
+        self.upload(&device.queue, budget, max_sweeps);
+        let mut encoder = device.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &self.bindings, &[]);
+        pass.dispatch_workgroups(self.due.len() as u32, 1, 1);
+        drop(pass);
+        let Buffers { counters, reports, staging, .. } = &self.buffers;
+        let reads = [counters, reports].map(|buffer| (buffer, 0, buffer.size()));
+        self.flight = Some(Flight { since: Instant::now(), back: Reading::submit(device, encoder, staging, &reads) });
+    }
+
+    /// Waits for what was started and takes its records; returns when it was started.
+    pub fn finish(&mut self, device: &Device) -> Result<Option<Instant>> {
+        let Some(Flight { since, back }) = self.flight.take() else {
+            self.forget_sweeps();
+            return Ok(None);
+        };
+        let bytes = back.wait(device)?;
+        let (counters, reports) = bytes.split_at(self.buffers.counters.size() as usize);
+        let counters: Vec<Counters> = bytemuck::pod_collect_to_vec(counters);
+        let reports: Vec<T> = bytemuck::pod_collect_to_vec(reports);
+        self.forget_sweeps();
+        for slot in self.due.iter().map(|slot| *slot as usize) {
+            check_progress(slot, &self.counters[slot], &counters[slot])?;
+            self.counters[slot] = counters[slot];
+            self.reports[slot] = Report::from_numbers(&reports[slot * Report::<T>::LEN..(slot + 1) * Report::<T>::LEN]);
+        }
+        Ok(Some(since))
+    }
+
+    /// Members that were not due have made none.
+    fn forget_sweeps(&mut self) {
+        for counters in &mut self.counters {
+            (counters.sweeps_k, counters.sweeps_x) = (0, 0);
+        }
+    }
+
+    fn upload(&mut self, queue: &wgpu::Queue, Budget { steps, sweeps }: Budget, max_sweeps: u32) {
+        let blocks = self.blocks.count() as u32;
+        let asked = Dispatch { steps, max_sweeps, sweeps, blocks, groups: blocks.isqrt() };
+        queue.write_buffer(&self.buffers.dispatch, 0, bytemuck::bytes_of(&asked));
+        queue.write_buffer(&self.buffers.due, 0, bytemuck::cast_slice(&self.due));
+        // From the first slot that changed to the last one: what is uploaded needlessly between them is what came back.
+        let Some(first) = self.changed.iter().position(|changed| *changed) else { return };
+        let end = self.changed.iter().rposition(|changed| *changed).map_or(first, |last| last + 1);
+        self.changed[first..end].fill(false);
+        let reports: Vec<T> = self.reports[first..end].iter().flat_map(Report::to_numbers).collect();
+        let fields = Parameters::<T>::FIELDS.len();
+        let write = |buffer: &wgpu::Buffer, bytes: usize, data: &[u8]| {
+            queue.write_buffer(buffer, (first * bytes) as u64, data);
+        };
+        let Buffers { parameters, counters, reports: of_reports, .. } = &self.buffers;
+        write(
+            parameters,
+            fields * size_of::<T>(),
+            bytemuck::cast_slice(&self.parameters[first * fields..end * fields]),
+        );
+        write(counters, size_of::<Counters>(), bytemuck::cast_slice(&self.counters[first..end]));
+        write(of_reports, Report::<T>::LEN * size_of::<T>(), bytemuck::cast_slice(&reports));
+    }
+}
+
+fn is_due(counters: &Counters) -> bool {
+    counters.status == 0 && counters.steps < counters.goal
+}
+
+/// A member that was due has made a step or a sweep, or ended: a kernel that does nothing must not be awaited.
+fn check_progress(slot: usize, before: &Counters, after: &Counters) -> Result<()> {
+    let position = |c: &Counters| (c.status, c.steps, c.rejected, c.phase, c.solve_sweeps);
+    if position(before) == position(after) && after.sweeps_k + after.sweeps_x == 0 {
+        return Err(Error::Device(format!(
+            "GPU: a dispatch did nothing for the member in slot {slot}; see `curvelax check`, or try --backend cpu"
+        )));
+    }
+    Ok(())
+}
+
+impl Reading {
+    /// Runs `encoder`, then copies `bytes` of each buffer towards the host through `staging`.
+    pub fn submit(
+        device: &Device,
+        mut encoder: wgpu::CommandEncoder,
+        staging: &wgpu::Buffer,
+        reads: &[(&wgpu::Buffer, u64, u64)],
+    ) -> Reading {
+        let mut at = 0;
+        for (buffer, offset, bytes) in reads {
+            encoder.copy_buffer_to_buffer(buffer, *offset, staging, at, *bytes);
+            at += bytes;
+        }
+        let submission = device.queue.submit([encoder.finish()]);
+        let (send, mapped) = channel();
+        staging.slice(..at).map_async(wgpu::MapMode::Read, move |result| drop(send.send(result)));
+        Reading { submission, staging: staging.clone(), bytes: at, mapped }
+    }
+
+    /// Waits until it has arrived.
+    pub fn wait(self, device: &Device) -> Result<Vec<u8>> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(self.submission), timeout: Some(DISPATCH_LIMIT) };
+        let polled = device.device.poll(wait);
+        device.check()?;
+        let failed = |what: String| Error::Device(format!("GPU: {what}; try --backend cpu"));
+        polled.map_err(|e| failed(format!("a dispatch did not end in {} s ({e})", DISPATCH_LIMIT.as_secs())))?;
+        match self.mapped.try_recv() {
+            Ok(Ok(())) => {}
+            other => return Err(failed(format!("results could not be read back ({other:?})"))),
+        }
+        let slice = self.staging.slice(..self.bytes);
+        let view = slice.get_mapped_range().map_err(|e| failed(format!("results could not be mapped ({e})")))?;
+        let bytes = view.to_vec();
+        drop(view);
+        self.staging.unmap();
+        Ok(bytes)
+    }
+}
+
+/// A buffer that the host can read.
+pub(super) fn staging(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
+    let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
+    device.create_buffer(&wgpu::BufferDescriptor { label: Some("staging"), size, usage, mapped_at_creation: false })
+}
+
+impl Buffers {
+    fn new<T: Real>(device: &wgpu::Device, n: usize, slots: usize, traced: bool) -> Buffers {
+        let buffer = |label, bytes: usize, kind| {
+            let usage = kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
+            let size = bytes as u64;
+            device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+        };
+        let storage = wgpu::BufferUsages::STORAGE;
+        let numbers = |label, count: usize| buffer(label, slots * count * size_of::<T>(), storage);
+        let counters = buffer("counters", slots * size_of::<Counters>(), storage);
+        let reports = numbers("reports", Report::<T>::LEN);
+        Buffers {
+            dispatch: buffer("dispatch", size_of::<Dispatch>(), wgpu::BufferUsages::UNIFORM),
+            parameters: numbers("parameters", Parameters::<T>::FIELDS.len()),
+            staging: staging(device, counters.size() + reports.size()),
+            counters,
+            reports,
+            states: numbers("states", STATE_FIELDS * n),
+            due: buffer("due", slots * size_of::<u32>(), storage),
+            trace: traced.then(|| numbers("trace", TRACE_FIELDS * n)),
+        }
+    }
+
+    fn bind(&self, device: &wgpu::Device, pipeline: &wgpu::ComputePipeline) -> wgpu::BindGroup {
+        let Buffers { dispatch, parameters, counters, reports, states, due, trace, .. } = self;
+        let buffers = [dispatch, parameters, counters, reports, states, due].into_iter().chain(trace);
+        let entries: Vec<_> = (0..)
+            .zip(buffers)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        let layout = pipeline.get_bind_group_layout(0);
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("evolve"),
+            layout: &layout,
+            entries: &entries,
+        })
+    }
+}

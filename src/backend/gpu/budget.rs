@@ -1,0 +1,90 @@
+//! How much one dispatch may do, and how that follows the time that dispatches take.
+
+use std::time::Duration;
+
+use super::{adapter::Gpu, shader::Variant};
+use crate::solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK, multigrid::SWEEPS_PER_CYCLE};
+
+/// A dispatch aims to last this long: short enough for every watchdog, long enough to hide its overhead, some 0.1 ms.
+const DISPATCH_TIME: Duration = Duration::from_millis(40);
+
+/// How much one dispatch may do. No bit of a result depends on it: a dispatch that runs out pauses, even inside a
+/// solve, and the next one goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Budget {
+    /// Steps per member.
+    pub steps: u32,
+    /// Sweeps per member, rounded up to the next look at the residual.
+    pub sweeps: u32,
+}
+
+/// Iterations of all loops in a cycle of multigrid, besides looks at the residual: over 11 levels at most of 4 colours.
+const ITERATIONS_PER_CYCLE: u32 = 300;
+/// And where its levels are built, down to the inverse of a matrix of 5 rows.
+const ITERATIONS_PER_BUILD: u32 = 300;
+/// llvmpipe leaves all loops of a shader, without a word, once they have made 65 535 iterations together.
+const SOFTWARE_ITERATIONS: u32 = 50_000;
+
+impl Budget {
+    /// The most that one dispatch may do on this adapter.
+    pub(super) fn most(gpu: &Gpu, blocks: Blocks, Variant { solver, adaptive, .. }: Variant) -> Budget {
+        if gpu.is_hardware() {
+            return Budget { steps: 1 << 20, sweeps: 1 << 24 };
+        }
+        // A sweep is one iteration; a look at the residual walks over all blocks at most, and a step does so ten times, an
+        // adaptive one, which is three of the paper's, forty times.
+        let walk = blocks.count() as u32 + 1;
+        let walks = if adaptive { 40 } else { 10 };
+        // The rings below the finest one are walked over in every cycle, and built twice in each of the paper's steps.
+        let (sweeps, cycle, build) = match solver {
+            Solver::Multigrid => (SWEEPS_PER_CYCLE, ITERATIONS_PER_CYCLE, walks / 5 * ITERATIONS_PER_BUILD),
+            Solver::GaussSeidel | Solver::Direct => (SWEEPS_PER_CHECK, SWEEPS_PER_CHECK, 0),
+        };
+        Budget {
+            steps: (SOFTWARE_ITERATIONS / 2 / (walks * walk + build)).max(1),
+            sweeps: (SOFTWARE_ITERATIONS / 2 / (cycle + walk) * sweeps).max(sweeps),
+        }
+    }
+
+    /// Of the first dispatch: certainly little.
+    pub(super) fn first(solver: Solver, most: Budget) -> Budget {
+        match solver {
+            Solver::GaussSeidel | Solver::Multigrid => Budget { sweeps: most.sweeps.min(256), ..most },
+            Solver::Direct => Budget { steps: 1, ..most },
+        }
+    }
+
+    /// Of the dispatch after one that took so long: at most twice the sweeps, or steps where there are no sweeps.
+    pub(super) fn after(self, took: Duration, solver: Solver, most: Budget) -> Budget {
+        let share = DISPATCH_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
+        let next = |now: u32, most: u32| ((f64::from(now) * share) as u32).clamp(1, 2 * now).min(most);
+        match solver {
+            Solver::GaussSeidel | Solver::Multigrid => Budget { sweeps: next(self.sweeps, most.sweeps), ..self },
+            Solver::Direct => Budget { steps: next(self.steps, most.steps), ..self },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_work_of_a_dispatch_settles_at_its_time() {
+        let most = Budget { steps: 1 << 20, sweeps: 1 << 24 };
+        for solver in Solver::ALL {
+            for nanoseconds_per_unit in [3_u32, 700, 90_000, 3_000_000] {
+                let units = |b: Budget| if solver == Solver::Direct { b.steps } else { b.sweeps };
+                let time = |b: Budget| Duration::from_nanos(u64::from(nanoseconds_per_unit)) * units(b);
+                let mut budget = Budget::first(solver, most);
+                for _ in 0..30 {
+                    budget = budget.after(time(budget), solver, most);
+                }
+                let settled = (0.5..1.1).contains(&(time(budget).as_secs_f64() / DISPATCH_TIME.as_secs_f64()));
+                let largest = units(budget) == units(most);
+                assert!(settled || largest, "{solver:?} at {nanoseconds_per_unit} ns: {budget:?}");
+                assert_eq!(budget.after(Duration::from_secs(3600), solver, most).steps.min(1), 1);
+            }
+        }
+    }
+}
