@@ -488,12 +488,17 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
     if !pace.contains(&"--t-end") {
         command.args(["run", "--curves", "7", "--t-end", "0.4", "--series", "0.07", "--snapshots", "0,0.1,0.2"]);
     }
-    command.args(pace).args(["--stop-when-relaxed", "--backend", backend, "--solver", solver]);
+    // In f32 an error estimate may meet its tolerance on one side only, and the step in which a member relaxes then ends at
+    // another time: there members go on to one that is the same for all.
+    let rounded = T::PRECISION == Precision::F32 && pace.contains(&"--adaptive");
+    if !rounded {
+        command.arg("--stop-when-relaxed");
+    }
+    command.args(pace).args(["--backend", backend, "--solver", solver]);
     let output = command.args(["--precision", T::NAME, "--points", &n.to_string(), "--out", "out"]).output()?;
     if !output.status.success() {
         return Err(String::from_utf8(output.stderr)?.into());
     }
-    let rounded = T::PRECISION == Precision::F32 && pace.contains(&"--adaptive");
     let (mut words, mut numbers) = (Vec::new(), Vec::new());
     for name in ["summary.csv", "series.csv", "snapshots.csv"] {
         let mut reader = csv::Reader::from_path(folder.path().join("out").join(name))?;
@@ -503,7 +508,7 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
                 match field.parse() {
                     // Counts of sweeps may differ where a residual meets its bound.
                     Ok(_) if column.starts_with("sweeps") => {}
-                    // So may those of adaptive steps in f32, where an error estimate meets its tolerance.
+                    // So may those of steps.
                     Ok(_) if rounded && ["steps", "rejected"].contains(&column) => {}
                     Ok(number) => numbers.push(number),
                     Err(_) => words.push(format!("{name} {column} {field}")),

@@ -2,11 +2,16 @@
 //! threads.
 //!
 //! Every call groups the members that are running anew, so that no lane is idle for long; no bit of a member depends on
-//! its group.
+//! its group. There are two batches of slots: while the threads advance one, the host looks after the other.
 
 mod vectors;
 
 pub use vectors::{Vectorised, Vectors};
+
+use std::sync::{
+    Arc,
+    mpsc::{Receiver, channel},
+};
 
 use rayon::prelude::*;
 
@@ -23,10 +28,12 @@ use crate::{
 };
 use vectors::Crew;
 
-/// Resident groups per thread: enough that threads end together, few enough that members end in order.
-const GROUPS_PER_THREAD: usize = 8;
-/// Resident members per thread at least.
-const SLOTS_PER_THREAD: usize = 16;
+/// Resident groups per thread and batch: enough that threads end together, few enough that members end in order.
+const GROUPS_PER_THREAD: usize = 4;
+/// Resident members per thread and batch at least.
+const SLOTS_PER_THREAD: usize = 8;
+/// While one is on its way, the host has time for the other.
+const BATCHES: usize = 2;
 
 /// Steps between two looks at the members, so that progress shows and stops are reached soon.
 fn steps_per_advance(solver: Solver) -> u32 {
@@ -38,10 +45,22 @@ fn steps_per_advance(solver: Solver) -> u32 {
 
 /// Members of `n` nodes in numbers of type `T`.
 pub struct CpuBackend<T> {
-    slots: Vec<Option<Box<Run<T>>>>,
+    batches: [Batch<T>; BATCHES],
+    slots: usize,
     method: Method,
-    crew: Box<dyn Crew<T>>,
+    crew: Arc<dyn Crew<T>>,
     pool: rayon::ThreadPool,
+}
+
+/// The members in a part of the slots.
+type Members<T> = Vec<Option<Box<Run<T>>>>;
+
+/// Part of the slots.
+struct Batch<T> {
+    /// Empty while the batch is on its way.
+    members: Members<T>,
+    /// Where they come back from there.
+    coming: Option<Receiver<Members<T>>>,
 }
 
 impl<T: Vectorised> CpuBackend<T> {
@@ -52,12 +71,14 @@ impl<T: Vectorised> CpuBackend<T> {
 
     /// The same with `vectors`, which the processor must have.
     pub fn with_vectors(blocks: Blocks, method: Method, threads: usize, vectors: Vectors) -> Result<Self> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        // A panic is told by the batch that does not come back.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).panic_handler(|_| {}).build();
         let pool = pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}; try --threads 1")))?;
         let threads = pool.current_num_threads();
         let crew = T::crew(vectors, method.solver, blocks, threads)?;
         let slots = threads * SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * crew.lanes());
-        Ok(CpuBackend { slots: (0..slots).map(|_| None).collect(), method, crew, pool })
+        let batch = || Batch { members: (0..slots).map(|_| None).collect(), coming: None };
+        Ok(CpuBackend { batches: [batch(), batch()], slots: BATCHES * slots, method, crew: crew.into(), pool })
     }
 
     /// Threads in use.
@@ -65,39 +86,68 @@ impl<T: Vectorised> CpuBackend<T> {
         self.pool.current_num_threads()
     }
 
+    fn place(&mut self, slot: usize) -> &mut Option<Box<Run<T>>> {
+        let size = self.slots / BATCHES;
+        &mut self.batches[slot / size].members[slot % size]
+    }
+
     fn run(&self, slot: usize) -> &Run<T> {
-        self.slots[slot].as_ref().expect("an occupied slot")
+        let size = self.slots / BATCHES;
+        self.batches[slot / size].members[slot % size].as_ref().expect("an occupied slot")
     }
 }
 
 impl<T: Vectorised> Backend for CpuBackend<T> {
     fn slots(&self) -> usize {
-        self.slots.len()
+        self.slots
     }
 
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
-        self.slots[slot] = Some(Box::new(run.convert()));
+        *self.place(slot) = Some(Box::new(run.convert()));
         Ok(())
     }
 
     fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>) {
-        let run = self.slots[slot].as_mut().expect("an occupied slot");
+        let run = self.place(slot).as_mut().expect("an occupied slot");
         run.counters.goal = goal;
         run.parameters = parameters.convert();
     }
 
     fn clear(&mut self, slot: usize) {
-        self.slots[slot] = None;
+        *self.place(slot) = None;
     }
 
     fn advance(&mut self) -> Result<()> {
-        let (crew, method) = (&self.crew, &self.method);
-        let mut running: Vec<&mut Run<T>> =
-            self.slots.iter_mut().flatten().map(|run| &mut **run).filter(|run| is_running(&run.counters)).collect();
-        let attempts = steps_per_advance(method.solver);
-        self.pool.install(|| {
-            running.par_chunks_mut(crew.lanes()).for_each(|group| crew.advance(group, method, attempts));
+        (0..BATCHES).try_for_each(|batch| self.start(batch))?;
+        (0..BATCHES).try_for_each(|batch| self.finish(batch))
+    }
+
+    fn batches(&self) -> usize {
+        BATCHES
+    }
+
+    fn start(&mut self, batch: usize) -> Result<()> {
+        let batch = &mut self.batches[batch];
+        let mut members = std::mem::take(&mut batch.members);
+        let (back, coming) = channel();
+        batch.coming = Some(coming);
+        let (crew, method) = (Arc::clone(&self.crew), self.method);
+        self.pool.spawn(move || {
+            let attempts = steps_per_advance(method.solver);
+            let mut running: Vec<&mut Run<T>> =
+                members.iter_mut().flatten().map(|run| &mut **run).filter(|run| is_running(&run.counters)).collect();
+            running.par_chunks_mut(crew.lanes()).for_each(|group| crew.advance(group, &method, attempts));
+            // Where nobody waits any more the run has ended.
+            let _ = back.send(members);
         });
+        Ok(())
+    }
+
+    fn finish(&mut self, batch: usize) -> Result<()> {
+        let Some(coming) = self.batches[batch].coming.take() else { return Ok(()) };
+        let members = coming.recv();
+        self.batches[batch].members =
+            members.map_err(|_| Error::Failed("a thread of the CPU back end has panicked".into()))?;
         Ok(())
     }
 

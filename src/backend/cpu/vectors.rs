@@ -96,6 +96,8 @@ fn crew_by<M: Solves + 'static, T: Lane>(vectors: Vectors, blocks: Blocks, threa
     match vectors {
         Vectors::None => Some(Group::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
         #[cfg(target_arch = "x86_64")]
+        Vectors::Bits128 if M::SOLVER.sweeps() => abreast::<_, M, T, 1>(pulp::x86::V2::try_new(), blocks, threads),
+        #[cfg(target_arch = "x86_64")]
         Vectors::Bits128 => abreast::<_, M, T, 2>(pulp::x86::V2::try_new(), blocks, threads),
         #[cfg(target_arch = "aarch64")]
         Vectors::Bits128 => abreast::<_, M, T, 2>(pulp::aarch64::Neon::try_new(), blocks, threads),
