@@ -491,10 +491,10 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
     // In f32 an error estimate may meet its tolerance on one side only, and the step in which a member relaxes then ends at
     // another time: there members go on to one that is the same for all.
     let rounded = T::PRECISION == Precision::F32 && pace.contains(&"--adaptive");
+    command.args(pace).args(["--backend", backend, "--solver", solver]);
     if !rounded {
         command.arg("--stop-when-relaxed");
     }
-    command.args(pace).args(["--backend", backend, "--solver", solver]);
     let output = command.args(["--precision", T::NAME, "--points", &n.to_string(), "--out", "out"]).output()?;
     if !output.status.success() {
         return Err(String::from_utf8(output.stderr)?.into());
