@@ -33,7 +33,7 @@ pub struct Sums<N> {
     pub turning: N,
 }
 
-/// The maxima; a value that is not finite shows as more than [`BIG`](crate::number::BIG).
+/// The maxima; a value that is not finite shows as more than [`BIG`].
 #[derive(Clone, Copy, Debug)]
 pub struct Maxima<N> {
     /// `max |k_i| r_i`.

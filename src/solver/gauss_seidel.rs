@@ -39,7 +39,7 @@ pub struct Control<N> {
     pub tolerance: N,
     /// Absolute error that is not worth a sweep: a fraction of the rounding error of the unknown.
     pub negligible: N,
-    /// ω_SOR; 0 for [`over_relaxation`].
+    /// ω_SOR; 0 to have it chosen by the size of the system.
     pub sor: N,
     /// Sweeps after which the solve gives up.
     pub max_sweeps: u32,
@@ -101,7 +101,7 @@ fn over_relaxation<N: Number>(size: N) -> N {
     (N::of(2.0) * (g / (N::of(1.0) + g))).max(N::of(1.0))
 }
 
-/// See [`over_relaxation`].
+/// The ⅝ in the over-relaxation of its own choice.
 pub const AUTO_SCALE: f64 = 0.625;
 
 #[inline(always)]

@@ -273,7 +273,8 @@ fn balanced<N: Number>(p: N, cell: N) -> N {
     p / (N::of(1.0) + N::of(BALANCE) * (p.max(N::of(0.0)) * (cell * cell)))
 }
 
-/// See [`balanced`]: with 1/12 the two cancel to order 4, with 1/9 nothing negative is left of a circle on 3 nodes or more.
+/// By how much p is damped on coarse levels: with 1/12 the two terms of a circle cancel to order 4, with 1/9 nothing
+/// negative is left of a circle on 3 nodes or more.
 pub const BALANCE: f64 = 1.0 / 9.0;
 
 /// A row of a coarse level, integrated over its cell and divided by its diagonal entry, and one over that entry.
