@@ -221,7 +221,13 @@ mod tests {
             self.counters[slot].goal = goal;
         }
         fn clear(&mut self, _: usize) {}
-        fn advance(&mut self) -> Result<()> {
+        fn batches(&self) -> usize {
+            1
+        }
+        fn start(&mut self, _: usize) -> Result<()> {
+            Ok(())
+        }
+        fn finish(&mut self, _: usize) -> Result<()> {
             for counters in &mut self.counters {
                 let steps = (counters.goal - counters.steps).min(5);
                 counters.steps += steps;

@@ -194,8 +194,7 @@ fn advance(launches: &[Run<f64>], method: Method) -> Vec<(Counters, State<f64>)>
     for (slot, launch) in launches.iter().enumerate() {
         backend.load(slot, launch).unwrap();
     }
-    let running = |c: Counters| c.status == 0 && c.steps < c.goal;
-    while (0..launches.len()).any(|slot| running(backend.counters(slot))) {
+    while (0..launches.len()).any(|slot| backend.counters(slot).is_running()) {
         backend.advance().unwrap();
     }
     (0..launches.len()).map(|slot| (backend.counters(slot), backend.state(slot).unwrap())).collect()

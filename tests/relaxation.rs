@@ -11,10 +11,9 @@ use curvelax::{
     backend,
     curve::{BaseCurve, Outline, Sampling, crossing, polygon},
     ensemble::{
-        Ended, Family, Member, Observables, Outcome, Sink, Snapshot, Spec, Status,
+        Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
         spec::{BackendChoice, Precision, Pull, SolverChoice, Sor},
     },
-    error::Result,
     flow::Flow,
     number::Real,
     schedule::{Ticks, outputs},
@@ -33,7 +32,7 @@ use curvelax::{
 use glam::DVec2;
 use rayon::prelude::*;
 
-use common::{DIRECT, Stepper, polygons, wavy_circle};
+use common::{All, DIRECT, Stepper, polygons, wavy_circle};
 
 /// One unperturbed curve in adaptive steps, directly solved.
 fn adaptive(shape: &str, points: usize) -> Spec {
@@ -56,15 +55,6 @@ fn run(spec: &Spec) -> Vec<Ended> {
 }
 
 fn run_of(spec: &Spec, curve: BaseCurve) -> Vec<Ended> {
-    #[derive(Default)]
-    struct All(Vec<Ended>);
-    impl Sink for All {
-        fn member(&mut self, ended: &Ended) -> Result<()> {
-            self.0.push(ended.clone());
-            Ok(())
-        }
-        fn progress(&mut self, _: u64, _: u64, _: f64) {}
-    }
     let spec = spec.clone().validate().unwrap();
     let family = Family::of(&spec, curve).unwrap();
     let choice = backend::choose(&spec, family.points()).unwrap();

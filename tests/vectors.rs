@@ -1,13 +1,15 @@
 //! Members abreast in vector instructions against one member at a time: the same bits, whatever goes beside a member, on
 //! however many threads. Each comparison has a negative control.
 
+mod common;
+
 use curvelax::{
     Result,
     backend::{
         Backend,
         cpu::{CpuBackend, Vectorised, Vectors},
     },
-    ensemble::{Ended, Family, Sink, Spec, Status, spec::Solver},
+    ensemble::{Ended, Family, Spec, Status, spec::Solver},
     scheme::{
         Parameters, State,
         evolve::Run,
@@ -18,17 +20,7 @@ use curvelax::{
     solver::{Blocks, Order},
 };
 
-/// Everything that the members of a run leave.
-#[derive(Default)]
-struct All(Vec<Ended>);
-
-impl Sink for All {
-    fn member(&mut self, ended: &Ended) -> Result<()> {
-        self.0.push(ended.clone());
-        Ok(())
-    }
-    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
-}
+use common::All;
 
 /// A back end with fewer slots, so that members meet others.
 struct Fewer(Box<dyn Backend>, usize);
@@ -46,7 +38,13 @@ impl Backend for Fewer {
     fn clear(&mut self, slot: usize) {
         self.0.clear(slot);
     }
-    fn advance(&mut self) -> Result<()> {
+    fn batches(&self) -> usize {
+        1
+    }
+    fn start(&mut self, _: usize) -> Result<()> {
+        Ok(())
+    }
+    fn finish(&mut self, _: usize) -> Result<()> {
         self.0.advance()
     }
     fn counters(&self, slot: usize) -> Counters {

@@ -32,23 +32,20 @@ pub trait Backend {
     /// Empties a slot.
     fn clear(&mut self, slot: usize);
 
-    /// Takes every member that is running and short of its goal some steps further.
-    fn advance(&mut self) -> Result<()>;
-
     /// Equal parts of the slots, one after the other, that can be advanced on their own: while one is on its way, the host
     /// has time for another.
-    fn batches(&self) -> usize {
-        1
-    }
+    fn batches(&self) -> usize;
 
     /// Begins to advance a batch; until `finish` its slots are left alone.
-    fn start(&mut self, _batch: usize) -> Result<()> {
-        Ok(())
-    }
+    fn start(&mut self, batch: usize) -> Result<()>;
 
     /// Waits until the batch has advanced.
-    fn finish(&mut self, _batch: usize) -> Result<()> {
-        self.advance()
+    fn finish(&mut self, batch: usize) -> Result<()>;
+
+    /// Takes every member that is running and short of its goal some steps further.
+    fn advance(&mut self) -> Result<()> {
+        (0..self.batches()).try_for_each(|batch| self.start(batch))?;
+        (0..self.batches()).try_for_each(|batch| self.finish(batch))
     }
 
     /// Counters after the last `advance`; the sweeps are those of that call.

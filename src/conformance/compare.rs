@@ -150,7 +150,7 @@ pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Opt
         kernel.load(slot, launch)?;
     }
     kernel.poison_trace()?;
-    while (0..MEMBERS).any(|slot| unfinished(kernel.counters(slot))) {
+    while (0..MEMBERS).any(|slot| kernel.counters(slot).is_running()) {
         kernel.advance()?;
     }
     let trace = kernel.trace()?;
@@ -228,7 +228,7 @@ fn ends_agree<T: Real>(
         let mut twin: Run<T> = launch.convert();
         let mut longest = 0.0_f64;
         let mut work = Team::new(blocks(n)?);
-        while unfinished(twin.counters) {
+        while twin.counters.is_running() {
             evolve(&mut twin, &method(solver), &mut work, 1);
             longest = longest.max(twin.report.progress.taken.to_f64());
         }
@@ -381,16 +381,12 @@ pub fn on_gpu_by<T: Real>(
     for (slot, launch) in launches.iter().enumerate() {
         kernel.load(slot, launch)?;
     }
-    while (0..launches.len()).any(|slot| unfinished(kernel.counters(slot))) {
+    while (0..launches.len()).any(|slot| kernel.counters(slot).is_running()) {
         kernel.advance()?;
     }
     let left =
         |slot| Ok(Left { state: kernel.state(slot)?, counters: kernel.counters(slot), report: kernel.report(slot) });
     (0..launches.len()).map(left).collect()
-}
-
-fn unfinished(counters: Counters) -> bool {
-    counters.status == 0 && counters.steps < counters.goal
 }
 
 /// The twin's side of the trace, in the order of [`STAGES`].

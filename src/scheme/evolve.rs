@@ -33,9 +33,10 @@ impl<T: Real> Run<T> {
     /// A member at its start, with no step to make and no events behind it.
     pub fn new(state: State<T>, parameters: Parameters<T>) -> Run<T> {
         let blocks = Blocks::new(state.curve.len()).expect("a ring of 6 nodes or more");
-        let now = Observed::of(&state.curve, &parameters, blocks);
+        let sums = observe::sums(&state.curve, &parameters, blocks);
+        let now = Observed::new(&sums, &observe::maxima(&state.curve), &parameters);
         let mut report = Report { before: now, middle: now, now, ..Report::default() };
-        report.progress.turning = observe::sums(&state.curve, &parameters, blocks).turning;
+        report.progress.turning = sums.turning;
         let counters = Counters { relax_step: NEVER, half_step: NEVER, ..Counters::default() };
         Run { state, parameters, counters, report }
     }
@@ -110,25 +111,23 @@ pub fn evolve_abreast<N: Number, S: Solves>(
     for (lane, run) in runs.iter_mut().enumerate() {
         run.counters.sweeps_k = 0;
         run.counters.sweeps_x = 0;
-        let runs = is_running(&run.counters);
+        let runs = run.counters.is_running();
         live.set_lane(lane, runs);
         running += usize::from(runs);
     }
-    let Some(first) = runs.iter().position(|run| is_running(&run.counters)) else { return };
+    let Some(first) = runs.iter().position(|run| run.counters.is_running()) else { return };
     let adaptive = !runs[first].parameters.adaptive.le(N::Real::of(0.0));
     for lane in 0..N::LANES {
         // A lane without a member goes along with the first one.
         team.take_in(lane, if live.lane(lane) { &*runs[lane] } else { &*runs[first] });
     }
     let enough = running.div_ceil(2);
-    let mut left = attempts;
-    while left > 0 {
-        left -= 1;
+    for made in 1..=attempts {
         let attempt = team.attempt::<S>(runs, live, adaptive, method);
         team.conclude(runs, live, adaptive, &attempt);
-        let all_leave = left == 0 || runs.iter().filter(|run| is_running(&run.counters)).count() < enough;
+        let all_leave = made == attempts || runs.iter().filter(|run| run.counters.is_running()).count() < enough;
         for lane in 0..runs.len() {
-            if live.lane(lane) && (all_leave || !is_running(&runs[lane].counters)) {
+            if live.lane(lane) && (all_leave || !runs[lane].counters.is_running()) {
                 team.let_out(lane, runs[lane], adaptive);
                 live.set_lane(lane, false);
             }
@@ -137,11 +136,6 @@ pub fn evolve_abreast<N: Number, S: Solves>(
             return;
         }
     }
-}
-
-/// Whether a member has steps to make.
-pub fn is_running(counters: &Counters) -> bool {
-    counters.status == 0 && counters.steps < counters.goal
 }
 
 impl<N: Number> Team<N> {
@@ -250,7 +244,7 @@ impl<N: Number> Team<N> {
         let Attempt { stepped, error, middle, seen, excess } = attempt;
         let (zero, half) = (N::Real::of(0.0), N::Real::of(0.5));
         let n = self.work.blocks.n;
-        let exact = error.le(self.parameters.adaptive.max(N::of(0.0)));
+        let exact = error.le(self.parameters.adaptive);
         let finite = seen.is_finite();
         let singular = seen.is_singular(self.turning, &self.parameters, n);
         let at_threshold = excess.le(self.parameters.relax_at).and(live);

@@ -36,8 +36,6 @@ pub struct Sums<N> {
 /// The maxima; a value that is not finite shows as more than [`BIG`].
 #[derive(Clone, Copy, Debug)]
 pub struct Maxima<N> {
-    /// `max |k_i| r_i`.
-    pub turn: N,
     /// `max |r_i - |e_i|| / |e_i|`.
     pub drift: N,
     /// Longest edge.
@@ -133,10 +131,9 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> S
 /// Maxima over the ring.
 pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
     let low = N::of(-2.0 * BIG);
-    let mut m = Maxima { turn: low, drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
+    let mut m = Maxima { drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
     for i in 0..curve.x.len() {
         let (k, r, e) = (curve.k[i], curve.r[i], edge(curve, i)[2]);
-        m.turn = m.turn.max((k * r).bounded_abs());
         m.drift = m.drift.max(((r - e) / e).bounded_abs());
         m.longest = m.longest.max(e.bounded_abs());
         m.minus_shortest = m.minus_shortest.max(-e.bounded_abs());

@@ -3,7 +3,10 @@
 //! Every field is one number of the run's precision, in declaration order, so that host and WGSL agree by
 //! construction; a test compares names and offsets with naga's view of `shaders/member.wgsl`.
 
-use super::{Curve, observe};
+use super::{
+    Curve,
+    observe::{self, Maxima, Sums},
+};
 use crate::{
     flow::{Flow, MAX_DEGREE},
     number::{BIG, Mask, Number, Real},
@@ -253,7 +256,11 @@ impl<T: Real> Observed<T> {
     /// What can be observed of a curve.
     #[inline(never)]
     pub fn of(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
-        let (sums, maxima) = (observe::sums(curve, p, blocks), observe::maxima(curve));
+        Observed::new(&observe::sums(curve, p, blocks), &observe::maxima(curve), p)
+    }
+
+    /// What the sums and maxima of a curve say.
+    pub fn new(sums: &Sums<T>, maxima: &Maxima<T>, p: &Parameters<T>) -> Observed<T> {
         Observed {
             length: sums.length,
             area: sums.area,
@@ -294,6 +301,11 @@ impl<T: Real> Report<T> {
 }
 
 impl Counters {
+    /// Whether the member has steps to make.
+    pub fn is_running(&self) -> bool {
+        self.status == 0 && self.steps < self.goal
+    }
+
     /// Field names in memory order.
     pub const FIELDS: [&'static str; 12] = [
         "status",

@@ -58,6 +58,31 @@ pub struct Swept<N: Number> {
     pub finite: N::Mask,
 }
 
+/// When the sweeps on a system have done enough.
+pub(super) struct Target<N: Number> {
+    /// See [`size`].
+    pub size: N,
+    tolerance: N,
+    negligible: N,
+    /// Whether the system is finite.
+    pub finite: N::Mask,
+}
+
+impl<N: Number> Target<N> {
+    #[inline(always)]
+    pub fn of<const F: usize>(system: &System<N, F>, control: &Control<N>) -> Target<N> {
+        let size = size(system);
+        let tolerance = control.tolerance.max(N::of(N::EPSILON) * size);
+        Target { size, tolerance, negligible: control.negligible, finite: size.le(N::of(BIG)) }
+    }
+
+    /// Whether an error that is bounded by the scaled residual is small enough for increments of this size.
+    #[inline(always)]
+    pub fn is_met(&self, [error, increment]: [N; 2]) -> N::Mask {
+        self.finite.and(error.le((self.tolerance * increment).max(self.negligible)))
+    }
+}
+
 /// Sweeps `unknown` (one ring per right-hand side) until its residual is small, in the lanes that are `live`. Lanes that are
 /// done stay as they are.
 #[inline(always)]
@@ -68,12 +93,10 @@ pub fn solve<N: Number, const F: usize>(
     control: &Control<N>,
     live: N::Mask,
 ) -> Swept<N> {
-    let size = size(system);
-    let tolerance = control.tolerance.max(N::of(N::EPSILON) * size);
-    let finite = size.le(N::of(BIG));
-    let sor = N::select(control.sor.le(N::of(0.0)), over_relaxation(size), control.sor);
-    let mut active = live.and(finite);
-    let mut swept = Swept { sweeps: N::of(0.0), converged: N::Mask::all_of(false), finite };
+    let target = Target::of(system, control);
+    let sor = N::select(control.sor.le(N::of(0.0)), over_relaxation(target.size), control.sor);
+    let mut active = live.and(target.finite);
+    let mut swept = Swept { sweeps: N::of(0.0), converged: N::Mask::all_of(false), finite: target.finite };
     let mut done = 0;
     while done < control.max_sweeps && active.any() {
         let sweeps = SWEEPS_PER_CHECK.min(control.max_sweeps - done);
@@ -85,10 +108,9 @@ pub fn solve<N: Number, const F: usize>(
         }
         done += sweeps;
         swept.sweeps += N::select(active, N::of(f64::from(sweeps)), N::of(0.0));
-        let [error, increment] = norms(system, &unknown);
-        let bound = (tolerance * increment).max(control.negligible);
-        swept.converged = finite.and(error.le(bound));
-        active = active.and(error.le(N::of(BIG))).and(swept.converged.not());
+        let norms = norms(system, &unknown);
+        swept.converged = target.is_met(norms);
+        active = active.and(norms[0].le(N::of(BIG))).and(swept.converged.not());
     }
     swept
 }
@@ -162,7 +184,7 @@ fn relax<N: Number, const F: usize>(
 /// Times ε it is the tolerance below which a scaled residual is rounding error: no sweep, and no direct solve, gets
 /// further.
 #[inline(always)]
-pub(super) fn size<N: Number, const F: usize>(system: &System<N, F>) -> N {
+fn size<N: Number, const F: usize>(system: &System<N, F>) -> N {
     let mut largest = N::of(0.0);
     for (i, row) in system.rows.iter().enumerate() {
         let terms = N::of(1.0) + row.a.abs() + row.b.abs() + row.d.abs() + row.e.abs();

@@ -19,7 +19,7 @@
 //! [`gauss_seidel`](super::gauss_seidel) stops at; sweeps are those of the finest level. Twin of `shaders/multigrid.wgsl`.
 
 use super::{
-    gauss_seidel::{Control, Swept, coloured_sweep, size},
+    gauss_seidel::{Control, Swept, Target, coloured_sweep},
     ring::{Blocks, MIN_POINTS, Ring},
     system::{Row, System},
 };
@@ -442,17 +442,14 @@ pub fn solve<N: Number, const F: usize>(
     live: N::Mask,
     levels: &mut Levels<N, F>,
 ) -> Swept<N> {
-    let size = size(system);
-    let tolerance = control.tolerance.max(N::of(N::EPSILON) * size);
-    let finite = size.le(N::of(BIG));
-    let mut swept = Swept { sweeps: N::of(0.0), converged: N::Mask::all_of(false), finite };
+    let target = Target::of(system, control);
+    let mut swept = Swept { sweeps: N::of(0.0), converged: N::Mask::all_of(false), finite: target.finite };
     levels.build();
     let mut done = 0;
     loop {
-        let [error, increment] = levels.residual(system, &unknown);
-        let bound = (tolerance * increment).max(control.negligible);
-        swept.converged = finite.and(error.le(bound));
-        let active = live.and(finite).and(error.le(N::of(BIG))).and(swept.converged.not());
+        let norms = levels.residual(system, &unknown);
+        swept.converged = target.is_met(norms);
+        let active = live.and(target.finite).and(norms[0].le(N::of(BIG))).and(swept.converged.not());
         if done >= control.max_sweeps || !active.any() {
             return swept;
         }

@@ -20,7 +20,7 @@ use crate::{
     error::{Error, Result},
     scheme::{
         Parameters, State,
-        evolve::{Run, is_running},
+        evolve::Run,
         parameters::{Counters, Report},
         step::Method,
     },
@@ -117,11 +117,6 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
         *self.place(slot) = None;
     }
 
-    fn advance(&mut self) -> Result<()> {
-        (0..BATCHES).try_for_each(|batch| self.start(batch))?;
-        (0..BATCHES).try_for_each(|batch| self.finish(batch))
-    }
-
     fn batches(&self) -> usize {
         BATCHES
     }
@@ -135,7 +130,7 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
         self.pool.spawn(move || {
             let attempts = steps_per_advance(method.solver);
             let mut running: Vec<&mut Run<T>> =
-                members.iter_mut().flatten().map(|run| &mut **run).filter(|run| is_running(&run.counters)).collect();
+                members.iter_mut().flatten().map(|run| &mut **run).filter(|run| run.counters.is_running()).collect();
             running.par_chunks_mut(crew.lanes()).for_each(|group| crew.advance(group, &method, attempts));
             // Where nobody waits any more the run has ended.
             let _ = back.send(members);

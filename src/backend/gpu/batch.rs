@@ -133,7 +133,7 @@ impl<T: Real> Batch<T> {
     /// Sends the members that are due on their way, if any are.
     pub fn start(&mut self, device: &Device, pipeline: &wgpu::ComputePipeline, budget: Budget, max_sweeps: u32) {
         self.due.clear();
-        self.due.extend((0..).zip(&self.counters).filter(|(_, counters)| is_due(counters)).map(|(slot, _)| slot));
+        self.due.extend((0..).zip(&self.counters).filter(|(_, counters)| counters.is_running()).map(|(slot, _)| slot));
         if self.due.is_empty() {
             return;
         }
@@ -198,10 +198,6 @@ impl<T: Real> Batch<T> {
         write(counters, size_of::<Counters>(), bytemuck::cast_slice(&self.counters[first..end]));
         write(of_reports, Report::<T>::LEN * size_of::<T>(), bytemuck::cast_slice(&reports));
     }
-}
-
-fn is_due(counters: &Counters) -> bool {
-    counters.status == 0 && counters.steps < counters.goal
 }
 
 /// A member that was due has made a step or a sweep, or ended: a kernel that does nothing must not be awaited.

@@ -178,11 +178,6 @@ impl<T: Real> Backend for Kernel<T> {
         Ok(())
     }
 
-    fn advance(&mut self) -> Result<()> {
-        (0..self.batches.len()).try_for_each(|batch| self.start(batch))?;
-        (0..self.batches.len()).try_for_each(|batch| self.finish(batch))
-    }
-
     fn counters(&self, slot: usize) -> Counters {
         let (batch, slot) = self.place(slot);
         batch.counters(slot)
