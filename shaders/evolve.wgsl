@@ -48,6 +48,8 @@ fn advance() -> u32 {
     let h = by.length;
     let parts = select(1u, 3u, ADAPTIVE);
     var solved = SOLVED;
+    // Inside a solve that was paused the increments are its own.
+    if SWEEPS && !ADAPTIVE && counters.phase == 0u && counters.solve_sweeps == 0u { lead(); }
     for (var part = uniform_decision(counters.phase / 2u); part < parts && solved == SOLVED; part++) {
         if ADAPTIVE { begin_part(part, h); }
         solved = step();
@@ -94,6 +96,21 @@ fn advance() -> u32 {
     r = new_r;
     if ADAPTIVE { store_curve(CURVE); }
     return accepted();
+}
+
+/// Goes on in a straight line from the increments of the last two steps: steps of one length change them smoothly.
+fn lead() {
+    let last_k = dk;
+    let last_x = dx;
+    let last_y = dy;
+    if counters.steps >= 2u {
+        dk = last_k + (last_k - load_field(EARLIER));
+        dx = last_x + (last_x - load_field(EARLIER + 1u));
+        dy = last_y + (last_y - load_field(EARLIER + 2u));
+    }
+    store_field(EARLIER, last_k);
+    store_field(EARLIER + 1u, last_x);
+    store_field(EARLIER + 2u, last_y);
 }
 
 /// Observes the middle of an adaptive step, which it returns, and then the new curve; x and y hold the curve before it.

@@ -100,14 +100,16 @@ struct Dispatch {
     groups: u32,
 }
 
-const STATE_FIELDS = 15u;
-/// Where in a state its curves begin, four fields each: x, y, k, r. The increments of k, x and y follow the first one.
+const STATE_FIELDS = 18u;
+/// Where in a state its curves begin, four fields each: x, y, k, r. The increments of k, x and y follow the first one, and
+/// then those of the step before, where fixed steps are solved by sweeps.
 const CURVE = 0u;
 const INCREMENTS = 4u;
+const EARLIER = 7u;
 /// The middle of the last adaptive step; during an attempt the result of its whole step.
-const MIDDLE = 7u;
+const MIDDLE = 10u;
 /// The curve before the last step; during an attempt the result of its first half step.
-const BEFORE = 11u;
+const BEFORE = 14u;
 
 @group(0) @binding(0) var<uniform> dispatch: Dispatch;
 @group(0) @binding(1) var<storage, read> all_parameters: array<Parameters>;

@@ -198,6 +198,14 @@ impl<N: Number> Team<N> {
                 h.set_lane(lane, strides[lane].length);
             }
         }
+        if !adaptive && S::SOLVER.sweeps() {
+            // Steps of one length change the increments smoothly: what the last two say of the next saves most sweeps.
+            let mut two_made = N::Mask::all_of(false);
+            for (lane, run) in runs.iter().enumerate() {
+                two_made.set_lane(lane, run.counters.steps >= 2);
+            }
+            state.increments.lead(&mut state.earlier, two_made);
+        }
         let half = N::of(0.5);
         let mut ok = live;
         let none = N::of(0.0);

@@ -10,9 +10,9 @@ use crate::{
 /// Fields of a curve.
 pub const CURVE_FIELDS: usize = 4;
 /// Fields of a state, in the order of [`State::fields`].
-pub const STATE_FIELDS: usize = 3 * CURVE_FIELDS + 3;
-/// Fields of a state that the next step reads, which come first: the curve and the increments.
-pub const NEEDED_FIELDS: usize = CURVE_FIELDS + 3;
+pub const STATE_FIELDS: usize = 3 * CURVE_FIELDS + 6;
+/// Fields of a state that the next step reads, which come first: the curve and both increments.
+pub const NEEDED_FIELDS: usize = CURVE_FIELDS + 6;
 
 /// A polygon of `n` nodes with the scheme's own curvatures and lengths.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +45,8 @@ pub struct State<N> {
     pub curve: Curve<N>,
     /// Increments where the next solve starts: those of the last one, stretched to its step length.
     pub increments: Increments<N>,
+    /// Those of the step before, where fixed steps are solved by sweeps.
+    pub earlier: Increments<N>,
     /// The curve in the middle of the last extrapolated step. During an attempt: the result of its whole step.
     pub middle: Curve<N>,
     /// The curve before the last step. During an attempt: the result of its first half step.
@@ -124,6 +126,21 @@ impl<N: Number> Increments<N> {
         Increments { k: Ring::zeros(n), x: Ring::zeros(n), y: Ring::zeros(n) }
     }
 
+    /// Goes on in a straight line from `earlier` over these, in the lanes of `mask`, and leaves these in `earlier`.
+    #[inline(always)]
+    pub fn lead(&mut self, earlier: &mut Increments<N>, mask: N::Mask) {
+        let Increments { k, x, y } = earlier;
+        for (own, earlier) in [(&mut self.k, k), (&mut self.x, x), (&mut self.y, y)] {
+            for i in 0..own.len() {
+                let last = own[i];
+                own[i] = N::select(mask, last + (last - earlier[i]), last);
+                earlier[i] = last;
+            }
+            own.close();
+            earlier.close();
+        }
+    }
+
     /// Multiplies all by `factor`; what is not finite becomes 0 where that is 0.
     #[inline(always)]
     pub fn stretch(&mut self, factor: N) {
@@ -141,26 +158,28 @@ impl<N: Number> Increments<N> {
 impl<N: Number> State<N> {
     /// A state of zeros, to be filled.
     pub fn zeros(n: usize) -> State<N> {
-        let curve = || Curve::zeros(n);
-        State { curve: curve(), increments: Increments::zeros(n), middle: curve(), before: curve() }
+        let (curve, increments) = (|| Curve::zeros(n), || Increments::zeros(n));
+        State { curve: curve(), increments: increments(), earlier: increments(), middle: curve(), before: curve() }
     }
 
     /// The fields in the order in which the device stores them.
     pub fn fields(&self) -> [&Ring<N>; STATE_FIELDS] {
-        let Increments { k, x, y } = &self.increments;
         let [a, b, c, d] = self.curve.fields();
+        let Increments { k, x, y } = &self.increments;
+        let Increments { k: ek, x: ex, y: ey } = &self.earlier;
         let [e, f, g, h] = self.middle.fields();
         let [l, m, n, o] = self.before.fields();
-        [a, b, c, d, k, x, y, e, f, g, h, l, m, n, o]
+        [a, b, c, d, k, x, y, ek, ex, ey, e, f, g, h, l, m, n, o]
     }
 
     /// The same, to be changed.
     pub fn fields_mut(&mut self) -> [&mut Ring<N>; STATE_FIELDS] {
-        let Increments { k, x, y } = &mut self.increments;
         let [a, b, c, d] = self.curve.fields_mut();
+        let Increments { k, x, y } = &mut self.increments;
+        let Increments { k: ek, x: ex, y: ey } = &mut self.earlier;
         let [e, f, g, h] = self.middle.fields_mut();
         let [l, m, n, o] = self.before.fields_mut();
-        [a, b, c, d, k, x, y, e, f, g, h, l, m, n, o]
+        [a, b, c, d, k, x, y, ek, ex, ey, e, f, g, h, l, m, n, o]
     }
 }
 
@@ -168,10 +187,11 @@ impl<T: Real> State<T> {
     /// The state before the first step.
     pub fn from_nodes(nodes: &[DVec2]) -> State<T> {
         let curve = Curve::from_nodes(nodes);
-        State { middle: curve.clone(), before: curve.clone(), increments: Increments::zeros(nodes.len()), curve }
+        let increments = Increments::zeros(nodes.len());
+        State { middle: curve.clone(), before: curve.clone(), earlier: increments.clone(), increments, curve }
     }
 
-    /// All fields one after another, `15n` numbers.
+    /// All fields one after another, `18n` numbers.
     pub fn to_numbers(&self) -> Vec<T> {
         self.fields().into_iter().flat_map(|field| field.nodes().iter().copied()).collect()
     }
@@ -181,11 +201,14 @@ impl<T: Real> State<T> {
         let n = numbers.len() / STATE_FIELDS;
         let field = |f: usize| Ring::from_nodes(numbers[f * n..(f + 1) * n].iter().copied());
         let curve = |f: usize| Curve { x: field(f), y: field(f + 1), k: field(f + 2), r: field(f + 3) };
+        let increments = |f: usize| Increments { k: field(f), x: field(f + 1), y: field(f + 2) };
+        let (curve_at, middle_at, before_at) = (0, NEEDED_FIELDS, NEEDED_FIELDS + CURVE_FIELDS);
         State {
-            curve: curve(0),
-            increments: Increments { k: field(4), x: field(5), y: field(6) },
-            middle: curve(7),
-            before: curve(11),
+            curve: curve(curve_at),
+            increments: increments(CURVE_FIELDS),
+            earlier: increments(CURVE_FIELDS + 3),
+            middle: curve(middle_at),
+            before: curve(before_at),
         }
     }
 

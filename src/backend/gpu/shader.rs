@@ -88,9 +88,11 @@ const TRACE_ON: [Part; 1] = parts!["trace_on.wgsl"];
 
 /// The whole source in precision `T`.
 pub fn source<T: Real>(variant: Variant) -> String {
-    let Variant { adaptive, .. } = variant;
-    let mut text =
-        format!("alias real = {}; const EPSILON = {:e}; const ADAPTIVE = {adaptive};\n", T::NAME, T::EPSILON);
+    let Variant { solver, adaptive, .. } = variant;
+    let (number, epsilon, sweeps) = (T::NAME, T::EPSILON, solver.sweeps());
+    let mut text = format!(
+        "alias real = {number}; const EPSILON = {epsilon:e}; const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps};\n"
+    );
     for (_, part) in variant.parts() {
         text.push_str(part);
         text.push('\n');
