@@ -1,8 +1,8 @@
 //! Gauss–Seidel sweeps to a residual, the paper's solver.
 //!
-//! *Theory.* The unknown is the increment over a step, started from the previous step's increment; with fixed steps, from the straight line through the last two. A sweep
-//! replaces `u_i` by `u_i + ω_SOR·residual_i`; ω_SOR = 1 is Gauss–Seidel. The slow modes of a fourth-order
-//! operator hardly show in the residual: their eigenvalue is only q/τ. So the residual is scaled by τ/q,
+//! *Theory.* The unknown is the increment over a step, started from the straight line through those of the last two
+//! steps where these have one length, else from the last one stretched. A sweep replaces `u_i` by
+//! `u_i + ω_SOR·residual_i`; ω_SOR = 1 is Gauss–Seidel. The slow modes of a fourth-order operator hardly show in the residual: their eigenvalue is only q/τ. So the residual is scaled by τ/q,
 //! which bounds the error of just these modes, and the sweeps stop when
 //! `max (τ/q)|residual| ≤ tolerance · max|u|`, or when that error is below the rounding of the unknown itself, or
 //! when the residual is all rounding (f32 reaches that at a tolerance of about 16·ε·τ/h⁴).
