@@ -9,6 +9,7 @@ use std::{
     ops::{Add, AddAssign, Div, Mul, Neg, Sub},
 };
 
+use bytemuck::cast;
 use pulp::Simd;
 
 use super::{Mask, Number, Real};
@@ -67,13 +68,14 @@ pub(crate) trait Element<S: Simd>: Real {
 
 macro_rules! element {
     ($real:ident, $register:ident, $mask:ident, $lanes:ident, $splat:ident, $first:ident,
-     $add:ident $sub:ident $mul:ident $div:ident $max:ident $min:ident, $neg:ident $abs:ident $sqrt:ident,
-     $le:ident $select:ident, $and:ident $or:ident $not:ident) => {
+     $add:ident $sub:ident $mul:ident $div:ident $max:ident $min:ident, $sqrt:ident,
+     $bits_splat:ident $bits_xor:ident $bits_and:ident $bits_select:ident,
+     $le:ident, $and:ident $or:ident $not:ident) => {
         impl<S: Simd> Element<S> for $real {
             type Register = S::$register;
             type Truth = S::$mask;
             element!(@binary S::$register: add $add, sub $sub, mul $mul, div $div, max $max, min $min);
-            element!(@unary S::$register: neg $neg, abs $abs, sqrt $sqrt);
+            element!(@unary S::$register: sqrt $sqrt);
             element!(@binary S::$mask: and $and, or $or);
             element!(@unary S::$mask: not $not);
             #[inline(always)]
@@ -84,9 +86,18 @@ macro_rules! element {
             fn le(simd: S, a: S::$register, b: S::$register) -> S::$mask {
                 simd.$le(a, b)
             }
+            // The next three are pulp's for whole numbers: those for floating-point ones are not compiled into their caller.
+            #[inline(always)]
+            fn neg(simd: S, a: S::$register) -> S::$register {
+                cast(simd.$bits_xor(cast(a), simd.$bits_splat((-0.0 as $real).to_bits())))
+            }
+            #[inline(always)]
+            fn abs(simd: S, a: S::$register) -> S::$register {
+                cast(simd.$bits_and(cast(a), simd.$bits_splat(!(-0.0 as $real).to_bits())))
+            }
             #[inline(always)]
             fn select(simd: S, mask: S::$mask, yes: S::$register, no: S::$register) -> S::$register {
-                simd.$select(mask, yes, no)
+                cast(simd.$bits_select(mask, cast(yes), cast(no)))
             }
             #[inline(always)]
             fn any(simd: S, a: S::$mask) -> bool {
@@ -113,11 +124,11 @@ macro_rules! element {
 }
 
 element!(f64, f64s, m64s, F64_LANES, splat_f64s, first_true_m64s,
-    add_f64s sub_f64s mul_f64s div_f64s max_f64s min_f64s, neg_f64s abs_f64s sqrt_f64s,
-    less_than_or_equal_f64s select_f64s, and_m64s or_m64s not_m64s);
+    add_f64s sub_f64s mul_f64s div_f64s max_f64s min_f64s, sqrt_f64s,
+    splat_u64s xor_u64s and_u64s select_u64s, less_than_or_equal_f64s, and_m64s or_m64s not_m64s);
 element!(f32, f32s, m32s, F32_LANES, splat_f32s, first_true_m32s,
-    add_f32s sub_f32s mul_f32s div_f32s max_f32s min_f32s, neg_f32s abs_f32s sqrt_f32s,
-    less_than_or_equal_f32s select_f32s, and_m32s or_m32s not_m32s);
+    add_f32s sub_f32s mul_f32s div_f32s max_f32s min_f32s, sqrt_f32s,
+    splat_u32s xor_u32s and_u32s select_u32s, less_than_or_equal_f32s, and_m32s or_m32s not_m32s);
 
 /// The numbers in `R` registers of the instructions `S`: where `R` is above 1, one is computed while the other waits.
 #[derive(Clone, Copy)]
