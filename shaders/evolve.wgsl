@@ -48,8 +48,6 @@ fn advance() -> u32 {
     let h = by.length;
     let parts = select(1u, 3u, ADAPTIVE);
     var solved = SOLVED;
-    // Inside a solve that was paused the increments are its own.
-    if SWEEPS && !ADAPTIVE && counters.phase == 0u && counters.solve_sweeps == 0u { lead(); }
     for (var part = uniform_decision(counters.phase / 2u); part < parts && solved == SOLVED; part++) {
         if ADAPTIVE { begin_part(part, h); }
         solved = step();
@@ -63,7 +61,7 @@ fn advance() -> u32 {
         error = error_of_attempt();
         if uniform_decision(select(1u, 0u, error <= p.adaptive)) == 1u {
             let next = next_length(h, error, 1.0);
-            stretch(next / (real(0.5) * h));
+            start_after_refused(next / (real(0.5) * h));
             return refuse(next, real(LEAST_STEP), SINGULAR);
         }
         extrapolate();
@@ -84,9 +82,11 @@ fn advance() -> u32 {
     if ADAPTIVE {
         let next = next_length(h, error, select(real(1.0), real(MOST_GROWTH), counters.refused == 0u));
         report.progress.next = next;
-        stretch(next / (real(0.5) * h));
+        start_after_taken(next / (real(0.5) * h));
         pass_time(by);
         counters.refused = 0u;
+    } else {
+        start_after_fixed();
     }
     // The curve before a fixed step is kept where an output time may lie between the two.
     if ADAPTIVE || counters.steps + 1u == counters.goal { store_curve(BEFORE); }
@@ -96,21 +96,6 @@ fn advance() -> u32 {
     r = new_r;
     if ADAPTIVE { store_curve(CURVE); }
     return accepted();
-}
-
-/// Goes on in a straight line from the increments of the last two steps: steps of one length change them smoothly.
-fn lead() {
-    let last_k = dk;
-    let last_x = dx;
-    let last_y = dy;
-    if counters.steps >= 2u {
-        dk = last_k + (last_k - load_field(EARLIER));
-        dx = last_x + (last_x - load_field(EARLIER + 1u));
-        dy = last_y + (last_y - load_field(EARLIER + 2u));
-    }
-    store_field(EARLIER, last_k);
-    store_field(EARLIER + 1u, last_x);
-    store_field(EARLIER + 2u, last_y);
 }
 
 /// Observes the middle of an adaptive step, which it returns, and then the new curve; x and y hold the curve before it.
@@ -156,9 +141,7 @@ fn refuse(next: real, least: real, cause: u32) -> u32 {
 
 /// Refuses a step of length h that failed outright; after that the increments may be anything.
 fn refuse_failure(h: real, cause: u32) -> u32 {
-    dk = vec(0.0);
-    dx = vec(0.0);
-    dy = vec(0.0);
+    start_nowhere();
     return refuse(real(LEAST_GROWTH) * h, select(real(LEAST_STEP), real(LEAST_TO_SINGULAR), cause == SINGULAR), cause);
 }
 

@@ -8,15 +8,9 @@ fn begin_part(part: u32, h: real) {
 
 /// Keeps what a part computed: the whole step in MIDDLE, the first half in BEFORE, the second one in the registers.
 fn end_part(part: u32) {
-    if part < 2u { store_fields(select(BEFORE, MIDDLE, part == 0u), here(new_x), here(new_y), new_k, new_r); }
-    if part == 0u { stretch(0.5); }
-}
-
-/// Multiplies the increments by `factor`.
-fn stretch(factor: real) {
-    dk = dk * factor;
-    dx = dx * factor;
-    dy = dy * factor;
+    if part == 2u { return; }
+    store_fields(select(BEFORE, MIDDLE, part == 0u), here(new_x), here(new_y), new_k, new_r);
+    start_after_part(part);
 }
 
 /// How far apart the whole step and the two half steps are.

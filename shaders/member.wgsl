@@ -102,7 +102,7 @@ struct Dispatch {
 
 const STATE_FIELDS = 18u;
 /// Where in a state its curves begin, four fields each: x, y, k, r. The increments of k, x and y follow the first one, and
-/// then those of the step before, where fixed steps are solved by sweeps.
+/// then what sweeps remember beside them.
 const CURVE = 0u;
 const INCREMENTS = 4u;
 const EARLIER = 7u;

@@ -490,7 +490,7 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
     }
     // In f32 an error estimate may meet its tolerance on one side only, and the step in which a member relaxes then ends at
     // another time: there members go on to one that is the same for all.
-    let rounded = T::PRECISION == Precision::F32 && pace.contains(&"--adaptive");
+    let rounded = T::PRECISION == Precision::F32 && pace.iter().any(|flag| flag.starts_with("--adaptive"));
     command.args(pace).args(["--backend", backend, "--solver", solver]);
     if !rounded {
         command.arg("--stop-when-relaxed");
@@ -540,7 +540,9 @@ fn adaptive_programs_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcom
     if solver == Solver::GaussSeidel {
         return Ok(());
     }
-    tables_agree::<T>(solver, n, &["--adaptive", "--pull", "auto", "--shape", "nonconvex", "--amplitude", "0.1"])?;
+    // An f32 member may make one step more on one side; the numbers then differ by what steps are allowed to be wrong.
+    let adaptive = if T::PRECISION == Precision::F32 { "--adaptive=2e-4" } else { "--adaptive" };
+    tables_agree::<T>(solver, n, &[adaptive, "--pull", "auto", "--shape", "nonconvex", "--amplitude", "0.1"])?;
     let times = ["run", "--curves", "7", "--t-end", "3", "--series", "0.3", "--snapshots", "1,2"];
     let law = ["--adaptive", "--pull", "auto", "--amplitude", "0.02", "--shape", "file:dumbbell.csv"];
     let words = tables_agree::<T>(solver, 128, &[&times[..], &law].concat())?;

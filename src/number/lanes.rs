@@ -16,15 +16,31 @@ use super::{Mask, Number, Real};
 
 /// Vector instructions whose token can be had anywhere.
 pub(crate) trait Instructions: Simd {
+    /// As wide as a register and aligned like that: loads of a number that lies across two lines of the cache take twice
+    /// the time, and padding would take twice the cache.
+    type Aligned: Copy + Send + Sync;
     /// The token. Only in code that runs after the processor was asked for these instructions.
     fn token() -> Self;
 }
 
-macro_rules! instructions {
-    ($($(#[$attribute:meta])* $type:ty),*) => {
+macro_rules! aligned {
+    ($($name:ident $bytes:literal),*) => {
         $(
-            $(#[$attribute])*
+            #[doc = concat!("Aligned to ", $bytes, " bytes.")]
+            #[derive(Clone, Copy)]
+            #[repr(align($bytes))]
+            pub(crate) struct $name;
+        )*
+    };
+}
+
+aligned!(To16 16, To32 32, To64 64);
+
+macro_rules! instructions {
+    ($($type:ty: $aligned:ty),*) => {
+        $(
             impl Instructions for $type {
+                type Aligned = $aligned;
                 #[inline(always)]
                 #[allow(unsafe_code)]
                 fn token() -> Self {
@@ -40,9 +56,9 @@ macro_rules! instructions {
 }
 
 #[cfg(target_arch = "x86_64")]
-instructions!(pulp::x86::V2, pulp::x86::V3, pulp::x86::V4);
+instructions!(pulp::x86::V2: To16, pulp::x86::V3: To32, pulp::x86::V4: To64);
 #[cfg(target_arch = "aarch64")]
-instructions!(pulp::aarch64::Neon);
+instructions!(pulp::aarch64::Neon: To16);
 
 /// A number that fits into the lanes of `S`.
 pub(crate) trait Element<S: Simd>: Real {
@@ -132,8 +148,12 @@ element!(f32, f32s, m32s, F32_LANES, splat_f32s, first_true_m32s,
 
 /// The numbers in `R` registers of the instructions `S`: where `R` is above 1, one is computed while the other waits.
 #[derive(Clone, Copy)]
-#[repr(C, align(64))]
-pub(crate) struct Lanes<S: Simd, T: Element<S>, const R: usize>([T::Register; R], PhantomData<S>);
+#[repr(C)]
+pub(crate) struct Lanes<S: Instructions, T: Element<S>, const R: usize>(
+    [T::Register; R],
+    [S::Aligned; 0],
+    PhantomData<S>,
+);
 
 /// One truth value a lane.
 #[derive(Clone, Copy)]
@@ -199,7 +219,7 @@ impl<S: Instructions, T: Element<S>, const R: usize> Mask for LaneMask<S, T, R> 
 impl<S: Instructions, T: Element<S>, const R: usize> Default for Lanes<S, T, R> {
     #[inline(always)]
     fn default() -> Self {
-        Lanes([bytemuck::Zeroable::zeroed(); R], PhantomData)
+        Lanes([bytemuck::Zeroable::zeroed(); R], [], PhantomData)
     }
 }
 
@@ -209,7 +229,7 @@ macro_rules! operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Lanes(each!(self.0, r => <T as Element<S>>::$method(S::token(), self.0[r], other.0[r])), PhantomData)
+                Lanes(each!(self.0, r => <T as Element<S>>::$method(S::token(), self.0[r], other.0[r])), [], PhantomData)
             }
         }
     };
@@ -231,7 +251,7 @@ impl<S: Instructions, T: Element<S>, const R: usize> Neg for Lanes<S, T, R> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Lanes(each!(self.0, r => <T as Element<S>>::neg(S::token(), self.0[r])), PhantomData)
+        Lanes(each!(self.0, r => <T as Element<S>>::neg(S::token(), self.0[r])), [], PhantomData)
     }
 }
 
@@ -244,7 +264,7 @@ impl<S: Instructions, T: Element<S>, const R: usize> Number for Lanes<S, T, R> {
 
     #[inline(always)]
     fn of(value: f64) -> Self {
-        Lanes([<T as Element<S>>::splat(S::token(), T::of(value)); R], PhantomData)
+        Lanes([<T as Element<S>>::splat(S::token(), T::of(value)); R], [], PhantomData)
     }
     #[inline(always)]
     fn lane(&self, lane: usize) -> T {
@@ -256,19 +276,19 @@ impl<S: Instructions, T: Element<S>, const R: usize> Number for Lanes<S, T, R> {
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Lanes(each!(self.0, r => <T as Element<S>>::sqrt(S::token(), self.0[r])), PhantomData)
+        Lanes(each!(self.0, r => <T as Element<S>>::sqrt(S::token(), self.0[r])), [], PhantomData)
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Lanes(each!(self.0, r => <T as Element<S>>::abs(S::token(), self.0[r])), PhantomData)
+        Lanes(each!(self.0, r => <T as Element<S>>::abs(S::token(), self.0[r])), [], PhantomData)
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        Lanes(each!(self.0, r => <T as Element<S>>::max(S::token(), self.0[r], other.0[r])), PhantomData)
+        Lanes(each!(self.0, r => <T as Element<S>>::max(S::token(), self.0[r], other.0[r])), [], PhantomData)
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        Lanes(each!(self.0, r => <T as Element<S>>::min(S::token(), self.0[r], other.0[r])), PhantomData)
+        Lanes(each!(self.0, r => <T as Element<S>>::min(S::token(), self.0[r], other.0[r])), [], PhantomData)
     }
     #[inline(always)]
     fn exp2_integral(mut self) -> Self {
@@ -287,6 +307,6 @@ impl<S: Instructions, T: Element<S>, const R: usize> Number for Lanes<S, T, R> {
     }
     #[inline(always)]
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
-        Lanes(each!(yes.0, r => <T as Element<S>>::select(S::token(), mask.0[r], yes.0[r], no.0[r])), PhantomData)
+        Lanes(each!(yes.0, r => <T as Element<S>>::select(S::token(), mask.0[r], yes.0[r], no.0[r])), [], PhantomData)
     }
 }

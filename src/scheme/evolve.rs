@@ -8,6 +8,7 @@ use super::{
     observe::{self, Glance},
     pace::{self, Stride},
     parameters::{Counters, NEVER, Observed, Report},
+    start::Start,
     state,
     step::{self, Method, Stepped},
 };
@@ -124,7 +125,7 @@ pub fn evolve_abreast<N: Number, S: Solves>(
     let enough = running.div_ceil(2);
     for made in 1..=attempts {
         let attempt = team.attempt::<S>(runs, live, adaptive, method);
-        team.conclude(runs, live, adaptive, &attempt);
+        team.conclude::<S>(runs, live, adaptive, &attempt);
         let all_leave = made == attempts || runs.iter().filter(|run| run.counters.is_running()).count() < enough;
         for lane in 0..runs.len() {
             if live.lane(lane) && (all_leave || !runs[lane].counters.is_running()) {
@@ -198,14 +199,6 @@ impl<N: Number> Team<N> {
                 h.set_lane(lane, strides[lane].length);
             }
         }
-        if !adaptive && S::SOLVER.sweeps() {
-            // Steps of one length change the increments smoothly: what the last two say of the next saves most sweeps.
-            let mut two_made = N::Mask::all_of(false);
-            for (lane, run) in runs.iter().enumerate() {
-                two_made.set_lane(lane, run.counters.steps >= 2);
-            }
-            state.increments.lead(&mut state.earlier, two_made);
-        }
         let half = N::of(0.5);
         let mut ok = live;
         let none = N::of(0.0);
@@ -223,13 +216,12 @@ impl<N: Number> Team<N> {
             if !ok.any() {
                 break;
             }
-            match (adaptive, part) {
-                (true, 0) => {
-                    std::mem::swap(&mut state.middle, &mut work.new);
-                    state.increments.stretch(half);
+            if adaptive && part < 2 {
+                let kept = if part == 0 { &mut state.middle } else { &mut state.before };
+                std::mem::swap(kept, &mut work.new);
+                if S::SOLVER.sweeps() {
+                    Start::after_part(part).put(&mut state.increments, &mut state.earlier);
                 }
-                (true, 1) => std::mem::swap(&mut state.before, &mut work.new),
-                _ => {}
             }
         }
         parameters.tau = h;
@@ -248,7 +240,13 @@ impl<N: Number> Team<N> {
 
     /// Decides for every member whether it takes the step, and notes what came with it.
     #[inline(always)]
-    fn conclude(&mut self, runs: &mut [&mut Run<N::Real>], live: N::Mask, adaptive: bool, attempt: &Attempt<N>) {
+    fn conclude<S: Solves>(
+        &mut self,
+        runs: &mut [&mut Run<N::Real>],
+        live: N::Mask,
+        adaptive: bool,
+        attempt: &Attempt<N>,
+    ) {
         let Attempt { stepped, error, middle, seen, excess } = attempt;
         let (zero, half) = (N::Real::of(0.0), N::Real::of(0.5));
         let n = self.work.blocks.n;
@@ -258,7 +256,7 @@ impl<N: Number> Team<N> {
         let at_threshold = excess.le(self.parameters.relax_at).and(live);
         let gap = if at_threshold.any() { observe::gap(&self.work.new) } else { N::of(0.0) };
         let mut kept = N::Mask::all_of(false);
-        let mut stretch = N::of(1.0);
+        let mut start = Start::after_fixed();
         for (lane, run) in runs.iter_mut().enumerate() {
             if !live.lane(lane) {
                 continue;
@@ -275,7 +273,7 @@ impl<N: Number> Team<N> {
             if adaptive && of_step.is_none() && !exact.lane(lane) {
                 let next = pace::next_length(h, error, 1.0, &run.parameters);
                 refuse(run, n, next, pace::LEAST_STEP, Status::Singular);
-                stretch.set_lane(lane, next / (half * h));
+                start.set_lane(lane, Start::after_refused(next / (half * h)));
                 kept.set_lane(lane, true);
                 continue;
             }
@@ -290,7 +288,7 @@ impl<N: Number> Team<N> {
                     let least = if cause == Status::Singular { pace::LEAST_TO_SINGULAR } else { pace::LEAST_STEP };
                     refuse(run, n, N::Real::of(pace::LEAST_GROWTH) * h, least, cause);
                     // After that the increments may be anything.
-                    stretch.set_lane(lane, zero);
+                    start.set_lane(lane, Start::nowhere());
                 } else {
                     run.counters.status = cause as u32;
                 }
@@ -309,7 +307,7 @@ impl<N: Number> Team<N> {
             if adaptive {
                 let most_growth = if counters.refused == 0 { pace::MOST_GROWTH } else { 1.0 };
                 progress.next = pace::next_length(h, error, most_growth, parameters);
-                stretch.set_lane(lane, progress.next / (half * h));
+                start.set_lane(lane, Start::after_taken(progress.next / (half * h)));
                 pace::pass(progress, self.strides[lane], parameters);
                 counters.refused = 0;
             }
@@ -325,8 +323,8 @@ impl<N: Number> Team<N> {
                 counters.goal = counters.steps;
             }
         }
-        if adaptive {
-            self.state.increments.stretch(stretch);
+        if S::SOLVER.sweeps() {
+            start.put(&mut self.state.increments, &mut self.state.earlier);
         }
         self.accept(kept, *excess);
     }

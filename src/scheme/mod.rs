@@ -30,6 +30,7 @@ pub mod parameters;
 pub mod position;
 pub mod pull;
 pub mod redistribution;
+pub mod start;
 pub mod state;
 pub mod status;
 pub mod step;

@@ -43,9 +43,9 @@ pub struct Increments<N> {
 pub struct State<N> {
     /// The last accepted curve.
     pub curve: Curve<N>,
-    /// Increments where the next solve starts: those of the last one, stretched to its step length.
+    /// Increments of the last solve; where sweeps start, see [`Start`](super::start::Start).
     pub increments: Increments<N>,
-    /// Those of the step before, where fixed steps are solved by sweeps.
+    /// What sweeps remember beside them.
     pub earlier: Increments<N>,
     /// The curve in the middle of the last extrapolated step. During an attempt: the result of its whole step.
     pub middle: Curve<N>,
@@ -124,34 +124,6 @@ impl<N: Number> Increments<N> {
     /// No change.
     pub fn zeros(n: usize) -> Increments<N> {
         Increments { k: Ring::zeros(n), x: Ring::zeros(n), y: Ring::zeros(n) }
-    }
-
-    /// Goes on in a straight line from `earlier` over these, in the lanes of `mask`, and leaves these in `earlier`.
-    #[inline(always)]
-    pub fn lead(&mut self, earlier: &mut Increments<N>, mask: N::Mask) {
-        let Increments { k, x, y } = earlier;
-        for (own, earlier) in [(&mut self.k, k), (&mut self.x, x), (&mut self.y, y)] {
-            for i in 0..own.len() {
-                let last = own[i];
-                own[i] = N::select(mask, last + (last - earlier[i]), last);
-                earlier[i] = last;
-            }
-            own.close();
-            earlier.close();
-        }
-    }
-
-    /// Multiplies all by `factor`; what is not finite becomes 0 where that is 0.
-    #[inline(always)]
-    pub fn stretch(&mut self, factor: N) {
-        let zero = N::of(0.0);
-        let vanishes = factor.le(zero);
-        for ring in [&mut self.k, &mut self.x, &mut self.y] {
-            for i in 0..ring.len() {
-                ring[i] = N::select(vanishes, zero, ring[i] * factor);
-            }
-            ring.close();
-        }
     }
 }
 

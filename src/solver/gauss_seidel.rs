@@ -1,8 +1,7 @@
 //! Gauss–Seidel sweeps to a residual, the paper's solver.
 //!
-//! *Theory.* The unknown is the increment over a step, started from the straight line through those of the last two
-//! steps where these have one length, else from the last one stretched. A sweep replaces `u_i` by
-//! `u_i + ω_SOR·residual_i`; ω_SOR = 1 is Gauss–Seidel. The slow modes of a fourth-order operator hardly show in the residual: their eigenvalue is only q/τ. So the residual is scaled by τ/q,
+//! *Theory.* The unknown is the increment over a step, started from a prediction ([`Start`](crate::scheme::start::Start)).
+//! A sweep replaces `u_i` by `u_i + ω_SOR·residual_i`; ω_SOR = 1 is Gauss–Seidel. The slow modes of a fourth-order operator hardly show in the residual: their eigenvalue is only q/τ. So the residual is scaled by τ/q,
 //! which bounds the error of just these modes, and the sweeps stop when
 //! `max (τ/q)|residual| ≤ tolerance · max|u|`, or when that error is below the rounding of the unknown itself, or
 //! when the residual is all rounding (f32 reaches that at a tolerance of about 16·ε·τ/h⁴).
@@ -11,11 +10,13 @@
 //! *Practice.* Coloured order gives the kernel its parallelism and needs the same number of sweeps as the
 //! lexicographic order of the paper. Twin of `shaders/gauss_seidel.wgsl`: same order, same arithmetic.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ring::{Blocks, COLOURS, Ring},
-    system::System,
+    ring::{self, Blocks, COLOURS, Ring},
+    system::{Row, System},
 };
 use crate::number::{BIG, Mask, Number};
 
@@ -126,6 +127,7 @@ fn over_relaxation<N: Number>(size: N) -> N {
 /// The ⅝ in the over-relaxation of its own choice.
 pub const AUTO_SCALE: f64 = 0.625;
 
+/// A sweep, colour by colour.
 #[inline(always)]
 pub(super) fn coloured_sweep<N: Number, const F: usize>(
     system: &System<N, F>,
@@ -134,18 +136,16 @@ pub(super) fn coloured_sweep<N: Number, const F: usize>(
     sor: N,
     active: N::Mask,
 ) {
+    let mut relaxation = Relaxation::new(system, unknown, sor, active);
     for colour in 0..COLOURS {
-        for i in blocks.of_colour(colour) {
-            for (f, u) in unknown.iter_mut().enumerate() {
-                relax(system, f, i, u, sor, active);
-            }
+        for (range, stride) in blocks.of_colour(colour) {
+            relaxation.every(stride, range);
         }
-        for u in unknown.iter_mut() {
-            u.close();
-        }
+        relaxation.close();
     }
 }
 
+/// A sweep node by node.
 #[inline(always)]
 fn lexicographic_sweep<N: Number, const F: usize>(
     system: &System<N, F>,
@@ -154,29 +154,55 @@ fn lexicographic_sweep<N: Number, const F: usize>(
     active: N::Mask,
 ) {
     let n = system.rows.len();
-    for (f, u) in unknown.iter_mut().enumerate() {
-        for i in 0..n {
-            relax(system, f, i, u, sor, active);
-            // Only the last two nodes read ghosts that this sweep has changed.
-            if i == n - 3 {
-                u.close();
-            }
-        }
-        u.close();
-    }
+    let mut relaxation = Relaxation::new(system, unknown, sor, active);
+    relaxation.every(1, 0..n - 2);
+    // Only the last two nodes read ghosts that this sweep has changed.
+    relaxation.close();
+    relaxation.every(1, n - 2..n);
+    relaxation.close();
 }
 
-#[inline(always)]
-fn relax<N: Number, const F: usize>(
-    system: &System<N, F>,
-    f: usize,
-    i: usize,
-    u: &mut Ring<N>,
+/// What a sweep reads and writes, as slices: their places then stay in registers.
+struct Relaxation<'a, N: Number, const F: usize> {
+    rows: &'a [Row<N>],
+    rhs: [&'a [N]; F],
+    padded: [Option<&'a mut [N]>; F],
     sor: N,
-    active: N::Mask,
-) {
-    let relaxed = u[i] + sor * system.residual(f, i, u);
-    u[i] = N::select(active, relaxed, u[i]);
+}
+
+impl<'a, N: Number, const F: usize> Relaxation<'a, N, F> {
+    #[inline(always)]
+    fn new(system: &'a System<N, F>, unknown: &'a mut [&mut Ring<N>; F], sor: N, active: N::Mask) -> Self {
+        let (mut rhs, mut padded) = ([&[][..]; F], [const { None }; F]);
+        for (f, ring) in unknown.iter_mut().enumerate() {
+            rhs[f] = &system.rhs[f][..];
+            padded[f] = Some(ring.padded_mut());
+        }
+        // Lanes that are done move by 0: a masked store is slow on many processors.
+        Relaxation { rows: &system.rows, rhs, padded, sor: N::select(active, sor, N::of(0.0)) }
+    }
+
+    /// Relaxes every `stride`-th node of a range.
+    #[inline(always)]
+    fn every(&mut self, stride: usize, range: Range<usize>) {
+        let mut i = range.start;
+        while i < range.end {
+            let row = self.rows[i];
+            for f in 0..F {
+                let Some(padded) = &mut self.padded[f] else { continue };
+                let u = &mut padded[i..i + 5];
+                u[2] += self.sor * row.residual(self.rhs[f][i], [u[0], u[1], u[2], u[3], u[4]]);
+            }
+            i += stride;
+        }
+    }
+
+    #[inline(always)]
+    fn close(&mut self) {
+        for padded in self.padded.iter_mut().flatten() {
+            ring::close(padded);
+        }
+    }
 }
 
 /// Largest scaled row sum; more than [`BIG`] where an entry or a right-hand side is not finite.

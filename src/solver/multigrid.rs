@@ -211,8 +211,9 @@ impl<N: Number, const F: usize> Levels<N, F> {
             }
             coarser = level;
         }
+        let share = N::select(active, N::of(1.0), N::of(0.0));
         for (f, u) in unknown.iter_mut().enumerate() {
-            transfer.interpolate(&coarser.unknown[f], u, Some(active));
+            transfer.interpolate(&coarser.unknown[f], u, Some(share));
         }
     }
 }
@@ -354,9 +355,9 @@ impl<N: Number, const F: usize> Transfer<N, F> {
         coarse.close();
     }
 
-    /// Puts the values of `coarse` at all nodes of the finer ring into `fine`, or adds them in the lanes of a mask.
+    /// Puts the values of `coarse` at all nodes of the finer ring into `fine`, or adds this many times as much.
     #[inline(always)]
-    fn interpolate(&self, coarse: &Ring<N>, fine: &mut Ring<N>, added: Option<N::Mask>) {
+    fn interpolate(&self, coarse: &Ring<N>, fine: &mut Ring<N>, added: Option<N>) {
         let m = coarse.len();
         let [w0, w1, w2, w3] = &self.weights;
         for j in 0..m {
@@ -371,12 +372,12 @@ impl<N: Number, const F: usize> Transfer<N, F> {
     }
 }
 
-/// Replaces `old`, or adds to it in the lanes of a mask.
+/// Replaces `old`, or adds this many times `value` to it.
 #[inline(always)]
-fn put<N: Number>(old: &mut N, value: N, added: Option<N::Mask>) {
+fn put<N: Number>(old: &mut N, value: N, added: Option<N>) {
     *old = match added {
         None => value,
-        Some(mask) => N::select(mask, *old + value, *old),
+        Some(times) => *old + times * value,
     };
 }
 

@@ -8,7 +8,7 @@
 //! *Practice.* [`Blocks`] is the one place that knows the cut; the kernel gives each thread one block
 //! (`shaders/ring.wgsl`). Sums are taken block by block there, and so they are here, in the same order.
 
-use std::ops::{Index, IndexMut};
+use std::ops::{Index, IndexMut, Range};
 
 use crate::number::Number;
 
@@ -48,12 +48,12 @@ impl Blocks {
         fours.chain((0..self.threes).map(move |block| (after_fours + 3 * block, 3)))
     }
 
-    /// The nodes of `colour` (0…3), in the order of the blocks.
+    /// The nodes of `colour` (0…3), in the order of the blocks: every fourth of one range, every third of another.
     #[inline(always)]
-    pub fn of_colour(self, colour: usize) -> impl Iterator<Item = usize> {
+    pub fn of_colour(self, colour: usize) -> [(Range<usize>, usize); 2] {
         let after_fours = 4 * self.fours;
         let threes = if colour < 3 { after_fours + colour..self.n } else { 0..0 };
-        (colour..after_fours).step_by(4).chain(threes.step_by(3))
+        [(colour..after_fours, 4), (threes, 3)]
     }
 }
 
@@ -144,11 +144,13 @@ impl<N: Number> Ring<N> {
     /// Copies the end nodes to the ghosts; call after writing.
     #[inline(always)]
     pub fn close(&mut self) {
-        let n = self.len();
-        self.padded[0] = self.padded[n];
-        self.padded[1] = self.padded[n + 1];
-        self.padded[n + 2] = self.padded[2];
-        self.padded[n + 3] = self.padded[3];
+        close(&mut self.padded);
+    }
+
+    /// The values with two ghosts at either end: node i at i + 2.
+    #[inline(always)]
+    pub(super) fn padded_mut(&mut self) -> &mut [N] {
+        &mut self.padded
     }
 
     /// Values at `i-2, i-1, i, i+1, i+2`, periodic.
@@ -179,6 +181,16 @@ impl<N: Number> IndexMut<usize> for Ring<N> {
     }
 }
 
+/// Copies the end nodes to the ghosts.
+#[inline(always)]
+pub(super) fn close<N: Number>(padded: &mut [N]) {
+    let n = padded.len() - 2 * GHOSTS;
+    padded[0] = padded[n];
+    padded[1] = padded[n + 1];
+    padded[n + 2] = padded[2];
+    padded[n + 3] = padded[3];
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -189,7 +201,7 @@ mod tests {
             let blocks = Blocks::new(n).unwrap();
             let mut colours = vec![usize::MAX; n];
             for colour in 0..COLOURS {
-                for i in blocks.of_colour(colour) {
+                for i in blocks.of_colour(colour).into_iter().flat_map(|(range, stride)| range.step_by(stride)) {
                     assert_eq!(colours[i], usize::MAX, "n = {n}: node {i} has two colours");
                     colours[i] = colour;
                 }

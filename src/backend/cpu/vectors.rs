@@ -90,8 +90,8 @@ vectorised!(f64 f32);
 
 /// A crew for the solver `M`, if the processor has the vectors.
 ///
-/// An elimination is a chain of results that wait for each other, so two registers of them go in turn. Sweeps wait for
-/// nothing, and go over their rows so often that these have to stay in the nearest cache: fewer members go abreast.
+/// An elimination is a chain of results that wait for each other, so two of the smaller registers go in turn. Sweeps wait
+/// for nothing, and go over their rows so often that these have to stay in the nearest cache: fewer members go abreast.
 fn crew_by<M: Solves + 'static, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Crew<T>>> {
     match vectors {
         Vectors::None => Some(Group::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
@@ -102,9 +102,7 @@ fn crew_by<M: Solves + 'static, T: Lane>(vectors: Vectors, blocks: Blocks, threa
         #[cfg(target_arch = "aarch64")]
         Vectors::Bits128 => abreast::<_, M, T, 2>(pulp::aarch64::Neon::try_new(), blocks, threads),
         #[cfg(target_arch = "x86_64")]
-        Vectors::Bits256 | Vectors::Bits512 if M::SOLVER.sweeps() => {
-            abreast::<_, M, T, 1>(pulp::x86::V3::try_new(), blocks, threads)
-        }
+        Vectors::Bits256 if M::SOLVER.sweeps() => abreast::<_, M, T, 1>(pulp::x86::V3::try_new(), blocks, threads),
         #[cfg(target_arch = "x86_64")]
         Vectors::Bits256 => abreast::<_, M, T, 2>(pulp::x86::V3::try_new(), blocks, threads),
         #[cfg(target_arch = "x86_64")]

@@ -62,7 +62,7 @@ impl Variant {
     }
 }
 
-const COMMON: [Part; 14] = parts![
+const COMMON: [Part; 15] = parts![
     "number.wgsl",
     "ring.wgsl",
     "member.wgsl",
@@ -75,6 +75,7 @@ const COMMON: [Part; 14] = parts![
     "observe.wgsl",
     "step.wgsl",
     "pace.wgsl",
+    "start.wgsl",
     "extrapolation.wgsl",
     "evolve.wgsl",
 ];
