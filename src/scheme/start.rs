@@ -90,7 +90,9 @@ mod tests {
     fn put(start: Start<f64>, [last, before]: [f64; 2]) -> [f64; 2] {
         let filled = |value: f64| {
             let mut all = Increments::zeros(6);
-            [&mut all.k, &mut all.x, &mut all.y].map(|ring| (0..6).for_each(|i| ring[i] = value));
+            for ring in [&mut all.k, &mut all.x, &mut all.y] {
+                (0..6).for_each(|i| ring[i] = value);
+            }
             all
         };
         let (mut increments, mut earlier) = (filled(last), filled(before));
