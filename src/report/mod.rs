@@ -3,15 +3,21 @@
 //! A [`Report`] is opened before the work starts, so that a folder that cannot be written costs nothing. It is the
 //! [`Sink`] of the simulation: rows stream to disk, and only a few numbers per member stay in memory.
 
+pub mod axis;
+pub mod chart;
+pub mod charts;
 pub mod folder;
 pub mod gallery;
 pub mod overview;
 pub mod plot;
 pub mod progress;
 pub mod provenance;
+pub mod style;
 pub mod svg;
 pub mod tables;
 pub mod tally;
+pub mod text;
+pub mod trace;
 
 use std::{
     path::PathBuf,

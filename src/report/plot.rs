@@ -1,10 +1,12 @@
 //! Curves in axes of equal scale: panels side by side, which share one range and one scale.
 
-use std::ops::RangeInclusive;
-
 use glam::DVec2;
 
-use super::svg::{Svg, closed_path, coordinate, dots};
+use super::{
+    axis::{multiples, tick_step},
+    style::sheet,
+    svg::{Svg, closed_path, coordinate, dots},
+};
 use crate::{curve::polygon, ensemble::Snapshot};
 
 /// Most width of all panels together and most height of one, in pixels.
@@ -31,18 +33,7 @@ const DENSE: f64 = 6.0;
 /// Width of a legend's entry, in pixels.
 const ENTRY: f64 = 104.0;
 
-// Colours of Okabe and Ito, which colour-blind readers tell apart, darkened or lightened for contrast.
-const STYLE: &str = "
-.back { fill: #ffffff }
-.frame { fill: none; stroke: #57606a; stroke-width: 1 }
-.grid { fill: none; stroke: #e3e6ea; stroke-width: 1 }
-.ticks { fill: none; stroke: #57606a; stroke-width: 1 }
-text { font-family: sans-serif; font-size: 12px; fill: #24292f }
-.head { font-size: 15px; font-weight: bold }
-.note { fill: #57606a }
-.middle { text-anchor: middle }
-.end { text-anchor: end }
-.axis { font-size: 14px; font-style: italic }
+const LIGHT: &str = "\
 .line { fill: none; stroke-width: 1.1; stroke-linejoin: round }
 .nodes { fill: none; stroke-width: 3.8; stroke-linecap: round }
 .dense { stroke-width: 2.6 }
@@ -51,18 +42,14 @@ text { font-family: sans-serif; font-size: 12px; fill: #24292f }
 .c2 path { stroke: #00855f }
 .c3 path { stroke: #b0569a }
 .c4 path { stroke: #0072b2 }
-@media screen and (prefers-color-scheme: dark) {
-.back { fill: #15191e }
-.frame, .ticks { stroke: #9aa4af }
-.grid { stroke: #2d343c }
-text { fill: #e6edf3 }
-.note { fill: #9aa4af }
+";
+
+const DARK: &str = "\
 .c0 path { stroke: #e6edf3 }
 .c1 path { stroke: #f58c3c }
 .c2 path { stroke: #2fc79a }
 .c3 path { stroke: #e39bcb }
 .c4 path { stroke: #56b4e9 }
-}
 ";
 
 /// Colours that the style sheet has.
@@ -117,7 +104,7 @@ impl Plot {
         let top = HEAD + legend + heading;
         let left = 0.5 * (width - panels_width + LEFT - RIGHT);
 
-        let mut svg = Svg::new(width, top + frame.size.y + FOOT, STYLE, &self.title);
+        let mut svg = Svg::new(width, top + frame.size.y + FOOT, &sheet(LIGHT, DARK), &self.title);
         svg.rectangle("back", DVec2::ZERO, DVec2::new(width, top + frame.size.y + FOOT), 0.0);
         svg.text("head", DVec2::new(RIGHT, 26.0), &self.title);
         svg.text("note", DVec2::new(RIGHT, 46.0), &self.subtitle);
@@ -181,14 +168,14 @@ impl Frame {
         let end = corner + self.size;
         let [left, right, top, bottom] = [corner.x, end.x, corner.y, end.y].map(coordinate);
         let (mut grid, mut ticks) = (String::new(), String::new());
-        for (label, value) in self.ticks(self.low.x..=self.high.x) {
+        for (label, value) in multiples(self.step, self.low.x, self.high.x) {
             let x = place(DVec2::splat(value)).x;
             let at = coordinate(x);
             grid += &format!("M{at} {top}V{bottom}");
             ticks += &format!("M{at} {bottom}v-{TICK}");
             svg.text("x tick middle", DVec2::new(x, end.y + 16.0), &label);
         }
-        for (label, value) in self.ticks(self.low.y..=self.high.y) {
+        for (label, value) in multiples(self.step, self.low.y, self.high.y) {
             let y = place(DVec2::splat(value)).y;
             let at = coordinate(y);
             grid += &format!("M{left} {at}H{right}");
@@ -216,23 +203,6 @@ impl Frame {
             svg.close();
         }
     }
-
-    /// Labels and values of the multiples of the step in `range`.
-    fn ticks(&self, range: RangeInclusive<f64>) -> impl Iterator<Item = (String, f64)> {
-        let step = self.step;
-        let digits = (-step.log10().floor()).max(0.0) as usize;
-        let [first, last] = [(range.start() / step).ceil(), (range.end() / step).floor()].map(|bound| bound as i64);
-        (first..=last).map(move |j| {
-            let value = j as f64 * step;
-            (format!("{value:.digits$}").replace('-', "\u{2212}"), value)
-        })
-    }
-}
-
-/// The least of 1, 2 and 5 times a power of ten that is not under `least`.
-fn tick_step(least: f64) -> f64 {
-    let power = 10_f64.powi(least.log10().floor() as i32);
-    [1.0, 2.0, 5.0].map(|digit| digit * power).into_iter().find(|step| *step >= least).unwrap_or(10.0 * power)
 }
 
 /// `value` as people write it: from 10⁻⁴ on plainly, below that with its power of ten.
@@ -255,13 +225,6 @@ mod tests {
     fn plot(panels: &[&[Curve]]) -> Plot {
         let panel = |curves: &&[Curve]| Panel { heading: None, curves: curves.to_vec() };
         Plot { title: "a".into(), subtitle: "b".into(), panels: panels.iter().map(panel).collect() }
-    }
-
-    #[test]
-    fn ticks_are_round_and_not_too_close() {
-        for (least, step) in [(0.11, 0.2), (0.2, 0.2), (0.3, 0.5), (0.6, 1.0), (3.0, 5.0), (7e-4, 1e-3)] {
-            assert!((tick_step(least) / step - 1.0_f64).abs() < 1e-12, "{least}");
-        }
     }
 
     #[test]

@@ -44,6 +44,21 @@ impl Svg {
         self.line(format_args!("<text class=\"{class}\" x=\"{x}\" y=\"{y}\">{content}</text>"));
     }
 
+    /// A [line of text](Svg::text), or nothing.
+    pub fn text_unless_empty(&mut self, class: &str, at: DVec2, content: &str) {
+        if !content.is_empty() {
+            self.text(class, at, content);
+        }
+    }
+
+    /// A line of text that reads upwards, for the name of a vertical axis.
+    pub fn text_upwards(&mut self, class: &str, at: DVec2, content: &str) {
+        let ([x, y], content) = ([at.x, at.y].map(coordinate), escape(content));
+        self.line(format_args!(
+            "<text class=\"{class}\" x=\"{x}\" y=\"{y}\" transform=\"rotate(-90 {x} {y})\">{content}</text>"
+        ));
+    }
+
     /// Begins a group, to be [closed](Svg::close).
     pub fn open(&mut self, class: &str) {
         self.line(format_args!("<g class=\"{class}\">"));
@@ -90,8 +105,21 @@ pub fn coordinate(value: f64) -> String {
     if short == "-0" { "0".into() } else { short.into() }
 }
 
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+/// `text` for the content and the quoted attributes of XML and HTML; characters that XML forbids become U+FFFD.
+pub fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\t' | '\n' => escaped.push(c),
+            '\0'..=' ' | '\u{7f}'..='\u{9f}' | '\u{fffe}' | '\u{ffff}' if c != ' ' => escaped.push('\u{fffd}'),
+            _ => escaped.push(c),
+        }
+    }
+    escaped
 }
 
 #[cfg(test)]
@@ -116,5 +144,6 @@ mod tests {
         let mut svg = Svg::new(1.0, 1.0, "", "a");
         svg.text("c", DVec2::ZERO, "a < b & c");
         assert!(svg.finish().contains("<text class=\"c\" x=\"0\" y=\"0\">a &lt; b &amp; c</text>"));
+        assert_eq!(escape("\"\0\u{1b}\u{85}\t ü"), "&quot;\u{fffd}\u{fffd}\u{fffd}\t ü");
     }
 }
