@@ -9,6 +9,7 @@ pub mod charts;
 pub mod folder;
 pub mod gallery;
 pub mod overview;
+pub mod page;
 pub mod plot;
 pub mod progress;
 pub mod provenance;

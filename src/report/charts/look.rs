@@ -2,6 +2,8 @@
 //!
 //! To look at the pictures: `CURVELAX_CHARTS=FOLDER cargo test charts`.
 
+use std::sync::OnceLock;
+
 use super::*;
 use crate::report::text::width;
 
@@ -72,8 +74,13 @@ fn amplitudes(label: &str, factor: f64, count: usize) -> Series {
 
 const NOTE: &str = "ellipse:2,1, surface-diffusion, n = 100, adaptive 0.0001, t-end = 2, seed 1";
 
-/// Every chart with data of every kind, and its name.
-fn pictures() -> Vec<(String, String)> {
+/// Every chart with data of every kind, and its name; drawn once.
+pub fn pictures() -> &'static [(String, String)] {
+    static PICTURES: OnceLock<Vec<(String, String)>> = OnceLock::new();
+    PICTURES.get_or_init(draw_all)
+}
+
+fn draw_all() -> Vec<(String, String)> {
     let mut pictures = Vec::new();
     let mut add = |name: &str, svg: String| pictures.push((name.to_owned(), svg));
     let unknown = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN_POSITIVE];
@@ -288,13 +295,13 @@ fn complaint(svg: &str) -> Option<String> {
 #[test]
 fn no_text_of_any_chart_is_cut_off_or_over_another() {
     for (name, svg) in pictures() {
-        if let Some(complaint) = complaint(&svg) {
+        if let Some(complaint) = complaint(svg) {
             panic!("{name}: {complaint}\n{svg}");
         }
-        assert!(texts(&svg).iter().any(|text| text.class == "head"), "{name}");
+        assert!(texts(svg).iter().any(|text| text.class == "head"), "{name}");
     }
     // The check tells a difference.
-    let (_, svg) = pictures().swap_remove(0);
+    let (_, svg) = &pictures()[0];
     let labels: Vec<&str> = svg.lines().filter(|line| line.contains("x tick")).collect();
     let moved = svg.replace(labels[0], labels[1]);
     assert!(complaint(&moved).is_some_and(|complaint| complaint.contains("is over")));
@@ -304,9 +311,8 @@ fn no_text_of_any_chart_is_cut_off_or_over_another() {
 
 #[test]
 fn equal_data_give_equal_bytes_and_no_number_is_unknown() {
-    let again = pictures();
-    for ((name, svg), (_, twin)) in pictures().into_iter().zip(again) {
-        assert!(svg == twin, "{name}: two drawings differ");
+    for ((name, svg), (_, twin)) in pictures().iter().zip(draw_all()) {
+        assert!(*svg == twin, "{name}: two drawings differ");
         let drawing = svg.split("</style>").nth(1).unwrap();
         for word in ["NaN", "inf", "-0 ", "e-", "null"] {
             let found = drawing.split('"').skip(1).step_by(2).any(|attribute| attribute.contains(word));
@@ -321,7 +327,7 @@ fn every_picture_is_small_whatever_its_data() {
     for (name, svg) in pictures() {
         assert!(svg.len() < 100_000, "{name}: {} bytes", svg.len());
         if let Some(folder) = std::env::var_os("CURVELAX_CHARTS") {
-            std::fs::write(std::path::Path::new(&folder).join(name + ".svg"), &svg).unwrap();
+            std::fs::write(std::path::Path::new(&folder).join(format!("{name}.svg")), svg).unwrap();
         }
     }
 }
@@ -330,7 +336,7 @@ fn every_picture_is_small_whatever_its_data() {
 #[test]
 fn nothing_is_drawn_outside() {
     for (name, svg) in pictures() {
-        let [width, height] = ["width", "height"].map(|name| attribute(&svg, name).parse::<f64>().unwrap());
+        let [width, height] = ["width", "height"].map(|name| attribute(svg, name).parse::<f64>().unwrap());
         for data in svg.lines().filter(|line| line.starts_with("<path ")).map(|line| attribute(line, "d")) {
             let commands: Vec<(usize, char)> = data.char_indices().filter(|(_, c)| c.is_alphabetic()).collect();
             let ends = commands.iter().skip(1).map(|(at, _)| *at).chain([data.len()]);

@@ -23,4 +23,4 @@ pub use super::{axis::Scale, chart::Estimate};
 const TIME: &str = "length⁴";
 
 #[cfg(test)]
-mod look;
+pub mod look;

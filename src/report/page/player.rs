@@ -1,0 +1,251 @@
+//! A few members that move: their nodes at some times, small enough to be part of a page.
+//!
+//! All members share one scale. A coordinate is a whole number below 4096 and two digits of base64; the script
+//! `page.js` reads them and moves the nodes on straight lines from time to time.
+
+use std::fmt::Write;
+
+use glam::DVec2;
+
+use super::digest::DIGITS;
+use crate::report::{
+    axis::{Scale, tick_step},
+    svg::escape,
+    text::significant,
+};
+
+/// More members, times of one, and nodes than these do not fit into a small page, and show no more.
+const MOST_MEMBERS: usize = 6;
+const MOST_TIMES: usize = 61;
+const MOST_NODES: usize = 200;
+/// Places of the slider that stand for times.
+const MOST_MARKS: usize = 121;
+/// Nodes are marked where there are no more than these.
+const MOST_DOTS: usize = 120;
+/// The largest coordinate, and the free space round a curve.
+const LARGEST: f64 = 4095.0;
+const PADDING: f64 = 200.0;
+/// Least height of a panel, as a share of its width.
+const LEAST_HEIGHT: f64 = 0.5;
+
+/// One member on its way.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trajectory {
+    /// What it is, and how it ended: `member 3: relaxed at t = 0.41`.
+    pub label: String,
+    /// Ascending times, in length⁴.
+    pub times: Vec<f64>,
+    /// Its nodes at each of them, equally many at all.
+    pub nodes: Vec<Vec<DVec2>>,
+}
+
+impl Trajectory {
+    /// The times that can be shown, thinned, and the nodes at each.
+    fn frames(&self) -> Vec<(f64, Vec<DVec2>)> {
+        let count = self.nodes.first().map_or(0, Vec::len);
+        let usable = |(t, nodes): &(&f64, &Vec<DVec2>)| {
+            let known = |p: &DVec2| Scale::Linear.holds(p.x) && Scale::Linear.holds(p.y);
+            t.is_finite() && nodes.len() == count && count > 0 && nodes.iter().all(known)
+        };
+        let frames: Vec<(&f64, &Vec<DVec2>)> = self.times.iter().zip(&self.nodes).filter(usable).collect();
+        let stride = count.div_ceil(MOST_NODES).max(1);
+        let node = |nodes: &Vec<DVec2>| nodes.iter().copied().step_by(stride).collect();
+        spread(frames.len(), MOST_TIMES).map(|i| (*frames[i].0, node(frames[i].1))).collect()
+    }
+}
+
+/// Members that can be shown, to one scale.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Player {
+    members: Vec<Member>,
+    /// Units of length in one unit of the coordinates.
+    unit: f64,
+    /// Height of a panel, in coordinates.
+    height: f64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Member {
+    label: String,
+    times: Vec<f64>,
+    /// Coordinates x, y, x, y, … at each time.
+    frames: Vec<Vec<u16>>,
+}
+
+impl Player {
+    /// The first of `trajectories` that have a time to show; none if none has.
+    pub fn new(trajectories: &[Trajectory]) -> Option<Player> {
+        let shown = trajectories.iter().map(|trajectory| (&trajectory.label, trajectory.frames()));
+        let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MOST_MEMBERS).collect();
+        let boxes: Vec<(DVec2, DVec2)> = shown.iter().filter_map(|(_, frames)| bounds(frames)).collect();
+        let extent = boxes.iter().map(|(low, high)| *high - *low).reduce(DVec2::max)?;
+        let largest = extent.max_element();
+        let unit = if largest > 0.0 { largest / (LARGEST - 2.0 * PADDING) } else { 1.0 };
+        let height = (extent.y / unit + 2.0 * PADDING).clamp(LEAST_HEIGHT * LARGEST, LARGEST).round();
+        let members = shown.into_iter().zip(boxes).map(|((label, frames), (low, high))| {
+            // y grows downwards in SVG.
+            let place =
+                |p: DVec2| (p - 0.5 * (low + high)) * DVec2::new(1.0, -1.0) / unit + 0.5 * DVec2::new(LARGEST, height);
+            let whole = |nodes: &[DVec2]| {
+                nodes.iter().flat_map(|p| place(*p).to_array()).map(|v| v.round().clamp(0.0, LARGEST) as u16).collect()
+            };
+            let (times, frames) = frames.iter().map(|(t, nodes)| (*t, whole(nodes))).unzip();
+            Member { label: label.clone(), times, frames }
+        });
+        Some(Player { members: members.collect(), unit, height })
+    }
+
+    /// Whether there is anything to move.
+    pub fn moves(&self) -> bool {
+        self.members.iter().any(|member| member.times.len() > 1)
+    }
+
+    /// Its part of the page. Without the script it shows the members at their first time.
+    pub fn html(&self) -> String {
+        let mut html = String::from("<div class=\"members\">\n");
+        for Member { label, frames, times } in &self.members {
+            let (start, label) = (path(&frames[0]), escape(label));
+            let dots = if frames[0].len() <= 2 * MOST_DOTS { dots(&frames[0]) } else { String::new() };
+            let height = self.height;
+            // Writing into a string cannot fail.
+            let _ = writeln!(
+                html,
+                "<figure><svg viewBox=\"0 0 {LARGEST} {height}\" role=\"img\" aria-label=\"{label}\">\
+                 <path class=\"start\" d=\"{start}\"/><path class=\"now\" d=\"{start}\"/>\
+                 <path class=\"nodes\" d=\"{dots}\"/>{}</svg><figcaption>{label}</figcaption></figure>",
+                self.scale_bar()
+            );
+            debug_assert_eq!(frames.len(), times.len());
+        }
+        html += "</div>\n";
+        if self.moves() {
+            html += "<div class=\"controls\" id=\"controls\" hidden>\n\
+                <button type=\"button\" id=\"play\">Play</button>\n\
+                <input type=\"range\" id=\"time\" min=\"0\" max=\"200\" value=\"0\" aria-label=\"Time\">\n\
+                <span id=\"clock\" aria-hidden=\"true\"></span>\n</div>\n";
+        }
+        let grey = if self.moves() { "Grey: at the start. " } else { "" };
+        let length = significant(self.bar().0, 1);
+        html += &format!("<p class=\"small\">{grey}All to one scale; the bar has length {length}.</p>\n");
+        html
+    }
+
+    /// What the script reads: numbers and digits of base64 only.
+    pub fn data(&self) -> String {
+        let list = |times: &[f64]| times.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        let member = |Member { times, frames, .. }: &Member| {
+            let frames: Vec<String> = frames.iter().map(|frame| format!("\"{}\"", digits(frame))).collect();
+            format!("{{\"times\":[{}],\"frames\":[{}]}}", list(times), frames.join(",\n"))
+        };
+        let members: Vec<String> = self.members.iter().map(member).collect();
+        format!("{{\"marks\":[{}],\n\"members\":[{}]}}", list(&self.marks()), members.join(",\n"))
+    }
+
+    /// Times at equal distances along the slider: where there are many, it moves slowly.
+    fn marks(&self) -> Vec<f64> {
+        let mut all: Vec<f64> = self.members.iter().flat_map(|member| member.times.iter().copied()).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        spread(all.len(), MOST_MARKS).map(|i| all[i]).collect()
+    }
+
+    /// A round length and the coordinates that it takes.
+    fn bar(&self) -> (f64, f64) {
+        let length = tick_step(0.15 * LARGEST * self.unit);
+        (length, length / self.unit)
+    }
+
+    fn scale_bar(&self) -> String {
+        let (y, length) = (self.height - 0.4 * PADDING, self.bar().1.round());
+        format!("<path class=\"bar\" d=\"M{PADDING} {y}h{length}\"/>")
+    }
+}
+
+/// At most `most` indices below `count`, the first and the last among them.
+fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
+    let shown = count.min(most);
+    (0..shown).map(move |i| if shown > 1 { i * (count - 1) / (shown - 1) } else { 0 })
+}
+
+fn bounds(frames: &[(f64, Vec<DVec2>)]) -> Option<(DVec2, DVec2)> {
+    let nodes = || frames.iter().flat_map(|(_, nodes)| nodes.iter().copied());
+    Some((nodes().reduce(DVec2::min)?, nodes().reduce(DVec2::max)?))
+}
+
+fn path(frame: &[u16]) -> String {
+    let steps = frame.chunks_exact(2).map(|at| format!("{} {}", at[0], at[1]));
+    format!("M{}Z", steps.collect::<Vec<_>>().join("L"))
+}
+
+fn dots(frame: &[u16]) -> String {
+    frame.chunks_exact(2).map(|at| format!("M{} {}h0", at[0], at[1])).collect()
+}
+
+/// Two digits for each coordinate.
+fn digits(frame: &[u16]) -> String {
+    frame.iter().flat_map(|v| [v >> 6, v & 63]).map(|digit| char::from(DIGITS[usize::from(digit)])).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+
+    /// An ellipse that becomes a circle, of this size.
+    fn ellipse(size: f64, times: usize, n: usize) -> Trajectory {
+        let nodes = |t: f64| {
+            let a = 1.0 + (-t).exp();
+            (0..n).map(|i| size * DVec2::new(a, 1.0 / a) * DVec2::from_angle(TAU * i as f64 / n as f64)).collect()
+        };
+        let times: Vec<f64> = (0..times).map(|i| 0.1 * i as f64).collect();
+        Trajectory { label: "member <0>".into(), nodes: times.iter().map(|t| nodes(*t)).collect(), times }
+    }
+
+    #[test]
+    fn coordinates_keep_a_thousandth_of_the_picture() {
+        let ellipse = ellipse(1e6, 5, 40);
+        let player = Player::new(std::slice::from_ref(&ellipse)).unwrap();
+        let member = &player.members[0];
+        for (frame, nodes) in member.frames.iter().zip(&ellipse.nodes) {
+            for (at, node) in frame.chunks_exact(2).zip(nodes) {
+                let back = (DVec2::new(f64::from(at[0]), player.height - f64::from(at[1]))
+                    - 0.5 * DVec2::new(LARGEST, player.height))
+                    * player.unit;
+                assert!(back.distance(*node) < 1e-3 * 4e6, "{back} {node}");
+            }
+        }
+        assert_eq!(digits(&[0, 63, 64, 4095]), "AAA/BA//");
+    }
+
+    #[test]
+    fn a_player_stays_small() {
+        let player = Player::new(&vec![ellipse(1.0, 1000, 5000); 20]).unwrap();
+        assert_eq!(player.members.len(), MOST_MEMBERS);
+        assert_eq!(player.members[0].frames.len(), MOST_TIMES);
+        assert_eq!(player.members[0].times.last(), Some(&(0.1 * 999.0)));
+        let bytes = player.html().len() + player.data().len();
+        assert!(bytes < 350_000, "{bytes}");
+    }
+
+    #[test]
+    fn what_cannot_be_shown_is_left_out() {
+        let mut broken = ellipse(1.0, 3, 12);
+        broken.nodes[1][4].x = f64::NAN;
+        let player = Player::new(&[Trajectory::default(), broken]).unwrap();
+        assert_eq!(player.members.len(), 1);
+        assert_eq!(player.members[0].times, [0.0, 0.2]);
+        assert_eq!(Player::new(&[Trajectory::default()]), None);
+        assert_eq!(Player::new(&[]), None);
+        let point = Trajectory { label: String::new(), times: vec![0.0], nodes: vec![vec![DVec2::ONE; 6]] };
+        let html = Player::new(&[point]).unwrap().html();
+        assert!(!html.contains("NaN") && !html.contains("inf") && !html.contains("type=\"range\""), "{html}");
+    }
+
+    #[test]
+    fn labels_are_escaped_and_the_data_hold_none() {
+        let player = Player::new(&[ellipse(1.0, 3, 12)]).unwrap();
+        assert!(player.html().contains("member &lt;0&gt;") && !player.html().contains("<0>"));
+        assert!(!player.data().contains('<') && !player.data().contains("member <"));
+    }
+}
