@@ -162,7 +162,7 @@ pub struct Heading<'a> {
     pub title: &'a str,
     /// Sentences below it, each a paragraph; empty ones are left out.
     pub sentences: Vec<String>,
-    /// The legend, in rows.
+    /// The legend; entries without a label are left out.
     pub legend: Vec<Entry>,
 }
 
@@ -200,7 +200,7 @@ impl Heading<'_> {
     fn rows(&self, room: f64) -> Vec<Vec<(f64, Entry)>> {
         let most = room - SAMPLE - 6.0;
         let fitted = |entry: &Entry| Entry { label: shortened(&entry.label, SIZE, most), ..entry.clone() };
-        let entries: Vec<Entry> = self.legend.iter().map(fitted).collect();
+        let entries: Vec<Entry> = self.legend.iter().filter(|entry| !entry.label.is_empty()).map(fitted).collect();
         let extent = |entry: &Entry| entry.sample() + 24.0 + width(&entry.label, SIZE);
         let mut rows: Vec<Vec<(f64, Entry)>> = Vec::new();
         let mut end = f64::INFINITY;

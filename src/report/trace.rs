@@ -145,6 +145,7 @@ mod tests {
         let parts = clipped(&line, DVec2::ZERO, DVec2::new(6.0, 2.0));
         let expected = [points(&[(0.0, 1.0), (1.0, 1.0), (2.0, 2.0)]), points(&[(4.0, 2.0), (5.0, 1.0), (6.0, 1.0)])];
         assert_eq!(parts, expected);
+        assert!(clipped(&points(&[(5.0, 3.0), (7.0, 1.5)]), DVec2::ZERO, DVec2::new(6.0, 2.0)).is_empty());
         assert!(clipped(&points(&[(0.0, 3.0), (6.0, 3.0)]), DVec2::ZERO, DVec2::new(6.0, 2.0)).is_empty());
     }
 

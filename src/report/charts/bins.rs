@@ -124,6 +124,14 @@ mod tests {
             (vec![-3.0, -1.0, 0.0, 0.2, 1e9], Scale::Linear),
         ] {
             let bins = Bins::of(&values, scale);
+            for (pair, count) in bins.bounds.windows(2).zip(&bins.counts) {
+                // A value on a bound may be on either side of it, by rounding.
+                let within = |room: f64| {
+                    let room = room * (pair[1] - pair[0]);
+                    values.iter().filter(|v| (pair[0] - room..=pair[1] + room).contains(v)).count() as u64
+                };
+                assert!((within(-1e-9)..=within(1e-9)).contains(count), "{pair:?} {count}");
+            }
             assert_eq!(bins.counts.iter().sum::<u64>(), values.len() as u64);
             assert_eq!(bins.bounds.len(), bins.counts.len() + 1);
             assert!(bins.counts.len() <= 96 && bins.bounds.is_sorted(), "{bins:?}");

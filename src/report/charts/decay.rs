@@ -14,6 +14,8 @@ const HEIGHT: f64 = 300.0;
 const MOST_BANDS: usize = 4;
 /// Smaller shares of the largest excess are rounding, and not drawn.
 const ROUNDING: f64 = 1e-18;
+/// Pieces of a line of theory, which is straight on some axes only.
+const PIECES: i32 = 100;
 /// A band may extend the axis below its curve by this factor.
 const BELOW: f64 = 1e-2;
 
@@ -52,12 +54,58 @@ pub struct DecayCurve {
 }
 
 /// A line that theory gives.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Theory {
     /// Its entry in the legend, such as `exp(−24 t/R⁴)`.
     pub label: String,
-    /// Times, ascending, in length⁴, and excess; two points are enough where the line is straight.
-    pub points: Vec<(f64, f64)>,
+    /// The line.
+    pub law: Law,
+}
+
+/// How excess falls in time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// start·exp(−rate·t).
+    Exponential {
+        /// Excess at t = 0.
+        start: f64,
+        /// 24/R⁴ for surface diffusion, in 1/length⁴.
+        rate: f64,
+    },
+    /// start·(1 + t/time)^(−power).
+    Algebraic {
+        /// Excess at t = 0.
+        start: f64,
+        /// R₀⁴/2 for the Willmore flow, in length⁴.
+        time: f64,
+        /// The slope at late times on logarithmic axes, without its sign.
+        power: f64,
+    },
+}
+
+impl Law {
+    /// The excess at this time.
+    pub fn at(self, t: f64) -> f64 {
+        match self {
+            Law::Exponential { start, rate } => start * (-rate * t).exp(),
+            Law::Algebraic { start, time, power } => start * (1.0 + t / time).powf(-power),
+        }
+    }
+
+    /// Data of its line across a panel.
+    fn line(self, panel: &Panel) -> String {
+        let (scale, (first, last)) = (panel.x.scale(), panel.x.range());
+        let [first, last] = [first, last].map(|t| scale.level(t));
+        let times = (0..=PIECES).map(|i| scale.value(first + (last - first) * f64::from(i) / f64::from(PIECES)));
+        let points = times.map(|t| (t, self.at(t))).filter(|(t, excess)| drawable((scale, *t), (Scale::Log, *excess)));
+        let points: Vec<DVec2> = points.map(|(t, excess)| panel.place(t, excess)).collect();
+        clipped(&points, panel)
+    }
+}
+
+/// Data of the parts of a line inside a panel.
+fn clipped(points: &[DVec2], panel: &Panel) -> String {
+    trace::clipped(points, panel.corner, panel.end()).iter().map(|part| trace::path(part)).collect()
 }
 
 impl DecayCurve {
@@ -112,9 +160,6 @@ impl Decay<'_> {
         };
         panel.draw(&mut svg);
         let least = trace::tolerance(colours.shown.len() * if bands { 3 } else { 1 }, panel.size.x);
-        let clipped = |points: &[DVec2]| -> String {
-            trace::clipped(points, panel.corner, panel.end()).iter().map(|part| trace::path(part)).collect()
-        };
         for (i, class) in &colours.shown {
             let curve = &curves[*i];
             svg.open(class);
@@ -122,15 +167,11 @@ impl Decay<'_> {
                 let [low, high] = [low, high].map(|bound| curve.line(bound, &panel, least, true));
                 svg.path("band", &trace::band(&high, &low));
             }
-            svg.path("series", &clipped(&curve.line(&curve.mean, &panel, least, false)));
+            svg.path("series", &clipped(&curve.line(&curve.mean, &panel, least, false), &panel));
             svg.close();
         }
         svg.open("ink");
-        for Theory { points, .. } in theory {
-            let points = points.iter().filter(|(t, excess)| drawable((scale, *t), (Scale::Log, *excess)));
-            let points: Vec<DVec2> = points.map(|(t, excess)| panel.place(*t, *excess)).collect();
-            svg.path("dashed", &clipped(&trace::thinned(&points, 1.0)));
-        }
+        theory.iter().for_each(|theory| svg.path("dashed", &theory.law.line(&panel)));
         svg.close();
         colours.draw_bar(&mut svg, &panel);
         svg.finish()

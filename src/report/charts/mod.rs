@@ -11,7 +11,7 @@ pub mod mesh;
 pub mod relaxation;
 pub mod survival;
 
-pub use decay::{Decay, DecayCurve, Theory};
+pub use decay::{Decay, DecayCurve, Law, Theory};
 pub use dependence::{Dependence, Level, PowerLaw, Series, Setting};
 pub use mesh::MeshQuality;
 pub use relaxation::RelaxationTimes;
@@ -23,4 +23,4 @@ pub use super::{axis::Scale, chart::Estimate};
 const TIME: &str = "length⁴";
 
 #[cfg(test)]
-pub mod look;
+pub mod tests;

@@ -3,7 +3,7 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::*;
-use crate::report::charts::look::pictures;
+use crate::report::charts::tests::pictures::pictures;
 
 /// A perturbed ellipse whose modes decay as theory says, recorded often at first and seldom later.
 fn member(j: usize) -> Trajectory {

@@ -1,11 +1,8 @@
-//! What holds for every chart, whatever its data.
-//!
-//! To look at the pictures: `CURVELAX_CHARTS=FOLDER cargo test charts`.
+//! Pictures of every kind of data, to test and to look at.
 
 use std::sync::OnceLock;
 
-use super::*;
-use crate::report::text::width;
+use crate::report::charts::*;
 
 /// Numbers in (0, 1), equal on every machine: halton of base 2 or 3.
 fn spread(i: usize, base: usize) -> f64 {
@@ -29,7 +26,7 @@ fn times(count: usize, median: f64, width: f64) -> Vec<f64> {
 }
 
 /// Kaplan and Meier's curve of members of which those past `end` are censored, and some on the way.
-fn survival(label: &str, value: Option<f64>, count: usize, median: f64, end: f64) -> SurvivalCurve {
+pub fn survival(label: &str, value: Option<f64>, count: usize, median: f64, end: f64) -> SurvivalCurve {
     let mut all: Vec<(f64, bool)> =
         times(count, median, 0.5).into_iter().enumerate().map(|(i, t)| (t.min(end), t < end && i % 17 != 3)).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -51,7 +48,8 @@ fn survival(label: &str, value: Option<f64>, count: usize, median: f64, end: f64
     curve
 }
 
-fn decay(label: &str, value: Option<f64>, rate: f64, count: usize) -> DecayCurve {
+/// The mean excess of a cell that decays at this rate after a faster start, at `count` times up to 1.5.
+pub fn decay(label: &str, value: Option<f64>, rate: f64, count: usize) -> DecayCurve {
     let t: Vec<f64> = (0..count).map(|i| 1.5 * i as f64 / (count - 1) as f64).collect();
     let mean: Vec<f64> = t.iter().map(|t| 0.07 * (-rate * t).exp() + 0.03 * (-9.0 * rate * t).exp()).collect();
     let band = (mean.iter().map(|e| 0.6 * e).collect(), mean.iter().map(|e| 1.5 * e).collect());
@@ -63,7 +61,8 @@ fn level(at: Setting, median: f64) -> Level {
     Level { at, median: Some(median), quartiles: (Some(0.8 * median.value), Some(1.3 * median.value)) }
 }
 
-fn amplitudes(label: &str, factor: f64, count: usize) -> Series {
+/// Medians scattered round factor·amplitude^(−0.31), at `count` amplitudes from 0.01 on.
+pub fn amplitudes(label: &str, factor: f64, count: usize) -> Series {
     let amplitude = |i: usize| 0.01 * 1.6_f64.powi(i as i32);
     let law = |x: f64| factor * x.powf(-0.31);
     let levels = (0..count).map(|i| level(Setting::Number(amplitude(i)), law(amplitude(i)) * (1.0 + 0.05 * normal(i))));
@@ -80,7 +79,8 @@ pub fn pictures() -> &'static [(String, String)] {
     PICTURES.get_or_init(draw_all)
 }
 
-fn draw_all() -> Vec<(String, String)> {
+/// See [`pictures`].
+pub fn draw_all() -> Vec<(String, String)> {
     let mut pictures = Vec::new();
     let mut add = |name: &str, svg: String| pictures.push((name.to_owned(), svg));
     let unknown = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN_POSITIVE];
@@ -126,11 +126,12 @@ fn draw_all() -> Vec<(String, String)> {
     let (t, survival) = (unknown.to_vec(), unknown.to_vec());
     add("survival-unknown", survive(vec![SurvivalCurve { t, survival, ..alone }], Some(Scale::Log)));
 
-    let theory = Theory {
-        label: "exp(−24 t/R⁴), R = 1.41".into(),
-        points: vec![(0.0, 0.06), (3.0, 0.06 * (-18.0_f64).exp())],
-    };
+    let theory =
+        Theory { label: "exp(−24 t/R⁴), R = 1.41".into(), law: Law::Exponential { start: 0.06, rate: 6.0 } };
+    let algebraic = Law::Algebraic { start: 0.09, time: 0.5, power: 4.0 };
+    let algebraic = Theory { label: "(1 + 2t/R₀⁴)⁻⁴".into(), law: algebraic };
     let fall = |curves: Vec<DecayCurve>, time: Option<Scale>| {
+        let theory = if time == Some(Scale::Log) { &algebraic } else { &theory };
         let theory = vec![theory.clone()];
         Decay {
             title: "Mean excess in time",
@@ -225,174 +226,4 @@ fn draw_all() -> Vec<(String, String)> {
     let curves = vec![SurvivalCurve { label: hostile.into(), ..cells(1, 20).remove(0) }; 2];
     add("hostile", Survival { title: hostile, note: hostile, key: hostile, curves, time: None }.draw());
     pictures
-}
-
-/// A line of text as drawn.
-struct Text<'a> {
-    class: &'a str,
-    content: String,
-    low: [f64; 2],
-    high: [f64; 2],
-}
-
-fn attribute<'a>(tag: &'a str, name: &str) -> &'a str {
-    let start = tag.find(&format!(" {name}=\"")).unwrap_or_else(|| panic!("{name} in {tag}")) + name.len() + 3;
-    tag[start..].split('"').next().unwrap()
-}
-
-fn text(line: &str) -> Text<'_> {
-    let (tag, content) = line.split_once('>').unwrap();
-    let content = content.strip_suffix("</text>").unwrap();
-    let entities = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&amp;", "&")];
-    let content = entities.iter().fold(content.to_owned(), |text, (entity, plain)| text.replace(entity, plain));
-    let [x, y] = ["x", "y"].map(|name| attribute(tag, name).parse::<f64>().unwrap());
-    let start = tag.find("class=\"").unwrap() + 7;
-    let class = line[start..].split('"').next().unwrap();
-    let has = |name: &str| class.split(' ').any(|part| part == name);
-    let size = if has("head") {
-        crate::report::text::TITLE
-    } else if has("axis") {
-        13.0
-    } else {
-        12.0
-    };
-    let across = width(&content, size);
-    let before = across
-        * if has("middle") {
-            0.5
-        } else if has("end") {
-            1.0
-        } else {
-            0.0
-        };
-    let (low, high) = match tag.contains("rotate(-90") {
-        false => ([x - before, y - 0.75 * size], [x - before + across, y + 0.2 * size]),
-        true => ([x - 0.75 * size, y - before], [x + 0.2 * size, y - before + across]),
-    };
-    Text { class, content, low, high }
-}
-
-fn texts(svg: &str) -> Vec<Text<'_>> {
-    svg.lines().filter(|line| line.starts_with("<text ")).map(text).collect()
-}
-
-/// Why a reader would complain about the text of a picture; nothing if all is well.
-fn complaint(svg: &str) -> Option<String> {
-    let [width, height] = ["width", "height"].map(|name| attribute(svg, name).parse::<f64>().unwrap());
-    let texts = texts(svg);
-    for (i, a) in texts.iter().enumerate() {
-        if a.low.iter().any(|v| *v < 0.0) || a.high[0] > width || a.high[1] > height {
-            return Some(format!("{:?} is cut off", a.content));
-        }
-        let overlap = |b: &&Text| (0..2).all(|axis| a.low[axis] < b.high[axis] && b.low[axis] < a.high[axis]);
-        if let Some(b) = texts[..i].iter().find(overlap) {
-            return Some(format!("{:?} is over {:?}", a.content, b.content));
-        }
-    }
-    None
-}
-
-#[test]
-fn no_text_of_any_chart_is_cut_off_or_over_another() {
-    for (name, svg) in pictures() {
-        if let Some(complaint) = complaint(svg) {
-            panic!("{name}: {complaint}\n{svg}");
-        }
-        assert!(texts(svg).iter().any(|text| text.class == "head"), "{name}");
-    }
-    // The check tells a difference.
-    let (_, svg) = &pictures()[0];
-    let labels: Vec<&str> = svg.lines().filter(|line| line.contains("x tick")).collect();
-    let moved = svg.replace(labels[0], labels[1]);
-    assert!(complaint(&moved).is_some_and(|complaint| complaint.contains("is over")));
-    let (title, outside) = ("x=\"20\" y=\"26\"", "x=\"620\" y=\"26\"");
-    assert!(complaint(&svg.replace(title, outside)).is_some_and(|complaint| complaint.contains("cut off")));
-}
-
-#[test]
-fn equal_data_give_equal_bytes_and_no_number_is_unknown() {
-    for ((name, svg), (_, twin)) in pictures().iter().zip(draw_all()) {
-        assert!(*svg == twin, "{name}: two drawings differ");
-        let drawing = svg.split("</style>").nth(1).unwrap();
-        for word in ["NaN", "inf", "-0 ", "e-", "null"] {
-            let found = drawing.split('"').skip(1).step_by(2).any(|attribute| attribute.contains(word));
-            assert!(!found, "{name}: {word} in {svg}");
-        }
-        assert!(!drawing.contains("NaN") && !drawing.contains("inf<"), "{name}: {svg}");
-    }
-}
-
-#[test]
-fn every_picture_is_small_whatever_its_data() {
-    for (name, svg) in pictures() {
-        assert!(svg.len() < 100_000, "{name}: {} bytes", svg.len());
-        if let Some(folder) = std::env::var_os("CURVELAX_CHARTS") {
-            std::fs::write(std::path::Path::new(&folder).join(format!("{name}.svg")), svg).unwrap();
-        }
-    }
-}
-
-/// All numbers in the data of the paths of a picture are inside it.
-#[test]
-fn nothing_is_drawn_outside() {
-    for (name, svg) in pictures() {
-        let [width, height] = ["width", "height"].map(|name| attribute(svg, name).parse::<f64>().unwrap());
-        for data in svg.lines().filter(|line| line.starts_with("<path ")).map(|line| attribute(line, "d")) {
-            let commands: Vec<(usize, char)> = data.char_indices().filter(|(_, c)| c.is_alphabetic()).collect();
-            let ends = commands.iter().skip(1).map(|(at, _)| *at).chain([data.len()]);
-            for ((start, command), end) in commands.iter().zip(ends) {
-                let numbers = data[start + 1..end].split(' ').filter(|number| !number.is_empty());
-                let numbers: Vec<f64> = numbers.map(|number| number.parse().unwrap()).collect();
-                let inside = match (command, &numbers[..]) {
-                    ('M' | 'L', [x, y]) => (0.0..=width).contains(x) && (0.0..=height).contains(y),
-                    ('H', [x]) => (0.0..=width).contains(x),
-                    ('V', [y]) => (0.0..=height).contains(y),
-                    ('h' | 'v', [_]) | ('l' | 'm', [_, _]) | ('a', _) | ('Z', []) => true,
-                    _ => false,
-                };
-                assert!(inside, "{name}: {command}{numbers:?} in {data}");
-            }
-        }
-    }
-}
-
-#[test]
-fn labels_are_escaped() {
-    let pictures = pictures();
-    let (_, svg) = pictures.last().unwrap();
-    assert!(svg.contains("&lt;script&gt;alert(&quot;a &amp; b&quot;)&lt;/script&gt;"), "{svg}");
-    assert!(!svg.contains("<script") && !svg.contains('\0'));
-}
-
-#[test]
-fn where_there_is_nothing_to_draw_the_picture_says_why() {
-    let pictures = pictures();
-    let text = |name: &str| {
-        let (_, svg) = pictures.iter().find(|(found, _)| found == name).unwrap();
-        texts(svg).iter().map(|text| text.content.clone()).collect::<Vec<_>>().join(" ")
-    };
-    for (name, sentence) in [
-        ("relaxation", "412 of 512 members relaxed; 100 have no t_relax (88 unfinished, 12 stalled)."),
-        ("relaxation-none", "No member relaxed, so there are no relaxation times to count."),
-        ("relaxation-none", "0 of 100 members relaxed; 100 have no t_relax"),
-        ("relaxation-empty", "There are no members."),
-        ("relaxation-one", "The only member relaxed."),
-        ("survival-none", "There are no members"),
-        ("survival-1000", "24 of 1000 cells are drawn, spread over all."),
-        ("decay-none", "There is no positive mean excess to draw."),
-        ("decay-zero", "There is no positive mean excess to draw."),
-        ("decay-one", "The mean excess is known at one time only"),
-        ("dependence", "fit: t_relax ∝ amplitudeᵖ, p = \u{2212}0.312 (\u{2212}0.330 to \u{2212}0.294)"),
-        ("dependence-partial", "1 cell without a median"),
-        ("dependence-none", "There are no cells to compare."),
-        ("dependence-unreached", "In no cell did enough members relax for a median."),
-        ("dependence-names", "The first 40 of 60 settings are drawn."),
-        ("mesh", "members with metric_drift above 0.1."),
-        ("mesh-none", "No member has a mesh_ratio."),
-        ("mesh-zero", "1 member with metric_drift 0 left out."),
-        ("mesh-unknown", "members without mesh_ratio."),
-    ] {
-        let text = text(name);
-        assert!(text.contains(sentence), "{name}: {text}");
-    }
 }
