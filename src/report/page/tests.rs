@@ -209,3 +209,21 @@ fn shares_are_0_and_100_only_where_they_are() {
     let shares = [(0, 7), (7, 7), (1, 100_000), (99_999, 100_000), (1, 3), (0, 0)].map(|(part, all)| share(part, all));
     assert_eq!(shares, ["0.0 %", "100.0 %", "< 0.1 %", "> 99.9 %", "33.3 %", "0.0 %"]);
 }
+
+#[test]
+fn the_page_of_a_large_study_stays_small() {
+    let figure =
+        |(name, svg): &(String, String)| Figure { title: name.clone(), caption: name.clone(), svg: svg.clone() };
+    let mut long = member(0);
+    long.times = (0..200).map(f64::from).collect();
+    long.nodes = vec![long.nodes[0].repeat(10); 200];
+    let warnings = warnings();
+    let html = Page {
+        members: vec![long; 8],
+        plots: pictures().iter().map(figure).collect(),
+        tables: vec![table(10_000); 10],
+        ..page(&warnings)
+    }
+    .html();
+    assert!(html.len() < 3_000_000 && is_well_formed(&html), "{}", html.len());
+}
