@@ -98,6 +98,9 @@ fn combinations_without_sense_name_a_remedy() {
     for (arguments, parts) in [
         ("--order lexicographic --backend gpu", ["--order lexicographic: ", "take --backend cpu"]),
         ("--order lexicographic --solver direct", ["--order lexicographic: ", "leave out --order"]),
+        ("--order lexicographic --solver multigrid", ["multigrid sweeps by colours", "take --solver gauss-seidel"]),
+        ("--sor 1.5 --solver multigrid", ["--sor 1.5: ", "leave out --sor"]),
+        ("--sor auto --solver direct", ["--sor auto: ", "leave out --sor"]),
         ("--adapter llvmpipe --backend cpu", ["--adapter llvmpipe: ", "leave out --adapter"]),
         ("--points 20", ["--modes 2..=8: ", "take --points 32 or more"]),
     ] {
