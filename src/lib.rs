@@ -52,7 +52,7 @@
 //! ```
 //! use curvelax::{
 //!     backend,
-//!     ensemble::{Ended, Family, Sink, Spec, Status, spec::{BackendChoice, Solver}},
+//!     ensemble::{Cell, Ended, Family, Sink, Spec, Status, spec::{BackendChoice, Solver}},
 //!     simulate::simulate,
 //! };
 //!
@@ -82,7 +82,7 @@
 //! let choice = backend::choose(&spec, family.points())?;
 //! let precision = choice.precision();
 //! let (mut backend, _) = choice.open(&spec, family.points())?;
-//! simulate(&spec, &family, precision, backend.as_mut(), 0, &mut Check)?;
+//! simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 0, &mut Check)?;
 //! # Ok::<(), curvelax::Error>(())
 //! ```
 

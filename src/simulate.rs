@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, ops::Range};
 
 use crate::{
     backend::Backend,
-    ensemble::{Ended, Family, Sink, Spec, spec::Precision},
+    ensemble::{Cell, Ended, Sink, spec::Precision},
     error::Result,
     schedule::{Output, outputs},
     trajectory::Trajectory,
@@ -16,30 +16,27 @@ use crate::{
 /// A member is admitted when at most this many times the slots are waiting for the first one that has not ended.
 const MEMBERS_AHEAD: usize = 8;
 
-/// Runs every member that `spec` asks for on `backend`, and hands each to `sink` in member order.
+/// Runs the members of `cells`, which keep [company](crate::ensemble::study::companies), on `backend`, and hands each to
+/// `sink` in member order.
 ///
-/// The first `portraits` members come with their nodes before and after.
+/// The first members come with their nodes before and after, `portraits` of them over all cells.
 pub fn simulate(
-    spec: &Spec,
-    family: &Family,
+    cells: &[Cell],
     precision: Precision,
     backend: &mut dyn Backend,
     portraits: usize,
     sink: &mut dyn Sink,
 ) -> Result<()> {
-    let outputs = outputs(spec.t_end, spec.series, &spec.snapshots);
-    let mut waiting = spec.members().enumerate().peekable();
+    let outputs: Vec<_> =
+        cells.iter().map(|Cell { spec, .. }| outputs(spec.t_end, spec.series, &spec.snapshots)).collect();
+    let members = cells.iter().enumerate().flat_map(|(cell, own)| own.members().enumerate().map(move |m| (cell, m)));
+    let mut waiting = members.enumerate().peekable();
     // Members that end early wait for those before them: this bounds how many.
     let ahead = MEMBERS_AHEAD * backend.slots();
-    let mut pool = Pool {
-        spec,
-        family,
-        precision,
-        outputs: &outputs,
-        resident: (0..backend.slots()).map(|_| None).collect(),
-        portraits,
-    };
-    let mut queue = Queue { total: spec.member_count(), ended: 0, next: 0, early: BTreeMap::new() };
+    let mut pool =
+        Pool { cells, precision, outputs: &outputs, resident: (0..backend.slots()).map(|_| None).collect(), portraits };
+    let total = cells.iter().map(|cell| cell.spec.member_count()).sum();
+    let mut queue = Queue { total, ended: 0, next: 0, early: BTreeMap::new() };
     // Where there are two batches, one of them is on its way while the other one is looked after.
     let size = backend.slots() / backend.batches();
     for batch in (0..backend.batches()).cycle() {
@@ -52,8 +49,8 @@ pub fn simulate(
         }
         for slot in slots.clone() {
             while pool.resident[slot].is_none() {
-                let Some((rank, index)) = waiting.next_if(|(rank, _)| *rank < queue.next + ahead) else { break };
-                if let Some(ended) = pool.admit(backend, slot, rank, index)? {
+                let Some((rank, who)) = waiting.next_if(|(rank, _)| *rank < queue.next + ahead) else { break };
+                if let Some(ended) = pool.admit(backend, slot, rank, who)? {
                     queue.leave(rank, ended, sink)?;
                 }
             }
@@ -72,20 +69,28 @@ pub fn simulate(
 
 /// The resident members of a run.
 struct Pool<'a> {
-    spec: &'a Spec,
-    family: &'a Family,
+    cells: &'a [Cell],
     precision: Precision,
-    outputs: &'a [Output],
+    /// Of each cell.
+    outputs: &'a [Vec<Output>],
     resident: Vec<Option<(usize, Trajectory<'a>)>>,
     portraits: usize,
 }
 
 impl Pool<'_> {
-    /// Puts member `index`, the `rank`-th of this run, into a free slot; or ends it where there is nothing to do.
-    fn admit(&mut self, backend: &mut dyn Backend, slot: usize, rank: usize, index: u64) -> Result<Option<Ended>> {
-        let member = self.family.member(index)?;
-        let mut trajectory = Trajectory::new(member, self.spec, self.precision, self.outputs);
-        trajectory.keep_portrait(rank < self.portraits);
+    /// Puts a member, the `rank`-th of this run and the `place`-th of a cell, into a free slot; or ends it where there is
+    /// nothing to do.
+    fn admit(
+        &mut self,
+        backend: &mut dyn Backend,
+        slot: usize,
+        rank: usize,
+        (cell, (place, index)): (usize, (usize, u64)),
+    ) -> Result<Option<Ended>> {
+        let own = &self.cells[cell];
+        let mut trajectory = Trajectory::new(own.member(index)?, &own.spec, self.precision, &self.outputs[cell]);
+        let each = (self.portraits / self.cells.len().max(1)).max(1);
+        trajectory.keep_portrait(cell < self.portraits && place < each);
         if trajectory.is_over() {
             return Ok(Some(trajectory.end(None)));
         }

@@ -384,6 +384,7 @@ impl<'a> Trajectory<'a> {
         });
         let outcome = Outcome {
             member: self.member.index,
+            cell: self.member.cell,
             status,
             t_end: self.now(),
             steps: self.counters.steps.into(),

@@ -11,7 +11,7 @@ use curvelax::{
     backend,
     curve::{BaseCurve, Outline, Sampling, crossing, polygon},
     ensemble::{
-        Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
+        Cell, Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
         spec::{BackendChoice, Precision, Pull, SolverChoice, Sor},
     },
     flow::Flow,
@@ -61,7 +61,7 @@ fn run_of(spec: &Spec, curve: BaseCurve) -> Vec<Ended> {
     let precision = choice.precision();
     let (mut backend, _) = choice.open(&spec, family.points()).unwrap();
     let mut all = All::default();
-    simulate(&spec, &family, precision, backend.as_mut(), usize::MAX, &mut all).unwrap();
+    simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), usize::MAX, &mut all).unwrap();
     all.0
 }
 

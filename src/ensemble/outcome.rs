@@ -51,6 +51,8 @@ impl Observables {
 pub struct Outcome {
     /// Index of the member, from 0.
     pub member: u64,
+    /// Index of its cell, from 0.
+    pub cell: u64,
     /// How it ended.
     pub status: Status,
     /// Time of its last accepted state.

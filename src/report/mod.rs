@@ -39,6 +39,9 @@ pub struct Report {
     folder: OutputFolder,
     tally: Tally,
     panels: Vec<Panel>,
+    /// Members of the whole study, and those of earlier simulations.
+    total: u64,
+    before: u64,
     progress: Progress,
     started: SystemTime,
     clock: Instant,
@@ -48,6 +51,8 @@ impl Report {
     /// Opens the tables that `spec` asks for.
     pub fn begin(folder: OutputFolder, spec: &Spec, quiet: bool) -> Result<Report> {
         Ok(Report {
+            total: spec.only.as_ref().map_or(spec.curves * spec.sweep.cells(), |only| only.len() as u64),
+            before: 0,
             summary: SummaryTable::begin(folder.file(folder::SUMMARY)?)?,
             series: spec.series.map(|_| SeriesTable::begin(folder.file(folder::SERIES)?)).transpose()?,
             snapshots: match spec.snapshots.is_empty() {
@@ -61,6 +66,11 @@ impl Report {
             started: SystemTime::now(),
             clock: Instant::now(),
         })
+    }
+
+    /// The members that come now are simulated by themselves; those before have all ended.
+    pub fn next_company(&mut self) {
+        self.before = self.tally.members();
     }
 
     /// Where the rows of the members that ended lie until the report is finished. If the file is there when the report
@@ -77,7 +87,7 @@ impl Report {
     /// Puts every file under its final name, once all are on disk, and returns the overview for stdout.
     pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String]) -> Result<String> {
         // In reverse order they are dropped: the folder last, after its files.
-        let Report { folder, tally, panels, progress, started, clock, summary, series, snapshots } = self;
+        let Report { folder, tally, panels, progress, started, clock, summary, series, snapshots, .. } = self;
         progress.finish();
         let wall = clock.elapsed();
         let mut names = vec![folder::SUMMARY];
@@ -122,7 +132,8 @@ impl Sink for Report {
     }
 
     fn progress(&mut self, done: u64, total: u64, share: f64) {
-        self.progress.show(done, total, share);
+        let share = (self.before as f64 + share * total as f64) / self.total.max(1) as f64;
+        self.progress.show(self.before + done, self.total, share);
     }
 }
 

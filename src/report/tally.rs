@@ -172,6 +172,7 @@ pub(crate) mod tests {
         let (start, end) = (Observables::default(), Observables::default());
         Outcome {
             member,
+            cell: 0,
             status,
             t_end: 2.0,
             steps: 10,
