@@ -356,7 +356,7 @@ proptest! {
             prop_assert!(mean.value <= sample.last().unwrap() + 1e-12);
         }
         prop_assert_eq!(curve.mean().is_none(), sample.events() == 0);
-        prop_assert_eq!(curve.caveat().is_none(), sample.len() > 1 && before == 0.0);
+        prop_assert_eq!(curve.caveat().is_none(), sample.events() > 1 && before == 0.0);
         let interval = Bootstrap { resamples: 40, ..Bootstrap::default() }.median(&sample);
         prop_assert_eq!(interval.is_some(), sample.len() > 1 && sample.events() > 0);
         if let Some(Interval { lower, upper, unreached }) = interval {

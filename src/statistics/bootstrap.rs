@@ -264,6 +264,18 @@ mod tests {
     }
 
     #[test]
+    fn without_censorings_before_the_median_a_resample_takes_few_random_numbers() {
+        for end in [f64::INFINITY, 1.0] {
+            let (sample, n) = (sample(100_003, 0.0, end), 100_003);
+            let (ranges, curve) = (Ranges::new(&sample), Curve { survival: 1.0, at_risk: n as f64 });
+            let mut resample = Resample { ranges: &ranges, draws: Draws::new(1, 0), curve, counts: Vec::new() };
+            assert!(resample.crossing(0..n, n).is_some());
+            // At most one for each level of the tree.
+            assert!(resample.draws.blocks() <= 17, "{end}: {}", resample.draws.blocks());
+        }
+    }
+
+    #[test]
     fn too_little_to_resample_is_none() {
         let bootstrap = Bootstrap::default();
         let of = |seen: &[(f64, bool)]| {

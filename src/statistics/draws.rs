@@ -28,6 +28,12 @@ impl Draws {
         self.stream.uniforms(self.next)[0]
     }
 
+    /// How many blocks of random numbers were asked for.
+    #[cfg(test)]
+    pub fn blocks(&self) -> u32 {
+        self.next
+    }
+
     /// Throws `count` balls, each into any of the boxes alike, and adds them to the numbers there.
     ///
     /// Boxes differ in probability by at most their number over 2³², relatively. There must be at least one.

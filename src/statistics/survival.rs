@@ -29,11 +29,10 @@ pub struct Step {
 pub struct Mean {
     /// The mean: of t where S comes down to 0, else of min(t, `restricted_to`).
     pub value: f64,
-    /// Standard deviation of a member's time, restricted likewise. Without censoring that of the sample (n - 1);
-    /// `None` for one member.
+    /// Standard deviation of a member's time, restricted likewise; without censoring that of the sample, with n - 1.
+    /// `None` where S falls to 0 by a single event.
     pub standard_deviation: Option<f64>,
-    /// Standard error of `value`. Without censoring that of a complete sample, deviation/√n; else from Greenwood's terms (see
-    /// [`KaplanMeier::mean`]).
+    /// Standard error of `value`; without censoring the standard deviation over √n. `None` likewise.
     pub standard_error: Option<f64>,
     /// The largest time, where S is not 0 there. The mean is then a lower bound of the members' mean time.
     pub restricted_to: Option<f64>,
@@ -111,7 +110,7 @@ impl KaplanMeier {
 
     /// The mean time, restricted to the largest time where S does not come down to 0.
     ///
-    /// With censoring the error is that of J. O. Irwin (1949), as in Kaplan and Meier and R's `survfit`:
+    /// With censoring the standard error is that of J. O. Irwin (1949), as in Kaplan and Meier and R's `survfit`:
     /// `var = Σ A_i² d_i/(n_i (n_i - d_i))`, A_i being the area under S from t_i on. `None` without an event, since
     /// then nothing is known but that S was 1, or where the numbers are too large for f64.
     pub fn mean(&self) -> Option<Mean> {
@@ -127,19 +126,24 @@ impl KaplanMeier {
         let value = first.time + masses.clone().map(|(t, mass)| mass * (t - first.time)).collect::<Sum>().value();
         let variance = masses.map(|(t, mass)| mass * (t - value).powi(2)).collect::<Sum>().value();
         let n = self.members as f64;
-        let (deviation, error) = if self.events < self.members {
-            (Some(variance.sqrt()), Some(self.area_variance(last).sqrt()))
-        } else if self.members > 1 {
-            (Some((variance * (n / (n - 1.0))).sqrt()), Some((variance / (n - 1.0)).sqrt()))
+        let [deviation, error] = if self.has_single_event() {
+            [None, None]
+        } else if self.events < self.members {
+            [variance, self.area_variance(last)].map(Some)
         } else {
-            (None, None)
+            [variance * (n / (n - 1.0)), variance / (n - 1.0)].map(Some)
         };
         Some(Mean {
             value: finite(value)?,
-            standard_deviation: deviation.and_then(finite),
-            standard_error: error.and_then(finite),
+            standard_deviation: deviation.map(f64::sqrt).and_then(finite),
+            standard_error: error.map(f64::sqrt).and_then(finite),
             restricted_to: (end.survival > 0.0).then_some(last),
         })
+    }
+
+    /// Whether S falls by one event from 1 to 0, which says nothing about the spread of times.
+    fn has_single_event(&self) -> bool {
+        self.events == 1 && self.steps.iter().all(|step| step.survival == 0.0)
     }
 
     /// Variance of the area under S up to `last`.
@@ -164,7 +168,7 @@ impl KaplanMeier {
         match self.last {
             None => Some(Caveat::NoMembers),
             Some(last) if self.events == 0 => Some(Caveat::AllCensored { members, last }),
-            Some(_) if members == 1 => Some(Caveat::OneMember),
+            Some(_) if self.has_single_event() => Some(Caveat::SingleEvent { members }),
             Some(last) if survival > 0.0 => Some(Caveat::TailCensored { members, censored, last, survival }),
             Some(_) => None,
         }
@@ -176,8 +180,11 @@ impl KaplanMeier {
 pub enum Caveat {
     /// The sample is empty.
     NoMembers,
-    /// A single member, with its event.
-    OneMember,
+    /// A single event, at which S falls from 1 to 0.
+    SingleEvent {
+        /// Number of members.
+        members: usize,
+    },
     /// No event at all.
     AllCensored {
         /// Number of members.
@@ -202,7 +209,9 @@ impl fmt::Display for Caveat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Caveat::NoMembers => write!(f, "no members, so there is nothing to estimate"),
-            Caveat::OneMember => write!(f, "one member, so there is no standard deviation, standard error or interval"),
+            Caveat::SingleEvent { members } => {
+                write!(f, "a single event ({members} members): no standard deviation and no standard error can be told")
+            }
             Caveat::AllCensored { members, last } => write!(
                 f,
                 "all {members} members are censored, the last at {last}: no mean and no quantile can be told before \
@@ -273,7 +282,11 @@ mod tests {
     fn one_member_has_a_mean_and_nothing_about_its_spread() {
         let one = curve("0.3");
         let mean = Mean { value: 0.3, standard_deviation: None, standard_error: None, restricted_to: None };
-        assert_eq!((one.median(), one.mean(), one.caveat()), (Some(0.3), Some(mean), Some(Caveat::OneMember)));
+        let caveat = Caveat::SingleEvent { members: 1 };
+        assert_eq!((one.median(), one.mean(), one.caveat()), (Some(0.3), Some(mean), Some(caveat)));
+        // Nor does it if others were censored before.
+        let last = curve("0.1+ 0.3");
+        assert_eq!((last.mean(), last.caveat()), (Some(mean), Some(Caveat::SingleEvent { members: 2 })));
     }
 
     #[test]
@@ -286,14 +299,23 @@ mod tests {
     }
 
     #[test]
+    fn a_complete_sample_has_fractions_of_its_members_to_the_last_bit() {
+        let times: String = (0..49).map(|t| format!("{t} ")).collect();
+        for (i, step) in curve(&times).steps().iter().enumerate() {
+            assert_eq!(step.survival, (48 - i) as f64 / 49.0);
+        }
+    }
+
+    #[test]
     fn equal_times_have_their_own_mean_and_no_deviation() {
-        let mean = curve("0.1 0.1 0.1").mean().unwrap();
-        assert_eq!((mean.value, mean.standard_deviation, mean.standard_error), (0.1, Some(0.0), Some(0.0)));
+        for (events, censored) in (1..30).flat_map(|events| (0..30).map(move |censored| (events, censored))) {
+            let mean = curve(&("0.1 ".repeat(events) + &"0.1+ ".repeat(censored))).mean().unwrap();
+            let spread = (events + censored > 1).then_some(0.0);
+            assert_eq!((mean.value, mean.standard_deviation, mean.standard_error), (0.1, spread, spread));
+        }
         let tied = curve("0.1 0.1 0.1+");
-        let mean = tied.mean().unwrap();
-        assert_eq!((mean.value, mean.standard_deviation, mean.standard_error), (0.1, Some(0.0), Some(0.0)));
         // The censored member was at risk at the time of the events.
-        assert_eq!((tied.survival(0.1), mean.restricted_to), (1.0 / 3.0, Some(0.1)));
+        assert_eq!((tied.survival(0.1), tied.mean().unwrap().restricted_to), (1.0 / 3.0, Some(0.1)));
     }
 
     #[test]
@@ -311,10 +333,9 @@ mod tests {
         );
         // The censored member counts by those that outlast it.
         let whole = curve("1+ 2 3");
-        assert_eq!(
-            (whole.mean().map(|mean| (mean.value, mean.restricted_to)), whole.caveat()),
-            (Some((2.5, None)), None)
-        );
+        let mean = whole.mean().unwrap();
+        assert_eq!((mean.value, mean.restricted_to, whole.caveat()), (2.5, None, None));
+        assert_eq!(mean.standard_error, Some(0.125_f64.sqrt()));
     }
 
     #[test]
