@@ -38,6 +38,7 @@
 //! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
 //! | [`schedule`], [`trajectory`], [`simulate`] | steps and output times; one member's way; the loop over all |
 //! | [`truth`] | problems with exact solutions, and the error and order against them |
+//! | [`statistics`] | censored times, their mean and median with intervals, tests between groups, fits |
 //! | [`report`] | tables, plots, provenance |
 //! | [`figures`] | the paper's figures, as data |
 //! | [`mod@bench`] | how fast a back end advances members |
@@ -101,6 +102,7 @@ pub mod schedule;
 pub mod scheme;
 pub mod simulate;
 pub mod solver;
+pub mod statistics;
 pub mod trajectory;
 pub mod truth;
 
