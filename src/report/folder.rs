@@ -17,13 +17,15 @@ pub const SERIES: &str = "series.csv";
 pub const SNAPSHOTS: &str = "snapshots.csv";
 /// Errors and orders against exact solutions.
 pub const CONVERGENCE: &str = "convergence.csv";
+/// Statistics by cell.
+pub const ENSEMBLE: &str = "ensemble.csv";
 /// How the run was made.
 pub const RUN: &str = "run.json";
 /// The first members before and after.
 pub const CURVES: &str = "plots/curves.svg";
 
 /// All files that a command may write, the one that vouches for the others first.
-const OWN: [&str; 6] = [RUN, SUMMARY, SERIES, SNAPSHOTS, CURVES, CONVERGENCE];
+const OWN: [&str; 7] = [RUN, SUMMARY, ENSEMBLE, SERIES, SNAPSHOTS, CURVES, CONVERGENCE];
 
 /// The folder of the plots, the only one below that of the run.
 const PLOTS: &str = "plots";

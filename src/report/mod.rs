@@ -3,6 +3,7 @@
 //! A [`Report`] is opened before the work starts, so that a folder that cannot be written costs nothing. It is the
 //! [`Sink`] of the simulation: rows stream to disk, and only a few numbers per member stay in memory.
 
+pub mod ensemble;
 pub mod folder;
 pub mod gallery;
 pub mod overview;
@@ -18,6 +19,7 @@ use std::{
     time::{Instant, SystemTime},
 };
 
+pub use ensemble::EnsembleStatistics;
 pub use folder::OutputFolder;
 pub use gallery::Panel;
 
@@ -104,11 +106,17 @@ impl Report {
             files.push(folder.write(folder::CURVES, &gallery::draw(&panels))?);
             names.push(folder::CURVES);
         }
+        let statistics = EnsembleStatistics::new(spec, &tally)?;
+        files.push(folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?);
+        names.insert(1, folder::ENSEMBLE);
         let provenance = provenance::Provenance::new(spec, platform, &tally, warnings, started, wall);
         let run = folder.write(folder::RUN, &provenance.to_json()?)?;
         names.push(folder::RUN);
         folder.publish(files, run)?;
-        Ok(overview::Overview { spec, platform, tally: &tally, wall, folder: folder.path(), files: &names }.to_string())
+        let (tally, folder) = (&tally, folder.path());
+        let overview =
+            overview::Overview { spec, platform, tally, statistics: &statistics, wall, folder, files: &names };
+        Ok(overview.to_string())
     }
 }
 
@@ -182,16 +190,16 @@ mod tests {
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
         let overview = report(&out, &all, Some(portrait)).finish(&all, &platform, &[]).unwrap();
-        assert_eq!(files(&out), ["plots", "run.json", "series.csv", "snapshots.csv", "summary.csv"]);
+        assert_eq!(files(&out), ["ensemble.csv", "plots", "run.json", "series.csv", "snapshots.csv", "summary.csv"]);
         assert_eq!(files(&out.join("plots")), ["curves.svg"]);
         for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");
         }
-        assert!(overview.contains("summary.csv, series.csv, snapshots.csv, plots/curves.svg, run.json"), "{overview}");
+        assert!(overview.contains("summary.csv, ensemble.csv, series.csv, snapshots.csv, plots/curves.svg, run.json"), "{overview}");
 
         let few = Spec::default();
         report(&out, &few, None).finish(&few, &platform, &["a warning".into()]).unwrap();
-        assert_eq!(files(&out), ["plots", "run.json", "summary.csv"]);
+        assert_eq!(files(&out), ["ensemble.csv", "plots", "run.json", "summary.csv"]);
         assert_eq!(files(&out.join("plots")), [""; 0]);
         assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
     }
