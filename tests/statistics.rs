@@ -346,7 +346,10 @@ proptest! {
         }
         for p in LEVELS.into_iter().chain([0.0, 1.0]) {
             match curve.quantile(p) {
-                Some(t) => prop_assert!(curve.survival(t) <= 1.0 - p + 1e-12 && curve.survival(t - 1e-9) > 1.0 - p - 1e-12),
+                Some(t) => {
+                    let [at, before] = [t, t - 1e-9].map(|t| curve.survival(t));
+                    prop_assert!(at <= 1.0 - p + 1e-12 && before > 1.0 - p - 1e-12);
+                }
                 None => prop_assert!(curve.steps().last().is_none_or(|step| step.survival > 1.0 - p)),
             }
         }

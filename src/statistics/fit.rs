@@ -27,7 +27,7 @@ impl Line {
     /// An error names the first point that is not finite. `None` where no slope is defined: fewer than two different
     /// x, or sums beyond the range of f64.
     pub fn fit(points: &[(f64, f64)]) -> Result<Option<Line>> {
-        require(points, |(x, y)| x.is_finite() && y.is_finite(), "a straight line", "is finite")?;
+        require(points, |(x, y)| x.is_finite() && y.is_finite(), "a straight line", "finite")?;
         Ok(least_squares(points))
     }
 
@@ -59,7 +59,7 @@ impl PowerLaw {
     /// two different x, or a factor beyond the range of f64.
     pub fn fit(points: &[(f64, f64)]) -> Result<Option<PowerLaw>> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
-        require(points, |(x, y)| positive(x) && positive(y), "a power law", "is finite and positive")?;
+        require(points, |(x, y)| positive(x) && positive(y), "a power law", "finite and positive")?;
         let logarithms: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
         Ok(least_squares(&logarithms).and_then(|line| {
             let factor = finite(line.intercept.exp()).filter(|factor| *factor > 0.0)?;
@@ -78,7 +78,7 @@ fn require(points: &[(f64, f64)], good: impl Fn((f64, f64)) -> bool, fit: &str, 
     match points.iter().position(|point| !good(*point)) {
         None => Ok(()),
         Some(i) => Err(Error::Failed(format!(
-            "fit of {fit}: point {i} (from 0) of {} is {:?}; it needs points of which each number {asked}: leave it out",
+            "fit of {fit}: point {i} (from 0) of {} is {:?}; each number must be {asked}: leave the point out",
             points.len(),
             points[i]
         ))),

@@ -24,8 +24,8 @@
 //!
 //! A [`Sample`] is checked and sorted once; [`KaplanMeier`], [`Bootstrap`] and [`log_rank`] read it and cannot fail. A
 //! [`Description`] is for complete data, [`Line`] and [`PowerLaw`] for one quantity against another. What cannot be
-//! known is `None`, never NaN and never infinite, and [`Caveat`] says in words why. Times may be in any one unit; means,
-//! deviations and quantiles have the same, variances of S have none.
+//! known is `None`, never NaN and never infinite, and [`Caveat`] says in words why. Times may be in any one unit, in
+//! which means, deviations and quantiles are too; variances of S have none.
 
 //!
 //! # Example

@@ -219,8 +219,8 @@ impl fmt::Display for Caveat {
             ),
             Caveat::TailCensored { members, censored, last, survival } => write!(
                 f,
-                "{censored} of {members} members are censored, and S ends at {} at the time {last}: the mean is that of \
-                 times cut off there, a lower bound, and quantiles above 1 - S are not known",
+                "{censored} of {members} members are censored, and S ends at {} at the time {last}: the mean is that \
+                 of times cut off there, a lower bound, and quantiles above 1 - S are not known",
                 significant(survival)
             ),
         }

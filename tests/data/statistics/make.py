@@ -1,9 +1,9 @@
 """Reference numbers for tests/statistics.rs: writes the samples, *.csv, and what is known of them, reference.toml.
 
-Survival curves, medians, quantiles, restricted means and log-rank tests are those of lifelines, quantiles and moments of
-complete data those of numpy and scipy, fits those of scipy. Two things lifelines does not give to 1e-12: the deviation of
-the restricted time (it integrates numerically) and the standard error of the restricted mean. They are computed here in
-rational numbers, and r.tsv, which make.R writes with R's survival package, has the latter again.
+Survival curves, medians, quantiles, restricted means and log-rank tests are those of lifelines, quantiles and moments
+of complete data those of numpy and scipy, fits those of scipy. Two things lifelines does not give to 1e-12: the
+deviation of the restricted time (it integrates numerically) and the standard error of the restricted mean. They are
+computed here in rational numbers, and r.tsv, which make.R writes with R's survival package, has the latter again.
 """
 
 import math
