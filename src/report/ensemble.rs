@@ -15,6 +15,9 @@ use crate::{
 /// Shares of the members whose times the table has, and what its columns are called.
 const QUANTILES: [(f64, &str); 5] = [(0.05, "q05"), (0.25, "q25"), (0.5, "median"), (0.75, "q75"), (0.95, "q95")];
 
+/// The test that compares cells takes the cube of their number.
+const MOST_COMPARED: usize = 500;
+
 /// Relaxation times of one cell.
 pub struct CellStatistics {
     /// Index of the cell.
@@ -69,7 +72,8 @@ impl EnsembleStatistics {
             .map(|cell| CellStatistics::new(spec, cell, tally.cells.get(cell as usize).unwrap_or(&none)))
             .collect::<Result<Vec<_>>>()?;
         let samples: Vec<Sample> = cells.iter().map(|cell| cell.sample.clone()).collect();
-        let log_rank = if cells.len() > 1 { log_rank(&samples) } else { None };
+        let compared = (2..=MOST_COMPARED).contains(&cells.len());
+        let log_rank = if compared { log_rank(&samples) } else { None };
         let power_law = match spec.sweep.axes() {
             [axis] => axis.numbers().and_then(|values| {
                 let medians = cells.iter().map(|cell| cell.survival.median());

@@ -195,7 +195,10 @@ mod tests {
         for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");
         }
-        assert!(overview.contains("summary.csv, ensemble.csv, series.csv, snapshots.csv, plots/curves.svg, run.json"), "{overview}");
+        assert!(
+            overview.contains("summary.csv, ensemble.csv, series.csv, snapshots.csv, plots/curves.svg, run.json"),
+            "{overview}"
+        );
 
         let few = Spec::default();
         report(&out, &few, None).finish(&few, &platform, &["a warning".into()]).unwrap();

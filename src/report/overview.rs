@@ -227,7 +227,7 @@ stalled             1    25.0 %
 all                 4
 
 ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
-t_relax    median 0.5000 (0.3000 to 0.5000), mean at least 1.200 +- 0.4243 over 2 members that reached it; 2 censored
+t_relax    median 0.5000, mean at least 1.200 +- 0.4016 over 2 members that reached it; 2 censored
 work       10 steps per member, sweeps 20 for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s
