@@ -4,7 +4,7 @@
 
 use curvelax::{
     backend,
-    ensemble::{Ended, Family, Sink, Spec},
+    ensemble::{Cell, Ended, Family, Sink, Spec},
     flow::Flow,
     simulate::simulate,
 };
@@ -33,7 +33,7 @@ fn main() -> curvelax::Result<()> {
     let (mut backend, _) = choice.open(&spec, family.points())?;
 
     let mut times = Times::default();
-    simulate(&spec, &family, precision, backend.as_mut(), 0, &mut times)?;
+    simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut times)?;
 
     let Times(mut times) = times;
     times.sort_by(f64::total_cmp);

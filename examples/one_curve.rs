@@ -4,7 +4,7 @@
 
 use curvelax::{
     backend,
-    ensemble::{Ended, Family, Sink, Spec},
+    ensemble::{Cell, Ended, Family, Sink, Spec},
     simulate::simulate,
 };
 
@@ -31,5 +31,5 @@ fn main() -> curvelax::Result<()> {
     let choice = backend::choose(&spec, family.points())?;
     let precision = choice.precision();
     let (mut backend, _) = choice.open(&spec, family.points())?;
-    simulate(&spec, &family, precision, backend.as_mut(), 0, &mut Print)
+    simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 0, &mut Print)
 }

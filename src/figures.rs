@@ -14,7 +14,7 @@ use crate::{
     backend,
     curve::Sampling,
     ensemble::{
-        Ended, Family, Sink, Spec,
+        Cell, Ended, Family, Sink, Spec,
         spec::{BackendChoice, Precision, Solver},
     },
     error::{Error, Result},
@@ -159,7 +159,7 @@ impl Figure {
         let precision = choice.precision();
         let (mut backend, _) = choice.open(spec, family.points())?;
         let mut only = Only { ended: None, progress };
-        simulate(spec, &family, precision, backend.as_mut(), 0, &mut only)?;
+        simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut only)?;
         only.progress.finish();
         let ended = only.ended.ok_or_else(|| Error::Failed(format!("{}: no curve came back", self.name)))?;
         let Ended { outcome, snapshots, .. } = &ended;

@@ -38,6 +38,7 @@
 //! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
 //! | [`schedule`], [`trajectory`], [`simulate`] | steps and output times; one member's way; the loop over all |
 //! | [`truth`] | problems with exact solutions, and the error and order against them |
+//! | [`statistics`] | censored times, their mean and median with intervals, tests between groups, fits |
 //! | [`report`] | tables, plots, provenance |
 //! | [`figures`] | the paper's figures, as data |
 //! | [`mod@bench`] | how fast a back end advances members |
@@ -52,7 +53,7 @@
 //! ```
 //! use curvelax::{
 //!     backend,
-//!     ensemble::{Ended, Family, Sink, Spec, Status, spec::{BackendChoice, Solver}},
+//!     ensemble::{Cell, Ended, Family, Sink, Spec, Status, spec::{BackendChoice, Solver}},
 //!     simulate::simulate,
 //! };
 //!
@@ -82,7 +83,7 @@
 //! let choice = backend::choose(&spec, family.points())?;
 //! let precision = choice.precision();
 //! let (mut backend, _) = choice.open(&spec, family.points())?;
-//! simulate(&spec, &family, precision, backend.as_mut(), 0, &mut Check)?;
+//! simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 0, &mut Check)?;
 //! # Ok::<(), curvelax::Error>(())
 //! ```
 
@@ -101,6 +102,7 @@ pub mod schedule;
 pub mod scheme;
 pub mod simulate;
 pub mod solver;
+pub mod statistics;
 pub mod trajectory;
 pub mod truth;
 

@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, ops::Range};
 
 use crate::{
     backend::Backend,
-    ensemble::{Ended, Family, Sink, Spec, spec::Precision},
+    ensemble::{Cell, Ended, Sink, spec::Precision},
     error::Result,
     schedule::{Output, outputs},
     trajectory::Trajectory,
@@ -16,30 +16,38 @@ use crate::{
 /// A member is admitted when at most this many times the slots are waiting for the first one that has not ended.
 const MEMBERS_AHEAD: usize = 8;
 
-/// Runs every member that `spec` asks for on `backend`, and hands each to `sink` in member order.
+/// Pictures of a member on its way, where it has a portrait.
+const FRAMES: u32 = 30;
+
+/// Runs the members of `cells`, which keep [company](crate::ensemble::study::companies), on `backend`, and hands each to
+/// `sink` in member order.
 ///
-/// The first `portraits` members come with their nodes before and after.
+/// The first members come with their nodes before, on their way and after, `portraits` of them over all cells.
 pub fn simulate(
-    spec: &Spec,
-    family: &Family,
+    cells: &[Cell],
     precision: Precision,
     backend: &mut dyn Backend,
     portraits: usize,
     sink: &mut dyn Sink,
 ) -> Result<()> {
-    let outputs = outputs(spec.t_end, spec.series, &spec.snapshots);
-    let mut waiting = spec.members().enumerate().peekable();
+    let outputs = |frames: u32| -> Vec<_> {
+        let of_cell = |Cell { spec, .. }: &Cell| outputs(spec.t_end, spec.series, &spec.snapshots, frames);
+        cells.iter().map(of_cell).collect()
+    };
+    let (outputs, framed) = (outputs(0), outputs(FRAMES));
+    let members = cells.iter().enumerate().flat_map(|(cell, own)| own.members().enumerate().map(move |m| (cell, m)));
+    let mut waiting = members.enumerate().peekable();
     // Members that end early wait for those before them: this bounds how many.
     let ahead = MEMBERS_AHEAD * backend.slots();
     let mut pool = Pool {
-        spec,
-        family,
+        cells,
         precision,
-        outputs: &outputs,
+        outputs: [&outputs, &framed],
         resident: (0..backend.slots()).map(|_| None).collect(),
         portraits,
     };
-    let mut queue = Queue { total: spec.member_count(), ended: 0, next: 0, early: BTreeMap::new() };
+    let total = cells.iter().map(|cell| cell.spec.member_count()).sum();
+    let mut queue = Queue { total, ended: 0, next: 0, early: BTreeMap::new() };
     // Where there are two batches, one of them is on its way while the other one is looked after.
     let size = backend.slots() / backend.batches();
     for batch in (0..backend.batches()).cycle() {
@@ -52,8 +60,8 @@ pub fn simulate(
         }
         for slot in slots.clone() {
             while pool.resident[slot].is_none() {
-                let Some((rank, index)) = waiting.next_if(|(rank, _)| *rank < queue.next + ahead) else { break };
-                if let Some(ended) = pool.admit(backend, slot, rank, index)? {
+                let Some((rank, who)) = waiting.next_if(|(rank, _)| *rank < queue.next + ahead) else { break };
+                if let Some(ended) = pool.admit(backend, slot, rank, who)? {
                     queue.leave(rank, ended, sink)?;
                 }
             }
@@ -72,20 +80,30 @@ pub fn simulate(
 
 /// The resident members of a run.
 struct Pool<'a> {
-    spec: &'a Spec,
-    family: &'a Family,
+    cells: &'a [Cell],
     precision: Precision,
-    outputs: &'a [Output],
+    /// Of each cell: for members without a portrait, and for those with one.
+    outputs: [&'a [Vec<Output>]; 2],
     resident: Vec<Option<(usize, Trajectory<'a>)>>,
     portraits: usize,
 }
 
 impl Pool<'_> {
-    /// Puts member `index`, the `rank`-th of this run, into a free slot; or ends it where there is nothing to do.
-    fn admit(&mut self, backend: &mut dyn Backend, slot: usize, rank: usize, index: u64) -> Result<Option<Ended>> {
-        let member = self.family.member(index)?;
-        let mut trajectory = Trajectory::new(member, self.spec, self.precision, self.outputs);
-        trajectory.keep_portrait(rank < self.portraits);
+    /// Puts a member, the `rank`-th of this run and the `place`-th of a cell, into a free slot; or ends it where there is
+    /// nothing to do.
+    fn admit(
+        &mut self,
+        backend: &mut dyn Backend,
+        slot: usize,
+        rank: usize,
+        (cell, (place, index)): (usize, (usize, u64)),
+    ) -> Result<Option<Ended>> {
+        let own = &self.cells[cell];
+        let each = (self.portraits / self.cells.len().max(1)).max(1);
+        let portrait = cell < self.portraits && place < each;
+        let outputs = &self.outputs[usize::from(portrait)][cell];
+        let mut trajectory = Trajectory::new(own.member(index)?, &own.spec, self.precision, outputs);
+        trajectory.keep_portrait(portrait);
         if trajectory.is_over() {
             return Ok(Some(trajectory.end(None)));
         }

@@ -82,6 +82,8 @@ pub struct Trajectory<'a> {
     start: Observables,
     series: Vec<SeriesRow>,
     snapshots: Vec<Snapshot>,
+    /// Times and nodes, in the user's frame.
+    frames: Vec<(f64, Vec<DVec2>)>,
     sweeps: [u64; 2],
     course: Course,
     /// When the polygon was first seen to cross itself.
@@ -140,6 +142,7 @@ impl<'a> Trajectory<'a> {
             start,
             series: Vec::new(),
             snapshots: Vec::new(),
+            frames: Vec::new(),
             sweeps: [0; 2],
             course,
             crossed: None,
@@ -231,7 +234,7 @@ impl<'a> Trajectory<'a> {
     /// Whether [`Trajectory::serve`] needs the state: for a snapshot, or for a look at the curve.
     pub fn wants_state(&self) -> bool {
         let due = self.outputs.iter().take_while(|output| self.place(output.t).is_some());
-        self.is_look_due() || due.into_iter().any(|output| output.snapshot)
+        self.is_look_due() || due.into_iter().any(|output| output.snapshot || output.frame)
     }
 
     /// Serves the output times that the last step has reached, and looks at the curve where that is due; `state` is
@@ -273,7 +276,7 @@ impl<'a> Trajectory<'a> {
             let at = Observables::new(&Observed::from_numbers(&at), progress.turning, self.unit);
             self.series.push(SeriesRow { member, t, at });
         }
-        if let (true, Some(state)) = (output.snapshot, state) {
+        if let (true, Some(state)) = (output.snapshot || output.frame, state) {
             let State { before, middle, curve, .. } = state;
             let field = |of: fn(&Curve<f64>) -> &Ring<f64>, unit: f64, origin: f64| {
                 let nodes = self.between(fraction, of(before).nodes(), of(middle).nodes(), of(curve).nodes());
@@ -288,7 +291,13 @@ impl<'a> Trajectory<'a> {
                 k: field(|curve| &curve.k, 1.0 / unit, 0.0),
                 r: field(|curve| &curve.r, unit, 0.0),
             };
-            self.snapshots.push(snapshot);
+            if output.frame {
+                let nodes = snapshot.x.iter().zip(&snapshot.y).map(|(x, y)| DVec2::new(*x, *y)).collect();
+                self.frames.push((t, nodes));
+            }
+            if output.snapshot {
+                self.snapshots.push(snapshot);
+            }
         }
     }
 
@@ -361,7 +370,8 @@ impl<'a> Trajectory<'a> {
     }
 
     /// What the member leaves; `last` is its last state, for the portrait.
-    pub fn end(self, last: Option<&State<f64>>) -> Ended {
+    pub fn end(mut self, last: Option<&State<f64>>) -> Ended {
+        let frames = std::mem::take(&mut self.frames);
         let progress = &self.report.progress;
         let inside = |step: u32, [high, low, length, fraction]: [f64; 4]| match (self.time, step) {
             (_, NEVER) => None,
@@ -380,10 +390,11 @@ impl<'a> Trajectory<'a> {
             let before: Vec<DVec2> = self.member.nodes.iter().map(|node| *node + origin).collect();
             let placed = |state: &State<f64>| state.curve.positions().map(|node| node * unit + origin).collect();
             let after = last.map_or_else(|| before.clone(), placed);
-            Portrait { before, after }
+            Portrait { before, frames, after }
         });
         let outcome = Outcome {
             member: self.member.index,
+            cell: self.member.cell,
             status,
             t_end: self.now(),
             steps: self.counters.steps.into(),

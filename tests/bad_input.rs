@@ -98,11 +98,34 @@ fn combinations_without_sense_name_a_remedy() {
     for (arguments, parts) in [
         ("--order lexicographic --backend gpu", ["--order lexicographic: ", "take --backend cpu"]),
         ("--order lexicographic --solver direct", ["--order lexicographic: ", "leave out --order"]),
+        ("--order lexicographic --solver multigrid", ["multigrid sweeps by colours", "take --solver gauss-seidel"]),
+        ("--sor 1.5 --solver multigrid", ["--sor 1.5: ", "leave out --sor"]),
+        ("--sor auto --solver direct", ["--sor auto: ", "leave out --sor"]),
         ("--adapter llvmpipe --backend cpu", ["--adapter llvmpipe: ", "leave out --adapter"]),
         ("--points 20", ["--modes 2..=8: ", "take --points 32 or more"]),
     ] {
         assert_says(&refused(&arguments.split(' ').collect::<Vec<_>>(), &[]), &parts);
     }
+}
+
+#[test]
+fn a_wrong_sweep_names_its_key_and_cell() {
+    let thousand = (0..1000).map(|i| i.to_string()).collect::<Vec<_>>().join(",");
+    let many = [format!("omega={thousand}"), format!("decay={thousand}")];
+    for (sweeps, parts) in [
+        (&["amplitud=1"][..], ["--sweep amplitud: ", "did you mean `amplitude`?"]),
+        (&["curves=1,2"], ["--sweep curves: ", "run once for each value"]),
+        (&["amplitude="], ["--sweep amplitude: no values", "amplitude=v1,v2"]),
+        (&["amplitude"], ["has no `=`", "key=v1,v2"]),
+        (&["amplitude=0.1,word"], ["--sweep amplitude=word: ", "in the cell amplitude = word"]),
+        (&["omega=1,-1", "decay=1,2"], ["--omega -1: ", "in the cell omega = -1, decay = 1"]),
+        (&[&many[0], &many[1]], ["(1000000 cells): too many", "at most 10000"]),
+    ] {
+        let arguments: Vec<&str> = sweeps.iter().flat_map(|sweep| ["--sweep", sweep]).collect();
+        assert_says(&refused(&arguments, &[]), &parts);
+    }
+    let message = refused(&["spec.toml"], &[("spec.toml", "[sweep]\namplitude = 1\n")]);
+    assert_says(&message, &["line 2, column 13", "invalid type: integer `1`"]);
 }
 
 #[test]
@@ -127,7 +150,7 @@ fn a_wrong_spec_file_is_shown_in_its_line() {
         ("only = [1, -2]", &["line 1, column 12", "`-2`"]),
         ("tau = 1\ntau = 2", &["line 2", "duplicate key"]),
         ("tau = ", &["line 1"]),
-        ("[sweep]", &["unknown field `sweep`"]),
+        ("[sweeps]", &["unknown field `sweeps`", "did you mean `sweep`?"]),
     ] {
         let message = refused(&["spec.toml"], &[("spec.toml", text)]);
         assert_says(&message, &["in the spec spec.toml: TOML parse error"]);

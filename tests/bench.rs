@@ -51,7 +51,8 @@ fn every_solver_and_precision_on_the_cpu_has_a_row_whose_numbers_agree() {
         assert!((number(row, "/nanoseconds_per_node") / per_node - 1.0).abs() < 1e-12, "{row}");
         match row["solver"].as_str() {
             Some("direct") => assert!(row["sweeps_per_step"].is_null(), "{row}"),
-            _ => assert!(number(row, "/sweeps_per_step") > 2.0, "{row}"),
+            // Curves at rest need none.
+            _ => assert!(number(row, "/sweeps_per_step") > 0.5, "{row}"),
         }
     }
 }

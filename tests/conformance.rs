@@ -15,7 +15,7 @@ use curvelax::{
         compare::{Left, adaptive, on_gpu, on_gpu_by, runs, stages},
         members,
     },
-    ensemble::{Ended, Family, Sink, Spec, Status, spec::Precision},
+    ensemble::{Cell, Ended, Family, Sink, Spec, Status, spec::Precision},
     number::Real,
     scheme::{
         State,
@@ -320,13 +320,13 @@ fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
         precision: Some(T::PRECISION),
         ..Spec::default()
     };
-    let family = Family::new(&spec)?;
     let blocks = Blocks::new(n).ok_or("n")?;
     let variant = gpu.capacity().variant(blocks, solver);
     let run = |batches: [usize; 2], spec: &Spec| -> Result<Vec<String>, Failed> {
         let mut kernel = Kernel::<T>::in_batches(gpu, blocks, batches, spec.max_sweeps, variant)?;
         let mut outcomes = Outcomes::default();
-        simulate(spec, &family, T::PRECISION, &mut kernel, 0, &mut outcomes)?;
+        let family = Family::new(spec)?;
+        simulate(&[Cell::only(spec.clone(), family)], T::PRECISION, &mut kernel, 0, &mut outcomes)?;
         Ok(outcomes.0)
     };
     let whole = run([1, 13], &spec)?;

@@ -5,7 +5,7 @@ mod common;
 use assert_cmd::Command;
 use curvelax::{
     backend::cpu::CpuBackend,
-    ensemble::{Ended, Family, Sink, Spec, spec::Precision},
+    ensemble::{Cell, Ended, Family, Sink, Spec, spec::Precision},
     error::Result,
     simulate::simulate,
     solver::Blocks,
@@ -177,7 +177,8 @@ fn every_number_in_the_files_is_the_one_that_was_computed() {
     let done = run_with(&[("spec.toml", &spec.to_toml().unwrap())], "spec.toml");
     let mut backend = CpuBackend::<f64>::new(Blocks::new(37).unwrap(), SWEEPS, 1).unwrap();
     let mut recorder = Recorder::default();
-    simulate(&spec, &Family::new(&spec).unwrap(), Precision::F64, &mut backend, 0, &mut recorder).unwrap();
+    let family = Family::new(&spec).unwrap();
+    simulate(&[Cell::only(spec.clone(), family)], Precision::F64, &mut backend, 0, &mut recorder).unwrap();
 
     let read = |row: &Row, names: &[&str]| -> Vec<Option<u64>> {
         names.iter().map(|name| (!row[*name].is_empty()).then(|| number(row, name).to_bits())).collect()

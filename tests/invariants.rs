@@ -11,7 +11,7 @@ use curvelax::{
     backend::{self, choose::MAX_POINTS_F32},
     curve::{BaseCurve, Sampling, Shape, polygon},
     ensemble::{
-        Ended, Family, Outcome, Sink, Spec, Status,
+        Cell, Ended, Family, Outcome, Sink, Spec, Status,
         spec::{BackendChoice, Precision, Pull, Solver, SolverChoice, Sor},
     },
     flow::Flow,
@@ -48,7 +48,7 @@ fn relaxed(spec: &Spec, curve: impl Fn(f64) -> DVec2 + Send + Sync + 'static) ->
     let precision = choice.precision();
     let (mut backend, _) = choice.open(&spec, spec.points).unwrap();
     let mut last = Last(None);
-    simulate(&spec, &family, precision, backend.as_mut(), 1, &mut last).unwrap();
+    simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 1, &mut last).unwrap();
     let ended = last.0.unwrap();
     let status = ended.outcome.status;
     assert!(matches!(status, Status::Relaxed | Status::Unfinished), "{status:?}");

@@ -11,7 +11,7 @@ use curvelax::{
     backend,
     curve::{BaseCurve, Outline, Sampling, crossing, polygon},
     ensemble::{
-        Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
+        Cell, Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
         spec::{BackendChoice, Precision, Pull, SolverChoice, Sor},
     },
     flow::Flow,
@@ -61,7 +61,7 @@ fn run_of(spec: &Spec, curve: BaseCurve) -> Vec<Ended> {
     let precision = choice.precision();
     let (mut backend, _) = choice.open(&spec, family.points()).unwrap();
     let mut all = All::default();
-    simulate(&spec, &family, precision, backend.as_mut(), usize::MAX, &mut all).unwrap();
+    simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), usize::MAX, &mut all).unwrap();
     all.0
 }
 
@@ -81,7 +81,7 @@ fn file(corners: &[DVec2]) -> BaseCurve {
 /// Runs a member to its end by hand, so that its last state can be looked at, also where the program refuses its n.
 fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let n = member.nodes.len();
-    let outputs = outputs(spec.t_end, spec.series, &spec.snapshots);
+    let outputs = outputs(spec.t_end, spec.series, &spec.snapshots, 0);
     let mut trajectory = Trajectory::new(member, spec, T::PRECISION, &outputs);
     let mut run = trajectory.launch().convert::<T>();
     let mut work = evolve::Team::new(Blocks::new(n).unwrap());

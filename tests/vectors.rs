@@ -9,7 +9,7 @@ use curvelax::{
         Backend,
         cpu::{CpuBackend, Vectorised, Vectors},
     },
-    ensemble::{Ended, Family, Spec, Status, spec::Solver},
+    ensemble::{Cell, Ended, Family, Spec, Status, spec::Solver},
     scheme::{
         Parameters, State,
         evolve::Run,
@@ -70,7 +70,8 @@ fn run<T: Vectorised>(spec: &Spec, vectors: Vectors, threads: usize, slots: usiz
     let backend = CpuBackend::<T>::with_vectors(blocks, method, threads, vectors).unwrap();
     let mut all = All::default();
     let family = Family::new(spec).unwrap();
-    simulate(spec, &family, T::PRECISION, &mut Fewer(Box::new(backend), slots), 2, &mut all).unwrap();
+    simulate(&[Cell::only(spec.clone(), family)], T::PRECISION, &mut Fewer(Box::new(backend), slots), 2, &mut all)
+        .unwrap();
     all.0
 }
 

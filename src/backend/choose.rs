@@ -178,16 +178,21 @@ impl Choice {
 
     /// The spec with everything that this choice settled written out, so that it can be repeated as it is.
     pub fn settle(&self, spec: &mut Spec) {
-        spec.backend = if self.gpu.is_some() { BackendChoice::Gpu } else { BackendChoice::Cpu };
-        spec.adapter = self.gpu.as_ref().map(|gpu| gpu.name().to_string());
+        self.settle_place(spec);
         if spec.solver().sweeps() {
             spec.tolerance = Some(spec.tolerance_at(self.precision));
         }
-        spec.precision = Some(self.precision);
         spec.solver = spec.solver().into();
     }
 
-    /// Opens it for `members` members of `n` nodes.
+    /// Writes into a spec with cells what they all have in common: where they are computed.
+    pub fn settle_place(&self, spec: &mut Spec) {
+        spec.backend = if self.gpu.is_some() { BackendChoice::Gpu } else { BackendChoice::Cpu };
+        spec.adapter = self.gpu.as_ref().map(|gpu| gpu.name().to_string());
+        spec.precision = Some(self.precision);
+    }
+
+    /// Opens it for the members of `spec`, of `n` nodes.
     pub fn open(self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         match self.precision {
             Precision::F32 => self.open_in::<f32>(spec, n),

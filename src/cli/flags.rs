@@ -11,6 +11,7 @@ use crate::{
     ensemble::{
         Spec,
         spec::{BackendChoice, Order, Precision, Pull, SolverChoice, Sor},
+        sweep::Axis,
     },
     flow::Flow,
 };
@@ -68,6 +69,16 @@ pub struct SpecFlags {
     /// Power p: mode m has standard deviation σ m^-p [default: 1]
     #[arg(long, value_name = "P", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE)]
     decay: Option<f64>,
+    /// Run a cell for each value of this key, and for each combination where several are swept; semicolons stand between
+    /// values that have commas: --sweep 'shape=ellipse:2,1;circle:1' [default: none]
+    #[arg(long, value_name = "KEY=V1,V2,...", value_parser = text_of::<Axis>, help_heading = ENSEMBLE)]
+    sweep: Vec<Axis>,
+    /// Draw member j of every cell from the same random numbers [default: false]
+    #[arg(
+        long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        hide_possible_values = true, help_heading = ENSEMBLE
+    )]
+    common_random_numbers: Option<bool>,
     /// Run only these members, bit for bit as in the whole ensemble [default: all]
     #[arg(
         long, value_name = "J1,J2,...", value_delimiter = ',', value_parser = whole::<u64>,
@@ -192,7 +203,8 @@ pub const OUTPUT: &str = "Output";
 
 impl SpecFlags {
     /// Replaces in `spec` what was given as a flag.
-    pub fn overlay(self, spec: &mut Spec) {
+    pub fn overlay(mut self, spec: &mut Spec) {
+        std::mem::take(&mut self.sweep).into_iter().for_each(|axis| spec.sweep.set(axis));
         // A flag wins over the file: also over the key that it stands instead of.
         if self.tau.is_some() || self.adaptive.is_some() {
             (spec.tau, spec.adaptive) = (None, None);
@@ -203,14 +215,14 @@ impl SpecFlags {
         macro_rules! replace {
             ($($key:ident)*; $($optional:ident)*) => {{
                 // Names every field, so that a flag cannot be forgotten here.
-                let SpecFlags { $($key,)* $($optional,)* } = self;
+                let SpecFlags { sweep: _, $($key,)* $($optional,)* } = self;
                 $(if let Some(value) = $key { spec.$key = value; })*
                 $(if $optional.is_some() { spec.$optional = $optional; })*
             }};
         }
         replace! {
             curves points seed shape sampling amplitude modes decay flow t_end omega no_redistribution pull solver
-            order sor max_sweeps backend stop_when_relaxed snapshots;
+            order sor max_sweeps backend stop_when_relaxed snapshots common_random_numbers;
             tau adaptive relax_to relax_at only tolerance adapter precision series threads
         }
     }
@@ -290,7 +302,7 @@ mod tests {
              --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --pull 3 --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \
-             --series 0.1 --snapshots 0,1 --only 1,2 --threads 2"
+             --series 0.1 --snapshots 0,1 --only 1,2 --threads 2 --common-random-numbers --sweep phase=1,2"
                 .split_whitespace()
                 .collect::<Vec<_>>()
                 .as_slice(),
@@ -300,7 +312,8 @@ mod tests {
         let kept: Vec<&str> = given.lines().filter(|line| default.contains(line)).collect();
         assert_eq!(kept, [""; 0]);
         // Either of the two that stand for one another.
-        assert_eq!(given.lines().count(), Spec::keys().len() - 2);
+        assert_eq!(given.lines().filter(|line| line.contains(" = ")).count(), Spec::keys().len() - 2);
+        assert!(given.ends_with("[sweep]\nphase = [1, 2]\n"), "{given}");
     }
 
     #[test]

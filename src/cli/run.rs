@@ -1,11 +1,11 @@
 //! `curvelax run`: arguments → spec → members → files.
 
-use std::path::PathBuf;
+use std::{ops::Range, path::PathBuf};
 
 use super::{flags, note, print};
 use crate::{
     backend,
-    ensemble::{Family, Spec},
+    ensemble::{Cell, Spec, study},
     error::{Error, Result},
     report::{OutputFolder, Report, gallery::MOST_PANELS},
     simulate::simulate,
@@ -49,12 +49,22 @@ pub struct RunArgs {
 /// Runs the command.
 pub fn run(args: RunArgs) -> Result<()> {
     let mut spec = resolve(args.spec, args.flags)?;
-    let family = Family::new(&spec)?;
-    // A file's own points are a number that no check has seen.
-    spec.points = family.points();
-    spec = spec.validate()?;
-    let choice = backend::choose(&spec, spec.points)?;
-    choice.settle(&mut spec);
+    let mut cells = study::cells(&spec)?;
+    let companies = study::companies(&cells);
+    let choices = companies
+        .iter()
+        .map(|range| {
+            let company = &mut cells[range.clone()];
+            let choice = backend::choose(&company[0].spec, company[0].spec.points)?;
+            company.iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
+            Ok(choice)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    if spec.sweep.is_empty() {
+        spec = Spec { only: spec.only, ..cells[0].spec.clone() };
+    } else {
+        choices[0].settle_place(&mut spec);
+    }
     if args.print_spec {
         return print(&spec.to_toml()?);
     }
@@ -65,15 +75,13 @@ pub fn run(args: RunArgs) -> Result<()> {
         }
     };
     let folder = OutputFolder::open(&out, args.force)?;
-    say(&choice.sentence(&spec));
-    family.warnings().iter().for_each(|warning| say(&format!("warning: {warning}")));
-    let precision = choice.precision();
-    let (mut backend, platform) = choice.open(&spec, spec.points)?;
+    let early = warnings(&cells);
+    early.iter().for_each(|warning| say(&format!("warning: {warning}")));
     let mut report = Report::begin(folder, &spec, args.quiet)?;
     let rows = report.kept_rows();
-    let done = simulate(&spec, &family, precision, backend.as_mut(), MOST_PANELS, &mut report).and_then(|()| {
+    let done = advance(&cells, companies, choices, &mut report, &say).and_then(|platform| {
         let late = report.warnings();
-        let warnings = [family.warnings(), &late].concat();
+        let warnings = [&early[..], &late].concat();
         Ok((report.finish(&spec, &platform, &warnings)?, late))
     });
     if done.is_err() && rows.exists() {
@@ -82,6 +90,38 @@ pub fn run(args: RunArgs) -> Result<()> {
     let (overview, late) = done?;
     late.iter().for_each(|warning| say(&format!("warning: {warning}")));
     if args.quiet { Ok(()) } else { print(&overview) }
+}
+
+/// Runs one company of cells after another; returns where the first one ran.
+fn advance(
+    cells: &[Cell],
+    companies: Vec<Range<usize>>,
+    choices: Vec<backend::Choice>,
+    report: &mut Report,
+    say: &dyn Fn(&str),
+) -> Result<backend::Platform> {
+    let mut first = None;
+    for (range, choice) in companies.into_iter().zip(choices) {
+        let company = &cells[range];
+        let precision = choice.precision();
+        say(&choice.sentence(&company[0].spec));
+        let curves = company.iter().map(|cell| cell.spec.member_count()).sum();
+        let whole = Spec { curves, only: None, ..company[0].spec.clone() };
+        let (mut backend, platform) = choice.open(&whole, whole.points)?;
+        first.get_or_insert(platform);
+        let portraits = (MOST_PANELS * company.len()).div_ceil(cells.len());
+        report.next_company();
+        simulate(company, precision, backend.as_mut(), portraits, report)?;
+    }
+    first.ok_or_else(|| Error::Failed("a study has no cell".into()))
+}
+
+/// What the user should know about the curves of all cells, each sentence once.
+fn warnings(cells: &[Cell]) -> Vec<String> {
+    let mut all: Vec<String> = cells.iter().flat_map(|cell| cell.family.warnings().iter().cloned()).collect();
+    all.sort();
+    all.dedup();
+    all
 }
 
 /// The spec file, overlaid with the flags, checked.

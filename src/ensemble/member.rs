@@ -28,6 +28,8 @@ const NO_EXCESS: &str = "the loops of a lemniscate cancel: its area is next to n
 pub struct Member {
     /// Index of the member, from 0.
     pub index: u64,
+    /// Index of its cell in a study, from 0.
+    pub cell: u64,
     /// Nodes relative to `origin`, counter-clockwise, i = 1…n at index i-1.
     pub nodes: Vec<DVec2>,
     /// Area centroid of the nodes in the user's frame, subtracted so that f32 keeps its digits.
@@ -106,7 +108,7 @@ impl Family {
         }
         let origin = polygon::area_centroid(&nodes);
         nodes.iter_mut().for_each(|node| *node -= origin);
-        Ok(Member { index, nodes, origin, mollified })
+        Ok(Member { index, cell: 0, nodes, origin, mollified })
     }
 
     /// The first draw of member `index` that keeps the radius positive.

@@ -6,9 +6,12 @@ pub mod mollifier;
 pub mod outcome;
 pub mod random;
 pub mod spec;
+pub mod study;
+pub mod sweep;
 mod validate;
 
 pub use member::{Family, Member};
 pub use mollifier::Mollified;
 pub use outcome::{Ended, Observables, Outcome, Portrait, SeriesRow, Sink, Snapshot, Status};
 pub use spec::Spec;
+pub use study::Cell;

@@ -51,6 +51,8 @@ impl Observables {
 pub struct Outcome {
     /// Index of the member, from 0.
     pub member: u64,
+    /// Index of its cell, from 0.
+    pub cell: u64,
     /// How it ended.
     pub status: Status,
     /// Time of its last accepted state.
@@ -108,6 +110,8 @@ pub struct Snapshot {
 pub struct Portrait {
     /// At the start.
     pub before: Vec<DVec2>,
+    /// At some times on its way.
+    pub frames: Vec<(f64, Vec<DVec2>)>,
     /// In the last accepted state.
     pub after: Vec<DVec2>,
 }

@@ -49,10 +49,14 @@ impl Stream {
         Stream { key: [seed as u32, (seed >> 32) as u32], index, attempt }
     }
 
-    /// Two independent uniforms in the open interval (0, 1).
+    /// Four independent words of random bits.
+    pub fn words(&self, draw: u32) -> [u32; 4] {
+        philox([draw, self.attempt, self.index as u32, (self.index >> 32) as u32], self.key)
+    }
+
+    /// Two independent uniforms in the open interval (0, 1), made of the words of the same draw.
     pub fn uniforms(&self, draw: u32) -> [f64; 2] {
-        let counter = [draw, self.attempt, self.index as u32, (self.index >> 32) as u32];
-        let [a, b, c, d] = philox(counter, self.key);
+        let [a, b, c, d] = self.words(draw);
         [open_uniform(a, b), open_uniform(c, d)]
     }
 

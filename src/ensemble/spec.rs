@@ -7,6 +7,7 @@ use std::{fmt, marker::PhantomData, path::Path, str::FromStr};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
+use super::sweep::Sweep;
 use crate::{
     curve::{Modes, Sampling, Shape},
     error::{Error, Result, did_you_mean},
@@ -160,6 +161,12 @@ pub struct Spec {
     /// Threads of the CPU back end; all cores if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threads: Option<usize>,
+    /// Member j of every cell is drawn from the same random numbers.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub common_random_numbers: bool,
+    /// Keys that vary from cell to cell.
+    #[serde(skip_serializing_if = "Sweep::is_empty")]
+    pub sweep: Sweep,
 }
 
 /// The paper's time step.
@@ -202,6 +209,8 @@ impl Default for Spec {
             snapshots: Vec::new(),
             only: None,
             threads: None,
+            common_random_numbers: false,
+            sweep: Sweep::default(),
         }
     }
 }
@@ -428,7 +437,7 @@ mod tests {
         let written: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
         assert!(written.keys().all(|key| keys.contains(key)));
         let optional = ["tau", "adaptive", "relax-to", "relax-at", "tolerance", "adapter", "precision", "series"];
-        let optional = [&optional[..], &["only", "threads"]].concat();
+        let optional = [&optional[..], &["only", "threads", "common-random-numbers", "sweep"]].concat();
         for key in &optional {
             assert!(keys.iter().any(|known| known == key), "{key}");
         }

@@ -28,6 +28,7 @@ const MOST_THREADS: usize = 1024;
 impl Spec {
     /// Checks every range and combination and returns the spec with its lists sorted and free of repetitions.
     pub fn validate(mut self) -> Result<Spec> {
+        self.sweep.check()?;
         self.check_counts()?;
         self.check_times()?;
         self.check_method()?;
@@ -50,6 +51,11 @@ impl Spec {
     }
 
     fn check_counts(&self) -> Result<()> {
+        let members = self.curves.saturating_mul(self.sweep.cells());
+        if self.curves > 0 && self.curves <= MOST_CURVES && members > MOST_CURVES {
+            let problem = format!("{} cells make {members} members, too many", self.sweep.cells());
+            return Err(Error::value("curves", self.curves, &problem, &format!("at most {MOST_CURVES} in all")));
+        }
         if !(1..=MOST_CURVES).contains(&self.curves) {
             let problem = if self.curves == 0 { "an ensemble needs a member" } else { "too many members" };
             return Err(Error::value("curves", self.curves, problem, &format!("take 1 to {MOST_CURVES}")));
@@ -275,9 +281,10 @@ impl Spec {
         if only.is_empty() {
             return Err(Error::value("only", "[]", "no member to run", "name at least one, or leave the key out"));
         }
-        if let Some(member) = only.iter().find(|member| **member >= self.curves) {
-            let problem = format!("no such member among {}", self.curves);
-            return Err(Error::value("only", member, &problem, &format!("take members from 0 to {}", self.curves - 1)));
+        let members = self.curves * self.sweep.cells();
+        if let Some(member) = only.iter().find(|member| **member >= members) {
+            let problem = format!("no such member among {members}");
+            return Err(Error::value("only", member, &problem, &format!("take members from 0 to {}", members - 1)));
         }
         only.sort_unstable();
         only.dedup();

@@ -23,22 +23,14 @@ pub(crate) trait Instructions: Simd {
     fn token() -> Self;
 }
 
-macro_rules! aligned {
-    ($($name:ident $bytes:literal),*) => {
+macro_rules! instructions {
+    ($($type:ty: $aligned:ident $bytes:literal),*) => {
         $(
             #[doc = concat!("Aligned to ", $bytes, " bytes.")]
             #[derive(Clone, Copy)]
             #[repr(align($bytes))]
-            pub(crate) struct $name;
-        )*
-    };
-}
+            pub(crate) struct $aligned;
 
-aligned!(To16 16, To32 32, To64 64);
-
-macro_rules! instructions {
-    ($($type:ty: $aligned:ty),*) => {
-        $(
             impl Instructions for $type {
                 type Aligned = $aligned;
                 #[inline(always)]
@@ -56,9 +48,9 @@ macro_rules! instructions {
 }
 
 #[cfg(target_arch = "x86_64")]
-instructions!(pulp::x86::V2: To16, pulp::x86::V3: To32, pulp::x86::V4: To64);
+instructions!(pulp::x86::V2: To16 16, pulp::x86::V3: To32 32, pulp::x86::V4: To64 64);
 #[cfg(target_arch = "aarch64")]
-instructions!(pulp::aarch64::Neon: To16);
+instructions!(pulp::aarch64::Neon: To16 16);
 
 /// A number that fits into the lanes of `S`.
 pub(crate) trait Element<S: Simd>: Real {

@@ -17,13 +17,27 @@ pub const SERIES: &str = "series.csv";
 pub const SNAPSHOTS: &str = "snapshots.csv";
 /// Errors and orders against exact solutions.
 pub const CONVERGENCE: &str = "convergence.csv";
+/// Statistics by cell.
+pub const ENSEMBLE: &str = "ensemble.csv";
 /// How the run was made.
 pub const RUN: &str = "run.json";
 /// The first members before and after.
 pub const CURVES: &str = "plots/curves.svg";
 
+/// Distribution of the relaxation times.
+pub const RELAXATION: &str = "plots/relaxation.svg";
+/// Kaplan-Meier curves.
+pub const SURVIVAL: &str = "plots/survival.svg";
+/// Relaxation times against a swept key.
+pub const DEPENDENCE: &str = "plots/dependence.svg";
+/// Spacing of nodes and metric drift.
+pub const MESH: &str = "plots/mesh.svg";
+/// Everything at a glance.
+pub const REPORT: &str = "report.html";
+
 /// All files that a command may write, the one that vouches for the others first.
-const OWN: [&str; 6] = [RUN, SUMMARY, SERIES, SNAPSHOTS, CURVES, CONVERGENCE];
+const OWN: [&str; 12] =
+    [RUN, SUMMARY, ENSEMBLE, SERIES, SNAPSHOTS, CURVES, RELAXATION, SURVIVAL, DEPENDENCE, MESH, REPORT, CONVERGENCE];
 
 /// The folder of the plots, the only one below that of the run.
 const PLOTS: &str = "plots";

@@ -6,6 +6,7 @@
 pub mod axis;
 pub mod chart;
 pub mod charts;
+pub mod ensemble;
 pub mod folder;
 pub mod gallery;
 pub mod overview;
@@ -13,6 +14,7 @@ pub mod page;
 pub mod plot;
 pub mod progress;
 pub mod provenance;
+pub mod study;
 pub mod style;
 pub mod svg;
 pub mod tables;
@@ -25,6 +27,7 @@ use std::{
     time::{Instant, SystemTime},
 };
 
+pub use ensemble::EnsembleStatistics;
 pub use folder::OutputFolder;
 pub use gallery::Panel;
 
@@ -34,8 +37,12 @@ use crate::{
     error::Result,
 };
 use progress::Progress;
+use study::Study;
 use tables::{SeriesTable, SnapshotTable, SummaryTable};
 use tally::Tally;
+
+/// How the overview names the pictures.
+const PLOTS: &str = "plots/*.svg";
 
 /// Everything that is written about one run.
 // The tables come before the folder: dropped first, they leave it empty for its own clean-up.
@@ -46,6 +53,11 @@ pub struct Report {
     folder: OutputFolder,
     tally: Tally,
     panels: Vec<Panel>,
+    /// The same members on their way.
+    watched: Vec<page::Trajectory>,
+    /// Members of the whole study, and those of earlier simulations.
+    total: u64,
+    before: u64,
     progress: Progress,
     started: SystemTime,
     clock: Instant,
@@ -55,6 +67,8 @@ impl Report {
     /// Opens the tables that `spec` asks for.
     pub fn begin(folder: OutputFolder, spec: &Spec, quiet: bool) -> Result<Report> {
         Ok(Report {
+            total: spec.only.as_ref().map_or(spec.curves * spec.sweep.cells(), |only| only.len() as u64),
+            before: 0,
             summary: SummaryTable::begin(folder.file(folder::SUMMARY)?)?,
             series: spec.series.map(|_| SeriesTable::begin(folder.file(folder::SERIES)?)).transpose()?,
             snapshots: match spec.snapshots.is_empty() {
@@ -64,10 +78,16 @@ impl Report {
             folder,
             tally: Tally::default(),
             panels: Vec::new(),
+            watched: Vec::new(),
             progress: Progress::new(quiet),
             started: SystemTime::now(),
             clock: Instant::now(),
         })
+    }
+
+    /// The members that come now are simulated by themselves; those before have all ended.
+    pub fn next_company(&mut self) {
+        self.before = self.tally.members();
     }
 
     /// Where the rows of the members that ended lie until the report is finished. If the file is there when the report
@@ -84,7 +104,7 @@ impl Report {
     /// Puts every file under its final name, once all are on disk, and returns the overview for stdout.
     pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String]) -> Result<String> {
         // In reverse order they are dropped: the folder last, after its files.
-        let Report { folder, tally, panels, progress, started, clock, summary, series, snapshots } = self;
+        let Report { folder, tally, panels, watched, progress, started, clock, summary, series, snapshots, .. } = self;
         progress.finish();
         let wall = clock.elapsed();
         let mut names = vec![folder::SUMMARY];
@@ -97,15 +117,29 @@ impl Report {
             files.push(snapshots.ready()?);
             names.push(folder::SNAPSHOTS);
         }
-        if !panels.is_empty() {
-            files.push(folder.write(folder::CURVES, &gallery::draw(&panels))?);
-            names.push(folder::CURVES);
+        let statistics = &EnsembleStatistics::new(spec, &tally)?;
+        files.push(folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?);
+        names.insert(1, folder::ENSEMBLE);
+        let gallery = (!panels.is_empty()).then(|| gallery::draw(&panels));
+        let study = Study { spec, platform, tally: &tally, statistics, warnings, started, wall };
+        let charts = study.charts();
+        let page = study.page(&charts, gallery.as_deref(), &watched)?;
+        for (name, text) in charts.iter().map(|chart| (chart.name, &chart.figure.svg)).chain([(folder::REPORT, &page)])
+        {
+            files.push(folder.write(name, text)?);
         }
+        names.push(folder::REPORT);
+        if let Some(gallery) = gallery {
+            files.push(folder.write(folder::CURVES, &gallery)?);
+        }
+        names.push(PLOTS);
         let provenance = provenance::Provenance::new(spec, platform, &tally, warnings, started, wall);
         let run = folder.write(folder::RUN, &provenance.to_json()?)?;
         names.push(folder::RUN);
         folder.publish(files, run)?;
-        Ok(overview::Overview { spec, platform, tally: &tally, wall, folder: folder.path(), files: &names }.to_string())
+        let (tally, folder) = (&tally, folder.path());
+        let overview = overview::Overview { spec, platform, tally, statistics, wall, folder, files: &names };
+        Ok(overview.to_string())
     }
 }
 
@@ -121,15 +155,17 @@ impl Sink for Report {
         self.summary.row(outcome)?;
         self.tally.add(outcome);
         self.tally.add_aside(mollified, *unresolved);
-        if let Some(Portrait { before, after }) = portrait.clone() {
+        if let Some(Portrait { before, frames, after }) = portrait.clone() {
             let Outcome { member, status, t_relax, .. } = *outcome;
+            self.watched.push(study::trajectory(outcome, &before, frames, &after));
             self.panels.push(Panel { member, status, t_relax, before, after });
         }
         Ok(())
     }
 
     fn progress(&mut self, done: u64, total: u64, share: f64) {
-        self.progress.show(done, total, share);
+        let share = (self.before as f64 + share * total as f64) / self.total.max(1) as f64;
+        self.progress.show(self.before + done, self.total, share);
     }
 }
 
@@ -174,20 +210,23 @@ mod tests {
         let out = home.path().join("out");
         let platform = provenance::tests::platform();
         let triangle = vec![DVec2::ZERO, DVec2::X, DVec2::Y];
-        let portrait = Portrait { before: triangle.clone(), after: triangle };
+        let portrait = Portrait { before: triangle.clone(), frames: Vec::new(), after: triangle };
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
         let overview = report(&out, &all, Some(portrait)).finish(&all, &platform, &[]).unwrap();
-        assert_eq!(files(&out), ["plots", "run.json", "series.csv", "snapshots.csv", "summary.csv"]);
+        assert_eq!(files(&out), ["ensemble.csv", "plots", "run.json", "series.csv", "snapshots.csv", "summary.csv"]);
         assert_eq!(files(&out.join("plots")), ["curves.svg"]);
         for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");
         }
-        assert!(overview.contains("summary.csv, series.csv, snapshots.csv, plots/curves.svg, run.json"), "{overview}");
+        assert!(
+            overview.contains("summary.csv, ensemble.csv, series.csv, snapshots.csv, plots/curves.svg, run.json"),
+            "{overview}"
+        );
 
         let few = Spec::default();
         report(&out, &few, None).finish(&few, &platform, &["a warning".into()]).unwrap();
-        assert_eq!(files(&out), ["plots", "run.json", "summary.csv"]);
+        assert_eq!(files(&out), ["ensemble.csv", "plots", "run.json", "summary.csv"]);
         assert_eq!(files(&out.join("plots")), [""; 0]);
         assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
     }

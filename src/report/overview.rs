@@ -3,13 +3,19 @@
 use std::{fmt, path::Path, time::Duration};
 
 use super::{
+    ensemble::{CellStatistics, EnsembleStatistics},
+    folder::ENSEMBLE,
     progress::duration,
     tally::{MollifiedMembers, Tally},
 };
 use crate::{
     backend::Platform,
     ensemble::{Spec, spec::Pace},
+    statistics::{Interval, LogRank, PowerLaw},
 };
+
+/// Cells at most of which there is a line; the table has them all.
+const MOST_CELLS: usize = 40;
 
 /// A finished run at a glance; its `Display` is the text for stdout.
 pub struct Overview<'a> {
@@ -19,6 +25,8 @@ pub struct Overview<'a> {
     pub platform: &'a Platform,
     /// What came out.
     pub tally: &'a Tally,
+    /// Statistics of the relaxation times.
+    pub statistics: &'a EnsembleStatistics,
     /// How long it took.
     pub wall: Duration,
     /// The output folder.
@@ -31,12 +39,13 @@ impl fmt::Display for Overview<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         self.statuses(f)?;
         writeln!(f)?;
+        self.cells(f)?;
         for (label, text) in [
-            ("ensemble", self.ensemble()),
+            ("ensemble", describe(self.spec)),
             ("corners", self.corners()),
             ("t_relax", self.relaxation()),
             ("work", self.work()),
-            ("ran on", self.machine()),
+            ("ran on", machine(self.platform)),
             ("wall time", duration(self.wall.as_secs_f64())),
             ("results", format!("{}: {}", self.folder.display(), self.files.join(", "))),
         ] {
@@ -62,16 +71,6 @@ impl Overview<'_> {
         writeln!(f, "{:<11}{members:>10}", "all")
     }
 
-    fn ensemble(&self) -> String {
-        let Spec { flow, points, t_end, seed, .. } = self.spec;
-        let pace = match self.spec.pace() {
-            Pace::Fixed(tau) => format!("tau = {tau:?}"),
-            Pace::Adaptive(tolerance) => format!("adaptive {tolerance:?}"),
-        };
-        let shape = String::from(self.spec.shape.clone());
-        format!("{shape}, {flow}, n = {points}, {pace}, t-end = {t_end}, seed {seed}")
-    }
-
     /// What was done to outlines whose corners the nodes do not resolve; empty where nothing was.
     fn corners(&self) -> String {
         let MollifiedMembers { members, most_rounds, largest_area_change, .. } = self.tally.mollified;
@@ -83,19 +82,44 @@ impl Overview<'_> {
     }
 
     fn relaxation(&self) -> String {
-        let members = self.tally.members();
-        match self.tally.relaxation() {
-            None => format!("none of {members} members reached it"),
-            Some(relaxed) => {
-                let (count, censored) = (relaxed.count, members.saturating_sub(relaxed.count));
-                let others = match censored {
-                    0 => String::new(),
-                    _ => format!("; {censored} censored, so both are biased low"),
-                };
-                let (mean, median) = (significant(relaxed.mean), significant(relaxed.median));
-                format!("mean {mean}, median {median} over {count} members that reached it{others}")
-            }
+        match &self.statistics.cells[..] {
+            [cell] => times(cell),
+            _ => String::new(),
         }
+    }
+
+    /// One line a cell of a study, and how they compare.
+    fn cells(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let EnsembleStatistics { cells, log_rank, power_law } = self.statistics;
+        if cells.len() < 2 {
+            return Ok(());
+        }
+        for cell in cells.iter().take(MOST_CELLS) {
+            writeln!(f, "{:<11}{}: t_relax {}", cell.cell, self.spec.sweep.name(cell.cell), times(cell))?;
+        }
+        if cells.len() > MOST_CELLS {
+            writeln!(f, "{:<11}{} more cells are in {ENSEMBLE}", "...", cells.len() - MOST_CELLS)?;
+        }
+        if let Some(LogRank { statistic, degrees_of_freedom, p_value, .. }) = log_rank {
+            let p = significant(*p_value);
+            let chi = significant(*statistic);
+            writeln!(
+                f,
+                "{:<11}log-rank test that all cells have one distribution: p = {p}, chi2 = {chi} ({degrees_of_freedom})",
+                "cells"
+            )?;
+        }
+        if let (Some(PowerLaw { exponent, exponent_error, .. }), [axis]) = (power_law, self.spec.sweep.axes()) {
+            let error = exponent_error.map_or(String::new(), |error| format!(" +- {}", significant(error)));
+            writeln!(
+                f,
+                "{:<11}median t_relax goes with {} to the power {}{error}",
+                "law",
+                axis.key,
+                significant(*exponent)
+            )?;
+        }
+        writeln!(f)
     }
 
     fn work(&self) -> String {
@@ -115,14 +139,49 @@ impl Overview<'_> {
             ),
         }
     }
+}
 
-    fn machine(&self) -> String {
-        let Platform { backend, adapter, precision, reason, threads, .. } = self.platform;
-        let adapter = adapter.as_ref().map_or(String::new(), |name| format!(" {name}"));
-        let threads = threads.map_or(String::new(), |count| format!(", {count} threads"));
-        let precision = format!("{precision:?}").to_lowercase();
-        format!("{backend}{adapter}, {precision}{threads} ({reason})")
-    }
+/// What was run, in a line.
+pub fn describe(spec: &Spec) -> String {
+    let Spec { flow, points, t_end, seed, .. } = spec;
+    let pace = match spec.pace() {
+        Pace::Fixed(tau) => format!("tau = {tau:?}"),
+        Pace::Adaptive(tolerance) => format!("adaptive {tolerance:?}"),
+    };
+    let shape = String::from(spec.shape.clone());
+    format!("{shape}, {flow}, n = {points}, {pace}, t-end = {t_end}, seed {seed}")
+}
+
+/// Where it was run, in a line.
+pub fn machine(platform: &Platform) -> String {
+    let Platform { backend, adapter, precision, reason, threads, .. } = platform;
+    let adapter = adapter.as_ref().map_or(String::new(), |name| format!(" {name}"));
+    let threads = threads.map_or(String::new(), |count| format!(", {count} threads"));
+    let precision = format!("{precision:?}").to_lowercase();
+    format!("{backend}{adapter}, {precision}{threads} ({reason})")
+}
+
+/// Median and mean of the times of a cell, and how far they are to be trusted.
+fn times(cell: &CellStatistics) -> String {
+    let (members, known) = (cell.members(), cell.survival.events() as u64);
+    let Some(mean) = cell.mean() else { return format!("none of {members} members reached it") };
+    let median = match (cell.survival.median(), cell.interval) {
+        (None, _) => "not reached by half of the members".to_string(),
+        (Some(median), Some(Interval { lower: Some(lower), upper: Some(upper), .. })) => {
+            format!("{} ({} to {})", significant(median), significant(lower), significant(upper))
+        }
+        (Some(median), _) => significant(median),
+    };
+    let error = mean.standard_error.map_or(String::new(), |error| format!(" +- {}", significant(error)));
+    let least = if mean.restricted_to.is_some() { "at least " } else { "" };
+    let censored = match members - known {
+        0 => String::new(),
+        censored => format!("; {censored} censored"),
+    };
+    format!(
+        "median {median}, mean {least}{}{error} over {known} members that reached it{censored}",
+        significant(mean.value)
+    )
 }
 
 /// Four significant digits; whole numbers from 1000 on in full.
@@ -150,7 +209,9 @@ mod tests {
         let (spec, platform) = (Spec::default(), platform());
         let wall = Duration::from_millis(12_345);
         let files = &[folder::SUMMARY, folder::RUN];
-        Overview { spec: &spec, platform: &platform, tally, wall, folder: Path::new("out"), files }.to_string()
+        let statistics = &EnsembleStatistics::new(&spec, tally).unwrap();
+        Overview { spec: &spec, platform: &platform, tally, statistics, wall, folder: Path::new("out"), files }
+            .to_string()
     }
 
     #[test]
@@ -168,7 +229,7 @@ stalled             1    25.0 %
 all                 4
 
 ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
-t_relax    mean 0.4000, median 0.4000 over 2 members that reached it; 2 censored, so both are biased low
+t_relax    median 0.5000, mean at least 1.200 +- 0.4016 over 2 members that reached it; 2 censored
 work       10 steps per member, sweeps 20 for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s

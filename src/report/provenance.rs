@@ -72,7 +72,7 @@ impl<'a> Provenance<'a> {
 }
 
 /// `time` in UTC to the second, for example `2026-11-05T09:08:07Z`.
-fn rfc3339(time: SystemTime) -> String {
+pub fn rfc3339(time: SystemTime) -> String {
     let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let (day, second) = (seconds / 86_400, seconds % 86_400);
     // Years begin in March here, so that the leap day is the last of its year (H. Hinnant, days_from_civil).

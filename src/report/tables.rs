@@ -108,7 +108,7 @@ impl SummaryTable {
         let Outcome { start, end, .. } = member;
         self.0.row(SummaryRow {
             member: member.member,
-            cell: 0,
+            cell: member.cell,
             status: member.status.name(),
             t_end: known(member.t_end),
             steps: member.steps,
@@ -215,6 +215,7 @@ mod tests {
     fn outcome(start: Observables, end: Observables) -> Outcome {
         Outcome {
             member: 3,
+            cell: 0,
             status: Status::Relaxed,
             t_end: 0.5,
             steps: 500,

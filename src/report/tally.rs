@@ -2,13 +2,17 @@
 
 use serde::Serialize;
 
-use crate::ensemble::{Mollified, Outcome, Status, mollifier::MAX_VERTEX_TURN};
+use crate::{
+    ensemble::{Mollified, Outcome, Status, mollifier::MAX_VERTEX_TURN},
+    statistics::Observation,
+};
 
 /// Counts and sums over the members that ended.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
     counts: [u64; Status::ALL.len()],
-    relaxation_times: Vec<f64>,
+    /// By cell.
+    pub cells: Vec<CellTally>,
     /// Steps of all members.
     pub steps: u64,
     /// Sweeps on curvature systems of all members.
@@ -23,8 +27,21 @@ pub struct Tally {
     unresolved: u64,
 }
 
+/// What the members of one cell came to.
+#[derive(Clone, Debug, Default)]
+pub struct CellTally {
+    /// Members by status, in the order of [`Status::ALL`].
+    pub counts: [u64; Status::ALL.len()],
+    /// When each relaxed, or until when it had not.
+    pub times: Vec<Observation>,
+    /// Those that have not relaxed, by status.
+    pub others: [u64; Status::ALL.len()],
+    /// Longest over shortest edge of each at its end, and its metric drift.
+    pub mesh: Vec<[f64; 2]>,
+}
+
 /// Metric drift above which the scheme's lengths are so far from the polygon's that times mean little.
-const DISTRUSTED_DRIFT: f64 = 0.1;
+pub const DISTRUSTED_DRIFT: f64 = 0.1;
 
 /// What rounding off corners did to the members (`ensemble/mollifier.rs`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -81,10 +98,18 @@ impl MollifiedMembers {
 impl Tally {
     /// Adds one member.
     pub fn add(&mut self, outcome: &Outcome) {
-        for (count, status) in self.counts.iter_mut().zip(Status::ALL) {
-            *count += u64::from(status == outcome.status);
+        let cell = outcome.cell as usize;
+        if self.cells.len() <= cell {
+            self.cells.resize_with(cell + 1, CellTally::default);
         }
-        self.relaxation_times.extend(outcome.t_relax);
+        let CellTally { counts, times, others, mesh } = &mut self.cells[cell];
+        mesh.push([outcome.end.mesh_ratio, outcome.end.metric_drift]);
+        times.push(Observation::new(outcome.t_relax, outcome.t_end));
+        for (counts, counted) in [(&mut self.counts, true), (counts, true), (others, outcome.t_relax.is_none())] {
+            for (count, status) in counts.iter_mut().zip(Status::ALL) {
+                *count += u64::from(counted && status == outcome.status);
+            }
+        }
         let drift = outcome.end.metric_drift;
         self.drifted.0 += u64::from(drift > DISTRUSTED_DRIFT);
         self.drifted.1 = self.drifted.1.max(drift);
@@ -137,30 +162,6 @@ impl Tally {
     pub fn counts(&self) -> impl Iterator<Item = (Status, u64)> {
         Status::ALL.into_iter().zip(self.counts)
     }
-
-    /// Relaxation time over the members that have one; none if no member has.
-    pub fn relaxation(&self) -> Option<Relaxation> {
-        let mut times = self.relaxation_times.clone();
-        times.sort_by(f64::total_cmp);
-        let (count, half) = (times.len(), times.len() / 2);
-        let median = match count % 2 {
-            _ if count == 0 => return None,
-            0 => 0.5 * (times[half - 1] + times[half]),
-            _ => times[half],
-        };
-        Some(Relaxation { count: count as u64, mean: times.iter().sum::<f64>() / count as f64, median })
-    }
-}
-
-/// Relaxation time over the members that have one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Relaxation {
-    /// How many have.
-    pub count: u64,
-    /// Their mean.
-    pub mean: f64,
-    /// Their median.
-    pub median: f64,
 }
 
 #[cfg(test)]
@@ -172,6 +173,7 @@ pub(crate) mod tests {
         let (start, end) = (Observables::default(), Observables::default());
         Outcome {
             member,
+            cell: 0,
             status,
             t_end: 2.0,
             steps: 10,
@@ -199,13 +201,6 @@ pub(crate) mod tests {
         assert_eq!((tally.members(), tally.steps, tally.sweeps_k, tally.sweeps_x), (5, 50, 100, 25));
         let counts: Vec<u64> = tally.counts().map(|(_, count)| count).collect();
         assert_eq!(counts, [2, 3, 0, 0, 0]);
-    }
-
-    #[test]
-    fn the_median_takes_the_middle_whatever_the_order() {
-        assert_eq!(tally(&[], 2).relaxation(), None);
-        assert_eq!(tally(&[9.0, 1.0, 2.0], 1).relaxation(), Some(Relaxation { count: 3, mean: 4.0, median: 2.0 }));
-        assert_eq!(tally(&[9.0, 1.0, 2.0, 4.0], 0).relaxation().unwrap().median, 3.0);
     }
 
     #[test]

@@ -253,7 +253,12 @@ impl<N: Number> Team<N> {
         let exact = error.le(self.parameters.adaptive);
         let finite = seen.is_finite();
         let singular = seen.is_singular(self.turning, &self.parameters, n);
-        let at_threshold = excess.le(self.parameters.relax_at).and(live);
+        // The gap costs a fifth of a direct step, and is asked for once.
+        let mut waiting = N::Mask::all_of(false);
+        for (lane, run) in runs.iter().enumerate() {
+            waiting.set_lane(lane, run.counters.relax_step == NEVER);
+        }
+        let at_threshold = excess.le(self.parameters.relax_at).and(live).and(waiting);
         let gap = if at_threshold.any() { observe::gap(&self.work.new) } else { N::of(0.0) };
         let mut kept = N::Mask::all_of(false);
         let mut start = Start::after_fixed();

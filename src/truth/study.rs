@@ -4,7 +4,7 @@ use super::Problem;
 use crate::{
     backend,
     ensemble::{
-        Ended, Family, Outcome, Sink, Spec, Status,
+        Cell, Ended, Family, Outcome, Sink, Spec, Status,
         spec::{Precision, Solver},
     },
     error::{Error, Result},
@@ -68,7 +68,7 @@ impl Problem {
         let family = Family::of(&spec, self.curve.resolve(precision))?;
         let (mut backend, _) = choice.open(&spec, at.n)?;
         let mut last = Last(None);
-        simulate(&spec, &family, precision, backend.as_mut(), 1, &mut last)?;
+        simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 1, &mut last)?;
         let Some(Ended { outcome, portrait: Some(nodes), .. }) = last.0 else {
             return Err(Error::Failed(format!("{}: the run left no nodes", self.name)));
         };

@@ -1,0 +1,295 @@
+//! Sweeps: the keys of a spec that vary from cell to cell of a study, and their values.
+//!
+//! The cells are the cross product of all values; the key named last changes fastest.
+
+use std::{fmt, str::FromStr};
+
+use serde::{
+    Deserialize, Deserializer, Serialize, Serializer,
+    de::{MapAccess, Visitor},
+    ser::SerializeMap,
+};
+use toml::{Table, Value};
+
+use super::Spec;
+use crate::error::{Error, Result, did_you_mean};
+
+/// Keys that all members of a run have in common.
+const COMMON: [&str; 12] = [
+    "curves",
+    "backend",
+    "adapter",
+    "precision",
+    "threads",
+    "series",
+    "snapshots",
+    "only",
+    "sweep",
+    "common-random-numbers",
+    "stop-when-relaxed",
+    "max-sweeps",
+];
+/// More cells than this are a slip of the keyboard.
+pub const MOST_CELLS: u64 = 10_000;
+
+/// The swept keys in order, each with its values.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sweep(Vec<Axis>);
+
+/// One key and the values that it takes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// A key of the spec.
+    pub key: String,
+    /// Its values: numbers, words or truths.
+    pub values: Vec<Value>,
+}
+
+impl Axis {
+    /// The values as they stand in tables.
+    pub fn labels(&self) -> Vec<String> {
+        self.values.iter().map(label).collect()
+    }
+
+    /// The values as numbers, if all are.
+    pub fn numbers(&self) -> Option<Vec<f64>> {
+        self.values.iter().map(|value| value.as_float().or_else(|| value.as_integer().map(|i| i as f64))).collect()
+    }
+}
+
+/// A value as it stands in tables and messages.
+fn label(value: &Value) -> String {
+    match value {
+        Value::String(word) => word.clone(),
+        Value::Float(number) => number.to_string(),
+        other => other.to_string(),
+    }
+}
+
+impl FromStr for Axis {
+    type Err = String;
+
+    /// `key=v1,v2`; where a value has commas itself, semicolons stand between the values.
+    fn from_str(text: &str) -> Result<Axis, String> {
+        let (key, values) = text.split_once('=').ok_or_else(|| format!("`{text}` has no `=`; write key=v1,v2,..."))?;
+        let separator = if values.contains(';') { ';' } else { ',' };
+        let value = |word: &str| {
+            let word = word.trim();
+            match (word.parse::<i64>(), word.parse::<f64>(), word.parse::<bool>()) {
+                (Ok(whole), ..) => Value::Integer(whole),
+                (_, Ok(real), _) => Value::Float(real),
+                (.., Ok(truth)) => Value::Boolean(truth),
+                _ => Value::String(word.to_string()),
+            }
+        };
+        let words = values.split(separator).filter(|word| !word.trim().is_empty());
+        Ok(Axis { key: key.trim().to_string(), values: words.map(value).collect() })
+    }
+}
+
+impl Sweep {
+    /// Whether nothing is swept.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The keys and their values, in order.
+    pub fn axes(&self) -> &[Axis] {
+        &self.0
+    }
+
+    /// Sets the values of a key: those of a flag stand instead of those of the file.
+    pub fn set(&mut self, axis: Axis) {
+        match self.0.iter_mut().find(|own| own.key == axis.key) {
+            Some(own) => *own = axis,
+            None => self.0.push(axis),
+        }
+    }
+
+    /// How many cells there are: 1 without a sweep.
+    pub fn cells(&self) -> u64 {
+        self.0.iter().map(|axis| axis.values.len() as u64).fold(1, u64::saturating_mul)
+    }
+
+    /// The value of every key in cell `index`, in the order of the keys.
+    pub fn values(&self, index: u64) -> Vec<&Value> {
+        let mut rest = index;
+        let mut values: Vec<&Value> = Vec::new();
+        for axis in self.0.iter().rev() {
+            let count = axis.values.len().max(1) as u64;
+            values.extend(axis.values.get((rest % count) as usize));
+            rest /= count;
+        }
+        values.reverse();
+        values
+    }
+
+    /// What the values of cell `index` are called, as `key = value`.
+    pub fn name(&self, index: u64) -> String {
+        let keys = self.0.iter().map(|axis| &axis.key);
+        let parts = keys.zip(self.values(index)).map(|(key, value)| format!("{key} = {}", label(value)));
+        parts.collect::<Vec<_>>().join(", ")
+    }
+
+    /// The values of cell `index` as they stand in tables.
+    pub fn labels(&self, index: u64) -> Vec<String> {
+        self.values(index).into_iter().map(label).collect()
+    }
+
+    /// Checks keys and numbers of values; whether the values themselves can be had is checked cell by cell.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a key that is unknown, cannot vary, or has no values, and for too many cells.
+    pub fn check(&self) -> Result<()> {
+        let keys = Spec::keys();
+        for (i, Axis { key, values }) in self.0.iter().enumerate() {
+            if !keys.contains(key) {
+                let hint = did_you_mean(key, keys.iter().map(String::as_str));
+                return Err(Error::Request(format!("--sweep {key}: no such key{hint}; see --print-spec for the keys")));
+            }
+            if COMMON.contains(&key.as_str()) {
+                let message = "all members of a run have it in common; run once for each value";
+                return Err(Error::Request(format!("--sweep {key}: {message}")));
+            }
+            if values.is_empty() {
+                return Err(Error::Request(format!("--sweep {key}: no values; write {key}=v1,v2,...")));
+            }
+            if let Some(value) = values.iter().find(|value| value.is_array() || value.is_table()) {
+                return Err(Error::Request(format!("--sweep {key}: {value} is no single value")));
+            }
+            if self.0[..i].iter().any(|before| before.key == *key) {
+                return Err(Error::Request(format!("--sweep {key}: named twice; put all its values behind one")));
+            }
+        }
+        match self.cells() {
+            0..=MOST_CELLS => Ok(()),
+            cells => {
+                Err(Error::value("sweep", format!("({cells} cells)"), "too many", &format!("at most {MOST_CELLS}")))
+            }
+        }
+    }
+
+    /// The spec of cell `index` of a study with this `base`, not yet validated.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a value that the key cannot have.
+    pub fn apply(&self, base: &Spec, index: u64) -> Result<Spec> {
+        let failed = |e: &dyn fmt::Display| Error::Failed(format!("cannot write the spec as TOML: {e}"));
+        let mut table = Table::try_from(Spec { sweep: Sweep::default(), ..base.clone() }).map_err(|e| failed(&e))?;
+        for (axis, value) in self.0.iter().zip(self.values(index)) {
+            // What stands instead of each other.
+            match axis.key.as_str() {
+                "tau" => drop(table.remove("adaptive")),
+                "adaptive" => drop(table.remove("tau")),
+                "relax-to" => drop(table.remove("relax-at")),
+                "relax-at" => drop(table.remove("relax-to")),
+                _ => {}
+            }
+            table.insert(axis.key.clone(), value.clone());
+            // Key by key, so that the message names the one that is wrong.
+            Spec::deserialize(table.clone()).map_err(|e| {
+                Error::Request(format!("--sweep {}={}: {}", axis.key, label(value), e.message().trim_end()))
+            })?;
+        }
+        Spec::deserialize(table).map_err(|e| failed(&e))
+    }
+}
+
+impl Serialize for Sweep {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for Axis { key, values } in &self.0 {
+            map.serialize_entry(key, values)?;
+        }
+        map.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for Sweep {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Sweep, D::Error> {
+        struct Axes;
+
+        impl<'de> Visitor<'de> for Axes {
+            type Value = Sweep;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                write!(f, "a table of keys, each with an array of values")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Sweep, A::Error> {
+                let mut axes = Vec::new();
+                while let Some((key, values)) = map.next_entry()? {
+                    axes.push(Axis { key, values });
+                }
+                Ok(Sweep(axes))
+            }
+        }
+
+        deserializer.deserialize_map(Axes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sweep(axes: &[&str]) -> Sweep {
+        let mut sweep = Sweep::default();
+        axes.iter().for_each(|axis| sweep.set(axis.parse().unwrap()));
+        sweep
+    }
+
+    #[test]
+    fn cells_are_the_cross_product_with_the_last_key_fastest() {
+        let sweep = sweep(&["shape=ellipse:2,1;circle:1", "amplitude=0.1,1"]);
+        sweep.check().unwrap();
+        assert_eq!(sweep.cells(), 4);
+        let names: Vec<String> = (0..4).map(|cell| sweep.name(cell)).collect();
+        assert_eq!(
+            names,
+            [
+                "shape = ellipse:2,1, amplitude = 0.1",
+                "shape = ellipse:2,1, amplitude = 1",
+                "shape = circle:1, amplitude = 0.1",
+                "shape = circle:1, amplitude = 1"
+            ]
+        );
+        let spec = sweep.apply(&Spec::default(), 1).unwrap();
+        assert_eq!(spec, Spec { amplitude: 1.0, ..Spec::default() });
+    }
+
+    #[test]
+    fn a_sweep_reads_back_from_its_toml_in_its_order() {
+        let spec = Spec { sweep: sweep(&["tau=0.01,0.1", "flow=willmore,elastic:0.5", "decay=1"]), ..Spec::default() };
+        let text = spec.to_toml().unwrap();
+        assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");
+    }
+
+    #[test]
+    fn what_stands_instead_of_a_swept_key_makes_room() {
+        let base = Spec { adaptive: Some(1e-3), relax_at: Some(0.01), ..Spec::default() };
+        let spec = sweep(&["tau=0.01", "relax-to=0.1"]).apply(&base, 0).unwrap();
+        assert_eq!((spec.tau, spec.adaptive, spec.relax_to, spec.relax_at), (Some(0.01), None, Some(0.1), None));
+    }
+
+    #[test]
+    fn wrong_sweeps_are_refused_with_their_key() {
+        for (axes, part) in [
+            (&["amplitud=1"][..], "--sweep amplitud: no such key (did you mean `amplitude`?)"),
+            (&["curves=1,2"], "--sweep curves: all members of a run have it in common"),
+            (&["amplitude="], "--sweep amplitude: no values"),
+            (&["seed=1,2,3,4,5,6,7,8,9,10", "decay=1,2,3,4,5,6,7,8,9,10"], ""),
+        ] {
+            match sweep(axes).check() {
+                Err(error) => assert!(!part.is_empty() && error.to_string().contains(part), "{error}"),
+                Ok(()) => assert_eq!(part, "", "{axes:?}"),
+            }
+        }
+        let thousand = format!("seed={}", (0..1000).map(|i| i.to_string()).collect::<Vec<_>>().join(","));
+        let many = sweep(&[&thousand, &thousand.replace("seed", "omega")]).check().unwrap_err().to_string();
+        assert!(many.contains("--sweep (1000000 cells): too many; at most 10000"), "{many}");
+        let wrong = sweep(&["amplitude=0.1,word"]).apply(&Spec::default(), 1).unwrap_err().to_string();
+        assert!(wrong.starts_with("--sweep amplitude=word: "), "{wrong}");
+        assert!("amplitude".parse::<Axis>().is_err());
+    }
+}

@@ -1,0 +1,179 @@
+//! `ensemble.csv`: the statistics of relaxation times, one row a cell.
+//!
+//! A member whose time is not known is censored where it ended: one that is unfinished at the final time, and one that
+//! ended badly at its last good state. How many of these there are is in the row.
+
+use csv::Writer;
+
+use super::tally::{CellTally, Tally};
+use crate::{
+    ensemble::{Spec, Status},
+    error::{Error, Result},
+    statistics::{Bootstrap, Interval, KaplanMeier, LogRank, Mean, PowerLaw, Sample, log_rank},
+};
+
+/// Shares of the members whose times the table has, and what its columns are called.
+pub const QUANTILES: [(f64, &str); 5] = [(0.05, "q05"), (0.25, "q25"), (0.5, "median"), (0.75, "q75"), (0.95, "q95")];
+
+/// The test that compares cells takes the cube of their number.
+const MOST_COMPARED: usize = 500;
+
+/// Relaxation times of one cell.
+pub struct CellStatistics {
+    /// Index of the cell.
+    pub cell: u64,
+    /// Its swept values, in the order of the keys.
+    pub values: Vec<String>,
+    /// Members by status.
+    pub counts: [u64; Status::ALL.len()],
+    /// The times, sorted.
+    pub sample: Sample,
+    /// The estimate from them.
+    pub survival: KaplanMeier,
+    /// 95 % interval of the median.
+    pub interval: Option<Interval>,
+}
+
+/// Relaxation times of all cells, and how they compare.
+pub struct EnsembleStatistics {
+    /// Each cell.
+    pub cells: Vec<CellStatistics>,
+    /// Whether the cells could have one distribution; none for a single cell.
+    pub log_rank: Option<LogRank>,
+    /// The medians as a power of the swept value, where one key is swept whose values are positive numbers.
+    pub power_law: Option<PowerLaw>,
+}
+
+impl CellStatistics {
+    fn new(spec: &Spec, cell: u64, tally: &CellTally) -> Result<CellStatistics> {
+        let sample = Sample::new(tally.times.iter().copied())?;
+        let survival = KaplanMeier::new(&sample);
+        let bootstrap = Bootstrap { seed: spec.seed.wrapping_add(cell), ..Bootstrap::default() };
+        let interval = bootstrap.median(&sample);
+        Ok(CellStatistics { cell, values: spec.sweep.labels(cell), counts: tally.counts, sample, survival, interval })
+    }
+
+    /// Members that ended.
+    pub fn members(&self) -> u64 {
+        self.counts.iter().sum()
+    }
+
+    /// Mean time, restricted where the last member is censored.
+    pub fn mean(&self) -> Option<Mean> {
+        self.survival.mean()
+    }
+}
+
+impl EnsembleStatistics {
+    /// From the times of a run of `spec`.
+    pub fn new(spec: &Spec, tally: &Tally) -> Result<EnsembleStatistics> {
+        let none = CellTally::default();
+        let cells = (0..spec.sweep.cells())
+            .map(|cell| CellStatistics::new(spec, cell, tally.cells.get(cell as usize).unwrap_or(&none)))
+            .collect::<Result<Vec<_>>>()?;
+        let samples: Vec<Sample> = cells.iter().map(|cell| cell.sample.clone()).collect();
+        let compared = (2..=MOST_COMPARED).contains(&cells.len());
+        let log_rank = if compared { log_rank(&samples) } else { None };
+        let power_law = match spec.sweep.axes() {
+            [axis] => axis.numbers().and_then(|values| {
+                let medians = cells.iter().map(|cell| cell.survival.median());
+                let points: Vec<(f64, f64)> =
+                    values.into_iter().zip(medians).filter_map(|(x, y)| Some((x, y?))).collect();
+                // Values that are not positive have no power law, which is no fault.
+                PowerLaw::fit(&points).ok().flatten()
+            }),
+            _ => None,
+        };
+        Ok(EnsembleStatistics { cells, log_rank, power_law })
+    }
+
+    /// The text of `ensemble.csv`.
+    pub fn to_csv(&self, spec: &Spec) -> Result<String> {
+        let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write ensemble.csv: {e}"));
+        let mut writer = Writer::from_writer(Vec::new());
+        let keys = spec.sweep.axes().iter().map(|axis| axis.key.clone());
+        let statuses = Status::ALL.iter().map(|status| status.name().to_string());
+        let times = ["known", "mean", "sd", "se", "restricted_to"].into_iter();
+        let times = times.chain(QUANTILES.map(|(_, name)| name)).chain(["median_low", "median_high"]);
+        let header = ["cell".to_string()].into_iter().chain(keys).chain(["members".to_string()]).chain(statuses);
+        let header = header.chain(times.map(|name| format!("t_relax_{name}")));
+        writer.write_record(header).map_err(|e| failed(&e))?;
+        for cell in &self.cells {
+            let mean = cell.mean();
+            let moments = [
+                mean.map(|mean| mean.value),
+                mean.and_then(|mean| mean.standard_deviation),
+                mean.and_then(|mean| mean.standard_error),
+                mean.and_then(|mean| mean.restricted_to),
+            ];
+            let quantiles = QUANTILES.map(|(share, _)| cell.survival.quantile(share));
+            let interval = cell.interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
+            let row = (
+                (cell.cell, &cell.values, cell.members(), cell.counts, cell.survival.events()),
+                (moments, quantiles, interval),
+            );
+            writer.serialize(row).map_err(|e| failed(&e))?;
+        }
+        let bytes = writer.into_inner().map_err(|e| failed(&e))?;
+        String::from_utf8(bytes).map_err(|e| failed(&e))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::tally::tests::outcome;
+
+    fn statistics(sweep: &str, members: &[(u64, Option<f64>)]) -> (Spec, EnsembleStatistics) {
+        let mut spec = Spec { curves: 2, ..Spec::default() };
+        if !sweep.is_empty() {
+            spec.sweep.set(sweep.parse().unwrap());
+        }
+        let mut tally = Tally::default();
+        for (cell, t_relax) in members {
+            let status = if t_relax.is_some() { Status::Relaxed } else { Status::Unfinished };
+            tally.add(&crate::ensemble::Outcome { cell: *cell, ..outcome(0, status, *t_relax) });
+        }
+        let statistics = EnsembleStatistics::new(&spec, &tally).unwrap();
+        (spec, statistics)
+    }
+
+    #[test]
+    fn a_table_looks_like_this() {
+        let members = [(0, Some(0.5)), (0, Some(1.5)), (1, Some(1.0)), (1, None)];
+        let (spec, statistics) = statistics("shape=ellipse:2,1;circle:1", &members);
+        let text = statistics.to_csv(&spec).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines[0],
+            "cell,shape,members,relaxed,unfinished,singular,nonfinite,stalled,t_relax_known,t_relax_mean,t_relax_sd,\
+             t_relax_se,t_relax_restricted_to,t_relax_q05,t_relax_q25,t_relax_median,t_relax_q75,t_relax_q95,\
+             t_relax_median_low,t_relax_median_high"
+        );
+        assert!(lines[1].starts_with("0,\"ellipse:2,1\",2,2,0,0,0,0,2,1.0,0.7071"), "{}", lines[1]);
+        assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
+        assert!(lines[2].contains(",2.0,1.0,1.0,1.0,,,"), "the mean is restricted, the tail unknown: {}", lines[2]);
+        assert_eq!(statistics.log_rank.unwrap().degrees_of_freedom, 1);
+        assert_eq!(statistics.power_law, None);
+    }
+
+    #[test]
+    fn medians_follow_a_power_of_the_swept_number() {
+        let members: Vec<(u64, Option<f64>)> =
+            (0..6).map(|member| (member / 2, Some(3.0 * [1.0, 4.0, 16.0][member as usize / 2]))).collect();
+        let law = statistics("amplitude=0.1,0.2,0.4", &members).1.power_law.unwrap();
+        assert!((law.exponent - 2.0).abs() < 1e-12 && (law.factor - 300.0).abs() < 1e-9, "{law:?}");
+        assert_eq!(statistics("omega=0,1,2", &members).1.power_law, None);
+    }
+
+    #[test]
+    fn cells_without_times_have_empty_fields_and_no_nan() {
+        let (spec, statistics) = statistics("omega=1,2,3", &[(0, None), (0, None), (2, Some(0.0))]);
+        let text = statistics.to_csv(&spec).unwrap();
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0{}", ",".repeat(11)));
+        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0{}", ",".repeat(11)));
+        assert!(lines[2].starts_with("2,3,1,1,0,0,0,0,1,0.0,,,,0.0,"), "{}", lines[2]);
+    }
+}

@@ -1,0 +1,165 @@
+//! One quantity against another: the straight line of least squares, and the power law as a line of logarithms.
+
+use super::{
+    finite,
+    sum::{Sum, mean},
+};
+use crate::error::{Error, Result};
+
+/// y = intercept + slope·x, with the least sum of squared distances in y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// Slope, in units of y over x.
+    pub slope: f64,
+    /// Value at x = 0.
+    pub intercept: f64,
+    /// Share of the variance of y that the line explains; `None` where all y are equal and there is none.
+    pub r2: Option<f64>,
+    /// Standard error of the slope, from the residuals with n - 2; `None` below three points.
+    pub slope_error: Option<f64>,
+    /// Number of points.
+    pub count: usize,
+}
+
+impl Line {
+    /// Through points (x, y), in any order.
+    ///
+    /// An error names the first point that is not finite. `None` where no slope is defined: fewer than two different
+    /// x, or sums beyond the range of f64.
+    pub fn fit(points: &[(f64, f64)]) -> Result<Option<Line>> {
+        require(points, |(x, y)| x.is_finite() && y.is_finite(), "a straight line", "finite")?;
+        Ok(least_squares(points))
+    }
+
+    /// The line's y at x.
+    pub fn at(&self, x: f64) -> f64 {
+        self.intercept + self.slope * x
+    }
+}
+
+/// y = factor·x^exponent, the line of ln y against ln x: errors in y count in proportion to y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PowerLaw {
+    /// y at x = 1.
+    pub factor: f64,
+    /// The power of x.
+    pub exponent: f64,
+    /// Standard error of the exponent; `None` below three points.
+    pub exponent_error: Option<f64>,
+    /// Share of the variance of ln y that the law explains; `None` where all y are equal.
+    pub r2: Option<f64>,
+    /// Number of points.
+    pub count: usize,
+}
+
+impl PowerLaw {
+    /// Through points (x, y), in any order.
+    ///
+    /// An error names the first point that is not finite and positive. `None` where no exponent is defined: fewer than
+    /// two different x, or a factor beyond the range of f64.
+    pub fn fit(points: &[(f64, f64)]) -> Result<Option<PowerLaw>> {
+        let positive = |v: f64| v.is_finite() && v > 0.0;
+        require(points, |(x, y)| positive(x) && positive(y), "a power law", "finite and positive")?;
+        let logarithms: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+        Ok(least_squares(&logarithms).and_then(|line| {
+            let factor = finite(line.intercept.exp()).filter(|factor| *factor > 0.0)?;
+            let Line { slope: exponent, slope_error: exponent_error, r2, count, .. } = line;
+            Some(PowerLaw { factor, exponent, exponent_error, r2, count })
+        }))
+    }
+
+    /// The law's y at x > 0.
+    pub fn at(&self, x: f64) -> f64 {
+        self.factor * x.powf(self.exponent)
+    }
+}
+
+fn require(points: &[(f64, f64)], good: impl Fn((f64, f64)) -> bool, fit: &str, asked: &str) -> Result<()> {
+    match points.iter().position(|point| !good(*point)) {
+        None => Ok(()),
+        Some(i) => Err(Error::Failed(format!(
+            "fit of {fit}: point {i} (from 0) of {} is {:?}; each number must be {asked}: leave the point out",
+            points.len(),
+            points[i]
+        ))),
+    }
+}
+
+fn least_squares(points: &[(f64, f64)]) -> Option<Line> {
+    let (x_mean, y_mean) = (mean(points.iter().map(|p| p.0))?, mean(points.iter().map(|p| p.1))?);
+    let about = || points.iter().map(|(x, y)| (x - x_mean, y - y_mean));
+    let of = |term: &dyn Fn((f64, f64)) -> f64| about().map(term).collect::<Sum>().value();
+    let (xx, xy, yy) = (of(&|(x, _)| x * x), of(&|(x, y)| x * y), of(&|(_, y)| y * y));
+    if !(xx > 0.0 && [xx, xy, yy].iter().all(|sum| sum.is_finite())) {
+        return None;
+    }
+    let slope = finite(xy / xx)?;
+    let residual = of(&|(x, y)| (y - slope * x).powi(2));
+    let degrees = points.len().saturating_sub(2);
+    Some(Line {
+        slope,
+        intercept: finite(y_mean - slope * x_mean)?,
+        r2: (yy > 0.0).then(|| (1.0 - residual / yy).clamp(0.0, 1.0)),
+        slope_error: (degrees > 0).then(|| (residual / degrees as f64 / xx).sqrt()).and_then(finite),
+        count: points.len(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_on_a_line_give_it_back() {
+        let points = [(0.0, 1.0), (1.0, 3.0), (4.0, 9.0)];
+        let line = Line { slope: 2.0, intercept: 1.0, r2: Some(1.0), slope_error: Some(0.0), count: 3 };
+        let found = Line::fit(&points).unwrap().unwrap();
+        assert!((found.slope - 2.0).abs() < 1e-15 && (found.intercept - 1.0).abs() < 1e-15, "{found:?}");
+        assert!(found.r2 > Some(1.0 - 1e-15) && found.slope_error < Some(1e-15), "{found:?}");
+        assert_eq!((line.at(5.0), found.count), (11.0, 3));
+    }
+
+    #[test]
+    fn too_few_points_have_no_line_and_two_have_no_error() {
+        assert_eq!(Line::fit(&[]).unwrap(), None);
+        assert_eq!(Line::fit(&[(1.0, 2.0)]).unwrap(), None);
+        assert_eq!(Line::fit(&[(1.0, 2.0), (1.0, 3.0), (1.0, 4.0)]).unwrap(), None);
+        let two = Line::fit(&[(1.0, 2.0), (2.0, 4.0)]).unwrap().unwrap();
+        assert_eq!((two.slope, two.intercept, two.r2, two.slope_error), (2.0, 0.0, Some(1.0), None));
+        assert_eq!(PowerLaw::fit(&[(2.0, 1.0)]).unwrap(), None);
+    }
+
+    #[test]
+    fn equal_values_have_a_level_line_that_explains_nothing() {
+        let level = Line::fit(&[(1.0, 0.1), (2.0, 0.1), (4.0, 0.1)]).unwrap().unwrap();
+        assert_eq!((level.slope, level.intercept, level.r2, level.slope_error), (0.0, 0.1, None, Some(0.0)));
+    }
+
+    #[test]
+    fn a_power_law_gives_its_exponent_and_factor() {
+        let points: Vec<(f64, f64)> = (1..6).map(|i| (f64::from(i), 0.5 * f64::from(i).powi(-3))).collect();
+        let law = PowerLaw::fit(&points).unwrap().unwrap();
+        assert!((law.exponent + 3.0).abs() < 1e-14 && (law.factor - 0.5).abs() < 1e-14, "{law:?}");
+        assert!((law.at(2.0) - 0.0625).abs() < 1e-15 && law.exponent_error < Some(1e-14) && law.count == 5);
+    }
+
+    #[test]
+    fn points_that_do_not_fit_are_refused_by_their_place() {
+        for point in [(f64::NAN, 1.0), (1.0, f64::INFINITY)] {
+            let message = Line::fit(&[(0.0, 0.0), point]).unwrap_err().to_string();
+            assert!(message.contains("point 1 (from 0) of 2"), "{message}");
+            assert!(PowerLaw::fit(&[(1.0, 1.0), point]).is_err());
+        }
+        for point in [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0)] {
+            assert!(Line::fit(&[(2.0, 2.0), point]).is_ok());
+            let message = PowerLaw::fit(&[(2.0, 2.0), point]).unwrap_err().to_string();
+            assert!(message.contains("finite and positive"), "{message}");
+        }
+    }
+
+    #[test]
+    fn numbers_beyond_the_range_are_none() {
+        assert_eq!(Line::fit(&[(1e300, 1.0), (-1e300, 2.0)]).unwrap(), None);
+        assert_eq!(PowerLaw::fit(&[(1e-3, 1e-300), (1e-2, 1.0)]).unwrap(), None);
+    }
+}

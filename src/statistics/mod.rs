@@ -1,0 +1,68 @@
+//! Statistics of relaxation times, some of which nobody has seen: pure functions from numbers to numbers.
+//!
+//! # Theory
+//!
+//! A member that has not relaxed at the end of its run still tells something: its time is *larger* than the run was
+//! long. Such a time is right-censored. To leave it out, or to take the end of the run for it, biases every mean and
+//! quantile downwards. The product-limit estimate of E. L. Kaplan and P. Meier (*J. Am. Stat. Assoc.* 53, 1958, 457)
+//! uses what it does tell,
+//!
+//! ```text
+//! S(t) = Π_{t_i ≤ t} (1 - d_i/n_i),    var S(t) ≈ S(t)² Σ_{t_i ≤ t} d_i/(n_i (n_i - d_i))
+//! ```
+//!
+//! with d_i events at the time t_i among the n_i members still at risk, and M. Greenwood's variance (1926). Quantiles
+//! are read off S; the mean is the area under it, and where S does not come down to 0, only the area up to the largest
+//! time: a lower bound. The log-rank test (N. Mantel, *Cancer Chemother. Rep.* 50, 1966, 163) compares the events of
+//! each group with those expected if all groups had one S. The interval of the median is B. Efron's bootstrap (*J. Am.
+//! Stat. Assoc.* 76, 1981, 312): members are drawn with replacement together with their censoring.
+//!
+//! All of it asks that censoring tells nothing about the time it hides. The end of the run is such a reason; a member
+//! that became singular is not, and what it is taken for is the caller's to decide and to report.
+//!
+//! # Practice
+//!
+//! A [`Sample`] is checked and sorted once; [`KaplanMeier`], [`Bootstrap`] and [`log_rank`] read it and cannot fail. A
+//! [`Description`] is for complete data, [`Line`] and [`PowerLaw`] for one quantity against another. What cannot be
+//! known is `None`, never NaN and never infinite, and [`Caveat`] says in words why. Times may be in any one unit, in
+//! which means, deviations and quantiles are too; variances of S have none.
+
+//!
+//! # Example
+//!
+//! ```
+//! use curvelax::statistics::{Bootstrap, KaplanMeier, Observation, Sample};
+//!
+//! let relaxed = [0.8, 0.5, 1.1, 0.9].map(|t| Observation::new(Some(t), 2.0));
+//! let unfinished = Observation::new(None, 2.0);
+//! let sample = Sample::new(relaxed.into_iter().chain([unfinished]))?;
+//! let curve = KaplanMeier::new(&sample);
+//! assert_eq!((curve.median(), curve.quantile(0.95)), (Some(0.9), None));
+//! assert_eq!(curve.mean().unwrap().restricted_to, Some(2.0));
+//! println!("{}", curve.caveat().unwrap());
+//! let interval = Bootstrap::default().median(&sample).unwrap();
+//! assert!(interval.lower <= curve.median());
+//! # Ok::<(), curvelax::Error>(())
+//! ```
+
+mod bootstrap;
+mod describe;
+mod draws;
+mod fit;
+mod log_rank;
+mod sample;
+mod special;
+mod sum;
+mod survival;
+
+pub use bootstrap::{Bootstrap, Interval};
+pub use describe::Description;
+pub use fit::{Line, PowerLaw};
+pub use log_rank::{Group, LogRank, log_rank};
+pub use sample::{Observation, Sample};
+pub use survival::{Caveat, KaplanMeier, Mean, Step};
+
+/// A finite number, or none.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}

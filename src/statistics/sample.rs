@@ -1,0 +1,193 @@
+//! Right-censored times, checked and sorted, and the product that every estimate from them builds.
+
+use crate::error::{Error, Result};
+
+/// One member's time, in any one unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// When it happened, or until when it had not.
+    pub time: f64,
+    /// Whether it happened; if not, the observation is censored at `time`.
+    pub happened: bool,
+}
+
+impl Observation {
+    /// The event, if it came before the `end` of what was seen.
+    pub fn new(event: Option<f64>, end: f64) -> Observation {
+        Observation { time: event.unwrap_or(end), happened: event.is_some() }
+    }
+}
+
+/// Observations in order of time; at one time events come before censorings, which were still at risk then.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sample {
+    sorted: Vec<Observation>,
+    events: usize,
+}
+
+impl Sample {
+    /// Sorts the observations of any number of members, in any order.
+    ///
+    /// An error names the first whose time is negative or not finite.
+    pub fn new(observations: impl IntoIterator<Item = Observation>) -> Result<Sample> {
+        let mut sorted: Vec<Observation> = observations.into_iter().collect();
+        if let Some((i, Observation { time, .. })) =
+            sorted.iter().enumerate().find(|(_, seen)| !(seen.time.is_finite() && seen.time >= 0.0))
+        {
+            return Err(Error::Failed(format!(
+                "statistics of times: number {i} (from 0) of {} is {time}; a time is finite and not negative: \
+                 leave the member out, or give it as censored at the end of its run",
+                sorted.len()
+            )));
+        }
+        // -0 would sort before 0 and not tie with it.
+        sorted.iter_mut().for_each(|seen| seen.time += 0.0);
+        sorted.sort_unstable_by(|a, b| a.time.total_cmp(&b.time).then(b.happened.cmp(&a.happened)));
+        let events = sorted.iter().filter(|seen| seen.happened).count();
+        Ok(Sample { sorted, events })
+    }
+
+    /// All observations, in order.
+    pub fn observations(&self) -> &[Observation] {
+        &self.sorted
+    }
+
+    /// Number of members.
+    pub fn len(&self) -> usize {
+        self.sorted.len()
+    }
+
+    /// Whether there are no members.
+    pub fn is_empty(&self) -> bool {
+        self.sorted.is_empty()
+    }
+
+    /// Number of members to which it happened.
+    pub fn events(&self) -> usize {
+        self.events
+    }
+
+    /// Number of members whose time is censored.
+    pub fn censored(&self) -> usize {
+        self.len() - self.events
+    }
+
+    /// The largest time, censored or not.
+    pub fn last(&self) -> Option<f64> {
+        self.sorted.last().map(|seen| seen.time)
+    }
+
+    /// The different times in order, each with the numbers of its events and its censorings.
+    pub(super) fn times(&self) -> impl Iterator<Item = (f64, usize, usize)> + '_ {
+        self.sorted.chunk_by(|a, b| a.time == b.time).map(|tied| {
+            let events = tied.partition_point(|seen| seen.happened);
+            (tied[0].time, events, tied.len() - events)
+        })
+    }
+}
+
+/// Π (1 - d/n) and Greenwood's sum, as members leave in order of time.
+///
+/// Between two censorings the factors telescope, (n-d₁)/n · (n-d₁-d₂)/(n-d₁) · … = left/n: so products are taken at
+/// censorings only, and a complete sample has S = left/n to the last bit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ProductLimit {
+    at_risk: f64,
+    /// S, Greenwood's sum and the members at risk after the last censoring.
+    survival: f64,
+    greenwood: f64,
+    from: f64,
+}
+
+impl ProductLimit {
+    pub(super) fn new(members: usize) -> ProductLimit {
+        ProductLimit { at_risk: members as f64, survival: 1.0, greenwood: 0.0, from: members as f64 }
+    }
+
+    /// At most as many as are at risk.
+    pub(super) fn events(&mut self, count: usize) {
+        self.at_risk -= count as f64;
+    }
+
+    /// At most as many as are at risk.
+    pub(super) fn censored(&mut self, count: usize) {
+        if count > 0 {
+            (self.survival, self.greenwood) = (self.survival(), self.greenwood());
+            self.at_risk -= count as f64;
+            self.from = self.at_risk;
+        }
+    }
+
+    pub(super) fn survival(&self) -> f64 {
+        if self.at_risk == self.from { self.survival } else { self.survival * (self.at_risk / self.from) }
+    }
+
+    /// 0 where S is 0: the limit of S²·Σ.
+    pub(super) fn variance(&self) -> f64 {
+        let survival = self.survival();
+        if survival == 0.0 { 0.0 } else { survival * survival * self.greenwood() }
+    }
+
+    /// Σ d/(n(n-d)), whose terms telescope too: 1/left - 1/n.
+    fn greenwood(&self) -> f64 {
+        let left = self.from - self.at_risk;
+        if left == 0.0 { self.greenwood } else { self.greenwood + left / (self.from * self.at_risk) }
+    }
+}
+
+/// Whether a survival has come down to a level, equality included.
+///
+/// Levels such as 1 - 0.9 and products of fractions carry roundings, so equality is meant up to 1e-12; S takes no
+/// value that close to 0, since it is at least 1/n where it is not 0.
+pub(super) fn reaches(survival: f64, level: f64) -> bool {
+    survival <= level + ROUNDING
+}
+
+const ROUNDING: f64 = 1e-12;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(time: f64, happened: bool) -> Observation {
+        Observation { time, happened }
+    }
+
+    #[test]
+    fn events_come_before_censorings_of_the_same_time_and_zeros_tie() {
+        let sample = Sample::new([seen(2.0, false), seen(0.0, false), seen(2.0, true), seen(-0.0, true)]).unwrap();
+        assert_eq!(sample.times().collect::<Vec<_>>(), [(0.0, 1, 1), (2.0, 1, 1)]);
+        assert!(sample.observations()[0].time.is_sign_positive());
+        assert_eq!((sample.len(), sample.events(), sample.censored(), sample.last()), (4, 2, 2, Some(2.0)));
+    }
+
+    #[test]
+    fn a_time_that_is_none_is_refused_by_its_place() {
+        for time in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e-300] {
+            let message = Sample::new([seen(1.0, true), seen(time, false)]).unwrap_err().to_string();
+            assert!(message.contains("number 1 (from 0) of 2") && message.contains(&format!(" {time};")), "{message}");
+        }
+        assert!(Sample::new([]).unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_complete_sample_has_fractions_of_its_members_to_the_last_bit() {
+        let mut limit = ProductLimit::new(1000);
+        for left in (0..1000).rev() {
+            limit.events(1);
+            assert_eq!(limit.survival(), f64::from(left) / 1000.0);
+        }
+        assert_eq!((limit.survival(), limit.variance()), (0.0, 0.0));
+    }
+
+    #[test]
+    fn when_all_have_left_by_censoring_the_product_stays() {
+        let mut limit = ProductLimit::new(3);
+        limit.events(1);
+        let before = (limit.survival(), limit.variance());
+        limit.censored(0);
+        limit.censored(2);
+        assert_eq!((limit.survival(), limit.variance()), before);
+        assert_eq!(before.0, 2.0 / 3.0);
+    }
+}

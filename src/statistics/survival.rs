@@ -1,0 +1,347 @@
+//! The product-limit estimate of Kaplan and Meier: the share of members to which it has not happened yet, with its
+//! quantiles and its mean.
+
+use std::fmt;
+
+use super::{
+    finite,
+    sample::{ProductLimit, Sample, reaches},
+    sum::Sum,
+};
+
+/// A time at which S falls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// When.
+    pub time: f64,
+    /// Members at risk just before, those censored at this very time included.
+    pub at_risk: usize,
+    /// Events at this time, at least 1.
+    pub events: usize,
+    /// S from this time on.
+    pub survival: f64,
+    /// Greenwood's variance of S; 0 where S is 0, which is its limit.
+    pub variance: f64,
+}
+
+/// The mean time, the area under S.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mean {
+    /// The mean: of t where S comes down to 0, else of min(t, `restricted_to`).
+    pub value: f64,
+    /// Standard deviation of a member's time, restricted likewise; without censoring that of the sample, with n - 1.
+    /// `None` where S falls to 0 by a single event.
+    pub standard_deviation: Option<f64>,
+    /// Standard error of `value`; without censoring the standard deviation over √n. `None` likewise.
+    pub standard_error: Option<f64>,
+    /// The largest time, where S is not 0 there. The mean is then a lower bound of the members' mean time.
+    pub restricted_to: Option<f64>,
+}
+
+/// An estimate of the survival function, a right-continuous step function from S = 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KaplanMeier {
+    steps: Vec<Step>,
+    members: usize,
+    events: usize,
+    last: Option<f64>,
+}
+
+impl KaplanMeier {
+    /// From any sample, an empty one included.
+    pub fn new(sample: &Sample) -> KaplanMeier {
+        let mut limit = ProductLimit::new(sample.len());
+        let (mut steps, mut at_risk) = (Vec::new(), sample.len());
+        for (time, events, censored) in sample.times() {
+            limit.events(events);
+            if events > 0 {
+                let (survival, variance) = (limit.survival(), limit.variance());
+                steps.push(Step { time, at_risk, events, survival, variance });
+            }
+            limit.censored(censored);
+            at_risk -= events + censored;
+        }
+        KaplanMeier { steps, members: sample.len(), events: sample.events(), last: sample.last() }
+    }
+
+    /// Where S falls, in order of time.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// Number of members.
+    pub fn members(&self) -> usize {
+        self.members
+    }
+
+    /// Number of members to which it happened.
+    pub fn events(&self) -> usize {
+        self.events
+    }
+
+    /// The largest time, censored or not, up to which S is known.
+    pub fn last(&self) -> Option<f64> {
+        self.last
+    }
+
+    /// S(t), the share of members to which it has not happened by the time t; beyond the largest time its last value.
+    pub fn survival(&self, t: f64) -> f64 {
+        let passed = self.steps.partition_point(|step| step.time <= t);
+        passed.checked_sub(1).map_or(1.0, |i| self.steps[i].survival)
+    }
+
+    /// The time by which it has happened to the share `p` ∈ [0, 1] of the members: the first with S(t) ≤ 1 - p.
+    ///
+    /// Where S is exactly 1 - p on an interval, that is the interval's start, as in lifelines and numpy's
+    /// `inverted_cdf` (R's `survfit` takes its middle); equality is meant up to 1e-12, so that rounding does not
+    /// decide. `None` where S does not come down that far, and for any other p.
+    pub fn quantile(&self, p: f64) -> Option<f64> {
+        if !(0.0..=1.0).contains(&p) {
+            return None;
+        }
+        let above = self.steps.partition_point(|step| !reaches(step.survival, 1.0 - p));
+        self.steps.get(above).map(|step| step.time)
+    }
+
+    /// The time by which it has happened to half of the members.
+    pub fn median(&self) -> Option<f64> {
+        self.quantile(0.5)
+    }
+
+    /// The mean time, restricted to the largest time where S does not come down to 0.
+    ///
+    /// With censoring the standard error is that of J. O. Irwin (1949), as in Kaplan and Meier and R's `survfit`:
+    /// `var = Σ A_i² d_i/(n_i (n_i - d_i))`, A_i being the area under S from t_i on. `None` without an event, since
+    /// then nothing is known but that S was 1, or where the numbers are too large for f64.
+    pub fn mean(&self) -> Option<Mean> {
+        let (first, end, last) = (self.steps.first()?, self.steps.last()?, self.last?);
+        // Each event carries the fall of S, the end carries what is left; measured from the first event, so that equal
+        // times have exactly their own mean and no deviation.
+        let falls = self.steps.iter().scan(1.0, |before, step| {
+            let fall = *before * (step.events as f64 / step.at_risk as f64);
+            *before = step.survival;
+            Some((step.time, fall))
+        });
+        let masses = falls.chain([(last, end.survival)]);
+        let value = first.time + masses.clone().map(|(t, mass)| mass * (t - first.time)).collect::<Sum>().value();
+        let variance = masses.map(|(t, mass)| mass * (t - value).powi(2)).collect::<Sum>().value();
+        let n = self.members as f64;
+        let [deviation, error] = if self.has_single_event() {
+            [None, None]
+        } else if self.events < self.members {
+            [variance, self.area_variance(last)].map(Some)
+        } else {
+            [variance * (n / (n - 1.0)), variance / (n - 1.0)].map(Some)
+        };
+        Some(Mean {
+            value: finite(value)?,
+            standard_deviation: deviation.map(f64::sqrt).and_then(finite),
+            standard_error: error.map(f64::sqrt).and_then(finite),
+            restricted_to: (end.survival > 0.0).then_some(last),
+        })
+    }
+
+    /// Whether S falls by one event from 1 to 0, which says nothing about the spread of times.
+    fn has_single_event(&self) -> bool {
+        self.events == 1 && self.steps.iter().all(|step| step.survival == 0.0)
+    }
+
+    /// Variance of the area under S up to `last`.
+    fn area_variance(&self, last: f64) -> f64 {
+        let (mut area, mut variance, mut next) = (Sum::default(), Sum::default(), last);
+        for step in self.steps.iter().rev() {
+            area.add(step.survival * (next - step.time));
+            next = step.time;
+            let (n, left) = (step.at_risk as f64, (step.at_risk - step.events) as f64);
+            // The last event of all has no area behind it.
+            if left > 0.0 {
+                variance.add(area.value().powi(2) * (step.events as f64 / (n * left)));
+            }
+        }
+        variance.value()
+    }
+
+    /// What a reader must know before using the numbers, if there is anything.
+    pub fn caveat(&self) -> Option<Caveat> {
+        let (members, censored) = (self.members, self.members - self.events);
+        let survival = self.steps.last().map_or(1.0, |step| step.survival);
+        match self.last {
+            None => Some(Caveat::NoMembers),
+            Some(last) if self.events == 0 => Some(Caveat::AllCensored { members, last }),
+            Some(_) if self.has_single_event() => Some(Caveat::SingleEvent { members }),
+            Some(last) if survival > 0.0 => Some(Caveat::TailCensored { members, censored, last, survival }),
+            Some(_) => None,
+        }
+    }
+}
+
+/// Why numbers are missing, or not what they are called; a sentence by `Display`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Caveat {
+    /// The sample is empty.
+    NoMembers,
+    /// A single event, at which S falls from 1 to 0.
+    SingleEvent {
+        /// Number of members.
+        members: usize,
+    },
+    /// No event at all.
+    AllCensored {
+        /// Number of members.
+        members: usize,
+        /// The largest time.
+        last: f64,
+    },
+    /// The last member or members are censored, so S does not come down to 0.
+    TailCensored {
+        /// Number of members.
+        members: usize,
+        /// Number of those whose time is censored.
+        censored: usize,
+        /// The largest time.
+        last: f64,
+        /// S there.
+        survival: f64,
+    },
+}
+
+impl fmt::Display for Caveat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Caveat::NoMembers => write!(f, "no members, so there is nothing to estimate"),
+            Caveat::SingleEvent { members } => {
+                write!(f, "a single event ({members} members): no standard deviation and no standard error can be told")
+            }
+            Caveat::AllCensored { members, last } => write!(
+                f,
+                "all {members} members are censored, the last at {last}: no mean and no quantile can be told before \
+                 some have their event"
+            ),
+            Caveat::TailCensored { members, censored, last, survival } => write!(
+                f,
+                "{censored} of {members} members are censored, and S ends at {} at the time {last}: the mean is that \
+                 of times cut off there, a lower bound, and quantiles above 1 - S are not known",
+                significant(survival)
+            ),
+        }
+    }
+}
+
+/// Rounded to four digits.
+fn significant(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::statistics::Observation;
+
+    /// Times with `+` for censored.
+    fn curve(times: &str) -> KaplanMeier {
+        let seen = |word: &str| Observation {
+            time: word.trim_end_matches('+').parse().unwrap(),
+            happened: !word.ends_with('+'),
+        };
+        KaplanMeier::new(&Sample::new(times.split_whitespace().map(seen)).unwrap())
+    }
+
+    #[test]
+    fn where_the_curve_is_exactly_at_the_level_the_quantile_is_the_first_time() {
+        assert_eq!(curve("1 2 3 4").median(), Some(2.0));
+        assert_eq!(curve("1 2 3 4 5").median(), Some(3.0));
+        // 1 - 0.9 is less than 1/10, 1 - 0.3 is less than 7/10, and a product with censoring is rounded.
+        let ten = curve("1 2 3 4 5 6 7 8 9 10");
+        assert_eq!([0.1, 0.3, 0.7, 0.9, 1.0].map(|p| ten.quantile(p)), [1.0, 3.0, 7.0, 9.0, 10.0].map(Some));
+        // 4/5 · 3/4 is 3/5, then one is censored: 3/5 · 1/2 is 3/10.
+        let censored = curve("1 2 2.5+ 3 4+");
+        assert_eq!([0.4, 0.7, 0.70001].map(|p| censored.quantile(p)), [Some(2.0), Some(3.0), None]);
+    }
+
+    #[test]
+    fn quantiles_outside_zero_and_one_are_none() {
+        let curve = curve("1 2 3");
+        assert_eq!([-0.1, 1.1, f64::NAN, f64::INFINITY].map(|p| curve.quantile(p)), [None; 4]);
+        assert_eq!([0.0, 1.0].map(|p| curve.quantile(p)), [Some(1.0), Some(3.0)]);
+    }
+
+    #[test]
+    fn the_survival_is_one_before_the_first_event_and_keeps_its_last_value() {
+        let curve = curve("1 2 3+");
+        assert_eq!([0.0, 0.999, 1.0, 2.5, 1e9].map(|t| curve.survival(t)), [1.0, 1.0, 2.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0]);
+    }
+
+    #[test]
+    fn no_members_have_no_numbers_and_a_sentence() {
+        let none = curve("");
+        assert_eq!((none.median(), none.mean(), none.last(), none.survival(1.0)), (None, None, None, 1.0));
+        assert_eq!(none.caveat(), Some(Caveat::NoMembers));
+    }
+
+    #[test]
+    fn one_member_has_a_mean_and_nothing_about_its_spread() {
+        let one = curve("0.3");
+        let mean = Mean { value: 0.3, standard_deviation: None, standard_error: None, restricted_to: None };
+        let caveat = Caveat::SingleEvent { members: 1 };
+        assert_eq!((one.median(), one.mean(), one.caveat()), (Some(0.3), Some(mean), Some(caveat)));
+        // Nor does it if others were censored before.
+        let last = curve("0.1+ 0.3");
+        assert_eq!((last.mean(), last.caveat()), (Some(mean), Some(Caveat::SingleEvent { members: 2 })));
+    }
+
+    #[test]
+    fn censored_members_alone_have_no_mean_and_no_quantile() {
+        for times in ["0.5+", "0.5+ 0.25+ 0.5+"] {
+            let all = curve(times);
+            assert!(all.mean().is_none() && all.median().is_none() && all.steps().is_empty());
+            assert_eq!(all.caveat(), Some(Caveat::AllCensored { members: all.members(), last: 0.5 }));
+        }
+    }
+
+    #[test]
+    fn a_complete_sample_has_fractions_of_its_members_to_the_last_bit() {
+        let times: String = (0..49).map(|t| format!("{t} ")).collect();
+        for (i, step) in curve(&times).steps().iter().enumerate() {
+            assert_eq!(step.survival, (48 - i) as f64 / 49.0);
+        }
+    }
+
+    #[test]
+    fn equal_times_have_their_own_mean_and_no_deviation() {
+        for (events, censored) in (1..30).flat_map(|events| (0..30).map(move |censored| (events, censored))) {
+            let mean = curve(&("0.1 ".repeat(events) + &"0.1+ ".repeat(censored))).mean().unwrap();
+            let spread = (events + censored > 1).then_some(0.0);
+            assert_eq!((mean.value, mean.standard_deviation, mean.standard_error), (0.1, spread, spread));
+        }
+        let tied = curve("0.1 0.1 0.1+");
+        // The censored member was at risk at the time of the events.
+        assert_eq!((tied.survival(0.1), tied.mean().unwrap().restricted_to), (1.0 / 3.0, Some(0.1)));
+    }
+
+    #[test]
+    fn the_mean_is_a_lower_bound_where_the_last_member_is_censored() {
+        let cut = curve("1 2+");
+        let mean = cut.mean().unwrap();
+        assert_eq!((mean.value, mean.standard_deviation, mean.restricted_to), (1.5, Some(0.5), Some(2.0)));
+        assert_eq!(mean.standard_error, Some(0.125_f64.sqrt()));
+        let caveat = cut.caveat().unwrap();
+        assert_eq!(caveat, Caveat::TailCensored { members: 2, censored: 1, last: 2.0, survival: 0.5 });
+        assert_eq!(
+            caveat.to_string(),
+            "1 of 2 members are censored, and S ends at 0.5 at the time 2: the mean is that of times cut off there, a \
+             lower bound, and quantiles above 1 - S are not known"
+        );
+        // The censored member counts by those that outlast it.
+        let whole = curve("1+ 2 3");
+        let mean = whole.mean().unwrap();
+        assert_eq!((mean.value, mean.restricted_to, whole.caveat()), (2.5, None, None));
+        assert_eq!(mean.standard_error, Some(0.125_f64.sqrt()));
+    }
+
+    #[test]
+    fn numbers_too_large_are_none() {
+        let large = curve("1e308 1e308 1e300+ 0");
+        assert!(large.mean().is_some_and(|mean| mean.value.is_finite() && mean.standard_deviation.is_none()));
+        assert!(large.mean().is_some_and(|mean| mean.standard_error.is_none()));
+    }
+}

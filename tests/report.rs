@@ -1,0 +1,72 @@
+//! The page and the plots of a run, from outside.
+
+mod common;
+
+use std::fs;
+
+use common::program::{Done, run};
+
+const RUN: &str = "--curves 7 --points 40 --adaptive=1e-3 --t-end 1";
+
+fn plots(done: &Done) -> Vec<String> {
+    let entries = fs::read_dir(done.path().join("plots")).unwrap();
+    let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_run_leaves_a_page_with_what_a_reader_asks_first() {
+    let done = run(RUN);
+    let page = done.text("report.html");
+    assert_eq!(plots(&done), ["curves.svg", "mesh.svg", "relaxation.svg", "survival.svg"]);
+    for part in ["7 members", "ellipse:2,1, surface-diffusion", "median t_relax", "relaxed", "seed", "ensemble.csv"] {
+        assert!(page.contains(part), "no {part:?}");
+    }
+    let elsewhere = page.replace("http://www.w3.org/2000/svg", "");
+    assert!(!page.contains("NaN") && !elsewhere.contains("http"), "the page asks for more");
+    assert!(page.len() < 1_000_000, "{} bytes", page.len());
+    for name in plots(&done) {
+        let svg = done.text(&format!("plots/{name}"));
+        assert!(svg.starts_with("<svg") && !svg.contains("NaN") && !svg.contains("inf\""), "{name}");
+    }
+}
+
+#[test]
+fn equal_runs_leave_equal_plots_and_statistics_whatever_the_threads() {
+    let (one, two) = (run(&format!("{RUN} --threads 1")), run(&format!("{RUN} --threads 2")));
+    for name in plots(&one).iter().map(|name| format!("plots/{name}")).chain(["ensemble.csv".to_string()]) {
+        assert_eq!(one.text(&name), two.text(&name), "{name}");
+    }
+    assert_ne!(one.text("plots/relaxation.svg"), run(&format!("{RUN} --seed 2")).text("plots/relaxation.svg"));
+}
+
+#[test]
+fn a_study_compares_its_cells() {
+    let done =
+        run(&format!("{RUN} --stop-when-relaxed --sweep amplitude=0.02,0.1 --sweep flow=surface-diffusion,willmore"));
+    assert!(plots(&done).contains(&"dependence.svg".to_string()));
+    let rows = done.rows("ensemble.csv");
+    assert_eq!(rows.len(), 4);
+    assert_eq!((rows[3]["amplitude"].as_str(), rows[3]["flow"].as_str()), ("0.1", "willmore"));
+    for (cell, row) in rows.iter().enumerate() {
+        let members: Vec<_> = done.summary().into_iter().filter(|member| member["cell"] == cell.to_string()).collect();
+        assert_eq!((row["members"].as_str(), members.len()), ("7", 7));
+        let mut times: Vec<f64> = members.iter().filter_map(|member| member["t_relax"].parse().ok()).collect();
+        times.sort_by(f64::total_cmp);
+        assert_eq!(row["t_relax_known"], times.len().to_string());
+        // The fourth of seven, censored ones being the last.
+        let median = times.get(3).map_or(String::new(), f64::to_string);
+        assert_eq!(row["t_relax_median"].parse::<f64>().ok(), median.parse().ok(), "cell {cell}");
+    }
+    assert!(done.text("report.html").contains("over 4 cells"));
+}
+
+#[test]
+fn members_of_the_page_move() {
+    let page = run(RUN).text("report.html");
+    assert!(page.contains("type=\"range\"") && page.contains("member 0: relaxed at t = "), "no slider");
+    // A member that is round from the start has nothing to show but its circle, and says so without fail.
+    let round = run("--curves 1 --shape circle:1 --amplitude 0 --stop-when-relaxed").text("report.html");
+    assert!(round.contains("member 0: relaxed at t = 0") && !round.contains("NaN"), "a member at rest");
+}
