@@ -214,20 +214,22 @@ mod tests {
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
         let overview = report(&out, &all, Some(portrait)).finish(&all, &platform, &[]).unwrap();
-        assert_eq!(files(&out), ["ensemble.csv", "plots", "run.json", "series.csv", "snapshots.csv", "summary.csv"]);
-        assert_eq!(files(&out.join("plots")), ["curves.svg"]);
+        let tables = ["ensemble.csv", "plots", "report.html", "run.json", "series.csv", "snapshots.csv", "summary.csv"];
+        assert_eq!(files(&out), tables);
+        assert_eq!(files(&out.join("plots")), ["curves.svg", "mesh.svg", "relaxation.svg", "survival.svg"]);
         for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");
         }
         assert!(
-            overview.contains("summary.csv, ensemble.csv, series.csv, snapshots.csv, plots/curves.svg, run.json"),
+            overview
+                .contains("summary.csv, ensemble.csv, series.csv, snapshots.csv, report.html, plots/*.svg, run.json"),
             "{overview}"
         );
 
         let few = Spec::default();
         report(&out, &few, None).finish(&few, &platform, &["a warning".into()]).unwrap();
-        assert_eq!(files(&out), ["ensemble.csv", "plots", "run.json", "summary.csv"]);
-        assert_eq!(files(&out.join("plots")), [""; 0]);
+        assert_eq!(files(&out), ["ensemble.csv", "plots", "report.html", "run.json", "summary.csv"]);
+        assert_eq!(files(&out.join("plots")), ["mesh.svg", "relaxation.svg", "survival.svg"]);
         assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
     }
 
