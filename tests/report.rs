@@ -63,6 +63,16 @@ fn a_study_compares_its_cells() {
 }
 
 #[test]
+fn the_mean_excess_of_a_series_is_drawn_with_its_slope() {
+    let done = run(&format!("{RUN} --series 0.05"));
+    let svg = done.text("plots/excess.svg");
+    assert!(svg.contains("exp(−24 t/R⁴)") && svg.contains("one standard deviation of the members"), "{svg}");
+    let study = run(&format!("{RUN} --series 0.05 --sweep amplitude=0.02,0.1"));
+    let svg = study.text("plots/excess.svg");
+    assert!(svg.contains("amplitude = 0.1") && !svg.contains("exp("), "{svg}");
+}
+
+#[test]
 fn members_of_the_page_move() {
     let page = run(RUN).text("report.html");
     assert!(page.contains("type=\"range\"") && page.contains("member 0: relaxed at t = "), "no slider");

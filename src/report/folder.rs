@@ -28,6 +28,8 @@ pub const CURVES: &str = "plots/curves.svg";
 pub const RELAXATION: &str = "plots/relaxation.svg";
 /// Kaplan-Meier curves.
 pub const SURVIVAL: &str = "plots/survival.svg";
+/// Mean excess in time.
+pub const EXCESS: &str = "plots/excess.svg";
 /// Relaxation times against a swept key.
 pub const DEPENDENCE: &str = "plots/dependence.svg";
 /// Spacing of nodes and metric drift.
@@ -36,8 +38,21 @@ pub const MESH: &str = "plots/mesh.svg";
 pub const REPORT: &str = "report.html";
 
 /// All files that a command may write, the one that vouches for the others first.
-const OWN: [&str; 12] =
-    [RUN, SUMMARY, ENSEMBLE, SERIES, SNAPSHOTS, CURVES, RELAXATION, SURVIVAL, DEPENDENCE, MESH, REPORT, CONVERGENCE];
+const OWN: [&str; 13] = [
+    RUN,
+    SUMMARY,
+    ENSEMBLE,
+    SERIES,
+    SNAPSHOTS,
+    CURVES,
+    RELAXATION,
+    SURVIVAL,
+    EXCESS,
+    DEPENDENCE,
+    MESH,
+    REPORT,
+    CONVERGENCE,
+];
 
 /// The folder of the plots, the only one below that of the run.
 const PLOTS: &str = "plots";

@@ -154,6 +154,7 @@ impl Sink for Report {
         }
         self.summary.row(outcome)?;
         self.tally.add(outcome);
+        self.tally.add_series(outcome.cell, series);
         self.tally.add_aside(mollified, *unresolved);
         if let Some(Portrait { before, frames, after }) = portrait.clone() {
             let Outcome { member, status, t_relax, .. } = *outcome;

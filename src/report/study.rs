@@ -6,7 +6,8 @@ use glam::DVec2;
 
 use super::{
     charts::{
-        Dependence, Estimate, Level, MeshQuality, PowerLaw, RelaxationTimes, Series, Setting, Survival, SurvivalCurve,
+        Decay, DecayCurve, Dependence, Estimate, Law, Level, MeshQuality, PowerLaw, RelaxationTimes, Series, Setting,
+        Survival, SurvivalCurve, Theory,
     },
     ensemble::{CellStatistics, EnsembleStatistics, QUANTILES},
     folder,
@@ -14,13 +15,14 @@ use super::{
     page::{Figure, Headline, Page, Table, Trajectory},
     progress::duration,
     provenance::rfc3339,
-    tally::{DISTRUSTED_DRIFT, Tally},
+    tally::{CellTally, DISTRUSTED_DRIFT, Moments, Tally},
     text::{count, significant},
 };
 use crate::{
     backend::Platform,
     ensemble::{Outcome, Spec, Status},
     error::Result,
+    flow::Flow,
     statistics::Interval,
 };
 
@@ -68,6 +70,7 @@ impl Study<'_> {
     /// The charts that this run has, in the order in which they are read.
     pub fn charts(&self) -> Vec<Chart> {
         let mut charts = vec![self.relaxation(), self.survival()];
+        charts.extend(self.excess());
         charts.extend(self.dependence());
         charts.push(self.mesh());
         charts
@@ -113,6 +116,41 @@ impl Study<'_> {
         let caption =
             "Kaplan-Meier estimate with Greenwood's 95 % band; a stroke marks a member that ended before it relaxed.";
         chart(folder::SURVIVAL, title, caption, survival.draw())
+    }
+
+    /// The mean excess as long as all members of a cell run, where the run has a series.
+    fn excess(&self) -> Option<Chart> {
+        let axes = self.spec.sweep.axes();
+        let numbers = if let [axis] = axes { axis.numbers() } else { None };
+        let curve = |(rank, cell): (usize, &CellTally)| {
+            let all: u64 = cell.counts.iter().sum();
+            let rows = cell.excess.iter().take_while(|(_, moments)| moments.count == all);
+            let rows: Vec<(f64, Moments)> = rows.map(|(t, moments)| (f64::from_bits(*t), *moments)).collect();
+            let bound = |sign: f64| rows.iter().map(|(_, m)| m.mean + sign * m.deviation()).collect();
+            DecayCurve {
+                label: if axes.is_empty() { "all members".into() } else { self.spec.sweep.name(rank as u64) },
+                value: numbers.as_ref().map(|numbers| numbers[rank]),
+                t: rows.iter().map(|(t, _)| *t).collect(),
+                mean: rows.iter().map(|(_, moments)| moments.mean).collect(),
+                band: Some((bound(-1.0), bound(1.0))),
+            }
+        };
+        let curves: Vec<DecayCurve> = self.tally.cells.iter().enumerate().map(curve).collect();
+        if curves.iter().all(|curve| curve.t.len() < 2) {
+            return None;
+        }
+        let theory = match (&self.tally.cells[..], &curves[..], &self.spec.flow) {
+            ([cell], [curve], Flow::SurfaceDiffusion) => theory(cell, curve),
+            _ => None,
+        };
+        let (title, key) = ("Mean excess", self.keys());
+        let note = format!("{}; over all members, as long as all of them run", self.what());
+        let band = "one standard deviation of the members";
+        let theory = theory.into_iter().collect();
+        let svg = Decay { title, note: &note, band, key: &key, curves, theory, time: None }.draw();
+        let caption =
+            "How the excess, L²/(4πA) above that of a regular polygon, falls, and the slope that linear theory gives.";
+        Some(chart(folder::EXCESS, title, caption, svg))
     }
 
     /// t_relax against the key that changes fastest, a series for each combination of the others.
@@ -307,6 +345,16 @@ fn chart(name: &'static str, title: &str, caption: &str, svg: String) -> Chart {
 /// Times of the members of a cell that relaxed, or of those that ended before.
 fn happened(cell: &CellStatistics, happened: bool) -> impl Iterator<Item = f64> + '_ {
     cell.sample.observations().iter().filter(move |seen| seen.happened == happened).map(|seen| seen.time)
+}
+
+/// The decay of a mode 2 on the circle of the members' mean area, through the mean where it has fallen to a tenth.
+fn theory(cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
+    let members: u64 = cell.counts.iter().sum();
+    let rate = 24.0 / (cell.area / members as f64 / std::f64::consts::PI).powi(2);
+    let first = curve.mean.first()?;
+    let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
+    let start = curve.mean[tenth] * (rate * curve.t[tenth]).exp();
+    Some(Theory { label: "exp(−24 t/R⁴)".into(), law: Law::Exponential { start, rate } })
 }
 
 fn median(cell: &CellStatistics) -> Option<Estimate> {

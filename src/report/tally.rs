@@ -1,9 +1,11 @@
 //! Running totals over members: what the overview and `run.json` say, without keeping the members.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use crate::{
-    ensemble::{Mollified, Outcome, Status, mollifier::MAX_VERTEX_TURN},
+    ensemble::{Mollified, Outcome, SeriesRow, Status, mollifier::MAX_VERTEX_TURN},
     statistics::Observation,
 };
 
@@ -38,6 +40,34 @@ pub struct CellTally {
     pub others: [u64; Status::ALL.len()],
     /// Longest over shortest edge of each at its end, and its metric drift.
     pub mesh: Vec<[f64; 2]>,
+    /// Sum of the areas at the start.
+    pub area: f64,
+    /// Excess at the times of the series, by the bits of the time, which order times that are not negative.
+    pub excess: BTreeMap<u64, Moments>,
+}
+
+/// Count, mean and spread of numbers that are added one by one (B. P. Welford, Technometrics 4, 1962, 419).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moments {
+    /// How many.
+    pub count: u64,
+    /// Their mean.
+    pub mean: f64,
+    squares: f64,
+}
+
+impl Moments {
+    fn add(&mut self, value: f64) {
+        self.count += 1;
+        let gap = value - self.mean;
+        self.mean += gap / self.count as f64;
+        self.squares += gap * (value - self.mean);
+    }
+
+    /// Their standard deviation; 0 of fewer than two.
+    pub fn deviation(&self) -> f64 {
+        (self.squares / (self.count.max(2) - 1) as f64).sqrt()
+    }
 }
 
 /// Metric drift above which the scheme's lengths are so far from the polygon's that times mean little.
@@ -102,7 +132,8 @@ impl Tally {
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
-        let CellTally { counts, times, others, mesh } = &mut self.cells[cell];
+        let CellTally { counts, times, others, mesh, area, .. } = &mut self.cells[cell];
+        *area += outcome.start.area.abs();
         mesh.push([outcome.end.mesh_ratio, outcome.end.metric_drift]);
         times.push(Observation::new(outcome.t_relax, outcome.t_end));
         for (counts, counted) in [(&mut self.counts, true), (counts, true), (others, outcome.t_relax.is_none())] {
@@ -116,6 +147,14 @@ impl Tally {
         self.steps += outcome.steps;
         self.sweeps_k += outcome.sweeps_k;
         self.sweeps_x += outcome.sweeps_x;
+    }
+
+    /// Adds the series of the member that was added last.
+    pub fn add_series(&mut self, cell: u64, series: &[SeriesRow]) {
+        let Some(CellTally { excess, .. }) = self.cells.get_mut(cell as usize) else { return };
+        for SeriesRow { t, at, .. } in series.iter().filter(|row| row.at.excess.is_finite()) {
+            excess.entry(t.to_bits()).or_default().add(at.excess);
+        }
     }
 
     /// Adds what is not in the summary's row.
@@ -193,6 +232,15 @@ pub(crate) mod tests {
         times.iter().for_each(|t| tally.add(&outcome(0, Status::Relaxed, Some(*t))));
         (0..censored).for_each(|_| tally.add(&outcome(0, Status::Unfinished, None)));
         tally
+    }
+
+    #[test]
+    fn moments_are_mean_and_standard_deviation() {
+        let mut moments = Moments::default();
+        assert_eq!(moments.deviation(), 0.0);
+        [2.0, 4.0, 9.0].iter().for_each(|value| moments.add(*value));
+        assert_eq!((moments.count, moments.mean), (3, 5.0));
+        assert!((moments.deviation() - 13.0_f64.sqrt()).abs() < 1e-15);
     }
 
     #[test]
