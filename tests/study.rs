@@ -33,6 +33,21 @@ fn a_cell_is_the_ensemble_of_its_values_bit_for_bit() {
 }
 
 #[test]
+fn the_specs_of_the_examples_are_right() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let files: Vec<_> =
+        std::fs::read_dir(root.join("examples/specs")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(files.len() >= 4);
+    for file in files {
+        let mut command = assert_cmd::Command::cargo_bin("curvelax").unwrap();
+        command.current_dir(root).env("XDG_RUNTIME_DIR", root).arg("run").arg(&file).arg("--print-spec");
+        let output = command.output().unwrap();
+        let printed = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success() && printed.contains("[sweep]"), "{}: {:?}", file.display(), output.stderr);
+    }
+}
+
+#[test]
 fn members_of_all_cells_differ_unless_their_random_numbers_are_common() {
     let study = run(&format!("{BASE} --sweep omega=1,1"));
     assert_ne!(rows(&study, "summary.csv", 0), rows(&study, "summary.csv", 1));

@@ -101,11 +101,14 @@ impl Overview<'_> {
             writeln!(f, "{:<11}{} more cells are in {ENSEMBLE}", "...", cells.len() - MOST_CELLS)?;
         }
         if let Some(LogRank { statistic, degrees_of_freedom, p_value, .. }) = log_rank {
-            let p = significant(*p_value);
+            let p = match *p_value {
+                0.0 => "< 1e-300".into(),
+                p => format!("= {}", significant(p)),
+            };
             let chi = significant(*statistic);
             writeln!(
                 f,
-                "{:<11}log-rank test that all cells have one distribution: p = {p}, chi2 = {chi} ({degrees_of_freedom})",
+                "{:<11}log-rank test that all cells have one distribution: p {p}, chi2 = {chi} ({degrees_of_freedom})",
                 "cells"
             )?;
         }
@@ -141,15 +144,23 @@ impl Overview<'_> {
     }
 }
 
-/// What was run, in a line.
+/// What was run, in a line; what is swept is left out.
 pub fn describe(spec: &Spec) -> String {
-    let Spec { flow, points, t_end, seed, .. } = spec;
     let pace = match spec.pace() {
-        Pace::Fixed(tau) => format!("tau = {tau:?}"),
-        Pace::Adaptive(tolerance) => format!("adaptive {tolerance:?}"),
+        Pace::Fixed(tau) => ("tau", format!("tau = {tau:?}")),
+        Pace::Adaptive(tolerance) => ("adaptive", format!("adaptive {tolerance:?}")),
     };
-    let shape = String::from(spec.shape.clone());
-    format!("{shape}, {flow}, n = {points}, {pace}, t-end = {t_end}, seed {seed}")
+    let parts = [
+        ("shape", String::from(spec.shape.clone())),
+        ("flow", spec.flow.to_string()),
+        ("points", format!("n = {}", spec.points)),
+        pace,
+        ("t-end", format!("t-end = {}", spec.t_end)),
+        ("seed", format!("seed {}", spec.seed)),
+    ];
+    let swept = |key: &str| spec.sweep.axes().iter().any(|axis| axis.key == key);
+    let parts = parts.into_iter().filter(|(key, _)| !swept(key)).map(|(_, part)| part);
+    parts.collect::<Vec<_>>().join(", ")
 }
 
 /// Where it was run, in a line.
