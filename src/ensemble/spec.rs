@@ -245,13 +245,18 @@ impl Spec {
     pub fn members(&self) -> Box<dyn Iterator<Item = u64> + '_> {
         match &self.only {
             Some(only) => Box::new(only.iter().copied()),
-            None => Box::new(0..self.curves),
+            None => Box::new(0..self.all_members()),
         }
     }
 
     /// How many members [`Spec::members`] has.
     pub fn member_count(&self) -> u64 {
-        self.only.as_ref().map_or(self.curves, |only| only.len() as u64)
+        self.only.as_ref().map_or(self.all_members(), |only| only.len() as u64)
+    }
+
+    /// Members of all cells, whether they are to run or not.
+    pub fn all_members(&self) -> u64 {
+        self.curves.saturating_mul(self.sweep.cells())
     }
 
     /// How time is cut into steps.

@@ -51,7 +51,7 @@ impl Spec {
     }
 
     fn check_counts(&self) -> Result<()> {
-        let members = self.curves.saturating_mul(self.sweep.cells());
+        let members = self.all_members();
         if self.curves > 0 && self.curves <= MOST_CURVES && members > MOST_CURVES {
             let problem = format!("{} cells make {members} members, too many", self.sweep.cells());
             return Err(Error::value("curves", self.curves, &problem, &format!("at most {MOST_CURVES} in all")));
@@ -277,11 +277,11 @@ impl Spec {
     }
 
     fn tidy_only(&mut self) -> Result<()> {
+        let members = self.all_members();
         let Some(only) = &mut self.only else { return Ok(()) };
         if only.is_empty() {
             return Err(Error::value("only", "[]", "no member to run", "name at least one, or leave the key out"));
         }
-        let members = self.curves * self.sweep.cells();
         if let Some(member) = only.iter().find(|member| **member >= members) {
             let problem = format!("no such member among {members}");
             return Err(Error::value("only", member, &problem, &format!("take members from 0 to {}", members - 1)));

@@ -30,6 +30,8 @@ pub struct CellStatistics {
     pub sample: Sample,
     /// The estimate from them.
     pub survival: KaplanMeier,
+    /// Mean time, restricted where the last member is censored.
+    pub mean: Option<Mean>,
     /// 95 % interval of the median.
     pub interval: Option<Interval>,
 }
@@ -49,8 +51,9 @@ impl CellStatistics {
         let sample = Sample::new(tally.times.iter().copied())?;
         let survival = KaplanMeier::new(&sample);
         let bootstrap = Bootstrap { seed: spec.seed.wrapping_add(cell), ..Bootstrap::default() };
-        let interval = bootstrap.median(&sample);
-        Ok(CellStatistics { cell, values: spec.sweep.labels(cell), counts: tally.counts, sample, survival, interval })
+        let (mean, interval) = (survival.mean(), bootstrap.median(&sample));
+        let (values, counts) = (spec.sweep.labels(cell), tally.counts);
+        Ok(CellStatistics { cell, values, counts, sample, survival, mean, interval })
     }
 
     /// Members that ended.
@@ -58,9 +61,9 @@ impl CellStatistics {
         self.counts.iter().sum()
     }
 
-    /// Mean time, restricted where the last member is censored.
-    pub fn mean(&self) -> Option<Mean> {
-        self.survival.mean()
+    /// The interval of the median, where both its ends are known.
+    pub fn bounds(&self) -> Option<(f64, f64)> {
+        self.interval.and_then(|Interval { lower, upper, .. }| Some((lower?, upper?)))
     }
 }
 
@@ -71,9 +74,9 @@ impl EnsembleStatistics {
         let cells = (0..spec.sweep.cells())
             .map(|cell| CellStatistics::new(spec, cell, tally.cells.get(cell as usize).unwrap_or(&none)))
             .collect::<Result<Vec<_>>>()?;
-        let samples: Vec<Sample> = cells.iter().map(|cell| cell.sample.clone()).collect();
         let compared = (2..=MOST_COMPARED).contains(&cells.len());
-        let log_rank = if compared { log_rank(&samples) } else { None };
+        let samples = || cells.iter().map(|cell| cell.sample.clone()).collect::<Vec<Sample>>();
+        let log_rank = if compared { log_rank(&samples()) } else { None };
         let power_law = match spec.sweep.axes() {
             [axis] => axis.numbers().and_then(|values| {
                 let medians = cells.iter().map(|cell| cell.survival.median());
@@ -99,7 +102,7 @@ impl EnsembleStatistics {
         let header = header.chain(times.map(|name| format!("t_relax_{name}")));
         writer.write_record(header).map_err(|e| failed(&e))?;
         for cell in &self.cells {
-            let mean = cell.mean();
+            let mean = cell.mean;
             let moments = [
                 mean.map(|mean| mean.value),
                 mean.and_then(|mean| mean.standard_deviation),

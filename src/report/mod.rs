@@ -67,7 +67,7 @@ impl Report {
     /// Opens the tables that `spec` asks for.
     pub fn begin(folder: OutputFolder, spec: &Spec, quiet: bool) -> Result<Report> {
         Ok(Report {
-            total: spec.only.as_ref().map_or(spec.curves * spec.sweep.cells(), |only| only.len() as u64),
+            total: spec.member_count(),
             before: 0,
             summary: SummaryTable::begin(folder.file(folder::SUMMARY)?)?,
             series: spec.series.map(|_| SeriesTable::begin(folder.file(folder::SERIES)?)).transpose()?,
@@ -107,8 +107,9 @@ impl Report {
         let Report { folder, tally, panels, watched, progress, started, clock, summary, series, snapshots, .. } = self;
         progress.finish();
         let wall = clock.elapsed();
-        let mut names = vec![folder::SUMMARY];
-        let mut files = vec![summary.ready()?];
+        let statistics = &EnsembleStatistics::new(spec, &tally)?;
+        let mut names = vec![folder::SUMMARY, folder::ENSEMBLE];
+        let mut files = vec![summary.ready()?, folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?];
         if let Some(series) = series {
             files.push(series.ready()?);
             names.push(folder::SERIES);
@@ -117,9 +118,6 @@ impl Report {
             files.push(snapshots.ready()?);
             names.push(folder::SNAPSHOTS);
         }
-        let statistics = &EnsembleStatistics::new(spec, &tally)?;
-        files.push(folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?);
-        names.insert(1, folder::ENSEMBLE);
         let gallery = (!panels.is_empty()).then(|| gallery::draw(&panels));
         let study = Study { spec, platform, tally: &tally, statistics, warnings, started, wall };
         let charts = study.charts();

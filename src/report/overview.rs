@@ -11,7 +11,7 @@ use super::{
 use crate::{
     backend::Platform,
     ensemble::{Spec, spec::Pace},
-    statistics::{Interval, LogRank, PowerLaw},
+    statistics::{LogRank, PowerLaw},
 };
 
 /// Cells at most of which there is a line; the table has them all.
@@ -175,10 +175,10 @@ pub fn machine(platform: &Platform) -> String {
 /// Median and mean of the times of a cell, and how far they are to be trusted.
 fn times(cell: &CellStatistics) -> String {
     let (members, known) = (cell.members(), cell.survival.events() as u64);
-    let Some(mean) = cell.mean() else { return format!("none of {members} members reached it") };
-    let median = match (cell.survival.median(), cell.interval) {
+    let Some(mean) = cell.mean else { return format!("none of {members} members reached it") };
+    let median = match (cell.survival.median(), cell.bounds()) {
         (None, _) => "not reached by half of the members".to_string(),
-        (Some(median), Some(Interval { lower: Some(lower), upper: Some(upper), .. })) => {
+        (Some(median), Some((lower, upper))) => {
             format!("{} ({} to {})", significant(median), significant(lower), significant(upper))
         }
         (Some(median), _) => significant(median),

@@ -23,7 +23,6 @@ use crate::{
     ensemble::{Outcome, Spec, Status},
     error::Result,
     flow::Flow,
-    statistics::Interval,
 };
 
 /// Half the width of a 95 % band in standard errors.
@@ -93,8 +92,7 @@ impl Study<'_> {
 
     fn survival(&self) -> Chart {
         let cells = &self.statistics.cells;
-        let axes = self.spec.sweep.axes();
-        let numbers = if let [axis] = axes { axis.numbers() } else { None };
+        let numbers = self.numbers();
         let curves = cells.iter().enumerate().map(|(rank, cell)| {
             let steps = cell.survival.steps();
             let bound = |sign: f64| {
@@ -103,7 +101,7 @@ impl Study<'_> {
                 steps.iter().map(of_step).collect()
             };
             SurvivalCurve {
-                label: if axes.is_empty() { "all members".into() } else { self.spec.sweep.name(cell.cell) },
+                label: self.label(cell.cell),
                 value: numbers.as_ref().map(|numbers| numbers[rank]),
                 t: steps.iter().map(|step| step.time).collect(),
                 survival: steps.iter().map(|step| step.survival).collect(),
@@ -120,15 +118,14 @@ impl Study<'_> {
 
     /// The mean excess as long as all members of a cell run, where the run has a series.
     fn excess(&self) -> Option<Chart> {
-        let axes = self.spec.sweep.axes();
-        let numbers = if let [axis] = axes { axis.numbers() } else { None };
+        let numbers = self.numbers();
         let curve = |(rank, cell): (usize, &CellTally)| {
             let all: u64 = cell.counts.iter().sum();
             let rows = cell.excess.iter().take_while(|(_, moments)| moments.count == all);
             let rows: Vec<(f64, Moments)> = rows.map(|(t, moments)| (f64::from_bits(*t), *moments)).collect();
             let bound = |sign: f64| rows.iter().map(|(_, m)| m.mean + sign * m.deviation()).collect();
             DecayCurve {
-                label: if axes.is_empty() { "all members".into() } else { self.spec.sweep.name(rank as u64) },
+                label: self.label(rank as u64),
                 value: numbers.as_ref().map(|numbers| numbers[rank]),
                 t: rows.iter().map(|(t, _)| *t).collect(),
                 mean: rows.iter().map(|(_, moments)| moments.mean).collect(),
@@ -235,6 +232,16 @@ impl Study<'_> {
         [describe(self.spec)].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
     }
 
+    /// The values of the only swept key, cell by cell, if they are numbers.
+    fn numbers(&self) -> Option<Vec<f64>> {
+        if let [axis] = self.spec.sweep.axes() { axis.numbers() } else { None }
+    }
+
+    /// What a cell is called in a legend.
+    fn label(&self, cell: u64) -> String {
+        if self.spec.sweep.is_empty() { "all members".into() } else { self.spec.sweep.name(cell) }
+    }
+
     fn keys(&self) -> String {
         self.spec.sweep.axes().iter().map(|axis| axis.key.as_str()).collect::<Vec<_>>().join(", ")
     }
@@ -248,11 +255,10 @@ impl Study<'_> {
         };
         match &cells[..] {
             [cell] => {
-                let around = cell.interval.and_then(|interval| Some((interval.lower?, interval.upper?)));
                 let bounds =
                     |(low, high)| format!("95 %: {} to {}", significant(low, DIGITS), significant(high, DIGITS));
-                add("median t_relax", cell.survival.median(), around.map_or(String::new(), bounds));
-                let mean = cell.mean();
+                add("median t_relax", cell.survival.median(), cell.bounds().map_or(String::new(), bounds));
+                let mean = cell.mean;
                 let error = mean.and_then(|mean| mean.standard_error);
                 let note = match mean.and_then(|mean| mean.restricted_to) {
                     Some(_) => "a lower bound: some members had not relaxed at the end".into(),
@@ -297,7 +303,7 @@ impl Study<'_> {
         let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
         let row = |cell: &CellStatistics| {
             let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
-            let mean = cell.mean();
+            let mean = cell.mean;
             let least = if mean.is_some_and(|mean| mean.restricted_to.is_some()) { "≥ " } else { "" };
             let moments = [
                 mean.map_or(String::new(), |mean| format!("{least}{}", significant(mean.value, DIGITS))),
@@ -358,8 +364,7 @@ fn theory(cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
 }
 
 fn median(cell: &CellStatistics) -> Option<Estimate> {
-    let interval = cell.interval.and_then(|Interval { lower, upper, .. }| Some((lower?, upper?)));
-    cell.survival.median().map(|value| Estimate { value, interval })
+    cell.survival.median().map(|value| Estimate { value, interval: cell.bounds() })
 }
 
 /// The number among `values` of a key whose values are numbers.

@@ -12,7 +12,6 @@ use crate::{
 /// Counts and sums over the members that ended.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
-    counts: [u64; Status::ALL.len()],
     /// By cell.
     pub cells: Vec<CellTally>,
     /// Steps of all members.
@@ -136,7 +135,7 @@ impl Tally {
         *area += outcome.start.area.abs();
         mesh.push([outcome.end.mesh_ratio, outcome.end.metric_drift]);
         times.push(Observation::new(outcome.t_relax, outcome.t_end));
-        for (counts, counted) in [(&mut self.counts, true), (counts, true), (others, outcome.t_relax.is_none())] {
+        for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
             for (count, status) in counts.iter_mut().zip(Status::ALL) {
                 *count += u64::from(counted && status == outcome.status);
             }
@@ -194,12 +193,13 @@ impl Tally {
 
     /// Members that ended.
     pub fn members(&self) -> u64 {
-        self.counts.iter().sum()
+        self.counts().map(|(_, count)| count).sum()
     }
 
     /// Each status with its number of members, in the order of [`Status::ALL`].
     pub fn counts(&self) -> impl Iterator<Item = (Status, u64)> {
-        Status::ALL.into_iter().zip(self.counts)
+        let of = |rank: usize| self.cells.iter().map(|cell| cell.counts[rank]).sum();
+        Status::ALL.into_iter().enumerate().map(move |(rank, status)| (status, of(rank)))
     }
 }
 

@@ -1,8 +1,8 @@
 //! Gauss–Seidel sweeps to a residual, the paper's solver.
 //!
 //! *Theory.* The unknown is the increment over a step, started from a prediction ([`Start`](crate::scheme::start::Start)).
-//! A sweep replaces `u_i` by `u_i + ω_SOR·residual_i`; ω_SOR = 1 is Gauss–Seidel. The slow modes of a fourth-order operator hardly show in the residual: their eigenvalue is only q/τ. So the residual is scaled by τ/q,
-//! which bounds the error of just these modes, and the sweeps stop when
+//! A sweep replaces `u_i` by `u_i + ω_SOR·residual_i`; ω_SOR = 1 is Gauss–Seidel. The slow modes of a fourth-order
+//! operator hardly show in the residual: their eigenvalue is only q/τ. So the residual is scaled by τ/q, which bounds the error of just these modes, and the sweeps stop when
 //! `max (τ/q)|residual| ≤ tolerance · max|u|`, or when that error is below the rounding of the unknown itself, or
 //! when the residual is all rounding (f32 reaches that at a tolerance of about 16·ε·τ/h⁴).
 //! Stopping on the update instead stops hundreds of times too early.
