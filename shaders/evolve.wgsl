@@ -9,7 +9,7 @@ fn take_member(index: u32) {
     member = all_due[index];
     p = all_parameters[member];
     counters = all_counters[member];
-    report = all_reports[member];
+    report = all_reports[member].report;
     counters.sweeps_k = 0u;
     counters.sweeps_x = 0u;
     let due = select(0u, counters.goal - counters.steps, counters.status == RUNNING);
@@ -33,7 +33,7 @@ fn take_member(index: u32) {
     storageBarrier();
     if lane == 0u {
         all_counters[member] = counters;
-        all_reports[member] = report;
+        all_reports[member].report = report;
     }
 }
 
@@ -79,6 +79,7 @@ fn advance() -> u32 {
     report.middle = middle;
     report.now = observed();
     record_events(h);
+    follow(h);
     if ADAPTIVE {
         let next = next_length(h, error, select(real(1.0), real(MOST_GROWTH), counters.refused == 0u));
         report.progress.next = next;

@@ -45,6 +45,13 @@ fn extrapolate() {
     new_y = moved.b;
 }
 
+/// A quantity at the fraction `at` of a step in which it goes from `start` over `middle` to `end`: on the parabola.
+fn inside(start: real, middle: real, end: real, at: real) -> real {
+    let slope = real(4.0) * middle - real(3.0) * start - end;
+    let bend = real(2.0) * (start - real(2.0) * middle + end);
+    return start + at * (slope + at * bend);
+}
+
 /// Where in the step a quantity that goes from `start` over `middle` to `end` first falls to `at`, as a fraction.
 fn crossing(start: real, middle: real, end: real, at: real) -> real {
     let above = start - at;

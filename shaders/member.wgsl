@@ -23,6 +23,10 @@ struct Parameters {
     goal_low: real,
     end_high: real,
     end_low: real,
+    clock_end: real,
+    fit_from: real,
+    fit_to: real,
+    growth: real,
 }
 
 /// Observables of one curve.
@@ -55,12 +59,30 @@ struct Progress {
     half_fraction: real,
 }
 
-/// What a member reports when a dispatch ends.
+/// The line fitted to ln excess.
+struct Decay {
+    x: real,
+    y: real,
+    mean_x: real,
+    mean_y: real,
+    xx: real,
+    xy: real,
+    yy: real,
+}
+
+/// What a member reports when a dispatch ends, but for what it notes on its way.
 struct Report {
     before: Observed,
     middle: Observed,
     now: Observed,
     progress: Progress,
+    decay: Decay,
+}
+
+/// All of it.
+struct Record {
+    report: Report,
+    excess_at: array<real, TIMES>,
 }
 
 /// Integers of a member. `status` is 0 while it is running; `phase` and `solve_sweeps` say where an attempt was paused.
@@ -77,6 +99,9 @@ struct Counters {
     sweeps_x: u32,
     phase: u32,
     solve_sweeps: u32,
+    fit_points: u32,
+    fit_over: u32,
+    noted: u32,
 }
 
 const RUNNING = 0u;
@@ -114,7 +139,7 @@ const BEFORE = 14u;
 @group(0) @binding(0) var<uniform> dispatch: Dispatch;
 @group(0) @binding(1) var<storage, read> all_parameters: array<Parameters>;
 @group(0) @binding(2) var<storage, read_write> all_counters: array<Counters>;
-@group(0) @binding(3) var<storage, read_write> all_reports: array<Report>;
+@group(0) @binding(3) var<storage, read_write> all_reports: array<Record>;
 /// STATE_FIELDS fields of NODES numbers each.
 @group(0) @binding(4) var<storage, read_write> all_states: array<real>;
 

@@ -5,7 +5,7 @@
 //! Horner's rule, so there is no division by a vanishing curvature. Units: `k` is 1/length, time is length⁴,
 //! so `c_j` is length^(j-3).
 
-use std::{fmt, str::FromStr};
+use std::{f64::consts::PI, fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
@@ -63,6 +63,29 @@ impl Flow {
         let slope: f64 =
             self.coefficients().iter().enumerate().map(|(j, c)| (j + 1) as f64 * c * k.powi(j as i32)).sum();
         (m2 - 1.0) * (m2 * k.powi(4) + slope * k * k)
+    }
+}
+
+impl Flow {
+    /// Where a nearly round curve of area `area` grows so that its excess falls as a power of `growth + t`: that time.
+    /// For Willmore flow, whose circles have `R⁴ = R₀⁴ + 2t`.
+    pub fn growth(&self, area: f64) -> Option<f64> {
+        (*self == Flow::Willmore).then(|| 0.5 * (area / PI).powi(2))
+    }
+
+    /// Rate at which the excess of a nearly round curve of area `area` falls in mode `m`, by linear theory, in 1/time:
+    /// `24/R⁴` for m = 2 and surface diffusion; for Willmore flow the exponent of `1 + 2t/R₀⁴`. None where circles are
+    /// not at rest and no such law is known.
+    pub fn excess_rate(&self, m: u32, area: f64) -> Option<f64> {
+        let radius = (area.abs() / PI).sqrt();
+        match self {
+            Flow::SurfaceDiffusion => Some(2.0 * self.linear_rate(m, radius)),
+            // The excess goes with the square of the mode's amplitude over the radius, both powers of R₀⁴ + 2t.
+            Flow::Willmore => Some(self.linear_rate(m, 1.0) + 0.5),
+            Flow::Elastic(lambda) if *lambda > 0.0 => Some(2.0 * self.linear_rate(m, (2.0 * lambda).sqrt().recip())),
+            _ => None,
+        }
+        .filter(|rate| rate.is_finite())
     }
 }
 

@@ -1,5 +1,7 @@
 //! Time: the clock of a run with fixed τ, that of adaptive steps, and the output times.
 
+use crate::scheme::decay;
+
 /// Relative distance from a step at which an output time counts as on it.
 const ON_A_STEP: f64 = 1e-9;
 
@@ -98,18 +100,19 @@ pub struct Output {
     pub frame: bool,
 }
 
-/// The output times of a run to `t_end`, in order: every `series` from 0 on, each of `snapshots`, and `frames` times
-/// between the ends, dense at the start, where curves move most.
-pub fn outputs(t_end: f64, series: Option<f64>, snapshots: &[f64], frames: u32) -> Vec<Output> {
+/// The times at which every member's excess is noted, both ends included.
+pub fn grid(t_end: f64) -> impl Iterator<Item = f64> {
+    (0..=decay::PARTS).map(move |part| decay::share::<f64>(part) * t_end)
+}
+
+/// The output times of a run to `t_end`, in order: every `series` from 0 on, each of `snapshots` and of `frames`.
+pub fn outputs(t_end: f64, series: Option<f64>, snapshots: &[f64], frames: &[f64]) -> Vec<Output> {
     let rows = series.map_or(0, |dt| (t_end / dt * (1.0 + ON_A_STEP)) as u64 + 1);
     let last = |t: f64| if t >= t_end * (1.0 - ON_A_STEP) { t_end } else { t };
     let mut outputs: Vec<Output> = (0..rows)
         .map(|row| Output { t: last(row as f64 * series.unwrap_or(0.0)), series: true, snapshot: false, frame: false })
         .chain(snapshots.iter().map(|t| Output { t: last(*t), series: false, snapshot: true, frame: false }))
-        .chain((1..=frames).map(|frame| {
-            let t = t_end * (f64::from(frame) / f64::from(frames + 1)).powi(3);
-            Output { t: last(t), series: false, snapshot: false, frame: true }
-        }))
+        .chain(frames.iter().map(|t| Output { t: last(*t), series: false, snapshot: false, frame: true }))
         .collect();
     outputs.sort_by(|a, b| a.t.total_cmp(&b.t));
     outputs.dedup_by(|later, earlier| {
@@ -142,7 +145,7 @@ mod tests {
     #[test]
     fn output_times_fall_on_steps_or_between_them() {
         let clock = Clock::new(0.1, 1.0);
-        let outputs = outputs(1.0, Some(0.25), &[0.3, 0.5, 1.0], 0);
+        let outputs = outputs(1.0, Some(0.25), &[0.3, 0.5, 1.0], &[]);
         let brief: Vec<_> = outputs.iter().map(|o| (o.t, clock.locate(o.t).0, o.series, o.snapshot)).collect();
         assert_eq!(
             brief,
@@ -168,7 +171,7 @@ mod tests {
                     let t_end = tau * f64::from(steps);
                     let clock = Clock::new(tau, t_end);
                     let dt = t_end / f64::from(rows);
-                    let outputs = outputs(t_end, Some(dt), &[t_end, 0.5 * t_end], 0);
+                    let outputs = outputs(t_end, Some(dt), &[t_end, 0.5 * t_end], &[]);
                     for output in &outputs {
                         let (step, fraction) = clock.locate(output.t);
                         assert!(fraction > 0.0 && fraction <= 1.0, "tau {tau}, t_end {t_end}: {output:?}");

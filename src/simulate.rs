@@ -9,15 +9,13 @@ use crate::{
     backend::Backend,
     ensemble::{Cell, Ended, Sink, spec::Precision},
     error::Result,
-    schedule::{Output, outputs},
+    schedule::{Output, grid, outputs},
+    scheme::decay,
     trajectory::Trajectory,
 };
 
 /// A member is admitted when at most this many times the slots are waiting for the first one that has not ended.
 const MEMBERS_AHEAD: usize = 8;
-
-/// Pictures of a member on its way, where it has a portrait.
-const FRAMES: u32 = 30;
 
 /// Runs the members of `cells`, which keep [company](crate::ensemble::study::companies), on `backend`, and hands each to
 /// `sink` in member order.
@@ -30,11 +28,17 @@ pub fn simulate(
     portraits: usize,
     sink: &mut dyn Sink,
 ) -> Result<()> {
-    let outputs = |frames: u32| -> Vec<_> {
-        let of_cell = |Cell { spec, .. }: &Cell| outputs(spec.t_end, spec.series, &spec.snapshots, frames);
+    let outputs = |framed: bool| -> Vec<_> {
+        let of_cell = |Cell { spec, .. }: &Cell| {
+            // The pictures show the start and the end anyway.
+            let inside = if framed { 1..decay::PARTS } else { 0..0 };
+            let frames: Vec<f64> =
+                grid(spec.t_end).enumerate().filter(|(part, _)| inside.contains(part)).map(|(_, t)| t).collect();
+            outputs(spec.t_end, spec.series, &spec.snapshots, &frames)
+        };
         cells.iter().map(of_cell).collect()
     };
-    let (outputs, framed) = (outputs(0), outputs(FRAMES));
+    let (outputs, framed) = (outputs(false), outputs(true));
     let members = cells.iter().enumerate().flat_map(|(cell, own)| own.members().enumerate().map(move |m| (cell, m)));
     let mut waiting = members.enumerate().peekable();
     // Members that end early wait for those before them: this bounds how many.

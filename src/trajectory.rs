@@ -15,9 +15,10 @@ use crate::{
     },
     schedule::{Clock, Output, Ticks},
     scheme::{
-        Curve, Parameters, State,
+        Curve, Parameters, State, decay,
         evolve::Run,
-        parameters::{Counters, NEVER, Observed, Report},
+        extrapolation,
+        parameters::{Counters, Decay, NEVER, Observed, Report},
     },
     solver::Ring,
 };
@@ -28,9 +29,11 @@ const ROUND: f64 = 1e-13;
 const RESOLUTION: f64 = 128.0;
 /// A threshold that no excess reaches.
 const NO_THRESHOLD: f64 = -1.0;
-/// Adaptive steps follow the shape until the excess is this fraction of its start, where the fit of the rate ends,
-/// or of the threshold.
-const FOLLOWED: f64 = 1e-3;
+/// The rate is fitted while the excess is between these fractions of its start. Adaptive steps follow the shape to the
+/// end of the fit, or to half the threshold.
+const FITTED: [f64; 2] = [1e-3, 1e-1];
+/// A fit with fewer points says nothing.
+const LEAST_POINTS: u32 = 8;
 /// A curve that has shrunk to this fraction of its length is gone.
 const SHRUNK: f64 = 1e-3;
 /// The first adaptive step in units of the fourth power of the shortest segment, the fastest time scale there is.
@@ -67,6 +70,16 @@ enum Time {
     Adaptive(Ticks),
 }
 
+impl Time {
+    /// The unit of the clock of [`decay`], for a member advanced in lengths of `unit`.
+    fn unit(self, unit: f64) -> f64 {
+        match self {
+            Time::Fixed(clock) => clock.tau,
+            Time::Adaptive(_) => unit.powi(4),
+        }
+    }
+}
+
 /// A resident member.
 pub struct Trajectory<'a> {
     member: Member,
@@ -86,6 +99,7 @@ pub struct Trajectory<'a> {
     frames: Vec<(f64, Vec<DVec2>)>,
     sweeps: [u64; 2],
     course: Course,
+    rate_theory: Option<f64>,
     /// When the polygon was first seen to cross itself.
     crossed: Option<f64>,
     portrait: bool,
@@ -113,7 +127,9 @@ impl<'a> Trajectory<'a> {
         let threshold = |excess: f64| if reachable && excess >= resolution { excess } else { NO_THRESHOLD };
         parameters.relax_at = if course == Course::Followed { limit } else { NO_THRESHOLD };
         parameters.half_at = threshold(0.5 * start.excess);
-        parameters.follow_to = (FOLLOWED * start.excess).min(0.5 * limit).max(resolution);
+        parameters.follow_to = (FITTED[0] * start.excess).min(0.5 * limit).max(resolution);
+        parameters.fit_from = threshold(FITTED[1] * start.excess);
+        parameters.fit_to = (FITTED[0] * start.excess).max(resolution);
         parameters.least_length = SHRUNK * launch.report.now.length;
         let time = match spec.pace() {
             Pace::Fixed(tau) => Time::Fixed(Clock::new(tau, spec.t_end)),
@@ -128,6 +144,9 @@ impl<'a> Trajectory<'a> {
                 Time::Adaptive(ticks)
             }
         };
+        let clock = time.unit(unit);
+        parameters.clock_end = spec.t_end / clock;
+        parameters.growth = spec.flow.growth(start.area).map_or(0.0, |growth| growth / clock);
         launch.parameters = parameters;
         launch.counters.stop_when_relaxed = spec.stop_when_relaxed.into();
         let mut trajectory = Trajectory {
@@ -145,6 +164,7 @@ impl<'a> Trajectory<'a> {
             frames: Vec::new(),
             sweeps: [0; 2],
             course,
+            rate_theory: spec.rate_in_theory(start.area),
             crossed: None,
             portrait: false,
         };
@@ -271,7 +291,7 @@ impl<'a> Trajectory<'a> {
     fn emit(&mut self, output: &Output, fraction: f64, state: Option<&State<f64>>) {
         let (member, t) = (self.member.index, output.t);
         if output.series {
-            let Report { before, middle, now, progress } = &self.report;
+            let Report { before, middle, now, progress, .. } = &self.report;
             let at = self.between(fraction, &before.to_numbers(), &middle.to_numbers(), &now.to_numbers());
             let at = Observables::new(&Observed::from_numbers(&at), progress.turning, self.unit);
             self.series.push(SeriesRow { member, t, at });
@@ -308,12 +328,9 @@ impl<'a> Trajectory<'a> {
             return now.to_vec();
         }
         let values = before.iter().zip(middle).zip(now);
-        let t = fraction;
         match self.time {
-            Time::Fixed(_) => values.map(|((a, _), b)| a + t * (b - a)).collect(),
-            Time::Adaptive(_) => {
-                values.map(|((a, m), b)| a + t * (4.0 * m - 3.0 * a - b) + 2.0 * t * t * (a - 2.0 * m + b)).collect()
-            }
+            Time::Fixed(_) => values.map(|((a, _), b)| a + fraction * (b - a)).collect(),
+            Time::Adaptive(_) => values.map(|((a, m), b)| extrapolation::inside(*a, *m, *b, fraction)).collect(),
         }
     }
 
@@ -369,6 +386,22 @@ impl<'a> Trajectory<'a> {
         Some((goal, parameters))
     }
 
+    /// Slope of the line fitted to -ln excess, in 1/time, or against the logarithm of time where the excess falls as a
+    /// power of it; and the share of the variance that the line explains.
+    fn rate(&self) -> Option<(f64, f64)> {
+        let Decay { xx, xy, yy, .. } = self.report.decay;
+        let clock = if self.launch.parameters.growth > 0.0 { 1.0 } else { self.time.unit(self.unit) };
+        let (rate, r2) = (-xy / xx / clock, xy * xy / (xx * yy));
+        (self.counters.fit_points >= LEAST_POINTS && rate.is_finite() && r2.is_finite()).then_some((rate, r2))
+    }
+
+    /// The excess at the times of [`schedule::grid`](crate::schedule::grid) that the member has reached.
+    fn excess(&self) -> Vec<f64> {
+        let noted = &self.report.excess_at[..(self.counters.noted as usize).min(decay::TIMES)];
+        let end = self.is_at_end().then_some(self.report.now.excess);
+        [self.start.excess].into_iter().chain(noted.iter().copied()).chain(end).collect()
+    }
+
     /// What the member leaves; `last` is its last state, for the portrait.
     pub fn end(mut self, last: Option<&State<f64>>) -> Ended {
         let frames = std::mem::take(&mut self.frames);
@@ -385,6 +418,7 @@ impl<'a> Trajectory<'a> {
         let t_half = if self.start.excess <= ROUND { Some(0.0) } else { halved };
         let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.counters.status);
         let status = failed.unwrap_or(if t_relax.is_some() { Status::Relaxed } else { Status::Unfinished });
+        let (rate, rate_r2) = self.rate().unzip();
         let (origin, unit) = (self.member.origin, self.unit);
         let portrait = self.portrait.then(|| {
             let before: Vec<DVec2> = self.member.nodes.iter().map(|node| *node + origin).collect();
@@ -403,11 +437,15 @@ impl<'a> Trajectory<'a> {
             sweeps_x: self.sweeps[1],
             t_relax,
             t_half,
+            rate,
+            rate_r2,
+            rate_theory: self.rate_theory,
             start: self.start,
             end: Observables::new(&self.report.now, progress.turning, unit),
             self_crossing: self.crossed,
         };
         Ended {
+            excess: self.excess(),
             outcome,
             series: self.series,
             snapshots: self.snapshots,

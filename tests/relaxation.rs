@@ -81,7 +81,7 @@ fn file(corners: &[DVec2]) -> BaseCurve {
 /// Runs a member to its end by hand, so that its last state can be looked at, also where the program refuses its n.
 fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let n = member.nodes.len();
-    let outputs = outputs(spec.t_end, spec.series, &spec.snapshots, 0);
+    let outputs = outputs(spec.t_end, spec.series, &spec.snapshots, &[]);
     let mut trajectory = Trajectory::new(member, spec, T::PRECISION, &outputs);
     let mut run = trajectory.launch().convert::<T>();
     let mut work = evolve::Team::new(Blocks::new(n).unwrap());

@@ -8,9 +8,10 @@ use curvelax::{
     ensemble::Status,
     number::{BIG, Real},
     scheme::{
+        decay,
         observe::{MAX_DRIFT, MAX_GAP, MAX_TURN, MIN_EDGE},
         pace,
-        parameters::{Counters, NEVER, Observed, Parameters, Progress, Report},
+        parameters::{Counters, Decay, NEVER, Observed, Parameters, Progress, Report},
         state::{CURVE_FIELDS, STATE_FIELDS},
         step::NEGLIGIBLE,
     },
@@ -142,10 +143,20 @@ fn layouts_agree<T: Real>() {
     expect("Parameters", Parameters::<T>::FIELDS, number);
     expect("Observed", Observed::<T>::FIELDS, number);
     expect("Progress", Progress::<T>::FIELDS, number);
-    let observed = Observed::<T>::FIELDS.len() as u32 * number;
-    let parts = ["before", "middle", "now", "progress"];
-    let parts: Vec<_> = (0..).zip(parts).map(|(i, part)| (part.to_string(), i * observed)).collect();
-    assert_eq!(found["Report"], (parts, Report::<T>::LEN as u32 * number), "Report in {}", T::NAME);
+    expect("Decay", Decay::<T>::FIELDS, number);
+    use std::mem::offset_of;
+    let parts = [
+        ("before", offset_of!(Report<T>, before)),
+        ("middle", offset_of!(Report<T>, middle)),
+        ("now", offset_of!(Report<T>, now)),
+        ("progress", offset_of!(Report<T>, progress)),
+        ("decay", offset_of!(Report<T>, decay)),
+    ];
+    let parts = parts.map(|(part, offset)| (part.to_string(), offset as u32)).to_vec();
+    let noted = offset_of!(Report<T>, excess_at) as u32;
+    assert_eq!(found["Report"], (parts, noted), "Report in {}", T::NAME);
+    let record = vec![("report".to_string(), 0), ("excess_at".to_string(), noted)];
+    assert_eq!(found["Record"], (record, Report::<T>::LEN as u32 * number), "Record in {}", T::NAME);
     expect("Counters", &Counters::FIELDS, 4);
     expect("Dispatch", &kernel::DISPATCH_FIELDS, 4);
 }
@@ -288,6 +299,10 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("MOST_GROWTH", pace::MOST_GROWTH),
         ("LEAST_GROWTH", pace::LEAST_GROWTH),
         ("LEAST_STEP", pace::LEAST_STEP),
+        ("PARTS", decay::PARTS as f64),
+        ("TIMES", decay::TIMES as f64),
+        ("HALVINGS", f64::from(decay::HALVINGS)),
+        ("TERMS", f64::from(decay::TERMS)),
         ("STATE_FIELDS", STATE_FIELDS as f64),
         ("INCREMENTS", CURVE_FIELDS as f64),
         ("EARLIER", (CURVE_FIELDS + 3) as f64),

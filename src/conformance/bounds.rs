@@ -98,6 +98,13 @@ pub const REPORT: [Bound; 10] = [
     bound("travel", Scale::Position, 16.0, 64.0),
 ];
 
+/// What a run keeps of how the excess falls: its values at the times of the grid, and the fitted rate.
+///
+/// An excess is off by its rounding, and inside an adaptive run by what a changed step length changes; its logarithm by
+/// that over the excess; the slope of a line by twice that over the time it spans.
+pub const DECAY: [Bound; 2] =
+    [bound("excess on the way", Scale::One, 16.0, 64.0), bound("fitted rate", Scale::One, 32.0, 128.0)];
+
 /// What adaptive runs leave besides their ends: the last step's start and middle, how long steps are, when events were.
 ///
 /// All of it lies where a step happened to begin or end. The error estimate is off by a rounding of the solve, ε·√w with

@@ -46,6 +46,11 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
                 polygon_ratio: polygon::regular_ratio(n),
                 relax_at: 0.9 * excess,
                 half_at: 0.95 * excess,
+                // However few its steps, a member leaves the fit with points.
+                fit_from: excess,
+                fit_to: 1e-3 * excess,
+                clock_end: f64::from(steps),
+                growth: if *flow == Flow::Willmore { 50.0 } else { 0.0 },
                 ..Parameters::of_flow(flow, tau(n) * (1.0 - 0.05 * j as f64))
             };
             let mut run = Run::new(State::from_nodes(&nodes), parameters);
@@ -65,6 +70,8 @@ pub fn adaptive_members(n: usize, count: usize, steps: u32, tolerance: f64, epsi
         let ticks = Ticks::new(end, epsilon);
         p.adaptive = tolerance;
         p.follow_to = 1e-3 * run.report.now.excess;
+        p.clock_end = end;
+        p.growth *= p.tau;
         (p.time_unit, p.time_tick) = (ticks.unit, ticks.tick);
         (p.end_high, p.end_low) = ticks.split(end);
         (p.goal_high, p.goal_low) = (p.end_high, p.end_low);

@@ -1,7 +1,7 @@
 //! The two comparisons, and their rows.
 
 use super::{
-    bounds::{Bound, FIELDS, PACE, REPORT, STAGES, Scale},
+    bounds::{Bound, DECAY, FIELDS, PACE, REPORT, STAGES, Scale},
     cases::{adaptive_members, members},
 };
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
     scheme::{
         Curve, Increments, Parameters, State, Workspace,
         evolve::{Run, Team, evolve},
-        parameters::{Counters, NEVER, Progress, Report},
+        parameters::{Counters, Decay, NEVER, Progress, Report},
         step::{self, Method},
     },
     solver::{Blocks, Order, Ring, Solver},
@@ -221,23 +221,27 @@ fn ends_agree<T: Real>(
     let adaptive = launches.iter().all(|launch| launch.parameters.adaptive > 0.0);
     let quantities: Vec<Bound> = FIELDS.iter().chain(&REPORT).copied().collect();
     let inside: &[Bound] = if adaptive { &PACE } else { &[] };
+    let of_curve = quantities.len();
     let begin = |bound| Row { adaptive, ..Row::begin::<T>(bound, solver, n, steps) };
-    let mut rows: Vec<Row> = quantities.iter().chain(inside).map(begin).collect();
+    let mut rows: Vec<Row> = quantities.iter().chain(&DECAY).chain(inside).map(begin).collect();
     for (member, (launch, left)) in launches.iter().zip(&ours).enumerate() {
         let Left { state, counters, report } = left;
         let mut twin: Run<T> = launch.convert();
-        let mut longest = 0.0_f64;
+        // Of its steps; and the most that one took off the excess.
+        let (mut longest, mut steepest) = (0.0_f64, 0.0_f64);
         let mut work = Team::new(blocks(n)?);
         while twin.counters.is_running() {
+            let before = twin.report.now.excess.to_f64();
             evolve(&mut twin, &method(solver), &mut work, 1);
+            steepest = steepest.max((twin.report.now.excess.to_f64() - before).abs());
             longest = longest.max(twin.report.progress.taken.to_f64());
         }
         let end = |counters: &Counters, report: &Report<f64>| {
-            let Counters { status, steps, rejected, half_step, relax_step, .. } = *counters;
+            let Counters { status, steps, rejected, half_step, relax_step, fit_points, noted, .. } = *counters;
             let Progress { time_high, time_low, .. } = report.progress;
             format!(
                 "status {status} after {steps} steps and {rejected} refused at t = {time_high:e} + {time_low:e}, events \
-                 in steps {half_step} and {relax_step}"
+                 in steps {half_step} and {relax_step}, {fit_points} points and {noted} times noted"
             )
         };
         let (on_gpu, on_cpu) = (end(counters, report), end(&twin.counters, &twin.report.convert()));
@@ -261,12 +265,18 @@ fn ends_agree<T: Real>(
             let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale * roundings;
             row.add(member, scale, limit, Gpu(ours[field]), Cpu(theirs[field]));
         }
+        // What a changed step length changes inside the run: nothing with fixed steps.
+        let estimate = T::EPSILON * growth(twin.counters.steps) * scales.stiffness() / launch.parameters.adaptive;
+        let change = if adaptive { estimate * steepest } else { 0.0 };
+        let factors = DECAY.map(|bound| bound.factor(adapter.is_hardware()));
+        let wide = twin.report.convert::<f64>();
+        let rounding = T::EPSILON * roundings + change;
+        decays_agree(&mut rows[of_curve..][..2], member, launch, factors, rounding, Gpu(report), Cpu(&wide));
         if adaptive {
-            let twin = Left { state: widened, counters: twin.counters, report: twin.report.convert() };
+            let twin = Left { state: widened, counters: twin.counters, report: wide };
             let rounding = T::EPSILON * roundings;
-            let estimate = T::EPSILON * growth(twin.counters.steps) * scales.stiffness() / launch.parameters.adaptive;
             let factors = PACE.map(|bound| bound.factor(adapter.is_hardware()));
-            let inside = &mut rows[quantities.len()..];
+            let inside = &mut rows[of_curve + DECAY.len()..];
             insides_agree(inside, member, &scales, factors, [rounding, estimate], Gpu(left), Cpu(&twin));
         }
     }
@@ -279,6 +289,25 @@ fn before(state: &State<f64>) -> &Curve<f64> {
 
 fn between(state: &State<f64>) -> &Curve<f64> {
     &state.middle
+}
+
+/// What a member keeps of its way down, see [`DECAY`]; `rounding` is that of an excess.
+fn decays_agree(
+    rows: &mut [Row],
+    member: usize,
+    launch: &Run<f64>,
+    factors: [f64; 2],
+    rounding: f64,
+    ours: Gpu<&Report<f64>>,
+    theirs: Cpu<&Report<f64>>,
+) {
+    let (Gpu(ours), Cpu(theirs)) = (ours, theirs);
+    let [way, rate] = rows else { panic!("{} rows of DECAY", rows.len()) };
+    way.add(member, 1.0, factors[0] * rounding, Gpu(&ours.excess_at), Cpu(&theirs.excess_at));
+    let slope = |decay: &Decay<f64>| if decay.xx > 0.0 { decay.xy / decay.xx } else { 0.0 };
+    let (least, span) = (theirs.now.excess.max(launch.parameters.fit_to), theirs.decay.x);
+    let scale = if span > 0.0 { 1.0 / (least * span) } else { 0.0 };
+    rate.add(member, scale, factors[1] * rounding * scale, Gpu(&[slope(&ours.decay)]), Cpu(&[slope(&theirs.decay)]));
 }
 
 /// What a member's run leaves besides its end, see [`PACE`]. `rounding` is what rounding does relative to a scale,

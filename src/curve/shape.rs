@@ -78,6 +78,20 @@ impl Shape {
         })
     }
 
+    /// The lowest mode, 2 or more, by which the shape differs from a circle; it decays last. None of a circle, and of a
+    /// lemniscate, which never becomes one.
+    pub fn lowest_mode(&self) -> Option<u32> {
+        match self {
+            Shape::Ellipse { a, b } => (a != b).then_some(2),
+            Shape::Circle { .. } | Shape::Lemniscate { .. } => None,
+            Shape::Nonconvex | Shape::File(_) => Some(2),
+            Shape::Astroid => Some(4),
+            Shape::Flower(modes) => {
+                modes.iter().filter(|term| term.amplitude != 0.0).map(|term| term.mode.max(2)).min()
+            }
+        }
+    }
+
     /// The highest mode that the shape is made of, for those that are made of modes.
     pub fn highest_mode(&self) -> Option<u32> {
         match self {

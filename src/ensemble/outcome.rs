@@ -69,6 +69,12 @@ pub struct Outcome {
     pub t_relax: Option<f64>,
     /// First time the excess was at or under half its start.
     pub t_half: Option<f64>,
+    /// Slope of the line fitted to -ln excess against time, in 1/time; of one against `ln(1 + 2t/R₀⁴)` for Willmore flow.
+    pub rate: Option<f64>,
+    /// What linear theory gives for `rate`, where it does.
+    pub rate_theory: Option<f64>,
+    /// Share of the variance of ln excess that the line explains.
+    pub rate_r2: Option<f64>,
     /// Observables of the initial curve, computed in f64 from the sampled nodes.
     pub start: Observables,
     /// Observables of the last accepted state.
@@ -121,6 +127,8 @@ pub struct Portrait {
 pub struct Ended {
     /// Its row of the summary.
     pub outcome: Outcome,
+    /// Its excess at the times of [`grid`](crate::schedule::grid) that it reached.
+    pub excess: Vec<f64>,
     /// Its rows of the series, in time order.
     pub series: Vec<SeriesRow>,
     /// Its snapshots, in time order.

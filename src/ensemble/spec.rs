@@ -278,6 +278,15 @@ impl Spec {
         self.relax_at.unwrap_or(self.relax_to.unwrap_or(DEFAULT_RELAX_TO) * excess)
     }
 
+    /// The rate at which the excess of a member of area `area` falls by linear theory, once only the mode that decays
+    /// last is left: the lowest one of the shape and of the perturbation. In 1/time, or an exponent, see
+    /// [`Flow::excess_rate`].
+    pub fn rate_in_theory(&self, area: f64) -> Option<f64> {
+        let drawn = (self.amplitude > 0.0).then(|| self.modes.low.max(2));
+        let mode = self.shape.lowest_mode().into_iter().chain(drawn).min()?;
+        self.flow.excess_rate(mode, area)
+    }
+
     /// The residual tolerance in use at `precision`.
     pub fn tolerance_at(&self, precision: Precision) -> f64 {
         self.tolerance.unwrap_or(precision.tolerance())

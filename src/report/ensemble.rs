@@ -1,4 +1,4 @@
-//! `ensemble.csv`: the statistics of relaxation times, one row a cell.
+//! `ensemble.csv`: the statistics of relaxation times and of rates of decay, one row a cell.
 //!
 //! A member whose time is not known is censored where it ended: one that is unfinished at the final time, and one that
 //! ended badly at its last good state. How many of these there are is in the row.
@@ -9,7 +9,9 @@ use super::tally::{CellTally, Tally};
 use crate::{
     ensemble::{Spec, Status},
     error::{Error, Result},
-    statistics::{Bootstrap, Interval, KaplanMeier, LogRank, Mean, PowerLaw, Sample, log_rank},
+    statistics::{
+        Bootstrap, Description, Interval, KaplanMeier, LogRank, Mean, Observation, PowerLaw, Sample, log_rank,
+    },
 };
 
 /// Shares of the members whose times the table has, and what its columns are called.
@@ -34,6 +36,46 @@ pub struct CellStatistics {
     pub mean: Option<Mean>,
     /// 95 % interval of the median.
     pub interval: Option<Interval>,
+    /// Rates of decay.
+    pub rates: Rates,
+}
+
+/// Fitted rates of decay of the members of one cell that have one: complete data.
+pub struct Rates {
+    /// The rates.
+    pub fitted: Description,
+    /// 95 % interval of their median.
+    pub interval: Option<Interval>,
+    /// What linear theory gives for each member of which it says something.
+    pub theory: Description,
+    /// The rate of each over that of theory.
+    pub ratio: Description,
+}
+
+impl Rates {
+    fn new(bootstrap: &Bootstrap, rates: &[(f64, Option<f64>)]) -> Result<Rates> {
+        let fitted = Description::new(rates.iter().map(|(rate, _)| *rate))?;
+        let known = || rates.iter().filter_map(|(rate, theory)| Some((*rate, (*theory)?)));
+        let theory = Description::new(known().map(|(_, theory)| theory))?;
+        let ratio = Description::new(known().map(|(rate, theory)| rate / theory))?;
+        // The interval is one of times, which are not negative, and moves along with what it is of.
+        let least = fitted.sorted().first().copied().unwrap_or(0.0);
+        let above = fitted.sorted().iter().map(|rate| Observation { time: rate - least, happened: true });
+        let back = |bound: Option<f64>| bound.map(|bound| bound + least);
+        let interval = bootstrap.median(&Sample::new(above)?);
+        let interval = interval.map(|i| Interval { lower: back(i.lower), upper: back(i.upper), ..i });
+        Ok(Rates { fitted, interval, theory, ratio })
+    }
+
+    fn columns(&self) -> ([Option<f64>; 3], [Option<f64>; 5], [Option<f64>; 2], [Option<f64>; 2]) {
+        let Rates { fitted, interval, theory, ratio } = self;
+        (
+            [fitted.mean(), fitted.standard_deviation(), fitted.standard_error()],
+            QUANTILES.map(|(share, _)| fitted.quantile(share)),
+            interval.map_or([None, None], |interval| [interval.lower, interval.upper]),
+            [theory.median(), ratio.median()],
+        )
+    }
 }
 
 /// Relaxation times of all cells, and how they compare.
@@ -53,7 +95,8 @@ impl CellStatistics {
         let bootstrap = Bootstrap { seed: spec.seed.wrapping_add(cell), ..Bootstrap::default() };
         let (mean, interval) = (survival.mean(), bootstrap.median(&sample));
         let (values, counts) = (spec.sweep.labels(cell), tally.counts);
-        Ok(CellStatistics { cell, values, counts, sample, survival, mean, interval })
+        let rates = Rates::new(&bootstrap, &tally.rates)?;
+        Ok(CellStatistics { cell, values, counts, sample, survival, mean, interval, rates })
     }
 
     /// Members that ended.
@@ -99,7 +142,9 @@ impl EnsembleStatistics {
         let times = ["known", "mean", "sd", "se", "restricted_to"].into_iter();
         let times = times.chain(QUANTILES.map(|(_, name)| name)).chain(["median_low", "median_high"]);
         let header = ["cell".to_string()].into_iter().chain(keys).chain(["members".to_string()]).chain(statuses);
-        let header = header.chain(times.map(|name| format!("t_relax_{name}")));
+        let rates = ["known", "mean", "sd", "se"].into_iter().chain(QUANTILES.map(|(_, name)| name));
+        let rates = rates.chain(["median_low", "median_high", "theory", "ratio"]).map(|name| format!("rate_{name}"));
+        let header = header.chain(times.map(|name| format!("t_relax_{name}"))).chain(rates);
         writer.write_record(header).map_err(|e| failed(&e))?;
         for cell in &self.cells {
             let mean = cell.mean;
@@ -114,6 +159,7 @@ impl EnsembleStatistics {
             let row = (
                 (cell.cell, &cell.values, cell.members(), cell.counts, cell.survival.events()),
                 (moments, quantiles, interval),
+                (cell.rates.fitted.count(), cell.rates.columns()),
             );
             writer.serialize(row).map_err(|e| failed(&e))?;
         }
@@ -151,7 +197,8 @@ mod tests {
             lines[0],
             "cell,shape,members,relaxed,unfinished,singular,nonfinite,stalled,t_relax_known,t_relax_mean,t_relax_sd,\
              t_relax_se,t_relax_restricted_to,t_relax_q05,t_relax_q25,t_relax_median,t_relax_q75,t_relax_q95,\
-             t_relax_median_low,t_relax_median_high"
+             t_relax_median_low,t_relax_median_high,rate_known,rate_mean,rate_sd,rate_se,rate_q05,rate_q25,\
+             rate_median,rate_q75,rate_q95,rate_median_low,rate_median_high,rate_theory,rate_ratio"
         );
         assert!(lines[1].starts_with("0,\"ellipse:2,1\",2,2,0,0,0,0,2,1.0,0.7071"), "{}", lines[1]);
         assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
@@ -175,8 +222,8 @@ mod tests {
         let text = statistics.to_csv(&spec).unwrap();
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         let lines: Vec<&str> = text.lines().skip(1).collect();
-        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0{}", ",".repeat(11)));
-        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0{}", ",".repeat(11)));
+        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0{}0{}", ",".repeat(12), ",".repeat(12)));
+        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0{}0{}", ",".repeat(12), ",".repeat(12)));
         assert!(lines[2].starts_with("2,3,1,1,0,0,0,0,1,0.0,,,,0.0,"), "{}", lines[2]);
     }
 }

@@ -11,6 +11,10 @@ use crate::error::{Error, Result};
 
 /// One row a member.
 pub const SUMMARY: &str = "summary.csv";
+/// Rates of decay, one row a member that has one.
+pub const RATES: &str = "rates.csv";
+/// Mean excess in time, by cell.
+pub const MEAN_EXCESS: &str = "mean_excess.csv";
 /// Observables over time.
 pub const SERIES: &str = "series.csv";
 /// Nodes at given times.
@@ -26,6 +30,8 @@ pub const CURVES: &str = "plots/curves.svg";
 
 /// Distribution of the relaxation times.
 pub const RELAXATION: &str = "plots/relaxation.svg";
+/// Fitted rates of decay.
+pub const RATE: &str = "plots/rate.svg";
 /// Kaplan-Meier curves.
 pub const SURVIVAL: &str = "plots/survival.svg";
 /// Mean excess in time.
@@ -38,14 +44,17 @@ pub const MESH: &str = "plots/mesh.svg";
 pub const REPORT: &str = "report.html";
 
 /// All files that a command may write, the one that vouches for the others first.
-const OWN: [&str; 13] = [
+const OWN: [&str; 16] = [
     RUN,
     SUMMARY,
     ENSEMBLE,
+    MEAN_EXCESS,
+    RATES,
     SERIES,
     SNAPSHOTS,
     CURVES,
     RELAXATION,
+    RATE,
     SURVIVAL,
     EXCESS,
     DEPENDENCE,

@@ -38,7 +38,7 @@ use crate::{
 };
 use progress::Progress;
 use study::Study;
-use tables::{SeriesTable, SnapshotTable, SummaryTable};
+use tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable};
 use tally::Tally;
 
 /// How the overview names the pictures.
@@ -48,6 +48,7 @@ const PLOTS: &str = "plots/*.svg";
 // The tables come before the folder: dropped first, they leave it empty for its own clean-up.
 pub struct Report {
     summary: SummaryTable,
+    rates: RateTable,
     series: Option<SeriesTable>,
     snapshots: Option<SnapshotTable>,
     folder: OutputFolder,
@@ -70,6 +71,7 @@ impl Report {
             total: spec.member_count(),
             before: 0,
             summary: SummaryTable::begin(folder.file(folder::SUMMARY)?)?,
+            rates: RateTable::begin(folder.file(folder::RATES)?)?,
             series: spec.series.map(|_| SeriesTable::begin(folder.file(folder::SERIES)?)).transpose()?,
             snapshots: match spec.snapshots.is_empty() {
                 true => None,
@@ -104,12 +106,16 @@ impl Report {
     /// Puts every file under its final name, once all are on disk, and returns the overview for stdout.
     pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String]) -> Result<String> {
         // In reverse order they are dropped: the folder last, after its files.
-        let Report { folder, tally, panels, watched, progress, started, clock, summary, series, snapshots, .. } = self;
+        let Report {
+            folder, tally, panels, watched, progress, started, clock, summary, rates, series, snapshots, ..
+        } = self;
         progress.finish();
         let wall = clock.elapsed();
         let statistics = &EnsembleStatistics::new(spec, &tally)?;
-        let mut names = vec![folder::SUMMARY, folder::ENSEMBLE];
-        let mut files = vec![summary.ready()?, folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?];
+        let mut names = vec![folder::SUMMARY, folder::ENSEMBLE, folder::RATES, folder::MEAN_EXCESS];
+        let ensemble = folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?;
+        let mean_excess = tables::mean_excess(folder.file(folder::MEAN_EXCESS)?, tally.mean_excess(spec)?)?;
+        let mut files = vec![summary.ready()?, ensemble, rates.ready()?, mean_excess];
         if let Some(series) = series {
             files.push(series.ready()?);
             names.push(folder::SERIES);
@@ -120,7 +126,7 @@ impl Report {
         }
         let gallery = (!panels.is_empty()).then(|| gallery::draw(&panels));
         let study = Study { spec, platform, tally: &tally, statistics, warnings, started, wall };
-        let charts = study.charts();
+        let charts = study.charts()?;
         let page = study.page(&charts, gallery.as_deref(), &watched)?;
         for (name, text) in charts.iter().map(|chart| (chart.name, &chart.figure.svg)).chain([(folder::REPORT, &page)])
         {
@@ -143,7 +149,7 @@ impl Report {
 
 impl Sink for Report {
     fn member(&mut self, ended: &Ended) -> Result<()> {
-        let Ended { outcome, series, snapshots, portrait, mollified, unresolved } = ended;
+        let Ended { outcome, series, snapshots, portrait, mollified, unresolved, excess } = ended;
         if let Some(table) = &mut self.series {
             series.iter().try_for_each(|row| table.row(row))?;
         }
@@ -151,8 +157,9 @@ impl Sink for Report {
             snapshots.iter().try_for_each(|snapshot| table.snapshot(snapshot))?;
         }
         self.summary.row(outcome)?;
+        self.rates.row(outcome)?;
         self.tally.add(outcome);
-        self.tally.add_series(outcome.cell, series);
+        self.tally.add_excess(outcome.cell, excess);
         self.tally.add_aside(mollified, *unresolved);
         if let Some(Portrait { before, frames, after }) = portrait.clone() {
             let Outcome { member, status, t_relax, .. } = *outcome;
@@ -193,6 +200,7 @@ mod tests {
         report
             .member(&Ended {
                 outcome,
+                excess: vec![0.2, 0.1],
                 series: vec![row],
                 snapshots: vec![snapshot],
                 portrait,

@@ -6,8 +6,8 @@ use glam::DVec2;
 
 use super::{
     charts::{
-        Decay, DecayCurve, Dependence, Estimate, Law, Level, MeshQuality, PowerLaw, RelaxationTimes, Series, Setting,
-        Survival, SurvivalCurve, Theory,
+        Decay, DecayCurve, Dependence, Estimate, FittedRates, Law, Level, MeshQuality, PowerLaw, RelaxationTimes,
+        Series, Setting, Survival, SurvivalCurve, Theory,
     },
     ensemble::{CellStatistics, EnsembleStatistics, QUANTILES},
     folder,
@@ -15,7 +15,7 @@ use super::{
     page::{Figure, Headline, Page, Table, Trajectory},
     progress::duration,
     provenance::rfc3339,
-    tally::{CellTally, DISTRUSTED_DRIFT, Moments, Tally},
+    tally::{CellTally, DISTRUSTED_DRIFT, Tally},
     text::{count, significant},
 };
 use crate::{
@@ -23,6 +23,7 @@ use crate::{
     ensemble::{Outcome, Spec, Status},
     error::Result,
     flow::Flow,
+    schedule::grid,
 };
 
 /// Half the width of a 95 % band in standard errors.
@@ -67,12 +68,16 @@ pub fn trajectory(outcome: &Outcome, before: &[DVec2], frames: Vec<(f64, Vec<DVe
 
 impl Study<'_> {
     /// The charts that this run has, in the order in which they are read.
-    pub fn charts(&self) -> Vec<Chart> {
+    ///
+    /// # Errors
+    /// [`Error::Request`](crate::Error::Request) where a cell's values do not fit the spec.
+    pub fn charts(&self) -> Result<Vec<Chart>> {
         let mut charts = vec![self.relaxation(), self.survival()];
-        charts.extend(self.excess());
+        charts.extend(self.excess()?);
+        charts.push(self.rates());
         charts.extend(self.dependence());
         charts.push(self.mesh());
-        charts
+        Ok(charts)
     }
 
     fn relaxation(&self) -> Chart {
@@ -116,38 +121,55 @@ impl Study<'_> {
         chart(folder::SURVIVAL, title, caption, survival.draw())
     }
 
-    /// The mean excess as long as all members of a cell run, where the run has a series.
-    fn excess(&self) -> Option<Chart> {
+    /// The mean excess as long as all members of a cell run.
+    fn excess(&self) -> Result<Option<Chart>> {
         let numbers = self.numbers();
-        let curve = |(rank, cell): (usize, &CellTally)| {
+        let mut curves = Vec::new();
+        let mut theory = Vec::new();
+        for (rank, cell) in self.tally.cells.iter().enumerate() {
+            let spec = self.spec.sweep.apply(self.spec, rank as u64)?;
             let all: u64 = cell.counts.iter().sum();
-            let rows = cell.excess.iter().take_while(|(_, moments)| moments.count == all);
-            let rows: Vec<(f64, Moments)> = rows.map(|(t, moments)| (f64::from_bits(*t), *moments)).collect();
-            let bound = |sign: f64| rows.iter().map(|(_, m)| m.mean + sign * m.deviation()).collect();
-            DecayCurve {
+            let rows = grid(spec.t_end).zip(&cell.excess).take_while(|(_, moments)| moments.count() == all);
+            let rows: Vec<(f64, f64, f64)> =
+                rows.map_while(|(t, m)| Some((t, m.mean()?, m.deviation().unwrap_or(0.0)))).collect();
+            let bound = |sign: f64| rows.iter().map(|(_, mean, deviation)| mean + sign * deviation).collect();
+            let curve = DecayCurve {
                 label: self.label(rank as u64),
                 value: numbers.as_ref().map(|numbers| numbers[rank]),
-                t: rows.iter().map(|(t, _)| *t).collect(),
-                mean: rows.iter().map(|(_, moments)| moments.mean).collect(),
+                t: rows.iter().map(|(t, ..)| *t).collect(),
+                mean: rows.iter().map(|(_, mean, _)| *mean).collect(),
                 band: Some((bound(-1.0), bound(1.0))),
-            }
-        };
-        let curves: Vec<DecayCurve> = self.tally.cells.iter().enumerate().map(curve).collect();
-        if curves.iter().all(|curve| curve.t.len() < 2) {
-            return None;
+            };
+            theory.extend(law(&spec, cell, &curve));
+            curves.push(curve);
         }
-        let theory = match (&self.tally.cells[..], &curves[..], &self.spec.flow) {
-            ([cell], [curve], Flow::SurfaceDiffusion) => theory(cell, curve),
-            _ => None,
-        };
+        if curves.iter().all(|curve| curve.t.len() < 2) {
+            return Ok(None);
+        }
+        // One line of theory is a help, many are not.
+        let theory = if let [_] = &curves[..] { theory } else { Vec::new() };
         let (title, key) = ("Mean excess", self.keys());
         let note = format!("{}; over all members, as long as all of them run", self.what());
         let band = "one standard deviation of the members";
-        let theory = theory.into_iter().collect();
         let svg = Decay { title, note: &note, band, key: &key, curves, theory, time: None }.draw();
         let caption =
             "How the excess, L²/(4πA) above that of a regular polygon, falls, and the slope that linear theory gives.";
-        Some(chart(folder::EXCESS, title, caption, svg))
+        Ok(Some(chart(folder::EXCESS, title, caption, svg)))
+    }
+
+    fn rates(&self) -> Chart {
+        let rates = || self.tally.cells.iter().flat_map(|cell| &cell.rates);
+        let relative = rates().all(|(_, theory)| theory.is_some());
+        let shown =
+            |(rate, theory): &(f64, Option<f64>)| theory.filter(|_| relative).map_or(*rate, |theory| rate / theory);
+        let shown: Vec<f64> = rates().map(shown).collect();
+        let title = "Rates of decay";
+        let without = self.tally.members() - shown.len() as u64;
+        let unit = "length⁻⁴";
+        let svg = FittedRates { title, note: &self.what(), rates: &shown, relative, unit, without }.draw();
+        let caption = "Slope of the line through ln excess, while that falls from a tenth to a thousandth of its start, over the \
+                       rate that linear theory gives the slowest mode.";
+        chart(folder::RATE, title, caption, svg)
     }
 
     /// t_relax against the key that changes fastest, a series for each combination of the others.
@@ -353,14 +375,29 @@ fn happened(cell: &CellStatistics, happened: bool) -> impl Iterator<Item = f64> 
     cell.sample.observations().iter().filter(move |seen| seen.happened == happened).map(|seen| seen.time)
 }
 
-/// The decay of a mode 2 on the circle of the members' mean area, through the mean where it has fallen to a tenth.
-fn theory(cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
+/// What linear theory says of the excess of a curve of the members' mean area, through the mean where it has fallen to a
+/// tenth.
+fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
     let members: u64 = cell.counts.iter().sum();
-    let rate = 24.0 / (cell.area / members as f64 / std::f64::consts::PI).powi(2);
+    let area = cell.area / members as f64;
+    let rate = spec.rate_in_theory(area)?;
     let first = curve.mean.first()?;
     let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
-    let start = curve.mean[tenth] * (rate * curve.t[tenth]).exp();
-    Some(Theory { label: "exp(−24 t/R⁴)".into(), law: Law::Exponential { start, rate } })
+    let (t, mean) = (curve.t[tenth], curve.mean[tenth]);
+    Some(match (spec.flow.growth(area), &spec.flow) {
+        (Some(time), _) => Theory {
+            label: format!("(1 + 2t/R⁴)^−{}", significant(rate, 3)),
+            law: Law::Algebraic { start: mean * (1.0 + t / time).powf(rate), time, power: rate },
+        },
+        (None, flow) => {
+            let fourth_power = (area / std::f64::consts::PI).powi(2);
+            let label = match flow {
+                Flow::SurfaceDiffusion => format!("exp(−{} t/R⁴)", significant(rate * fourth_power, 3)),
+                _ => format!("exp(−{} t)", significant(rate, 3)),
+            };
+            Theory { label, law: Law::Exponential { start: mean * (rate * t).exp(), rate } }
+        }
+    })
 }
 
 fn median(cell: &CellStatistics) -> Option<Estimate> {

@@ -11,6 +11,7 @@ use super::folder::PartFile;
 use crate::{
     ensemble::{Outcome, SeriesRow, Snapshot},
     error::{Error, Result},
+    statistics::Moments,
     truth::Row,
 };
 
@@ -18,6 +19,8 @@ const SUMMARY: &str = "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x
     length_start,length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
     mesh_ratio,metric_drift,self_crossing";
 const SERIES: &str = "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift";
+const RATES: &str = "member,cell,rate,rate_r2,rate_theory,rate_ratio";
+const MEAN_EXCESS: &str = "cell,t,members,mean,sd";
 const SNAPSHOTS: &str = "member,t,i,x,y,k,r";
 const CONVERGENCE: &str = "problem,varied,n,tau,tolerance,error,order";
 
@@ -60,13 +63,16 @@ impl Table {
 /// `summary.csv`: one row a member.
 pub struct SummaryTable(Table);
 
+/// `rates.csv`: the fitted rate of each member that has one, beside that of linear theory.
+pub struct RateTable(Table);
+
 /// `series.csv`: the observables of each member over time.
 pub struct SeriesTable(Table);
 
 /// `snapshots.csv`: the nodes of each member at given times.
 pub struct SnapshotTable(Table);
 
-/// Columns of `summary.csv`; those of type `()` are not computed by this version and stay empty.
+/// Columns of `summary.csv`.
 #[derive(Serialize)]
 struct SummaryRow {
     member: u64,
@@ -79,8 +85,8 @@ struct SummaryRow {
     sweeps_x: u64,
     t_relax: Option<f64>,
     t_half: Option<f64>,
-    rate: (),
-    rate_r2: (),
+    rate: Option<f64>,
+    rate_r2: Option<f64>,
     length_start: Option<f64>,
     length_end: Option<f64>,
     area_start: Option<f64>,
@@ -117,8 +123,8 @@ impl SummaryTable {
             sweeps_x: member.sweeps_x,
             t_relax: member.t_relax.and_then(known),
             t_half: member.t_half.and_then(known),
-            rate: (),
-            rate_r2: (),
+            rate: member.rate.and_then(known),
+            rate_r2: member.rate_r2.and_then(known),
             length_start: known(start.length),
             length_end: known(end.length),
             area_start: known(start.area),
@@ -145,6 +151,36 @@ impl SummaryTable {
     pub fn ready(self) -> Result<PartFile> {
         self.0.ready()
     }
+}
+
+impl RateTable {
+    /// Writes the header.
+    pub fn begin(file: PartFile) -> Result<RateTable> {
+        Table::begin(file, RATES).map(RateTable)
+    }
+
+    /// Writes the row of one member, if it has a rate.
+    pub fn row(&mut self, member: &Outcome) -> Result<()> {
+        let Outcome { member, cell, rate, rate_r2, rate_theory, .. } = *member;
+        let Some(rate) = rate else { return Ok(()) };
+        let ratio = rate_theory.map(|theory| rate / theory).and_then(known);
+        self.0.row((member, cell, rate, rate_r2.and_then(known), rate_theory.and_then(known), ratio))
+    }
+
+    /// The complete file, on disk under its temporary name.
+    pub fn ready(self) -> Result<PartFile> {
+        self.0.ready()
+    }
+}
+
+/// Writes `mean_excess.csv`: by cell the count, mean and standard deviation of the excess at each time, which comes with
+/// it.
+pub fn mean_excess<'a>(file: PartFile, rows: impl IntoIterator<Item = (u64, f64, &'a Moments)>) -> Result<PartFile> {
+    let mut table = Table::begin(file, MEAN_EXCESS)?;
+    for (cell, t, moments) in rows {
+        table.row((cell, t, moments.count(), moments.mean(), moments.deviation()))?;
+    }
+    table.ready()
 }
 
 impl SeriesTable {
@@ -224,6 +260,9 @@ mod tests {
             sweeps_x: 987,
             t_relax: Some(0.1 + 0.2),
             t_half: None,
+            rate: Some(6.5),
+            rate_r2: None,
+            rate_theory: None,
             start,
             end,
             self_crossing: Some(0.25),
@@ -269,13 +308,33 @@ mod tests {
             "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
              length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
              mesh_ratio,metric_drift,self_crossing\n\
-             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25\n"
+             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25\n"
         );
     }
 
     #[test]
     fn an_empty_table_is_a_header() {
         assert_eq!(summary(&[]), format!("{SUMMARY}\n"));
+    }
+
+    #[test]
+    fn rates_and_mean_excess_have_these_bytes() {
+        let text = written("rates.csv", |file| {
+            let mut table = RateTable::begin(file)?;
+            let at = Observables::default();
+            for rate_theory in [None, Some(6.0)] {
+                table.row(&Outcome { rate: Some(6.0), rate_r2: Some(0.5), rate_theory, ..outcome(at, at) })?;
+            }
+            table.row(&Outcome { rate: None, ..outcome(at, at) })?;
+            table.ready()
+        });
+        assert_eq!(text, "member,cell,rate,rate_r2,rate_theory,rate_ratio\n3,0,6.0,0.5,,\n3,0,6.0,0.5,6.0,1.0\n");
+        let mut moments = Moments::default();
+        moments.add(0.5);
+        let (one, mut two) = (moments, moments);
+        two.add(0.25);
+        let text = written("mean_excess.csv", |file| mean_excess(file, [(0, 0.0, &two), (0, 0.5, &one)]));
+        assert_eq!(text, "cell,t,members,mean,sd\n0,0.0,2,0.375,0.1767766952966369\n0,0.5,1,0.5,\n");
     }
 
     #[test]

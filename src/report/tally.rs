@@ -1,12 +1,12 @@
 //! Running totals over members: what the overview and `run.json` say, without keeping the members.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
 use crate::{
-    ensemble::{Mollified, Outcome, SeriesRow, Status, mollifier::MAX_VERTEX_TURN},
-    statistics::Observation,
+    ensemble::{Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
+    error::Result,
+    schedule::grid,
+    statistics::{Moments, Observation},
 };
 
 /// Counts and sums over the members that ended.
@@ -41,32 +41,10 @@ pub struct CellTally {
     pub mesh: Vec<[f64; 2]>,
     /// Sum of the areas at the start.
     pub area: f64,
-    /// Excess at the times of the series, by the bits of the time, which order times that are not negative.
-    pub excess: BTreeMap<u64, Moments>,
-}
-
-/// Count, mean and spread of numbers that are added one by one (B. P. Welford, Technometrics 4, 1962, 419).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Moments {
-    /// How many.
-    pub count: u64,
-    /// Their mean.
-    pub mean: f64,
-    squares: f64,
-}
-
-impl Moments {
-    fn add(&mut self, value: f64) {
-        self.count += 1;
-        let gap = value - self.mean;
-        self.mean += gap / self.count as f64;
-        self.squares += gap * (value - self.mean);
-    }
-
-    /// Their standard deviation; 0 of fewer than two.
-    pub fn deviation(&self) -> f64 {
-        (self.squares / (self.count.max(2) - 1) as f64).sqrt()
-    }
+    /// Rate of decay of each that has one, and what theory says.
+    pub rates: Vec<(f64, Option<f64>)>,
+    /// Excess at the times of [`grid`](crate::schedule::grid), of the members that reached them.
+    pub excess: Vec<Moments>,
 }
 
 /// Metric drift above which the scheme's lengths are so far from the polygon's that times mean little.
@@ -131,9 +109,10 @@ impl Tally {
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
-        let CellTally { counts, times, others, mesh, area, .. } = &mut self.cells[cell];
+        let CellTally { counts, times, others, mesh, area, rates, .. } = &mut self.cells[cell];
         *area += outcome.start.area.abs();
         mesh.push([outcome.end.mesh_ratio, outcome.end.metric_drift]);
+        rates.extend(outcome.rate.map(|rate| (rate, outcome.rate_theory)));
         times.push(Observation::new(outcome.t_relax, outcome.t_end));
         for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
             for (count, status) in counts.iter_mut().zip(Status::ALL) {
@@ -148,18 +127,30 @@ impl Tally {
         self.sweeps_x += outcome.sweeps_x;
     }
 
-    /// Adds the series of the member that was added last.
-    pub fn add_series(&mut self, cell: u64, series: &[SeriesRow]) {
-        let Some(CellTally { excess, .. }) = self.cells.get_mut(cell as usize) else { return };
-        for SeriesRow { t, at, .. } in series.iter().filter(|row| row.at.excess.is_finite()) {
-            excess.entry(t.to_bits()).or_default().add(at.excess);
-        }
+    /// Adds the excess of a member of `cell` at the times of [`grid`](crate::schedule::grid) that it reached.
+    pub fn add_excess(&mut self, cell: u64, excess: &[f64]) {
+        let Some(tally) = self.cells.get_mut(cell as usize) else { return };
+        tally.excess.resize_with(tally.excess.len().max(excess.len()), Moments::default);
+        tally.excess.iter_mut().zip(excess).for_each(|(moments, excess)| moments.add(*excess));
     }
 
     /// Adds what is not in the summary's row.
     pub fn add_aside(&mut self, mollified: &Mollified, unresolved: bool) {
         self.mollified.add(mollified);
         self.unresolved += u64::from(unresolved);
+    }
+
+    /// Cell, time and moments of the excess, in order.
+    ///
+    /// # Errors
+    /// [`Error::Request`](crate::Error::Request) where the values of a cell do not fit `spec`.
+    pub fn mean_excess(&self, spec: &Spec) -> Result<Vec<(u64, f64, &Moments)>> {
+        let mut rows = Vec::new();
+        for (cell, CellTally { excess, .. }) in (0..).zip(&self.cells) {
+            let t_end = spec.sweep.apply(spec, cell)?.t_end;
+            rows.extend(grid(t_end).zip(excess).map(|(t, moments)| (cell, t, moments)));
+        }
+        Ok(rows)
     }
 
     /// What the user should know about the results, a sentence each.
@@ -220,6 +211,9 @@ pub(crate) mod tests {
             sweeps_x: 5,
             t_relax,
             t_half: None,
+            rate: None,
+            rate_r2: None,
+            rate_theory: None,
             start,
             end,
             rejected: 0,
@@ -232,15 +226,6 @@ pub(crate) mod tests {
         times.iter().for_each(|t| tally.add(&outcome(0, Status::Relaxed, Some(*t))));
         (0..censored).for_each(|_| tally.add(&outcome(0, Status::Unfinished, None)));
         tally
-    }
-
-    #[test]
-    fn moments_are_mean_and_standard_deviation() {
-        let mut moments = Moments::default();
-        assert_eq!(moments.deviation(), 0.0);
-        [2.0, 4.0, 9.0].iter().for_each(|value| moments.add(*value));
-        assert_eq!((moments.count, moments.mean), (3, 5.0));
-        assert!((moments.deviation() - 13.0_f64.sqrt()).abs() < 1e-15);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! plain `f64` it is one member alone, the reference; no bit of a member depends on who goes beside it.
 
 use super::{
-    Parameters, State, Status, Workspace, extrapolation,
+    Parameters, State, Status, Workspace, decay, extrapolation,
     observe::{self, Glance},
     pace::{self, Stride},
     parameters::{Counters, NEVER, Observed, Report},
@@ -307,6 +307,7 @@ impl<N: Number> Team<N> {
                 gap: gap.lane(lane),
             };
             record_events(run, &taken);
+            decay::follow(run, &taken);
             let Run { parameters, counters, report, .. } = &mut **run;
             let progress = &mut report.progress;
             if adaptive {
@@ -359,11 +360,11 @@ fn refuse<T: Real>(run: &mut Run<T>, n: usize, next: T, least: f64, cause: Statu
 }
 
 /// A step that is taken: its length where it is adaptive, the excess on its way, and the gap between k and the polygon.
-struct Taken<T> {
-    h: T,
-    before: T,
-    middle: T,
-    after: T,
+pub(super) struct Taken<T> {
+    pub(super) h: T,
+    pub(super) before: T,
+    pub(super) middle: T,
+    pub(super) after: T,
     gap: T,
 }
 

@@ -57,6 +57,15 @@ fn between<N: Number>(a: &mut N, b1: N, b: &mut N) {
     *b += gap;
 }
 
+/// A quantity at the fraction `at` of a step in which it goes from `start` over `middle` to `end`: on the parabola
+/// through the three.
+pub fn inside<T: Real>(start: T, middle: T, end: T, at: T) -> T {
+    let (two, four) = (T::of(2.0), T::of(4.0));
+    let slope = four * middle - T::of(3.0) * start - end;
+    let bend = two * (start - two * middle + end);
+    start + at * (slope + at * bend)
+}
+
 /// Where in a step a quantity that goes from `start` over `middle` to `end` first falls to `target`, as a fraction of
 /// the step; `start > target >= end`.
 pub fn crossing<T: Real>(start: T, middle: T, end: T, target: T) -> T {

@@ -13,7 +13,7 @@
 //! the residual of the old state in node differences, so no digits are lost to the size of x.
 //!
 //! With adaptive steps, [`extrapolation`] makes three of them, of τ, τ/2 and τ/2, into one of second order, and
-//! [`pace`] chooses its length and keeps the time.
+//! [`pace`] chooses its length and keeps the time. [`decay`] keeps of every step what says how fast the excess falls.
 //!
 //! *Practice.* Node i = 1…n of the paper is index i-1 here. `k[i]` and `r[i]` live on the segment that ends at
 //! node i, `q[i]` between the middles of segments i and i+1. A [`Curve`] is x, y, k and r; a [`State`]
@@ -22,6 +22,7 @@
 
 pub mod coarse;
 pub mod curvature;
+pub mod decay;
 pub mod evolve;
 pub mod extrapolation;
 pub mod observe;

@@ -5,6 +5,7 @@
 
 use super::{
     Curve,
+    decay::TIMES,
     observe::{self, Maxima, Sums},
 };
 use crate::{
@@ -105,6 +106,14 @@ numbers! {
         end_high,
         /// Low part.
         end_low,
+        /// Final time by the clock of [`decay`](super::decay).
+        clock_end,
+        /// Excess from which its decay is fitted.
+        fit_from,
+        /// Excess down to which it is.
+        fit_to,
+        /// Where the excess falls as a power of `growth + t`, this time; else 0, and it falls exponentially.
+        growth,
     }
 }
 
@@ -164,6 +173,26 @@ numbers! {
     }
 }
 
+numbers! {
+    /// The line fitted to ln excess: the last point, and the means and sums of squares of all.
+    Decay {
+        /// Abscissa of the last curve, from the first point on.
+        x,
+        /// ln of its excess over that of the first point.
+        y,
+        /// Mean of x over the points.
+        mean_x,
+        /// Mean of y.
+        mean_y,
+        /// `Σ (x - mean)²`.
+        xx,
+        /// `Σ (x - mean)(y - mean)`.
+        xy,
+        /// `Σ (y - mean)²`.
+        yy,
+    }
+}
+
 /// What a member reports when a dispatch ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
@@ -176,6 +205,10 @@ pub struct Report<N> {
     pub now: Observed<N>,
     /// Its time, its events.
     pub progress: Progress<N>,
+    /// How its excess falls.
+    pub decay: Decay<N>,
+    /// Its excess at the first `noted` times of the grid of [`decay`](super::decay).
+    pub excess_at: [N; TIMES],
 }
 
 /// No such step.
@@ -210,6 +243,12 @@ pub struct Counters {
     pub phase: u32,
     /// Sweeps that the paused solve has made.
     pub solve_sweeps: u32,
+    /// Points of the fitted line.
+    pub fit_points: u32,
+    /// 1: the excess has left the window of the fit.
+    pub fit_over: u32,
+    /// Times of the grid that are behind the member.
+    pub noted: u32,
 }
 
 impl Parameters<f64> {
@@ -277,22 +316,32 @@ impl<T: Real> Observed<T> {
 impl<T: Real> Report<T> {
     /// All numbers in memory order.
     pub fn to_numbers(&self) -> Vec<T> {
-        let Report { before, middle, now, progress } = self;
-        [before.to_numbers(), middle.to_numbers(), now.to_numbers(), progress.to_numbers()].concat()
+        let Report { before, middle, now, progress, decay, excess_at } = self;
+        let observed = [before, middle, now].into_iter().flat_map(Observed::to_numbers);
+        let rest = [progress.to_numbers(), decay.to_numbers(), excess_at.to_vec()].into_iter().flatten();
+        observed.chain(rest).collect()
     }
 
     /// The inverse of [`Report::to_numbers`].
     pub fn from_numbers(numbers: &[T]) -> Report<T> {
-        let observed = |j: usize| {
-            let fields = Observed::<T>::FIELDS.len();
-            Observed::from_numbers(&numbers[j * fields..(j + 1) * fields])
+        let mut rest = numbers;
+        let mut next = |fields: usize| {
+            let (first, others) = rest.split_at(fields);
+            rest = others;
+            first
         };
-        let progress = Progress::from_numbers(&numbers[3 * Observed::<T>::FIELDS.len()..]);
-        Report { before: observed(0), middle: observed(1), now: observed(2), progress }
+        let mut observed = || Observed::from_numbers(next(Observed::<T>::FIELDS.len()));
+        let (before, middle, now) = (observed(), observed(), observed());
+        let progress = Progress::from_numbers(next(Progress::<T>::FIELDS.len()));
+        let decay = Decay::from_numbers(next(Decay::<T>::FIELDS.len()));
+        let mut excess_at = [T::of(0.0); TIMES];
+        excess_at.copy_from_slice(next(TIMES));
+        Report { before, middle, now, progress, decay, excess_at }
     }
 
     /// How many numbers it is.
-    pub const LEN: usize = 3 * Observed::<T>::FIELDS.len() + Progress::<T>::FIELDS.len();
+    pub const LEN: usize =
+        3 * Observed::<T>::FIELDS.len() + Progress::<T>::FIELDS.len() + Decay::<T>::FIELDS.len() + TIMES;
 
     /// The same in another precision, rounded.
     pub fn convert<U: Real>(&self) -> Report<U> {
@@ -307,7 +356,7 @@ impl Counters {
     }
 
     /// Field names in memory order.
-    pub const FIELDS: [&'static str; 12] = [
+    pub const FIELDS: [&'static str; 15] = [
         "status",
         "steps",
         "rejected",
@@ -320,6 +369,9 @@ impl Counters {
         "sweeps_x",
         "phase",
         "solve_sweeps",
+        "fit_points",
+        "fit_over",
+        "noted",
     ];
 }
 

@@ -48,6 +48,7 @@
 mod bootstrap;
 mod describe;
 mod draws;
+mod exact;
 mod fit;
 mod log_rank;
 mod sample;
@@ -57,6 +58,7 @@ mod survival;
 
 pub use bootstrap::{Bootstrap, Interval};
 pub use describe::Description;
+pub use exact::{ExactSum, Moments};
 pub use fit::{Line, PowerLaw};
 pub use log_rank::{Group, LogRank, log_rank};
 pub use sample::{Observation, Sample};

@@ -62,7 +62,7 @@ impl Variant {
     }
 }
 
-const COMMON: [Part; 15] = parts![
+const COMMON: [Part; 16] = parts![
     "number.wgsl",
     "ring.wgsl",
     "member.wgsl",
@@ -77,6 +77,7 @@ const COMMON: [Part; 15] = parts![
     "pace.wgsl",
     "start.wgsl",
     "extrapolation.wgsl",
+    "decay.wgsl",
     "evolve.wgsl",
 ];
 const EXCHANGE: [Part; 1] = parts!["exchange.wgsl"];

@@ -8,12 +8,14 @@ mod bins;
 pub mod decay;
 pub mod dependence;
 pub mod mesh;
+pub mod rates;
 pub mod relaxation;
 pub mod survival;
 
 pub use decay::{Decay, DecayCurve, Law, Theory};
 pub use dependence::{Dependence, Level, PowerLaw, Series, Setting};
 pub use mesh::MeshQuality;
+pub use rates::FittedRates;
 pub use relaxation::RelaxationTimes;
 pub use survival::{Survival, SurvivalCurve};
 

@@ -100,6 +100,17 @@ pub fn draw_all() -> Vec<(String, String)> {
     add("relaxation-unknown", relaxation(&unknown, &[], Some(f64::NAN)));
     add("relaxation-million", relaxation(&times(1_000_000, 0.4, 0.3), &some, Some(0.4)));
 
+    let rates = |rates: &[f64], relative: bool, without: u64| {
+        FittedRates { title: "Rates of decay", note: NOTE, rates, relative, unit: "length⁻⁴", without }.draw()
+    };
+    add("rates", rates(&times(412, 1.0, 0.01), true, 3));
+    add("rates-absolute", rates(&times(412, 24.0, 0.5), false, 0));
+    add("rates-negative", rates(&[-0.1, 0.4, 1.0], true, 0));
+    add("rates-none", rates(&[], true, 256));
+    add("rates-one", rates(&[1.0], true, 0));
+    add("rates-unknown", rates(&unknown, true, 0));
+    add("rates-million", rates(&times(1_000_000, 1.0, 0.3), true, 1));
+
     let survive = |curves: Vec<SurvivalCurve>, time: Option<Scale>| {
         Survival { title: "Share that has not relaxed", note: NOTE, key: "amplitude", curves, time }.draw()
     };

@@ -1,0 +1,94 @@
+// How the excess of a member falls: the line fitted to its logarithm, and its values at the times of a grid. Twin of
+// src/scheme/decay.rs.
+
+const PARTS = 32u;
+const TIMES = 31u;
+const HALVINGS = 64u;
+const TERMS = 10u;
+
+/// Notes what a step of length h that is taken adds; its curves are in the report, it is not yet counted.
+fn follow(h: real) {
+    var start = real(counters.steps);
+    var end = min(start + real(1.0), p.clock_end);
+    if ADAPTIVE {
+        start = report.progress.time_high + report.progress.time_low;
+        end = start + h;
+    }
+    if ADAPTIVE {
+        let half = start + real(0.5) * h;
+        fit(start, half, report.before.excess, report.middle.excess);
+        fit(half, end, report.middle.excess, report.now.excess);
+    } else {
+        fit(start, end, report.before.excess, report.now.excess);
+    }
+    note(start, end);
+}
+
+/// Takes the excess at the end of a step, or of half an adaptive one, into the fit while it is inside the window.
+fn fit(start: real, end: real, before: real, after: real) {
+    if counters.fit_over != 0u || (counters.fit_points == 0u && !(after <= p.fit_from)) { return; }
+    if !(p.fit_to <= after) {
+        counters.fit_over = 1u;
+        return;
+    }
+    if counters.fit_points > 0u {
+        report.decay.x += abscissa(start, end);
+        report.decay.y += ln_ratio(before, after);
+    }
+    if !(after <= p.fit_from) { return; }
+    counters.fit_points += 1u;
+    let count = real(counters.fit_points);
+    let dx = report.decay.x - report.decay.mean_x;
+    let dy = report.decay.y - report.decay.mean_y;
+    report.decay.mean_x += dx / count;
+    report.decay.mean_y += dy / count;
+    report.decay.xx += dx * (report.decay.x - report.decay.mean_x);
+    report.decay.xy += dx * (report.decay.y - report.decay.mean_y);
+    report.decay.yy += dy * (report.decay.y - report.decay.mean_y);
+}
+
+/// What the step adds to the abscissa.
+fn abscissa(start: real, end: real) -> real {
+    if p.growth <= real(0.0) { return end - start; }
+    return ln_ratio(p.growth + start, p.growth + end);
+}
+
+/// Notes the excess at the times of the grid that lie in the step.
+fn note(start: real, end: real) {
+    while counters.noted < TIMES {
+        let share = real(counters.noted + 1u) / real(PARTS);
+        let time = share * share * share * p.clock_end;
+        if !(time <= end) { return; }
+        let at = min(max((time - start) / (end - start), real(0.0)), real(1.0));
+        let before = report.before.excess;
+        let after = report.now.excess;
+        var excess = before + at * (after - before);
+        if ADAPTIVE { excess = inside(before, report.middle.excess, after, at); }
+        if lane == 0u { all_reports[member].excess_at[counters.noted] = excess; }
+        counters.noted += 1u;
+    }
+}
+
+/// ln(b/a) of positive numbers; WGSL has no logarithm in f64.
+fn ln_ratio(a: real, b: real) -> real {
+    var q = b / a;
+    var whole = real(0.0);
+    for (var halving = 0u; halving < HALVINGS; halving++) {
+        if !(real(0.7071067811865476) <= q) {
+            q = real(2.0) * q;
+            whole = whole - real(0.6931471805599453);
+        } else if !(q <= real(1.4142135623730951)) {
+            q = real(0.5) * q;
+            whole = whole + real(0.6931471805599453);
+        } else {
+            break;
+        }
+    }
+    let z = (q - real(1.0)) / (q + real(1.0));
+    let square = z * z;
+    var sum = real(0.0);
+    for (var left = TERMS; left > 0u; left--) {
+        sum = sum * square + real(1.0) / real(2u * left - 1u);
+    }
+    return whole + real(2.0) * (z * sum);
+}

@@ -1,0 +1,68 @@
+//! How fast the excess of the members falls: their fitted rates, as multiples of what linear theory gives where it does.
+
+use glam::DVec2;
+
+use super::bins::{Bins, guide};
+use crate::report::{
+    axis::{Axis, Scale},
+    chart::{Entry, FOOT, Heading, MARGIN, Mark, Panel, WIDTH, nothing},
+    text::{count, significant},
+};
+
+const HEIGHT: f64 = 200.0;
+
+/// Fitted rates of the members.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FittedRates<'a> {
+    /// First line.
+    pub title: &'a str,
+    /// A sentence below it, or nothing.
+    pub note: &'a str,
+    /// Rates over those of theory; or rates, in `unit`, where there is no theory.
+    pub rates: &'a [f64],
+    /// They are multiples of what theory gives.
+    pub relative: bool,
+    /// Unit of rates that are not.
+    pub unit: &'a str,
+    /// Members without a rate.
+    pub without: u64,
+}
+
+impl FittedRates<'_> {
+    /// The text of an SVG file.
+    pub fn draw(&self) -> String {
+        let mut sorted: Vec<f64> = self.rates.iter().copied().filter(|rate| rate.is_finite()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let without = match self.without {
+            0 => String::new(),
+            without => format!("{} without a rate: fewer than 8 points in the window.", count(without, "member")),
+        };
+        if sorted.is_empty() {
+            let sentences = vec![self.note.into(), without];
+            return nothing(self.title, sentences, "No member was followed closely enough for a rate to be fitted.");
+        }
+        let median = format!("Median {}.", significant(sorted[sorted.len() / 2], 4));
+        let scale = if sorted[0] > 0.0 { Scale::of(sorted.iter().copied()) } else { Scale::Linear };
+        let bins = Bins::of(&sorted, scale);
+        let (name, unit) = if self.relative { ("rate / theory", "") } else { ("rate", self.unit) };
+        let (across, members) = (bins.axis(name, unit, scale), Axis::counts("members", bins.most()));
+        let shown = self.relative && across.holds(1.0);
+        let legend = if shown { vec![Entry::new("ink", Mark::Dashed, "as linear theory has it")] } else { Vec::new() };
+        let sentences = vec![self.note.into(), median, without];
+        let (mut svg, top) = Heading { title: self.title, sentences, legend }.begin(HEIGHT + FOOT + 8.0);
+        let left = Panel::left(&members, HEIGHT);
+        let corner = DVec2::new(left, top + 8.0);
+        let size = DVec2::new(WIDTH - MARGIN - left, HEIGHT);
+        let panel = Panel { heading: "", corner, size, x: &across, y: &members, labels_x: true };
+        panel.draw_x(&mut svg);
+        panel.draw_y(&mut svg);
+        bins.draw(&mut svg, &panel);
+        if shown {
+            svg.open("ink");
+            guide(&mut svg, &panel, 1.0);
+            svg.close();
+        }
+        panel.draw_frame(&mut svg);
+        svg.finish()
+    }
+}
