@@ -19,7 +19,8 @@ fn plots(done: &Done) -> Vec<String> {
 fn a_run_leaves_a_page_with_what_a_reader_asks_first() {
     let done = run(RUN);
     let page = done.text("report.html");
-    assert_eq!(plots(&done), ["curves.svg", "mesh.svg", "relaxation.svg", "survival.svg"]);
+    let names = ["curves.svg", "excess.svg", "mesh.svg", "rate.svg", "relaxation.svg", "survival.svg"];
+    assert_eq!(plots(&done), names);
     for part in ["7 members", "ellipse:2,1, surface-diffusion", "median t_relax", "relaxed", "seed", "Kaplan-Meier"] {
         assert!(page.contains(part), "no {part:?}");
     }
@@ -63,11 +64,12 @@ fn a_study_compares_its_cells() {
 }
 
 #[test]
-fn the_mean_excess_of_a_series_is_drawn_with_its_slope() {
-    let done = run(&format!("{RUN} --series 0.05"));
-    let svg = done.text("plots/excess.svg");
+fn the_mean_excess_is_drawn_with_its_slope() {
+    let svg = run(RUN).text("plots/excess.svg");
     assert!(svg.contains("exp(−24 t/R⁴)") && svg.contains("one standard deviation of the members"), "{svg}");
-    let study = run(&format!("{RUN} --series 0.05 --sweep amplitude=0.02,0.1"));
+    let svg = run(&format!("{RUN} --flow willmore")).text("plots/excess.svg");
+    assert!(svg.contains("(1 + 2t/R⁴)^−8"), "{svg}");
+    let study = run(&format!("{RUN} --sweep amplitude=0.02,0.1"));
     let svg = study.text("plots/excess.svg");
     assert!(svg.contains("amplitude = 0.1") && !svg.contains("exp("), "{svg}");
 }

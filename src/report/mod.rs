@@ -221,22 +221,23 @@ mod tests {
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
         let overview = report(&out, &all, Some(portrait)).finish(&all, &platform, &[]).unwrap();
-        let tables = ["ensemble.csv", "plots", "report.html", "run.json", "series.csv", "snapshots.csv", "summary.csv"];
-        assert_eq!(files(&out), tables);
-        assert_eq!(files(&out.join("plots")), ["curves.svg", "mesh.svg", "relaxation.svg", "survival.svg"]);
+        let always = ["ensemble.csv", "mean_excess.csv", "plots", "rates.csv", "report.html", "run.json"];
+        assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());
+        let plots = ["excess.svg", "mesh.svg", "rate.svg", "relaxation.svg", "survival.svg"];
+        assert_eq!(files(&out.join("plots")), [&["curves.svg"], &plots[..]].concat());
         for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");
         }
         assert!(
             overview
-                .contains("summary.csv, ensemble.csv, series.csv, snapshots.csv, report.html, plots/*.svg, run.json"),
+                .contains("ensemble.csv, rates.csv, mean_excess.csv, series.csv, snapshots.csv, report.html, plots/*.svg"),
             "{overview}"
         );
 
         let few = Spec::default();
         report(&out, &few, None).finish(&few, &platform, &["a warning".into()]).unwrap();
-        assert_eq!(files(&out), ["ensemble.csv", "plots", "report.html", "run.json", "summary.csv"]);
-        assert_eq!(files(&out.join("plots")), ["mesh.svg", "relaxation.svg", "survival.svg"]);
+        assert_eq!(files(&out), [&always[..], &["summary.csv"]].concat());
+        assert_eq!(files(&out.join("plots")), plots);
         assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
     }
 
