@@ -108,7 +108,8 @@ def draw(table, snapshots, path):
     middle.errorbar(median.index, median, bars, fmt="o", ms=5, color="black", capsize=3, label="median, quartiles")
     line = np.array([amplitudes[0] / 1.3, amplitudes[-1] * 1.3])
     middle.plot(line, a + b * np.log(line), color="crimson", label=f"fit: slope {b:.4f} ± {error:.4f}")
-    middle.plot(line, median.iloc[0] + np.log(line / amplitudes[0]) / RATE, "k:", label=f"theory: slope 1/12 = {1 / RATE:.4f}")
+    theory = median.iloc[0] + np.log(line / amplitudes[0]) / RATE
+    middle.plot(line, theory, "k:", label=f"theory: slope 1/12 = {1 / RATE:.4f}")
     middle.set(xscale="log", xlabel="amplitude σ", ylabel="t_relax / R⁴", title="Relaxation time grows as ln σ / 12")
     middle.set_xticks(amplitudes, [f"{amplitude:g}" for amplitude in amplitudes])
     middle.minorticks_off()
@@ -121,7 +122,8 @@ def draw(table, snapshots, path):
     for colour, (_, curve) in zip(shades, curves.groupby("time")):
         closed = curve.squeeze().isel(node=np.arange(curve.sizes["node"] + 1) % curve.sizes["node"])
         right.plot(closed.x, closed.y, color=colour, lw=1.3, label=f"{float(curve.time.squeeze()):g}")
-    right.set(aspect="equal", xlabel="x / R", ylabel="y / R", title=f"Member {rough}, σ = {table.amplitude[rough]:g}, at times t / R⁴")
+    title = f"Member {rough}, σ = {table.amplitude[rough]:g}, at times t / R⁴"
+    right.set(aspect="equal", xlabel="x / R", ylabel="y / R", title=title)
     right.legend(frameon=False, loc="center", fontsize=8)
     figure.savefig(path, dpi=150)
     plt.close(figure)

@@ -89,8 +89,7 @@ pub fn cells(spec: &Spec) -> Result<Vec<Cell>> {
     let unequal = cells.windows(2).find(|pair| pair[0].spec.points != pair[1].spec.points);
     if let (Store::Zarr, Some([one, other])) = (spec.store, unequal) {
         let [(one, own), (other, others)] = [one, other].map(|cell| (spec.sweep.name(cell.index), cell.spec.points));
-        let problem =
-            format!("an array has as many nodes for all members: {own} in the cell {one}, {others} in {other}");
+        let problem = format!("an array has as many nodes for all members: {own} in {one}, {others} in {other}");
         return Err(Error::value("store", "zarr", &problem, "take --store csv, or one number of --points"));
     }
     Ok(cells)
