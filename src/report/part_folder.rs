@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn half_a_file_is_not_left() {
+    fn a_file_that_cannot_be_written_is_named_by_its_final_place() {
         let home = tempfile::tempdir().unwrap();
         let folder = OutputFolder::open(home.path(), true).unwrap();
         let store = begun(&folder);
