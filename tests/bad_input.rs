@@ -87,6 +87,7 @@ fn a_value_that_cannot_be_read_is_named_with_its_flag() {
         ("--order", "colored", "similar value exists: 'coloured'"),
         ("--backend", "cuda", "auto, gpu, cpu"),
         ("--precision", "f16", "f32, f64"),
+        ("--store", "zar", "similar value exists: 'zarr'"),
     ] {
         let message = refused(&[flag, value], &[]);
         assert_says(&message, &[&format!("invalid value '{value}' for '{flag} "), reason]);
@@ -103,6 +104,14 @@ fn combinations_without_sense_name_a_remedy() {
         ("--sor auto --solver direct", ["--sor auto: ", "leave out --sor"]),
         ("--adapter llvmpipe --backend cpu", ["--adapter llvmpipe: ", "leave out --adapter"]),
         ("--points 20", ["--modes 2..=8: ", "take --points 32 or more"]),
+        (
+            "--store zarr",
+            ["--store zarr: there are no snapshots to store; ", "add --snapshots T1,T2,..., or leave out"],
+        ),
+        (
+            "--store zarr --snapshots 0 --sweep points=40,50 --sweep decay=1,2",
+            ["50 in points = 50, decay = 1; ", "take --store csv, or one number of --points"],
+        ),
     ] {
         assert_says(&refused(&arguments.split(' ').collect::<Vec<_>>(), &[]), &parts);
     }
@@ -115,6 +124,7 @@ fn a_wrong_sweep_names_its_key_and_cell() {
     for (sweeps, parts) in [
         (&["amplitud=1"][..], ["--sweep amplitud: ", "did you mean `amplitude`?"]),
         (&["curves=1,2"], ["--sweep curves: ", "run once for each value"]),
+        (&["store=csv,zarr"], ["--sweep store: ", "run once for each value"]),
         (&["amplitude="], ["--sweep amplitude: no values", "amplitude=v1,v2"]),
         (&["amplitude"], ["has no `=`", "key=v1,v2"]),
         (&["amplitude=0.1,word"], ["--sweep amplitude=word: ", "in the cell amplitude = word"]),

@@ -84,7 +84,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     }
     if let Some(folder) = folder {
         let file = tables::convergence(folder.file(folder::CONVERGENCE)?, &rows)?;
-        folder.publish(Vec::new(), file)?;
+        folder.publish(Vec::new(), None, file)?;
     }
     if !args.quiet {
         print(&table(&rows))?;

@@ -10,7 +10,7 @@ use crate::{
     curve::{Modes, Sampling, Shape},
     ensemble::{
         Spec,
-        spec::{BackendChoice, Order, Precision, Pull, SolverChoice, Sor},
+        spec::{BackendChoice, Order, Precision, Pull, SolverChoice, Sor, Store},
         sweep::Axis,
     },
     flow::Flow,
@@ -21,6 +21,7 @@ pub(super) const SOLVERS: &[&str] = &["auto", "gauss-seidel", "multigrid", "dire
 const ORDERS: &[&str] = &["coloured", "lexicographic"];
 pub(super) const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
 pub(super) const PRECISIONS: &[&str] = &["f32", "f64"];
+const STORES: &[&str] = &["csv", "zarr"];
 
 /// One flag for each key of [`Spec`], none given unless the user gave it.
 ///
@@ -192,6 +193,10 @@ pub struct SpecFlags {
         allow_hyphen_values = true, help_heading = OUTPUT
     )]
     snapshots: Option<Vec<f64>>,
+    /// How snapshots are stored: as the table snapshots.csv, or as the arrays of snapshots.zarr, for xarray
+    /// [default: csv]
+    #[arg(long, value_name = "HOW", value_parser = word::<Store>(STORES), help_heading = OUTPUT)]
+    store: Option<Store>,
 }
 
 const ENSEMBLE: &str = "Ensemble";
@@ -222,7 +227,7 @@ impl SpecFlags {
         }
         replace! {
             curves points seed shape sampling amplitude modes decay flow t_end omega no_redistribution pull solver
-            order sor max_sweeps backend stop_when_relaxed snapshots common_random_numbers;
+            order sor max_sweeps backend stop_when_relaxed snapshots store common_random_numbers;
             tau adaptive relax_to relax_at only tolerance adapter precision series threads
         }
     }
@@ -302,7 +307,7 @@ mod tests {
              --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --pull 3 --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \
-             --series 0.1 --snapshots 0,1 --only 1,2 --threads 2 --common-random-numbers --sweep phase=1,2"
+             --series 0.1 --snapshots 0,1 --store zarr --only 1,2 --threads 2 --common-random-numbers --sweep phase=1,2"
                 .split_whitespace()
                 .collect::<Vec<_>>()
                 .as_slice(),
@@ -354,6 +359,7 @@ mod tests {
         assert_eq!(words::<Order>(), ORDERS);
         assert_eq!(words::<BackendChoice>(), BACKENDS);
         assert_eq!(words::<Precision>(), PRECISIONS);
+        assert_eq!(words::<Store>(), STORES);
         for name in SAMPLINGS {
             let sampling: Sampling = serde_json::from_value((*name).into()).unwrap();
             assert_eq!(serde_json::to_value(sampling).unwrap(), *name);

@@ -77,7 +77,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     let folder = OutputFolder::open(&out, args.force)?;
     let early = warnings(&cells);
     early.iter().for_each(|warning| say(&format!("warning: {warning}")));
-    let mut report = Report::begin(folder, &spec, args.quiet)?;
+    let mut report = Report::begin(folder, &spec, cells[0].spec.points, args.quiet)?;
     let rows = report.kept_rows();
     let done = advance(&cells, companies, choices, &mut report, &say).and_then(|platform| {
         let late = report.warnings();

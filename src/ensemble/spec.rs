@@ -83,6 +83,16 @@ pub enum Sor {
     Auto,
 }
 
+/// How snapshots are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Store {
+    /// The table `snapshots.csv`.
+    Csv,
+    /// The arrays of `snapshots.zarr`.
+    Zarr,
+}
+
 /// A complete description of an ensemble and of the method that relaxes it.
 ///
 /// `Default` is the paper's first example as an ensemble: 256 perturbed 2:1 ellipses under surface diffusion.
@@ -152,9 +162,11 @@ pub struct Spec {
     /// Interval between rows of `series.csv`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub series: Option<f64>,
-    /// Times of `snapshots.csv`.
+    /// Times of the snapshots.
     #[serde(deserialize_with = "list")]
     pub snapshots: Vec<f64>,
+    /// How snapshots are stored.
+    pub store: Store,
     /// Run only these members.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
     pub only: Option<Vec<u64>>,
@@ -207,6 +219,7 @@ impl Default for Spec {
             stop_when_relaxed: false,
             series: None,
             snapshots: Vec::new(),
+            store: Store::Csv,
             only: None,
             threads: None,
             common_random_numbers: false,
@@ -434,6 +447,7 @@ mod tests {
             tolerance: Some(3e-4),
             series: Some(0.01),
             snapshots: vec![0.0, 1.0 / 3.0],
+            store: Store::Zarr,
             only: Some(vec![0, 200]),
             ..Spec::default()
         };

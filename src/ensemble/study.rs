@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
-use super::{Family, Member, Spec, spec::Pace};
+use super::{
+    Family, Member, Spec,
+    spec::{Pace, Store},
+};
 use crate::{
     error::{Error, Result},
     solver::{Order, Solver},
@@ -62,7 +65,8 @@ impl Cell {
 /// All cells of `spec`, checked; one if nothing is swept.
 ///
 /// # Errors
-/// [`Error::Request`] for a value that is out of range, with the cell that has it.
+/// [`Error::Request`] for a value that is out of range, with the cell that has it, and for curves of unequal numbers of
+/// nodes that are to share an array.
 pub fn cells(spec: &Spec) -> Result<Vec<Cell>> {
     let cell = |index: u64| -> Result<Cell> {
         let first = index * spec.curves;
@@ -80,7 +84,15 @@ pub fn cells(spec: &Spec) -> Result<Vec<Cell>> {
         }
         error => error,
     };
-    (0..spec.sweep.cells()).map(|index| cell(index).map_err(|error| name(index, error))).collect()
+    let cells = (0..spec.sweep.cells()).map(|index| cell(index).map_err(|error| name(index, error)));
+    let cells = cells.collect::<Result<Vec<_>>>()?;
+    let unequal = cells.windows(2).find(|pair| pair[0].spec.points != pair[1].spec.points);
+    if let (Store::Zarr, Some([one, other])) = (spec.store, unequal) {
+        let [(one, own), (other, others)] = [one, other].map(|cell| (spec.sweep.name(cell.index), cell.spec.points));
+        let problem = format!("an array has as many nodes for all members: {own} in {one}, {others} in {other}");
+        return Err(Error::value("store", "zarr", &problem, "take --store csv, or one number of --points"));
+    }
+    Ok(cells)
 }
 
 /// Ranges of cells whose members run side by side, in order.

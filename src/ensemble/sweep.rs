@@ -15,7 +15,7 @@ use super::Spec;
 use crate::error::{Error, Result, did_you_mean};
 
 /// Keys that all members of a run have in common.
-const COMMON: [&str; 12] = [
+const COMMON: [&str; 13] = [
     "curves",
     "backend",
     "adapter",
@@ -23,6 +23,7 @@ const COMMON: [&str; 12] = [
     "threads",
     "series",
     "snapshots",
+    "store",
     "only",
     "sweep",
     "common-random-numbers",

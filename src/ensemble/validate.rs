@@ -3,7 +3,9 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that
 //! takes the file they come from; only the resolution of the highest mode is checked here.
 
-use super::spec::{BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Solver, Sor, Spec};
+use super::spec::{
+    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Solver, Sor, Spec, Store,
+};
 use crate::error::{Error, Result};
 
 /// More members than this is a slip of the keyboard.
@@ -213,6 +215,10 @@ impl Spec {
     fn check_combinations(&self) -> Result<()> {
         let lexicographic = self.order == Order::Lexicographic;
         self.check_sweeps()?;
+        if self.store == Store::Zarr && self.snapshots.is_empty() {
+            let allowed = "add --snapshots T1,T2,..., or leave out --store";
+            return Err(Error::value("store", "zarr", "there are no snapshots to store", allowed));
+        }
         if self.backend == BackendChoice::Gpu {
             let cpu = "take --backend cpu";
             if lexicographic {
@@ -374,6 +380,8 @@ mod tests {
         ("snapshots = [-1]", "--snapshots -1: "),
         ("snapshots = [nan]", "--snapshots NaN: "),
         ("snapshots = [inf]", "--snapshots inf: "),
+        ("store = 'zarr'", "--store zarr: there are no snapshots to store; add --snapshots T1,T2,..."),
+        ("store = 'zarr'\nsnapshots = []", "--store zarr: "),
         ("only = []", "--only []: "),
         ("only = [256]", "--only 256: no such member among 256; take members from 0 to 255"),
         ("only = [18446744073709551615]", "--only 18446744073709551615: "),
@@ -429,6 +437,8 @@ mod tests {
         "series = 5",
         "snapshots = [0, 2]",
         "snapshots = []",
+        "snapshots = [0]\nstore = 'zarr'",
+        "store = 'csv'",
         "threads = 1024",
         "order = 'lexicographic'",
         "order = 'lexicographic'\nbackend = 'cpu'",

@@ -7,6 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use super::part_folder::PartFolder;
 use crate::error::{Error, Result};
 
 /// One row a member.
@@ -19,6 +20,8 @@ pub const MEAN_EXCESS: &str = "mean_excess.csv";
 pub const SERIES: &str = "series.csv";
 /// Nodes at given times.
 pub const SNAPSHOTS: &str = "snapshots.csv";
+/// The same as arrays: a folder.
+pub const STORE: &str = "snapshots.zarr";
 /// Errors and orders against exact solutions.
 pub const CONVERGENCE: &str = "convergence.csv";
 /// Statistics by cell.
@@ -43,8 +46,8 @@ pub const MESH: &str = "plots/mesh.svg";
 /// Everything at a glance.
 pub const REPORT: &str = "report.html";
 
-/// All files that a command may write, the one that vouches for the others first.
-const OWN: [&str; 16] = [
+/// All that a command may write, the file that vouches for the others first.
+const OWN: [&str; 17] = [
     RUN,
     SUMMARY,
     ENSEMBLE,
@@ -52,6 +55,7 @@ const OWN: [&str; 16] = [
     RATES,
     SERIES,
     SNAPSHOTS,
+    STORE,
     CURVES,
     RELAXATION,
     RATE,
@@ -63,7 +67,7 @@ const OWN: [&str; 16] = [
     CONVERGENCE,
 ];
 
-/// The folder of the plots, the only one below that of the run.
+/// The folder of the plots.
 const PLOTS: &str = "plots";
 
 /// Locked while a run writes; what counts is the lock, which ends with its process, and not the file.
@@ -125,7 +129,7 @@ impl OutputFolder {
         let probe = path.join(".curvelax.part");
         create(&probe).and_then(|_| fs::remove_file(&probe)).map_err(refuse)?;
         // What an interrupted run left; its lock is gone, so it is no longer writing.
-        folder.names.iter().try_for_each(|name| remove(&folder.part(name))).map_err(refuse)?;
+        folder.names.iter().try_for_each(|name| remove_any(&folder.part(name))).map_err(refuse)?;
         Ok(folder)
     }
 
@@ -143,6 +147,11 @@ impl OutputFolder {
         Ok(PartFile { file, part, target, keep: Cell::new(false), broken: false, finished: false })
     }
 
+    /// Begins the folder `name`, which must be that of a store.
+    pub fn store(&self, name: &str) -> Result<PartFolder> {
+        PartFolder::begin(self.part(name), self.path.join(name))
+    }
+
     /// Writes the whole file `name`, ready for [`OutputFolder::publish`].
     pub fn write(&self, name: &str, text: &str) -> Result<PartFile> {
         let mut file = self.file(name)?;
@@ -151,14 +160,16 @@ impl OutputFolder {
         Ok(file)
     }
 
-    /// Gives complete files their final names, `run` last, and removes what an earlier run wrote and this one did not.
+    /// Gives what is complete its final name, `run` last, and removes what an earlier run wrote and this one did not.
     ///
     /// All of them are on disk by now, so that little is left that can fail. The earlier `run.json` goes first: no
     /// moment has one that vouches for the files of two runs.
-    pub fn publish(&self, files: Vec<PartFile>, run: PartFile) -> Result<()> {
-        let written: Vec<PathBuf> = files.iter().map(|file| file.target.clone()).collect();
+    pub fn publish(&self, files: Vec<PartFile>, store: Option<PartFolder>, run: PartFile) -> Result<()> {
+        let targets = files.iter().map(PartFile::target).chain(store.iter().map(PartFolder::target));
+        let written: Vec<PathBuf> = targets.map(Path::to_path_buf).collect();
         self.remove_own(RUN)?;
         files.into_iter().try_for_each(PartFile::finish)?;
+        store.map_or(Ok(()), PartFolder::finish)?;
         OWN.iter()
             .filter(|name| !written.contains(&self.path.join(name)))
             .try_for_each(|name| self.remove_own(name))?;
@@ -172,7 +183,7 @@ impl OutputFolder {
 
     fn remove_own(&self, name: &str) -> Result<()> {
         let path = self.path.join(name);
-        remove(&path).map_err(Error::io("cannot remove", &path))
+        remove_any(&path).map_err(Error::io("cannot remove", &path))
     }
 
     /// The temporary name of `name`.
@@ -209,8 +220,14 @@ impl OutputFolder {
         }
         for name in &self.names {
             for path in [self.path.join(name), self.part(name)] {
-                if path.is_dir() {
-                    return in_the_way(&path, "a folder");
+                match (is_store(&path), path.is_dir()) {
+                    (false, true) => return in_the_way(&path, "a folder"),
+                    (true, false) if path.symlink_metadata().is_ok() => return in_the_way(&path, "no folder"),
+                    // All in it would be removed.
+                    (true, true) if !is_own_store(&path) => {
+                        return in_the_way(&path, "not the folder of an earlier run");
+                    }
+                    _ => {}
                 }
             }
         }
@@ -305,6 +322,33 @@ fn create(path: &Path) -> io::Result<File> {
     File::create_new(path)
 }
 
+/// Whether a folder, and not a file, has this name.
+fn is_store(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().trim_end_matches(".part").ends_with(STORE))
+}
+
+/// Whether a run may have left the folder of a store.
+fn is_own_store(path: &Path) -> bool {
+    let empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+    !path.is_symlink() && (path.join("zarr.json").is_file() || empty())
+}
+
+/// Removes a file, or the folder of a store; either may be absent.
+fn remove_any(path: &Path) -> io::Result<()> {
+    match is_store(path) {
+        true => remove_folder(path),
+        false => remove(path),
+    }
+}
+
+/// Removes a folder and what is in it; it may be absent.
+pub(super) fn remove_folder(path: &Path) -> io::Result<()> {
+    match fs::remove_dir_all(path) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
+        _ => Ok(()),
+    }
+}
+
 /// Removes a file, which may be absent.
 fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
@@ -345,13 +389,16 @@ fn lies_at(_: &File, path: &Path) -> bool {
     path.exists()
 }
 
-/// Makes a rename durable; only Unix lets a folder be synced.
-fn sync_parent(path: &Path) -> Result<()> {
-    match path.parent() {
-        Some(parent) if cfg!(unix) => {
-            File::open(parent).and_then(|folder| folder.sync_all()).map_err(Error::io("cannot write to", parent))
-        }
-        _ => Ok(()),
+/// Makes a rename durable.
+pub(super) fn sync_parent(path: &Path) -> Result<()> {
+    path.parent().map_or(Ok(()), sync_folder)
+}
+
+/// Makes the names of what is in a folder durable; only Unix lets a folder be synced.
+pub(super) fn sync_folder(path: &Path) -> Result<()> {
+    match cfg!(unix) {
+        true => File::open(path).and_then(|folder| folder.sync_all()).map_err(Error::io("cannot write to", path)),
+        false => Ok(()),
     }
 }
 
@@ -404,7 +451,7 @@ mod tests {
         for name in [SUMMARY, SERIES, RUN] {
             assert_eq!(fs::read(home.path().join(name)).unwrap(), b"old", "{name} goes before the new files are ready");
         }
-        folder.publish(vec![summary], run).unwrap();
+        folder.publish(vec![summary], None, run).unwrap();
         drop(folder);
         assert_eq!(names(home.path()), ["notes.txt", RUN, SUMMARY]);
         for (name, text) in [(SUMMARY, "new"), (RUN, "new"), ("notes.txt", "old")] {

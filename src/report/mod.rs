@@ -11,6 +11,7 @@ pub mod folder;
 pub mod gallery;
 pub mod overview;
 pub mod page;
+pub mod part_folder;
 pub mod plot;
 pub mod progress;
 pub mod provenance;
@@ -21,6 +22,7 @@ pub mod tables;
 pub mod tally;
 pub mod text;
 pub mod trace;
+pub mod zarr;
 
 use std::{
     path::PathBuf,
@@ -33,13 +35,14 @@ pub use gallery::Panel;
 
 use crate::{
     backend::Platform,
-    ensemble::{Ended, Outcome, Portrait, Sink, Spec},
+    ensemble::{Ended, Outcome, Portrait, Sink, Spec, spec::Store},
     error::Result,
 };
 use progress::Progress;
 use study::Study;
 use tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable};
 use tally::Tally;
+use zarr::SnapshotStore;
 
 /// How the overview names the pictures.
 const PLOTS: &str = "plots/*.svg";
@@ -51,6 +54,7 @@ pub struct Report {
     rates: RateTable,
     series: Option<SeriesTable>,
     snapshots: Option<SnapshotTable>,
+    store: Option<SnapshotStore>,
     folder: OutputFolder,
     tally: Tally,
     panels: Vec<Panel>,
@@ -65,17 +69,23 @@ pub struct Report {
 }
 
 impl Report {
-    /// Opens the tables that `spec` asks for.
-    pub fn begin(folder: OutputFolder, spec: &Spec, quiet: bool) -> Result<Report> {
+    /// Opens the tables that `spec` asks for. `points` is the number of nodes of a member, which matters only where all
+    /// have the same.
+    pub fn begin(folder: OutputFolder, spec: &Spec, points: usize, quiet: bool) -> Result<Report> {
+        let stored = |store: Store| spec.store == store && !spec.snapshots.is_empty();
         Ok(Report {
             total: spec.member_count(),
             before: 0,
             summary: SummaryTable::begin(folder.file(folder::SUMMARY)?)?,
             rates: RateTable::begin(folder.file(folder::RATES)?)?,
             series: spec.series.map(|_| SeriesTable::begin(folder.file(folder::SERIES)?)).transpose()?,
-            snapshots: match spec.snapshots.is_empty() {
-                true => None,
-                false => Some(SnapshotTable::begin(folder.file(folder::SNAPSHOTS)?)?),
+            snapshots: match stored(Store::Csv) {
+                true => Some(SnapshotTable::begin(folder.file(folder::SNAPSHOTS)?)?),
+                false => None,
+            },
+            store: match stored(Store::Zarr) {
+                true => Some(SnapshotStore::begin(folder.store(folder::STORE)?, spec, points)?),
+                false => None,
             },
             folder,
             tally: Tally::default(),
@@ -106,9 +116,9 @@ impl Report {
     /// Puts every file under its final name, once all are on disk, and returns the overview for stdout.
     pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String]) -> Result<String> {
         // In reverse order they are dropped: the folder last, after its files.
-        let Report {
-            folder, tally, panels, watched, progress, started, clock, summary, rates, series, snapshots, ..
-        } = self;
+        let Report { folder, tally, panels, watched, progress, started, clock, .. } = self;
+        let (summary, rates, series) = (self.summary, self.rates, self.series);
+        let (snapshots, store) = (self.snapshots, self.store);
         progress.finish();
         let wall = clock.elapsed();
         let statistics = &EnsembleStatistics::new(spec, &tally)?;
@@ -123,6 +133,10 @@ impl Report {
         if let Some(snapshots) = snapshots {
             files.push(snapshots.ready()?);
             names.push(folder::SNAPSHOTS);
+        }
+        let store = store.map(SnapshotStore::ready).transpose()?;
+        if store.is_some() {
+            names.push(folder::STORE);
         }
         let gallery = (!panels.is_empty()).then(|| gallery::draw(&panels));
         let study = Study { spec, platform, tally: &tally, statistics, warnings, started, wall };
@@ -140,7 +154,7 @@ impl Report {
         let provenance = provenance::Provenance::new(spec, platform, &tally, warnings, started, wall);
         let run = folder.write(folder::RUN, &provenance.to_json()?)?;
         names.push(folder::RUN);
-        folder.publish(files, run)?;
+        folder.publish(files, store, run)?;
         let (tally, folder) = (&tally, folder.path());
         let overview = overview::Overview { spec, platform, tally, statistics, wall, folder, files: &names };
         Ok(overview.to_string())
@@ -155,6 +169,9 @@ impl Sink for Report {
         }
         if let Some(table) = &mut self.snapshots {
             snapshots.iter().try_for_each(|snapshot| table.snapshot(snapshot))?;
+        }
+        if let Some(store) = &mut self.store {
+            store.member(outcome.status, snapshots)?;
         }
         self.summary.row(outcome)?;
         self.rates.row(outcome)?;
@@ -193,7 +210,7 @@ mod tests {
 
     /// A report into `out` that has received one member.
     fn report(out: &Path, spec: &Spec, portrait: Option<Portrait>) -> Report {
-        let mut report = Report::begin(OutputFolder::open(out, true).unwrap(), spec, true).unwrap();
+        let mut report = Report::begin(OutputFolder::open(out, true).unwrap(), spec, 1, true).unwrap();
         let row = SeriesRow { member: 0, t: 0.0, at: Observables::default() };
         let snapshot = Snapshot { member: 0, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] };
         let outcome = tally::tests::outcome(0, Status::Relaxed, Some(0.5));
@@ -229,8 +246,9 @@ mod tests {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");
         }
         assert!(
-            overview
-                .contains("ensemble.csv, rates.csv, mean_excess.csv, series.csv, snapshots.csv, report.html, plots/*.svg"),
+            overview.contains(
+                "ensemble.csv, rates.csv, mean_excess.csv, series.csv, snapshots.csv, report.html, plots/*.svg"
+            ),
             "{overview}"
         );
 

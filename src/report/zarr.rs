@@ -1,0 +1,574 @@
+//! `snapshots.zarr`: the snapshots as arrays x, y, k, r of member × time × node, in Zarr's format 3.
+//!
+//! An array is a folder with a `zarr.json` and raw little-endian chunks `c.I.J.K`, which are written as soon as the
+//! members that fill them have ended: what is in memory does not grow with the ensemble. A snapshot that a member did not
+//! live to see is NaN. Equal runs give equal bytes.
+//!
+//! The format: <https://zarr-specs.readthedocs.io/en/latest/v3/core/>. Metadata is consolidated as zarr-python does it,
+//! and dimension names, units and flags are those that xarray and the CF conventions know.
+
+use serde_json::{Map, Value, json};
+
+use super::part_folder::PartFolder;
+use crate::{
+    ensemble::{Snapshot, Spec, Status},
+    error::{Error, Result},
+    schedule::outputs,
+};
+
+/// About so many bytes make a chunk: few files for many members, and little to read for one.
+const CHUNK_BYTES: usize = 4 << 20;
+
+/// The arrays of nodes, with units and what they are.
+const FIELDS: [(&str, &str, &str); 4] = [
+    ("x", "length", "x coordinate of the node"),
+    ("y", "length", "y coordinate of the node"),
+    ("k", "1/length", "signed curvature of the segment that ends at the node"),
+    ("r", "length", "length of the segment that ends at the node, as the scheme evolves it"),
+];
+
+/// `snapshots.zarr` while it grows.
+pub struct SnapshotStore {
+    folder: PartFolder,
+    times: Vec<f64>,
+    points: usize,
+    fields: Vec<Array>,
+    status: Array,
+}
+
+/// An array that is written from its first element to its last.
+struct Array {
+    name: &'static str,
+    metadata: Value,
+    /// Chunks in each dimension.
+    grid: Vec<u64>,
+    chunk_bytes: usize,
+    /// What stands for an element that was not written.
+    fill: Vec<u8>,
+    /// The chunk that is being filled, and the number of those before it.
+    chunk: Vec<u8>,
+    written: u64,
+    /// Bytes between two elements that begin a chunk whatever is in the one before, and how many of them are to come.
+    run_bytes: u64,
+    run_left: u64,
+}
+
+/// Type of an element.
+#[derive(Clone, Copy)]
+enum Kind {
+    Float64,
+    Int64,
+    Int8,
+}
+
+impl SnapshotStore {
+    /// Makes the arrays for the members of `spec`, of `points` nodes each, and writes all that is known of them
+    /// beforehand.
+    pub fn begin(folder: PartFolder, spec: &Spec, points: usize) -> Result<SnapshotStore> {
+        // Times that agree with the final one to rounding are that one, as in `snapshots.csv`.
+        let times: Vec<f64> = outputs(spec.t_end, None, &spec.snapshots, &[]).iter().map(|output| output.t).collect();
+        SnapshotStore::of_chunks(folder, spec, points, times, CHUNK_BYTES)
+    }
+
+    fn of_chunks(
+        mut folder: PartFolder,
+        spec: &Spec,
+        points: usize,
+        times: Vec<f64>,
+        bytes: usize,
+    ) -> Result<SnapshotStore> {
+        let members = ("member", spec.member_count());
+        let (instants, nodes) = (("time", times.len() as u64), ("node", points as u64));
+        let vector = |name, kind, along, attributes| Array::new(name, kind, &[along], attributes, bytes);
+        let of_member = |name: &str| json!({ "long_name": name });
+        let mut member = vector("member", Kind::Int64, members, of_member("index of the member"));
+        let mut cell = vector("cell", Kind::Int64, members, of_member("index of the cell of the sweep"));
+        let time = json!({ "long_name": "time", "units": "length^4" });
+        let mut time = vector("time", Kind::Float64, instants, time);
+        let mut node = vector("node", Kind::Int64, nodes, json!({ "long_name": "number of the node along the curve" }));
+        let flags = json!({
+            "long_name": "how the member ended",
+            "flag_values": Status::ALL.map(|status| status as u32),
+            "flag_meanings": Status::ALL.map(Status::name).join(" "),
+        });
+        let status = vector("status", Kind::Int8, members, flags);
+        let fields = FIELDS.map(|(name, units, what)| {
+            let attributes = json!({ "long_name": what, "units": units, "coordinates": "cell status" });
+            Array::new(name, Kind::Float64, &[members, instants, nodes], attributes, bytes)
+        });
+
+        let all = fields.iter().chain([&member, &time, &node, &cell, &status]);
+        let consolidated: Map<String, Value> = all.clone().map(|a| (a.name.into(), a.metadata.clone())).collect();
+        let group = json!({
+            "zarr_format": 3,
+            "node_type": "group",
+            "attributes": {
+                "title": "nodes of relaxing plane curves",
+                "curvelax": env!("CARGO_PKG_VERSION"),
+                // Where it ran and on how many threads makes no difference to the numbers.
+                "spec": Spec { threads: None, ..spec.clone() }.to_toml()?,
+            },
+            "consolidated_metadata": { "kind": "inline", "must_understand": false, "metadata": consolidated },
+        });
+        folder.write("zarr.json", &pretty(&group)?)?;
+        for array in all {
+            folder.make(array.name)?;
+            folder.write(&format!("{}/zarr.json", array.name), &pretty(&array.metadata)?)?;
+        }
+        for index in spec.members() {
+            member.push(&folder, &(index as i64).to_le_bytes())?;
+            cell.push(&folder, &((index / spec.curves) as i64).to_le_bytes())?;
+        }
+        times.iter().try_for_each(|t| time.push(&folder, &t.to_le_bytes()))?;
+        (1..=points as i64).try_for_each(|i| node.push(&folder, &i.to_le_bytes()))?;
+        Ok(SnapshotStore { folder, times, points, fields: fields.into(), status })
+    }
+
+    /// Adds the next member: how it ended, and the snapshots that it left, in time order.
+    pub fn member(&mut self, status: Status, snapshots: &[Snapshot]) -> Result<()> {
+        let of: [fn(&Snapshot) -> &[f64]; 4] = [|s| &s.x, |s| &s.y, |s| &s.k, |s| &s.r];
+        for (array, of) in self.fields.iter_mut().zip(of) {
+            let mut values = vec![f64::NAN; self.times.len() * self.points];
+            for snapshot in snapshots {
+                let first = nearest(&self.times, snapshot.t) * self.points;
+                let own = values[first..].iter_mut().take(self.points);
+                // Unknown is NaN, as it is empty in tables.
+                own.zip(of(snapshot)).for_each(|(own, v)| *own = if v.is_finite() { *v } else { f64::NAN });
+            }
+            let bytes: Vec<u8> = values.into_iter().flat_map(f64::to_le_bytes).collect();
+            array.push(&self.folder, &bytes)?;
+        }
+        self.status.push(&self.folder, &[status as u8])?;
+        if self.fields.iter().all(|array| array.written > 0) {
+            self.folder.keep();
+        }
+        Ok(())
+    }
+
+    /// The whole store, on disk and ready for its final name.
+    pub fn ready(self) -> Result<PartFolder> {
+        self.folder.sync()?;
+        Ok(self.folder)
+    }
+}
+
+impl Array {
+    /// With extents by name of the dimension, chunks of at most `bytes`, and these attributes.
+    fn new(name: &'static str, kind: Kind, dimensions: &[(&str, u64)], attributes: Value, bytes: usize) -> Array {
+        let size = kind.fill().len();
+        let shape: Vec<u64> = dimensions.iter().map(|(_, extent)| *extent).collect();
+        let names: Vec<&str> = dimensions.iter().map(|(name, _)| *name).collect();
+        let chunk = chunk_shape(&shape, (bytes / size) as u64);
+        let grid: Vec<u64> = shape.iter().zip(&chunk).map(|(extent, chunk)| extent.div_ceil(*chunk)).collect();
+        // Before the last dimension that is cut chunks have one element, after it they have all.
+        let cut = grid.iter().rposition(|chunks| *chunks > 1).unwrap_or(0);
+        let run_bytes = shape[cut..].iter().product::<u64>() * size as u64;
+        Array {
+            name,
+            metadata: json!({
+                "zarr_format": 3,
+                "node_type": "array",
+                "shape": shape,
+                "data_type": kind.name(),
+                "chunk_grid": { "name": "regular", "configuration": { "chunk_shape": chunk } },
+                // Files beside each other, instead of a folder for each index.
+                "chunk_key_encoding": { "name": "default", "configuration": { "separator": "." } },
+                "fill_value": kind.fill_value(),
+                "codecs": [{ "name": "bytes", "configuration": { "endian": "little" } }],
+                "attributes": attributes,
+                "dimension_names": names,
+            }),
+            grid,
+            chunk_bytes: chunk.iter().product::<u64>() as usize * size,
+            fill: kind.fill(),
+            chunk: Vec::new(),
+            written: 0,
+            run_bytes,
+            run_left: run_bytes,
+        }
+    }
+
+    /// Adds elements, and writes the chunks that they complete.
+    fn push(&mut self, folder: &PartFolder, mut bytes: &[u8]) -> Result<()> {
+        while !bytes.is_empty() {
+            let room = (self.chunk_bytes - self.chunk.len()).min(self.run_left as usize);
+            let (now, later) = bytes.split_at(room.min(bytes.len()));
+            self.chunk.extend_from_slice(now);
+            self.run_left -= now.len() as u64;
+            if self.run_left == 0 || self.chunk.len() == self.chunk_bytes {
+                self.write(folder)?;
+            }
+            bytes = later;
+        }
+        Ok(())
+    }
+
+    /// Writes the chunk, which has its full length even where it reaches beyond the array.
+    fn write(&mut self, folder: &PartFolder) -> Result<()> {
+        let missing = self.chunk_bytes - self.chunk.len();
+        self.chunk.extend(self.fill.iter().cycle().take(missing));
+        folder.write(&format!("{}/{}", self.name, self.key()), &self.chunk)?;
+        self.chunk.clear();
+        self.written += 1;
+        if self.run_left == 0 {
+            self.run_left = self.run_bytes;
+        }
+        Ok(())
+    }
+
+    /// The name of the chunk that is being filled: `c`, and its place in the grid.
+    fn key(&self) -> String {
+        let mut rest = self.written;
+        let mut key = String::new();
+        for chunks in self.grid.iter().rev() {
+            key = format!(".{}{key}", rest % chunks);
+            rest /= chunks;
+        }
+        format!("c{key}")
+    }
+}
+
+impl Kind {
+    fn name(self) -> &'static str {
+        match self {
+            Kind::Float64 => "float64",
+            Kind::Int64 => "int64",
+            Kind::Int8 => "int8",
+        }
+    }
+
+    fn fill_value(self) -> Value {
+        match self {
+            Kind::Float64 => "NaN".into(),
+            Kind::Int64 | Kind::Int8 => 0.into(),
+        }
+    }
+
+    /// The bytes of the fill value.
+    fn fill(self) -> Vec<u8> {
+        match self {
+            Kind::Float64 => f64::NAN.to_le_bytes().into(),
+            Kind::Int64 => 0_i64.to_le_bytes().into(),
+            Kind::Int8 => vec![0],
+        }
+    }
+}
+
+/// Extents of chunks of at most `room` elements: whole dimensions from the last on, then equal parts of one, then single
+/// elements.
+fn chunk_shape(shape: &[u64], mut room: u64) -> Vec<u64> {
+    let mut chunk: Vec<u64> = shape
+        .iter()
+        .rev()
+        .map(|extent| {
+            let parts = extent.div_ceil(room.max(1));
+            let part = extent.div_ceil(parts);
+            // What is cut takes more than half of the room, and leaves 1 for the dimensions before it.
+            room /= part;
+            part
+        })
+        .collect();
+    chunk.reverse();
+    chunk
+}
+
+/// The index of the time nearest to `t`, which is among them but for rounding where final times differ from cell to cell.
+fn nearest(times: &[f64], t: f64) -> usize {
+    let after = times.partition_point(|own| *own < t).min(times.len() - 1);
+    if after > 0 && t - times[after - 1] < times[after] - t { after - 1 } else { after }
+}
+
+fn pretty(metadata: &Value) -> Result<Vec<u8>> {
+    let text = serde_json::to_string_pretty(metadata);
+    text.map(|text| (text + "\n").into()).map_err(|e| Error::Failed(format!("cannot write zarr.json: {e}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, path::Path};
+
+    use super::*;
+    use crate::{
+        backend::{Backend, cpu::CpuBackend},
+        ensemble::{
+            Cell, Ended, Family, Sink,
+            spec::{Precision, Store},
+        },
+        report::{OutputFolder, folder, tables::SnapshotTable},
+        scheme::step::Method,
+        simulate::simulate,
+        solver::{Blocks, Order, Solver},
+    };
+
+    /// An array as it was read, in C order.
+    #[derive(Clone, Debug, PartialEq)]
+    struct Read {
+        shape: Vec<usize>,
+        chunk: Vec<usize>,
+        elements: Vec<[u8; 8]>,
+    }
+
+    impl Read {
+        fn floats(&self) -> Vec<u64> {
+            self.elements.iter().map(|bytes| f64::from_le_bytes(*bytes).to_bits()).collect()
+        }
+
+        fn whole(&self) -> Vec<i64> {
+            self.elements.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect()
+        }
+    }
+
+    /// Reads an array by its metadata alone, element by element; bytes of short elements come first.
+    fn read(store: &Path, name: &str) -> Read {
+        let text = fs::read_to_string(store.join(name).join("zarr.json")).unwrap();
+        let metadata: Value = serde_json::from_str(&text).unwrap();
+        let extents = |list: &Value| -> Vec<usize> {
+            list.as_array().unwrap().iter().map(|extent| extent.as_u64().unwrap() as usize).collect()
+        };
+        let shape = extents(&metadata["shape"]);
+        let chunk = extents(&metadata["chunk_grid"]["configuration"]["chunk_shape"]);
+        let size = if metadata["data_type"] == "int8" { 1 } else { 8 };
+        let element = |mut number: usize| {
+            let (mut key, mut offset, mut stride) = (String::new(), 0, size);
+            for (extent, chunk) in shape.iter().zip(&chunk).rev() {
+                let i = number % extent;
+                number /= extent;
+                key = format!(".{}{key}", i / chunk);
+                offset += i % chunk * stride;
+                stride *= chunk;
+            }
+            let bytes = fs::read(store.join(name).join(format!("c{key}"))).unwrap();
+            assert_eq!(bytes.len(), stride, "{name}/c{key} is no whole chunk");
+            let mut element = [0; 8];
+            element[..size].copy_from_slice(&bytes[offset..offset + size]);
+            element
+        };
+        let elements = (0..shape.iter().product()).map(element).collect();
+        Read { shape, chunk, elements }
+    }
+
+    /// The store that members leave in chunks of at most `bytes`.
+    fn stored(home: &Path, spec: &Spec, members: &[(Status, Vec<Snapshot>)], bytes: usize) -> std::path::PathBuf {
+        let out = OutputFolder::open(home, true).unwrap();
+        let points = members.iter().flat_map(|(_, snapshots)| snapshots).map(|s| s.x.len()).max().unwrap();
+        let folder = out.store(folder::STORE).unwrap();
+        let mut store = SnapshotStore::of_chunks(folder, spec, points, spec.snapshots.clone(), bytes).unwrap();
+        members.iter().for_each(|(status, snapshots)| store.member(*status, snapshots).unwrap());
+        let run = out.write(folder::RUN, "{}").unwrap();
+        out.publish(Vec::new(), Some(store.ready().unwrap()), run).unwrap();
+        home.join(folder::STORE)
+    }
+
+    fn spec(curves: u64, snapshots: &[f64]) -> Spec {
+        Spec { curves, snapshots: snapshots.into(), store: Store::Zarr, ..Spec::default() }
+    }
+
+    /// Seven members with five nodes that all differ, of which the fourth ends before the last of three times.
+    fn members() -> Vec<(Status, Vec<Snapshot>)> {
+        let node = |member: u64, t: f64, field: f64| -> Vec<f64> {
+            (1..=5).map(|i| 1000.0 * field + 100.0 * member as f64 + 10.0 * t + f64::from(i)).collect()
+        };
+        let snapshot = |member: u64, t: f64| {
+            let [x, y, k, r] = [1.0, 2.0, 3.0, 4.0].map(|field| node(member, t, field));
+            Snapshot { member, t, x, y, k, r }
+        };
+        let member = |member| match member {
+            3 => (Status::Stalled, vec![snapshot(3, 0.0), snapshot(3, 1.0)]),
+            _ => (Status::Relaxed, [0.0, 1.0, 2.0].map(|t| snapshot(member, t)).into()),
+        };
+        (0..7).map(member).collect()
+    }
+
+    fn expected(members: &[(Status, Vec<Snapshot>)], of: fn(&Snapshot) -> &Vec<f64>) -> Vec<u64> {
+        let mut all = Vec::new();
+        for (_, snapshots) in members {
+            for t in [0.0, 1.0, 2.0] {
+                match snapshots.iter().find(|snapshot| snapshot.t == t) {
+                    Some(snapshot) => all.extend(of(snapshot).iter().map(|value| value.to_bits())),
+                    None => all.extend([f64::NAN.to_bits(); 5]),
+                }
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn every_element_is_where_the_metadata_say_however_the_arrays_are_cut() {
+        let (spec, members) = (spec(7, &[0.0, 1.0, 2.0]), members());
+        for (bytes, chunk) in [
+            (1 << 20, [7, 3, 5]),
+            (360, [3, 3, 5]), // three members in a chunk, one in the last
+            (120, [1, 3, 5]),
+            (80, [1, 2, 5]), // times are cut
+            (24, [1, 1, 3]), // nodes are
+            (8, [1, 1, 1]),
+        ] {
+            let home = tempfile::tempdir().unwrap();
+            let store = stored(home.path(), &spec, &members, bytes);
+            let x = read(&store, "x");
+            assert_eq!((&x.shape[..], &x.chunk[..]), (&[7, 3, 5][..], &chunk[..]));
+            assert_eq!(x.floats(), expected(&members, |snapshot| &snapshot.x), "chunks of {bytes} bytes");
+            assert_eq!(read(&store, "y").floats(), expected(&members, |snapshot| &snapshot.y));
+            assert_eq!(read(&store, "k").floats(), expected(&members, |snapshot| &snapshot.k));
+            assert_eq!(read(&store, "r").floats(), expected(&members, |snapshot| &snapshot.r));
+            assert_eq!(read(&store, "member").whole(), [0, 1, 2, 3, 4, 5, 6]);
+            assert_eq!(read(&store, "node").whole(), [1, 2, 3, 4, 5]);
+            assert_eq!(read(&store, "time").floats(), [0.0, 1.0, 2.0].map(f64::to_bits));
+            let codes = read(&store, "status").elements.iter().map(|element| element[0]).collect::<Vec<_>>();
+            assert_eq!(codes, [1, 1, 1, 5, 1, 1, 1]);
+            let chunks = fs::read_dir(store.join("x")).unwrap().count() - 1;
+            assert_eq!(chunks, 7_usize.div_ceil(chunk[0]) * 3_usize.div_ceil(chunk[1]) * 5_usize.div_ceil(chunk[2]));
+
+            // Members in another order are seen, and so is a chunk with another one's bytes.
+            let mut other = members.clone();
+            other.swap(1, 2);
+            assert_ne!(x.floats(), expected(&other, |snapshot| &snapshot.x));
+            if chunk[0] == 3 {
+                fs::copy(store.join("x/c.1.0.0"), store.join("x/c.0.0.0")).unwrap();
+                assert_ne!(read(&store, "x").floats(), x.floats());
+            }
+        }
+    }
+
+    #[test]
+    fn unknown_is_nan_and_padding_is_never_in_the_array() {
+        let home = tempfile::tempdir().unwrap();
+        let (spec, mut members) = (spec(7, &[0.0, 1.0, 2.0]), members());
+        members[6].1[2].k[4] = f64::INFINITY;
+        let store = stored(home.path(), &spec, &members, 360);
+        let unknown = |name| -> Vec<usize> {
+            let elements = read(&store, name).floats();
+            (0..elements.len()).filter(|i| elements[*i] == f64::NAN.to_bits()).collect()
+        };
+        let lost: Vec<usize> = (3 * 15 + 10..3 * 15 + 15).collect();
+        assert_eq!(unknown("x"), lost);
+        assert_eq!(unknown("k"), [lost, vec![6 * 15 + 14]].concat());
+        let last = fs::read(store.join("x/c.2.0.0")).unwrap();
+        assert!(last.chunks(8).skip(15).all(|element| element == f64::NAN.to_le_bytes()));
+    }
+
+    /// Keeps all that the members leave.
+    #[derive(Default)]
+    struct Recorder(Vec<Ended>);
+
+    impl Sink for Recorder {
+        fn member(&mut self, ended: &Ended) -> Result<()> {
+            self.0.push(ended.clone());
+            Ok(())
+        }
+        fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
+    }
+
+    #[test]
+    fn a_run_leaves_the_same_bits_as_in_its_table() {
+        let spec = Spec {
+            points: 33,
+            t_end: 0.3,
+            relax_to: Some(0.2),
+            stop_when_relaxed: true,
+            only: Some(vec![1, 2, 5, 7, 8]),
+            solver: Solver::Direct.into(),
+            ..spec(11, &[0.0, 0.0123, 0.1, 0.3])
+        };
+        let spec = spec.validate().unwrap();
+        let family = Family::new(&spec).unwrap();
+        let direct = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
+        let mut backend = CpuBackend::<f64>::new(Blocks::new(33).unwrap(), direct, 1).unwrap();
+        let mut recorder = Recorder::default();
+        let backend: &mut dyn Backend = &mut backend;
+        simulate(&[Cell::only(spec.clone(), family)], Precision::F64, backend, 0, &mut recorder).unwrap();
+        let members: Vec<_> = recorder.0.into_iter().map(|ended| (ended.outcome.status, ended.snapshots)).collect();
+
+        let home = tempfile::tempdir().unwrap();
+        let store = stored(home.path(), &spec, &members, 2 * 4 * 33 * 8);
+        let [member, node] = ["member", "node"].map(|name| read(&store, name).whole());
+        assert_eq!(member, [1, 2, 5, 7, 8]);
+        let time: Vec<f64> = read(&store, "time").floats().into_iter().map(f64::from_bits).collect();
+        let fields = ["x", "y", "k", "r"].map(|name| read(&store, name));
+        assert_eq!(fields[0].chunk, [2, 4, 33]);
+        let mut rows = Vec::new();
+        for number in 0..fields[0].elements.len() {
+            let values = fields.each_ref().map(|field| f64::from_le_bytes(field.elements[number]));
+            if !values[0].is_nan() {
+                let (member, t, i) = (member[number / 132], time[number / 33 % 4], node[number % 33]);
+                let [x, y, k, r] = values;
+                rows.push(format!("{member},{t:?},{i},{x:?},{y:?},{k:?},{r:?}"));
+            }
+        }
+
+        let out = OutputFolder::open(home.path(), true).unwrap();
+        let mut table = SnapshotTable::begin(out.file("snapshots.csv").unwrap()).unwrap();
+        members.iter().flat_map(|(_, snapshots)| snapshots).for_each(|own| table.snapshot(own).unwrap());
+        let text = fs::read_to_string(table.ready().unwrap().part()).unwrap();
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert!(rows.len() < 5 * 4 * 33 && rows.len() > 2 * 4 * 33, "{} rows: some, not all, end early", rows.len());
+        assert_eq!(rows, lines);
+    }
+
+    #[test]
+    fn the_metadata_hold_the_spec_and_repeat_that_of_each_array() {
+        let home = tempfile::tempdir().unwrap();
+        let spec = Spec { threads: Some(3), ..spec(7, &[0.0, 1.0, 2.0]) };
+        let store = stored(home.path(), &spec, &members(), 1 << 20);
+        let json = |name: &str| -> Value {
+            serde_json::from_str(&fs::read_to_string(store.join(name).join("zarr.json")).unwrap()).unwrap()
+        };
+        let group = json("");
+        let text = group["attributes"]["spec"].as_str().unwrap();
+        assert_eq!(Spec::from_toml(text).unwrap(), Spec { threads: None, ..spec });
+        assert_eq!(group["attributes"]["curvelax"], env!("CARGO_PKG_VERSION"));
+        let all = group["consolidated_metadata"]["metadata"].as_object().unwrap();
+        assert_eq!(all.len(), 9);
+        all.iter().for_each(|(name, metadata)| assert_eq!(json(name), *metadata, "{name}"));
+        assert_eq!(json("k")["attributes"]["units"], "1/length");
+        assert_eq!(json("time")["attributes"]["units"], "length^4");
+        let meanings = json("status")["attributes"]["flag_meanings"].as_str().unwrap().to_string();
+        let words: Vec<&str> = meanings.split(' ').collect();
+        let codes = json("status")["attributes"]["flag_values"].clone();
+        for (i, status) in Status::ALL.into_iter().enumerate() {
+            assert_eq!((words[i], &codes[i]), (status.name(), &json!(status as u32)));
+        }
+    }
+
+    #[test]
+    fn what_is_kept_of_a_failed_run_is_a_store_with_what_had_ended() {
+        let home = tempfile::tempdir().unwrap();
+        let (spec, members) = (spec(7, &[0.0, 1.0, 2.0]), members());
+        for (ended, kept) in [(2, false), (5, true)] {
+            let out = OutputFolder::open(home.path(), true).unwrap();
+            let times = spec.snapshots.clone();
+            let folder = out.store(folder::STORE).unwrap();
+            let mut store = SnapshotStore::of_chunks(folder, &spec, 5, times, 360).unwrap();
+            members[..ended].iter().for_each(|(status, snapshots)| store.member(*status, snapshots).unwrap());
+            drop((store, out));
+            let part = home.path().join(".snapshots.zarr.part");
+            assert_eq!(part.is_dir(), kept);
+            if kept {
+                assert_eq!(read(&part, "member").whole(), [0, 1, 2, 3, 4, 5, 6]);
+                assert!(part.join("x/c.0.0.0").is_file() && !part.join("x/c.1.0.0").exists());
+            }
+        }
+    }
+
+    #[test]
+    fn chunks_are_full_and_of_equal_size() {
+        for (shape, room, chunk) in [
+            (&[1_000_000, 1, 100][..], 524_288, &[5236, 1, 100][..]),
+            (&[256, 11, 100], 524_288, &[256, 11, 100]),
+            (&[10, 10_000, 100], 524_288, &[1, 5000, 100]),
+            (&[3, 2, 1_000_000], 524_288, &[1, 1, 500_000]),
+            (&[600_000], 524_288, &[300_000]),
+            (&[1], 524_288, &[1]),
+        ] {
+            assert_eq!(chunk_shape(shape, room), chunk, "{shape:?}");
+        }
+    }
+
+    #[test]
+    fn a_time_that_rounding_moved_finds_its_place() {
+        let times = [0.0, 0.5, 1.0];
+        for (t, place) in [(0.0, 0), (0.5, 1), (0.5 + 1e-12, 1), (0.5 - 1e-12, 1), (1.0, 2), (1.0 + 1e-12, 2)] {
+            assert_eq!(nearest(&times, t), place, "{t}");
+        }
+    }
+}
