@@ -21,9 +21,10 @@ pub const CONVERGENCE: &str = "convergence.csv";
 pub const ENSEMBLE: &str = "ensemble.csv";
 /// How the run was made.
 pub const RUN: &str = "run.json";
-/// The first members before and after.
+/// The first members before, on their way and after.
 pub const CURVES: &str = "plots/curves.svg";
-
+/// The nodes of the same members, from which pictures are drawn.
+pub const PORTRAITS: &str = "plots/portraits.json";
 /// Distribution of the relaxation times.
 pub const RELAXATION: &str = "plots/relaxation.svg";
 /// Kaplan-Meier curves.
@@ -38,12 +39,13 @@ pub const MESH: &str = "plots/mesh.svg";
 pub const REPORT: &str = "report.html";
 
 /// All files that a command may write, the one that vouches for the others first.
-const OWN: [&str; 13] = [
+const OWN: [&str; 14] = [
     RUN,
     SUMMARY,
     ENSEMBLE,
     SERIES,
     SNAPSHOTS,
+    PORTRAITS,
     CURVES,
     RELAXATION,
     SURVIVAL,
@@ -53,6 +55,9 @@ const OWN: [&str; 13] = [
     REPORT,
     CONVERGENCE,
 ];
+
+/// The files that are drawn from the others.
+pub const PICTURES: [&str; 7] = [REPORT, RELAXATION, SURVIVAL, EXCESS, DEPENDENCE, MESH, CURVES];
 
 /// The folder of the plots, the only one below that of the run.
 const PLOTS: &str = "plots";

@@ -12,8 +12,10 @@ pub mod gallery;
 pub mod overview;
 pub mod page;
 pub mod plot;
+pub mod portraits;
 pub mod progress;
 pub mod provenance;
+pub mod reader;
 pub mod study;
 pub mod style;
 pub mod svg;
@@ -29,14 +31,15 @@ use std::{
 
 pub use ensemble::EnsembleStatistics;
 pub use folder::OutputFolder;
-pub use gallery::Panel;
 
 use crate::{
     backend::Platform,
-    ensemble::{Ended, Outcome, Portrait, Sink, Spec},
-    error::Result,
+    ensemble::{Ended, Sink, Spec},
+    error::{Error, Result},
 };
+use portraits::Film;
 use progress::Progress;
+use provenance::Provenance;
 use study::Study;
 use tables::{SeriesTable, SnapshotTable, SummaryTable};
 use tally::Tally;
@@ -52,9 +55,8 @@ pub struct Report {
     snapshots: Option<SnapshotTable>,
     folder: OutputFolder,
     tally: Tally,
-    panels: Vec<Panel>,
-    /// The same members on their way.
-    watched: Vec<page::Trajectory>,
+    /// The first members.
+    films: Vec<Film>,
     /// Members of the whole study, and those of earlier simulations.
     total: u64,
     before: u64,
@@ -77,8 +79,7 @@ impl Report {
             },
             folder,
             tally: Tally::default(),
-            panels: Vec::new(),
-            watched: Vec::new(),
+            films: Vec::new(),
             progress: Progress::new(quiet),
             started: SystemTime::now(),
             clock: Instant::now(),
@@ -102,9 +103,11 @@ impl Report {
     }
 
     /// Puts every file under its final name, once all are on disk, and returns the overview for stdout.
+    ///
+    /// Where only the pictures cannot be written the tables are published all the same, with an error that says so.
     pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String]) -> Result<String> {
         // In reverse order they are dropped: the folder last, after its files.
-        let Report { folder, tally, panels, watched, progress, started, clock, summary, series, snapshots, .. } = self;
+        let Report { folder, tally, films, progress, started, clock, summary, series, snapshots, .. } = self;
         progress.finish();
         let wall = clock.elapsed();
         let statistics = &EnsembleStatistics::new(spec, &tally)?;
@@ -118,23 +121,29 @@ impl Report {
             files.push(snapshots.ready()?);
             names.push(folder::SNAPSHOTS);
         }
-        let gallery = (!panels.is_empty()).then(|| gallery::draw(&panels));
-        let study = Study { spec, platform, tally: &tally, statistics, warnings, started, wall };
-        let charts = study.charts();
-        let page = study.page(&charts, gallery.as_deref(), &watched)?;
-        for (name, text) in charts.iter().map(|chart| (chart.name, &chart.figure.svg)).chain([(folder::REPORT, &page)])
-        {
-            files.push(folder.write(name, text)?);
-        }
-        names.push(folder::REPORT);
-        if let Some(gallery) = gallery {
-            files.push(folder.write(folder::CURVES, &gallery)?);
-        }
-        names.push(PLOTS);
-        let provenance = provenance::Provenance::new(spec, platform, &tally, warnings, started, wall);
+        let provenance = &Provenance::new(spec, platform, &tally, warnings, started, wall);
         let run = folder.write(folder::RUN, &provenance.to_json()?)?;
-        names.push(folder::RUN);
-        folder.publish(files, run)?;
+        let study = Study { provenance, tally: &tally, statistics, films: &films };
+        let mut drawn = Vec::new();
+        let done = (|| {
+            drawn.push(folder.write(folder::PORTRAITS, &portraits::to_json(&films)?)?);
+            for (name, text) in study.pictures()? {
+                drawn.push(folder.write(name, &text)?);
+            }
+            Ok(())
+        })();
+        if done.is_err() {
+            // All but what pictures are drawn from.
+            drawn.truncate(1);
+        }
+        folder.publish(files.into_iter().chain(drawn).collect(), run)?;
+        done.map_err(|error: Error| {
+            let folder = folder.path().display();
+            Error::Failed(format!(
+                "{error}; the tables in {folder} are complete: make room, then curvelax plot {folder}"
+            ))
+        })?;
+        names.extend([folder::REPORT, PLOTS, folder::RUN]);
         let (tally, folder) = (&tally, folder.path());
         let overview = overview::Overview { spec, platform, tally, statistics, wall, folder, files: &names };
         Ok(overview.to_string())
@@ -154,11 +163,7 @@ impl Sink for Report {
         self.tally.add(outcome);
         self.tally.add_series(outcome.cell, series);
         self.tally.add_aside(mollified, *unresolved);
-        if let Some(Portrait { before, frames, after }) = portrait.clone() {
-            let Outcome { member, status, t_relax, .. } = *outcome;
-            self.watched.push(study::trajectory(outcome, &before, frames, &after));
-            self.panels.push(Panel { member, status, t_relax, before, after });
-        }
+        self.films.extend(portrait.as_ref().map(|portrait| Film::new(outcome, portrait)));
         Ok(())
     }
 
@@ -175,7 +180,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::ensemble::{Mollified, Observables, SeriesRow, Snapshot, Status};
+    use crate::ensemble::{Mollified, Observables, Portrait, SeriesRow, Snapshot, Status};
 
     fn files(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
@@ -215,7 +220,8 @@ mod tests {
         let overview = report(&out, &all, Some(portrait)).finish(&all, &platform, &[]).unwrap();
         let tables = ["ensemble.csv", "plots", "report.html", "run.json", "series.csv", "snapshots.csv", "summary.csv"];
         assert_eq!(files(&out), tables);
-        assert_eq!(files(&out.join("plots")), ["curves.svg", "mesh.svg", "relaxation.svg", "survival.svg"]);
+        let pictures = ["curves.svg", "mesh.svg", "portraits.json", "relaxation.svg", "survival.svg"];
+        assert_eq!(files(&out.join("plots")), pictures);
         for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");
         }
@@ -228,7 +234,7 @@ mod tests {
         let few = Spec::default();
         report(&out, &few, None).finish(&few, &platform, &["a warning".into()]).unwrap();
         assert_eq!(files(&out), ["ensemble.csv", "plots", "report.html", "run.json", "summary.csv"]);
-        assert_eq!(files(&out.join("plots")), ["mesh.svg", "relaxation.svg", "survival.svg"]);
+        assert_eq!(files(&out.join("plots")), ["mesh.svg", "portraits.json", "relaxation.svg", "survival.svg"]);
         assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
     }
 

@@ -1,26 +1,22 @@
 //! What people look at: the charts of a run and its page, from its statistics.
 
-use std::time::{Duration, SystemTime};
-
-use glam::DVec2;
-
 use super::{
     charts::{
         Decay, DecayCurve, Dependence, Estimate, Law, Level, MeshQuality, PowerLaw, RelaxationTimes, Series, Setting,
         Survival, SurvivalCurve, Theory,
     },
     ensemble::{CellStatistics, EnsembleStatistics, QUANTILES},
-    folder,
+    folder, gallery,
     overview::{describe, machine},
     page::{Figure, Headline, Page, Table, Trajectory},
+    portraits::Film,
     progress::duration,
-    provenance::rfc3339,
+    provenance::Provenance,
     tally::{CellTally, DISTRUSTED_DRIFT, Moments, Tally},
     text::{count, significant},
 };
 use crate::{
-    backend::Platform,
-    ensemble::{Outcome, Spec, Status},
+    ensemble::{Spec, Status},
     error::Result,
     flow::Flow,
 };
@@ -32,20 +28,14 @@ const DIGITS: usize = 4;
 
 /// A finished run.
 pub struct Study<'a> {
-    /// What was asked for.
-    pub spec: &'a Spec,
-    /// Where it was computed.
-    pub platform: &'a Platform,
+    /// What was asked for, where and when it was computed.
+    pub provenance: &'a Provenance,
     /// What came out.
     pub tally: &'a Tally,
     /// Statistics of the relaxation times.
     pub statistics: &'a EnsembleStatistics,
-    /// What the user should know, a sentence each.
-    pub warnings: &'a [String],
-    /// When it began.
-    pub started: SystemTime,
-    /// How long it took.
-    pub wall: Duration,
+    /// The first members.
+    pub films: &'a [Film],
 }
 
 /// A picture with its place in the folder of the run.
@@ -57,15 +47,27 @@ pub struct Chart {
 }
 
 /// A member on its way, for the page.
-pub fn trajectory(outcome: &Outcome, before: &[DVec2], frames: Vec<(f64, Vec<DVec2>)>, after: &[DVec2]) -> Trajectory {
-    let frames = frames.into_iter().filter(|(t, _)| *t > 0.0 && *t < outcome.t_end);
-    let start = (0.0, before.to_vec());
-    let (times, nodes) = [start].into_iter().chain(frames).chain([(outcome.t_end, after.to_vec())]).unzip();
-    let at = outcome.t_relax.map_or(String::new(), |t| format!(" at t = {}", significant(t, 3)));
-    Trajectory { label: format!("member {}: {}{at}", outcome.member, outcome.status.name()), times, nodes }
+fn trajectory(film: &Film) -> Trajectory {
+    let at = film.t_relax.map_or(String::new(), |t| format!(" at t = {}", significant(t, 3)));
+    let label = format!("member {}: {}{at}", film.member, film.status.name());
+    Trajectory { label, times: film.times.clone(), nodes: film.frames() }
 }
 
 impl Study<'_> {
+    /// The files that are drawn: name and text.
+    pub fn pictures(&self) -> Result<Vec<(&'static str, String)>> {
+        let charts = self.charts();
+        let gallery = (!self.films.is_empty()).then(|| gallery::draw(self.films));
+        let page = self.page(&charts, gallery.as_deref())?;
+        let charts = charts.into_iter().map(|chart| (chart.name, chart.figure.svg));
+        let gallery = gallery.map(|svg| (folder::CURVES, svg));
+        Ok(charts.chain(gallery).chain([(folder::REPORT, page)]).collect())
+    }
+
+    fn spec(&self) -> &Spec {
+        &self.provenance.spec
+    }
+
     /// The charts that this run has, in the order in which they are read.
     pub fn charts(&self) -> Vec<Chart> {
         let mut charts = vec![self.relaxation(), self.survival()];
@@ -136,7 +138,7 @@ impl Study<'_> {
         if curves.iter().all(|curve| curve.t.len() < 2) {
             return None;
         }
-        let theory = match (&self.tally.cells[..], &curves[..], &self.spec.flow) {
+        let theory = match (&self.tally.cells[..], &curves[..], &self.spec().flow) {
             ([cell], [curve], Flow::SurfaceDiffusion) => theory(cell, curve),
             _ => None,
         };
@@ -152,7 +154,7 @@ impl Study<'_> {
 
     /// t_relax against the key that changes fastest, a series for each combination of the others.
     fn dependence(&self) -> Option<Chart> {
-        let (axis, others) = self.spec.sweep.axes().split_last()?;
+        let (axis, others) = self.spec().sweep.axes().split_last()?;
         let numbers = axis.numbers();
         let cells = &self.statistics.cells;
         let series = cells.chunks(axis.values.len().max(1)).map(|cells| {
@@ -206,19 +208,20 @@ impl Study<'_> {
     }
 
     /// The text of `report.html`; `gallery` is the picture of the first members.
-    pub fn page(&self, charts: &[Chart], gallery: Option<&str>, members: &[Trajectory]) -> Result<String> {
-        let spec = self.spec.to_toml()?;
+    fn page(&self, charts: &[Chart], gallery: Option<&str>) -> Result<String> {
+        let spec = self.spec().to_toml()?;
         let first = gallery.map(|svg| {
-            let title = "The first members before and after";
-            chart(folder::CURVES, title, "Grey: the start. Colour: the last state, by status.", svg.into()).figure
+            let title = "The first members before, on their way and after";
+            let caption = "Grey: the start. Light: on the way. Colour: the last state, by status.";
+            chart(folder::CURVES, title, caption, svg.into()).figure
         });
         let page = Page {
             title: "curvelax run",
             what: &format!("{}, {}.", count(self.tally.members(), "member"), self.what()),
             statuses: self.tally.counts().map(|(status, count)| (status.name(), count)).collect(),
             headline: self.headline(),
-            warnings: self.warnings,
-            members: members.to_vec(),
+            warnings: &self.provenance.warnings,
+            members: self.films.iter().map(trajectory).collect(),
             plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
             tables: vec![self.table()],
             spec: &spec,
@@ -228,22 +231,22 @@ impl Study<'_> {
     }
 
     fn what(&self) -> String {
-        let swept = self.spec.sweep.axes().iter().map(|axis| format!("{} = {}", axis.key, axis.labels().join(", ")));
-        [describe(self.spec)].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
+        let swept = self.spec().sweep.axes().iter().map(|axis| format!("{} = {}", axis.key, axis.labels().join(", ")));
+        [describe(self.spec())].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
     }
 
     /// The values of the only swept key, cell by cell, if they are numbers.
     fn numbers(&self) -> Option<Vec<f64>> {
-        if let [axis] = self.spec.sweep.axes() { axis.numbers() } else { None }
+        if let [axis] = self.spec().sweep.axes() { axis.numbers() } else { None }
     }
 
     /// What a cell is called in a legend.
     fn label(&self, cell: u64) -> String {
-        if self.spec.sweep.is_empty() { "all members".into() } else { self.spec.sweep.name(cell) }
+        if self.spec().sweep.is_empty() { "all members".into() } else { self.spec().sweep.name(cell) }
     }
 
     fn keys(&self) -> String {
-        self.spec.sweep.axes().iter().map(|axis| axis.key.as_str()).collect::<Vec<_>>().join(", ")
+        self.spec().sweep.axes().iter().map(|axis| axis.key.as_str()).collect::<Vec<_>>().join(", ")
     }
 
     fn headline(&self) -> Vec<Headline> {
@@ -297,7 +300,7 @@ impl Study<'_> {
     }
 
     fn table(&self) -> Table {
-        let keys = self.spec.sweep.axes().iter().map(|axis| axis.key.clone());
+        let keys = self.spec().sweep.axes().iter().map(|axis| axis.key.clone());
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
         let numbers = ["mean", "standard error"].into_iter().chain(QUANTILES.map(|(_, name)| name));
         let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
@@ -329,13 +332,13 @@ impl Study<'_> {
             _ => format!("{steps} steps, {sweeps_k} sweeps for k and {sweeps_x} for x, y"),
         };
         [
-            ("curvelax", env!("CARGO_PKG_VERSION").to_string()),
-            ("started", rfc3339(self.started)),
-            ("wall time", duration(self.wall.as_secs_f64())),
-            ("ran on", machine(self.platform)),
-            ("driver", self.platform.driver.clone().unwrap_or_default()),
+            ("curvelax", self.provenance.curvelax.clone()),
+            ("started", self.provenance.started.clone()),
+            ("wall time", duration(self.provenance.wall_seconds)),
+            ("ran on", machine(&self.provenance.platform)),
+            ("driver", self.provenance.platform.driver.clone().unwrap_or_default()),
             ("work", work),
-            ("seed", self.spec.seed.to_string()),
+            ("seed", self.spec().seed.to_string()),
         ]
         .into_iter()
         .filter(|(_, value)| !value.is_empty())

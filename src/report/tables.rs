@@ -14,10 +14,12 @@ use crate::{
     truth::Row,
 };
 
-const SUMMARY: &str = "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,\
+/// Columns of `summary.csv`.
+pub const SUMMARY: &str = "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,\
     length_start,length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
     mesh_ratio,metric_drift,self_crossing";
-const SERIES: &str = "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift";
+/// Columns of `series.csv`.
+pub const SERIES: &str = "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift";
 const SNAPSHOTS: &str = "member,t,i,x,y,k,r";
 const CONVERGENCE: &str = "problem,varied,n,tau,tolerance,error,order";
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     ensemble::{Mollified, Outcome, SeriesRow, Status, mollifier::MAX_VERTEX_TURN},
@@ -24,8 +24,10 @@ pub struct Tally {
     pub mollified: MollifiedMembers,
     /// Members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
     drifted: (u64, f64),
-    /// Members whose relaxation cannot be told in this precision.
-    unresolved: u64,
+    /// Members whose relaxation cannot be told: their threshold lies in the rounding of the precision.
+    pub below_rounding: u64,
+    /// Rows of the series of all members.
+    pub series_rows: u64,
 }
 
 /// What the members of one cell came to.
@@ -73,7 +75,7 @@ impl Moments {
 pub const DISTRUSTED_DRIFT: f64 = 0.1;
 
 /// What rounding off corners did to the members (`ensemble/mollifier.rs`).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MollifiedMembers {
     /// How many were not left alone.
     pub members: u64,
@@ -150,6 +152,7 @@ impl Tally {
 
     /// Adds the series of the member that was added last.
     pub fn add_series(&mut self, cell: u64, series: &[SeriesRow]) {
+        self.series_rows += series.len() as u64;
         let Some(CellTally { excess, .. }) = self.cells.get_mut(cell as usize) else { return };
         for SeriesRow { t, at, .. } in series.iter().filter(|row| row.at.excess.is_finite()) {
             excess.entry(t.to_bits()).or_default().add(at.excess);
@@ -159,7 +162,7 @@ impl Tally {
     /// Adds what is not in the summary's row.
     pub fn add_aside(&mut self, mollified: &Mollified, unresolved: bool) {
         self.mollified.add(mollified);
-        self.unresolved += u64::from(unresolved);
+        self.below_rounding += u64::from(unresolved);
     }
 
     /// What the user should know about the results, a sentence each.
@@ -173,11 +176,11 @@ impl Tally {
                  smaller --tau or --adaptive, or more --points, helps"
             ));
         }
-        if self.unresolved > 0 {
+        if self.below_rounding > 0 {
             warnings.push(format!(
                 "{} of {members} members are so nearly round that their threshold lies in the rounding of the \
                  precision: they have no t_relax; take --precision f64 or a larger --relax-to",
-                self.unresolved
+                self.below_rounding
             ));
         }
         let (drifted, worst) = self.drifted;

@@ -5,7 +5,7 @@
 //! every script but the one below the slider, and equal pages have equal bytes. However large the run, a page holds a few
 //! members, the pictures and the first rows of each table.
 
-mod digest;
+pub(super) mod digest;
 mod player;
 mod scope;
 
