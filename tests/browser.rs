@@ -2,8 +2,7 @@
 //!
 //! Chromium or Chrome: the program that `CURVELAX_BROWSER` names, or the first in the path. It has no network here.
 
-#[path = "common/program.rs"]
-mod program;
+mod common;
 
 use std::{
     env,
@@ -13,8 +12,8 @@ use std::{
     process::{Command, ExitCode},
 };
 
+use common::program::{Done, run};
 use libtest_mimic::{Arguments, Trial};
-use program::{Done, run};
 
 const NAMES: [&str; 5] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
 
@@ -51,7 +50,9 @@ fn main() -> ExitCode {
 fn browser() -> Option<PathBuf> {
     let named = env::var_os("CURVELAX_BROWSER").map(PathBuf::from);
     let folders: Vec<PathBuf> = env::split_paths(&env::var_os("PATH").unwrap_or_default()).collect();
-    named.or_else(|| NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|p| p.is_file()))
+    named.or_else(|| {
+        NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|p| p.is_file())
+    })
 }
 
 /// A page after its script has run.
@@ -167,7 +168,9 @@ fn a_broken_page_is_found_out(browser: &Path) {
 fn a_request_is_found_out(browser: &Path) {
     let done = run(RUN);
     let text = fs::read_to_string(page(&done)).unwrap();
-    for request in ["<img src=\"https://example.org/a.png\">", "<link rel=\"stylesheet\" href=\"https://example.org/a.css\">"] {
+    for request in
+        ["<img src=\"https://example.org/a.png\">", "<link rel=\"stylesheet\" href=\"https://example.org/a.css\">"]
+    {
         let path = done.path().join("spoiled.html");
         fs::write(&path, text.replacen("</h1>", &format!("</h1>{request}"), 1)).unwrap();
         assert!(!Shown::new(browser, &path, "").console.is_empty(), "{request}");

@@ -46,7 +46,7 @@ fn pictures(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn pictures_come_back_byte_for_byte() {
     for (arguments, count) in [
         ("--curves 7 --points 40 --adaptive=1e-3 --t-end 1", 5),
-        ("--curves 1 --points 31 --t-end 0.01", 5),
+        ("--curves 1 --points 32 --t-end 0.01", 5),
         (RUN, 7),
         ("--curves 5 --points 32 --tau 1e-3 --t-end 0.3 --series 0.013", 6),
         ("--curves 9 --points 32 --adaptive=1e-3 --t-end 0.3 --series 0.1 --only 2,5,7 --snapshots 0,0.1", 6),
@@ -56,7 +56,7 @@ fn pictures_come_back_byte_for_byte() {
         ),
         // Members that cross themselves and members that end badly.
         ("--curves 6 --points 64 --shape lemniscate:1 --sampling parameter --adaptive=1e-3 --t-end 0.1", 5),
-        ("--curves 6 --points 24 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct", 5),
+        ("--curves 6 --points 32 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct", 5),
         ("--curves 3 --points 700 --adaptive=1e-2 --t-end 0.05 --shape nonconvex", 5),
     ] {
         let done = run(arguments);
@@ -83,7 +83,7 @@ fn runs_with_bad_members_are_among_those_that_were_drawn_again() {
     let statuses = |arguments| run(arguments).text("run.json");
     let crossed = run("--curves 6 --points 64 --shape lemniscate:1 --sampling parameter --adaptive=1e-3 --t-end 0.1");
     assert!(crossed.summary().iter().any(|row| !row["self_crossing"].is_empty()));
-    let bad = statuses("--curves 6 --points 24 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct");
+    let bad = statuses("--curves 6 --points 32 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct");
     assert!(bad.contains("ended badly") || bad.contains("metric drift"), "{bad}");
 }
 

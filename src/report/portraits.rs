@@ -52,7 +52,9 @@ impl Film {
         let Portrait { before, frames, after } = portrait;
         let inside = frames.iter().filter(|(t, _)| *t > 0.0 && *t < outcome.t_end);
         let inside = inside.map(|(t, nodes)| (*t, nodes));
-        let all = [(0.0, before)].into_iter().chain(inside).chain([(outcome.t_end, after)]);
+        // A member that ended at once has one time only.
+        let end = (outcome.t_end > 0.0).then_some((outcome.t_end, after));
+        let all = [(0.0, before)].into_iter().chain(inside).chain(end);
         let held = |nodes: &[DVec2]| nodes.iter().all(|p| p.to_array().iter().all(|v| Scale::Linear.holds(*v)));
         let shown: Vec<(f64, &Vec<DVec2>)> = all.filter(|(_, nodes)| held(nodes)).collect();
 
@@ -89,7 +91,7 @@ impl Film {
         let place = self.corner.iter().all(|v| Scale::Linear.holds(*v));
         match () {
             _ if self.times.len() != self.nodes.len() => Some("as many times as states"),
-            _ if !self.times.is_sorted_by(|a, b| a <= b) => Some("ascending times"),
+            _ if !self.times.is_sorted_by(|a, b| a < b) => Some("ascending times"),
             _ if !self.nodes.iter().all(known) => Some("digits of base64"),
             _ if !self.nodes.iter().all(equal) => Some("equally many nodes at all times"),
             _ if !place || !Scale::Log.holds(self.unit) => Some("a corner and a positive unit"),
@@ -208,10 +210,19 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_member_that_ended_at_once_has_one_time() {
+        let triangle = vec![DVec2::ZERO, DVec2::X, DVec2::Y];
+        let portrait = Portrait { before: triangle.clone(), frames: vec![], after: triangle };
+        let at_once = Outcome { t_end: 0.0, ..outcome(0, Status::Relaxed, Some(0.0)) };
+        assert_eq!(Film::new(&at_once, &portrait).times, [0.0]);
+    }
+
+    #[test]
     fn many_nodes_and_none_are_kept_small() {
         assert!(film(0, 5000, Status::Relaxed, Some(0.1)).frames()[0].len() <= MOST_NODES);
         let empty = Portrait { before: vec![DVec2::INFINITY; 9], frames: vec![], after: vec![DVec2::NAN; 9] };
         let film = Film::new(&outcome(0, Status::Nonfinite, None), &empty);
+
         assert!(film.frames().is_empty() && !to_json(&[film]).unwrap().contains("null,null"));
     }
 }

@@ -120,9 +120,6 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
         }
         tally.add_series(outcome.cell, &rows);
     }
-    if let Some(row) = series.next() {
-        return Err(foreign(folder, row?.member));
-    }
     let expected = |name: &str, what: &str, expected: u64, found: u64| match expected == found {
         true => Ok(()),
         false => Err(Error::Request(format!(
@@ -137,6 +134,9 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
         expected(folder::SUMMARY, &format!("{status} members"), told, count)?;
     }
     expected(folder::SUMMARY, "steps", provenance.steps, tally.steps)?;
+    if let Some(row) = series.next() {
+        return Err(foreign(folder, row?.member));
+    }
     expected(folder::SERIES, "rows", provenance.series_rows, tally.series_rows)?;
     Ok(tally)
 }

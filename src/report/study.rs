@@ -8,7 +8,7 @@ use super::{
     ensemble::{CellStatistics, EnsembleStatistics, QUANTILES},
     folder, gallery,
     overview::{describe, machine},
-    page::{Figure, Headline, Page, Table, Trajectory},
+    page::{Figure, Headline, MOST_MEMBERS, Page, Table, Trajectory},
     portraits::Film,
     progress::duration,
     provenance::Provenance,
@@ -44,13 +44,6 @@ pub struct Chart {
     pub name: &'static str,
     /// The picture, with its words.
     pub figure: Figure,
-}
-
-/// A member on its way, for the page.
-fn trajectory(film: &Film) -> Trajectory {
-    let at = film.t_relax.map_or(String::new(), |t| format!(" at t = {}", significant(t, 3)));
-    let label = format!("member {}: {}{at}", film.member, film.status.name());
-    Trajectory { label, times: film.times.clone(), nodes: film.frames() }
 }
 
 impl Study<'_> {
@@ -221,13 +214,29 @@ impl Study<'_> {
             statuses: self.tally.counts().map(|(status, count)| (status.name(), count)).collect(),
             headline: self.headline(),
             warnings: &self.provenance.warnings,
-            members: self.films.iter().map(trajectory).collect(),
+            members: self.trajectories(),
             plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
             tables: vec![self.table()],
             spec: &spec,
             provenance: self.provenance(),
         };
         Ok(page.html())
+    }
+
+    /// The members to watch: the first ones, or some of all cells.
+    fn trajectories(&self) -> Vec<Trajectory> {
+        let sweep = &self.spec().sweep;
+        let trajectory = |film: &Film| {
+            let at = film.t_relax.map_or(String::new(), |t| format!(" at t = {}", significant(t, 3)));
+            let cell = match sweep.is_empty() {
+                true => String::new(),
+                false => format!(" ({})", sweep.name(film.member / self.spec().curves)),
+            };
+            let label = format!("member {}{cell}: {}{at}", film.member, film.status.name());
+            Trajectory { label, status: film.status.name(), times: film.times.clone(), nodes: film.frames() }
+        };
+        let stride = if sweep.is_empty() { 1 } else { self.films.len().div_ceil(MOST_MEMBERS) };
+        self.films.iter().step_by(stride.max(1)).map(trajectory).collect()
     }
 
     fn what(&self) -> String {
@@ -373,4 +382,115 @@ fn median(cell: &CellStatistics) -> Option<Estimate> {
 /// The number among `values` of a key whose values are numbers.
 fn value_of(axis: &crate::ensemble::sweep::Axis, values: &[String]) -> Option<f64> {
     axis.numbers().and_then(|_| values.first()?.parse().ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, UNIX_EPOCH};
+
+    use glam::DVec2;
+
+    use super::*;
+    use crate::{
+        ensemble::{Outcome, SeriesRow},
+        report::{
+            portraits::tests::film,
+            provenance::tests::platform,
+            svg::dots,
+            tally::{Tally, tests::outcome},
+        },
+    };
+
+    /// Names and texts of the pictures of a run of `spec` that came to `tally`.
+    fn pictures(spec: &Spec, tally: &Tally, films: &[Film]) -> Vec<(&'static str, String)> {
+        let provenance = &Provenance::new(spec, &platform(), tally, &[], UNIX_EPOCH, Duration::from_secs(1));
+        let statistics = &EnsembleStatistics::new(spec, tally).unwrap();
+        Study { provenance, tally, statistics, films }.pictures().unwrap()
+    }
+
+    /// 10⁵ members, no two alike, a third of them censored at times of their own.
+    fn many(cells: u64) -> Tally {
+        let mut tally = Tally::default();
+        for member in 0..100_000_u64 {
+            let share = member as f64 / 1e5;
+            let t = 0.3 + share.powi(3) + 0.1 * (share * 1e4).sin();
+            let relaxed = member % 3 > 0;
+            let status = if relaxed { Status::Relaxed } else { Status::Singular };
+            let mut outcome =
+                Outcome { cell: member % cells, t_end: t, ..outcome(member, status, relaxed.then_some(t)) };
+            (outcome.end.mesh_ratio, outcome.end.metric_drift) = (1.0 + share, 1e-3 + share * share);
+            outcome.start.area = 1.0;
+            tally.add(&outcome);
+            let row = |i: u32| {
+                let at = crate::ensemble::Observables { excess: (-24.0 * t * f64::from(i)).exp(), ..outcome.start };
+                SeriesRow { member, t: 0.01 * f64::from(i), at }
+            };
+            if member < 100 {
+                tally.add_series(outcome.cell, &(0..2000).map(row).collect::<Vec<_>>());
+            }
+        }
+        tally
+    }
+
+    #[test]
+    fn pictures_of_1e5_members_are_small() {
+        let films: Vec<Film> = (0..12).map(|member| film(member, 100, Status::Relaxed, Some(0.4))).collect();
+        let marks: Vec<DVec2> = (0..100_000).map(|i| DVec2::new(0.006 * f64::from(i), 1.0)).collect();
+        for cells in [1, 8, 500] {
+            let mut spec = Spec { curves: 100_000 / cells, ..Spec::default() };
+            if cells > 1 {
+                let values = (1..=cells).map(|value| value.to_string()).collect::<Vec<_>>().join(",");
+                spec.sweep.set(format!("omega={values}").parse().unwrap());
+            }
+            let drawn = pictures(&spec, &many(cells), &films);
+            for (name, text) in &drawn {
+                let most = if *name == folder::REPORT { 800_000 } else { 120_000 };
+                assert!(text.len() < most, "{name} of {cells} cells: {} bytes", text.len());
+            }
+            assert!(drawn.len() >= 5);
+        }
+        assert!(dots(&marks).len() > 800_000, "marks one by one would be seen");
+    }
+
+    /// Words of the text that are no numbers where numbers should be.
+    fn none_of(text: &str) -> Vec<&str> {
+        let words = text.split(|c: char| !c.is_alphanumeric());
+        // Letters of a path may stand before it.
+        let is_none = |word: &&str| word.contains("NaN") || ["inf", "Infinity"].contains(word);
+        words.filter(is_none).collect()
+    }
+
+    #[test]
+    fn few_members_and_none_are_drawn_without_a_number_that_is_none() {
+        let none = Tally::default();
+        let of = |members: &[Outcome]| {
+            let mut tally = Tally::default();
+            members.iter().for_each(|member| tally.add(member));
+            tally
+        };
+        let relaxed = outcome(0, Status::Relaxed, Some(0.0));
+        let censored = Outcome { t_end: 0.0, ..outcome(1, Status::Singular, None) };
+        let mut unknown = outcome(2, Status::Nonfinite, None);
+        (unknown.end.mesh_ratio, unknown.end.metric_drift, unknown.start.area) = (f64::INFINITY, f64::NAN, f64::NAN);
+        for (tally, sentence) in [
+            (none, "There are no members."),
+            (of(std::slice::from_ref(&relaxed)), "Nothing: every member relaxed"),
+            (of(std::slice::from_ref(&censored)), "<strong>0</strong> of 1 member relaxed"),
+            (of(&vec![censored.clone(); 9]), "No member relaxed, so there are no relaxation times"),
+            (of(&[relaxed, censored, unknown]), "<strong>1</strong> of 3 members relaxed"),
+        ] {
+            for sweep in ["", "omega=1,2", "shape=circle:1;astroid"] {
+                let mut spec = Spec::default();
+                if !sweep.is_empty() {
+                    spec.sweep.set(sweep.parse().unwrap());
+                }
+                for (name, text) in pictures(&spec, &tally, &[]) {
+                    let bad = none_of(&text);
+                    assert!(bad.is_empty(), "{name}: {bad:?}");
+                    assert!(name != folder::REPORT || text.contains(sentence), "no {sentence:?}");
+                }
+            }
+        }
+        assert_eq!(none_of("d=\"MNaN 3\" inf -inf;information NaN"), ["MNaN", "inf", "inf", "NaN"]);
+    }
 }

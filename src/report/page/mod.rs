@@ -11,7 +11,7 @@ mod scope;
 
 use std::fmt::Write;
 
-pub use player::Trajectory;
+pub use player::{MOST_MEMBERS, Trajectory};
 
 use super::{
     svg::escape,
