@@ -88,6 +88,14 @@ fn runs_with_bad_members_are_among_those_that_were_drawn_again() {
 }
 
 #[test]
+fn the_picture_in_the_readme_is_that_of_its_run() {
+    let kept = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/images/ellipses.svg")).unwrap();
+    let drawn = run("--curves 12").text("plots/curves.svg");
+    assert!(drawn == kept, "docs/images/ellipses.svg is old: copy plots/curves.svg of curvelax run --curves 12");
+    assert!(drawn != run("--curves 12 --seed 2").text("plots/curves.svg"));
+}
+
+#[test]
 fn pictures_can_be_drawn_elsewhere() {
     let done = run(RUN);
     let before = files(&done.path());
