@@ -36,6 +36,37 @@ fn a_full_disk_leaves_the_rows_that_it_took_and_says_where() {
 }
 
 #[test]
+fn a_disk_that_is_full_for_the_pictures_leaves_the_tables_and_they_can_be_drawn_later() {
+    // In blocks: too few for the portraits, and too few for the page.
+    for (limit, missing) in [("4", "plots/portraits.json"), ("60", "report.html")] {
+        let home = TempDir::new().unwrap();
+        let out = home.path().join("out");
+        let before = curvelax(home.path(), "unlimited", "--curves 3 --seed 2 --out out");
+        assert_eq!(before.status.code(), Some(0));
+        let output = curvelax(home.path(), limit, "--curves 2 --out out --force");
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.starts_with(&format!("error: cannot write out/{missing}: ")), "{message}");
+        assert!(
+            message.ends_with("; the tables in out are complete: make room, then curvelax plot out\n"),
+            "{message}"
+        );
+        assert_eq!(fs::read_to_string(out.join("summary.csv")).unwrap().lines().count(), 3);
+        // Of the run, and not of the one before.
+        assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("\"members\": 2"));
+        assert!(!out.join("report.html").exists() && !out.join("plots/curves.svg").exists());
+        assert!(
+            fs::read_dir(&out).unwrap().all(|entry| !entry.unwrap().file_name().to_string_lossy().contains("part"))
+        );
+
+        let program = assert_cmd::cargo::cargo_bin("curvelax");
+        let drawn = Command::new(program).args(["plot", "out", "--quiet"]).current_dir(home.path()).status().unwrap();
+        assert!(drawn.success() && out.join("report.html").exists());
+        assert_eq!(out.join("plots/curves.svg").exists(), missing == "report.html");
+    }
+}
+
+#[test]
 fn nothing_is_said_to_be_kept_that_is_not() {
     let home = TempDir::new().unwrap();
     let output = curvelax(home.path(), "0", "--curves 400 --out new/out");

@@ -27,10 +27,41 @@ fn a_run_leaves_a_page_with_what_a_reader_asks_first() {
     let elsewhere = page.replace("http://www.w3.org/2000/svg", "");
     assert!(!page.contains("NaN") && !elsewhere.contains("://"), "the page asks for more");
     assert!(page.len() < 1_000_000, "{} bytes", page.len());
-    for name in plots(&done) {
+    for name in plots(&done).into_iter().filter(|name| name.ends_with("svg")) {
         let svg = done.text(&format!("plots/{name}"));
         assert!(svg.starts_with("<svg") && !svg.contains("NaN") && !svg.contains("inf\""), "{name}");
     }
+}
+
+/// Words that stand where a number should be.
+fn none_of(text: &str) -> Vec<&str> {
+    let words = text.split(|c: char| !c.is_alphanumeric());
+    words.filter(|word| word.contains("NaN") || ["inf", "Infinity"].contains(word)).collect()
+}
+
+#[test]
+fn runs_of_one_member_of_none_in_a_cell_and_of_none_that_relaxed_leave_no_number_that_is_none() {
+    let none_relaxed = "had not relaxed when time was up";
+    for (arguments, said) in [
+        ("--curves 1 --points 40 --adaptive=1e-3", "The only member relaxed."),
+        ("--curves 1 --points 40 --adaptive=1e-3 --t-end 0.01 --series 0.01", none_relaxed),
+        ("--curves 5 --points 40 --adaptive=1e-3 --t-end 0.01 --series 0.002", none_relaxed),
+        ("--curves 2 --points 40 --adaptive=1e-3 --t-end 0.1 --sweep omega=1,2 --only 1 --series 0.01", none_relaxed),
+        ("--curves 2 --points 40 --shape circle:1 --amplitude 0 --stop-when-relaxed", "All 2 members relaxed."),
+        ("--curves 4 --points 32 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct --series 0.1", "ended badly"),
+    ] {
+        let done = run(arguments);
+        assert!(done.text("report.html").contains(said), "{arguments}: no {said:?}");
+        let names = plots(&done).into_iter().map(|name| format!("plots/{name}"));
+        for name in names.chain(["report.html", "summary.csv", "ensemble.csv", "run.json"].map(String::from)) {
+            // Two words of base64 may spell anything.
+            let text = done.text(&name);
+            let text = text.split("id=\"trajectories\"").next().unwrap();
+            let bad = if name.ends_with("portraits.json") { vec![] } else { none_of(text) };
+            assert!(bad.is_empty(), "{arguments}: {name}: {bad:?}");
+        }
+    }
+    assert_eq!(none_of("<path d=\"MNaN 3\"/>-inf, information"), ["MNaN", "inf"]);
 }
 
 #[test]

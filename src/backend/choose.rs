@@ -1,6 +1,6 @@
 //! Which back end a spec gets, and why: all that can be refused is refused here, before any work.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     Backend,
@@ -21,7 +21,7 @@ use crate::{
 pub const MAX_POINTS_F32: usize = 320;
 
 /// Where a run is computed.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Platform {
     /// `gpu` or `cpu`.
     pub backend: String,

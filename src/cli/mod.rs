@@ -9,6 +9,7 @@ mod check;
 mod convergence;
 mod figure;
 mod flags;
+mod plot;
 mod run;
 
 use std::{
@@ -40,6 +41,7 @@ enum Command {
     Bench(bench::BenchArgs),
     Convergence(convergence::ConvergenceArgs),
     Figure(figure::FigureArgs),
+    Plot(plot::PlotArgs),
     Adapters(adapters::AdaptersArgs),
 }
 
@@ -52,6 +54,7 @@ pub fn main() -> ExitCode {
         Command::Bench(args) => bench::bench(args),
         Command::Convergence(args) => convergence::convergence(args),
         Command::Figure(args) => figure::figure(args),
+        Command::Plot(args) => plot::plot(args),
         Command::Adapters(args) => adapters::adapters(args),
     };
     match done {

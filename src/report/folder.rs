@@ -28,9 +28,10 @@ pub const CONVERGENCE: &str = "convergence.csv";
 pub const ENSEMBLE: &str = "ensemble.csv";
 /// How the run was made.
 pub const RUN: &str = "run.json";
-/// The first members before and after.
+/// The first members before, on their way and after.
 pub const CURVES: &str = "plots/curves.svg";
-
+/// The nodes of the same members, from which pictures are drawn.
+pub const PORTRAITS: &str = "plots/portraits.json";
 /// Distribution of the relaxation times.
 pub const RELAXATION: &str = "plots/relaxation.svg";
 /// Fitted rates of decay.
@@ -47,7 +48,7 @@ pub const MESH: &str = "plots/mesh.svg";
 pub const REPORT: &str = "report.html";
 
 /// All that a command may write, the file that vouches for the others first.
-const OWN: [&str; 17] = [
+const OWN: [&str; 18] = [
     RUN,
     SUMMARY,
     ENSEMBLE,
@@ -56,6 +57,7 @@ const OWN: [&str; 17] = [
     SERIES,
     SNAPSHOTS,
     STORE,
+    PORTRAITS,
     CURVES,
     RELAXATION,
     RATE,
@@ -66,6 +68,9 @@ const OWN: [&str; 17] = [
     REPORT,
     CONVERGENCE,
 ];
+
+/// The files that are drawn from the others.
+pub const PICTURES: [&str; 8] = [REPORT, RELAXATION, SURVIVAL, EXCESS, RATE, DEPENDENCE, MESH, CURVES];
 
 /// The folder of the plots.
 const PLOTS: &str = "plots";

@@ -1,9 +1,11 @@
-//! `plots/curves.svg`: the first members before and after, all to one scale.
+//! `plots/curves.svg`: the first members before, on their way and after, all to one scale.
 
 use glam::DVec2;
 
-use super::svg::{Svg, closed_path, coordinate, dots};
-use crate::ensemble::Status;
+use super::{
+    portraits::Film,
+    svg::{Svg, closed_path, coordinate, dots},
+};
 
 /// More members than this are not drawn.
 pub const MOST_PANELS: usize = 12;
@@ -20,8 +22,11 @@ const HEAD: f64 = 48.0;
 const FOOT: f64 = 40.0;
 /// A picture this wide holds the head line.
 const LEAST_COLUMNS: usize = 2;
-/// A curve is drawn through at most this many of its nodes: more do not show.
-const MOST_VERTICES: usize = 600;
+/// States on the way: those in which about this share of the way to the end is left. The excess, which goes with the
+/// square, has then fallen to a half and to a tenth.
+const LEFT: [f64; 2] = [0.71, 0.32];
+/// A state with more or less left than this looks like the start or the end.
+const APART: std::ops::RangeInclusive<f64> = 0.12..=0.88;
 /// Nodes closer than this, in pixels, are a line already, and are not marked.
 const LEAST_SPACING: f64 = 2.5;
 
@@ -34,6 +39,7 @@ text { font-family: sans-serif; font-size: 12px; fill: #24292f }
 .middle { text-anchor: middle }
 .end { text-anchor: end }
 .before { fill: none; stroke: #8c959f; stroke-width: 1 }
+.way { stroke-width: 1 }
 .after { stroke-width: 1.6; stroke-linejoin: round; fill-opacity: 0.08 }
 .nodes { fill: none; stroke-width: 3.2; stroke-linecap: round }
 .scale { fill: none; stroke: #24292f; stroke-width: 1.2 }
@@ -43,6 +49,7 @@ text { font-family: sans-serif; font-size: 12px; fill: #24292f }
 .nonfinite path { stroke: #8a3ab9; fill: #8a3ab9 } .nonfinite .word { fill: #8a3ab9 }
 .stalled path { stroke: #5a6b00; fill: #5a6b00 } .stalled .word { fill: #5a6b00 }
 .panel .before { fill: none; stroke: #8c959f }
+.panel .way { fill: none; stroke-opacity: 0.5 }
 .panel .nodes { fill: none }
 @media screen and (prefers-color-scheme: dark) {
 .back { fill: #15191e }
@@ -60,35 +67,20 @@ text { fill: #e6edf3 }
 }
 ";
 
-/// One member of the gallery.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Panel {
-    /// Index of the member.
-    pub member: u64,
-    /// How it ended.
-    pub status: Status,
-    /// Its relaxation time.
-    pub t_relax: Option<f64>,
-    /// Nodes of the initial curve.
-    pub before: Vec<DVec2>,
-    /// Nodes of the last accepted state.
-    pub after: Vec<DVec2>,
-}
-
-/// The gallery of the first [`MOST_PANELS`] of `panels`, as the text of an SVG file.
-pub fn draw(panels: &[Panel]) -> String {
-    let panels = &panels[..panels.len().min(MOST_PANELS)];
+/// The gallery of the first [`MOST_PANELS`] of `films`, as the text of an SVG file.
+pub fn draw(films: &[Film]) -> String {
+    let panels: Vec<Panel> = films.iter().take(MOST_PANELS).map(Panel::new).collect();
     let columns = panels.len().clamp(LEAST_COLUMNS, COLUMNS);
     let rows = panels.len().div_ceil(columns).max(1);
-    let Layout { scale, frame } = layout(panels);
+    let Layout { scale, frame } = layout(&panels);
     let pitch = frame + DVec2::new(GAP, CAPTION);
     let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
     let height = HEAD + rows as f64 * pitch.y + FOOT;
 
-    let mut svg = Svg::new(width, height, STYLE, "Members before and after relaxation");
+    let mut svg = Svg::new(width, height, STYLE, "Members before, during and after relaxation");
     svg.rectangle("back", DVec2::ZERO, DVec2::new(width, height), 0.0);
-    svg.text("head", DVec2::new(MARGIN, 30.0), "Before and after");
-    svg.text("note end", DVec2::new(width - MARGIN, 30.0), "grey: initial curve, colour: final curve");
+    svg.text("head", DVec2::new(MARGIN, 30.0), "Before, during and after");
+    svg.text("note end", DVec2::new(width - MARGIN, 30.0), "grey: start, light: on the way, colour: end");
     for (i, panel) in panels.iter().enumerate() {
         let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
         draw_panel(&mut svg, panel, DVec2::new(MARGIN, HEAD) + place * pitch, frame, scale);
@@ -97,27 +89,65 @@ pub fn draw(panels: &[Panel]) -> String {
     svg.finish()
 }
 
+/// One member of the gallery.
+struct Panel<'a> {
+    film: &'a Film,
+    /// Its nodes at the start, on the way and at the end; none where nothing can be drawn.
+    states: Vec<Vec<DVec2>>,
+}
+
+impl Panel<'_> {
+    fn new(film: &Film) -> Panel<'_> {
+        let frames = film.frames();
+        let states = shown(&frames).into_iter().map(|i| frames[i].clone()).collect();
+        Panel { film, states }
+    }
+
+    /// Lower left and upper right corner of all states.
+    fn bounds(&self) -> Option<(DVec2, DVec2)> {
+        let nodes = || self.states.iter().flatten().copied();
+        Some((nodes().reduce(DVec2::min)?, nodes().reduce(DVec2::max)?))
+    }
+}
+
+/// The first of `frames`, those on the way that look different, and the last.
+fn shown(frames: &[Vec<DVec2>]) -> Vec<usize> {
+    let (Some(start), Some(end)) = (frames.first(), frames.last()) else { return Vec::new() };
+    let to_end = |nodes: &[DVec2]| nodes.iter().zip(end).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    let left: Vec<f64> = frames.iter().map(|nodes| to_end(nodes) / to_end(start)).collect();
+    let between = || (1..frames.len().saturating_sub(1)).filter(|i| APART.contains(&left[*i]));
+    let nearest = |share: f64| between().min_by(|i, j| (left[*i] - share).abs().total_cmp(&(left[*j] - share).abs()));
+    let way = LEFT.into_iter().filter_map(nearest);
+    let mut shown: Vec<usize> = [0].into_iter().chain(way).chain([frames.len() - 1]).collect();
+    shown.sort_unstable();
+    shown.dedup();
+    shown
+}
+
 fn draw_panel(svg: &mut Svg, panel: &Panel, corner: DVec2, frame: DVec2, scale: f64) {
     let middle = corner + 0.5 * frame;
-    svg.open(&format!("panel {}", panel.status.name()));
+    let Film { member, status, t_relax, points, .. } = panel.film;
+    svg.open(&format!("panel {}", status.name()));
     svg.rectangle("frame", corner, frame, 6.0);
-    if let Some((low, high)) = bounds(panel) {
+    if let Some((low, high)) = panel.bounds() {
         // y grows downwards in SVG.
-        let place = |p: DVec2| middle + (p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
-        let project = |nodes: &[DVec2]| -> Vec<DVec2> { finite(nodes).map(place).collect() };
-        let (before, after) = (project(&panel.before), project(&panel.after));
-        svg.path("before", &closed_path(&thinned(&before)));
-        svg.path("after", &closed_path(&thinned(&after)));
-        if mean_spacing(&after) >= LEAST_SPACING {
-            svg.path("nodes", &dots(&after));
+        let place = |p: &DVec2| middle + (*p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
+        let last = panel.states.len() - 1;
+        for (i, nodes) in panel.states.iter().enumerate() {
+            let nodes: Vec<DVec2> = nodes.iter().map(place).collect();
+            let class = if i == last { "after" } else { ["before", "way"][usize::from(i > 0)] };
+            svg.path(class, &closed_path(&nodes));
+            if i == last && nodes.len() == *points && mean_spacing(&nodes) >= LEAST_SPACING {
+                svg.path("nodes", &dots(&nodes));
+            }
         }
     }
     let below = DVec2::new(middle.x, corner.y + frame.y + 16.0);
-    let caption = match panel.t_relax {
-        Some(t) => format!("{} at t = {}", panel.status.name(), rounded(t)),
-        None => panel.status.name().into(),
+    let caption = match t_relax {
+        Some(t) => format!("{} at t = {}", status.name(), rounded(*t)),
+        None => status.name().into(),
     };
-    svg.text("middle", below, &format!("member {}", panel.member));
+    svg.text("middle", below, &format!("member {member}"));
     svg.text("middle word", below + DVec2::new(0.0, 15.0), &caption);
     svg.close();
 }
@@ -144,27 +174,11 @@ struct Layout {
 
 /// The largest of `panels` fills its frame, which is as low as the tallest allows.
 fn layout(panels: &[Panel]) -> Layout {
-    let extent = panels.iter().filter_map(bounds).map(|(low, high)| high - low).fold(DVec2::ZERO, DVec2::max);
+    let extent = panels.iter().filter_map(Panel::bounds).map(|(low, high)| high - low).fold(DVec2::ZERO, DVec2::max);
     let largest = extent.max_element();
     let scale = if largest > 0.0 && largest.is_finite() { (SIDE - 2.0 * PADDING) / largest } else { 1.0 };
     let height = (extent.y * scale + 2.0 * PADDING).clamp(LEAST_HEIGHT, SIDE);
     Layout { scale, frame: DVec2::new(SIDE, height) }
-}
-
-/// Lower left and upper right corner of both curves; none if no node is finite.
-fn bounds(panel: &Panel) -> Option<(DVec2, DVec2)> {
-    let nodes = || finite(&panel.before).chain(finite(&panel.after));
-    Some((nodes().reduce(DVec2::min)?, nodes().reduce(DVec2::max)?))
-}
-
-/// The nodes that can be drawn: finite, and small enough for their differences to be.
-fn finite(nodes: &[DVec2]) -> impl Iterator<Item = DVec2> {
-    nodes.iter().copied().filter(|p| p.abs().cmplt(DVec2::splat(1e100)).all())
-}
-
-/// Every m-th of `points`, with the least m that leaves at most [`MOST_VERTICES`].
-fn thinned(points: &[DVec2]) -> Vec<DVec2> {
-    points.iter().copied().step_by(points.len().div_ceil(MOST_VERTICES).max(1)).collect()
 }
 
 fn mean_spacing(points: &[DVec2]) -> f64 {
@@ -180,21 +194,12 @@ fn rounded(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
-
     use super::*;
+    use crate::{ensemble::Status, report::portraits::tests::film};
 
     /// Perturbed ellipses of different sizes that end as circles or part of the way there.
-    fn panels(count: u64, n: usize) -> Vec<Panel> {
-        let curve = |member: u64, rest: f64| -> Vec<DVec2> {
-            let size = 1.0 + 0.1 * (member % 3) as f64;
-            let node = |u: f64| {
-                let wave = 1.0 + rest * 0.15 * ((3.0 + (member % 4) as f64) * u + member as f64).cos();
-                DVec2::new((1.0 + rest) * u.cos(), u.sin() * (1.0 + 0.4 * (1.0 - rest))) * wave * size
-            };
-            (0..n).map(|i| node(TAU * i as f64 / n as f64)).collect()
-        };
-        let panel = |member: u64| {
+    fn films(count: u64, n: usize) -> Vec<Film> {
+        let one = |member: u64| {
             let status = match member {
                 4 => Status::Unfinished,
                 6 => Status::Singular,
@@ -202,20 +207,19 @@ mod tests {
                 11 => Status::Nonfinite,
                 _ => Status::Relaxed,
             };
-            let rest = if status == Status::Relaxed { 0.02 } else { 0.4 };
-            let t_relax = (status == Status::Relaxed).then_some(0.4 + 0.0123456 * member as f64);
-            Panel { member, status, t_relax, before: curve(member, 1.0), after: curve(member, rest) }
+            film(member, n, status, (status == Status::Relaxed).then_some(0.4 + 0.0123456 * member as f64))
         };
-        (0..count).map(panel).collect()
+        (0..count).map(one).collect()
     }
 
     #[test]
     fn a_gallery_has_a_panel_for_each_of_the_first_twelve() {
         for (count, shown) in [(0, 0), (1, 1), (5, 5), (12, 12), (30, 12)] {
-            let text = draw(&panels(count, 60));
+            let text = draw(&films(count, 60));
             assert_eq!(text.matches("class=\"frame\"").count(), shown);
             assert_eq!(text.matches("class=\"after\"").count(), shown);
-            assert_eq!(text, draw(&panels(count, 60)));
+            assert_eq!(text.matches("class=\"way\"").count(), 2 * shown);
+            assert_eq!(text, draw(&films(count, 60)));
             // To look at: CURVELAX_GALLERY=FOLDER cargo test gallery
             if let Some(folder) = std::env::var_os("CURVELAX_GALLERY") {
                 let path = std::path::Path::new(&folder).join(format!("gallery{count}.svg"));
@@ -225,31 +229,32 @@ mod tests {
     }
 
     #[test]
+    fn states_on_the_way_differ_from_both_ends() {
+        let circle = |r: f64| (0..9).map(|i| r * DVec2::from_angle(0.7 * f64::from(i))).collect::<Vec<_>>();
+        let of = |sizes: &[f64]| shown(&sizes.iter().map(|r| circle(*r)).collect::<Vec<_>>());
+        assert_eq!(of(&[2.0, 1.99, 1.7, 1.6, 1.3, 1.1, 1.01, 1.0]), [0, 2, 4, 7]);
+        assert_eq!(of(&[2.0, 1.95, 1.5, 1.05, 1.0]), [0, 2, 4]);
+        assert_eq!(of(&[2.0, 1.99, 1.01, 1.0]), [0, 3]);
+        assert_eq!(of(&[1.0, 1.0, 1.0]), [0, 2]);
+        assert_eq!((of(&[1.0]), of(&[])), (vec![0], vec![]));
+    }
+
+    #[test]
     fn one_scale_fits_the_largest_member() {
-        let mut panels = panels(3, 60);
-        panels[1].before.iter_mut().for_each(|p| *p *= 10.0);
+        let films = films(3, 60);
+        let mut panels: Vec<Panel> = films.iter().map(Panel::new).collect();
+        panels[1].states[0].iter_mut().for_each(|p| *p *= 10.0);
         let Layout { scale, frame } = layout(&panels);
-        let (low, high) = bounds(&panels[1]).unwrap();
+        let (low, high) = panels[1].bounds().unwrap();
         let slack = frame - (high - low) * scale - 2.0 * PADDING;
         assert!(slack.x.abs() < 1e-9 && slack.y.abs() < 1e-9, "{slack}");
     }
 
     #[test]
-    fn values_that_are_not_finite_do_not_reach_the_picture() {
-        let mut panels = panels(2, 60);
-        panels[0].after[3].x = f64::NAN;
-        panels[0].after[4].y = -f64::MAX;
-        panels[1].before = vec![DVec2::splat(f64::INFINITY); 60];
-        panels[1].after = panels[1].before.clone();
-        let text = draw(&panels).to_lowercase();
-        assert!(!text.contains("nan") && !text.contains("inf"), "{text}");
-    }
-
-    #[test]
     fn many_nodes_are_drawn_as_a_line() {
-        let text = draw(&panels(1, 5000));
+        let text = draw(&films(1, 5000));
         assert!(!text.contains("class=\"nodes\""));
-        assert!(text.len() < 40_000, "{}", text.len());
+        assert!(text.len() < 50_000, "{}", text.len());
     }
 
     #[test]

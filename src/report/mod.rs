@@ -13,8 +13,10 @@ pub mod overview;
 pub mod page;
 pub mod part_folder;
 pub mod plot;
+pub mod portraits;
 pub mod progress;
 pub mod provenance;
+pub mod reader;
 pub mod study;
 pub mod style;
 pub mod svg;
@@ -31,14 +33,15 @@ use std::{
 
 pub use ensemble::EnsembleStatistics;
 pub use folder::OutputFolder;
-pub use gallery::Panel;
 
 use crate::{
     backend::Platform,
-    ensemble::{Ended, Outcome, Portrait, Sink, Spec, spec::Store},
-    error::Result,
+    ensemble::{Ended, Sink, Spec, spec::Store},
+    error::{Error, Result},
 };
+use portraits::Film;
 use progress::Progress;
+use provenance::Provenance;
 use study::Study;
 use tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable};
 use tally::Tally;
@@ -57,9 +60,8 @@ pub struct Report {
     store: Option<SnapshotStore>,
     folder: OutputFolder,
     tally: Tally,
-    panels: Vec<Panel>,
-    /// The same members on their way.
-    watched: Vec<page::Trajectory>,
+    /// The first members.
+    films: Vec<Film>,
     /// Members of the whole study, and those of earlier simulations.
     total: u64,
     before: u64,
@@ -89,8 +91,7 @@ impl Report {
             },
             folder,
             tally: Tally::default(),
-            panels: Vec::new(),
-            watched: Vec::new(),
+            films: Vec::new(),
             progress: Progress::new(quiet),
             started: SystemTime::now(),
             clock: Instant::now(),
@@ -114,9 +115,11 @@ impl Report {
     }
 
     /// Puts every file under its final name, once all are on disk, and returns the overview for stdout.
+    ///
+    /// Where only the pictures cannot be written the tables are published all the same, with an error that says so.
     pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String]) -> Result<String> {
         // In reverse order they are dropped: the folder last, after its files.
-        let Report { folder, tally, panels, watched, progress, started, clock, .. } = self;
+        let Report { folder, tally, films, progress, started, clock, .. } = self;
         let (summary, rates, series) = (self.summary, self.rates, self.series);
         let (snapshots, store) = (self.snapshots, self.store);
         progress.finish();
@@ -124,7 +127,8 @@ impl Report {
         let statistics = &EnsembleStatistics::new(spec, &tally)?;
         let mut names = vec![folder::SUMMARY, folder::ENSEMBLE, folder::RATES, folder::MEAN_EXCESS];
         let ensemble = folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?;
-        let mean_excess = tables::mean_excess(folder.file(folder::MEAN_EXCESS)?, tally.mean_excess(spec)?)?;
+        let excess = &tally.mean_excess(spec)?;
+        let mean_excess = tables::mean_excess(folder.file(folder::MEAN_EXCESS)?, excess)?;
         let mut files = vec![summary.ready()?, ensemble, rates.ready()?, mean_excess];
         if let Some(series) = series {
             files.push(series.ready()?);
@@ -138,23 +142,29 @@ impl Report {
         if store.is_some() {
             names.push(folder::STORE);
         }
-        let gallery = (!panels.is_empty()).then(|| gallery::draw(&panels));
-        let study = Study { spec, platform, tally: &tally, statistics, warnings, started, wall };
-        let charts = study.charts()?;
-        let page = study.page(&charts, gallery.as_deref(), &watched)?;
-        for (name, text) in charts.iter().map(|chart| (chart.name, &chart.figure.svg)).chain([(folder::REPORT, &page)])
-        {
-            files.push(folder.write(name, text)?);
-        }
-        names.push(folder::REPORT);
-        if let Some(gallery) = gallery {
-            files.push(folder.write(folder::CURVES, &gallery)?);
-        }
-        names.push(PLOTS);
-        let provenance = provenance::Provenance::new(spec, platform, &tally, warnings, started, wall);
+        let provenance = &Provenance::new(spec, platform, &tally, warnings, started, wall);
         let run = folder.write(folder::RUN, &provenance.to_json()?)?;
-        names.push(folder::RUN);
-        folder.publish(files, store, run)?;
+        let study = Study { provenance, tally: &tally, statistics, excess, films: &films };
+        let mut drawn = Vec::new();
+        let done = (|| {
+            drawn.push(folder.write(folder::PORTRAITS, &portraits::to_json(&films)?)?);
+            for (name, text) in study.pictures()? {
+                drawn.push(folder.write(name, &text)?);
+            }
+            Ok(())
+        })();
+        if done.is_err() {
+            // All but what pictures are drawn from.
+            drawn.truncate(1);
+        }
+        folder.publish(files.into_iter().chain(drawn).collect(), store, run)?;
+        done.map_err(|error: Error| {
+            let folder = folder.path().display();
+            Error::Failed(format!(
+                "{error}; the tables in {folder} are complete: make room, then curvelax plot {folder}"
+            ))
+        })?;
+        names.extend([folder::REPORT, PLOTS, folder::RUN]);
         let (tally, folder) = (&tally, folder.path());
         let overview = overview::Overview { spec, platform, tally, statistics, wall, folder, files: &names };
         Ok(overview.to_string())
@@ -178,11 +188,7 @@ impl Sink for Report {
         self.tally.add(outcome);
         self.tally.add_excess(outcome.cell, excess);
         self.tally.add_aside(mollified, *unresolved);
-        if let Some(Portrait { before, frames, after }) = portrait.clone() {
-            let Outcome { member, status, t_relax, .. } = *outcome;
-            self.watched.push(study::trajectory(outcome, &before, frames, &after));
-            self.panels.push(Panel { member, status, t_relax, before, after });
-        }
+        self.films.extend(portrait.as_ref().map(|portrait| Film::new(outcome, portrait)));
         Ok(())
     }
 
@@ -199,7 +205,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::ensemble::{Mollified, Observables, SeriesRow, Snapshot, Status};
+    use crate::ensemble::{Mollified, Observables, Portrait, SeriesRow, Snapshot, Status};
 
     fn files(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
@@ -240,7 +246,7 @@ mod tests {
         let overview = report(&out, &all, Some(portrait)).finish(&all, &platform, &[]).unwrap();
         let always = ["ensemble.csv", "mean_excess.csv", "plots", "rates.csv", "report.html", "run.json"];
         assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());
-        let plots = ["excess.svg", "mesh.svg", "rate.svg", "relaxation.svg", "survival.svg"];
+        let plots = ["excess.svg", "mesh.svg", "portraits.json", "rate.svg", "relaxation.svg", "survival.svg"];
         assert_eq!(files(&out.join("plots")), [&["curves.svg"], &plots[..]].concat());
         for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");

@@ -1,11 +1,11 @@
-//! `run.json`: enough to repeat a run and to trust it. The only file with clock times.
+//! `run.json`: enough to repeat a run, to trust it and to draw it again. The only file with clock times.
 
 use std::{
     collections::BTreeMap,
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::tally::{MollifiedMembers, Tally};
 use crate::{
@@ -14,51 +14,78 @@ use crate::{
     error::{Error, Result},
 };
 
+/// What programs that read a run check first: it grows when an older reader would misunderstand the files.
+pub const FORMAT: u64 = 1;
+
 /// The content of `run.json`.
-#[derive(Serialize)]
-pub struct Provenance<'a> {
-    curvelax: &'static str,
-    seed: u64,
-    precision: Precision,
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Version of the program.
+    pub curvelax: String,
+    /// [`FORMAT`] of the files.
+    pub format: u64,
+    /// Seed of the perturbations.
+    pub seed: u64,
+    /// Number type of the arithmetic.
+    pub precision: Precision,
+    /// Residual tolerance of the sweeps, where there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
-    tolerance: Option<f64>,
-    spec: &'a Spec,
-    platform: &'a Platform,
-    members: u64,
-    members_by_status: BTreeMap<&'static str, u64>,
-    steps: u64,
-    sweeps_k: u64,
-    sweeps_x: u64,
-    mollified: MollifiedMembers,
-    warnings: &'a [String],
-    started: String,
-    wall_seconds: f64,
+    pub tolerance: Option<f64>,
+    /// What was asked for, resolved.
+    pub spec: Spec,
+    /// Where it was computed.
+    pub platform: Platform,
+    /// Members that ended: the rows of `summary.csv`.
+    pub members: u64,
+    /// The same by status.
+    pub members_by_status: BTreeMap<String, u64>,
+    /// Steps of all members.
+    pub steps: u64,
+    /// Sweeps on curvature systems of all members.
+    pub sweeps_k: u64,
+    /// Sweeps on position systems of all members.
+    pub sweeps_x: u64,
+    /// Members whose corners were rounded off before the run.
+    pub mollified: MollifiedMembers,
+    /// Members whose threshold lies in the rounding of the precision.
+    pub below_rounding: u64,
+    /// Rows of `mean_excess.csv`.
+    pub excess_rows: u64,
+    /// What the user was told, a sentence each.
+    pub warnings: Vec<String>,
+    /// When it began, in UTC.
+    pub started: String,
+    /// How long it took, to the millisecond.
+    pub wall_seconds: f64,
 }
 
-impl<'a> Provenance<'a> {
+impl Provenance {
     /// Collects it at the end of a run.
     pub fn new(
-        spec: &'a Spec,
-        platform: &'a Platform,
+        spec: &Spec,
+        platform: &Platform,
         tally: &Tally,
-        warnings: &'a [String],
+        warnings: &[String],
         started: SystemTime,
         wall: Duration,
-    ) -> Provenance<'a> {
+    ) -> Provenance {
         Provenance {
-            curvelax: env!("CARGO_PKG_VERSION"),
+            curvelax: env!("CARGO_PKG_VERSION").into(),
+            format: FORMAT,
             seed: spec.seed,
             precision: platform.precision,
             tolerance: spec.solver().sweeps().then(|| spec.tolerance_at(platform.precision)),
-            spec,
-            platform,
+            spec: spec.clone(),
+            platform: platform.clone(),
             members: tally.members(),
-            members_by_status: tally.counts().map(|(status, count)| (status.name(), count)).collect(),
+            members_by_status: by_status(tally),
             steps: tally.steps,
             sweeps_k: tally.sweeps_k,
             sweeps_x: tally.sweeps_x,
             mollified: tally.mollified,
-            warnings,
+            below_rounding: tally.below_rounding,
+            excess_rows: tally.cells.iter().map(|cell| cell.excess.len() as u64).sum(),
+            warnings: warnings.into(),
             started: rfc3339(started),
             wall_seconds: (wall.as_secs_f64() * 1e3).round() / 1e3,
         }
@@ -69,6 +96,11 @@ impl<'a> Provenance<'a> {
         let text = serde_json::to_string_pretty(self);
         text.map(|text| text + "\n").map_err(|e| Error::Failed(format!("cannot write run.json: {e}")))
     }
+}
+
+/// Members by the name of their status.
+pub fn by_status(tally: &Tally) -> BTreeMap<String, u64> {
+    tally.counts().map(|(status, count)| (status.name().into(), count)).collect()
 }
 
 /// `time` in UTC to the second, for example `2026-11-05T09:08:07Z`.
@@ -128,5 +160,6 @@ pub(crate) mod tests {
         assert_eq!(json["tolerance"], 1e-5);
         assert_eq!(json["wall_seconds"], 1.5);
         assert_eq!(json["members_by_status"]["relaxed"], 0);
+        assert_eq!(serde_json::from_str::<Provenance>(&run.to_json().unwrap()).unwrap(), run);
     }
 }

@@ -1,29 +1,24 @@
 //! What people look at: the charts of a run and its page, from its statistics.
 
-use std::time::{Duration, SystemTime};
-
-use glam::DVec2;
-
 use super::{
     charts::{
         Decay, DecayCurve, Dependence, Estimate, FittedRates, Law, Level, MeshQuality, PowerLaw, RelaxationTimes,
         Series, Setting, Survival, SurvivalCurve, Theory,
     },
     ensemble::{CellStatistics, EnsembleStatistics, QUANTILES},
-    folder,
+    folder, gallery,
     overview::{describe, machine},
-    page::{Figure, Headline, Page, Table, Trajectory},
+    page::{Figure, Headline, MOST_MEMBERS, Page, Table, Trajectory},
+    portraits::Film,
     progress::duration,
-    provenance::rfc3339,
-    tally::{CellTally, DISTRUSTED_DRIFT, Tally},
+    provenance::Provenance,
+    tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
     text::{count, significant},
 };
 use crate::{
-    backend::Platform,
-    ensemble::{Outcome, Spec, Status},
+    ensemble::{Spec, Status},
     error::Result,
     flow::Flow,
-    schedule::grid,
 };
 
 /// Half the width of a 95 % band in standard errors.
@@ -33,20 +28,16 @@ const DIGITS: usize = 4;
 
 /// A finished run.
 pub struct Study<'a> {
-    /// What was asked for.
-    pub spec: &'a Spec,
-    /// Where it was computed.
-    pub platform: &'a Platform,
+    /// What was asked for, where and when it was computed.
+    pub provenance: &'a Provenance,
     /// What came out.
     pub tally: &'a Tally,
     /// Statistics of the relaxation times.
     pub statistics: &'a EnsembleStatistics,
-    /// What the user should know, a sentence each.
-    pub warnings: &'a [String],
-    /// When it began.
-    pub started: SystemTime,
-    /// How long it took.
-    pub wall: Duration,
+    /// The mean excess in time.
+    pub excess: &'a [MeanExcess],
+    /// The first members.
+    pub films: &'a [Film],
 }
 
 /// A picture with its place in the folder of the run.
@@ -57,16 +48,21 @@ pub struct Chart {
     pub figure: Figure,
 }
 
-/// A member on its way, for the page.
-pub fn trajectory(outcome: &Outcome, before: &[DVec2], frames: Vec<(f64, Vec<DVec2>)>, after: &[DVec2]) -> Trajectory {
-    let frames = frames.into_iter().filter(|(t, _)| *t > 0.0 && *t < outcome.t_end);
-    let start = (0.0, before.to_vec());
-    let (times, nodes) = [start].into_iter().chain(frames).chain([(outcome.t_end, after.to_vec())]).unzip();
-    let at = outcome.t_relax.map_or(String::new(), |t| format!(" at t = {}", significant(t, 3)));
-    Trajectory { label: format!("member {}: {}{at}", outcome.member, outcome.status.name()), times, nodes }
-}
-
 impl Study<'_> {
+    /// The files that are drawn: name and text.
+    pub fn pictures(&self) -> Result<Vec<(&'static str, String)>> {
+        let charts = self.charts()?;
+        let gallery = (!self.films.is_empty()).then(|| gallery::draw(self.films));
+        let page = self.page(&charts, gallery.as_deref())?;
+        let charts = charts.into_iter().map(|chart| (chart.name, chart.figure.svg));
+        let gallery = gallery.map(|svg| (folder::CURVES, svg));
+        Ok(charts.chain(gallery).chain([(folder::REPORT, page)]).collect())
+    }
+
+    fn spec(&self) -> &Spec {
+        &self.provenance.spec
+    }
+
     /// The charts that this run has, in the order in which they are read.
     ///
     /// # Errors
@@ -127,11 +123,10 @@ impl Study<'_> {
         let mut curves = Vec::new();
         let mut theory = Vec::new();
         for (rank, cell) in self.tally.cells.iter().enumerate() {
-            let spec = self.spec.sweep.apply(self.spec, rank as u64)?;
             let all: u64 = cell.counts.iter().sum();
-            let rows = grid(spec.t_end).zip(&cell.excess).take_while(|(_, moments)| moments.count() == all);
+            let rows = self.excess.iter().filter(|row| row.cell == rank as u64).take_while(|row| row.members == all);
             let rows: Vec<(f64, f64, f64)> =
-                rows.map_while(|(t, m)| Some((t, m.mean()?, m.deviation().unwrap_or(0.0)))).collect();
+                rows.map_while(|row| Some((row.t, row.mean?, row.sd.unwrap_or(0.0)))).collect();
             let bound = |sign: f64| rows.iter().map(|(_, mean, deviation)| mean + sign * deviation).collect();
             let curve = DecayCurve {
                 label: self.label(rank as u64),
@@ -140,6 +135,7 @@ impl Study<'_> {
                 mean: rows.iter().map(|(_, mean, _)| *mean).collect(),
                 band: Some((bound(-1.0), bound(1.0))),
             };
+            let spec = self.spec().sweep.apply(self.spec(), rank as u64)?;
             theory.extend(law(&spec, cell, &curve));
             curves.push(curve);
         }
@@ -174,7 +170,7 @@ impl Study<'_> {
 
     /// t_relax against the key that changes fastest, a series for each combination of the others.
     fn dependence(&self) -> Option<Chart> {
-        let (axis, others) = self.spec.sweep.axes().split_last()?;
+        let (axis, others) = self.spec().sweep.axes().split_last()?;
         let numbers = axis.numbers();
         let cells = &self.statistics.cells;
         let series = cells.chunks(axis.values.len().max(1)).map(|cells| {
@@ -228,19 +224,20 @@ impl Study<'_> {
     }
 
     /// The text of `report.html`; `gallery` is the picture of the first members.
-    pub fn page(&self, charts: &[Chart], gallery: Option<&str>, members: &[Trajectory]) -> Result<String> {
-        let spec = self.spec.to_toml()?;
+    fn page(&self, charts: &[Chart], gallery: Option<&str>) -> Result<String> {
+        let spec = self.spec().to_toml()?;
         let first = gallery.map(|svg| {
-            let title = "The first members before and after";
-            chart(folder::CURVES, title, "Grey: the start. Colour: the last state, by status.", svg.into()).figure
+            let title = "The first members before, on their way and after";
+            let caption = "Grey: the start. Light: on the way. Colour: the last state, by status.";
+            chart(folder::CURVES, title, caption, svg.into()).figure
         });
         let page = Page {
             title: "curvelax run",
             what: &format!("{}, {}.", count(self.tally.members(), "member"), self.what()),
             statuses: self.tally.counts().map(|(status, count)| (status.name(), count)).collect(),
             headline: self.headline(),
-            warnings: self.warnings,
-            members: members.to_vec(),
+            warnings: &self.provenance.warnings,
+            members: self.trajectories(),
             plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
             tables: vec![self.table()],
             spec: &spec,
@@ -249,23 +246,39 @@ impl Study<'_> {
         Ok(page.html())
     }
 
+    /// The members to watch: the first ones, or some of all cells.
+    fn trajectories(&self) -> Vec<Trajectory> {
+        let sweep = &self.spec().sweep;
+        let trajectory = |film: &Film| {
+            let at = film.t_relax.map_or(String::new(), |t| format!(" at t = {}", significant(t, 3)));
+            let cell = match sweep.is_empty() {
+                true => String::new(),
+                false => format!(" ({})", sweep.name(film.member / self.spec().curves)),
+            };
+            let label = format!("member {}{cell}: {}{at}", film.member, film.status.name());
+            Trajectory { label, status: film.status.name(), times: film.times.clone(), nodes: film.frames() }
+        };
+        let stride = if sweep.is_empty() { 1 } else { self.films.len().div_ceil(MOST_MEMBERS) };
+        self.films.iter().step_by(stride.max(1)).map(trajectory).collect()
+    }
+
     fn what(&self) -> String {
-        let swept = self.spec.sweep.axes().iter().map(|axis| format!("{} = {}", axis.key, axis.labels().join(", ")));
-        [describe(self.spec)].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
+        let swept = self.spec().sweep.axes().iter().map(|axis| format!("{} = {}", axis.key, axis.labels().join(", ")));
+        [describe(self.spec())].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
     }
 
     /// The values of the only swept key, cell by cell, if they are numbers.
     fn numbers(&self) -> Option<Vec<f64>> {
-        if let [axis] = self.spec.sweep.axes() { axis.numbers() } else { None }
+        if let [axis] = self.spec().sweep.axes() { axis.numbers() } else { None }
     }
 
     /// What a cell is called in a legend.
     fn label(&self, cell: u64) -> String {
-        if self.spec.sweep.is_empty() { "all members".into() } else { self.spec.sweep.name(cell) }
+        if self.spec().sweep.is_empty() { "all members".into() } else { self.spec().sweep.name(cell) }
     }
 
     fn keys(&self) -> String {
-        self.spec.sweep.axes().iter().map(|axis| axis.key.as_str()).collect::<Vec<_>>().join(", ")
+        self.spec().sweep.axes().iter().map(|axis| axis.key.as_str()).collect::<Vec<_>>().join(", ")
     }
 
     fn headline(&self) -> Vec<Headline> {
@@ -319,7 +332,7 @@ impl Study<'_> {
     }
 
     fn table(&self) -> Table {
-        let keys = self.spec.sweep.axes().iter().map(|axis| axis.key.clone());
+        let keys = self.spec().sweep.axes().iter().map(|axis| axis.key.clone());
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
         let numbers = ["mean", "standard error"].into_iter().chain(QUANTILES.map(|(_, name)| name));
         let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
@@ -351,13 +364,13 @@ impl Study<'_> {
             _ => format!("{steps} steps, {sweeps_k} sweeps for k and {sweeps_x} for x, y"),
         };
         [
-            ("curvelax", env!("CARGO_PKG_VERSION").to_string()),
-            ("started", rfc3339(self.started)),
-            ("wall time", duration(self.wall.as_secs_f64())),
-            ("ran on", machine(self.platform)),
-            ("driver", self.platform.driver.clone().unwrap_or_default()),
+            ("curvelax", self.provenance.curvelax.clone()),
+            ("started", self.provenance.started.clone()),
+            ("wall time", duration(self.provenance.wall_seconds)),
+            ("ran on", machine(&self.provenance.platform)),
+            ("driver", self.provenance.platform.driver.clone().unwrap_or_default()),
             ("work", work),
-            ("seed", self.spec.seed.to_string()),
+            ("seed", self.spec().seed.to_string()),
         ]
         .into_iter()
         .filter(|(_, value)| !value.is_empty())
@@ -407,4 +420,113 @@ fn median(cell: &CellStatistics) -> Option<Estimate> {
 /// The number among `values` of a key whose values are numbers.
 fn value_of(axis: &crate::ensemble::sweep::Axis, values: &[String]) -> Option<f64> {
     axis.numbers().and_then(|_| values.first()?.parse().ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, UNIX_EPOCH};
+
+    use glam::DVec2;
+
+    use super::*;
+    use crate::{
+        ensemble::Outcome,
+        report::{
+            portraits::tests::film,
+            provenance::tests::platform,
+            svg::dots,
+            tally::{Tally, tests::outcome},
+        },
+        schedule::grid,
+    };
+
+    /// Names and texts of the pictures of a run of `spec` that came to `tally`.
+    fn pictures(spec: &Spec, tally: &Tally, films: &[Film]) -> Vec<(&'static str, String)> {
+        let provenance = &Provenance::new(spec, &platform(), tally, &[], UNIX_EPOCH, Duration::from_secs(1));
+        let statistics = &EnsembleStatistics::new(spec, tally).unwrap();
+        let excess = &tally.mean_excess(spec).unwrap();
+        Study { provenance, tally, statistics, excess, films }.pictures().unwrap()
+    }
+
+    /// 10⁵ members, no two alike, a third of them censored at times of their own.
+    fn many(cells: u64) -> Tally {
+        let mut tally = Tally::default();
+        for member in 0..100_000_u64 {
+            let share = member as f64 / 1e5;
+            let t = 0.3 + share.powi(3) + 0.1 * (share * 1e4).sin();
+            let relaxed = member % 3 > 0;
+            let status = if relaxed { Status::Relaxed } else { Status::Singular };
+            let mut outcome =
+                Outcome { cell: member % cells, t_end: t, ..outcome(member, status, relaxed.then_some(t)) };
+            (outcome.rate, outcome.rate_theory) = (Some(20.0 + t), Some(24.0));
+            (outcome.end.mesh_ratio, outcome.end.metric_drift) = (1.0 + share, 1e-3 + share * share);
+            outcome.start.area = 1.0;
+            tally.add(&outcome);
+            let excess = grid(1.0).map(|at| (-24.0 * t * at).exp()).collect::<Vec<_>>();
+            tally.add_excess(outcome.cell, &excess);
+        }
+        tally
+    }
+
+    #[test]
+    fn pictures_of_1e5_members_are_small() {
+        let films: Vec<Film> = (0..12).map(|member| film(member, 100, Status::Relaxed, Some(0.4))).collect();
+        let marks: Vec<DVec2> = (0..100_000).map(|i| DVec2::new(0.006 * f64::from(i), 1.0)).collect();
+        for cells in [1, 8, 500] {
+            let mut spec = Spec { curves: 100_000 / cells, ..Spec::default() };
+            if cells > 1 {
+                let values = (1..=cells).map(|value| value.to_string()).collect::<Vec<_>>().join(",");
+                spec.sweep.set(format!("omega={values}").parse().unwrap());
+            }
+            let drawn = pictures(&spec, &many(cells), &films);
+            for (name, text) in &drawn {
+                let most = if *name == folder::REPORT { 800_000 } else { 120_000 };
+                assert!(text.len() < most, "{name} of {cells} cells: {} bytes", text.len());
+            }
+            assert!(drawn.len() >= 5);
+        }
+        assert!(dots(&marks).len() > 800_000, "marks one by one would be seen");
+    }
+
+    /// Words of the text that are no numbers where numbers should be.
+    fn none_of(text: &str) -> Vec<&str> {
+        let words = text.split(|c: char| !c.is_alphanumeric());
+        // Letters of a path may stand before it.
+        let is_none = |word: &&str| word.contains("NaN") || ["inf", "Infinity"].contains(word);
+        words.filter(is_none).collect()
+    }
+
+    #[test]
+    fn few_members_and_none_are_drawn_without_a_number_that_is_none() {
+        let none = Tally::default();
+        let of = |members: &[Outcome]| {
+            let mut tally = Tally::default();
+            members.iter().for_each(|member| tally.add(member));
+            tally
+        };
+        let relaxed = outcome(0, Status::Relaxed, Some(0.0));
+        let censored = Outcome { t_end: 0.0, ..outcome(1, Status::Singular, None) };
+        let mut unknown = outcome(2, Status::Nonfinite, None);
+        (unknown.end.mesh_ratio, unknown.end.metric_drift, unknown.start.area) = (f64::INFINITY, f64::NAN, f64::NAN);
+        for (tally, sentence) in [
+            (none, "There are no members."),
+            (of(std::slice::from_ref(&relaxed)), "Nothing: every member relaxed"),
+            (of(std::slice::from_ref(&censored)), "<strong>0</strong> of 1 member relaxed"),
+            (of(&vec![censored.clone(); 9]), "No member relaxed, so there are no relaxation times"),
+            (of(&[relaxed, censored, unknown]), "<strong>1</strong> of 3 members relaxed"),
+        ] {
+            for sweep in ["", "omega=1,2", "shape=circle:1;astroid"] {
+                let mut spec = Spec::default();
+                if !sweep.is_empty() {
+                    spec.sweep.set(sweep.parse().unwrap());
+                }
+                for (name, text) in pictures(&spec, &tally, &[]) {
+                    let bad = none_of(&text);
+                    assert!(bad.is_empty(), "{name}: {bad:?}");
+                    assert!(name != folder::REPORT || text.contains(sentence), "no {sentence:?}");
+                }
+            }
+        }
+        assert_eq!(none_of("d=\"MNaN 3\" inf -inf;information NaN"), ["MNaN", "inf", "inf", "NaN"]);
+    }
 }

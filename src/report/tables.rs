@@ -7,20 +7,21 @@ use std::path::Path;
 use csv::{Writer, WriterBuilder};
 use serde::Serialize;
 
-use super::folder::PartFile;
+use super::{folder::PartFile, tally::MeanExcess};
 use crate::{
     ensemble::{Outcome, SeriesRow, Snapshot},
     error::{Error, Result},
-    statistics::Moments,
     truth::Row,
 };
 
-const SUMMARY: &str = "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,\
+/// Columns of `summary.csv`.
+pub const SUMMARY: &str = "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,\
     length_start,length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
     mesh_ratio,metric_drift,self_crossing";
-const SERIES: &str = "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift";
 const RATES: &str = "member,cell,rate,rate_r2,rate_theory,rate_ratio";
-const MEAN_EXCESS: &str = "cell,t,members,mean,sd";
+/// Columns of `mean_excess.csv`.
+pub const MEAN_EXCESS: &str = "cell,t,members,mean,sd";
+const SERIES: &str = "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift";
 const SNAPSHOTS: &str = "member,t,i,x,y,k,r";
 const CONVERGENCE: &str = "problem,varied,n,tau,tolerance,error,order";
 
@@ -173,13 +174,10 @@ impl RateTable {
     }
 }
 
-/// Writes `mean_excess.csv`: by cell the count, mean and standard deviation of the excess at each time, which comes with
-/// it.
-pub fn mean_excess<'a>(file: PartFile, rows: impl IntoIterator<Item = (u64, f64, &'a Moments)>) -> Result<PartFile> {
+/// Writes `mean_excess.csv`.
+pub fn mean_excess(file: PartFile, rows: &[MeanExcess]) -> Result<PartFile> {
     let mut table = Table::begin(file, MEAN_EXCESS)?;
-    for (cell, t, moments) in rows {
-        table.row((cell, t, moments.count(), moments.mean(), moments.deviation()))?;
-    }
+    rows.iter().try_for_each(|row| table.row(row))?;
     table.ready()
 }
 
@@ -329,11 +327,9 @@ mod tests {
             table.ready()
         });
         assert_eq!(text, "member,cell,rate,rate_r2,rate_theory,rate_ratio\n3,0,6.0,0.5,,\n3,0,6.0,0.5,6.0,1.0\n");
-        let mut moments = Moments::default();
-        moments.add(0.5);
-        let (one, mut two) = (moments, moments);
-        two.add(0.25);
-        let text = written("mean_excess.csv", |file| mean_excess(file, [(0, 0.0, &two), (0, 0.5, &one)]));
+        let two = MeanExcess { cell: 0, t: 0.0, members: 2, mean: Some(0.375), sd: Some(0.1767766952966369) };
+        let one = MeanExcess { t: 0.5, members: 1, mean: Some(0.5), sd: None, ..two };
+        let text = written("mean_excess.csv", |file| mean_excess(file, &[two, one]));
         assert_eq!(text, "cell,t,members,mean,sd\n0,0.0,2,0.375,0.1767766952966369\n0,0.5,1,0.5,\n");
     }
 

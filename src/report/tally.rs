@@ -1,6 +1,6 @@
 //! Running totals over members: what the overview and `run.json` say, without keeping the members.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     ensemble::{Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
@@ -24,8 +24,8 @@ pub struct Tally {
     pub mollified: MollifiedMembers,
     /// Members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
     drifted: (u64, f64),
-    /// Members whose relaxation cannot be told in this precision.
-    unresolved: u64,
+    /// Members whose relaxation cannot be told: their threshold lies in the rounding of the precision.
+    pub below_rounding: u64,
 }
 
 /// What the members of one cell came to.
@@ -47,11 +47,32 @@ pub struct CellTally {
     pub excess: Vec<Moments>,
 }
 
+/// A row of `mean_excess.csv`: the excess of the members of a cell that reached a time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MeanExcess {
+    /// Index of the cell.
+    pub cell: u64,
+    /// The time.
+    pub t: f64,
+    /// How many reached it.
+    pub members: u64,
+    /// Their mean excess.
+    pub mean: Option<f64>,
+    /// Its standard deviation.
+    pub sd: Option<f64>,
+}
+
+impl MeanExcess {
+    fn new(cell: u64, t: f64, of: &Moments) -> MeanExcess {
+        MeanExcess { cell, t, members: of.count(), mean: of.mean(), sd: of.deviation() }
+    }
+}
+
 /// Metric drift above which the scheme's lengths are so far from the polygon's that times mean little.
 pub const DISTRUSTED_DRIFT: f64 = 0.1;
 
 /// What rounding off corners did to the members (`ensemble/mollifier.rs`).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MollifiedMembers {
     /// How many were not left alone.
     pub members: u64,
@@ -137,18 +158,19 @@ impl Tally {
     /// Adds what is not in the summary's row.
     pub fn add_aside(&mut self, mollified: &Mollified, unresolved: bool) {
         self.mollified.add(mollified);
-        self.unresolved += u64::from(unresolved);
+        self.below_rounding += u64::from(unresolved);
     }
 
-    /// Cell, time and moments of the excess, in order.
+    /// The rows of `mean_excess.csv`.
     ///
     /// # Errors
     /// [`Error::Request`](crate::Error::Request) where the values of a cell do not fit `spec`.
-    pub fn mean_excess(&self, spec: &Spec) -> Result<Vec<(u64, f64, &Moments)>> {
+    pub fn mean_excess(&self, spec: &Spec) -> Result<Vec<MeanExcess>> {
         let mut rows = Vec::new();
         for (cell, CellTally { excess, .. }) in (0..).zip(&self.cells) {
             let t_end = spec.sweep.apply(spec, cell)?.t_end;
-            rows.extend(grid(t_end).zip(excess).map(|(t, moments)| (cell, t, moments)));
+            let row = |(t, of): (f64, &Moments)| MeanExcess::new(cell, t, of);
+            rows.extend(grid(t_end).zip(excess).map(row));
         }
         Ok(rows)
     }
@@ -164,11 +186,11 @@ impl Tally {
                  smaller --tau or --adaptive, or more --points, helps"
             ));
         }
-        if self.unresolved > 0 {
+        if self.below_rounding > 0 {
             warnings.push(format!(
                 "{} of {members} members are so nearly round that their threshold lies in the rounding of the \
                  precision: they have no t_relax; take --precision f64 or a larger --relax-to",
-                self.unresolved
+                self.below_rounding
             ));
         }
         let (drifted, worst) = self.drifted;

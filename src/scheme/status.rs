@@ -1,7 +1,10 @@
 //! How a member ends: the codes that the kernel and its twin leave in [`Counters`](super::parameters::Counters).
 
+use serde::{Deserialize, Serialize};
+
 /// How a member ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 #[repr(u32)]
 pub enum Status {
     /// Its excess reached the threshold.

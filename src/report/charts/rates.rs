@@ -31,7 +31,7 @@ pub struct FittedRates<'a> {
 impl FittedRates<'_> {
     /// The text of an SVG file.
     pub fn draw(&self) -> String {
-        let mut sorted: Vec<f64> = self.rates.iter().copied().filter(|rate| rate.is_finite()).collect();
+        let mut sorted: Vec<f64> = self.rates.iter().copied().filter(|rate| Scale::Linear.holds(*rate)).collect();
         sorted.sort_by(f64::total_cmp);
         let without = match self.without {
             0 => String::new(),

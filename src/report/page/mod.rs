@@ -5,13 +5,13 @@
 //! every script but the one below the slider, and equal pages have equal bytes. However large the run, a page holds a few
 //! members, the pictures and the first rows of each table.
 
-mod digest;
+pub(super) mod digest;
 mod player;
 mod scope;
 
 use std::fmt::Write;
 
-pub use player::Trajectory;
+pub use player::{MOST_MEMBERS, Trajectory};
 
 use super::{
     svg::escape,

@@ -7,15 +7,16 @@ use std::fmt::Write;
 
 use glam::DVec2;
 
-use super::digest::DIGITS;
+use super::{colour, digest::DIGITS};
 use crate::report::{
     axis::{Scale, tick_step},
     svg::escape,
     text::significant,
 };
 
-/// More members, times of one, and nodes than these do not fit into a small page, and show no more.
-const MOST_MEMBERS: usize = 6;
+/// More members than these are not shown.
+pub const MOST_MEMBERS: usize = 6;
+/// More times of one member, and nodes, than these do not fit into a small page, and show no more.
 const MOST_TIMES: usize = 61;
 const MOST_NODES: usize = 200;
 /// Places of the slider that stand for times.
@@ -33,6 +34,8 @@ const LEAST_HEIGHT: f64 = 0.5;
 pub struct Trajectory {
     /// What it is, and how it ended: `member 3: relaxed at t = 0.41`.
     pub label: String,
+    /// How it ended, which its colour shows.
+    pub status: &'static str,
     /// Ascending times, in length⁴.
     pub times: Vec<f64>,
     /// Its nodes at each of them, equally many at all.
@@ -67,6 +70,7 @@ pub struct Player {
 #[derive(Clone, Debug, PartialEq)]
 struct Member {
     label: String,
+    status: &'static str,
     times: Vec<f64>,
     /// Coordinates x, y, x, y, … at each time.
     frames: Vec<Vec<u16>>,
@@ -75,14 +79,14 @@ struct Member {
 impl Player {
     /// The first of `trajectories` that have a time to show; none if none has.
     pub fn new(trajectories: &[Trajectory]) -> Option<Player> {
-        let shown = trajectories.iter().map(|trajectory| (&trajectory.label, trajectory.frames()));
+        let shown = trajectories.iter().map(|trajectory| (trajectory, trajectory.frames()));
         let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MOST_MEMBERS).collect();
         let boxes: Vec<(DVec2, DVec2)> = shown.iter().filter_map(|(_, frames)| bounds(frames)).collect();
         let extent = boxes.iter().map(|(low, high)| *high - *low).reduce(DVec2::max)?;
         let largest = extent.max_element();
         let unit = if largest > 0.0 { largest / (LARGEST - 2.0 * PADDING) } else { 1.0 };
         let height = (extent.y / unit + 2.0 * PADDING).clamp(LEAST_HEIGHT * LARGEST, LARGEST).round();
-        let members = shown.into_iter().zip(boxes).map(|((label, frames), (low, high))| {
+        let members = shown.into_iter().zip(boxes).map(|((trajectory, frames), (low, high))| {
             // y grows downwards in SVG.
             let place =
                 |p: DVec2| (p - 0.5 * (low + high)) * DVec2::new(1.0, -1.0) / unit + 0.5 * DVec2::new(LARGEST, height);
@@ -90,7 +94,7 @@ impl Player {
                 nodes.iter().flat_map(|p| place(*p).to_array()).map(|v| v.round().clamp(0.0, LARGEST) as u16).collect()
             };
             let (times, frames) = frames.iter().map(|(t, nodes)| (*t, whole(nodes))).unzip();
-            Member { label: label.clone(), times, frames }
+            Member { label: trajectory.label.clone(), status: trajectory.status, times, frames }
         });
         Some(Player { members: members.collect(), unit, height })
     }
@@ -103,14 +107,14 @@ impl Player {
     /// Its part of the page. Without the script it shows the members at their first time.
     pub fn html(&self) -> String {
         let mut html = String::from("<div class=\"members\">\n");
-        for Member { label, frames, times } in &self.members {
+        for Member { label, status, frames, times } in &self.members {
             let (start, label) = (path(&frames[0]), escape(label));
             let dots = if frames[0].len() <= 2 * MOST_DOTS { dots(&frames[0]) } else { String::new() };
-            let height = self.height;
+            let (height, colour) = (self.height, colour(status));
             // Writing into a string cannot fail.
             let _ = writeln!(
                 html,
-                "<figure><svg viewBox=\"0 0 {LARGEST} {height}\" role=\"img\" aria-label=\"{label}\">\
+                "<figure style=\"--now: var(--{colour})\"><svg viewBox=\"0 0 {LARGEST} {height}\" role=\"img\" aria-label=\"{label}\">\
                  <path class=\"start\" d=\"{start}\"/><path class=\"now\" d=\"{start}\"/>\
                  <path class=\"nodes\" d=\"{dots}\"/>{}</svg><figcaption>{label}</figcaption></figure>",
                 self.scale_bar()
@@ -199,7 +203,12 @@ mod tests {
             (0..n).map(|i| size * DVec2::new(a, 1.0 / a) * DVec2::from_angle(TAU * i as f64 / n as f64)).collect()
         };
         let times: Vec<f64> = (0..times).map(|i| 0.1 * i as f64).collect();
-        Trajectory { label: "member <0>".into(), nodes: times.iter().map(|t| nodes(*t)).collect(), times }
+        Trajectory {
+            label: "member <0>".into(),
+            status: "relaxed",
+            nodes: times.iter().map(|t| nodes(*t)).collect(),
+            times,
+        }
     }
 
     #[test]
@@ -237,7 +246,8 @@ mod tests {
         assert_eq!(player.members[0].times, [0.0, 0.2]);
         assert_eq!(Player::new(&[Trajectory::default()]), None);
         assert_eq!(Player::new(&[]), None);
-        let point = Trajectory { label: String::new(), times: vec![0.0], nodes: vec![vec![DVec2::ONE; 6]] };
+        let nodes = vec![vec![DVec2::ONE; 6]];
+        let point = Trajectory { times: vec![0.0], nodes, ..Trajectory::default() };
         let html = Player::new(&[point]).unwrap().html();
         assert!(!html.contains("NaN") && !html.contains("inf") && !html.contains("type=\"range\""), "{html}");
     }

@@ -19,7 +19,7 @@ fn member(j: usize) -> Trajectory {
     };
     let times: Vec<f64> = (0..=40).map(|i| 0.5 * (i as f64 / 40.0).powi(2)).collect();
     let label = format!("member {j}: relaxed at t = {:.3}", 0.38 + 0.01 * j as f64);
-    Trajectory { label, nodes: times.iter().map(|t| nodes(*t)).collect(), times }
+    Trajectory { label, status: "relaxed", nodes: times.iter().map(|t| nodes(*t)).collect(), times }
 }
 
 fn table(rows: usize) -> Table {

@@ -1,0 +1,59 @@
+//! `curvelax plot`: the pictures of a finished run, drawn again from its files.
+
+use std::path::PathBuf;
+
+use super::{note, print};
+use crate::{
+    error::Result,
+    report::{EnsembleStatistics, OutputFolder, folder, reader, reader::Finished, study::Study},
+};
+
+const EXAMPLES: &str = "\
+Examples:
+  curvelax plot ellipses
+  curvelax plot ellipses --out pictures
+
+Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, mean_excess.csv and plots/portraits.json in DIR: the same
+bytes as the run, with the same version of the program.";
+
+/// Redraw the plots and the report of a finished run.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct PlotArgs {
+    /// Folder of the run
+    #[arg(value_name = "DIR")]
+    run: PathBuf,
+    /// Folder for the pictures, which must not exist yet [default: that of the run]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write into an existing --out DIR, replacing earlier pictures
+    #[arg(long)]
+    force: bool,
+    /// No table: only errors
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Runs the command.
+pub fn plot(args: PlotArgs) -> Result<()> {
+    // Before the folder is opened, which would make one that is not there.
+    reader::provenance(&args.run)?;
+    let (out, force) = match &args.out {
+        Some(out) => (out, args.force),
+        None => (&args.run, true),
+    };
+    let folder = OutputFolder::open_for(out, force, folder::PICTURES.map(String::from).into())?;
+    let Finished { provenance, tally, excess, films } = &Finished::read(&args.run)?;
+    if films.is_empty() && !args.quiet {
+        note(&format!("note: no {} in {}: without pictures of members", folder::PORTRAITS, args.run.display()));
+    }
+    let statistics = &EnsembleStatistics::new(&provenance.spec, tally)?;
+    let pictures = Study { provenance, tally, statistics, excess, films }.pictures()?;
+    let files = pictures.iter().map(|(name, text)| folder.write(name, text)).collect::<Result<_>>()?;
+    folder.publish_all(files)?;
+    if args.quiet {
+        return Ok(());
+    }
+    let names: Vec<&str> = pictures.iter().map(|(name, _)| *name).collect();
+    print(&format!("results    {}: {}\n", out.display(), names.join(", ")))
+}

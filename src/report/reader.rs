@@ -1,0 +1,387 @@
+//! A finished run, read back from its folder: what `plot` draws again.
+//!
+//! Tables are read row by row. Nothing is taken on trust: whatever this program would not have written is refused, with
+//! file, line and column, what was expected there and what was found.
+
+use std::{
+    fs::File,
+    io::{Read, Seek, SeekFrom},
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use csv::{ReaderBuilder, StringRecord};
+
+use super::{
+    folder,
+    portraits::{self, Film},
+    provenance::{FORMAT, Provenance, by_status},
+    tables,
+    tally::{MeanExcess, Tally},
+};
+use crate::{
+    ensemble::{Observables, Outcome, Spec, Status},
+    error::{Error, Result},
+};
+
+/// What helps against a file that was changed or cut off.
+const REMEDY: &str = "restore the file, or run again";
+
+/// A run as its folder tells it.
+pub struct Finished {
+    /// How it was made.
+    pub provenance: Provenance,
+    /// What came out.
+    pub tally: Tally,
+    /// The mean excess in time.
+    pub excess: Vec<MeanExcess>,
+    /// The first members; none where the run could not keep them.
+    pub films: Vec<Film>,
+}
+
+impl Finished {
+    /// Reads the run in `folder`.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a folder without a finished run, and for files that are not those of one run.
+    pub fn read(folder: &Path) -> Result<Finished> {
+        let provenance = provenance(folder)?;
+        let tally = tally(folder, &provenance)?;
+        let path = folder.join(folder::PORTRAITS);
+        let films = if path.exists() { portraits::read(&path)? } else { Vec::new() };
+        let excess = mean_excess(folder, &provenance)?;
+        Ok(Finished { provenance, tally, excess, films })
+    }
+}
+
+/// Reads `run.json`.
+///
+/// # Errors
+/// As [`Finished::read`].
+pub fn provenance(folder: &Path) -> Result<Provenance> {
+    let path = folder.join(folder::RUN);
+    let refuse = |problem: String| Err(Error::Request(format!("{}{problem}", path.display())));
+    if !folder.is_dir() {
+        return Err(Error::Request(format!("{}: no such folder; name that of a run", folder.display())));
+    }
+    if !path.exists() {
+        let begun = folder.join(format!(".{}.part", folder::SUMMARY)).exists();
+        let problem =
+            if begun { "the run there did not finish; start it again" } else { "no run there; name its folder" };
+        return Err(Error::Request(format!("{}: {problem} (no {})", folder.display(), folder::RUN)));
+    }
+    let text = std::fs::read_to_string(&path);
+    let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
+    let json: serde_json::Value = match serde_json::from_str(&text) {
+        Ok(json) => json,
+        Err(e) => return refuse(format!(": {e}; {REMEDY}")),
+    };
+    let Some(version) = json["curvelax"].as_str() else {
+        return refuse(": not written by curvelax: expected its version under `curvelax`, found none".into());
+    };
+    match json["format"].as_u64() {
+        Some(1..=FORMAT) => {}
+        Some(format) => {
+            let own = env!("CARGO_PKG_VERSION");
+            return refuse(format!(
+                ": expected format {FORMAT} at most, found {format}, of curvelax {version}; this is {own}: take a newer one"
+            ));
+        }
+        None => return refuse(format!(": expected a number under `format`, found none; {REMEDY}")),
+    }
+    // From the text and not from the value, so that an error has its line.
+    let provenance: Provenance = match serde_json::from_str(&text) {
+        Ok(provenance) => provenance,
+        Err(e) => return refuse(format!(": {e}; {REMEDY}")),
+    };
+    match provenance.spec.clone().validate() {
+        Ok(_) => Ok(provenance),
+        Err(e) => refuse(format!(", spec: {e}; {REMEDY}")),
+    }
+}
+
+/// Adds up the tables in `folder`, as the run did member by member.
+///
+/// # Errors
+/// As [`Finished::read`].
+pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
+    let spec = &provenance.spec;
+    let mut tally = Tally::default();
+    (tally.mollified, tally.below_rounding) = (provenance.mollified, provenance.below_rounding);
+    for outcome in Summary::open(folder, spec)? {
+        tally.add(&outcome?);
+    }
+    let summary = |what: &str, told: u64, found: u64| expected(folder, folder::SUMMARY, what, told, found);
+    summary("rows", provenance.members, tally.members())?;
+    for (status, count) in by_status(&tally) {
+        let told = provenance.members_by_status.get(&status).copied().unwrap_or(0);
+        summary(&format!("{status} members"), told, count)?;
+    }
+    summary("steps", provenance.steps, tally.steps)?;
+    Ok(tally)
+}
+
+/// A count that `run.json` knows.
+fn expected(folder: &Path, name: &str, what: &str, expected: u64, found: u64) -> Result<()> {
+    if expected == found {
+        return Ok(());
+    }
+    let (path, told) = (folder.join(name), folder::RUN);
+    Err(Error::Request(format!("{}: expected {expected} {what} by {told}, found {found}; {REMEDY}", path.display())))
+}
+
+/// The rows of a `summary.csv`, in order; members ascend.
+pub struct Summary {
+    table: Table,
+    last: Option<u64>,
+    spec: Spec,
+    /// The last cell and its spec.
+    spec_of: Option<(u64, Spec)>,
+}
+
+impl Summary {
+    /// Opens the table in `folder`, of a run of `spec`.
+    ///
+    /// # Errors
+    /// [`Error::Request`] where there is none, or one with other columns, or one that is cut off.
+    pub fn open(folder: &Path, spec: &Spec) -> Result<Summary> {
+        let table = Table::open(folder.join(folder::SUMMARY), tables::SUMMARY)?;
+        Ok(Summary { table, last: None, spec: spec.clone(), spec_of: None })
+    }
+
+    fn read(&mut self) -> Result<Option<Outcome>> {
+        let Some(mut row) = self.table.read()? else { return Ok(None) };
+        let member = row.whole()?;
+        if let Some(last) = self.last.filter(|last| member <= *last) {
+            return Err(row.unexpected(&format!("a member after {last}: members ascend, each once")));
+        }
+        let all = self.spec.all_members();
+        if member >= all {
+            return Err(row.unexpected(&format!("a member below {all}")));
+        }
+        self.last = Some(member);
+        let cell = row.whole()?;
+        if cell != member / self.spec.curves {
+            return Err(row.unexpected(&format!("{}, the cell of member {member}", member / self.spec.curves)));
+        }
+        let outcome = Outcome {
+            member,
+            cell,
+            status: row.status()?,
+            t_end: row.time()?,
+            steps: row.whole()?,
+            rejected: row.whole()?,
+            sweeps_k: row.whole()?,
+            sweeps_x: row.whole()?,
+            t_relax: row.event()?,
+            t_half: row.event()?,
+            rate: row.number()?,
+            rate_r2: row.number()?,
+            rate_theory: None,
+            start: Observables::default(),
+            end: Observables::default(),
+            self_crossing: None,
+        };
+        let [mut start, mut end] = [Observables::default(); 2];
+        (start.length, end.length) = (row.known()?, row.known()?);
+        (start.area, end.area) = (row.known()?, row.known()?);
+        (start.excess, end.excess) = (row.known()?, row.known()?);
+        (start.energy, end.energy) = (row.known()?, row.known()?);
+        (end.k_min, end.k_max, end.turning) = (row.known()?, row.known()?, row.whole()?);
+        (end.mesh_ratio, end.metric_drift) = (row.known()?, row.known()?);
+        let self_crossing = row.event()?;
+        // What theory says is in no table, since the spec says it.
+        if self.spec_of.as_ref().is_none_or(|(of, _)| *of != cell) {
+            self.spec_of = Some((cell, self.spec.sweep.apply(&self.spec, cell)?));
+        }
+        let rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| spec.rate_in_theory(start.area));
+        Ok(Some(Outcome { start, end, self_crossing, rate_theory, ..outcome }))
+    }
+}
+
+impl Iterator for Summary {
+    type Item = Result<Outcome>;
+
+    fn next(&mut self) -> Option<Result<Outcome>> {
+        self.read().transpose()
+    }
+}
+
+/// Reads `mean_excess.csv`.
+///
+/// # Errors
+/// As [`Finished::read`].
+pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExcess>> {
+    let mut table = Table::open(folder.join(folder::MEAN_EXCESS), tables::MEAN_EXCESS)?;
+    let mut rows: Vec<MeanExcess> = Vec::new();
+    while let Some(mut row) = table.read()? {
+        let cell = row.whole()?;
+        let t = row.time()?;
+        if let Some(last) = rows.last().filter(|last| (cell, t) <= (last.cell, last.t)) {
+            return Err(row.unexpected(&format!("a time after {} of cell {}", last.t, last.cell)));
+        }
+        rows.push(MeanExcess { cell, t, members: row.whole()?, mean: row.number()?, sd: row.number()? });
+    }
+    expected(folder, folder::MEAN_EXCESS, "rows", provenance.excess_rows, rows.len() as u64)?;
+    Ok(rows)
+}
+
+/// A CSV file with known columns.
+struct Table {
+    path: PathBuf,
+    columns: &'static str,
+    reader: csv::Reader<File>,
+    record: StringRecord,
+}
+
+impl Table {
+    fn open(path: PathBuf, columns: &'static str) -> Result<Table> {
+        let file = File::open(&path).and_then(|mut file| Ok((ends_with_a_line(&mut file)?, file)));
+        let (whole, file) =
+            file.map_err(|e| Error::Request(format!("cannot read {}: {e}; {REMEDY}", path.display())))?;
+        if !whole {
+            let problem = "expected an end of line, found the end of the file: it was cut off";
+            return Err(Error::Request(format!("{}: {problem}; {REMEDY}", path.display())));
+        }
+        // Rows are checked here, where more can be said about them.
+        let reader = ReaderBuilder::new().has_headers(false).flexible(true).quoting(false).from_reader(file);
+        let mut table = Table { path, columns, reader, record: StringRecord::new() };
+        if let Some(mut row) = table.read()? {
+            for name in columns.split(',') {
+                if row.word() != name {
+                    return Err(row.unexpected(&format!("the heading `{name}`")));
+                }
+            }
+        }
+        Ok(table)
+    }
+
+    /// The next row, with as many fields as there are columns.
+    fn read(&mut self) -> Result<Option<Row<'_>>> {
+        let Table { path, columns, reader, record } = self;
+        let path = path.as_path();
+        let some =
+            reader.read_record(record).map_err(|e| Error::Request(format!("{}: {e}; {REMEDY}", path.display())))?;
+        let (expected, found) = (columns.split(',').count(), record.len());
+        if some && found != expected {
+            let line = line(record);
+            let problem = format!("line {line}: expected {expected} fields, found {found}");
+            return Err(Error::Request(format!("{}, {problem}; {REMEDY}", path.display())));
+        }
+        Ok(some.then_some(Row { path, columns, record, taken: 0 }))
+    }
+}
+
+/// A row whose fields are taken from left to right.
+struct Row<'a> {
+    path: &'a Path,
+    columns: &'static str,
+    record: &'a StringRecord,
+    taken: usize,
+}
+
+impl Row<'_> {
+    fn word(&mut self) -> &str {
+        self.taken += 1;
+        &self.record[self.taken - 1]
+    }
+
+    fn whole<T: FromStr>(&mut self) -> Result<T> {
+        let value = self.word().parse();
+        value.map_err(|_| self.unexpected("a whole number"))
+    }
+
+    fn status(&mut self) -> Result<Status> {
+        let word = self.word();
+        let status = Status::ALL.into_iter().find(|status| status.name() == word);
+        status.ok_or_else(|| self.unexpected(&Status::ALL.map(Status::name).join(", ")))
+    }
+
+    /// A float; none if it is unknown.
+    fn number(&mut self) -> Result<Option<f64>> {
+        match self.word() {
+            "" => Ok(None),
+            word => match word.parse().ok().filter(|value: &f64| value.is_finite()) {
+                None => Err(self.unexpected("a number or nothing")),
+                known => Ok(known),
+            },
+        }
+    }
+
+    /// A float; not a number if it is unknown.
+    fn known(&mut self) -> Result<f64> {
+        Ok(self.number()?.unwrap_or(f64::NAN))
+    }
+
+    /// A time that may be unknown.
+    fn event(&mut self) -> Result<Option<f64>> {
+        match self.number()? {
+            Some(t) if t < 0.0 => Err(self.unexpected("a time or nothing")),
+            t => Ok(t),
+        }
+    }
+
+    fn time(&mut self) -> Result<f64> {
+        self.event()?.ok_or_else(|| self.unexpected("a time"))
+    }
+
+    /// That the field taken last is not what was expected.
+    fn unexpected(&self, expected: &str) -> Error {
+        let last = self.taken - 1;
+        let (line, column) = (line(self.record), self.columns.split(',').nth(last).unwrap_or_default());
+        Error::Request(format!(
+            "{}, line {line}, column {column}: expected {expected}, found `{}`; {REMEDY}",
+            self.path.display(),
+            &self.record[last]
+        ))
+    }
+}
+
+fn line(record: &StringRecord) -> u64 {
+    record.position().map_or(0, csv::Position::line)
+}
+
+/// Whether the file is complete as far as its last byte tells; it is then read from its start.
+fn ends_with_a_line(file: &mut File) -> std::io::Result<bool> {
+    let mut last = [0];
+    if file.metadata()?.len() > 0 {
+        file.seek(SeekFrom::End(-1))?;
+        file.read_exact(&mut last)?;
+        file.rewind()?;
+    }
+    Ok(last == *b"\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::{OutputFolder, tables::SummaryTable, tally::tests::outcome};
+
+    #[test]
+    fn a_row_reads_back_to_the_outcome_that_was_written() {
+        let home = tempfile::tempdir().unwrap();
+        let mut written = outcome(3, Status::Stalled, Some(0.1 + 0.2));
+        (written.cell, written.rejected, written.self_crossing, written.t_half) = (1, 7, Some(1.0 / 3.0), Some(1e-300));
+        written.start = Observables { length: 9.1, area: -6.5, excess: 0.3, energy: 2.0, ..Observables::default() };
+        written.end = Observables {
+            length: 8.1,
+            area: 6.1,
+            excess: -0.0,
+            energy: 1.0 / 7.0,
+            k_min: -3.0,
+            k_max: f64::MAX,
+            mesh_ratio: 1.5,
+            metric_drift: 0.01,
+            turning: -1,
+        };
+        let folder = OutputFolder::open(home.path(), true).unwrap();
+        let mut table = SummaryTable::begin(folder.file(folder::SUMMARY).unwrap()).unwrap();
+        table.row(&written).unwrap();
+        folder.publish_all(vec![table.ready().unwrap()]).unwrap();
+        let mut spec = Spec { curves: 2, ..Spec::default() };
+        spec.sweep.set("omega=1,2".parse().unwrap());
+        let read: Vec<Outcome> = Summary::open(home.path(), &spec).unwrap().map(Result::unwrap).collect();
+        assert_eq!(read, [written.clone()]);
+        assert_eq!(read[0].end.excess.to_bits(), written.end.excess.to_bits());
+    }
+}
