@@ -67,7 +67,6 @@
 //!         assert_eq!(ended.outcome.status, Status::Unfinished);
 //!         Ok(())
 //!     }
-//!     fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
 //! }
 //!
 //! let spec = Spec {

@@ -70,7 +70,7 @@ pub fn simulate(
             backend.start(batch)?;
         }
         let work = queue.ended as f64 + pool.share();
-        sink.progress(queue.ended, queue.total, work / queue.total as f64);
+        sink.progress(queue.ended, queue.total, work / queue.total as f64)?;
         if pool.resident.iter().all(Option::is_none) {
             break;
         }

@@ -4,6 +4,7 @@
 //! ended badly at its last good state. How many of these there are is in the row.
 
 use csv::Writer;
+use serde::Serialize;
 
 use super::tally::{CellTally, Tally};
 use crate::{
@@ -36,6 +37,24 @@ pub struct CellStatistics {
     pub interval: Option<Interval>,
 }
 
+/// The numbers of `ensemble.csv` on the relaxation times of a cell, named as its columns are.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[expect(missing_docs, reason = "README has the columns")]
+pub struct CellTimes {
+    pub known: usize,
+    pub mean: Option<f64>,
+    pub sd: Option<f64>,
+    pub se: Option<f64>,
+    pub restricted_to: Option<f64>,
+    pub q05: Option<f64>,
+    pub q25: Option<f64>,
+    pub median: Option<f64>,
+    pub q75: Option<f64>,
+    pub q95: Option<f64>,
+    pub median_low: Option<f64>,
+    pub median_high: Option<f64>,
+}
+
 /// Relaxation times of all cells, and how they compare.
 pub struct EnsembleStatistics {
     /// Each cell.
@@ -59,6 +78,26 @@ impl CellStatistics {
     /// Members that ended.
     pub fn members(&self) -> u64 {
         self.counts.iter().sum()
+    }
+
+    /// What the table says of the times.
+    pub fn times(&self) -> CellTimes {
+        let mean = self.mean;
+        let [q05, q25, median, q75, q95] = QUANTILES.map(|(share, _)| self.survival.quantile(share));
+        CellTimes {
+            known: self.survival.events(),
+            mean: mean.map(|mean| mean.value),
+            sd: mean.and_then(|mean| mean.standard_deviation),
+            se: mean.and_then(|mean| mean.standard_error),
+            restricted_to: mean.and_then(|mean| mean.restricted_to),
+            q05,
+            q25,
+            median,
+            q75,
+            q95,
+            median_low: self.interval.and_then(|interval| interval.lower),
+            median_high: self.interval.and_then(|interval| interval.upper),
+        }
     }
 
     /// The interval of the median, where both its ends are known.
@@ -102,19 +141,7 @@ impl EnsembleStatistics {
         let header = header.chain(times.map(|name| format!("t_relax_{name}")));
         writer.write_record(header).map_err(|e| failed(&e))?;
         for cell in &self.cells {
-            let mean = cell.mean;
-            let moments = [
-                mean.map(|mean| mean.value),
-                mean.and_then(|mean| mean.standard_deviation),
-                mean.and_then(|mean| mean.standard_error),
-                mean.and_then(|mean| mean.restricted_to),
-            ];
-            let quantiles = QUANTILES.map(|(share, _)| cell.survival.quantile(share));
-            let interval = cell.interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
-            let row = (
-                (cell.cell, &cell.values, cell.members(), cell.counts, cell.survival.events()),
-                (moments, quantiles, interval),
-            );
+            let row = (cell.cell, &cell.values, cell.members(), cell.counts, cell.times());
             writer.serialize(row).map_err(|e| failed(&e))?;
         }
         let bytes = writer.into_inner().map_err(|e| failed(&e))?;
