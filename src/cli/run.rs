@@ -2,11 +2,12 @@
 
 use std::{ops::Range, path::PathBuf, time::Duration};
 
-use super::{flags, note, print};
+use super::{dry_run, flags, note, print, to_json};
 use crate::{
     backend,
     ensemble::{Cell, Spec, study},
     error::{Error, Result},
+    estimate::Estimate,
     report::{Form, OutputFolder, Report, folder, gallery::MOST_PANELS, text::plural},
     simulate::simulate,
 };
@@ -20,6 +21,7 @@ Examples:
       relaxation times of an outline, with steps of the right length
   curvelax run --curves 8 --tau 1e-4 --print-spec > spec.toml
   curvelax run spec.toml --seed 2 --out second
+  curvelax run spec.toml --dry-run
 
 The keys of SPEC.toml are the names of the flags; a flag wins over the file.";
 
@@ -33,7 +35,7 @@ pub struct RunArgs {
     #[command(flatten)]
     flags: flags::SpecFlags,
     /// Folder for the results, which must not exist yet
-    #[arg(long, value_name = "DIR", required_unless_present = "print_spec", help_heading = flags::OUTPUT)]
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["print_spec", "dry_run"], help_heading = flags::OUTPUT)]
     out: Option<PathBuf>,
     /// Write into an existing DIR, replacing the files of an earlier run
     #[arg(long, help_heading = flags::OUTPUT)]
@@ -50,6 +52,9 @@ pub struct RunArgs {
     /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; the rows of the members that ended are kept
     #[arg(long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, help_heading = flags::OUTPUT)]
     max_time: Option<Duration>,
+    /// Print what the run will take, from a pilot of about two seconds, and stop: memory, steps, time
+    #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
+    dry_run: bool,
     /// Print the resolved spec and stop
     #[arg(long, help_heading = flags::OUTPUT)]
     print_spec: bool,
@@ -76,6 +81,14 @@ pub fn run(args: RunArgs) -> Result<()> {
     }
     if args.print_spec {
         return print(&spec.to_toml()?);
+    }
+    if args.dry_run {
+        let estimate = Estimate::new(&mut cells, companies, choices)?;
+        return match (args.json, args.quiet) {
+            (true, _) => print(&to_json(&estimate)?),
+            (false, false) => print(&dry_run::table(&estimate, &cells[0].spec)),
+            (false, true) => Ok(()),
+        };
     }
     let out = args.out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
     let say = |line: &str| {

@@ -3,7 +3,7 @@
 //! A member whose time is not known is censored where it ended: one that is unfinished at the final time, and one that
 //! ended badly at its last good state. How many of these there are is in the row.
 
-use csv::Writer;
+use csv::WriterBuilder;
 use serde::Serialize;
 
 use super::tally::{CellTally, Tally};
@@ -132,7 +132,7 @@ impl EnsembleStatistics {
     /// The text of `ensemble.csv`.
     pub fn to_csv(&self, spec: &Spec) -> Result<String> {
         let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write ensemble.csv: {e}"));
-        let mut writer = Writer::from_writer(Vec::new());
+        let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
         let keys = spec.sweep.axes().iter().map(|axis| axis.key.clone());
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
         let times = ["known", "mean", "sd", "se", "restricted_to"].into_iter();

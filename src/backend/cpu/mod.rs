@@ -11,7 +11,7 @@ pub use vectors::{Vectorised, Vectors};
 use std::{
     sync::{
         Arc,
-        mpsc::{Receiver, channel},
+        mpsc::{Receiver, RecvTimeoutError, channel},
     },
     time::{Duration, Instant},
 };
@@ -63,12 +63,17 @@ pub struct CpuBackend<T> {
 /// The members in a part of the slots.
 type Members<T> = Vec<Option<Box<Run<T>>>>;
 
+/// Members that come back, and the time that they took.
+type Back<T> = (Members<T>, Duration);
+
 /// Part of the slots.
 struct Batch<T> {
     /// Empty while the batch is on its way.
     members: Members<T>,
-    /// Where they come back from there, with the time that it took.
-    coming: Option<Receiver<(Members<T>, Duration)>>,
+    /// Where they come back from there.
+    coming: Option<Receiver<Back<T>>>,
+    /// What came.
+    back: Option<Back<T>>,
 }
 
 impl<T: Vectorised> CpuBackend<T> {
@@ -85,7 +90,7 @@ impl<T: Vectorised> CpuBackend<T> {
         let threads = pool.current_num_threads();
         let crew = T::crew(vectors, method.solver, blocks, threads)?;
         let slots = threads * SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * crew.lanes());
-        let batch = || Batch { members: (0..slots).map(|_| None).collect(), coming: None };
+        let batch = || Batch { members: (0..slots).map(|_| None).collect(), coming: None, back: None };
         Ok(CpuBackend {
             batches: [batch(), batch()],
             slots: BATCHES * slots,
@@ -153,11 +158,25 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
         Ok(())
     }
 
+    fn is_back(&mut self, batch: usize, most: Duration) -> bool {
+        let Batch { coming, back, .. } = &mut self.batches[batch];
+        if let (None, Some(coming)) = (&back, coming) {
+            match coming.recv_timeout(most) {
+                Ok(members) => *back = Some(members),
+                Err(RecvTimeoutError::Timeout) => return false,
+                // `finish` tells.
+                Err(RecvTimeoutError::Disconnected) => {}
+            }
+        }
+        true
+    }
+
     fn finish(&mut self, batch: usize) -> Result<()> {
-        let Some(coming) = self.batches[batch].coming.take() else { return Ok(()) };
-        let back = coming.recv().map_err(|_| Error::Failed("a thread of the CPU back end has panicked".into()))?;
-        let (members, took) = back;
-        self.batches[batch].members = members;
+        let batch = &mut self.batches[batch];
+        let Some(coming) = batch.coming.take() else { return Ok(()) };
+        let back = batch.back.take().map_or_else(|| coming.recv(), Ok);
+        let (members, took) = back.map_err(|_| Error::Failed("a thread of the CPU back end has panicked".into()))?;
+        batch.members = members;
         let share = ADVANCE_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
         let steps = (f64::from(self.steps) * share) as u32;
         self.steps = steps.clamp(1, 2 * self.steps).min(most_steps(self.method.solver));
