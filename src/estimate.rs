@@ -16,9 +16,9 @@ use crate::{
     backend::{Backend, Choice, Platform},
     ensemble::{Cell, Ended, Sink, Spec, spec::Pace, spec::Precision},
     error::{Error, Result},
+    report::gallery::MOST_PANELS,
     schedule::Clock,
-    scheme::state::STATE_FIELDS,
-    simulate::simulate,
+    simulate::{FRAMES, simulate},
     statistics::{Observation, Step},
 };
 
@@ -32,9 +32,15 @@ const FIRST_SHARE: usize = 8;
 const FILLED: f64 = 0.6;
 
 /// The program with nothing to do, in bytes.
-const PROGRAM_BYTES: u64 = 15 << 20;
-/// Charts and page of a run with few members, in bytes.
-const REPORT_BYTES: u64 = 2 << 20;
+const PROGRAM_BYTES: u64 = 10_000_000;
+/// Numbers that a resident member takes a node: its state on the back end and the one at its start on the host, of
+/// 18 each, with what surrounds them. Measured, as the next one is.
+const POOL_NUMBERS: usize = 68;
+/// Bytes of the page and its pictures a node, up to as many nodes as are drawn.
+const PAGE_BYTES: usize = 25_000;
+const DRAWN_NODES: usize = 600;
+/// Copies of the nodes of the members that are drawn.
+const PORTRAIT_COPIES: usize = 3;
 
 /// What a run will take.
 #[derive(Clone, Debug, Serialize)]
@@ -68,6 +74,8 @@ pub struct Pilot {
     pub members: u64,
     /// Those of them that ended.
     pub ended: u64,
+    /// Those of them that relaxed.
+    pub relaxed: u64,
     /// Time taken.
     pub seconds: f64,
 }
@@ -88,7 +96,8 @@ impl Estimate {
     /// As the run itself.
     pub fn new(cells: &mut [Cell], companies: Vec<Range<usize>>, choices: Vec<Choice>) -> Result<Estimate> {
         let members = cells.iter().map(|cell| cell.spec.member_count()).sum::<u64>();
-        let (mut opened, mut slots, mut start_up, mut pilot) = (None, 0, 0.0, Pilot::default());
+        let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
+        let (mut slots, mut resident) = (0, 0);
         let (every, count) = (companies.len().div_ceil(MOST_PILOTS), companies.len());
         let budget = PILOT / count.div_ceil(every).max(1) as u32;
         let mut total = Work { seconds: Some(0.0), dispatches: Some(0.0), steps: Some(0.0), ..Work::default() };
@@ -102,7 +111,8 @@ impl Estimate {
             start_up += started.elapsed().as_secs_f64();
             opened.get_or_insert(platform);
             slots = slots.max(backend.slots());
-            let work = sample(company, precision, backend.as_mut(), budget, &mut pilot)?;
+            let (work, most) = sample(company, precision, backend.as_mut(), budget, &mut pilot)?;
+            resident = resident.max(most.min(backend.slots() as u64) as usize);
             let add = |sum: Option<f64>, part: Option<f64>| Some(sum? + part?);
             total.members += work.members;
             total.seconds = add(total.seconds, work.seconds);
@@ -117,7 +127,14 @@ impl Estimate {
         Ok(Estimate {
             members,
             cells: cells.len(),
-            memory_bytes: memory(members, slots, cells[0].spec.points, cells.iter().map(rows).sum()),
+            memory_bytes: memory(
+                members,
+                // Where none has ended yet, all may relax.
+                if pilot.ended == 0 { 1.0 } else { pilot.relaxed as f64 / pilot.ended as f64 },
+                [slots, resident],
+                cells[0].spec.points,
+                cells.iter().map(rows).sum(),
+            ),
             platform,
             slots,
             steps_per_member: total.steps.map(|steps| steps / total.members.max(1.0)),
@@ -134,6 +151,7 @@ struct Seen {
     members: u64,
     /// Members that have left it, and the steps that they made.
     left: u64,
+    relaxed: u64,
     steps: u64,
     /// Share of its work that was done.
     share: f64,
@@ -142,9 +160,16 @@ struct Seen {
     until: Instant,
 }
 
+impl Seen {
+    fn new(members: u64, until: Instant) -> Seen {
+        Seen { members, left: 0, relaxed: 0, steps: 0, share: 0.0, dispatches: 0, seconds: 0.0, until }
+    }
+}
+
 impl Sink for Seen {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         self.left += 1;
+        self.relaxed += u64::from(ended.outcome.t_relax.is_some());
         self.steps += ended.outcome.steps;
         Ok(())
     }
@@ -159,14 +184,14 @@ impl Sink for Seen {
     }
 }
 
-/// Pilots of a company, and what all of it will take.
+/// Pilots of a company: what all of it will take, and the members of the largest.
 fn sample(
     company: &mut [Cell],
     precision: Precision,
     backend: &mut dyn Backend,
     budget: Duration,
     pilot: &mut Pilot,
-) -> Result<Work> {
+) -> Result<(Work, u64)> {
     let until = Instant::now() + budget;
     let own: Vec<Option<Vec<u64>>> = company.iter().map(|cell| cell.spec.only.clone()).collect();
     let all: u64 = company.iter().map(|cell| cell.spec.member_count()).sum();
@@ -174,7 +199,7 @@ fn sample(
     let mut count = (backend.slots().div_ceil(FIRST_SHARE) as u64).min(all);
     loop {
         choose(company, &own, all, count);
-        let mut seen = Seen { members: count, left: 0, steps: 0, share: 0.0, dispatches: 0, seconds: 0.0, until };
+        let mut seen = Seen::new(count, until);
         let started = Instant::now();
         let stopped = match simulate(company, precision, backend, 0, &mut seen) {
             Err(Error::Stopped(_)) => true,
@@ -194,15 +219,17 @@ fn sample(
     for seen in &pilots {
         pilot.members += seen.members;
         pilot.ended += seen.left;
+        pilot.relaxed += seen.relaxed;
         pilot.seconds += seen.seconds;
     }
     let steps = pilots.iter().rfind(|seen| seen.left > 0).map(|seen| seen.steps as f64 / seen.left as f64);
-    Ok(Work {
+    let work = Work {
         members: all as f64,
         seconds: extrapolated(&pilots, all, |seen| seen.seconds),
         dispatches: extrapolated(&pilots, all, |seen| seen.dispatches as f64),
         steps: steps.or_else(|| certain_steps(company)).map(|each| each * all as f64),
-    })
+    };
+    Ok((work, count))
 }
 
 /// A cost of `all` members from that of the pilots, each of which is scaled to its end.
@@ -244,19 +271,27 @@ fn choose(company: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) 
     }
 }
 
-/// Peak resident size of a run: what the process has taken by now, back end and resident members included, and what
-/// tally and statistics keep of each member.
+/// Peak resident size of a run of `members` of `n` nodes, in bytes, from that of this process, which had `resident` of
+/// up to `slots` members in its pool.
 ///
-/// At the end there are of each member: its time and its mesh quality in the tally, its time in the sorted sample, a step
-/// of the survival curve, and the numbers of the charts: for the curve and its band four, for the histogram, the two of
-/// the mesh and their sorted copies five.
-fn memory(members: u64, slots: usize, n: usize, series_rows: u64) -> u64 {
-    let numbers = |count: usize| count * size_of::<f64>();
-    let kept = 2 * size_of::<Observation>() + numbers(2) + size_of::<Step>() + numbers(9);
-    // The state on the back end, that at its start on the host, and the nodes.
-    let pool = || (slots * n * numbers(2 * STATE_FIELDS + 2)) as u64;
-    let excess = series_rows * (2 * numbers(4)) as u64;
-    peak_resident().unwrap_or_else(|| PROGRAM_BYTES + pool()) + REPORT_BYTES + members * kept as u64 + excess
+/// The peak is at the end of the run, with a full pool and the tally, or after that, with the statistics and the charts
+/// and without the pool. The tally has of each member its time and its mesh quality. Then come its time in the sorted
+/// sample and five numbers for the charts; and of the share `relaxed` a step of the survival curve and its number there.
+fn memory(members: u64, relaxed: f64, [slots, resident]: [usize; 2], n: usize, series_rows: u64) -> u64 {
+    let numbers = |count: usize| (count * size_of::<f64>()) as u64;
+    let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
+    let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MOST_PANELS);
+    let portraits = numbers(2 * n * (FRAMES as usize + 2) * drawn);
+    let page = (PAGE_BYTES * n.min(DRAWN_NODES) * drawn / MOST_PANELS) as u64;
+    let tally = members * (size_of::<Observation>() as u64 + numbers(2));
+    let curve = relaxed * (members * (size_of::<Step>() as u64 + numbers(1))) as f64;
+    let statistics = members * (size_of::<Observation>() as u64 + numbers(5)) + curve as u64;
+    let excess = series_rows * numbers(8);
+    let program = peak_resident().map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(pool(resident)));
+    let full = usize::try_from(members).unwrap_or(usize::MAX).min(slots);
+    let running = pool(full) + portraits;
+    let reporting = PORTRAIT_COPIES as u64 * portraits + page + statistics;
+    program + tally + excess + running.max(reporting)
 }
 
 /// The most that this process has had resident so far, in bytes, where the system tells.
@@ -306,7 +341,7 @@ mod tests {
     }
 
     fn seen(members: u64, share: f64, seconds: f64) -> Seen {
-        Seen { members, left: 0, steps: 0, share, dispatches: 0, seconds, until: Instant::now() }
+        Seen { share, seconds, ..Seen::new(members, Instant::now()) }
     }
 
     #[test]

@@ -20,7 +20,7 @@ const MEMBERS_AHEAD: usize = 8;
 const LONGEST_WAIT: Duration = Duration::from_secs(1);
 
 /// Pictures of a member on its way, where it has a portrait.
-const FRAMES: u32 = 30;
+pub const FRAMES: u32 = 30;
 
 /// Runs the members of `cells`, which keep [company](crate::ensemble::study::companies), on `backend`, and hands each to
 /// `sink` in member order.
