@@ -18,8 +18,6 @@ impl Sink for Times {
         self.0.extend(ended.outcome.t_relax);
         Ok(())
     }
-
-    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
 }
 
 fn main() -> curvelax::Result<()> {

@@ -21,8 +21,6 @@ impl Sink for Print {
         println!("1 % of the initial excess: {t_relax}");
         Ok(())
     }
-
-    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
 }
 
 fn main() -> curvelax::Result<()> {

@@ -26,6 +26,12 @@ pub enum Error {
     /// A comparison or run ended badly, as reported in its table. Exit code 1.
     #[error("{0}")]
     Failed(String),
+    /// The run is done and its files are written, but members ended in a way that was to be an error. Exit code 3.
+    #[error("{0}")]
+    Strict(String),
+    /// The run was stopped before its end, as was asked for. Exit code 75.
+    #[error("{0}")]
+    Stopped(String),
 }
 
 /// Result with the crate's [`Error`] unless another is named.
@@ -48,6 +54,8 @@ impl Error {
         match self {
             Error::Request(_) => 2,
             Error::Io { .. } | Error::Device(_) | Error::Failed(_) => 1,
+            Error::Strict(_) => 3,
+            Error::Stopped(_) => 75,
         }
     }
 }

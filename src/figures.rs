@@ -218,8 +218,9 @@ impl Sink for Only {
         Ok(())
     }
 
-    fn progress(&mut self, done: u64, total: u64, share: f64) {
+    fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
         self.progress.show(done, total, share);
+        Ok(())
     }
 }
 

@@ -42,6 +42,7 @@
 //! | [`report`] | tables, plots, provenance |
 //! | [`figures`] | the paper's figures, as data |
 //! | [`mod@bench`] | how fast a back end advances members |
+//! | [`estimate`] | what a run will take, from a short pilot |
 //! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
 //! | [`cli`] | the commands |
 //!
@@ -67,7 +68,6 @@
 //!         assert_eq!(ended.outcome.status, Status::Unfinished);
 //!         Ok(())
 //!     }
-//!     fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
 //! }
 //!
 //! let spec = Spec {
@@ -94,6 +94,7 @@ pub mod conformance;
 pub mod curve;
 pub mod ensemble;
 pub mod error;
+pub mod estimate;
 pub mod figures;
 pub mod flow;
 pub mod number;

@@ -3,7 +3,7 @@
 //! Nothing here depends on where the members are advanced or on how many are resident: a member's steps are its
 //! own, its output times are reached by pausing it there, and rows leave in member order.
 
-use std::{collections::BTreeMap, ops::Range};
+use std::{collections::BTreeMap, ops::Range, time::Duration};
 
 use crate::{
     backend::Backend,
@@ -16,6 +16,9 @@ use crate::{
 
 /// A member is admitted when at most this many times the slots are waiting for the first one that has not ended.
 const MEMBERS_AHEAD: usize = 8;
+
+/// Where a dispatch takes longer, the sink is told in between, and may stop the run.
+const LONGEST_WAIT: Duration = Duration::from_secs(1);
 
 /// Runs the members of `cells`, which keep [company](crate::ensemble::study::companies), on `backend`, and hands each to
 /// `sink` in member order.
@@ -57,6 +60,9 @@ pub fn simulate(
     for batch in (0..backend.batches()).cycle() {
         let slots = batch * size..(batch + 1) * size;
         if pool.resident[slots.clone()].iter().any(Option::is_some) {
+            while !backend.is_back(batch, LONGEST_WAIT) {
+                queue.tell(&pool, sink)?;
+            }
             backend.finish(batch)?;
             for (rank, ended) in pool.collect(backend, slots.clone())? {
                 queue.leave(rank, ended, sink)?;
@@ -73,8 +79,7 @@ pub fn simulate(
         if pool.resident[slots].iter().any(Option::is_some) {
             backend.start(batch)?;
         }
-        let work = queue.ended as f64 + pool.share();
-        sink.progress(queue.ended, queue.total, work / queue.total as f64);
+        queue.tell(&pool, sink)?;
         if pool.resident.iter().all(Option::is_none) {
             break;
         }
@@ -160,6 +165,12 @@ struct Queue {
 }
 
 impl Queue {
+    /// Tells how far the run is, and hears whether it is to go on.
+    fn tell(&self, pool: &Pool, sink: &mut dyn Sink) -> Result<()> {
+        let work = self.ended as f64 + pool.share();
+        sink.progress(self.ended, self.total, work / self.total as f64)
+    }
+
     fn leave(&mut self, rank: usize, ended: Ended, sink: &mut dyn Sink) -> Result<()> {
         self.ended += 1;
         self.early.insert(rank, ended);

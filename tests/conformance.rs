@@ -302,7 +302,6 @@ impl Sink for Outcomes {
         self.0.push(format!("{outcome:?} {series:?} {snapshots:?}"));
         Ok(())
     }
-    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
 }
 
 /// Members that end at their own times, looked at on the way, refilled into slots of two batches.

@@ -159,7 +159,6 @@ impl Sink for Recorder {
         self.0.push(ended.clone());
         Ok(())
     }
-    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
 }
 
 #[test]

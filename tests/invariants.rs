@@ -36,8 +36,6 @@ impl Sink for Last {
         self.0 = Some(ended.clone());
         Ok(())
     }
-
-    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
 }
 
 /// What became of `curve`, and its last nodes.

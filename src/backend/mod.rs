@@ -9,6 +9,8 @@ pub mod gpu;
 
 pub use choose::{Choice, Platform, choose};
 
+use std::time::Duration;
+
 use crate::{
     error::Result,
     scheme::{
@@ -38,6 +40,12 @@ pub trait Backend {
 
     /// Begins to advance a batch; until `finish` its slots are left alone.
     fn start(&mut self, batch: usize) -> Result<()>;
+
+    /// Waits until the batch has advanced, but no longer than `most`; whether it has. Where waits are short by nature, it
+    /// may leave them to `finish`.
+    fn is_back(&mut self, _batch: usize, _most: Duration) -> bool {
+        true
+    }
 
     /// Waits until the batch has advanced.
     fn finish(&mut self, batch: usize) -> Result<()>;

@@ -1,56 +1,120 @@
 //! `curvelax adapters`: what this machine offers, and which adapter `auto` takes and why.
 
-use super::print;
+use serde::Serialize;
+
+use super::{flags, print, to_json};
 use crate::{
     backend::{self, choose::MAX_POINTS_F32, gpu::Gpu},
-    ensemble::Spec,
+    ensemble::{
+        Spec,
+        spec::{BackendChoice, Precision},
+    },
     error::Result,
 };
 
+const EXAMPLES: &str = "\
+Examples:
+  curvelax adapters
+  curvelax adapters --json";
+
 /// List the GPU adapters, their features and limits, and which one `--backend auto` takes and why.
 #[derive(clap::Args)]
-pub struct AdaptersArgs {}
-
-/// Prints the listing.
-pub fn adapters(AdaptersArgs {}: AdaptersArgs) -> Result<()> {
-    let found = Gpu::list();
-    let spec = Spec::default();
-    let mut text = String::new();
-    for gpu in &found {
-        text += &describe(gpu, &spec);
-    }
-    if found.is_empty() {
-        text += "no GPU adapter; Debian's software GPU is the package mesa-vulkan-drivers\n";
-    }
-    let choice = backend::choose(&spec, spec.points)?;
-    print(&format!("{text}\n--backend auto, for the default run: {}\n", choice.sentence(&spec)))
+#[command(after_help = EXAMPLES)]
+pub struct AdaptersArgs {
+    /// The list as JSON
+    #[arg(long, help_heading = flags::OUTPUT)]
+    json: bool,
 }
 
-fn describe(gpu: &Gpu, spec: &Spec) -> String {
-    let (limits, capacity) = (gpu.limits(), gpu.capacity());
-    let kind = if gpu.is_hardware() { "hardware" } else { "software" };
-    let points = match gpu.has_f64() {
-        true => format!(
-            "{} in f32, {} in f64",
-            capacity.max_points::<f32>(spec.solver()).min(MAX_POINTS_F32),
-            capacity.max_points::<f64>(spec.solver())
-        ),
-        false => format!("{} in f32", capacity.max_points::<f32>(spec.solver()).min(MAX_POINTS_F32)),
-    };
-    let rows = [
-        ("kind", format!("{kind}, {}, {}", gpu.device_type(), gpu.api())),
-        ("driver", gpu.driver()),
-        ("precisions", if gpu.has_f64() { "f32, f64" } else { "f32" }.into()),
-        ("points", format!("at most {points}")),
-        (
-            "workgroup",
-            format!(
-                "{} threads, {} bytes, subgroups of {}",
-                capacity.threads, capacity.workgroup_bytes, capacity.subgroup
+/// What there is, and what is taken.
+#[derive(Serialize)]
+struct Listing {
+    curvelax: &'static str,
+    adapters: Vec<Adapter>,
+    auto: Auto,
+}
+
+/// An adapter, with its limits for the solver of the default run.
+#[derive(Serialize)]
+struct Adapter {
+    name: String,
+    hardware: bool,
+    device_type: String,
+    api: String,
+    driver: String,
+    /// Most nodes of a member; null where there is no f64.
+    max_points_f32: usize,
+    max_points_f64: Option<usize>,
+    workgroup_threads: usize,
+    workgroup_bytes: usize,
+    subgroup: u32,
+    binding_bytes: u64,
+}
+
+/// What `--backend auto` takes for the default run.
+#[derive(Serialize)]
+struct Auto {
+    backend: BackendChoice,
+    adapter: Option<String>,
+    precision: Option<Precision>,
+    sentence: String,
+}
+
+/// Prints the listing.
+pub fn adapters(args: AdaptersArgs) -> Result<()> {
+    let spec = Spec::default();
+    let adapters: Vec<Adapter> = Gpu::list().iter().map(|gpu| Adapter::new(gpu, &spec)).collect();
+    let choice = backend::choose(&spec, spec.points)?;
+    let mut settled = spec.clone();
+    choice.settle_place(&mut settled);
+    let Spec { backend, adapter, precision, .. } = settled;
+    let auto = Auto { backend, adapter, precision, sentence: choice.sentence(&spec) };
+    if args.json {
+        return print(&to_json(&Listing { curvelax: env!("CARGO_PKG_VERSION"), adapters, auto })?);
+    }
+    let mut text: String = adapters.iter().map(Adapter::describe).collect();
+    if adapters.is_empty() {
+        text += "no GPU adapter; Debian's software GPU is the package mesa-vulkan-drivers\n";
+    }
+    print(&format!("{text}\n--backend auto, for the default run: {}\n", auto.sentence))
+}
+
+impl Adapter {
+    fn new(gpu: &Gpu, spec: &Spec) -> Adapter {
+        let capacity = gpu.capacity();
+        Adapter {
+            name: gpu.name().into(),
+            hardware: gpu.is_hardware(),
+            device_type: gpu.device_type(),
+            api: gpu.api(),
+            driver: gpu.driver(),
+            max_points_f32: capacity.max_points::<f32>(spec.solver()).min(MAX_POINTS_F32),
+            max_points_f64: gpu.has_f64().then(|| capacity.max_points::<f64>(spec.solver())),
+            workgroup_threads: capacity.threads,
+            workgroup_bytes: capacity.workgroup_bytes,
+            subgroup: capacity.subgroup,
+            binding_bytes: gpu.limits().max_storage_buffer_binding_size,
+        }
+    }
+
+    fn describe(&self) -> String {
+        let kind = if self.hardware { "hardware" } else { "software" };
+        let f64_points = self.max_points_f64.map_or(String::new(), |most| format!(", {most} in f64"));
+        let rows = [
+            ("kind", format!("{kind}, {}, {}", self.device_type, self.api)),
+            ("driver", self.driver.clone()),
+            ("precisions", if self.max_points_f64.is_some() { "f32, f64" } else { "f32" }.into()),
+            ("points", format!("at most {} in f32{f64_points}", self.max_points_f32)),
+            (
+                "workgroup",
+                format!(
+                    "{} threads, {} bytes, subgroups of {}",
+                    self.workgroup_threads, self.workgroup_bytes, self.subgroup
+                ),
             ),
-        ),
-        ("binding", format!("{} bytes", limits.max_storage_buffer_binding_size)),
-    ];
-    let rows: String = rows.iter().map(|(label, value)| format!("  {label:<12}{value}\n")).collect();
-    format!("{}\n{rows}", gpu.name())
+            ("binding", format!("{} bytes", self.binding_bytes)),
+        ];
+        let rows: String = rows.iter().map(|(label, value)| format!("  {label:<12}{value}\n")).collect();
+        format!("{}\n{rows}", self.name)
+    }
 }

@@ -4,7 +4,7 @@ use std::{collections::HashSet, time::Duration};
 
 use serde::Serialize;
 
-use super::{flags, note, print};
+use super::{flags, note, print, to_json};
 use crate::{
     backend::{choose::no_adapter, gpu::Gpu},
     bench::{self, Bench, Sample},
@@ -153,9 +153,7 @@ pub fn bench(args: BenchArgs) -> Result<()> {
     let rows: Vec<Row> = cases.iter().map(Case::row).collect();
     if args.json {
         let benches = Benches { curvelax: env!("CARGO_PKG_VERSION"), seconds, repeats, rows: &rows };
-        let text =
-            serde_json::to_string_pretty(&benches).map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        return print(&(text + "\n"));
+        return print(&to_json(&benches)?);
     }
     print(&table(&rows))
 }

@@ -1,6 +1,8 @@
 //! `curvelax check`: does the GPU compute what the CPU computes, on this machine?
 
-use super::{note, print};
+use serde::Serialize;
+
+use super::{flags, note, print, to_json};
 use crate::{
     backend::{
         choose::no_adapter,
@@ -15,7 +17,7 @@ use crate::{
 const EXAMPLES: &str = "\
 Examples:
   curvelax check
-  curvelax check --adapter llvmpipe
+  curvelax check --adapter llvmpipe --json > check.json
 
 An error is the largest difference between GPU and CPU over all members and nodes; a bound is a small multiple of
 the rounding error of the quantity's natural scale. Exit code 1 if one is exceeded.";
@@ -35,6 +37,34 @@ pub struct CheckArgs {
     /// No remarks on stderr
     #[arg(long)]
     quiet: bool,
+    /// The rows as JSON instead of the table
+    #[arg(long, help_heading = flags::OUTPUT)]
+    json: bool,
+}
+
+/// All rows of an adapter.
+#[derive(Serialize)]
+struct Comparison {
+    adapter: String,
+    driver: String,
+    members: usize,
+    rows: Vec<Verdict>,
+}
+
+/// A row, and whether it is good.
+#[derive(Serialize)]
+struct Verdict {
+    #[serde(flatten)]
+    row: Row,
+    passes: bool,
+}
+
+/// What programs get.
+#[derive(Serialize)]
+struct Checks {
+    curvelax: &'static str,
+    failed: usize,
+    adapters: Vec<Comparison>,
 }
 
 /// Runs the comparisons and prints their table.
@@ -48,7 +78,7 @@ pub fn check(args: CheckArgs) -> Result<()> {
             None => Error::Failed("no GPU adapter to check; `--backend cpu` needs none".into()),
         });
     }
-    let mut failed = 0;
+    let (mut failed, mut adapters) = (0, Vec::new());
     for gpu in &chosen {
         let say = |precision: &str| {
             if !args.quiet {
@@ -67,7 +97,18 @@ pub fn check(args: CheckArgs) -> Result<()> {
             }
         }
         failed += rows.iter().filter(|row| !row.passes()).count();
-        print(&table(gpu, &rows))?;
+        match args.json {
+            false => print(&table(gpu, &rows))?,
+            true => adapters.push(Comparison {
+                adapter: gpu.name().into(),
+                driver: gpu.driver(),
+                members: MEMBERS,
+                rows: rows.into_iter().map(|row| Verdict { passes: row.passes(), row }).collect(),
+            }),
+        }
+    }
+    if args.json {
+        print(&to_json(&Checks { curvelax: env!("CARGO_PKG_VERSION"), failed, adapters })?)?;
     }
     match failed {
         0 => Ok(()),

@@ -3,6 +3,8 @@
 //! Values are only parsed here. Ranges are checked once, on the resolved spec, so that a number from the file
 //! and a number from a flag meet the same check.
 
+use std::time::Duration;
+
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::{Deserialize, de::value::StrDeserializer};
 
@@ -242,6 +244,28 @@ pub(super) fn whole<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
     value.ok_or_else(|| format!("not a whole number from 0 to {}", u128::MAX >> (128 - 8 * size_of::<T>())))
 }
 
+/// A time in hours, minutes and seconds: `1h30m`, `5m`, `90s`, or seconds alone.
+pub(super) fn duration(text: &str) -> Result<Duration, String> {
+    let wrong = || "not a time; write 90, 90s, 5m or 1h30m".to_string();
+    let number =
+        |digits: &str| digits.parse::<u64>().ok().filter(|_| digits.bytes().all(|digit| digit.is_ascii_digit()));
+    let (mut rest, mut seconds) = (text.trim(), 0_u64);
+    if let Some(all) = number(rest) {
+        (rest, seconds) = ("", all);
+    }
+    for (unit, size) in [('h', 3600), ('m', 60), ('s', 1)] {
+        if let Some((digits, after)) = rest.split_once(unit) {
+            let part = number(digits).and_then(|count| count.checked_mul(size)).ok_or_else(wrong)?;
+            seconds = seconds.checked_add(part).ok_or_else(wrong)?;
+            rest = after;
+        }
+    }
+    match seconds {
+        1.. if rest.is_empty() => Ok(Duration::from_secs(seconds)),
+        _ => Err(wrong()),
+    }
+}
+
 fn text<T: TryFrom<String, Error = String>>(text: &str) -> Result<T, String> {
     T::try_from(text.to_owned())
 }
@@ -297,6 +321,32 @@ mod tests {
                 other => other.to_string(),
             };
             assert_eq!(stated, expected, "{argument}");
+        }
+    }
+
+    #[test]
+    fn a_duration_is_in_hours_minutes_and_seconds() {
+        for (text, seconds) in [("90", 90), ("90s", 90), ("5m", 300), ("1h30m", 5400), ("1h1s", 3601), (" 2h ", 7200)] {
+            assert_eq!(duration(text), Ok(Duration::from_secs(seconds)), "{text}");
+        }
+        for text in [
+            "",
+            "0",
+            "0s",
+            "-1",
+            "+5",
+            "1.5h",
+            "90x",
+            "5m1h",
+            "1m1m",
+            "m",
+            "1h30",
+            "s90",
+            "1d",
+            "1 h",
+            "18446744073709551615h",
+        ] {
+            assert!(duration(text).is_err_and(|message| message.contains("90s, 5m or 1h30m")), "{text}");
         }
     }
 

@@ -6,9 +6,12 @@
 mod adapters;
 mod bench;
 mod check;
+mod completions;
 mod convergence;
+mod dry_run;
 mod figure;
 mod flags;
+mod man;
 mod plot;
 mod run;
 
@@ -23,12 +26,18 @@ use clap::{
     CommandFactory, FromArgMatches, Parser, Subcommand,
     error::{ContextKind, ContextValue, ErrorKind},
 };
+use serde::Serialize;
 
 use crate::error::{Error, Result, nearest};
 
+const EXAMPLES: &str = "\
+Examples:
+  curvelax run --out ellipses
+  curvelax run --help";
+
 /// Relaxes ensembles of closed plane curves by fourth-order geometric flows, on the GPU and the CPU.
 #[derive(Parser)]
-#[command(name = "curvelax", version, arg_required_else_help = true)]
+#[command(name = "curvelax", version, arg_required_else_help = true, after_help = EXAMPLES)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -43,6 +52,8 @@ enum Command {
     Figure(figure::FigureArgs),
     Plot(plot::PlotArgs),
     Adapters(adapters::AdaptersArgs),
+    Completions(completions::CompletionsArgs),
+    Man(man::ManArgs),
 }
 
 /// Parses the arguments of the process, does what they ask, and returns the exit code.
@@ -56,6 +67,8 @@ pub fn main() -> ExitCode {
         Command::Figure(args) => figure::figure(args),
         Command::Plot(args) => plot::plot(args),
         Command::Adapters(args) => adapters::adapters(args),
+        Command::Completions(args) => completions::completions(args),
+        Command::Man(args) => man::man(args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -97,6 +110,12 @@ pub(crate) fn print(text: &str) -> Result<()> {
     }
 }
 
+/// `value` as JSON, in lines.
+fn to_json(value: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(value);
+    text.map(|text| text + "\n").map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))
+}
+
 /// Writes a line to stderr, where nothing can be done if that fails.
 pub(crate) fn note(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{line}");
@@ -109,6 +128,46 @@ mod tests {
     #[test]
     fn the_command_line_is_well_formed() {
         Cli::command().debug_assert();
+    }
+
+    /// The examples at the end of the help of a command.
+    fn examples(help: &str) -> Vec<&str> {
+        let (_, examples) = help.split_once("\nExamples:\n").unwrap_or_default();
+        let lines = examples.lines().take_while(|line| !line.is_empty()).map(str::trim);
+        lines.filter(|line| line.starts_with("curvelax ")).collect()
+    }
+
+    /// The words of a line as a shell passes them on, without what it takes for itself.
+    fn words(line: &str) -> impl Iterator<Item = &str> {
+        line.split_whitespace().take_while(|word| !matches!(*word, ">" | "|" | "#"))
+    }
+
+    #[test]
+    fn the_examples_of_every_help_parse() {
+        let mut commands: Vec<String> = Cli::command().get_subcommands().map(|c| c.get_name().into()).collect();
+        assert!(commands.len() >= 8, "{commands:?}");
+        commands.push(String::new());
+        for command in &commands {
+            let asked = ["curvelax", command, "--help"];
+            let help = parse(asked.into_iter().filter(|word| !word.is_empty())).err().expect("help").to_string();
+            let examples = examples(&help);
+            assert!(!examples.is_empty(), "no example in the help of `{command}`: {help}");
+            assert!(examples[0].starts_with(&format!("curvelax {command}")), "{help}");
+            for example in examples.iter().filter(|example| !example.ends_with("--help")) {
+                if let Err(error) = parse(words(example)) {
+                    panic!("`{example}` in the help of `{command}`: {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_example_that_does_not_parse_is_found() {
+        let help =
+            "Usage\n\nExamples:\n  curvelax run --out a\n      what it does\n  curvelax run --uot b > c\n\nText.\n";
+        assert_eq!(examples(help), ["curvelax run --out a", "curvelax run --uot b > c"]);
+        assert!(parse(words(examples(help)[0])).is_ok() && parse(words(examples(help)[1])).is_err());
+        assert_eq!(examples("Usage"), [""; 0]);
     }
 
     #[test]

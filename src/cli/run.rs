@@ -1,13 +1,14 @@
 //! `curvelax run`: arguments → spec → members → files.
 
-use std::{ops::Range, path::PathBuf};
+use std::{ops::Range, path::PathBuf, time::Duration};
 
-use super::{flags, note, print};
+use super::{dry_run, flags, note, print, to_json};
 use crate::{
     backend,
     ensemble::{Cell, Spec, study},
     error::{Error, Result},
-    report::{OutputFolder, Report, gallery::MOST_PANELS},
+    estimate::Estimate,
+    report::{Form, OutputFolder, Report, folder, gallery::MOST_PANELS, text::plural},
     simulate::simulate,
 };
 
@@ -20,6 +21,7 @@ Examples:
       relaxation times of an outline, with steps of the right length
   curvelax run --curves 8 --tau 1e-4 --print-spec > spec.toml
   curvelax run spec.toml --seed 2 --out second
+  curvelax run spec.toml --dry-run
 
 The keys of SPEC.toml are the names of the flags; a flag wins over the file.";
 
@@ -33,14 +35,26 @@ pub struct RunArgs {
     #[command(flatten)]
     flags: flags::SpecFlags,
     /// Folder for the results, which must not exist yet
-    #[arg(long, value_name = "DIR", required_unless_present = "print_spec", help_heading = flags::OUTPUT)]
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["print_spec", "dry_run"], help_heading = flags::OUTPUT)]
     out: Option<PathBuf>,
     /// Write into an existing DIR, replacing the files of an earlier run
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
-    /// No progress, no notes, no table: only errors
+    /// No progress, no notes, no table: only errors, and what --json asks for
     #[arg(long, help_heading = flags::OUTPUT)]
     quiet: bool,
+    /// Print the results as one JSON document instead of the table
+    #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
+    json: bool,
+    /// Exit code 3 if a member ends neither relaxed nor unfinished
+    #[arg(long, help_heading = flags::OUTPUT)]
+    strict: bool,
+    /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; the rows of the members that ended are kept
+    #[arg(long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, help_heading = flags::OUTPUT)]
+    max_time: Option<Duration>,
+    /// Print what the run will take, from a pilot of about two seconds, and stop: memory, steps, time
+    #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
+    dry_run: bool,
     /// Print the resolved spec and stop
     #[arg(long, help_heading = flags::OUTPUT)]
     print_spec: bool,
@@ -68,6 +82,14 @@ pub fn run(args: RunArgs) -> Result<()> {
     if args.print_spec {
         return print(&spec.to_toml()?);
     }
+    if args.dry_run {
+        let estimate = Estimate::new(&mut cells, companies, choices)?;
+        return match (args.json, args.quiet) {
+            (true, _) => print(&to_json(&estimate)?),
+            (false, false) => print(&dry_run::table(&estimate, &cells[0].spec)),
+            (false, true) => Ok(()),
+        };
+    }
     let out = args.out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
     let say = |line: &str| {
         if !args.quiet {
@@ -78,18 +100,33 @@ pub fn run(args: RunArgs) -> Result<()> {
     let early = warnings(&cells);
     early.iter().for_each(|warning| say(&format!("warning: {warning}")));
     let mut report = Report::begin(folder, &spec, cells[0].spec.points, args.quiet)?;
+    if let Some(most) = args.max_time {
+        report.stop_after(most);
+    }
     let rows = report.kept_rows();
+    let form = if args.json { Form::Json } else { Form::Overview };
     let done = advance(&cells, companies, choices, &mut report, &say).and_then(|platform| {
-        let late = report.warnings();
+        let (late, failed) = (report.warnings(), report.failed());
         let warnings = [&early[..], &late].concat();
-        Ok((report.finish(&spec, &platform, &warnings)?, late))
+        Ok((report.finish(&spec, &platform, &warnings, form)?, late, failed))
     });
     if done.is_err() && rows.exists() {
         note(&format!("note: the members that ended are kept in {}", rows.display()));
     }
-    let (overview, late) = done?;
+    let (text, late, failed) = done?;
     late.iter().for_each(|warning| say(&format!("warning: {warning}")));
-    if args.quiet { Ok(()) } else { print(&overview) }
+    if args.json || !args.quiet {
+        print(&text)?;
+    }
+    match failed {
+        1.. if args.strict => Err(Error::Strict(format!(
+            "--strict: {failed} of {} {} ended neither relaxed nor unfinished; see `status` in {}",
+            spec.member_count(),
+            plural(spec.member_count(), "member"),
+            out.join(folder::SUMMARY).display()
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Runs one company of cells after another; returns where the first one ran.

@@ -1,5 +1,7 @@
 //! The two comparisons, and their rows.
 
+use serde::Serialize;
+
 use super::{
     bounds::{Bound, DECAY, FIELDS, PACE, REPORT, STAGES, Scale},
     cases::{adaptive_members, members},
@@ -42,7 +44,7 @@ pub struct Tamper {
 }
 
 /// One line of the table: the worst case of a quantity over all members and nodes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// The quantity.
     pub quantity: &'static str,

@@ -62,6 +62,26 @@ impl Outline {
         source.outline(&String::from_utf8_lossy(&bytes))
     }
 
+    /// The outline through a list of points, in either sense, with or without the first one again at the end.
+    ///
+    /// ```
+    /// use curvelax::curve::Outline;
+    /// use glam::DVec2;
+    ///
+    /// let triangle = Outline::from_points(&[DVec2::ZERO, DVec2::X, DVec2::Y])?;
+    /// assert_eq!(triangle.vertices().len(), 3);
+    /// assert!(Outline::from_points(&[DVec2::ZERO, DVec2::X]).is_err());
+    /// # Ok::<(), curvelax::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Outline::read`], as if each point were a line of a file `(points)`.
+    pub fn from_points(points: &[DVec2]) -> Result<Outline> {
+        // `{:?}` reads back exactly.
+        let lines: String = points.iter().map(|point| format!("{:?},{:?}\n", point.x, point.y)).collect();
+        Source { path: Path::new("(points)") }.outline(&lines)
+    }
+
     /// The polygon through points that are known to be fit: counter-clockwise, no two neighbours the same.
     fn through(vertices: Vec<DVec2>, not_simple: Option<String>) -> Outline {
         let mut reached = vec![0.0];
@@ -415,6 +435,14 @@ mod tests {
         assert_refused("1,1\n", &["1 distinct point;"]);
         assert_refused("1,1\n1,1\n1,1\n", &["1 distinct point;"]);
         assert_refused("0,0\n1,1\n0,0\n1,1\n", &["2 distinct points"]);
+    }
+
+    #[test]
+    fn a_list_of_points_is_a_file_of_them() {
+        let points = [DVec2::ZERO, DVec2::new(1.0 / 3.0, 0.0), DVec2::new(0.1, 1e-7), DVec2::ZERO];
+        assert_eq!(Outline::from_points(&points).unwrap().vertices(), &points[..3]);
+        let message = Outline::from_points(&[DVec2::ZERO, DVec2::new(1.0, f64::NAN)]).unwrap_err().to_string();
+        assert!(message.contains("(points): line 2: `NaN` is not finite"), "{message}");
     }
 
     #[test]

@@ -63,6 +63,20 @@ impl Family {
 
     /// As [`Family::new`] with `curve` in place of the shape: any curve that has no name on the command line.
     ///
+    /// ```
+    /// use curvelax::{
+    ///     curve::BaseCurve,
+    ///     ensemble::{Family, Spec},
+    /// };
+    /// use glam::DVec2;
+    ///
+    /// let spec = Spec { points: 64, amplitude: 0.0, ..Spec::default() }.validate()?;
+    /// let circle = BaseCurve::from_formula(|u| DVec2::from_angle(std::f64::consts::TAU * u));
+    /// let member = Family::of(&spec, circle)?.member(0)?;
+    /// assert!(member.nodes.iter().all(|node| (node.length() - 1.0).abs() < 1e-6));
+    /// # Ok::<(), curvelax::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// [`Error::Request`] when one of the keys sampling, points, amplitude, modes and decay is wrong.
     pub fn of(spec: &Spec, curve: BaseCurve) -> Result<Family> {

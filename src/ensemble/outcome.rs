@@ -145,6 +145,9 @@ pub struct Ended {
 pub trait Sink {
     /// A member has ended; called exactly once per member, in member order.
     fn member(&mut self, ended: &Ended) -> Result<()>;
-    /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done.
-    fn progress(&mut self, done: u64, total: u64, share: f64);
+    /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done. Called after every dispatch, and
+    /// during long ones: an error stops the run.
+    fn progress(&mut self, _done: u64, _total: u64, _share: f64) -> Result<()> {
+        Ok(())
+    }
 }

@@ -238,7 +238,18 @@ impl Spec {
         Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", path.display())))
     }
 
-    /// Parses the text of a spec file. The message has toml's line and caret, and the nearest valid spelling.
+    /// Parses the text of a spec file; absent keys take their defaults.
+    ///
+    /// ```
+    /// use curvelax::{ensemble::Spec, flow::Flow};
+    ///
+    /// let spec = Spec::from_toml("flow = 'willmore'\ncurves = 8").unwrap();
+    /// assert_eq!((spec.flow, spec.curves, spec.points), (Flow::Willmore, 8, 100));
+    /// assert!(Spec::from_toml("curvs = 8").unwrap_err().contains("did you mean `curves`?"));
+    /// ```
+    ///
+    /// # Errors
+    /// The message has toml's line and caret, and the nearest valid spelling.
     pub fn from_toml(text: &str) -> Result<Spec, String> {
         toml::from_str(text).map_err(|e| format!("{}{}", e.to_string().trim_end(), suggestion(e.message())))
     }

@@ -36,6 +36,15 @@ pub struct Company {
 
 impl Cell {
     /// The only cell of a spec without a sweep.
+    ///
+    /// ```
+    /// use curvelax::ensemble::{Cell, Family, Spec};
+    ///
+    /// let spec = Spec { curves: 3, ..Spec::default() }.validate()?;
+    /// let family = Family::new(&spec)?;
+    /// assert_eq!(Cell::only(spec, family).members().collect::<Vec<_>>(), [0, 1, 2]);
+    /// # Ok::<(), curvelax::Error>(())
+    /// ```
     pub fn only(spec: Spec, family: Family) -> Cell {
         Cell { index: 0, spec, family, first: 0, common: false }
     }

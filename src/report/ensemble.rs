@@ -3,7 +3,8 @@
 //! A member whose time is not known is censored where it ended: one that is unfinished at the final time, and one that
 //! ended badly at its last good state. How many of these there are is in the row.
 
-use csv::Writer;
+use csv::WriterBuilder;
+use serde::Serialize;
 
 use super::tally::{CellTally, Tally};
 use crate::{
@@ -67,15 +68,63 @@ impl Rates {
         Ok(Rates { fitted, interval, theory, ratio })
     }
 
-    fn columns(&self) -> ([Option<f64>; 3], [Option<f64>; 5], [Option<f64>; 2], [Option<f64>; 2]) {
+    /// What the table says of them.
+    pub fn columns(&self) -> CellRates {
         let Rates { fitted, interval, theory, ratio } = self;
-        (
-            [fitted.mean(), fitted.standard_deviation(), fitted.standard_error()],
-            QUANTILES.map(|(share, _)| fitted.quantile(share)),
-            interval.map_or([None, None], |interval| [interval.lower, interval.upper]),
-            [theory.median(), ratio.median()],
-        )
+        let [q05, q25, median, q75, q95] = QUANTILES.map(|(share, _)| fitted.quantile(share));
+        CellRates {
+            known: fitted.count(),
+            mean: fitted.mean(),
+            sd: fitted.standard_deviation(),
+            se: fitted.standard_error(),
+            q05,
+            q25,
+            median,
+            q75,
+            q95,
+            median_low: interval.and_then(|interval| interval.lower),
+            median_high: interval.and_then(|interval| interval.upper),
+            theory: theory.median(),
+            ratio: ratio.median(),
+        }
     }
+}
+
+/// The numbers of `ensemble.csv` on the rates of decay of a cell, named as its columns are.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[expect(missing_docs, reason = "README has the columns")]
+pub struct CellRates {
+    pub known: usize,
+    pub mean: Option<f64>,
+    pub sd: Option<f64>,
+    pub se: Option<f64>,
+    pub q05: Option<f64>,
+    pub q25: Option<f64>,
+    pub median: Option<f64>,
+    pub q75: Option<f64>,
+    pub q95: Option<f64>,
+    pub median_low: Option<f64>,
+    pub median_high: Option<f64>,
+    pub theory: Option<f64>,
+    pub ratio: Option<f64>,
+}
+
+/// The numbers of `ensemble.csv` on the relaxation times of a cell, named as its columns are.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[expect(missing_docs, reason = "README has the columns")]
+pub struct CellTimes {
+    pub known: usize,
+    pub mean: Option<f64>,
+    pub sd: Option<f64>,
+    pub se: Option<f64>,
+    pub restricted_to: Option<f64>,
+    pub q05: Option<f64>,
+    pub q25: Option<f64>,
+    pub median: Option<f64>,
+    pub q75: Option<f64>,
+    pub q95: Option<f64>,
+    pub median_low: Option<f64>,
+    pub median_high: Option<f64>,
 }
 
 /// Relaxation times of all cells, and how they compare.
@@ -102,6 +151,26 @@ impl CellStatistics {
     /// Members that ended.
     pub fn members(&self) -> u64 {
         self.counts.iter().sum()
+    }
+
+    /// What the table says of the times.
+    pub fn times(&self) -> CellTimes {
+        let mean = self.mean;
+        let [q05, q25, median, q75, q95] = QUANTILES.map(|(share, _)| self.survival.quantile(share));
+        CellTimes {
+            known: self.survival.events(),
+            mean: mean.map(|mean| mean.value),
+            sd: mean.and_then(|mean| mean.standard_deviation),
+            se: mean.and_then(|mean| mean.standard_error),
+            restricted_to: mean.and_then(|mean| mean.restricted_to),
+            q05,
+            q25,
+            median,
+            q75,
+            q95,
+            median_low: self.interval.and_then(|interval| interval.lower),
+            median_high: self.interval.and_then(|interval| interval.upper),
+        }
     }
 
     /// The interval of the median, where both its ends are known.
@@ -136,7 +205,7 @@ impl EnsembleStatistics {
     /// The text of `ensemble.csv`.
     pub fn to_csv(&self, spec: &Spec) -> Result<String> {
         let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write ensemble.csv: {e}"));
-        let mut writer = Writer::from_writer(Vec::new());
+        let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
         let keys = spec.sweep.axes().iter().map(|axis| axis.key.clone());
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
         let times = ["known", "mean", "sd", "se", "restricted_to"].into_iter();
@@ -147,20 +216,8 @@ impl EnsembleStatistics {
         let header = header.chain(times.map(|name| format!("t_relax_{name}"))).chain(rates);
         writer.write_record(header).map_err(|e| failed(&e))?;
         for cell in &self.cells {
-            let mean = cell.mean;
-            let moments = [
-                mean.map(|mean| mean.value),
-                mean.and_then(|mean| mean.standard_deviation),
-                mean.and_then(|mean| mean.standard_error),
-                mean.and_then(|mean| mean.restricted_to),
-            ];
-            let quantiles = QUANTILES.map(|(share, _)| cell.survival.quantile(share));
-            let interval = cell.interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
-            let row = (
-                (cell.cell, &cell.values, cell.members(), cell.counts, cell.survival.events()),
-                (moments, quantiles, interval),
-                (cell.rates.fitted.count(), cell.rates.columns()),
-            );
+            let (times, rates) = (cell.times(), cell.rates.columns());
+            let row = (cell.cell, &cell.values, cell.members(), cell.counts, times, rates);
             writer.serialize(row).map_err(|e| failed(&e))?;
         }
         let bytes = writer.into_inner().map_err(|e| failed(&e))?;

@@ -6,6 +6,7 @@
 pub mod axis;
 pub mod chart;
 pub mod charts;
+pub mod document;
 pub mod ensemble;
 pub mod folder;
 pub mod gallery;
@@ -28,7 +29,7 @@ pub mod zarr;
 
 use std::{
     path::PathBuf,
-    time::{Instant, SystemTime},
+    time::{Duration, Instant, SystemTime},
 };
 
 pub use ensemble::EnsembleStatistics;
@@ -39,13 +40,24 @@ use crate::{
     ensemble::{Ended, Sink, Spec, spec::Store},
     error::{Error, Result},
 };
+use document::Document;
 use portraits::Film;
-use progress::Progress;
+use progress::{Progress, duration};
 use provenance::Provenance;
 use study::Study;
 use tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable};
 use tally::Tally;
+use text::plural;
 use zarr::SnapshotStore;
+
+/// What is said on stdout of a run that is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A table and some lines for people.
+    Overview,
+    /// One document for programs.
+    Json,
+}
 
 /// How the overview names the pictures.
 const PLOTS: &str = "plots/*.svg";
@@ -68,6 +80,8 @@ pub struct Report {
     progress: Progress,
     started: SystemTime,
     clock: Instant,
+    /// When the run is to stop at the latest, from its start.
+    most: Option<Duration>,
 }
 
 impl Report {
@@ -95,7 +109,13 @@ impl Report {
             progress: Progress::new(quiet),
             started: SystemTime::now(),
             clock: Instant::now(),
+            most: None,
         })
+    }
+
+    /// Stops the run with [`Error::Stopped`] when it has taken `most`, from now on.
+    pub fn stop_after(&mut self, most: Duration) {
+        self.most = Some(self.clock.elapsed() + most);
     }
 
     /// The members that come now are simulated by themselves; those before have all ended.
@@ -114,10 +134,15 @@ impl Report {
         self.tally.warnings()
     }
 
-    /// Puts every file under its final name, once all are on disk, and returns the overview for stdout.
+    /// How many members ended neither relaxed nor unfinished.
+    pub fn failed(&self) -> u64 {
+        self.tally.failed()
+    }
+
+    /// Puts every file under its final name, once all are on disk, and returns the text for stdout.
     ///
     /// Where only the pictures cannot be written the tables are published all the same, with an error that says so.
-    pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String]) -> Result<String> {
+    pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String], form: Form) -> Result<String> {
         // In reverse order they are dropped: the folder last, after its files.
         let Report { folder, tally, films, progress, started, clock, .. } = self;
         let (summary, rates, series) = (self.summary, self.rates, self.series);
@@ -165,9 +190,14 @@ impl Report {
             ))
         })?;
         names.extend([folder::REPORT, PLOTS, folder::RUN]);
-        let (tally, folder) = (&tally, folder.path());
-        let overview = overview::Overview { spec, platform, tally, statistics, wall, folder, files: &names };
-        Ok(overview.to_string())
+        let (tally, folder, files) = (&tally, folder.path(), &names[..]);
+        match form {
+            Form::Overview => {
+                let overview = overview::Overview { spec, platform, tally, statistics, wall, folder, files };
+                Ok(overview.to_string())
+            }
+            Form::Json => Document::new(provenance, spec, statistics, folder, files).to_json(),
+        }
     }
 }
 
@@ -192,9 +222,22 @@ impl Sink for Report {
         Ok(())
     }
 
-    fn progress(&mut self, done: u64, total: u64, share: f64) {
+    fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
         let share = (self.before as f64 + share * total as f64) / self.total.max(1) as f64;
-        self.progress.show(self.before + done, self.total, share);
+        let done = self.before + done;
+        self.progress.show(done, self.total, share);
+        match self.most {
+            // What is done is written, however long that took.
+            Some(most) if done < self.total && self.clock.elapsed() >= most => {
+                let (rows, all) = (self.tally.members(), plural(self.total, "member"));
+                Err(Error::Stopped(format!(
+                    "--max-time: stopped after {} with {rows} of {} {all} in the table; take more time, or fewer members",
+                    duration(self.clock.elapsed().as_secs_f64()),
+                    self.total,
+                )))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -243,7 +286,7 @@ mod tests {
         let portrait = Portrait { before: triangle.clone(), frames: Vec::new(), after: triangle };
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
-        let overview = report(&out, &all, Some(portrait)).finish(&all, &platform, &[]).unwrap();
+        let overview = report(&out, &all, Some(portrait)).finish(&all, &platform, &[], Form::Overview).unwrap();
         let always = ["ensemble.csv", "mean_excess.csv", "plots", "rates.csv", "report.html", "run.json"];
         assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());
         let plots = ["excess.svg", "mesh.svg", "portraits.json", "rate.svg", "relaxation.svg", "survival.svg"];
@@ -259,10 +302,26 @@ mod tests {
         );
 
         let few = Spec::default();
-        report(&out, &few, None).finish(&few, &platform, &["a warning".into()]).unwrap();
+        report(&out, &few, None).finish(&few, &platform, &["a warning".into()], Form::Overview).unwrap();
         assert_eq!(files(&out), [&always[..], &["summary.csv"]].concat());
         assert_eq!(files(&out.join("plots")), plots);
         assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
+    }
+
+    #[test]
+    fn a_run_stops_when_its_time_is_over_and_not_before() {
+        let home = tempfile::tempdir().unwrap();
+        let spec = Spec::default();
+        let mut running = report(&home.path().join("out"), &spec, None);
+        running.progress(1, 256, 0.1).unwrap();
+        running.stop_after(Duration::from_secs(1000));
+        running.progress(1, 256, 0.1).unwrap();
+        running.stop_after(Duration::ZERO);
+        let error = running.progress(1, 256, 0.1).unwrap_err();
+        assert_eq!(error.exit_code(), 75);
+        assert!(error.to_string().contains("with 1 of 256 members in the table"), "{error}");
+        // All have ended: there is nothing to stop.
+        running.progress(256, 256, 1.0).unwrap();
     }
 
     #[test]

@@ -3,10 +3,11 @@
 use std::{fmt, path::Path, time::Duration};
 
 use super::{
-    ensemble::{CellStatistics, EnsembleStatistics},
+    ensemble::{CellStatistics, EnsembleStatistics, Rates},
     folder::ENSEMBLE,
     progress::duration,
     tally::{MollifiedMembers, Tally},
+    text::plural,
 };
 use crate::{
     backend::Platform,
@@ -44,6 +45,7 @@ impl fmt::Display for Overview<'_> {
             ("ensemble", describe(self.spec)),
             ("corners", self.corners()),
             ("t_relax", self.relaxation()),
+            ("rate", self.rate()),
             ("work", self.work()),
             ("ran on", machine(self.platform)),
             ("wall time", duration(self.wall.as_secs_f64())),
@@ -78,7 +80,8 @@ impl Overview<'_> {
             return String::new();
         }
         let change = significant(100.0 * largest_area_change);
-        format!("rounded off in {members} members, at most {most_rounds} rounds, area changed by at most {change} %")
+        let (which, rounds) = (plural(members, "member"), plural(most_rounds.into(), "round"));
+        format!("rounded off in {members} {which}, at most {most_rounds} {rounds}, area changed by at most {change} %")
     }
 
     fn relaxation(&self) -> String {
@@ -86,6 +89,18 @@ impl Overview<'_> {
             [cell] => times(cell),
             _ => String::new(),
         }
+    }
+
+    /// The rates of a single ensemble; empty where no member has one.
+    fn rate(&self) -> String {
+        let [CellStatistics { rates: Rates { fitted, ratio, .. }, .. }] = &self.statistics.cells[..] else {
+            return String::new();
+        };
+        let Some(median) = fitted.median() else { return String::new() };
+        let theory =
+            ratio.median().map_or(String::new(), |ratio| format!(", {} times that of theory", significant(ratio)));
+        let (count, members) = (fitted.count(), plural(fitted.count() as u64, "member"));
+        format!("median {}{theory}, fitted to {count} {members}", significant(median))
     }
 
     /// One line a cell of a study, and how they compare.
@@ -97,8 +112,10 @@ impl Overview<'_> {
         for cell in cells.iter().take(MOST_CELLS) {
             writeln!(f, "{:<11}{}: t_relax {}", cell.cell, self.spec.sweep.name(cell.cell), times(cell))?;
         }
-        if cells.len() > MOST_CELLS {
-            writeln!(f, "{:<11}{} more cells are in {ENSEMBLE}", "...", cells.len() - MOST_CELLS)?;
+        match cells.len().saturating_sub(MOST_CELLS) {
+            0 => {}
+            1 => writeln!(f, "{:<11}1 more cell is in {ENSEMBLE}", "...")?,
+            more => writeln!(f, "{:<11}{more} more cells are in {ENSEMBLE}", "...")?,
         }
         if let Some(LogRank { statistic, degrees_of_freedom, p_value, .. }) = log_rank {
             let p = match *p_value {
@@ -132,14 +149,13 @@ impl Overview<'_> {
             0 => (total / members).to_string(),
             _ => significant(total as f64 / members as f64),
         };
-        let steps_each = each(*steps);
+        let steps_each = match each(*steps) {
+            one if one == "1" => "1 step".into(),
+            several => format!("{several} steps"),
+        };
         match sweeps_k + sweeps_x {
-            0 => format!("{steps_each} steps per member, no sweeps"),
-            _ => format!(
-                "{steps_each} steps per member, sweeps {} for k and {} for x, y",
-                each(*sweeps_k),
-                each(*sweeps_x)
-            ),
+            0 => format!("{steps_each} per member, no sweeps"),
+            _ => format!("{steps_each} per member, sweeps {} for k and {} for x, y", each(*sweeps_k), each(*sweeps_x)),
         }
     }
 }
@@ -167,7 +183,7 @@ pub fn describe(spec: &Spec) -> String {
 pub fn machine(platform: &Platform) -> String {
     let Platform { backend, adapter, precision, reason, threads, .. } = platform;
     let adapter = adapter.as_ref().map_or(String::new(), |name| format!(" {name}"));
-    let threads = threads.map_or(String::new(), |count| format!(", {count} threads"));
+    let threads = threads.map_or(String::new(), |count| format!(", {count} {}", plural(count as u64, "thread")));
     let precision = format!("{precision:?}").to_lowercase();
     format!("{backend}{adapter}, {precision}{threads} ({reason})")
 }
@@ -175,7 +191,7 @@ pub fn machine(platform: &Platform) -> String {
 /// Median and mean of the times of a cell, and how far they are to be trusted.
 fn times(cell: &CellStatistics) -> String {
     let (members, known) = (cell.members(), cell.survival.events() as u64);
-    let Some(mean) = cell.mean else { return format!("none of {members} members reached it") };
+    let Some(mean) = cell.mean else { return format!("none of {members} {} reached it", plural(members, "member")) };
     let median = match (cell.survival.median(), cell.bounds()) {
         (None, _) => "not reached by half of the members".to_string(),
         (Some(median), Some((lower, upper))) => {
@@ -190,8 +206,9 @@ fn times(cell: &CellStatistics) -> String {
         censored => format!("; {censored} censored"),
     };
     format!(
-        "median {median}, mean {least}{}{error} over {known} members that reached it{censored}",
-        significant(mean.value)
+        "median {median}, mean {least}{}{error} over {known} {} that reached it{censored}",
+        significant(mean.value),
+        plural(known, "member")
     )
 }
 
@@ -253,6 +270,19 @@ results    out: summary.csv, run.json
     fn nobody_relaxed_is_said_so() {
         let text = overview(&Tally::default());
         assert!(text.contains("t_relax    none of 0 members reached it\n"), "{text}");
+    }
+
+    #[test]
+    fn one_is_not_many() {
+        let mut tally = Tally::default();
+        tally.add(&outcome(0, Status::Relaxed, Some(0.3)));
+        assert!(overview(&tally).contains("over 1 member that reached it\n"), "{}", overview(&tally));
+        tally.cells[0] = Default::default();
+        tally.add(&outcome(0, Status::Unfinished, None));
+        assert!(overview(&tally).contains("none of 1 member reached it\n"), "{}", overview(&tally));
+        let one_thread = Platform { threads: Some(1), ..platform() };
+        assert!(machine(&one_thread).contains(", 1 thread ("), "{}", machine(&one_thread));
+        assert!(machine(&platform()).contains(", 2 threads ("), "{}", machine(&platform()));
     }
 
     #[test]

@@ -7,6 +7,8 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle, style::TemplateError};
 
+use super::text::plural;
+
 /// Time between lines where there is no terminal.
 const PERIOD: Duration = Duration::from_secs(10);
 /// Resolution of the bar.
@@ -18,13 +20,15 @@ pub enum Progress {
     Quiet,
     /// On a terminal.
     Bar(ProgressBar),
-    /// In a file or a pipe.
-    Lines {
-        /// When the run began.
-        began: Instant,
-        /// When the last line was written.
-        last: Instant,
-    },
+    /// In a file or a pipe, since the run began.
+    Lines(Instant, Lines),
+}
+
+/// Lines at even times, none in a run that is over before the first.
+#[derive(Default)]
+pub struct Lines {
+    /// Periods that have passed at the last line.
+    periods: u64,
 }
 
 impl Progress {
@@ -34,8 +38,7 @@ impl Progress {
             return Progress::Quiet;
         }
         if !io::stderr().is_terminal() {
-            let now = Instant::now();
-            return Progress::Lines { began: now, last: now };
+            return Progress::Lines(Instant::now(), Lines::default());
         }
         let colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         let bar = ProgressBar::new(TICKS);
@@ -48,13 +51,12 @@ impl Progress {
         match self {
             Progress::Quiet => {}
             Progress::Bar(bar) => {
-                bar.set_message(format!("{done} of {total} members"));
+                bar.set_message(members(done, total));
                 bar.set_position((share.clamp(0.0, 1.0) * TICKS as f64) as u64);
             }
-            Progress::Lines { began, last } => {
-                if last.elapsed() >= PERIOD {
-                    *last = Instant::now();
-                    let _ = writeln!(io::stderr().lock(), "{}", line(done, total, share, began.elapsed()));
+            Progress::Lines(began, lines) => {
+                if let Some(line) = lines.at(began.elapsed(), done, total, share) {
+                    let _ = writeln!(io::stderr().lock(), "{line}");
                 }
             }
         }
@@ -68,6 +70,16 @@ impl Progress {
     }
 }
 
+impl Lines {
+    /// The line that is due `elapsed` after the begin of the run, if one is.
+    fn at(&mut self, elapsed: Duration, done: u64, total: u64, share: f64) -> Option<String> {
+        let periods = elapsed.as_secs() / PERIOD.as_secs();
+        let due = periods > self.periods;
+        self.periods = periods;
+        due.then(|| line(done, total, share, elapsed))
+    }
+}
+
 fn style(colour: bool) -> Result<ProgressStyle, TemplateError> {
     let bar = if colour { "{bar:32.cyan/dim}" } else { "{bar:32}" };
     let style = ProgressStyle::with_template(&format!("{bar} {{percent:>3}} %  {{msg}}  {{eta}} left"))?;
@@ -78,7 +90,11 @@ fn line(done: u64, total: u64, share: f64, elapsed: Duration) -> String {
     let share = share.clamp(0.0, 1.0);
     let estimate = elapsed.as_secs_f64() * (1.0 - share) / share;
     let left = if share > 0.0 { format!(", about {} left", duration(estimate)) } else { String::new() };
-    format!("{done} of {total} members, {:.1} %{left}", 100.0 * share)
+    format!("{}, {:.1} %{left}", members(done, total), 100.0 * share)
+}
+
+fn members(done: u64, total: u64) -> String {
+    format!("{done} of {total} {}", plural(total, "member"))
 }
 
 /// Seconds in the unit that a person would take.
@@ -101,6 +117,18 @@ mod tests {
         let elapsed = Duration::from_secs(30);
         assert_eq!(line(64, 256, 0.25, elapsed), "64 of 256 members, 25.0 %, about 1 min 30 s left");
         assert_eq!(line(0, 256, 0.0, elapsed), "0 of 256 members, 0.0 %");
+        assert_eq!(line(0, 1, 0.5, elapsed), "0 of 1 member, 50.0 %, about 30.0 s left");
+    }
+
+    #[test]
+    fn a_line_is_due_every_ten_seconds_and_not_before() {
+        let mut lines = Lines::default();
+        let at = |lines: &mut Lines, milliseconds| lines.at(Duration::from_millis(milliseconds), 1, 4, 0.5).is_some();
+        let due: Vec<u64> = (0..60_000).step_by(70).filter(|elapsed| at(&mut lines, *elapsed)).collect();
+        assert_eq!(due, [10_010, 20_020, 30_030, 40_040, 50_050]);
+        // Dispatches that take long leave lines out; none follow to make up for them.
+        let due: Vec<u64> = [95_000, 99_999, 100_000].into_iter().filter(|elapsed| at(&mut lines, *elapsed)).collect();
+        assert_eq!(due, [95_000, 100_000]);
     }
 
     #[test]

@@ -335,6 +335,7 @@ impl Study<'_> {
         let keys = self.spec().sweep.axes().iter().map(|axis| axis.key.clone());
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
         let numbers = ["mean", "standard error"].into_iter().chain(QUANTILES.map(|(_, name)| name));
+        let numbers = numbers.chain(["median rate", "over theory"]);
         let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
         let row = |cell: &CellStatistics| {
             let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
@@ -347,10 +348,11 @@ impl Study<'_> {
             let quantiles = QUANTILES.map(|(share, _)| shown(cell.survival.quantile(share)));
             let counts = cell.counts.iter().map(u64::to_string);
             let start = [cell.cell.to_string()].into_iter().chain(cell.values.iter().cloned());
-            start.chain(counts).chain(moments).chain(quantiles).collect()
+            let rates = [&cell.rates.fitted, &cell.rates.ratio].map(|of| shown(of.median()));
+            start.chain(counts).chain(moments).chain(quantiles).chain(rates).collect()
         };
         Table {
-            caption: "Members by status, and statistics of t_relax (Kaplan-Meier)".into(),
+            caption: "Members by status, statistics of t_relax (Kaplan-Meier), and rates of decay".into(),
             header: header.collect(),
             rows: self.statistics.cells.iter().map(row).collect(),
             source: folder::ENSEMBLE.into(),

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::text::plural;
 use crate::{
     ensemble::{Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
     error::Result,
@@ -108,15 +109,16 @@ impl MollifiedMembers {
         let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = self;
         (*unresolved > 0).then(|| {
             let parts = [
-                (crossed, "cross themselves although the outline does not".to_owned()),
-                (sharp, format!("keep a turn above {MAX_VERTEX_TURN} rad")),
-                (distorted, format!("changed their area by more than {} %", 100.0 * Mollified::DISTORTED)),
+                (crossed, "with crossings that the outline has not".to_owned()),
+                (sharp, format!("with a turn left above {MAX_VERTEX_TURN} rad")),
+                (distorted, format!("with an area changed by more than {} %", 100.0 * Mollified::DISTORTED)),
             ];
             let parts = parts.into_iter().filter(|(count, _)| **count > 0);
             let parts: Vec<String> = parts.map(|(count, what)| format!("{count} {what}")).collect();
             format!(
-                "{unresolved} of {all} members start from an outline with parts thinner than the spacing of their \
-                 nodes: {}; take more --points or a simpler outline",
+                "{unresolved} of {all} {} started from an outline with parts thinner than the spacing of the nodes: {}; \
+                 take more --points or a simpler outline",
+                plural(all, "member"),
                 parts.join(", ")
             )
         })
@@ -177,31 +179,36 @@ impl Tally {
 
     /// What the user should know about the results, a sentence each.
     pub fn warnings(&self) -> Vec<String> {
-        let members = self.members();
-        let mut warnings: Vec<String> = self.mollified.warning(members).into_iter().collect();
-        let failed: u64 = self.counts().filter(|(status, _)| status.is_failure()).map(|(_, count)| count).sum();
+        let mut warnings: Vec<String> = self.mollified.warning(self.members()).into_iter().collect();
+        let members = format!("{} {}", self.members(), plural(self.members(), "member"));
+        let failed = self.failed();
         if failed > 0 {
             warnings.push(format!(
-                "{failed} of {members} members ended badly (see `status`); unless the flow itself goes wrong there, a \
+                "{failed} of {members} ended badly (see `status`); unless the flow itself goes wrong there, a \
                  smaller --tau or --adaptive, or more --points, helps"
             ));
         }
         if self.below_rounding > 0 {
             warnings.push(format!(
-                "{} of {members} members are so nearly round that their threshold lies in the rounding of the \
-                 precision: they have no t_relax; take --precision f64 or a larger --relax-to",
+                "{} of {members} started so nearly round that the threshold lies in the rounding of the precision: no \
+                 t_relax can be told; take --precision f64 or a larger --relax-to",
                 self.below_rounding
             ));
         }
         let (drifted, worst) = self.drifted;
         if drifted > 0 {
             warnings.push(format!(
-                "{drifted} of {members} members ended with a metric drift above {DISTRUSTED_DRIFT} (worst {worst:.2}): \
+                "{drifted} of {members} ended with a metric drift above {DISTRUSTED_DRIFT} (worst {worst:.2}): \
                  their times and areas are not to be trusted; take --pull auto, a smaller --tau or --adaptive, or \
                  more --points"
             ));
         }
         warnings
+    }
+
+    /// Members that ended neither relaxed nor unfinished.
+    pub fn failed(&self) -> u64 {
+        self.counts().filter(|(status, _)| status.is_failure()).map(|(_, count)| count).sum()
     }
 
     /// Members that ended.
@@ -269,11 +276,12 @@ pub(crate) mod tests {
         let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = tally.mollified;
         assert_eq!((unresolved, crossed, sharp, distorted), (2, 1, 1, 1));
         let warnings = tally.warnings();
-        assert!(warnings[0].starts_with("2 of 4 members start from an outline with parts thinner"), "{warnings:?}");
-        let parts = "1 cross themselves although the outline does not, 1 keep a turn above 1.5 rad, 1 changed";
+        assert!(warnings[0].starts_with("2 of 4 members started from an outline with parts thinner"), "{warnings:?}");
+        let parts =
+            "1 with crossings that the outline has not, 1 with a turn left above 1.5 rad, 1 with an area changed";
         assert!(warnings[0].contains(parts) && warnings[0].contains("more than 10 %; take more --points"));
         tally.mollified.crossed = 0;
-        assert!(!tally.warnings()[0].contains("cross"));
+        assert!(!tally.warnings()[0].contains("crossings"));
     }
 
     #[test]

@@ -95,7 +95,12 @@ pub fn power_of_ten(power: i32) -> String {
 
 /// `1 member`, `2 members`.
 pub fn count(number: u64, one: &str) -> String {
-    format!("{} {one}{}", grouped(number), if number == 1 { "" } else { "s" })
+    format!("{} {}", grouped(number), plural(number, one))
+}
+
+/// The noun for `number` of what is called `one`.
+pub fn plural(number: u64, one: &str) -> String {
+    format!("{one}{}", if number == 1 { "" } else { "s" })
 }
 
 /// `number` with its thousands apart from 10 000 on.

@@ -456,7 +456,9 @@ mod tests {
             self.0.push(ended.clone());
             Ok(())
         }
-        fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
+        fn progress(&mut self, _done: u64, _total: u64, _share: f64) -> Result<()> {
+            Ok(())
+        }
     }
 
     #[test]

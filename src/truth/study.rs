@@ -85,8 +85,6 @@ impl Sink for Last {
         self.0 = Some(ended.clone());
         Ok(())
     }
-
-    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
 }
 
 /// What a study refines.

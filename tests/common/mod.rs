@@ -31,7 +31,6 @@ impl Sink for All {
         self.0.push(ended.clone());
         Ok(())
     }
-    fn progress(&mut self, _done: u64, _total: u64, _share: f64) {}
 }
 
 /// n nodes at `u = i/n`, i = 1…n.

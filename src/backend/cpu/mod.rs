@@ -8,9 +8,12 @@ mod vectors;
 
 pub use vectors::{Vectorised, Vectors};
 
-use std::sync::{
-    Arc,
-    mpsc::{Receiver, channel},
+use std::{
+    sync::{
+        Arc,
+        mpsc::{Receiver, RecvTimeoutError, channel},
+    },
+    time::{Duration, Instant},
 };
 
 use rayon::prelude::*;
@@ -35,8 +38,11 @@ const SLOTS_PER_THREAD: usize = 8;
 /// While one is on its way, the host has time for the other.
 const BATCHES: usize = 2;
 
-/// Steps between two looks at the members, so that progress shows and stops are reached soon.
-fn steps_per_advance(solver: Solver) -> u32 {
+/// A batch on its way is to be back after this time, so that progress shows and a run can be stopped.
+const ADVANCE_TIME: Duration = Duration::from_millis(250);
+
+/// Steps between two looks at the members at most, so that stops are reached soon.
+fn most_steps(solver: Solver) -> u32 {
     match solver {
         Solver::Direct => 256,
         Solver::GaussSeidel | Solver::Multigrid => 64,
@@ -50,17 +56,24 @@ pub struct CpuBackend<T> {
     method: Method,
     crew: Arc<dyn Crew<T>>,
     pool: rayon::ThreadPool,
+    /// Steps of the next batch; no bit of a result depends on it.
+    steps: u32,
 }
 
 /// The members in a part of the slots.
 type Members<T> = Vec<Option<Box<Run<T>>>>;
+
+/// Members that come back, and the time that they took.
+type Back<T> = (Members<T>, Duration);
 
 /// Part of the slots.
 struct Batch<T> {
     /// Empty while the batch is on its way.
     members: Members<T>,
     /// Where they come back from there.
-    coming: Option<Receiver<Members<T>>>,
+    coming: Option<Receiver<Back<T>>>,
+    /// What came.
+    back: Option<Back<T>>,
 }
 
 impl<T: Vectorised> CpuBackend<T> {
@@ -77,8 +90,15 @@ impl<T: Vectorised> CpuBackend<T> {
         let threads = pool.current_num_threads();
         let crew = T::crew(vectors, method.solver, blocks, threads)?;
         let slots = threads * SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * crew.lanes());
-        let batch = || Batch { members: (0..slots).map(|_| None).collect(), coming: None };
-        Ok(CpuBackend { batches: [batch(), batch()], slots: BATCHES * slots, method, crew: crew.into(), pool })
+        let batch = || Batch { members: (0..slots).map(|_| None).collect(), coming: None, back: None };
+        Ok(CpuBackend {
+            batches: [batch(), batch()],
+            slots: BATCHES * slots,
+            method,
+            crew: crew.into(),
+            pool,
+            steps: 1,
+        })
     }
 
     /// Threads in use.
@@ -126,23 +146,40 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
         let mut members = std::mem::take(&mut batch.members);
         let (back, coming) = channel();
         batch.coming = Some(coming);
-        let (crew, method) = (Arc::clone(&self.crew), self.method);
+        let (crew, method, attempts) = (Arc::clone(&self.crew), self.method, self.steps);
         self.pool.spawn(move || {
-            let attempts = steps_per_advance(method.solver);
+            let started = Instant::now();
             let mut running: Vec<&mut Run<T>> =
                 members.iter_mut().flatten().map(|run| &mut **run).filter(|run| run.counters.is_running()).collect();
             running.par_chunks_mut(crew.lanes()).for_each(|group| crew.advance(group, &method, attempts));
             // Where nobody waits any more the run has ended.
-            let _ = back.send(members);
+            let _ = back.send((members, started.elapsed()));
         });
         Ok(())
     }
 
+    fn is_back(&mut self, batch: usize, most: Duration) -> bool {
+        let Batch { coming, back, .. } = &mut self.batches[batch];
+        if let (None, Some(coming)) = (&back, coming) {
+            match coming.recv_timeout(most) {
+                Ok(members) => *back = Some(members),
+                Err(RecvTimeoutError::Timeout) => return false,
+                // `finish` tells.
+                Err(RecvTimeoutError::Disconnected) => {}
+            }
+        }
+        true
+    }
+
     fn finish(&mut self, batch: usize) -> Result<()> {
-        let Some(coming) = self.batches[batch].coming.take() else { return Ok(()) };
-        let members = coming.recv();
-        self.batches[batch].members =
-            members.map_err(|_| Error::Failed("a thread of the CPU back end has panicked".into()))?;
+        let batch = &mut self.batches[batch];
+        let Some(coming) = batch.coming.take() else { return Ok(()) };
+        let back = batch.back.take().map_or_else(|| coming.recv(), Ok);
+        let (members, took) = back.map_err(|_| Error::Failed("a thread of the CPU back end has panicked".into()))?;
+        batch.members = members;
+        let share = ADVANCE_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
+        let steps = (f64::from(self.steps) * share) as u32;
+        self.steps = steps.clamp(1, 2 * self.steps).min(most_steps(self.method.solver));
         Ok(())
     }
 

@@ -1,0 +1,91 @@
+//! `curvelax run --dry-run`: what the run will take, as a table or as JSON; nothing is written.
+
+use crate::{
+    ensemble::Spec,
+    estimate::Estimate,
+    report::{overview::machine, progress::duration, text::plural},
+};
+
+/// The table.
+pub fn table(estimate: &Estimate, spec: &Spec) -> String {
+    let Estimate { members, cells, slots, pilot, .. } = estimate;
+    let unknown = |what: &str| format!("not known: the pilot was over before {what}");
+    let which = plural(*members, "member");
+    let rows = [
+        ("members", format!("{members} in {cells} {}", plural(*cells as u64, "cell"))),
+        ("back end", format!("{}; solver {}", machine(&estimate.platform), spec.solver().name())),
+        ("resident", format!("{} {which} at once", (*slots as u64).min(*members))),
+        ("memory", format!("about {}", size(estimate.memory_bytes))),
+        (
+            "steps",
+            estimate.steps_per_member.map_or(unknown("a member ended"), |steps| format!("about {steps:.0} per member")),
+        ),
+        ("dispatches", estimate.dispatches.map_or(unknown("a step"), |count| format!("about {count}"))),
+        ("start-up", duration(estimate.start_up_seconds)),
+        (
+            "time",
+            estimate.seconds.map_or(unknown("a step"), |seconds| format!("about {} after start-up", duration(seconds))),
+        ),
+        ("pilot", format!("{} of {} started members ended in {}", pilot.ended, pilot.members, duration(pilot.seconds))),
+    ];
+    rows.iter().map(|(label, text)| format!("{label:<11}{text}\n")).collect()
+}
+
+/// Bytes in the unit that a person would take.
+fn size(bytes: u64) -> String {
+    let bytes = bytes as f64;
+    match bytes {
+        ..1e9 => format!("{:.0} MB", bytes / 1e6),
+        _ => format!("{:.1} GB", bytes / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{backend::Platform, estimate::Pilot, number::Precision};
+
+    #[test]
+    fn an_estimate_looks_like_this() {
+        let platform = Platform {
+            backend: "cpu".into(),
+            adapter: None,
+            driver: None,
+            device_type: None,
+            precision: Precision::F64,
+            reason: "asked for".into(),
+            threads: Some(2),
+        };
+        let estimate = Estimate {
+            members: 3000,
+            cells: 1,
+            platform,
+            slots: 128,
+            memory_bytes: 17_400_000,
+            steps_per_member: Some(1999.6),
+            dispatches: Some(740),
+            start_up_seconds: 0.014,
+            seconds: Some(31.9),
+            pilot: Pilot { members: 130, ended: 130, relaxed: 129, seconds: 1.4 },
+        };
+        let expected = "\
+members    3000 in 1 cell
+back end   cpu, f64, 2 threads (asked for); solver gauss-seidel
+resident   128 members at once
+memory     about 17 MB
+steps      about 2000 per member
+dispatches about 740
+start-up   0.01 s
+time       about 31.9 s after start-up
+pilot      130 of 130 started members ended in 1.40 s
+";
+        assert_eq!(table(&estimate, &Spec::default()), expected);
+        let little = Estimate { steps_per_member: None, dispatches: None, seconds: None, ..estimate };
+        assert_eq!(table(&little, &Spec::default()).matches("not known: the pilot was over before a").count(), 3);
+    }
+
+    #[test]
+    fn sizes_read_as_people_say_them() {
+        assert_eq!([17_400_000, 2_340_000_000].map(size), ["17 MB", "2.3 GB"]);
+    }
+}

@@ -1,0 +1,383 @@
+//! What a run will take, without making it: memory, dispatches, steps and time.
+//!
+//! Work cannot be foretold from a spec: how many steps and sweeps a member takes depends on its curve. So a pilot runs a
+//! few members, spread evenly over all cells, on the back end of the run and through the same loop, for at most
+//! about two seconds: first as many as go abreast, then, where these are done early, as many more as there is time for.
+//! Between the two pilots lies the time of one more member, free of what is the same for any number of them.
+
+use std::{
+    ops::Range,
+    time::{Duration, Instant},
+};
+
+use serde::Serialize;
+
+use crate::{
+    backend::{Backend, Choice, Platform},
+    ensemble::{Cell, Ended, Sink, Spec, spec::Pace, spec::Precision},
+    error::{Error, Result},
+    report::gallery::MOST_PANELS,
+    schedule::Clock,
+    scheme::decay,
+    simulate::simulate,
+    statistics::{Observation, Step},
+};
+
+/// Time for the pilots of all companies.
+const PILOT: Duration = Duration::from_secs(2);
+/// Companies that have a pilot, at most: each gets its share of the time, and less would show nothing.
+const MOST_PILOTS: usize = 20;
+/// The first pilot has this share of the slots: on the CPU a vector of members for each thread.
+const FIRST_SHARE: usize = 8;
+/// Share of the time left that a larger pilot is to take; it may take longer than foreseen.
+const FILLED: f64 = 0.6;
+
+/// The program with nothing to do, in bytes.
+const PROGRAM_BYTES: u64 = 10_000_000;
+/// Numbers that a resident member takes a node: its state on the back end and the one at its start on the host, of
+/// 18 each, with what surrounds them. Measured, as the next one is.
+const POOL_NUMBERS: usize = 68;
+/// Bytes of the page and its pictures a node, up to as many nodes as are drawn.
+const PAGE_BYTES: usize = 25_000;
+const DRAWN_NODES: usize = 600;
+/// Copies of the nodes of the members that are drawn.
+const PORTRAIT_COPIES: usize = 3;
+
+/// What a run will take.
+#[derive(Clone, Debug, Serialize)]
+pub struct Estimate {
+    /// Members of the run.
+    pub members: u64,
+    /// Its cells.
+    pub cells: usize,
+    /// Where it would run.
+    pub platform: Platform,
+    /// Members resident at once, the most of all companies.
+    pub slots: usize,
+    /// Peak resident size of the process.
+    pub memory_bytes: u64,
+    /// Mean over the members; none where no member of the pilot has ended and nothing else tells.
+    pub steps_per_member: Option<f64>,
+    /// Dispatches; none where the pilot was over before any work was done.
+    pub dispatches: Option<u64>,
+    /// Time in which back ends are opened and kernels compiled.
+    pub start_up_seconds: f64,
+    /// Time of the run besides; none as with the dispatches.
+    pub seconds: Option<f64>,
+    /// What the estimate rests on.
+    pub pilot: Pilot,
+}
+
+/// The pilots of all companies together.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Pilot {
+    /// Members that were started.
+    pub members: u64,
+    /// Those of them that ended.
+    pub ended: u64,
+    /// Those of them that relaxed.
+    pub relaxed: u64,
+    /// Time taken.
+    pub seconds: f64,
+}
+
+/// What companies of cells will take together, and how many members of theirs a pilot stands for.
+#[derive(Default)]
+struct Work {
+    members: f64,
+    seconds: Option<f64>,
+    dispatches: Option<f64>,
+    steps: Option<f64>,
+}
+
+impl Estimate {
+    /// Estimates the run of `companies` of `cells`, each on its choice.
+    ///
+    /// # Errors
+    /// As the run itself.
+    pub fn new(cells: &mut [Cell], companies: Vec<Range<usize>>, choices: Vec<Choice>) -> Result<Estimate> {
+        let members = cells.iter().map(|cell| cell.spec.member_count()).sum::<u64>();
+        let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
+        let (mut slots, mut resident) = (0, 0);
+        let (every, count) = (companies.len().div_ceil(MOST_PILOTS), companies.len());
+        let budget = PILOT / count.div_ceil(every).max(1) as u32;
+        let mut total = Work { seconds: Some(0.0), dispatches: Some(0.0), steps: Some(0.0), ..Work::default() };
+        for (range, choice) in companies.into_iter().zip(choices).step_by(every) {
+            let company = &mut cells[range];
+            let precision = choice.precision();
+            let all: u64 = company.iter().map(|cell| cell.spec.member_count()).sum();
+            let whole = Spec { curves: all, only: None, ..company[0].spec.clone() };
+            let started = Instant::now();
+            let (mut backend, platform) = choice.open(&whole, whole.points)?;
+            start_up += started.elapsed().as_secs_f64();
+            opened.get_or_insert(platform);
+            slots = slots.max(backend.slots());
+            let (work, most) = sample(company, precision, backend.as_mut(), budget, &mut pilot)?;
+            resident = resident.max(most.min(backend.slots() as u64) as usize);
+            let add = |sum: Option<f64>, part: Option<f64>| Some(sum? + part?);
+            total.members += work.members;
+            total.seconds = add(total.seconds, work.seconds);
+            total.dispatches = add(total.dispatches, work.dispatches);
+            total.steps = add(total.steps, work.steps);
+        }
+        let platform = opened.ok_or_else(|| Error::Failed("a study has no cell".into()))?;
+        // Companies without a pilot are like those that have one.
+        let scale = members as f64 / total.members.max(1.0);
+        start_up *= every as f64;
+        Ok(Estimate {
+            members,
+            cells: cells.len(),
+            memory_bytes: memory(
+                members,
+                // Where none has ended yet, all may relax.
+                if pilot.ended == 0 { 1.0 } else { pilot.relaxed as f64 / pilot.ended as f64 },
+                [slots, resident],
+                cells[0].spec.points,
+            ),
+            platform,
+            slots,
+            steps_per_member: total.steps.map(|steps| steps / total.members.max(1.0)),
+            dispatches: total.dispatches.map(|dispatches| (scale * dispatches).ceil() as u64),
+            start_up_seconds: start_up,
+            seconds: total.seconds.map(|seconds| scale * seconds),
+            pilot,
+        })
+    }
+}
+
+/// One pilot.
+struct Seen {
+    members: u64,
+    /// Members that have left it, and the steps that they made.
+    left: u64,
+    relaxed: u64,
+    steps: u64,
+    /// Share of its work that was done.
+    share: f64,
+    dispatches: u64,
+    seconds: f64,
+    until: Instant,
+}
+
+impl Seen {
+    fn new(members: u64, until: Instant) -> Seen {
+        Seen { members, left: 0, relaxed: 0, steps: 0, share: 0.0, dispatches: 0, seconds: 0.0, until }
+    }
+}
+
+impl Sink for Seen {
+    fn member(&mut self, ended: &Ended) -> Result<()> {
+        self.left += 1;
+        self.relaxed += u64::from(ended.outcome.t_relax.is_some());
+        self.steps += ended.outcome.steps;
+        Ok(())
+    }
+
+    fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
+        self.share = share;
+        self.dispatches += 1;
+        match done < total && Instant::now() >= self.until {
+            true => Err(Error::Stopped("the pilot is over".into())),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Pilots of a company: what all of it will take, and the members of the largest.
+fn sample(
+    company: &mut [Cell],
+    precision: Precision,
+    backend: &mut dyn Backend,
+    budget: Duration,
+    pilot: &mut Pilot,
+) -> Result<(Work, u64)> {
+    let until = Instant::now() + budget;
+    let own: Vec<Option<Vec<u64>>> = company.iter().map(|cell| cell.spec.only.clone()).collect();
+    let all: u64 = company.iter().map(|cell| cell.spec.member_count()).sum();
+    let mut pilots: Vec<Seen> = Vec::new();
+    let mut count = (backend.slots().div_ceil(FIRST_SHARE) as u64).min(all);
+    loop {
+        choose(company, &own, all, count);
+        let mut seen = Seen::new(count, until);
+        let started = Instant::now();
+        let stopped = match simulate(company, precision, backend, 0, &mut seen) {
+            Err(Error::Stopped(_)) => true,
+            done => done.map(|()| false)?,
+        };
+        seen.seconds = started.elapsed().as_secs_f64();
+        let left = until.saturating_duration_since(Instant::now()).as_secs_f64();
+        let more = (count as f64 * FILLED * left / seen.seconds.max(1e-6)) as u64;
+        pilots.push(seen);
+        // One that is not twice as large would show nothing new.
+        if stopped || count == all || more < 2 * count {
+            break;
+        }
+        count = more.min(all);
+    }
+    company.iter_mut().zip(own).for_each(|(cell, only)| cell.spec.only = only);
+    for seen in &pilots {
+        pilot.members += seen.members;
+        pilot.ended += seen.left;
+        pilot.relaxed += seen.relaxed;
+        pilot.seconds += seen.seconds;
+    }
+    let steps = pilots.iter().rfind(|seen| seen.left > 0).map(|seen| seen.steps as f64 / seen.left as f64);
+    let work = Work {
+        members: all as f64,
+        seconds: extrapolated(&pilots, all, |seen| seen.seconds),
+        dispatches: extrapolated(&pilots, all, |seen| seen.dispatches as f64),
+        steps: steps.or_else(|| certain_steps(company)).map(|each| each * all as f64),
+    };
+    Ok((work, count))
+}
+
+/// A cost of `all` members from that of the pilots, each of which is scaled to its end.
+fn extrapolated(pilots: &[Seen], all: u64, cost: impl Fn(&Seen) -> f64) -> Option<f64> {
+    let whole = |seen: &Seen| (seen.share > 0.0).then(|| cost(seen) / seen.share.min(1.0));
+    let known: Vec<(f64, f64)> = pilots.iter().filter_map(|seen| Some((seen.members as f64, whole(seen)?))).collect();
+    let (members, most) = *known.last()?;
+    let each = match known[..] {
+        [.., (fewer, less), _] if most > less => (most - less) / (members - fewer),
+        _ => most / members,
+    };
+    Some(most + each * (all as f64 - members))
+}
+
+/// Steps of a member where these do not depend on its curve.
+fn certain_steps(company: &[Cell]) -> Option<f64> {
+    let of_cell = |Cell { spec, .. }: &Cell| match spec.pace() {
+        Pace::Fixed(tau) if !spec.stop_when_relaxed => Some(f64::from(Clock::new(tau, spec.t_end).steps)),
+        _ => None,
+    };
+    let steps = company.iter().map(of_cell).sum::<Option<f64>>()?;
+    Some(steps / company.len() as f64)
+}
+
+/// Leaves `count` of the members of `company`, which has `all`, spread evenly; `own` are those that its cells were to run.
+fn choose(company: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) {
+    let place = |i: u64| ((2 * u128::from(i) + 1) * u128::from(all) / (2 * u128::from(count))) as u64;
+    let mut places = (0..count).map(place).peekable();
+    let mut before = 0;
+    for (cell, own) in company.iter_mut().zip(own) {
+        let members = own.as_ref().map_or(cell.spec.curves, |only| only.len() as u64);
+        let mut only = Vec::new();
+        while let Some(place) = places.next_if(|place| *place < before + members) {
+            let place = place - before;
+            only.push(own.as_ref().map_or(place, |only| only[place as usize]));
+        }
+        cell.spec.only = Some(only);
+        before += members;
+    }
+}
+
+/// Peak resident size of a run of `members` of `n` nodes, in bytes, from that of this process, which had `resident` of
+/// up to `slots` members in its pool.
+///
+/// The peak is at the end of the run, with a full pool and the tally, or after that, with the statistics and the charts
+/// and without the pool. The tally has of each member its time, its mesh quality and its rate with that of theory. Then
+/// come its time and its rate in sorted samples, three numbers of the rate and five for the charts; and of the share
+/// `relaxed` a step of the survival curve and its number there.
+fn memory(members: u64, relaxed: f64, [slots, resident]: [usize; 2], n: usize) -> u64 {
+    let numbers = |count: usize| (count * size_of::<f64>()) as u64;
+    let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
+    let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MOST_PANELS);
+    let portraits = numbers(2 * n * (decay::PARTS + 1) * drawn);
+    let page = (PAGE_BYTES * n.min(DRAWN_NODES) * drawn / MOST_PANELS) as u64;
+    let tally = members * ((size_of::<Observation>() + size_of::<(f64, Option<f64>)>()) as u64 + numbers(2));
+    let curve = relaxed * (members * (size_of::<Step>() as u64 + numbers(1))) as f64;
+    let statistics = members * (2 * size_of::<Observation>() as u64 + numbers(8)) + curve as u64;
+    let program = peak_resident().map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(pool(resident)));
+    let full = usize::try_from(members).unwrap_or(usize::MAX).min(slots);
+    let running = pool(full) + portraits;
+    let reporting = PORTRAIT_COPIES as u64 * portraits + page + statistics;
+    program + tally + running.max(reporting)
+}
+
+/// The most that this process has had resident so far, in bytes, where the system tells.
+pub fn peak_resident() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kibibytes << 10)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ensemble::study;
+
+    fn cells(spec: Spec) -> Vec<Cell> {
+        study::cells(&spec.validate().unwrap()).unwrap()
+    }
+
+    fn chosen(cells: &[Cell]) -> Vec<u64> {
+        cells.iter().flat_map(|cell| cell.members().collect::<Vec<_>>()).collect()
+    }
+
+    #[test]
+    fn a_pilot_is_spread_over_all_cells() {
+        let mut spec = Spec { curves: 1000, ..Spec::default() };
+        spec.sweep.set("amplitude=0.01,0.02,0.05".parse().unwrap());
+        let mut cells = cells(spec);
+        let own = vec![None; 3];
+        choose(&mut cells, &own, 3000, 3);
+        assert_eq!(chosen(&cells), [500, 1500, 2500]);
+        choose(&mut cells, &own, 3000, 3000);
+        assert_eq!(chosen(&cells), (0..3000).collect::<Vec<u64>>());
+        choose(&mut cells, &own, 3000, 7);
+        assert_eq!(cells.iter().map(|cell| cell.spec.member_count()).collect::<Vec<_>>(), [2, 3, 2]);
+    }
+
+    #[test]
+    fn a_pilot_takes_members_that_are_to_run() {
+        let only: Vec<u64> = (0..90).map(|i| 11 * i).collect();
+        let mut cells = cells(Spec { curves: 1000, only: Some(only.clone()), ..Spec::default() });
+        let own = vec![cells[0].spec.only.clone()];
+        choose(&mut cells, &own, 90, 13);
+        let chosen = chosen(&cells);
+        assert!(chosen.len() == 13 && chosen.iter().all(|member| only.contains(member)), "{chosen:?}");
+        assert!(chosen[0] < 100 && chosen[12] > 880, "{chosen:?}");
+    }
+
+    fn seen(members: u64, share: f64, seconds: f64) -> Seen {
+        Seen { share, seconds, ..Seen::new(members, Instant::now()) }
+    }
+
+    #[test]
+    fn costs_are_extrapolated_from_the_two_largest_pilots() {
+        let of = |pilots: &[Seen], all| extrapolated(pilots, all, |seen| seen.seconds);
+        // 0.3 s whatever the number, and 0.01 s each.
+        let pilots = [seen(10, 1.0, 0.4), seen(110, 1.0, 1.4)];
+        assert!((of(&pilots, 1010).unwrap() - 10.4).abs() < 1e-12);
+        // Half of it was seen.
+        assert!((of(&[seen(10, 0.5, 1.0)], 30).unwrap() - 6.0).abs() < 1e-12);
+        assert_eq!(of(&[seen(10, 1.0, 1.5)], 10), Some(1.5));
+        assert_eq!(of(&[seen(10, 0.0, 2.0)], 10), None);
+    }
+
+    #[test]
+    fn steps_of_fixed_length_are_certain_unless_members_stop() {
+        let fixed = Spec { tau: Some(0.01), t_end: 0.055, ..Spec::default() };
+        assert_eq!(certain_steps(&cells(fixed.clone())), Some(6.0));
+        assert_eq!(certain_steps(&cells(Spec { stop_when_relaxed: true, ..fixed })), None);
+        assert_eq!(certain_steps(&cells(Spec { adaptive: Some(1e-3), ..Spec::default() })), None);
+    }
+
+    #[test]
+    fn ten_million_members_are_estimated_without_room_for_them() {
+        let before = peak_resident();
+        let spec = Spec { curves: 10_000_000, adaptive: Some(1e-3), stop_when_relaxed: true, ..Spec::default() };
+        let spec = Spec { backend: crate::ensemble::spec::BackendChoice::Cpu, points: 32, ..spec }.validate().unwrap();
+        let mut cells = cells(spec.clone());
+        let choice = crate::backend::choose(&spec, spec.points).unwrap();
+        let only_cell = std::iter::once(0..1).collect();
+        let estimate = Estimate::new(&mut cells, only_cell, vec![choice]).unwrap();
+        assert_eq!((estimate.members, estimate.cells), (10_000_000, 1));
+        assert!(estimate.memory_bytes > 1 << 30, "{estimate:?}");
+        assert!(estimate.pilot.members < 5_000_000 && estimate.pilot.seconds < 60.0, "{estimate:?}");
+        // What the estimate names is not what it takes; other tests run beside this one.
+        if let (Some(before), Some(after)) = (before, peak_resident()) {
+            assert!(after - before < estimate.memory_bytes / 4, "{before} to {after}");
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! What a run says to programs (`--json`): the content of `run.json`, where its files are, and the statistics of its
+//! cells. Floats read back exactly; unknown is null.
+
+use std::{collections::BTreeMap, path::Path};
+
+use serde::Serialize;
+use toml::Value;
+
+use super::{
+    ensemble::{CellRates, CellStatistics, CellTimes, EnsembleStatistics},
+    provenance::Provenance,
+};
+use crate::{
+    ensemble::{Spec, Status},
+    error::{Error, Result},
+};
+
+/// A finished run as one document.
+#[derive(Serialize)]
+pub struct Document<'a> {
+    #[serde(flatten)]
+    run: &'a Provenance,
+    folder: &'a Path,
+    files: &'a [&'static str],
+    cells: Vec<Cell<'a>>,
+    /// Whether the cells could have one distribution; null where they were not compared.
+    log_rank: Option<Comparison>,
+    /// The medians as a power of the swept value; null where there is no such law.
+    power_law: Option<Law>,
+}
+
+/// A row of `ensemble.csv`, under the names of its columns.
+#[derive(Serialize)]
+struct Cell<'a> {
+    cell: u64,
+    values: BTreeMap<&'a str, &'a Value>,
+    members: u64,
+    members_by_status: BTreeMap<&'static str, u64>,
+    t_relax: CellTimes,
+    rate: CellRates,
+}
+
+#[derive(Serialize)]
+struct Comparison {
+    chi2: f64,
+    degrees_of_freedom: usize,
+    p: f64,
+}
+
+#[derive(Serialize)]
+struct Law {
+    factor: f64,
+    exponent: f64,
+    exponent_se: Option<f64>,
+    r2: Option<f64>,
+}
+
+impl<'a> Document<'a> {
+    /// Collects it.
+    pub fn new(
+        run: &'a Provenance,
+        spec: &'a Spec,
+        statistics: &EnsembleStatistics,
+        folder: &'a Path,
+        files: &'a [&'static str],
+    ) -> Document<'a> {
+        let EnsembleStatistics { cells, log_rank, power_law } = statistics;
+        let log_rank = log_rank.as_ref().map(|test| Comparison {
+            chi2: test.statistic,
+            degrees_of_freedom: test.degrees_of_freedom,
+            p: test.p_value,
+        });
+        let power_law = power_law.as_ref().map(|law| Law {
+            factor: law.factor,
+            exponent: law.exponent,
+            exponent_se: law.exponent_error,
+            r2: law.r2,
+        });
+        let cells = cells.iter().map(|cell| Cell::new(spec, cell)).collect();
+        Document { run, folder, files, cells, log_rank, power_law }
+    }
+
+    /// Its text.
+    pub fn to_json(&self) -> Result<String> {
+        let text = serde_json::to_string_pretty(self);
+        text.map(|text| text + "\n").map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))
+    }
+}
+
+impl<'a> Cell<'a> {
+    fn new(spec: &'a Spec, statistics: &CellStatistics) -> Cell<'a> {
+        let (cell, counts) = (statistics.cell, statistics.counts);
+        Cell {
+            cell,
+            values: spec.sweep.axes().iter().map(|axis| &axis.key[..]).zip(spec.sweep.values(cell)).collect(),
+            members: statistics.members(),
+            members_by_status: Status::ALL.iter().map(|status| status.name()).zip(counts).collect(),
+            t_relax: statistics.times(),
+            rate: statistics.rates.columns(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, UNIX_EPOCH};
+
+    use super::*;
+    use crate::{
+        ensemble::Outcome,
+        report::{
+            provenance::tests::platform,
+            tally::{Tally, tests::outcome},
+        },
+    };
+
+    #[test]
+    fn a_document_has_what_the_files_have_and_its_floats_read_back() {
+        let mut spec = Spec { curves: 3, seed: u64::MAX, ..Spec::default() };
+        spec.sweep.set("amplitude=0.1,0.2".parse().unwrap());
+        let mut tally = Tally::default();
+        for (member, t_relax) in
+            [Some(0.1 + 0.2), Some(1.0 / 3.0), None, Some(0.5), Some(0.25), None].iter().enumerate()
+        {
+            let status = if t_relax.is_some() { Status::Relaxed } else { Status::Stalled };
+            let member = member as u64;
+            tally.add(&Outcome { cell: member / 3, ..outcome(member, status, *t_relax) });
+        }
+        let (platform, statistics) = (platform(), EnsembleStatistics::new(&spec, &tally).unwrap());
+        let run = Provenance::new(&spec, &platform, &tally, &[], UNIX_EPOCH, Duration::ZERO);
+        let text = Document::new(&run, &spec, &statistics, Path::new("out"), &["summary.csv"]).to_json().unwrap();
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+
+        let alone: serde_json::Value = serde_json::from_str(&run.to_json().unwrap()).unwrap();
+        assert!(alone.as_object().unwrap().iter().all(|(key, value)| json[key] == *value), "{text}");
+        assert_eq!((&json["folder"], &json["files"][0]), (&"out".into(), &"summary.csv".into()));
+        let cell = &json["cells"][1];
+        assert_eq!(
+            (&cell["cell"], &cell["values"]["amplitude"], &cell["members"]),
+            (&1.into(), &0.2.into(), &3.into())
+        );
+        assert_eq!((&cell["members_by_status"]["stalled"], &cell["t_relax"]["known"]), (&1.into(), &2.into()));
+        for (cell, statistics) in json["cells"].as_array().unwrap().iter().zip(&statistics.cells) {
+            let read = |name: &str| cell["t_relax"][name].as_f64();
+            assert_eq!(read("median"), statistics.survival.median());
+            assert_eq!(read("mean"), statistics.mean.map(|mean| mean.value));
+            assert_eq!(read("se"), statistics.mean.and_then(|mean| mean.standard_error));
+            assert_eq!(read("q95"), None, "a quantile beyond the last event is unknown: {text}");
+        }
+        assert_eq!(json["log_rank"]["degrees_of_freedom"], 1);
+        assert_eq!(json["power_law"]["exponent"].as_f64(), statistics.power_law.map(|law| law.exponent));
+    }
+}

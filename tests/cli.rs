@@ -1,0 +1,245 @@
+//! The habits of the program: JSON, exit codes, `--max-time`, the dry run, completions, the man page.
+
+mod common;
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output, Stdio},
+    time::{Duration, Instant},
+};
+
+use common::program::{number, run};
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn curvelax(folder: &Path, arguments: &str) -> Output {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
+    // Where this is not set, a layer of Mesa says so on stderr.
+    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).args(arguments.split_whitespace()).output().unwrap()
+}
+
+/// What the program prints, which must succeed without a word on stderr.
+#[track_caller]
+fn printed(folder: &Path, arguments: &str) -> String {
+    let output = curvelax(folder, arguments);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.is_empty(), "{arguments}: {said}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[track_caller]
+fn json(folder: &Path, arguments: &str) -> Value {
+    serde_json::from_str(&printed(folder, arguments)).expect("one JSON document")
+}
+
+/// Names of what lies in a folder.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+const SMALL: &str = "run --backend cpu --points 34 --adaptive=1e-3 --t-end 1 --curves 11 --quiet";
+
+#[test]
+fn json_of_a_run_is_run_json_with_the_statistics_of_ensemble_csv() {
+    let home = TempDir::new().unwrap();
+    let said = json(home.path(), &format!("{SMALL} --sweep amplitude=0.03,0.1 --json --out out"));
+    let file: Value = serde_json::from_str(&fs::read_to_string(home.path().join("out/run.json")).unwrap()).unwrap();
+    for (key, value) in file.as_object().unwrap() {
+        assert_eq!(said[key], *value, "{key}");
+    }
+    let done =
+        run(&format!("{} --sweep amplitude=0.03,0.1", SMALL.replace("run --backend cpu", "").replace("--quiet", "")));
+    let rows = done.rows("ensemble.csv");
+    let cells = said["cells"].as_array().unwrap();
+    assert_eq!((cells.len(), rows.len()), (2, 2));
+    for (cell, row) in cells.iter().zip(&rows) {
+        for name in ["known", "mean", "sd", "se", "q05", "median", "q95", "median_low", "median_high"] {
+            assert_eq!(cell["t_relax"][name].as_f64(), Some(number(row, &format!("t_relax_{name}"))), "{name}");
+        }
+        assert_eq!(cell["members_by_status"]["relaxed"].as_f64(), Some(number(row, "relaxed")));
+        assert_eq!(cell["values"]["amplitude"].as_f64(), Some(number(row, "amplitude")));
+    }
+    assert_ne!(cells[0]["t_relax"]["mean"], cells[1]["t_relax"]["mean"]);
+}
+
+#[test]
+fn json_of_adapters_says_what_the_table_says() {
+    let home = TempDir::new().unwrap();
+    let (said, table) = (json(home.path(), "adapters --json"), printed(home.path(), "adapters"));
+    assert!(table.ends_with(&format!(": {}\n", said["auto"]["sentence"].as_str().unwrap())), "{table}");
+    for adapter in said["adapters"].as_array().unwrap() {
+        assert!(table.contains(&format!("{}\n", adapter["name"].as_str().unwrap())), "{table}");
+        assert!(table.contains(&format!("at most {} in f32", adapter["max_points_f32"])), "{table}");
+    }
+}
+
+#[test]
+fn strict_fails_where_members_end_badly_and_only_there() {
+    let home = TempDir::new().unwrap();
+    // Steps so long that they merge nodes, and members that have not relaxed.
+    let bad = "run --backend cpu --points 34 --curves 3 --shape nonconvex --tau 0.05 --t-end 0.1 --quiet";
+    let output = curvelax(home.path(), &format!("{bad} --strict --out strict"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(3), "{message}");
+    assert!(
+        message.starts_with("error: --strict: ") && message.contains("see `status` in strict/summary.csv"),
+        "{message}"
+    );
+    assert_eq!(curvelax(home.path(), &format!("{bad} --out mild")).status.code(), Some(0));
+    assert_eq!(names(&home.path().join("strict")), names(&home.path().join("mild")));
+    let good = curvelax(home.path(), &format!("{SMALL} --t-end 0.01 --strict --out good"));
+    assert_eq!(good.status.code(), Some(0), "{}", String::from_utf8_lossy(&good.stderr));
+}
+
+#[test]
+fn a_run_out_of_time_keeps_the_members_that_ended() {
+    let home = TempDir::new().unwrap();
+    // Months of members.
+    let long = "run --backend cpu --points 34 --adaptive=1e-3 --curves 100000000 --stop-when-relaxed";
+    let started = Instant::now();
+    let output = curvelax(home.path(), &format!("{long} --max-time 2s --out out"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(75), "{message}");
+    // Neither at once nor never; how soon it stops is for people to see.
+    assert!(started.elapsed() >= Duration::from_secs(2) && started.elapsed() < Duration::from_secs(600));
+    assert!(message.contains("error: --max-time: stopped after 2"), "{message}");
+    assert!(message.contains("note: the members that ended are kept in out/.summary.csv.part\n"), "{message}");
+    let kept = fs::read_to_string(home.path().join("out/.summary.csv.part")).unwrap();
+    let rows = kept.lines().count() - 1;
+    assert!(
+        rows > 100 && message.contains(&format!("with {rows} of 100000000 members in the table")),
+        "{rows}: {message}"
+    );
+    assert_eq!(names(&home.path().join("out")), [".summary.csv.part"]);
+    assert_eq!(output.stdout, b"");
+}
+
+#[test]
+fn a_dispatch_that_takes_long_does_not_hold_up_the_stop() {
+    let home = TempDir::new().unwrap();
+    // The first sweeps of so many nodes take minutes.
+    let long = "run --backend cpu --points 600 --curves 64 --solver gauss-seidel --max-sweeps 100000000 --tau 0.1";
+    let output = curvelax(home.path(), &format!("{long} --max-time 1 --quiet --out new/out"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(75), "{message}");
+    assert!(message.starts_with("error: --max-time: stopped after ") && message.contains("with 0 of 64"), "{message}");
+    let seconds: f64 = message.split_whitespace().nth(4).unwrap().parse().unwrap();
+    assert!(seconds < 6.0, "{message}");
+    assert!(!home.path().join("new").exists());
+}
+
+#[test]
+fn a_time_that_cannot_be_read_is_refused() {
+    let home = TempDir::new().unwrap();
+    for time in ["1d", "0", "-5", "1.5h", "soon"] {
+        let output = curvelax(home.path(), &format!("run --max-time {time} --out new"));
+        assert_eq!(output.status.code(), Some(2), "{time}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("write 90, 90s, 5m or 1h30m"), "{time}");
+    }
+    assert_eq!(names(home.path()), [""; 0]);
+}
+
+#[test]
+fn a_dry_run_writes_nothing_and_its_table_says_what_its_json_says() {
+    let home = TempDir::new().unwrap();
+    let study = "run --backend cpu --points 34 --tau 0.01 --curves 23 --sweep amplitude=0.03,0.1 --dry-run";
+    let said = json(home.path(), &format!("{study} --json"));
+    assert_eq!(
+        (&said["members"], &said["cells"], &said["platform"]["backend"]),
+        (&46.into(), &2.into(), &"cpu".into())
+    );
+    assert_eq!(said["steps_per_member"], 200.0);
+    for key in ["dispatches", "seconds", "memory_bytes", "slots"] {
+        assert!(said[key].as_f64().is_some_and(|value| value > 0.0), "{key}: {said}");
+    }
+    let table = printed(home.path(), &format!("{study} --out out"));
+    for line in ["members    46 in 2 cells\n", "steps      about 200 per member\n", "time       about "] {
+        assert!(table.contains(line), "{table}");
+    }
+    assert_eq!(names(home.path()), [""; 0]);
+}
+
+/// The peak resident size of `curvelax ARGUMENTS`, read as long as it lives, and what it prints.
+#[cfg(target_os = "linux")]
+fn peak(folder: &Path, arguments: &str) -> (f64, String) {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
+    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).args(arguments.split_whitespace());
+    let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+    let (status, mut peak) = (format!("/proc/{}/status", child.id()), 0.0);
+    while child.try_wait().unwrap().is_none() {
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        peak = line.and_then(|line| line.trim().trim_end_matches(" kB").parse().ok()).unwrap_or(peak);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{arguments}");
+    (1024.0 * peak, String::from_utf8(output.stdout).unwrap())
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_memory_of_a_run_is_foretold_within_a_fifth() {
+    let home = TempDir::new().unwrap();
+    let mut foretold = Vec::new();
+    // Few members, and so many small ones that what is kept of each is most of it; relaxed they take more.
+    let many = "--points 12 --modes 2..=3 --solver direct --stop-when-relaxed";
+    let runs = [
+        "--curves 300 --adaptive=1e-3 --stop-when-relaxed".to_string(),
+        format!("--curves 250000 --tau 0.01 --t-end 0.01 {many}"),
+        format!("--curves 250000 --tau 0.05 --t-end 0.5 --relax-to 0.99 {many}"),
+    ];
+    for (rank, spec) in runs.iter().enumerate() {
+        let base = format!("run --backend cpu {spec} --quiet");
+        let said = json(home.path(), &format!("{base} --dry-run --json"))["memory_bytes"].as_f64().unwrap();
+        let (taken, _) = peak(home.path(), &format!("{base} --out {rank}"));
+        assert!((said / taken - 1.0).abs() < 0.2, "{spec}: {said} foretold, {taken} taken");
+        foretold.push(said);
+    }
+    // The one would not do for the other.
+    assert!(foretold[1] > 1.5 * foretold[0] && foretold[2] > 1.2 * foretold[1], "{foretold:?}");
+}
+
+#[test]
+fn completions_are_scripts_and_know_the_commands_and_flags() {
+    let home = TempDir::new().unwrap();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = printed(home.path(), &format!("completions {shell}"));
+        for word in ["convergence", "stop-when-relaxed", "max-time"] {
+            assert!(script.contains(word), "no {word} for {shell}");
+        }
+    }
+    let parses = |script: &str| {
+        fs::write(home.path().join("script"), script).unwrap();
+        Command::new("bash").arg("-n").arg(home.path().join("script")).stderr(Stdio::null()).status().unwrap().success()
+    };
+    let script = printed(home.path(), "completions bash");
+    assert!(parses(&script));
+    assert!(!parses(&script.replacen("esac", "", 1)), "bash takes anything");
+    assert_eq!(curvelax(home.path(), "completions tcsh").status.code(), Some(2));
+}
+
+/// The commands that have a section of their own in a man page.
+fn sections(page: &str) -> Vec<&str> {
+    page.lines().filter_map(|line| line.strip_prefix(".SH \"curvelax ")?.strip_suffix('"')).collect()
+}
+
+#[test]
+fn the_man_page_has_every_command_with_its_flags() {
+    let home = TempDir::new().unwrap();
+    let page = printed(home.path(), "man");
+    let help = printed(home.path(), "--help");
+    let (_, listed) = help.split_once("Commands:\n").unwrap();
+    let listed = listed.lines().take_while(|line| line.starts_with("  "));
+    let commands: Vec<&str> =
+        listed.filter_map(|line| line.split_whitespace().next()).filter(|c| *c != "help").collect();
+    assert!(commands.len() >= 8 && commands.contains(&"run"), "{commands:?}");
+    assert_eq!(sections(&page), commands);
+    assert!(page.contains(".TH curvelax 1") && page.contains("max\\-time"), "{page}");
+    let without = page.replace(".SH \"curvelax bench\"", ".PP");
+    assert_ne!(sections(&without), commands, "a command that is missing is not missed");
+}
