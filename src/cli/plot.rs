@@ -13,8 +13,8 @@ Examples:
   curvelax plot ellipses
   curvelax plot ellipses --out pictures
 
-Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, series.csv and plots/portraits.json in DIR: the same
-bytes as the run, with the same version of the program.";
+Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, series.csv and plots/portraits.json in DIR: the
+same bytes as the run, with the same version of the program.";
 
 /// Redraw the plots and the report of a finished run.
 #[derive(clap::Args)]
