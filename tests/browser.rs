@@ -70,7 +70,7 @@ impl Shown {
         let mut user_data = OsString::from("--user-data-dir=");
         user_data.push(profile.path());
         // The sandbox needs rights that containers do not give; the page is our own.
-        let flags = "--headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --no-first-run --disable-extensions \
+        let flags = "--headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --no-first-run \
             --virtual-time-budget=3000 --enable-logging=stderr --v=0 --dump-dom";
         let output = Command::new(browser)
             .arg(user_data)

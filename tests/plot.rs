@@ -50,10 +50,7 @@ fn pictures_come_back_byte_for_byte() {
         (RUN, 8),
         ("--curves 5 --points 32 --tau 1e-3 --t-end 0.3 --series 0.013", 7),
         ("--curves 9 --points 32 --adaptive=1e-3 --t-end 0.3 --series 0.1 --only 2,5,7 --snapshots 0,0.1", 7),
-        (
-            "--curves 4 --points 32 --adaptive=1e-3 --t-end 0.3 --sweep amplitude=0.01,0.2,0.3 --sweep seed=1,2 --only 2,9",
-            8,
-        ),
+        ("--curves 4 --points 32 --adaptive --t-end 0.3 --sweep amplitude=0.01,0.2,0.3 --sweep seed=1,2 --only 2,9", 8),
         // Members that cross themselves and members that end badly.
         ("--curves 6 --points 64 --shape lemniscate:1 --sampling parameter --adaptive=1e-3 --t-end 0.1", 7),
         ("--curves 6 --points 32 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct", 7),

@@ -1,7 +1,7 @@
 //! `plots/portraits.json`: the first members at the start, on their way and at the end.
 //!
 //! All pictures of them are drawn from what this file holds, so that they can be drawn again from it. A coordinate is a
-//! whole number below 4096 and two digits of base64; each member has a scale of its own, so that none depends on others.
+//! whole number below 4096 and two digits of base64; each member has a scale of its own, and depends on no other.
 
 use std::path::Path;
 

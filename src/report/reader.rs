@@ -84,7 +84,8 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
         Some(format) => {
             let own = env!("CARGO_PKG_VERSION");
             return refuse(format!(
-                ": expected format {FORMAT} at most, found {format}, of curvelax {version}; this is {own}: take a newer one"
+                ": expected format {FORMAT} at most, found {format}, of curvelax {version}; this is {own}: take a newer \
+                 one"
             ));
         }
         None => return refuse(format!(": expected a number under `format`, found none; {REMEDY}")),

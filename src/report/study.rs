@@ -8,7 +8,7 @@ use super::{
     ensemble::{CellStatistics, EnsembleStatistics, QUANTILES},
     folder, gallery,
     overview::{describe, machine},
-    page::{Figure, Headline, MOST_MEMBERS, Page, Table, Trajectory},
+    page::{Figure, Headline, MOST_MEMBERS, Page, Table, Trajectory, spread},
     portraits::Film,
     progress::duration,
     provenance::Provenance,
@@ -258,8 +258,8 @@ impl Study<'_> {
             let label = format!("member {}{cell}: {}{at}", film.member, film.status.name());
             Trajectory { label, status: film.status.name(), times: film.times.clone(), nodes: film.frames() }
         };
-        let stride = if sweep.is_empty() { 1 } else { self.films.len().div_ceil(MOST_MEMBERS) };
-        self.films.iter().step_by(stride.max(1)).map(trajectory).collect()
+        let shown = if sweep.is_empty() { self.films.len() } else { MOST_MEMBERS };
+        spread(self.films.len(), shown).map(|i| trajectory(&self.films[i])).collect()
     }
 
     fn what(&self) -> String {

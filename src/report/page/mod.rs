@@ -11,7 +11,7 @@ mod scope;
 
 use std::fmt::Write;
 
-pub use player::{MOST_MEMBERS, Trajectory};
+pub use player::{MOST_MEMBERS, Trajectory, spread};
 
 use super::{
     svg::escape,

@@ -114,7 +114,8 @@ impl Player {
             // Writing into a string cannot fail.
             let _ = writeln!(
                 html,
-                "<figure style=\"--now: var(--{colour})\"><svg viewBox=\"0 0 {LARGEST} {height}\" role=\"img\" aria-label=\"{label}\">\
+                "<figure style=\"--now: var(--{colour})\">\
+                 <svg viewBox=\"0 0 {LARGEST} {height}\" role=\"img\" aria-label=\"{label}\">\
                  <path class=\"start\" d=\"{start}\"/><path class=\"now\" d=\"{start}\"/>\
                  <path class=\"nodes\" d=\"{dots}\"/>{}</svg><figcaption>{label}</figcaption></figure>",
                 self.scale_bar()
@@ -166,7 +167,7 @@ impl Player {
 }
 
 /// At most `most` indices below `count`, the first and the last among them.
-fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
+pub fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
     let shown = count.min(most);
     (0..shown).map(move |i| if shown > 1 { i * (count - 1) / (shown - 1) } else { 0 })
 }
