@@ -20,6 +20,9 @@ const NAMES: [&str; 5] = ["chromium", "chromium-browser", "google-chrome", "goog
 /// Members that move for a while, one that never relaxes, a series and two cells: a page with all that a page can have.
 const RUN: &str = "--curves 4 --points 40 --adaptive=1e-3 --t-end 0.5 --series 0.05 --sweep omega=1,2";
 
+/// A name and what is done with the browser.
+type Test = (&'static str, fn(&Path));
+
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let browser = browser();
@@ -30,19 +33,20 @@ fn main() -> ExitCode {
              name one by CURVELAX_BROWSER"
         ),
     }
-    let tests: [(&str, fn(&Path)); 4] = [
+    let tests: [Test; 4] = [
         ("the_slider_moves_the_members_and_nothing_is_said_on_the_console", the_slider_moves_the_members),
         ("a_run_that_does_not_move_has_no_slider", a_run_that_does_not_move),
         ("a_page_whose_script_is_broken_is_found_out", a_broken_page_is_found_out),
         ("a_page_that_asks_for_the_network_is_found_out", a_request_is_found_out),
     ];
+    let missing = browser.is_none();
     let trials = tests.map(|(name, test)| {
         let browser = browser.clone();
         let trial = Trial::test(name, move || {
             test(&browser.ok_or("there is no browser")?);
             Ok(())
         });
-        trial.with_ignored_flag(!env::args().any(|a| a == "--ignored") && self::browser().is_none())
+        trial.with_ignored_flag(missing)
     });
     libtest_mimic::run(&arguments, trials.into()).exit_code()
 }

@@ -87,7 +87,7 @@ impl Film {
     /// What is wrong with it, if it was not written by this program.
     fn fault(&self) -> Option<&'static str> {
         let known = |text: &String| text.bytes().all(|digit| DIGITS.contains(&digit));
-        let equal = |text: &String| text.len() % 4 == 0 && text.len() == self.nodes[0].len();
+        let equal = |text: &String| text.len().is_multiple_of(4) && text.len() == self.nodes[0].len();
         let place = self.corner.iter().all(|v| Scale::Linear.holds(*v));
         match () {
             _ if self.times.len() != self.nodes.len() => Some("as many times as states"),
@@ -202,7 +202,7 @@ pub(crate) mod tests {
             ("\"nodes\":[\"", "\"nodes\":[\"AAAA", "member 5: expected equally many nodes"),
             ("\"unit\":", "\"unit\":-", "member 5: expected a corner and a positive unit"),
             ("relaxed", "slack", "unknown variant `slack`"),
-            ("}\n", "\n", "line 2"),
+            ("}\n", "\n", "EOF while parsing"),
         ] {
             let error = twisted(from, to).unwrap_err();
             assert!(error.contains(said) && error.contains("portraits.json"), "{error}");
