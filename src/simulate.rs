@@ -181,3 +181,77 @@ impl Queue {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        ensemble::{Spec, study},
+        error::Error,
+        scheme::{
+            Parameters, State,
+            evolve::Run,
+            parameters::{Counters, Report},
+        },
+    };
+
+    /// Takes members and never brings them back.
+    struct Never;
+
+    impl Backend for Never {
+        fn slots(&self) -> usize {
+            2
+        }
+        fn load(&mut self, _: usize, _: &Run<f64>) -> Result<()> {
+            Ok(())
+        }
+        fn aim(&mut self, _: usize, _: u32, _: &Parameters<f64>) {}
+        fn clear(&mut self, _: usize) {}
+        fn batches(&self) -> usize {
+            1
+        }
+        fn start(&mut self, _: usize) -> Result<()> {
+            Ok(())
+        }
+        fn is_back(&mut self, _: usize, _: Duration) -> bool {
+            false
+        }
+        fn finish(&mut self, _: usize) -> Result<()> {
+            unreachable!("it is not back")
+        }
+        fn counters(&self, _: usize) -> Counters {
+            unreachable!("it is not back")
+        }
+        fn report(&self, _: usize) -> Report<f64> {
+            unreachable!("it is not back")
+        }
+        fn state(&mut self, _: usize) -> Result<State<f64>> {
+            unreachable!("it is not back")
+        }
+    }
+
+    /// Stops a run when it has been told of it so often.
+    struct Patience(u32);
+
+    impl Sink for Patience {
+        fn member(&mut self, _: &Ended) -> Result<()> {
+            unreachable!("no member ends")
+        }
+        fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
+            assert_eq!((done, total, share), (0, 3, 0.0));
+            self.0 -= 1;
+            if self.0 == 0 { Err(Error::Stopped("no patience".into())) } else { Ok(()) }
+        }
+    }
+
+    #[test]
+    fn a_sink_stops_a_run_between_dispatches_and_during_one() {
+        let spec = Spec { curves: 3, ..Spec::default() }.validate().unwrap();
+        let cells = study::cells(&spec).unwrap();
+        for patience in [1, 2, 7] {
+            let mut sink = Patience(patience);
+            let stopped = simulate(&cells, Precision::F64, &mut Never, 0, &mut sink).unwrap_err();
+            assert_eq!((stopped.exit_code(), sink.0), (75, 0), "{stopped}");
+        }
+    }
+}

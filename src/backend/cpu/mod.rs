@@ -38,8 +38,8 @@ const SLOTS_PER_THREAD: usize = 8;
 /// While one is on its way, the host has time for the other.
 const BATCHES: usize = 2;
 
-/// A batch on its way is to be back after this time, so that progress shows and a run can be stopped.
-const ADVANCE_TIME: Duration = Duration::from_millis(250);
+/// A batch on its way is to be back after this time, so that progress shows; far more than it takes for usual n.
+const ADVANCE_TIME: Duration = Duration::from_secs(1);
 
 /// Steps between two looks at the members at most, so that stops are reached soon.
 fn most_steps(solver: Solver) -> u32 {
