@@ -77,6 +77,8 @@ pub struct Pilot {
     pub ended: u64,
     /// Those of them that relaxed.
     pub relaxed: u64,
+    /// Those of them that have a rate.
+    pub rated: u64,
     /// Time taken.
     pub seconds: f64,
 }
@@ -130,7 +132,8 @@ impl Estimate {
             memory_bytes: memory(
                 members,
                 // Where none has ended yet, all may relax.
-                if pilot.ended == 0 { 1.0 } else { pilot.relaxed as f64 / pilot.ended as f64 },
+                [pilot.relaxed, pilot.rated]
+                    .map(|some| if pilot.ended == 0 { 1.0 } else { some as f64 / pilot.ended as f64 }),
                 [slots, resident],
                 cells[0].spec.points,
             ),
@@ -151,6 +154,7 @@ struct Seen {
     /// Members that have left it, and the steps that they made.
     left: u64,
     relaxed: u64,
+    rated: u64,
     steps: u64,
     /// Share of its work that was done.
     share: f64,
@@ -161,7 +165,7 @@ struct Seen {
 
 impl Seen {
     fn new(members: u64, until: Instant) -> Seen {
-        Seen { members, left: 0, relaxed: 0, steps: 0, share: 0.0, dispatches: 0, seconds: 0.0, until }
+        Seen { members, left: 0, relaxed: 0, rated: 0, steps: 0, share: 0.0, dispatches: 0, seconds: 0.0, until }
     }
 }
 
@@ -169,6 +173,7 @@ impl Sink for Seen {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         self.left += 1;
         self.relaxed += u64::from(ended.outcome.t_relax.is_some());
+        self.rated += u64::from(ended.outcome.rate.is_some());
         self.steps += ended.outcome.steps;
         Ok(())
     }
@@ -219,6 +224,7 @@ fn sample(
         pilot.members += seen.members;
         pilot.ended += seen.left;
         pilot.relaxed += seen.relaxed;
+        pilot.rated += seen.rated;
         pilot.seconds += seen.seconds;
     }
     let steps = pilots.iter().rfind(|seen| seen.left > 0).map(|seen| seen.steps as f64 / seen.left as f64);
@@ -274,18 +280,21 @@ fn choose(company: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) 
 /// up to `slots` members in its pool.
 ///
 /// The peak is at the end of the run, with a full pool and the tally, or after that, with the statistics and the charts
-/// and without the pool. The tally has of each member its time, its mesh quality and its rate with that of theory. Then
-/// come its time and its rate in sorted samples, three numbers of the rate and five for the charts; and of the share
-/// `relaxed` a step of the survival curve and its number there.
-fn memory(members: u64, relaxed: f64, [slots, resident]: [usize; 2], n: usize) -> u64 {
+/// and without the pool. The tally has of each member its time and its mesh quality, and of the share `rated` its rate
+/// with that of theory. Then come its time in the sorted sample and five numbers for the charts; of the share `relaxed` a
+/// step of the survival curve and its number there; and of that `rated` three sorted numbers and those of the bootstrap.
+fn memory(members: u64, [relaxed, rated]: [f64; 2], [slots, resident]: [usize; 2], n: usize) -> u64 {
     let numbers = |count: usize| (count * size_of::<f64>()) as u64;
     let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
     let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MOST_PANELS);
     let portraits = numbers(2 * n * (decay::PARTS + 1) * drawn);
     let page = (PAGE_BYTES * n.min(DRAWN_NODES) * drawn / MOST_PANELS) as u64;
-    let tally = members * ((size_of::<Observation>() + size_of::<(f64, Option<f64>)>()) as u64 + numbers(2));
-    let curve = relaxed * (members * (size_of::<Step>() as u64 + numbers(1))) as f64;
-    let statistics = members * (2 * size_of::<Observation>() as u64 + numbers(8)) + curve as u64;
+    let of = |share: f64, bytes: u64| (share * (members * bytes) as f64) as u64;
+    let tally =
+        members * (size_of::<Observation>() as u64 + numbers(2)) + of(rated, size_of::<(f64, Option<f64>)>() as u64);
+    let curve = of(relaxed, size_of::<Step>() as u64 + numbers(1));
+    let rates = of(rated, size_of::<Observation>() as u64 + numbers(4));
+    let statistics = members * (size_of::<Observation>() as u64 + numbers(5)) + curve + rates;
     let program = peak_resident().map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(pool(resident)));
     let full = usize::try_from(members).unwrap_or(usize::MAX).min(slots);
     let running = pool(full) + portraits;

@@ -38,7 +38,7 @@ fn a_full_disk_leaves_the_rows_that_it_took_and_says_where() {
 #[test]
 fn a_disk_that_is_full_for_the_pictures_leaves_the_tables_and_they_can_be_drawn_later() {
     // In blocks: too few for the portraits, and too few for the page.
-    for (limit, missing) in [("4", "plots/portraits.json"), ("60", "report.html")] {
+    for (limit, missing) in [("8", "plots/portraits.json"), ("60", "report.html")] {
         let home = TempDir::new().unwrap();
         let out = home.path().join("out");
         let before = curvelax(home.path(), "unlimited", "--curves 3 --seed 2 --out out");

@@ -26,11 +26,11 @@ fn share_as_in_theory(done: &Done, theory: impl Fn(f64) -> f64) -> f64 {
 
 #[test]
 fn small_modes_of_a_circle_decay_as_linear_theory_has_it() {
-    let common = "--shape circle:1.3 --amplitude 0.02 --adaptive=1e-4 --t-end 3 --curves 100";
+    let common = "--shape circle:1.3 --amplitude 0.02 --adaptive=1e-4 --curves 100";
     let fourth = |area: f64| (area / PI).powi(2);
-    let two = run(&format!("{common} --modes 2..=2"));
+    let two = run(&format!("{common} --modes 2..=2 --t-end 3"));
     assert!(share_as_in_theory(&two, |area| 24.0 / fourth(area)) >= 0.95);
-    let three = run(&format!("{common} --modes 3..=3"));
+    let three = run(&format!("{common} --modes 3..=3 --t-end 1"));
     assert!(share_as_in_theory(&three, |area| 144.0 / fourth(area)) >= 0.95);
     let willmore = run(&format!("{common} --modes 2..=2 --flow willmore --t-end 9"));
     assert!(share_as_in_theory(&willmore, |_| 8.0) >= 0.95);
@@ -69,7 +69,7 @@ fn a_rate_is_the_slope_of_the_line_through_the_steps_in_the_window() {
             let rate = number(member, "rate");
             let bound = if precision == "f64" { 1e-10 } else { 1e-4 };
             assert!(points >= 8 && (rate / expected - 1.0).abs() < bound, "{rate} and {expected} from {points} points");
-            let other = slope(&rows, 1e-2, 1e-1).1;
+            let other = slope(&rows, 5e-2, 5e-1).1;
             assert!((rate / other - 1.0).abs() > 10.0 * bound, "{rate}: another window has the same slope");
         }
     }
@@ -104,7 +104,7 @@ fn the_mean_excess_is_that_of_the_series_and_counts_who_is_left() {
 
 #[test]
 fn a_rate_needs_eight_points() {
-    let few = run("--curves 2 --points 40 --solver direct --tau 0.05 --t-end 1");
+    let few = run("--curves 2 --points 40 --solver direct --tau 0.1 --t-end 0.6");
     assert!(few.rows("rates.csv").is_empty() && few.summary().iter().all(|member| member["rate"].is_empty()));
     let cell = &few.rows("ensemble.csv")[0];
     assert_eq!((cell["rate_known"].as_str(), cell["rate_mean"].as_str()), ("0", ""));

@@ -66,7 +66,7 @@ mod tests {
             dispatches: Some(740),
             start_up_seconds: 0.014,
             seconds: Some(31.9),
-            pilot: Pilot { members: 130, ended: 130, relaxed: 129, seconds: 1.4 },
+            pilot: Pilot { members: 130, ended: 130, relaxed: 129, rated: 120, seconds: 1.4 },
         };
         let expected = "\
 members    3000 in 1 cell

@@ -151,10 +151,12 @@ impl Report {
         let wall = clock.elapsed();
         let statistics = &EnsembleStatistics::new(spec, &tally)?;
         let mut names = vec![folder::SUMMARY, folder::ENSEMBLE, folder::RATES, folder::MEAN_EXCESS];
+        // The rows of the members first: where the disk fills up they are what is kept.
+        let summary = summary.ready()?;
         let ensemble = folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?;
         let excess = &tally.mean_excess(spec)?;
         let mean_excess = tables::mean_excess(folder.file(folder::MEAN_EXCESS)?, excess)?;
-        let mut files = vec![summary.ready()?, ensemble, rates.ready()?, mean_excess];
+        let mut files = vec![summary, ensemble, rates.ready()?, mean_excess];
         if let Some(series) = series {
             files.push(series.ready()?);
             names.push(folder::SERIES);

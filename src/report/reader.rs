@@ -363,6 +363,7 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let mut written = outcome(3, Status::Stalled, Some(0.1 + 0.2));
         (written.cell, written.rejected, written.self_crossing, written.t_half) = (1, 7, Some(1.0 / 3.0), Some(1e-300));
+        (written.rate, written.rate_r2) = (Some(-0.5), Some(0.25));
         written.start = Observables { length: 9.1, area: -6.5, excess: 0.3, energy: 2.0, ..Observables::default() };
         written.end = Observables {
             length: 8.1,
@@ -381,6 +382,7 @@ mod tests {
         folder.publish_all(vec![table.ready().unwrap()]).unwrap();
         let mut spec = Spec { curves: 2, ..Spec::default() };
         spec.sweep.set("omega=1,2".parse().unwrap());
+        written.rate_theory = spec.rate_in_theory(-6.5);
         let read: Vec<Outcome> = Summary::open(home.path(), &spec).unwrap().map(Result::unwrap).collect();
         assert_eq!(read, [written.clone()]);
         assert_eq!(read[0].end.excess.to_bits(), written.end.excess.to_bits());

@@ -165,7 +165,8 @@ impl RateTable {
         let Outcome { member, cell, rate, rate_r2, rate_theory, .. } = *member;
         let Some(rate) = rate else { return Ok(()) };
         let ratio = rate_theory.map(|theory| rate / theory).and_then(known);
-        self.0.row((member, cell, rate, rate_r2.and_then(known), rate_theory.and_then(known), ratio))
+        // Not kept where the run fails: summary.csv has the rates too.
+        self.0.write((member, cell, rate, rate_r2.and_then(known), rate_theory.and_then(known), ratio))
     }
 
     /// The complete file, on disk under its temporary name.
