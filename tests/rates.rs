@@ -34,7 +34,9 @@ fn small_modes_of_a_circle_decay_as_linear_theory_has_it() {
     assert!(share_as_in_theory(&three, |area| 144.0 / fourth(area)) >= 0.95);
     let willmore = run(&format!("{common} --modes 2..=2 --flow willmore --t-end 9"));
     assert!(share_as_in_theory(&willmore, |_| 8.0) >= 0.95);
-    let elastic = run("--flow elastic:0.5 --shape circle:1 --amplitude 0.02 --modes 2..=2 --adaptive=1e-4 --curves 50");
+    let elastic = run(
+        "--flow elastic:0.5 --pull auto --shape circle:1 --amplitude 0.02 --modes 2..=2 --adaptive=1e-4 --curves 50",
+    );
     assert!(share_as_in_theory(&elastic, |_| 18.0) >= 0.95);
     let cell = &two.rows("ensemble.csv")[0];
     assert!((number(cell, "rate_ratio") - 1.0).abs() < 0.02 && number(cell, "rate_known") >= 95.0, "{cell:?}");

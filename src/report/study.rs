@@ -399,16 +399,18 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
     let first = curve.mean.first()?;
     let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
     let (t, mean) = (curve.t[tenth], curve.mean[tenth]);
+    // 24, not 24.0.
+    let brief = |rate: f64| significant(rate, 3).trim_end_matches('0').trim_end_matches('.').to_string();
     Some(match (spec.flow.growth(area), &spec.flow) {
         (Some(time), _) => Theory {
-            label: format!("(1 + 2t/R⁴)^−{}", significant(rate, 3)),
+            label: format!("(1 + 2t/R⁴)^−{}", brief(rate)),
             law: Law::Algebraic { start: mean * (1.0 + t / time).powf(rate), time, power: rate },
         },
         (None, flow) => {
             let fourth_power = (area / std::f64::consts::PI).powi(2);
             let label = match flow {
-                Flow::SurfaceDiffusion => format!("exp(−{} t/R⁴)", significant(rate * fourth_power, 3)),
-                _ => format!("exp(−{} t)", significant(rate, 3)),
+                Flow::SurfaceDiffusion => format!("exp(−{} t/R⁴)", brief(rate * fourth_power)),
+                _ => format!("exp(−{} t)", brief(rate)),
             };
             Theory { label, law: Law::Exponential { start: mean * (rate * t).exp(), rate } }
         }
