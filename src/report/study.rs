@@ -400,7 +400,10 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
     let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
     let (t, mean) = (curve.t[tenth], curve.mean[tenth]);
     // 24, not 24.0.
-    let brief = |rate: f64| significant(rate, 3).trim_end_matches('0').trim_end_matches('.').to_string();
+    let brief = |rate: f64| match rate.round() {
+        whole if (rate - whole).abs() < 1e-6 * rate && rate < 1e4 => format!("{whole}"),
+        _ => significant(rate, 3),
+    };
     Some(match (spec.flow.growth(area), &spec.flow) {
         (Some(time), _) => Theory {
             label: format!("(1 + 2t/R⁴)^−{}", brief(rate)),
