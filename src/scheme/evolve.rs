@@ -45,7 +45,12 @@ impl<T: Real> Run<T> {
     /// Reports what its curves are; not compiled into the vector code, since it is one member's.
     #[inline(never)]
     fn report_on(&mut self, blocks: Blocks, adaptive: bool) {
-        let Run { state, parameters, report, .. } = self;
+        let Run { state, parameters, report, counters } = self;
+        // The start is known as it was handed in; observed here it may be a rounding away, and the next step's events with
+        // it, which must not depend on where a dispatch ended.
+        if counters.steps == 0 {
+            return;
+        }
         report.before = Observed::of(&state.before, parameters, blocks);
         report.now = Observed::of(&state.curve, parameters, blocks);
         report.middle = if adaptive { Observed::of(&state.middle, parameters, blocks) } else { report.before };
