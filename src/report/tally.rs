@@ -44,7 +44,7 @@ pub struct CellTally {
     pub area: f64,
     /// Rate of decay of each that has one, and what theory says.
     pub rates: Vec<(f64, Option<f64>)>,
-    /// Excess at the times of [`grid`](crate::schedule::grid), of the members that reached them.
+    /// Excess at the times of [`grid`], of the members that reached them.
     pub excess: Vec<Moments>,
 }
 
@@ -150,7 +150,7 @@ impl Tally {
         self.sweeps_x += outcome.sweeps_x;
     }
 
-    /// Adds the excess of a member of `cell` at the times of [`grid`](crate::schedule::grid) that it reached.
+    /// Adds the excess of a member of `cell` at the times of [`grid`] that it reached.
     pub fn add_excess(&mut self, cell: u64, excess: &[f64]) {
         let Some(tally) = self.cells.get_mut(cell as usize) else { return };
         tally.excess.resize_with(tally.excess.len().max(excess.len()), Moments::default);

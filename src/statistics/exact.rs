@@ -21,7 +21,7 @@ pub struct ExactSum {
 impl ExactSum {
     /// Adds a term; what of it is below 2⁻¹⁴⁰ is cut off.
     pub fn add(&mut self, term: f64) {
-        if !(term.abs() < f64::from(MOST).exp2()) {
+        if term.is_nan() || term.abs() >= f64::from(MOST).exp2() {
             self.lost = true;
             return;
         }

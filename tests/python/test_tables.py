@@ -11,7 +11,8 @@ from common import Runs, columns
 TABLES = ["summary.csv", "ensemble.csv", "series.csv", "snapshots.csv"]
 INTEGERS = {
     "summary.csv": ["member", "cell", "steps", "rejected", "sweeps_k", "sweeps_x", "turning"],
-    "ensemble.csv": ["cell", "members", "relaxed", "unfinished", "singular", "nonfinite", "stalled", "t_relax_known"],
+    "ensemble.csv": ["cell", "members", "relaxed", "unfinished", "singular", "nonfinite", "stalled", "t_relax_known",
+                     "rate_known"],
     "series.csv": ["member"],
     "snapshots.csv": ["member", "i"],
 }
