@@ -8,11 +8,13 @@ import polars as pl
 
 from common import Runs, columns
 
-TABLES = ["summary.csv", "ensemble.csv", "series.csv", "snapshots.csv"]
+TABLES = ["summary.csv", "ensemble.csv", "rates.csv", "mean_excess.csv", "series.csv", "snapshots.csv"]
 INTEGERS = {
     "summary.csv": ["member", "cell", "steps", "rejected", "sweeps_k", "sweeps_x", "turning"],
     "ensemble.csv": ["cell", "members", "relaxed", "unfinished", "singular", "nonfinite", "stalled", "t_relax_known",
                      "rate_known"],
+    "rates.csv": ["member", "cell"],
+    "mean_excess.csv": ["cell", "members"],
     "series.csv": ["member"],
     "snapshots.csv": ["member", "i"],
 }
