@@ -62,6 +62,8 @@ impl Axis {
 fn label(value: &Value) -> String {
     match value {
         Value::String(word) => word.clone(),
+        // 1e-12, not 0.000000000001; both read back exactly.
+        Value::Float(number) if *number != 0.0 && !(1e-4..1e15).contains(&number.abs()) => format!("{number:e}"),
         Value::Float(number) => number.to_string(),
         other => other.to_string(),
     }
@@ -257,6 +259,8 @@ mod tests {
         );
         let spec = sweep.apply(&Spec::default(), 1).unwrap();
         assert_eq!(spec, Spec { amplitude: 1.0, ..Spec::default() });
+        let tiny = self::sweep(&["tolerance=1e-12,0.0001,0.0"]);
+        assert_eq!(tiny.axes()[0].labels(), ["1e-12", "0.0001", "0"]);
     }
 
     #[test]
