@@ -32,6 +32,9 @@ pub enum Error {
     /// The run was stopped before its end, as was asked for. Exit code 75.
     #[error("{0}")]
     Stopped(String),
+    /// The same by Ctrl-C. Exit code 130.
+    #[error("{0}")]
+    Interrupted(String),
 }
 
 /// Result with the crate's [`Error`] unless another is named.
@@ -56,12 +59,20 @@ impl Error {
             Error::Io { .. } | Error::Device(_) | Error::Failed(_) => 1,
             Error::Strict(_) => 3,
             Error::Stopped(_) => 75,
+            Error::Interrupted(_) => 130,
         }
     }
 }
 
+/// Longer than any word that can be meant.
+const LONGEST_WORD: usize = 64;
+
 /// The candidate nearest to `word`, if one is near enough to be meant.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // Likeness takes the product of the lengths.
+    if word.len() > LONGEST_WORD {
+        return None;
+    }
     candidates
         .into_iter()
         .map(|candidate| (likeness(word, candidate), candidate))
@@ -82,6 +93,36 @@ pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str
     nearest(word, candidates).map_or(String::new(), |near| format!(" (did you mean `{near}`?)"))
 }
 
+/// `text` in about `most` characters and an ellipsis, its control characters escaped.
+pub(crate) fn shortened(text: &str, most: usize) -> String {
+    let (mut shown, mut length) = (String::new(), 0);
+    for c in text.chars() {
+        if length >= most {
+            return shown + "...";
+        }
+        let before = shown.len();
+        match c.is_control() {
+            true => shown.extend(c.escape_debug()),
+            false => shown.push(c),
+        }
+        length += if c.is_control() { shown.len() - before } else { 1 };
+    }
+    shown
+}
+
+/// `text` in the same lines, its other control characters escaped: it may quote what a file holds, and a terminal obeys.
+pub(crate) fn without_controls(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\n' | '\t' => shown.push(c),
+            c if c.is_control() => shown.extend(c.escape_debug()),
+            c => shown.push(c),
+        }
+    }
+    shown
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,5 +136,20 @@ mod tests {
         for word in ["", "x", "colour"] {
             assert_eq!(nearest(word, keys), None, "{word}");
         }
+    }
+    #[test]
+    fn no_likeness_is_sought_for_a_word_without_end() {
+        let start = std::time::Instant::now();
+        assert_eq!(nearest(&"tau".repeat(10_000_000), ["tau"; 30]), None);
+        assert!(start.elapsed().as_secs() < 1, "{:?}", start.elapsed());
+        assert_eq!(nearest(&format!("{}s", "x".repeat(63)), ["x".repeat(63).as_str()]), Some("x".repeat(63).as_str()));
+    }
+
+    #[test]
+    fn what_a_terminal_would_obey_is_shown_instead() {
+        assert_eq!(without_controls("a\u{1b}[31m\n\tb\r\0ü"), "a\\u{1b}[31m\n\tb\\r\\0ü");
+        assert_eq!(shortened("a\u{1b}bcd", 8), "a\\u{1b}b...");
+        assert_eq!(shortened("\"a\"", 3), "\"a\"");
+        assert_eq!(shortened("abc", 3), "abc");
     }
 }

@@ -97,6 +97,7 @@ pub mod error;
 pub mod estimate;
 pub mod figures;
 pub mod flow;
+mod input;
 pub mod number;
 pub mod report;
 pub mod schedule;

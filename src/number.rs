@@ -10,7 +10,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 mod lanes;
 
-pub(crate) use lanes::{Element, Instructions, Lanes};
+pub(crate) use lanes::{Element, Instructions, WithLanes, with_lanes};
 
 /// Values above this bound count as not finite; far below the overflow of `f32`, so that squares survive.
 pub const BIG: f64 = 1e18;

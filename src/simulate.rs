@@ -1,14 +1,19 @@
 //! The loop: fill slots with members, advance them, collect what they report, refill.
 //!
 //! Nothing here depends on where the members are advanced or on how many are resident: a member's steps are its
-//! own, its output times are reached by pausing it there, and rows leave in member order.
+//! own, its output times are reached by pausing it there, and rows leave in member order. So a run may be interrupted
+//! between any two dispatches: the [`Standing`] then has all that [`go_on`] needs to end it as it would have ended.
 
-use std::{collections::BTreeMap, ops::Range, time::Duration};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    ops::Range,
+    time::Duration,
+};
 
 use crate::{
     backend::Backend,
-    ensemble::{Cell, Ended, Sink, spec::Precision},
-    error::Result,
+    ensemble::{Cell, Ended, Paused, Sink, Standing, Wish, spec::Precision},
+    error::{Error, Result},
     schedule::{Output, grid, outputs},
     scheme::decay,
     trajectory::Trajectory,
@@ -18,7 +23,13 @@ use crate::{
 const MEMBERS_AHEAD: usize = 8;
 
 /// Where a dispatch takes longer, the sink is told in between, and may stop the run.
-const LONGEST_WAIT: Duration = Duration::from_secs(1);
+const LONGEST_WAIT: Duration = Duration::from_millis(200);
+
+/// Members that end as they are made, between two words with the sink.
+const MOST_AT_ONCE: usize = 1000;
+
+/// States that are read back at once when a run is kept.
+const READ_BACK: usize = 512;
 
 /// Runs the members of `cells`, which keep [company](crate::ensemble::study::companies), on `backend`, and hands each to
 /// `sink` in member order.
@@ -31,57 +42,111 @@ pub fn simulate(
     portraits: usize,
     sink: &mut dyn Sink,
 ) -> Result<()> {
+    go_on(cells, precision, backend, portraits, Standing::default(), sink)
+}
+
+/// As [`simulate`], from where an earlier one of the same cells stood.
+///
+/// # Errors
+/// Beside those of the back end and the sink, [`Error::Request`] where members in `standing` are not those of `cells`.
+pub fn go_on(
+    cells: &[Cell],
+    precision: Precision,
+    backend: &mut dyn Backend,
+    portraits: usize,
+    standing: Standing,
+    sink: &mut dyn Sink,
+) -> Result<()> {
     let outputs = |framed: bool| -> Vec<_> {
         let of_cell = |Cell { spec, .. }: &Cell| {
             // The pictures show the start and the end anyway.
-            let inside = if framed { 1..decay::PARTS } else { 0..0 };
-            let frames: Vec<f64> =
-                grid(spec.t_end).enumerate().filter(|(part, _)| inside.contains(part)).map(|(_, t)| t).collect();
+            let inside = if framed { decay::TIMES } else { 0 };
+            let frames: Vec<f64> = grid(spec.t_end).skip(1).take(inside).collect();
             outputs(spec.t_end, spec.series, &spec.snapshots, &frames)
         };
         cells.iter().map(of_cell).collect()
     };
     let (outputs, framed) = (outputs(false), outputs(true));
-    let members = cells.iter().enumerate().flat_map(|(cell, own)| own.members().enumerate().map(move |m| (cell, m)));
-    let mut waiting = members.enumerate().peekable();
-    // Members that end early wait for those before them: this bounds how many.
-    let ahead = MEMBERS_AHEAD * backend.slots();
+    let Standing { next, early, resident } = standing;
     let mut pool = Pool {
         cells,
         precision,
         outputs: [&outputs, &framed],
         resident: (0..backend.slots()).map(|_| None).collect(),
         portraits,
+        paused: resident.unwrap_or_default(),
     };
     let total = cells.iter().map(|cell| cell.spec.member_count()).sum();
-    let mut queue = Queue { total, ended: 0, next: 0, early: BTreeMap::new() };
+    let [first, last] = [cells.first(), cells.last()].map(|cell| cell.map_or(0, |cell| cell.index));
+    let is_own =
+        |(rank, ended): (&u64, &Ended)| (next..total).contains(rank) && (first..=last).contains(&ended.outcome.cell);
+    if next > total || !early.iter().all(is_own) {
+        return Err(Error::Request(format!("the state tells of members that are not among the {total} of the spec")));
+    }
+    let mut queue = Queue { total, ended: next + early.len() as u64, next, early, kept: false };
+    let done = run(&mut pool, &mut queue, backend, sink);
+    if done.is_err() && !queue.kept {
+        // What has ended is not to be lost. Why the run ends is told already.
+        let _ = queue.keep(None, sink);
+    }
+    done
+}
+
+fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut dyn Sink) -> Result<()> {
+    let cells = pool.cells.iter().enumerate();
+    let members = cells.flat_map(|(cell, own)| own.members().enumerate().map(move |member| (cell, member)));
+    let ended: BTreeSet<u64> = queue.early.keys().copied().collect();
+    let left = (0..).zip(members).skip(queue.next as usize).filter(|(rank, _)| !ended.contains(rank));
+    let mut waiting = left.peekable();
+    // Members that end early wait for those before them: this bounds how many.
+    let ahead = (MEMBERS_AHEAD * backend.slots()) as u64;
     // Where there are two batches, one of them is on its way while the other one is looked after.
     let size = backend.slots() / backend.batches();
+    let mut on_the_way = vec![false; backend.batches()];
+    let mut told = false;
     for batch in (0..backend.batches()).cycle() {
         let slots = batch * size..(batch + 1) * size;
-        if pool.resident[slots.clone()].iter().any(Option::is_some) {
+        if on_the_way[batch] {
             while !backend.is_back(batch, LONGEST_WAIT) {
-                queue.tell(&pool, sink)?;
+                queue.tell(pool, sink)?;
+                told = told || queue.keep_before_the_stop(sink)?;
             }
             backend.finish(batch)?;
+            on_the_way[batch] = false;
             for (rank, ended) in pool.collect(backend, slots.clone())? {
                 queue.leave(rank, ended, sink)?;
             }
         }
+        // Where members end at once, the sink is to be heard all the same.
+        let mut over = 0;
         for slot in slots.clone() {
-            while pool.resident[slot].is_none() {
+            while pool.resident[slot].is_none() && over < MOST_AT_ONCE {
                 let Some((rank, who)) = waiting.next_if(|(rank, _)| *rank < queue.next + ahead) else { break };
                 if let Some(ended) = pool.admit(backend, slot, rank, who)? {
+                    over += 1;
                     queue.leave(rank, ended, sink)?;
                 }
             }
         }
+        queue.tell(pool, sink)?;
+        if pool.resident.iter().all(Option::is_none) && waiting.peek().is_none() {
+            break;
+        }
+        let wish = sink.wish();
+        let goes_on = matches!(wish, Wish::GoOn);
+        // To be kept, all have to be back.
+        if !goes_on && !on_the_way.contains(&true) {
+            queue.keep(Some(pool.pause(backend)?), sink)?;
+            if let Wish::Stop(error) = wish {
+                return Err(error);
+            }
+        } else if !goes_on {
+            told = told || queue.keep_before_the_stop(sink)?;
+            continue;
+        }
         if pool.resident[slots].iter().any(Option::is_some) {
             backend.start(batch)?;
-        }
-        queue.tell(&pool, sink)?;
-        if pool.resident.iter().all(Option::is_none) {
-            break;
+            (on_the_way[batch], queue.kept) = (true, false);
         }
     }
     Ok(())
@@ -93,8 +158,10 @@ struct Pool<'a> {
     precision: Precision,
     /// Of each cell: for members without a portrait, and for those with one.
     outputs: [&'a [Vec<Output>]; 2],
-    resident: Vec<Option<(usize, Trajectory<'a>)>>,
+    resident: Vec<Option<(u64, Trajectory<'a>)>>,
     portraits: usize,
+    /// Members that go on where they were, by rank.
+    paused: BTreeMap<u64, Paused>,
 }
 
 impl Pool<'_> {
@@ -104,7 +171,7 @@ impl Pool<'_> {
         &mut self,
         backend: &mut dyn Backend,
         slot: usize,
-        rank: usize,
+        rank: u64,
         (cell, (place, index)): (usize, (usize, u64)),
     ) -> Result<Option<Ended>> {
         let own = &self.cells[cell];
@@ -116,13 +183,30 @@ impl Pool<'_> {
         if trajectory.is_over() {
             return Ok(Some(trajectory.end(None)));
         }
+        if let Some(paused) = self.paused.remove(&rank) {
+            trajectory.go_on_from(paused)?;
+        }
         backend.load(slot, &trajectory.launch())?;
         self.resident[slot] = Some((rank, trajectory));
         Ok(None)
     }
 
+    /// All members on their way; none of them is in a batch that is.
+    fn pause(&self, backend: &mut dyn Backend) -> Result<BTreeMap<u64, Paused>> {
+        let occupied = self.resident.iter().enumerate().filter_map(|(slot, own)| Some((slot, own.as_ref()?)));
+        let occupied: Vec<_> = occupied.collect();
+        let mut all = self.paused.clone();
+        for part in occupied.chunks(READ_BACK) {
+            let slots: Vec<usize> = part.iter().map(|(slot, _)| *slot).collect();
+            for ((slot, (rank, trajectory)), state) in part.iter().zip(backend.states(&slots)?) {
+                all.insert(*rank, trajectory.pause(backend.counters(*slot), backend.report(*slot), &state));
+            }
+        }
+        Ok(all)
+    }
+
     /// Looks at the members in `slots`: serves their output times, and aims them further or ends them, which are returned.
-    fn collect(&mut self, backend: &mut dyn Backend, slots: Range<usize>) -> Result<Vec<(usize, Ended)>> {
+    fn collect(&mut self, backend: &mut dyn Backend, slots: Range<usize>) -> Result<Vec<(u64, Ended)>> {
         let mut wanted = Vec::new();
         for slot in slots.clone() {
             let Some((_, trajectory)) = &mut self.resident[slot] else { continue };
@@ -160,25 +244,46 @@ impl Pool<'_> {
 struct Queue {
     total: u64,
     ended: u64,
-    next: usize,
-    early: BTreeMap<usize, Ended>,
+    next: u64,
+    early: BTreeMap<u64, Ended>,
+    /// The sink knows where the run stands, to the last member.
+    kept: bool,
 }
 
 impl Queue {
-    /// Tells how far the run is, and hears whether it is to go on.
+    /// Tells how far the run is, and hears whether it is to end at once.
     fn tell(&self, pool: &Pool, sink: &mut dyn Sink) -> Result<()> {
         let work = self.ended as f64 + pool.share();
         sink.progress(self.ended, self.total, work / self.total as f64)
     }
 
-    fn leave(&mut self, rank: usize, ended: Ended, sink: &mut dyn Sink) -> Result<()> {
+    fn leave(&mut self, rank: u64, ended: Ended, sink: &mut dyn Sink) -> Result<()> {
         self.ended += 1;
+        self.kept = false;
         self.early.insert(rank, ended);
         while let Some(ended) = self.early.remove(&self.next) {
             sink.member(&ended)?;
             self.next += 1;
         }
         Ok(())
+    }
+
+    /// Has the members kept that have ended, and those on their way where they are known.
+    fn keep(&mut self, resident: Option<BTreeMap<u64, Paused>>, sink: &mut dyn Sink) -> Result<()> {
+        let standing = Standing { next: self.next, early: std::mem::take(&mut self.early), resident };
+        let done = sink.keep(&standing);
+        self.kept = done.is_ok() && standing.resident.is_some();
+        self.early = standing.early;
+        done
+    }
+
+    /// Where the run is to stop: has kept what is known at once, since nobody may wait for those on their way.
+    fn keep_before_the_stop(&mut self, sink: &mut dyn Sink) -> Result<bool> {
+        let stops = matches!(sink.wish(), Wish::Stop(_));
+        if stops {
+            self.keep(None, sink)?;
+        }
+        Ok(stops)
     }
 }
 
@@ -187,7 +292,6 @@ mod tests {
     use super::*;
     use crate::{
         ensemble::{Spec, study},
-        error::Error,
         scheme::{
             Parameters, State,
             evolve::Run,

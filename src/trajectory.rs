@@ -9,16 +9,18 @@ use glam::DVec2;
 use crate::{
     curve::{clearance, crossing, polygon},
     ensemble::{
-        Ended, Member, Observables, Outcome, Portrait, SeriesRow, Snapshot, Spec, Status,
+        Ended, Member, Observables, Outcome, Paused, Portrait, SeriesRow, Snapshot, Spec, Status,
         member::{relaxation_rate, strongest_pull},
         spec::{Pace, Precision, Pull, Sor},
     },
+    error::{Error, Result},
     schedule::{Clock, Output, Ticks},
     scheme::{
         Curve, Parameters, State, decay,
         evolve::Run,
         extrapolation,
         parameters::{Counters, Decay, NEVER, Observed, Report},
+        state::STATE_FIELDS,
     },
     solver::Ring,
 };
@@ -88,8 +90,9 @@ pub struct Trajectory<'a> {
     t_end: f64,
     time: Time,
     launch: Run<f64>,
-    /// Output times still to come.
+    /// Output times, and how many of them are behind the member.
     outputs: &'a [Output],
+    served: usize,
     counters: Counters,
     report: Report<f64>,
     start: Observables,
@@ -155,6 +158,7 @@ impl<'a> Trajectory<'a> {
             t_end: spec.t_end,
             time,
             outputs,
+            served: 0,
             counters: launch.counters,
             report: launch.report,
             launch,
@@ -177,27 +181,73 @@ impl<'a> Trajectory<'a> {
         trajectory
     }
 
-    /// What the back end needs to start the member.
+    /// What the back end needs to start the member, or to go on with it.
     pub fn launch(&self) -> Run<f64> {
-        let mut run = self.launch.clone();
-        if let Some((goal, parameters)) = self.next_aim() {
+        let (goal, parameters) = self.aim();
+        let mut run = Run { parameters, ..self.launch.clone() };
+        if self.needs_aim() {
             run.counters.goal = goal;
-            run.parameters = parameters;
         }
         run
+    }
+
+    /// The member between two dispatches, with what the back end has of it.
+    pub fn pause(&self, counters: Counters, report: Report<f64>, state: &State<f64>) -> Paused {
+        Paused {
+            counters,
+            report,
+            state: state.to_numbers(),
+            sweeps: self.sweeps,
+            served: self.served as u64,
+            series: self.series.clone(),
+            snapshots: self.snapshots.clone(),
+            frames: self.frames.clone(),
+            crossed: self.crossed,
+            look_at: self.launch.parameters.look_at,
+        }
+    }
+
+    /// Puts a member that has just been made where it was [paused](Trajectory::pause).
+    ///
+    /// # Errors
+    /// [`Error::Request`] where that was not this member.
+    pub fn go_on_from(&mut self, paused: Paused) -> Result<()> {
+        let Paused { counters, report, state, sweeps, served, series, snapshots, frames, crossed, look_at } = paused;
+        let (index, numbers) = (self.member.index, STATE_FIELDS * self.member.nodes.len());
+        let served = usize::try_from(served).unwrap_or(usize::MAX);
+        if state.len() != numbers || served > self.outputs.len() || counters.status != 0 {
+            return Err(Error::Request(format!(
+                "member {index} in the state is not that of the spec: {} numbers of {numbers}, {served} output times of \
+                 {}, status {}",
+                state.len(),
+                self.outputs.len(),
+                counters.status
+            )));
+        }
+        self.launch.state = State::from_numbers(&state);
+        (self.launch.counters, self.launch.report, self.launch.parameters.look_at) = (counters, report, look_at);
+        (self.series, self.snapshots, self.frames) = (series, snapshots, frames);
+        (self.served, self.crossed) = (served, crossed);
+        self.sweeps = sweeps;
+        self.take(counters, &report);
+        Ok(())
     }
 
     /// Takes what the back end reports.
     pub fn observe(&mut self, counters: Counters, report: &Report<f64>) {
         self.sweeps[0] += u64::from(counters.sweeps_k);
         self.sweeps[1] += u64::from(counters.sweeps_x);
+        self.take(counters, report);
+        if self.counters.status == 0 && !self.is_at_end() && counters.steps >= self.most_steps() {
+            self.counters.status = Status::Stalled as u32;
+        }
+    }
+
+    fn take(&mut self, counters: Counters, report: &Report<f64>) {
         self.counters = counters;
         // Until the first step is accepted the start is known better here, in f64.
         if counters.steps > 0 {
             self.report = *report;
-        }
-        if self.counters.status == 0 && !self.is_at_end() && counters.steps >= self.most_steps() {
-            self.counters.status = Status::Stalled as u32;
         }
     }
 
@@ -253,7 +303,7 @@ impl<'a> Trajectory<'a> {
 
     /// Whether [`Trajectory::serve`] needs the state: for a snapshot, or for a look at the curve.
     pub fn wants_state(&self) -> bool {
-        let due = self.outputs.iter().take_while(|output| self.place(output.t).is_some());
+        let due = self.outputs[self.served..].iter().take_while(|output| self.place(output.t).is_some());
         self.is_look_due() || due.into_iter().any(|output| output.snapshot || output.frame)
     }
 
@@ -263,11 +313,11 @@ impl<'a> Trajectory<'a> {
         if let (true, Some(state)) = (self.is_look_due(), state) {
             self.look(&state.curve);
         }
-        while let Some(output) = self.outputs.first()
+        while let Some(output) = self.outputs.get(self.served)
             && let Some(fraction) = self.place(output.t)
         {
             self.emit(output, fraction, state);
-            self.outputs = &self.outputs[1..];
+            self.served += 1;
         }
     }
 
@@ -361,12 +411,17 @@ impl<'a> Trajectory<'a> {
 
     /// Where to run to next, as a number of steps and the parameters on the way; none where the goal still stands.
     pub fn next_aim(&self) -> Option<(u32, Parameters<f64>)> {
+        self.needs_aim().then(|| self.aim())
+    }
+
+    fn needs_aim(&self) -> bool {
+        self.counters.steps >= self.counters.goal
+    }
+
+    fn aim(&self) -> (u32, Parameters<f64>) {
         let steps = self.counters.steps;
-        if steps < self.counters.goal {
-            return None;
-        }
         let mut parameters = self.launch.parameters;
-        let output = self.outputs.first().map(|output| output.t);
+        let output = self.outputs.get(self.served).map(|output| output.t);
         let goal = match self.time {
             Time::Fixed(clock) => {
                 let goal = output.map_or(clock.steps, |t| clock.locate(t).0);
@@ -383,7 +438,7 @@ impl<'a> Trajectory<'a> {
                 self.most_steps()
             }
         };
-        Some((goal, parameters))
+        (goal, parameters)
     }
 
     /// Slope of the line fitted to -ln excess, in 1/time, or against the logarithm of time where the excess falls as a

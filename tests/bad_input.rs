@@ -188,6 +188,204 @@ fn a_spec_file_that_cannot_be_read_is_named() {
     assert_says(&refused(&["."], &[]), &["cannot read the spec .: "]);
 }
 
+/// `curvelax ARGUMENTS` refused in one line that begins with `start`, in a few seconds and a memory of 300 MB.
+///
+/// A limit that is passed ends the program otherwise: allocations fail, a pipe is waited for.
+#[cfg(target_os = "linux")]
+#[track_caller]
+fn refused_at_once(folder: &Path, arguments: &[&str], start: &str) {
+    let program = assert_cmd::cargo::cargo_bin("curvelax");
+    let mut command = Command::new("sh");
+    command.args(["-c", "ulimit -v 300000 && exec \"$0\" \"$@\""]).arg(program).args(arguments);
+    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).timeout(std::time::Duration::from_secs(10));
+    let began = std::time::Instant::now();
+    let output = command.output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    let shown: String = message.chars().take(300).collect();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?} ended with {}: {shown}", output.status);
+    assert!(message.starts_with(start), "{arguments:?}: not {start:?} but {shown}");
+    assert!(message.len() < 2000 && message.lines().count() == 1, "{arguments:?}: {} bytes: {shown}", message.len());
+    assert!(!message.trim_end().contains(char::is_control), "{arguments:?}: {message:?}");
+    assert!(output.stdout.is_empty() && !folder.join("new").exists(), "{arguments:?}");
+    assert!(began.elapsed().as_secs() < 5, "{arguments:?} took {:?}", began.elapsed());
+}
+
+/// A file of `size` zero bytes, none of which is on a disk.
+#[cfg(target_os = "linux")]
+fn endless(path: &Path, size: u64) {
+    fs::File::create(path).unwrap().set_len(size).unwrap();
+}
+
+#[cfg(target_os = "linux")]
+fn pipe(path: &Path) {
+    assert!(std::process::Command::new("mkfifo").arg(path).status().unwrap().success());
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_spec_without_end_is_refused_at_once() {
+    let home = TempDir::new().unwrap();
+    let in_home = |name: &str| home.path().join(name);
+    endless(&in_home("huge.toml"), 3 << 30);
+    pipe(&in_home("pipe"));
+    fs::create_dir(in_home("folder")).unwrap();
+    fs::write(in_home("over.toml"), "#".repeat((1 << 20) + 1)).unwrap();
+    fs::write(in_home("latin.toml"), b"curves = 3 # \xe7").unwrap();
+    let many = |count: usize, item: &str| vec![item; count].join(",");
+    for (name, text) in [
+        ("deep.toml", format!("omega = {}", "[".repeat(1_000_000))),
+        ("dotted.toml", format!("{}a = 1", "a.".repeat(500_000))),
+        (
+            "nested.toml",
+            format!("[sweep]\nomega = [{}]", many(9_000, &format!("{}{}", "[".repeat(50), "]".repeat(50)))),
+        ),
+        ("key.toml", format!("{} = 1", "a".repeat(1_000_000))),
+        ("word.toml", format!("solver = '{}'", "a".repeat(1_000_000))),
+        ("escape.toml", format!("shape = '{}'", "\\u001b[31m".repeat(10_000)).replace('\'', "\"")),
+        (
+            "times.toml",
+            format!(
+                "t-end = 1\nsnapshots = [{}]",
+                (0..90_000).map(|i| format!("{}", i as f64 / 1e5)).collect::<Vec<_>>().join(",")
+            ),
+        ),
+        ("flower.toml", format!("shape = 'flower:{}'", many(130_000, "3:1e-9"))),
+        ("curves.toml", "curves = 18446744073709551615".into()),
+        ("points.toml", "points = 1000000000000".into()),
+    ] {
+        fs::write(in_home(name), text).unwrap();
+    }
+    for (spec, start) in [
+        ("huge.toml", "error: cannot read the spec huge.toml: 3221225472 bytes; at most 1048576 are read"),
+        ("over.toml", "error: cannot read the spec over.toml: 1048577 bytes; "),
+        ("pipe", "error: cannot read the spec pipe: a pipe or a device; save what it holds in a file"),
+        ("/dev/zero", "error: cannot read the spec /dev/zero: a pipe or a device; "),
+        ("folder", "error: cannot read the spec folder: is a directory"),
+        ("latin.toml", "error: cannot read the spec latin.toml: byte 13 is no UTF-8; save it in UTF-8"),
+        ("deep.toml", "error: in the spec deep.toml: TOML parse error at line 1, column 89: cannot recurse further"),
+        ("dotted.toml", "error: in the spec dotted.toml: recursion limit"),
+        ("nested.toml", "error: --sweep omega: [[[["),
+        ("key.toml", "error: in the spec key.toml: TOML parse error at line 1, column 1: unknown field `aaa"),
+        ("word.toml", "error: in the spec word.toml: TOML parse error at line 1, column 10: unknown variant `aaa"),
+        (
+            "escape.toml",
+            "error: in the spec escape.toml: TOML parse error at line 1, column 9: unknown shape `\\u{1b}[",
+        ),
+        ("times.toml", "error: --snapshots (90000 times): too many times; at most 10000"),
+        (
+            "flower.toml",
+            "error: in the spec flower.toml: TOML parse error at line 1, column 9: a flower of 130000 modes",
+        ),
+        ("curves.toml", "error: --curves 18446744073709551615: too many members; take 1 to 1000000000"),
+        ("points.toml", "error: --points 1000000000000: too many nodes; take 6 to 1000000"),
+    ] {
+        refused_at_once(home.path(), &["run", spec, "--out", "new/out"], start);
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn an_outline_without_end_is_refused_at_once() {
+    let home = TempDir::new().unwrap();
+    let in_home = |name: &str| home.path().join(name);
+    endless(&in_home("huge.csv"), 3 << 30);
+    pipe(&in_home("pipe"));
+    fs::write(in_home("commas.csv"), ",".repeat(1 << 26)).unwrap();
+    fs::write(in_home("latin.csv"), vec![0xff; 1 << 26]).unwrap();
+    fs::write(in_home("nul.csv"), "0,0\n1,0\n1,\0\u{1b}\n").unwrap();
+    fs::write(in_home("points.csv"), "0,0\n1,1\n".repeat(1 << 20)).unwrap();
+    for (file, said) in [
+        ("huge.csv", " cannot read it: 3221225472 bytes; at most 67108864 are read; give a CSV file x,y"),
+        ("pipe", " cannot read it: a pipe or a device; "),
+        ("/dev/zero", " cannot read it: a pipe or a device; "),
+        ("commas.csv", " line 1: a line of 67108864 bytes; write a point a line, x,y, of at most 65536 bytes"),
+        ("latin.csv", " line 1: a line of 67108864 bytes; "),
+        ("nul.csv", " line 3: `\\0\\u{1b}` is not a number; "),
+        ("points.csv", " the file holds more than 1000000 points; "),
+    ] {
+        let shape = format!("file:{file}");
+        let start = format!("error: --shape {shape}:{said}");
+        refused_at_once(home.path(), &["run", "--shape", &shape, "--out", "new/out"], &start);
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn files_of_a_run_without_end_are_refused_at_once() {
+    let home = TempDir::new().unwrap();
+    let arguments = ["--curves", "2", "--t-end", "0.01", "--points", "40", "--backend", "cpu", "--quiet"];
+    let run = curvelax(home.path(), &[&["run", "--out", "run"], &arguments[..]].concat());
+    assert_eq!(run.status.code(), Some(0), "{}", String::from_utf8_lossy(&run.stderr));
+    let files = ["run.json", "summary.csv", "mean_excess.csv", "plots/portraits.json"];
+    let table = |row: &str| [vec![b'x'; 1 << 26], row.as_bytes().to_vec()].concat();
+    for (name, bytes, said) in [
+        ("run.json", [b"{\"curvelax\":[".as_slice(), &b"0,".repeat(2_000_000)].concat(), ": EOF while parsing"),
+        ("run.json", [b"{\"a\":".as_slice(), &b"[".repeat(4_000_000)].concat(), ": EOF while parsing"),
+        (
+            "run.json",
+            [b"{\"spec\":\"".as_slice(), &b"a".repeat(4_000_000), b"\"}"].concat(),
+            ": not written by curvelax",
+        ),
+        ("summary.csv", table("\n"), ": a line of more than 65536 bytes; restore the file"),
+        ("mean_excess.csv", table("\n"), ": a line of more than 65536 bytes; restore the file"),
+        (
+            "plots/portraits.json",
+            [br#"{"members":[{"nodes":["#.as_slice(), &br#""","#.repeat(2_700_000)].concat(),
+            ": EOF while parsing",
+        ),
+    ] {
+        let place = home.path().join("run").join(name);
+        let kept = fs::read(&place).unwrap();
+        fs::write(&place, bytes).unwrap();
+        refused_at_once(home.path(), &["plot", "run"], &format!("error: run/{name}{said}"));
+        fs::write(&place, kept).unwrap();
+    }
+    for name in files {
+        let place = home.path().join("run").join(name);
+        let kept = fs::read(&place).unwrap();
+        fs::remove_file(&place).unwrap();
+        pipe(&place);
+        let start = format!("error: cannot read run/{name}: a pipe or a device; ");
+        refused_at_once(home.path(), &["plot", "run"], &start);
+        fs::remove_file(&place).unwrap();
+        if name.ends_with("json") {
+            endless(&place, 3 << 30);
+            let start = format!("error: cannot read run/{name}: 3221225472 bytes; at most ");
+            refused_at_once(home.path(), &["plot", "run"], &start);
+        }
+        fs::write(&place, kept).unwrap();
+    }
+    let again = curvelax(home.path(), &["plot", "run", "--quiet"]);
+    assert_eq!(again.status.code(), Some(0), "it was no run before: {}", String::from_utf8_lossy(&again.stderr));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn requests_for_more_than_a_memory_holds_are_refused_at_once() {
+    let home = TempDir::new().unwrap();
+    let list = |count: usize| (1..=count).map(|i| i.to_string()).collect::<Vec<_>>().join(",");
+    let thousand = [format!("omega={}", list(1000)), format!("decay={}", list(1000)), format!("seed={}", list(1000))];
+    let times = (0..10_000).map(|i| format!("{}", f64::from(i) / 1e4)).collect::<Vec<_>>().join(",");
+    for (arguments, start) in [
+        (
+            &["--sweep", &thousand[0], "--sweep", &thousand[1], "--sweep", &thousand[2]][..],
+            "error: --sweep (1000000000 cells): ",
+        ),
+        (
+            &["--snapshots", &times, "--points", "1000000"],
+            "error: --snapshots (10000 times): 10000000000 rows per member; ",
+        ),
+        (&["--series", "1e-9"], "error: --series 1e-9: about 2.0e9 rows per member; "),
+        (&["--only", "18446744073709551615"], "error: --only 18446744073709551615: no such member among 256; "),
+        (
+            &["--curves", "1000000000", "--sweep", "omega=1,2"],
+            "error: --curves 1000000000: 2 cells make 2000000000 members",
+        ),
+    ] {
+        refused_at_once(home.path(), &[&["run", "--out", "new/out"], arguments].concat(), start);
+    }
+}
+
 #[test]
 fn a_flag_mends_the_file() {
     let home = TempDir::new().unwrap();

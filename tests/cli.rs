@@ -97,7 +97,7 @@ fn strict_fails_where_members_end_badly_and_only_there() {
 }
 
 #[test]
-fn a_run_out_of_time_keeps_the_members_that_ended() {
+fn a_run_out_of_time_keeps_its_state() {
     let home = TempDir::new().unwrap();
     // Months of members.
     let long = "run --backend cpu --points 34 --adaptive=1e-3 --curves 100000000 --stop-when-relaxed";
@@ -105,17 +105,26 @@ fn a_run_out_of_time_keeps_the_members_that_ended() {
     let output = curvelax(home.path(), &format!("{long} --max-time 2s --out out"));
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(75), "{message}");
-    assert!(started.elapsed() >= Duration::from_secs(2), "{message}");
-    assert!(message.contains("error: --max-time: stopped after "), "{message}");
-    assert!(message.contains("note: the members that ended are kept in out/.summary.csv.part\n"), "{message}");
-    let kept = fs::read_to_string(home.path().join("out/.summary.csv.part")).unwrap();
-    let rows = kept.lines().count() - 1;
+    assert!((2..7).contains(&started.elapsed().as_secs()), "{message}");
+    assert!(message.contains("error: stopped by --max-time after "), "{message}");
+    assert!(message.contains("members in the table; curvelax resume out goes on\n"), "{message}");
+    let rows = || fs::read_to_string(home.path().join("out/.summary.csv.part")).unwrap().lines().count() - 1;
+    let kept = rows();
     assert!(
-        rows > 100 && message.contains(&format!("with {rows} of 100000000 members in the table")),
-        "{rows}: {message}"
+        kept > 100 && message.contains(&format!("with {kept} of 100000000 members in the table")),
+        "{kept}: {message}"
     );
-    assert_eq!(names(&home.path().join("out")), [".summary.csv.part"]);
+    assert_eq!(
+        names(&home.path().join("out")),
+        [".curvelax.state", ".curvelax.state.old", ".rates.csv.part", ".summary.csv.part"]
+    );
     assert_eq!(output.stdout, b"");
+    // What was done is not done again.
+    let output = curvelax(home.path(), "resume out --max-time 1s");
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(75), "{message}");
+    assert!(message.contains(&format!("resuming: {kept} of 100000000 members are in the table\n")), "{message}");
+    assert!(rows() > kept, "{message}");
 }
 
 #[test]

@@ -4,11 +4,7 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::program::{Done, Row, run};
-
-fn number(row: &Row, name: &str) -> f64 {
-    row[name].parse().unwrap_or_else(|_| panic!("{name} is {:?}", row[name]))
-}
+use common::program::{Done, Row, column, number, run};
 
 /// Share of all members whose rate is within 2 % of what theory gives, which `theory` says once more.
 fn share_as_in_theory(done: &Done, theory: impl Fn(f64) -> f64) -> f64 {
@@ -100,7 +96,7 @@ fn the_mean_excess_is_that_of_the_series_and_counts_who_is_left() {
     }
     assert!(number(&rows[16], "mean") < 0.9 * number(&rows[0], "mean"), "it does not fall");
     let stopped = run(&format!("{common} --relax-to 0.1 --stop-when-relaxed")).rows("mean_excess.csv");
-    let left: Vec<f64> = stopped.iter().map(|row| number(row, "members")).collect();
+    let left = column(&stopped, "members");
     assert!(left[0] == 5.0 && left.len() < 33 && left.is_sorted_by(|a, b| a >= b), "{left:?}");
 }
 

@@ -9,7 +9,7 @@ use std::{collections::BTreeMap, f64::consts::TAU, time::Instant};
 
 use curvelax::{
     backend,
-    curve::{BaseCurve, Outline, Sampling, crossing, polygon},
+    curve::{BaseCurve, Sampling, crossing, polygon},
     ensemble::{
         Cell, Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
         spec::{BackendChoice, Precision, Pull, SolverChoice, Sor},
@@ -32,7 +32,7 @@ use curvelax::{
 use glam::DVec2;
 use rayon::prelude::*;
 
-use common::{All, DIRECT, Stepper, polygons, wavy_circle};
+use common::{All, DIRECT, Stepper, dumbbell, file, polygons, wavy_circle};
 
 /// One unperturbed curve in adaptive steps, directly solved.
 fn adaptive(shape: &str, points: usize) -> Spec {
@@ -70,14 +70,6 @@ fn one(spec: &Spec) -> Outcome {
 }
 
 /// A polygon of `corners` as a user's file.
-fn file(corners: &[DVec2]) -> BaseCurve {
-    let text: String = corners.iter().map(|p| format!("{:?},{:?}\n", p.x, p.y)).collect();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("outline.csv");
-    std::fs::write(&path, text).unwrap();
-    BaseCurve::from_outline(Outline::read(&path).unwrap())
-}
-
 /// Runs a member to its end by hand, so that its last state can be looked at, also where the program refuses its n.
 fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let n = member.nodes.len();
@@ -368,14 +360,6 @@ fn one_sweep_is_too_few_and_the_member_stalls_in_finite_time() {
     // Steps of any length are solved once they are short enough; the member creeps on until it has made its share.
     assert!(outcome.steps == 31_631 && outcome.t_end < 0.1, "{outcome:?}");
     assert_eq!(one(&Spec { max_sweeps: 200_000, sor: Sor::Factor(1.7), ..spec }).status, Status::Relaxed);
-}
-
-/// Two unit discs joined by a bar.
-fn dumbbell(half_length: f64, half_width: f64) -> Vec<DVec2> {
-    let end = std::f64::consts::PI - half_width.asin();
-    let arc = |j: i32| DVec2::new(half_length, 0.0) + DVec2::from_angle(end * f64::from(j - 100) / 100.0);
-    let right: Vec<DVec2> = (0..=200).map(arc).collect();
-    right.iter().copied().chain(right.iter().map(|p| -*p)).collect()
 }
 
 fn crosses(snapshot: &Snapshot) -> bool {

@@ -107,7 +107,7 @@ fn members_of_a_sweep_and_members_alone_keep_their_index() {
 #[cfg(unix)]
 fn limited(home: &Path, limit: &str, arguments: &str) -> std::process::Output {
     let program = assert_cmd::cargo::cargo_bin("curvelax");
-    let script = format!("trap '' XFSZ; ulimit -f {limit}; exec \"$0\" run --backend cpu --quiet {arguments}");
+    let script = format!("ulimit -f {limit}; exec \"$0\" {arguments} --quiet");
     std::process::Command::new("sh").args(["-c", &script]).arg(program).current_dir(home).output().unwrap()
 }
 
@@ -115,7 +115,8 @@ fn limited(home: &Path, limit: &str, arguments: &str) -> std::process::Output {
 #[test]
 fn a_full_disk_leaves_the_store_of_the_earlier_run_and_no_half_of_another() {
     let home = tempfile::tempdir().unwrap();
-    let small = "--curves 100 --points 32 --tau 1e-4 --t-end 2e-4 --snapshots 0,2e-4 --store zarr --out out";
+    let small =
+        "run --backend cpu --curves 100 --points 32 --tau 1e-4 --t-end 2e-4 --snapshots 0,2e-4 --store zarr --out out";
     let first = limited(home.path(), "unlimited", small);
     assert_eq!(first.status.code(), Some(0), "{}", String::from_utf8_lossy(&first.stderr));
     let out = home.path().join("out");
@@ -128,7 +129,18 @@ fn a_full_disk_leaves_the_store_of_the_earlier_run_and_no_half_of_another() {
     let after = files(&out);
     assert!(before.iter().all(|(name, bytes)| after.get(name) == Some(bytes)), "{:?}", after.keys());
     let more: Vec<&String> = after.keys().filter(|name| !before.contains_key(*name)).collect();
-    assert!(more.iter().all(|name| *name == ".summary.csv.part"), "{more:?}");
+    let state = [".curvelax.", ".summary.csv.part", ".rates.csv.part", ".snapshots.zarr.part/"];
+    assert!(more.iter().all(|name| state.iter().any(|part| name.starts_with(part))), "{more:?}");
+    assert!(message.contains("note: the state of the run is kept: curvelax resume out goes on\n"), "{message}");
+
+    // With room it goes on, to what it would have been.
+    let resumed = limited(home.path(), "unlimited", "resume out");
+    assert_eq!(resumed.status.code(), Some(0), "{}", String::from_utf8_lossy(&resumed.stderr));
+    let straight = format!("{} --seed 2", small.replace("--out out", "--out straight"));
+    assert_eq!(limited(home.path(), "unlimited", &straight).status.code(), Some(0));
+    let (mut ours, mut theirs) = (files(&out), files(&home.path().join("straight")));
+    assert!(ours.remove("run.json").is_some() && theirs.remove("run.json").is_some());
+    assert!(ours == theirs, "{:?}", ours.keys());
 
     // A later run of another kind leaves nothing of it.
     let third = limited(home.path(), "unlimited", &format!("{} --force", small.replace("zarr", "csv")));

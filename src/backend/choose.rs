@@ -8,6 +8,7 @@ use super::{
     gpu::{Capacity, Gpu, Kernel, Variant},
 };
 use crate::{
+    conformance::self_test,
     ensemble::{
         Spec,
         spec::{BackendChoice, Precision},
@@ -39,9 +40,26 @@ pub struct Platform {
     pub threads: Option<usize>,
 }
 
+impl Platform {
+    /// Whether results are the same there to the last bit: those of the same program on the same adapter and driver, or on
+    /// any CPU, whatever its threads and vectors.
+    pub fn computes_like(&self, other: &Platform) -> bool {
+        let place = |of: &Platform| (of.backend.clone(), of.adapter.clone(), of.driver.clone(), of.precision);
+        place(self) == place(other)
+    }
+
+    /// Writes into a spec where it ran, which is elsewhere than was chosen if the GPU failed.
+    pub fn settle_place(&self, spec: &mut Spec) {
+        spec.backend = if self.backend == "gpu" { BackendChoice::Gpu } else { BackendChoice::Cpu };
+        spec.adapter = self.adapter.clone();
+    }
+}
+
 /// A back end that suits a spec, not yet opened.
 pub struct Choice {
     gpu: Option<Gpu>,
+    /// Where the GPU cannot be opened the CPU is taken.
+    or_cpu: bool,
     precision: Precision,
     reason: String,
 }
@@ -59,6 +77,34 @@ pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
     }
 }
 
+/// Chooses back ends for several parts of a study, of so many nodes each: all in one place, that of the first part, or with
+/// `--backend auto` on the CPU where that cannot do all of them.
+///
+/// # Errors
+/// As [`choose`].
+pub fn choose_all(parts: &[(&Spec, usize)]) -> Result<Vec<Choice>> {
+    let Some(((first, n), others)) = parts.split_first() else { return Ok(Vec::new()) };
+    let auto = first.backend == BackendChoice::Auto && first.adapter.is_none();
+    let choice = choose(first, *n)?;
+    let there = |(spec, n): &(&Spec, usize)| {
+        let mut spec = (*spec).clone();
+        choice.settle_place(&mut spec);
+        choose(&spec, *n).map(|own| if auto { own.or_cpu() } else { own })
+    };
+    let rest: Result<Vec<Choice>> = others.iter().map(there).collect();
+    match rest {
+        Err(error) if auto && choice.gpu.is_some() => {
+            let reason = format!("the GPU cannot do all cells: {error}");
+            parts.iter().map(|(spec, n)| cpu(spec, *n, reason.clone())).collect()
+        }
+        rest => {
+            let mut all = rest?;
+            all.insert(0, choice);
+            Ok(all)
+        }
+    }
+}
+
 /// What `--backend auto` takes: the first hardware GPU that can do the run, else the CPU.
 fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
     if spec.order == Order::Lexicographic {
@@ -68,7 +114,7 @@ fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
     for adapter in adapters.into_iter().filter(Gpu::is_hardware) {
         let name = adapter.name().to_string();
         match take(spec, n, adapter, format!("hardware GPU {name}")) {
-            Ok(choice) => return Ok(choice),
+            Ok(choice) => return Ok(choice.or_cpu()),
             Err(error) => reason = format!("GPU {name} cannot do it: {error}"),
         }
     }
@@ -78,7 +124,7 @@ fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
 fn cpu(spec: &Spec, n: usize, reason: String) -> Result<Choice> {
     let precision = spec.precision.unwrap_or(Precision::F64);
     check_precision(n, precision)?;
-    Ok(Choice { gpu: None, precision, reason })
+    Ok(Choice { gpu: None, or_cpu: false, precision, reason })
 }
 
 fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
@@ -111,7 +157,7 @@ pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
 
 fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<Choice> {
     let precision = fitting_precision(spec, n, adapter.name(), &adapter.capacity())?;
-    Ok(Choice { gpu: Some(adapter), precision, reason })
+    Ok(Choice { gpu: Some(adapter), or_cpu: false, precision, reason })
 }
 
 /// The precision of the run on an adapter, if members of `n` nodes fit it.
@@ -192,7 +238,56 @@ impl Choice {
         spec.precision = Some(self.precision);
     }
 
-    /// Opens it for the members of `spec`, of `n` nodes.
+    /// Where the members of `spec` are computed by this choice.
+    pub fn platform(&self, spec: &Spec) -> Platform {
+        let mut platform = Platform {
+            backend: "cpu".into(),
+            adapter: None,
+            driver: None,
+            device_type: None,
+            precision: self.precision,
+            reason: self.reason.clone(),
+            threads: None,
+        };
+        match &self.gpu {
+            Some(gpu) => {
+                platform.backend = "gpu".into();
+                platform.adapter = Some(gpu.name().to_string());
+                platform.driver = Some(gpu.driver());
+                platform.device_type = Some(gpu.device_type());
+            }
+            None => platform.threads = Some(threads(spec)),
+        }
+        platform
+    }
+
+    /// The choice for a later part of a study whose first part runs `there`: a study does not move in its midst. Where the
+    /// GPU of the first part failed (`fell_back`), it is the CPU; else a GPU that fails is an error.
+    pub fn after(self, there: &Platform, fell_back: bool) -> Choice {
+        let moves = fell_back && self.or_cpu;
+        Choice {
+            gpu: self.gpu.filter(|_| !moves),
+            or_cpu: false,
+            precision: self.precision,
+            reason: if moves { there.reason.clone() } else { self.reason },
+        }
+    }
+
+    /// The same, but the CPU where the GPU cannot be opened or computes wrongly.
+    pub fn or_cpu(self) -> Choice {
+        Choice { or_cpu: true, ..self }
+    }
+
+    /// The GPU, if it is one.
+    pub fn gpu(&self) -> Option<&Gpu> {
+        self.gpu.as_ref()
+    }
+
+    /// Opens it for the members of `spec`, of `n` nodes; a GPU has to pass a [self-test](crate::conformance::self_test()).
+    /// Where `--backend auto` chose a GPU that fails, it opens the CPU, and the platform's reason says why.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when a GPU that was asked for cannot be opened or computes wrongly.
     pub fn open(self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         match self.precision {
             Precision::F32 => self.open_in::<f32>(spec, n),
@@ -200,33 +295,38 @@ impl Choice {
         }
     }
 
-    fn open_in<T: Vectorised>(self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+    fn open_in<T: Vectorised>(mut self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         let blocks = ring(n)?;
-        let mut platform = Platform {
-            backend: "cpu".into(),
-            adapter: None,
-            driver: None,
-            device_type: None,
-            precision: self.precision,
-            reason: self.reason,
-            threads: None,
-        };
-        if let Some(gpu) = self.gpu {
-            let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
-            let variant = gpu.capacity().variant(blocks, spec.solver());
-            let variant = Variant { adaptive: spec.adaptive.is_some(), ..variant };
-            let kernel = Kernel::<T>::new(&gpu, blocks, members, spec.max_sweeps, variant)?;
-            platform.backend = "gpu".into();
-            platform.adapter = Some(gpu.name().to_string());
-            platform.driver = Some(gpu.driver());
-            platform.device_type = Some(gpu.device_type());
-            return Ok((Box::new(kernel), platform));
-        }
         let method = Method { solver: spec.solver(), order: spec.order, max_sweeps: spec.max_sweeps };
-        let backend = CpuBackend::<T>::new(blocks, method, spec.threads.unwrap_or(0))?;
-        platform.threads = Some(backend.threads());
+        if let Some(gpu) = &self.gpu {
+            match open_gpu::<T>(gpu, blocks, spec, &method) {
+                Ok(kernel) => return Ok((kernel, self.platform(spec))),
+                Err(Error::Device(fault)) if self.or_cpu => {
+                    (self.gpu, self.reason) = (None, format!("the GPU failed: {fault}"));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let platform = self.platform(spec);
+        let backend = CpuBackend::<T>::new(blocks, method, threads(spec))?;
         Ok((Box::new(backend), platform))
     }
+}
+
+/// Threads of the CPU back end: all cores unless the spec says how many.
+fn threads(spec: &Spec) -> usize {
+    spec.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
+
+/// The kernel for the members of `spec`, which has passed its self-test.
+fn open_gpu<T: Vectorised>(gpu: &Gpu, blocks: Blocks, spec: &Spec, method: &Method) -> Result<Box<dyn Backend>> {
+    let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
+    let adaptive = spec.adaptive.is_some();
+    let variant = Variant { adaptive, ..gpu.capacity().variant(blocks, spec.solver()) };
+    let mut kernel = Kernel::<T>::new(gpu, blocks, members, spec.max_sweeps, variant)?;
+    let device = format!("{} ({})", gpu.name(), gpu.driver());
+    self_test::<T>(&mut kernel, &device, gpu.is_hardware(), method, blocks.n, adaptive)?;
+    Ok(Box::new(kernel))
 }
 
 #[cfg(test)]

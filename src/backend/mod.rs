@@ -7,7 +7,7 @@ pub mod choose;
 pub mod cpu;
 pub mod gpu;
 
-pub use choose::{Choice, Platform, choose};
+pub use choose::{Choice, Platform, choose, choose_all};
 
 use std::time::Duration;
 

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{flags, print, to_json};
+use super::{flags, print, print_json};
 use crate::{
     backend::{self, choose::MAX_POINTS_F32, gpu::Gpu},
     ensemble::{
@@ -70,7 +70,7 @@ pub fn adapters(args: AdaptersArgs) -> Result<()> {
     let Spec { backend, adapter, precision, .. } = settled;
     let auto = Auto { backend, adapter, precision, sentence: choice.sentence(&spec) };
     if args.json {
-        return print(&to_json(&Listing { curvelax: env!("CARGO_PKG_VERSION"), adapters, auto })?);
+        return print_json(&Listing { curvelax: env!("CARGO_PKG_VERSION"), adapters, auto });
     }
     let mut text: String = adapters.iter().map(Adapter::describe).collect();
     if adapters.is_empty() {

@@ -4,7 +4,7 @@ use std::{collections::HashSet, time::Duration};
 
 use serde::Serialize;
 
-use super::{flags, note, print, to_json};
+use super::{flags, note, print, print_json};
 use crate::{
     backend::{choose::no_adapter, gpu::Gpu},
     bench::{self, Bench, Sample},
@@ -153,7 +153,7 @@ pub fn bench(args: BenchArgs) -> Result<()> {
     let rows: Vec<Row> = cases.iter().map(Case::row).collect();
     if args.json {
         let benches = Benches { curvelax: env!("CARGO_PKG_VERSION"), seconds, repeats, rows: &rows };
-        return print(&to_json(&benches)?);
+        return print_json(&benches);
     }
     print(&table(&rows))
 }

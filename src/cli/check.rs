@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{flags, note, print, to_json};
+use super::{flags, note, print, print_json};
 use crate::{
     backend::{
         choose::no_adapter,
@@ -108,7 +108,7 @@ pub fn check(args: CheckArgs) -> Result<()> {
         }
     }
     if args.json {
-        print(&to_json(&Checks { curvelax: env!("CARGO_PKG_VERSION"), failed, adapters })?)?;
+        print_json(&Checks { curvelax: env!("CARGO_PKG_VERSION"), failed, adapters })?;
     }
     match failed {
         0 => Ok(()),

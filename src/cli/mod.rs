@@ -13,7 +13,9 @@ mod figure;
 mod flags;
 mod man;
 mod plot;
+mod resume;
 mod run;
+mod signals;
 
 use std::{
     ffi::OsString,
@@ -28,11 +30,16 @@ use clap::{
 };
 use serde::Serialize;
 
-use crate::error::{Error, Result, nearest};
+use crate::{
+    error::{Error, Result, nearest, without_controls},
+    report::provenance::json,
+};
 
 const EXAMPLES: &str = "\
 Examples:
   curvelax run --out ellipses
+  curvelax resume ellipses
+      goes on with it if it was interrupted
   curvelax run --help";
 
 /// Relaxes ensembles of closed plane curves by fourth-order geometric flows, on the GPU and the CPU.
@@ -46,6 +53,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Run(Box<run::RunArgs>),
+    Resume(resume::ResumeArgs),
     Check(check::CheckArgs),
     Bench(bench::BenchArgs),
     Convergence(convergence::ConvergenceArgs),
@@ -61,6 +69,7 @@ pub fn main() -> ExitCode {
     let cli = parse(std::env::args_os()).unwrap_or_else(|error| error.exit());
     let done = match cli.command {
         Command::Run(args) => run::run(*args),
+        Command::Resume(args) => resume::resume(args),
         Command::Check(args) => check::check(args),
         Command::Bench(args) => bench::bench(args),
         Command::Convergence(args) => convergence::convergence(args),
@@ -110,15 +119,14 @@ pub(crate) fn print(text: &str) -> Result<()> {
     }
 }
 
-/// `value` as JSON, in lines.
-fn to_json(value: &impl Serialize) -> Result<String> {
-    let text = serde_json::to_string_pretty(value);
-    text.map(|text| text + "\n").map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))
+/// Writes `value` to stdout as JSON.
+fn print_json(value: &impl Serialize) -> Result<()> {
+    print(&json(value, "JSON")?)
 }
 
 /// Writes a line to stderr, where nothing can be done if that fails.
 pub(crate) fn note(line: &str) {
-    let _ = writeln!(io::stderr().lock(), "{line}");
+    let _ = writeln!(io::stderr().lock(), "{}", without_controls(line));
 }
 
 #[cfg(test)]

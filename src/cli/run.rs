@@ -1,15 +1,21 @@
 //! `curvelax run`: arguments → spec → members → files.
 
-use std::{ops::Range, path::PathBuf, time::Duration};
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
-use super::{dry_run, flags, note, print, to_json};
+use super::{dry_run, flags, note, print, print_json, signals};
 use crate::{
-    backend,
-    ensemble::{Cell, Spec, study},
+    backend::{self, Backend, Platform},
+    ensemble::{Cell, Spec, Standing, study},
     error::{Error, Result},
     estimate::Estimate,
-    report::{Form, OutputFolder, Report, folder, gallery::MOST_PANELS, text::plural},
-    simulate::simulate,
+    report::{
+        Form, Manner, OutputFolder, Report, Stop, checkpoint::Origin, folder, gallery::MOST_PANELS, text::plural,
+    },
+    simulate::go_on,
 };
 
 const EXAMPLES: &str = "\
@@ -40,125 +46,227 @@ pub struct RunArgs {
     /// Write into an existing DIR, replacing the files of an earlier run
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
-    /// No progress, no notes, no table: only errors, and what --json asks for
-    #[arg(long, help_heading = flags::OUTPUT)]
-    quiet: bool,
-    /// Print the results as one JSON document instead of the table
-    #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
-    json: bool,
-    /// Exit code 3 if a member ends neither relaxed nor unfinished
-    #[arg(long, help_heading = flags::OUTPUT)]
-    strict: bool,
-    /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; the rows of the members that ended are kept
-    #[arg(long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, help_heading = flags::OUTPUT)]
-    max_time: Option<Duration>,
+    #[command(flatten)]
+    manner: MannerFlags,
     /// Print what the run will take, from a pilot of about two seconds, and stop: memory, steps, time
     #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
     dry_run: bool,
     /// Print the resolved spec and stop
-    #[arg(long, help_heading = flags::OUTPUT)]
+    #[arg(long, conflicts_with = "json", help_heading = flags::OUTPUT)]
     print_spec: bool,
+}
+
+/// How a run goes about its work: nothing of it changes a result.
+#[derive(clap::Args)]
+pub struct MannerFlags {
+    /// No progress, no notes, no table: only errors, and what --json asks for
+    #[arg(long, help_heading = flags::OUTPUT)]
+    quiet: bool,
+    /// Print the results as one JSON document instead of the table
+    #[arg(long, help_heading = flags::OUTPUT)]
+    json: bool,
+    /// Exit code 3 if a member ends neither relaxed nor unfinished
+    #[arg(long, help_heading = flags::OUTPUT)]
+    strict: bool,
+    /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; `curvelax resume` goes on
+    #[arg(long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, help_heading = flags::OUTPUT)]
+    max_time: Option<Duration>,
+    /// Keep the state of the run so often, for `curvelax resume`: at most so much work is lost if the run is killed
+    #[arg(
+        long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, default_value = "5s",
+        help_heading = flags::OUTPUT
+    )]
+    checkpoint_every: Duration,
+}
+
+impl MannerFlags {
+    /// Says a line on stderr, unless all should be quiet.
+    pub fn say(&self, line: &str) {
+        if !self.quiet {
+            note(line)
+        }
+    }
+
+    /// From now on the run can be stopped.
+    pub fn manner(&self) -> Manner {
+        let stop = Stop::default();
+        signals::watch(&stop, self.max_time);
+        Manner { quiet: self.quiet, every: self.checkpoint_every, stop }
+    }
+}
+
+/// A study, ready to run: its companies of cells, and where each is computed.
+pub struct Work {
+    /// Resolved, with everything that was settled by the choices.
+    pub spec: Spec,
+    /// All cells.
+    pub cells: Vec<Cell>,
+    /// By company; no choice where its back end is open already.
+    companies: Vec<(Range<usize>, Option<backend::Choice>)>,
+    /// The back end of the first company, and whether it had to be the CPU.
+    opened: Option<(Box<dyn Backend>, bool)>,
+}
+
+impl Work {
+    /// Checks everything that can be wrong with `spec` on this machine.
+    pub fn new(mut spec: Spec) -> Result<Work> {
+        let mut cells = study::cells(&spec)?;
+        let ranges = study::companies(&cells);
+        let first = |range: &Range<usize>| (&cells[range.start].spec, cells[range.start].spec.points);
+        let choices = backend::choose_all(&ranges.iter().map(first).collect::<Vec<_>>())?;
+        for (range, choice) in ranges.iter().zip(&choices) {
+            cells[range.clone()].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
+        }
+        if spec.sweep.is_empty() {
+            spec = Spec { only: spec.only, ..cells[0].spec.clone() };
+        } else {
+            choices[0].settle_place(&mut spec);
+        }
+        let companies = ranges.into_iter().zip(choices.into_iter().map(Some)).collect();
+        Ok(Work { spec, cells, companies, opened: None })
+    }
+
+    /// Opens the back end of the first company: where that is not the chosen one, the spec tells. Returns where it is.
+    fn open(&mut self, flags: &MannerFlags) -> Result<Platform> {
+        let (range, choice) = &mut self.companies[0];
+        let choice = choice.take().ok_or_else(|| Error::Failed("the back end is open already".into()))?;
+        let chosen_gpu = choice.gpu().is_some();
+        let (backend, platform) = open(&self.cells[range.clone()], choice, flags)?;
+        let fell_back = chosen_gpu && platform.backend == "cpu";
+        if fell_back {
+            flags.say(&format!("note: on the CPU instead: {}", platform.reason));
+            platform.settle_place(&mut self.spec);
+        }
+        self.opened = Some((backend, fell_back));
+        Ok(platform)
+    }
+
+    /// Members of the companies before `company`.
+    fn members_before(&self, company: usize) -> u64 {
+        let before = self.companies.iter().take(company).flat_map(|(range, _)| &self.cells[range.clone()]);
+        before.map(|cell| cell.spec.member_count()).sum()
+    }
+
+    /// Where all is computed.
+    pub fn platform(&self) -> Result<Platform> {
+        let (range, choice) = &self.companies[0];
+        let choice = choice.as_ref().ok_or_else(|| Error::Failed("the back end is open already".into()))?;
+        Ok(choice.platform(&self.cells[range.start].spec))
+    }
+
+    /// What the user should know about the curves of all cells, each sentence once.
+    fn warnings(&self) -> Vec<String> {
+        let mut all: Vec<String> = self.cells.iter().flat_map(|cell| cell.family.warnings().iter().cloned()).collect();
+        all.sort();
+        all.dedup();
+        all
+    }
+
+    /// Runs what is left to do, and publishes all results.
+    ///
+    /// # Errors
+    /// Beside those of the run, [`Error::Request`] where `standing` is not that of the report.
+    pub fn carry_out(self, mut report: Report, standing: Standing, flags: &MannerFlags) -> Result<()> {
+        let (told, rows) = (self.members_before(report.company()).saturating_add(standing.next), report.members());
+        if told != rows {
+            let path = report.folder().display();
+            return Err(Error::Request(format!("{path}: the state tells of {told} members, and the table has {rows}")));
+        }
+        let early = [&self.warnings()[..], report.moves()].concat();
+        early.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
+        let out = report.folder().to_path_buf();
+        let Work { spec, cells, companies, opened } = self;
+        let done = advance(&cells, companies, opened, standing, &mut report, flags);
+        if let Err(error) = done {
+            let stopped = matches!(error, Error::Stopped(_) | Error::Interrupted(_));
+            if report.give_up() && !stopped {
+                kept(&out);
+            }
+            return Err(error);
+        }
+        let (late, failed) = (report.warnings(), report.failed());
+        let form = if flags.json { Form::Json } else { Form::Overview };
+        let text = report.finish(&spec, &[&early[..], &late].concat(), form).inspect_err(|_| kept(&out))?;
+        late.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
+        if flags.json || !flags.quiet {
+            print(&text)?;
+        }
+        match failed {
+            1.. if flags.strict => Err(Error::Strict(format!(
+                "--strict: {failed} of {} {} ended neither relaxed nor unfinished; see `status` in {}",
+                spec.member_count(),
+                plural(spec.member_count(), "member"),
+                out.join(folder::SUMMARY).display()
+            ))),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Runs the command.
 pub fn run(args: RunArgs) -> Result<()> {
-    let mut spec = resolve(args.spec, args.flags)?;
-    let mut cells = study::cells(&spec)?;
-    let companies = study::companies(&cells);
-    let choices = companies
-        .iter()
-        .map(|range| {
-            let company = &mut cells[range.clone()];
-            let choice = backend::choose(&company[0].spec, company[0].spec.points)?;
-            company.iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
-            Ok(choice)
-        })
-        .collect::<Result<Vec<_>>>()?;
-    if spec.sweep.is_empty() {
-        spec = Spec { only: spec.only, ..cells[0].spec.clone() };
-    } else {
-        choices[0].settle_place(&mut spec);
-    }
+    let mut work = Work::new(resolve(args.spec, args.flags)?)?;
     if args.print_spec {
-        return print(&spec.to_toml()?);
+        return print(&work.spec.to_toml()?);
     }
+    let flags = args.manner;
     if args.dry_run {
-        let estimate = Estimate::new(&mut cells, companies, choices)?;
-        return match (args.json, args.quiet) {
-            (true, _) => print(&to_json(&estimate)?),
-            (false, false) => print(&dry_run::table(&estimate, &cells[0].spec)),
+        let companies = work.companies.into_iter().filter_map(|(range, choice)| Some((range, choice?)));
+        let (companies, choices) = companies.unzip();
+        let estimate = Estimate::new(&mut work.cells, companies, choices)?;
+        return match (flags.json, flags.quiet) {
+            (true, _) => print_json(&estimate),
+            (false, false) => print(&dry_run::table(&estimate, &work.cells[0].spec)),
             (false, true) => Ok(()),
         };
     }
     let out = args.out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
-    let say = |line: &str| {
-        if !args.quiet {
-            note(line)
-        }
-    };
     let folder = OutputFolder::open(&out, args.force)?;
-    let early = warnings(&cells);
-    early.iter().for_each(|warning| say(&format!("warning: {warning}")));
-    let mut report = Report::begin(folder, &spec, cells[0].spec.points, args.quiet)?;
-    if let Some(most) = args.max_time {
-        report.stop_after(most);
-    }
-    let rows = report.kept_rows();
-    let form = if args.json { Form::Json } else { Form::Overview };
-    let done = advance(&cells, companies, choices, &mut report, &say).and_then(|platform| {
-        let (late, failed) = (report.warnings(), report.failed());
-        let warnings = [&early[..], &late].concat();
-        Ok((report.finish(&spec, &platform, &warnings, form)?, late, failed))
-    });
-    if done.is_err() && rows.exists() {
-        note(&format!("note: the members that ended are kept in {}", rows.display()));
-    }
-    let (text, late, failed) = done?;
-    late.iter().for_each(|warning| say(&format!("warning: {warning}")));
-    if args.json || !args.quiet {
-        print(&text)?;
-    }
-    match failed {
-        1.. if args.strict => Err(Error::Strict(format!(
-            "--strict: {failed} of {} {} ended neither relaxed nor unfinished; see `status` in {}",
-            spec.member_count(),
-            plural(spec.member_count(), "member"),
-            out.join(folder::SUMMARY).display()
-        ))),
-        _ => Ok(()),
-    }
+    let manner = flags.manner();
+    let platform = work.open(&flags)?;
+    let origin = Origin::new(work.spec.to_toml()?, &work.cells, platform)?;
+    let report = Report::begin(folder, &work.spec, work.cells[0].spec.points, origin, manner)?;
+    work.carry_out(report, Standing::default(), &flags)
 }
 
-/// Runs one company of cells after another; returns where the first one ran.
+/// Says how a run that failed goes on.
+fn kept(out: &Path) {
+    note(&format!("note: the state of the run is kept: curvelax resume {} goes on", out.display()));
+}
+
+/// Opens the back end that was chosen for a company.
+fn open(company: &[Cell], choice: backend::Choice, flags: &MannerFlags) -> Result<(Box<dyn Backend>, Platform)> {
+    flags.say(&choice.sentence(&company[0].spec));
+    let curves = company.iter().map(|cell| cell.spec.member_count()).sum();
+    let whole = Spec { curves, only: None, ..company[0].spec.clone() };
+    choice.open(&whole, whole.points)
+}
+
+/// Runs one company of cells after another, from where `standing` is in that of the report; `opened` is the back end of the
+/// first one, where it is open.
 fn advance(
     cells: &[Cell],
-    companies: Vec<Range<usize>>,
-    choices: Vec<backend::Choice>,
+    companies: Vec<(Range<usize>, Option<backend::Choice>)>,
+    mut opened: Option<(Box<dyn Backend>, bool)>,
+    mut standing: Standing,
     report: &mut Report,
-    say: &dyn Fn(&str),
-) -> Result<backend::Platform> {
-    let mut first = None;
-    for (range, choice) in companies.into_iter().zip(choices) {
+    flags: &MannerFlags,
+) -> Result<()> {
+    let fell_back = opened.as_ref().is_some_and(|(_, fell_back)| *fell_back);
+    let precision = report.platform().precision;
+    for (number, (range, choice)) in companies.into_iter().enumerate().skip(report.company()) {
         let company = &cells[range];
-        let precision = choice.precision();
-        say(&choice.sentence(&company[0].spec));
-        let curves = company.iter().map(|cell| cell.spec.member_count()).sum();
-        let whole = Spec { curves, only: None, ..company[0].spec.clone() };
-        let (mut backend, platform) = choice.open(&whole, whole.points)?;
-        first.get_or_insert(platform);
+        let mut backend = match (choice, opened.take()) {
+            // A run that has begun does not move.
+            (Some(choice), _) => open(company, choice.after(report.platform(), fell_back), flags)?.0,
+            (None, Some((backend, _))) => backend,
+            (None, None) => return Err(Error::Failed("a back end was used up".into())),
+        };
         let portraits = (MOST_PANELS * company.len()).div_ceil(cells.len());
-        report.next_company();
-        simulate(company, precision, backend.as_mut(), portraits, report)?;
+        report.begin_company(number);
+        go_on(company, precision, backend.as_mut(), portraits, std::mem::take(&mut standing), report)?;
     }
-    first.ok_or_else(|| Error::Failed("a study has no cell".into()))
-}
-
-/// What the user should know about the curves of all cells, each sentence once.
-fn warnings(cells: &[Cell]) -> Vec<String> {
-    let mut all: Vec<String> = cells.iter().flat_map(|cell| cell.family.warnings().iter().cloned()).collect();
-    all.sort();
-    all.dedup();
-    all
+    Ok(())
 }
 
 /// The spec file, overlaid with the flags, checked.

@@ -74,6 +74,11 @@ impl Row {
         self.error <= self.bound && self.bound.is_finite()
     }
 
+    /// Whether nothing was compared.
+    pub(super) fn is_empty(&self) -> bool {
+        self.bound == f64::INFINITY
+    }
+
     /// The error as a share of its bound.
     pub fn share(&self) -> f64 {
         if self.error == 0.0 { 0.0 } else { self.error / self.bound }
@@ -99,7 +104,7 @@ impl Row {
         assert!(!ours.is_empty() && ours.len() == theirs.len(), "{}: sides of different length", self.quantity);
         for (node, (a, b)) in ours.iter().zip(theirs).enumerate() {
             let error = (a - b).abs();
-            let first = self.bound.is_infinite();
+            let first = self.is_empty();
             let share = if error == 0.0 { 0.0 } else { error / bound };
             if first || error.is_nan() || share > self.share() {
                 (self.scale, self.error, self.bound, self.at) = (scale, error, bound, (member, node));
@@ -219,6 +224,18 @@ fn ends_agree<T: Real>(
     tamper: Option<Tamper>,
 ) -> Result<Vec<Row>> {
     let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
+    compare_ends::<T>(adapter.is_hardware(), &method(solver), n, &launches, &ours)
+}
+
+/// What a device left of `launches`, within the bounds of hardware or of software, against the twin by `method`.
+pub(super) fn compare_ends<T: Real>(
+    hardware: bool,
+    method: &Method,
+    n: usize,
+    launches: &[Run<f64>],
+    ours: &[Left],
+) -> Result<Vec<Row>> {
+    let solver = method.solver;
     let steps = ours.iter().map(|left| left.counters.steps).max().unwrap_or(0);
     let adaptive = launches.iter().all(|launch| launch.parameters.adaptive > 0.0);
     let quantities: Vec<Bound> = FIELDS.iter().chain(&REPORT).copied().collect();
@@ -226,7 +243,7 @@ fn ends_agree<T: Real>(
     let of_curve = quantities.len();
     let begin = |bound| Row { adaptive, ..Row::begin::<T>(bound, solver, n, steps) };
     let mut rows: Vec<Row> = quantities.iter().chain(&DECAY).chain(inside).map(begin).collect();
-    for (member, (launch, left)) in launches.iter().zip(&ours).enumerate() {
+    for (member, (launch, left)) in launches.iter().zip(ours).enumerate() {
         let Left { state, counters, report } = left;
         let mut twin: Run<T> = launch.convert();
         // Of its steps; and the most that one took off the excess.
@@ -234,7 +251,7 @@ fn ends_agree<T: Real>(
         let mut work = Team::new(blocks(n)?);
         while twin.counters.is_running() {
             let before = twin.report.now.excess.to_f64();
-            evolve(&mut twin, &method(solver), &mut work, 1);
+            evolve(&mut twin, method, &mut work, 1);
             steepest = steepest.max((twin.report.now.excess.to_f64() - before).abs());
             longest = longest.max(twin.report.progress.taken.to_f64());
         }
@@ -264,20 +281,20 @@ fn ends_agree<T: Real>(
         let roundings = growth(twin.counters.steps) * if adaptive { 5.0 } else { 1.0 };
         for (field, (row, bound)) in rows.iter_mut().zip(&quantities).enumerate() {
             let scale = scales.get(bound.scale);
-            let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale * roundings;
+            let limit = bound.factor(hardware) * T::EPSILON * scale * roundings;
             row.add(member, scale, limit, Gpu(ours[field]), Cpu(theirs[field]));
         }
         // What a changed step length changes inside the run: nothing with fixed steps.
         let estimate = T::EPSILON * growth(twin.counters.steps) * scales.stiffness() / launch.parameters.adaptive;
         let change = if adaptive { estimate * steepest } else { 0.0 };
-        let factors = DECAY.map(|bound| bound.factor(adapter.is_hardware()));
+        let factors = DECAY.map(|bound| bound.factor(hardware));
         let wide = twin.report.convert::<f64>();
         let rounding = T::EPSILON * roundings + change;
         decays_agree(&mut rows[of_curve..][..2], member, launch, factors, rounding, Gpu(report), Cpu(&wide));
         if adaptive {
             let twin = Left { state: widened, counters: twin.counters, report: wide };
             let rounding = T::EPSILON * roundings;
-            let factors = PACE.map(|bound| bound.factor(adapter.is_hardware()));
+            let factors = PACE.map(|bound| bound.factor(hardware));
             let inside = &mut rows[of_curve + DECAY.len()..];
             insides_agree(inside, member, &scales, factors, [rounding, estimate], Gpu(left), Cpu(&twin));
         }

@@ -7,11 +7,14 @@
 //! *Practice.* [`stages`] compares everything that one step computes, [`runs`] the curve after many
 //! steps, [`adaptive`] after adaptive ones. Both take
 //! an ensemble in which every member has its own curve, flow, τ and ω ([`members`]). `curvelax check` prints the
-//! table, `tests/conformance.rs` asserts it, with a negative control for each comparison.
+//! table, `tests/conformance.rs` asserts it, with a negative control for each comparison. A run that begins on a GPU
+//! compares a few members first ([`self_test`](self_test::self_test)).
 
 pub mod bounds;
 pub mod cases;
 pub mod compare;
+pub mod self_test;
 
 pub use cases::{adaptive_members, members};
 pub use compare::{Row, Tamper, adaptive, runs, stages};
+pub use self_test::self_test;

@@ -6,18 +6,18 @@
 //! with the warning of a crossing, as may an edge that returns along another (a spike without width). Either orientation is accepted; a clockwise outline is turned round about
 //! its first point, which stays first.
 
-use std::{fs::File, io::Read, path::Path};
+use std::path::Path;
 
 use glam::DVec2;
 
 use super::{Undecided, crossing_within, polygon};
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result, shortened},
+    input::{self, LONGEST_LINE, MOST_OUTLINE},
+};
 
 /// Largest number of points of an outline, and of nodes of a curve.
 pub const MAX_POINTS: usize = 1_000_000;
-
-/// Bytes after which reading stops: a million long lines, but not an endless device.
-const MAX_BYTES: u64 = 1 << 29;
 
 /// Largest coordinate. Fourth powers of lengths, which times are measured in, stay finite.
 const MAX_COORDINATE: f64 = 1e30;
@@ -46,20 +46,25 @@ impl Outline {
     /// # Errors
     /// [`Error::Request`] naming the path, the line, the value and the remedy: the file cannot be read, is empty,
     /// or holds more than [`MAX_POINTS`] points or less than three distinct ones; a line is no pair of finite
-    /// numbers; neighbouring points coincide; no net area is enclosed. An outline that crosses itself is
+    /// numbers, or longer than 65 536 bytes; neighbouring points coincide; no net area is enclosed. An outline that crosses itself is
     /// accepted with a warning.
     pub fn read(path: &Path) -> Result<Outline> {
+        let remedy = format!("give a CSV file x,y of at most {MOST_OUTLINE} bytes");
+        let bytes = input::bytes(path, MOST_OUTLINE);
+        let bytes = bytes.map_err(|e| Source { path }.refusal(None, &format!("cannot read it: {e}"), &remedy))?;
+        Outline::from_csv(path, &bytes)
+    }
+
+    /// Reads an outline from what the file at `path` holds; the path is for the messages.
+    ///
+    /// # Errors
+    /// As [`Outline::read`].
+    pub fn from_csv(path: &Path, bytes: &[u8]) -> Result<Outline> {
         let source = Source { path };
-        let mut bytes = Vec::new();
-        let opened = File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
-        opened.map_err(|error| source.refusal(None, &format!("cannot read it: {error}"), "give a CSV file x,y"))?;
-        if bytes.len() as u64 > MAX_BYTES {
-            return Err(source.too_many(&format!("more than {MAX_BYTES} bytes")));
-        }
         if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
             return Err(source.refusal(None, "the file is in UTF-16", "save it in UTF-8"));
         }
-        source.outline(&String::from_utf8_lossy(&bytes))
+        source.outline(bytes)
     }
 
     /// The outline through a list of points, in either sense, with or without the first one again at the end.
@@ -79,7 +84,7 @@ impl Outline {
     pub fn from_points(points: &[DVec2]) -> Result<Outline> {
         // `{:?}` reads back exactly.
         let lines: String = points.iter().map(|point| format!("{:?},{:?}\n", point.x, point.y)).collect();
-        Source { path: Path::new("(points)") }.outline(&lines)
+        Source { path: Path::new("(points)") }.outline(lines.as_bytes())
     }
 
     /// The polygon through points that are known to be fit: counter-clockwise, no two neighbours the same.
@@ -169,8 +174,8 @@ impl Source<'_> {
         self.refusal(None, &format!("the file holds {count}"), &remedy)
     }
 
-    fn outline(&self, text: &str) -> Result<Outline> {
-        let mut table = self.table(text.strip_prefix('\u{feff}').unwrap_or(text))?;
+    fn outline(&self, bytes: &[u8]) -> Result<Outline> {
+        let mut table = self.table(bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes))?;
         self.make_distinct(&mut table)?;
         let mut points = table.points;
         let (area, length) = (polygon::signed_area(&points), polygon::length(&points));
@@ -204,11 +209,21 @@ impl Source<'_> {
     }
 
     /// Parses the lines into points.
-    fn table(&self, text: &str) -> Result<Table> {
+    fn table(&self, bytes: &[u8]) -> Result<Table> {
         let mut table = Table::default();
         let mut columns = None;
-        let content = (1..).zip(text.lines().map(str::trim));
-        for (line, content) in content.filter(|(_, content)| !content.is_empty() && !content.starts_with('#')) {
+        for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
+            if content.len() > LONGEST_LINE {
+                let problem = format!("a line of {} bytes", content.len());
+                let remedy = format!("write a point a line, x,y, of at most {LONGEST_LINE} bytes");
+                return Err(self.refusal(Some(line), &problem, &remedy));
+            }
+            // Other columns may be in any encoding.
+            let content = String::from_utf8_lossy(content);
+            let content = content.trim();
+            if content.is_empty() || content.starts_with('#') {
+                continue;
+            }
             if !content.contains(',') {
                 self.refuse_separator(line, content, &SEPARATORS)?;
             }
@@ -238,7 +253,7 @@ impl Source<'_> {
         let Some((_, name)) = separators.iter().find(|(separator, _)| content.contains(*separator)) else {
             return Ok(());
         };
-        let problem = format!("the columns of `{}` are separated by {name}", shortened(content));
+        let problem = format!("the columns of `{}` are separated by {name}", shortened(content, SHOWN));
         Err(self.refusal(Some(line), &problem, "separate them by a comma and write decimal points: 1.0,0.5"))
     }
 
@@ -246,7 +261,7 @@ impl Source<'_> {
     fn header(&self, line: usize, fields: &[&str]) -> Result<Columns> {
         let column = |name: &str| fields.iter().position(|field| field.eq_ignore_ascii_case(name));
         let (Some(x), Some(y)) = (column("x"), column("y")) else {
-            let problem = format!("`{}` names no columns x and y", shortened(&fields.join(",")));
+            let problem = format!("`{}` names no columns x and y", shortened(&fields.join(","), SHOWN));
             return Err(self.refusal(
                 Some(line),
                 &problem,
@@ -257,7 +272,7 @@ impl Source<'_> {
     }
 
     fn coordinate(&self, line: usize, field: &str) -> Result<f64> {
-        let shown = shortened(field);
+        let shown = shortened(field, SHOWN);
         match field.parse::<f64>() {
             Ok(value) if value.abs() <= MAX_COORDINATE => Ok(value),
             Ok(value) => {
@@ -309,17 +324,11 @@ fn fields(line: &str) -> impl Iterator<Item = &str> {
     line.split(separates).map(|field| field.trim().trim_matches('"').trim())
 }
 
+/// Characters of foreign text in a message.
+const SHOWN: usize = 40;
+
 /// What else separates columns, of which a space may also follow a comma.
 const SEPARATORS: [(char, &str); 3] = [(';', "semicolons"), ('\t', "tabs"), (' ', "spaces")];
-
-/// At most 40 characters of foreign text, control characters escaped.
-fn shortened(text: &str) -> String {
-    let mut shown: String = text.chars().take(40).flat_map(char::escape_debug).collect();
-    if text.chars().nth(40).is_some() {
-        shown.push_str("...");
-    }
-    shown
-}
 
 #[cfg(test)]
 mod tests {
@@ -328,7 +337,7 @@ mod tests {
     const SQUARE: &str = "0,0\n1,0\n1,1\n0,1\n";
 
     fn outline(text: &str) -> Result<Outline> {
-        Source { path: Path::new("shape.csv") }.outline(text)
+        Outline::from_csv(Path::new("shape.csv"), text.as_bytes())
     }
 
     fn vertices(text: &str) -> Vec<(f64, f64)> {
@@ -471,6 +480,20 @@ mod tests {
             let error = Outline::read(Path::new(path)).unwrap_err();
             assert!(error.exit_code() == 2 && error.to_string().contains(path), "{error}");
         }
+    }
+
+    #[test]
+    fn a_line_without_end_is_refused_before_it_is_cut_into_columns() {
+        let long = |columns: usize| format!("x,y{}\n0,0\n1,0\n1,1\n", ",".repeat(columns));
+        assert_eq!(vertices(&long(LONGEST_LINE - 3)).len(), 3);
+        assert_refused(&long(LONGEST_LINE - 2), &["line 1: a line of 65537 bytes; ", "x,y, of at most 65536 bytes"]);
+        assert_refused(&format!("0,0\n{}", " ".repeat(1 << 20)), &["line 2: a line of 1048576 bytes"]);
+    }
+
+    #[test]
+    fn other_columns_may_be_in_any_encoding() {
+        let latin = b"x,y,name\n0,0,Cura\xe7ao\n1,0,\n1,1,\xff\n";
+        assert_eq!(Outline::from_csv(Path::new("shape.csv"), latin).unwrap().vertices().len(), 3);
     }
 
     #[test]

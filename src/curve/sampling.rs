@@ -136,6 +136,14 @@ impl Sampler {
         self.nodes
     }
 
+    /// Bytes of what is tabulated for `nodes` nodes, the vertices of an outline aside.
+    pub(crate) fn bytes(sampling: Sampling, nodes: usize) -> usize {
+        match sampling {
+            Sampling::Parameter | Sampling::Points => nodes * size_of::<DVec2>(),
+            Sampling::Arclength => MIN_SAMPLES.max(SAMPLES_PER_NODE * nodes) * size_of::<Sample>(),
+        }
+    }
+
     /// The nodes i = 1…n, at index i-1, of the curve stretched by `factor` about its area centroid.
     pub fn sample(&self, factor: &RadialFactor) -> Vec<DVec2> {
         let centre = self.curve.centroid();

@@ -155,6 +155,9 @@ fn check_flower(modes: &[FlowerMode]) -> Result<(), String> {
     if modes.is_empty() {
         return Err("a flower without modes; write for example flower:3:0.2,5:0.1".into());
     }
+    if modes.len() > MAX_MODE as usize {
+        return Err(format!("a flower of {} modes; allowed are at most {MAX_MODE}", modes.len()));
+    }
     for term in modes {
         if !(1..=MAX_MODE).contains(&term.mode) {
             return Err(format!("the mode {} is out of range; allowed are 1 to {MAX_MODE}", term.mode));
@@ -334,6 +337,9 @@ mod tests {
             let says_what_is_allowed = message.contains("allowed are") || message.contains("less than 1");
             assert!(message.contains(value) && says_what_is_allowed, "{text}: {message}");
         }
+        let many = |count: usize| format!("flower:{}", vec!["3:0.0005"; count].join(","));
+        assert!(refusal(&many(1001)).contains("a flower of 1001 modes; allowed are at most 1000"));
+        assert_eq!(shape(&many(1000)).highest_mode(), Some(3));
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! the same number whichever other modes are asked for. The number of nodes does not enter either: at n = 100 and
 //! n = 200 member j is the same curve.
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, sync::Arc};
 
 use glam::DVec2;
 
@@ -40,11 +40,11 @@ pub struct Member {
 
 /// The curve of a spec, prepared once, from which every member is made.
 pub struct Family {
-    sampler: Sampler,
+    sampler: Arc<Sampler>,
     law: RadialLaw,
     seed: u64,
     /// Directions at which a draw is checked.
-    directions: Vec<DVec2>,
+    directions: Arc<[DVec2]>,
     warnings: Vec<String>,
     /// An outline spaced equally: its corners may be too sharp for n nodes.
     has_corners: bool,
@@ -93,8 +93,30 @@ impl Family {
         }
         let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
         check_pull(spec.pull, &sampler.sample(&RadialFactor::default()))?;
-        let directions = check_directions(spec.modes.high);
+        let (sampler, directions) = (Arc::new(sampler), check_directions(spec.modes.high).into());
         Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners, simple })
+    }
+
+    /// As [`Family::new`] for a spec with the shape, sampling and points of that of `other`, which it shares what is
+    /// large with.
+    ///
+    /// # Errors
+    /// As [`Family::new`].
+    pub(crate) fn like(other: &Family, spec: &Spec) -> Result<Family> {
+        let law = RadialLaw::new(spec.amplitude, spec.modes, spec.decay)?;
+        check_pull(spec.pull, &other.sampler.sample(&RadialFactor::default()))?;
+        let directions = match other.law.modes().high == spec.modes.high {
+            true => Arc::clone(&other.directions),
+            false => check_directions(spec.modes.high).into(),
+        };
+        let (sampler, warnings) = (Arc::clone(&other.sampler), other.warnings.clone());
+        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, ..*other })
+    }
+
+    /// Whether the tables of its curve are those of `other`.
+    #[cfg(test)]
+    pub(crate) fn shares_with(&self, other: &Family) -> bool {
+        Arc::ptr_eq(&self.sampler, &other.sampler)
     }
 
     /// What the user should know about the curve, a sentence each.

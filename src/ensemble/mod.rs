@@ -6,12 +6,14 @@ pub mod mollifier;
 pub mod outcome;
 pub mod random;
 pub mod spec;
+pub mod standing;
 pub mod study;
 pub mod sweep;
 mod validate;
 
 pub use member::{Family, Member};
 pub use mollifier::Mollified;
-pub use outcome::{Ended, Observables, Outcome, Portrait, SeriesRow, Sink, Snapshot, Status};
+pub use outcome::{Ended, Observables, Outcome, Portrait, SeriesRow, Sink, Snapshot, Status, Wish};
 pub use spec::Spec;
+pub use standing::{Paused, Standing};
 pub use study::Cell;

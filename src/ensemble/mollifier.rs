@@ -13,6 +13,7 @@
 //! the plane (checked on random polygons in `tests/polygons.rs`).
 
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     curve::{crossing, polygon, resample},
@@ -27,7 +28,7 @@ const STRENGTH: f64 = 0.1;
 const MAX_ROUNDS: u32 = 100;
 
 /// What rounding off did to a curve.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mollified {
     /// Rounds made; 0 if the curve was left alone.
     pub rounds: u32,

@@ -1,13 +1,17 @@
 //! What a member's run leaves behind: its status, its times, and its observables at the start and the end.
 
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
-use super::Mollified;
+use super::{Mollified, Standing};
 pub use crate::scheme::Status;
-use crate::{error::Result, scheme::parameters::Observed};
+use crate::{
+    error::{Error, Result},
+    scheme::parameters::Observed,
+};
 
 /// Scalar observables of one curve at one time (f64 whatever the precision of the run).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Observables {
     /// Length `L` of the polygon `x`.
     pub length: f64,
@@ -47,7 +51,7 @@ impl Observables {
 }
 
 /// One row of `summary.csv`. Times are in the curve's own units (length⁴).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Index of the member, from 0.
     pub member: u64,
@@ -84,7 +88,7 @@ pub struct Outcome {
 }
 
 /// One row of `series.csv`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeriesRow {
     /// Index of the member.
     pub member: u64,
@@ -95,7 +99,7 @@ pub struct SeriesRow {
 }
 
 /// The nodes of one member at one time; each vector has n entries, node i = 1…n at index i-1.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
     /// Index of the member.
     pub member: u64,
@@ -112,7 +116,7 @@ pub struct Snapshot {
 }
 
 /// A member's nodes in the user's frame.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Portrait {
     /// At the start.
     pub before: Vec<DVec2>,
@@ -123,7 +127,7 @@ pub struct Portrait {
 }
 
 /// Everything that one member left.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ended {
     /// Its row of the summary.
     pub outcome: Outcome,
@@ -141,6 +145,17 @@ pub struct Ended {
     pub unresolved: bool,
 }
 
+/// What a sink wishes of a run between two dispatches.
+#[derive(Debug)]
+pub enum Wish {
+    /// To go on.
+    GoOn,
+    /// To be told where the run stands, and to go on.
+    Keep,
+    /// To be told where the run stands, and to end with this error.
+    Stop(Error),
+}
+
 /// Receives everything that the members leave.
 pub trait Sink {
     /// A member has ended; called exactly once per member, in member order.
@@ -148,6 +163,14 @@ pub trait Sink {
     /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done. Called after every dispatch, and
     /// during long ones: an error stops the run.
     fn progress(&mut self, _done: u64, _total: u64, _share: f64) -> Result<()> {
+        Ok(())
+    }
+    /// What it wishes now; asked after every dispatch, and during long ones.
+    fn wish(&mut self) -> Wish {
+        Wish::GoOn
+    }
+    /// Where the run stands: as was wished for, or as it comes to a bad end.
+    fn keep(&mut self, _standing: &Standing) -> Result<()> {
         Ok(())
     }
 }

@@ -10,8 +10,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use super::sweep::Sweep;
 use crate::{
     curve::{Modes, Sampling, Shape},
-    error::{Error, Result, did_you_mean},
+    error::{Error, Result, did_you_mean, shortened},
     flow::Flow,
+    input,
 };
 
 pub use crate::{
@@ -233,7 +234,7 @@ impl Spec {
     ///
     /// Not yet [validated](Spec::validate): flags may still replace what is wrong in it.
     pub fn read(path: &Path) -> Result<Spec> {
-        let text = std::fs::read_to_string(path)
+        let text = input::text(path, input::MOST_SPEC)
             .map_err(|e| Error::Request(format!("cannot read the spec {}: {e}", path.display())))?;
         Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", path.display())))
     }
@@ -251,7 +252,7 @@ impl Spec {
     /// # Errors
     /// The message has toml's line and caret, and the nearest valid spelling.
     pub fn from_toml(text: &str) -> Result<Spec, String> {
-        toml::from_str(text).map_err(|e| format!("{}{}", e.to_string().trim_end(), suggestion(e.message())))
+        toml::from_str(text).map_err(|e| format!("{}{}", told(&e), suggestion(e.message())))
     }
 
     /// The spec as a TOML file that [`Spec::from_toml`] reads back to the same spec.
@@ -315,6 +316,19 @@ impl Spec {
     pub fn tolerance_at(&self, precision: Precision) -> f64 {
         self.tolerance.unwrap_or(precision.tolerance())
     }
+}
+
+/// Characters of a line that is still shown with its caret: the list of all keys has half as many.
+const LONGEST_SHOWN: usize = 1000;
+
+/// What is wrong, with the line and a caret; of a line without end only where in it.
+fn told(error: &toml::de::Error) -> String {
+    let whole = error.to_string();
+    if whole.lines().all(|line| line.len() <= LONGEST_SHOWN) {
+        return whole.trim_end().to_owned();
+    }
+    let place = whole.lines().next().unwrap_or_default();
+    format!("{}: {}", shortened(place, LONGEST_SHOWN), shortened(error.message().trim_end(), LONGEST_SHOWN))
 }
 
 /// The nearest of the names that serde lists after "unknown field `x`, expected one of `a`, `b`".
@@ -491,6 +505,19 @@ mod tests {
         assert_eq!(Spec::from_toml("only = [3, 1]").unwrap().only, Some(vec![3, 1]));
         for text in ["snapshots = 1", "snapshots = '0,,1'", "snapshots = ['a']", "only = [1.5]", "only = [-1]"] {
             assert!(Spec::from_toml(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn of_a_line_without_end_only_the_place_is_told() {
+        let long = "x".repeat(100_000);
+        for (text, start) in [
+            (format!("\nshape = '{long}'"), "TOML parse error at line 2, column 9: unknown shape `xxx"),
+            (format!("{long} = 1"), "TOML parse error at line 1, column 1: unknown field `xxx"),
+            (format!("a = {}", "[".repeat(100_000)), "TOML parse error at line 1, column 85: cannot recurse further"),
+        ] {
+            let message = Spec::from_toml(&text).unwrap_err();
+            assert!(message.starts_with(start) && message.len() < 1200 && !message.contains('\n'), "{message}");
         }
     }
 

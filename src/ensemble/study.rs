@@ -7,6 +7,7 @@ use super::{
     spec::{Pace, Store},
 };
 use crate::{
+    curve::Sampler,
     error::{Error, Result},
     solver::{Order, Solver},
 };
@@ -71,30 +72,54 @@ impl Cell {
     }
 }
 
+/// The curves of all cells are made before the first of them runs, and may take this much memory: those of three cells of
+/// a million nodes.
+const MOST_BYTES: usize = 4_000_000_000;
+
+/// Cell `index` of `spec`, after the cells `before`, whose curves take `bytes`.
+fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<Cell> {
+    let first = index * spec.curves;
+    let only = spec.only.as_ref().map(|only| {
+        // They ascend.
+        let below = |member: u64| only.partition_point(|m| *m < member);
+        only[below(first)..below(first + spec.curves)].iter().map(|member| member - first).collect()
+    });
+    let own = Spec { only: None, ..spec.sweep.apply(spec, index)? }.validate()?;
+    let curve = |other: &Spec| (own.points, own.sampling) == (other.points, other.sampling) && own.shape == other.shape;
+    let family = match before.iter().rfind(|cell| curve(&cell.spec)) {
+        Some(other) => Family::like(&other.family, &own)?,
+        None => {
+            *bytes += Sampler::bytes(own.sampling, own.points);
+            if *bytes > MOST_BYTES {
+                let (cells, gigabytes) = (format!("({} cells)", spec.sweep.cells()), MOST_BYTES as f64 / 1e9);
+                let problem = format!("the curves of the first {} take more than {gigabytes} GB", index + 1);
+                return Err(Error::value("sweep", cells, &problem, "take fewer --points, or fewer cells at once"));
+            }
+            Family::new(&own)?
+        }
+    };
+    // A file's own points are a number that no check has seen.
+    let own = Spec { points: family.points(), ..own }.validate()?;
+    Ok(Cell { index, spec: Spec { only, ..own }, family, first, common: spec.common_random_numbers })
+}
+
 /// All cells of `spec`, checked; one if nothing is swept.
 ///
 /// # Errors
 /// [`Error::Request`] for a value that is out of range, with the cell that has it, and for curves of unequal numbers of
-/// nodes that are to share an array.
+/// nodes that are to share an array, and for more curves than a memory holds.
 pub fn cells(spec: &Spec) -> Result<Vec<Cell>> {
-    let cell = |index: u64| -> Result<Cell> {
-        let first = index * spec.curves;
-        let of_cell = |member: &u64| (first..first + spec.curves).contains(member);
-        let only = spec.only.as_ref().map(|only| only.iter().filter(|m| of_cell(m)).map(|m| m - first).collect());
-        let own = Spec { only: None, ..spec.sweep.apply(spec, index)? }.validate()?;
-        let family = Family::new(&own)?;
-        // A file's own points are a number that no check has seen.
-        let own = Spec { points: family.points(), ..own }.validate()?;
-        Ok(Cell { index, spec: Spec { only, ..own }, family, first, common: spec.common_random_numbers })
-    };
-    let name = |index, error| match error {
-        Error::Request(message) if !spec.sweep.is_empty() => {
-            Error::Request(format!("{message} (in the cell {})", spec.sweep.name(index)))
-        }
-        error => error,
-    };
-    let cells = (0..spec.sweep.cells()).map(|index| cell(index).map_err(|error| name(index, error)));
-    let cells = cells.collect::<Result<Vec<_>>>()?;
+    let mut cells: Vec<Cell> = Vec::new();
+    let mut bytes = 0;
+    for index in 0..spec.sweep.cells() {
+        let cell = cell(spec, index, &cells, &mut bytes).map_err(|error| match error {
+            Error::Request(message) if !spec.sweep.is_empty() => {
+                Error::Request(format!("{message} (in the cell {})", spec.sweep.name(index)))
+            }
+            error => error,
+        })?;
+        cells.push(cell);
+    }
     let unequal = cells.windows(2).find(|pair| pair[0].spec.points != pair[1].spec.points);
     if let (Store::Zarr, Some([one, other])) = (spec.store, unequal) {
         let [(one, own), (other, others)] = [one, other].map(|cell| (spec.sweep.name(cell.index), cell.spec.points));
@@ -114,4 +139,52 @@ pub fn companies(cells: &[Cell]) -> Vec<Range<usize>> {
         }
     }
     companies
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn swept(axes: &[&str], base: Spec) -> Spec {
+        let mut spec = base;
+        axes.iter().for_each(|axis| spec.sweep.set(axis.parse().unwrap()));
+        spec.validate().unwrap()
+    }
+
+    #[test]
+    fn cells_of_one_curve_share_it_and_have_the_members_of_cells_that_do_not() {
+        let axes = ["amplitude=0.05,0.1", "modes=2..=4;2..=8", "shape=ellipse:2,1;circle:1", "seed=1,2"];
+        let spec = swept(&axes, Spec { points: 48, curves: 2, ..Spec::default() });
+        let cells = cells(&spec).unwrap();
+        assert_eq!(cells.len(), 16);
+        for (one, other) in cells.iter().flat_map(|one| cells.iter().map(move |other| (one, other))) {
+            assert_eq!(one.family.shares_with(&other.family), one.spec.shape == other.spec.shape);
+        }
+        for cell in &cells {
+            let alone = Family::new(&cell.spec).unwrap();
+            for member in cell.members() {
+                assert_eq!(cell.member(member).unwrap().nodes, alone.member(member).unwrap().nodes, "{member}");
+            }
+        }
+        assert_ne!(cells[0].member(0).unwrap().nodes, cells[4].member(0).unwrap().nodes, "other modes");
+    }
+
+    #[test]
+    fn more_curves_than_a_memory_holds_are_refused_before_they_are_made() {
+        // Equal parameters take little time; their tables are a share of those of equal spacing.
+        let spec = swept(&["sampling=parameter,arclength"], Spec { points: 1_000_000, ..Spec::default() });
+        let bytes = |held: usize| cell(&spec, 0, &[], &mut { held });
+        assert!(bytes(MOST_BYTES - 16_000_000).is_ok());
+        let message = bytes(MOST_BYTES - 15_999_999).err().unwrap().to_string();
+        assert!(message.starts_with("--sweep (2 cells): the curves of the first 1 take more than 4 GB; "), "{message}");
+    }
+
+    #[test]
+    fn the_members_to_run_fall_to_their_cells() {
+        let only = Some(vec![0, 2, 3, 8]);
+        let spec = swept(&["omega=1,2,3"], Spec { points: 48, curves: 3, only, ..Spec::default() });
+        let cells = cells(&spec).unwrap();
+        let members: Vec<Vec<u64>> = cells.iter().map(|cell| cell.members().collect()).collect();
+        assert_eq!(members, [vec![0, 2], vec![3], vec![8]]);
+    }
 }

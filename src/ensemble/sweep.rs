@@ -178,7 +178,10 @@ impl Sweep {
     /// [`Error::Request`] for a value that the key cannot have.
     pub fn apply(&self, base: &Spec, index: u64) -> Result<Spec> {
         let failed = |e: &dyn fmt::Display| Error::Failed(format!("cannot write the spec as TOML: {e}"));
-        let mut table = Table::try_from(Spec { sweep: Sweep::default(), ..base.clone() }).map_err(|e| failed(&e))?;
+        // The lists, which are long and cannot vary, go beside.
+        let Spec { snapshots, only, .. } = base;
+        let short = Spec { sweep: Sweep::default(), snapshots: Vec::new(), only: None, ..base.clone() };
+        let mut table = Table::try_from(short).map_err(|e| failed(&e))?;
         for (axis, value) in self.0.iter().zip(self.values(index)) {
             // What stands instead of each other.
             match axis.key.as_str() {
@@ -194,7 +197,8 @@ impl Sweep {
                 Error::Request(format!("--sweep {}={}: {}", axis.key, label(value), e.message().trim_end()))
             })?;
         }
-        Spec::deserialize(table).map_err(|e| failed(&e))
+        let spec = Spec::deserialize(table).map_err(|e| failed(&e))?;
+        Ok(Spec { snapshots: snapshots.clone(), only: only.clone(), ..spec })
     }
 }
 
@@ -268,6 +272,13 @@ mod tests {
         let spec = Spec { sweep: sweep(&["tau=0.01,0.1", "flow=willmore,elastic:0.5", "decay=1"]), ..Spec::default() };
         let text = spec.to_toml().unwrap();
         assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");
+    }
+
+    #[test]
+    fn a_cell_keeps_the_lists_of_its_base() {
+        let base = Spec { snapshots: vec![0.0, 0.5], only: Some(vec![3, 4]), ..Spec::default() };
+        let spec = sweep(&["omega=2"]).apply(&base, 0).unwrap();
+        assert_eq!(spec, Spec { omega: 2.0, ..base });
     }
 
     #[test]

@@ -18,6 +18,8 @@ const MOST_STEPS: f64 = 1e9;
 /// The rows of a resident member stay in memory until it ends.
 const MOST_SERIES_ROWS: f64 = 1e6;
 const MOST_SNAPSHOTS: usize = 10_000;
+/// Likewise: four numbers a row.
+const MOST_SNAPSHOT_ROWS: usize = 100_000_000;
 /// The lengths approach their mean explicitly, by a factor 1 - ωτ a step.
 const MOST_OMEGA_TAU: f64 = 1.0;
 /// Above this local error a step says nothing about the curve.
@@ -279,6 +281,12 @@ impl Spec {
                 &format!("at most {MOST_SNAPSHOTS}"),
             ));
         }
+        let rows = self.snapshots.len().saturating_mul(self.points);
+        if rows > MOST_SNAPSHOT_ROWS {
+            let problem = format!("{rows} rows per member");
+            let allowed = format!("at most {MOST_SNAPSHOT_ROWS}: take fewer times, or fewer --points");
+            return Err(Error::value("snapshots", format!("({} times)", self.snapshots.len()), &problem, &allowed));
+        }
         Ok(())
     }
 
@@ -505,5 +513,9 @@ mod tests {
         let snapshots: Vec<f64> = (0..=MOST_SNAPSHOTS).map(|i| i as f64 * 1e-4).collect();
         let message = Spec { snapshots, ..Spec::default() }.validate().unwrap_err().to_string();
         assert!(message.starts_with("--snapshots (10001 times): "), "{message}");
+        let rows = |points| Spec { snapshots: (0..1000).map(|i| i as f64 * 1e-3).collect(), points, ..Spec::default() };
+        assert_eq!(rows(100_000).validate().unwrap().snapshots.len(), 1000);
+        let message = rows(100_001).validate().unwrap_err().to_string();
+        assert!(message.starts_with("--snapshots (1000 times): 100001000 rows per member; at most"), "{message}");
     }
 }

@@ -1,8 +1,8 @@
 //! Numbers side by side in the registers of vector instructions: one lane a member.
 //!
 //! The instructions are [`pulp`]'s, each behind a token that proves that the processor has them. An expression such as
-//! `a + b` has nowhere to carry a token, so the type of the numbers stands for it: [`Lanes`] are only used behind
-//! [`Vectors`](crate::backend::cpu::Vectors), which asks the processor first.
+//! `a + b` has nowhere to carry a token, so the type of the numbers stands for it: nobody else can name [`Lanes`], and
+//! [`with_lanes`] hands them on in exchange for a token.
 
 use std::{
     marker::PhantomData,
@@ -19,9 +19,16 @@ pub(crate) trait Instructions: Simd {
     /// As wide as a register and aligned like that: loads of a number that lies across two lines of the cache take twice
     /// the time, and padding would take twice the cache.
     type Aligned: Copy + Send + Sync;
-    /// The token. Only in code that runs after the processor was asked for these instructions.
-    fn token() -> Self;
+    /// The token. Only here, see [`Here`].
+    fn token(here: Here) -> Self;
 }
+
+/// What nobody but this file can make: the operations of [`Lanes`] show it to take a token.
+#[derive(Clone, Copy)]
+pub(crate) struct Here(());
+
+/// To be used in the operations of [`Lanes`] and [`LaneMask`] alone: the proof of [`Instructions::token`] rests on it.
+const HERE: Here = Here(());
 
 macro_rules! instructions {
     ($($type:ty: $aligned:ident $bytes:literal),*) => {
@@ -35,11 +42,17 @@ macro_rules! instructions {
                 type Aligned = $aligned;
                 #[inline(always)]
                 #[allow(unsafe_code)]
-                fn token() -> Self {
+                fn token(_: Here) -> Self {
                     debug_assert!(<$type>::is_available());
-                    // SAFETY: the type asks for nothing but that the processor has the instructions. Tokens are taken by
-                    // the operations on `Lanes` alone, which are private to this crate and instantiated in one place
-                    // only, `abreast` of the CPU back end, behind a token made by `try_new`, that is by asking the processor.
+                    // SAFETY: the function asks for nothing but that the processor has the instructions.
+                    // 1. Whoever calls it has a `Here`. Its field is private, and this file makes one, `HERE`, used in the
+                    //    operations of `Lanes<S, ..>` and `LaneMask<S, ..>` for `S::token` alone.
+                    // 2. These two types are private. Other code gets them as the type parameter of `WithLanes::call` only,
+                    //    or as its `Number::Mask`; and the one who calls that, `with_lanes`, was given a value of type `S`.
+                    // 3. A value of type `S` is a proof of the same thing: pulp makes one in `try_new`, which asks the
+                    //    processor, and in functions that are unsafe, which this crate denies but here.
+                    // 4. The answer holds for the whole process and until its end, so the value need not be kept: an
+                    //    operation in another thread, or in a destructor, still comes after it.
                     unsafe { <$type>::new_unchecked() }
                 }
             }
@@ -138,18 +151,27 @@ element!(f32, f32s, m32s, F32_LANES, splat_f32s, first_true_m32s,
     add_f32s sub_f32s mul_f32s div_f32s max_f32s min_f32s, sqrt_f32s,
     splat_u32s xor_u32s and_u32s select_u32s, less_than_or_equal_f32s, and_m32s or_m32s not_m32s);
 
+/// What is done with numbers of a type that can be had only where its instructions are.
+pub(crate) trait WithLanes<T: Real> {
+    /// What comes out.
+    type Output;
+    /// Does it.
+    fn call<N: Number<Real = T>>(self) -> Self::Output;
+}
+
+/// Calls `work` with the numbers in `R` registers of the instructions `S`, which the token proves to be there.
+pub(crate) fn with_lanes<S: Instructions, T: Element<S>, const R: usize, W: WithLanes<T>>(_: S, work: W) -> W::Output {
+    work.call::<Lanes<S, T, R>>()
+}
+
 /// The numbers in `R` registers of the instructions `S`: where `R` is above 1, one is computed while the other waits.
 #[derive(Clone, Copy)]
 #[repr(C)]
-pub(crate) struct Lanes<S: Instructions, T: Element<S>, const R: usize>(
-    [T::Register; R],
-    [S::Aligned; 0],
-    PhantomData<S>,
-);
+struct Lanes<S: Instructions, T: Element<S>, const R: usize>([T::Register; R], [S::Aligned; 0], PhantomData<S>);
 
 /// One truth value a lane.
 #[derive(Clone, Copy)]
-pub(crate) struct LaneMask<S: Simd, T: Element<S>, const R: usize>([T::Truth; R], PhantomData<(S, T)>);
+struct LaneMask<S: Simd, T: Element<S>, const R: usize>([T::Truth; R], PhantomData<(S, T)>);
 
 /// `$result` of every register `$r`, in an array that starts as `$start`. A loop: a closure need not be compiled with the
 /// instructions of its caller.
@@ -180,21 +202,21 @@ impl<S: Instructions, T: Element<S>, const R: usize> Mask for LaneMask<S, T, R> 
     fn any(self) -> bool {
         let mut any = false;
         for r in 0..R {
-            any |= <T as Element<S>>::any(S::token(), self.0[r]);
+            any |= <T as Element<S>>::any(S::token(HERE), self.0[r]);
         }
         any
     }
     #[inline(always)]
     fn and(self, other: Self) -> Self {
-        LaneMask(each!(self.0, r => <T as Element<S>>::and(S::token(), self.0[r], other.0[r])), PhantomData)
+        LaneMask(each!(self.0, r => <T as Element<S>>::and(S::token(HERE), self.0[r], other.0[r])), PhantomData)
     }
     #[inline(always)]
     fn or(self, other: Self) -> Self {
-        LaneMask(each!(self.0, r => <T as Element<S>>::or(S::token(), self.0[r], other.0[r])), PhantomData)
+        LaneMask(each!(self.0, r => <T as Element<S>>::or(S::token(HERE), self.0[r], other.0[r])), PhantomData)
     }
     #[inline(always)]
     fn not(self) -> Self {
-        LaneMask(each!(self.0, r => <T as Element<S>>::not(S::token(), self.0[r])), PhantomData)
+        LaneMask(each!(self.0, r => <T as Element<S>>::not(S::token(HERE), self.0[r])), PhantomData)
     }
     #[inline(always)]
     fn lane(self, lane: usize) -> bool {
@@ -221,7 +243,7 @@ macro_rules! operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Lanes(each!(self.0, r => <T as Element<S>>::$method(S::token(), self.0[r], other.0[r])), [], PhantomData)
+                Lanes(each!(self.0, r => <T as Element<S>>::$method(S::token(HERE), self.0[r], other.0[r])), [], PhantomData)
             }
         }
     };
@@ -243,7 +265,7 @@ impl<S: Instructions, T: Element<S>, const R: usize> Neg for Lanes<S, T, R> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Lanes(each!(self.0, r => <T as Element<S>>::neg(S::token(), self.0[r])), [], PhantomData)
+        Lanes(each!(self.0, r => <T as Element<S>>::neg(S::token(HERE), self.0[r])), [], PhantomData)
     }
 }
 
@@ -256,7 +278,7 @@ impl<S: Instructions, T: Element<S>, const R: usize> Number for Lanes<S, T, R> {
 
     #[inline(always)]
     fn of(value: f64) -> Self {
-        Lanes([<T as Element<S>>::splat(S::token(), T::of(value)); R], [], PhantomData)
+        Lanes([<T as Element<S>>::splat(S::token(HERE), T::of(value)); R], [], PhantomData)
     }
     #[inline(always)]
     fn lane(&self, lane: usize) -> T {
@@ -268,19 +290,19 @@ impl<S: Instructions, T: Element<S>, const R: usize> Number for Lanes<S, T, R> {
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Lanes(each!(self.0, r => <T as Element<S>>::sqrt(S::token(), self.0[r])), [], PhantomData)
+        Lanes(each!(self.0, r => <T as Element<S>>::sqrt(S::token(HERE), self.0[r])), [], PhantomData)
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Lanes(each!(self.0, r => <T as Element<S>>::abs(S::token(), self.0[r])), [], PhantomData)
+        Lanes(each!(self.0, r => <T as Element<S>>::abs(S::token(HERE), self.0[r])), [], PhantomData)
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        Lanes(each!(self.0, r => <T as Element<S>>::max(S::token(), self.0[r], other.0[r])), [], PhantomData)
+        Lanes(each!(self.0, r => <T as Element<S>>::max(S::token(HERE), self.0[r], other.0[r])), [], PhantomData)
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        Lanes(each!(self.0, r => <T as Element<S>>::min(S::token(), self.0[r], other.0[r])), [], PhantomData)
+        Lanes(each!(self.0, r => <T as Element<S>>::min(S::token(HERE), self.0[r], other.0[r])), [], PhantomData)
     }
     #[inline(always)]
     fn exp2_integral(mut self) -> Self {
@@ -291,14 +313,146 @@ impl<S: Instructions, T: Element<S>, const R: usize> Number for Lanes<S, T, R> {
     }
     #[inline(always)]
     fn le(self, other: Self) -> Self::Mask {
-        let mut mask = [<T as Element<S>>::le(S::token(), self.0[0], other.0[0]); R];
+        let mut mask = [<T as Element<S>>::le(S::token(HERE), self.0[0], other.0[0]); R];
         for r in 1..R {
-            mask[r] = <T as Element<S>>::le(S::token(), self.0[r], other.0[r]);
+            mask[r] = <T as Element<S>>::le(S::token(HERE), self.0[r], other.0[r]);
         }
         LaneMask(mask, PhantomData)
     }
     #[inline(always)]
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
-        Lanes(each!(yes.0, r => <T as Element<S>>::select(S::token(), mask.0[r], yes.0[r], no.0[r])), [], PhantomData)
+        Lanes(
+            each!(yes.0, r => <T as Element<S>>::select(S::token(HERE), mask.0[r], yes.0[r], no.0[r])),
+            [],
+            PhantomData,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers at which operations differ, more than any registers hold.
+    const VALUES: [f64; 19] = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        0.1,
+        -2.5,
+        3.0,
+        1e18,
+        -1e18,
+        1e-30,
+        7.25,
+        -0.3,
+        126.0,
+        -126.0,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::NAN,
+        1e-300,
+        65_536.5,
+    ];
+
+    /// Every operation in every lane against that of one number.
+    struct EveryOperation;
+
+    impl<T: Real> WithLanes<T> for EveryOperation {
+        type Output = usize;
+
+        fn call<N: Number<Real = T>>(self) -> usize {
+            assert_eq!(N::LANES * size_of::<T>(), size_of::<N>(), "no padding");
+            assert_eq!(size_of::<N>() % align_of::<N>(), 0);
+            let value = |i: usize| T::of(VALUES[i % VALUES.len()]);
+            let (mut a, mut b) = (N::default(), N::default());
+            let mut compared = 0;
+            for shift in 0..VALUES.len() {
+                for lane in 0..N::LANES {
+                    a.set_lane(lane, value(lane + shift));
+                    b.set_lane(lane, value(3 * lane + 5 * shift));
+                }
+                let mut sum = a;
+                sum += b;
+                let (below, above) = (a.le(b), b.le(a));
+                let mut set = below;
+                set.set_lane(shift % N::LANES, true);
+                for lane in 0..N::LANES {
+                    let (x, y) = (a.lane(lane), b.lane(lane));
+                    let same = |name: &str, found: N, expected: T| {
+                        let [found, expected] = [found.lane(lane), expected].map(|value| value.to_f64());
+                        let equal = found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan();
+                        assert!(equal, "{name} of {x} and {y} in lane {lane} of {}: {found}, not {expected}", N::LANES);
+                    };
+                    same("+", a + b, x + y);
+                    same("+=", sum, x + y);
+                    same("-", a - b, x - y);
+                    same("*", a * b, x * y);
+                    same("/", a / b, x / y);
+                    same("neg", -a, -x);
+                    same("abs", a.abs(), x.abs());
+                    same("sqrt", a.sqrt(), x.sqrt());
+                    same("of", N::of(0.1), T::of(0.1));
+                    same("select", N::select(below, a, b), if x <= y { x } else { y });
+                    // Neither takes NaN, nor tells zeros apart.
+                    if x <= y || y <= x {
+                        assert!(a.max(b).lane(lane) == Number::max(x, y) && a.min(b).lane(lane) == Number::min(x, y));
+                    }
+                    if x.to_f64().abs() <= 126.0 && x.floor() == x {
+                        same("exp2_integral", a.exp2_integral(), x.exp2_integral());
+                    }
+                    let truths = [below.lane(lane), above.lane(lane), set.lane(lane)];
+                    assert_eq!(truths, [x <= y, y <= x, x <= y || lane == shift % N::LANES], "{x} {y}");
+                    assert_eq!(below.and(above).lane(lane), x <= y && y <= x);
+                    assert_eq!(below.or(above).lane(lane), x <= y || y <= x);
+                    assert_eq!(below.not().lane(lane), !below.lane(lane));
+                    compared += 1;
+                }
+                let any = (0..N::LANES).any(|lane| below.lane(lane));
+                let all = (0..N::LANES).all(|lane| below.lane(lane));
+                assert_eq!((below.any(), below.all()), (any, all));
+                assert_eq!((N::Mask::all_of(true).all(), N::Mask::all_of(false).any()), (true, false));
+            }
+            compared
+        }
+    }
+
+    fn every_operation<S: Instructions>(simd: Option<S>) -> usize
+    where
+        f64: Element<S>,
+        f32: Element<S>,
+    {
+        let Some(simd) = simd else { return 0 };
+        let doubles =
+            with_lanes::<S, f64, 1, _>(simd, EveryOperation) + with_lanes::<S, f64, 2, _>(simd, EveryOperation);
+        doubles + with_lanes::<S, f32, 1, _>(simd, EveryOperation) + with_lanes::<S, f32, 2, _>(simd, EveryOperation)
+    }
+
+    #[test]
+    fn every_operation_on_lanes_is_that_on_one_number_in_each() {
+        #[cfg(target_arch = "x86_64")]
+        let compared = [
+            every_operation(pulp::x86::V2::try_new()),
+            every_operation(pulp::x86::V3::try_new()),
+            every_operation(pulp::x86::V4::try_new()),
+        ];
+        #[cfg(target_arch = "aarch64")]
+        let compared = [every_operation(pulp::aarch64::Neon::try_new())];
+        println!("lanes compared, by instructions: {compared:?}");
+        #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+        assert!(compared[0] >= 18 * VALUES.len(), "no vector instructions here: {compared:?}");
+    }
+
+    /// The first step of the proof of `token`: the compiler sees to the others.
+    #[test]
+    fn the_one_unsafe_block_is_shown_where_it_is_called_from() {
+        let (code, _) = include_str!("lanes.rs").split_once("#[cfg(test)]").unwrap();
+        let code: Vec<&str> = code.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+        let lines = |part: &str| code.iter().filter(|line| line.contains(part)).count();
+        assert_eq!((lines("unsafe {"), lines("Here(")), (1, 2), "Here is declared, and made in HERE");
+        let uses = code.iter().filter(|line| line.contains("HERE")).count() - 1;
+        let tokens = code.iter().filter(|line| line.contains("S::token(HERE)")).count();
+        assert!(uses == tokens && uses > 10, "HERE is used in {uses} lines, in {tokens} of them for a token");
     }
 }

@@ -387,6 +387,12 @@ impl Colours {
         Colours { shown: picked.map(class).collect(), bar: Some(axis) }
     }
 
+    /// The entries of curves that are told apart; `label` names them.
+    pub fn legend<'a>(&self, label: impl Fn(usize) -> &'a str) -> impl Iterator<Item = Entry> {
+        let told_apart = self.shown.iter().filter(|_| self.bar.is_none());
+        told_apart.map(move |(i, class)| Entry::new(class, Mark::Series, label(*i)))
+    }
+
     /// The marker of the curve drawn at this rank: colours that are ordered need no shapes.
     pub fn rank(&self, rank: usize) -> usize {
         if self.bar.is_some() { 0 } else { rank }

@@ -7,12 +7,12 @@ use serde::Serialize;
 use toml::Value;
 
 use super::{
-    ensemble::{CellRates, CellStatistics, CellTimes, EnsembleStatistics},
-    provenance::Provenance,
+    ensemble::{CellStatistics, EnsembleStatistics, Numbers},
+    provenance::{Provenance, json},
 };
 use crate::{
     ensemble::{Spec, Status},
-    error::{Error, Result},
+    error::Result,
 };
 
 /// A finished run as one document.
@@ -36,8 +36,8 @@ struct Cell<'a> {
     values: BTreeMap<&'a str, &'a Value>,
     members: u64,
     members_by_status: BTreeMap<&'static str, u64>,
-    t_relax: CellTimes,
-    rate: CellRates,
+    t_relax: Numbers,
+    rate: Numbers,
 }
 
 #[derive(Serialize)]
@@ -82,8 +82,7 @@ impl<'a> Document<'a> {
 
     /// Its text.
     pub fn to_json(&self) -> Result<String> {
-        let text = serde_json::to_string_pretty(self);
-        text.map(|text| text + "\n").map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))
+        json(self, "JSON")
     }
 }
 
@@ -96,14 +95,14 @@ impl<'a> Cell<'a> {
             members: statistics.members(),
             members_by_status: Status::ALL.iter().map(|status| status.name()).zip(counts).collect(),
             t_relax: statistics.times(),
-            rate: statistics.rates.columns(),
+            rate: statistics.rates.numbers(),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, UNIX_EPOCH};
+    use std::time::Duration;
 
     use super::*;
     use crate::{
@@ -127,7 +126,7 @@ mod tests {
             tally.add(&Outcome { cell: member / 3, ..outcome(member, status, *t_relax) });
         }
         let (platform, statistics) = (platform(), EnsembleStatistics::new(&spec, &tally).unwrap());
-        let run = Provenance::new(&spec, &platform, &tally, &[], UNIX_EPOCH, Duration::ZERO);
+        let run = Provenance::new(&spec, &platform, &tally, &[], Duration::ZERO, Duration::ZERO);
         let text = Document::new(&run, &spec, &statistics, Path::new("out"), &["summary.csv"]).to_json().unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
 

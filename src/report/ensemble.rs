@@ -4,7 +4,7 @@
 //! ended badly at its last good state. How many of these there are is in the row.
 
 use csv::WriterBuilder;
-use serde::Serialize;
+use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::tally::{CellTally, Tally};
 use crate::{
@@ -69,62 +69,41 @@ impl Rates {
     }
 
     /// What the table says of them.
-    pub fn columns(&self) -> CellRates {
+    pub fn numbers(&self) -> Numbers {
         let Rates { fitted, interval, theory, ratio } = self;
-        let [q05, q25, median, q75, q95] = QUANTILES.map(|(share, _)| fitted.quantile(share));
-        CellRates {
-            known: fitted.count(),
-            mean: fitted.mean(),
-            sd: fitted.standard_deviation(),
-            se: fitted.standard_error(),
-            q05,
-            q25,
-            median,
-            q75,
-            q95,
-            median_low: interval.and_then(|interval| interval.lower),
-            median_high: interval.and_then(|interval| interval.upper),
-            theory: theory.median(),
-            ratio: ratio.median(),
-        }
+        let moments = [("mean", fitted.mean()), ("sd", fitted.standard_deviation()), ("se", fitted.standard_error())];
+        let beside = [("theory", theory.median()), ("ratio", ratio.median())];
+        let places = places(|share| fitted.quantile(share), *interval);
+        Numbers { known: fitted.count(), named: moments.into_iter().chain(places).chain(beside).collect() }
     }
 }
 
-/// The numbers of `ensemble.csv` on the rates of decay of a cell, named as its columns are.
-#[derive(Clone, Copy, Debug, Serialize)]
-#[expect(missing_docs, reason = "README has the columns")]
-pub struct CellRates {
+/// The numbers of `ensemble.csv` on one quantity of a cell, in the order of its columns and named as these are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Numbers {
+    /// Members of which the quantity is known.
     pub known: usize,
-    pub mean: Option<f64>,
-    pub sd: Option<f64>,
-    pub se: Option<f64>,
-    pub q05: Option<f64>,
-    pub q25: Option<f64>,
-    pub median: Option<f64>,
-    pub q75: Option<f64>,
-    pub q95: Option<f64>,
-    pub median_low: Option<f64>,
-    pub median_high: Option<f64>,
-    pub theory: Option<f64>,
-    pub ratio: Option<f64>,
+    /// All others.
+    pub named: Vec<(&'static str, Option<f64>)>,
 }
 
-/// The numbers of `ensemble.csv` on the relaxation times of a cell, named as its columns are.
-#[derive(Clone, Copy, Debug, Serialize)]
-#[expect(missing_docs, reason = "README has the columns")]
-pub struct CellTimes {
-    pub known: usize,
-    pub mean: Option<f64>,
-    pub sd: Option<f64>,
-    pub se: Option<f64>,
-    pub restricted_to: Option<f64>,
-    pub q05: Option<f64>,
-    pub q25: Option<f64>,
-    pub median: Option<f64>,
-    pub q75: Option<f64>,
-    pub q95: Option<f64>,
-    pub median_low: Option<f64>,
-    pub median_high: Option<f64>,
+impl Serialize for Numbers {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(1 + self.named.len()))?;
+        map.serialize_entry("known", &self.known)?;
+        self.named.iter().try_for_each(|(name, value)| map.serialize_entry(name, value))?;
+        map.end()
+    }
+}
+
+/// Quantiles, and the interval of the median.
+fn places(
+    quantile: impl Fn(f64) -> Option<f64>,
+    interval: Option<Interval>,
+) -> impl Iterator<Item = (&'static str, Option<f64>)> {
+    let ends = interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
+    let quantiles = QUANTILES.map(|(share, name)| (name, quantile(share)));
+    quantiles.into_iter().chain(["median_low", "median_high"].into_iter().zip(ends))
 }
 
 /// Relaxation times of all cells, and how they compare.
@@ -154,23 +133,16 @@ impl CellStatistics {
     }
 
     /// What the table says of the times.
-    pub fn times(&self) -> CellTimes {
-        let mean = self.mean;
-        let [q05, q25, median, q75, q95] = QUANTILES.map(|(share, _)| self.survival.quantile(share));
-        CellTimes {
-            known: self.survival.events(),
-            mean: mean.map(|mean| mean.value),
-            sd: mean.and_then(|mean| mean.standard_deviation),
-            se: mean.and_then(|mean| mean.standard_error),
-            restricted_to: mean.and_then(|mean| mean.restricted_to),
-            q05,
-            q25,
-            median,
-            q75,
-            q95,
-            median_low: self.interval.and_then(|interval| interval.lower),
-            median_high: self.interval.and_then(|interval| interval.upper),
-        }
+    pub fn times(&self) -> Numbers {
+        let of = |number: fn(Mean) -> Option<f64>| self.mean.and_then(number);
+        let moments = [
+            ("mean", of(|mean| Some(mean.value))),
+            ("sd", of(|mean| mean.standard_deviation)),
+            ("se", of(|mean| mean.standard_error)),
+            ("restricted_to", of(|mean| mean.restricted_to)),
+        ];
+        let places = places(|share| self.survival.quantile(share), self.interval);
+        Numbers { known: self.survival.events(), named: moments.into_iter().chain(places).collect() }
     }
 
     /// The interval of the median, where both its ends are known.
@@ -208,16 +180,18 @@ impl EnsembleStatistics {
         let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
         let keys = spec.sweep.axes().iter().map(|axis| axis.key.clone());
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
-        let times = ["known", "mean", "sd", "se", "restricted_to"].into_iter();
-        let times = times.chain(QUANTILES.map(|(_, name)| name)).chain(["median_low", "median_high"]);
         let header = ["cell".to_string()].into_iter().chain(keys).chain(["members".to_string()]).chain(statuses);
-        let rates = ["known", "mean", "sd", "se"].into_iter().chain(QUANTILES.map(|(_, name)| name));
-        let rates = rates.chain(["median_low", "median_high", "theory", "ratio"]).map(|name| format!("rate_{name}"));
-        let header = header.chain(times.map(|name| format!("t_relax_{name}"))).chain(rates);
-        writer.write_record(header).map_err(|e| failed(&e))?;
+        let quantities = |cell: &CellStatistics| [("t_relax", cell.times()), ("rate", cell.rates.numbers())];
+        let columns = self.cells.first().into_iter().flat_map(quantities).flat_map(|(quantity, numbers)| {
+            let names = ["known"].into_iter().chain(numbers.named.into_iter().map(|(name, _)| name));
+            names.map(move |name| format!("{quantity}_{name}"))
+        });
+        writer.write_record(header.chain(columns)).map_err(|e| failed(&e))?;
         for cell in &self.cells {
-            let (times, rates) = (cell.times(), cell.rates.columns());
-            let row = (cell.cell, &cell.values, cell.members(), cell.counts, times, rates);
+            let numbers = quantities(cell).map(|(_, Numbers { known, named })| {
+                (known, named.into_iter().map(|(_, value)| value).collect::<Vec<_>>())
+            });
+            let row = (cell.cell, &cell.values, cell.members(), cell.counts, numbers);
             writer.serialize(row).map_err(|e| failed(&e))?;
         }
         let bytes = writer.into_inner().map_err(|e| failed(&e))?;

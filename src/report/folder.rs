@@ -3,12 +3,17 @@
 use std::{
     cell::Cell,
     fs::{self, File, TryLockError},
-    io::{self, Write},
+    io::{self, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
-use super::part_folder::PartFolder;
-use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+use super::{part_folder::PartFolder, zarr};
+use crate::{
+    error::{Error, Result},
+    input,
+};
 
 /// One row a member.
 pub const SUMMARY: &str = "summary.csv";
@@ -69,14 +74,47 @@ const OWN: [&str; 18] = [
     CONVERGENCE,
 ];
 
+/// The tables of a run and its store, in the order in which they are named to people.
+pub const TABLES: [&str; 7] = [SUMMARY, ENSEMBLE, RATES, MEAN_EXCESS, SERIES, SNAPSHOTS, STORE];
+
 /// The files that are drawn from the others.
 pub const PICTURES: [&str; 8] = [REPORT, RELAXATION, SURVIVAL, EXCESS, RATE, DEPENDENCE, MESH, CURVES];
+
+/// What helps against a file that was changed or cut off.
+pub const REMEDY: &str = "restore the file, or run again";
 
 /// The folder of the plots.
 const PLOTS: &str = "plots";
 
 /// Locked while a run writes; what counts is the lock, which ends with its process, and not the file.
 const LOCK: &str = ".curvelax.lock";
+
+/// From which an interrupted run goes on, see [`checkpoint`](super::checkpoint).
+pub const STATE: &str = ".curvelax.state";
+/// The one before, for the case that the last one is damaged.
+pub const STATE_OLD: &str = ".curvelax.state.old";
+/// The next one, while it is written.
+const STATE_PART: &str = ".curvelax.state.part";
+
+/// What is said of a file that failed before.
+const TORN: &str = "an earlier write failed";
+
+/// In every folder of a store.
+const IS_STORE: &str = "zarr.json";
+
+/// Says whether a folder can be written.
+const PROBE: &str = ".curvelax.part";
+
+/// A growing file as far as a state vouches for it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Mark {
+    /// Its final name.
+    pub name: String,
+    /// Bytes.
+    pub length: u64,
+    /// Their CRC-32C.
+    pub crc: u32,
+}
 
 /// A folder that this run, and no other at the same time, may write into.
 ///
@@ -120,6 +158,10 @@ impl OutputFolder {
             Err(_) if !path.is_dir() => {
                 return Err(Error::value("out", path.display(), "exists and is no folder", "name another"));
             }
+            Err(_) if !force && path.join(STATE).exists() => {
+                let resume = format!("curvelax resume {} goes on with it, --force begins anew", path.display());
+                return Err(Error::value("out", path.display(), "a run was interrupted here", &resume));
+            }
             Err(_) if !force => {
                 let allowed = "name a new folder, or add --force to replace the files of an earlier run";
                 return Err(Error::value("out", path.display(), "already exists", allowed));
@@ -131,11 +173,67 @@ impl OutputFolder {
             return Err(Error::value("out", path.display(), "a run is writing here", "name another folder"));
         }
         folder.check_names()?;
-        let probe = path.join(".curvelax.part");
-        create(&probe).and_then(|_| fs::remove_file(&probe)).map_err(refuse)?;
+        folder.probe().map_err(refuse)?;
         // What an interrupted run left; its lock is gone, so it is no longer writing.
-        folder.names.iter().try_for_each(|name| remove_any(&folder.part(name))).map_err(refuse)?;
+        if folder.names.iter().any(|name| name == RUN) {
+            folder.forget_states()?;
+        }
+        folder.remove_parts(&[]).map_err(refuse)?;
+        folder.made.iter().try_for_each(|made| sync_names(parent(made))).map_err(refuse)?;
         Ok(folder)
+    }
+
+    /// The folder of an interrupted run, as it is.
+    ///
+    /// # Errors
+    /// [`Error::Request`] where there is none, where it cannot be written, or where another run is writing.
+    pub fn open_again(path: &Path) -> Result<OutputFolder> {
+        let refuse = |problem: String| Error::Request(format!("{}: {problem}", path.display()));
+        let cannot = |e: io::Error| refuse(format!("cannot be written ({e})"));
+        if !path.is_dir() {
+            return Err(refuse("no such folder; name that of a run".into()));
+        }
+        // A folder that no run has begun in is left as it is.
+        let mut begun = false;
+        for name in [STATE, STATE_OLD, RUN] {
+            begun |= path.join(name).try_exists().map_err(|e| refuse(format!("cannot find {name} in it ({e})")))?;
+        }
+        if !begun {
+            return Err(refuse("no run was begun here; begin it with curvelax run and --force".into()));
+        }
+        let (names, made) = (OWN.map(String::from).into(), Vec::new());
+        let mut folder = OutputFolder { path: path.to_path_buf(), made, new_plots: false, lock: None, names };
+        folder.lock = lock(&path.join(LOCK)).map_err(cannot)?;
+        if folder.lock.is_none() {
+            return Err(refuse("a run is writing here; wait for its end".into()));
+        }
+        folder.check_names()?;
+        folder.probe().map_err(cannot)?;
+        Ok(folder)
+    }
+
+    /// Stays where it is when the current folder changes.
+    pub fn make_absolute(&mut self) -> Result<()> {
+        self.path = std::path::absolute(&self.path).map_err(Error::io("cannot find", &self.path))?;
+        Ok(())
+    }
+
+    /// Whether files can be made here.
+    fn probe(&self) -> io::Result<()> {
+        let probe = self.path.join(PROBE);
+        create(&probe).and_then(|_| fs::remove_file(&probe))
+    }
+
+    /// Removes what an interrupted run left, but for the files in `keep`.
+    fn remove_parts(&self, keep: &[&str]) -> io::Result<()> {
+        let parts = self.names.iter().filter(|name| !keep.contains(&name.as_str()));
+        parts.into_iter().try_for_each(|name| remove_any(&self.part(name)))
+    }
+
+    /// Removes what a run left beside the files of a complete one because it was killed before its first state.
+    pub fn tidy(&self) -> Result<()> {
+        self.forget_states()?;
+        self.remove_parts(&[]).map_err(Error::io("cannot remove what a run left in", &self.path))
     }
 
     /// Where it is.
@@ -149,7 +247,130 @@ impl OutputFolder {
         let parent = target.parent().unwrap_or(&self.path);
         fs::create_dir_all(parent).map_err(Error::io("cannot make the folder", parent))?;
         let file = create(&part).map_err(Error::io("cannot write", &part))?;
-        Ok(PartFile { file, part, target, keep: Cell::new(false), broken: false, finished: false })
+        let mark = Mark { name: name.into(), length: 0, crc: 0 };
+        Ok(PartFile {
+            file,
+            part,
+            target,
+            mark,
+            keep: Cell::new(false),
+            broken: false,
+            torn: Cell::new(false),
+            finished: false,
+        })
+    }
+
+    /// Whether the file is there, under its temporary or its final name, as far as `mark` goes; else what is wrong with it.
+    pub fn check(&self, mark: &Mark) -> std::result::Result<(), String> {
+        // A state that was not written by this program could name any file.
+        if !self.names.contains(&mark.name) || is_store(Path::new(&mark.name)) {
+            return Err(format!("it tells of {:?}, which no run writes", mark.name));
+        }
+        let path = self.growing(&mark.name).map_err(|e| format!("cannot find {} ({e})", mark.name))?;
+        if path.is_symlink() {
+            return Err(format!("{} is a link, which no run writes", path.display()));
+        }
+        let same = input::open(&path)
+            .and_then(|file| Ok(checksum(&mut file.take(mark.length), 0)? == (mark.length, mark.crc)));
+        match same {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(format!("{} is not the file that it tells of", path.display())),
+            Err(e) => Err(format!("cannot read {} ({e})", path.display())),
+        }
+    }
+
+    /// The same for the folder of a store.
+    pub fn check_store(&self, mark: &zarr::Mark) -> std::result::Result<(), String> {
+        mark.check(&self.growing(STORE).map_err(|e| format!("cannot find {STORE} ({e})"))?)
+    }
+
+    /// Goes on with the files and the store of a state, and removes everything else that an interrupted run left. What was
+    /// written after the state is cut off.
+    pub fn reopen(&self, marks: &[Mark], store: bool) -> Result<(Vec<PartFile>, Option<PartFolder>)> {
+        let mut keep: Vec<&str> = marks.iter().map(|mark| mark.name.as_str()).collect();
+        keep.extend(store.then_some(STORE));
+        self.remove_parts(&keep).map_err(Error::io("cannot remove what a run left in", &self.path))?;
+        let store = match store {
+            true => Some(PartFolder::again(self.back(STORE)?, self.path.join(STORE))),
+            false => None,
+        };
+        let files = marks.iter().map(|mark| {
+            let part = self.back(&mark.name)?;
+            let cut = |part: &Path| {
+                let mut file = File::options().read(true).write(true).open(part)?;
+                file.set_len(mark.length)?;
+                file.seek(SeekFrom::End(0))?;
+                Ok(file)
+            };
+            let file = cut(&part).map_err(Error::io("cannot write", &part))?;
+            let (target, mark) = (self.path.join(&mark.name), mark.clone());
+            Ok(PartFile {
+                file,
+                part,
+                target,
+                mark,
+                keep: Cell::new(true),
+                broken: false,
+                torn: Cell::new(false),
+                finished: false,
+            })
+        });
+        Ok((files.collect::<Result<_>>()?, store))
+    }
+
+    /// Where `name` lies of a run that was interrupted: if that was at its very end, under its final name.
+    fn growing(&self, name: &str) -> io::Result<PathBuf> {
+        let part = self.part(name);
+        match part.symlink_metadata() {
+            Ok(_) => Ok(part),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(self.path.join(name)),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// Gives `name` its temporary name back, which is returned.
+    fn back(&self, name: &str) -> Result<PathBuf> {
+        let part = self.part(name);
+        let now = self.growing(name).map_err(Error::io("cannot find", &part))?;
+        if now != part {
+            fs::rename(&now, &part).map_err(Error::io("cannot rename", &now))?;
+        }
+        Ok(part)
+    }
+
+    /// Puts a state in the place of the last one, which is kept as the one before.
+    pub fn keep_state(&self, bytes: &[u8]) -> Result<()> {
+        let [state, old, part] = [STATE, STATE_OLD, STATE_PART].map(|name| self.path.join(name));
+        let written = create(&part).and_then(|mut file| {
+            file.write_all(bytes)?;
+            file.sync_all()
+        });
+        let renamed = written.and_then(|()| {
+            if state.exists() {
+                fs::rename(&state, &old)?;
+            }
+            fs::rename(&part, &state)
+        });
+        renamed.map_err(|e| {
+            let _ = remove(&part);
+            Error::io("cannot write", &state)(e)
+        })?;
+        sync_folder(&self.path)
+    }
+
+    /// Removes a last state that is damaged, lest it become the one before.
+    pub fn forget_last_state(&self) -> Result<()> {
+        let state = self.path.join(STATE);
+        remove(&state).map_err(Error::io("cannot remove", &state))
+    }
+
+    /// Removes the states, the older one first: alone it would go on with files that have their final names.
+    pub fn forget_states(&self) -> Result<()> {
+        for name in [STATE_PART, STATE_OLD, STATE] {
+            let path = self.path.join(name);
+            remove(&path).map_err(Error::io("cannot remove", &path))?;
+        }
+        Ok(())
     }
 
     /// Begins the folder `name`, which must be that of a store.
@@ -262,15 +483,25 @@ pub struct PartFile {
     file: File,
     part: PathBuf,
     target: PathBuf,
+    /// What was written.
+    mark: Mark,
     keep: Cell<bool>,
     broken: bool,
+    /// What was written may not be on disk, whatever the system says.
+    torn: Cell<bool>,
     finished: bool,
 }
 
 impl PartFile {
-    /// What was written so far is worth keeping even if the run fails.
-    pub fn keep(&self) {
-        self.keep.set(true);
+    /// Whether what is written is worth keeping if the run fails.
+    pub fn keep(&self, keep: bool) {
+        self.keep.set(keep);
+    }
+
+    /// What was written so far, once it is on disk.
+    pub fn mark(&self) -> Result<Mark> {
+        self.sync()?;
+        Ok(self.mark.clone())
     }
 
     /// Its temporary name.
@@ -285,7 +516,11 @@ impl PartFile {
 
     /// Returns once its content is on disk.
     pub fn sync(&self) -> Result<()> {
-        self.file.sync_all().map_err(Error::io("cannot write", &self.target))
+        let synced = self.file.sync_all();
+        // What was not synced once may be lost although it is synced the next time.
+        self.torn.set(self.torn.get() || synced.is_err());
+        let whole = if self.torn.get() && synced.is_ok() { Err(io::Error::other(TORN)) } else { synced };
+        whole.map_err(Error::io("cannot write", &self.target))
     }
 
     /// Gives the file its final name; its content should be on disk.
@@ -300,9 +535,13 @@ impl Write for PartFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         // A writer with a buffer tries again when dropped, and would repeat what had got through.
         if self.broken {
-            return Err(io::Error::other("an earlier write failed"));
+            return Err(io::Error::other(TORN));
         }
         let written = self.file.write(bytes);
+        if let Ok(count) = written {
+            self.mark.length += count as u64;
+            self.mark.crc = crc32c::crc32c_append(self.mark.crc, &bytes[..count]);
+        }
         self.broken = written.as_ref().is_err_and(|e| e.kind() != io::ErrorKind::Interrupted);
         written
     }
@@ -314,15 +553,14 @@ impl Write for PartFile {
 
 impl Drop for PartFile {
     fn drop(&mut self) {
-        let nothing = || self.file.metadata().is_ok_and(|file| file.len() == 0);
-        if !self.finished && (!self.keep.get() || nothing()) {
+        if !self.finished && !self.keep.get() {
             let _ = fs::remove_file(&self.part);
         }
     }
 }
 
 /// Makes the file anew: what lies there is removed and not written into, as it may be a link to elsewhere.
-fn create(path: &Path) -> io::Result<File> {
+pub(super) fn create(path: &Path) -> io::Result<File> {
     remove(path)?;
     File::create_new(path)
 }
@@ -335,23 +573,37 @@ fn is_store(path: &Path) -> bool {
 /// Whether a run may have left the folder of a store.
 fn is_own_store(path: &Path) -> bool {
     let empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
-    !path.is_symlink() && (path.join("zarr.json").is_file() || empty())
+    !path.is_symlink() && (path.join(IS_STORE).is_file() || empty())
 }
 
 /// Removes a file, or the folder of a store; either may be absent.
 fn remove_any(path: &Path) -> io::Result<()> {
     match is_store(path) {
-        true => remove_folder(path),
+        true => remove_store(path),
         false => remove(path),
     }
 }
 
-/// Removes a folder and what is in it; it may be absent.
-pub(super) fn remove_folder(path: &Path) -> io::Result<()> {
-    match fs::remove_dir_all(path) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
-        _ => Ok(()),
+/// Removes the folder of a store and what is in it; it may be absent. What tells that it is a store goes last, so that what
+/// is left by one who is killed meanwhile still is one.
+pub(super) fn remove_store(path: &Path) -> io::Result<()> {
+    if path.is_symlink() {
+        return fs::remove_file(path);
     }
+    let entries = match fs::read_dir(path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            fs::remove_dir_all(entry.path())?;
+        } else if entry.file_name() != IS_STORE {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    remove(&path.join(IS_STORE))?;
+    fs::remove_dir(path)
 }
 
 /// Removes a file, which may be absent.
@@ -360,6 +612,23 @@ fn remove(path: &Path) -> io::Result<()> {
         // Below a folder that is absent, too.
         Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
         _ => Ok(()),
+    }
+}
+
+/// Bytes of what is left of `file`, and the CRC-32C of them after those of `crc`.
+pub(super) fn checksum(file: &mut impl Read, mut crc: u32) -> io::Result<(u64, u32)> {
+    let mut length = 0;
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer) {
+            Ok(0) => return Ok((length, crc)),
+            Ok(count) => {
+                length += count as u64;
+                crc = crc32c::crc32c_append(crc, &buffer[..count]);
+            }
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
     }
 }
 
@@ -374,36 +643,56 @@ fn lock(path: &Path) -> io::Result<Option<File>> {
             Err(TryLockError::WouldBlock) => return Ok(None),
             // A file system without locks is no reason not to run.
             Err(TryLockError::Error(e)) if e.kind() != io::ErrorKind::Unsupported => return Err(e),
-            // The run before may have removed the file after it was opened here: a lock that nobody else sees.
-            _ if !lies_at(&file, path) => {}
-            _ => return Ok(Some(file)),
+            _ => {}
+        }
+        // The run before may have removed the file after it was opened here: a lock that nobody else sees.
+        if lies_at(&file, path)? {
+            return Ok(Some(file));
         }
     }
 }
 
 #[cfg(unix)]
-fn lies_at(file: &File, path: &Path) -> bool {
+fn lies_at(file: &File, path: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
-    let id = |of: &fs::Metadata| (of.dev(), of.ino());
-    matches!((file.metadata(), fs::metadata(path)), (Ok(a), Ok(b)) if id(&a) == id(&b))
+    let id = |of: fs::Metadata| (of.dev(), of.ino());
+    match fs::metadata(path) {
+        Ok(there) => Ok(id(file.metadata()?) == id(there)),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(e) => Err(e),
+    }
 }
 
 /// Elsewhere a file has no number to ask for in safe and stable Rust; a file at its place has to do.
 #[cfg(not(unix))]
-fn lies_at(_: &File, path: &Path) -> bool {
-    path.exists()
+fn lies_at(_: &File, path: &Path) -> io::Result<bool> {
+    path.try_exists()
 }
 
 /// Makes a rename durable.
 pub(super) fn sync_parent(path: &Path) -> Result<()> {
-    path.parent().map_or(Ok(()), sync_folder)
+    sync_folder(parent(path))
 }
 
-/// Makes the names of what is in a folder durable; only Unix lets a folder be synced.
+/// Makes the names of what is in a folder durable.
 pub(super) fn sync_folder(path: &Path) -> Result<()> {
+    sync_names(path).map_err(Error::io("cannot write to", path))
+}
+
+/// The same; only Unix lets a folder be synced.
+fn sync_names(folder: &Path) -> io::Result<()> {
     match cfg!(unix) {
-        true => File::open(path).and_then(|folder| folder.sync_all()).map_err(Error::io("cannot write to", path)),
+        true => File::open(folder).and_then(|folder| folder.sync_all()),
         false => Ok(()),
+    }
+}
+
+/// The folder in which `path` is a name.
+fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        Some(_) => Path::new("."),
+        None => path,
     }
 }
 
@@ -572,9 +861,72 @@ mod tests {
         file.write_all(b"to a file that can only be read").unwrap_err();
         file.file = good;
         file.write_all(b"again").unwrap_err();
-        file.keep();
+        assert_eq!(file.mark().unwrap().length, 0);
         drop(file);
-        assert_eq!(names(home.path()), [LOCK], "an empty file is not worth keeping");
+        assert_eq!(names(home.path()), [LOCK]);
+    }
+
+    fn state_of(folder: &OutputFolder) -> Vec<String> {
+        let text = |name| fs::read_to_string(folder.path().join(name)).ok();
+        [STATE, STATE_OLD].into_iter().filter_map(text).collect()
+    }
+
+    #[test]
+    fn two_states_are_kept_and_forgotten_together() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = OutputFolder::open(home.path(), true).unwrap();
+        for (bytes, kept) in [("1", &["1"][..]), ("2", &["2", "1"]), ("3", &["3", "2"])] {
+            folder.keep_state(bytes.as_bytes()).unwrap();
+            assert_eq!(state_of(&folder), kept);
+        }
+        // The last one is damaged: the one before stays until a new one is whole.
+        folder.forget_last_state().unwrap();
+        folder.keep_state(b"4").unwrap();
+        assert_eq!(state_of(&folder), ["4", "2"]);
+        let error = OutputFolder::open(home.path(), false).unwrap_err().to_string();
+        assert!(error.contains("a run was interrupted here; curvelax resume ") && error.contains("--force"), "{error}");
+        folder.forget_states().unwrap();
+        drop(folder);
+        assert_eq!(names(home.path()), [""; 0]);
+        let error = OutputFolder::open_again(home.path()).unwrap_err().to_string();
+        assert!(error.contains("no run was begun here"), "{error}");
+        assert_eq!(names(home.path()), [""; 0], "it is left as it was");
+    }
+
+    #[test]
+    fn a_file_goes_on_after_its_mark_wherever_the_run_was_interrupted() {
+        for published in [false, true] {
+            let home = tempfile::tempdir().unwrap();
+            let folder = OutputFolder::open(home.path(), true).unwrap();
+            let mut file = folder.file(SUMMARY).unwrap();
+            file.write_all(b"kept").unwrap();
+            let mark = file.mark().unwrap();
+            assert_eq!((mark.length, mark.crc), (4, crc32c::crc32c(b"kept")));
+            file.write_all(b" and later").unwrap();
+            file.keep(true);
+            let series = folder.file(SERIES).unwrap();
+            series.keep(true);
+            if published {
+                file.finish().unwrap()
+            } else {
+                drop(file)
+            }
+            drop(series);
+            folder.check(&mark).unwrap();
+            for wrong in [Mark { crc: mark.crc ^ 1, ..mark.clone() }, Mark { length: 99, ..mark.clone() }] {
+                let fault = folder.check(&wrong).unwrap_err();
+                assert!(fault.contains("summary.csv") && fault.contains("is not the file"), "{fault}");
+            }
+            let fault = folder.check(&Mark { name: "../mine".into(), ..mark.clone() }).unwrap_err();
+            assert!(fault.contains("which no run writes"), "{fault}");
+
+            let (mut files, store) = folder.reopen(&[mark], false).unwrap();
+            assert!(store.is_none());
+            assert_eq!(names(home.path()), [LOCK, ".summary.csv.part"], "what no state tells of is removed");
+            files[0].write_all(b", then this").unwrap();
+            files.remove(0).finish().unwrap();
+            assert_eq!(fs::read_to_string(home.path().join(SUMMARY)).unwrap(), "kept, then this");
+        }
     }
 
     #[test]
@@ -584,7 +936,7 @@ mod tests {
         let folder = OutputFolder::open(&path, false).unwrap();
         let (useless, mut useful) = (folder.file(SERIES).unwrap(), folder.file(SUMMARY).unwrap());
         useful.write_all(b"row").unwrap();
-        useful.keep();
+        useful.keep(true);
         drop((useless, useful, folder));
         assert_eq!(names(&path), [".summary.csv.part"]);
 

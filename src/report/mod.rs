@@ -6,10 +6,12 @@
 pub mod axis;
 pub mod chart;
 pub mod charts;
+pub mod checkpoint;
 pub mod document;
 pub mod ensemble;
 pub mod folder;
 pub mod gallery;
+pub mod growing;
 pub mod overview;
 pub mod page;
 pub mod part_folder;
@@ -18,6 +20,7 @@ pub mod portraits;
 pub mod progress;
 pub mod provenance;
 pub mod reader;
+pub mod stop;
 pub mod study;
 pub mod style;
 pub mod svg;
@@ -28,27 +31,31 @@ pub mod trace;
 pub mod zarr;
 
 use std::{
-    path::PathBuf,
-    time::{Duration, Instant, SystemTime},
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
 };
 
 pub use ensemble::EnsembleStatistics;
 pub use folder::OutputFolder;
+pub use stop::{Cause, Stop};
 
 use crate::{
     backend::Platform,
-    ensemble::{Ended, Sink, Spec, spec::Store},
+    ensemble::{Ended, Sink, Spec, Standing, Wish},
     error::{Error, Result},
 };
+use checkpoint::{Head, Kept, Origin};
 use document::Document;
+use folder::PartFile;
+use growing::Growing;
+use part_folder::PartFolder;
 use portraits::Film;
 use progress::{Progress, duration};
 use provenance::Provenance;
 use study::Study;
-use tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable};
 use tally::Tally;
 use text::plural;
-use zarr::SnapshotStore;
 
 /// What is said on stdout of a run that is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,71 +69,164 @@ pub enum Form {
 /// How the overview names the pictures.
 const PLOTS: &str = "plots/*.svg";
 
+/// A run that is asked to stop and does not come to a place where it can ends after this time all the same.
+const PATIENCE: Duration = Duration::from_millis(2500);
+
+/// States take at most this share of the time of a run.
+const SHARE_OF_STATES: u32 = 20;
+
+/// How a report goes about its work; nothing of it is in the results.
+pub struct Manner {
+    /// No progress on stderr.
+    pub quiet: bool,
+    /// Time between two states.
+    pub every: Duration,
+    /// Who may stop the run.
+    pub stop: Stop,
+}
+
 /// Everything that is written about one run.
 // The tables come before the folder: dropped first, they leave it empty for its own clean-up.
 pub struct Report {
-    summary: SummaryTable,
-    rates: RateTable,
-    series: Option<SeriesTable>,
-    snapshots: Option<SnapshotTable>,
-    store: Option<SnapshotStore>,
+    growing: Growing,
     folder: OutputFolder,
+    origin: Origin,
     tally: Tally,
     /// The first members.
     films: Vec<Film>,
     /// Members of the whole study, and those of earlier simulations.
     total: u64,
     before: u64,
+    /// Which simulation this is.
+    company: u64,
     progress: Progress,
-    started: SystemTime,
     clock: Instant,
-    /// When the run is to stop at the latest, from its start.
-    most: Option<Duration>,
+    /// Wall time before it was interrupted.
+    earlier: Duration,
+    every: Duration,
+    stop: Stop,
+    /// When the last state was complete, and how long it took.
+    kept: (Instant, Duration),
+    /// There is something in the state.
+    has_begun: bool,
 }
 
 impl Report {
-    /// Opens the tables that `spec` asks for. `points` is the number of nodes of a member, which matters only where all
-    /// have the same.
-    pub fn begin(folder: OutputFolder, spec: &Spec, points: usize, quiet: bool) -> Result<Report> {
-        let stored = |store: Store| spec.store == store && !spec.snapshots.is_empty();
-        Ok(Report {
-            total: spec.member_count(),
-            before: 0,
-            summary: SummaryTable::begin(folder.file(folder::SUMMARY)?)?,
-            rates: RateTable::begin(folder.file(folder::RATES)?)?,
-            series: spec.series.map(|_| SeriesTable::begin(folder.file(folder::SERIES)?)).transpose()?,
-            snapshots: match stored(Store::Csv) {
-                true => Some(SnapshotTable::begin(folder.file(folder::SNAPSHOTS)?)?),
-                false => None,
-            },
-            store: match stored(Store::Zarr) {
-                true => Some(SnapshotStore::begin(folder.store(folder::STORE)?, spec, points)?),
-                false => None,
-            },
+    /// Opens the tables that `spec` asks for, and keeps the first state, from which a run that is killed goes on.
+    ///
+    /// `points` is the number of nodes of a member, which matters only where all have the same.
+    pub fn begin(folder: OutputFolder, spec: &Spec, points: usize, origin: Origin, manner: Manner) -> Result<Report> {
+        let growing = Growing::begin(&folder, spec, points)?;
+        let mut report = Report::new(folder, growing, spec, origin, manner);
+        match report.keep(&Standing { resident: Some(BTreeMap::new()), ..Standing::default() }) {
+            Ok(()) => Ok(report),
+            Err(error) => {
+                report.give_up();
+                Err(error)
+            }
+        }
+    }
+
+    /// Goes on with the report of an interrupted run; returns where that stood.
+    ///
+    /// # Errors
+    /// [`Error::Request`] where its files are not those of `spec`.
+    pub fn go_on(
+        folder: OutputFolder,
+        spec: &Spec,
+        points: usize,
+        kept: Kept,
+        manner: Manner,
+    ) -> Result<(Report, Standing)> {
+        let Kept { head, standing, note } = kept;
+        let Head { origin, wall, company, tables, store, aside, films } = head;
+        let growing = Growing::go_on(&folder, spec, points, &tables, store.as_ref())?;
+        if note.is_some() {
+            folder.forget_last_state()?;
+        }
+        let tally = reader::rows(&growing.rows(), spec, aside)?;
+        let mut report = Report::new(folder, growing, spec, origin, manner);
+        (report.tally, report.films, report.earlier, report.company) = (tally, films, wall, company);
+        report.before = report.tally.members().saturating_sub(standing.next);
+        report.has_begun = true;
+        Ok((report, standing))
+    }
+
+    fn new(folder: OutputFolder, growing: Growing, spec: &Spec, origin: Origin, manner: Manner) -> Report {
+        let Manner { quiet, every, stop } = manner;
+        Report {
+            growing,
             folder,
+            origin,
             tally: Tally::default(),
             films: Vec::new(),
+            total: spec.member_count(),
+            before: 0,
+            company: 0,
             progress: Progress::new(quiet),
-            started: SystemTime::now(),
             clock: Instant::now(),
-            most: None,
-        })
+            earlier: Duration::ZERO,
+            every,
+            stop,
+            kept: (Instant::now(), Duration::ZERO),
+            has_begun: false,
+        }
     }
 
-    /// Stops the run with [`Error::Stopped`] when it has taken `most`, from now on.
-    pub fn stop_after(&mut self, most: Duration) {
-        self.most = Some(self.clock.elapsed() + most);
+    /// The members that come now are simulated by themselves, as the `company`-th; those before have all ended.
+    pub fn begin_company(&mut self, company: usize) {
+        if self.company != company as u64 {
+            (self.company, self.before) = (company as u64, self.tally.members());
+        }
     }
 
-    /// The members that come now are simulated by themselves; those before have all ended.
-    pub fn next_company(&mut self) {
-        self.before = self.tally.members();
+    /// Where everything is written.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
     }
 
-    /// Where the rows of the members that ended lie until the report is finished. If the file is there when the report
-    /// is gone, the run has failed and they are kept.
-    pub fn kept_rows(&self) -> PathBuf {
-        self.summary.part().to_path_buf()
+    /// Where the run is computed.
+    pub fn platform(&self) -> &Platform {
+        &self.origin.platform
+    }
+
+    /// Where it was computed before, a sentence each.
+    pub fn moves(&self) -> &[String] {
+        &self.origin.moves
+    }
+
+    /// Which simulation of the study comes now, from 0.
+    pub fn company(&self) -> usize {
+        self.company as usize
+    }
+
+    /// Members whose rows are written.
+    pub fn members(&self) -> u64 {
+        self.tally.members()
+    }
+
+    /// Ends a run that failed: its state and its rows stay where they are; unless there is nothing in them, then none do.
+    /// Returns whether there is something to resume.
+    pub fn give_up(mut self) -> bool {
+        let wanted = self.has_begun || self.stop.asked().is_some();
+        // A state that cannot be removed keeps its rows.
+        let stays = wanted || self.folder.forget_states().is_err();
+        self.growing.keep(stays);
+        stays
+    }
+
+    fn wall(&self) -> Duration {
+        self.earlier.saturating_add(self.clock.elapsed())
+    }
+
+    fn so_far(&self) -> String {
+        let (rows, all) = (self.tally.members(), plural(self.total, "member"));
+        format!(
+            " after {} with {rows} of {} {all} in the table; curvelax resume {} goes on",
+            duration(self.wall().as_secs_f64()),
+            self.total,
+            self.folder.path().display(),
+        )
     }
 
     /// What the user should know about the results so far.
@@ -142,34 +242,26 @@ impl Report {
     /// Puts every file under its final name, once all are on disk, and returns the text for stdout.
     ///
     /// Where only the pictures cannot be written the tables are published all the same, with an error that says so.
-    pub fn finish(self, spec: &Spec, platform: &Platform, warnings: &[String], form: Form) -> Result<String> {
+    pub fn finish(mut self, spec: &Spec, warnings: &[String], form: Form) -> Result<String> {
+        // All rows are there: a run that is killed from now on draws its pictures again, and nothing else.
+        let next = self.tally.members() - self.before;
+        self.keep(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;
         // In reverse order they are dropped: the folder last, after its files.
-        let Report { folder, tally, films, progress, started, clock, .. } = self;
-        let (summary, rates, series) = (self.summary, self.rates, self.series);
-        let (snapshots, store) = (self.snapshots, self.store);
+        let Report { folder, tally, films, progress, origin, clock, earlier, growing, .. } = self;
         progress.finish();
-        let wall = clock.elapsed();
+        let wall = earlier.saturating_add(clock.elapsed());
+        let platform = &origin.platform;
         let statistics = &EnsembleStatistics::new(spec, &tally)?;
-        let mut names = vec![folder::SUMMARY, folder::ENSEMBLE, folder::RATES, folder::MEAN_EXCESS];
         // The rows of the members first: where the disk fills up they are what is kept.
-        let summary = summary.ready()?;
-        let ensemble = folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?;
+        let (mut files, store) = growing.ready()?;
+        files.push(folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?);
         let excess = &tally.mean_excess(spec)?;
-        let mean_excess = tables::mean_excess(folder.file(folder::MEAN_EXCESS)?, excess)?;
-        let mut files = vec![summary, ensemble, rates.ready()?, mean_excess];
-        if let Some(series) = series {
-            files.push(series.ready()?);
-            names.push(folder::SERIES);
-        }
-        if let Some(snapshots) = snapshots {
-            files.push(snapshots.ready()?);
-            names.push(folder::SNAPSHOTS);
-        }
-        let store = store.map(SnapshotStore::ready).transpose()?;
-        if store.is_some() {
-            names.push(folder::STORE);
-        }
-        let provenance = &Provenance::new(spec, platform, &tally, warnings, started, wall);
+        files.push(tables::mean_excess(folder.file(folder::MEAN_EXCESS)?, excess)?);
+        let written = files.iter().map(PartFile::target).chain(store.iter().map(PartFolder::target));
+        let written: Vec<PathBuf> = written.map(Path::to_path_buf).collect();
+        let is_written = |name: &&str| written.contains(&folder.path().join(name));
+        let mut names: Vec<&str> = folder::TABLES.into_iter().filter(is_written).collect();
+        let provenance = &Provenance::new(spec, platform, &tally, warnings, origin.started, wall);
         let run = folder.write(folder::RUN, &provenance.to_json()?)?;
         let study = Study { provenance, tally: &tally, statistics, excess, films: &films };
         let mut drawn = Vec::new();
@@ -187,10 +279,9 @@ impl Report {
         folder.publish(files.into_iter().chain(drawn).collect(), store, run)?;
         done.map_err(|error: Error| {
             let folder = folder.path().display();
-            Error::Failed(format!(
-                "{error}; the tables in {folder} are complete: make room, then curvelax plot {folder}"
-            ))
+            Error::Failed(format!("{error}; the tables in {folder} are complete, some pictures are missing"))
         })?;
+        folder.forget_states()?;
         names.extend([folder::REPORT, PLOTS, folder::RUN]);
         let (tally, folder, files) = (&tally, folder.path(), &names[..]);
         match form {
@@ -205,18 +296,9 @@ impl Report {
 
 impl Sink for Report {
     fn member(&mut self, ended: &Ended) -> Result<()> {
-        let Ended { outcome, series, snapshots, portrait, mollified, unresolved, excess } = ended;
-        if let Some(table) = &mut self.series {
-            series.iter().try_for_each(|row| table.row(row))?;
-        }
-        if let Some(table) = &mut self.snapshots {
-            snapshots.iter().try_for_each(|snapshot| table.snapshot(snapshot))?;
-        }
-        if let Some(store) = &mut self.store {
-            store.member(outcome.status, snapshots)?;
-        }
-        self.summary.row(outcome)?;
-        self.rates.row(outcome)?;
+        let Ended { outcome, portrait, mollified, unresolved, excess, .. } = ended;
+        self.growing.add(ended)?;
+        self.has_begun = true;
         self.tally.add(outcome);
         self.tally.add_excess(outcome.cell, excess);
         self.tally.add_aside(mollified, *unresolved);
@@ -226,20 +308,48 @@ impl Sink for Report {
 
     fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
         let share = (self.before as f64 + share * total as f64) / self.total.max(1) as f64;
-        let done = self.before + done;
-        self.progress.show(done, self.total, share);
-        match self.most {
-            // What is done is written, however long that took.
-            Some(most) if done < self.total && self.clock.elapsed() >= most => {
-                let (rows, all) = (self.tally.members(), plural(self.total, "member"));
-                Err(Error::Stopped(format!(
-                    "--max-time: stopped after {} with {rows} of {} {all} in the table; take more time, or fewer members",
-                    duration(self.clock.elapsed().as_secs_f64()),
-                    self.total,
-                )))
-            }
+        self.progress.show(self.before + done, self.total, share);
+        match self.stop.asked() {
+            Some((cause, when)) if when.elapsed() > PATIENCE => Err(cause.error(&self.so_far())),
             _ => Ok(()),
         }
+    }
+
+    fn wish(&mut self) -> Wish {
+        let (since, took) = self.kept;
+        match self.stop.asked() {
+            Some((cause, _)) => Wish::Stop(cause.error(&self.so_far())),
+            None if since.elapsed() >= self.every.max(SHARE_OF_STATES * took) => Wish::Keep,
+            None => Wish::GoOn,
+        }
+    }
+
+    fn keep(&mut self, standing: &Standing) -> Result<()> {
+        let begun = Instant::now();
+        let (tables, store) = self.growing.mark()?;
+        let head = Head {
+            origin: self.origin.clone(),
+            wall: self.wall(),
+            company: self.company,
+            tables,
+            store,
+            aside: self.tally.aside(),
+            films: self.films.clone(),
+        };
+        let known;
+        let resident = match &standing.resident {
+            Some(resident) => resident,
+            None => {
+                known = checkpoint::on_their_way(self.folder.path(), self.company, standing);
+                &known
+            }
+        };
+        self.folder.keep_state(&checkpoint::to_bytes(&head, standing, resident)?)?;
+        self.growing.keep(true);
+        self.has_begun |= !standing.early.is_empty() || !resident.is_empty();
+        self.kept = (Instant::now(), begun.elapsed());
+        self.stop.set_kept();
+        Ok(())
     }
 }
 
@@ -250,7 +360,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::ensemble::{Mollified, Observables, Portrait, SeriesRow, Snapshot, Status};
+    use crate::ensemble::{Mollified, Observables, Portrait, SeriesRow, Snapshot, Status, spec::Store, study};
 
     fn files(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
@@ -259,23 +369,32 @@ mod tests {
         names
     }
 
+    fn manner(stop: &Stop) -> Manner {
+        Manner { quiet: true, every: Duration::from_secs(1000), stop: stop.clone() }
+    }
+
+    fn begun(out: &Path, spec: &Spec, stop: &Stop) -> Report {
+        let origin = Origin::new(spec.to_toml().unwrap(), &study::cells(spec).unwrap(), provenance::tests::platform());
+        Report::begin(OutputFolder::open(out, true).unwrap(), spec, 1, origin.unwrap(), manner(stop)).unwrap()
+    }
+
+    /// What a member leaves.
+    fn ended(member: u64, portrait: Option<Portrait>) -> Ended {
+        Ended {
+            outcome: tally::tests::outcome(member, Status::Relaxed, Some(0.5)),
+            excess: vec![0.2, 0.1],
+            series: vec![SeriesRow { member, t: 0.0, at: Observables::default() }],
+            snapshots: vec![Snapshot { member, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] }],
+            portrait,
+            mollified: Mollified::default(),
+            unresolved: false,
+        }
+    }
+
     /// A report into `out` that has received one member.
     fn report(out: &Path, spec: &Spec, portrait: Option<Portrait>) -> Report {
-        let mut report = Report::begin(OutputFolder::open(out, true).unwrap(), spec, 1, true).unwrap();
-        let row = SeriesRow { member: 0, t: 0.0, at: Observables::default() };
-        let snapshot = Snapshot { member: 0, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] };
-        let outcome = tally::tests::outcome(0, Status::Relaxed, Some(0.5));
-        report
-            .member(&Ended {
-                outcome,
-                excess: vec![0.2, 0.1],
-                series: vec![row],
-                snapshots: vec![snapshot],
-                portrait,
-                mollified: Mollified::default(),
-                unresolved: false,
-            })
-            .unwrap();
+        let mut report = begun(out, spec, &Stop::default());
+        report.member(&ended(0, portrait)).unwrap();
         report
     }
 
@@ -283,12 +402,11 @@ mod tests {
     fn a_finished_report_leaves_the_files_asked_for_and_no_others() {
         let home = tempfile::tempdir().unwrap();
         let out = home.path().join("out");
-        let platform = provenance::tests::platform();
         let triangle = vec![DVec2::ZERO, DVec2::X, DVec2::Y];
         let portrait = Portrait { before: triangle.clone(), frames: Vec::new(), after: triangle };
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
-        let overview = report(&out, &all, Some(portrait)).finish(&all, &platform, &[], Form::Overview).unwrap();
+        let overview = report(&out, &all, Some(portrait)).finish(&all, &[], Form::Overview).unwrap();
         let always = ["ensemble.csv", "mean_excess.csv", "plots", "rates.csv", "report.html", "run.json"];
         assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());
         let plots = ["excess.svg", "mesh.svg", "portraits.json", "rate.svg", "relaxation.svg", "survival.svg"];
@@ -304,36 +422,101 @@ mod tests {
         );
 
         let few = Spec::default();
-        report(&out, &few, None).finish(&few, &platform, &["a warning".into()], Form::Overview).unwrap();
+        report(&out, &few, None).finish(&few, &["a warning".into()], Form::Overview).unwrap();
         assert_eq!(files(&out), [&always[..], &["summary.csv"]].concat());
         assert_eq!(files(&out.join("plots")), plots);
         assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
     }
 
     #[test]
-    fn a_run_stops_when_its_time_is_over_and_not_before() {
+    fn a_run_that_is_asked_to_stop_says_so_and_waits_only_so_long() {
         let home = tempfile::tempdir().unwrap();
-        let spec = Spec::default();
-        let mut running = report(&home.path().join("out"), &spec, None);
-        running.progress(1, 256, 0.1).unwrap();
-        running.stop_after(Duration::from_secs(1000));
-        running.progress(1, 256, 0.1).unwrap();
-        running.stop_after(Duration::ZERO);
-        let error = running.progress(1, 256, 0.1).unwrap_err();
-        assert_eq!(error.exit_code(), 75);
-        assert!(error.to_string().contains("with 1 of 256 members in the table"), "{error}");
-        // All have ended: there is nothing to stop.
-        running.progress(256, 256, 1.0).unwrap();
+        let (spec, stop) = (Spec::default(), Stop::default());
+        let mut running = begun(&home.path().join("out"), &spec, &stop);
+        running.member(&ended(0, None)).unwrap();
+        assert!(matches!(running.wish(), Wish::GoOn) && running.progress(1, 256, 0.1).is_ok());
+        stop.ask(Cause::MaxTime);
+        stop.ask(Cause::Interrupt);
+        let Wish::Stop(error) = running.wish() else { panic!("it goes on") };
+        assert_eq!(error.exit_code(), 75, "the first cause counts");
+        assert!(error.to_string().starts_with("stopped by --max-time after "), "{error}");
+        assert!(error.to_string().contains("with 1 of 256 members in the table; curvelax resume "), "{error}");
+        assert!(running.progress(1, 256, 0.1).is_ok() && !stop.is_kept());
+        running.keep(&Standing { next: 1, ..Standing::default() }).unwrap();
+        assert!(stop.is_kept());
+        std::thread::sleep(PATIENCE + Duration::from_millis(50));
+        assert_eq!(running.progress(1, 256, 0.1).unwrap_err().exit_code(), 75);
+        assert_eq!(Cause::Interrupt.error("").exit_code(), 130);
     }
 
     #[test]
-    fn a_run_that_fails_keeps_the_members_that_ended() {
+    fn a_state_is_wished_for_when_its_time_has_come() {
+        let home = tempfile::tempdir().unwrap();
+        let (spec, stop) = (Spec::default(), Stop::default());
+        let mut running = begun(&home.path().join("out"), &spec, &stop);
+        running.every = Duration::from_millis(100);
+        running.kept = (Instant::now(), Duration::ZERO);
+        assert!(matches!(running.wish(), Wish::GoOn));
+        std::thread::sleep(running.every);
+        assert!(matches!(running.wish(), Wish::Keep));
+        // A state that took long is not written again soon.
+        running.kept.1 = Duration::from_secs(1);
+        assert!(matches!(running.wish(), Wish::GoOn));
+    }
+
+    #[test]
+    fn a_report_goes_on_from_its_state_to_the_same_bytes() {
+        let home = tempfile::tempdir().unwrap();
+        let csv = Spec { curves: 3, series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
+        let zarr = Spec { store: Store::Zarr, ..csv.clone() };
+        for (name, spec) in [("csv", csv), ("zarr", zarr)] {
+            let [straight, broken] = ["straight", "broken"].map(|way| home.path().join(name).join(way));
+            let mut whole = begun(&straight, &spec, &Stop::default());
+            (0..3).for_each(|member| whole.member(&ended(member, None)).unwrap());
+            whole.finish(&spec, &[], Form::Overview).unwrap();
+
+            let mut first = begun(&broken, &spec, &Stop::default());
+            first.member(&ended(0, None)).unwrap();
+            let early = BTreeMap::from([(2, ended(2, None))]);
+            first.keep(&Standing { next: 1, early, resident: Some(BTreeMap::new()) }).unwrap();
+            // Not in the state: to be cut off.
+            first.member(&ended(1, None)).unwrap();
+            assert!(first.give_up(), "there is something to go on with");
+            let folder = OutputFolder::open_again(&broken).unwrap();
+            let kept = checkpoint::find(&folder).unwrap().unwrap();
+            assert_eq!(kept.note, None);
+            let (mut second, standing) = Report::go_on(folder, &spec, 1, kept, manner(&Stop::default())).unwrap();
+            assert_eq!((standing.next, second.members()), (1, 1));
+            second.member(&ended(1, None)).unwrap();
+            second.member(&standing.early[&2]).unwrap();
+            second.finish(&spec, &[], Form::Overview).unwrap();
+            let tables: Vec<String> = files(&straight).into_iter().filter(|name| name.ends_with("csv")).collect();
+            assert_eq!(files(&straight), files(&broken));
+            for name in tables {
+                let text = |folder: &Path| fs::read_to_string(folder.join(&name)).unwrap();
+                assert_eq!(text(&straight), text(&broken), "{name}");
+            }
+            if name == "zarr" {
+                for chunk in ["x/c.0.0.0", "k/c.0.0.0", "status/c.0", "zarr.json"] {
+                    let bytes = |folder: &Path| fs::read(folder.join(folder::STORE).join(chunk)).unwrap();
+                    assert_eq!(bytes(&straight), bytes(&broken), "{chunk}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_run_that_fails_keeps_its_state_unless_there_is_nothing_in_it() {
         let home = tempfile::tempdir().unwrap();
         let out = home.path().join("out");
-        let failed = report(&out, &Spec::default(), None);
-        let kept = failed.kept_rows();
-        drop(failed);
-        assert_eq!(files(&out), [".summary.csv.part"]);
-        assert_eq!(fs::read_to_string(kept).unwrap().lines().count(), 2);
+        assert!(!begun(&out, &Spec::default(), &Stop::default()).give_up());
+        assert_eq!(files(home.path()), [""; 0]);
+        assert!(report(&out, &Spec::default(), None).give_up());
+        assert_eq!(files(&out), [".curvelax.state", ".rates.csv.part", ".summary.csv.part"]);
+        // Nothing has ended, but it was asked to stop, which is no failure.
+        let stop = Stop::default();
+        let running = begun(&home.path().join("stopped"), &Spec::default(), &stop);
+        stop.ask(Cause::Terminate);
+        assert!(running.give_up());
     }
 }

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::folder::{remove_folder, sync_folder, sync_parent};
+use super::folder::{create, remove_store, sync_folder, sync_parent};
 use crate::error::{Error, Result};
 
 /// A folder that is not complete yet; dropped so, it is removed with all that is in it unless
@@ -17,6 +17,8 @@ pub struct PartFolder {
     target: PathBuf,
     /// The folders in it.
     below: Vec<PathBuf>,
+    /// It was begun by a run that was interrupted.
+    again: bool,
     keep: bool,
     finished: bool,
 }
@@ -25,13 +27,21 @@ impl PartFolder {
     /// Makes it, empty, at `part`; it will be `target`.
     pub(super) fn begin(part: PathBuf, target: PathBuf) -> Result<PartFolder> {
         fs::create_dir(&part).map_err(Error::io("cannot make the folder", &part))?;
-        Ok(PartFolder { part, target, below: Vec::new(), keep: false, finished: false })
+        Ok(PartFolder { part, target, below: Vec::new(), again: false, keep: false, finished: false })
+    }
+
+    /// Goes on with the one at `part`, whose files may be written once more.
+    pub(super) fn again(part: PathBuf, target: PathBuf) -> PartFolder {
+        PartFolder { part, target, below: Vec::new(), again: true, keep: true, finished: false }
     }
 
     /// Makes the folder `name` in it.
     pub fn make(&mut self, name: &str) -> Result<()> {
         let path = self.part.join(name);
-        fs::create_dir(&path).map_err(Error::io("cannot make the folder", &path))?;
+        // A link to a folder is none: what is in it is not ours.
+        if !(self.again && path.symlink_metadata().is_ok_and(|of| of.is_dir())) {
+            fs::create_dir(&path).map_err(Error::io("cannot make the folder", &path))?;
+        }
         self.below.push(path);
         Ok(())
     }
@@ -39,20 +49,34 @@ impl PartFolder {
     /// Writes the whole file `name` (with `/` between a folder in it and the file), whose content is on disk then.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let path = self.part.join(name);
-        let written = File::create_new(&path).and_then(|mut file| {
+        // What makes it a store stays there without a gap.
+        if self.again && fs::read(&path).is_ok_and(|old| old == bytes) {
+            return Ok(());
+        }
+        // What is there stays until it has a successor.
+        let replaced = self.again && path.symlink_metadata().is_ok();
+        let place = if replaced { path.with_extension("part") } else { path.clone() };
+        let file = if replaced { create(&place) } else { File::create_new(&place) };
+        let written = file.and_then(|mut file| {
             file.write_all(bytes)?;
-            file.sync_all()
+            file.sync_all()?;
+            if replaced { fs::rename(&place, &path) } else { Ok(()) }
         });
         written.map_err(|e| {
             // Half a file would be taken for a whole one.
-            let _ = fs::remove_file(&path);
+            let _ = fs::remove_file(&place);
             Error::io("cannot write", &self.target.join(name))(e)
         })
     }
 
-    /// What was written so far is worth keeping even if the run fails.
-    pub fn keep(&mut self) {
-        self.keep = true;
+    /// Whether what is written is worth keeping if the run fails.
+    pub fn keep(&mut self, keep: bool) {
+        self.keep = keep;
+    }
+
+    /// Its temporary name.
+    pub(super) fn part(&self) -> &Path {
+        &self.part
     }
 
     /// Its final name.
@@ -67,7 +91,7 @@ impl PartFolder {
 
     /// Gives the folder its final name, in the place of what an earlier run left there.
     pub(super) fn finish(mut self) -> Result<()> {
-        remove_folder(&self.target).map_err(Error::io("cannot remove", &self.target))?;
+        remove_store(&self.target).map_err(Error::io("cannot remove", &self.target))?;
         fs::rename(&self.part, &self.target).map_err(Error::io("cannot write", &self.target))?;
         self.finished = true;
         sync_parent(&self.target)
@@ -77,7 +101,7 @@ impl PartFolder {
 impl Drop for PartFolder {
     fn drop(&mut self) {
         if !self.finished && !self.keep {
-            let _ = remove_folder(&self.part);
+            let _ = remove_store(&self.part);
         }
     }
 }
@@ -140,7 +164,7 @@ mod tests {
 
         let folder = OutputFolder::open(&out, false).unwrap();
         let mut store = begun(&folder);
-        store.keep();
+        store.keep(true);
         drop((store, folder));
         assert_eq!(names(&out), [".snapshots.zarr.part"]);
         drop(OutputFolder::open(&out, true).unwrap());

@@ -8,10 +8,15 @@ use std::path::Path;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{axis::Scale, folder, page::digest::DIGITS};
+use super::{
+    axis::Scale,
+    folder::{self, REMEDY},
+    page::digest::DIGITS,
+};
 use crate::{
     ensemble::{Outcome, Portrait, Status},
-    error::{Error, Result},
+    error::{Error, Result, shortened},
+    input,
 };
 
 /// The largest coordinate.
@@ -85,7 +90,7 @@ impl Film {
     }
 
     /// What is wrong with it, if it was not written by this program.
-    fn fault(&self) -> Option<&'static str> {
+    pub fn fault(&self) -> Option<&'static str> {
         let known = |text: &String| text.bytes().all(|digit| DIGITS.contains(&digit));
         let equal = |text: &String| text.len().is_multiple_of(4) && text.len() == self.nodes[0].len();
         let place = self.corner.iter().all(|v| Scale::Linear.holds(*v));
@@ -113,15 +118,16 @@ pub fn to_json(films: &[Film]) -> Result<String> {
 /// # Errors
 /// [`Error::Request`] that names the file, and the member where it has one.
 pub fn read(path: &Path) -> Result<Vec<Film>> {
-    let text = std::fs::read_to_string(path);
+    let text = input::text(path, input::MOST_PORTRAITS);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
-    let Portraits { members } = serde_json::from_str(&text)
-        .map_err(|e| Error::Request(format!("{}: {e}; restore the file, or run again", path.display())))?;
+    let Portraits { members } = serde_json::from_str(&text).map_err(|e| {
+        let problem = shortened(&e.to_string(), 200);
+        Error::Request(format!("{}: {problem}; {REMEDY}", path.display()))
+    })?;
     match members.iter().find_map(|film| Some((film.member, film.fault()?))) {
-        Some((member, expected)) => Err(Error::Request(format!(
-            "{}, member {member}: expected {expected}; restore the file, or run again",
-            path.display()
-        ))),
+        Some((member, expected)) => {
+            Err(Error::Request(format!("{}, member {member}: expected {expected}; {REMEDY}", path.display())))
+        }
         None => Ok(members),
     }
 }

@@ -1,9 +1,6 @@
 //! `run.json`: enough to repeat a run, to trust it and to draw it again. The only file with clock times.
 
-use std::{
-    collections::BTreeMap,
-    time::{Duration, SystemTime, UNIX_EPOCH},
-};
+use std::{collections::BTreeMap, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +63,7 @@ impl Provenance {
         platform: &Platform,
         tally: &Tally,
         warnings: &[String],
-        started: SystemTime,
+        started: Duration,
         wall: Duration,
     ) -> Provenance {
         Provenance {
@@ -93,9 +90,14 @@ impl Provenance {
 
     /// The text of the file.
     pub fn to_json(&self) -> Result<String> {
-        let text = serde_json::to_string_pretty(self);
-        text.map(|text| text + "\n").map_err(|e| Error::Failed(format!("cannot write run.json: {e}")))
+        json(self, "run.json")
     }
+}
+
+/// `value` as JSON, in lines; `name` is what cannot be written if that fails.
+pub fn json(value: &impl Serialize, name: &str) -> Result<String> {
+    let text = serde_json::to_string_pretty(value);
+    text.map(|text| text + "\n").map_err(|e| Error::Failed(format!("cannot write {name}: {e}")))
 }
 
 /// Members by the name of their status.
@@ -103,9 +105,9 @@ pub fn by_status(tally: &Tally) -> BTreeMap<String, u64> {
     tally.counts().map(|(status, count)| (status.name().into(), count)).collect()
 }
 
-/// `time` in UTC to the second, for example `2026-11-05T09:08:07Z`.
-pub fn rfc3339(time: SystemTime) -> String {
-    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+/// A time `since` 1970 in UTC to the second, for example `2026-11-05T09:08:07Z`.
+pub fn rfc3339(since: Duration) -> String {
+    let seconds = since.as_secs();
     let (day, second) = (seconds / 86_400, seconds % 86_400);
     // Years begin in March here, so that the leap day is the last of its year (H. Hinnant, days_from_civil).
     let shifted = day + 719_468;
@@ -145,7 +147,7 @@ pub(crate) mod tests {
             (1_735_689_599, "2024-12-31T23:59:59Z"),
             (4_107_542_400, "2100-03-01T00:00:00Z"),
         ] {
-            assert_eq!(rfc3339(UNIX_EPOCH + Duration::from_secs(seconds)), text);
+            assert_eq!(rfc3339(Duration::from_secs(seconds)), text);
         }
     }
 
@@ -153,7 +155,7 @@ pub(crate) mod tests {
     fn the_spec_in_run_json_repeats_the_run() {
         let spec = Spec { seed: u64::MAX, tau: Some(1.0 / 3.0), only: Some(vec![2]), ..Spec::default() };
         let (platform, tally) = (platform(), Tally::default());
-        let run = Provenance::new(&spec, &platform, &tally, &[], UNIX_EPOCH, Duration::from_millis(1500));
+        let run = Provenance::new(&spec, &platform, &tally, &[], Duration::ZERO, Duration::from_millis(1500));
         let json: serde_json::Value = serde_json::from_str(&run.to_json().unwrap()).unwrap();
         assert_eq!(serde_json::from_value::<Spec>(json["spec"].clone()).unwrap(), spec);
         assert_eq!(json["curvelax"], env!("CARGO_PKG_VERSION"));

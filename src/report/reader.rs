@@ -11,21 +11,23 @@ use std::{
 };
 
 use csv::{ReaderBuilder, StringRecord};
+use serde::Deserialize;
 
 use super::{
-    folder,
+    folder::{self, REMEDY},
     portraits::{self, Film},
     provenance::{FORMAT, Provenance, by_status},
     tables,
-    tally::{MeanExcess, Tally},
+    tally::{Aside, MeanExcess, Tally},
 };
 use crate::{
     ensemble::{Observables, Outcome, Spec, Status},
-    error::{Error, Result},
+    error::{Error, Result, shortened},
+    input::{self, Lines},
 };
 
-/// What helps against a file that was changed or cut off.
-const REMEDY: &str = "restore the file, or run again";
+/// Characters of foreign text in a message.
+const SHOWN: usize = 200;
 
 /// A run as its folder tells it.
 pub struct Finished {
@@ -54,6 +56,14 @@ impl Finished {
     }
 }
 
+/// What tells whether the rest can be understood, and nothing of the rest.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Head {
+    curvelax: serde_json::Value,
+    format: serde_json::Value,
+}
+
 /// Reads `run.json`.
 ///
 /// # Errors
@@ -70,19 +80,20 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
             if begun { "the run there did not finish; start it again" } else { "no run there; name its folder" };
         return Err(Error::Request(format!("{}: {problem} (no {})", folder.display(), folder::RUN)));
     }
-    let text = std::fs::read_to_string(&path);
+    let text = input::text(&path, input::MOST_RUN);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
-    let json: serde_json::Value = match serde_json::from_str(&text) {
-        Ok(json) => json,
-        Err(e) => return refuse(format!(": {e}; {REMEDY}")),
+    let no_json = |e: serde_json::Error| format!(": {}; {REMEDY}", shortened(&e.to_string(), SHOWN));
+    let Head { curvelax, format } = match serde_json::from_str(&text) {
+        Ok(head) => head,
+        Err(e) => return refuse(no_json(e)),
     };
-    let Some(version) = json["curvelax"].as_str() else {
+    let Some(version) = curvelax.as_str() else {
         return refuse(": not written by curvelax: expected its version under `curvelax`, found none".into());
     };
-    match json["format"].as_u64() {
+    match format.as_u64() {
         Some(1..=FORMAT) => {}
         Some(format) => {
-            let own = env!("CARGO_PKG_VERSION");
+            let (version, own) = (shortened(version, SHOWN), env!("CARGO_PKG_VERSION"));
             return refuse(format!(
                 ": expected format {FORMAT} at most, found {format}, of curvelax {version}; this is {own}: take a newer \
                  one"
@@ -93,7 +104,7 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
     // From the text and not from the value, so that an error has its line.
     let provenance: Provenance = match serde_json::from_str(&text) {
         Ok(provenance) => provenance,
-        Err(e) => return refuse(format!(": {e}; {REMEDY}")),
+        Err(e) => return refuse(no_json(e)),
     };
     match provenance.spec.clone().validate() {
         Ok(_) => Ok(provenance),
@@ -122,6 +133,19 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     Ok(tally)
 }
 
+/// Adds up the rows of a run that goes on, and `aside`.
+///
+/// # Errors
+/// [`Error::Request`] for rows that are not those of a run of `spec`.
+pub fn rows(path: &Path, spec: &Spec, aside: Aside) -> Result<Tally> {
+    let mut tally = Tally::default();
+    for outcome in Summary::of(path, spec)? {
+        tally.add(&outcome?);
+    }
+    tally.set_aside(aside);
+    Ok(tally)
+}
+
 /// A count that `run.json` knows.
 fn expected(folder: &Path, name: &str, what: &str, expected: u64, found: u64) -> Result<()> {
     if expected == found {
@@ -146,7 +170,11 @@ impl Summary {
     /// # Errors
     /// [`Error::Request`] where there is none, or one with other columns, or one that is cut off.
     pub fn open(folder: &Path, spec: &Spec) -> Result<Summary> {
-        let table = Table::open(folder.join(folder::SUMMARY), tables::SUMMARY)?;
+        Summary::of(&folder.join(folder::SUMMARY), spec)
+    }
+
+    fn of(path: &Path, spec: &Spec) -> Result<Summary> {
+        let table = Table::open(path.to_path_buf(), tables::SUMMARY)?;
         Ok(Summary { table, last: None, spec: spec.clone(), spec_of: None })
     }
 
@@ -214,16 +242,20 @@ impl Iterator for Summary {
 /// As [`Finished::read`].
 pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExcess>> {
     let mut table = Table::open(folder.join(folder::MEAN_EXCESS), tables::MEAN_EXCESS)?;
-    let mut rows: Vec<MeanExcess> = Vec::new();
+    let (mut rows, mut count, mut last): (Vec<MeanExcess>, u64, _) = (Vec::new(), 0, None);
     while let Some(mut row) = table.read()? {
         let cell = row.whole()?;
         let t = row.time()?;
-        if let Some(last) = rows.last().filter(|last| (cell, t) <= (last.cell, last.t)) {
-            return Err(row.unexpected(&format!("a time after {} of cell {}", last.t, last.cell)));
+        if let Some((last_cell, last)) = last.filter(|last| (cell, t) <= *last) {
+            return Err(row.unexpected(&format!("a time after {last} of cell {last_cell}")));
         }
-        rows.push(MeanExcess { cell, t, members: row.whole()?, mean: row.number()?, sd: row.number()? });
+        last = Some((cell, t));
+        count += 1;
+        let row = MeanExcess { cell, t, members: row.whole()?, mean: row.number()?, sd: row.number()? };
+        // More than there should be are counted only.
+        rows.extend((count <= provenance.excess_rows).then_some(row));
     }
-    expected(folder, folder::MEAN_EXCESS, "rows", provenance.excess_rows, rows.len() as u64)?;
+    expected(folder, folder::MEAN_EXCESS, "rows", provenance.excess_rows, count)?;
     Ok(rows)
 }
 
@@ -231,13 +263,13 @@ pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExc
 struct Table {
     path: PathBuf,
     columns: &'static str,
-    reader: csv::Reader<File>,
+    reader: csv::Reader<Lines<File>>,
     record: StringRecord,
 }
 
 impl Table {
     fn open(path: PathBuf, columns: &'static str) -> Result<Table> {
-        let file = File::open(&path).and_then(|mut file| Ok((ends_with_a_line(&mut file)?, file)));
+        let file = input::open(&path).and_then(|mut file| Ok((ends_with_a_line(&mut file)?, file)));
         let (whole, file) =
             file.map_err(|e| Error::Request(format!("cannot read {}: {e}; {REMEDY}", path.display())))?;
         if !whole {
@@ -245,7 +277,8 @@ impl Table {
             return Err(Error::Request(format!("{}: {problem}; {REMEDY}", path.display())));
         }
         // Rows are checked here, where more can be said about them.
-        let reader = ReaderBuilder::new().has_headers(false).flexible(true).quoting(false).from_reader(file);
+        let reader =
+            ReaderBuilder::new().has_headers(false).flexible(true).quoting(false).from_reader(Lines::new(file));
         let mut table = Table { path, columns, reader, record: StringRecord::new() };
         if let Some(mut row) = table.read()? {
             for name in columns.split(',') {
@@ -333,7 +366,7 @@ impl Row<'_> {
         Error::Request(format!(
             "{}, line {line}, column {column}: expected {expected}, found `{}`; {REMEDY}",
             self.path.display(),
-            &self.record[last]
+            shortened(&self.record[last], SHOWN)
         ))
     }
 }

@@ -10,7 +10,6 @@ use super::{
     overview::{describe, machine},
     page::{Figure, Headline, MOST_MEMBERS, Page, Table, Trajectory, spread},
     portraits::Film,
-    progress::duration,
     provenance::Provenance,
     tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
     text::{count, significant},
@@ -120,30 +119,32 @@ impl Study<'_> {
     /// The mean excess as long as all members of a cell run.
     fn excess(&self) -> Result<Option<Chart>> {
         let numbers = self.numbers();
-        let mut curves = Vec::new();
-        let mut theory = Vec::new();
-        for (rank, cell) in self.tally.cells.iter().enumerate() {
+        let curve = |(rank, cell): (usize, &CellTally)| {
             let all: u64 = cell.counts.iter().sum();
-            let rows = self.excess.iter().filter(|row| row.cell == rank as u64).take_while(|row| row.members == all);
+            // The rows come cell by cell.
+            let first = self.excess.partition_point(|row| row.cell < rank as u64);
+            let rows = self.excess[first..].iter().take_while(|row| row.cell == rank as u64 && row.members == all);
             let rows: Vec<(f64, f64, f64)> =
                 rows.map_while(|row| Some((row.t, row.mean?, row.sd.unwrap_or(0.0)))).collect();
             let bound = |sign: f64| rows.iter().map(|(_, mean, deviation)| mean + sign * deviation).collect();
-            let curve = DecayCurve {
+            DecayCurve {
                 label: self.label(rank as u64),
                 value: numbers.as_ref().map(|numbers| numbers[rank]),
                 t: rows.iter().map(|(t, ..)| *t).collect(),
                 mean: rows.iter().map(|(_, mean, _)| *mean).collect(),
                 band: Some((bound(-1.0), bound(1.0))),
-            };
-            let spec = self.spec().sweep.apply(self.spec(), rank as u64)?;
-            theory.extend(law(&spec, cell, &curve));
-            curves.push(curve);
-        }
+            }
+        };
+        let curves: Vec<DecayCurve> = self.tally.cells.iter().enumerate().map(curve).collect();
         if curves.iter().all(|curve| curve.t.len() < 2) {
             return Ok(None);
         }
         // One line of theory is a help, many are not.
-        let theory = if let [_] = &curves[..] { theory } else { Vec::new() };
+        let theory = match (&self.tally.cells[..], &curves[..]) {
+            ([cell], [curve]) => law(&self.spec().sweep.apply(self.spec(), 0)?, cell, curve),
+            _ => None,
+        };
+        let theory = theory.into_iter().collect();
         let (title, key) = ("Mean excess", self.keys());
         let note = format!("{}; over all members, as long as all of them run", self.what());
         let band = "one standard deviation of the members";
@@ -367,8 +368,7 @@ impl Study<'_> {
         };
         [
             ("curvelax", self.provenance.curvelax.clone()),
-            ("started", self.provenance.started.clone()),
-            ("wall time", duration(self.provenance.wall_seconds)),
+            // No clock times: equal runs give equal bytes.
             ("ran on", machine(&self.provenance.platform)),
             ("driver", self.provenance.platform.driver.clone().unwrap_or_default()),
             ("work", work),
@@ -431,7 +431,7 @@ fn value_of(axis: &crate::ensemble::sweep::Axis, values: &[String]) -> Option<f6
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, UNIX_EPOCH};
+    use std::time::Duration;
 
     use glam::DVec2;
 
@@ -449,7 +449,7 @@ mod tests {
 
     /// Names and texts of the pictures of a run of `spec` that came to `tally`.
     fn pictures(spec: &Spec, tally: &Tally, films: &[Film]) -> Vec<(&'static str, String)> {
-        let provenance = &Provenance::new(spec, &platform(), tally, &[], UNIX_EPOCH, Duration::from_secs(1));
+        let provenance = &Provenance::new(spec, &platform(), tally, &[], Duration::ZERO, Duration::from_secs(1));
         let statistics = &EnsembleStatistics::new(spec, tally).unwrap();
         let excess = &tally.mean_excess(spec).unwrap();
         Study { provenance, tally, statistics, excess, films }.pictures().unwrap()

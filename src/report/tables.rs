@@ -2,12 +2,15 @@
 //!
 //! A float that is not finite is unknown. No clock times here: equal runs give equal bytes.
 
-use std::path::Path;
+use std::{marker::PhantomData, path::Path};
 
 use csv::{Writer, WriterBuilder};
 use serde::Serialize;
 
-use super::{folder::PartFile, tally::MeanExcess};
+use super::{
+    folder::{Mark, PartFile},
+    tally::MeanExcess,
+};
 use crate::{
     ensemble::{Outcome, SeriesRow, Snapshot},
     error::{Error, Result},
@@ -28,50 +31,90 @@ const CONVERGENCE: &str = "problem,varied,n,tau,tolerance,error,order";
 /// Bytes gathered before they are written.
 const BUFFER: usize = 1 << 16;
 
-/// A table that grows row by row. Dropped unfinished, it leaves its rows under their temporary name.
-struct Table {
-    // Flushes when dropped.
-    writer: Writer<PartFile>,
+/// What a table has in its columns.
+pub trait Kind {
+    /// Their names.
+    const COLUMNS: &str;
 }
 
-impl Table {
-    fn begin(file: PartFile, header: &str) -> Result<Table> {
-        let writer = WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
-        let mut table = Table { writer };
-        table.write(header.split(',').collect::<Vec<_>>())?;
+/// A table that grows row by row.
+pub struct Table<K> {
+    // Flushes when dropped.
+    writer: Writer<PartFile>,
+    kind: PhantomData<K>,
+}
+
+impl<K: Kind> Table<K> {
+    /// Begins a table with its header.
+    pub fn begin(file: PartFile) -> Result<Self> {
+        let mut table = Table::go_on(file);
+        table.write(K::COLUMNS.split(',').collect::<Vec<_>>())?;
         Ok(table)
     }
 
-    fn row(&mut self, row: impl Serialize) -> Result<()> {
-        self.write(row)?;
-        // Not left to the end: the flush may fail there, and the rows before it are still worth keeping.
-        self.writer.get_ref().keep();
-        Ok(())
+    /// Goes on with the rows that are in `file`.
+    pub fn go_on(file: PartFile) -> Self {
+        let writer = WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
+        Table { writer, kind: PhantomData }
     }
 
-    fn write(&mut self, row: impl Serialize) -> Result<()> {
-        self.writer.serialize(row).map_err(|e| Error::io("cannot write", self.writer.get_ref().target())(e.into()))
+    /// How far it has grown, once that is on disk.
+    pub fn mark(&mut self) -> Result<Mark> {
+        self.writer.flush().map_err(Error::io("cannot write", self.writer.get_ref().target()))?;
+        self.writer.get_ref().mark()
     }
 
-    fn ready(self) -> Result<PartFile> {
+    /// Whether its rows are worth keeping if the run fails.
+    pub fn keep(&self, keep: bool) {
+        self.writer.get_ref().keep(keep);
+    }
+
+    /// The temporary name under which its rows lie.
+    pub fn part(&self) -> &Path {
+        self.writer.get_ref().part()
+    }
+
+    /// The whole table, on disk and ready for its final name.
+    pub fn ready(self) -> Result<PartFile> {
         let target = self.writer.get_ref().target().to_path_buf();
         let file = self.writer.into_inner().map_err(|e| Error::io("cannot write", &target)(e.into_error()))?;
         file.sync()?;
         Ok(file)
     }
+
+    fn write(&mut self, row: impl Serialize) -> Result<()> {
+        self.writer.serialize(row).map_err(|e| Error::io("cannot write", self.writer.get_ref().target())(e.into()))
+    }
 }
 
-/// `summary.csv`: one row a member.
-pub struct SummaryTable(Table);
+macro_rules! kinds {
+    ($($(#[$outer:meta])* $table:ident of $kind:ident: $columns:expr;)*) => {$(
+        #[doc(hidden)]
+        pub enum $kind {}
 
-/// `rates.csv`: the fitted rate of each member that has one, beside that of linear theory.
-pub struct RateTable(Table);
+        impl Kind for $kind {
+            const COLUMNS: &str = $columns;
+        }
 
-/// `series.csv`: the observables of each member over time.
-pub struct SeriesTable(Table);
+        $(#[$outer])*
+        pub type $table = Table<$kind>;
+    )*};
+}
 
-/// `snapshots.csv`: the nodes of each member at given times.
-pub struct SnapshotTable(Table);
+kinds! {
+    /// `summary.csv`: one row a member.
+    SummaryTable of Summary: SUMMARY;
+    /// `rates.csv`: the fitted rate of each member that has one, beside that of linear theory.
+    RateTable of Rates: RATES;
+    /// `series.csv`: the observables of each member over time.
+    SeriesTable of Series: SERIES;
+    /// `snapshots.csv`: the nodes of each member at given times.
+    SnapshotTable of Snapshots: SNAPSHOTS;
+    /// `mean_excess.csv`: the mean excess of each cell over time.
+    ExcessTable of Excess: MEAN_EXCESS;
+    /// `convergence.csv`: errors and orders against exact solutions.
+    ConvergenceTable of Convergence: CONVERGENCE;
+}
 
 /// Columns of `summary.csv`.
 #[derive(Serialize)]
@@ -105,15 +148,10 @@ struct SummaryRow {
 }
 
 impl SummaryTable {
-    /// Writes the header.
-    pub fn begin(file: PartFile) -> Result<SummaryTable> {
-        Table::begin(file, SUMMARY).map(SummaryTable)
-    }
-
     /// Writes the row of one member.
     pub fn row(&mut self, member: &Outcome) -> Result<()> {
         let Outcome { start, end, .. } = member;
-        self.0.row(SummaryRow {
+        self.write(SummaryRow {
             member: member.member,
             cell: member.cell,
             status: member.status.name(),
@@ -142,93 +180,52 @@ impl SummaryTable {
             self_crossing: member.self_crossing.and_then(known),
         })
     }
-
-    /// The temporary name under which rows lie until the table is finished.
-    pub fn part(&self) -> &Path {
-        self.0.writer.get_ref().part()
-    }
-
-    /// The whole table, on disk and ready for its final name.
-    pub fn ready(self) -> Result<PartFile> {
-        self.0.ready()
-    }
 }
 
 impl RateTable {
-    /// Writes the header.
-    pub fn begin(file: PartFile) -> Result<RateTable> {
-        Table::begin(file, RATES).map(RateTable)
-    }
-
     /// Writes the row of one member, if it has a rate.
     pub fn row(&mut self, member: &Outcome) -> Result<()> {
         let Outcome { member, cell, rate, rate_r2, rate_theory, .. } = *member;
         let Some(rate) = rate else { return Ok(()) };
         let ratio = rate_theory.map(|theory| rate / theory).and_then(known);
-        // Not kept where the run fails: summary.csv has the rates too.
-        self.0.write((member, cell, rate, rate_r2.and_then(known), rate_theory.and_then(known), ratio))
-    }
-
-    /// The complete file, on disk under its temporary name.
-    pub fn ready(self) -> Result<PartFile> {
-        self.0.ready()
+        self.write((member, cell, rate, rate_r2.and_then(known), rate_theory.and_then(known), ratio))
     }
 }
 
 /// Writes `mean_excess.csv`.
 pub fn mean_excess(file: PartFile, rows: &[MeanExcess]) -> Result<PartFile> {
-    let mut table = Table::begin(file, MEAN_EXCESS)?;
-    rows.iter().try_for_each(|row| table.row(row))?;
+    let mut table = ExcessTable::begin(file)?;
+    rows.iter().try_for_each(|row| table.write(row))?;
     table.ready()
 }
 
 impl SeriesTable {
-    /// Writes the header.
-    pub fn begin(file: PartFile) -> Result<SeriesTable> {
-        Table::begin(file, SERIES).map(SeriesTable)
-    }
-
     /// Writes one row.
     pub fn row(&mut self, row: &SeriesRow) -> Result<()> {
         let at = &row.at;
         let scalars = [at.length, at.area, at.excess, at.energy, at.k_min, at.k_max, at.mesh_ratio, at.metric_drift];
-        self.0.row((row.member, row.t, scalars.map(known)))
-    }
-
-    /// The whole table, on disk and ready for its final name.
-    pub fn ready(self) -> Result<PartFile> {
-        self.0.ready()
+        self.write((row.member, row.t, scalars.map(known)))
     }
 }
 
 impl SnapshotTable {
-    /// Writes the header.
-    pub fn begin(file: PartFile) -> Result<SnapshotTable> {
-        Table::begin(file, SNAPSHOTS).map(SnapshotTable)
-    }
-
     /// Writes one row a node, i = 1…n.
     pub fn snapshot(&mut self, snapshot: &Snapshot) -> Result<()> {
         let Snapshot { member, t, x, y, k, r } = snapshot;
         let nodes = x.iter().zip(y).zip(k).zip(r);
         for (i, (((x, y), k), r)) in (1_u64..).zip(nodes) {
-            self.0.row((member, t, i, [x, y, k, r].map(|value| known(*value))))?;
+            self.write((member, t, i, [x, y, k, r].map(|value| known(*value))))?;
         }
         Ok(())
-    }
-
-    /// The whole table, on disk and ready for its final name.
-    pub fn ready(self) -> Result<PartFile> {
-        self.0.ready()
     }
 }
 
 /// `convergence.csv`, the whole table: one row a run, τ or the tolerance of adaptive steps empty.
 pub fn convergence(file: PartFile, rows: &[Row]) -> Result<PartFile> {
-    let mut table = Table::begin(file, CONVERGENCE)?;
+    let mut table = ConvergenceTable::begin(file)?;
     for Row { problem, varied, at, error, order, .. } in rows {
         let tau = at.tolerance.is_none().then_some(at.tau);
-        table.row((problem, varied.name(), at.n as u64, tau, at.tolerance, error, order))?;
+        table.write((problem, varied.name(), at.n as u64, tau, at.tolerance, error, order))?;
     }
     table.ready()
 }
@@ -399,15 +396,30 @@ mod tests {
     }
 
     #[test]
-    fn rows_survive_a_failure_and_a_lone_header_does_not() {
+    fn a_table_goes_on_after_its_mark_and_is_kept_as_it_is_told() {
         let home = tempfile::tempdir().unwrap();
+        let text = |name: &str| fs::read_to_string(home.path().join(name)).unwrap();
+        let one = outcome(observables(), observables());
         let folder = OutputFolder::open(home.path(), true).unwrap();
         let mut table = SummaryTable::begin(folder.file("summary.csv").unwrap()).unwrap();
         let lone = SeriesTable::begin(folder.file("series.csv").unwrap()).unwrap();
-        table.row(&outcome(observables(), observables())).unwrap();
-        let part = table.part().to_path_buf();
-        drop((table, lone, folder));
-        assert_eq!(fs::read_to_string(&part).unwrap().lines().count(), 2);
-        assert_eq!(fs::read_dir(home.path()).unwrap().count(), 1);
+        table.row(&one).unwrap();
+        let mark = table.mark().unwrap();
+        table.row(&Outcome { member: 4, ..one.clone() }).unwrap();
+        table.keep(true);
+        drop((table, lone));
+        assert_eq!(fs::read_dir(home.path()).unwrap().count(), 2, "the lock and one table");
+        assert_eq!(text(".summary.csv.part").lines().count(), 3);
+
+        folder.check(&mark).unwrap();
+        let (mut files, _) = folder.reopen(&[mark], false).unwrap();
+        let mut again = SummaryTable::go_on(files.remove(0));
+        again.row(&Outcome { member: 5, ..one.clone() }).unwrap();
+        let straight = summary(&[one.clone(), Outcome { member: 5, ..one }]);
+        let mark = again.mark().unwrap();
+        assert_eq!((mark.length, mark.crc), (straight.len() as u64, crc32c::crc32c(straight.as_bytes())));
+        again.keep(false);
+        drop((again, folder));
+        assert_eq!(fs::read_dir(home.path()).unwrap().count(), 0);
     }
 }

@@ -48,6 +48,16 @@ pub struct CellTally {
     pub excess: Vec<Moments>,
 }
 
+/// What a [`Tally`] knows of the members that ended beside what their rows in `summary.csv` say.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Aside {
+    mollified: MollifiedMembers,
+    drifted: (u64, f64),
+    below_rounding: u64,
+    /// By cell.
+    excess: Vec<Vec<Moments>>,
+}
+
 /// A row of `mean_excess.csv`: the excess of the members of a cell that reached a time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MeanExcess {
@@ -145,9 +155,10 @@ impl Tally {
         let drift = outcome.end.metric_drift;
         self.drifted.0 += u64::from(drift > DISTRUSTED_DRIFT);
         self.drifted.1 = self.drifted.1.max(drift);
-        self.steps += outcome.steps;
-        self.sweeps_k += outcome.sweeps_k;
-        self.sweeps_x += outcome.sweeps_x;
+        // A table that was read may say anything.
+        self.steps = self.steps.saturating_add(outcome.steps);
+        self.sweeps_k = self.sweeps_k.saturating_add(outcome.sweeps_k);
+        self.sweeps_x = self.sweeps_x.saturating_add(outcome.sweeps_x);
     }
 
     /// Adds the excess of a member of `cell` at the times of [`grid`] that it reached.
@@ -161,6 +172,24 @@ impl Tally {
     pub fn add_aside(&mut self, mollified: &Mollified, unresolved: bool) {
         self.mollified.add(mollified);
         self.below_rounding += u64::from(unresolved);
+    }
+
+    /// What rows do not say.
+    pub fn aside(&self) -> Aside {
+        let Tally { mollified, drifted, below_rounding, .. } = *self;
+        Aside {
+            mollified,
+            drifted,
+            below_rounding,
+            excess: self.cells.iter().map(|cell| cell.excess.clone()).collect(),
+        }
+    }
+
+    /// Takes it back, after all rows.
+    pub fn set_aside(&mut self, aside: Aside) {
+        let Aside { mollified, drifted, below_rounding, excess } = aside;
+        (self.mollified, self.drifted, self.below_rounding) = (mollified, drifted, below_rounding);
+        self.cells.iter_mut().zip(excess).for_each(|(cell, excess)| cell.excess = excess);
     }
 
     /// The rows of `mean_excess.csv`.

@@ -7,17 +7,24 @@
 //! The format: <https://zarr-specs.readthedocs.io/en/latest/v3/core/>. Metadata is consolidated as zarr-python does it,
 //! and dimension names, units and flags are those that xarray and the CF conventions know.
 
+use std::{fs, path::Path};
+
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::part_folder::PartFolder;
+use super::{folder::checksum, part_folder::PartFolder, provenance::json as json_text};
 use crate::{
     ensemble::{Snapshot, Spec, Status},
     error::{Error, Result},
+    input,
     schedule::outputs,
 };
 
 /// About so many bytes make a chunk: few files for many members, and little to read for one.
 const CHUNK_BYTES: usize = 4 << 20;
+
+/// The array of how members ended.
+const STATUS: &str = "status";
 
 /// The arrays of nodes, with units and what they are.
 const FIELDS: [(&str, &str, &str); 4] = [
@@ -26,6 +33,27 @@ const FIELDS: [(&str, &str, &str); 4] = [
     ("k", "1/length", "signed curvature of the segment that ends at the node"),
     ("r", "length", "length of the segment that ends at the node, as the scheme evolves it"),
 ];
+
+/// A growing store as far as a state vouches for it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Mark {
+    /// Its arrays that grow.
+    arrays: Vec<ArrayMark>,
+}
+
+/// The same of an array.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct ArrayMark {
+    name: String,
+    /// Chunks in each dimension.
+    grid: Vec<u64>,
+    /// Chunks that are written, and the CRC-32C of all of them.
+    written: u64,
+    crc: u32,
+    /// The chunk that is being filled.
+    chunk: Vec<u8>,
+    run_left: u64,
+}
 
 /// `snapshots.zarr` while it grows.
 pub struct SnapshotStore {
@@ -48,6 +76,8 @@ struct Array {
     /// The chunk that is being filled, and the number of those before it.
     chunk: Vec<u8>,
     written: u64,
+    /// CRC-32C of those.
+    crc: u32,
     /// Bytes between two elements that begin a chunk whatever is in the one before, and how many of them are to come.
     run_bytes: u64,
     run_left: u64,
@@ -91,7 +121,7 @@ impl SnapshotStore {
             "flag_values": Status::ALL.map(|status| status as u32),
             "flag_meanings": Status::ALL.map(Status::name).join(" "),
         });
-        let status = vector("status", Kind::Int8, members, flags);
+        let status = vector(STATUS, Kind::Int8, members, flags);
         let fields = FIELDS.map(|(name, units, what)| {
             let attributes = json!({ "long_name": what, "units": units, "coordinates": "cell status" });
             Array::new(name, Kind::Float64, &[members, instants, nodes], attributes, bytes)
@@ -138,11 +168,41 @@ impl SnapshotStore {
             let bytes: Vec<u8> = values.into_iter().flat_map(f64::to_le_bytes).collect();
             array.push(&self.folder, &bytes)?;
         }
-        self.status.push(&self.folder, &[status as u8])?;
-        if self.fields.iter().all(|array| array.written > 0) {
-            self.folder.keep();
+        self.status.push(&self.folder, &[status as u8])
+    }
+
+    /// How far it has grown, once that is on disk.
+    pub fn mark(&self) -> Result<Mark> {
+        self.folder.sync()?;
+        Ok(Mark { arrays: self.fields.iter().chain([&self.status]).map(Array::mark).collect() })
+    }
+
+    /// Whether what is written is worth keeping if the run fails.
+    pub fn keep(&mut self, keep: bool) {
+        self.folder.keep(keep);
+    }
+
+    /// Goes on with one that [was checked](Mark::check); what was written after `mark` is removed.
+    ///
+    /// # Errors
+    /// [`Error::Request`] where the mark is of the arrays of another spec.
+    pub fn go_on(folder: PartFolder, spec: &Spec, points: usize, mark: &Mark) -> Result<SnapshotStore> {
+        mark.cut_off(folder.part())?;
+        SnapshotStore::begin(folder, spec, points)?.from(mark)
+    }
+
+    fn from(mut self, mark: &Mark) -> Result<SnapshotStore> {
+        let mut fits = true;
+        for (array, mark) in self.fields.iter_mut().chain([&mut self.status]).zip(&mark.arrays) {
+            fits &= array.go_on_from(mark);
         }
-        Ok(())
+        match fits {
+            true => Ok(self),
+            false => Err(Error::Request(format!(
+                "the arrays in {} are not those of the spec in the state",
+                self.folder.target().display()
+            ))),
+        }
     }
 
     /// The whole store, on disk and ready for its final name.
@@ -183,6 +243,7 @@ impl Array {
             fill: kind.fill(),
             chunk: Vec::new(),
             written: 0,
+            crc: 0,
             run_bytes,
             run_left: run_bytes,
         }
@@ -207,7 +268,8 @@ impl Array {
     fn write(&mut self, folder: &PartFolder) -> Result<()> {
         let missing = self.chunk_bytes - self.chunk.len();
         self.chunk.extend(self.fill.iter().cycle().take(missing));
-        folder.write(&format!("{}/{}", self.name, self.key()), &self.chunk)?;
+        folder.write(&format!("{}/{}", self.name, key(self.written, &self.grid)), &self.chunk)?;
+        self.crc = crc32c::crc32c_append(self.crc, &self.chunk);
         self.chunk.clear();
         self.written += 1;
         if self.run_left == 0 {
@@ -216,15 +278,82 @@ impl Array {
         Ok(())
     }
 
-    /// The name of the chunk that is being filled: `c`, and its place in the grid.
-    fn key(&self) -> String {
-        let mut rest = self.written;
-        let mut key = String::new();
-        for chunks in self.grid.iter().rev() {
-            key = format!(".{}{key}", rest % chunks);
-            rest /= chunks;
+    fn mark(&self) -> ArrayMark {
+        ArrayMark {
+            name: self.name.into(),
+            grid: self.grid.clone(),
+            written: self.written,
+            crc: self.crc,
+            chunk: self.chunk.clone(),
+            run_left: self.run_left,
         }
-        format!("c{key}")
+    }
+
+    /// Goes on as marked, if the mark is of this array.
+    fn go_on_from(&mut self, mark: &ArrayMark) -> bool {
+        let ArrayMark { name, grid, written, crc, chunk, run_left } = mark;
+        let fits = chunk.len() < self.chunk_bytes && *written <= grid.iter().product();
+        let fits = fits && name == self.name && *grid == self.grid && *run_left <= self.run_bytes;
+        (self.written, self.crc, self.run_left) = (*written, *crc, *run_left);
+        self.chunk.clone_from(chunk);
+        fits
+    }
+}
+
+/// The name of a chunk: `c`, and its place in the grid.
+fn key(number: u64, grid: &[u64]) -> String {
+    let mut rest = number;
+    let mut key = String::new();
+    for chunks in grid.iter().rev() {
+        key = format!(".{}{key}", rest % chunks);
+        rest /= chunks;
+    }
+    format!("c{key}")
+}
+
+impl Mark {
+    /// That the chunks in `store` are those it vouches for; else what is wrong.
+    pub fn check(&self, store: &Path) -> std::result::Result<(), String> {
+        let own = || FIELDS.iter().map(|(name, ..)| *name).chain([STATUS]);
+        if !self.arrays.iter().map(|mark| mark.name.as_str()).eq(own()) {
+            return Err(format!("it tells of other arrays than {}", own().collect::<Vec<_>>().join(", ")));
+        }
+        self.arrays.iter().try_for_each(|mark| mark.check(&store.join(&mark.name)))
+    }
+
+    /// Removes the chunks that were written later.
+    fn cut_off(&self, store: &Path) -> Result<()> {
+        for ArrayMark { name, grid, written, .. } in &self.arrays {
+            let later = (*written..grid.iter().product()).map(|number| store.join(name).join(key(number, grid)));
+            for path in later.take_while(|path| path.exists()) {
+                fs::remove_file(&path).map_err(Error::io("cannot remove", &path))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl ArrayMark {
+    fn check(&self, array: &Path) -> std::result::Result<(), String> {
+        let ArrayMark { grid, written, crc, .. } = self;
+        let all = grid.iter().try_fold(1_u64, |all, own| all.checked_mul(*own)).unwrap_or(0);
+        if all == 0 || *written > all {
+            return Err(format!("it tells of {} with {written} of {grid:?} chunks", array.display()));
+        }
+        if array.is_symlink() {
+            return Err(format!("{} is a link, which no run writes", array.display()));
+        }
+        let mut found = 0;
+        for number in 0..*written {
+            let path = array.join(key(number, grid));
+            // Each chunk goes on where the one before it ended.
+            let sum = input::open(&path).and_then(|mut file| checksum(&mut file, found));
+            found = sum.map_err(|e| format!("cannot read {} ({e})", path.display()))?.1;
+        }
+        match found == *crc {
+            true => Ok(()),
+            false => Err(format!("the chunks in {} are not those that it tells of", array.display())),
+        }
     }
 }
 
@@ -279,8 +408,7 @@ fn nearest(times: &[f64], t: f64) -> usize {
 }
 
 fn pretty(metadata: &Value) -> Result<Vec<u8>> {
-    let text = serde_json::to_string_pretty(metadata);
-    text.map(|text| (text + "\n").into()).map_err(|e| Error::Failed(format!("cannot write zarr.json: {e}")))
+    json_text(metadata, "zarr.json").map(String::into_bytes)
 }
 
 #[cfg(test)]
@@ -532,24 +660,61 @@ mod tests {
         }
     }
 
+    /// All files of a store with their bytes.
+    fn contents(store: &Path) -> Vec<(String, Vec<u8>)> {
+        let arrays = fs::read_dir(store).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir());
+        let files = arrays.flat_map(|array| fs::read_dir(array).unwrap().map(|entry| entry.unwrap().path()));
+        let name = |path: &Path| path.strip_prefix(store).unwrap().display().to_string();
+        let mut all: Vec<_> = files.map(|path| (name(&path), fs::read(path).unwrap())).collect();
+        all.sort();
+        all
+    }
+
     #[test]
-    fn what_is_kept_of_a_failed_run_is_a_store_with_what_had_ended() {
-        let home = tempfile::tempdir().unwrap();
+    fn a_store_goes_on_from_every_member_to_the_same_bytes() {
         let (spec, members) = (spec(7, &[0.0, 1.0, 2.0]), members());
-        for (ended, kept) in [(2, false), (5, true)] {
-            let out = OutputFolder::open(home.path(), true).unwrap();
-            let times = spec.snapshots.clone();
-            let folder = out.store(folder::STORE).unwrap();
-            let mut store = SnapshotStore::of_chunks(folder, &spec, 5, times, 360).unwrap();
-            members[..ended].iter().for_each(|(status, snapshots)| store.member(*status, snapshots).unwrap());
-            drop((store, out));
-            let part = home.path().join(".snapshots.zarr.part");
-            assert_eq!(part.is_dir(), kept);
-            if kept {
-                assert_eq!(read(&part, "member").whole(), [0, 1, 2, 3, 4, 5, 6]);
-                assert!(part.join("x/c.0.0.0").is_file() && !part.join("x/c.1.0.0").exists());
+        let begin =
+            |folder: PartFolder| SnapshotStore::of_chunks(folder, &spec, 5, spec.snapshots.clone(), 360).unwrap();
+        let add = |store: &mut SnapshotStore, of: &[(Status, Vec<Snapshot>)]| {
+            of.iter().for_each(|(status, snapshots)| store.member(*status, snapshots).unwrap());
+        };
+        let home = tempfile::tempdir().unwrap();
+        let out = OutputFolder::open(home.path(), true).unwrap();
+        let mut straight = begin(out.store(folder::STORE).unwrap());
+        add(&mut straight, &members);
+        let whole = contents(straight.folder.part());
+        assert!(whole.len() > 9);
+        drop(straight);
+        for kept in 0..=members.len() {
+            let mut first = begin(out.store(folder::STORE).unwrap());
+            add(&mut first, &members[..kept]);
+            let mark = first.mark().unwrap();
+            // Not in the state, so to be removed.
+            add(&mut first, &members[kept..(kept + 3).min(members.len())]);
+            let part = first.folder.part().to_path_buf();
+            first.keep(true);
+            drop(first);
+            out.check_store(&mark).unwrap();
+            if kept > 2 {
+                let chunk = part.join("x/c.0.0.0");
+                let bytes = fs::read(&chunk).unwrap();
+                fs::write(&chunk, [&[bytes[0] ^ 1], &bytes[1..]].concat()).unwrap();
+                assert!(out.check_store(&mark).unwrap_err().contains("/x are not those that it tells of"));
+                fs::remove_file(&chunk).unwrap();
+                assert!(out.check_store(&mark).unwrap_err().contains("cannot read "));
+                fs::write(&chunk, bytes).unwrap();
             }
+            mark.cut_off(&part).unwrap();
+            let mut second =
+                begin(PartFolder::again(part.clone(), home.path().join(folder::STORE))).from(&mark).unwrap();
+            add(&mut second, &members[kept..]);
+            assert!(contents(&part) == whole, "from {kept} members");
+            second.keep(false);
         }
+        let other = Mark {
+            arrays: vec![ArrayMark { written: 1000, ..begin(out.store(folder::STORE).unwrap()).status.mark() }],
+        };
+        assert!(out.check_store(&other).unwrap_err().contains("other arrays than x, y, k, r, status"));
     }
 
     #[test]

@@ -3,6 +3,8 @@
 //! Every field is one number of the run's precision, in declaration order, so that host and WGSL agree by
 //! construction; a test compares names and offsets with naga's view of `shaders/member.wgsl`.
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     Curve,
     decay::TIMES,
@@ -18,7 +20,7 @@ use crate::{
 macro_rules! numbers {
     ($(#[$outer:meta])* $name:ident { $($(#[$inner:meta])* $field:ident),+ $(,)? }) => {
         $(#[$outer])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
         #[repr(C)]
         pub struct $name<N> { $($(#[$inner])* pub $field: N),+ }
 
@@ -194,7 +196,7 @@ numbers! {
 }
 
 /// What a member reports when a dispatch ends.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Report<N> {
     /// The curve before the last step.
@@ -215,7 +217,7 @@ pub struct Report<N> {
 pub const NEVER: u32 = u32::MAX;
 
 /// Integers of one member, read and written by the kernel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Counters {
     /// 0 while the member is running, else its [`Status`](super::Status).

@@ -2,6 +2,8 @@
 //!
 //! Members may be added in any order and parts of an ensemble merged, and every bit of the sum is the same.
 
+use serde::{Deserialize, Serialize};
+
 /// The least significant bit is 2 to this power: far below the rounding of any excess and of its square.
 const QUANTUM: i32 = -140;
 /// Terms are below 2 to this power, so that 2³² of them fit.
@@ -10,7 +12,7 @@ const MOST: i32 = 83;
 const EQUAL: f64 = 4.0 * f64::EPSILON;
 
 /// A running sum.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ExactSum {
     low: u128,
     high: i128,
@@ -67,7 +69,7 @@ fn negated(low: u128, high: i128) -> (u128, i128) {
 }
 
 /// Count, mean and deviation of numbers of size 2⁻⁴⁰ to 2⁴⁰, whatever their order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Moments {
     count: u64,
     sum: ExactSum,

@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 
 use curvelax::{
     Result,
+    curve::{BaseCurve, Outline},
     ensemble::{Ended, Sink},
     number::Real,
     scheme::{
@@ -118,4 +119,21 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
     let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
     let [xy, xx] = points.iter().fold([0.0; 2], |s, p| [s[0] + (p.0 - x) * (p.1 - y), s[1] + (p.0 - x).powi(2)]);
     xy / xx
+}
+
+/// The outline with these corners.
+pub fn file(corners: &[DVec2]) -> BaseCurve {
+    let text: String = corners.iter().map(|p| format!("{:?},{:?}\n", p.x, p.y)).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("outline.csv");
+    std::fs::write(&path, text).unwrap();
+    BaseCurve::from_outline(Outline::read(&path).unwrap())
+}
+
+/// Two unit discs joined by a bar.
+pub fn dumbbell(half_length: f64, half_width: f64) -> Vec<DVec2> {
+    let end = std::f64::consts::PI - half_width.asin();
+    let arc = |j: i32| DVec2::new(half_length, 0.0) + DVec2::from_angle(end * f64::from(j - 100) / 100.0);
+    let right: Vec<DVec2> = (0..=200).map(arc).collect();
+    right.iter().copied().chain(right.iter().map(|p| -*p)).collect()
 }

@@ -6,7 +6,7 @@ use pulp::{NullaryFnOnce, Simd};
 
 use crate::{
     error::{Error, Result},
-    number::{Element, Instructions, Lanes, Number, Real},
+    number::{Element, Instructions, Number, Real, WithLanes, with_lanes},
     scheme::{
         evolve::{Run, Team, evolve_abreast},
         step::Method,
@@ -118,7 +118,24 @@ fn abreast<S: Instructions, M: Solves + 'static, T: Element<S>, const R: usize>(
     blocks: Blocks,
     threads: usize,
 ) -> Option<Box<dyn Crew<T>>> {
-    simd.map(|simd| Group::<S, M, Lanes<S, T, R>>::crew(simd, blocks, threads))
+    let solver = PhantomData::<fn() -> M>;
+    simd.map(|simd| with_lanes::<S, T, R, _>(simd, Abreast { simd, solver, blocks, threads }))
+}
+
+/// What a crew is made of, but for its lanes.
+struct Abreast<S, M> {
+    simd: S,
+    solver: PhantomData<fn() -> M>,
+    blocks: Blocks,
+    threads: usize,
+}
+
+impl<S: Simd, M: Solves + 'static, T: Real> WithLanes<T> for Abreast<S, M> {
+    type Output = Box<dyn Crew<T>>;
+
+    fn call<N: Number<Real = T>>(self) -> Box<dyn Crew<T>> {
+        Group::<S, M, N>::crew(self.simd, self.blocks, self.threads)
+    }
 }
 
 /// A number that fits into all vectors of this kind of processor.

@@ -1,8 +1,11 @@
 //! Adapters: what is there, what each can do, and which one to take.
 
 use std::{
+    cell::Cell,
     collections::HashMap,
-    sync::{Arc, Mutex, PoisonError},
+    panic::{self, AssertUnwindSafe},
+    sync::{Arc, Mutex, Once, PoisonError},
+    time::Duration,
 };
 
 use crate::{
@@ -29,6 +32,7 @@ pub struct Gpu {
 pub struct Device {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
+    name: String,
     fault: Arc<Mutex<Option<String>>>,
 }
 
@@ -181,6 +185,14 @@ impl Gpu {
         Ok((device.clone(), pipeline.clone()))
     }
 
+    /// Takes the device away from all kernels that are on it, as a reset of the driver does: for tests of what follows.
+    #[doc(hidden)]
+    pub fn lose(&self) {
+        if let Some((device, _)) = &*self.opened.lock().unwrap_or_else(PoisonError::into_inner) {
+            device.device.destroy();
+        }
+    }
+
     /// Opens the adapter with all its limits, and with f64 and subgroups where it has them.
     fn open(&self) -> Result<Device> {
         let descriptor = wgpu::DeviceDescriptor {
@@ -192,31 +204,112 @@ impl Gpu {
         let (device, queue) = pollster::block_on(self.adapter.request_device(&descriptor))
             .map_err(|e| Error::Device(format!("adapter {}: cannot be opened: {e}; try --backend cpu", self.name())))?;
         let fault = Arc::new(Mutex::new(None));
-        let record = |fault: &Arc<Mutex<Option<String>>>, what: String| {
-            if let Ok(mut fault) = fault.lock() {
-                fault.get_or_insert(what);
-            }
+        let set = |fault: &Mutex<Option<String>>, set: &dyn Fn(Option<String>) -> String| {
+            let mut fault = fault.lock().unwrap_or_else(PoisonError::into_inner);
+            *fault = Some(set(fault.take()));
         };
         let at = fault.clone();
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| record(&at, error.to_string())));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            set(&at, &|first| first.unwrap_or_else(|| one_line(&error.to_string())));
+        }));
         let at = fault.clone();
+        // Dropping the device also calls back; then nobody is left who asks.
         device.set_device_lost_callback(move |reason, message| {
-            // Dropping the device also calls back; that is no fault.
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                record(&at, format!("the device was lost: {message}"));
-            }
+            set(&at, &|_| one_line(&format!("the device was lost ({reason:?}) {message}")));
         });
-        Ok(Device { device, queue, fault })
+        Ok(Device { device, queue, name: self.name().to_string(), fault })
     }
 }
 
+/// What became of a wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Waited {
+    /// The work is done.
+    Done,
+    /// It is still on its way.
+    OnItsWay,
+}
+
 impl Device {
-    /// The first fault that wgpu reported, if any.
+    /// Whether wgpu has reported a fault.
     pub fn check(&self) -> Result<()> {
-        match self.fault.lock().map(|fault| fault.clone()) {
-            Ok(None) => Ok(()),
-            Ok(Some(fault)) => Err(Error::Device(format!("GPU: {fault}; try --backend cpu"))),
-            Err(_) => Err(Error::Device("GPU: a callback failed; try --backend cpu".into())),
+        self.fault().map_or(Ok(()), |fault| Err(self.error(&fault)))
+    }
+
+    /// What wgpu reported, in one line, if anything: that the device was lost, or else the first fault.
+    pub(super) fn fault(&self) -> Option<String> {
+        let known = || self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if known().is_some() {
+            // Calls on a device that is gone look like wrong ones; that it is gone is told when it is polled.
+            let _ = guarded(|| self.device.poll(wgpu::PollType::Poll));
         }
+        known()
+    }
+
+    /// The error of a fault of this device.
+    pub(super) fn error(&self, fault: &str) -> Error {
+        let Device { name, .. } = self;
+        Error::Device(format!("GPU {name}: {fault}; see `curvelax adapters`, or take --backend cpu"))
+    }
+
+    /// Waits for what was submitted, but no longer than `most`.
+    pub(super) fn wait(&self, submission: &wgpu::SubmissionIndex, most: Duration) -> Result<Waited> {
+        let wait =
+            |poll| guarded(|| self.device.poll(poll)).map_err(|fault| self.error(&self.fault().unwrap_or(fault)));
+        let polled = wait(wgpu::PollType::Wait { submission_index: Some(submission.clone()), timeout: Some(most) })?;
+        if polled.is_err() {
+            // A lost device takes no submission, so there is none to wait for; this hears what became of it.
+            let _ = wait(wgpu::PollType::Poll)?;
+        }
+        self.check()?;
+        match polled {
+            Ok(_) => Ok(Waited::Done),
+            Err(wgpu::PollError::Timeout) => Ok(Waited::OnItsWay),
+            Err(error) => Err(self.error(&format!("a dispatch was not taken ({error})"))),
+        }
+    }
+}
+
+thread_local! {
+    /// Panics of this thread are caught and told as errors.
+    static GUARDED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What `call` returns, or the message with which it panicked: wgpu does where it waits for a device that is lost.
+fn guarded<R>(call: impl FnOnce() -> R) -> std::result::Result<R, String> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let otherwise = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !GUARDED.get() {
+                otherwise(info);
+            }
+        }));
+    });
+    GUARDED.set(true);
+    let returned = panic::catch_unwind(AssertUnwindSafe(call));
+    GUARDED.set(false);
+    returned.map_err(|payload| {
+        let text = payload.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("a panic without a message");
+        one_line(text)
+    })
+}
+
+/// wgpu draws its errors as trees.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_of_the_driver_becomes_one_line() {
+        assert_eq!(guarded(|| 7), Ok(7));
+        let reset = |after: u32| -> u32 { panic!("Error in Device::poll:\n  parent device\n  is lost after {after}") };
+        assert_eq!(guarded(|| reset(3)), Err("Error in Device::poll: parent device is lost after 3".into()));
+        assert!(!GUARDED.get());
     }
 }

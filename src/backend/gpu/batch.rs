@@ -8,9 +8,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{adapter::Device, budget::Budget, kernel::TRACE_FIELDS};
+use super::{
+    adapter::{Device, Waited},
+    budget::Budget,
+    kernel::TRACE_FIELDS,
+};
 use crate::{
-    error::{Error, Result},
+    error::Result,
     number::Real,
     scheme::{
         Parameters,
@@ -20,9 +24,6 @@ use crate::{
     },
     solver::Blocks,
 };
-
-/// A dispatch that takes longer than this is given up.
-const DISPATCH_LIMIT: Duration = Duration::from_secs(120);
 
 /// Field names of what one dispatch asks for, in memory order.
 pub const DISPATCH_FIELDS: [&str; 5] = ["steps", "max_sweeps", "sweeps", "blocks", "groups"];
@@ -93,6 +94,13 @@ impl<T: Real> Batch<T> {
         }
     }
 
+    /// Bytes of its buffers.
+    pub fn bytes(&self) -> u64 {
+        let Buffers { dispatch, parameters, counters, reports, states, due, trace, staging } = &self.buffers;
+        let all = [dispatch, parameters, counters, reports, states, due, staging].into_iter().chain(trace);
+        all.map(wgpu::Buffer::size).sum()
+    }
+
     pub fn counters(&self, slot: usize) -> Counters {
         self.counters[slot]
     }
@@ -149,19 +157,31 @@ impl<T: Real> Batch<T> {
         self.flight = Some(Flight { since: Instant::now(), back: Reading::submit(device, encoder, staging, &reads) });
     }
 
-    /// Waits for what was started and takes its records; returns when it was started.
-    pub fn finish(&mut self, device: &Device) -> Result<Option<Instant>> {
+    /// When what is on its way was started.
+    pub fn since(&self) -> Option<Instant> {
+        self.flight.as_ref().map(|flight| flight.since)
+    }
+
+    /// Waits for what was started, but no longer than `most`; whether there is nothing left to wait for, be it for a fault,
+    /// which `finish` tells.
+    pub fn is_back(&self, device: &Device, most: Duration) -> bool {
+        let Some(Flight { back, .. }) = &self.flight else { return true };
+        !matches!(device.wait(&back.submission, most), Ok(Waited::OnItsWay))
+    }
+
+    /// Waits for what was started, but no longer than `most`, and takes its records; returns when it was started.
+    pub fn finish(&mut self, device: &Device, most: Duration) -> Result<Option<Instant>> {
         let Some(Flight { since, back }) = self.flight.take() else {
             self.forget_sweeps();
             return Ok(None);
         };
-        let bytes = back.wait(device)?;
+        let bytes = back.wait(device, most, since)?;
         let (counters, reports) = bytes.split_at(self.buffers.counters.size() as usize);
         let counters: Vec<Counters> = bytemuck::pod_collect_to_vec(counters);
         let reports: Vec<T> = bytemuck::pod_collect_to_vec(reports);
         self.forget_sweeps();
         for slot in self.due.iter().map(|slot| *slot as usize) {
-            check_progress(slot, &self.counters[slot], &counters[slot])?;
+            check_progress(device, slot, &self.counters[slot], &counters[slot])?;
             self.counters[slot] = counters[slot];
             self.reports[slot] = Report::from_numbers(&reports[slot * Report::<T>::LEN..(slot + 1) * Report::<T>::LEN]);
         }
@@ -201,12 +221,10 @@ impl<T: Real> Batch<T> {
 }
 
 /// A member that was due has made a step or a sweep, or ended: a kernel that does nothing must not be awaited.
-fn check_progress(slot: usize, before: &Counters, after: &Counters) -> Result<()> {
+fn check_progress(device: &Device, slot: usize, before: &Counters, after: &Counters) -> Result<()> {
     let position = |c: &Counters| (c.status, c.steps, c.rejected, c.phase, c.solve_sweeps);
     if position(before) == position(after) && after.sweeps_k + after.sweeps_x == 0 {
-        return Err(Error::Device(format!(
-            "GPU: a dispatch did nothing for the member in slot {slot}; see `curvelax check`, or try --backend cpu"
-        )));
+        return Err(device.error(&format!("a dispatch did nothing for the member in slot {slot}")));
     }
     Ok(())
 }
@@ -230,13 +248,13 @@ impl Reading {
         Reading { submission, staging: staging.clone(), bytes: at, mapped }
     }
 
-    /// Waits until it has arrived.
-    pub fn wait(self, device: &Device) -> Result<Vec<u8>> {
-        let wait = wgpu::PollType::Wait { submission_index: Some(self.submission), timeout: Some(DISPATCH_LIMIT) };
-        let polled = device.device.poll(wait);
-        device.check()?;
-        let failed = |what: String| Error::Device(format!("GPU: {what}; try --backend cpu"));
-        polled.map_err(|e| failed(format!("a dispatch did not end in {} s ({e})", DISPATCH_LIMIT.as_secs())))?;
+    /// Waits until it has arrived, but no longer than `most`; it is on its way `since` then.
+    pub fn wait(self, device: &Device, most: Duration, since: Instant) -> Result<Vec<u8>> {
+        if device.wait(&self.submission, most)? == Waited::OnItsWay {
+            let seconds = since.elapsed().as_secs_f64();
+            return Err(device.error(&format!("a dispatch did not end in {seconds:.3} s and is given up")));
+        }
+        let failed = |what: String| device.error(&what);
         match self.mapped.try_recv() {
             Ok(Ok(())) => {}
             other => return Err(failed(format!("results could not be read back ({other:?})"))),

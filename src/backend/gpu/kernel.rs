@@ -3,7 +3,7 @@
 //! With two batches the device advances one while the host collects and refills the other. A batch has buffers of its own,
 //! so that nothing makes the device wait between them either.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::{
     adapter::{Device, Gpu},
@@ -25,6 +25,9 @@ use crate::{
 
 pub use super::{batch::DISPATCH_FIELDS, budget::Budget, pipeline::compile};
 
+/// A dispatch that takes longer than this is given up: drivers of hardware do so after some seconds, and one on lavapipe
+/// lasts a fraction of one.
+const DISPATCH_LIMIT: Duration = Duration::from_secs(120);
 /// Slots of a batch at most; more members resident at once gain nothing.
 const MAX_SLOTS: usize = 8192;
 /// Members of a batch at least, where there are two: enough to fill a large GPU several times over, which holds some thousand
@@ -45,6 +48,7 @@ pub struct Kernel<T> {
     budget: Budget,
     most: Budget,
     fixed: bool,
+    limit: Duration,
     /// When the last dispatch ended.
     ended: Instant,
 }
@@ -72,11 +76,30 @@ impl<T: Real> Kernel<T> {
         gpu.capacity()
             .check_size::<T>(blocks, variant.solver)
             .map_err(|e| Error::Request(format!("n = {} needs {e}", blocks.n)))?;
+        Self::with_slots(gpu, blocks, [batches, slots], max_sweeps, variant)
+    }
+
+    /// The same with exactly so many slots, for which the device may have no room.
+    ///
+    /// # Errors
+    /// [`Error::Device`] with their bytes.
+    pub fn with_slots(
+        gpu: &Gpu,
+        blocks: Blocks,
+        [batches, slots]: [usize; 2],
+        max_sweeps: u32,
+        variant: Variant,
+    ) -> Result<Self> {
         let most = Budget::most(gpu, blocks, variant);
         let (device, pipeline) = gpu.pipeline::<T>(blocks, variant)?;
-        let batch = || Batch::new(&device, &pipeline, blocks, slots, variant.traced);
-        let batches = (0..batches).map(|_| batch()).collect();
         device.check()?;
+        let batch = || Batch::new(&device, &pipeline, blocks, slots, variant.traced);
+        let batches: Vec<Batch<T>> = (0..batches).map(|_| batch()).collect();
+        if let Some(fault) = device.fault() {
+            let (members, n) = (batches.len() * slots, blocks.n);
+            let mebibytes = batches.iter().map(Batch::bytes).sum::<u64>().div_ceil(1 << 20);
+            return Err(device.error(&format!("no room for {members} members of {n} points, {mebibytes} MiB: {fault}")));
+        }
         Ok(Kernel {
             gpu: device,
             pipeline,
@@ -87,6 +110,7 @@ impl<T: Real> Kernel<T> {
             budget: Budget::first(variant.solver, most),
             most,
             fixed: false,
+            limit: DISPATCH_LIMIT,
             ended: Instant::now(),
         })
     }
@@ -97,6 +121,18 @@ impl<T: Real> Kernel<T> {
             Budget { steps: budget.steps.clamp(1, self.most.steps), sweeps: budget.sweeps.clamp(1, self.most.sweeps) };
         self.fixed = true;
         self
+    }
+
+    /// Gives a dispatch up after `limit`, in place of two minutes.
+    pub fn with_limit(mut self, limit: Duration) -> Self {
+        self.limit = limit;
+        self
+    }
+
+    /// What is left of the time of a batch that was started then. A device takes one dispatch after the other, so it works
+    /// on this one from its start, or from the end of what was before it.
+    fn left(&self, since: Instant) -> Duration {
+        self.limit.saturating_sub(since.max(self.ended).elapsed())
     }
 
     /// Overwrites the trace with NaN, so that nothing stale passes for a result.
@@ -121,7 +157,8 @@ impl<T: Real> Kernel<T> {
         }
         let staging = staging(&self.gpu.device, reads.iter().map(|read| read.2).sum());
         let encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let bytes = Reading::submit(&self.gpu, encoder, &staging, reads).wait(&self.gpu)?;
+        let since = Instant::now();
+        let bytes = Reading::submit(&self.gpu, encoder, &staging, reads).wait(&self.gpu, self.limit, since)?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
@@ -166,9 +203,16 @@ impl<T: Real> Backend for Kernel<T> {
         self.gpu.check()
     }
 
+    fn is_back(&mut self, batch: usize, most: Duration) -> bool {
+        let Some(since) = self.batches[batch].since() else { return true };
+        let left = self.left(since);
+        // One whose time is over is given up by `finish`.
+        self.batches[batch].is_back(&self.gpu, most.min(left)) || left <= most
+    }
+
     fn finish(&mut self, batch: usize) -> Result<()> {
-        let Some(since) = self.batches[batch].finish(&self.gpu)? else { return Ok(()) };
-        // The device worked on it from its start, or from the end of what was before it.
+        let left = self.batches[batch].since().map_or(self.limit, |since| self.left(since));
+        let Some(since) = self.batches[batch].finish(&self.gpu, left)? else { return Ok(()) };
         let now = Instant::now();
         let took = now - since.max(self.ended);
         self.ended = now;

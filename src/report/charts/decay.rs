@@ -2,16 +2,14 @@
 
 use glam::DVec2;
 
-use super::TIME;
+use super::{MOST_BANDS, TIME, only_panel};
 use crate::report::{
     axis::{Axis, Scale},
-    chart::{Colours, Entry, FOOT, Heading, MARGIN, Mark, Panel, WIDTH, drawable, nothing},
+    chart::{Colours, Entry, FOOT, Heading, Mark, Panel, drawable, nothing},
     trace,
 };
 
 const HEIGHT: f64 = 300.0;
-/// With more curves than this, bands would hide each other.
-const MOST_BANDS: usize = 4;
 /// Smaller shares of the largest excess are rounding, and not drawn.
 const ROUNDING: f64 = 1e-18;
 /// Pieces of a line of theory, which is straight on some axes only.
@@ -149,15 +147,7 @@ impl Decay<'_> {
 
         let across = Axis::over("t", TIME, scale, times()).from_zero();
         let upwards = self.excess(bands);
-        let left = Panel::left(&upwards, HEIGHT);
-        let panel = Panel {
-            heading: "",
-            corner: DVec2::new(left, top + 8.0),
-            size: DVec2::new(WIDTH - left - MARGIN - colours.room(HEIGHT), HEIGHT),
-            x: &across,
-            y: &upwards,
-            labels_x: true,
-        };
+        let panel = only_panel([&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);
         let least = trace::tolerance(colours.shown.len() * if bands { 3 } else { 1 }, panel.size.x);
         for (i, class) in &colours.shown {
@@ -190,8 +180,7 @@ impl Decay<'_> {
     }
 
     fn legend(&self, colours: &Colours, bands: bool) -> Vec<Entry> {
-        let told_apart = colours.shown.iter().filter(|_| colours.bar.is_none());
-        let curves = told_apart.map(|(i, class)| Entry::new(class, Mark::Series, &self.curves[*i].label));
+        let curves = colours.legend(|i| &self.curves[i].label);
         let band = bands.then(|| Entry::new("faint", Mark::Band, self.band));
         let theory = self.theory.iter().map(|theory| Entry::new("ink", Mark::Dashed, &theory.label));
         curves.chain(band).chain(theory).collect()

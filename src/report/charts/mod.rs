@@ -21,8 +21,24 @@ pub use survival::{Survival, SurvivalCurve};
 
 pub use super::{axis::Scale, chart::Estimate};
 
+use glam::DVec2;
+
+use super::{
+    axis::Axis,
+    chart::{MARGIN, Panel, WIDTH},
+};
+
 /// The unit of all times.
 const TIME: &str = "length⁴";
+/// With more curves than this, bands would hide each other.
+const MOST_BANDS: usize = 4;
+
+/// The panel of a picture that has one, `height` high below `top`, with `room` for a colour bar at its right.
+fn only_panel<'a>([x, y]: [&'a Axis; 2], top: f64, height: f64, room: f64) -> Panel<'a> {
+    let left = Panel::left(y, height);
+    let size = DVec2::new(WIDTH - left - MARGIN - room, height);
+    Panel { heading: "", corner: DVec2::new(left, top + 8.0), size, x, y, labels_x: true }
+}
 
 #[cfg(test)]
 pub mod tests;

@@ -1,11 +1,12 @@
 //! How fast the excess of the members falls: their fitted rates, as multiples of what linear theory gives where it does.
 
-use glam::DVec2;
-
-use super::bins::{Bins, guide};
+use super::{
+    bins::{Bins, guide},
+    only_panel,
+};
 use crate::report::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, Heading, MARGIN, Mark, Panel, WIDTH, nothing},
+    chart::{Entry, FOOT, Heading, Mark, nothing},
     text::{count, significant},
 };
 
@@ -50,10 +51,7 @@ impl FittedRates<'_> {
         let legend = if shown { vec![Entry::new("ink", Mark::Dashed, "as linear theory has it")] } else { Vec::new() };
         let sentences = vec![self.note.into(), median, without];
         let (mut svg, top) = Heading { title: self.title, sentences, legend }.begin(HEIGHT + FOOT + 8.0);
-        let left = Panel::left(&members, HEIGHT);
-        let corner = DVec2::new(left, top + 8.0);
-        let size = DVec2::new(WIDTH - MARGIN - left, HEIGHT);
-        let panel = Panel { heading: "", corner, size, x: &across, y: &members, labels_x: true };
+        let panel = only_panel([&across, &members], top, HEIGHT, 0.0);
         panel.draw_x(&mut svg);
         panel.draw_y(&mut svg);
         bins.draw(&mut svg, &panel);

@@ -2,16 +2,14 @@
 
 use glam::DVec2;
 
-use super::TIME;
+use super::{MOST_BANDS, TIME, only_panel};
 use crate::report::{
     axis::{Axis, Scale},
-    chart::{Colours, Entry, FOOT, Heading, MARGIN, Mark, Panel, WIDTH, nothing, stroke},
+    chart::{Colours, Entry, FOOT, Heading, Mark, Panel, nothing, stroke},
     trace,
 };
 
 const HEIGHT: f64 = 300.0;
-/// With more curves than this, bands would hide each other.
-const MOST_BANDS: usize = 4;
 /// Censoring strokes of all curves together.
 const MOST_STROKES: f64 = 1200.0;
 /// Least pixels between two of them on a curve.
@@ -111,15 +109,7 @@ impl Survival<'_> {
         let scale = if times().any(|t| scale.holds(t)) { scale } else { Scale::Linear };
         let across = Axis::over("t", TIME, scale, times()).from_zero();
         let upwards = Axis::new("share not relaxed", "", Scale::Linear, (0.0, 1.02));
-        let left = Panel::left(&upwards, HEIGHT);
-        let panel = Panel {
-            heading: "",
-            corner: DVec2::new(left, top + 8.0),
-            size: DVec2::new(WIDTH - left - MARGIN - colours.room(HEIGHT), HEIGHT),
-            x: &across,
-            y: &upwards,
-            labels_x: true,
-        };
+        let panel = only_panel([&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);
         let lines = colours.shown.len() * if bands { 3 } else { 1 };
         let least = trace::tolerance(lines, HEIGHT);
@@ -140,8 +130,7 @@ impl Survival<'_> {
     }
 
     fn legend(&self, colours: &Colours, bands: bool, censored: bool) -> Vec<Entry> {
-        let told_apart = colours.shown.iter().filter(|_| colours.bar.is_none());
-        let curves = told_apart.map(|(i, class)| Entry::new(class, Mark::Series, &self.curves[*i].label));
+        let curves = colours.legend(|i| &self.curves[i].label);
         let band = bands.then(|| Entry::new("faint", Mark::Band, "95 % band"));
         let stroke = censored.then(|| Entry::new("faint", Mark::Stroke, "censored"));
         curves.chain(band).chain(stroke).collect()

@@ -1,0 +1,68 @@
+//! A self-test by known answers: before a run begins on a device, a few members take two steps there and on the CPU.
+//!
+//! What is tested is what the run will use: its kernel, its number of nodes, its slots. The bounds are those of the other
+//! comparisons.
+
+use super::{
+    adaptive_members,
+    compare::{Left, Row, compare_ends},
+    members,
+};
+use crate::{
+    backend::Backend,
+    error::{Error, Result},
+    number::Real,
+    scheme::step::Method,
+};
+
+/// One for each law of [`members`]; with and without redistribution and pull.
+const MEMBERS: usize = 4;
+/// Steps of fixed length, or the time of so many.
+const STEPS: u32 = 2;
+/// Tolerance of adaptive steps.
+const ADAPTIVE: f64 = 1e-3;
+
+/// Makes two steps with members of `n` nodes, or adaptive ones over the time of two, and compares what they leave with what
+/// `method` leaves on the CPU. The slots, which must be free, are free again afterwards.
+///
+/// # Errors
+/// [`Error::Device`] with the quantity, its error and its bound; what `backend` itself reports.
+pub fn self_test<T: Real>(
+    backend: &mut dyn Backend,
+    device: &str,
+    hardware: bool,
+    method: &Method,
+    n: usize,
+    adaptive: bool,
+) -> Result<()> {
+    let count = MEMBERS.min(backend.slots());
+    let launches = match adaptive {
+        false => members(n, count, STEPS, T::PRECISION.tolerance())?,
+        true => adaptive_members(n, count, STEPS, ADAPTIVE, T::EPSILON)?,
+    };
+    // In all batches.
+    let slots: Vec<usize> = (0..count).map(|member| member * backend.slots() / count).collect();
+    for (slot, launch) in slots.iter().zip(&launches) {
+        backend.load(*slot, launch)?;
+    }
+    while slots.iter().any(|slot| backend.counters(*slot).is_running()) {
+        backend.advance()?;
+    }
+    let mut left = Vec::with_capacity(count);
+    for slot in slots {
+        left.push(Left { state: backend.state(slot)?, counters: backend.counters(slot), report: backend.report(slot) });
+        backend.clear(slot);
+    }
+    let wrong = |what: String| {
+        let remedy = "see `curvelax check`, or take --backend cpu";
+        Error::Device(format!("GPU {device} computes wrongly: {what}; {remedy}"))
+    };
+    let rows = compare_ends::<T>(hardware, method, n, &launches, &left).map_err(|error| wrong(error.to_string()))?;
+    match rows.iter().filter(|row| !row.is_empty()).find(|row| !row.passes()) {
+        None => Ok(()),
+        Some(Row { quantity, error, bound, at: (member, node), .. }) => Err(wrong(format!(
+            "{quantity} of member {member}, node {node}, of {n} in {}, is off by {error:.1e}, bound {bound:.1e}",
+            T::NAME
+        ))),
+    }
+}

@@ -1,0 +1,47 @@
+//! Where a run stands between two dispatches: enough to go on from there as if nothing had happened.
+
+use std::collections::BTreeMap;
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use super::{Ended, SeriesRow, Snapshot};
+use crate::scheme::parameters::{Counters, Report};
+
+/// The members of a run by rank, their place in the order in which they leave it, from 0.
+///
+/// Those of lower rank than `next` have been handed to the sink; one that is nowhere here is at its start.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Standing {
+    /// The first member that has not been handed to the sink.
+    pub next: u64,
+    /// Members that ended, but before one of lower rank.
+    pub early: BTreeMap<u64, Ended>,
+    /// Members on their way; none where they are not to be had, so that those kept last still hold.
+    pub resident: Option<BTreeMap<u64, Paused>>,
+}
+
+/// A member on its way, as it was between two dispatches.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Paused {
+    /// Its counters in the back end.
+    pub counters: Counters,
+    /// Its report there.
+    pub report: Report<f64>,
+    /// All fields of its [`State`](crate::scheme::State) there, one after another, `18n` numbers.
+    pub state: Vec<f64>,
+    /// Sweeps so far, on curvature and on position systems.
+    pub sweeps: [u64; 2],
+    /// How many of its output times it has reached.
+    pub served: u64,
+    /// Its rows of the series so far.
+    pub series: Vec<SeriesRow>,
+    /// Its snapshots so far.
+    pub snapshots: Vec<Snapshot>,
+    /// Its portrait so far, with times.
+    pub frames: Vec<(f64, Vec<DVec2>)>,
+    /// When it was first seen to cross itself.
+    pub crossed: Option<f64>,
+    /// Travel at which it is looked at next.
+    pub look_at: f64,
+}

@@ -1,0 +1,144 @@
+//! Files that a user names, read up to a size that no honest one has.
+//!
+//! A pipe may never end and a device never does, so neither is opened: the answer to a slip in a path comes at once.
+
+use std::{
+    fs::{self, File},
+    io::{self, Error, ErrorKind, Read},
+    path::Path,
+};
+
+/// Most bytes of a spec: half a million members by number.
+pub(crate) const MOST_SPEC: u64 = 1 << 20;
+/// Most bytes of an outline: a million points with all their digits.
+pub(crate) const MOST_OUTLINE: u64 = 1 << 26;
+/// Most bytes of a `run.json`: the longest spec, in lines.
+pub(crate) const MOST_RUN: u64 = 1 << 22;
+/// Most bytes of the first members: ten times what twelve of them take.
+pub(crate) const MOST_PORTRAITS: u64 = 1 << 23;
+/// Most bytes of a line of a table: a thousand numbers.
+pub(crate) const LONGEST_LINE: usize = 1 << 16;
+
+/// Opens the file at `path`.
+///
+/// # Errors
+/// As [`File::open`], and for what is no file.
+pub(crate) fn open(path: &Path) -> io::Result<File> {
+    // Before it is opened: to open a pipe is to wait for its writer.
+    let kind = fs::metadata(path)?.file_type();
+    match () {
+        _ if kind.is_dir() => Err(ErrorKind::IsADirectory.into()),
+        _ if !kind.is_file() => Err(Error::other("a pipe or a device; save what it holds in a file")),
+        _ => File::open(path),
+    }
+}
+
+/// The content of the file at `path`, if it is of `most` bytes or less.
+///
+/// # Errors
+/// As [`open`], and for a longer one.
+pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let file = open(path)?;
+    let too_long = |size: &str| Error::new(ErrorKind::FileTooLarge, format!("{size} bytes; at most {most} are read"));
+    let size = file.metadata()?.len();
+    if size > most {
+        return Err(too_long(&size.to_string()));
+    }
+    // Files of the system have no size beforehand.
+    let mut bytes = Vec::new();
+    match file.take(most + 1).read_to_end(&mut bytes)? as u64 > most {
+        true => Err(too_long(&format!("more than {most}"))),
+        false => Ok(bytes),
+    }
+}
+
+/// The same as text.
+///
+/// # Errors
+/// As [`bytes`], and where it is not in UTF-8.
+pub(crate) fn text(path: &Path, most: u64) -> io::Result<String> {
+    String::from_utf8(bytes(path, most)?).map_err(|e| {
+        let at = e.utf8_error().valid_up_to();
+        Error::new(ErrorKind::InvalidData, format!("byte {at} is no UTF-8; save it in UTF-8"))
+    })
+}
+
+/// A reader that ends with an error where a line has not ended after [`LONGEST_LINE`] bytes: nobody who reads line by line
+/// then holds more than that.
+pub(crate) struct Lines<R> {
+    inner: R,
+    /// Bytes since the last end of a line.
+    since: usize,
+}
+
+impl<R: Read> Lines<R> {
+    pub(crate) fn new(inner: R) -> Lines<R> {
+        Lines { inner, since: 0 }
+    }
+}
+
+impl<R: Read> Read for Lines<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.inner.read(buffer)?;
+        let mut ends = buffer[..count].iter().enumerate().filter(|(_, byte)| **byte == b'\n').map(|(at, _)| at);
+        let first = self.since + ends.next().unwrap_or(count);
+        self.since = match buffer[..count].iter().rposition(|byte| *byte == b'\n') {
+            Some(last) => count - last - 1,
+            None => first,
+        };
+        if first > LONGEST_LINE {
+            let problem = format!("a line of more than {LONGEST_LINE} bytes");
+            return Err(Error::new(ErrorKind::InvalidData, problem));
+        }
+        Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_read_up_to_its_size_and_no_further() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("file");
+        fs::write(&path, "1234").unwrap();
+        assert_eq!(bytes(&path, 4).unwrap(), b"1234");
+        assert_eq!(bytes(&path, 3).unwrap_err().to_string(), "4 bytes; at most 3 are read");
+        assert_eq!(bytes(home.path(), 4).unwrap_err().kind(), ErrorKind::IsADirectory);
+        fs::write(&path, b"ab\xff").unwrap();
+        assert_eq!(text(&path, 4).unwrap_err().to_string(), "byte 2 is no UTF-8; save it in UTF-8");
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_file_without_a_size_and_a_device_have_no_end_that_is_waited_for() {
+        let error = bytes(Path::new("/proc/self/status"), 10).unwrap_err().to_string();
+        assert_eq!(error, "more than 10 bytes; at most 10 are read");
+        assert!(bytes(Path::new("/dev/zero"), 10).unwrap_err().to_string().starts_with("a pipe or a device; "));
+    }
+
+    #[test]
+    fn a_line_is_read_up_to_its_longest_wherever_reads_end() {
+        let line = |length: usize| [vec![b'x'; length], vec![b'\n']].concat();
+        let read = |text: &[u8], step: usize| {
+            let mut lines = Lines::new(text);
+            let mut part = vec![0; step];
+            loop {
+                match lines.read(&mut part) {
+                    Ok(0) => return Ok(()),
+                    Ok(_) => {}
+                    Err(e) => return Err(e.to_string()),
+                }
+            }
+        };
+        for step in [1, 7, 4096, LONGEST_LINE + 1, 10 * LONGEST_LINE] {
+            let longest = line(LONGEST_LINE);
+            assert_eq!(read(&[&longest[..], &longest, b"\n\n", &longest].concat(), step), Ok(()), "{step}");
+            let longer = [&longest[..], &line(LONGEST_LINE + 1)].concat();
+            // Of what one read brings only the beginning and the end are looked at: that much is held anyhow.
+            assert_eq!(read(&longer, step).is_err(), step <= LONGEST_LINE + 1, "{step}");
+            assert!(read(&vec![b'x'; 30 * LONGEST_LINE], step).is_err(), "{step}");
+        }
+    }
+}

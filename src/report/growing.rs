@@ -1,0 +1,145 @@
+//! The files that grow as members end: tables, and the store of snapshots.
+
+use std::path::PathBuf;
+
+use super::{
+    folder::{self, Mark, OutputFolder, PartFile},
+    part_folder::PartFolder,
+    tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable},
+    zarr::{self, SnapshotStore},
+};
+use crate::{
+    ensemble::{Ended, Spec, spec::Store},
+    error::{Error, Result},
+};
+
+/// Those that a spec asks for.
+pub struct Growing {
+    summary: SummaryTable,
+    rates: RateTable,
+    series: Option<SeriesTable>,
+    snapshots: Option<SnapshotTable>,
+    store: Option<SnapshotStore>,
+    /// A member got into some of them only.
+    torn: bool,
+}
+
+impl Growing {
+    /// The tables for `spec`, the store aside.
+    fn names(spec: &Spec) -> Vec<&'static str> {
+        let snapshots = !spec.snapshots.is_empty() && spec.store == Store::Csv;
+        let optional = [(folder::SERIES, spec.series.is_some()), (folder::SNAPSHOTS, snapshots)];
+        let asked = optional.into_iter().filter(|(_, asked)| *asked).map(|(name, _)| name);
+        [folder::SUMMARY, folder::RATES].into_iter().chain(asked).collect()
+    }
+
+    fn has_store(spec: &Spec) -> bool {
+        !spec.snapshots.is_empty() && spec.store == Store::Zarr
+    }
+
+    /// Begins them; `points` is the number of nodes of a member, which matters only where all have the same.
+    pub fn begin(folder: &OutputFolder, spec: &Spec, points: usize) -> Result<Growing> {
+        let names = Growing::names(spec);
+        let file = |name: &str| names.contains(&name).then(|| folder.file(name)).transpose();
+        Ok(Growing {
+            summary: SummaryTable::begin(folder.file(folder::SUMMARY)?)?,
+            rates: RateTable::begin(folder.file(folder::RATES)?)?,
+            series: file(folder::SERIES)?.map(SeriesTable::begin).transpose()?,
+            snapshots: file(folder::SNAPSHOTS)?.map(SnapshotTable::begin).transpose()?,
+            store: match Growing::has_store(spec) {
+                true => Some(SnapshotStore::begin(folder.store(folder::STORE)?, spec, points)?),
+                false => None,
+            },
+            torn: false,
+        })
+    }
+
+    /// Goes on with those of an interrupted run, as far as they were marked.
+    ///
+    /// # Errors
+    /// [`Error::Request`] where the marks are not of the files of `spec`.
+    pub fn go_on(
+        folder: &OutputFolder,
+        spec: &Spec,
+        points: usize,
+        marks: &[Mark],
+        store: Option<&zarr::Mark>,
+    ) -> Result<Growing> {
+        let names = Growing::names(spec);
+        if !marks.iter().map(|mark| mark.name.as_str()).eq(names.iter().copied())
+            || store.is_some() != Growing::has_store(spec)
+        {
+            let path = folder.path().display();
+            return Err(Error::Request(format!("{path}: the state tells of other files than its spec asks for")));
+        }
+        let (files, part) = folder.reopen(marks, store.is_some())?;
+        let mut files = names.into_iter().zip(files).collect::<Vec<_>>();
+        let mut file = |name: &str| files.iter().position(|own| own.0 == name).map(|at| files.swap_remove(at).1);
+        let missing = |name: &str| Error::Failed(format!("no {name} to go on with"));
+        Ok(Growing {
+            summary: SummaryTable::go_on(file(folder::SUMMARY).ok_or_else(|| missing(folder::SUMMARY))?),
+            rates: RateTable::go_on(file(folder::RATES).ok_or_else(|| missing(folder::RATES))?),
+            series: file(folder::SERIES).map(SeriesTable::go_on),
+            snapshots: file(folder::SNAPSHOTS).map(SnapshotTable::go_on),
+            store: match part.zip(store) {
+                Some((part, mark)) => Some(SnapshotStore::go_on(part, spec, points, mark)?),
+                None => None,
+            },
+            torn: false,
+        })
+    }
+
+    /// Writes what a member left.
+    pub fn add(&mut self, ended: &Ended) -> Result<()> {
+        // Until all of it is written.
+        self.torn = true;
+        let Ended { outcome, series, snapshots, .. } = ended;
+        if let Some(table) = &mut self.series {
+            series.iter().try_for_each(|row| table.row(row))?;
+        }
+        if let Some(table) = &mut self.snapshots {
+            snapshots.iter().try_for_each(|snapshot| table.snapshot(snapshot))?;
+        }
+        if let Some(store) = &mut self.store {
+            store.member(outcome.status, snapshots)?;
+        }
+        self.summary.row(outcome)?;
+        self.rates.row(outcome)?;
+        self.torn = false;
+        Ok(())
+    }
+
+    /// Where the rows of the members lie as yet.
+    pub fn rows(&self) -> PathBuf {
+        self.summary.part().to_path_buf()
+    }
+
+    /// How far all have grown, once that is on disk.
+    pub fn mark(&mut self) -> Result<(Vec<Mark>, Option<zarr::Mark>)> {
+        if self.torn {
+            return Err(Error::Failed("the rows of a member could not all be written".into()));
+        }
+        let mut marks = vec![self.summary.mark()?, self.rates.mark()?];
+        marks.extend(self.series.as_mut().map(SeriesTable::mark).transpose()?);
+        marks.extend(self.snapshots.as_mut().map(SnapshotTable::mark).transpose()?);
+        Ok((marks, self.store.as_ref().map(SnapshotStore::mark).transpose()?))
+    }
+
+    /// Whether they are worth keeping if the run fails.
+    pub fn keep(&mut self, keep: bool) {
+        self.summary.keep(keep);
+        self.rates.keep(keep);
+        self.series.iter().for_each(|table| table.keep(keep));
+        self.snapshots.iter().for_each(|table| table.keep(keep));
+        self.store.iter_mut().for_each(|store| store.keep(keep));
+    }
+
+    /// All of them, on disk and ready for their final names.
+    pub fn ready(self) -> Result<(Vec<PartFile>, Option<PartFolder>)> {
+        let Growing { summary, rates, series, snapshots, store, .. } = self;
+        let mut files = vec![summary.ready()?, rates.ready()?];
+        files.extend(series.map(SeriesTable::ready).transpose()?);
+        files.extend(snapshots.map(SnapshotTable::ready).transpose()?);
+        Ok((files, store.map(SnapshotStore::ready).transpose()?))
+    }
+}

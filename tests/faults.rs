@@ -1,0 +1,650 @@
+//! Faults of devices and of members: an adapter that computes wrongly, a device that is lost, full or slow, a back end that
+//! fails at any call, a member whose numbers are poison. Each ends in an error by name or in the status of that member
+//! alone.
+//!
+//! Cases that need an adapter are reported as ignored where there is none and `ALLOW_NO_GPU=1` says that this is allowed.
+
+mod common;
+
+use std::{
+    process::{Command, Output},
+    time::{Duration, Instant},
+};
+
+use curvelax::{
+    Error,
+    backend::{
+        self, Backend,
+        cpu::{CpuBackend, Vectorised, Vectors},
+        gpu::{Gpu, Kernel, Variant, kernel::Budget},
+    },
+    conformance::{adaptive_members, members, self_test},
+    ensemble::{
+        Cell, Family, Spec, Status,
+        spec::{BackendChoice, Precision},
+    },
+    number::Real,
+    scheme::{
+        Parameters, State,
+        evolve::Run,
+        parameters::{Counters, Report},
+        step::Method,
+    },
+    simulate::simulate,
+    solver::{Blocks, Order, Solver},
+};
+use glam::DVec2;
+use libtest_mimic::{Arguments, Failed, Trial};
+
+use common::All;
+
+type Outcome = Result<(), Failed>;
+
+/// Nodes of the members among which one is poison.
+const POINTS: usize = 11;
+/// Its company: every lane of the widest vectors is met twice, and not all vectors are full.
+const COMPANY: usize = 40;
+/// More advances than members of a few steps can take.
+const MANY_ADVANCES: usize = 10_000;
+
+fn main() {
+    let mut trials = Vec::new();
+    for solver in Solver::ALL {
+        for adaptive in [false, true] {
+            on_the_cpu::<f32>(solver, adaptive, &mut trials);
+            on_the_cpu::<f64>(solver, adaptive, &mut trials);
+        }
+    }
+    trials.push(Trial::test("a back end that fails at any call ends the run with its error", any_call_fails));
+    #[cfg(target_os = "linux")]
+    trials.push(Trial::test("without an adapter a GPU is refused by name, and auto runs on the CPU", no_adapter));
+    let found = Gpu::list();
+    let allowed = std::env::var("ALLOW_NO_GPU").is_ok_and(|value| value == "1");
+    if found.is_empty() {
+        let missing = || -> Outcome { Err("no GPU adapter: install one, or set ALLOW_NO_GPU=1".into()) };
+        trials.push(Trial::test("an adapter is there", missing).with_ignored_flag(allowed));
+    }
+    for (index, gpu) in found.iter().enumerate() {
+        println!("adapter {index}: {} ({}, {})", gpu.name(), gpu.device_type(), gpu.driver());
+        for (solver, adaptive) in Solver::ALL.into_iter().flat_map(|solver| [(solver, false), (solver, true)]) {
+            match gpu.capacity().best_precision() {
+                Precision::F32 => on_the_gpu::<f32>(index, solver, adaptive, &mut trials),
+                Precision::F64 => on_the_gpu::<f64>(index, solver, adaptive, &mut trials),
+            }
+        }
+        let mut add = |name: &str, case: fn(&Gpu) -> Outcome| {
+            trials.push(Trial::test(format!("adapter {index}: {name}"), move || case(&Gpu::list()[index])));
+        };
+        add("a device that is lost between dispatches is an error by name", lost_between_dispatches);
+        add("a device that is lost during a dispatch is an error by name", lost_during_a_dispatch);
+        add("on a lost device nothing is opened, and auto goes on with the CPU", lost_before);
+        add("a device without room for the slots is an error with their bytes", no_room);
+        add("a dispatch is given up at its limit, and waited for in slices", slow_dispatch);
+    }
+    libtest_mimic::run(&Arguments::from_args(), trials).exit();
+}
+
+fn on_the_cpu<T: Vectorised>(solver: Solver, adaptive: bool, trials: &mut Vec<Trial>) {
+    let pace = pace(adaptive);
+    let mut add = |name: &str, case: fn(Solver, bool) -> Outcome| {
+        let name = format!("{} {} {pace}: {name}", T::NAME, solver.name());
+        trials.push(Trial::test(name, move || case(solver, adaptive)));
+    };
+    add("a poisoned member leaves all others untouched", poison_on_the_cpu::<T>);
+    add("the self-test passes what computes rightly, and names what does not", the_self_test_finds_a_liar::<T>);
+}
+
+/// One kernel for both, since lavapipe takes a second or more to compile one.
+fn on_the_gpu<T: Real>(index: usize, solver: Solver, adaptive: bool, trials: &mut Vec<Trial>) {
+    let name = format!("{} {} {}, adapter {index}", T::NAME, solver.name(), pace(adaptive));
+    let case = move || -> Outcome {
+        let gpu = &Gpu::list()[index];
+        let blocks = Blocks::new(POINTS).ok_or("n")?;
+        let variant = Variant { adaptive, ..gpu.capacity().variant(blocks, solver) };
+        let started = Instant::now();
+        let mut kernel = Kernel::<T>::new(gpu, blocks, COMPANY + 1, method(solver).max_sweeps, variant)?;
+        the_self_test_passes(&mut kernel, gpu, solver, adaptive, started)?;
+        poison_on_the_gpu(kernel, gpu, solver, adaptive)
+    };
+    let name = format!("{name}: the self-test passes, and a poisoned member leaves all others untouched");
+    trials.push(Trial::test(name, case));
+}
+
+fn pace(adaptive: bool) -> &'static str {
+    if adaptive { "adaptive" } else { "fixed" }
+}
+
+fn method(solver: Solver) -> Method {
+    Method { solver, order: Order::Coloured, max_sweeps: 2000 }
+}
+
+fn require(holds: bool, otherwise: impl FnOnce() -> String) -> Outcome {
+    if holds { Ok(()) } else { Err(otherwise().into()) }
+}
+
+// Poisoned members.
+
+/// What is wrong with a member, and what was done to it.
+type Poison = (&'static str, fn(&mut Run<f64>));
+
+const POISONS: [Poison; 9] = [
+    ("a node is NaN", |run| renew(run, |nodes| nodes[3] = DVec2::new(f64::NAN, 0.0))),
+    ("a node is infinite", |run| renew(run, |nodes| nodes[0].y = f64::NEG_INFINITY)),
+    ("a node is at 1e30", |run| renew(run, |nodes| nodes[POINTS - 1].x = 1e30)),
+    ("all nodes are beyond the roots of the largest number", |run| {
+        renew(run, |nodes| nodes.iter_mut().for_each(|node| *node *= 1e200));
+    }),
+    ("two neighbours are in one place", |run| renew(run, |nodes| nodes[6] = nodes[5])),
+    ("all nodes are in one place", |run| renew(run, |nodes| nodes.fill(DVec2::new(0.3, -0.2)))),
+    ("a curvature is NaN", |run| {
+        run.state.curve.k[4] = f64::NAN;
+        run.state.curve.k.close();
+    }),
+    ("all lengths are 0", |run| {
+        (0..POINTS).for_each(|i| run.state.curve.r[i] = 0.0);
+        run.state.curve.r.close();
+    }),
+    ("its ω is NaN", |run| run.parameters.omega = f64::NAN),
+];
+
+/// Starts `run` from other nodes.
+fn renew(run: &mut Run<f64>, change: impl FnOnce(&mut [DVec2])) {
+    let mut nodes: Vec<DVec2> = run.state.curve.positions().collect();
+    change(&mut nodes);
+    let (counters, next) = (run.counters, run.report.progress.next);
+    *run = Run { counters, ..Run::new(State::from_nodes(&nodes), run.parameters) };
+    run.report.progress.next = next;
+}
+
+/// Members no two of which are alike; lanes ask that all of them are redistributed, or none, and pulled, or none.
+fn launches<T: Real>(count: usize, adaptive: bool) -> curvelax::Result<Vec<Run<f64>>> {
+    let few = 13;
+    let some = match adaptive {
+        true => adaptive_members(POINTS, few, 4, 1e-3, T::EPSILON)?,
+        false => members(POINTS, few, 4, 1e-4)?,
+    };
+    let member = |j: usize| {
+        let mut run = some[j % few].clone();
+        let factor = 1.0 - 0.01 * (j / few) as f64;
+        run.parameters.tau *= factor;
+        run.report.progress.next *= factor;
+        (run.parameters.redistribution, run.parameters.pull) = (1.0, 50.0);
+        run
+    };
+    Ok((0..count).map(member).collect())
+}
+
+/// The bits that a member leaves, but for the sweeps of the last dispatch.
+type Bits = ([u32; 8], Vec<u64>);
+
+/// Runs `launches` to their goals.
+fn finished(backend: &mut dyn Backend, launches: &[Run<f64>]) -> Result<Vec<(Counters, Bits)>, Failed> {
+    for (slot, launch) in launches.iter().enumerate() {
+        backend.load(slot, launch)?;
+    }
+    let mut advances = 0;
+    while (0..launches.len()).any(|slot| backend.counters(slot).is_running()) {
+        backend.advance()?;
+        advances += 1;
+        require(advances < MANY_ADVANCES, || "a member hangs".into())?;
+    }
+    let slots: Vec<usize> = (0..launches.len()).collect();
+    let states = backend.states(&slots)?;
+    let left = |(slot, state): (usize, State<f64>)| {
+        let c = backend.counters(slot);
+        let counts = [c.status, c.steps, c.rejected, c.refused, c.relax_step, c.half_step, c.fit_points, c.noted];
+        let numbers = [state.to_numbers(), backend.report(slot).to_numbers()].concat();
+        (c, (counts, numbers.into_iter().map(f64::to_bits).collect()))
+    };
+    Ok(slots.into_iter().zip(states).map(left).collect())
+}
+
+/// Every poison for which `takes` holds, at every place among the others.
+fn poison<T: Real>(
+    backend: &mut dyn Backend,
+    adaptive: bool,
+    where_: &str,
+    takes: impl Fn(usize, usize) -> bool,
+) -> Outcome {
+    let good = launches::<T>(COMPANY, adaptive)?;
+    let alone = finished(backend, &good)?;
+    if let Some(j) = alone.iter().position(|(counters, _)| counters.status != 0 || counters.steps < 2) {
+        return Err(format!("{where_}: good member {j}: {:?}", alone[j].0).into());
+    }
+    // The negative control: a member that is some roundings away is noticed.
+    let mut other = good.clone();
+    other[7].state.curve.k[3] *= 1.0 + 64.0 * T::EPSILON;
+    other[7].state.curve.k.close();
+    let differ = finished(backend, &other)?.iter().zip(&alone).map(|(a, b)| a.1 != b.1).collect::<Vec<_>>();
+    require(differ.iter().filter(|differs| **differs).count() == 1 && differ[7], || format!("{where_}: {differ:?}"))?;
+    let mut cases = 0;
+    for place in 0..=COMPANY {
+        for (_, (what, poison)) in POISONS.iter().enumerate().filter(|(kind, _)| takes(place, *kind)) {
+            let mut bad = good[place % COMPANY].clone();
+            poison(&mut bad);
+            let mut mixed = good.clone();
+            mixed.insert(place, bad);
+            let mut together =
+                finished(backend, &mixed).map_err(|e| format!("{what}: {}", e.message().unwrap_or("")))?;
+            let (poisoned, _) = together.remove(place);
+            let failed = [Status::Singular, Status::Nonfinite, Status::Stalled].map(|status| status as u32);
+            let at = || format!("{where_}: {what}, place {place}");
+            require(failed.contains(&poisoned.status), || format!("{}: it ends as {poisoned:?}", at()))?;
+            if let Some(j) = (0..COMPANY).find(|j| together[*j].1 != alone[*j].1) {
+                return Err(format!("{}: member {j} ends as {:?} in place of {:?}", at(), together[j], alone[j]).into());
+            }
+            cases += 1;
+        }
+    }
+    println!("{where_}: {cases} poisoned members");
+    require(cases >= COMPANY, || format!("{where_}: only {cases} cases"))
+}
+
+fn poison_on_the_cpu<T: Vectorised>(solver: Solver, adaptive: bool) -> Outcome {
+    let blocks = Blocks::new(POINTS).ok_or("n")?;
+    for vectors in Vectors::ALL.into_iter().filter(|vectors| vectors.are_available()) {
+        let mut backend = CpuBackend::<T>::with_vectors(blocks, method(solver), 3, vectors)?;
+        let where_ = format!("{} {} {} {vectors:?}", T::NAME, solver.name(), pace(adaptive));
+        let widest = vectors == Vectors::widest();
+        poison::<T>(&mut backend, adaptive, &where_, |place, kind| widest || place % POISONS.len() == kind)?;
+    }
+    Ok(())
+}
+
+fn poison_on_the_gpu<T: Real>(kernel: Kernel<T>, gpu: &Gpu, solver: Solver, adaptive: bool) -> Outcome {
+    let mut kernel = kernel.with_budget(Budget { steps: 1 << 10, sweeps: 1 << 20 });
+    let where_ = format!("{} {} {} {}", T::NAME, solver.name(), pace(adaptive), gpu.name());
+    // The members of a dispatch share nothing but its end: not every poison at every place.
+    poison::<T>(&mut kernel, adaptive, &where_, |place, kind| place % POISONS.len() == kind)
+}
+
+// The self-test.
+
+/// A back end that computes rightly and tells one thing wrongly.
+struct Liar<B> {
+    inner: B,
+    lie: Lie,
+}
+
+/// What is told wrongly: of which number, by how much relative to the radius.
+#[derive(Clone, Copy, Debug)]
+enum Lie {
+    None,
+    Node(f64),
+    Curvature(f64),
+    Excess(f64),
+    Steps,
+    Nothing,
+}
+
+impl<B: Backend> Backend for Liar<B> {
+    fn slots(&self) -> usize {
+        self.inner.slots()
+    }
+    fn load(&mut self, slot: usize, run: &Run<f64>) -> curvelax::Result<()> {
+        self.inner.load(slot, run)
+    }
+    fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>) {
+        self.inner.aim(slot, goal, parameters);
+    }
+    fn clear(&mut self, slot: usize) {
+        self.inner.clear(slot);
+    }
+    fn batches(&self) -> usize {
+        self.inner.batches()
+    }
+    fn start(&mut self, batch: usize) -> curvelax::Result<()> {
+        self.inner.start(batch)
+    }
+    fn finish(&mut self, batch: usize) -> curvelax::Result<()> {
+        self.inner.finish(batch)
+    }
+    fn counters(&self, slot: usize) -> Counters {
+        let mut counters = self.inner.counters(slot);
+        if let (Lie::Steps, false) = (self.lie, counters.is_running()) {
+            counters.steps += 1;
+        }
+        counters
+    }
+    fn report(&self, slot: usize) -> Report<f64> {
+        let mut report = self.inner.report(slot);
+        if let Lie::Excess(by) = self.lie {
+            report.now.excess += by;
+        }
+        report
+    }
+    fn state(&mut self, slot: usize) -> curvelax::Result<State<f64>> {
+        let mut state = self.inner.state(slot)?;
+        let curve = &mut state.curve;
+        match self.lie {
+            Lie::Node(by) => curve.x[5] += by,
+            Lie::Curvature(by) => curve.k[2] += by,
+            // As a device does whose shaders do not run: what it was given, or zeros.
+            Lie::Nothing => state = State::zeros(curve.len()),
+            Lie::None | Lie::Excess(_) | Lie::Steps => {}
+        }
+        Ok(state)
+    }
+}
+
+fn the_self_test_finds_a_liar<T: Vectorised>(solver: Solver, adaptive: bool) -> Outcome {
+    let n = 64;
+    let tested = |lie: Lie| -> Result<curvelax::Result<()>, Failed> {
+        // One member at a time: those of the self-test could not go abreast.
+        let inner = CpuBackend::<T>::with_vectors(Blocks::new(n).ok_or("n")?, method(solver), 1, Vectors::None)?;
+        let mut liar = Liar { inner, lie };
+        let result = self_test::<T>(&mut liar, "toaster (bread 1.2)", false, &method(solver), n, adaptive);
+        // Its slots are free again.
+        liar.start(0)?;
+        liar.finish(0)?;
+        Ok(result)
+    };
+    tested(Lie::None)??;
+    // The smallest lie is some thousand roundings.
+    let little = 4096.0 * T::EPSILON;
+    let lies = [
+        (Lie::Node(little), ["x of member", "node 5"]),
+        (Lie::Node(f64::NAN), ["x of member", "node 5"]),
+        (Lie::Curvature(64.0 * little), ["k of member", "node 2"]),
+        (Lie::Excess(little), ["excess of member", "node 0"]),
+        (Lie::Steps, ["member 0", "steps"]),
+        (Lie::Nothing, ["x of member", "is off by"]),
+    ];
+    for (lie, named) in lies {
+        let Err(Error::Device(message)) = tested(lie)? else { return Err(format!("{lie:?} was not noticed").into()) };
+        let parts = ["GPU toaster (bread 1.2) computes wrongly", "curvelax check", "--backend cpu"];
+        for part in parts.into_iter().chain(named) {
+            require(message.contains(part), || format!("{lie:?}: {part:?} is not in: {message}"))?;
+        }
+    }
+    Ok(())
+}
+
+fn the_self_test_passes<T: Real>(
+    kernel: &mut Kernel<T>,
+    gpu: &Gpu,
+    solver: Solver,
+    adaptive: bool,
+    started: Instant,
+) -> Outcome {
+    let (hardware, method) = (gpu.is_hardware(), method(solver));
+    let mut test = || self_test::<T>(kernel, gpu.name(), hardware, &method, POINTS, adaptive);
+    test()?;
+    let first = started.elapsed();
+    test()?;
+    let again = started.elapsed() - first;
+    let name = solver.name();
+    println!("{name} {}: opened and tested in {first:.1?}, tested again in {again:.1?}", pace(adaptive));
+    require((0..kernel.slots()).all(|slot| kernel.counters(slot) == Counters::default()), || "a slot is taken".into())
+}
+
+// The device.
+
+/// A kernel with `count` members that have a long way to go, in dispatches of `sweeps` where the adapter allows as many.
+fn busy(gpu: &Gpu, count: usize, sweeps: u32) -> Result<Kernel<f32>, Failed> {
+    let blocks = Blocks::new(64).ok_or("n")?;
+    let variant = gpu.capacity().variant(blocks, Solver::GaussSeidel);
+    let kernel = Kernel::<f32>::in_batches(gpu, blocks, [1, count], 1 << 30, variant)?;
+    let mut kernel = kernel.with_budget(Budget { steps: 1 << 20, sweeps });
+    for (slot, launch) in members(64, 3, 1 << 20, 1e-4)?.iter().cycle().take(count).enumerate() {
+        kernel.load(slot, launch)?;
+    }
+    Ok(kernel)
+}
+
+/// The error must be of the device and name the adapter, `what` and a remedy, in one line.
+fn named<R>(result: curvelax::Result<R>, gpu: &Gpu, what: &str) -> Outcome {
+    let Err(error) = result else { return Err(format!("{what}: not noticed").into()) };
+    let message = error.to_string();
+    let parts = [&format!("GPU {}: ", gpu.name()), what, "--backend cpu"];
+    let missing = parts.into_iter().find(|part| !message.contains(*part));
+    let right = matches!(error, Error::Device(_)) && missing.is_none() && message.lines().count() == 1;
+    require(right, || format!("{missing:?} is not in: {message} ({error:?})"))
+}
+
+fn lost_between_dispatches(gpu: &Gpu) -> Outcome {
+    let mut kernel = busy(gpu, 3, 64)?;
+    kernel.advance()?;
+    gpu.lose();
+    named(kernel.advance(), gpu, "the device was lost")?;
+    // And whatever is asked of it then.
+    named(kernel.advance(), gpu, "the device was lost")?;
+    named(kernel.load(1, &members(64, 1, 9, 1e-4)?[0]), gpu, "the device was lost")?;
+    named(kernel.state(0), gpu, "the device was lost")?;
+    named(busy(gpu, 3, 64).map_err(|e| Error::Device(e.message().unwrap_or("").into())), gpu, "the device was lost")
+}
+
+fn lost_during_a_dispatch(gpu: &Gpu) -> Outcome {
+    let mut kernel = busy(gpu, 3, 1 << 14)?;
+    kernel.start(0)?;
+    gpu.lose();
+    // What was on its way may still arrive.
+    let finished = kernel.finish(0);
+    if finished.is_err() {
+        named(finished, gpu, "the device was lost")?;
+    }
+    require(kernel.is_back(0, Duration::from_secs(9)), || "a lost device is waited for".into())?;
+    named(kernel.advance(), gpu, "the device was lost")
+}
+
+fn lost_before(gpu: &Gpu) -> Outcome {
+    let adapter = Some(gpu.name().to_string());
+    let spec = Spec { backend: BackendChoice::Gpu, adapter, curves: 3, t_end: 0.01, ..Spec::default() }.validate()?;
+    let choice = || -> Result<backend::Choice, Failed> {
+        let choice = backend::choose(&spec, spec.points)?;
+        let gpu = choice.gpu().ok_or("no GPU")?;
+        let blocks = Blocks::new(spec.points).ok_or("n")?;
+        let _ = gpu.pipeline::<f64>(blocks, gpu.capacity().variant(blocks, spec.solver()))?;
+        gpu.lose();
+        Ok(choice)
+    };
+    named(choice()?.open(&spec, spec.points), gpu, "the device was lost")?;
+    let choice = choice()?.or_cpu();
+    let precision = choice.precision();
+    let (mut backend, platform) = choice.open(&spec, spec.points)?;
+    let told = platform.reason.starts_with("the GPU failed: ") && platform.reason.contains("the device was lost");
+    require(platform.backend == "cpu" && platform.adapter.is_none() && told, || format!("{platform:?}"))?;
+    let mut settled = spec.clone();
+    platform.settle_place(&mut settled);
+    require((settled.backend, settled.adapter) == (BackendChoice::Cpu, None), || "the spec says another place".into())?;
+    let mut all = All::default();
+    let family = Family::new(&spec)?;
+    simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut all)?;
+    require(all.0.len() == 3, || format!("{} members", all.0.len()))?;
+    // A later part of the same study goes the same way, and one of a study that is on a GPU stays there.
+    let later = choice_like(&spec)?.or_cpu().after(&platform, true);
+    require(later.gpu().is_none(), || "a later part goes back to the GPU".into())?;
+    let (_, there) = choice_like(&spec)?.open(&spec, spec.points)?;
+    require(there.backend == "gpu", || format!("{there:?}"))?;
+    let later = choice_like(&spec)?.or_cpu().after(&there, false);
+    let own = later.gpu().ok_or("no GPU")?;
+    let blocks = Blocks::new(spec.points).ok_or("n")?;
+    let _ = own.pipeline::<f64>(blocks, own.capacity().variant(blocks, spec.solver()))?;
+    own.lose();
+    named(later.open(&spec, spec.points), gpu, "the device was lost")
+}
+
+fn choice_like(spec: &Spec) -> curvelax::Result<backend::Choice> {
+    backend::choose(spec, spec.points)
+}
+
+fn no_room(gpu: &Gpu) -> Outcome {
+    let blocks = Blocks::new(100).ok_or("n")?;
+    let variant = gpu.capacity().variant(blocks, Solver::Direct);
+    let state = 18 * 100 * size_of::<f32>() as u64;
+    let limits = gpu.limits();
+    let slots = (limits.max_buffer_size.min(1 << 42) / state) as usize + 1;
+    let opened = Kernel::<f32>::with_slots(gpu, blocks, [1, slots], 1, variant);
+    named(opened.map(drop), gpu, &format!("no room for {slots} members of 100 points"))
+}
+
+fn slow_dispatch(gpu: &Gpu) -> Outcome {
+    // Long enough to be watched.
+    let mut kernel = busy(gpu, 96, 1 << 16)?;
+    kernel.start(0)?;
+    let started = Instant::now();
+    let slice = Duration::from_millis(1);
+    let mut slices = 0;
+    while !kernel.is_back(0, slice) {
+        slices += 1;
+    }
+    let whole = started.elapsed();
+    kernel.finish(0)?;
+    println!("a dispatch of {whole:.1?}, waited for in {slices} slices of 1 ms");
+    require(slices > 1, || format!("a dispatch of {whole:.1?} was back after {slices} slices"))?;
+    require(kernel.is_back(0, slice), || "nothing is on its way, and it is waited for".into())?;
+    // The same dispatch with less time than it takes.
+    let limit = whole / 8;
+    let mut kernel = busy(gpu, 96, 1 << 16)?.with_limit(limit);
+    let started = Instant::now();
+    kernel.start(0)?;
+    require(kernel.is_back(0, Duration::from_secs(100)), || "a dispatch beyond its limit is waited for".into())?;
+    let waited = started.elapsed();
+    require((limit.mul_f64(0.9)..Duration::from_secs(50)).contains(&waited), || {
+        format!("{waited:.1?} of {limit:.1?}")
+    })?;
+    named(kernel.finish(0), gpu, "a dispatch did not end in 0.")
+}
+
+// Whatever calls a run makes.
+
+/// A back end that fails at one of its calls.
+struct Failing {
+    inner: Box<dyn Backend>,
+    /// Calls of `call` that succeed before.
+    before: usize,
+    call: &'static str,
+    failed: bool,
+}
+
+impl Failing {
+    fn count(&mut self, call: &'static str) -> curvelax::Result<()> {
+        assert!(!self.failed, "{call} after the error of {}", self.call);
+        match (call == self.call, &mut self.before) {
+            (true, 0) => {
+                self.failed = true;
+                Err(Error::Device(format!("planned: {call}")))
+            }
+            (true, before) => {
+                *before -= 1;
+                Ok(())
+            }
+            (false, _) => Ok(()),
+        }
+    }
+}
+
+impl Backend for Failing {
+    fn slots(&self) -> usize {
+        self.inner.slots()
+    }
+    fn load(&mut self, slot: usize, run: &Run<f64>) -> curvelax::Result<()> {
+        self.count("load")?;
+        self.inner.load(slot, run)
+    }
+    fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>) {
+        self.inner.aim(slot, goal, parameters);
+    }
+    fn clear(&mut self, slot: usize) {
+        self.inner.clear(slot);
+    }
+    fn batches(&self) -> usize {
+        self.inner.batches()
+    }
+    fn start(&mut self, batch: usize) -> curvelax::Result<()> {
+        self.count("start")?;
+        self.inner.start(batch)
+    }
+    fn is_back(&mut self, batch: usize, most: Duration) -> bool {
+        self.inner.is_back(batch, most)
+    }
+    fn finish(&mut self, batch: usize) -> curvelax::Result<()> {
+        self.count("finish")?;
+        self.inner.finish(batch)
+    }
+    fn counters(&self, slot: usize) -> Counters {
+        self.inner.counters(slot)
+    }
+    fn report(&self, slot: usize) -> Report<f64> {
+        self.inner.report(slot)
+    }
+    fn state(&mut self, slot: usize) -> curvelax::Result<State<f64>> {
+        self.inner.state(slot)
+    }
+    fn states(&mut self, slots: &[usize]) -> curvelax::Result<Vec<State<f64>>> {
+        self.count("states")?;
+        self.inner.states(slots)
+    }
+}
+
+fn any_call_fails() -> Outcome {
+    let spec = Spec {
+        curves: 41,
+        points: 32,
+        tau: Some(1e-2),
+        t_end: 0.2,
+        relax_to: Some(0.5),
+        stop_when_relaxed: true,
+        series: Some(0.05),
+        solver: Solver::Direct.into(),
+        ..Spec::default()
+    };
+    let spec = spec.validate()?;
+    let blocks = Blocks::new(spec.points).ok_or("n")?;
+    let run = |call, before| -> Result<(Vec<String>, curvelax::Result<()>), Failed> {
+        let inner = CpuBackend::<f64>::with_vectors(blocks, method(Solver::Direct), 1, Vectors::None)?;
+        let mut backend = Failing { inner: Box::new(inner), before, call, failed: false };
+        let mut all = All::default();
+        let cells = [Cell::only(spec.clone(), Family::new(&spec)?)];
+        let result = simulate(&cells, Precision::F64, &mut backend, 2, &mut all);
+        Ok((all.0.iter().map(|ended| format!("{ended:?}")).collect(), result))
+    };
+    let (whole, result) = run("none", 0)?;
+    result?;
+    require(whole.len() == 41, || format!("{} members", whole.len()))?;
+    for call in ["load", "start", "finish", "states"] {
+        let mut before = 0;
+        loop {
+            let (some, result) = run(call, before)?;
+            let place = format!("{call} fails after {before}");
+            require(some[..] == whole[..some.len()], || format!("{place}: the members before it differ"))?;
+            match result {
+                Ok(()) => break require(some.len() == 41, || format!("{place}: {} members", some.len()))?,
+                Err(Error::Device(message)) if message == format!("planned: {call}") => {}
+                Err(error) => return Err(format!("{place}: {error}").into()),
+            }
+            before += 1;
+        }
+        println!("{call} fails at each of {before} calls");
+        require(before > 3, || format!("{call}: only {before} calls"))?;
+    }
+    Ok(())
+}
+
+/// The program where the loader of Vulkan finds no driver.
+#[cfg(target_os = "linux")]
+fn no_adapter() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let run = |arguments: &[&str]| -> Result<(Output, String), Failed> {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_curvelax"));
+        for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+            command.env(variable, "/nonexistent");
+        }
+        command.current_dir(&folder).env("XDG_RUNTIME_DIR", folder.path()).args(["run", "--curves", "3"]);
+        let output = command.args(["--t-end", "0.01", "--out", "out"]).args(arguments).output()?;
+        let said = String::from_utf8(output.stderr.clone())?;
+        Ok((output, said))
+    };
+    for arguments in [&["--backend", "gpu"][..], &["--adapter", "toaster"]] {
+        let (output, said) = run(arguments)?;
+        let named = said.starts_with("error: --") && said.contains("GPU driver") && said.contains("--backend cpu");
+        require(output.status.code() == Some(2) && named && said.lines().count() == 1, || format!("{output:?}"))?;
+        require(!folder.path().join("out").exists(), || "something was written".into())?;
+    }
+    let (output, said) = run(&["--backend", "auto"])?;
+    require(output.status.success() && said.contains("back end: CPU, f64 (no hardware GPU found)"), || {
+        format!("{output:?}")
+    })?;
+    let record = std::fs::read_to_string(folder.path().join("out/run.json"))?;
+    require(record.contains("no hardware GPU found"), || record)
+}

@@ -1,0 +1,196 @@
+//! `curvelax resume` as a user meets it: what it goes on with, what it refuses, and where it goes on.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+use tempfile::TempDir;
+
+/// Ten million steps, some 20 s, stopped after one.
+const LONG: &str = "--curves 3 --points 34 --tau 1e-7 --t-end 1 --solver direct --series 0.1 --max-time 1s";
+/// A million steps, some 2 s, stopped after a twentieth of that.
+const SHORT: &str = "--curves 3 --points 34 --tau 1e-6 --t-end 1 --solver direct --series 0.1 --max-time 0.1s";
+
+fn curvelax(home: &Path, arguments: &str) -> Output {
+    program(home, arguments).output().unwrap()
+}
+
+fn program(home: &Path, arguments: &str) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
+    command.args(arguments.split_whitespace()).current_dir(home).env("XDG_RUNTIME_DIR", home);
+    command
+}
+
+#[track_caller]
+fn said(output: &Output, code: i32) -> String {
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    said
+}
+
+fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
+    let mut all: Vec<_> = entries.map(|path| (path.display().to_string(), fs::read(path).unwrap())).collect();
+    all.sort();
+    all
+}
+
+/// `resume ARGUMENTS` is refused with these words, and leaves the folder as it is.
+#[track_caller]
+fn refused(home: &Path, run: &str, arguments: &str, words: &[&str]) {
+    let before = contents(&home.join(run));
+    let message = said(&curvelax(home, &format!("resume {run} {arguments}")), 2);
+    let line = message.lines().last().unwrap_or_default();
+    assert!(line.starts_with("error: ") && words.iter().all(|word| line.contains(word)), "{message}");
+    assert!(contents(&home.join(run)) == before, "{words:?}");
+}
+
+#[test]
+fn what_is_no_interrupted_run_is_refused_or_left_alone() {
+    let home = TempDir::new().unwrap();
+    refused_place(home.path(), "nowhere", "no such folder");
+    fs::create_dir(home.path().join("empty")).unwrap();
+    refused(home.path(), "empty", "", &["empty: no run was begun here", "--force"]);
+    let small = "run --backend cpu --curves 2 --points 34 --t-end 0.01 --out done --quiet";
+    said(&curvelax(home.path(), small), 0);
+    let before = contents(&home.path().join("done"));
+    let message = said(&curvelax(home.path(), "resume done"), 0);
+    assert_eq!(message, "note: the run in done is finished: nothing is left to do\n");
+    assert!(contents(&home.path().join("done")) == before);
+}
+
+#[track_caller]
+fn refused_place(home: &Path, run: &str, words: &str) {
+    let message = said(&curvelax(home, &format!("resume {run}")), 2);
+    assert!(message.starts_with(&format!("error: {run}: {words}")), "{message}");
+    assert!(!home.join(run).exists());
+}
+
+#[test]
+fn an_outline_is_found_again_from_anywhere_and_has_to_be_the_same() {
+    let home = TempDir::new().unwrap();
+    let (begun, elsewhere) = (home.path().join("begun"), home.path().join("elsewhere"));
+    [&begun, &elsewhere].into_iter().for_each(|folder| fs::create_dir(folder).unwrap());
+    let square = "x,y\n0,0\n1,0\n1,1\n0,1\n";
+    fs::write(begun.join("square.csv"), square).unwrap();
+    // Another outline of this name lies where it is resumed.
+    fs::write(elsewhere.join("square.csv"), "x,y\n0,0\n2,0\n0,1\n").unwrap();
+    let run = format!("run --backend cpu --shape file:square.csv {LONG}");
+    said(&curvelax(&begun, &format!("{run} --out out")), 75);
+    fs::write(begun.join("square.csv"), square.replace("1,1", "1,1.5")).unwrap();
+    refused(&elsewhere, "../begun/out", "", &["square.csv has changed since the run began"]);
+    fs::remove_file(begun.join("square.csv")).unwrap();
+    refused(&elsewhere, "../begun/out", "", &["square.csv has changed since the run began, or is gone"]);
+    fs::write(begun.join("square.csv"), square).unwrap();
+    let message = said(&curvelax(&elsewhere, "resume ../begun/out --max-time 1s"), 75);
+    assert!(message.contains("resuming: 0 of 3 members"), "{message}");
+}
+
+#[test]
+fn a_run_goes_on_where_it_began_unless_it_is_told_to_go_elsewhere() {
+    let home = TempDir::new().unwrap();
+    said(&curvelax(home.path(), &format!("run --backend cpu {SHORT} --out out")), 75);
+    // As if it had begun on another machine: the platform is in the state, and the state has a checksum.
+    let state = home.path().join("out/.curvelax.state");
+    let (mut head, standing) = curvelax::report::checkpoint::from_bytes(&fs::read(&state).unwrap()).unwrap();
+    head.origin.platform.driver = Some("another".into());
+    let resident = standing.resident.clone().unwrap();
+    fs::write(&state, curvelax::report::checkpoint::to_bytes(&head, &standing, &resident).unwrap()).unwrap();
+    let words = ["the run is on cpu another", "go on on cpu", "add --backend cpu"];
+    refused(home.path(), "out", "", &words);
+    let message = said(&curvelax(home.path(), "resume out --backend cpu"), 0);
+    assert!(message.contains("resuming: 0 of 3 members"), "{message}");
+    let run = fs::read_to_string(home.path().join("out/run.json")).unwrap();
+    assert!(run.contains("\"the run was on cpu another and went on on cpu\""), "{run}");
+    assert!(!home.path().join("out/.curvelax.state").exists());
+}
+
+#[test]
+fn json_and_strict_are_those_of_a_run() {
+    let home = TempDir::new().unwrap();
+    said(&curvelax(home.path(), &format!("run --backend cpu {SHORT} --out out")), 75);
+    let output = curvelax(home.path(), "resume out --json --quiet");
+    assert_eq!(said(&output, 0), "");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json["members"], 3, "{json}");
+}
+
+#[test]
+fn members_that_end_as_they_are_made_are_kept_too() {
+    let home = TempDir::new().unwrap();
+    let round = "run --backend cpu --shape circle:1 --amplitude 0 --stop-when-relaxed --curves 30000000 --max-time 1s";
+    let message = said(&curvelax(home.path(), &format!("{round} --out out")), 75);
+    assert!(message.contains("stopped by --max-time after "), "{message}");
+    let message = said(&curvelax(home.path(), "resume out --max-time 1s"), 75);
+    assert!(message.contains("resuming: ") && !message.contains("resuming: 0 of"), "{message}");
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::{
+        ffi::OsStr,
+        os::unix::{ffi::OsStrExt, fs::symlink},
+        thread,
+        time::Duration,
+    };
+
+    use super::*;
+
+    #[test]
+    fn what_is_ignored_from_outside_stays_ignored() {
+        let home = TempDir::new().unwrap();
+        let long = LONG.replace("--max-time 1s", "");
+        let script = format!("trap '' HUP; exec \"$0\" run --backend cpu {long} --out out");
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &script]).arg(assert_cmd::cargo::cargo_bin("curvelax")).current_dir(home.path());
+        let mut child = shell.env("XDG_RUNTIME_DIR", home.path()).spawn().unwrap();
+        let signal = |name: &str| {
+            let sent = Command::new("kill").args([name, &child.id().to_string()]).status().unwrap();
+            assert!(sent.success());
+        };
+        let state = home.path().join("out/.curvelax.state");
+        while !state.exists() {
+            thread::sleep(Duration::from_millis(20));
+        }
+        signal("-HUP");
+        thread::sleep(Duration::from_millis(500));
+        signal("-TERM");
+        assert_eq!(child.wait().unwrap().code(), Some(75));
+        let mut heard = program(home.path(), &format!("run --backend cpu {long} --out heard"));
+        let mut child = heard.spawn().unwrap();
+        while !home.path().join("heard/.curvelax.state").exists() {
+            thread::sleep(Duration::from_millis(20));
+        }
+        let sent = Command::new("kill").args(["-HUP", &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        assert_eq!(child.wait().unwrap().code(), Some(75));
+    }
+
+    #[test]
+    fn a_link_in_the_place_of_a_table_is_not_followed() {
+        let home = TempDir::new().unwrap();
+        said(&curvelax(home.path(), &format!("run --backend cpu {LONG} --out out")), 75);
+        let (part, mine) = (home.path().join("out/.summary.csv.part"), home.path().join("mine"));
+        let table = fs::read(&part).unwrap();
+        fs::write(&mine, [&table[..], b"and mine"].concat()).unwrap();
+        fs::remove_file(&part).unwrap();
+        symlink(&mine, &part).unwrap();
+        refused(home.path(), "out", "", &[".summary.csv.part is a link, which no run writes"]);
+        assert!(fs::read(&mine).unwrap().ends_with(b"and mine"));
+    }
+
+    #[test]
+    fn a_folder_of_any_name_will_do() {
+        let home = TempDir::new().unwrap();
+        let odd = home.path().join(OsStr::from_bytes(b"caf\xe9"));
+        fs::create_dir(&odd).unwrap();
+        said(&curvelax(&odd, &format!("run --backend cpu {LONG} --out out")), 75);
+        said(&curvelax(&odd, "resume out --max-time 1s"), 75);
+        fs::write(odd.join("square.csv"), "x,y\n0,0\n1,0\n1,1\n0,1\n").unwrap();
+        let message = said(&curvelax(&odd, "run --backend cpu --shape file:square.csv --curves 1 --out named"), 2);
+        assert!(message.contains("has a name that is not UTF-8"), "{message}");
+        assert!(!odd.join("named").exists());
+    }
+}

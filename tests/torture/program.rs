@@ -1,0 +1,148 @@
+//! The program as a user starts it, waits for it, signals it and kills it.
+
+use std::{
+    io::Read,
+    os::unix::process::ExitStatusExt,
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    thread::{JoinHandle, sleep, spawn},
+    time::{Duration, Instant},
+};
+
+/// How often a process is looked at.
+const GLANCE: Duration = Duration::from_millis(1);
+/// No process of these tests runs as long; one that does hangs.
+pub const HANGS: Duration = Duration::from_secs(600);
+
+/// The built program.
+pub fn binary() -> PathBuf {
+    assert_cmd::cargo::cargo_bin("curvelax")
+}
+
+/// `curvelax ARGUMENTS` in the folder `home`.
+pub fn curvelax(home: &Path, arguments: &str) -> Command {
+    through(home, &[], arguments)
+}
+
+/// The same, started by another program such as `strace`.
+pub fn through(home: &Path, starter: &[&str], arguments: &str) -> Command {
+    let mut words = starter.iter().map(PathBuf::from).chain([binary()]);
+    let mut command = Command::new(words.next().unwrap());
+    // Where this is not set, a layer of Mesa says so on stderr.
+    command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(words).args(arguments.split_whitespace());
+    command
+}
+
+/// Whether `program` can be started.
+pub fn is_there(program: &str) -> bool {
+    let quietly = |command: &mut Command| command.stdout(Stdio::null()).stderr(Stdio::null()).status();
+    quietly(Command::new(program).arg("--version")).is_ok_and(|status| status.success())
+}
+
+/// A started program; killed when it is dropped.
+pub struct Running {
+    child: Child,
+    /// Reads its stderr: a pipe, so that limits of files do not bind what is said.
+    said: Option<JoinHandle<Vec<u8>>>,
+    since: Instant,
+}
+
+/// What a program left.
+#[derive(Debug)]
+pub struct Ended {
+    pub code: Option<i32>,
+    pub signal: Option<i32>,
+    /// On stderr.
+    pub said: String,
+}
+
+impl Running {
+    /// Starts `command`, whose stdout goes nowhere unless it was told otherwise.
+    #[track_caller]
+    pub fn start(command: &mut Command) -> Running {
+        Running::start_with(command.stdout(Stdio::null()))
+    }
+
+    /// Starts `command` with its own stdout.
+    #[track_caller]
+    pub fn start_with(command: &mut Command) -> Running {
+        let child = command.stdin(Stdio::null()).stderr(Stdio::piped()).spawn();
+        let mut child = child.unwrap_or_else(|e| panic!("{command:?}: {e}"));
+        let mut stderr = child.stderr.take().unwrap();
+        let said = spawn(move || {
+            let mut said = Vec::new();
+            stderr.read_to_end(&mut said).unwrap();
+            said
+        });
+        Running { child, said: Some(said), since: Instant::now() }
+    }
+
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Time since its start.
+    pub fn age(&self) -> Duration {
+        self.since.elapsed()
+    }
+
+    pub fn is_over(&mut self) -> bool {
+        self.child.try_wait().unwrap().is_some()
+    }
+
+    /// Waits until it is over, or `enough` is true; returns whether it is still running.
+    pub fn wait_until(&mut self, mut enough: impl FnMut(&Running) -> bool) -> bool {
+        while !self.is_over() {
+            assert!(self.age() < HANGS, "hangs");
+            if enough(self) {
+                return true;
+            }
+            sleep(GLANCE);
+        }
+        false
+    }
+
+    /// `kill -s NAME`.
+    pub fn signal(&mut self, name: &str) {
+        // It may be over by now.
+        let _ = Command::new("kill").args(["-s", name, &self.id().to_string()]).stderr(Stdio::null()).status();
+    }
+
+    pub fn kill(mut self) -> Ended {
+        let _ = self.child.kill();
+        self.end()
+    }
+
+    /// Waits for its end. Whatever was done to it, it must not panic.
+    #[track_caller]
+    pub fn end(mut self) -> Ended {
+        self.wait_until(|_| false);
+        let status = self.child.wait().unwrap();
+        let said = self.said.take().unwrap().join().unwrap();
+        let ended =
+            Ended { code: status.code(), signal: status.signal(), said: String::from_utf8_lossy(&said).into_owned() };
+        let panicked = ended.code == Some(101) || ended.signal == Some(6) || ended.said.contains("panicked");
+        assert!(!panicked, "a panic: {ended:?}");
+        ended
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Ended {
+    /// The lines that begin with `error: `.
+    pub fn errors(&self) -> Vec<&str> {
+        self.said.lines().filter(|line| line.starts_with("error: ")).collect()
+    }
+
+    /// Whether it was told that there is nothing to resume.
+    pub fn had_not_begun(&self) -> bool {
+        let is_said = |words: &str| self.said.contains(words);
+        self.code == Some(2) && is_said("--force") && (is_said("had not begun") || is_said("no run was begun here"))
+    }
+}

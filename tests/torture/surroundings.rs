@@ -1,0 +1,223 @@
+//! Where a run finds itself: folders that cannot be written or vanish, nobody who listens, other languages and clocks.
+
+use std::{
+    fs,
+    io::Read,
+    os::unix::fs::PermissionsExt,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+use tempfile::TempDir;
+
+use crate::{
+    Found, Outcome,
+    calls::must_be_a_decent_end,
+    program::{Ended, Running, binary, curvelax, is_there},
+    space::Disk,
+    study::{Attempt, Study},
+};
+
+/// The user who may do nothing, to whom root changes: no folder is closed to root.
+const NOBODY: [&str; 4] = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"];
+
+/// A run as a user whom permissions bind.
+struct AsNobody {
+    /// A copy that this user may start, wherever the program was built.
+    program: PathBuf,
+    home: TempDir,
+    is_root: bool,
+}
+
+impl AsNobody {
+    fn new() -> AsNobody {
+        let home = TempDir::new().unwrap();
+        let program = home.path().join("curvelax");
+        fs::copy(binary(), &program).unwrap();
+        set_mode(home.path(), 0o777);
+        AsNobody { program, home, is_root: is_root() }
+    }
+
+    fn go(&self, umask: &str, arguments: &str) -> Ended {
+        let script = format!("umask {umask}; exec \"$0\" {arguments}");
+        let starter: &[&str] = if self.is_root { &NOBODY } else { &["env"] };
+        let mut command = Command::new(starter[0]);
+        command.args(&starter[1..]).args(["sh", "-c", &script]).arg(&self.program).current_dir(self.home.path());
+        Running::start(&mut command).end()
+    }
+}
+
+fn is_root() -> bool {
+    let output = Command::new("id").arg("-u").output().unwrap();
+    output.stdout == b"0\n"
+}
+
+fn set_mode(path: &Path, mode: u32) {
+    fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
+}
+
+/// A folder that may only be read: a run is refused there, and a resumed one keeps its state.
+pub fn folders_that_cannot_be_written(study: &Study) -> Outcome {
+    let nobody = AsNobody::new();
+    let closed = nobody.home.path().join("closed");
+    fs::create_dir(&closed).unwrap();
+    set_mode(&closed, 0o555);
+    let ended = nobody.go("022", &format!("run {} --out closed/out", study.arguments));
+    assert!(ended.code == Some(2) && ended.errors()[0].contains("closed/out"), "{ended:?}");
+    let ended = nobody.go("022", &format!("run {} --out closed --force", study.arguments));
+    assert!(ended.code == Some(2) && ended.errors()[0].contains("closed"), "{ended:?}");
+    let ended = nobody.go("022", "resume closed");
+    assert!(ended.code == Some(2) && ended.errors()[0].contains("closed"), "{ended:?}");
+    assert_eq!(fs::read_dir(&closed).unwrap().count(), 0);
+
+    let attempt = Attempt::interrupted(study);
+    let before = attempt.names();
+    crate::folder::copy(&attempt.out(), &nobody.home.path().join("out"));
+    set_mode(&nobody.home.path().join("out"), 0o555);
+    let ended = nobody.go("022", "resume out");
+    assert!(matches!(ended.code, Some(1 | 2)) && ended.errors()[0].contains("out"), "{ended:?}");
+    assert!(nobody.home.path().join("out/.curvelax.state").exists());
+    let after: Vec<String> = crate::folder::content(&nobody.home.path().join("out")).into_keys().collect();
+    assert_eq!(after, before);
+    set_mode(&nobody.home.path().join("out"), 0o777);
+    attempt.must_end_well(ended);
+    Found::new(4, "refused by name, nothing lost")
+}
+
+/// A file system that is mounted to be read: not even root writes there.
+pub fn read_only_disk(study: &Study) -> Outcome {
+    let attempt = Attempt::new(study);
+    let disk = Disk::mount(attempt.home.path(), "size=64m").ok_or("cannot mount")?;
+    let mut running = attempt.start();
+    running.wait_until(|_| attempt.has_state());
+    let ended = running.kill();
+    let before = attempt.names();
+    assert!(disk.remount("ro"));
+    let refused = attempt.resume().end();
+    let code = must_be_a_decent_end(&refused, &format!("{refused:?}"));
+    assert!(code != 0 && attempt.names() == before, "{refused:?}");
+    let other = Running::start(&mut curvelax(attempt.home.path(), &attempt.run().replace("out out", "out out2"))).end();
+    assert!(other.code == Some(2) && other.errors()[0].contains("out2"), "{other:?}");
+    assert!(disk.remount("rw"));
+    attempt.must_end_well(ended);
+    Found::new(2, "refused by name, nothing lost")
+}
+
+/// A mask that takes all rights from new files.
+pub fn no_rights_for_new_files(study: &Study) -> Outcome {
+    let nobody = AsNobody::new();
+    let out = nobody.home.path().join("out");
+    let ended = nobody.go("777", &format!("run {} --quiet --out out", study.arguments));
+    assert!(ended.code == Some(2) && ended.errors()[0].contains("out"), "{ended:?}");
+    assert!(!out.exists(), "a folder was left");
+    // Files that their owner may only write serve a run, and say so when they are to be read again.
+    let ended = nobody.go("477", &format!("run {} --quiet --out out", study.arguments));
+    must_be_a_decent_end(&ended, &format!("{ended:?}"));
+    let attempt = Attempt::new(study);
+    if is_root() {
+        let mut command = Command::new("sh");
+        let script = format!("umask 777; exec \"$0\" {}", attempt.run());
+        command.args(["-c", &script]).arg(binary()).current_dir(attempt.home.path());
+        let ended = Running::start(&mut command).end();
+        assert_eq!(ended.code, Some(0), "{ended:?}");
+        attempt.must_be_the_reference(&[format!("{ended:?}")]);
+    }
+    Found::new(3, "refused by name, or 0 differing bytes")
+}
+
+/// `rm -rf` while the run writes there.
+pub fn vanished_folder(study: &Study, cases: usize, seed: u64) -> Outcome {
+    let mut random = crate::random::Random::new(seed);
+    let mut failed = 0;
+    for _ in 0..cases {
+        let attempt = Attempt::new(study);
+        let mut running = attempt.start();
+        let time = study.reference().took.mul_f64(random.real());
+        running.wait_until(|running| running.age() >= time && attempt.has_state());
+        // Until the run has seen it, it may make files anew.
+        let mut tries = 0;
+        while fs::remove_dir_all(attempt.out()).is_err() && tries < 1000 {
+            tries += 1;
+        }
+        let ended = running.end();
+        failed += usize::from(must_be_a_decent_end(&ended, &format!("after {time:?} (seed {seed}): {ended:?}")) == 1);
+        let resumed = attempt.resume().end();
+        let code = must_be_a_decent_end(&resumed, &format!("{resumed:?}"));
+        assert!(code != 0 || ended.code == Some(0), "{ended:?} {resumed:?}");
+    }
+    assert!(failed > 0, "no run saw it");
+    Found::new(cases, format!("a named error in {failed}, 0 panics"))
+}
+
+/// Nobody reads what is printed: pipes without a reader, closed streams, a device that is full.
+pub fn nobody_listens(study: &Study) -> Outcome {
+    let talkative = |attempt: &Attempt| attempt.run().replace("--quiet ", "");
+    let shells = ["exec \"$0\" ARGUMENTS >&-", "exec \"$0\" ARGUMENTS 2>&-", "exec \"$0\" ARGUMENTS >&- 2>&- <&-"];
+    for script in shells {
+        let attempt = Attempt::new(study);
+        let script = script.replace("ARGUMENTS", &talkative(&attempt));
+        let mut command = Command::new("sh");
+        command.args(["-c", &script]).arg(binary()).current_dir(attempt.home.path());
+        let ended = Running::start(&mut command).end();
+        assert_eq!(ended.code, Some(0), "{script}: {ended:?}");
+        attempt.must_be_the_reference(&[script]);
+    }
+    for (stdout, stderr) in [(true, false), (false, true), (true, true)] {
+        for json in ["", " --json"] {
+            let attempt = Attempt::new(study);
+            let mut command = curvelax(attempt.home.path(), &(talkative(&attempt) + json));
+            let piped = |closed: bool| if closed { Stdio::piped() } else { Stdio::null() };
+            let mut child = command.stdin(Stdio::null()).stdout(piped(stdout)).stderr(piped(stderr)).spawn().unwrap();
+            // The reading ends.
+            drop((child.stdout.take(), child.stderr.take()));
+            let status = child.wait().unwrap();
+            assert_eq!(status.code(), Some(0), "closed: stdout {stdout}, stderr {stderr}: {status:?}");
+            attempt.must_be_the_reference(&[format!("stdout {stdout}, stderr {stderr}")]);
+        }
+    }
+    let attempt = Attempt::new(study);
+    let full = fs::File::options().write(true).open("/dev/full").unwrap();
+    let mut command = curvelax(attempt.home.path(), &talkative(&attempt));
+    let ended = Running::start_with(command.stdout(full)).end();
+    assert!(ended.code == Some(1) && ended.errors()[0].contains("stdout"), "{ended:?}");
+    attempt.must_be_the_reference(&[format!("{ended:?}")]);
+    Found::new(10, "0 differing bytes; a full stdout is named")
+}
+
+/// Other decimal signs, other letters, names that no system knows.
+pub fn locales(study: &Study) -> Outcome {
+    let locales = ["C", "POSIX", "de_DE.UTF-8", "tr_TR.UTF-8", "C.UTF-8", "nonsense", "", "\u{fffd}"];
+    for locale in locales {
+        let attempt = Attempt::new(study);
+        let mut command = curvelax(attempt.home.path(), &attempt.run());
+        let ended = Running::start(command.env("LC_ALL", locale).env("LANG", locale).env("LANGUAGE", locale)).end();
+        assert_eq!((ended.code, &*ended.said), (Some(0), ""), "{locale:?}");
+        attempt.must_be_the_reference(&[locale.into()]);
+    }
+    Found::new(locales.len(), "0 differing bytes")
+}
+
+pub fn has_faketime() -> bool {
+    is_there("faketime")
+}
+
+/// Clocks of other centuries, and one that goes back between a run and its continuation.
+pub fn wrong_clocks(study: &Study) -> Outcome {
+    let clocks = ["1970-01-01 00:00:00", "1999-12-31 23:59:59", "2038-01-19 03:14:07", "2106-02-07 06:28:15"];
+    for clock in clocks {
+        let attempt = Attempt::new(study);
+        let ended = attempt.start_through(&["faketime", clock]).end();
+        assert_eq!((ended.code, &*ended.said), (Some(0), ""), "{clock}");
+        attempt.must_be_the_reference(&[clock.into()]);
+        // Begun today.
+        let attempt = Attempt::interrupted(study);
+        let ended = attempt.resume_through(&["faketime", clock]).end();
+        assert_eq!((ended.code, &*ended.said), (Some(0), ""), "{clock}");
+        attempt.must_be_the_reference(&[clock.into()]);
+        let mut json = String::new();
+        fs::File::open(attempt.out().join("run.json")).unwrap().read_to_string(&mut json).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert!(json["wall_seconds"].as_f64().is_some_and(|wall| (0.0..1e4).contains(&wall)), "{clock}: {json}");
+    }
+    Found::new(2 * clocks.len(), "0 differing bytes")
+}
