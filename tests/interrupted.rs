@@ -10,8 +10,8 @@ use tempfile::TempDir;
 
 /// Ten million steps, some 20 s, stopped after one.
 const LONG: &str = "--curves 3 --points 34 --tau 1e-7 --t-end 1 --solver direct --series 0.1 --max-time 1s";
-/// A million steps, some 2 s, stopped after a twentieth of that.
-const SHORT: &str = "--curves 3 --points 34 --tau 1e-6 --t-end 1 --solver direct --series 0.1 --max-time 0.1s";
+/// Four million steps, some 13 s, stopped after one.
+const SHORT: &str = "--curves 3 --points 34 --tau 2.5e-7 --t-end 1 --solver direct --series 0.1 --max-time 1s";
 
 fn curvelax(home: &Path, arguments: &str) -> Output {
     program(home, arguments).output().unwrap()
