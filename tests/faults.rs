@@ -452,11 +452,11 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut all)?;
     require(all.0.len() == 3, || format!("{} members", all.0.len()))?;
     // A later part of the same study goes the same way, and one of a study that is on a GPU stays there.
-    let later = choice_like(&spec)?.or_cpu().after(&platform, true);
+    let later = choice_like(&spec)?.or_cpu().after(&platform);
     require(later.gpu().is_none(), || "a later part goes back to the GPU".into())?;
     let (_, there) = choice_like(&spec)?.open(&spec, spec.points)?;
     require(there.backend == "gpu", || format!("{there:?}"))?;
-    let later = choice_like(&spec)?.or_cpu().after(&there, false);
+    let later = choice_like(&spec)?.or_cpu().after(&there);
     let own = later.gpu().ok_or("no GPU")?;
     let blocks = Blocks::new(spec.points).ok_or("n")?;
     let _ = own.pipeline::<f64>(blocks, own.capacity().variant(blocks, spec.solver()))?;

@@ -84,16 +84,15 @@ pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
 /// As [`choose`].
 pub fn choose_all(parts: &[(&Spec, usize)]) -> Result<Vec<Choice>> {
     let Some(((first, n), others)) = parts.split_first() else { return Ok(Vec::new()) };
-    let auto = first.backend == BackendChoice::Auto && first.adapter.is_none();
     let choice = choose(first, *n)?;
     let there = |(spec, n): &(&Spec, usize)| {
         let mut spec = (*spec).clone();
         choice.settle_place(&mut spec);
-        choose(&spec, *n).map(|own| if auto { own.or_cpu() } else { own })
+        choose(&spec, *n)
     };
     let rest: Result<Vec<Choice>> = others.iter().map(there).collect();
     match rest {
-        Err(error) if auto && choice.gpu.is_some() => {
+        Err(error) if choice.or_cpu => {
             let reason = format!("the GPU cannot do all cells: {error}");
             parts.iter().map(|(spec, n)| cpu(spec, *n, reason.clone())).collect()
         }
@@ -262,15 +261,16 @@ impl Choice {
     }
 
     /// The choice for a later part of a study whose first part runs `there`: a study does not move in its midst. Where the
-    /// GPU of the first part failed (`fell_back`), it is the CPU; else a GPU that fails is an error.
-    pub fn after(self, there: &Platform, fell_back: bool) -> Choice {
-        let moves = fell_back && self.or_cpu;
-        Choice {
-            gpu: self.gpu.filter(|_| !moves),
-            or_cpu: false,
-            precision: self.precision,
-            reason: if moves { there.reason.clone() } else { self.reason },
+    /// GPU of the first part failed, it is the CPU; else a GPU that fails is an error.
+    pub fn after(self, there: &Platform) -> Choice {
+        match there.backend.as_str() {
+            "cpu" if self.gpu.is_some() => self.on_cpu(there.reason.clone()),
+            _ => Choice { or_cpu: false, ..self },
         }
+    }
+
+    fn on_cpu(&self, reason: String) -> Choice {
+        Choice { gpu: None, or_cpu: false, precision: self.precision, reason }
     }
 
     /// The same, but the CPU where the GPU cannot be opened or computes wrongly.
@@ -288,28 +288,27 @@ impl Choice {
     ///
     /// # Errors
     /// [`Error::Device`] when a GPU that was asked for cannot be opened or computes wrongly.
-    pub fn open(self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+    pub fn open(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         match self.precision {
             Precision::F32 => self.open_in::<f32>(spec, n),
             Precision::F64 => self.open_in::<f64>(spec, n),
         }
     }
 
-    fn open_in<T: Vectorised>(mut self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+    fn open_in<T: Vectorised>(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         let blocks = ring(n)?;
         let method = Method { solver: spec.solver(), order: spec.order, max_sweeps: spec.max_sweeps };
-        if let Some(gpu) = &self.gpu {
-            match open_gpu::<T>(gpu, blocks, spec, &method) {
-                Ok(kernel) => return Ok((kernel, self.platform(spec))),
-                Err(Error::Device(fault)) if self.or_cpu => {
-                    (self.gpu, self.reason) = (None, format!("the GPU failed: {fault}"));
-                }
-                Err(error) => return Err(error),
+        let Some(gpu) = &self.gpu else {
+            let backend = CpuBackend::<T>::new(blocks, method, threads(spec))?;
+            return Ok((Box::new(backend), self.platform(spec)));
+        };
+        match open_gpu::<T>(gpu, blocks, spec, &method) {
+            Ok(kernel) => Ok((kernel, self.platform(spec))),
+            Err(Error::Device(fault)) if self.or_cpu => {
+                self.on_cpu(format!("the GPU failed: {fault}")).open_in::<T>(spec, n)
             }
+            Err(error) => Err(error),
         }
-        let platform = self.platform(spec);
-        let backend = CpuBackend::<T>::new(blocks, method, threads(spec))?;
-        Ok((Box::new(backend), platform))
     }
 }
 

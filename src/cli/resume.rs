@@ -47,7 +47,7 @@ pub struct ResumeArgs {
 /// Runs the command.
 pub fn resume(args: ResumeArgs) -> Result<()> {
     let flags = args.manner;
-    let folder = OutputFolder::open_again(&args.run)?;
+    let mut folder = OutputFolder::open_again(&args.run)?;
     let Some(mut kept) = checkpoint::find(&folder)? else {
         folder.tidy()?;
         flags.say(&format!("note: the run in {} is finished: nothing is left to do", args.run.display()));
@@ -59,7 +59,6 @@ pub fn resume(args: ResumeArgs) -> Result<()> {
         note(&format!("warning: {}: {fault}", args.run.display()));
     }
     let origin = &mut kept.head.origin;
-    let mut folder = folder;
     if !origin.outlines.is_empty() {
         folder.make_absolute()?;
         go_to(Path::new(&origin.base))?;
@@ -68,7 +67,7 @@ pub fn resume(args: ResumeArgs) -> Result<()> {
     let began = origin.platform.clone();
     let elsewhere = args.backend.is_some() || args.adapter.is_some();
     let work = Work::new(spec(&origin.spec, args.backend, args.adapter, args.threads)?)?;
-    let mut here = work.platform()?;
+    let mut here = work.platform();
     here.reason = began.reason.clone();
     if !here.computes_like(&began) {
         if !elsewhere {

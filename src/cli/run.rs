@@ -8,7 +8,7 @@ use std::{
 
 use super::{dry_run, flags, note, print, print_json, signals};
 use crate::{
-    backend::{self, Backend, Platform},
+    backend::{self, Backend, Choice, Platform},
     ensemble::{Cell, Spec, Standing, study},
     error::{Error, Result},
     estimate::Estimate,
@@ -101,10 +101,10 @@ pub struct Work {
     pub spec: Spec,
     /// All cells.
     pub cells: Vec<Cell>,
-    /// By company; no choice where its back end is open already.
-    companies: Vec<(Range<usize>, Option<backend::Choice>)>,
-    /// The back end of the first company, and whether it had to be the CPU.
-    opened: Option<(Box<dyn Backend>, bool)>,
+    /// Cells that are computed together, and where.
+    companies: Vec<(Range<usize>, Choice)>,
+    /// The back end of the first company, once it is open.
+    opened: Option<Box<dyn Backend>>,
 }
 
 impl Work {
@@ -122,22 +122,18 @@ impl Work {
         } else {
             choices[0].settle_place(&mut spec);
         }
-        let companies = ranges.into_iter().zip(choices.into_iter().map(Some)).collect();
-        Ok(Work { spec, cells, companies, opened: None })
+        Ok(Work { spec, cells, companies: ranges.into_iter().zip(choices).collect(), opened: None })
     }
 
     /// Opens the back end of the first company: where that is not the chosen one, the spec tells. Returns where it is.
     fn open(&mut self, flags: &MannerFlags) -> Result<Platform> {
-        let (range, choice) = &mut self.companies[0];
-        let choice = choice.take().ok_or_else(|| Error::Failed("the back end is open already".into()))?;
-        let chosen_gpu = choice.gpu().is_some();
+        let (range, choice) = &self.companies[0];
         let (backend, platform) = open(&self.cells[range.clone()], choice, flags)?;
-        let fell_back = chosen_gpu && platform.backend == "cpu";
-        if fell_back {
+        if choice.gpu().is_some() && platform.backend == "cpu" {
             flags.say(&format!("note: on the CPU instead: {}", platform.reason));
             platform.settle_place(&mut self.spec);
         }
-        self.opened = Some((backend, fell_back));
+        self.opened = Some(backend);
         Ok(platform)
     }
 
@@ -148,10 +144,9 @@ impl Work {
     }
 
     /// Where all is computed.
-    pub fn platform(&self) -> Result<Platform> {
+    pub fn platform(&self) -> Platform {
         let (range, choice) = &self.companies[0];
-        let choice = choice.as_ref().ok_or_else(|| Error::Failed("the back end is open already".into()))?;
-        Ok(choice.platform(&self.cells[range.start].spec))
+        choice.platform(&self.cells[range.start].spec)
     }
 
     /// What the user should know about the curves of all cells, each sentence once.
@@ -211,8 +206,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     }
     let flags = args.manner;
     if args.dry_run {
-        let companies = work.companies.into_iter().filter_map(|(range, choice)| Some((range, choice?)));
-        let (companies, choices) = companies.unzip();
+        let (companies, choices) = work.companies.into_iter().unzip();
         let estimate = Estimate::new(&mut work.cells, companies, choices)?;
         return match (flags.json, flags.quiet) {
             (true, _) => print_json(&estimate),
@@ -235,7 +229,7 @@ fn kept(out: &Path) {
 }
 
 /// Opens the back end that was chosen for a company.
-fn open(company: &[Cell], choice: backend::Choice, flags: &MannerFlags) -> Result<(Box<dyn Backend>, Platform)> {
+fn open(company: &[Cell], choice: &Choice, flags: &MannerFlags) -> Result<(Box<dyn Backend>, Platform)> {
     flags.say(&choice.sentence(&company[0].spec));
     let curves = company.iter().map(|cell| cell.spec.member_count()).sum();
     let whole = Spec { curves, only: None, ..company[0].spec.clone() };
@@ -246,21 +240,19 @@ fn open(company: &[Cell], choice: backend::Choice, flags: &MannerFlags) -> Resul
 /// first one, where it is open.
 fn advance(
     cells: &[Cell],
-    companies: Vec<(Range<usize>, Option<backend::Choice>)>,
-    mut opened: Option<(Box<dyn Backend>, bool)>,
+    companies: Vec<(Range<usize>, Choice)>,
+    mut opened: Option<Box<dyn Backend>>,
     mut standing: Standing,
     report: &mut Report,
     flags: &MannerFlags,
 ) -> Result<()> {
-    let fell_back = opened.as_ref().is_some_and(|(_, fell_back)| *fell_back);
     let precision = report.platform().precision;
     for (number, (range, choice)) in companies.into_iter().enumerate().skip(report.company()) {
         let company = &cells[range];
-        let mut backend = match (choice, opened.take()) {
+        let mut backend = match opened.take() {
+            Some(backend) => backend,
             // A run that has begun does not move.
-            (Some(choice), _) => open(company, choice.after(report.platform(), fell_back), flags)?.0,
-            (None, Some((backend, _))) => backend,
-            (None, None) => return Err(Error::Failed("a back end was used up".into())),
+            None => open(company, &choice.after(report.platform()), flags)?.0,
         };
         let portraits = (MOST_PANELS * company.len()).div_ceil(cells.len());
         report.begin_company(number);

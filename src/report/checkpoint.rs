@@ -15,7 +15,8 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    folder::{Mark, OutputFolder, STATE, STATE_OLD},
+    folder::{OutputFolder, STATE, STATE_OLD},
+    part_file::Mark,
     portraits::Film,
     tally::Aside,
     zarr,

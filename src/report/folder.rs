@@ -1,15 +1,17 @@
 //! The output folder. A file grows as `.NAME.part` and takes its final name only when it is complete and on disk.
 
 use std::{
-    cell::Cell,
-    fs::{self, File, TryLockError},
+    fs::{self, File},
     io::{self, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
-use serde::{Deserialize, Serialize};
-
-use super::{part_folder::PartFolder, zarr};
+use super::{
+    disk::{IS_STORE, checksum, create, lock, parent, remove, remove_store, sync_folder, sync_names},
+    part_file::{Mark, PartFile},
+    part_folder::PartFolder,
+    zarr,
+};
 use crate::{
     error::{Error, Result},
     input,
@@ -96,25 +98,8 @@ pub const STATE_OLD: &str = ".curvelax.state.old";
 /// The next one, while it is written.
 const STATE_PART: &str = ".curvelax.state.part";
 
-/// What is said of a file that failed before.
-const TORN: &str = "an earlier write failed";
-
-/// In every folder of a store.
-const IS_STORE: &str = "zarr.json";
-
 /// Says whether a folder can be written.
 const PROBE: &str = ".curvelax.part";
-
-/// A growing file as far as a state vouches for it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Mark {
-    /// Its final name.
-    pub name: String,
-    /// Bytes.
-    pub length: u64,
-    /// Their CRC-32C.
-    pub crc: u32,
-}
 
 /// A folder that this run, and no other at the same time, may write into.
 ///
@@ -233,7 +218,7 @@ impl OutputFolder {
     /// Removes what a run left beside the files of a complete one because it was killed before its first state.
     pub fn tidy(&self) -> Result<()> {
         self.forget_states()?;
-        self.remove_parts(&[]).map_err(Error::io("cannot remove what a run left in", &self.path))
+        self.keep_only(&[])
     }
 
     /// Where it is.
@@ -247,17 +232,7 @@ impl OutputFolder {
         let parent = target.parent().unwrap_or(&self.path);
         fs::create_dir_all(parent).map_err(Error::io("cannot make the folder", parent))?;
         let file = create(&part).map_err(Error::io("cannot write", &part))?;
-        let mark = Mark { name: name.into(), length: 0, crc: 0 };
-        Ok(PartFile {
-            file,
-            part,
-            target,
-            mark,
-            keep: Cell::new(false),
-            broken: false,
-            torn: Cell::new(false),
-            finished: false,
-        })
+        Ok(PartFile::new(file, part, target, Mark { name: name.into(), length: 0, crc: 0 }))
     }
 
     /// Whether the file is there, under its temporary or its final name, as far as `mark` goes; else what is wrong with it.
@@ -284,38 +259,27 @@ impl OutputFolder {
         mark.check(&self.growing(STORE).map_err(|e| format!("cannot find {STORE} ({e})"))?)
     }
 
-    /// Goes on with the files and the store of a state, and removes everything else that an interrupted run left. What was
-    /// written after the state is cut off.
-    pub fn reopen(&self, marks: &[Mark], store: bool) -> Result<(Vec<PartFile>, Option<PartFolder>)> {
-        let mut keep: Vec<&str> = marks.iter().map(|mark| mark.name.as_str()).collect();
-        keep.extend(store.then_some(STORE));
-        self.remove_parts(&keep).map_err(Error::io("cannot remove what a run left in", &self.path))?;
-        let store = match store {
-            true => Some(PartFolder::again(self.back(STORE)?, self.path.join(STORE))),
-            false => None,
+    /// Removes everything that an interrupted run left but for what `names` name.
+    pub fn keep_only(&self, names: &[&str]) -> Result<()> {
+        self.remove_parts(names).map_err(Error::io("cannot remove what a run left in", &self.path))
+    }
+
+    /// Goes on with a file of an interrupted run. What was written after `mark` is cut off.
+    pub fn file_again(&self, mark: &Mark) -> Result<PartFile> {
+        let part = self.back(&mark.name)?;
+        let cut = |part: &Path| {
+            let mut file = File::options().read(true).write(true).open(part)?;
+            file.set_len(mark.length)?;
+            file.seek(SeekFrom::End(0))?;
+            Ok(file)
         };
-        let files = marks.iter().map(|mark| {
-            let part = self.back(&mark.name)?;
-            let cut = |part: &Path| {
-                let mut file = File::options().read(true).write(true).open(part)?;
-                file.set_len(mark.length)?;
-                file.seek(SeekFrom::End(0))?;
-                Ok(file)
-            };
-            let file = cut(&part).map_err(Error::io("cannot write", &part))?;
-            let (target, mark) = (self.path.join(&mark.name), mark.clone());
-            Ok(PartFile {
-                file,
-                part,
-                target,
-                mark,
-                keep: Cell::new(true),
-                broken: false,
-                torn: Cell::new(false),
-                finished: false,
-            })
-        });
-        Ok((files.collect::<Result<_>>()?, store))
+        let file = cut(&part).map_err(Error::io("cannot write", &part))?;
+        Ok(PartFile::new(file, part, self.path.join(&mark.name), mark.clone()))
+    }
+
+    /// The same for the folder of a store.
+    pub fn store_again(&self, name: &str) -> Result<PartFolder> {
+        Ok(PartFolder::again(self.back(name)?, self.path.join(name)))
     }
 
     /// Where `name` lies of a run that was interrupted: if that was at its very end, under its final name.
@@ -381,7 +345,7 @@ impl OutputFolder {
     /// Writes the whole file `name`, ready for [`OutputFolder::publish`].
     pub fn write(&self, name: &str, text: &str) -> Result<PartFile> {
         let mut file = self.file(name)?;
-        file.write_all(text.as_bytes()).map_err(Error::io("cannot write", &file.target))?;
+        file.write_all(text.as_bytes()).map_err(Error::io("cannot write", file.target()))?;
         file.sync()?;
         Ok(file)
     }
@@ -477,94 +441,6 @@ impl Drop for OutputFolder {
     }
 }
 
-/// A file that is not complete yet; dropped so, it is removed unless [told](PartFile::keep) otherwise.
-#[derive(Debug)]
-pub struct PartFile {
-    file: File,
-    part: PathBuf,
-    target: PathBuf,
-    /// What was written.
-    mark: Mark,
-    keep: Cell<bool>,
-    broken: bool,
-    /// What was written may not be on disk, whatever the system says.
-    torn: Cell<bool>,
-    finished: bool,
-}
-
-impl PartFile {
-    /// Whether what is written is worth keeping if the run fails.
-    pub fn keep(&self, keep: bool) {
-        self.keep.set(keep);
-    }
-
-    /// What was written so far, once it is on disk.
-    pub fn mark(&self) -> Result<Mark> {
-        self.sync()?;
-        Ok(self.mark.clone())
-    }
-
-    /// Its temporary name.
-    pub fn part(&self) -> &Path {
-        &self.part
-    }
-
-    /// Its final name.
-    pub fn target(&self) -> &Path {
-        &self.target
-    }
-
-    /// Returns once its content is on disk.
-    pub fn sync(&self) -> Result<()> {
-        let synced = self.file.sync_all();
-        // What was not synced once may be lost although it is synced the next time.
-        self.torn.set(self.torn.get() || synced.is_err());
-        let whole = if self.torn.get() && synced.is_ok() { Err(io::Error::other(TORN)) } else { synced };
-        whole.map_err(Error::io("cannot write", &self.target))
-    }
-
-    /// Gives the file its final name; its content should be on disk.
-    fn finish(mut self) -> Result<()> {
-        fs::rename(&self.part, &self.target).map_err(Error::io("cannot write", &self.target))?;
-        self.finished = true;
-        sync_parent(&self.target)
-    }
-}
-
-impl Write for PartFile {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // A writer with a buffer tries again when dropped, and would repeat what had got through.
-        if self.broken {
-            return Err(io::Error::other(TORN));
-        }
-        let written = self.file.write(bytes);
-        if let Ok(count) = written {
-            self.mark.length += count as u64;
-            self.mark.crc = crc32c::crc32c_append(self.mark.crc, &bytes[..count]);
-        }
-        self.broken = written.as_ref().is_err_and(|e| e.kind() != io::ErrorKind::Interrupted);
-        written
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
-    }
-}
-
-impl Drop for PartFile {
-    fn drop(&mut self) {
-        if !self.finished && !self.keep.get() {
-            let _ = fs::remove_file(&self.part);
-        }
-    }
-}
-
-/// Makes the file anew: what lies there is removed and not written into, as it may be a link to elsewhere.
-pub(super) fn create(path: &Path) -> io::Result<File> {
-    remove(path)?;
-    File::create_new(path)
-}
-
 /// Whether a folder, and not a file, has this name.
 fn is_store(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().trim_end_matches(".part").ends_with(STORE))
@@ -581,118 +457,6 @@ fn remove_any(path: &Path) -> io::Result<()> {
     match is_store(path) {
         true => remove_store(path),
         false => remove(path),
-    }
-}
-
-/// Removes the folder of a store and what is in it; it may be absent. What tells that it is a store goes last, so that what
-/// is left by one who is killed meanwhile still is one.
-pub(super) fn remove_store(path: &Path) -> io::Result<()> {
-    if path.is_symlink() {
-        return fs::remove_file(path);
-    }
-    let entries = match fs::read_dir(path) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
-        entries => entries?,
-    };
-    for entry in entries {
-        let entry = entry?;
-        if entry.file_type()?.is_dir() {
-            fs::remove_dir_all(entry.path())?;
-        } else if entry.file_name() != IS_STORE {
-            fs::remove_file(entry.path())?;
-        }
-    }
-    remove(&path.join(IS_STORE))?;
-    fs::remove_dir(path)
-}
-
-/// Removes a file, which may be absent.
-fn remove(path: &Path) -> io::Result<()> {
-    match fs::remove_file(path) {
-        // Below a folder that is absent, too.
-        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
-        _ => Ok(()),
-    }
-}
-
-/// Bytes of what is left of `file`, and the CRC-32C of them after those of `crc`.
-pub(super) fn checksum(file: &mut impl Read, mut crc: u32) -> io::Result<(u64, u32)> {
-    let mut length = 0;
-    let mut buffer = vec![0; 1 << 16];
-    loop {
-        match file.read(&mut buffer) {
-            Ok(0) => return Ok((length, crc)),
-            Ok(count) => {
-                length += count as u64;
-                crc = crc32c::crc32c_append(crc, &buffer[..count]);
-            }
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(e),
-        }
-    }
-}
-
-/// Locks the file at `path`, made if need be; none if another holds it.
-fn lock(path: &Path) -> io::Result<Option<File>> {
-    loop {
-        if path.is_symlink() {
-            remove(path)?;
-        }
-        let file = File::options().write(true).create(true).truncate(false).open(path)?;
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => return Ok(None),
-            // A file system without locks is no reason not to run.
-            Err(TryLockError::Error(e)) if e.kind() != io::ErrorKind::Unsupported => return Err(e),
-            _ => {}
-        }
-        // The run before may have removed the file after it was opened here: a lock that nobody else sees.
-        if lies_at(&file, path)? {
-            return Ok(Some(file));
-        }
-    }
-}
-
-#[cfg(unix)]
-fn lies_at(file: &File, path: &Path) -> io::Result<bool> {
-    use std::os::unix::fs::MetadataExt;
-    let id = |of: fs::Metadata| (of.dev(), of.ino());
-    match fs::metadata(path) {
-        Ok(there) => Ok(id(file.metadata()?) == id(there)),
-        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(false),
-        Err(e) => Err(e),
-    }
-}
-
-/// Elsewhere a file has no number to ask for in safe and stable Rust; a file at its place has to do.
-#[cfg(not(unix))]
-fn lies_at(_: &File, path: &Path) -> io::Result<bool> {
-    path.try_exists()
-}
-
-/// Makes a rename durable.
-pub(super) fn sync_parent(path: &Path) -> Result<()> {
-    sync_folder(parent(path))
-}
-
-/// Makes the names of what is in a folder durable.
-pub(super) fn sync_folder(path: &Path) -> Result<()> {
-    sync_names(path).map_err(Error::io("cannot write to", path))
-}
-
-/// The same; only Unix lets a folder be synced.
-fn sync_names(folder: &Path) -> io::Result<()> {
-    match cfg!(unix) {
-        true => File::open(folder).and_then(|folder| folder.sync_all()),
-        false => Ok(()),
-    }
-}
-
-/// The folder in which `path` is a name.
-fn parent(path: &Path) -> &Path {
-    match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        Some(_) => Path::new("."),
-        None => path,
     }
 }
 
@@ -852,20 +616,6 @@ mod tests {
         assert_eq!(names(&out), [""; 0]);
     }
 
-    #[test]
-    fn nothing_is_written_after_a_failed_write() {
-        let home = tempfile::tempdir().unwrap();
-        let folder = OutputFolder::open(home.path(), true).unwrap();
-        let mut file = folder.file(SUMMARY).unwrap();
-        let good = std::mem::replace(&mut file.file, File::open(&file.part).unwrap());
-        file.write_all(b"to a file that can only be read").unwrap_err();
-        file.file = good;
-        file.write_all(b"again").unwrap_err();
-        assert_eq!(file.mark().unwrap().length, 0);
-        drop(file);
-        assert_eq!(names(home.path()), [LOCK]);
-    }
-
     fn state_of(folder: &OutputFolder) -> Vec<String> {
         let text = |name| fs::read_to_string(folder.path().join(name)).ok();
         [STATE, STATE_OLD].into_iter().filter_map(text).collect()
@@ -920,11 +670,11 @@ mod tests {
             let fault = folder.check(&Mark { name: "../mine".into(), ..mark.clone() }).unwrap_err();
             assert!(fault.contains("which no run writes"), "{fault}");
 
-            let (mut files, store) = folder.reopen(&[mark], false).unwrap();
-            assert!(store.is_none());
+            folder.keep_only(&[SUMMARY]).unwrap();
+            let mut file = folder.file_again(&mark).unwrap();
             assert_eq!(names(home.path()), [LOCK, ".summary.csv.part"], "what no state tells of is removed");
-            files[0].write_all(b", then this").unwrap();
-            files.remove(0).finish().unwrap();
+            file.write_all(b", then this").unwrap();
+            file.finish().unwrap();
             assert_eq!(fs::read_to_string(home.path().join(SUMMARY)).unwrap(), "kept, then this");
         }
     }

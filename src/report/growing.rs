@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use super::{
-    folder::{self, Mark, OutputFolder, PartFile},
+    folder::{self, OutputFolder},
+    part_file::{Mark, PartFile},
     part_folder::PartFolder,
-    tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable},
+    tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable, Table},
     zarr::{self, SnapshotStore},
 };
 use crate::{
@@ -39,19 +40,11 @@ impl Growing {
 
     /// Begins them; `points` is the number of nodes of a member, which matters only where all have the same.
     pub fn begin(folder: &OutputFolder, spec: &Spec, points: usize) -> Result<Growing> {
-        let names = Growing::names(spec);
-        let file = |name: &str| names.contains(&name).then(|| folder.file(name)).transpose();
-        Ok(Growing {
-            summary: SummaryTable::begin(folder.file(folder::SUMMARY)?)?,
-            rates: RateTable::begin(folder.file(folder::RATES)?)?,
-            series: file(folder::SERIES)?.map(SeriesTable::begin).transpose()?,
-            snapshots: file(folder::SNAPSHOTS)?.map(SnapshotTable::begin).transpose()?,
-            store: match Growing::has_store(spec) {
-                true => Some(SnapshotStore::begin(folder.store(folder::STORE)?, spec, points)?),
-                false => None,
-            },
-            torn: false,
-        })
+        let store = match Growing::has_store(spec) {
+            true => Some(SnapshotStore::begin(folder.store(folder::STORE)?, spec, points)?),
+            false => None,
+        };
+        Growing::of(spec, store, |name| folder.file(name))
     }
 
     /// Goes on with those of an interrupted run, as far as they were marked.
@@ -65,26 +58,36 @@ impl Growing {
         marks: &[Mark],
         store: Option<&zarr::Mark>,
     ) -> Result<Growing> {
-        let names = Growing::names(spec);
-        if !marks.iter().map(|mark| mark.name.as_str()).eq(names.iter().copied())
-            || store.is_some() != Growing::has_store(spec)
-        {
+        let mut names: Vec<&str> = marks.iter().map(|mark| mark.name.as_str()).collect();
+        let others = || {
             let path = folder.path().display();
-            return Err(Error::Request(format!("{path}: the state tells of other files than its spec asks for")));
+            Error::Request(format!("{path}: the state tells of other files than its spec asks for"))
+        };
+        if names != Growing::names(spec) || store.is_some() != Growing::has_store(spec) {
+            return Err(others());
         }
-        let (files, part) = folder.reopen(marks, store.is_some())?;
-        let mut files = names.into_iter().zip(files).collect::<Vec<_>>();
-        let mut file = |name: &str| files.iter().position(|own| own.0 == name).map(|at| files.swap_remove(at).1);
-        let missing = |name: &str| Error::Failed(format!("no {name} to go on with"));
+        names.extend(store.map(|_| folder::STORE));
+        folder.keep_only(&names)?;
+        let store = match store {
+            Some(mark) => Some(SnapshotStore::go_on(folder.store_again(folder::STORE)?, spec, points, mark)?),
+            None => None,
+        };
+        Growing::of(spec, store, |name| {
+            let mark = marks.iter().find(|mark| mark.name == name).ok_or_else(others)?;
+            folder.file_again(mark)
+        })
+    }
+
+    /// The tables in the files that `file` finds.
+    fn of(spec: &Spec, store: Option<SnapshotStore>, file: impl Fn(&str) -> Result<PartFile>) -> Result<Growing> {
+        let names = Growing::names(spec);
+        let asked = |name: &str| names.contains(&name).then(|| file(name)).transpose();
         Ok(Growing {
-            summary: SummaryTable::go_on(file(folder::SUMMARY).ok_or_else(|| missing(folder::SUMMARY))?),
-            rates: RateTable::go_on(file(folder::RATES).ok_or_else(|| missing(folder::RATES))?),
-            series: file(folder::SERIES).map(SeriesTable::go_on),
-            snapshots: file(folder::SNAPSHOTS).map(SnapshotTable::go_on),
-            store: match part.zip(store) {
-                Some((part, mark)) => Some(SnapshotStore::go_on(part, spec, points, mark)?),
-                None => None,
-            },
+            summary: Table::new(file(folder::SUMMARY)?)?,
+            rates: Table::new(file(folder::RATES)?)?,
+            series: asked(folder::SERIES)?.map(Table::new).transpose()?,
+            snapshots: asked(folder::SNAPSHOTS)?.map(Table::new).transpose()?,
+            store,
             torn: false,
         })
     }

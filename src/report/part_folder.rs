@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::folder::{create, remove_store, sync_folder, sync_parent};
+use super::disk::{create, remove_store, sync_folder, sync_parent};
 use crate::error::{Error, Result};
 
 /// A folder that is not complete yet; dropped so, it is removed with all that is in it unless

@@ -410,7 +410,7 @@ mod tests {
             turning: -1,
         };
         let folder = OutputFolder::open(home.path(), true).unwrap();
-        let mut table = SummaryTable::begin(folder.file(folder::SUMMARY).unwrap()).unwrap();
+        let mut table = SummaryTable::new(folder.file(folder::SUMMARY).unwrap()).unwrap();
         table.row(&written).unwrap();
         folder.publish_all(vec![table.ready().unwrap()]).unwrap();
         let mut spec = Spec { curves: 2, ..Spec::default() };

@@ -8,7 +8,7 @@ use csv::{Writer, WriterBuilder};
 use serde::Serialize;
 
 use super::{
-    folder::{Mark, PartFile},
+    part_file::{Mark, PartFile},
     tally::MeanExcess,
 };
 use crate::{
@@ -45,17 +45,15 @@ pub struct Table<K> {
 }
 
 impl<K: Kind> Table<K> {
-    /// Begins a table with its header.
-    pub fn begin(file: PartFile) -> Result<Self> {
-        let mut table = Table::go_on(file);
-        table.write(K::COLUMNS.split(',').collect::<Vec<_>>())?;
-        Ok(table)
-    }
-
-    /// Goes on with the rows that are in `file`.
-    pub fn go_on(file: PartFile) -> Self {
+    /// Begins a table with its header, or goes on with the rows that are in `file`.
+    pub fn new(file: PartFile) -> Result<Self> {
+        let begins = file.is_empty();
         let writer = WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
-        Table { writer, kind: PhantomData }
+        let mut table = Table { writer, kind: PhantomData };
+        if begins {
+            table.write(K::COLUMNS.split(',').collect::<Vec<_>>())?;
+        }
+        Ok(table)
     }
 
     /// How far it has grown, once that is on disk.
@@ -194,7 +192,7 @@ impl RateTable {
 
 /// Writes `mean_excess.csv`.
 pub fn mean_excess(file: PartFile, rows: &[MeanExcess]) -> Result<PartFile> {
-    let mut table = ExcessTable::begin(file)?;
+    let mut table = ExcessTable::new(file)?;
     rows.iter().try_for_each(|row| table.write(row))?;
     table.ready()
 }
@@ -222,7 +220,7 @@ impl SnapshotTable {
 
 /// `convergence.csv`, the whole table: one row a run, τ or the tolerance of adaptive steps empty.
 pub fn convergence(file: PartFile, rows: &[Row]) -> Result<PartFile> {
-    let mut table = ConvergenceTable::begin(file)?;
+    let mut table = ConvergenceTable::new(file)?;
     for Row { problem, varied, at, error, order, .. } in rows {
         let tau = at.tolerance.is_none().then_some(at.tau);
         table.write((problem, varied.name(), at.n as u64, tau, at.tolerance, error, order))?;
@@ -289,7 +287,7 @@ mod tests {
 
     fn summary(rows: &[Outcome]) -> String {
         written("summary.csv", |file| {
-            let mut table = SummaryTable::begin(file)?;
+            let mut table = SummaryTable::new(file)?;
             rows.iter().try_for_each(|row| table.row(row))?;
             table.ready()
         })
@@ -316,7 +314,7 @@ mod tests {
     #[test]
     fn rates_and_mean_excess_have_these_bytes() {
         let text = written("rates.csv", |file| {
-            let mut table = RateTable::begin(file)?;
+            let mut table = RateTable::new(file)?;
             let at = Observables::default();
             for rate_theory in [None, Some(6.0)] {
                 table.row(&Outcome { rate: Some(6.0), rate_r2: Some(0.5), rate_theory, ..outcome(at, at) })?;
@@ -334,7 +332,7 @@ mod tests {
     #[test]
     fn series_and_snapshots_have_these_bytes() {
         let text = written("series.csv", |file| {
-            let mut table = SeriesTable::begin(file)?;
+            let mut table = SeriesTable::new(file)?;
             table.row(&SeriesRow { member: 1, t: 0.01, at: Observables { k_max: f64::NAN, ..observables() } })?;
             table.ready()
         });
@@ -344,7 +342,7 @@ mod tests {
              1,0.01,9.688448220547675,6.5,1e-300,-0.0,2.781342323134e-309,,1.0,0.3333333333333333\n"
         );
         let text = written("snapshots.csv", |file| {
-            let mut table = SnapshotTable::begin(file)?;
+            let mut table = SnapshotTable::new(file)?;
             let (x, y) = (vec![1.0, 2.0], vec![3.0, 4.0]);
             table.snapshot(&Snapshot { member: 1, t: 0.25, x, y, k: vec![5.0, 6.0], r: vec![7.0, 8.0] })?;
             table.ready()
@@ -401,8 +399,8 @@ mod tests {
         let text = |name: &str| fs::read_to_string(home.path().join(name)).unwrap();
         let one = outcome(observables(), observables());
         let folder = OutputFolder::open(home.path(), true).unwrap();
-        let mut table = SummaryTable::begin(folder.file("summary.csv").unwrap()).unwrap();
-        let lone = SeriesTable::begin(folder.file("series.csv").unwrap()).unwrap();
+        let mut table = SummaryTable::new(folder.file("summary.csv").unwrap()).unwrap();
+        let lone = SeriesTable::new(folder.file("series.csv").unwrap()).unwrap();
         table.row(&one).unwrap();
         let mark = table.mark().unwrap();
         table.row(&Outcome { member: 4, ..one.clone() }).unwrap();
@@ -412,8 +410,7 @@ mod tests {
         assert_eq!(text(".summary.csv.part").lines().count(), 3);
 
         folder.check(&mark).unwrap();
-        let (mut files, _) = folder.reopen(&[mark], false).unwrap();
-        let mut again = SummaryTable::go_on(files.remove(0));
+        let mut again = SummaryTable::new(folder.file_again(&mark).unwrap()).unwrap();
         again.row(&Outcome { member: 5, ..one.clone() }).unwrap();
         let straight = summary(&[one.clone(), Outcome { member: 5, ..one }]);
         let mark = again.mark().unwrap();

@@ -12,7 +12,7 @@ use std::{fs, path::Path};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{folder::checksum, part_folder::PartFolder, provenance::json as json_text};
+use super::{disk::checksum, part_folder::PartFolder, provenance::json as json_text};
 use crate::{
     ensemble::{Snapshot, Spec, Status},
     error::{Error, Result},
@@ -627,7 +627,7 @@ mod tests {
         }
 
         let out = OutputFolder::open(home.path(), true).unwrap();
-        let mut table = SnapshotTable::begin(out.file("snapshots.csv").unwrap()).unwrap();
+        let mut table = SnapshotTable::new(out.file("snapshots.csv").unwrap()).unwrap();
         members.iter().flat_map(|(_, snapshots)| snapshots).for_each(|own| table.snapshot(own).unwrap());
         let text = fs::read_to_string(table.ready().unwrap().part()).unwrap();
         let lines: Vec<&str> = text.lines().skip(1).collect();

@@ -1,0 +1,130 @@
+//! What the file system is asked for: files that are no links, locks, checksums, names that last.
+
+use std::{
+    fs::{self, File, TryLockError},
+    io::{self, Read},
+    path::Path,
+};
+
+use crate::error::{Error, Result};
+
+/// In every folder of a store.
+pub const IS_STORE: &str = "zarr.json";
+
+/// Makes the file anew: what lies there is removed and not written into, as it may be a link to elsewhere.
+pub fn create(path: &Path) -> io::Result<File> {
+    remove(path)?;
+    File::create_new(path)
+}
+
+/// Removes the folder of a store and what is in it; it may be absent. What tells that it is a store goes last, so that what
+/// is left by one who is killed meanwhile still is one.
+pub fn remove_store(path: &Path) -> io::Result<()> {
+    if path.is_symlink() {
+        return fs::remove_file(path);
+    }
+    let entries = match fs::read_dir(path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            fs::remove_dir_all(entry.path())?;
+        } else if entry.file_name() != IS_STORE {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    remove(&path.join(IS_STORE))?;
+    fs::remove_dir(path)
+}
+
+/// Removes a file, which may be absent.
+pub fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        // Below a folder that is absent, too.
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
+        _ => Ok(()),
+    }
+}
+
+/// Bytes of what is left of `file`, and the CRC-32C of them after those of `crc`.
+pub fn checksum(file: &mut impl Read, mut crc: u32) -> io::Result<(u64, u32)> {
+    let mut length = 0;
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer) {
+            Ok(0) => return Ok((length, crc)),
+            Ok(count) => {
+                length += count as u64;
+                crc = crc32c::crc32c_append(crc, &buffer[..count]);
+            }
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+}
+
+/// Locks the file at `path`, made if need be; none if another holds it.
+pub fn lock(path: &Path) -> io::Result<Option<File>> {
+    loop {
+        if path.is_symlink() {
+            remove(path)?;
+        }
+        let file = File::options().write(true).create(true).truncate(false).open(path)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => return Ok(None),
+            // A file system without locks is no reason not to run.
+            Err(TryLockError::Error(e)) if e.kind() != io::ErrorKind::Unsupported => return Err(e),
+            _ => {}
+        }
+        // The run before may have removed the file after it was opened here: a lock that nobody else sees.
+        if lies_at(&file, path)? {
+            return Ok(Some(file));
+        }
+    }
+}
+
+#[cfg(unix)]
+fn lies_at(file: &File, path: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    let id = |of: fs::Metadata| (of.dev(), of.ino());
+    match fs::metadata(path) {
+        Ok(there) => Ok(id(file.metadata()?) == id(there)),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(e) => Err(e),
+    }
+}
+
+/// Elsewhere a file has no number to ask for in safe and stable Rust; a file at its place has to do.
+#[cfg(not(unix))]
+fn lies_at(_: &File, path: &Path) -> io::Result<bool> {
+    path.try_exists()
+}
+
+/// Makes a rename durable.
+pub fn sync_parent(path: &Path) -> Result<()> {
+    sync_folder(parent(path))
+}
+
+/// Makes the names of what is in a folder durable.
+pub fn sync_folder(path: &Path) -> Result<()> {
+    sync_names(path).map_err(Error::io("cannot write to", path))
+}
+
+/// The same; only Unix lets a folder be synced.
+pub fn sync_names(folder: &Path) -> io::Result<()> {
+    match cfg!(unix) {
+        true => File::open(folder).and_then(|folder| folder.sync_all()),
+        false => Ok(()),
+    }
+}
+
+/// The folder in which `path` is a name.
+pub fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        Some(_) => Path::new("."),
+        None => path,
+    }
+}

@@ -1,0 +1,140 @@
+//! A file that grows as `.NAME.part` and takes its final name only when it is complete and on disk.
+
+use std::{
+    cell::Cell,
+    fs::{self, File},
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::disk::sync_parent;
+use crate::error::{Error, Result};
+
+/// What is said of a file that failed before.
+const TORN: &str = "an earlier write failed";
+
+/// A growing file as far as a state vouches for it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Mark {
+    /// Its final name.
+    pub name: String,
+    /// Bytes.
+    pub length: u64,
+    /// Their CRC-32C.
+    pub crc: u32,
+}
+
+/// A file that is not complete yet; dropped so, it is removed unless [told](PartFile::keep) otherwise.
+#[derive(Debug)]
+pub struct PartFile {
+    file: File,
+    part: PathBuf,
+    target: PathBuf,
+    /// What was written.
+    mark: Mark,
+    keep: Cell<bool>,
+    broken: bool,
+    /// What was written may not be on disk, whatever the system says.
+    torn: Cell<bool>,
+    finished: bool,
+}
+
+impl PartFile {
+    /// Goes on with `file`, which lies at `part` and holds what `mark` tells; it will be `target`.
+    pub(super) fn new(file: File, part: PathBuf, target: PathBuf, mark: Mark) -> PartFile {
+        let (keep, torn) = (Cell::new(mark.length > 0), Cell::new(false));
+        PartFile { file, part, target, mark, keep, broken: false, torn, finished: false }
+    }
+
+    /// Whether nothing was written yet.
+    pub fn is_empty(&self) -> bool {
+        self.mark.length == 0
+    }
+
+    /// Whether what is written is worth keeping if the run fails.
+    pub fn keep(&self, keep: bool) {
+        self.keep.set(keep);
+    }
+
+    /// What was written so far, once it is on disk.
+    pub fn mark(&self) -> Result<Mark> {
+        self.sync()?;
+        Ok(self.mark.clone())
+    }
+
+    /// Its temporary name.
+    pub fn part(&self) -> &Path {
+        &self.part
+    }
+
+    /// Its final name.
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// Returns once its content is on disk.
+    pub fn sync(&self) -> Result<()> {
+        let synced = self.file.sync_all();
+        // What was not synced once may be lost although it is synced the next time.
+        self.torn.set(self.torn.get() || synced.is_err());
+        let whole = if self.torn.get() && synced.is_ok() { Err(io::Error::other(TORN)) } else { synced };
+        whole.map_err(Error::io("cannot write", &self.target))
+    }
+
+    /// Gives the file its final name; its content should be on disk.
+    pub(super) fn finish(mut self) -> Result<()> {
+        fs::rename(&self.part, &self.target).map_err(Error::io("cannot write", &self.target))?;
+        self.finished = true;
+        sync_parent(&self.target)
+    }
+}
+
+impl Write for PartFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        // A writer with a buffer tries again when dropped, and would repeat what had got through.
+        if self.broken {
+            return Err(io::Error::other(TORN));
+        }
+        let written = self.file.write(bytes);
+        if let Ok(count) = written {
+            self.mark.length += count as u64;
+            self.mark.crc = crc32c::crc32c_append(self.mark.crc, &bytes[..count]);
+        }
+        self.broken = written.as_ref().is_err_and(|e| e.kind() != io::ErrorKind::Interrupted);
+        written
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Drop for PartFile {
+    fn drop(&mut self) {
+        if !self.finished && !self.keep.get() {
+            let _ = fs::remove_file(&self.part);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_written_after_a_failed_write() {
+        let home = tempfile::tempdir().unwrap();
+        let [part, target] = [".rows.part", "rows"].map(|name| home.path().join(name));
+        let mark = Mark { name: "rows".into(), length: 0, crc: 0 };
+        let mut file = PartFile::new(File::create_new(&part).unwrap(), part, target, mark);
+        let good = std::mem::replace(&mut file.file, File::open(&file.part).unwrap());
+        file.write_all(b"to a file that can only be read").unwrap_err();
+        file.file = good;
+        file.write_all(b"again").unwrap_err();
+        assert_eq!(file.mark().unwrap().length, 0);
+        drop(file);
+        assert_eq!(fs::read_dir(home.path()).unwrap().count(), 0);
+    }
+}
