@@ -108,7 +108,7 @@ impl Estimate {
             let company = &mut cells[range];
             let precision = choice.precision();
             let all: u64 = company.iter().map(|cell| cell.spec.member_count()).sum();
-            let whole = Spec { curves: all, only: None, ..company[0].spec.clone() };
+            let whole = Spec { curves: all, only: None, shard: None, ..company[0].spec.clone() };
             let started = Instant::now();
             let (mut backend, platform) = choice.open(&whole, whole.points)?;
             start_up += started.elapsed().as_secs_f64();
@@ -265,12 +265,14 @@ fn choose(company: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) 
     let mut places = (0..count).map(place).peekable();
     let mut before = 0;
     for (cell, own) in company.iter_mut().zip(own) {
-        let members = own.as_ref().map_or(cell.spec.curves, |only| only.len() as u64);
-        let mut only = Vec::new();
+        cell.spec.only.clone_from(own);
+        let members = cell.spec.member_count();
+        let (mut own, mut taken, mut only) = (cell.spec.members(), 0, Vec::new());
         while let Some(place) = places.next_if(|place| *place < before + members) {
-            let place = place - before;
-            only.push(own.as_ref().map_or(place, |only| only[place as usize]));
+            only.extend(own.nth((place - before - taken) as usize));
+            taken = place - before + 1;
         }
+        drop(own);
         cell.spec.only = Some(only);
         before += members;
     }

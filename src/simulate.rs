@@ -94,7 +94,7 @@ pub fn go_on(
 
 fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut dyn Sink) -> Result<()> {
     let cells = pool.cells.iter().enumerate();
-    let members = cells.flat_map(|(cell, own)| own.members().enumerate().map(move |member| (cell, member)));
+    let members = cells.flat_map(|(cell, own)| own.members().map(move |member| (cell, member)));
     let ended: BTreeSet<u64> = queue.early.keys().copied().collect();
     let left = (0..).zip(members).skip(queue.next as usize).filter(|(rank, _)| !ended.contains(rank));
     let mut waiting = left.peekable();
@@ -165,18 +165,18 @@ struct Pool<'a> {
 }
 
 impl Pool<'_> {
-    /// Puts a member, the `rank`-th of this run and the `place`-th of a cell, into a free slot; or ends it where there is
-    /// nothing to do.
+    /// Puts a member, the `rank`-th of this run, into a free slot; or ends it where there is nothing to do.
     fn admit(
         &mut self,
         backend: &mut dyn Backend,
         slot: usize,
         rank: u64,
-        (cell, (place, index)): (usize, (usize, u64)),
+        (cell, index): (usize, u64),
     ) -> Result<Option<Ended>> {
         let own = &self.cells[cell];
         let each = (self.portraits / self.cells.len().max(1)).max(1);
-        let portrait = cell < self.portraits && place < each;
+        // The same ones whatever shard they are in.
+        let portrait = cell < self.portraits && own.place(index) < each as u64;
         let outputs = &self.outputs[usize::from(portrait)][cell];
         let mut trajectory = Trajectory::new(own.member(index)?, &own.spec, self.precision, outputs);
         trajectory.keep_portrait(portrait);

@@ -48,6 +48,12 @@ impl Platform {
         place(self) == place(other)
     }
 
+    /// Back end, adapter and driver.
+    pub fn name(&self) -> String {
+        let parts = [Some(self.backend.as_str()), self.adapter.as_deref(), self.driver.as_deref()];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(" ")
+    }
+
     /// Writes into a spec where it ran, which is elsewhere than was chosen if the GPU failed.
     pub fn settle_place(&self, spec: &mut Spec) {
         spec.backend = if self.backend == "gpu" { BackendChoice::Gpu } else { BackendChoice::Cpu };
@@ -58,6 +64,8 @@ impl Platform {
 /// A back end that suits a spec, not yet opened.
 pub struct Choice {
     gpu: Option<Gpu>,
+    /// Its number, if it was asked for by that.
+    number: Option<String>,
     /// Where the GPU cannot be opened the CPU is taken.
     or_cpu: bool,
     precision: Precision,
@@ -123,7 +131,7 @@ fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
 fn cpu(spec: &Spec, n: usize, reason: String) -> Result<Choice> {
     let precision = spec.precision.unwrap_or(Precision::F64);
     check_precision(n, precision)?;
-    Ok(Choice { gpu: None, or_cpu: false, precision, reason })
+    Ok(Choice { gpu: None, number: None, or_cpu: false, precision, reason })
 }
 
 fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
@@ -133,8 +141,11 @@ fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
     }
     let found = Gpu::list();
     let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
-    match found.into_iter().find(|gpu| gpu.matches(spec.adapter.as_deref())) {
-        Some(adapter) => take(spec, n, adapter, "asked for".into()),
+    match Gpu::find(found, spec.adapter.as_deref()) {
+        Some((adapter, by_number)) => {
+            let number = by_number.then(|| spec.adapter.clone()).flatten();
+            Ok(Choice { number, ..take(spec, n, adapter, "asked for".into())? })
+        }
         None => Err(no_adapter(spec.adapter.as_deref(), &names)),
     }
 }
@@ -156,7 +167,7 @@ pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
 
 fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<Choice> {
     let precision = fitting_precision(spec, n, adapter.name(), &adapter.capacity())?;
-    Ok(Choice { gpu: Some(adapter), or_cpu: false, precision, reason })
+    Ok(Choice { gpu: Some(adapter), number: None, or_cpu: false, precision, reason })
 }
 
 /// The precision of the run on an adapter, if members of `n` nodes fit it.
@@ -233,7 +244,9 @@ impl Choice {
     /// Writes into a spec with cells what they all have in common: where they are computed.
     pub fn settle_place(&self, spec: &mut Spec) {
         spec.backend = if self.gpu.is_some() { BackendChoice::Gpu } else { BackendChoice::Cpu };
-        spec.adapter = self.gpu.as_ref().map(|gpu| gpu.name().to_string());
+        // Several of one name are told apart by their numbers only.
+        let name = || self.gpu.as_ref().map(|gpu| gpu.name().to_string());
+        spec.adapter = self.number.clone().or_else(name);
         spec.precision = Some(self.precision);
     }
 
@@ -270,7 +283,7 @@ impl Choice {
     }
 
     fn on_cpu(&self, reason: String) -> Choice {
-        Choice { gpu: None, or_cpu: false, precision: self.precision, reason }
+        Choice { gpu: None, number: None, or_cpu: false, precision: self.precision, reason }
     }
 
     /// The same, but the CPU where the GPU cannot be opened or computes wrongly.

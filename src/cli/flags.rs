@@ -11,7 +11,7 @@ use serde::{Deserialize, de::value::StrDeserializer};
 use crate::{
     curve::{Modes, Sampling, Shape},
     ensemble::{
-        Spec,
+        Shard, Spec,
         spec::{BackendChoice, Order, Precision, Pull, SolverChoice, Sor, Store},
         sweep::Axis,
     },
@@ -88,6 +88,9 @@ pub struct SpecFlags {
         allow_hyphen_values = true, help_heading = ENSEMBLE
     )]
     only: Option<Vec<u64>>,
+    /// Run only the members j with j mod N = I, for `curvelax merge`; `slurm` takes I/N from a job array [default: all]
+    #[arg(long, value_name = "I/N", value_parser = shard, allow_hyphen_values = true, help_heading = ENSEMBLE)]
+    shard: Option<Shard>,
 
     /// surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,... [default: surface-diffusion]
     #[arg(
@@ -201,6 +204,9 @@ pub struct SpecFlags {
     store: Option<Store>,
 }
 
+/// Says how many shards there are where not all are in the array.
+pub(super) const SHARDS: &str = "CURVELAX_SHARDS";
+
 const ENSEMBLE: &str = "Ensemble";
 const EVOLUTION: &str = "Evolution";
 pub(super) const METHOD: &str = "Method";
@@ -230,7 +236,7 @@ impl SpecFlags {
         replace! {
             curves points seed shape sampling amplitude modes decay flow t_end omega no_redistribution pull solver
             order sor max_sweeps backend stop_when_relaxed snapshots store common_random_numbers;
-            tau adaptive relax_to relax_at only tolerance adapter precision series threads
+            tau adaptive relax_to relax_at only shard tolerance adapter precision series threads
         }
     }
 }
@@ -242,6 +248,37 @@ pub(super) fn real(text: &str) -> Result<f64, String> {
 pub(super) fn whole<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
     let value = text.trim().parse::<u64>().ok().and_then(|value| T::try_from(value).ok());
     value.ok_or_else(|| format!("not a whole number from 0 to {}", u128::MAX >> (128 - 8 * size_of::<T>())))
+}
+
+/// `I/N`, or `slurm`.
+fn shard(text: &str) -> Result<Shard, String> {
+    match text.trim() {
+        "slurm" => slurm(|name| std::env::var(name).ok()),
+        text => text.parse(),
+    }
+}
+
+/// The shard of this task of a Slurm job array. An array of some shards of N, submitted again, says N in
+/// `CURVELAX_SHARDS`, since the array's own count is then not N.
+fn slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
+    let number = |name: &str| {
+        let text = variable(name).ok_or_else(|| format!("no {name}: this is no task of a Slurm job array"))?;
+        text.parse::<u64>().map_err(|_| format!("{name}={text} is no whole number"))
+    };
+    let index = number("SLURM_ARRAY_TASK_ID")?;
+    if variable(SHARDS).is_some() {
+        return Shard::new(index, number(SHARDS)?);
+    }
+    let count = number("SLURM_ARRAY_TASK_COUNT")?;
+    let (first, last) = (number("SLURM_ARRAY_TASK_MIN")?, number("SLURM_ARRAY_TASK_MAX")?);
+    if first != 0 || last.checked_add(1) != Some(count) {
+        return Err(format!(
+            "the array has {count} tasks from {first} to {last}, and shards count from 0 to N - 1: take --array=0-{}, or \
+             export {SHARDS}=N to run some of N",
+            count.saturating_sub(1)
+        ));
+    }
+    Shard::new(index, count)
 }
 
 /// A time in hours, minutes and seconds: `1h30m`, `5m`, `90s`, or seconds alone.

@@ -12,6 +12,7 @@ mod dry_run;
 mod figure;
 mod flags;
 mod man;
+mod merge;
 mod plot;
 mod resume;
 mod run;
@@ -54,6 +55,7 @@ struct Cli {
 enum Command {
     Run(Box<run::RunArgs>),
     Resume(resume::ResumeArgs),
+    Merge(merge::MergeArgs),
     Check(check::CheckArgs),
     Bench(bench::BenchArgs),
     Convergence(convergence::ConvergenceArgs),
@@ -70,6 +72,7 @@ pub fn main() -> ExitCode {
     let done = match cli.command {
         Command::Run(args) => run::run(*args),
         Command::Resume(args) => resume::resume(args),
+        Command::Merge(args) => merge::merge(args),
         Command::Check(args) => check::check(args),
         Command::Bench(args) => bench::bench(args),
         Command::Convergence(args) => convergence::convergence(args),

@@ -8,10 +8,13 @@ use super::{
     run::{MannerFlags, Work},
 };
 use crate::{
-    backend::Platform,
     ensemble::{Spec, spec::BackendChoice},
     error::{Error, Result},
-    report::{OutputFolder, Report, checkpoint},
+    report::{
+        OutputFolder, Report,
+        checkpoint::{self, Kept},
+        folder, reader,
+    },
 };
 
 const EXAMPLES: &str = "\
@@ -46,17 +49,64 @@ pub struct ResumeArgs {
 
 /// Runs the command.
 pub fn resume(args: ResumeArgs) -> Result<()> {
-    let flags = args.manner;
-    let mut folder = OutputFolder::open_again(&args.run)?;
-    let Some(mut kept) = checkpoint::find(&folder)? else {
+    let folder = OutputFolder::open_again(&args.run)?;
+    let kept = checkpoint::find(&folder)?;
+    let place = Place { backend: args.backend, adapter: args.adapter, threads: args.threads };
+    go_on(folder, kept, place, args.manner)
+}
+
+/// The run that was begun in the folder at `path`, if one was: its folder, and its state unless it is finished.
+///
+/// # Errors
+/// As those of [`resume`].
+pub fn begun(path: &Path) -> Result<Option<(OutputFolder, Option<Kept>)>> {
+    let there = |name: &&str| path.join(name).exists();
+    if ![folder::STATE, folder::STATE_OLD, folder::RUN].iter().any(there) {
+        return Ok(None);
+    }
+    let folder = OutputFolder::open_again(path)?;
+    let kept = checkpoint::find(&folder)?;
+    Ok(Some((folder, kept)))
+}
+
+/// Goes on with a run that was begun, if it is one of `spec`.
+///
+/// # Errors
+/// [`Error::Request`] for one of another spec, and as [`resume`].
+pub fn go_on_like((folder, kept): (OutputFolder, Option<Kept>), spec: Spec, flags: MannerFlags) -> Result<()> {
+    let path = folder.path().display().to_string();
+    let own = match &kept {
+        Some(kept) => Spec::from_toml(&kept.head.origin.spec).map_err(|e| state_spec(&e))?,
+        None => reader::provenance(folder.path())?.spec,
+    };
+    // Where it goes on is checked by itself, and on how many threads makes no difference.
+    if let Some((key, here, there)) = spec.difference(&own, &["backend", "adapter", "threads"]) {
+        return Err(Error::Request(format!(
+            "--resume: the run in {path} is of another spec: {key} is {there} there, and {here} here; name another folder"
+        )));
+    }
+    go_on(folder, kept, Place { threads: spec.threads, ..Place::default() }, flags)
+}
+
+/// Where a run is to go on, if not where it was.
+#[derive(Default)]
+struct Place {
+    backend: Option<BackendChoice>,
+    adapter: Option<String>,
+    threads: Option<usize>,
+}
+
+fn go_on(mut folder: OutputFolder, kept: Option<Kept>, place: Place, flags: MannerFlags) -> Result<()> {
+    let path = folder.path().to_path_buf();
+    let Some(mut kept) = kept else {
         folder.tidy()?;
-        flags.say(&format!("note: the run in {} is finished: nothing is left to do", args.run.display()));
+        flags.say(&format!("note: the run in {} is finished: nothing is left to do", path.display()));
         return Ok(());
     };
     // Before a device is looked for, which takes its time.
     let manner = flags.manner();
     if let Some(fault) = &kept.note {
-        note(&format!("warning: {}: {fault}", args.run.display()));
+        note(&format!("warning: {}: {fault}", path.display()));
     }
     let origin = &mut kept.head.origin;
     if !origin.outlines.is_empty() {
@@ -65,23 +115,24 @@ pub fn resume(args: ResumeArgs) -> Result<()> {
         origin.check_outlines()?;
     }
     let began = origin.platform.clone();
-    let elsewhere = args.backend.is_some() || args.adapter.is_some();
-    let work = Work::new(spec(&origin.spec, args.backend, args.adapter, args.threads)?)?;
+    let elsewhere = place.backend.is_some() || place.adapter.is_some();
+    let new_threads = place.threads.is_some();
+    let work = Work::new(spec(&origin.spec, place)?)?;
     let mut here = work.platform();
     here.reason = began.reason.clone();
     if !here.computes_like(&began) {
         if !elsewhere {
             return Err(Error::Request(format!(
                 "the run is on {}, and here it would go on on {}, where digits differ; add --backend {} if it should",
-                name(&began),
-                name(&here),
+                began.name(),
+                here.name(),
                 here.backend
             )));
         }
-        origin.moves.push(format!("the run was on {} and went on on {}", name(&began), name(&here)));
+        origin.moves.push(format!("the run was on {} and went on on {}", began.name(), here.name()));
         origin.spec = work.spec.to_toml()?;
         origin.platform = here;
-    } else if args.threads.is_some() {
+    } else if new_threads {
         (origin.platform.threads, origin.spec) = (here.threads, work.spec.to_toml()?);
     }
     let (report, standing) = Report::go_on(folder, &work.spec, work.cells[0].spec.points, kept, manner)?;
@@ -90,8 +141,8 @@ pub fn resume(args: ResumeArgs) -> Result<()> {
 }
 
 /// The spec of the state, with what this command line asks for instead.
-fn spec(text: &str, backend: Option<BackendChoice>, adapter: Option<String>, threads: Option<usize>) -> Result<Spec> {
-    let mut spec = Spec::from_toml(text).map_err(|e| Error::Request(format!("the spec in the state: {e}")))?;
+fn spec(text: &str, Place { backend, adapter, threads }: Place) -> Result<Spec> {
+    let mut spec = Spec::from_toml(text).map_err(|e| state_spec(&e))?;
     if backend.is_some() || adapter.is_some() {
         spec.backend = backend.unwrap_or(BackendChoice::Gpu);
         spec.adapter = adapter;
@@ -102,15 +153,14 @@ fn spec(text: &str, backend: Option<BackendChoice>, adapter: Option<String>, thr
     spec.validate()
 }
 
+fn state_spec(fault: &str) -> Error {
+    Error::Request(format!("the spec in the state: {fault}"))
+}
+
 /// Where paths in the spec begin.
 fn go_to(base: &Path) -> Result<()> {
     std::env::set_current_dir(base).map_err(|e| {
         let base = base.display();
         Error::Request(format!("{base}: the run was begun in this folder, and its outline is named from there ({e})"))
     })
-}
-
-fn name(platform: &Platform) -> String {
-    let parts = [Some(platform.backend.as_str()), platform.adapter.as_deref(), platform.driver.as_deref()];
-    parts.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }

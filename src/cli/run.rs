@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use super::{dry_run, flags, note, print, print_json, signals};
+use super::{dry_run, flags, note, print, print_json, resume, signals};
 use crate::{
     backend::{self, Backend, Choice, Platform},
     ensemble::{Cell, Spec, Standing, study},
@@ -27,6 +27,8 @@ Examples:
       relaxation times of an outline, with steps of the right length
   curvelax run --curves 8 --tau 1e-4 --print-spec > spec.toml
   curvelax run spec.toml --seed 2 --out second
+  curvelax run spec.toml --shard 3/8 --resume --out shards/3
+      an eighth of the members, for curvelax merge; the same line goes on with it if it was interrupted
   curvelax run spec.toml --dry-run
 
 The keys of SPEC.toml are the names of the flags; a flag wins over the file.";
@@ -46,6 +48,10 @@ pub struct RunArgs {
     /// Write into an existing DIR, replacing the files of an earlier run
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
+    /// Go on with the run in DIR if it was interrupted, leave it if it is finished, begin it if there is none: the same line
+    /// starts a job and starts it again
+    #[arg(long, conflicts_with_all = ["force", "dry_run", "print_spec"], help_heading = flags::OUTPUT)]
+    resume: bool,
     #[command(flatten)]
     manner: MannerFlags,
     /// Print what the run will take, from a pilot of about two seconds, and stop: memory, steps, time
@@ -118,7 +124,7 @@ impl Work {
             cells[range.clone()].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
         }
         if spec.sweep.is_empty() {
-            spec = Spec { only: spec.only, ..cells[0].spec.clone() };
+            spec = Spec { only: spec.only, shard: spec.shard, ..cells[0].spec.clone() };
         } else {
             choices[0].settle_place(&mut spec);
         }
@@ -181,7 +187,7 @@ impl Work {
         }
         let (late, failed) = (report.warnings(), report.failed());
         let form = if flags.json { Form::Json } else { Form::Overview };
-        let text = report.finish(&spec, &[&early[..], &late].concat(), form).inspect_err(|_| kept(&out))?;
+        let text = report.finish(&spec, &early, form).inspect_err(|_| kept(&out))?;
         late.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
         if flags.json || !flags.quiet {
             print(&text)?;
@@ -215,7 +221,12 @@ pub fn run(args: RunArgs) -> Result<()> {
         };
     }
     let out = args.out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
-    let folder = OutputFolder::open(&out, args.force)?;
+    let begun = if args.resume { resume::begun(&out)? } else { None };
+    if let Some(begun) = begun {
+        return resume::go_on_like(begun, work.spec, flags);
+    }
+    // Without a run there is nothing to lose.
+    let folder = OutputFolder::open(&out, args.force || args.resume)?;
     let manner = flags.manner();
     let platform = work.open(&flags)?;
     let origin = Origin::new(work.spec.to_toml()?, &work.cells, platform)?;
@@ -232,7 +243,7 @@ fn kept(out: &Path) {
 fn open(company: &[Cell], choice: &Choice, flags: &MannerFlags) -> Result<(Box<dyn Backend>, Platform)> {
     flags.say(&choice.sentence(&company[0].spec));
     let curves = company.iter().map(|cell| cell.spec.member_count()).sum();
-    let whole = Spec { curves, only: None, ..company[0].spec.clone() };
+    let whole = Spec { curves, only: None, shard: None, ..company[0].spec.clone() };
     choice.open(&whole, whole.points)
 }
 

@@ -7,7 +7,7 @@ use std::{fmt, marker::PhantomData, path::Path, str::FromStr};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::sweep::Sweep;
+use super::{shard::Shard, sweep::Sweep};
 use crate::{
     curve::{Modes, Sampling, Shape},
     error::{Error, Result, did_you_mean, shortened},
@@ -171,6 +171,9 @@ pub struct Spec {
     /// Run only these members.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
     pub only: Option<Vec<u64>>,
+    /// Of these, run only this shard's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shard: Option<Shard>,
     /// Threads of the CPU back end; all cores if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threads: Option<usize>,
@@ -222,6 +225,7 @@ impl Default for Spec {
             snapshots: Vec::new(),
             store: Store::Csv,
             only: None,
+            shard: None,
             threads: None,
             common_random_numbers: false,
             sweep: Sweep::default(),
@@ -268,20 +272,45 @@ impl Spec {
 
     /// The indices of the members to run, ascending.
     pub fn members(&self) -> Box<dyn Iterator<Item = u64> + '_> {
+        let (first, count) = self.shard.map_or((0, 1), |shard| (shard.index(), shard.count()));
         match &self.only {
-            Some(only) => Box::new(only.iter().copied()),
-            None => Box::new(0..self.all_members()),
+            Some(only) => Box::new(only.iter().copied().filter(move |member| member % count == first)),
+            None => {
+                let step = usize::try_from(count).unwrap_or(usize::MAX);
+                Box::new((first..self.all_members()).step_by(step))
+            }
         }
     }
 
     /// How many members [`Spec::members`] has.
     pub fn member_count(&self) -> u64 {
-        self.only.as_ref().map_or(self.all_members(), |only| only.len() as u64)
+        match (&self.only, self.shard) {
+            (Some(only), None) => only.len() as u64,
+            (Some(_), Some(_)) => self.members().count() as u64,
+            (None, None) => self.all_members(),
+            (None, Some(shard)) => self.all_members().saturating_sub(shard.index()).div_ceil(shard.count()),
+        }
+    }
+
+    /// The place of `member` among those that would run without shards.
+    pub fn place(&self, member: u64) -> u64 {
+        self.only.as_ref().map_or(member, |only| only.partition_point(|own| *own < member) as u64)
     }
 
     /// Members of all cells, whether they are to run or not.
     pub fn all_members(&self) -> u64 {
         self.curves.saturating_mul(self.sweep.cells())
+    }
+
+    /// The first key, but for those in `but`, that another spec has with another value: its name, the value here, and the one
+    /// there.
+    pub fn difference(&self, other: &Spec, but: &[&str]) -> Option<(String, String, String)> {
+        let [here, there] = [self, other].map(|spec| toml::Table::try_from(spec).unwrap_or_default());
+        let shown = |value: Option<&toml::Value>| value.map_or("unset".into(), |value| shortened(&value.to_string(), 60));
+        let keys = here.keys().chain(there.keys().filter(|key| !here.contains_key(*key)));
+        let mut keys = keys.filter(|key| !but.contains(&key.as_str()));
+        keys.find(|key| here.get(*key) != there.get(*key))
+            .map(|key| (key.clone(), shown(here.get(key)), shown(there.get(key))))
     }
 
     /// How time is cut into steps.

@@ -50,6 +50,11 @@ impl Cell {
         Cell { index: 0, spec, family, first: 0, common: false }
     }
 
+    /// The place of a member among those of the cell that would run without shards.
+    pub fn place(&self, index: u64) -> u64 {
+        self.spec.place(index - self.first)
+    }
+
     /// The members to run: the index of each in the study.
     pub fn members(&self) -> impl Iterator<Item = u64> + '_ {
         self.spec.members().map(|member| self.first + member)
@@ -84,7 +89,7 @@ fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<C
         let below = |member: u64| only.partition_point(|m| *m < member);
         only[below(first)..below(first + spec.curves)].iter().map(|member| member - first).collect()
     });
-    let own = Spec { only: None, ..spec.sweep.apply(spec, index)? }.validate()?;
+    let own = Spec { only: None, shard: None, ..spec.sweep.apply(spec, index)? }.validate()?;
     let curve = |other: &Spec| (own.points, own.sampling) == (other.points, other.sampling) && own.shape == other.shape;
     let family = match before.iter().rfind(|cell| curve(&cell.spec)) {
         Some(other) => Family::like(&other.family, &own)?,
@@ -100,7 +105,8 @@ fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<C
     };
     // A file's own points are a number that no check has seen.
     let own = Spec { points: family.points(), ..own }.validate()?;
-    Ok(Cell { index, spec: Spec { only, ..own }, family, first, common: spec.common_random_numbers })
+    let shard = spec.shard.map(|shard| shard.from(first));
+    Ok(Cell { index, spec: Spec { only, shard, ..own }, family, first, common: spec.common_random_numbers })
 }
 
 /// All cells of `spec`, checked; one if nothing is swept.

@@ -15,7 +15,7 @@ use super::Spec;
 use crate::error::{Error, Result, did_you_mean};
 
 /// Keys that all members of a run have in common.
-const COMMON: [&str; 13] = [
+const COMMON: [&str; 14] = [
     "curves",
     "backend",
     "adapter",
@@ -25,6 +25,7 @@ const COMMON: [&str; 13] = [
     "snapshots",
     "store",
     "only",
+    "shard",
     "sweep",
     "common-random-numbers",
     "stop-when-relaxed",

@@ -41,6 +41,7 @@ impl Spec {
         self.fill_defaults();
         self.tidy_snapshots()?;
         self.tidy_only()?;
+        self.check_shard()?;
         Ok(self)
     }
 
@@ -303,6 +304,17 @@ impl Spec {
         only.sort_unstable();
         only.dedup();
         Ok(())
+    }
+
+    fn check_shard(&self) -> Result<()> {
+        match self.shard {
+            Some(shard) if self.member_count() == 0 => {
+                let members = self.only.as_ref().map_or(self.all_members(), |only| only.len() as u64);
+                let problem = format!("there are {members} members to run, and none of them falls to it");
+                Err(Error::value("shard", shard, &problem, "take fewer shards, or leave this one out"))
+            }
+            _ => Ok(()),
+        }
     }
 }
 

@@ -145,8 +145,13 @@ fn checksum(path: &Path) -> Result<u32> {
 
 /// The bytes of a state; `resident` takes the place of that in `standing`.
 pub fn to_bytes(head: &Head, standing: &Standing, resident: &BTreeMap<u64, Paused>) -> Result<Vec<u8>> {
-    let body = (env!("CARGO_PKG_VERSION"), head, standing.next, &standing.early, resident);
-    sealed(|bytes| postcard::to_extend(&body, bytes)).map_err(|e| Error::Failed(format!("cannot write {STATE}: {e}")))
+    let body = (head, standing.next, &standing.early, resident);
+    sealed_body(&body).map_err(|e| Error::Failed(format!("cannot write {STATE}: {e}")))
+}
+
+/// A file of this version of the program with this body.
+pub fn sealed_body(body: &impl Serialize) -> postcard::Result<Vec<u8>> {
+    sealed(|bytes| postcard::to_extend(&(env!("CARGO_PKG_VERSION"), body), bytes))
 }
 
 /// A file with the body that `write` appends to its beginning.
@@ -162,11 +167,11 @@ pub fn sealed<E>(write: impl FnOnce(Vec<u8>) -> Result<Vec<u8>, E>) -> Result<Ve
     Ok(bytes)
 }
 
-/// Reads a state back.
+/// The body of a [sealed](sealed_body) file.
 ///
 /// # Errors
 /// A [`Fault`] for anything but all the bytes that this version of the program wrote.
-pub fn from_bytes(bytes: &[u8]) -> Result<(Head, Standing), Fault> {
+pub fn opened(bytes: &[u8]) -> Result<&[u8], Fault> {
     let damaged = |what: &str| Err(Fault::Damaged(what.into()));
     let mut rest = bytes;
     let (Some(magic), Some(version), Some(length)) =
@@ -192,16 +197,32 @@ pub fn from_bytes(bytes: &[u8]) -> Result<(Head, Standing), Fault> {
         return Err(Fault::Foreign(message));
     }
     let own = env!("CARGO_PKG_VERSION");
-    let unreadable = |e: postcard::Error| Fault::Damaged(format!("it cannot be read ({e})"));
     let (program, body) = postcard::take_from_bytes::<&str>(&rest[..rest.len() - AFTER]).map_err(unreadable)?;
     if program != own {
         return Err(Fault::Foreign(format!("it is of curvelax {program}, and this is {own}, whose digits may differ")));
     }
-    type Body = (Head, u64, BTreeMap<u64, Ended>, BTreeMap<u64, Paused>);
-    let ((head, next, early, resident), after) = postcard::take_from_bytes::<Body>(body).map_err(unreadable)?;
-    if !after.is_empty() {
-        return damaged("there is more in it than a state");
+    Ok(body)
+}
+
+/// Reads what [`opened`] gave.
+pub fn body<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Fault> {
+    match postcard::take_from_bytes(bytes).map_err(unreadable)? {
+        (body, []) => Ok(body),
+        _ => Err(Fault::Damaged("there is more in it than a state".into())),
     }
+}
+
+fn unreadable(e: postcard::Error) -> Fault {
+    Fault::Damaged(format!("it cannot be read ({e})"))
+}
+
+/// Reads a state back.
+///
+/// # Errors
+/// As [`opened`].
+pub fn from_bytes(bytes: &[u8]) -> Result<(Head, Standing), Fault> {
+    type Body = (Head, u64, BTreeMap<u64, Ended>, BTreeMap<u64, Paused>);
+    let (head, next, early, resident): Body = body(opened(bytes)?)?;
     Ok((head, Standing { next, early, resident: Some(resident) }))
 }
 
@@ -218,7 +239,12 @@ fn take<const N: usize>(bytes: &mut &[u8]) -> Option<[u8; N]> {
 
 /// Reads the state `name` in the folder of a run.
 pub fn read(folder: &Path, name: &str) -> Result<(Head, Standing), Fault> {
-    let bytes = input::open(&folder.join(name)).and_then(|file| {
+    from_bytes(&bytes(&folder.join(name))?)
+}
+
+/// The bytes of the file at `path`, or the first of them if it is not sealed.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
+    let bytes = input::open(path).and_then(|file| {
         // No more than was there to begin with, should it grow.
         let (mut bytes, length) = (Vec::new(), file.metadata()?.len());
         let mut file = file.take(length);
@@ -229,7 +255,7 @@ pub fn read(folder: &Path, name: &str) -> Result<(Head, Standing), Fault> {
         }
         Ok(bytes)
     });
-    from_bytes(&bytes.map_err(|e| Fault::Damaged(e.to_string()))?)
+    bytes.map_err(|e| Fault::Damaged(e.to_string()))
 }
 
 /// Members on their way by the last state in `folder`, of those that have not ended in `standing`: where they are lost,

@@ -54,9 +54,13 @@ pub const MESH: &str = "plots/mesh.svg";
 /// Everything at a glance.
 pub const REPORT: &str = "report.html";
 
+/// What a merge has to know of a shard beside its tables, see [`shard`](super::shard).
+pub const SHARD: &str = "shard.state";
+
 /// All that a command may write, the file that vouches for the others first.
-const OWN: [&str; 18] = [
+const OWN: [&str; 19] = [
     RUN,
+    SHARD,
     SUMMARY,
     ENSEMBLE,
     MEAN_EXCESS,
@@ -89,7 +93,7 @@ pub const REMEDY: &str = "restore the file, or run again";
 const PLOTS: &str = "plots";
 
 /// Locked while a run writes; what counts is the lock, which ends with its process, and not the file.
-const LOCK: &str = ".curvelax.lock";
+pub(super) const LOCK: &str = ".curvelax.lock";
 
 /// From which an interrupted run goes on, see [`checkpoint`](super::checkpoint).
 pub const STATE: &str = ".curvelax.state";
@@ -343,9 +347,9 @@ impl OutputFolder {
     }
 
     /// Writes the whole file `name`, ready for [`OutputFolder::publish`].
-    pub fn write(&self, name: &str, text: &str) -> Result<PartFile> {
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<PartFile> {
         let mut file = self.file(name)?;
-        file.write_all(text.as_bytes()).map_err(Error::io("cannot write", file.target()))?;
+        file.write_all(content.as_ref()).map_err(Error::io("cannot write", file.target()))?;
         file.sync()?;
         Ok(file)
     }

@@ -26,15 +26,16 @@ pub struct Growing {
 }
 
 impl Growing {
-    /// The tables for `spec`, the store aside.
-    fn names(spec: &Spec) -> Vec<&'static str> {
+    /// Their names for `spec`, the store aside.
+    pub fn names(spec: &Spec) -> Vec<&'static str> {
         let snapshots = !spec.snapshots.is_empty() && spec.store == Store::Csv;
         let optional = [(folder::SERIES, spec.series.is_some()), (folder::SNAPSHOTS, snapshots)];
         let asked = optional.into_iter().filter(|(_, asked)| *asked).map(|(name, _)| name);
         [folder::SUMMARY, folder::RATES].into_iter().chain(asked).collect()
     }
 
-    fn has_store(spec: &Spec) -> bool {
+    /// Whether `spec` asks for the store.
+    pub fn has_store(spec: &Spec) -> bool {
         !spec.snapshots.is_empty() && spec.store == Store::Zarr
     }
 

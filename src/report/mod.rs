@@ -7,12 +7,14 @@ pub mod axis;
 pub mod chart;
 pub mod charts;
 pub mod checkpoint;
+pub mod complete;
 pub mod disk;
 pub mod document;
 pub mod ensemble;
 pub mod folder;
 pub mod gallery;
 pub mod growing;
+pub mod merge;
 pub mod overview;
 pub mod page;
 pub mod part_file;
@@ -22,6 +24,7 @@ pub mod portraits;
 pub mod progress;
 pub mod provenance;
 pub mod reader;
+pub mod shard;
 pub mod stop;
 pub mod study;
 pub mod style;
@@ -34,7 +37,7 @@ pub mod zarr;
 
 use std::{
     collections::BTreeMap,
-    path::{Path, PathBuf},
+    path::Path,
     time::{Duration, Instant},
 };
 
@@ -45,17 +48,13 @@ pub use stop::{Cause, Stop};
 use crate::{
     backend::Platform,
     ensemble::{Ended, Sink, Spec, Standing, Wish},
-    error::{Error, Result},
+    error::Result,
 };
 use checkpoint::{Head, Kept, Origin};
-use document::Document;
+use complete::Complete;
 use growing::Growing;
-use part_file::PartFile;
-use part_folder::PartFolder;
 use portraits::Film;
 use progress::{Progress, duration};
-use provenance::Provenance;
-use study::Study;
 use tally::Tally;
 use text::plural;
 
@@ -67,9 +66,6 @@ pub enum Form {
     /// One document for programs.
     Json,
 }
-
-/// How the overview names the pictures.
-const PLOTS: &str = "plots/*.svg";
 
 /// A run that is asked to stop and does not come to a place where it can ends after this time all the same.
 const PATIENCE: Duration = Duration::from_millis(2500);
@@ -93,6 +89,8 @@ pub struct Report {
     growing: Growing,
     folder: OutputFolder,
     origin: Origin,
+    /// Nodes of a member.
+    points: usize,
     tally: Tally,
     /// The first members.
     films: Vec<Film>,
@@ -119,7 +117,7 @@ impl Report {
     /// `points` is the number of nodes of a member, which matters only where all have the same.
     pub fn begin(folder: OutputFolder, spec: &Spec, points: usize, origin: Origin, manner: Manner) -> Result<Report> {
         let growing = Growing::begin(&folder, spec, points)?;
-        let mut report = Report::new(folder, growing, spec, origin, manner);
+        let mut report = Report::new(folder, growing, spec, points, origin, manner);
         match report.keep(&Standing { resident: Some(BTreeMap::new()), ..Standing::default() }) {
             Ok(()) => Ok(report),
             Err(error) => {
@@ -147,19 +145,27 @@ impl Report {
             folder.forget_last_state()?;
         }
         let tally = reader::rows(&growing.rows(), spec, aside)?;
-        let mut report = Report::new(folder, growing, spec, origin, manner);
+        let mut report = Report::new(folder, growing, spec, points, origin, manner);
         (report.tally, report.films, report.earlier, report.company) = (tally, films, wall, company);
         report.before = report.tally.members().saturating_sub(standing.next);
         report.has_begun = true;
         Ok((report, standing))
     }
 
-    fn new(folder: OutputFolder, growing: Growing, spec: &Spec, origin: Origin, manner: Manner) -> Report {
+    fn new(
+        folder: OutputFolder,
+        growing: Growing,
+        spec: &Spec,
+        points: usize,
+        origin: Origin,
+        manner: Manner,
+    ) -> Report {
         let Manner { quiet, every, stop } = manner;
         Report {
             growing,
             folder,
             origin,
+            points,
             tally: Tally::default(),
             films: Vec::new(),
             total: spec.member_count(),
@@ -217,6 +223,20 @@ impl Report {
         stays
     }
 
+    /// How far it has come, once that is on disk.
+    fn head(&mut self) -> Result<Head> {
+        let (tables, store) = self.growing.mark()?;
+        Ok(Head {
+            origin: self.origin.clone(),
+            wall: self.wall(),
+            company: self.company,
+            tables,
+            store,
+            aside: self.tally.aside(),
+            films: self.films.clone(),
+        })
+    }
+
     fn wall(&self) -> Duration {
         self.earlier.saturating_add(self.clock.elapsed())
     }
@@ -241,58 +261,26 @@ impl Report {
         self.tally.failed()
     }
 
-    /// Puts every file under its final name, once all are on disk, and returns the text for stdout.
-    ///
-    /// Where only the pictures cannot be written the tables are published all the same, with an error that says so.
-    pub fn finish(mut self, spec: &Spec, warnings: &[String], form: Form) -> Result<String> {
+    /// Puts every file under its final name, as [`Complete::publish`] does; `early` is what the user was told before.
+    pub fn finish(mut self, spec: &Spec, early: &[String], form: Form) -> Result<String> {
         // All rows are there: a run that is killed from now on draws its pictures again, and nothing else.
         let next = self.tally.members() - self.before;
         self.keep(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;
+        let shard = match spec.shard {
+            Some(_) => Some(shard::to_bytes(&self.head()?, self.points, early)?),
+            None => None,
+        };
         // In reverse order they are dropped: the folder last, after its files.
         let Report { folder, tally, films, progress, origin, clock, earlier, growing, .. } = self;
         progress.finish();
         let wall = earlier.saturating_add(clock.elapsed());
-        let platform = &origin.platform;
-        let statistics = &EnsembleStatistics::new(spec, &tally)?;
-        // The rows of the members first: where the disk fills up they are what is kept.
-        let (mut files, store) = growing.ready()?;
-        files.push(folder.write(folder::ENSEMBLE, &statistics.to_csv(spec)?)?);
-        let excess = &tally.mean_excess(spec)?;
-        files.push(tables::mean_excess(folder.file(folder::MEAN_EXCESS)?, excess)?);
-        let written = files.iter().map(PartFile::target).chain(store.iter().map(PartFolder::target));
-        let written: Vec<PathBuf> = written.map(Path::to_path_buf).collect();
-        let is_written = |name: &&str| written.contains(&folder.path().join(name));
-        let mut names: Vec<&str> = folder::TABLES.into_iter().filter(is_written).collect();
-        let provenance = &Provenance::new(spec, platform, &tally, warnings, origin.started, wall);
-        let run = folder.write(folder::RUN, &provenance.to_json()?)?;
-        let study = Study { provenance, tally: &tally, statistics, excess, films: &films };
-        let mut drawn = Vec::new();
-        let done = (|| {
-            drawn.push(folder.write(folder::PORTRAITS, &portraits::to_json(&films)?)?);
-            for (name, text) in study.pictures()? {
-                drawn.push(folder.write(name, &text)?);
-            }
-            Ok(())
-        })();
-        if done.is_err() {
-            // All but what pictures are drawn from.
-            drawn.truncate(1);
-        }
-        folder.publish(files.into_iter().chain(drawn).collect(), store, run)?;
-        done.map_err(|error: Error| {
-            let folder = folder.path().display();
-            Error::Failed(format!("{error}; the tables in {folder} are complete, some pictures are missing"))
-        })?;
+        let (files, store) = growing.ready()?;
+        let Origin { platform, started, .. } = &origin;
+        let warnings = &[early, &tally.warnings()].concat();
+        let complete = Complete { spec, platform, tally: &tally, films: &films, warnings, started: *started, wall };
+        let text = complete.publish(&folder, files, store, shard.as_deref(), form)?;
         folder.forget_states()?;
-        names.extend([folder::REPORT, PLOTS, folder::RUN]);
-        let (tally, folder, files) = (&tally, folder.path(), &names[..]);
-        match form {
-            Form::Overview => {
-                let overview = overview::Overview { spec, platform, tally, statistics, wall, folder, files };
-                Ok(overview.to_string())
-            }
-            Form::Json => Document::new(provenance, spec, statistics, folder, files).to_json(),
-        }
+        Ok(text)
     }
 }
 
@@ -328,16 +316,7 @@ impl Sink for Report {
 
     fn keep(&mut self, standing: &Standing) -> Result<()> {
         let begun = Instant::now();
-        let (tables, store) = self.growing.mark()?;
-        let head = Head {
-            origin: self.origin.clone(),
-            wall: self.wall(),
-            company: self.company,
-            tables,
-            store,
-            aside: self.tally.aside(),
-            films: self.films.clone(),
-        };
+        let head = self.head()?;
         let known;
         let resident = match &standing.resident {
             Some(resident) => resident,

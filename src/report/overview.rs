@@ -181,11 +181,17 @@ pub fn describe(spec: &Spec) -> String {
 
 /// Where it was run, in a line.
 pub fn machine(platform: &Platform) -> String {
-    let Platform { backend, adapter, precision, reason, threads, .. } = platform;
-    let adapter = adapter.as_ref().map_or(String::new(), |name| format!(" {name}"));
+    let Platform { reason, threads, .. } = platform;
     let threads = threads.map_or(String::new(), |count| format!(", {count} {}", plural(count as u64, "thread")));
+    format!("{}{threads} ({reason})", place(platform))
+}
+
+/// The same, as far as results depend on it.
+pub fn place(platform: &Platform) -> String {
+    let Platform { backend, adapter, precision, .. } = platform;
+    let adapter = adapter.as_ref().map_or(String::new(), |name| format!(" {name}"));
     let precision = format!("{precision:?}").to_lowercase();
-    format!("{backend}{adapter}, {precision}{threads} ({reason})")
+    format!("{backend}{adapter}, {precision}")
 }
 
 /// Median and mean of the times of a cell, and how far they are to be trusted.

@@ -7,7 +7,7 @@ use super::{
     },
     ensemble::{CellStatistics, EnsembleStatistics, QUANTILES},
     folder, gallery,
-    overview::{describe, machine},
+    overview::{describe, place},
     page::{Figure, Headline, MOST_MEMBERS, Page, Table, Trajectory, spread},
     portraits::Film,
     provenance::Provenance,
@@ -226,7 +226,8 @@ impl Study<'_> {
 
     /// The text of `report.html`; `gallery` is the picture of the first members.
     fn page(&self, charts: &[Chart], gallery: Option<&str>) -> Result<String> {
-        let spec = self.spec().to_toml()?;
+        // Equal results give equal bytes, on however many threads.
+        let spec = Spec { threads: None, ..self.spec().clone() }.to_toml()?;
         let first = gallery.map(|svg| {
             let title = "The first members before, on their way and after";
             let caption = "Grey: the start. Light: on the way. Colour: the last state, by status.";
@@ -368,8 +369,8 @@ impl Study<'_> {
         };
         [
             ("curvelax", self.provenance.curvelax.clone()),
-            // No clock times: equal runs give equal bytes.
-            ("ran on", machine(&self.provenance.platform)),
+            // No clock times, and nothing else that does not change a digit.
+            ("ran on", place(&self.provenance.platform)),
             ("driver", self.provenance.platform.driver.clone().unwrap_or_default()),
             ("work", work),
             ("seed", self.spec().seed.to_string()),

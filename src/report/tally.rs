@@ -58,6 +58,21 @@ pub struct Aside {
     excess: Vec<Vec<Moments>>,
 }
 
+impl Aside {
+    /// Adds what is known of other members.
+    pub fn merge(&mut self, other: &Aside) {
+        let Aside { mollified, drifted, below_rounding, excess } = other;
+        self.mollified.merge(mollified);
+        self.drifted = (self.drifted.0.saturating_add(drifted.0), self.drifted.1.max(drifted.1));
+        self.below_rounding = self.below_rounding.saturating_add(*below_rounding);
+        self.excess.resize_with(self.excess.len().max(excess.len()), Vec::new);
+        for (own, other) in self.excess.iter_mut().zip(excess) {
+            own.resize_with(own.len().max(other.len()), Moments::default);
+            own.iter_mut().zip(other).for_each(|(own, other)| own.merge(other));
+        }
+    }
+}
+
 /// A row of `mean_excess.csv`: the excess of the members of a cell that reached a time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MeanExcess {
@@ -112,6 +127,18 @@ impl MollifiedMembers {
         for (count, fault) in [&mut self.crossed, &mut self.sharp, &mut self.distorted].into_iter().zip(faults) {
             *count += u64::from(fault);
         }
+    }
+
+    /// Adds others.
+    fn merge(&mut self, other: &MollifiedMembers) {
+        let MollifiedMembers { members, most_rounds, largest_area_change, unresolved, crossed, sharp, distorted } = other;
+        self.members = self.members.saturating_add(*members);
+        self.most_rounds = self.most_rounds.max(*most_rounds);
+        self.largest_area_change = self.largest_area_change.max(*largest_area_change);
+        self.unresolved = self.unresolved.saturating_add(*unresolved);
+        self.crossed = self.crossed.saturating_add(*crossed);
+        self.sharp = self.sharp.saturating_add(*sharp);
+        self.distorted = self.distorted.saturating_add(*distorted);
     }
 
     /// What the user should know, unless all is well.

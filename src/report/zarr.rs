@@ -7,7 +7,10 @@
 //! The format: <https://zarr-specs.readthedocs.io/en/latest/v3/core/>. Metadata is consolidated as zarr-python does it,
 //! and dimension names, units and flags are those that xarray and the CF conventions know.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -78,6 +81,8 @@ struct Array {
     written: u64,
     /// CRC-32C of those.
     crc: u32,
+    /// Bytes of all elements.
+    bytes: u64,
     /// Bytes between two elements that begin a chunk whatever is in the one before, and how many of them are to come.
     run_bytes: u64,
     run_left: u64,
@@ -95,9 +100,7 @@ impl SnapshotStore {
     /// Makes the arrays for the members of `spec`, of `points` nodes each, and writes all that is known of them
     /// beforehand.
     pub fn begin(folder: PartFolder, spec: &Spec, points: usize) -> Result<SnapshotStore> {
-        // Times that agree with the final one to rounding are that one, as in `snapshots.csv`.
-        let times: Vec<f64> = outputs(spec.t_end, None, &spec.snapshots, &[]).iter().map(|output| output.t).collect();
-        SnapshotStore::of_chunks(folder, spec, points, times, CHUNK_BYTES)
+        SnapshotStore::of_chunks(folder, spec, points, times(spec), CHUNK_BYTES)
     }
 
     fn of_chunks(
@@ -107,26 +110,7 @@ impl SnapshotStore {
         times: Vec<f64>,
         bytes: usize,
     ) -> Result<SnapshotStore> {
-        let members = ("member", spec.member_count());
-        let (instants, nodes) = (("time", times.len() as u64), ("node", points as u64));
-        let vector = |name, kind, along, attributes| Array::new(name, kind, &[along], attributes, bytes);
-        let of_member = |name: &str| json!({ "long_name": name });
-        let mut member = vector("member", Kind::Int64, members, of_member("index of the member"));
-        let mut cell = vector("cell", Kind::Int64, members, of_member("index of the cell of the sweep"));
-        let time = json!({ "long_name": "time", "units": "length^4" });
-        let mut time = vector("time", Kind::Float64, instants, time);
-        let mut node = vector("node", Kind::Int64, nodes, json!({ "long_name": "number of the node along the curve" }));
-        let flags = json!({
-            "long_name": "how the member ended",
-            "flag_values": Status::ALL.map(|status| status as u32),
-            "flag_meanings": Status::ALL.map(Status::name).join(" "),
-        });
-        let status = vector(STATUS, Kind::Int8, members, flags);
-        let fields = FIELDS.map(|(name, units, what)| {
-            let attributes = json!({ "long_name": what, "units": units, "coordinates": "cell status" });
-            Array::new(name, Kind::Float64, &[members, instants, nodes], attributes, bytes)
-        });
-
+        let Arrays { mut member, mut time, mut node, mut cell, fields, status } = arrays(spec, points, &times, bytes);
         let all = fields.iter().chain([&member, &time, &node, &cell, &status]);
         let consolidated: Map<String, Value> = all.clone().map(|a| (a.name.into(), a.metadata.clone())).collect();
         let group = json!({
@@ -171,6 +155,14 @@ impl SnapshotStore {
         self.status.push(&self.folder, &[status as u8])
     }
 
+    /// Adds the next member of another store, as it is there.
+    pub fn copy(&mut self, from: &mut StoredMembers) -> Result<()> {
+        for (array, from) in self.fields.iter_mut().chain([&mut self.status]).zip(&mut from.arrays) {
+            array.push(&self.folder, from.next()?)?;
+        }
+        Ok(())
+    }
+
     /// How far it has grown, once that is on disk.
     pub fn mark(&self) -> Result<Mark> {
         self.folder.sync()?;
@@ -212,6 +204,108 @@ impl SnapshotStore {
     }
 }
 
+/// The members of a store that is complete, one after another. A chunk is opened when it is needed: any number of stores
+/// can be read side by side.
+pub struct StoredMembers {
+    /// In the order of those that grow.
+    arrays: Vec<Elements>,
+}
+
+/// The elements of an array in their order.
+struct Elements {
+    /// As it was when it grew; its `chunk` is the one that is being read.
+    array: Array,
+    path: PathBuf,
+    /// CRC-32C of all chunks.
+    crc: u32,
+    /// Bytes of a member.
+    size: usize,
+    member: Vec<u8>,
+    /// Bytes of the chunk that were taken.
+    taken: usize,
+}
+
+impl StoredMembers {
+    /// Opens the store at `path`, of the members of `spec`, of `points` nodes each.
+    ///
+    /// # Errors
+    /// [`Error::Request`] where `mark` is not that of such a store.
+    pub fn open(path: &Path, spec: &Spec, points: usize, mark: &Mark) -> Result<StoredMembers> {
+        let arrays = arrays(spec, points, &times(spec), CHUNK_BYTES);
+        let Arrays { fields, status, .. } = arrays;
+        let own: Vec<Array> = fields.into_iter().chain([status]).collect();
+        let fits = |(array, mark): (&Array, &ArrayMark)| {
+            (array.name, &array.grid) == (mark.name.as_str(), &mark.grid) && mark.written == array.grid.iter().product::<u64>()
+        };
+        if own.len() != mark.arrays.len() || !own.iter().zip(&mark.arrays).all(fits) {
+            return Err(Error::Request(format!("{}: it has not the arrays of its spec", path.display())));
+        }
+        let members = spec.member_count().max(1);
+        let elements = |(array, mark): (Array, &ArrayMark)| Elements {
+            size: (array.bytes / members) as usize,
+            path: path.join(array.name),
+            crc: mark.crc,
+            member: Vec::new(),
+            taken: 0,
+            array,
+        };
+        Ok(StoredMembers { arrays: own.into_iter().zip(&mark.arrays).map(elements).collect() })
+    }
+
+    /// That what was read is what was written.
+    ///
+    /// # Errors
+    /// [`Error::Request`] naming the array that is not.
+    pub fn check(&self) -> Result<()> {
+        match self.arrays.iter().find(|own| own.array.crc != own.crc) {
+            None => Ok(()),
+            Some(own) => Err(own.changed("their checksum is another one")),
+        }
+    }
+}
+
+impl Elements {
+    fn changed(&self, what: &str) -> Error {
+        Error::Request(format!(
+            "{}: {what}: the chunks are not those that the shard wrote; copy them again, or run the shard again",
+            self.path.display()
+        ))
+    }
+
+    /// Those of the next member.
+    fn next(&mut self) -> Result<&[u8]> {
+        self.member.clear();
+        while self.member.len() < self.size {
+            if self.taken == self.array.chunk.len() {
+                self.read()?;
+            }
+            let most = self.taken + self.size - self.member.len();
+            let now = &self.array.chunk[self.taken..most.min(self.array.chunk.len())];
+            self.member.extend_from_slice(now);
+            self.taken += now.len();
+        }
+        Ok(&self.member)
+    }
+
+    /// Reads the next chunk, and leaves of it what is in the array.
+    fn read(&mut self) -> Result<()> {
+        let Array { chunk_bytes, grid, written, run_left, run_bytes, .. } = &self.array;
+        let path = self.path.join(key(*written, grid));
+        let chunk = input::bytes(&path, *chunk_bytes as u64);
+        let mut chunk = chunk.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
+        if chunk.len() != *chunk_bytes {
+            return Err(self.changed(&format!("chunk {written} has {} bytes of {chunk_bytes}", chunk.len())));
+        }
+        let crc = crc32c::crc32c_append(self.array.crc, &chunk);
+        chunk.truncate(usize::try_from(*run_left).unwrap_or(usize::MAX));
+        let left = run_left - chunk.len() as u64;
+        (self.array.run_left, self.array.crc) = (if left == 0 { *run_bytes } else { left }, crc);
+        (self.array.chunk, self.taken) = (chunk, 0);
+        self.array.written += 1;
+        Ok(())
+    }
+}
+
 impl Array {
     /// With extents by name of the dimension, chunks of at most `bytes`, and these attributes.
     fn new(name: &'static str, kind: Kind, dimensions: &[(&str, u64)], attributes: Value, bytes: usize) -> Array {
@@ -240,6 +334,7 @@ impl Array {
             }),
             grid,
             chunk_bytes: chunk.iter().product::<u64>() as usize * size,
+            bytes: shape.iter().product::<u64>() * size as u64,
             fill: kind.fill(),
             chunk: Vec::new(),
             written: 0,
@@ -298,6 +393,46 @@ impl Array {
         self.chunk.clone_from(chunk);
         fits
     }
+}
+
+/// All of a store.
+struct Arrays {
+    member: Array,
+    time: Array,
+    node: Array,
+    cell: Array,
+    fields: [Array; FIELDS.len()],
+    status: Array,
+}
+
+/// Those of the members of `spec`, with chunks of at most `bytes`.
+fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) -> Arrays {
+    let members = ("member", spec.member_count());
+    let (instants, nodes) = (("time", times.len() as u64), ("node", points as u64));
+    let vector = |name, kind, along, attributes| Array::new(name, kind, &[along], attributes, bytes);
+    let of_member = |name: &str| json!({ "long_name": name });
+    let flags = json!({
+        "long_name": "how the member ended",
+        "flag_values": Status::ALL.map(|status| status as u32),
+        "flag_meanings": Status::ALL.map(Status::name).join(" "),
+    });
+    let time = json!({ "long_name": "time", "units": "length^4" });
+    Arrays {
+        member: vector("member", Kind::Int64, members, of_member("index of the member")),
+        time: vector("time", Kind::Float64, instants, time),
+        node: vector("node", Kind::Int64, nodes, json!({ "long_name": "number of the node along the curve" })),
+        cell: vector("cell", Kind::Int64, members, of_member("index of the cell of the sweep")),
+        fields: FIELDS.map(|(name, units, what)| {
+            let attributes = json!({ "long_name": what, "units": units, "coordinates": "cell status" });
+            Array::new(name, Kind::Float64, &[members, instants, nodes], attributes, bytes)
+        }),
+        status: vector(STATUS, Kind::Int8, members, flags),
+    }
+}
+
+/// The times of the snapshots. Times that agree with the final one to rounding are that one, as in `snapshots.csv`.
+fn times(spec: &Spec) -> Vec<f64> {
+    outputs(spec.t_end, None, &spec.snapshots, &[]).iter().map(|output| output.t).collect()
 }
 
 /// The name of a chunk: `c`, and its place in the grid.

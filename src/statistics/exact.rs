@@ -86,7 +86,7 @@ impl Moments {
 
     /// Adds the numbers of another.
     pub fn merge(&mut self, other: &Moments) {
-        self.count += other.count;
+        self.count = self.count.saturating_add(other.count);
         self.sum.merge(&other.sum);
         self.squares.merge(&other.squares);
     }

@@ -126,6 +126,14 @@ impl Gpu {
         part.is_none_or(|part| self.name().to_lowercase().contains(&part.to_lowercase()))
     }
 
+    /// The first of `found` that [matches](Gpu::matches) `asked`, or that of this number, counted from 0; and whether it was
+    /// found by its number.
+    pub fn find(mut found: Vec<Gpu>, asked: Option<&str>) -> Option<(Gpu, bool)> {
+        let number = asked.and_then(|asked| asked.trim().parse::<usize>().ok()).filter(|number| *number < found.len());
+        let place = number.or_else(|| found.iter().position(|gpu| gpu.matches(asked)))?;
+        Some((found.swap_remove(place), number.is_some()))
+    }
+
     /// `Vulkan`, `Metal` or `Dx12`.
     pub fn api(&self) -> String {
         format!("{:?}", self.info.backend)

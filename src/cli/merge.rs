@@ -1,0 +1,105 @@
+//! `curvelax merge`: shards → the files that one run of all members would have written.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use super::{flags, print};
+use crate::{
+    error::{Error, Result},
+    report::{
+        Form, OutputFolder,
+        merge::{Shards, ranges},
+        shard,
+        text::plural,
+    },
+};
+
+const EXAMPLES: &str = "\
+Examples:
+  curvelax merge shards/* --out study
+  curvelax merge shards/* --missing
+      what is not done yet, and the line that submits it to Slurm again
+
+The files are those that one run without --shard would have written, byte for byte but for the times in run.json. Shards of
+other specs, seeds, versions or back ends are refused.";
+
+/// Join the shards of a study.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct MergeArgs {
+    /// Folders of the shards, in any order
+    #[arg(value_name = "DIR", required = true)]
+    shards: Vec<PathBuf>,
+    /// Folder for the results, which must not exist yet
+    #[arg(long, value_name = "DIR", required_unless_present = "missing", help_heading = flags::OUTPUT)]
+    out: Option<PathBuf>,
+    /// Write into an existing --out DIR, replacing the files of an earlier run
+    #[arg(long, help_heading = flags::OUTPUT)]
+    force: bool,
+    /// Print the shards that are missing and the line that submits them to Slurm, and stop
+    #[arg(long, conflicts_with_all = ["out", "force", "json"], help_heading = flags::OUTPUT)]
+    missing: bool,
+    /// The job script in that line
+    #[arg(long, value_name = "FILE", default_value = "array.sh", requires = "missing", help_heading = flags::OUTPUT)]
+    script: String,
+    /// No table: only errors, and what --json asks for
+    #[arg(long, conflicts_with = "missing", help_heading = flags::OUTPUT)]
+    quiet: bool,
+    /// Print the results as one JSON document instead of the table
+    #[arg(long, help_heading = flags::OUTPUT)]
+    json: bool,
+}
+
+/// Runs the command.
+pub fn merge(args: MergeArgs) -> Result<()> {
+    let found = args.shards.iter().map(|path| shard::look(path)).collect::<Result<Vec<_>>>()?;
+    let shards = Shards::new(found)?;
+    if args.missing {
+        return print(&missing(&shards, &args.script));
+    }
+    shards.check_complete()?;
+    let out = args.out.ok_or_else(|| Error::Request("--out DIR: the results need a folder".into()))?;
+    check_place(&out, &args.shards)?;
+    let folder = OutputFolder::open(&out, args.force)?;
+    let form = if args.json { Form::Json } else { Form::Overview };
+    let text = shards.merge(&folder, form)?;
+    if args.json || !args.quiet { print(&text) } else { Ok(()) }
+}
+
+/// What is to be done, and how.
+fn missing(shards: &Shards, script: &str) -> String {
+    let (missing, count) = (shards.missing(), shards.count());
+    if missing.is_empty() {
+        return format!("all {count} {} are there\n", plural(count, "shard"));
+    }
+    let array = ranges(&missing);
+    let submit = format!("sbatch --array={array} --export=ALL,{}={count} {script}", flags::SHARDS);
+    shards.told().into_iter().chain([submit]).map(|line| line + "\n").collect()
+}
+
+/// Refuses to write the results into a shard, whose files they would replace.
+fn check_place(out: &Path, shards: &[PathBuf]) -> Result<()> {
+    let cannot = |e: io::Error| Error::Request(format!("--out {}: cannot be found ({e})", out.display()));
+    let out_is = place(out).map_err(cannot)?;
+    for shard in shards {
+        if out_is.starts_with(place(shard).map_err(cannot)?) {
+            let problem = format!("it is inside the shard {}", shard.display());
+            return Err(Error::value("out", out.display(), &problem, "name a folder beside the shards"));
+        }
+    }
+    Ok(())
+}
+
+/// Where `path` is or would be, without links.
+fn place(path: &Path) -> io::Result<PathBuf> {
+    match path.canonicalize() {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            let name = path.file_name().ok_or(e)?;
+            let above = path.parent().filter(|above| !above.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            Ok(place(above)?.join(name))
+        }
+        found => found,
+    }
+}

@@ -1,0 +1,107 @@
+//! The end of a run: statistics, pictures and provenance, and all files under their final names.
+
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use super::{
+    Form,
+    document::Document,
+    ensemble::EnsembleStatistics,
+    folder::{self, OutputFolder},
+    overview::Overview,
+    part_file::PartFile,
+    part_folder::PartFolder,
+    portraits::{self, Film},
+    provenance::Provenance,
+    study::Study,
+    tables,
+    tally::Tally,
+};
+use crate::{
+    backend::Platform,
+    ensemble::Spec,
+    error::{Error, Result},
+};
+
+/// How the overview names the pictures.
+const PLOTS: &str = "plots/*.svg";
+
+/// All members of a run, ended.
+pub struct Complete<'a> {
+    /// What was asked for, resolved.
+    pub spec: &'a Spec,
+    /// Where it was computed.
+    pub platform: &'a Platform,
+    /// What came out.
+    pub tally: &'a Tally,
+    /// The first members.
+    pub films: &'a [Film],
+    /// What the user was told, a sentence each.
+    pub warnings: &'a [String],
+    /// When it began, since 1970.
+    pub started: Duration,
+    /// How long it took.
+    pub wall: Duration,
+}
+
+impl Complete<'_> {
+    /// Puts every file under its final name, once all are on disk, and returns the text for stdout. `files` and `store` have
+    /// the members; `shard` is [what a merge needs beside them](super::shard).
+    ///
+    /// # Errors
+    /// Where only the pictures cannot be written the tables are published all the same, with an error that says so.
+    pub fn publish(
+        &self,
+        folder: &OutputFolder,
+        mut files: Vec<PartFile>,
+        store: Option<PartFolder>,
+        shard: Option<&[u8]>,
+        form: Form,
+    ) -> Result<String> {
+        let Complete { spec, platform, tally, films, warnings, started, wall } = *self;
+        let statistics = &EnsembleStatistics::new(spec, tally)?;
+        // The rows of the members are first: where the disk fills up they are what is kept.
+        files.push(folder.write(folder::ENSEMBLE, statistics.to_csv(spec)?)?);
+        let excess = &tally.mean_excess(spec)?;
+        files.push(tables::mean_excess(folder.file(folder::MEAN_EXCESS)?, excess)?);
+        if let Some(shard) = shard {
+            files.push(folder.write(folder::SHARD, shard)?);
+        }
+        let written = files.iter().map(PartFile::target).chain(store.iter().map(PartFolder::target));
+        let written: Vec<PathBuf> = written.map(Path::to_path_buf).collect();
+        let is_written = |name: &&str| written.contains(&folder.path().join(name));
+        let mut names: Vec<&str> = folder::TABLES.into_iter().filter(is_written).collect();
+        let provenance = &Provenance::new(spec, platform, tally, warnings, started, wall);
+        let run = folder.write(folder::RUN, provenance.to_json()?)?;
+        let study = Study { provenance, tally, statistics, excess, films };
+        let mut drawn = Vec::new();
+        let done = (|| {
+            drawn.push(folder.write(folder::PORTRAITS, portraits::to_json(films)?)?);
+            for (name, text) in study.pictures()? {
+                drawn.push(folder.write(name, text)?);
+            }
+            Ok(())
+        })();
+        if done.is_err() {
+            // All but what pictures are drawn from.
+            drawn.truncate(1);
+        }
+        folder.publish(files.into_iter().chain(drawn).collect(), store, run)?;
+        done.map_err(|error: Error| {
+            let folder = folder.path().display();
+            Error::Failed(format!("{error}; the tables in {folder} are complete, some pictures are missing"))
+        })?;
+        names.extend([folder::REPORT, PLOTS, folder::RUN]);
+        names.extend(shard.map(|_| folder::SHARD));
+        let (folder, files) = (folder.path(), &names[..]);
+        match form {
+            Form::Overview => {
+                let overview = Overview { spec, platform, tally, statistics, wall, folder, files };
+                Ok(overview.to_string())
+            }
+            Form::Json => Document::new(provenance, spec, statistics, folder, files).to_json(),
+        }
+    }
+}

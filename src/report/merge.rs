@@ -1,0 +1,414 @@
+//! Joins shards to the files that one run of all members would have written.
+//!
+//! Rows are copied as they are, in the order of the members, and nothing but a block of each shard is in memory; what is
+//! not in the rows is added up exactly. Statistics and pictures are then those of any run that is [`Complete`].
+
+use std::{
+    cmp::Reverse,
+    collections::{BTreeMap, BTreeSet, BinaryHeap},
+    fs::File,
+    io::{BufWriter, Read, Seek, SeekFrom, Write},
+    path::PathBuf,
+};
+
+use super::{
+    Form,
+    complete::Complete,
+    folder::{self, OutputFolder},
+    growing::Growing,
+    part_file::{Mark, PartFile},
+    part_folder::PartFolder,
+    portraits::Film,
+    reader,
+    shard::{Found, Part},
+    tally::Aside,
+    zarr::{SnapshotStore, StoredMembers},
+};
+use crate::{
+    ensemble::{Shard, Spec},
+    error::{Error, Result},
+    input::{self, LONGEST_LINE},
+};
+
+/// Bytes of all shards together that are read at once, and of one at least.
+const BLOCKS: usize = 64 << 20;
+const LEAST_BLOCK: usize = LONGEST_LINE;
+const MOST_BLOCK: usize = 1 << 20;
+
+/// Shards that are named one by one in a message.
+const NAMED: usize = 8;
+
+/// Keys that may differ from shard to shard: where and how it was computed, which the platform tells, and which shard.
+const OWN_KEYS: [&str; 4] = ["shard", "threads", "backend", "adapter"];
+
+/// Shards of one study.
+pub struct Shards {
+    /// Those that are done, by number.
+    parts: BTreeMap<u64, Part>,
+    /// What is known of the others.
+    unfinished: Vec<(Option<u64>, PathBuf, String)>,
+    /// The spec of the whole.
+    spec: Spec,
+    /// N.
+    count: u64,
+}
+
+impl Shards {
+    /// Sorts what was found.
+    ///
+    /// # Errors
+    /// [`Error::Request`] where two shards are not of one study, or one is there twice.
+    pub fn new(found: Vec<Found>) -> Result<Shards> {
+        let of = |found: &Found| match found {
+            Found::Done(part) => Some((part.path.clone(), part.spec.clone())),
+            Found::Unfinished { path, spec, .. } => Some((path.clone(), *spec.clone()?)),
+        };
+        let Some((first, own)) = found.iter().find_map(of) else {
+            let folders: Vec<String> = found.iter().map(unfinished).collect();
+            let message = format!("no folder tells of which study it is a shard: {}", listed(&folders, "; "));
+            return Err(Error::Request(message));
+        };
+        let Some(shard) = own.shard else {
+            return Err(Error::Request(format!("{}: the run there is no shard", first.display())));
+        };
+        let mut shards = Shards {
+            parts: BTreeMap::new(),
+            unfinished: Vec::new(),
+            spec: Spec { shard: None, ..own.clone() },
+            count: shard.count(),
+        };
+        let mut places: BTreeMap<u64, PathBuf> = BTreeMap::new();
+        for one in found {
+            let told = of(&one);
+            let index = match &told {
+                Some((path, spec)) => Some(same_study((path, spec), (&first, &own))?),
+                None => None,
+            };
+            match one {
+                Found::Done(part) => {
+                    if let Some(other) = places.insert(part.shard.index(), part.path.clone()) {
+                        let (one, other) = (part.path.display(), other.display());
+                        let message = format!("{one}: shard {} is there twice, also in {other}; name one", part.shard);
+                        return Err(Error::Request(message));
+                    }
+                    shards.parts.insert(part.shard.index(), *part);
+                }
+                Found::Unfinished { path, why, .. } => shards.unfinished.push((index, path, why)),
+            }
+        }
+        shards.check_places()?;
+        Ok(shards)
+    }
+
+    /// Digits are equal only where they were computed alike.
+    fn check_places(&self) -> Result<()> {
+        let mut parts = self.parts.values();
+        let Some(first) = parts.next() else { return Ok(()) };
+        for part in parts {
+            let [one, own] = [part, first].map(|part| &part.record.head.origin);
+            let differs = |what: String| {
+                let (one, own) = (part.path.display(), first.path.display());
+                Err(Error::Request(format!("{one} and {own} are not of one study: {what}; run one of them again")))
+            };
+            if !one.platform.computes_like(&own.platform) {
+                let [one, own] = [one, own].map(|origin| origin.platform.name());
+                return differs(format!("one was computed on {one} and the other on {own}, where digits differ"));
+            }
+            let sums = |of: &[(PathBuf, u32)]| of.iter().map(|(_, crc)| *crc).collect::<BTreeSet<_>>();
+            if sums(&one.outlines) != sums(&own.outlines) {
+                return differs("their outlines differ".into());
+            }
+            if part.record.points != first.record.points {
+                return differs(format!("members have {} and {} nodes", part.record.points, first.record.points));
+            }
+        }
+        Ok(())
+    }
+
+    /// How many shards the study has; those without a member do not count.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The numbers of the shards that are not done.
+    pub fn missing(&self) -> Vec<u64> {
+        let with_members: Box<dyn Iterator<Item = u64>> = match &self.spec.only {
+            Some(only) => Box::new(only.iter().map(|m| m % self.count).collect::<BTreeSet<_>>().into_iter()),
+            None => Box::new(0..self.count.min(self.spec.all_members())),
+        };
+        with_members.filter(|index| !self.parts.contains_key(index)).collect()
+    }
+
+    /// A line for each shard that is not done: its number, and what there is instead; those of which nothing is known in
+    /// one line.
+    pub fn told(&self) -> Vec<String> {
+        let missing = self.missing();
+        let line = |(index, path, why): &(Option<u64>, PathBuf, String)| match index {
+            Some(index) if !missing.contains(index) => None,
+            Some(index) => Some(format!("shard {index}/{}: {}: {why}", self.count, path.display())),
+            None => Some(format!("{}: {why}", path.display())),
+        };
+        let mut lines: Vec<String> = self.unfinished.iter().filter_map(line).collect();
+        let known: BTreeSet<u64> = self.unfinished.iter().filter_map(|(index, ..)| *index).collect();
+        let nowhere: Vec<u64> = missing.into_iter().filter(|index| !known.contains(index)).collect();
+        if !nowhere.is_empty() {
+            let shards = if nowhere.len() == 1 { "shard" } else { "shards" };
+            lines.push(format!("{shards} {} of {}: not among the folders", ranges(&nowhere), self.count));
+        }
+        lines
+    }
+
+    /// Joins them in `folder`, and returns the text for stdout.
+    ///
+    /// # Errors
+    /// [`Error::Request`] where a shard is missing or is not what it was when it was done; nothing is left in `folder` then.
+    pub fn merge(self, folder: &OutputFolder, form: Form) -> Result<String> {
+        self.check_complete()?;
+        let Shards { parts, spec, .. } = self;
+        let spec = &spec;
+        let parts: Vec<Part> = parts.into_values().collect();
+        let mut files = Vec::new();
+        for name in Growing::names(spec) {
+            files.push(join(&parts, name, folder)?);
+        }
+        let store = match Growing::has_store(spec) {
+            true => Some(join_stores(&parts, spec, folder)?),
+            false => None,
+        };
+        let (mut aside, mut films, mut warnings) = (Aside::default(), Vec::<Film>::new(), Vec::<String>::new());
+        for Part { record, .. } in &parts {
+            aside.merge(&record.head.aside);
+            films.extend(record.head.films.iter().cloned());
+            warnings.extend(record.warnings.iter().cloned());
+        }
+        films.sort_by_key(|film| film.member);
+        let mut seen = BTreeSet::new();
+        warnings.retain(|warning| seen.insert(warning.clone()));
+        let summary = files[0].part().to_path_buf();
+        let tally = reader::rows(&summary, spec, aside)?;
+        if tally.members() != spec.member_count() {
+            let (found, all) = (tally.members(), spec.member_count());
+            return Err(Error::Request(format!("the shards have {found} members, and their spec has {all}")));
+        }
+        warnings.extend(tally.warnings());
+        let heads = || parts.iter().map(|part| &part.record.head);
+        let complete = Complete {
+            spec,
+            platform: &parts[0].record.head.origin.platform,
+            tally: &tally,
+            films: &films,
+            warnings: &warnings,
+            started: heads().map(|head| head.origin.started).min().unwrap_or_default(),
+            wall: heads().fold(std::time::Duration::ZERO, |all, head| all.saturating_add(head.wall)),
+        };
+        complete.publish(folder, files, store, None, form)
+    }
+
+    /// # Errors
+    /// [`Error::Request`] naming the shards that are missing.
+    pub fn check_complete(&self) -> Result<()> {
+        let missing = self.missing();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let there = self.parts.len();
+        Err(Error::Request(format!(
+            "{there} of {} shards are done; {}; `curvelax merge --missing` prints what submits them",
+            there + missing.len(),
+            listed(&self.told(), "; ")
+        )))
+    }
+}
+
+/// The number of the shard in `one`, if it is of the same study as `own`.
+fn same_study(one: (&PathBuf, &Spec), own: (&PathBuf, &Spec)) -> Result<u64> {
+    let refuse = |what: String| {
+        let (one, own) = (one.0.display(), own.0.display());
+        Err(Error::Request(format!("{one} is of another study than {own}: {what}")))
+    };
+    let (one, own) = (one.1, own.1);
+    if let Some((key, here, there)) = one.difference(own, &OWN_KEYS) {
+        return refuse(format!("{key} is {here}, and {there} there"));
+    }
+    match (one.shard, own.shard) {
+        (Some(shard), Some(own)) if shard.count() == own.count() => Ok(shard.index()),
+        (Some(shard), Some(own)) => refuse(format!("it is shard {shard}, and there is {own}")),
+        _ => refuse("it is no shard".into()),
+    }
+}
+
+fn unfinished(found: &Found) -> String {
+    match found {
+        Found::Done(part) => part.path.display().to_string(),
+        Found::Unfinished { path, why, .. } => format!("{}: {why}", path.display()),
+    }
+}
+
+/// The first of them, and how many more.
+fn listed(lines: &[String], between: &str) -> String {
+    let mut text = lines.iter().take(NAMED).cloned().collect::<Vec<_>>().join(between);
+    if lines.len() > NAMED {
+        text += &format!("{between}and {} more", lines.len() - NAMED);
+    }
+    text
+}
+
+/// Ascending numbers as Slurm writes them: `0,3,5-9`.
+pub fn ranges(numbers: &[u64]) -> String {
+    let runs = numbers.chunk_by(|a, b| a + 1 == *b).map(|run| match run {
+        [first, .., last] => format!("{first}-{last}"),
+        one => one.iter().map(u64::to_string).collect(),
+    });
+    runs.collect::<Vec<_>>().join(",")
+}
+
+/// The rows of a table of one shard, which is opened for every block anew: any number of shards can be joined.
+struct Rows {
+    path: PathBuf,
+    shard: Shard,
+    mark: Mark,
+    /// Bytes that were read, and their CRC-32C.
+    read: Mark,
+    block: usize,
+    buffer: Vec<u8>,
+    /// Where in it the next line begins, and its length.
+    at: usize,
+    line: usize,
+}
+
+impl Rows {
+    fn new(part: &Part, name: &str, block: usize) -> Result<Rows> {
+        let path = part.path.join(name);
+        let mark = part.record.head.tables.iter().find(|mark| mark.name == name).cloned();
+        let missing = || Error::Request(format!("{}: the shard does not tell of it", path.display()));
+        let mark = mark.ok_or_else(missing)?;
+        let read = Mark { name: String::new(), length: 0, crc: 0 };
+        Ok(Rows { path, shard: part.shard, mark, read, block, buffer: Vec::new(), at: 0, line: 0 })
+    }
+
+    fn changed(&self, what: &str) -> Error {
+        Error::Request(format!(
+            "{}: {what}: it is not the file that the shard wrote; copy it again, or run the shard again",
+            self.path.display()
+        ))
+    }
+
+    /// Goes to the next line; none at the end of the file, which is then known to be what the shard wrote.
+    fn next(&mut self) -> Result<Option<&[u8]>> {
+        self.at += self.line;
+        loop {
+            if let Some(end) = self.buffer[self.at..].iter().position(|byte| *byte == b'\n') {
+                self.line = end + 1;
+                return Ok(Some(&self.buffer[self.at..self.at + self.line]));
+            }
+            if self.read.length == self.mark.length {
+                break;
+            }
+            if self.buffer.len() - self.at > LONGEST_LINE {
+                return Err(self.changed(&format!("a line of more than {LONGEST_LINE} bytes")));
+            }
+            self.fill()?;
+        }
+        self.line = 0;
+        match () {
+            _ if self.at < self.buffer.len() => Err(self.changed("its last line is cut off")),
+            _ if self.read.crc != self.mark.crc => Err(self.changed("its checksum is another one")),
+            _ => Ok(None),
+        }
+    }
+
+    fn fill(&mut self) -> Result<()> {
+        self.buffer.drain(..self.at);
+        self.at = 0;
+        let more = (self.mark.length - self.read.length).min(self.block as u64);
+        let kept = self.buffer.len();
+        let read = input::open(&self.path).and_then(|mut file: File| {
+            file.seek(SeekFrom::Start(self.read.length))?;
+            file.take(more).read_to_end(&mut self.buffer)
+        });
+        let count = read.map_err(|e| Error::Request(format!("cannot read {}: {e}", self.path.display())))?;
+        if (count as u64) < more {
+            return Err(self.changed(&format!("it ends after {} bytes", self.read.length + count as u64)));
+        }
+        self.read.length += more;
+        self.read.crc = crc32c::crc32c_append(self.read.crc, &self.buffer[kept..]);
+        Ok(())
+    }
+
+    /// The member of the next line.
+    fn member(&mut self) -> Result<Option<u64>> {
+        let shard = self.shard;
+        let member = match self.next()? {
+            None => return Ok(None),
+            Some(line) => {
+                let digits = line.split(|byte| *byte == b',').next().unwrap_or_default();
+                std::str::from_utf8(digits).ok().and_then(|text| text.parse().ok())
+            }
+        };
+        match member.filter(|member| shard.has(*member)) {
+            Some(member) => Ok(Some(member)),
+            None => Err(self.changed(&format!("a row that is of no member of shard {shard}"))),
+        }
+    }
+
+    fn line(&self) -> &[u8] {
+        &self.buffer[self.at..self.at + self.line]
+    }
+}
+
+/// The table `name` of all parts, in the order of the members.
+fn join(parts: &[Part], name: &str, folder: &OutputFolder) -> Result<PartFile> {
+    let file = folder.file(name)?;
+    let target = file.target().to_path_buf();
+    let cannot = |e| Error::io("cannot write", &target)(e);
+    let mut out = BufWriter::with_capacity(MOST_BLOCK, file);
+    let block = (BLOCKS / parts.len()).clamp(LEAST_BLOCK, MOST_BLOCK);
+    let mut all = parts.iter().map(|part| Rows::new(part, name, block)).collect::<Result<Vec<_>>>()?;
+    let mut header: Option<Vec<u8>> = None;
+    for rows in &mut all {
+        let own = rows.next()?.map(<[u8]>::to_vec);
+        match (&header, own) {
+            (None, Some(own)) => {
+                out.write_all(&own).map_err(cannot)?;
+                header = Some(own);
+            }
+            (Some(header), Some(own)) if *header == own => {}
+            _ => return Err(rows.changed("its columns are others")),
+        }
+    }
+    let mut next = BinaryHeap::new();
+    for (i, rows) in all.iter_mut().enumerate() {
+        next.extend(rows.member()?.map(|member| Reverse((member, i))));
+    }
+    while let Some(Reverse((member, i))) = next.pop() {
+        let rows = &mut all[i];
+        out.write_all(rows.line()).map_err(cannot)?;
+        match rows.member()? {
+            Some(after) if after < member => return Err(rows.changed(&format!("member {after} after {member}"))),
+            after => next.extend(after.map(|after| Reverse((after, i)))),
+        }
+    }
+    let file = out.into_inner().map_err(|e| cannot(e.into_error()))?;
+    file.sync()?;
+    Ok(file)
+}
+
+/// The arrays of all parts, in the order of the members.
+fn join_stores(parts: &[Part], spec: &Spec, folder: &OutputFolder) -> Result<PartFolder> {
+    let points = parts[0].record.points;
+    let mut stored = BTreeMap::new();
+    for part in parts {
+        let path = part.path.join(folder::STORE);
+        let missing = || Error::Request(format!("{}: the shard does not tell of it", path.display()));
+        let mark = part.record.head.store.as_ref().ok_or_else(missing)?;
+        stored.insert(part.shard.index(), StoredMembers::open(&path, &part.spec, points, mark)?);
+    }
+    let count = parts[0].shard.count();
+    let mut store = SnapshotStore::begin(folder.store(folder::STORE)?, spec, points)?;
+    for member in spec.members() {
+        let missing = || Error::Request(format!("no shard has member {member}"));
+        store.copy(stored.get_mut(&(member % count)).ok_or_else(missing)?)?;
+    }
+    stored.values().try_for_each(StoredMembers::check)?;
+    store.ready()
+}

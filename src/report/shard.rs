@@ -1,0 +1,139 @@
+//! `shard.state`: what a [merge](super::merge) has to know of a shard beside its tables.
+//!
+//! It is sealed as a [state](super::checkpoint) is, and has the length and the checksum of every table of the shard, so that
+//! one that was copied by half is known.
+
+use std::{fs::File, path::Path, path::PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    checkpoint::{self, Fault, Head},
+    folder::{LOCK, RUN, SHARD, STATE, STATE_OLD},
+};
+use crate::{
+    ensemble::{Shard, Spec},
+    error::{Error, Result},
+};
+
+/// What is in the file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// As in the last state of the run: all members have ended.
+    pub head: Head,
+    /// Nodes of a member, where all have the same.
+    pub points: usize,
+    /// What the user was told beside what follows from the results, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// A shard that is done.
+pub struct Part {
+    /// Its folder.
+    pub path: PathBuf,
+    /// Which one it is.
+    pub shard: Shard,
+    /// Its resolved spec.
+    pub spec: Spec,
+    /// The rest.
+    pub record: Record,
+}
+
+/// What the folder of a shard has.
+pub enum Found {
+    /// All of it.
+    Done(Box<Part>),
+    /// Not all, and why.
+    Unfinished {
+        /// The folder.
+        path: PathBuf,
+        /// The spec, if it tells one.
+        spec: Option<Box<Spec>>,
+        /// What there is instead, and what to do.
+        why: String,
+    },
+}
+
+/// The bytes of the file.
+pub fn to_bytes(head: &Head, points: usize, warnings: &[String]) -> Result<Vec<u8>> {
+    checkpoint::sealed_body(&(head, points, warnings))
+        .map_err(|e| Error::Failed(format!("cannot write {SHARD}: {e}")))
+}
+
+/// Reads it back.
+///
+/// # Errors
+/// A [`Fault`] for anything but all the bytes that this version of the program wrote.
+pub fn from_bytes(bytes: &[u8]) -> Result<Record, Fault> {
+    let record: Record = checkpoint::body(checkpoint::opened(bytes)?)?;
+    match record.head.films.iter().find_map(|film| Some((film.member, film.fault()?))) {
+        Some((member, fault)) => Err(Fault::Damaged(format!("the portrait of member {member} has not {fault}"))),
+        None => Ok(record),
+    }
+}
+
+/// Looks at the folder of a shard, and changes nothing there.
+///
+/// # Errors
+/// [`Error::Request`] where it is the folder of something else, or has what no shard of this program wrote.
+pub fn look(path: &Path) -> Result<Found> {
+    let refuse = |problem: String| Err(Error::Request(format!("{}: {problem}", path.display())));
+    let unfinished = |spec: Option<Spec>, why: String| {
+        Ok(Found::Unfinished { path: path.to_path_buf(), spec: spec.map(Box::new), why })
+    };
+    let there = |name: &str| {
+        let found = path.join(name).try_exists();
+        found.map_err(|e| Error::Request(format!("{}: cannot find {name} in it ({e})", path.display())))
+    };
+    if !there("")? {
+        return unfinished(None, "no such folder".into());
+    }
+    if !path.is_dir() {
+        return refuse("no folder; name that of a shard".into());
+    }
+    let states = [STATE, STATE_OLD].map(|name| checkpoint::read(path, name).ok());
+    let spec = || states.iter().flatten().next().and_then(|(head, _)| Spec::from_toml(&head.origin.spec).ok());
+    if is_running(path) {
+        return unfinished(spec(), "a run is writing here".into());
+    }
+    if there(STATE)? || there(STATE_OLD)? {
+        let resume = format!("interrupted; curvelax resume {} goes on with it", path.display());
+        return unfinished(spec(), resume);
+    }
+    if !there(SHARD)? {
+        return match there(RUN)? {
+            true => refuse(format!("the run there is no shard: it has no {SHARD}")),
+            false => unfinished(None, "no shard was finished here".into()),
+        };
+    }
+    let faulty = |what: &str, fault: &str| {
+        format!("{}: {what}: {fault}; copy the shard again, or run it again", path.display())
+    };
+    let read = checkpoint::bytes(&path.join(SHARD)).and_then(|bytes| from_bytes(&bytes));
+    let record = read.map_err(|fault| {
+        let (Fault::Foreign(what) | Fault::Damaged(what)) = fault;
+        Error::Request(faulty(SHARD, &what))
+    })?;
+    for mark in &record.head.tables {
+        let length = path.join(&mark.name).metadata().map(|of| of.len());
+        let fault = match length {
+            Ok(length) if length == mark.length => continue,
+            Ok(length) => format!("{length} bytes, and the shard wrote {}", mark.length),
+            Err(e) => format!("cannot be found ({e})"),
+        };
+        return Err(Error::Request(faulty(&mark.name, &fault)));
+    }
+    let spec = Spec::from_toml(&record.head.origin.spec).map_err(|e| e.to_string());
+    let spec = spec.and_then(|spec| spec.validate().map_err(|e| e.to_string()));
+    match spec.map(|spec| (spec.shard, spec)) {
+        Ok((Some(shard), spec)) => Ok(Found::Done(Box::new(Part { path: path.to_path_buf(), shard, spec, record }))),
+        Ok((None, _)) => refuse(faulty(SHARD, "its spec is not of a shard")),
+        Err(e) => refuse(faulty(SHARD, &format!("its spec: {e}"))),
+    }
+}
+
+/// Whether a run holds the lock of the folder.
+fn is_running(path: &Path) -> bool {
+    let lock = File::open(path.join(LOCK));
+    lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(std::fs::TryLockError::WouldBlock)))
+}
