@@ -3,7 +3,11 @@
 //! It is sealed as a [state](super::checkpoint) is, and has the length and the checksum of every table of the shard, so that
 //! one that was copied by half is known.
 
-use std::{fs::File, path::Path, path::PathBuf};
+use std::{
+    fs::{File, TryLockError},
+    io,
+    path::{Path, PathBuf},
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -56,8 +60,7 @@ pub enum Found {
 
 /// The bytes of the file.
 pub fn to_bytes(head: &Head, points: usize, warnings: &[String]) -> Result<Vec<u8>> {
-    checkpoint::sealed_body(&(head, points, warnings))
-        .map_err(|e| Error::Failed(format!("cannot write {SHARD}: {e}")))
+    checkpoint::sealed_body(&(head, points, warnings)).map_err(|e| Error::Failed(format!("cannot write {SHARD}: {e}")))
 }
 
 /// Reads it back.
@@ -85,11 +88,11 @@ pub fn look(path: &Path) -> Result<Found> {
         let found = path.join(name).try_exists();
         found.map_err(|e| Error::Request(format!("{}: cannot find {name} in it ({e})", path.display())))
     };
-    if !there("")? {
-        return unfinished(None, "no such folder".into());
-    }
-    if !path.is_dir() {
-        return refuse("no folder; name that of a shard".into());
+    match path.metadata() {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return unfinished(None, "no such folder".into()),
+        Err(e) => return refuse(format!("cannot be found ({e})")),
+        Ok(of) if !of.is_dir() => return refuse("no folder; name that of a shard".into()),
+        Ok(_) => {}
     }
     let states = [STATE, STATE_OLD].map(|name| checkpoint::read(path, name).ok());
     let spec = || states.iter().flatten().next().and_then(|(head, _)| Spec::from_toml(&head.origin.spec).ok());
@@ -106,8 +109,8 @@ pub fn look(path: &Path) -> Result<Found> {
             false => unfinished(None, "no shard was finished here".into()),
         };
     }
-    let faulty = |what: &str, fault: &str| {
-        format!("{}: {what}: {fault}; copy the shard again, or run it again", path.display())
+    let faulty = |name: &str, fault: &str| {
+        format!("{}: {fault}; copy the shard again, or run it again", path.join(name).display())
     };
     let read = checkpoint::bytes(&path.join(SHARD)).and_then(|bytes| from_bytes(&bytes));
     let record = read.map_err(|fault| {
@@ -127,13 +130,13 @@ pub fn look(path: &Path) -> Result<Found> {
     let spec = spec.and_then(|spec| spec.validate().map_err(|e| e.to_string()));
     match spec.map(|spec| (spec.shard, spec)) {
         Ok((Some(shard), spec)) => Ok(Found::Done(Box::new(Part { path: path.to_path_buf(), shard, spec, record }))),
-        Ok((None, _)) => refuse(faulty(SHARD, "its spec is not of a shard")),
-        Err(e) => refuse(faulty(SHARD, &format!("its spec: {e}"))),
+        Ok((None, _)) => Err(Error::Request(faulty(SHARD, "its spec is not of a shard"))),
+        Err(e) => Err(Error::Request(faulty(SHARD, &format!("its spec: {e}")))),
     }
 }
 
 /// Whether a run holds the lock of the folder.
 fn is_running(path: &Path) -> bool {
     let lock = File::open(path.join(LOCK));
-    lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(std::fs::TryLockError::WouldBlock)))
+    lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }

@@ -131,7 +131,8 @@ impl MollifiedMembers {
 
     /// Adds others.
     fn merge(&mut self, other: &MollifiedMembers) {
-        let MollifiedMembers { members, most_rounds, largest_area_change, unresolved, crossed, sharp, distorted } = other;
+        let MollifiedMembers { members, most_rounds, largest_area_change, unresolved, crossed, sharp, distorted } =
+            other;
         self.members = self.members.saturating_add(*members);
         self.most_rounds = self.most_rounds.max(*most_rounds);
         self.largest_area_change = self.largest_area_change.max(*largest_area_change);

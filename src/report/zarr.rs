@@ -235,7 +235,8 @@ impl StoredMembers {
         let Arrays { fields, status, .. } = arrays;
         let own: Vec<Array> = fields.into_iter().chain([status]).collect();
         let fits = |(array, mark): (&Array, &ArrayMark)| {
-            (array.name, &array.grid) == (mark.name.as_str(), &mark.grid) && mark.written == array.grid.iter().product::<u64>()
+            (array.name, &array.grid) == (mark.name.as_str(), &mark.grid)
+                && mark.written == array.grid.iter().product::<u64>()
         };
         if own.len() != mark.arrays.len() || !own.iter().zip(&mark.arrays).all(fits) {
             return Err(Error::Request(format!("{}: it has not the arrays of its spec", path.display())));

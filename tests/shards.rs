@@ -1,0 +1,397 @@
+//! Shards and their merge, as a user meets them: the very files of one run, and what is refused.
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    path::Path,
+    process::{Command, Output},
+};
+
+use curvelax::{
+    backend::gpu::Gpu,
+    report::{checkpoint, shard},
+};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Cells that cost unequally, all files, members that end in several ways.
+const STUDY: &str = "--backend cpu --curves 9 --points 34 --sweep shape=ellipse:2,1;lemniscate:1;circle:1 --adaptive=1e-3 \
+                     --stop-when-relaxed --t-end 0.4 --series 0.05 --snapshots 0,0.1,0.4";
+/// A study that takes no time, with 12 members.
+const SMALL: &str = "--backend cpu --curves 12 --points 34 --tau 1e-3 --t-end 0.01 --solver direct";
+
+fn program(home: &Path, arguments: &str) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
+    command.args(arguments.split_whitespace()).current_dir(home).env("XDG_RUNTIME_DIR", home);
+    for name in ["SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "CURVELAX_SHARDS"] {
+        command.env_remove(name);
+    }
+    command
+}
+
+fn curvelax(home: &Path, arguments: &str) -> Output {
+    program(home, arguments).output().unwrap()
+}
+
+/// What it said on stderr, if it ended with this code.
+#[track_caller]
+fn said(output: &Output, code: i32) -> String {
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    said
+}
+
+#[track_caller]
+fn done(home: &Path, arguments: &str) {
+    said(&curvelax(home, &format!("{arguments} --quiet")), 0);
+}
+
+/// All files below a folder, by name.
+fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let (path, name) = entry.map(|entry| (entry.path(), entry.file_name().into_string().unwrap())).unwrap();
+        match path.is_dir() {
+            true => all.extend(content(&path).into_iter().map(|(below, bytes)| (format!("{name}/{below}"), bytes))),
+            false => drop(all.insert(name, fs::read(&path).unwrap())),
+        }
+    }
+    all
+}
+
+/// `run.json` without what may differ: when it ran, how long it took, and on how many threads.
+fn lasting(run: &[u8]) -> Value {
+    let mut run: Value = serde_json::from_slice(run).unwrap();
+    for key in ["started", "wall_seconds"] {
+        run.as_object_mut().unwrap().remove(key).unwrap();
+    }
+    for part in ["spec", "platform"] {
+        run[part].as_object_mut().unwrap().remove("threads");
+    }
+    run
+}
+
+/// The names of the files in which two runs differ.
+fn differences(one: &Path, other: &Path) -> Vec<String> {
+    let [mut one, mut other] = [one, other].map(content);
+    let [own, others] = [&mut one, &mut other].map(|run| lasting(&run.remove("run.json").unwrap()));
+    let names = one.keys().chain(other.keys().filter(|name| !one.contains_key(*name)));
+    let mut differing: Vec<String> = names.filter(|name| one.get(*name) != other.get(*name)).cloned().collect();
+    differing.extend((own != others).then(|| "run.json".to_string()));
+    differing
+}
+
+/// Runs `study` in `count` shards and joins them to `out`.
+fn sharded(home: &Path, study: &str, count: u64, out: &str) {
+    for index in 0..count {
+        // On other numbers of threads members are advanced in other batches.
+        let threads = 1 + index % 3;
+        done(home, &format!("run {study} --shard {index}/{count} --threads {threads} --out {out}-{count}/{index}"));
+    }
+    let shards: Vec<String> = (0..count).rev().map(|index| format!("{out}-{count}/{index}")).collect();
+    done(home, &format!("merge {} --out {out}", shards.join(" ")));
+}
+
+#[test]
+fn merged_shards_are_the_files_of_one_run() {
+    let home = TempDir::new().unwrap();
+    for store in ["csv", "zarr"] {
+        // A store needs one number of nodes, and has chunks of many members.
+        let study = format!("{STUDY} --store {store}");
+        done(home.path(), &format!("run {study} --out {store}"));
+        let one = home.path().join(store);
+        for count in [1, 3, 8, 27] {
+            let out = format!("{store}-merged-{count}");
+            sharded(home.path(), &study, count, &out);
+            assert_eq!(differences(&one, &home.path().join(&out)), [""; 0], "{count} shards, {store}");
+        }
+        // A byte that differs is seen, in whatever file, and a number in run.json too.
+        let merged = home.path().join(format!("{store}-merged-3"));
+        for name in content(&merged).keys() {
+            let path = merged.join(name);
+            let text = fs::read(&path).unwrap();
+            let mut changed = text.clone();
+            match name.as_str() {
+                "run.json" => {
+                    changed = String::from_utf8(text.clone()).unwrap().replace("\"seed\": 1", "\"seed\": 2").into()
+                }
+                _ => changed[text.len() / 2] ^= 1,
+            }
+            fs::write(&path, &changed).unwrap();
+            assert_eq!(differences(&one, &merged), [name.clone()]);
+            fs::write(&path, text).unwrap();
+        }
+    }
+}
+
+#[test]
+fn more_shards_than_files_may_be_open_are_joined() {
+    let home = TempDir::new().unwrap();
+    let study =
+        "--backend cpu --curves 80 --points 34 --tau 1e-3 --t-end 0.001 --solver direct --snapshots 0 --store zarr";
+    done(home.path(), &format!("run {study} --out one"));
+    sharded(home.path(), study, 80, "all");
+    fs::remove_dir_all(home.path().join("all")).unwrap();
+    let merge = format!("ulimit -n 40; exec {} merge all-80/* --out all --quiet", env!("CARGO_BIN_EXE_curvelax"));
+    let output = Command::new("bash").args(["-c", &merge]).current_dir(home.path()).output().unwrap();
+    assert_eq!(said(&output, 0), "");
+    assert_eq!(differences(&home.path().join("one"), &home.path().join("all")), [""; 0]);
+}
+
+#[test]
+fn merged_shards_of_a_gpu_are_the_files_of_one_run() {
+    if Gpu::list().is_empty() {
+        assert!(std::env::var("ALLOW_NO_GPU").is_ok(), "no GPU; ALLOW_NO_GPU=1 leaves this out");
+        return;
+    }
+    let home = TempDir::new().unwrap();
+    let study =
+        "--backend gpu --precision f32 --curves 10 --points 34 --adaptive=1e-2 --stop-when-relaxed --series 0.1";
+    done(home.path(), &format!("run {study} --out one"));
+    sharded(home.path(), study, 3, "merged");
+    assert_eq!(differences(&home.path().join("one"), &home.path().join("merged")), [""; 0]);
+    // The CPU computes other digits in this precision.
+    let other = study.replace("gpu", "cpu");
+    done(home.path(), &format!("run {other} --shard 1/3 --out other"));
+    let words = ["not of one study", "one was computed on cpu and the other on gpu"];
+    refused(home.path(), "merge merged-3/0 other merged-3/2 --out no", &words);
+}
+
+#[test]
+fn some_members_are_sharded_by_their_numbers() {
+    let home = TempDir::new().unwrap();
+    let study = format!("{SMALL} --only 1,3,4,10");
+    done(home.path(), &format!("run {study} --out one"));
+    for index in [0, 1, 3] {
+        done(
+            home.path(),
+            &format!("run {study} --shard {index}/4 --out s/{index}").replace("0/4", "2/4").replace("s/0", "s/2"),
+        );
+    }
+    refused(
+        home.path(),
+        &format!("run {SMALL} --shard 0/5 --only 1,3 --out no"),
+        &[
+            "--shard 0/5: there are 2 members to run, and none of them falls to it",
+            "take fewer shards, or leave this one out",
+        ],
+    );
+    // 0/4 has member 4, and 2/4 has 10.
+    refused(
+        home.path(),
+        "merge s/1 s/2 s/3 --out no",
+        &["3 of 4 shards are done", "shard 0 of 4: not among the folders"],
+    );
+    done(home.path(), &format!("run {study} --shard 0/4 --out s/0"));
+    done(home.path(), "merge s/0 s/1 s/2 s/3 --out merged");
+    assert_eq!(differences(&home.path().join("one"), &home.path().join("merged")), [""; 0]);
+}
+
+/// A command that ends with 2 and these words in its last line, and makes no folder `no`.
+#[track_caller]
+fn refused(home: &Path, arguments: &str, words: &[&str]) {
+    let message = said(&curvelax(home, arguments), 2);
+    let line = message.lines().last().unwrap_or_default();
+    assert!(words.iter().all(|word| line.contains(word)), "{arguments}: {message}");
+    assert!(!home.join("no").exists(), "{arguments}: something was written");
+}
+
+/// The three shards of [`SMALL`] in `s/0`, `s/1`, `s/2`.
+fn three() -> TempDir {
+    let home = TempDir::new().unwrap();
+    (0..3).for_each(|index| done(home.path(), &format!("run {SMALL} --shard {index}/3 --out s/{index}")));
+    home
+}
+
+const MERGE: &str = "merge s/0 s/1 s/2 --out no";
+
+#[test]
+fn what_are_not_the_shards_of_one_study_is_refused_by_name() {
+    let home = three();
+    let path = home.path();
+    let before = content(&path.join("s"));
+    done(path, &format!("run {SMALL} --out whole"));
+    done(path, &format!("run {SMALL} --seed 2 --shard 1/3 --out seed"));
+    done(path, &format!("run {SMALL} --shard 1/4 --out quarter"));
+    done(path, &format!("run {SMALL} --precision f32 --shard 1/3 --out f32"));
+    fs::create_dir(path.join("empty")).unwrap();
+    for (arguments, words) in [
+        ("s/0 s/2", &["2 of 3 shards are done", "shard 1 of 3: not among the folders", "--missing"][..]),
+        ("s/1", &["1 of 3 shards are done", "shards 0,2 of 3: not among the folders"]),
+        ("s/0 s/1 s/2 s/1", &["s/1: shard 1/3 is there twice, also in s/1; name one"]),
+        ("s/0 s/2 seed", &["seed is of another study than s/0: seed is 2, and 1 there"]),
+        ("s/0 s/2 quarter", &["quarter is of another study than s/0: it is shard 1/4, and there is 0/3"]),
+        ("s/0 s/2 f32", &["f32 is of another study than s/0: precision is \"f32\", and \"f64\" there"]),
+        ("s/0 s/1 s/2 whole", &["whole: the run there is no shard: it has no shard.state"]),
+        ("s/0 s/1 nowhere", &["nowhere: no such folder", "shard 2 of 3"]),
+        ("s/0 s/1 empty", &["empty: no shard was finished here"]),
+        (
+            "empty nowhere",
+            &["no folder tells of which study it is a shard: empty: no shard was", "nowhere: no such folder"],
+        ),
+        ("s/0 s/1 s/2/summary.csv", &["s/2/summary.csv: no folder; name that of a shard"]),
+    ] {
+        refused(path, &format!("merge {arguments} --out no"), words);
+    }
+    for out in ["s/1", "s/1/deeper", "s/../s/1/plots/x"] {
+        refused(path, &format!("merge s/0 s/1 s/2 --force --out {out}"), &["--out", "it is inside the shard s/1"]);
+    }
+    refused(path, "merge s/0 s/1 s/2 --out whole", &["--out whole: already exists"]);
+    assert!(content(&path.join("s")) == before);
+    done(path, MERGE);
+    assert_eq!(differences(&path.join("whole"), &path.join("no")), [""; 0]);
+}
+
+#[test]
+fn shards_that_are_not_what_they_were_are_refused_by_name() {
+    let home = three();
+    let path = home.path();
+    let copies = |name: &str| fs::read(path.join(name)).unwrap();
+    let spoil = |name: &str, bytes: &[u8], words: &[&str]| {
+        let whole = copies(name);
+        fs::write(path.join(name), bytes).unwrap();
+        refused(path, MERGE, &[&[name][..], words].concat());
+        fs::write(path.join(name), whole).unwrap();
+    };
+    let summary = copies("s/1/summary.csv");
+    let mut other = summary.clone();
+    other[summary.len() - 2] ^= 1;
+    spoil("s/1/summary.csv", &summary[..summary.len() - 9], &["bytes, and the shard wrote", "copy the shard again"]);
+    spoil("s/1/summary.csv", &other, &["its checksum is another one", "copy it again"]);
+    let text = String::from_utf8(summary.clone()).unwrap();
+    let (member, cut) = (text.replacen("\n4,", "\n5,", 1), text.replace('\n', "x"));
+    spoil("s/1/summary.csv", member.as_bytes(), &["a row that is of no member of shard 1/3"]);
+    spoil("s/1/summary.csv", cut.as_bytes(), &["its last line is cut off"]);
+    spoil("s/1/summary.csv", text.replacen("member", "mumber", 1).as_bytes(), &["its columns are others"]);
+    let state = copies("s/2/shard.state");
+    spoil("s/2/shard.state", &state[..state.len() / 2], &["bytes where"]);
+    let mut bit = state.clone();
+    bit[state.len() / 2] ^= 4;
+    spoil("s/2/shard.state", &bit, &["its checksum is wrong"]);
+    fs::rename(path.join("s/1/rates.csv"), path.join("rates")).unwrap();
+    refused(path, MERGE, &["s/1/rates.csv: cannot be found"]);
+    fs::rename(path.join("rates"), path.join("s/1/rates.csv")).unwrap();
+
+    // Whole, but of another program, or from elsewhere.
+    let record = shard::from_bytes(&state).unwrap();
+    let older = checkpoint::sealed(|bytes| postcard::to_extend(&("0.0.1", &record), bytes)).unwrap();
+    spoil("s/2/shard.state", &older, &["it is of curvelax 0.0.1, and this is"]);
+    let mut elsewhere = record.clone();
+    elsewhere.head.origin.platform.driver = Some("another".into());
+    let elsewhere = shard::to_bytes(&elsewhere.head, elsewhere.points, &elsewhere.warnings).unwrap();
+    fs::write(path.join("s/2/shard.state"), elsewhere).unwrap();
+    refused(path, MERGE, &["s/2 and s/0 are not of one study: one was computed on cpu another and the other on cpu"]);
+    fs::write(path.join("s/2/shard.state"), state).unwrap();
+
+    // One that runs now, and one that was interrupted.
+    let lock = File::create(path.join("s/0/.curvelax.lock")).unwrap();
+    lock.lock().unwrap();
+    refused(path, MERGE, &["2 of 3 shards are done", "s/0: a run is writing here"]);
+    drop(lock);
+    fs::remove_file(path.join("s/0/.curvelax.lock")).unwrap();
+    let long = SMALL.replace("1e-3", "1e-9").replace("0.01", "1");
+    said(&curvelax(path, &format!("run {long} --shard 2/3 --max-time 1s --out long")), 75);
+    refused(path, "merge long --out no", &["shard 2/3: long: interrupted; curvelax resume long goes on with it"]);
+    done(path, MERGE);
+}
+
+#[test]
+fn what_is_missing_is_printed_with_the_line_that_submits_it() {
+    let home = TempDir::new().unwrap();
+    for index in [0, 2, 3, 9] {
+        done(home.path(), &format!("run {SMALL} --shard {index}/12 --out s/{index}"));
+    }
+    let long = SMALL.replace("1e-3", "1e-9");
+    said(&curvelax(home.path(), &format!("run {long} --shard 5/12 --max-time 1s --out s/5")), 75);
+    let printed = |arguments: &str| {
+        let output = curvelax(home.path(), arguments);
+        assert_eq!(said(&output, 0), "");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let (five, all) = ("s/5", "s/0 s/2 s/3 s/9");
+    let submit = "sbatch --array=1,4-8,10-11 --export=ALL,CURVELAX_SHARDS=12";
+    let folders = "shards 1,4-8,10-11 of 12: not among the folders";
+    assert_eq!(printed(&format!("merge --missing {all}")), format!("{folders}\n{submit} array.sh\n"));
+    assert_eq!(printed(&format!("merge --missing --script job {all}")), format!("{folders}\n{submit} job\n"));
+    // What was interrupted says which one it is.
+    let words = "s/5 is of another study than s/0: tau is 0.000000001, and 0.001 there";
+    refused(home.path(), &format!("merge --missing {all} {five}"), &[words]);
+    let lines = printed(&format!("merge --missing {five}"));
+    assert!(lines.starts_with("shard 5/12: s/5: interrupted; curvelax resume s/5 goes on with it\n"), "{lines}");
+    for index in [1, 4, 5, 6, 7, 8, 10, 11] {
+        done(home.path(), &format!("run {SMALL} --shard {index}/12 --out t/{index}"));
+    }
+    assert_eq!(
+        printed(&format!("merge --missing {all} t/1 t/4 t/5 t/6 t/7 t/8 t/10 t/11")),
+        "all 12 shards are there\n"
+    );
+}
+
+#[test]
+fn a_task_of_a_job_array_knows_its_shard() {
+    let home = TempDir::new().unwrap();
+    let run = |variables: &[(&str, &str)]| {
+        let mut command = program(home.path(), &format!("run {SMALL} --shard slurm --print-spec"));
+        let output = command.envs(variables.iter().copied()).output().unwrap();
+        let text = [output.stdout, output.stderr].concat();
+        (output.status.code(), String::from_utf8(text).unwrap())
+    };
+    let array = |id, count, first, last| {
+        let names = ["SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "SLURM_ARRAY_TASK_MIN", "SLURM_ARRAY_TASK_MAX"];
+        names.into_iter().zip([id, count, first, last]).collect::<Vec<_>>()
+    };
+    let (code, text) = run(&array("3", "8", "0", "7"));
+    assert!(code == Some(0) && text.contains("shard = \"3/8\""), "{text}");
+    // Some of them again.
+    let (code, text) = run(&[&array("5", "2", "3", "5")[..], &[("CURVELAX_SHARDS", "8")]].concat());
+    assert!(code == Some(0) && text.contains("shard = \"5/8\""), "{text}");
+    for (variables, told) in [
+        (array("5", "2", "3", "5"), "the array has 2 tasks from 3 to 5, and shards count from 0 to N - 1"),
+        (array("8", "8", "1", "8"), "take --array=0-7, or export CURVELAX_SHARDS=N"),
+        (Vec::new(), "no SLURM_ARRAY_TASK_ID: this is no task of a Slurm job array"),
+        (vec![("SLURM_ARRAY_TASK_ID", "8"), ("CURVELAX_SHARDS", "8")], "take I from 0 to 7"),
+        (vec![("SLURM_ARRAY_TASK_ID", "8"), ("CURVELAX_SHARDS", "many")], "CURVELAX_SHARDS=many is no whole number"),
+    ] {
+        let (code, text) = run(&variables);
+        assert!(code == Some(2) && text.contains(told), "{text}");
+    }
+    for (shard, told) in [("3/3", "take I from 0 to 2"), ("0/0", "N from 1"), ("-1/3", "write I/N"), ("1", "write I/N")]
+    {
+        refused(home.path(), &format!("run {SMALL} --out no --shard {shard}"), &[]);
+        let message = said(&curvelax(home.path(), &format!("run {SMALL} --out no --shard {shard}")), 2);
+        assert!(message.contains(told), "{message}");
+    }
+    fs::write(home.path().join("spec.toml"), "shard = '4/4'\n").unwrap();
+    let message = said(&curvelax(home.path(), "run spec.toml --out no"), 2);
+    assert!(message.contains("take I from 0 to 3") && message.contains("shard = '4/4'"), "{message}");
+}
+
+#[test]
+fn one_line_begins_a_run_goes_on_with_it_and_leaves_it() {
+    let home = TempDir::new().unwrap();
+    // Four million steps, some 13 s.
+    let long = SMALL.replace("1e-3", "2.5e-7").replace("0.01", "1");
+    let line = format!("run {long} --only 1,3 --resume --out out");
+    said(&curvelax(home.path(), &format!("{line} --max-time 1s")), 75);
+    // An orphan of this job still runs.
+    let lock = File::create(home.path().join("out/.curvelax.lock")).unwrap();
+    lock.lock().unwrap();
+    refused(home.path(), &line, &["out: a run is writing here"]);
+    drop(lock);
+    refused(
+        home.path(),
+        &format!("{line} --seed 2"),
+        &["--resume: the run in out is of another spec: seed is 1 there, and 2 here"],
+    );
+    let message = said(&curvelax(home.path(), &format!("{line} --max-time 1s")), 75);
+    assert!(message.contains("resuming: 0 of 2 members are in the table"), "{message}");
+    let short = format!("run {SMALL} --resume --out short");
+    // A folder in which nothing was begun is no obstacle.
+    fs::create_dir(home.path().join("short")).unwrap();
+    said(&curvelax(home.path(), &short), 0);
+    let before = content(&home.path().join("short"));
+    let message = said(&curvelax(home.path(), &short), 0);
+    assert!(message.ends_with("note: the run in short is finished: nothing is left to do\n"), "{message}");
+    refused(home.path(), &short.replace("1e-3", "2e-3"), &["tau is 0.001 there, and 0.002 here"]);
+    assert!(content(&home.path().join("short")) == before);
+}
