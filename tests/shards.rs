@@ -145,13 +145,13 @@ fn merged_shards_of_a_gpu_are_the_files_of_one_run() {
         return;
     }
     let home = TempDir::new().unwrap();
-    let study =
-        "--backend gpu --precision f32 --curves 10 --points 34 --adaptive=1e-2 --stop-when-relaxed --series 0.1";
+    // By its number, as one of several of one name is told apart.
+    let study = "--backend gpu --adapter 0 --precision f32 --curves 10 --points 34 --adaptive=1e-2 --stop-when-relaxed --series 0.1";
     done(home.path(), &format!("run {study} --out one"));
     sharded(home.path(), study, 3, "merged");
     assert_eq!(differences(&home.path().join("one"), &home.path().join("merged")), [""; 0]);
     // The CPU computes other digits in this precision.
-    let other = study.replace("gpu", "cpu");
+    let other = study.replace("gpu --adapter 0", "cpu");
     done(home.path(), &format!("run {other} --shard 1/3 --out other"));
     let words = ["not of one study", "one was computed on cpu and the other on gpu"];
     refused(home.path(), "merge merged-3/0 other merged-3/2 --out no", &words);

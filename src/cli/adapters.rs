@@ -72,7 +72,7 @@ pub fn adapters(args: AdaptersArgs) -> Result<()> {
     if args.json {
         return print_json(&Listing { curvelax: env!("CARGO_PKG_VERSION"), adapters, auto });
     }
-    let mut text: String = adapters.iter().map(Adapter::describe).collect();
+    let mut text: String = adapters.iter().enumerate().map(|(number, adapter)| adapter.describe(number)).collect();
     if adapters.is_empty() {
         text += "no GPU adapter; Debian's software GPU is the package mesa-vulkan-drivers\n";
     }
@@ -97,7 +97,7 @@ impl Adapter {
         }
     }
 
-    fn describe(&self) -> String {
+    fn describe(&self, number: usize) -> String {
         let kind = if self.hardware { "hardware" } else { "software" };
         let f64_points = self.max_points_f64.map_or(String::new(), |most| format!(", {most} in f64"));
         let rows = [
@@ -115,6 +115,6 @@ impl Adapter {
             ("binding", format!("{} bytes", self.binding_bytes)),
         ];
         let rows: String = rows.iter().map(|(label, value)| format!("  {label:<12}{value}\n")).collect();
-        format!("{}\n{rows}", self.name)
+        format!("{number}  {}\n{rows}", self.name)
     }
 }

@@ -176,7 +176,7 @@ pub struct SpecFlags {
     /// Where to run; auto takes a hardware GPU, else the CPU [default: auto]
     #[arg(long, value_name = "WHERE", value_parser = word::<BackendChoice>(BACKENDS), help_heading = MACHINE)]
     backend: Option<BackendChoice>,
-    /// Part of the name of the GPU adapter to take [default: the best]
+    /// Part of the name of the GPU adapter to take, or its number in `curvelax adapters` [default: the best]
     #[arg(long, value_name = "NAME", help_heading = MACHINE)]
     adapter: Option<String>,
     /// Number type [default: f64 where the device has it]

@@ -8,7 +8,8 @@ use std::{
     collections::{BTreeMap, BTreeSet, BinaryHeap},
     fs::File,
     io::{BufWriter, Read, Seek, SeekFrom, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
+    time::Duration,
 };
 
 use super::{
@@ -199,7 +200,7 @@ impl Shards {
             films: &films,
             warnings: &warnings,
             started: heads().map(|head| head.origin.started).min().unwrap_or_default(),
-            wall: heads().fold(std::time::Duration::ZERO, |all, head| all.saturating_add(head.wall)),
+            wall: heads().fold(Duration::ZERO, |all, head| all.saturating_add(head.wall)),
         };
         complete.publish(folder, files, store, None, form)
     }
@@ -360,9 +361,20 @@ impl Rows {
 fn join(parts: &[Part], name: &str, folder: &OutputFolder) -> Result<PartFile> {
     let file = folder.file(name)?;
     let target = file.target().to_path_buf();
-    let cannot = |e| Error::io("cannot write", &target)(e);
     let mut out = BufWriter::with_capacity(MOST_BLOCK, file);
-    let block = (BLOCKS / parts.len()).clamp(LEAST_BLOCK, MOST_BLOCK);
+    join_rows(parts, name, &mut out, &target)?;
+    let file = out.into_inner().map_err(|e| Error::io("cannot write", &target)(e.into_error()))?;
+    file.sync()?;
+    Ok(file)
+}
+
+/// Writes the table `name` of all parts, in the order of the members, to `out`, which is called `target`.
+///
+/// # Errors
+/// [`Error::Request`] naming a file that is not what its shard wrote.
+pub fn join_rows(parts: &[Part], name: &str, out: &mut impl Write, target: &Path) -> Result<()> {
+    let cannot = |e| Error::io("cannot write", target)(e);
+    let block = (BLOCKS / parts.len().max(1)).clamp(LEAST_BLOCK, MOST_BLOCK);
     let mut all = parts.iter().map(|part| Rows::new(part, name, block)).collect::<Result<Vec<_>>>()?;
     let mut header: Option<Vec<u8>> = None;
     for rows in &mut all {
@@ -388,9 +400,7 @@ fn join(parts: &[Part], name: &str, folder: &OutputFolder) -> Result<PartFile> {
             after => next.extend(after.map(|after| Reverse((after, i)))),
         }
     }
-    let file = out.into_inner().map_err(|e| cannot(e.into_error()))?;
-    file.sync()?;
-    Ok(file)
+    Ok(())
 }
 
 /// The arrays of all parts, in the order of the members.

@@ -95,6 +95,8 @@ vectorised!(f64 f32);
 fn crew_by<M: Solves + 'static, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Crew<T>>> {
     match vectors {
         Vectors::None => Some(Group::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
+        // Fuzzing (`fuzz/run`) advances no member, and would take minutes to count the branches of all this.
+        _ if cfg!(fuzzing) => None,
         #[cfg(target_arch = "x86_64")]
         Vectors::Bits128 if M::SOLVER.sweeps() => abreast::<_, M, T, 1>(pulp::x86::V2::try_new(), blocks, threads),
         #[cfg(target_arch = "x86_64")]
