@@ -53,7 +53,7 @@ pub fn figure(args: FigureArgs) -> Result<()> {
         let mut rows = SnapshotTable::new(folder.file(data)?)?;
         ended.snapshots.iter().try_for_each(|snapshot| rows.snapshot(snapshot))?;
         parts.push(rows.ready()?);
-        parts.push(folder.write(picture, &figure.plot(&ended).draw())?);
+        parts.push(folder.write(picture, figure.plot(&ended).draw())?);
         made.push((*figure, ended));
         if !args.quiet {
             note(&format!("note: {}: {}", figure.name, figure.remark));

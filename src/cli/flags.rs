@@ -394,7 +394,8 @@ mod tests {
              --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --pull 3 --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \
-             --series 0.1 --snapshots 0,1 --store zarr --only 1,2 --threads 2 --common-random-numbers --sweep phase=1,2"
+             --series 0.1 --snapshots 0,1 --store zarr --only 1,2 --shard 0/2 --threads 2 --common-random-numbers \
+             --sweep phase=1,2"
                 .split_whitespace()
                 .collect::<Vec<_>>()
                 .as_slice(),

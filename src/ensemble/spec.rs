@@ -504,6 +504,7 @@ mod tests {
             snapshots: vec![0.0, 1.0 / 3.0],
             store: Store::Zarr,
             only: Some(vec![0, 200]),
+            shard: Some(Shard::new(1, 3).unwrap()),
             ..Spec::default()
         };
         let adaptive =
@@ -520,7 +521,7 @@ mod tests {
         let written: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
         assert!(written.keys().all(|key| keys.contains(key)));
         let optional = ["tau", "adaptive", "relax-to", "relax-at", "tolerance", "adapter", "precision", "series"];
-        let optional = [&optional[..], &["only", "threads", "common-random-numbers", "sweep"]].concat();
+        let optional = [&optional[..], &["only", "shard", "threads", "common-random-numbers", "sweep"]].concat();
         for key in &optional {
             assert!(keys.iter().any(|known| known == key), "{key}");
         }
