@@ -1,4 +1,4 @@
-"""A study in shards on dask.distributed; its files are those of the single run, byte for byte.
+"""A study in shards on dask.distributed; its files are those of the single run, byte for byte but for run.json.
 
     python examples/python/dask_study.py examples/specs/amplitude.toml --shards 8 --workers 2 --out amplitude
 
@@ -23,8 +23,8 @@ from dask.distributed import Client, LocalCluster
 def run_shard(i, shards, run, home):
     """Runs shard i, from its start or from where an earlier try left it, and returns its folder."""
     out = f"{home}/{i}-of-{shards}"
-    # A worker that is killed leaves its curvelax behind, which goes on and keeps the folder locked. Linux stops it with
-    # the worker, its state kept. Until it has ended (elsewhere: at the end of its shard) the retry waits; nothing is lost.
+    # A worker that is killed leaves its curvelax behind, which goes on and keeps the folder locked. Linux ends it with the
+    # worker; until it has ended (elsewhere: when its shard is done) the retry waits, and goes on from what it has left.
     libc = ctypes.CDLL(None) if sys.platform == "linux" else None
 
     def end_with_worker():
@@ -56,10 +56,11 @@ def main():
     run = [curvelax, "run", os.path.abspath(arguments.spec), "--threads", "1", "--resume", "--quiet"]
     # Each worker is a process with a nanny, which replaces it when it dies; its shard goes to another one, three times at
     # most (distributed.scheduler.allowed-failures). Retries are for shards that fail: a full disk, exit code 75.
-    with LocalCluster(arguments.workers, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
-        several = {"shards": arguments.shards, "run": run, "home": f"{out}.shards"}
-        folders = client.gather(client.map(run_shard, range(arguments.shards), **several, retries=3, pure=False))
-    merged = subprocess.run([curvelax, "merge", *folders, "--out", out])
+    workers = {"n_workers": arguments.workers, "threads_per_worker": 1, "dashboard_address": ":0"}
+    with LocalCluster(**workers) as cluster, Client(cluster) as client:
+        same = {"shards": arguments.shards, "run": run, "home": f"{out}.shards"}
+        folders = client.gather(client.map(run_shard, range(arguments.shards), **same, retries=3, pure=False))
+    merged = subprocess.run([curvelax, "merge", *folders, "--force", "--quiet", "--out", out])
     if merged.returncode != 0:
         sys.exit(f"curvelax merge ended with exit code {merged.returncode}")
 

@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # A Slurm of two nodes on this machine, for tests/slurm/run: its own munged, slurmctld and slurmd n1 and n2, under one
 # folder, as the user who calls, beside any Slurm that may be there. To be sourced.
 
@@ -23,7 +24,7 @@ free_ports() {
 cluster_start() {
     cluster=$1
     local port user
-    port=$(free_ports)
+    port=$(free_ports) || return
     user=$(id -un)
     export SLURM_CONF=$cluster/slurm.conf
     mkdir -p "$cluster/munge" "$cluster/state" "$cluster/spool"
@@ -50,6 +51,8 @@ SlurmdParameters=config_overrides
 SchedulerParameters=bf_interval=2,sched_interval=5
 ReturnToService=2
 SlurmdTimeout=6
+MessageTimeout=5
+TCPTimeout=1
 KillWait=5
 JobRequeue=1
 MinJobAge=3600
@@ -123,7 +126,7 @@ kill_all() {
         kill -KILL $all 2>/dev/null || true
         sleep 0.1
     done
-    echo "what does not die: $* says" $all >&2
+    echo "what does not die ($*):" "$all" >&2
     return 1
 }
 

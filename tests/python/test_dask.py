@@ -1,0 +1,171 @@
+"""examples/python/dask_study.py: a worker is killed on the way, and the files are those of the single run."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+import psutil
+
+from common import CURVELAX, rows
+
+STUDY = Path(__file__).parents[2] / "examples" / "python" / "dask_study.py"
+SHARDS = 4
+MEMBERS = 1600
+# Two cells, dear enough that a worker can be killed in the middle of its shard: a second each.
+SPEC = f"""
+curves = {MEMBERS // 2}
+stop-when-relaxed = true
+backend = "cpu"
+
+[sweep]
+adaptive = [1e-3, 1e-5]
+"""
+
+
+def files(folder):
+    """The bytes of all files but run.json, which has times."""
+    paths = [path for path in folder.rglob("*") if path.is_file() and path.name != "run.json"]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
+
+
+def shards(study):
+    """The processes of the study that run a shard, with the folder of each."""
+    found = []
+    for process in psutil.Process(study.pid).children(recursive=True):
+        try:
+            line = process.cmdline()
+            if "--shard" in line:
+                found.append((process, Path(line[line.index("--out") + 1])))
+        except psutil.NoSuchProcess:
+            pass  # ended in the meantime
+    return found
+
+
+def pending(process):
+    """The signals that a process has not yet got, a bit each."""
+    return int(re.search(r"ShdPnd:\s*(\w+)", Path(f"/proc/{process.pid}/status").read_text())[1], 16)
+
+
+def end(process):
+    """Ends a process that a test has stopped, however the test went."""
+    try:
+        process.kill()
+    except psutil.NoSuchProcess:
+        pass
+
+
+def soon(look, study):
+    """The first result of `look` that is something, while the study goes on."""
+    until = time.monotonic() + 30
+    while time.monotonic() < until and study.poll() is None:
+        if found := look():
+            return found
+        time.sleep(0.01)
+    raise AssertionError("what was waited for did not come")
+
+
+@unittest.skipUnless(sys.platform == "linux", "kills processes as Linux has them")
+class Dask(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        home = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(home.cleanup)
+        cls.home = Path(home.name)
+        (cls.home / "spec.toml").write_text(SPEC)
+        subprocess.run([CURVELAX, "run", cls.home / "spec.toml", "--quiet", "--out", cls.home / "single"], check=True)
+        cls.single = files(cls.home / "single")
+
+    def study(self, name, kill, deaths="3"):
+        """Runs the study in two workers, of which `kill` kills one; its exit code, what it printed, and its folder."""
+        out = self.home / name
+        command = [sys.executable, STUDY, self.home / "spec.toml", "--shards", SHARDS, "--workers", 2, "--out", out]
+        environment = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": deaths}
+        with open(self.home / f"{name}.log", "w+") as log:
+            study = subprocess.Popen(list(map(str, command)), stdout=log, stderr=log, env=environment)
+            try:
+                if kill:
+                    self.kill(study, kill)
+                code = study.wait(timeout=120)
+            finally:
+                study.kill()
+            log.seek(0)
+            return code, log.read(), out
+
+    def kill(self, study, who):
+        """Kills a worker in the middle of its shard: with its curvelax, or without."""
+
+        def on_its_way():
+            for curvelax, out in shards(study):
+                part = out / ".summary.csv.part"
+                if part.exists() and part.stat().st_size > 0:
+                    return curvelax, curvelax.parent(), out
+
+        curvelax, worker, out = soon(on_its_way, study)
+        curvelax.suspend()
+        self.addCleanup(end, curvelax)
+        self.assertFalse((out / "run.json").exists(), "the shard is finished")
+        worker.kill()
+        if who == "both":
+            curvelax.kill()
+            return
+        # Its worker gone, it is told to end, but holds the lock of its folder for longer than the retry would take to fail as
+        # often as it may: all other shards are done by then, so that nothing else keeps the workers.
+        soon(lambda: pending(curvelax) >> signal.SIGTERM - 1 & 1, study)
+        soon(lambda: len(list(out.parent.glob("*/run.json"))) == SHARDS - 1, study)
+        time.sleep(1)
+        curvelax.resume()
+        self.assertIsNone(study.poll(), "the study did not wait")
+
+    def assert_whole(self, out):
+        """Each member once, and every byte that of the single run."""
+        self.assertEqual([int(row["member"]) for row in rows(out / "summary.csv")], list(range(MEMBERS)))
+        found = files(out)
+        self.assertEqual(sorted(found), sorted(self.single))
+        for name, content in self.single.items():
+            self.assertTrue(found[name] == content, name)
+
+    def test_a_worker_is_killed_with_its_shard(self):
+        code, said, out = self.study("both", "both")
+        self.assertEqual(code, 0, said)
+        self.assert_whole(out)
+        # Both cells are printed with all their members.
+        self.assertRegex(said, rf"(?m)^0 +{MEMBERS // 2} ")
+        self.assertRegex(said, rf"(?m)^1 +{MEMBERS // 2} ")
+
+    def test_a_worker_is_killed_and_its_shard_is_left_behind(self):
+        code, said, out = self.study("worker", "worker")
+        self.assertEqual(code, 0, said)
+        self.assert_whole(out)
+
+    def test_a_death_that_is_not_allowed_ends_the_study_and_the_same_line_ends_it_well(self):
+        """The control: the kill is felt. Nothing is merged of three shards in four, and nothing is lost of them."""
+        code, said, out = self.study("control", "both", deaths="0")
+        self.assertNotEqual(code, 0)
+        self.assertIn("KilledWorker", said)
+        self.assertFalse(out.exists())
+        self.assertEqual(self.study("control", None)[0], 0)
+        self.assert_whole(out)
+
+    def test_the_comparison_sees_a_byte_and_a_member(self):
+        out = self.home / "changed"
+        shutil.copytree(self.home / "single", out)
+        self.assert_whole(out)
+        table = (out / "summary.csv").read_text().splitlines(keepends=True)
+        changed = table[7].replace("relaxed", "singular")
+        for rows_now in ([*table[:7], changed, *table[8:]], table[:-1], [*table, table[-1]]):
+            (out / "summary.csv").write_text("".join(rows_now))
+            self.assertRaises(AssertionError, self.assert_whole, out)
+        shutil.copy(self.home / "single" / "summary.csv", out)
+        (out / "plots" / "mesh.svg").unlink()
+        self.assertRaises(AssertionError, self.assert_whole, out)
+
+
+if __name__ == "__main__":
+    unittest.main()
