@@ -9,8 +9,7 @@
 #SBATCH --cpus-per-task=1
 #SBATCH --mem-per-cpu=1G
 #SBATCH --time=00:30:00
-#SBATCH --requeue
-#SBATCH --open-mode=append
+#SBATCH --no-requeue
 #SBATCH --output=merge.log
 
 set -euo pipefail
