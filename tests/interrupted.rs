@@ -158,8 +158,11 @@ mod unix {
         thread::sleep(Duration::from_millis(500));
         signal("-TERM");
         assert_eq!(child.wait().unwrap().code(), Some(75));
-        let mut heard = program(home.path(), &format!("run --backend cpu {long} --out heard"));
-        let mut child = heard.spawn().unwrap();
+        // Where these tests run under nohup it would be ignored here too.
+        let mut heard = Command::new("env");
+        heard.arg("--default-signal=HUP").arg(assert_cmd::cargo::cargo_bin("curvelax"));
+        heard.args(format!("run --backend cpu {long} --out heard").split_whitespace()).current_dir(home.path());
+        let mut child = heard.env("XDG_RUNTIME_DIR", home.path()).spawn().unwrap();
         while !home.path().join("heard/.curvelax.state").exists() {
             thread::sleep(Duration::from_millis(20));
         }

@@ -53,8 +53,8 @@ fn state(body: &[u8]) {
         let [one, other] = shards;
         one.hold(folder::SHARD, &again);
         // Beside a right one, which it may be of the same study with.
-        let found = [one, other].map(|shard| look(&shard.path));
-        one_line(found.into_iter().collect::<Result<Vec<_>, _>>().and_then(Shards::new).map(|shards| shards.told()));
+        let found = [&*one, other].into_iter().map(|shard| look(&shard.path)).collect::<Result<Vec<_>, _>>();
+        one_line(found.and_then(Shards::new).map(|shards| shards.told()));
         let record = one.record.clone();
         one.hold(folder::SHARD, &to_bytes(&record.head, record.points, &record.warnings).expect("bytes"));
     });

@@ -17,8 +17,11 @@ use super::{
 };
 use crate::{
     ensemble::{Shard, Spec},
-    error::{Error, Result},
+    error::{Error, Result, shortened},
 };
+
+/// Characters of a fault in a message.
+const SHOWN: usize = 200;
 
 /// What is in the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -131,7 +134,11 @@ pub fn look(path: &Path) -> Result<Found> {
     match spec.map(|spec| (spec.shard, spec)) {
         Ok((Some(shard), spec)) => Ok(Found::Done(Box::new(Part { path: path.to_path_buf(), shard, spec, record }))),
         Ok((None, _)) => Err(Error::Request(faulty(SHARD, "its spec is not of a shard"))),
-        Err(e) => Err(Error::Request(faulty(SHARD, &format!("its spec: {e}")))),
+        // A message with a caret, in one line.
+        Err(e) => {
+            let words = e.split_whitespace().collect::<Vec<_>>().join(" ");
+            Err(Error::Request(faulty(SHARD, &format!("its spec: {}", shortened(&words, SHOWN)))))
+        }
     }
 }
 
