@@ -306,8 +306,9 @@ impl Spec {
     /// there.
     pub fn difference(&self, other: &Spec, but: &[&str]) -> Option<(String, String, String)> {
         let [here, there] = [self, other].map(|spec| toml::Table::try_from(spec).unwrap_or_default());
-        let shown =
-            |value: Option<&toml::Value>| value.map_or("unset".into(), |value| shortened(&value.to_string(), 60));
+        let shown = |value: Option<&toml::Value>| {
+            value.map_or("unset".into(), |value| shortened(&value.to_string().replace('\n', " "), 60))
+        };
         let keys = here.keys().chain(there.keys().filter(|key| !here.contains_key(*key)));
         let mut keys = keys.filter(|key| !but.contains(&key.as_str()));
         keys.find(|key| here.get(*key) != there.get(*key))

@@ -27,7 +27,7 @@ use super::{
 };
 use crate::{
     ensemble::{Shard, Spec},
-    error::{Error, Result},
+    error::{Error, Result, without_controls},
     input::{self, LONGEST_LINE},
 };
 
@@ -112,7 +112,7 @@ impl Shards {
                 Err(Error::Request(format!("{one} and {own} are not of one study: {what}; run one of them again")))
             };
             if !one.platform.computes_like(&own.platform) {
-                let [one, own] = [one, own].map(|origin| origin.platform.name());
+                let [one, own] = [one, own].map(|origin| without_controls(&origin.platform.name()));
                 return differs(format!("one was computed on {one} and the other on {own}, where digits differ"));
             }
             let sums = |of: &[(PathBuf, u32)]| of.iter().map(|(_, crc)| *crc).collect::<BTreeSet<_>>();

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     checkpoint::{self, Fault, Head},
     folder::{LOCK, RUN, SHARD, STATE, STATE_OLD},
+    growing::Growing,
 };
 use crate::{
     ensemble::{Shard, Spec},
@@ -120,6 +121,19 @@ pub fn look(path: &Path) -> Result<Found> {
         let (Fault::Foreign(what) | Fault::Damaged(what)) = fault;
         Error::Request(faulty(SHARD, &what))
     })?;
+    let spec = Spec::from_toml(&record.head.origin.spec).map_err(|e| e.to_string());
+    let spec = spec.and_then(|spec| spec.validate().map_err(|e| e.to_string()));
+    // A message with a caret, in one line.
+    let spec = spec.map_err(|e| {
+        let words = e.split_whitespace().collect::<Vec<_>>().join(" ");
+        Error::Request(faulty(SHARD, &format!("its spec: {}", shortened(&words, SHOWN))))
+    })?;
+    let Some(shard) = spec.shard else {
+        return Err(Error::Request(faulty(SHARD, "its spec is not of a shard")));
+    };
+    if !record.head.tables.iter().map(|mark| mark.name.as_str()).eq(Growing::names(&spec)) {
+        return Err(Error::Request(faulty(SHARD, "it tells of other files than its spec asks for")));
+    }
     for mark in &record.head.tables {
         let length = path.join(&mark.name).metadata().map(|of| of.len());
         let fault = match length {
@@ -129,17 +143,7 @@ pub fn look(path: &Path) -> Result<Found> {
         };
         return Err(Error::Request(faulty(&mark.name, &fault)));
     }
-    let spec = Spec::from_toml(&record.head.origin.spec).map_err(|e| e.to_string());
-    let spec = spec.and_then(|spec| spec.validate().map_err(|e| e.to_string()));
-    match spec.map(|spec| (spec.shard, spec)) {
-        Ok((Some(shard), spec)) => Ok(Found::Done(Box::new(Part { path: path.to_path_buf(), shard, spec, record }))),
-        Ok((None, _)) => Err(Error::Request(faulty(SHARD, "its spec is not of a shard"))),
-        // A message with a caret, in one line.
-        Err(e) => {
-            let words = e.split_whitespace().collect::<Vec<_>>().join(" ");
-            Err(Error::Request(faulty(SHARD, &format!("its spec: {}", shortened(&words, SHOWN)))))
-        }
-    }
+    Ok(Found::Done(Box::new(Part { path: path.to_path_buf(), shard, spec, record })))
 }
 
 /// Whether a run holds the lock of the folder.
