@@ -16,11 +16,10 @@ use crate::{
     backend::{Backend, Choice, Platform},
     ensemble::{Cell, Ended, Sink, Spec, spec::Pace, spec::Precision},
     error::{Error, Result},
-    report::gallery::MOST_PANELS,
+    report::{gallery::MOST_PANELS, tally::Rate},
     schedule::Clock,
     scheme::decay,
     simulate::simulate,
-    statistics::{Observation, Step},
 };
 
 /// Time for the pilots of all companies.
@@ -131,9 +130,8 @@ impl Estimate {
             cells: cells.len(),
             memory_bytes: memory(
                 members,
-                // Where none has ended yet, all may relax.
-                [pilot.relaxed, pilot.rated]
-                    .map(|some| if pilot.ended == 0 { 1.0 } else { some as f64 / pilot.ended as f64 }),
+                // Where none has ended yet, all may have one.
+                if pilot.ended == 0 { 1.0 } else { pilot.rated as f64 / pilot.ended as f64 },
                 [slots, resident],
                 cells[0].spec.points,
             ),
@@ -282,21 +280,19 @@ fn choose(company: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) 
 /// up to `slots` members in its pool.
 ///
 /// The peak is at the end of the run, with a full pool and the tally, or after that, with the statistics and the charts
-/// and without the pool. The tally has of each member its time and its mesh quality, and of the share `rated` its rate
-/// with that of theory. Then come its time in the sorted sample and five numbers for the charts; of the share `relaxed` a
-/// step of the survival curve and its number there; and of that `rated` three sorted numbers and those of the bootstrap.
-fn memory(members: u64, [relaxed, rated]: [f64; 2], [slots, resident]: [usize; 2], n: usize) -> u64 {
+/// and without the pool. The tally has of each member its time and two numbers of its mesh, of half the size, and of the
+/// share `rated` its rate with that of theory. Times are sorted where they are, and rates one number at a time; in their
+/// place comes the one that is drawn. A chart sorts the numbers that it shows.
+fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], n: usize) -> u64 {
     let numbers = |count: usize| (count * size_of::<f64>()) as u64;
     let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
     let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MOST_PANELS);
     let portraits = numbers(2 * n * (decay::PARTS + 1) * drawn);
     let page = (PAGE_BYTES * n.min(DRAWN_NODES) * drawn / MOST_PANELS) as u64;
-    let of = |share: f64, bytes: u64| (share * (members * bytes) as f64) as u64;
-    let tally =
-        members * (size_of::<Observation>() as u64 + numbers(2)) + of(rated, size_of::<(f64, Option<f64>)>() as u64);
-    let curve = of(relaxed, size_of::<Step>() as u64 + numbers(1));
-    let rates = of(rated, size_of::<Observation>() as u64 + numbers(4));
-    let statistics = members * (size_of::<Observation>() as u64 + numbers(5)) + curve + rates;
+    let rated = (rated * members as f64) as u64;
+    let tally = members * (size_of::<f64>() + 2 * size_of::<f32>()) as u64 + rated * size_of::<Rate>() as u64;
+    let [fitted, charted] = [rated, members.saturating_sub(rated)].map(|count| count * size_of::<f64>() as u64);
+    let statistics = fitted.max(charted);
     let program = peak_resident().map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(pool(resident)));
     let full = usize::try_from(members).unwrap_or(usize::MAX).min(slots);
     let running = pool(full) + portraits;
@@ -384,7 +380,7 @@ mod tests {
         let only_cell = std::iter::once(0..1).collect();
         let estimate = Estimate::new(&mut cells, only_cell, vec![choice]).unwrap();
         assert_eq!((estimate.members, estimate.cells), (10_000_000, 1));
-        assert!(estimate.memory_bytes > 1 << 30, "{estimate:?}");
+        assert!((300_000_000..500_000_000).contains(&estimate.memory_bytes), "{estimate:?}");
         assert!(estimate.pilot.members < 5_000_000 && estimate.pilot.seconds < 60.0, "{estimate:?}");
         // What the estimate names is not what it takes; other tests run beside this one.
         if let (Some(before), Some(after)) = (before, peak_resident()) {

@@ -43,12 +43,13 @@ pub fn plot(args: PlotArgs) -> Result<()> {
         None => (&args.run, true),
     };
     let folder = OutputFolder::open_for(out, force, folder::PICTURES.map(String::from).into())?;
-    let Finished { provenance, tally, excess, films } = &Finished::read(&args.run)?;
+    let Finished { provenance, mut tally, excess, films } = Finished::read(&args.run)?;
     if films.is_empty() && !args.quiet {
         note(&format!("note: no {} in {}: without pictures of members", folder::PORTRAITS, args.run.display()));
     }
-    let statistics = &EnsembleStatistics::new(&provenance.spec, tally)?;
-    let pictures = Study { provenance, tally, statistics, excess, films }.pictures()?;
+    let statistics = &EnsembleStatistics::new(&provenance.spec, &mut tally)?;
+    let study = Study { provenance: &provenance, tally: &tally, statistics, excess: &excess, films: &films };
+    let pictures = study.pictures()?;
     let files = pictures.iter().map(|(name, text)| folder.write(name, text)).collect::<Result<_>>()?;
     folder.publish_all(files)?;
     if args.quiet {

@@ -35,7 +35,7 @@ pub struct Complete<'a> {
     /// Where it was computed.
     pub platform: &'a Platform,
     /// What came out.
-    pub tally: &'a Tally,
+    pub tally: Tally,
     /// The first members.
     pub films: &'a [Film],
     /// What the user was told, a sentence each.
@@ -53,15 +53,16 @@ impl Complete<'_> {
     /// # Errors
     /// Where only the pictures cannot be written the tables are published all the same, with an error that says so.
     pub fn publish(
-        &self,
+        self,
         folder: &OutputFolder,
         mut files: Vec<PartFile>,
         store: Option<PartFolder>,
         shard: Option<&[u8]>,
         form: Form,
     ) -> Result<String> {
-        let Complete { spec, platform, tally, films, warnings, started, wall } = *self;
-        let statistics = &EnsembleStatistics::new(spec, tally)?;
+        let Complete { spec, platform, mut tally, films, warnings, started, wall } = self;
+        let statistics = &EnsembleStatistics::new(spec, &mut tally)?;
+        let tally = &tally;
         // The rows of the members are first: where the disk fills up they are what is kept.
         files.push(folder.write(folder::ENSEMBLE, statistics.to_csv(spec)?)?);
         let excess = &tally.mean_excess(spec)?;

@@ -74,8 +74,7 @@ pub fn lock(path: &Path) -> io::Result<Option<File>> {
         let file = File::options().write(true).create(true).truncate(false).open(path)?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => return Ok(None),
-            // A file system without locks is no reason not to run.
-            Err(TryLockError::Error(e)) if e.kind() != io::ErrorKind::Unsupported => return Err(e),
+            Err(TryLockError::Error(e)) if !has_no_locks(&e) => return Err(e),
             _ => {}
         }
         // The run before may have removed the file after it was opened here: a lock that nobody else sees.
@@ -83,6 +82,13 @@ pub fn lock(path: &Path) -> io::Result<Option<File>> {
             return Ok(Some(file));
         }
     }
+}
+
+/// Whether the file system says that it has no locks, which is no reason not to run: NFS without its lock daemon calls
+/// that `ENOLCK`.
+fn has_no_locks(error: &io::Error) -> bool {
+    const ENOLCK: i32 = if cfg!(target_os = "linux") { 37 } else { 77 };
+    error.kind() == io::ErrorKind::Unsupported || (cfg!(unix) && error.raw_os_error() == Some(ENOLCK))
 }
 
 #[cfg(unix)]

@@ -3,16 +3,16 @@
 //! A member whose time is not known is censored where it ended: one that is unfinished at the final time, and one that
 //! ended badly at its last good state. How many of these there are is in the row.
 
+use std::mem;
+
 use csv::WriterBuilder;
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-use super::tally::{CellTally, Tally};
+use super::tally::{CellTally, Rate, Tally};
 use crate::{
     ensemble::{Spec, Status},
     error::{Error, Result},
-    statistics::{
-        Bootstrap, Description, Interval, KaplanMeier, LogRank, Mean, Observation, PowerLaw, Sample, log_rank,
-    },
+    statistics::{Bootstrap, Description, Interval, KaplanMeier, LogRank, Mean, PowerLaw, Sample, log_rank},
 };
 
 /// Shares of the members whose times the table has, and what its columns are called.
@@ -31,10 +31,10 @@ pub struct CellStatistics {
     pub counts: [u64; Status::ALL.len()],
     /// The times, sorted.
     pub sample: Sample,
-    /// The estimate from them.
-    pub survival: KaplanMeier,
     /// Mean time, restricted where the last member is censored.
     pub mean: Option<Mean>,
+    /// Times of the [shares](QUANTILES) of the members.
+    pub quantiles: [Option<f64>; QUANTILES.len()],
     /// 95 % interval of the median.
     pub interval: Option<Interval>,
     /// Rates of decay.
@@ -43,38 +43,32 @@ pub struct CellStatistics {
 
 /// Fitted rates of decay of the members of one cell that have one: complete data.
 pub struct Rates {
-    /// The rates.
-    pub fitted: Description,
-    /// 95 % interval of their median.
-    pub interval: Option<Interval>,
-    /// What linear theory gives for each member of which it says something.
-    pub theory: Description,
-    /// The rate of each over that of theory.
-    pub ratio: Description,
+    /// What the table says of them.
+    pub numbers: Numbers,
+    /// What is drawn: the rates, or what they are over those of theory.
+    pub drawn: Description,
 }
 
 impl Rates {
-    fn new(bootstrap: &Bootstrap, rates: &[(f64, Option<f64>)]) -> Result<Rates> {
-        let fitted = Description::new(rates.iter().map(|(rate, _)| *rate))?;
-        let known = || rates.iter().filter_map(|(rate, theory)| Some((*rate, (*theory)?)));
-        let theory = Description::new(known().map(|(_, theory)| theory))?;
-        let ratio = Description::new(known().map(|(rate, theory)| rate / theory))?;
-        // The interval is one of times, which are not negative, and moves along with what it is of.
-        let least = fitted.sorted().first().copied().unwrap_or(0.0);
-        let above = fitted.sorted().iter().map(|rate| Observation { time: rate - least, happened: true });
-        let back = |bound: Option<f64>| bound.map(|bound| bound + least);
-        let interval = bootstrap.median(&Sample::new(above)?);
-        let interval = interval.map(|i| Interval { lower: back(i.lower), upper: back(i.upper), ..i });
-        Ok(Rates { fitted, interval, theory, ratio })
-    }
-
-    /// What the table says of them.
-    pub fn numbers(&self) -> Numbers {
-        let Rates { fitted, interval, theory, ratio } = self;
+    /// Of `rates`, of which what they are over theory is drawn if they are `relative`.
+    fn new(bootstrap: &Bootstrap, rates: &[Rate], relative: bool) -> Result<Rates> {
+        let theory = Description::new(rates.iter().filter_map(Rate::theory))?.median();
+        let fitted = Description::new(rates.iter().map(|rate| rate.fitted))?;
         let moments = [("mean", fitted.mean()), ("sd", fitted.standard_deviation()), ("se", fitted.standard_error())];
-        let beside = [("theory", theory.median()), ("ratio", ratio.median())];
-        let places = places(|share| fitted.quantile(share), *interval);
-        Numbers { known: fitted.count(), named: moments.into_iter().chain(places).chain(beside).collect() }
+        let quantiles = QUANTILES.map(|(share, _)| fitted.quantile(share));
+        let places = places(quantiles, bootstrap.median_of(&fitted));
+        let (known, mut named) = (fitted.count(), moments.into_iter().chain(places).collect::<Vec<_>>());
+        // Each is as large as all times of the cell: one at a time.
+        let mut drawn = fitted;
+        if relative {
+            drawn = Description::default();
+        }
+        let ratio = Description::new(rates.iter().filter_map(Rate::ratio))?;
+        named.extend([("theory", theory), ("ratio", ratio.median())]);
+        if relative {
+            drawn = ratio;
+        }
+        Ok(Rates { numbers: Numbers { known, named }, drawn })
     }
 }
 
@@ -85,6 +79,13 @@ pub struct Numbers {
     pub known: usize,
     /// All others.
     pub named: Vec<(&'static str, Option<f64>)>,
+}
+
+impl Numbers {
+    /// The one of this name, where it is known.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.named.iter().find(|(own, _)| *own == name).and_then(|(_, value)| *value)
+    }
 }
 
 impl Serialize for Numbers {
@@ -98,12 +99,12 @@ impl Serialize for Numbers {
 
 /// Quantiles, and the interval of the median.
 fn places(
-    quantile: impl Fn(f64) -> Option<f64>,
+    quantiles: [Option<f64>; QUANTILES.len()],
     interval: Option<Interval>,
 ) -> impl Iterator<Item = (&'static str, Option<f64>)> {
     let ends = interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
-    let quantiles = QUANTILES.map(|(share, name)| (name, quantile(share)));
-    quantiles.into_iter().chain(["median_low", "median_high"].into_iter().zip(ends))
+    let names = QUANTILES.map(|(_, name)| name);
+    names.into_iter().zip(quantiles).chain(["median_low", "median_high"].into_iter().zip(ends))
 }
 
 /// Relaxation times of all cells, and how they compare.
@@ -114,17 +115,21 @@ pub struct EnsembleStatistics {
     pub log_rank: Option<LogRank>,
     /// The medians as a power of the swept value, where one key is swept whose values are positive numbers.
     pub power_law: Option<PowerLaw>,
+    /// Rates are drawn over those of theory, which says something of every member that has one.
+    pub relative: bool,
 }
 
 impl CellStatistics {
-    fn new(spec: &Spec, cell: u64, tally: &CellTally) -> Result<CellStatistics> {
-        let sample = Sample::new(tally.times.iter().copied())?;
+    /// Takes times and rates out of `tally`.
+    fn new(spec: &Spec, cell: u64, tally: &mut CellTally, relative: bool) -> Result<CellStatistics> {
+        let sample = Sample::from(mem::take(&mut tally.times));
         let survival = KaplanMeier::new(&sample);
         let bootstrap = Bootstrap { seed: spec.seed.wrapping_add(cell), ..Bootstrap::default() };
         let (mean, interval) = (survival.mean(), bootstrap.median(&sample));
+        let quantiles = QUANTILES.map(|(share, _)| survival.quantile(share));
         let (values, counts) = (spec.sweep.labels(cell), tally.counts);
-        let rates = Rates::new(&bootstrap, &tally.rates)?;
-        Ok(CellStatistics { cell, values, counts, sample, survival, mean, interval, rates })
+        let rates = Rates::new(&bootstrap, &mem::take(&mut tally.rates), relative)?;
+        Ok(CellStatistics { cell, values, counts, sample, mean, quantiles, interval, rates })
     }
 
     /// Members that ended.
@@ -141,8 +146,14 @@ impl CellStatistics {
             ("se", of(|mean| mean.standard_error)),
             ("restricted_to", of(|mean| mean.restricted_to)),
         ];
-        let places = places(|share| self.survival.quantile(share), self.interval);
-        Numbers { known: self.survival.events(), named: moments.into_iter().chain(places).collect() }
+        let places = places(self.quantiles, self.interval);
+        Numbers { known: self.sample.events(), named: moments.into_iter().chain(places).collect() }
+    }
+
+    /// The time by which half of the members have relaxed.
+    pub fn median(&self) -> Option<f64> {
+        let [_, _, median, ..] = self.quantiles;
+        median
     }
 
     /// The interval of the median, where both its ends are known.
@@ -152,18 +163,24 @@ impl CellStatistics {
 }
 
 impl EnsembleStatistics {
-    /// From the times of a run of `spec`.
-    pub fn new(spec: &Spec, tally: &Tally) -> Result<EnsembleStatistics> {
-        let none = CellTally::default();
+    /// From the times and rates of a run of `spec`, which are taken out of `tally`: it keeps what is counted.
+    ///
+    /// Those of 10⁷ members are 240 MB, so they are sorted where they are.
+    pub fn new(spec: &Spec, tally: &mut Tally) -> Result<EnsembleStatistics> {
+        let relative = tally.cells.iter().flat_map(|cell| &cell.rates).all(|rate| rate.theory().is_some());
+        let mut none = CellTally::default();
         let cells = (0..spec.sweep.cells())
-            .map(|cell| CellStatistics::new(spec, cell, tally.cells.get(cell as usize).unwrap_or(&none)))
+            .map(|cell| {
+                let of_cell = tally.cells.get_mut(cell as usize).unwrap_or(&mut none);
+                CellStatistics::new(spec, cell, of_cell, relative)
+            })
             .collect::<Result<Vec<_>>>()?;
         let compared = (2..=MOST_COMPARED).contains(&cells.len());
-        let samples = || cells.iter().map(|cell| cell.sample.clone()).collect::<Vec<Sample>>();
+        let samples = || cells.iter().map(|cell| &cell.sample).collect::<Vec<_>>();
         let log_rank = if compared { log_rank(&samples()) } else { None };
         let power_law = match spec.sweep.axes() {
             [axis] => axis.numbers().and_then(|values| {
-                let medians = cells.iter().map(|cell| cell.survival.median());
+                let medians = cells.iter().map(CellStatistics::median);
                 let points: Vec<(f64, f64)> =
                     values.into_iter().zip(medians).filter_map(|(x, y)| Some((x, y?))).collect();
                 // Values that are not positive have no power law, which is no fault.
@@ -171,7 +188,7 @@ impl EnsembleStatistics {
             }),
             _ => None,
         };
-        Ok(EnsembleStatistics { cells, log_rank, power_law })
+        Ok(EnsembleStatistics { cells, log_rank, power_law, relative })
     }
 
     /// The text of `ensemble.csv`.
@@ -181,7 +198,7 @@ impl EnsembleStatistics {
         let keys = spec.sweep.axes().iter().map(|axis| axis.key.clone());
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
         let header = ["cell".to_string()].into_iter().chain(keys).chain(["members".to_string()]).chain(statuses);
-        let quantities = |cell: &CellStatistics| [("t_relax", cell.times()), ("rate", cell.rates.numbers())];
+        let quantities = |cell: &CellStatistics| [("t_relax", cell.times()), ("rate", cell.rates.numbers.clone())];
         let columns = self.cells.first().into_iter().flat_map(quantities).flat_map(|(quantity, numbers)| {
             let names = ["known"].into_iter().chain(numbers.named.into_iter().map(|(name, _)| name));
             names.map(move |name| format!("{quantity}_{name}"))
@@ -212,9 +229,9 @@ mod tests {
         let mut tally = Tally::default();
         for (cell, t_relax) in members {
             let status = if t_relax.is_some() { Status::Relaxed } else { Status::Unfinished };
-            tally.add(&crate::ensemble::Outcome { cell: *cell, ..outcome(0, status, *t_relax) });
+            tally.add(&crate::ensemble::Outcome { cell: *cell, ..outcome(0, status, *t_relax) }).unwrap();
         }
-        let statistics = EnsembleStatistics::new(&spec, &tally).unwrap();
+        let statistics = EnsembleStatistics::new(&spec, &mut tally).unwrap();
         (spec, statistics)
     }
 

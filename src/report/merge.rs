@@ -196,7 +196,7 @@ impl Shards {
         let complete = Complete {
             spec,
             platform: &parts[0].record.head.origin.platform,
-            tally: &tally,
+            tally,
             films: &films,
             warnings: &warnings,
             started: heads().map(|head| head.origin.started).min().unwrap_or_default(),

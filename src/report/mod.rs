@@ -277,7 +277,7 @@ impl Report {
         let (files, store) = growing.ready()?;
         let Origin { platform, started, .. } = &origin;
         let warnings = &[early, &tally.warnings()].concat();
-        let complete = Complete { spec, platform, tally: &tally, films: &films, warnings, started: *started, wall };
+        let complete = Complete { spec, platform, tally, films: &films, warnings, started: *started, wall };
         let text = complete.publish(&folder, files, store, shard.as_deref(), form)?;
         folder.forget_states()?;
         Ok(text)
@@ -289,7 +289,7 @@ impl Sink for Report {
         let Ended { outcome, portrait, mollified, unresolved, excess, .. } = ended;
         self.growing.add(ended)?;
         self.has_begun = true;
-        self.tally.add(outcome);
+        self.tally.add(outcome)?;
         self.tally.add_excess(outcome.cell, excess);
         self.tally.add_aside(mollified, *unresolved);
         self.films.extend(portrait.as_ref().map(|portrait| Film::new(outcome, portrait)));

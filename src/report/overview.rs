@@ -93,19 +93,19 @@ impl Overview<'_> {
 
     /// The rates of a single ensemble; empty where no member has one.
     fn rate(&self) -> String {
-        let [CellStatistics { rates: Rates { fitted, ratio, .. }, .. }] = &self.statistics.cells[..] else {
+        let [CellStatistics { rates: Rates { numbers, .. }, .. }] = &self.statistics.cells[..] else {
             return String::new();
         };
-        let Some(median) = fitted.median() else { return String::new() };
-        let theory =
-            ratio.median().map_or(String::new(), |ratio| format!(", {} times that of theory", significant(ratio)));
-        let (count, members) = (fitted.count(), plural(fitted.count() as u64, "member"));
-        format!("median {}{theory}, fitted to {count} {members}", significant(median))
+        let Some(median) = numbers.get("median") else { return String::new() };
+        let theory = numbers.get("ratio");
+        let theory = theory.map_or(String::new(), |ratio| format!(", {} times that of theory", significant(ratio)));
+        let members = plural(numbers.known as u64, "member");
+        format!("median {}{theory}, fitted to {} {members}", significant(median), numbers.known)
     }
 
     /// One line a cell of a study, and how they compare.
     fn cells(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let EnsembleStatistics { cells, log_rank, power_law } = self.statistics;
+        let EnsembleStatistics { cells, log_rank, power_law, .. } = self.statistics;
         if cells.len() < 2 {
             return Ok(());
         }
@@ -196,9 +196,9 @@ pub fn place(platform: &Platform) -> String {
 
 /// Median and mean of the times of a cell, and how far they are to be trusted.
 fn times(cell: &CellStatistics) -> String {
-    let (members, known) = (cell.members(), cell.survival.events() as u64);
+    let (members, known) = (cell.members(), cell.sample.events() as u64);
     let Some(mean) = cell.mean else { return format!("none of {members} {} reached it", plural(members, "member")) };
-    let median = match (cell.survival.median(), cell.bounds()) {
+    let median = match (cell.median(), cell.bounds()) {
         (None, _) => "not reached by half of the members".to_string(),
         (Some(median), Some((lower, upper))) => {
             format!("{} ({} to {})", significant(median), significant(lower), significant(upper))
@@ -240,21 +240,21 @@ mod tests {
     };
 
     fn overview(tally: &Tally) -> String {
-        let (spec, platform) = (Spec::default(), platform());
+        let (spec, platform, mut tally) = (Spec::default(), platform(), tally.clone());
         let wall = Duration::from_millis(12_345);
         let files = &[folder::SUMMARY, folder::RUN];
-        let statistics = &EnsembleStatistics::new(&spec, tally).unwrap();
-        Overview { spec: &spec, platform: &platform, tally, statistics, wall, folder: Path::new("out"), files }
+        let statistics = &EnsembleStatistics::new(&spec, &mut tally).unwrap();
+        Overview { spec: &spec, platform: &platform, tally: &tally, statistics, wall, folder: Path::new("out"), files }
             .to_string()
     }
 
     #[test]
     fn an_overview_looks_like_this() {
         let mut tally = Tally::default();
-        tally.add(&outcome(0, Status::Relaxed, Some(0.3)));
-        tally.add(&outcome(1, Status::Relaxed, Some(0.5)));
-        tally.add(&outcome(2, Status::Unfinished, None));
-        tally.add(&outcome(3, Status::Stalled, None));
+        tally.add(&outcome(0, Status::Relaxed, Some(0.3))).unwrap();
+        tally.add(&outcome(1, Status::Relaxed, Some(0.5))).unwrap();
+        tally.add(&outcome(2, Status::Unfinished, None)).unwrap();
+        tally.add(&outcome(3, Status::Stalled, None)).unwrap();
         let expected = "\
 status        members     share
 relaxed             2    50.0 %
@@ -281,10 +281,10 @@ results    out: summary.csv, run.json
     #[test]
     fn one_is_not_many() {
         let mut tally = Tally::default();
-        tally.add(&outcome(0, Status::Relaxed, Some(0.3)));
+        tally.add(&outcome(0, Status::Relaxed, Some(0.3))).unwrap();
         assert!(overview(&tally).contains("over 1 member that reached it\n"), "{}", overview(&tally));
         tally.cells[0] = Default::default();
-        tally.add(&outcome(0, Status::Unfinished, None));
+        tally.add(&outcome(0, Status::Unfinished, None)).unwrap();
         assert!(overview(&tally).contains("none of 1 member reached it\n"), "{}", overview(&tally));
         let one_thread = Platform { threads: Some(1), ..platform() };
         assert!(machine(&one_thread).contains(", 1 thread ("), "{}", machine(&one_thread));

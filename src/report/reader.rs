@@ -121,7 +121,7 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     let mut tally = Tally::default();
     (tally.mollified, tally.below_rounding) = (provenance.mollified, provenance.below_rounding);
     for outcome in Summary::open(folder, spec)? {
-        tally.add(&outcome?);
+        tally.add(&outcome?)?;
     }
     let summary = |what: &str, told: u64, found: u64| expected(folder, folder::SUMMARY, what, told, found);
     summary("rows", provenance.members, tally.members())?;
@@ -140,7 +140,7 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
 pub fn rows(path: &Path, spec: &Spec, aside: Aside) -> Result<Tally> {
     let mut tally = Tally::default();
     for outcome in Summary::of(path, spec)? {
-        tally.add(&outcome?);
+        tally.add(&outcome?)?;
     }
     tally.set_aside(aside);
     Ok(tally)

@@ -18,6 +18,7 @@ use crate::{
     ensemble::{Spec, Status},
     error::Result,
     flow::Flow,
+    statistics::{KaplanMeier, Step},
 };
 
 /// Half the width of a 95 % band in standard errors.
@@ -29,9 +30,9 @@ const DIGITS: usize = 4;
 pub struct Study<'a> {
     /// What was asked for, where and when it was computed.
     pub provenance: &'a Provenance,
-    /// What came out.
+    /// What came out, but for what the statistics have taken.
     pub tally: &'a Tally,
-    /// Statistics of the relaxation times.
+    /// Statistics of times and rates.
     pub statistics: &'a EnsembleStatistics,
     /// The mean excess in time.
     pub excess: &'a [MeanExcess],
@@ -85,7 +86,7 @@ impl Study<'_> {
         let others: Vec<(&str, u64)> = others.filter(|(_, without)| *without > 0).collect();
         let median = if let [cell] = &cells[..] { median(cell) } else { None };
         let title = "Relaxation times";
-        let svg = RelaxationTimes { title, note: &self.what(), times: &times, others: &others, median }.draw();
+        let svg = RelaxationTimes { title, note: &self.what(), times, others: &others, median }.draw();
         let caption = "How many members relaxed when, and which share of all had relaxed by then.";
         chart(folder::RELAXATION, title, caption, svg)
     }
@@ -94,20 +95,17 @@ impl Study<'_> {
         let cells = &self.statistics.cells;
         let numbers = self.numbers();
         let curves = cells.iter().enumerate().map(|(rank, cell)| {
-            let steps = cell.survival.steps();
-            let bound = |sign: f64| {
-                let of_step =
-                    |s: &crate::statistics::Step| (s.survival + sign * BAND * s.variance.sqrt()).clamp(0.0, 1.0);
-                steps.iter().map(of_step).collect()
-            };
-            SurvivalCurve {
+            let mut curve = SurvivalCurve {
                 label: self.label(cell.cell),
                 value: numbers.as_ref().map(|numbers| numbers[rank]),
-                t: steps.iter().map(|step| step.time).collect(),
-                survival: steps.iter().map(|step| step.survival).collect(),
-                band: Some((bound(-1.0), bound(1.0))),
-                censored: happened(cell, false).collect(),
+                ..SurvivalCurve::default()
+            };
+            for Step { time, survival, variance, .. } in KaplanMeier::new(&cell.sample).steps() {
+                let bound = |sign: f64| (survival + sign * BAND * variance.sqrt()).clamp(0.0, 1.0);
+                curve.add_step(time, survival, (bound(-1.0), bound(1.0)));
             }
+            happened(cell, false).for_each(|t| curve.add_censored(t));
+            curve
         });
         let (title, key) = ("Members not yet relaxed", self.keys());
         let survival = Survival { title, note: &self.what(), key: &key, curves: curves.collect(), time: None };
@@ -155,15 +153,12 @@ impl Study<'_> {
     }
 
     fn rates(&self) -> Chart {
-        let rates = || self.tally.cells.iter().flat_map(|cell| &cell.rates);
-        let relative = rates().all(|(_, theory)| theory.is_some());
-        let shown =
-            |(rate, theory): &(f64, Option<f64>)| theory.filter(|_| relative).map_or(*rate, |theory| rate / theory);
-        let shown: Vec<f64> = rates().map(shown).collect();
+        let EnsembleStatistics { cells, relative, .. } = self.statistics;
+        let rates: Vec<f64> = cells.iter().flat_map(|cell| cell.rates.drawn.sorted()).copied().collect();
         let title = "Rates of decay";
-        let without = self.tally.members() - shown.len() as u64;
-        let unit = "length⁻⁴";
-        let svg = FittedRates { title, note: &self.what(), rates: &shown, relative, unit, without }.draw();
+        let without = self.tally.members() - rates.len() as u64;
+        let (relative, unit) = (*relative, "length⁻⁴");
+        let svg = FittedRates { title, note: &self.what(), rates, relative, unit, without }.draw();
         let caption = "Slope of the line through ln excess, while that falls from a tenth to a thousandth of its start, over the \
                        rate that linear theory gives the slowest mode.";
         chart(folder::RATE, title, caption, svg)
@@ -183,7 +178,7 @@ impl Study<'_> {
                     None => Setting::Name(cell.values[others.len()].clone()),
                 },
                 median: median(cell),
-                quartiles: (cell.survival.quantile(0.25), cell.survival.quantile(0.75)),
+                quartiles: quartiles(cell),
             };
             let mut levels: Vec<Level> = cells.iter().enumerate().map(level).collect();
             if numbers.is_some() {
@@ -209,16 +204,13 @@ impl Study<'_> {
     }
 
     fn mesh(&self) -> Chart {
-        let mesh = || self.tally.cells.iter().flat_map(|cell| cell.mesh.iter());
-        let mesh_ratio: Vec<f64> = mesh().map(|[ratio, _]| *ratio).collect();
-        let metric_drift: Vec<f64> = mesh().map(|[_, drift]| *drift).collect();
         let title = "Mesh quality at the end";
         let quality = MeshQuality {
             title,
             note: &self.what(),
-            mesh_ratio: &mesh_ratio,
-            metric_drift: &metric_drift,
-            distrusted: Some(DISTRUSTED_DRIFT),
+            mesh_ratio: &self.tally.mesh_ratios,
+            metric_drift: &self.tally.metric_drifts,
+            distrusted: Some((DISTRUSTED_DRIFT, self.tally.distrusted())),
         };
         let caption = "Longest over shortest edge, and how far the scheme's lengths have left the polygon's.";
         chart(folder::MESH, title, caption, quality.draw())
@@ -284,7 +276,7 @@ impl Study<'_> {
     }
 
     fn headline(&self) -> Vec<Headline> {
-        let EnsembleStatistics { cells, log_rank, power_law } = self.statistics;
+        let EnsembleStatistics { cells, log_rank, power_law, .. } = self.statistics;
         let mut headline = Vec::new();
         let mut add = |label: &str, value: Option<f64>, note: String| {
             let value = value.map_or("not reached".into(), |value| significant(value, DIGITS));
@@ -294,7 +286,7 @@ impl Study<'_> {
             [cell] => {
                 let bounds =
                     |(low, high)| format!("95 %: {} to {}", significant(low, DIGITS), significant(high, DIGITS));
-                add("median t_relax", cell.survival.median(), cell.bounds().map_or(String::new(), bounds));
+                add("median t_relax", cell.median(), cell.bounds().map_or(String::new(), bounds));
                 let mean = cell.mean;
                 let error = mean.and_then(|mean| mean.standard_error);
                 let note = match mean.and_then(|mean| mean.restricted_to) {
@@ -302,14 +294,13 @@ impl Study<'_> {
                     None => error.map_or(String::new(), |error| format!("standard error {}", significant(error, 2))),
                 };
                 add("mean t_relax", mean.map(|mean| mean.value), note);
-                let quartiles = [0.05, 0.95].map(|share| cell.survival.quantile(share));
-                if let [Some(low), Some(high)] = quartiles {
+                if let [Some(low), .., Some(high)] = cell.quantiles {
                     let range = format!("{} to {}", significant(low, 3), significant(high, 3));
                     headline.push(Headline { label: "nine in ten".into(), value: range, note: "5 to 95 %".into() });
                 }
             }
             _ => {
-                let medians: Vec<f64> = cells.iter().filter_map(|cell| cell.survival.median()).collect();
+                let medians: Vec<f64> = cells.iter().filter_map(CellStatistics::median).collect();
                 let range = [f64::min, f64::max].map(|of| medians.iter().copied().reduce(of));
                 let shown = match range {
                     [Some(low), Some(high)] => format!("{} to {}", significant(low, 3), significant(high, 3)),
@@ -347,10 +338,10 @@ impl Study<'_> {
                 mean.map_or(String::new(), |mean| format!("{least}{}", significant(mean.value, DIGITS))),
                 mean.and_then(|mean| mean.standard_error).map_or(String::new(), |error| significant(error, 2)),
             ];
-            let quantiles = QUANTILES.map(|(share, _)| shown(cell.survival.quantile(share)));
+            let quantiles = cell.quantiles.map(shown);
             let counts = cell.counts.iter().map(u64::to_string);
             let start = [cell.cell.to_string()].into_iter().chain(cell.values.iter().cloned());
-            let rates = [&cell.rates.fitted, &cell.rates.ratio].map(|of| shown(of.median()));
+            let rates = ["median", "ratio"].map(|name| shown(cell.rates.numbers.get(name)));
             start.chain(counts).chain(moments).chain(quantiles).chain(rates).collect()
         };
         Table {
@@ -388,7 +379,7 @@ fn chart(name: &'static str, title: &str, caption: &str, svg: String) -> Chart {
 
 /// Times of the members of a cell that relaxed, or of those that ended before.
 fn happened(cell: &CellStatistics, happened: bool) -> impl Iterator<Item = f64> + '_ {
-    cell.sample.observations().iter().filter(move |seen| seen.happened == happened).map(|seen| seen.time)
+    cell.sample.observations().filter(move |seen| seen.happened == happened).map(|seen| seen.time)
 }
 
 /// What linear theory says of the excess of a curve of the members' mean area, through the mean where it has fallen to a
@@ -422,7 +413,12 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
 }
 
 fn median(cell: &CellStatistics) -> Option<Estimate> {
-    cell.survival.median().map(|value| Estimate { value, interval: cell.bounds() })
+    cell.median().map(|value| Estimate { value, interval: cell.bounds() })
+}
+
+fn quartiles(cell: &CellStatistics) -> (Option<f64>, Option<f64>) {
+    let [_, lower, _, upper, _] = cell.quantiles;
+    (lower, upper)
 }
 
 /// The number among `values` of a key whose values are numbers.
@@ -449,11 +445,11 @@ mod tests {
     };
 
     /// Names and texts of the pictures of a run of `spec` that came to `tally`.
-    fn pictures(spec: &Spec, tally: &Tally, films: &[Film]) -> Vec<(&'static str, String)> {
-        let provenance = &Provenance::new(spec, &platform(), tally, &[], Duration::ZERO, Duration::from_secs(1));
-        let statistics = &EnsembleStatistics::new(spec, tally).unwrap();
+    fn pictures(spec: &Spec, mut tally: Tally, films: &[Film]) -> Vec<(&'static str, String)> {
+        let provenance = &Provenance::new(spec, &platform(), &tally, &[], Duration::ZERO, Duration::from_secs(1));
+        let statistics = &EnsembleStatistics::new(spec, &mut tally).unwrap();
         let excess = &tally.mean_excess(spec).unwrap();
-        Study { provenance, tally, statistics, excess, films }.pictures().unwrap()
+        Study { provenance, tally: &tally, statistics, excess, films }.pictures().unwrap()
     }
 
     /// 10⁵ members, no two alike, a third of them censored at times of their own.
@@ -469,7 +465,7 @@ mod tests {
             (outcome.rate, outcome.rate_theory) = (Some(20.0 + t), Some(24.0));
             (outcome.end.mesh_ratio, outcome.end.metric_drift) = (1.0 + share, 1e-3 + share * share);
             outcome.start.area = 1.0;
-            tally.add(&outcome);
+            tally.add(&outcome).unwrap();
             let excess = grid(1.0).map(|at| (-24.0 * t * at).exp()).collect::<Vec<_>>();
             tally.add_excess(outcome.cell, &excess);
         }
@@ -486,7 +482,7 @@ mod tests {
                 let values = (1..=cells).map(|value| value.to_string()).collect::<Vec<_>>().join(",");
                 spec.sweep.set(format!("omega={values}").parse().unwrap());
             }
-            let drawn = pictures(&spec, &many(cells), &films);
+            let drawn = pictures(&spec, many(cells), &films);
             for (name, text) in &drawn {
                 let most = if *name == folder::REPORT { 800_000 } else { 120_000 };
                 assert!(text.len() < most, "{name} of {cells} cells: {} bytes", text.len());
@@ -509,7 +505,7 @@ mod tests {
         let none = Tally::default();
         let of = |members: &[Outcome]| {
             let mut tally = Tally::default();
-            members.iter().for_each(|member| tally.add(member));
+            members.iter().for_each(|member| tally.add(member).unwrap());
             tally
         };
         let relaxed = outcome(0, Status::Relaxed, Some(0.0));
@@ -528,7 +524,7 @@ mod tests {
                 if !sweep.is_empty() {
                     spec.sweep.set(sweep.parse().unwrap());
                 }
-                for (name, text) in pictures(&spec, &tally, &[]) {
+                for (name, text) in pictures(&spec, tally.clone(), &[]) {
                     let bad = none_of(&text);
                     assert!(bad.is_empty(), "{name}: {bad:?}");
                     assert!(name != folder::REPORT || text.contains(sentence), "no {sentence:?}");

@@ -7,7 +7,7 @@ use crate::{
     ensemble::{Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
     error::Result,
     schedule::grid,
-    statistics::{Moments, Observation},
+    statistics::{Moments, Observation, Observations},
 };
 
 /// Counts and sums over the members that ended.
@@ -27,6 +27,31 @@ pub struct Tally {
     drifted: (u64, f64),
     /// Members whose relaxation cannot be told: their threshold lies in the rounding of the precision.
     pub below_rounding: u64,
+    /// Longest over shortest edge of each at its end, for a picture.
+    pub mesh_ratios: Vec<f32>,
+    /// Metric drift of each at its end, likewise.
+    pub metric_drifts: Vec<f32>,
+}
+
+/// Rate of decay of a member.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate {
+    /// As fitted, in length⁻⁴.
+    pub fitted: f64,
+    /// NaN where theory says nothing.
+    theory: f64,
+}
+
+impl Rate {
+    /// What linear theory gives, if anything.
+    pub fn theory(&self) -> Option<f64> {
+        Some(self.theory).filter(|theory| !theory.is_nan())
+    }
+
+    /// Over that of theory.
+    pub fn ratio(&self) -> Option<f64> {
+        self.theory().map(|theory| self.fitted / theory)
+    }
 }
 
 /// What the members of one cell came to.
@@ -35,15 +60,13 @@ pub struct CellTally {
     /// Members by status, in the order of [`Status::ALL`].
     pub counts: [u64; Status::ALL.len()],
     /// When each relaxed, or until when it had not.
-    pub times: Vec<Observation>,
+    pub times: Observations,
     /// Those that have not relaxed, by status.
     pub others: [u64; Status::ALL.len()],
-    /// Longest over shortest edge of each at its end, and its metric drift.
-    pub mesh: Vec<[f64; 2]>,
     /// Sum of the areas at the start.
     pub area: f64,
-    /// Rate of decay of each that has one, and what theory says.
-    pub rates: Vec<(f64, Option<f64>)>,
+    /// Those that have a rate of decay.
+    pub rates: Vec<Rate>,
     /// Excess at the times of [`grid`], of the members that reached them.
     pub excess: Vec<Moments>,
 }
@@ -165,16 +188,20 @@ impl MollifiedMembers {
 
 impl Tally {
     /// Adds one member.
-    pub fn add(&mut self, outcome: &Outcome) {
+    ///
+    /// # Errors
+    /// For a time that is none.
+    pub fn add(&mut self, outcome: &Outcome) -> Result<()> {
         let cell = outcome.cell as usize;
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
-        let CellTally { counts, times, others, mesh, area, rates, .. } = &mut self.cells[cell];
+        let CellTally { counts, times, others, area, rates, .. } = &mut self.cells[cell];
+        times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
         *area += outcome.start.area.abs();
-        mesh.push([outcome.end.mesh_ratio, outcome.end.metric_drift]);
-        rates.extend(outcome.rate.map(|rate| (rate, outcome.rate_theory)));
-        times.push(Observation::new(outcome.t_relax, outcome.t_end));
+        rates.extend(outcome.rate.map(|fitted| Rate { fitted, theory: outcome.rate_theory.unwrap_or(f64::NAN) }));
+        self.mesh_ratios.push(outcome.end.mesh_ratio as f32);
+        self.metric_drifts.push(outcome.end.metric_drift as f32);
         for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
             for (count, status) in counts.iter_mut().zip(Status::ALL) {
                 *count += u64::from(counted && status == outcome.status);
@@ -187,6 +214,12 @@ impl Tally {
         self.steps = self.steps.saturating_add(outcome.steps);
         self.sweeps_k = self.sweeps_k.saturating_add(outcome.sweeps_k);
         self.sweeps_x = self.sweeps_x.saturating_add(outcome.sweeps_x);
+        Ok(())
+    }
+
+    /// Members that ended with a metric drift above [`DISTRUSTED_DRIFT`].
+    pub fn distrusted(&self) -> u64 {
+        self.drifted.0
     }
 
     /// Adds the excess of a member of `cell` at the times of [`grid`] that it reached.
@@ -309,8 +342,8 @@ pub(crate) mod tests {
 
     fn tally(times: &[f64], censored: u64) -> Tally {
         let mut tally = Tally::default();
-        times.iter().for_each(|t| tally.add(&outcome(0, Status::Relaxed, Some(*t))));
-        (0..censored).for_each(|_| tally.add(&outcome(0, Status::Unfinished, None)));
+        times.iter().for_each(|t| tally.add(&outcome(0, Status::Relaxed, Some(*t))).unwrap());
+        (0..censored).for_each(|_| tally.add(&outcome(0, Status::Unfinished, None)).unwrap());
         tally
     }
 
@@ -344,13 +377,13 @@ pub(crate) mod tests {
     #[test]
     fn bad_ends_and_drift_are_warned_of_and_nothing_else_is() {
         let mut tally = Tally::default();
-        tally.add(&outcome(0, Status::Relaxed, Some(0.5)));
-        tally.add(&outcome(1, Status::Unfinished, None));
+        tally.add(&outcome(0, Status::Relaxed, Some(0.5))).unwrap();
+        tally.add(&outcome(1, Status::Unfinished, None)).unwrap();
         assert_eq!(tally.warnings(), [""; 0]);
-        tally.add(&outcome(2, Status::Stalled, None));
+        tally.add(&outcome(2, Status::Stalled, None)).unwrap();
         let mut drifted = outcome(3, Status::Relaxed, Some(0.5));
         drifted.end.metric_drift = 0.25;
-        tally.add(&drifted);
+        tally.add(&drifted).unwrap();
         let warnings = tally.warnings();
         assert!(warnings[0].starts_with("1 of 4 members ended badly"), "{warnings:?}");
         assert!(

@@ -29,17 +29,17 @@ pub fn thinned(points: &[DVec2], least: f64) -> Vec<DVec2> {
 }
 
 /// The corners of the steps whose heights change at `points`; changes under `least` wait for the next.
-pub fn steps(points: &[DVec2], least: f64) -> Vec<DVec2> {
+pub fn steps(points: impl IntoIterator<Item = DVec2>, least: f64) -> Vec<DVec2> {
     let mut corners: Vec<DVec2> = Vec::new();
-    for (i, point) in points.iter().enumerate() {
+    let mut points = points.into_iter().peekable();
+    while let Some(point) = points.next() {
         let Some(before) = corners.last().copied() else {
-            corners.push(*point);
+            corners.push(point);
             continue;
         };
-        let last = i + 1 == points.len();
-        if last || (point.y - before.y).abs() >= least {
+        if points.peek().is_none() || (point.y - before.y).abs() >= least {
             corners.push(DVec2::new(point.x, before.y));
-            corners.push(*point);
+            corners.push(point);
         }
     }
     corners
@@ -123,10 +123,10 @@ mod tests {
 
     #[test]
     fn steps_go_across_and_then_up() {
-        let corners = steps(&points(&[(0.0, 0.0), (1.0, 0.1), (2.0, 1.0), (3.0, 1.2)]), 0.5);
+        let corners = steps(points(&[(0.0, 0.0), (1.0, 0.1), (2.0, 1.0), (3.0, 1.2)]), 0.5);
         assert_eq!(corners, points(&[(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (3.0, 1.0), (3.0, 1.2)]));
         assert_eq!(path(&corners), "M0 0H2V1H3V1.2");
-        assert_eq!(path(&steps(&[], 0.5)), "");
+        assert_eq!(path(&steps([], 0.5)), "");
     }
 
     #[test]
@@ -136,7 +136,7 @@ mod tests {
         let kept = thinned(&points, tolerance(8, 600.0));
         assert!((300..600).contains(&kept.len()), "{}", kept.len());
         assert_eq!((kept.first(), kept.last()), (points.first(), points.last()));
-        assert!(steps(&points, tolerance(8, 600.0)).len() < 2000);
+        assert!(steps(points, tolerance(8, 600.0)).len() < 2000);
     }
 
     #[test]

@@ -17,7 +17,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::{
-    describe,
+    Description, describe,
     draws::Draws,
     sample::{Sample, reaches},
 };
@@ -56,14 +56,23 @@ impl Bootstrap {
     /// Its ends are quantiles of the resamples' medians, of type 7. `None` for fewer than two members, without an
     /// event, without resamples, and for a level outside (0, 1).
     pub fn median(&self, sample: &Sample) -> Option<Interval> {
-        if sample.len() < 2 || sample.events() == 0 || self.resamples == 0 || !(self.level > 0.0 && self.level < 1.0) {
+        self.interval(&Ranges::new(sample), |place| sample.range(place..place + 1).next().map(|seen| seen.time))
+    }
+
+    /// That of complete data, of which a resample's median is the value in the middle, the lower of two.
+    pub fn median_of(&self, values: &Description) -> Option<Interval> {
+        self.interval(&Ranges::complete(values.count()), |place| values.sorted().get(place).copied())
+    }
+
+    /// The interval where `value` is what stands at a place.
+    fn interval(&self, ranges: &Ranges, value: impl Fn(usize) -> Option<f64> + Sync) -> Option<Interval> {
+        let has_median = ranges.members > 1 && ranges.events(&(0..ranges.members)) > 0;
+        if !has_median || self.resamples == 0 || !(self.level > 0.0 && self.level < 1.0) {
             return None;
         }
-        let ranges = Ranges::new(sample);
-        let mut medians: Vec<f64> = (0..self.resamples)
-            .into_par_iter()
-            .map(|resample| ranges.median(Draws::new(self.seed, resample.into())).unwrap_or(f64::INFINITY))
-            .collect();
+        let median = |resample: u32| ranges.median(Draws::new(self.seed, resample.into())).and_then(&value);
+        let mut medians: Vec<f64> =
+            (0..self.resamples).into_par_iter().map(|resample| median(resample).unwrap_or(f64::INFINITY)).collect();
         medians.sort_unstable_by(f64::total_cmp);
         let end = |p| describe::quantile(&medians, p);
         let outside = 0.5 * (1.0 - self.level);
@@ -72,35 +81,51 @@ impl Bootstrap {
     }
 }
 
-/// The sorted sample, with the number of events in any range at hand.
+/// Places of a sorted sample, with the number of events in any range at hand.
 struct Ranges<'a> {
-    sample: &'a Sample,
-    events_before: Vec<usize>,
+    members: usize,
+    /// What it is of where some members are censored, and the number of events before every [`BLOCK`]-th place.
+    censored: Option<(&'a Sample, Vec<usize>)>,
     /// Members of both kinds that are drawn one by one.
     short: usize,
 }
 
 impl Ranges<'_> {
+    fn complete(members: usize) -> Ranges<'static> {
+        Ranges { members, censored: None, short: SHORT }
+    }
+
     fn new(sample: &Sample) -> Ranges<'_> {
-        let events = sample.observations().iter().scan(0, |events, seen| {
-            *events += usize::from(seen.happened);
-            Some(*events)
+        let complete = Ranges::complete(sample.len());
+        if sample.censored() == 0 {
+            return complete;
+        }
+        let mut before = 0;
+        let blocks = (0..=sample.len() / BLOCK).map(|block| {
+            let here = before;
+            before += events(sample, block * BLOCK..((block + 1) * BLOCK).min(sample.len()));
+            here
         });
-        Ranges { sample, events_before: [0].into_iter().chain(events).collect(), short: SHORT }
+        Ranges { censored: Some((sample, blocks.collect())), ..complete }
     }
 
     fn events(&self, range: &Range<usize>) -> usize {
-        self.events_before[range.end] - self.events_before[range.start]
+        let Some((sample, blocks)) = &self.censored else { return range.len() };
+        let before = |place: usize| blocks[place / BLOCK] + events(sample, place - place % BLOCK..place);
+        before(range.end) - before(range.start)
     }
 
-    /// The median of one resample, if its S comes down to ½.
-    fn median(&self, draws: Draws) -> Option<f64> {
-        let n = self.sample.len();
+    /// Where the median of one resample stands, if its S comes down to ½.
+    fn median(&self, draws: Draws) -> Option<usize> {
+        let n = self.members;
         let curve = Curve { survival: 1.0, at_risk: n as f64 };
         let mut resample = Resample { ranges: self, draws, curve, counts: Vec::new() };
-        let at = resample.crossing(0..n, n)?;
-        Some(self.sample.observations()[at].time)
+        resample.crossing(0..n, n)
     }
+}
+
+fn events(sample: &Sample, range: Range<usize>) -> usize {
+    sample.range(range).filter(|seen| seen.happened).count()
 }
 
 /// S and the members at risk, before the range that is looked at.
@@ -149,20 +174,19 @@ impl Resample<'_> {
             if events == 1 {
                 return Some(range.start);
             }
-        } else if range.len() <= self.ranges.short {
-            return self.short_crossing(range, count);
+        } else if let Some((sample, _)) = self.ranges.censored.as_ref().filter(|_| range.len() <= self.ranges.short) {
+            return self.short_crossing(sample, range, count);
         }
         let middle = range.start + range.len() / 2;
         let left = self.draws.binomial(count, (middle - range.start) as f64 / range.len() as f64);
         self.crossing(range.start..middle, left).or_else(|| self.crossing(middle..range.end, count - left))
     }
 
-    fn short_crossing(&mut self, range: Range<usize>, count: usize) -> Option<usize> {
+    fn short_crossing(&mut self, sample: &Sample, range: Range<usize>, count: usize) -> Option<usize> {
         self.counts.clear();
         self.counts.resize(range.len(), 0);
         self.draws.scatter(count, &mut self.counts);
-        let observations = &self.ranges.sample.observations()[range.clone()];
-        let mut curves = observations.iter().zip(&self.counts).scan(self.curve, |curve, (seen, count)| {
+        let mut curves = sample.range(range.clone()).zip(&self.counts).scan(self.curve, |curve, (seen, count)| {
             let leaving = f64::from(*count);
             *curve = curve.after(f64::from(u8::from(seen.happened)) * leaving, leaving);
             Some(*curve)
@@ -179,6 +203,8 @@ impl Resample<'_> {
 
 /// More would not stay in the nearest cache with their numbers; fewer would cost more binomials.
 const SHORT: usize = 4096;
+/// Members whose events are counted anew.
+const BLOCK: usize = 64;
 
 #[cfg(test)]
 mod tests {
@@ -203,7 +229,8 @@ mod tests {
     /// Medians of resamples, in order, ranges up to `short` drawn one by one.
     fn medians(sample: &Sample, short: usize) -> Vec<f64> {
         let ranges = Ranges { short, ..Ranges::new(sample) };
-        sorted((0..RESAMPLES.into()).map(|i| ranges.median(Draws::new(9, i))))
+        let times: Vec<f64> = sample.observations().map(|seen| seen.time).collect();
+        sorted((0..RESAMPLES.into()).map(|i| ranges.median(Draws::new(9, i)).map(|place| times[place])))
     }
 
     fn sorted(medians: impl Iterator<Item = Option<f64>>) -> Vec<f64> {
@@ -214,10 +241,10 @@ mod tests {
 
     /// Medians of resamples drawn member by member, sorted and estimated as any sample.
     fn plain_medians(sample: &Sample) -> Vec<f64> {
-        let n = sample.len();
+        let (n, observations) = (sample.len(), sample.observations().collect::<Vec<_>>());
         let draw = |i: u64| {
             let index = |draw| (Stream::new(10, i, 0).uniforms(draw)[0] * n as f64) as usize;
-            let drawn = (0..n as u32).map(|draw| sample.observations()[index(draw)]);
+            let drawn = (0..n as u32).map(|draw| observations[index(draw)]);
             KaplanMeier::new(&Sample::new(drawn).unwrap()).median()
         };
         sorted((0..RESAMPLES.into()).map(draw))
@@ -252,10 +279,10 @@ mod tests {
     fn medians_of_a_complete_sample_follow_the_binomial_law() {
         let n = 1001;
         let (sample, mut random) = (sample(n, 0.0, f64::INFINITY), Draws::new(11, 0));
-        let found = medians(&sample, SHORT);
+        let (found, times) = (medians(&sample, SHORT), sample.observations().collect::<Vec<_>>());
         // The median of a resample is at or before the k-th time if at least 501 draws are.
         for k in [470, 490, 501, 510, 530] {
-            let share = found.partition_point(|t| *t <= sample.observations()[k - 1].time) as f64;
+            let share = found.partition_point(|t| *t <= times[k - 1].time) as f64;
             let reached = (0..RESAMPLES).filter(|_| random.binomial(n as usize, k as f64 / n as f64) >= 501).count();
             let apart = (share - reached as f64).abs() / f64::from(RESAMPLES);
             assert!(apart < 4.5 * (0.5 / f64::from(RESAMPLES)).sqrt(), "seeds 5, 9, 11: {k}: {apart}");
@@ -289,6 +316,19 @@ mod tests {
             assert_eq!(Bootstrap { level, ..bootstrap }.median(&two), None, "{level}");
         }
         assert_eq!(Bootstrap { resamples: 0, ..bootstrap }.median(&two), None);
+    }
+
+    #[test]
+    fn complete_data_have_the_interval_of_a_sample_without_censorings() {
+        let sample = sample(1001, 0.0, f64::INFINITY);
+        let times = || sample.observations().map(|seen| seen.time);
+        let of = |values: Vec<f64>| Bootstrap::default().median_of(&Description::new(values).unwrap());
+        assert_eq!(of(times().collect()), Bootstrap::default().median(&sample));
+        let moved = of(times().map(|t| t - 8.0).collect()).unwrap();
+        let back = [moved.lower, moved.upper].map(|end| end.unwrap() + 8.0);
+        let still = of(times().collect()).unwrap();
+        assert!((back[0] - still.lower.unwrap()).abs() < 1e-14 && (back[1] - still.upper.unwrap()).abs() < 1e-14);
+        assert_eq!([of(vec![]), of(vec![1.0])], [None, None]);
     }
 
     #[test]

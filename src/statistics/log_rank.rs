@@ -11,6 +11,8 @@
 //! earlier of their two times, which is known when that one leaves. So one pass makes V in members × groups instead of
 //! times × groups²; the diagonal follows because rows of V add up to 0, which costs no digits as a difference would.
 
+use std::{borrow::Borrow, cmp::Reverse, collections::BinaryHeap};
+
 use super::{finite, sample::Sample, special::chi_square_tail, sum::Sum};
 
 /// What the test found.
@@ -40,7 +42,8 @@ pub struct Group {
 /// A group without members at risk at the first event says nothing and takes no degree of freedom. `None` where fewer
 /// than two groups say something, or all members at risk have their event at one time. Takes members × groups + groups³
 /// operations and groups² numbers.
-pub fn log_rank(samples: &[Sample]) -> Option<LogRank> {
+pub fn log_rank(samples: &[impl Borrow<Sample>]) -> Option<LogRank> {
+    let samples: &[&Sample] = &samples.iter().map(Borrow::borrow).collect::<Vec<_>>();
     let tally = Tally::of(samples);
     // All groups at risk at the first event are at risk together there, so V has the rank of their number, less one.
     let compared: Vec<usize> = (0..samples.len()).filter(|j| tally.expected[*j].value() > 0.0).collect();
@@ -68,36 +71,43 @@ struct Tally {
 }
 
 impl Tally {
-    fn of(samples: &[Sample]) -> Tally {
-        let mut members: Vec<(f64, bool, usize)> = Vec::with_capacity(samples.iter().map(Sample::len).sum());
-        for (j, sample) in samples.iter().enumerate() {
-            members.extend(sample.observations().iter().map(|seen| (seen.time, seen.happened, j)));
-        }
-        // Stable: it finds the runs of the groups and merges them.
-        members.sort_by(|a, b| a.0.total_cmp(&b.0));
-
+    fn of(samples: &[&Sample]) -> Tally {
         let k = samples.len();
         let mut tally = Tally { expected: vec![Sum::default(); k], pairs: vec![vec![0.0; k]; k] };
         let mut at_risk: Vec<f64> = samples.iter().map(|sample| sample.len() as f64).collect();
-        let (mut n, mut hazard, mut covariance) = (members.len() as f64, Sum::default(), Sum::default());
-        for tied in members.chunk_by(|a, b| a.0 == b.0) {
-            let events = tied.iter().filter(|(_, happened, _)| *happened).count() as f64;
+        let (mut n, mut hazard, mut covariance) = (at_risk.iter().sum::<f64>(), Sum::default(), Sum::default());
+        let mut groups: Vec<_> = samples.iter().map(|sample| sample.times()).collect();
+        // Times are not negative, so their bits are ordered as they are.
+        let mut after = |j: usize| {
+            let (time, events, censored) = groups[j].next()?;
+            Some(Reverse((time.to_bits(), j, events, events + censored)))
+        };
+        let mut next: BinaryHeap<_> = (0..k).filter_map(&mut after).collect();
+        let mut tied = Vec::new();
+        while let Some(Reverse((time, ..))) = next.peek().copied() {
+            tied.clear();
+            while let Some(Reverse((_, j, events, leaving))) = next.peek().copied().filter(|at| at.0.0 == time) {
+                next.pop();
+                tied.push((j, events as f64, leaving as f64));
+                next.extend(after(j));
+            }
+            let events: f64 = tied.iter().map(|(_, events, _)| events).sum();
             if events > 0.0 {
                 hazard.add(events / n);
                 if events < n {
                     covariance.add(events * (n - events) / (n - 1.0) / (n * n));
                 }
             }
-            for &(.., j) in tied {
-                tally.expected[j].add(hazard.value());
-                at_risk[j] -= 1.0;
+            for &(j, _, leaving) in &tied {
+                tally.expected[j].add(leaving * hazard.value());
+                at_risk[j] -= leaving;
+                n -= leaving;
                 if covariance.value() > 0.0 {
                     for (pair, others) in tally.pairs[j].iter_mut().zip(&at_risk) {
-                        *pair += covariance.value() * others;
+                        *pair += leaving * covariance.value() * others;
                     }
                 }
             }
-            n -= tied.len() as f64;
         }
         tally
     }

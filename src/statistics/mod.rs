@@ -61,7 +61,7 @@ pub use describe::Description;
 pub use exact::{ExactSum, Moments};
 pub use fit::{Line, PowerLaw};
 pub use log_rank::{Group, LogRank, log_rank};
-pub use sample::{Observation, Sample};
+pub use sample::{Observation, Observations, Sample};
 pub use survival::{Caveat, KaplanMeier, Mean, Step};
 
 /// A finite number, or none.

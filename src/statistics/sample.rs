@@ -1,5 +1,7 @@
 //! Right-censored times, checked and sorted, and the product that every estimate from them builds.
 
+use std::ops::Range;
+
 use crate::error::{Error, Result};
 
 /// One member's time, in any one unit.
@@ -18,11 +20,56 @@ impl Observation {
     }
 }
 
+/// Observations as they come in, 8 bytes each.
+///
+/// A time that is not negative has a sign bit of 0. Its place takes the other bits, and theirs the censoring: so numbers
+/// are ordered as their times are, and at one time events come before censorings.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Observations {
+    keys: Vec<u64>,
+}
+
+impl Observations {
+    /// Adds one.
+    ///
+    /// An error names its place where its time is negative or not finite.
+    pub fn push(&mut self, seen: Observation) -> Result<()> {
+        let Observation { time, happened } = seen;
+        if !(time.is_finite() && time >= 0.0) {
+            return Err(Error::Failed(format!(
+                "statistics of times: number {} (from 0) is {time}; a time is finite and not negative: leave the member \
+                 out, or give it as censored at the end of its run",
+                self.keys.len()
+            )));
+        }
+        // -0 would sort behind all others and not tie with 0.
+        self.keys.push((time + 0.0).to_bits() << 1 | u64::from(!happened));
+        Ok(())
+    }
+}
+
+fn observation(key: u64) -> Observation {
+    Observation { time: f64::from_bits(key >> 1), happened: happened(key) }
+}
+
+fn happened(key: u64) -> bool {
+    key & 1 == 0
+}
+
 /// Observations in order of time; at one time events come before censorings, which were still at risk then.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sample {
-    sorted: Vec<Observation>,
+    sorted: Vec<u64>,
     events: usize,
+}
+
+impl From<Observations> for Sample {
+    fn from(observations: Observations) -> Sample {
+        let mut sorted = observations.keys;
+        sorted.sort_unstable();
+        let events = sorted.iter().filter(|key| happened(**key)).count();
+        Sample { sorted, events }
+    }
 }
 
 impl Sample {
@@ -30,26 +77,19 @@ impl Sample {
     ///
     /// An error names the first whose time is negative or not finite.
     pub fn new(observations: impl IntoIterator<Item = Observation>) -> Result<Sample> {
-        let mut sorted: Vec<Observation> = observations.into_iter().collect();
-        if let Some((i, Observation { time, .. })) =
-            sorted.iter().enumerate().find(|(_, seen)| !(seen.time.is_finite() && seen.time >= 0.0))
-        {
-            return Err(Error::Failed(format!(
-                "statistics of times: number {i} (from 0) of {} is {time}; a time is finite and not negative: \
-                 leave the member out, or give it as censored at the end of its run",
-                sorted.len()
-            )));
-        }
-        // -0 would sort before 0 and not tie with it.
-        sorted.iter_mut().for_each(|seen| seen.time += 0.0);
-        sorted.sort_unstable_by(|a, b| a.time.total_cmp(&b.time).then(b.happened.cmp(&a.happened)));
-        let events = sorted.iter().filter(|seen| seen.happened).count();
-        Ok(Sample { sorted, events })
+        let mut all = Observations::default();
+        observations.into_iter().try_for_each(|seen| all.push(seen))?;
+        Ok(all.into())
     }
 
     /// All observations, in order.
-    pub fn observations(&self) -> &[Observation] {
-        &self.sorted
+    pub fn observations(&self) -> impl ExactSizeIterator<Item = Observation> + Clone + '_ {
+        self.range(0..self.len())
+    }
+
+    /// Those at some places, which must be there.
+    pub(super) fn range(&self, places: Range<usize>) -> impl ExactSizeIterator<Item = Observation> + Clone + '_ {
+        self.sorted[places].iter().map(|key| observation(*key))
     }
 
     /// Number of members.
@@ -74,14 +114,14 @@ impl Sample {
 
     /// The largest time, censored or not.
     pub fn last(&self) -> Option<f64> {
-        self.sorted.last().map(|seen| seen.time)
+        self.sorted.last().map(|key| observation(*key).time)
     }
 
     /// The different times in order, each with the numbers of its events and its censorings.
     pub(super) fn times(&self) -> impl Iterator<Item = (f64, usize, usize)> + '_ {
-        self.sorted.chunk_by(|a, b| a.time == b.time).map(|tied| {
-            let events = tied.partition_point(|seen| seen.happened);
-            (tied[0].time, events, tied.len() - events)
+        self.sorted.chunk_by(|a, b| a >> 1 == b >> 1).map(|tied| {
+            let events = tied.partition_point(|key| happened(*key));
+            (observation(tied[0]).time, events, tied.len() - events)
         })
     }
 }
@@ -157,7 +197,7 @@ mod tests {
     fn events_come_before_censorings_of_the_same_time_and_zeros_tie() {
         let sample = Sample::new([seen(2.0, false), seen(0.0, false), seen(2.0, true), seen(-0.0, true)]).unwrap();
         assert_eq!(sample.times().collect::<Vec<_>>(), [(0.0, 1, 1), (2.0, 1, 1)]);
-        assert!(sample.observations()[0].time.is_sign_positive());
+        assert!(sample.last().is_some() && sample.observations().all(|seen| seen.time.is_sign_positive()));
         assert_eq!((sample.len(), sample.events(), sample.censored(), sample.last()), (4, 2, 2, Some(2.0)));
     }
 
@@ -165,7 +205,7 @@ mod tests {
     fn a_time_that_is_none_is_refused_by_its_place() {
         for time in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e-300] {
             let message = Sample::new([seen(1.0, true), seen(time, false)]).unwrap_err().to_string();
-            assert!(message.contains("number 1 (from 0) of 2") && message.contains(&format!(" {time};")), "{message}");
+            assert!(message.contains("number 1 (from 0)") && message.contains(&format!(" {time};")), "{message}");
         }
         assert!(Sample::new([]).unwrap().is_empty());
     }

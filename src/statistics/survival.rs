@@ -24,6 +24,13 @@ pub struct Step {
     pub variance: f64,
 }
 
+impl Step {
+    /// By how much S falls here, from what it is before.
+    fn fall_from(&self, survival: f64) -> f64 {
+        survival * (self.events as f64 / self.at_risk as f64)
+    }
+}
+
 /// The mean time, the area under S.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mean {
@@ -39,55 +46,51 @@ pub struct Mean {
 }
 
 /// An estimate of the survival function, a right-continuous step function from S = 1.
-#[derive(Clone, Debug, PartialEq)]
-pub struct KaplanMeier {
-    steps: Vec<Step>,
-    members: usize,
-    events: usize,
-    last: Option<f64>,
+///
+/// Nothing is kept beside the sample: each number goes through it once or twice.
+#[derive(Clone, Copy, Debug)]
+pub struct KaplanMeier<'a> {
+    sample: &'a Sample,
 }
 
-impl KaplanMeier {
+impl<'a> KaplanMeier<'a> {
     /// From any sample, an empty one included.
-    pub fn new(sample: &Sample) -> KaplanMeier {
-        let mut limit = ProductLimit::new(sample.len());
-        let (mut steps, mut at_risk) = (Vec::new(), sample.len());
-        for (time, events, censored) in sample.times() {
-            limit.events(events);
-            if events > 0 {
-                let (survival, variance) = (limit.survival(), limit.variance());
-                steps.push(Step { time, at_risk, events, survival, variance });
-            }
-            limit.censored(censored);
-            at_risk -= events + censored;
-        }
-        KaplanMeier { steps, members: sample.len(), events: sample.events(), last: sample.last() }
+    pub fn new(sample: &'a Sample) -> KaplanMeier<'a> {
+        KaplanMeier { sample }
     }
 
     /// Where S falls, in order of time.
-    pub fn steps(&self) -> &[Step] {
-        &self.steps
+    pub fn steps(&self) -> impl Iterator<Item = Step> + 'a {
+        let mut limit = ProductLimit::new(self.sample.len());
+        let mut left = self.sample.len();
+        self.sample.times().filter_map(move |(time, events, censored)| {
+            let at_risk = left;
+            limit.events(events);
+            let (survival, variance) = (limit.survival(), limit.variance());
+            limit.censored(censored);
+            left -= events + censored;
+            (events > 0).then_some(Step { time, at_risk, events, survival, variance })
+        })
     }
 
     /// Number of members.
     pub fn members(&self) -> usize {
-        self.members
+        self.sample.len()
     }
 
     /// Number of members to which it happened.
     pub fn events(&self) -> usize {
-        self.events
+        self.sample.events()
     }
 
     /// The largest time, censored or not, up to which S is known.
     pub fn last(&self) -> Option<f64> {
-        self.last
+        self.sample.last()
     }
 
     /// S(t), the share of members to which it has not happened by the time t; beyond the largest time its last value.
     pub fn survival(&self, t: f64) -> f64 {
-        let passed = self.steps.partition_point(|step| step.time <= t);
-        passed.checked_sub(1).map_or(1.0, |i| self.steps[i].survival)
+        self.steps().take_while(|step| step.time <= t).last().map_or(1.0, |step| step.survival)
     }
 
     /// The time by which it has happened to the share `p` ∈ [0, 1] of the members: the first with S(t) ≤ 1 - p.
@@ -99,8 +102,7 @@ impl KaplanMeier {
         if !(0.0..=1.0).contains(&p) {
             return None;
         }
-        let above = self.steps.partition_point(|step| !reaches(step.survival, 1.0 - p));
-        self.steps.get(above).map(|step| step.time)
+        self.steps().find(|step| reaches(step.survival, 1.0 - p)).map(|step| step.time)
     }
 
     /// The time by which it has happened to half of the members.
@@ -114,22 +116,22 @@ impl KaplanMeier {
     /// `var = Σ A_i² d_i/(n_i (n_i - d_i))`, A_i being the area under S from t_i on. `None` without an event, since
     /// then nothing is known but that S was 1, or where the numbers are too large for f64.
     pub fn mean(&self) -> Option<Mean> {
-        let (first, end, last) = (self.steps.first()?, self.steps.last()?, self.last?);
+        let (first, last) = (self.steps().next()?.time, self.last()?);
         // Each event carries the fall of S, the end carries what is left; measured from the first event, so that equal
         // times have exactly their own mean and no deviation.
-        let falls = self.steps.iter().scan(1.0, |before, step| {
-            let fall = *before * (step.events as f64 / step.at_risk as f64);
-            *before = step.survival;
-            Some((step.time, fall))
-        });
-        let masses = falls.chain([(last, end.survival)]);
-        let value = first.time + masses.clone().map(|(t, mass)| mass * (t - first.time)).collect::<Sum>().value();
-        let variance = masses.map(|(t, mass)| mass * (t - value).powi(2)).collect::<Sum>().value();
-        let n = self.members as f64;
+        let (mut area, mut survival) = (Sum::default(), 1.0);
+        for step in self.steps() {
+            area.add(step.fall_from(survival) * (step.time - first));
+            survival = step.survival;
+        }
+        area.add(survival * (last - first));
+        let value = first + area.value();
+        let [variance, area_variance] = self.variances(value, area.value());
+        let n = self.members() as f64;
         let [deviation, error] = if self.has_single_event() {
             [None, None]
-        } else if self.events < self.members {
-            [variance, self.area_variance(last)].map(Some)
+        } else if self.sample.censored() > 0 {
+            [variance, area_variance].map(Some)
         } else {
             [variance * (n / (n - 1.0)), variance / (n - 1.0)].map(Some)
         };
@@ -137,37 +139,43 @@ impl KaplanMeier {
             value: finite(value)?,
             standard_deviation: deviation.map(f64::sqrt).and_then(finite),
             standard_error: error.map(f64::sqrt).and_then(finite),
-            restricted_to: (end.survival > 0.0).then_some(last),
+            restricted_to: (survival > 0.0).then_some(last),
         })
+    }
+
+    /// Of the times about their `mean`, and of the `area` under S from the first event on.
+    fn variances(&self, mean: f64, area: f64) -> [f64; 2] {
+        let (mut of_times, mut of_area, mut passed) = (Sum::default(), Sum::default(), Sum::default());
+        let mut before: Option<Step> = None;
+        for step in self.steps() {
+            let survival = before.map_or(1.0, |before| before.survival);
+            of_times.add(step.fall_from(survival) * (step.time - mean).powi(2));
+            passed.add(before.map_or(0.0, |before| survival * (step.time - before.time)));
+            let (n, left) = (step.at_risk as f64, (step.at_risk - step.events) as f64);
+            // The last event of all has no area behind it.
+            if left > 0.0 {
+                of_area.add((area - passed.value()).powi(2) * (step.events as f64 / (n * left)));
+            }
+            before = Some(step);
+        }
+        if let (Some(end), Some(last)) = (before, self.last()) {
+            of_times.add(end.survival * (last - mean).powi(2));
+        }
+        [of_times, of_area].map(Sum::value)
     }
 
     /// Whether S falls by one event from 1 to 0, which says nothing about the spread of times.
     fn has_single_event(&self) -> bool {
-        self.events == 1 && self.steps.iter().all(|step| step.survival == 0.0)
-    }
-
-    /// Variance of the area under S up to `last`.
-    fn area_variance(&self, last: f64) -> f64 {
-        let (mut area, mut variance, mut next) = (Sum::default(), Sum::default(), last);
-        for step in self.steps.iter().rev() {
-            area.add(step.survival * (next - step.time));
-            next = step.time;
-            let (n, left) = (step.at_risk as f64, (step.at_risk - step.events) as f64);
-            // The last event of all has no area behind it.
-            if left > 0.0 {
-                variance.add(area.value().powi(2) * (step.events as f64 / (n * left)));
-            }
-        }
-        variance.value()
+        self.events() == 1 && self.steps().all(|step| step.survival == 0.0)
     }
 
     /// What a reader must know before using the numbers, if there is anything.
     pub fn caveat(&self) -> Option<Caveat> {
-        let (members, censored) = (self.members, self.members - self.events);
-        let survival = self.steps.last().map_or(1.0, |step| step.survival);
-        match self.last {
+        let (members, censored) = (self.members(), self.sample.censored());
+        let survival = self.steps().last().map_or(1.0, |step| step.survival);
+        match self.last() {
             None => Some(Caveat::NoMembers),
-            Some(last) if self.events == 0 => Some(Caveat::AllCensored { members, last }),
+            Some(last) if self.events() == 0 => Some(Caveat::AllCensored { members, last }),
             Some(_) if self.has_single_event() => Some(Caveat::SingleEvent { members }),
             Some(last) if survival > 0.0 => Some(Caveat::TailCensored { members, censored, last, survival }),
             Some(_) => None,
@@ -238,12 +246,12 @@ mod tests {
     use crate::statistics::Observation;
 
     /// Times with `+` for censored.
-    fn curve(times: &str) -> KaplanMeier {
+    fn curve(times: &str) -> KaplanMeier<'static> {
         let seen = |word: &str| Observation {
             time: word.trim_end_matches('+').parse().unwrap(),
             happened: !word.ends_with('+'),
         };
-        KaplanMeier::new(&Sample::new(times.split_whitespace().map(seen)).unwrap())
+        KaplanMeier::new(Box::leak(Box::new(Sample::new(times.split_whitespace().map(seen)).unwrap())))
     }
 
     #[test]
@@ -293,7 +301,7 @@ mod tests {
     fn censored_members_alone_have_no_mean_and_no_quantile() {
         for times in ["0.5+", "0.5+ 0.25+ 0.5+"] {
             let all = curve(times);
-            assert!(all.mean().is_none() && all.median().is_none() && all.steps().is_empty());
+            assert!(all.mean().is_none() && all.median().is_none() && all.steps().next().is_none());
             assert_eq!(all.caveat(), Some(Caveat::AllCensored { members: all.members(), last: 0.5 }));
         }
     }
@@ -301,7 +309,7 @@ mod tests {
     #[test]
     fn a_complete_sample_has_fractions_of_its_members_to_the_last_bit() {
         let times: String = (0..49).map(|t| format!("{t} ")).collect();
-        for (i, step) in curve(&times).steps().iter().enumerate() {
+        for (i, step) in curve(&times).steps().enumerate() {
             assert_eq!(step.survival, (48 - i) as f64 / 49.0);
         }
     }

@@ -257,6 +257,8 @@ fn the_rest(suite: &mut Suite, seed: u64) {
         surroundings::folders_that_cannot_be_written(&SHORT)
     });
     suite.test_if(mount, "a_disk_that_is_read_only", "refused by name", || surroundings::read_only_disk(&TINY));
+    let strace = (!calls::can_trace()).then_some("strace");
+    suite.test_if(strace, "a_file_system_without_locks", SAME, || surroundings::no_locks(&SHORT));
     suite.test("no_rights_for_new_files", "refused by name", || surroundings::no_rights_for_new_files(&SHORT));
     let cases = suite.of(3, 50);
     suite.test("a_folder_that_vanishes", "a named error, no panic", move || {

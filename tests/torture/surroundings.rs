@@ -197,6 +197,25 @@ pub fn locales(study: &Study) -> Outcome {
     Found::new(locales.len(), "0 differing bytes")
 }
 
+/// A file system that has no locks, whichever way it says so; an error of another kind is one.
+pub fn no_locks(study: &Study) -> Outcome {
+    let start = |attempt: &Attempt, error: &str| {
+        let inject = format!("inject=flock:error={error}");
+        let starter = ["strace", "-f", "-qq", "-o", "/dev/null", "-e", "trace=flock", "-e", &inject];
+        if attempt.has_state() { attempt.resume_through(&starter).end() } else { attempt.start_through(&starter).end() }
+    };
+    for error in ["ENOLCK", "EOPNOTSUPP"] {
+        for attempt in [Attempt::new(study), Attempt::interrupted(study)] {
+            let ended = start(&attempt, error);
+            assert_eq!((ended.code, &*ended.said), (Some(0), ""), "{error}");
+            attempt.must_be_the_reference(&[error.into()]);
+        }
+    }
+    let ended = start(&Attempt::new(study), "EIO");
+    assert!(ended.code == Some(2) && ended.errors().len() == 1, "{ended:?}");
+    Found::new(5, "0 differing bytes")
+}
+
 pub fn has_faketime() -> bool {
     is_there("faketime")
 }

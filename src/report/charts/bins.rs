@@ -32,8 +32,8 @@ impl Bins {
     ///
     /// Their width follows Freedman and Diaconis, 2·IQR/∛n, rounded to 1, 2 or 5 times a power of ten.
     pub fn of(sorted: &[f64], scale: Scale) -> Bins {
-        let levels: Vec<f64> = sorted.iter().map(|value| scale.level(*value)).collect();
-        let [low, high] = [levels[0], levels[levels.len() - 1]];
+        let level = |place: usize| scale.level(sorted[place]);
+        let [low, high] = [level(0), level(sorted.len() - 1)];
         let range = high - low;
         let equal = range <= EQUAL * if scale == Scale::Log { 1.0 } else { low.abs().max(high.abs()) };
         if equal {
@@ -44,15 +44,15 @@ impl Bins {
             };
             return Bins { bounds: vec![around(-0.01), around(0.01)], counts: vec![sorted.len() as u64] };
         }
-        let quantile = |share: f64| levels[(share * (levels.len() - 1) as f64).round() as usize];
-        let advised = 2.0 * (quantile(0.75) - quantile(0.25)) / (levels.len() as f64).cbrt();
+        let quantile = |share: f64| level((share * (sorted.len() - 1) as f64).round() as usize);
+        let advised = 2.0 * (quantile(0.75) - quantile(0.25)) / (sorted.len() as f64).cbrt();
         let count = (range / advised).clamp(FEWEST, MOST);
         let width = tick_step(ROUNDING * range / count);
         let first = (low / width).floor();
         let bins = ((high / width).ceil() - first).max(1.0) as usize;
         let mut counts = vec![0; bins];
-        for level in &levels {
-            counts[((level / width - first) as usize).min(bins - 1)] += 1;
+        for value in sorted {
+            counts[((scale.level(*value) / width - first) as usize).min(bins - 1)] += 1;
         }
         let bounds = (0..=bins).map(|i| scale.value((first + i as f64) * width)).collect();
         Bins { bounds, counts }

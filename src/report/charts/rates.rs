@@ -13,14 +13,14 @@ use crate::report::{
 const HEIGHT: f64 = 200.0;
 
 /// Fitted rates of the members.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct FittedRates<'a> {
     /// First line.
     pub title: &'a str,
     /// A sentence below it, or nothing.
     pub note: &'a str,
     /// Rates over those of theory; or rates, in `unit`, where there is no theory.
-    pub rates: &'a [f64],
+    pub rates: Vec<f64>,
     /// They are multiples of what theory gives.
     pub relative: bool,
     /// Unit of rates that are not.
@@ -31,26 +31,27 @@ pub struct FittedRates<'a> {
 
 impl FittedRates<'_> {
     /// The text of an SVG file.
-    pub fn draw(&self) -> String {
-        let mut sorted: Vec<f64> = self.rates.iter().copied().filter(|rate| Scale::Linear.holds(*rate)).collect();
-        sorted.sort_by(f64::total_cmp);
-        let without = match self.without {
+    pub fn draw(self) -> String {
+        let FittedRates { title, note, rates: mut sorted, relative, unit, without } = self;
+        sorted.retain(|rate| Scale::Linear.holds(*rate));
+        sorted.sort_unstable_by(f64::total_cmp);
+        let without = match without {
             0 => String::new(),
             without => format!("{} without a rate: fewer than 8 points in the window.", count(without, "member")),
         };
         if sorted.is_empty() {
-            let sentences = vec![self.note.into(), without];
-            return nothing(self.title, sentences, "No member was followed closely enough for a rate to be fitted.");
+            let sentences = vec![note.into(), without];
+            return nothing(title, sentences, "No member was followed closely enough for a rate to be fitted.");
         }
         let median = format!("Median {}.", significant(sorted[sorted.len() / 2], 4));
         let scale = if sorted[0] > 0.0 { Scale::of(sorted.iter().copied()) } else { Scale::Linear };
         let bins = Bins::of(&sorted, scale);
-        let (name, unit) = if self.relative { ("rate / theory", "") } else { ("rate", self.unit) };
+        let (name, unit) = if relative { ("rate / theory", "") } else { ("rate", unit) };
         let (across, members) = (bins.axis(name, unit, scale), Axis::counts("members", bins.most()));
-        let shown = self.relative && across.holds(1.0);
+        let shown = relative && across.holds(1.0);
         let legend = if shown { vec![Entry::new("ink", Mark::Dashed, "as linear theory has it")] } else { Vec::new() };
-        let sentences = vec![self.note.into(), median, without];
-        let (mut svg, top) = Heading { title: self.title, sentences, legend }.begin(HEIGHT + FOOT + 8.0);
+        let sentences = vec![note.into(), median, without];
+        let (mut svg, top) = Heading { title, sentences, legend }.begin(HEIGHT + FOOT + 8.0);
         let panel = only_panel([&across, &members], top, HEIGHT, 0.0);
         panel.draw_x(&mut svg);
         panel.draw_y(&mut svg);

@@ -1,5 +1,7 @@
 //! Survival curves: the share of members that has not relaxed yet, cell by cell (Kaplan and Meier).
 
+use std::iter;
+
 use glam::DVec2;
 
 use super::{MOST_BANDS, TIME, only_panel};
@@ -10,6 +12,8 @@ use crate::report::{
 };
 
 const HEIGHT: f64 = 300.0;
+/// Share of the members, and of a time, that is less than a tenth of a pixel.
+const FINEST: f64 = 1.0 / 4096.0;
 /// Censoring strokes of all curves together.
 const MOST_STROKES: f64 = 1200.0;
 /// Least pixels between two of them on a curve.
@@ -48,6 +52,35 @@ pub struct SurvivalCurve {
 }
 
 impl SurvivalCurve {
+    /// Adds a step at a time behind all others, after which the share is `survival`, within `bounds`. Steps that come before
+    /// the curve has fallen by what shows are one, at the last of them.
+    pub fn add_step(&mut self, t: f64, survival: f64, bounds: (f64, f64)) {
+        let (low, high) = self.band.get_or_insert_default();
+        // The share before the last step, which then is not far below it.
+        let before = match self.survival[..] {
+            [.., before, _] => before,
+            [_] => 1.0,
+            [] => f64::INFINITY,
+        };
+        if before - survival < FINEST {
+            for (all, last) in [(&mut self.t, t), (&mut self.survival, survival), (low, bounds.0), (high, bounds.1)] {
+                all.pop();
+                all.push(last);
+            }
+        } else {
+            for (all, next) in [(&mut self.t, t), (&mut self.survival, survival), (low, bounds.0), (high, bounds.1)] {
+                all.push(next);
+            }
+        }
+    }
+
+    /// Adds a member that was censored at a time not before any other, unless its stroke would be over the last one.
+    pub fn add_censored(&mut self, t: f64) {
+        if self.censored.last().is_none_or(|last| t - last > FINEST * t) {
+            self.censored.push(t);
+        }
+    }
+
     /// All times, in order of size within each kind.
     fn times(&self) -> impl Iterator<Item = f64> + '_ {
         self.t.iter().chain(&self.censored).copied()
@@ -64,10 +97,10 @@ impl SurvivalCurve {
         let Some(end) = self.end(time) else { return Vec::new() };
         let pairs = self.t.iter().zip(shares).filter(|(t, s)| time.holds(**t) && share.holds(**s));
         let start = DVec2::new(panel.corner.x, panel.height(1.0));
-        let place = |(t, s): (&f64, &f64)| DVec2::new(panel.across(*t), panel.height(*s));
-        let mut points: Vec<DVec2> = std::iter::once(start).chain(pairs.map(place)).collect();
-        points.push(DVec2::new(panel.across(end), points[points.len() - 1].y));
-        trace::steps(&points, least)
+        let last = pairs.clone().next_back().map_or(start.y, |(_, s)| panel.height(*s));
+        let places = pairs.map(|(t, s)| DVec2::new(panel.across(*t), panel.height(*s)));
+        let end = DVec2::new(panel.across(end), last);
+        trace::steps(iter::once(start).chain(places).chain([end]), least)
     }
 
     /// Strokes where members were censored.
@@ -134,5 +167,33 @@ impl Survival<'_> {
         let band = bands.then(|| Entry::new("faint", Mark::Band, "95 % band"));
         let stroke = censored.then(|| Entry::new("faint", Mark::Stroke, "censored"));
         curves.chain(band).chain(stroke).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_of_many_steps_keeps_those_that_show() {
+        for members in [1, 7, 4000, 100_000] {
+            let mut curve = SurvivalCurve::default();
+            let share = |i: usize| 1.0 - (i + 1) as f64 / members as f64;
+            let all: Vec<(f64, f64)> = (0..members).map(|i| ((i as f64).sqrt(), share(i))).collect();
+            all.iter().for_each(|(t, s)| curve.add_step(*t, *s, (s - 0.01, s + 0.01)));
+            assert_eq!(curve.t.len(), curve.survival.len());
+            assert!(if members <= 4000 { curve.t.len() == members } else { curve.t.len() <= 4200 }, "{members}");
+            assert_eq!((curve.t.last(), curve.survival.last()), (all.last().map(|l| &l.0), Some(&0.0)));
+            for (t, share) in &all {
+                let passed = curve.t.partition_point(|kept| kept <= t);
+                let shown = passed.checked_sub(1).map_or(1.0, |last| curve.survival[last]);
+                assert!((0.0..=FINEST).contains(&(shown - share)), "{members}: {t}: {shown} {share}");
+            }
+            let (low, high) = curve.band.unwrap();
+            assert!(low.iter().zip(&curve.survival).all(|(low, s)| *low == s - 0.01) && high.len() == low.len());
+        }
+        let mut curve = SurvivalCurve::default();
+        (0..100_000).for_each(|i| curve.add_censored(1.0 + 1e-5 * f64::from(i)));
+        assert!((2000..4000).contains(&curve.censored.len()), "{}", curve.censored.len());
     }
 }

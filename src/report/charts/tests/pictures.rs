@@ -88,7 +88,7 @@ pub fn draw_all() -> Vec<(String, String)> {
 
     let relaxation = |times: &[f64], others: &[(&str, u64)], median: Option<f64>| {
         let median = median.map(|value| Estimate { value, interval: Some((0.97 * value, 1.04 * value)) });
-        RelaxationTimes { title: "Relaxation times", note: NOTE, times, others, median }.draw()
+        RelaxationTimes { title: "Relaxation times", note: NOTE, times: times.to_vec(), others, median }.draw()
     };
     add("relaxation", relaxation(&times(412, 0.4, 0.2), &some, Some(0.42)));
     add("relaxation-wide", relaxation(&times(5000, 1e-6, 1.5), &[], Some(1e-6)));
@@ -101,6 +101,7 @@ pub fn draw_all() -> Vec<(String, String)> {
     add("relaxation-million", relaxation(&times(1_000_000, 0.4, 0.3), &some, Some(0.4)));
 
     let rates = |rates: &[f64], relative: bool, without: u64| {
+        let rates = rates.to_vec();
         FittedRates { title: "Rates of decay", note: NOTE, rates, relative, unit: "length⁻⁴", without }.draw()
     };
     add("rates", rates(&times(412, 1.0, 0.01), true, 3));
@@ -220,8 +221,11 @@ pub fn draw_all() -> Vec<(String, String)> {
     add("dependence-unknown", depend(vec![Series { levels, fit, ..Series::default() }], "amplitude"));
 
     let mesh = |mesh_ratio: &[f64], metric_drift: &[f64]| {
-        MeshQuality { title: "Mesh quality at the end", note: NOTE, mesh_ratio, metric_drift, distrusted: Some(0.1) }
-            .draw()
+        let [mesh_ratio, metric_drift] =
+            [mesh_ratio, metric_drift].map(|values| values.iter().map(|v| *v as f32).collect::<Vec<_>>());
+        let [mesh_ratio, metric_drift] = [&mesh_ratio[..], &metric_drift[..]];
+        let distrusted = Some((0.1, metric_drift.iter().filter(|drift| **drift > 0.1).count() as u64));
+        MeshQuality { title: "Mesh quality at the end", note: NOTE, mesh_ratio, metric_drift, distrusted }.draw()
     };
     let ratios = |count: usize| -> Vec<f64> { times(count, 0.05, 0.4).iter().map(|t| 1.0 + t).collect() };
     add("mesh", mesh(&ratios(512), &times(512, 1e-3, 2.2)));
