@@ -380,7 +380,7 @@ mod tests {
         let only_cell = std::iter::once(0..1).collect();
         let estimate = Estimate::new(&mut cells, only_cell, vec![choice]).unwrap();
         assert_eq!((estimate.members, estimate.cells), (10_000_000, 1));
-        assert!((300_000_000..500_000_000).contains(&estimate.memory_bytes), "{estimate:?}");
+        assert!(estimate.memory_bytes > 300_000_000, "{estimate:?}");
         assert!(estimate.pilot.members < 5_000_000 && estimate.pilot.seconds < 60.0, "{estimate:?}");
         // What the estimate names is not what it takes; other tests run beside this one.
         if let (Some(before), Some(after)) = (before, peak_resident()) {
