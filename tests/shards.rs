@@ -15,7 +15,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 /// Cells that cost unequally, all files, members that end in several ways.
-const STUDY: &str = "--backend cpu --curves 9 --points 34 --sweep shape=ellipse:2,1;lemniscate:1;circle:1 --adaptive=1e-3 \
+const STUDY: &str = "--backend cpu --curves 22 --points 34 --sweep shape=ellipse:2,1;lemniscate:1;circle:1 --adaptive=1e-3 \
                      --stop-when-relaxed --t-end 0.4 --series 0.05 --snapshots 0,0.1,0.4";
 /// A study that takes no time, with 12 members.
 const SMALL: &str = "--backend cpu --curves 12 --points 34 --tau 1e-3 --t-end 0.01 --solver direct";
@@ -100,7 +100,7 @@ fn merged_shards_are_the_files_of_one_run() {
         let study = format!("{STUDY} --store {store}");
         done(home.path(), &format!("run {study} --out {store}"));
         let one = home.path().join(store);
-        for count in [1, 3, 8, 27] {
+        for count in [1, 3, 8, 64] {
             let out = format!("{store}-merged-{count}");
             sharded(home.path(), &study, count, &out);
             assert_eq!(differences(&one, &home.path().join(&out)), [""; 0], "{count} shards, {store}");
