@@ -182,7 +182,8 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
     let home = TempDir::new().unwrap();
     let mut foretold = Vec::new();
     // Few members, and so many small ones that what is kept of each is most of it; those that have a rate take more.
-    let many = "--shape circle:1 --points 8 --modes 2..=2 --solver direct --stop-when-relaxed --tau 0.02";
+    let many = "--shape circle:1 --sampling parameter --points 8 --modes 2..=2 --solver direct --stop-when-relaxed \
+                --tau 0.02";
     let runs = [
         "--curves 300 --adaptive=1e-3 --stop-when-relaxed".to_string(),
         format!("--curves 250000 --t-end 0.02 {many}"),
@@ -196,7 +197,7 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
         foretold.push(said);
     }
     // The one would not do for the other.
-    assert!(foretold[1] > 1.5 * foretold[0] && foretold[2] > 1.2 * foretold[1], "{foretold:?}");
+    assert!(foretold[2] > 1.4 * foretold[1], "{foretold:?}");
 }
 
 #[test]

@@ -119,14 +119,17 @@ impl<'a> KaplanMeier<'a> {
         let (first, last) = (self.steps().next()?.time, self.last()?);
         // Each event carries the fall of S, the end carries what is left; measured from the first event, so that equal
         // times have exactly their own mean and no deviation.
-        let (mut area, mut survival) = (Sum::default(), 1.0);
+        let (mut mean, mut area) = (Sum::default(), Sum::default());
+        let (mut survival, mut before) = (1.0, first);
         for step in self.steps() {
-            area.add(step.fall_from(survival) * (step.time - first));
-            survival = step.survival;
+            mean.add(step.fall_from(survival) * (step.time - first));
+            area.add(survival * (step.time - before));
+            (survival, before) = (step.survival, step.time);
         }
-        area.add(survival * (last - first));
-        let value = first + area.value();
-        let [variance, area_variance] = self.variances(value, area.value());
+        mean.add(survival * (last - first));
+        area.add(survival * (last - before));
+        let value = first + mean.value();
+        let [variance, area_variance] = self.variances(value, area);
         let n = self.members() as f64;
         let [deviation, error] = if self.has_single_event() {
             [None, None]
@@ -143,23 +146,23 @@ impl<'a> KaplanMeier<'a> {
         })
     }
 
-    /// Of the times about their `mean`, and of the `area` under S from the first event on.
-    fn variances(&self, mean: f64, area: f64) -> [f64; 2] {
-        let (mut of_times, mut of_area, mut passed) = (Sum::default(), Sum::default(), Sum::default());
-        let mut before: Option<Step> = None;
+    /// Of the times about their `mean`, and of the `area` under S from the first event on. What is left of that comes down
+    /// to 0 without the rounding of all steps, since it is taken off as it was added up.
+    fn variances(&self, mean: f64, mut area: Sum) -> [f64; 2] {
+        let (mut of_times, mut of_area) = (Sum::default(), Sum::default());
+        let (mut survival, mut before) = (1.0, None);
         for step in self.steps() {
-            let survival = before.map_or(1.0, |before| before.survival);
             of_times.add(step.fall_from(survival) * (step.time - mean).powi(2));
-            passed.add(before.map_or(0.0, |before| survival * (step.time - before.time)));
+            area.add(before.map_or(0.0, |before| -survival * (step.time - before)));
             let (n, left) = (step.at_risk as f64, (step.at_risk - step.events) as f64);
             // The last event of all has no area behind it.
             if left > 0.0 {
-                of_area.add((area - passed.value()).powi(2) * (step.events as f64 / (n * left)));
+                of_area.add(area.value().powi(2) * (step.events as f64 / (n * left)));
             }
-            before = Some(step);
+            (survival, before) = (step.survival, Some(step.time));
         }
-        if let (Some(end), Some(last)) = (before, self.last()) {
-            of_times.add(end.survival * (last - mean).powi(2));
+        if let Some(last) = self.last() {
+            of_times.add(survival * (last - mean).powi(2));
         }
         [of_times, of_area].map(Sum::value)
     }
