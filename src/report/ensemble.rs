@@ -59,16 +59,10 @@ impl Rates {
         let places = places(quantiles, bootstrap.median_of(&fitted));
         let (known, mut named) = (fitted.count(), moments.into_iter().chain(places).collect::<Vec<_>>());
         // Each is as large as all times of the cell: one at a time.
-        let mut drawn = fitted;
-        if relative {
-            drawn = Description::default();
-        }
+        let kept = (!relative).then_some(fitted);
         let ratio = Description::new(rates.iter().filter_map(Rate::ratio))?;
         named.extend([("theory", theory), ("ratio", ratio.median())]);
-        if relative {
-            drawn = ratio;
-        }
-        Ok(Rates { numbers: Numbers { known, named }, drawn })
+        Ok(Rates { numbers: Numbers { known, named }, drawn: kept.unwrap_or(ratio) })
     }
 }
 

@@ -15,8 +15,8 @@ use crate::{
 /// A run that was asked to stop has stopped after so long.
 pub const SOON: Duration = Duration::from_secs(5);
 
-/// So many stops may be slower, and are not counted: a disk or a processor that others use stalls now and then, and a
-/// program that is slow is so again.
+/// So many stops may be slower, and are not counted: a machine that others use stalls now and then, and a program that is
+/// slow is so again.
 const STALLS: usize = 2;
 
 /// How long it took to stop.
@@ -59,7 +59,7 @@ pub fn stop_at_random_times(studies: &[&Study], signals: &[(&str, i32, i32)], ca
         let study = studies[rank % studies.len()];
         let (name, number, code) = signals[rank % signals.len()];
         rank += 1;
-        let attempt = Attempt::new(study);
+        let attempt = Attempt::on_a_fast_disk(study);
         let mut running = attempt.start();
         // Twice in a row: the second one stops a resumed run.
         for _ in 0..2 {
@@ -97,7 +97,7 @@ pub fn stop_twice(study: &Study, cases: usize, seed: u64) -> Outcome {
     let mut random = Random::new(seed);
     let mut stops = Stops::within(SOON / 5);
     while stops.prompt < cases {
-        let attempt = Attempt::new(study);
+        let attempt = Attempt::on_a_fast_disk(study);
         let mut running = attempt.start();
         let time = study.reference().took.mul_f64(0.7 * random.real());
         running.wait_until(|running| running.age() >= time && attempt.has_state());

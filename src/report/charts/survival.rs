@@ -56,21 +56,18 @@ impl SurvivalCurve {
     /// the curve has fallen by what shows are one, at the last of them.
     pub fn add_step(&mut self, t: f64, survival: f64, bounds: (f64, f64)) {
         let (low, high) = self.band.get_or_insert_default();
-        // The share before the last step, which then is not far below it.
+        // The share before the last step.
         let before = match self.survival[..] {
             [.., before, _] => before,
             [_] => 1.0,
             [] => f64::INFINITY,
         };
-        if before - survival < FINEST {
-            for (all, last) in [(&mut self.t, t), (&mut self.survival, survival), (low, bounds.0), (high, bounds.1)] {
+        let is_one_with_the_last = before - survival < FINEST;
+        for (all, next) in [(&mut self.t, t), (&mut self.survival, survival), (low, bounds.0), (high, bounds.1)] {
+            if is_one_with_the_last {
                 all.pop();
-                all.push(last);
             }
-        } else {
-            for (all, next) in [(&mut self.t, t), (&mut self.survival, survival), (low, bounds.0), (high, bounds.1)] {
-                all.push(next);
-            }
+            all.push(next);
         }
     }
 
