@@ -5,6 +5,7 @@ use std::{
     os::unix::process::ExitStatusExt,
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
+    sync::OnceLock,
     thread::{JoinHandle, sleep, spawn},
     time::{Duration, Instant},
 };
@@ -26,11 +27,20 @@ pub fn curvelax(home: &Path, arguments: &str) -> Command {
 
 /// The same, started by another program such as `strace`.
 pub fn through(home: &Path, starter: &[&str], arguments: &str) -> Command {
-    let mut words = starter.iter().map(PathBuf::from).chain([binary()]);
+    let mut words = hearing().iter().chain(starter).map(PathBuf::from).chain([binary()]);
     let mut command = Command::new(words.next().unwrap());
     // Where this is not set, a layer of Mesa says so on stderr.
     command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(words).args(arguments.split_whitespace());
     command
+}
+
+/// Starts a program that hears signals: who runs these tests in the background of a shell lets them ignore Ctrl-C, which is
+/// inherited. Nothing where there is no such starter.
+fn hearing() -> &'static [&'static str] {
+    const ENV: [&str; 2] = ["env", "--default-signal=INT,HUP,TERM"];
+    static HAS_ENV: OnceLock<bool> = OnceLock::new();
+    let try_it = || Command::new(ENV[0]).args([ENV[1], "true"]).stderr(Stdio::null()).status();
+    if *HAS_ENV.get_or_init(|| try_it().is_ok_and(|status| status.success())) { &ENV } else { &[] }
 }
 
 /// Whether `program` can be started.

@@ -15,47 +15,15 @@ use crate::{
 /// A run that was asked to stop has stopped after so long.
 pub const SOON: Duration = Duration::from_secs(5);
 
-/// So many stops may be slower, and are not counted: a machine that others use stalls now and then, and a program that is
-/// slow is so again.
-const STALLS: usize = 2;
-
-/// How long it took to stop.
-struct Stops {
-    bound: Duration,
-    prompt: usize,
-    slow: usize,
-    longest: Duration,
-}
-
-impl Stops {
-    fn within(bound: Duration) -> Stops {
-        Stops { bound, prompt: 0, slow: 0, longest: Duration::ZERO }
-    }
-
-    fn add(&mut self, took: Duration) {
-        self.longest = self.longest.max(took);
-        if took < self.bound {
-            self.prompt += 1
-        } else {
-            self.slow += 1
-        }
-        assert!(self.slow <= STALLS, "{:?} to stop, and {} stops of more than {:?}", took, self.slow, self.bound);
-    }
-
-    fn found(&self) -> Outcome {
-        let stalls = if self.slow == 0 { String::new() } else { format!("; {} stalls", self.slow) };
-        Found::new(self.prompt, format!("0 differing bytes; longest {:.2} s{stalls}", self.longest.as_secs_f64()))
-    }
-}
-
 /// So long a program may take until it listens to signals.
 const WAKES: Duration = Duration::from_millis(300);
 
 /// Stops runs of `studies` at random times by the signals in turn; each is then resumed to its end.
 pub fn stop_at_random_times(studies: &[&Study], signals: &[(&str, i32, i32)], cases: usize, seed: u64) -> Outcome {
     let mut random = Random::new(seed);
-    let (mut stops, mut rank) = (Stops::within(SOON), 0);
-    while stops.prompt < cases {
+    let mut longest = Duration::ZERO;
+    let (mut stopped, mut rank) = (0, 0);
+    while stopped < cases {
         let study = studies[rank % studies.len()];
         let (name, number, code) = signals[rank % signals.len()];
         rank += 1;
@@ -68,12 +36,12 @@ pub fn stop_at_random_times(studies: &[&Study], signals: &[(&str, i32, i32)], ca
             let (asked, age) = (Instant::now(), running.age());
             running.signal(name);
             let ended = running.end();
-            let took = asked.elapsed();
+            longest = longest.max(asked.elapsed());
             let told = format!("{name} after {time:?} (seed {seed}): {ended:?}");
             match (ended.code, ended.signal) {
                 (Some(found), _) if found == code => {
                     assert!(attempt.has_state(), "{told}");
-                    stops.add(took);
+                    stopped += 1;
                 }
                 // It came before the program listened, or when all was done.
                 (None, Some(found)) if found == number => assert!(!attempt.has_state() || age < WAKES, "{told}"),
@@ -86,7 +54,8 @@ pub fn stop_at_random_times(studies: &[&Study], signals: &[(&str, i32, i32)], ca
         assert!(last.code == Some(0) || last.had_not_begun(), "{last:?}");
         attempt.must_end_well(last);
     }
-    stops.found()
+    assert!(longest < SOON, "{longest:?} to stop");
+    Found::new(stopped, format!("0 differing bytes; longest {:.2} s", longest.as_secs_f64()))
 }
 
 /// Between one Ctrl-C and the next of somebody in a hurry.
@@ -95,8 +64,8 @@ const PRESSED_AGAIN: Duration = Duration::from_millis(100);
 /// A second Ctrl-C does not wait for anything.
 pub fn stop_twice(study: &Study, cases: usize, seed: u64) -> Outcome {
     let mut random = Random::new(seed);
-    let mut stops = Stops::within(SOON / 5);
-    while stops.prompt < cases {
+    let mut longest = Duration::ZERO;
+    for _ in 0..cases {
         let attempt = Attempt::on_a_fast_disk(study);
         let mut running = attempt.start();
         let time = study.reference().took.mul_f64(0.7 * random.real());
@@ -110,18 +79,19 @@ pub fn stop_twice(study: &Study, cases: usize, seed: u64) -> Outcome {
             sleep(PRESSED_AGAIN);
         }
         let ended = running.end();
-        stops.add(asked.elapsed());
+        longest = longest.max(asked.elapsed());
         assert!(matches!((ended.code, ended.signal), (Some(130 | 0), _) | (_, Some(2))), "{ended:?}");
         attempt.must_end_well(ended);
     }
-    stops.found()
+    assert!(longest < SOON / 5, "{longest:?} to stop at once");
+    Found::new(cases, format!("0 differing bytes; longest {:.2} s", longest.as_secs_f64()))
 }
 
 /// A run that may only take a second at a time.
 pub fn a_second_at_a_time(studies: &[&Study]) -> Outcome {
     let mut stops = 0;
     for study in studies {
-        let attempt = Attempt::new(study);
+        let attempt = Attempt::on_a_fast_disk(study);
         let second = |arguments: &str| {
             let arguments = format!("{arguments} --max-time 1s");
             Running::start(&mut curvelax(attempt.home.path(), &arguments)).end()
