@@ -41,7 +41,7 @@ fuzz_target!(|data: &[u8]| FOLDER.with_borrow_mut(|folder| {
     folder.hold(content);
     match Finished::read(&folder.path) {
         // Words of the run may say anything.
-        Ok(run) if checksum(data) % DRAWN == 0 => draw(&run, data.windows(3).any(|word| word == b"NaN")),
+        Ok(run) if checksum(data) % DRAWN == 0 => draw(run, data.windows(3).any(|word| word == b"NaN")),
         Ok(_) => {}
         Err(error) => {
             let message = error.to_string();
@@ -51,10 +51,12 @@ fuzz_target!(|data: &[u8]| FOLDER.with_borrow_mut(|folder| {
 }));
 
 /// Draws all pictures, or says why that cannot be; `told`: the run itself speaks of NaN.
-fn draw(run: &Finished, told: bool) {
-    let Finished { provenance, tally, excess, films } = run;
-    let drawn = EnsembleStatistics::new(&provenance.spec, tally)
-        .and_then(|statistics| Study { provenance, tally, statistics: &statistics, excess, films }.pictures());
+fn draw(run: Finished, told: bool) {
+    let Finished { provenance, mut tally, excess, films } = run;
+    let drawn = EnsembleStatistics::new(&provenance.spec, &mut tally).and_then(|statistics| {
+        let (provenance, tally, statistics) = (&provenance, &tally, &statistics);
+        Study { provenance, tally, statistics, excess: &excess, films: &films }.pictures()
+    });
     if let Ok(pictures) = drawn {
         for (name, text) in pictures {
             assert!(told || !text.contains("NaN") && !text.contains("\"inf"), "{name}");
