@@ -123,6 +123,11 @@ pub(crate) fn without_controls(text: &str) -> String {
     shown
 }
 
+/// A message of several lines, such as a tree of causes or a text with a caret under it, as one.
+pub(crate) fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

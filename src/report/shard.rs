@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     ensemble::{Shard, Spec},
-    error::{Error, Result, shortened},
+    error::{Error, Result, one_line, shortened},
 };
 
 /// Characters of a fault in a message.
@@ -123,11 +123,8 @@ pub fn look(path: &Path) -> Result<Found> {
     })?;
     let spec = Spec::from_toml(&record.head.origin.spec).map_err(|e| e.to_string());
     let spec = spec.and_then(|spec| spec.validate().map_err(|e| e.to_string()));
-    // A message with a caret, in one line.
-    let spec = spec.map_err(|e| {
-        let words = e.split_whitespace().collect::<Vec<_>>().join(" ");
-        Error::Request(faulty(SHARD, &format!("its spec: {}", shortened(&words, SHOWN))))
-    })?;
+    let fault = |e: String| faulty(SHARD, &format!("its spec: {}", shortened(&one_line(&e), SHOWN)));
+    let spec = spec.map_err(|e| Error::Request(fault(e)))?;
     let Some(shard) = spec.shard else {
         return Err(Error::Request(faulty(SHARD, "its spec is not of a shard")));
     };

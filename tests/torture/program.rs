@@ -39,14 +39,17 @@ pub fn through(home: &Path, starter: &[&str], arguments: &str) -> Command {
 fn hearing() -> &'static [&'static str] {
     const ENV: [&str; 2] = ["env", "--default-signal=INT,HUP,TERM"];
     static HAS_ENV: OnceLock<bool> = OnceLock::new();
-    let try_it = || Command::new(ENV[0]).args([ENV[1], "true"]).stderr(Stdio::null()).status();
-    if *HAS_ENV.get_or_init(|| try_it().is_ok_and(|status| status.success())) { &ENV } else { &[] }
+    if *HAS_ENV.get_or_init(|| succeeds(Command::new(ENV[0]).args([ENV[1], "true"]))) { &ENV } else { &[] }
 }
 
 /// Whether `program` can be started.
 pub fn is_there(program: &str) -> bool {
-    let quietly = |command: &mut Command| command.stdout(Stdio::null()).stderr(Stdio::null()).status();
-    quietly(Command::new(program).arg("--version")).is_ok_and(|status| status.success())
+    succeeds(Command::new(program).arg("--version"))
+}
+
+fn succeeds(command: &mut Command) -> bool {
+    let status = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
+    status.is_ok_and(|status| status.success())
 }
 
 /// A started program; killed when it is dropped.

@@ -14,7 +14,7 @@ use crate::{
         pipeline::{self, Key},
         shader,
     },
-    error::{Error, Result},
+    error::{Error, Result, one_line},
     number::{Precision, Real},
     solver::{Blocks, Solver, ring::MIN_POINTS},
 };
@@ -302,11 +302,6 @@ fn guarded<R>(call: impl FnOnce() -> R) -> std::result::Result<R, String> {
         let text = text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("a panic without a message");
         one_line(text)
     })
-}
-
-/// wgpu draws its errors as trees.
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
