@@ -49,10 +49,12 @@ fn stages<T: Real>(c: &mut Criterion) {
     let Start { curve, mut increments, parameters: p, mut work } = Start::<T>::new(points);
     let Workspace { blocks, motion, new, curvature, position, factors, .. } = &mut work;
     group.bench_function("redistribution", |b| {
-        b.iter(|| redistribution::redistribute(&curve, &p, *blocks, motion, &mut new.r));
+        b.iter(|| redistribution::redistribute(&curve, &p, p.branches(), *blocks, motion, &mut new.r));
     });
     group.bench_function("curvature", |b| b.iter(|| curvature.assemble(&Curvature::new(&curve, new, motion, &p))));
-    group.bench_function("position", |b| b.iter(|| position.assemble(&Position::new(&curve, new, motion, &p))));
+    group.bench_function("position", |b| {
+        b.iter(|| position.assemble(&Position::new(&curve, new, motion, &p, p.branches())))
+    });
     group.bench_function("direct, curvature", |b| {
         b.iter(|| direct::solve(curvature, [&mut increments.k], &mut factors.0));
     });

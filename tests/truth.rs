@@ -180,16 +180,17 @@ fn correct_step(Linear { state, work, p }: &mut Linear) {
 fn misprinted_step(Linear { state, work, p }: &mut Linear) {
     let State { curve, increments, .. } = state;
     let Workspace { blocks, motion, new, curvature, position, factors, .. } = work;
-    redistribution::redistribute(curve, p, *blocks, motion, &mut new.r);
+    redistribution::redistribute(curve, p, p.branches(), *blocks, motion, &mut new.r);
     curvature.assemble(&Curvature::new(curve, new, motion, p));
     direct::solve(curvature, [&mut increments.k], &mut factors.0);
     (0..curve.len()).for_each(|i| new.k[i] = curve.k[i] + increments.k[i]);
     new.k.close();
 
-    position.assemble(&Position::new(curve, new, motion, p));
+    position.assemble(&Position::new(curve, new, motion, p, p.branches()));
+    let law = p.law(p.branches());
     for i in 0..curve.len() {
         let ([_, before, _, after, _], ir) = (new.k.window(i), motion.ir[i]);
-        let change = 0.5 * (p.law().phi(before) - p.law().phi(after)) * ir;
+        let change = 0.5 * (law.phi(before) - law.phi(after)) * ir;
         let row = &mut position.rows[i];
         // The diagonal is q/τ minus the other entries, so it changes by as much the other way.
         let c = row.weight / (p.tau * motion.iq[i]);

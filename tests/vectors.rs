@@ -9,7 +9,7 @@ use curvelax::{
         Backend,
         cpu::{CpuBackend, Vectorised, Vectors},
     },
-    ensemble::{Cell, Ended, Family, Spec, Status, spec::Solver},
+    ensemble::{Cell, Ended, Spec, Status, spec::Solver, study},
     scheme::{
         Parameters, State,
         evolve::Run,
@@ -64,24 +64,24 @@ fn spec(shape: &str, more: Spec) -> Spec {
     Spec { shape, curves: 37, series: Some(0.013), snapshots: vec![0.0, 0.02], ..more }.validate().unwrap()
 }
 
-fn run<T: Vectorised>(spec: &Spec, vectors: Vectors, threads: usize, slots: usize) -> Vec<Ended> {
-    let method = Method { solver: spec.solver(), order: Order::Coloured, max_sweeps: spec.max_sweeps };
-    let blocks = Blocks::new(spec.points).unwrap();
+/// All members of `specs`, which have solver and n in common, side by side.
+fn run<T: Vectorised>(specs: &[Spec], vectors: Vectors, threads: usize, slots: usize) -> Vec<Ended> {
+    let method = Method { solver: specs[0].solver(), order: Order::Coloured, max_sweeps: specs[0].max_sweeps };
+    let blocks = Blocks::new(specs[0].points).unwrap();
     let backend = CpuBackend::<T>::with_vectors(blocks, method, threads, vectors).unwrap();
     let mut all = All::default();
-    let family = Family::new(spec).unwrap();
-    simulate(&[Cell::only(spec.clone(), family)], T::PRECISION, &mut Fewer(Box::new(backend), slots), 2, &mut all)
-        .unwrap();
+    let cells: Vec<Cell> = specs.iter().flat_map(|spec| study::cells(spec).unwrap()).collect();
+    simulate(&cells, T::PRECISION, &mut Fewer(Box::new(backend), slots), 2, &mut all).unwrap();
     all.0
 }
 
-fn same_bits<T: Vectorised>(name: &str, spec: &Spec) {
-    let alone = run::<T>(spec, Vectors::None, 1, 16);
-    assert_eq!(alone.len(), spec.curves as usize);
+fn same_bits<T: Vectorised>(name: &str, specs: &[Spec]) {
+    let alone = run::<T>(specs, Vectors::None, 1, 16);
+    assert_eq!(alone.len() as u64, specs.iter().map(Spec::all_members).sum::<u64>());
     let (mut compared, mut wider) = (0, 0);
     for vectors in Vectors::ALL.into_iter().filter(|vectors| vectors.are_available()) {
         for (threads, slots) in [(1, 1000), (2, 11)] {
-            let abreast = run::<T>(spec, vectors, threads, slots);
+            let abreast = run::<T>(specs, vectors, threads, slots);
             for (one, other) in alone.iter().zip(&abreast) {
                 // Debug prints every bit of a float, and NaN equal to NaN.
                 let member = one.outcome.member;
@@ -99,7 +99,8 @@ fn same_bits<T: Vectorised>(name: &str, spec: &Spec) {
     assert!(compared > 0);
     println!("{name}, {}: {compared} members, {wider} runs in vectors", T::NAME);
     // Negative control: a member of another seed has other bits.
-    let other = run::<T>(&Spec { seed: spec.seed + 1, ..spec.clone() }, Vectors::widest(), 1, 1000);
+    let other: Vec<Spec> = specs.iter().map(|spec| Spec { seed: spec.seed + 1, ..spec.clone() }).collect();
+    let other = run::<T>(&other, Vectors::widest(), 1, 1000);
     assert_ne!(format!("{:?}", alone[5]), format!("{:?}", other[5]));
 }
 
@@ -108,9 +109,9 @@ fn fixed_steps_give_the_same_bits_in_every_vector() {
     for solver in Solver::ALL {
         for n in [32, 37] {
             let fixed = Spec { tau: Some(1e-3), t_end: 0.3, points: n, solver: solver.into(), ..Spec::default() };
-            let spec = spec("ellipse:2,1", Spec { stop_when_relaxed: true, relax_to: Some(0.5), ..fixed });
-            same_bits::<f64>(&format!("{solver:?}, n = {n}"), &spec);
-            same_bits::<f32>(&format!("{solver:?}, n = {n}"), &spec);
+            let specs = [spec("ellipse:2,1", Spec { stop_when_relaxed: true, relax_to: Some(0.5), ..fixed })];
+            same_bits::<f64>(&format!("{solver:?}, n = {n}"), &specs);
+            same_bits::<f32>(&format!("{solver:?}, n = {n}"), &specs);
         }
     }
 }
@@ -119,19 +120,35 @@ fn fixed_steps_give_the_same_bits_in_every_vector() {
 fn adaptive_steps_give_the_same_bits_in_every_vector() {
     for solver in Solver::ALL {
         let adaptive = Spec { adaptive: Some(1e-2), t_end: 0.4, points: 33, solver: solver.into(), ..Spec::default() };
-        let spec = spec("flower:3:0.3", Spec { stop_when_relaxed: true, ..adaptive });
-        same_bits::<f64>(&format!("{solver:?}, adaptive"), &spec);
-        same_bits::<f32>(&format!("{solver:?}, adaptive"), &spec);
+        let specs = [spec("flower:3:0.3", Spec { stop_when_relaxed: true, ..adaptive })];
+        same_bits::<f64>(&format!("{solver:?}, adaptive"), &specs);
+        same_bits::<f32>(&format!("{solver:?}, adaptive"), &specs);
+    }
+}
+
+#[test]
+fn members_that_take_other_branches_are_not_disturbed() {
+    for solver in Solver::ALL {
+        // Every branch by itself, and all mixtures.
+        let specs = [(Some(1e-3), None), (None, Some(1e-2))].map(|(tau, adaptive)| {
+            let (solver, amplitude) = (solver.into(), 0.1);
+            let mut mixed = Spec { tau, adaptive, t_end: 0.03, points: 24, solver, amplitude, ..Spec::default() };
+            let axes = ["no-redistribution=true,false", "pull=0,3", "flow=surface-diffusion;willmore;poly:0.2"];
+            axes.map(|axis| mixed.sweep.set(axis.parse().unwrap()));
+            Spec { curves: 3, ..spec("ellipse:2,1", mixed) }
+        });
+        same_bits::<f64>(&format!("{solver:?}, mixed"), &specs);
+        same_bits::<f32>(&format!("{solver:?}, mixed"), &specs);
     }
 }
 
 #[test]
 fn members_that_fail_leave_the_lanes_to_others() {
     let base = Spec { t_end: 0.5, points: 40, solver: Solver::Direct.into(), amplitude: 0.3, ..Spec::default() };
-    let fixed = spec("lemniscate:1", Spec { tau: Some(1e-3), ..base.clone() });
-    let adaptive = spec("lemniscate:1", Spec { adaptive: Some(1e-3), ..base });
-    for spec in [&fixed, &adaptive] {
-        let all = run::<f64>(spec, Vectors::widest(), 2, 1000);
+    let fixed = [spec("lemniscate:1", Spec { tau: Some(1e-3), ..base.clone() })];
+    let adaptive = [spec("lemniscate:1", Spec { adaptive: Some(1e-3), ..base })];
+    for specs in [&fixed, &adaptive] {
+        let all = run::<f64>(specs, Vectors::widest(), 2, 1000);
         let singular = all.iter().filter(|ended| ended.outcome.status == Status::Singular).count();
         let first = all[0].outcome.steps;
         assert!(singular > 9 && all.iter().any(|ended| ended.outcome.steps != first), "{singular} end badly");

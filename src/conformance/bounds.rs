@@ -137,7 +137,7 @@ impl Scale {
         match self {
             Scale::Velocity => {
                 let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
-                k() / (shortest * shortest) + p.law().b(k()).abs()
+                k() / (shortest * shortest) + p.law(p.branches()).b(k()).abs()
             }
             Scale::Tangential => work.motion.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
             Scale::Length => longest(),

@@ -4,7 +4,7 @@
 //! w = -α; that of x on nodes, r apart and q long, with ρ = 1/τ, p = φ and w = -α + ³⁄₂ ∂_s k². Coarse systems are only
 //! corrected by, so α is taken as the mean over the cell.
 
-use super::{Motion, Parameters};
+use super::{Branches, Motion, Parameters};
 use crate::{
     number::Number,
     solver::{Ring, multigrid::Levels},
@@ -28,9 +28,16 @@ pub fn curvature<N: Number>(motion: &Motion<N>, r: &Ring<N>, p: &Parameters<N>, 
 
 /// The terms of the position system, from the motion of the old curve and the new lengths and curvatures.
 #[inline(always)]
-pub fn position<N: Number>(motion: &Motion<N>, r: &Ring<N>, k: &Ring<N>, p: &Parameters<N>, levels: &mut Levels<N, 2>) {
+pub fn position<N: Number>(
+    motion: &Motion<N>,
+    r: &Ring<N>,
+    k: &Ring<N>,
+    p: &Parameters<N>,
+    branches: Branches,
+    levels: &mut Levels<N, 2>,
+) {
     levels.rate = p.tau.recip();
-    let law = p.law();
+    let law = p.law(branches);
     for i in 0..r.len() {
         let [_, _, own, next, _] = r.window(i);
         let [_, _, here, after, _] = k.window(i);

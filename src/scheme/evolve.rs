@@ -1,10 +1,10 @@
 //! A member's run: steps, acceptance, status and relaxation events. Twin of `shaders/evolve.wgsl`.
 //!
-//! Members go abreast, one a lane of a number: what they compute is common, what is decided is decided for each. With a
-//! plain `f64` it is one member alone, the reference; no bit of a member depends on who goes beside it.
+//! Members of a [`Group`] go abreast, one a lane of a number: they run the same instructions, and every decision is made
+//! for each of them. With a plain `f64` it is one member alone, the reference; no bit of a member depends on the others.
 
 use super::{
-    Parameters, State, Status, Workspace, decay, extrapolation,
+    Branches, Parameters, State, Status, Workspace, decay, extrapolation,
     observe::{self, Glance},
     pace::{self, Stride},
     parameters::{Counters, NEVER, Observed, Report},
@@ -67,6 +67,23 @@ impl<T: Real> Run<T> {
     }
 }
 
+/// Members that take the same branches of the scheme, and so can go abreast.
+pub struct Group<'a, 'b, T> {
+    runs: &'a mut [&'b mut Run<T>],
+    branches: Branches,
+}
+
+impl<'a, 'b, T: Real> Group<'a, 'b, T> {
+    /// Members sorted into groups of `most` at most.
+    pub fn of(runs: &'a mut [&'b mut Run<T>], most: usize) -> Vec<Group<'a, 'b, T>> {
+        let branches = |run: &Run<T>| run.parameters.branches();
+        runs.sort_by_key(|run| branches(run));
+        let alike = runs.chunk_by_mut(|one, other| branches(one) == branches(other));
+        let groups = alike.flat_map(|alike| alike.chunks_mut(most));
+        groups.map(|runs| Group { branches: branches(runs[0]), runs }).collect()
+    }
+}
+
 /// Members abreast: one a lane.
 pub struct Team<N: Number> {
     state: State<N>,
@@ -96,22 +113,21 @@ struct Attempt<N: Number> {
 /// is tried again with a shorter step, until that is too short to mean anything; one that is too inaccurate at every
 /// length follows a curve that n nodes do not resolve, which is singular.
 pub fn evolve<T: Real>(run: &mut Run<T>, method: &Method, team: &mut Team<T>, attempts: u32) {
+    let branches = run.parameters.branches();
+    let alone = Group { runs: &mut [run], branches };
     match method.solver {
-        Solver::GaussSeidel => evolve_abreast::<T, Sweeps>(&mut [run], method, team, attempts),
-        Solver::Multigrid => evolve_abreast::<T, Cycles>(&mut [run], method, team, attempts),
-        Solver::Direct => evolve_abreast::<T, Elimination>(&mut [run], method, team, attempts),
+        Solver::GaussSeidel => evolve_abreast::<T, Sweeps>(alone, method, team, attempts),
+        Solver::Multigrid => evolve_abreast::<T, Cycles>(alone, method, team, attempts),
+        Solver::Direct => evolve_abreast::<T, Elimination>(alone, method, team, attempts),
     }
 }
 
-/// Advances up to as many members as there are lanes, all with fixed or all with adaptive steps, by the solver `S`; returns
-/// earlier when less than half of them are still running: the others would pay for lanes that are idle.
+/// Advances a group of at most as many members as there are lanes by the solver `S`; returns earlier when less than half of
+/// them are still running: the others would pay for lanes that are idle.
 #[inline(always)]
-pub fn evolve_abreast<N: Number, S: Solves>(
-    runs: &mut [&mut Run<N::Real>],
-    method: &Method,
-    team: &mut Team<N>,
-    attempts: u32,
-) {
+pub fn evolve_abreast<N: Number, S: Solves>(group: Group<N::Real>, method: &Method, team: &mut Team<N>, attempts: u32) {
+    let Group { runs, branches } = group;
+    let adaptive = branches.adaptive;
     let mut live = N::Mask::all_of(false);
     let mut running = 0;
     for (lane, run) in runs.iter_mut().enumerate() {
@@ -122,14 +138,13 @@ pub fn evolve_abreast<N: Number, S: Solves>(
         running += usize::from(runs);
     }
     let Some(first) = runs.iter().position(|run| run.counters.is_running()) else { return };
-    let adaptive = !runs[first].parameters.adaptive.le(N::Real::of(0.0));
     for lane in 0..N::LANES {
         // A lane without a member goes along with the first one.
         team.take_in(lane, if live.lane(lane) { &*runs[lane] } else { &*runs[first] });
     }
     let enough = running.div_ceil(2);
     for made in 1..=attempts {
-        let attempt = team.attempt::<S>(runs, live, adaptive, method);
+        let attempt = team.attempt::<S>(runs, live, branches, method);
         team.conclude::<S>(runs, live, adaptive, &attempt);
         let all_leave = made == attempts || runs.iter().filter(|run| run.counters.is_running()).count() < enough;
         for lane in 0..runs.len() {
@@ -193,9 +208,10 @@ impl<N: Number> Team<N> {
         &mut self,
         runs: &mut [&mut Run<N::Real>],
         live: N::Mask,
-        adaptive: bool,
+        branches: Branches,
         method: &Method,
     ) -> Attempt<N> {
+        let adaptive = branches.adaptive;
         let Team { state, parameters, excess, strides, work, .. } = self;
         let mut h = parameters.tau;
         if adaptive {
@@ -211,7 +227,7 @@ impl<N: Number> Team<N> {
         for part in 0..if adaptive { 3 } else { 1 } {
             parameters.tau = if part == 0 { h } else { half * h };
             let from = if part == 2 { &state.before } else { &state.curve };
-            let stepped = step::step_by::<N, S>(from, &mut state.increments, parameters, ok, method, work);
+            let stepped = step::step_by::<N, S>(from, &mut state.increments, parameters, branches, ok, method, work);
             // What failed before says why, and makes no more sweeps.
             all.finite = all.finite.and(stepped.finite.or(ok.not()));
             all.solved = all.solved.and(stepped.solved.or(ok.not()));

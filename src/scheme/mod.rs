@@ -20,6 +20,7 @@
 //! is a curve with what the next step needs of the last one; a [`Workspace`] holds what a step computes on the way, and
 //! doubles as its trace for the conformance test.
 
+pub mod branches;
 pub mod coarse;
 pub mod curvature;
 pub mod decay;
@@ -36,6 +37,7 @@ pub mod state;
 pub mod status;
 pub mod step;
 
+pub use branches::Branches;
 pub use parameters::Parameters;
 pub use state::{Curve, Increments, Motion, State, Workspace};
 pub use status::Status;

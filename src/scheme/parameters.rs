@@ -6,13 +6,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Curve,
+    Branches, Curve,
     decay::TIMES,
     observe::{self, Maxima, Sums},
 };
 use crate::{
     flow::{Flow, MAX_DEGREE},
-    number::{BIG, Mask, Number, Real},
+    number::{BIG, Number, Real},
     solver::Blocks,
 };
 
@@ -378,21 +378,20 @@ impl Counters {
 }
 
 impl<N: Number> Parameters<N> {
-    /// The law.
+    /// c₁ … c₈.
     #[inline(always)]
-    pub fn law(&self) -> Law<N> {
-        let coefficients = [self.c1, self.c2, self.c3, self.c4, self.c5, self.c6, self.c7, self.c8];
-        let (zero, mut degree) = (N::of(0.0), 0);
-        for (j, c) in coefficients.into_iter().enumerate() {
-            if !c.le(zero).and(zero.le(c)).all() {
-                degree = j + 1;
-            }
-        }
-        Law { coefficients, degree }
+    pub(super) fn coefficients(&self) -> [N; MAX_DEGREE] {
+        [self.c1, self.c2, self.c3, self.c4, self.c5, self.c6, self.c7, self.c8]
+    }
+
+    /// The law, whose degree is that of the `branches`.
+    #[inline(always)]
+    pub fn law(&self, branches: Branches) -> Law<N> {
+        Law { coefficients: self.coefficients(), degree: branches.degree }
     }
 }
 
-/// `b(k) = c₁k + c₂k² + …`, up to the highest power that any lane has: those above would add zeros.
+/// `b(k) = c₁k + c₂k² + …`, up to its degree.
 #[derive(Clone, Copy, Debug)]
 pub struct Law<N> {
     coefficients: [N; MAX_DEGREE],

@@ -5,7 +5,7 @@
 //! decay rates that do not converge (`docs/method.md`). `𝓒 = q_i/τ - (𝓐+𝓑+𝓓+𝓔)`, so the residual of the old
 //! state is `-Σ_j off_ij (x_j - x_i)`.
 
-use super::{Curve, Parameters, parameters::Law, state::Motion};
+use super::{Branches, Curve, Parameters, parameters::Law, state::Motion};
 use crate::{
     number::Number,
     solver::{Equation, Equations},
@@ -24,8 +24,14 @@ pub struct Position<'a, N> {
 impl<'a, N: Number> Position<'a, N> {
     /// The system of a step of `p.tau` from `old`, with the lengths and curvatures of `new`.
     #[inline(always)]
-    pub fn new(old: &'a Curve<N>, new: &'a Curve<N>, motion: &'a Motion<N>, p: &Parameters<N>) -> Self {
-        Position { old, new, motion, law: p.law(), tau: p.tau, rate: p.tau.recip() }
+    pub fn new(
+        old: &'a Curve<N>,
+        new: &'a Curve<N>,
+        motion: &'a Motion<N>,
+        p: &Parameters<N>,
+        branches: Branches,
+    ) -> Self {
+        Position { old, new, motion, law: p.law(branches), tau: p.tau, rate: p.tau.recip() }
     }
 }
 

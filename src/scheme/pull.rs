@@ -8,8 +8,8 @@
 //! which the position equation leaves it at rest. With θ itself k is larger by θ²/24 and circles grow for ever.
 //! κ = 0 is the paper.
 
-use super::{Curve, Parameters, observe::edge};
-use crate::number::{Mask, Number};
+use super::{Branches, Curve, Parameters, observe::edge};
+use crate::number::Number;
 
 /// By how much the polygon turns at both ends of segment i together, and the length it turns over.
 #[inline(always)]
@@ -28,9 +28,8 @@ fn vertex_turn<N: Number>([ex, ey, e]: [N; 3], [fx, fy, f]: [N; 3]) -> N {
 
 /// Pulls the new k and r of a step towards `curve`'s polygon.
 #[inline(always)]
-pub fn pull<N: Number>(curve: &mut Curve<N>, p: &Parameters<N>) {
-    // Members side by side in lanes have it or not together.
-    if !p.pull.le(N::of(0.0)).not().any() {
+pub fn pull<N: Number>(curve: &mut Curve<N>, p: &Parameters<N>, branches: Branches) {
+    if !branches.pulled {
         return;
     }
     let rate = p.pull * p.tau;

@@ -8,9 +8,9 @@
 //! - `r_i ← r_i·exp(τ(-B + ω(M/r_i - 1)))`, eq. (3) for `η = ln r`; without redistribution α = 0 and
 //!   `r_i ← r_i·exp(-τ k_i β_i)`.
 
-use super::{Curve, Parameters, state::Motion};
+use super::{Branches, Curve, Parameters, state::Motion};
 use crate::{
-    number::{Mask, Number},
+    number::Number,
     solver::{Blocks, Ring, Sums},
 };
 
@@ -19,13 +19,14 @@ use crate::{
 pub fn redistribute<N: Number>(
     old: &Curve<N>,
     p: &Parameters<N>,
+    branches: Branches,
     blocks: Blocks,
     motion: &mut Motion<N>,
     r: &mut Ring<N>,
 ) -> N {
     let n = N::of(old.len() as f64);
     reciprocals(&old.r, motion);
-    let law = p.law();
+    let law = p.law(branches);
     for i in 0..old.len() {
         motion.b[i] = law.b(old.k[i]);
     }
@@ -40,8 +41,7 @@ pub fn redistribute<N: Number>(
     }
     let [length, sum_rkb] = sums.totals();
     let (mean_rkb, mean_length) = (sum_rkb / length, length / n);
-    // Members side by side in lanes have it or not together.
-    if N::of(0.5).le(p.redistribution).any() {
+    if branches.redistributed {
         tangential_velocity(old, p, [mean_rkb, mean_length], blocks, motion);
         for i in 0..old.len() {
             let rate = p.omega * (mean_length * motion.ir[i] - N::of(1.0)) - mean_rkb;

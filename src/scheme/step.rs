@@ -1,7 +1,8 @@
 //! One step of the paper's scheme, from an old curve to the new one in the workspace. Twin of `shaders/step.wgsl`.
 
 use super::{
-    Curve, Increments, Parameters, Workspace, coarse, curvature::Curvature, position::Position, pull, redistribution,
+    Branches, Curve, Increments, Parameters, Workspace, coarse, curvature::Curvature, position::Position, pull,
+    redistribution,
 };
 use crate::{
     number::{Mask, Number, Real},
@@ -47,26 +48,28 @@ pub fn step<T: Real>(
     method: &Method,
     work: &mut Workspace<T>,
 ) -> Stepped<T> {
+    let branches = p.branches();
     match method.solver {
-        Solver::GaussSeidel => step_by::<T, Sweeps>(old, increments, p, true, method, work),
-        Solver::Multigrid => step_by::<T, Cycles>(old, increments, p, true, method, work),
-        Solver::Direct => step_by::<T, Elimination>(old, increments, p, true, method, work),
+        Solver::GaussSeidel => step_by::<T, Sweeps>(old, increments, p, branches, true, method, work),
+        Solver::Multigrid => step_by::<T, Cycles>(old, increments, p, branches, true, method, work),
+        Solver::Direct => step_by::<T, Elimination>(old, increments, p, branches, true, method, work),
     }
 }
 
-/// The same for members side by side, by the solver `S`. Lanes that are not `live` cost no sweeps and mean nothing
+/// The same for members side by side that share `branches`, by the solver `S`. Lanes that are not `live` cost no sweeps and mean nothing
 /// afterwards.
 #[inline(always)]
 pub fn step_by<N: Number, S: Solves>(
     old: &Curve<N>,
     increments: &mut Increments<N>,
     p: &Parameters<N>,
+    branches: Branches,
     live: N::Mask,
     method: &Method,
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
     let Workspace { blocks, motion, new, curvature, position, traced, factors, levels } = work;
-    let length = redistribution::redistribute(old, p, *blocks, motion, &mut new.r);
+    let length = redistribution::redistribute(old, p, branches, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
     let rounding = N::of(NEGLIGIBLE * N::EPSILON);
@@ -93,7 +96,7 @@ pub fn step_by<N: Number, S: Solves>(
     };
     add(&old.k, &increments.k, &mut new.k);
 
-    let equations = Position::new(old, new, motion, p);
+    let equations = Position::new(old, new, motion, p, branches);
     if S::SOLVER.sweeps() || *traced {
         position.assemble(&equations);
     }
@@ -103,13 +106,13 @@ pub fn step_by<N: Number, S: Solves>(
         Solver::Direct => unswept(direct::solve(&equations, unknowns, &mut factors.1)),
         Solver::GaussSeidel => gauss_seidel::solve(position, unknowns, *blocks, &control, live),
         Solver::Multigrid => {
-            coarse::position(motion, &new.r, &new.k, p, &mut levels.1);
+            coarse::position(motion, &new.r, &new.k, p, branches, &mut levels.1);
             multigrid::solve(position, unknowns, *blocks, &control, live, &mut levels.1)
         }
     };
     add(&old.x, &increments.x, &mut new.x);
     add(&old.y, &increments.y, &mut new.y);
-    pull::pull(new, p);
+    pull::pull(new, p, branches);
 
     // What the second solve did counts only where the first one succeeded.
     Stepped {

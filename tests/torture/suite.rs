@@ -11,7 +11,7 @@ use libtest_mimic::{Arguments, Failed, Trial};
 
 use crate::{
     calls::{self, From},
-    controls, kills, order, program, races, signals, sizes, soak, space, state,
+    controls, differential, kills, order, program, races, signals, sizes, soak, space, state,
     study::Study,
     surroundings,
 };
@@ -269,6 +269,10 @@ fn the_rest(suite: &mut Suite, seed: u64) {
     let faketime = (!surroundings::has_faketime()).then_some("faketime");
     suite.test_if(faketime, "wrong_clocks", SAME, || surroundings::wrong_clocks(&SHORT));
     suite.test("threads", SAME, || order::threads(&SHORT));
+    let studies = suite.of(12, 2000);
+    suite.test("random_studies", SAME, move || differential::studies("cpu", studies, seed));
+    let studies = suite.of(3, 400);
+    suite.test_if(gpu, "random_studies_on_the_gpu", SAME, move || differential::studies("gpu", studies, seed));
     suite.test("subsets", SAME, || order::subsets(&SHORT, &["0", "9", "1,2,3,7", "0,1,2,3,4,5,6,7,8,9"]));
     let times = suite.of(2, 20);
     suite.test_if(gpu, "repeats_on_the_gpu", SAME, move || order::repeats(&GPU_ZARR, times));

@@ -23,7 +23,7 @@ use crate::{
     error::{Error, Result},
     scheme::{
         Parameters, State,
-        evolve::Run,
+        evolve::{Group, Run},
         parameters::{Counters, Report},
         step::Method,
     },
@@ -151,7 +151,8 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
             let started = Instant::now();
             let mut running: Vec<&mut Run<T>> =
                 members.iter_mut().flatten().map(|run| &mut **run).filter(|run| run.counters.is_running()).collect();
-            running.par_chunks_mut(crew.lanes()).for_each(|group| crew.advance(group, &method, attempts));
+            let groups = Group::of(&mut running, crew.lanes());
+            groups.into_par_iter().for_each(|group| crew.advance(group, &method, attempts));
             // Where nobody waits any more the run has ended.
             let _ = back.send((members, started.elapsed()));
         });

@@ -8,7 +8,7 @@ use crate::{
     error::{Error, Result},
     number::{Element, Instructions, Number, Real, WithLanes, with_lanes},
     scheme::{
-        evolve::{Run, Team, evolve_abreast},
+        evolve::{Group, Team, evolve_abreast},
         step::Method,
     },
     solver::{Blocks, Cycles, Elimination, Solver, Solves, Sweeps},
@@ -94,7 +94,7 @@ vectorised!(f64 f32);
 /// for nothing, and go over their rows so often that these have to stay in the nearest cache: fewer members go abreast.
 fn crew_by<M: Solves + 'static, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Crew<T>>> {
     match vectors {
-        Vectors::None => Some(Group::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
+        Vectors::None => Some(Teams::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
         // Fuzzing (`fuzz/run`) advances no member, and would take minutes to count the branches of all this.
         _ if cfg!(fuzzing) => None,
         #[cfg(target_arch = "x86_64")]
@@ -136,7 +136,7 @@ impl<S: Simd, M: Solves + 'static, T: Real> WithLanes<T> for Abreast<S, M> {
     type Output = Box<dyn Crew<T>>;
 
     fn call<N: Number<Real = T>>(self) -> Box<dyn Crew<T>> {
-        Group::<S, M, N>::crew(self.simd, self.blocks, self.threads)
+        Teams::<S, M, N>::crew(self.simd, self.blocks, self.threads)
     }
 }
 
@@ -159,39 +159,39 @@ pub trait Crew<T>: Send + Sync {
     fn lanes(&self) -> usize;
 
     /// Takes a group of at most that many members some steps further, in a thread of the pool.
-    fn advance(&self, runs: &mut [&mut Run<T>], method: &Method, attempts: u32);
+    fn advance(&self, group: Group<T>, method: &Method, attempts: u32);
 }
 
 /// Lanes of `N` in instructions `S`, which the token proves to be there, for the solver `M`; a team for each thread.
-struct Group<S, M, N: Number> {
+struct Teams<S, M, N: Number> {
     simd: S,
     solver: PhantomData<fn() -> M>,
     teams: Vec<Mutex<Team<N>>>,
 }
 
-impl<S: Simd, M: Solves + 'static, T: Real, N: Number<Real = T>> Group<S, M, N> {
+impl<S: Simd, M: Solves + 'static, T: Real, N: Number<Real = T>> Teams<S, M, N> {
     fn crew(simd: S, blocks: Blocks, threads: usize) -> Box<dyn Crew<T>> {
         let teams = (0..threads).map(|_| Mutex::new(Team::<N>::new(blocks))).collect();
-        Box::new(Group { simd, solver: PhantomData::<fn() -> M>, teams })
+        Box::new(Teams { simd, solver: PhantomData::<fn() -> M>, teams })
     }
 }
 
-impl<S: Simd, M: Solves, N: Number> Crew<N::Real> for Group<S, M, N> {
+impl<S: Simd, M: Solves, N: Number> Crew<N::Real> for Teams<S, M, N> {
     fn lanes(&self) -> usize {
         N::LANES
     }
 
-    fn advance(&self, runs: &mut [&mut Run<N::Real>], method: &Method, attempts: u32) {
+    fn advance(&self, group: Group<N::Real>, method: &Method, attempts: u32) {
         let thread = rayon::current_thread_index().unwrap_or(0);
         // A team that a panic left behind is taken over: members overwrite all of it.
         let mut team = self.teams[thread].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        self.simd.vectorize(Advance { runs, solver: self.solver, method, team: &mut team, attempts });
+        self.simd.vectorize(Advance { group, solver: self.solver, method, team: &mut team, attempts });
     }
 }
 
 /// The call that is compiled for the instructions.
 struct Advance<'a, 'b, M, N: Number> {
-    runs: &'a mut [&'b mut Run<N::Real>],
+    group: Group<'a, 'b, N::Real>,
     solver: PhantomData<fn() -> M>,
     method: &'a Method,
     team: &'a mut Team<N>,
@@ -203,7 +203,7 @@ impl<M: Solves, N: Number> NullaryFnOnce for Advance<'_, '_, M, N> {
 
     #[inline(always)]
     fn call(self) {
-        let Advance { runs, solver: PhantomData, method, team, attempts } = self;
-        evolve_abreast::<N, M>(runs, method, team, attempts);
+        let Advance { group, solver: PhantomData, method, team, attempts } = self;
+        evolve_abreast::<N, M>(group, method, team, attempts);
     }
 }

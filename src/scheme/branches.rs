@@ -1,0 +1,62 @@
+//! Which branches of the scheme a member takes: what members must share to go abreast.
+//!
+//! Members in the lanes of a number are advanced by one stream of instructions. What differs from lane to lane is
+//! selected by masks; what decides which instructions are run at all is here, and nowhere else. It is read from the
+//! parameters of single members only, [`Group`](super::evolve::Group) compares it, and the stages are handed it: no stage
+//! asks a number of several lanes which way to go.
+
+use super::Parameters;
+use crate::number::Real;
+
+/// The branches of one member, or of a group of members that share them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Branches {
+    /// Three steps are extrapolated to one whose length adapts.
+    pub adaptive: bool,
+    /// Nodes are redistributed along the curve.
+    pub redistributed: bool,
+    /// k and r are pulled to the polygon's own.
+    pub pulled: bool,
+    /// Degree of `b(k)`.
+    pub degree: usize,
+}
+
+impl<T: Real> Parameters<T> {
+    /// The branches that a member with these parameters takes.
+    pub fn branches(&self) -> Branches {
+        let zero = T::of(0.0);
+        let positive = |value: T| !value.le(zero);
+        let vanishes = |c: &T| c.le(zero) && zero.le(*c);
+        let highest = self.coefficients().iter().rposition(|c| !vanishes(c));
+        Branches {
+            adaptive: positive(self.adaptive),
+            redistributed: T::of(0.5).le(self.redistribution),
+            pulled: positive(self.pull),
+            degree: highest.map_or(0, |j| j + 1),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::Flow;
+
+    #[test]
+    fn every_parameter_that_steers_shows_in_the_branches() {
+        let branches = |flow: &str, change: fn(&mut Parameters<f64>)| {
+            let mut p = Parameters::of_flow(&flow.parse::<Flow>().unwrap(), 1.0);
+            change(&mut p);
+            p.branches()
+        };
+        let paper = branches("surface-diffusion", |_| {});
+        assert_eq!(paper, Branches { adaptive: false, redistributed: true, pulled: false, degree: 0 });
+        let adaptive = branches("surface-diffusion", |p| p.adaptive = 1e-3);
+        assert_eq!(adaptive, Branches { adaptive: true, ..paper });
+        let free = branches("surface-diffusion", |p| p.redistribution = 0.0);
+        assert_eq!(free, Branches { redistributed: false, ..paper });
+        assert_eq!(branches("surface-diffusion", |p| p.pull = 2.0), Branches { pulled: true, ..paper });
+        assert_eq!(branches("poly:0,-1,0,-0.0", |_| {}), Branches { degree: 2, ..paper });
+        assert_eq!(branches("willmore", |_| {}), Branches { degree: 3, ..paper });
+    }
+}
