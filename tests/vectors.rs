@@ -132,9 +132,9 @@ fn members_that_take_other_branches_are_not_disturbed() {
         // Every branch by itself, and all mixtures.
         let specs = [(Some(1e-3), None), (None, Some(1e-2))].map(|(tau, adaptive)| {
             let (solver, amplitude) = (solver.into(), 0.1);
-            let mut mixed = Spec { tau, adaptive, t_end: 0.03, points: 24, solver, amplitude, ..Spec::default() };
+            let mut mixed = Spec { tau, adaptive, t_end: 0.03, points: 32, solver, amplitude, ..Spec::default() };
             let axes = ["no-redistribution=true,false", "pull=0,3", "flow=surface-diffusion;willmore;poly:0.2"];
-            axes.map(|axis| mixed.sweep.set(axis.parse().unwrap()));
+            axes.into_iter().for_each(|axis| mixed.sweep.set(axis.parse().unwrap()));
             Spec { curves: 3, ..spec("ellipse:2,1", mixed) }
         });
         same_bits::<f64>(&format!("{solver:?}, mixed"), &specs);

@@ -26,8 +26,7 @@ impl<T: Real> Parameters<T> {
     pub fn branches(&self) -> Branches {
         let zero = T::of(0.0);
         let positive = |value: T| !value.le(zero);
-        let vanishes = |c: &T| c.le(zero) && zero.le(*c);
-        let highest = self.coefficients().iter().rposition(|c| !vanishes(c));
+        let highest = self.coefficients().iter().rposition(|c| *c != zero);
         Branches {
             adaptive: positive(self.adaptive),
             redistributed: T::of(0.5).le(self.redistribution),

@@ -33,9 +33,9 @@ const KEYS: [(&str, &[&str]); 20] = [
     ("modes", &["2..=4", "2..=8", "3..=3"]),
     ("decay", &["0", "1", "2.5"]),
     ("flow", &["surface-diffusion", "willmore", "elastic:0.5", "poly:0,-0.3", "poly:0.1,0,-0.5,0.01"]),
-    ("tau", &["1e-3", "2e-3", "7e-4"]),
+    ("tau", &["1e-3", "5e-4", "2e-4"]),
     ("adaptive", &["1e-2", "1e-3", "4e-3"]),
-    ("t-end", &["0.03", "0.1", "0.21"]),
+    ("t-end", &["0.2", "0.5", "0.81"]),
     ("omega", &["0", "1", "5"]),
     ("no-redistribution", &["true", "false"]),
     ("pull", &["0", "auto", "3"]),
@@ -84,7 +84,7 @@ impl Drawn {
             (key, values)
         });
         let mut base = Settings::new();
-        let fixed = [("t-end", "0.06"), ("points", if on_the_gpu { "16" } else { "23" }), ("tau", "1e-3")];
+        let fixed = [("t-end", "0.4"), ("points", if on_the_gpu { "16" } else { "23" }), ("tau", "1e-3")];
         base.extend(fixed.map(|(key, value)| (key, value.to_string())));
         // Lengths of steps and numbers of nodes are whole other ways through the program; the rest stays as it is half the
         // time. On a GPU every number of nodes is a kernel to compile.
@@ -108,15 +108,15 @@ impl Drawn {
         };
         sometimes(" --precision f32", 2);
         sometimes(" --stop-when-relaxed", 2);
-        sometimes(" --series 0.011", 2);
-        sometimes(" --snapshots 0,0.02,0.03", 2);
+        sometimes(" --series 0.061", 2);
+        sometimes(" --snapshots 0,0.02,0.15", 2);
         sometimes(" --store zarr", 4);
         sometimes(" --max-sweeps 40", 6);
         let common = random.below(3) == 0;
         if common {
             rest.push_str(" --common-random-numbers");
         }
-        Drawn { base, axes, rest, members: 1 + random.below(5), common }
+        Drawn { base, axes, rest, members: 1 + random.below(6), common }
     }
 
     fn cells(&self) -> usize {
@@ -297,9 +297,11 @@ impl Trial {
         let study = self.drawn.study();
         let mut running = self.start(&format!("{study} --out stopped"));
         let mut interruptions = 0;
-        for round in 0..4 {
-            let moment = took.mul_f64(random.real());
-            running.wait_until(|running| running.age() >= moment || round == 3);
+        for _ in 0..4 {
+            // Members are advanced from the moment on at which their table is there, and for a part of the time only.
+            let (table, moment) =
+                (self.home.path().join("stopped/.summary.csv.part"), took.mul_f64(0.5 * random.real()));
+            running.wait_until(|running| table.exists() && running.age() >= moment);
             // A stop leaves a state of that very moment, a kill what was there.
             let ended = match random.below(3) {
                 0 => running.kill(),
