@@ -5,7 +5,7 @@
 //! meet every key. A study whose values do not go together is refused by the program and drawn again.
 
 use std::{
-    collections::{BTreeMap, VecDeque},
+    collections::{BTreeMap, BTreeSet, VecDeque},
     fs,
     path::Path,
     time::{Duration, Instant},
@@ -22,7 +22,7 @@ use crate::{
 
 /// Every key that can be swept, with values for it. A value that has commas is why `;` stands between them.
 const KEYS: [(&str, &[&str]); 20] = [
-    ("points", &["8", "13", "16", "24", "37"]),
+    ("points", &["13", "16", "24", "37"]),
     ("seed", &["1", "2", "77"]),
     (
         "shape",
@@ -30,7 +30,7 @@ const KEYS: [(&str, &[&str]); 20] = [
     ),
     ("sampling", &["arclength", "parameter"]),
     ("amplitude", &["0", "0.01", "0.05", "0.2"]),
-    ("modes", &["2..=4", "2..=8", "3..=3"]),
+    ("modes", &["2..=2", "2..=3", "3..=3"]),
     ("decay", &["0", "1", "2.5"]),
     ("flow", &["surface-diffusion", "willmore", "elastic:0.5", "poly:0,-0.3", "poly:0.1,0,-0.5,0.01"]),
     ("tau", &["1e-3", "5e-4", "2e-4"]),
@@ -84,7 +84,8 @@ impl Drawn {
             (key, values)
         });
         let mut base = Settings::new();
-        let fixed = [("t-end", "0.4"), ("points", if on_the_gpu { "16" } else { "23" }), ("tau", "1e-3")];
+        let fixed =
+            [("t-end", "0.4"), ("modes", "2..=3"), ("points", if on_the_gpu { "16" } else { "23" }), ("tau", "1e-3")];
         base.extend(fixed.map(|(key, value)| (key, value.to_string())));
         // Lengths of steps and numbers of nodes are whole other ways through the program; the rest stays as it is half the
         // time. On a GPU every number of nodes is a kernel to compile.
@@ -336,12 +337,19 @@ impl Trial {
 pub fn studies(backend: &'static str, wanted: usize, seed: u64) -> Outcome {
     let mut random = Random::new(seed ^ u64::from(backend == "gpu") << 40);
     let mut pack = VecDeque::new();
+    // Where there is room for all keys, none is left out.
+    let mut missing: BTreeSet<&str> = keys(backend).into_iter().collect();
+    missing.retain(|_| 2 * wanted >= KEYS.len());
     let (mut studies, mut refused, mut cells, mut rows, mut interruptions) = (0, 0, 0, 0, 0);
-    while studies < wanted {
+    while studies < wanted || !missing.is_empty() {
         if pack.len() < 2 {
-            pack.extend(shuffled(&mut random, backend));
+            pack.extend(shuffled(&mut random, keys(backend)));
         }
         let keys = [pack.pop_front().unwrap(), pack.pop_front().unwrap()];
+        if keys[0] == keys[1] {
+            pack.push_back(keys[0]);
+            continue;
+        }
         // Until the program takes it; some pairs never go together.
         for _ in 0..TRIES {
             let mut trial = Trial::new(Drawn::new(&mut random, keys, backend));
@@ -360,6 +368,7 @@ pub fn studies(backend: &'static str, wanted: usize, seed: u64) -> Outcome {
             interruptions += trial.interruptions(&expected, took, &mut random);
             cells += trial.drawn.cells();
             studies += 1;
+            missing.retain(|key| !keys.contains(key));
             break;
         }
     }
@@ -370,10 +379,12 @@ pub fn studies(backend: &'static str, wanted: usize, seed: u64) -> Outcome {
     Found::new(studies, found)
 }
 
-/// Keys that a study can sweep on this back end, in random order.
-fn shuffled(random: &mut Random, backend: &str) -> Vec<&'static str> {
-    let mut keys: Vec<&str> =
-        KEYS.map(|(key, _)| key).into_iter().filter(|key| backend == "cpu" || *key != "order").collect();
+/// Keys that a study can sweep on this back end.
+fn keys(backend: &str) -> Vec<&'static str> {
+    KEYS.iter().map(|(key, _)| *key).filter(|key| backend == "cpu" || *key != "order").collect()
+}
+
+fn shuffled(random: &mut Random, mut keys: Vec<&'static str>) -> Vec<&'static str> {
     for last in (1..keys.len()).rev() {
         keys.swap(last, random.below(last + 1));
     }
