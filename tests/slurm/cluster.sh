@@ -29,14 +29,15 @@ cluster_start() {
     export SLURM_CONF=$cluster/slurm.conf
     mkdir -p "$cluster/munge" "$cluster/state" "$cluster/spool"
     (umask 077 && head -c 128 /dev/urandom >"$cluster/munge/key")
-    # SlurmdTimeout: a node that says nothing for so long is down. cred_expire: also how long a requeued task has to wait,
-    # two minutes if nothing is said. config_overrides: two cores for each node, whatever there is.
+    # SlurmdTimeout: a node that says nothing for so long is down, and one on a busy machine must not be. cred_expire: what
+    # a message may take, and also how long a requeued task has to wait, two minutes if nothing is said. config_overrides:
+    # two cores for each node, whatever there is.
     cat >"$SLURM_CONF" <<CONF
 ClusterName=curvelax
 SlurmctldHost=localhost
 SlurmctldPort=$port
 AuthType=auth/munge
-AuthInfo=socket=$cluster/munge/socket,cred_expire=5
+AuthInfo=socket=$cluster/munge/socket,cred_expire=20
 SlurmUser=$user
 SlurmdUser=$user
 ProctrackType=proctrack/linuxproc
@@ -50,9 +51,9 @@ SelectTypeParameters=CR_Core
 SlurmdParameters=config_overrides
 SchedulerParameters=bf_interval=2,sched_interval=5
 ReturnToService=2
-SlurmdTimeout=6
-MessageTimeout=5
-TCPTimeout=1
+SlurmdTimeout=20
+MessageTimeout=60
+TCPTimeout=10
 KillWait=5
 JobRequeue=1
 MinJobAge=3600
@@ -71,7 +72,7 @@ CONF
     slurmctld -f "$SLURM_CONF" -c || return
     node_start n1 || return
     node_start n2 || return
-    for _ in {1..60}; do
+    for _ in {1..1200}; do
         if [ "$(sinfo -h -o '%D %T' 2>/dev/null)" = "2 idle" ]; then
             return
         fi
@@ -95,29 +96,28 @@ processes_with() {
     done | sort -nu
 }
 
-# tasks: what runs as tasks of this cluster: process, node, job, and index in the array, or - for one that is of none.
+# tasks: what runs as tasks of this cluster: process, node, and index in the array, or - for one that is of none.
 tasks() {
-    local environment variable process node job index
+    local environment variable process node index
     # A process may end meanwhile.
     { grep -lzxF "SLURM_CONF=$SLURM_CONF" /proc/[0-9]*/environ 2>/dev/null || true; } | while read -r environment; do
-        process=${environment#/proc/} node='' job='' index=-
+        process=${environment#/proc/} node='' index=-
         while IFS= read -rd '' variable; do
             case $variable in
                 SLURMD_NODENAME=*) node=${variable#*=} ;;
-                SLURM_JOB_ID=*) job=${variable#*=} ;;
                 SLURM_ARRAY_TASK_ID=*) index=${variable#*=} ;;
             esac
         done 2>/dev/null <"$environment" || true
         if [ -n "$node" ]; then
-            echo "${process%/*} $node $job $index"
+            echo "${process%/*} $node $index"
         fi
     done
 }
 
-# kill_all COMMAND: kills the processes that COMMAND names until it names none.
+# kill_all COMMAND: kills the processes that COMMAND names until it names none. Ten minutes are for none that can be killed.
 kill_all() {
     local all
-    for _ in {1..20}; do
+    for _ in {1..6000}; do
         all=$("$@")
         if [ -z "$all" ]; then
             return
