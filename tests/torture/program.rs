@@ -1,6 +1,7 @@
 //! The program as a user starts it, waits for it, signals it and kills it.
 
 use std::{
+    fs,
     io::Read,
     os::unix::process::ExitStatusExt,
     path::{Path, PathBuf},
@@ -12,8 +13,10 @@ use std::{
 
 /// How often a process is looked at.
 const GLANCE: Duration = Duration::from_millis(1);
-/// No process of these tests runs as long; one that does hangs.
-pub const HANGS: Duration = Duration::from_secs(600);
+/// No process of these tests runs as long, on whatever machine; one that does hangs.
+pub const HANGS: Duration = Duration::from_secs(1800);
+/// A tick of the processor time in `/proc`, on every machine that matters.
+const TICK: Duration = Duration::from_millis(10);
 
 /// The built program.
 pub fn binary() -> PathBuf {
@@ -50,6 +53,12 @@ pub fn is_there(program: &str) -> bool {
 fn succeeds(command: &mut Command) -> bool {
     let status = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
     status.is_ok_and(|status| status.success())
+}
+
+/// What `/proc/PROCESS/status` says under `name`, such as `VmRSS:`.
+pub fn status(process: u32, name: &str) -> Option<String> {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    Some(status.lines().find_map(|line| line.strip_prefix(name))?.trim().to_string())
 }
 
 /// A started program; killed when it is dropped.
@@ -116,9 +125,47 @@ impl Running {
     }
 
     /// `kill -s NAME`.
-    pub fn signal(&mut self, name: &str) {
-        // It may be over by now.
-        let _ = Command::new("kill").args(["-s", name, &self.id().to_string()]).stderr(Stdio::null()).status();
+    pub fn signal(&self, name: &str) {
+        signal(name, &[self]);
+    }
+
+    /// Whether it has a handler for the signal `number`: before that, the signal ends it.
+    pub fn hears(&self, number: i32) -> bool {
+        let caught = status(self.id(), "SigCgt:").and_then(|mask| u64::from_str_radix(&mask, 16).ok());
+        caught.is_some_and(|mask| mask >> (number - 1) & 1 == 1)
+    }
+
+    /// Whether SIGSTOP holds it.
+    pub fn is_held(&self) -> bool {
+        status(self.id(), "State:").is_some_and(|state| state.starts_with('T'))
+    }
+
+    /// Whether it has a file of this name open.
+    pub fn has_open(&self, name: &str) -> bool {
+        let files = fs::read_dir(format!("/proc/{}/fd", self.id())).into_iter().flatten().flatten();
+        files.filter_map(|file| fs::read_link(file.path()).ok()).any(|path| path.ends_with(name))
+    }
+
+    /// The processor time that it has had so far.
+    pub fn worked(&self) -> Option<Duration> {
+        let stat = fs::read_to_string(format!("/proc/{}/stat", self.id())).ok()?;
+        // After the name of the program, from the third field on; the 14th and the 15th.
+        let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+        let ticks = |field: usize| fields.get(field - 3)?.parse::<u32>().ok();
+        Some(TICK * (ticks(14)? + ticks(15)?))
+    }
+
+    /// Does something to it until its end; returns also the processor time that it takes from now on.
+    #[track_caller]
+    pub fn end_while(mut self, mut what: impl FnMut(&Running)) -> (Ended, Duration) {
+        let before = self.worked().unwrap_or_default();
+        let mut last = before;
+        self.wait_until(|running| {
+            what(running);
+            last = running.worked().unwrap_or(last);
+            false
+        });
+        (self.end(), last.saturating_sub(before))
     }
 
     pub fn kill(mut self) -> Ended {
@@ -138,6 +185,13 @@ impl Running {
         assert!(!panicked, "a panic: {ended:?}");
         ended
     }
+}
+
+/// `kill -s NAME` of all at once.
+pub fn signal(name: &str, all: &[&Running]) {
+    let ids = all.iter().map(|running| running.id().to_string());
+    // They may be over by now.
+    let _ = Command::new("kill").args(["-s", name]).args(ids).stderr(Stdio::null()).status();
 }
 
 impl Drop for Running {

@@ -2,9 +2,15 @@
 
 use crate::{
     Found, Outcome,
-    program::{Ended, Running, curvelax},
+    program::{Ended, Running, signal, through},
     study::{Attempt, Study},
 };
+
+/// Begins when it is woken, so that two that are woken together begin together.
+const HELD: [&str; 3] = ["sh", "-c", "kill -s STOP $$; exec \"$0\" \"$@\""];
+
+/// Open in a run that is at work, from its begin to its end.
+const TABLE: &str = ".summary.csv.part";
 
 /// Who starts twice.
 #[derive(Clone, Copy, Debug)]
@@ -40,9 +46,10 @@ pub fn double_starts(study: &Study, races: usize) -> Outcome {
             Twins::Runs => Attempt::new(study),
             _ => middle.fork(),
         };
-        let started =
-            twins.arguments(&attempt).map(|arguments| Running::start(&mut curvelax(attempt.home.path(), &arguments)));
-        let ended = started.map(Running::end);
+        let ended = together(twins.arguments(&attempt).map(|arguments| {
+            let mut command = through(attempt.home.path(), &HELD, &arguments);
+            Running::start(&mut command)
+        }));
         let codes = ended.each_ref().map(|ended| ended.code);
         assert!(matches!(codes, [Some(0), Some(2)] | [Some(2), Some(0)]), "{twins:?}: {ended:?}");
         let refused: &Ended = ended.iter().find(|ended| ended.code == Some(2)).unwrap();
@@ -51,4 +58,32 @@ pub fn double_starts(study: &Study, races: usize) -> Outcome {
         attempt.must_be_the_reference(&[format!("{twins:?} {ended:?}")]);
     }
     Found::new(races, format!("{races} proceeded, {races} refused, 0 differing bytes; {second_won} times the second"))
+}
+
+/// Lets both begin at once. The one that gets to work is held until the other one has ended: it must not be done before the
+/// other one looks, however little work there is.
+fn together(mut both: [Running; 2]) -> [Ended; 2] {
+    for one in &mut both {
+        one.wait_until(Running::is_held);
+    }
+    signal("CONT", &both.each_ref());
+    let [one, other] = &mut both;
+    let mut at_work = None;
+    one.wait_until(|one| {
+        at_work = [one, &*other].iter().position(|running| running.has_open(TABLE));
+        at_work.is_some()
+    });
+    match at_work {
+        Some(0) => hold_until_the_end(one, other),
+        Some(_) => hold_until_the_end(other, one),
+        // The first one has ended.
+        None => {}
+    }
+    both.map(Running::end)
+}
+
+fn hold_until_the_end(held: &Running, other: &mut Running) {
+    held.signal("STOP");
+    other.wait_until(|_| false);
+    held.signal("CONT");
 }

@@ -1,10 +1,10 @@
 //! A state that is not what was written: any bit, any length.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, time::Instant};
 
 use crate::{
     Found, Outcome,
-    program::Ended,
+    program::{Ended, HANGS},
     random::Random,
     study::{Attempt, Study},
 };
@@ -14,10 +14,12 @@ const BEFORE: &str = ".curvelax.state.old";
 
 /// An interrupted run with its two states.
 fn with_two_states(study: &Study) -> Attempt<'_> {
-    for _ in 0..20 {
+    let since = Instant::now();
+    // A run may end before it is asked to stop.
+    while since.elapsed() < HANGS {
         let attempt = Attempt::interrupted(study);
         let mut running = attempt.resume();
-        running.wait_until(|running| running.age().as_millis() >= 10);
+        running.wait_until(|running| running.hears(15));
         running.signal("TERM");
         let ended = running.end();
         if ended.code == Some(75) && [NEWEST, BEFORE].iter().all(|name| attempt.out().join(name).is_file()) {

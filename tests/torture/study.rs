@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use crate::{
     folder::{Content, content, copy, differences},
-    program::{Ended, Running, curvelax, through},
+    program::{Ended, HANGS, Running, curvelax, through},
 };
 
 /// A run by its arguments.
@@ -173,7 +173,9 @@ impl<'a> Attempt<'a> {
 
     /// A run that was interrupted as soon as it could be, with what it says.
     pub fn interrupted(study: &'a Study) -> Attempt<'a> {
-        for _ in 0..20 {
+        let since = Instant::now();
+        // A run may end before anybody looks.
+        while since.elapsed() < HANGS {
             let attempt = Attempt::new(study);
             let mut running = attempt.start();
             running.wait_until(|_| attempt.out().join(".curvelax.state").exists());
