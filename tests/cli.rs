@@ -158,22 +158,30 @@ fn a_dry_run_writes_nothing_and_its_table_says_what_its_json_says() {
     assert_eq!(names(home.path()), [""; 0]);
 }
 
-/// The peak resident size of `curvelax ARGUMENTS`, read as long as it lives, and what it prints.
+/// The peak resident size of `curvelax ARGUMENTS --out OUT`, which prints its results into a pipe that is full: when its files
+/// are complete, it waits there until the size has been read.
 #[cfg(target_os = "linux")]
-fn peak(folder: &Path, arguments: &str) -> (f64, String) {
+fn peak(folder: &Path, arguments: &str, out: &str) -> f64 {
+    use std::io::Write;
+
+    let (mut reader, mut writer) = std::io::pipe().unwrap();
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
     command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).args(arguments.split_whitespace());
-    let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
-    let (status, mut peak) = (format!("/proc/{}/status", child.id()), 0.0);
-    while child.try_wait().unwrap().is_none() {
-        let text = fs::read_to_string(&status).unwrap_or_default();
-        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-        peak = line.and_then(|line| line.trim().trim_end_matches(" kB").parse().ok()).unwrap_or(peak);
+    command.args(["--json", "--out", out]).stdout(writer.try_clone().unwrap());
+    let filler = std::thread::spawn(move || writer.write_all(&vec![b' '; 1 << 22]));
+    let mut child = command.spawn().unwrap();
+    drop(command);
+    let (out, started) = (folder.join(out), Instant::now());
+    while !out.join("run.json").exists() || out.join(".curvelax.lock").exists() {
+        assert!(child.try_wait().unwrap().is_none() && started.elapsed().as_secs() < 600, "{arguments}");
         std::thread::sleep(Duration::from_millis(1));
     }
-    let output = child.wait_with_output().unwrap();
-    assert!(output.status.success(), "{arguments}");
-    (1024.0 * peak, String::from_utf8(output.stdout).unwrap())
+    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
+    std::io::copy(&mut reader, &mut std::io::sink()).unwrap();
+    filler.join().unwrap().unwrap();
+    assert!(child.wait().unwrap().success(), "{arguments}");
+    1024.0 * line.trim().trim_end_matches(" kB").parse::<f64>().unwrap()
 }
 
 #[cfg(target_os = "linux")]
@@ -192,7 +200,7 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
     for (rank, spec) in runs.iter().enumerate() {
         let base = format!("run --backend cpu {spec} --quiet");
         let said = json(home.path(), &format!("{base} --dry-run --json"))["memory_bytes"].as_f64().unwrap();
-        let (taken, _) = peak(home.path(), &format!("{base} --out {rank}"));
+        let taken = peak(home.path(), &base, &rank.to_string());
         assert!((said / taken - 1.0).abs() < 0.2, "{spec}: {said} foretold, {taken} taken");
         foretold.push(said);
     }

@@ -18,7 +18,11 @@ from common import CURVELAX, rows
 STUDY = Path(__file__).parents[2] / "examples" / "python" / "dask_study.py"
 SHARDS = 4
 MEMBERS = 1600
-# Two cells, dear enough that a worker can be killed in the middle of its shard: a second each.
+# What is waited for so long hangs: nothing here depends on how fast a machine is.
+HANGS = 600
+# A failed task is tried again so often.
+RETRIES = 3
+# Two cells.
 SPEC = f"""
 curves = {MEMBERS // 2}
 stop-when-relaxed = true
@@ -26,6 +30,14 @@ backend = "cpu"
 
 [sweep]
 adaptive = [1e-3, 1e-5]
+"""
+
+
+# What the study starts in the place of curvelax: notes each start, and while there is a file `hold` waits to be woken.
+WRAPPER = """#!/bin/sh
+echo "$*" >>"$0.log"
+[ ! -e "$0.hold" ] || kill -STOP $$
+exec "$CURVELAX_ITSELF" "$@"
 """
 
 
@@ -48,6 +60,25 @@ def shards(study):
     return found
 
 
+def held(study):
+    """Those of them that wait to be woken."""
+
+    def is_held(process):
+        try:
+            return process.status() == psutil.STATUS_STOPPED
+        except psutil.NoSuchProcess:
+            return False
+
+    return [(process, out) for process, out in shards(study) if is_held(process)]
+
+
+def wake(study, but=None):
+    """Wakes those that still wait, all but one."""
+    for process, _ in held(study):
+        if process != but:
+            process.resume()
+
+
 def pending(process):
     """The signals that a process has not yet got, a bit each."""
     return int(re.search(r"ShdPnd:\s*(\w+)", Path(f"/proc/{process.pid}/status").read_text())[1], 16)
@@ -61,14 +92,33 @@ def end(process):
         pass
 
 
-def soon(look, study):
+def soon(look, study, meanwhile=lambda: None):
     """The first result of `look` that is something, while the study goes on."""
-    until = time.monotonic() + 30
+    until = time.monotonic() + HANGS
     while time.monotonic() < until and study.poll() is None:
+        meanwhile()
         if found := look():
             return found
         time.sleep(0.01)
     raise AssertionError("what was waited for did not come")
+
+
+def caught(study):
+    """A shard that is suspended in its middle, with its worker and its folder; else nothing."""
+    for curvelax, out in held(study):
+        table = out / ".summary.csv.part"
+        try:
+            worker = curvelax.parent()
+            curvelax.resume()
+            soon(lambda: not curvelax.is_running() or (table.exists() and table.stat().st_size > 0), study)
+            curvelax.suspend()
+            soon(lambda: curvelax.status() == psutil.STATUS_STOPPED, study)
+        except (psutil.NoSuchProcess, FileNotFoundError):
+            continue  # ended too soon
+        if table.exists():
+            return curvelax, worker, out
+        curvelax.resume()
+    return None
 
 
 @unittest.skipUnless(sys.platform == "linux", "kills processes as Linux has them")
@@ -86,40 +136,52 @@ class Dask(unittest.TestCase):
         """Runs the study in two workers, of which `kill` kills one; its exit code, what it printed, and its folder."""
         out = self.home / name
         command = [sys.executable, STUDY, self.home / "spec.toml", "--shards", SHARDS, "--workers", 2, "--out", out]
-        environment = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": deaths}
+        wrapper = self.home / f"{name}.sh"
+        wrapper.write_text(WRAPPER)
+        wrapper.chmod(0o755)
+        if kill:
+            Path(f"{wrapper}.hold").touch()
+        environment = {
+            **os.environ,
+            "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": deaths,
+            "CURVELAX": str(wrapper),
+            "CURVELAX_ITSELF": CURVELAX,
+        }
         with open(self.home / f"{name}.log", "w+") as log:
             study = subprocess.Popen(list(map(str, command)), stdout=log, stderr=log, env=environment)
             try:
                 if kill:
-                    self.kill(study, kill)
-                code = study.wait(timeout=120)
+                    self.kill(study, kill, wrapper)
+                until = time.monotonic() + HANGS
+                while (code := study.poll()) is None:
+                    self.assertLess(time.monotonic(), until, "the study hangs")
+                    wake(study)
+                    time.sleep(0.01)
             finally:
                 study.kill()
             log.seek(0)
             return code, log.read(), out
 
-    def kill(self, study, who):
+    def kill(self, study, who, wrapper):
         """Kills a worker in the middle of its shard: with its curvelax, or without."""
-
-        def on_its_way():
-            for curvelax, out in shards(study):
-                part = out / ".summary.csv.part"
-                if part.exists() and part.stat().st_size > 0:
-                    return curvelax, curvelax.parent(), out
-
-        curvelax, worker, out = soon(on_its_way, study)
-        curvelax.suspend()
+        curvelax, worker, out = soon(lambda: caught(study), study)
         self.addCleanup(end, curvelax)
-        self.assertFalse((out / "run.json").exists(), "the shard is finished")
         worker.kill()
         if who == "both":
             curvelax.kill()
+        Path(f"{wrapper}.hold").unlink()
+        if who == "both":
             return
-        # Its worker gone, it is told to end, but holds the lock of its folder for longer than the retry would take to fail as
-        # often as it may: all other shards are done by then, so that nothing else keeps the workers.
-        soon(lambda: pending(curvelax) >> signal.SIGTERM - 1 & 1, study)
-        soon(lambda: len(list(out.parent.glob("*/run.json"))) == SHARDS - 1, study)
-        time.sleep(1)
+
+        def wake_others():
+            wake(study, but=curvelax)
+
+        # Its worker gone, it is told to end, but holds the lock of its folder until the retry was refused more often than it
+        # may fail. All other shards are done by then, so that nothing else keeps the workers.
+        soon(lambda: pending(curvelax) >> signal.SIGTERM - 1 & 1, study, wake_others)
+        soon(lambda: len(list(out.parent.glob("*/run.json"))) == SHARDS - 1, study, wake_others)
+        log = Path(f"{wrapper}.log")
+        soon(lambda: log.read_text().count(f"--out {out}\n") > 2 + RETRIES, study, wake_others)
         curvelax.resume()
         self.assertIsNone(study.poll(), "the study did not wait")
 
