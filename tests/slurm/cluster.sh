@@ -5,10 +5,11 @@
 # The folder of all that the cluster writes; set by cluster_start.
 cluster=
 
-# free_ports: the first of three ports in a row on which nobody listens.
+# free_ports: the first of three ports in a row on which nobody listens; not always the same, for two clusters that start at
+# the same time.
 free_ports() {
     local base port
-    for base in {17000..17900..10}; do
+    for base in $(shuf -e {17000..17900..10}); do
         for port in "$base" $((base + 1)) $((base + 2)); do
             if (exec 3<>"/dev/tcp/127.0.0.1/$port") 2>/dev/null; then
                 continue 2
