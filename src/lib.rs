@@ -29,6 +29,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`error`] | what, where, numbers, remedy, exit code |
+//! | `threads` | every thread is started there |
 //! | [`number`] | the number that the scheme is generic over |
 //! | [`flow`] | the law b(k) |
 //! | [`curve`] | plane curves in f64: shapes, perturbation, sampling, measures |
@@ -105,6 +106,7 @@ pub mod scheme;
 pub mod simulate;
 pub mod solver;
 pub mod statistics;
+mod threads;
 pub mod trajectory;
 pub mod truth;
 

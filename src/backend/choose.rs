@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Backend,
     cpu::{CpuBackend, Vectorised},
-    gpu::{Capacity, Gpu, Kernel, Variant},
+    gpu::{Capacity, Gpu, Kernel, Variant, may_have_hardware},
 };
 use crate::{
     conformance::self_test,
@@ -81,6 +81,8 @@ pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
         BackendChoice::Cpu => cpu(spec, n, "asked for".into()),
         BackendChoice::Gpu => gpu(spec, n),
         BackendChoice::Auto if spec.adapter.is_some() => gpu(spec, n),
+        // Drivers are not loaded for nothing: that takes a tenth of a second, and Mesa's print what only matters to windows.
+        BackendChoice::Auto if !may_have_hardware() => auto(spec, n, Vec::new()),
         BackendChoice::Auto => auto(spec, n, Gpu::list()),
     }
 }

@@ -11,6 +11,7 @@ use crate::{
     conformance::{Row, adaptive, compare::MEMBERS, runs, stages},
     error::{Error, Result},
     number::Real,
+    report::progress::Progress,
     solver::Solver,
 };
 
@@ -20,12 +21,41 @@ Examples:
   curvelax check --adapter llvmpipe --json > check.json
 
 An error is the largest difference between GPU and CPU over all members and nodes; a bound is a small multiple of
-the rounding error of the quantity's natural scale. Exit code 1 if one is exceeded.";
+the rounding error of the quantity's natural scale. Exit code 1 if one is exceeded. Most of the time goes into compiling
+kernels, unless the driver has them in its cache: minutes the first time, seconds from then on.";
 
 /// Sizes of the rings that are compared: odd, a power of two, the default, a prime.
 const SIZES: [usize; 4] = [7, 64, 100, 101];
 /// Steps after which whole runs are compared.
 const STEPS: [u32; 2] = [1, 100];
+/// What a kernel can do in a dispatch.
+const BUDGET: Budget = Budget { steps: 16, sweeps: u32::MAX };
+
+/// What is compared by a kernel of its own.
+#[derive(Clone, Copy)]
+enum Kind {
+    /// The stages of a step.
+    Stages,
+    /// Whole runs in fixed steps.
+    Fixed,
+    /// Whole runs in adaptive steps.
+    Adaptive,
+}
+
+impl Kind {
+    const ALL: [Kind; 3] = [Kind::Stages, Kind::Fixed, Kind::Adaptive];
+
+    fn name(self) -> &'static str {
+        match self {
+            Kind::Stages => "stages of a step",
+            Kind::Fixed => "fixed steps",
+            Kind::Adaptive => "adaptive steps",
+        }
+    }
+}
+
+/// Kernels that are compiled and compared for each adapter and precision.
+const KERNELS: usize = Solver::ALL.len() * SIZES.len() * Kind::ALL.len();
 
 /// Compare the GPU with the CPU on this machine's adapters, as a table; exit code 1 on failure.
 #[derive(clap::Args)]
@@ -80,22 +110,10 @@ pub fn check(args: CheckArgs) -> Result<()> {
     }
     let (mut failed, mut adapters) = (0, Vec::new());
     for gpu in &chosen {
-        let say = |precision: &str| {
-            if !args.quiet {
-                note(&format!("comparing {} in {precision} with the CPU", gpu.name()));
-            }
-        };
-        say("f32");
-        let mut rows = Vec::new();
-        for solver in Solver::ALL {
-            rows.extend(compare::<f32>(gpu, solver)?);
+        if !args.quiet {
+            note(&format!("comparing {} with the CPU", gpu.name()));
         }
-        if gpu.has_f64() {
-            say("f64");
-            for solver in Solver::ALL {
-                rows.extend(compare::<f64>(gpu, solver)?);
-            }
-        }
+        let rows = compare(gpu, Progress::new(args.quiet))?;
         failed += rows.iter().filter(|row| !row.passes()).count();
         match args.json {
             false => print(&table(gpu, &rows))?,
@@ -116,26 +134,63 @@ pub fn check(args: CheckArgs) -> Result<()> {
     }
 }
 
-/// The worst row of every quantity over all sizes; of all solvers but the first what does not come before a solve.
-fn compare<T: Real>(gpu: &Gpu, solver: Solver) -> Result<Vec<Row>> {
-    let mut worst: Vec<Row> = Vec::new();
-    for n in SIZES {
-        let mut rows = stages::<T>(gpu, solver, n, None)?;
-        rows.retain(|row| solver == Solver::GaussSeidel || row.quantity.starts_with('δ'));
-        for steps in STEPS {
-            rows.extend(runs::<T>(gpu, solver, n, steps, Budget { steps: 16, sweeps: u32::MAX }, None)?);
-        }
-        rows.extend(adaptive::<T>(gpu, solver, n, Budget { steps: 16, sweeps: u32::MAX }, None)?);
-        match worst.is_empty() {
-            true => worst = rows,
-            false => worst.iter_mut().zip(rows).for_each(|(worst, row)| {
-                if row.share() > worst.share() || row.error.is_nan() {
-                    *worst = row;
-                }
-            }),
-        }
+/// All rows of an adapter.
+fn compare(gpu: &Gpu, progress: Progress) -> Result<Vec<Row>> {
+    let total = if gpu.has_f64() { 2 * KERNELS } else { KERNELS };
+    let mut done = 0;
+    let mut tell = |precision: &str, solver: Solver, n: usize, kind: Kind| {
+        progress.step(done, total, &format!("{precision}, {}, n = {n}, {}", solver.name(), kind.name()));
+        done += 1;
+    };
+    let mut rows = compare_in::<f32>(gpu, &mut tell)?;
+    if gpu.has_f64() {
+        rows.extend(compare_in::<f64>(gpu, &mut tell)?);
     }
-    Ok(worst)
+    progress.finish();
+    Ok(rows)
+}
+
+/// The worst row of every quantity over all sizes; of all solvers but the first what does not come before a solve. Every
+/// kernel is told before it is compiled.
+fn compare_in<T: Real>(gpu: &Gpu, tell: &mut impl FnMut(&str, Solver, usize, Kind)) -> Result<Vec<Row>> {
+    let mut all = Vec::new();
+    for solver in Solver::ALL {
+        let mut worst: Vec<Row> = Vec::new();
+        for n in SIZES {
+            let mut rows = Vec::new();
+            for kind in Kind::ALL {
+                tell(T::NAME, solver, n, kind);
+                rows.extend(compare_kernel::<T>(gpu, solver, n, kind)?);
+            }
+            match worst.is_empty() {
+                true => worst = rows,
+                false => worst.iter_mut().zip(rows).for_each(|(worst, row)| {
+                    if row.share() > worst.share() || row.error.is_nan() {
+                        *worst = row;
+                    }
+                }),
+            }
+        }
+        all.extend(worst);
+    }
+    Ok(all)
+}
+
+fn compare_kernel<T: Real>(gpu: &Gpu, solver: Solver, n: usize, kind: Kind) -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    match kind {
+        Kind::Stages => {
+            rows = stages::<T>(gpu, solver, n, None)?;
+            rows.retain(|row| solver == Solver::GaussSeidel || row.quantity.starts_with('δ'));
+        }
+        Kind::Fixed => {
+            for steps in STEPS {
+                rows.extend(runs::<T>(gpu, solver, n, steps, BUDGET, None)?);
+            }
+        }
+        Kind::Adaptive => rows = adaptive::<T>(gpu, solver, n, BUDGET, None)?,
+    }
+    Ok(rows)
 }
 
 fn table(gpu: &Gpu, rows: &[Row]) -> String {

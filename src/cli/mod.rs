@@ -17,6 +17,7 @@ mod plot;
 mod resume;
 mod run;
 mod signals;
+mod unknown;
 
 use std::{
     ffi::OsString,
@@ -25,14 +26,11 @@ use std::{
     process::ExitCode,
 };
 
-use clap::{
-    CommandFactory, FromArgMatches, Parser, Subcommand,
-    error::{ContextKind, ContextValue, ErrorKind},
-};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use serde::Serialize;
 
 use crate::{
-    error::{Error, Result, nearest, without_controls},
+    error::{Error, Result, without_controls},
     report::provenance::json,
 };
 
@@ -91,26 +89,15 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// As `Cli::try_parse_from`, with the nearest flag also for a slip in a short word, which clap does not see.
-fn parse(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<Cli, clap::Error> {
-    let command = Cli::command();
-    let parsed = command.clone().try_get_matches_from(arguments).and_then(|matches| Cli::from_arg_matches(&matches));
+/// As `Cli::try_parse_from`, with [an answer](unknown::explain) to flags that are not there.
+fn parse(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Result<Cli, clap::Error> {
+    let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    let program = Cli::command();
+    let parsed = program.clone().try_get_matches_from(&arguments).and_then(|matches| Cli::from_arg_matches(&matches));
     parsed.map_err(|mut error| {
-        if error.kind() == ErrorKind::UnknownArgument
-            && error.get(ContextKind::SuggestedArg).is_none()
-            && let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg)
-            && let Some(flag) = nearest_flag(&command, given)
-        {
-            error.remove(ContextKind::Suggested);
-            error.insert(ContextKind::SuggestedArg, ContextValue::String(flag));
-        }
+        unknown::explain(&mut error, &program, &arguments);
         error
     })
-}
-
-fn nearest_flag(command: &clap::Command, given: &str) -> Option<String> {
-    let flags = command.get_subcommands().flat_map(clap::Command::get_arguments).filter_map(clap::Arg::get_long);
-    nearest(given.trim_start_matches('-'), flags).map(|flag| format!("--{flag}"))
 }
 
 /// Writes `text` to stdout; that the reader has gone away is no error.
@@ -179,12 +166,5 @@ mod tests {
         assert_eq!(examples(help), ["curvelax run --out a", "curvelax run --uot b > c"]);
         assert!(parse(words(examples(help)[0])).is_ok() && parse(words(examples(help)[1])).is_err());
         assert_eq!(examples("Usage"), [""; 0]);
-    }
-
-    #[test]
-    fn a_slip_in_a_short_flag_is_recognised() {
-        let error = parse(["curvelax", "run", "--tua", "1"]).err().expect("an unknown flag").to_string();
-        assert!(error.contains("a similar argument exists: '--tau'"), "{error}");
-        assert!(!error.contains("-- --tua"), "{error}");
     }
 }

@@ -104,7 +104,7 @@ fn go_on(mut folder: OutputFolder, kept: Option<Kept>, place: Place, flags: Mann
         return Ok(());
     };
     // Before a device is looked for, which takes its time.
-    let manner = flags.manner();
+    let manner = flags.manner()?;
     if let Some(fault) = &kept.note {
         note(&format!("warning: {}: {fault}", path.display()));
     }

@@ -94,10 +94,10 @@ impl MannerFlags {
     }
 
     /// From now on the run can be stopped.
-    pub fn manner(&self) -> Manner {
+    pub fn manner(&self) -> Result<Manner> {
         let stop = Stop::default();
-        signals::watch(&stop, self.max_time);
-        Manner { quiet: self.quiet, every: self.checkpoint_every, stop }
+        signals::watch(&stop, self.max_time)?;
+        Ok(Manner { quiet: self.quiet, every: self.checkpoint_every, stop })
     }
 }
 
@@ -225,9 +225,9 @@ pub fn run(args: RunArgs) -> Result<()> {
     if let Some(begun) = begun {
         return resume::go_on_like(begun, work.spec, flags);
     }
+    let manner = flags.manner()?;
     // Without a run there is nothing to lose.
     let folder = OutputFolder::open(&out, args.force || args.resume)?;
-    let manner = flags.manner();
     let platform = work.open(&flags)?;
     let origin = Origin::new(work.spec.to_toml()?, &work.cells, platform)?;
     let report = Report::begin(folder, &work.spec, work.cells[0].spec.points, origin, manner)?;

@@ -1,45 +1,79 @@
 //! Ctrl-C, SIGTERM, SIGHUP and `--max-time` ask a run to stop; one that does not answer is ended.
+//!
+//! Two threads do all of it. Both are started before the run, because a system may have no third one when it is needed: one
+//! receives the signals and says the last word, the other counts the time and ends the process.
 
-use std::{thread, time::Duration};
+use std::{
+    sync::mpsc::{Receiver, RecvTimeoutError, channel},
+    thread,
+    time::{Duration, Instant},
+};
 
 use super::note;
-use crate::report::{Cause, Stop};
+use crate::{
+    error::Result,
+    report::{Cause, Stop},
+    threads,
+};
 
 /// A run that was asked to stop has so long to come to its end.
 const PATIENCE: Duration = Duration::from_secs(4);
+/// A run that is asked to stop twice has so long to keep what is finished.
+const SHORT_PATIENCE: Duration = Duration::from_millis(1000);
 /// Whoever reads what is said has so long to take it.
 const LAST_WORD: Duration = Duration::from_millis(100);
 
 /// Passes on to `stop` whatever asks this process to end, from now on; and the end of `most`.
-pub fn watch(stop: &Stop, most: Option<Duration>) {
-    system::watch(stop);
-    if let Some(most) = most {
-        let stop = stop.clone();
-        thread::spawn(move || {
-            thread::sleep(most);
-            ask(&stop, Cause::MaxTime);
+///
+/// # Errors
+/// [`Error::Failed`](crate::Error::Failed) where the system has no threads or no pipe for it.
+pub fn watch(stop: &Stop, most: Option<Duration>) -> Result<()> {
+    let (mut ears, closing) = system::ears()?;
+    let (ask, asked) = channel();
+    let (to_stop, at_end) = (stop.clone(), stop.clone());
+    threads::start("clock", move || clock(&at_end, &asked, most, closing))?;
+    threads::start("signals", move || {
+        ears.hear(|cause| {
+            to_stop.ask(cause);
+            // The clock has gone where the process ends.
+            let _ = ask.send(());
         });
+        if let Some(cause) = to_stop.asked().map(|(cause, _)| cause) {
+            // The clock does not wait for it: nobody may read what is said.
+            note(&format!("error: {}", last_word(cause)));
+        }
+    })?;
+    Ok(())
+}
+
+fn last_word(cause: Cause) -> crate::Error {
+    cause.error(" at once; curvelax resume goes on from the last state")
+}
+
+/// Waits until the run is `asked` to stop or `most` is over, and then for its end; whatever is running when its time is up,
+/// its state is on disk.
+fn clock(stop: &Stop, asked: &Receiver<()>, most: Option<Duration>, ears: system::Closing) {
+    match most.map_or_else(|| asked.recv().map_err(Into::into), |most| asked.recv_timeout(most)) {
+        Ok(()) => {}
+        Err(RecvTimeoutError::Timeout) => stop.ask(Cause::MaxTime),
+        Err(RecvTimeoutError::Disconnected) => return,
+    }
+    match asked.recv_timeout(PATIENCE) {
+        Ok(()) => wait_until_kept(stop),
+        Err(RecvTimeoutError::Timeout) => {}
+        Err(RecvTimeoutError::Disconnected) => return,
+    }
+    if let Some((cause, _)) = stop.asked() {
+        ears.close();
+        thread::sleep(LAST_WORD);
+        system::exit(last_word(cause).exit_code());
     }
 }
 
-/// Asks once, then ends the process; whatever is running there, its state is on disk.
-fn ask(stop: &Stop, cause: Cause) {
-    stop.ask(cause);
-    let stop = stop.clone();
-    thread::spawn(move || {
-        thread::sleep(PATIENCE);
-        leave(&stop);
-    });
-}
-
-fn leave(stop: &Stop) {
-    if let Some((cause, _)) = stop.asked() {
-        let error = cause.error(" at once; curvelax resume goes on from the last state");
-        let line = format!("error: {error}");
-        // Not here: the run may be stuck in a line of its own that nobody reads.
-        thread::spawn(move || note(&line));
-        thread::sleep(LAST_WORD);
-        system::exit(error.exit_code());
+fn wait_until_kept(stop: &Stop) {
+    let asked = Instant::now();
+    while !stop.is_kept() && asked.elapsed() < SHORT_PATIENCE {
+        thread::sleep(Duration::from_millis(5));
     }
 }
 
@@ -48,39 +82,46 @@ mod system {
     use std::{
         fs,
         sync::{Arc, atomic::AtomicBool},
-        time::Instant,
     };
 
     use signal_hook::{
         consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ},
         flag,
-        iterator::Signals,
+        iterator::{Handle, Signals},
         low_level,
     };
 
     use super::*;
+    use crate::Error;
 
-    /// A run that is asked to stop twice has so long to keep what is finished.
-    const SHORT_PATIENCE: Duration = Duration::from_millis(1000);
+    /// What receives the signals.
+    pub struct Ears(Signals);
+    /// Ends their receiving.
+    pub type Closing = Handle;
 
-    pub fn watch(stop: &Stop) {
+    pub fn ears() -> Result<(Ears, Closing)> {
         // So that a file that grows too large is an error as any other.
         let _ = flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
-        // Where signals cannot be had the process ends as it would without them.
         let ignored = ignored();
         let heard = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
-        let Ok(mut signals) = Signals::new(heard) else { return };
-        let stop = stop.clone();
-        thread::spawn(move || {
-            for signal in signals.forever() {
-                match stop.asked() {
-                    Some(_) => leave_soon(&stop),
-                    None if signal == SIGINT => ask(&stop, Cause::Interrupt),
-                    None if signal == SIGHUP => ask(&stop, Cause::Hangup),
-                    None => ask(&stop, Cause::Terminate),
-                }
+        let signals = Signals::new(heard).map_err(|e| {
+            Error::Failed(format!("cannot receive signals: {e}; raise the limit of open files (ulimit -n), or close some"))
+        })?;
+        let closing = signals.handle();
+        Ok((Ears(signals), closing))
+    }
+
+    impl Ears {
+        /// Passes on what asks for the end, until they are closed.
+        pub fn hear(&mut self, mut ask: impl FnMut(Cause)) {
+            for signal in self.0.forever() {
+                ask(match signal {
+                    SIGINT => Cause::Interrupt,
+                    SIGHUP => Cause::Hangup,
+                    _ => Cause::Terminate,
+                });
             }
-        });
+        }
     }
 
     /// Those that whoever started the process wants it to ignore, such as `nohup`: bit i - 1 for the signal i. Only Linux tells.
@@ -90,27 +131,38 @@ mod system {
         mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
     }
 
-    /// Ends the process as soon as what is finished is kept.
-    fn leave_soon(stop: &Stop) {
-        let asked = Instant::now();
-        while !stop.is_kept() && asked.elapsed() < SHORT_PATIENCE {
-            thread::sleep(Duration::from_millis(5));
-        }
-        leave(stop);
-    }
-
     /// Without what the C library does at the end, which drivers take ill while they are at work.
     pub fn exit(code: u8) {
         low_level::exit(code.into());
     }
 }
 
+/// The system ends the process; a run loses what is younger than its state.
 #[cfg(not(unix))]
 mod system {
+    use std::sync::mpsc::Sender;
+
     use super::*;
 
-    /// The system ends the process; a run loses what is younger than its state.
-    pub fn watch(_: &Stop) {}
+    pub struct Ears(Receiver<()>);
+    pub struct Closing(Sender<()>);
+
+    pub fn ears() -> Result<(Ears, Closing)> {
+        let (closing, ears) = channel();
+        Ok((Ears(ears), Closing(closing)))
+    }
+
+    impl Ears {
+        pub fn hear(&mut self, _: impl FnMut(Cause)) {
+            let _ = self.0.recv();
+        }
+    }
+
+    impl Closing {
+        pub fn close(self) {
+            let _ = self.0.send(());
+        }
+    }
 
     pub fn exit(code: u8) {
         std::process::exit(code.into());

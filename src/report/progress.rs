@@ -1,4 +1,5 @@
-//! How far a run is, on stderr: a bar with an estimate on a terminal, else a line every ten seconds.
+//! How far a command is, on stderr: a bar with an estimate on a terminal; else a run has a line every ten seconds, and work
+//! in few long steps one for each of them.
 
 use std::{
     io::{self, IsTerminal, Write},
@@ -58,6 +59,21 @@ impl Progress {
                 if let Some(line) = lines.at(began.elapsed(), done, total, share) {
                     let _ = writeln!(io::stderr().lock(), "{line}");
                 }
+            }
+        }
+    }
+
+    /// `done` of `total` steps have ended, and `what` comes now. Where there is no bar every step has its line: one may take
+    /// long, and then it is known which.
+    pub fn step(&self, done: usize, total: usize, what: &str) {
+        match self {
+            Progress::Quiet => {}
+            Progress::Bar(bar) => {
+                bar.set_message(what.to_string());
+                bar.set_position(TICKS * done as u64 / total.max(1) as u64);
+            }
+            Progress::Lines(..) => {
+                let _ = writeln!(io::stderr().lock(), "{} of {total}: {what}", done + 1);
             }
         }
     }

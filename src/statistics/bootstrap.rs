@@ -14,13 +14,12 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::{
     Description, describe,
     draws::Draws,
     sample::{Sample, reaches},
 };
+use crate::threads;
 
 /// How resampling is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,8 +70,7 @@ impl Bootstrap {
             return None;
         }
         let median = |resample: u32| ranges.median(Draws::new(self.seed, resample.into())).and_then(&value);
-        let mut medians: Vec<f64> =
-            (0..self.resamples).into_par_iter().map(|resample| median(resample).unwrap_or(f64::INFINITY)).collect();
+        let mut medians = threads::map(self.resamples, |resample| median(resample).unwrap_or(f64::INFINITY));
         medians.sort_unstable_by(f64::total_cmp);
         let end = |p| describe::quantile(&medians, p);
         let outside = 0.5 * (1.0 - self.level);

@@ -28,6 +28,7 @@ use crate::{
         step::Method,
     },
     solver::{Blocks, Solver},
+    threads,
 };
 use vectors::Crew;
 
@@ -85,8 +86,7 @@ impl<T: Vectorised> CpuBackend<T> {
     /// The same with `vectors`, which the processor must have.
     pub fn with_vectors(blocks: Blocks, method: Method, threads: usize, vectors: Vectors) -> Result<Self> {
         // A panic is told by the batch that does not come back.
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).panic_handler(|_| {}).build();
-        let pool = pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}; try --threads 1")))?;
+        let pool = threads::pool(threads)?;
         let threads = pool.current_num_threads();
         let crew = T::crew(vectors, method.solver, blocks, threads)?;
         let slots = threads * SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * crew.lanes());

@@ -4,9 +4,11 @@ pub mod adapter;
 mod batch;
 mod budget;
 pub mod kernel;
+mod nodes;
 mod pipeline;
 pub mod shader;
 
 pub use adapter::{Capacity, Gpu};
 pub use kernel::Kernel;
+pub use nodes::may_have_hardware;
 pub use shader::Variant;

@@ -1,0 +1,57 @@
+//! Device nodes: whether a hardware GPU can be there, as far as can be known without its driver.
+
+/// Whether this machine may have a hardware GPU. On Linux none is reached without a node in `/dev`.
+pub fn may_have_hardware() -> bool {
+    #[cfg(target_os = "linux")]
+    return linux::has_nodes("/dev".as_ref());
+    #[cfg(not(target_os = "linux"))]
+    true
+}
+
+#[cfg(target_os = "linux")]
+mod linux {
+    use std::{fs, path::Path};
+
+    /// Names begin so that drivers of GPUs give: NVIDIA's (also on Tegra), AMD's, Windows' for its Linux, and those of Mali,
+    /// Adreno, PowerVR and Vivante.
+    const VENDORS: [&str; 9] = ["nvidia", "nvhost", "nvgpu", "kfd", "dxg", "mali", "kgsl", "pvr", "galcore"];
+    /// And those in `dri` that compute. A `card` alone only shows pictures.
+    const RENDER: [&str; 1] = ["renderD"];
+
+    pub fn has_nodes(dev: &Path) -> bool {
+        has(dev, &VENDORS) || has(&dev.join("dri"), &RENDER)
+    }
+
+    /// Whether a name in `folder` begins so.
+    fn has(folder: &Path, begins: &[&str]) -> bool {
+        let Ok(entries) = fs::read_dir(folder) else { return false };
+        let names = entries.flatten().map(|entry| entry.file_name());
+        names.into_iter().any(|name| begins.iter().any(|begin| name.as_encoded_bytes().starts_with(begin.as_bytes())))
+    }
+
+    #[cfg(test)]
+    mod tests {
+        use super::*;
+
+        #[test]
+        fn hardware_is_looked_for_where_a_node_of_a_driver_is() {
+            let dev = tempfile::tempdir().unwrap();
+            for name in ["null", "tty0", "dri/card0", "nvram", "nvme0"] {
+                make(dev.path(), name);
+                assert!(!has_nodes(dev.path()), "{name}");
+            }
+            assert!(!has_nodes(&dev.path().join("nowhere")));
+            for name in ["dri/renderD128", "nvidia0", "nvidiactl", "kfd", "dxg", "mali0", "kgsl-3d0", "nvhost-gpu"] {
+                let dev = tempfile::tempdir().unwrap();
+                make(dev.path(), name);
+                assert!(has_nodes(dev.path()), "{name}");
+            }
+        }
+
+        fn make(dev: &Path, name: &str) {
+            let path = dev.join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! Flags that a command does not have: what may have been meant.
+
+use std::{ffi::OsString, iter};
+
+use clap::{
+    Command,
+    builder::StyledStr,
+    error::{ContextKind, ContextValue, ErrorKind},
+};
+
+use crate::error::nearest;
+
+/// Flags of a command that are listed at most; the help has more.
+const LISTED: usize = 16;
+
+/// Says in `error`, if it is of a flag that is not there, which commands have it, or which flag of its own command is like it:
+/// clap does not see a slip in a short word, and looks for words that are alike where a flag is of another command.
+pub fn explain(error: &mut clap::Error, program: &Command, arguments: &[OsString]) {
+    let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return };
+    let Some(word) = given.strip_prefix("--").filter(|_| error.kind() == ErrorKind::UnknownArgument) else { return };
+    let word = word.to_string();
+    // The program itself has no flag with a value that could stand before the command.
+    let called = arguments.iter().skip(1).find_map(|argument| program.find_subcommand(argument));
+    let command = called.unwrap_or(program);
+    let owners: Vec<&str> =
+        program.get_subcommands().filter(|command| flags(command).any(|flag| flag == word)).map(Command::get_name).collect();
+    if !owners.is_empty() {
+        error.remove(ContextKind::SuggestedArg);
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(belongs(&word, &owners, called)));
+    } else if let Some(near) = nearest(&word, flags(command))
+        && error.get(ContextKind::SuggestedArg).is_none()
+    {
+        error.remove(ContextKind::Suggested);
+        error.insert(ContextKind::SuggestedArg, ContextValue::String(format!("--{near}")));
+    }
+}
+
+fn flags(command: &Command) -> impl Iterator<Item = &str> {
+    command.get_arguments().filter_map(clap::Arg::get_long)
+}
+
+/// Where a flag belongs, and what the command that was `called` does and takes.
+fn belongs(word: &str, owners: &[&str], called: Option<&Command>) -> Vec<StyledStr> {
+    let owners = quoted(owners.iter().map(|owner| (*owner).to_string()));
+    let Some(command) = called else { return vec![format!("'--{word}' goes behind a command: {owners}").into()] };
+    let name = command.get_name();
+    let own: Vec<String> = flags(command).map(|flag| format!("--{flag}")).collect();
+    let takes = match own.len() {
+        0 => format!("'{name}' takes no flags; "),
+        1..=LISTED => format!("'{name}' takes {}; ", quoted(own.into_iter())),
+        _ => String::new(),
+    };
+    let does = command.get_about().map(|about| format!("'{name}': {about}").into());
+    iter::once(format!("{takes}'--{word}' belongs to {owners}").into()).chain(does).collect()
+}
+
+fn quoted(words: impl Iterator<Item = String>) -> String {
+    words.map(|word| format!("'{word}'")).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use clap::CommandFactory;
+
+    use super::*;
+    use crate::cli::{Cli, parse};
+
+    fn said(arguments: &[&str]) -> String {
+        parse([&["curvelax"], arguments].concat()).err().expect("an unknown flag").to_string()
+    }
+
+    #[test]
+    fn a_slip_in_a_short_flag_is_recognised() {
+        let error = said(&["run", "--tua", "1"]);
+        assert!(error.contains("a similar argument exists: '--tau'"), "{error}");
+        assert!(!error.contains("-- --tua"), "{error}");
+    }
+
+    #[test]
+    fn a_slip_is_mended_by_flags_of_the_command_only() {
+        for (command, slip) in [("check", "--tua"), ("plot", "--sede"), ("adapters", "--pionts")] {
+            let error = said(&[command, slip]);
+            assert!(!error.contains("similar"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_flag_of_another_command_is_told_as_such() {
+        let program = Cli::command();
+        let all: BTreeSet<&str> = program.get_subcommands().flat_map(flags).collect();
+        let mut pairs = 0;
+        for command in program.get_subcommands() {
+            let own: BTreeSet<&str> = flags(command).collect();
+            for flag in all.difference(&own) {
+                for word in [format!("--{flag}"), format!("--{flag}=1")] {
+                    let error = said(&[command.get_name(), &word]);
+                    assert!(error.contains(&format!("'--{flag}' belongs to '")), "{error}");
+                    assert!(!error.contains("similar") && !error.contains("as a value"), "{error}");
+                    pairs += 1;
+                }
+            }
+        }
+        assert!(pairs > 500, "{pairs}");
+    }
+
+    #[test]
+    fn a_back_end_for_check_is_answered_with_what_check_does() {
+        let error = said(&["check", "--backend", "gpu"]);
+        let parts = ["'--adapter'", "'--backend' belongs to 'run', 'resume', 'bench', 'convergence'", "Compare the GPU"];
+        assert!(parts.iter().all(|part| error.contains(part)), "{error}");
+    }
+
+    #[test]
+    fn a_flag_before_the_command_is_sent_behind_it() {
+        for arguments in [&["--json"][..], &["--curves=3"]] {
+            let error = said(arguments);
+            assert!(error.contains("goes behind a command: 'run'") && !error.contains("similar"), "{error}");
+        }
+    }
+}

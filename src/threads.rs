@@ -1,0 +1,79 @@
+//! Threads are started here, so that a system that has no more of them is an error by name.
+
+use std::{
+    error::Error as _,
+    fmt::Display,
+    sync::OnceLock,
+    thread::{Builder, JoinHandle},
+};
+
+use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
+
+use crate::error::{Error, Result};
+
+/// What helps where the system starts no more threads.
+const REMEDY: &str = "raise the limit of this user or container (ulimit -u, pids.max), or end other processes";
+
+/// Starts a thread that does `work`; debuggers show its `name`.
+///
+/// # Errors
+/// [`Error::Failed`] where the system starts no more threads.
+pub fn start(name: &str, work: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>> {
+    Builder::new().name(name.into()).spawn(work).map_err(|e| no_more("a thread", "", &e))
+}
+
+/// A pool of `count` threads (0: all cores). A panic in one of them prints no second message.
+///
+/// # Errors
+/// As [`start`].
+pub fn pool(count: usize) -> Result<ThreadPool> {
+    let pool = ThreadPoolBuilder::new().num_threads(count).panic_handler(|_| {}).build();
+    pool.map_err(|e| match count {
+        0 => no_more("a thread on each core", "try --threads 1, or ", &e),
+        1 => no_more("1 thread", "", &e),
+        _ => no_more(&format!("{count} threads"), "try --threads 1, or ", &e),
+    })
+}
+
+fn no_more(what: &str, fewer: &str, error: &dyn Display) -> Error {
+    Error::Failed(format!("cannot start {what}: {error}; {fewer}{REMEDY}"))
+}
+
+/// `of` each number below `count`, in their order: on all cores, or on this thread alone where no others can be started.
+pub fn map<R: Send>(count: u32, of: impl Fn(u32) -> R + Sync) -> Vec<R> {
+    if rayon::current_thread_index().is_some() || has_common_pool() {
+        (0..count).into_par_iter().map(&of).collect()
+    } else {
+        (0..count).map(of).collect()
+    }
+}
+
+/// Whether rayon's common pool is there. A first use would panic where it cannot be started.
+fn has_common_pool() -> bool {
+    static IS_THERE: OnceLock<bool> = OnceLock::new();
+    *IS_THERE.get_or_init(|| match ThreadPoolBuilder::new().build_global() {
+        Ok(()) => true,
+        // Without a source the fault is that somebody built it before.
+        Err(e) => e.source().is_none(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_system_without_threads_is_told_with_what_helps() {
+        let error = no_more("1 thread", "", &"no");
+        assert_eq!(error.exit_code(), 1);
+        assert_eq!(error.to_string(), format!("cannot start 1 thread: no; {REMEDY}"));
+    }
+
+    #[test]
+    fn all_numbers_come_in_their_order() {
+        let double: Vec<u32> = (0..1000).map(|n| 2 * n).collect();
+        assert_eq!(map(1000, |n| 2 * n), double);
+        assert_eq!(pool(3).unwrap().install(|| map(1000, |n| 2 * n)), double);
+        assert_eq!(map(0, |n| n), [0_u32; 0]);
+    }
+}
