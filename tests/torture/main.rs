@@ -38,6 +38,8 @@ mod study;
 mod suite;
 #[cfg(target_os = "linux")]
 mod surroundings;
+#[cfg(target_os = "linux")]
+mod threads;
 
 #[cfg(target_os = "linux")]
 use suite::{Found, Outcome};

@@ -13,7 +13,7 @@ use crate::{
     calls::{self, From},
     controls, differential, kills, order, program, races, signals, sizes, soak, space, state,
     study::Study,
-    surroundings,
+    surroundings, threads,
 };
 
 /// Cases of a test, and what it saw.
@@ -259,6 +259,13 @@ fn the_rest(suite: &mut Suite, seed: u64) {
     suite.test_if(mount, "a_disk_that_is_read_only", "refused by name", || surroundings::read_only_disk(&TINY));
     let strace = (!calls::can_trace()).then_some("strace");
     suite.test_if(strace, "a_file_system_without_locks", SAME, || surroundings::no_locks(&SHORT));
+    const NAMED: &str = "refused by name, or 0 differing bytes";
+    suite.test_if(strace, "few_threads", NAMED, || threads::few(&SHORT_ZARR));
+    let most = suite.of(4, 12);
+    suite.test_if(strace.or(gpu), "few_threads_on_the_gpu", NAMED, move || threads::few_on_the_gpu(&GPU, most));
+    suite.test_if(strace, "no_threads_left_for_signals", "0 differing bytes, out in 5 s", || {
+        threads::none_left_for_signals(&SECOND, &STOPS)
+    });
     suite.test("no_rights_for_new_files", "refused by name", || surroundings::no_rights_for_new_files(&SHORT));
     let cases = suite.of(3, 50);
     suite.test("a_folder_that_vanishes", "a named error, no panic", move || {

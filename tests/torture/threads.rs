@@ -1,0 +1,132 @@
+//! A system that starts no more threads: what cannot do without them says so, and signals are received all the same.
+//!
+//! `strace` lets the calls fail by which the main thread starts others: a limit of the user does not bind root.
+
+use std::time::Instant;
+
+use crate::{
+    Found, Outcome,
+    program::{Ended, Running, curvelax, through},
+    signals::SOON,
+    study::{Attempt, Study},
+};
+
+
+/// Starts `arguments` where the main thread can start `room` threads and no more. `strace` stays a grandchild, so that
+/// signals reach the program.
+fn start(attempt: &Attempt, room: usize, arguments: &str) -> Running {
+    let inject = format!("inject=clone,clone3:error=EAGAIN:when={}+", room + 1);
+    let starter = ["strace", "-D", "-f", "-qq", "-o", "/dev/null", "-e", "trace=clone,clone3", "-e", &inject];
+    Running::start(&mut through(attempt.home.path(), &starter, arguments))
+}
+
+/// A command that is given less and less room.
+struct Case {
+    name: &'static str,
+    arguments: String,
+    /// Threads without which it cannot do its work.
+    least: usize,
+    /// Where it begins.
+    prepare: fn(&'static Study) -> Attempt<'static>,
+    /// Whether it is to leave the files of the study.
+    writes: bool,
+}
+
+/// Every command with room for no thread, for one, and so on until it is done.
+pub fn few(study: &'static Study) -> Outcome {
+    const BENCH: &str = "bench --backend cpu --threads 1 --points 34 --solver direct --precision f64 --seconds 0.1 --quiet";
+    let run = Attempt::new(study).run();
+    // Two for signals and the clock, and one that computes.
+    let list = [
+        Case { name: "run", arguments: run, least: 3, prepare: Attempt::new, writes: true },
+        Case { name: "resume", arguments: "resume out".into(), least: 3, prepare: Attempt::interrupted, writes: true },
+        Case { name: "merge", arguments: "merge 0 1 --out out".into(), least: 0, prepare: shards, writes: true },
+        Case { name: "plot", arguments: "plot out".into(), least: 0, prepare: finished, writes: true },
+        Case { name: "bench", arguments: BENCH.into(), least: 1, prepare: Attempt::new, writes: false },
+    ];
+    let mut cases = 0;
+    for Case { name, arguments, least, prepare, writes } in list {
+        for room in 0..=least {
+            let attempt = prepare(study);
+            let ended = start(&attempt, room, &format!("{arguments} --quiet").replace("--quiet --quiet", "--quiet")).end();
+            let told = format!("{name} with room for {room} threads: {ended:?}");
+            cases += 1;
+            if room == least {
+                assert_eq!((ended.code, &*ended.said), (Some(0), ""), "{told}");
+            } else {
+                must_be_named(&ended, "ulimit -u", &told);
+            }
+            if writes && room == least {
+                attempt.must_be_the_reference(&[told]);
+            } else if writes && name == "run" {
+                assert!(!attempt.out().exists(), "{told}");
+            }
+        }
+    }
+    Found::new(cases, "refused by name, 0 panics, 0 differing bytes")
+}
+
+/// A finished run.
+fn finished(study: &'static Study) -> Attempt<'static> {
+    let attempt = Attempt::new(study);
+    let ended = attempt.start().end();
+    assert_eq!(ended.code, Some(0), "{ended:?}");
+    attempt
+}
+
+/// Two shards, to be merged.
+fn shards(study: &'static Study) -> Attempt<'static> {
+    let attempt = Attempt::new(study);
+    for shard in ["0", "1"] {
+        let arguments = format!("run {} --quiet --shard {shard}/2 --out {shard}", study.arguments);
+        let ended = Running::start(&mut curvelax(attempt.home.path(), &arguments)).end();
+        assert_eq!(ended.code, Some(0), "{ended:?}");
+    }
+    attempt
+}
+
+/// A software GPU starts threads of its own, some of which it can do without.
+pub fn few_on_the_gpu(study: &'static Study, most: usize) -> Outcome {
+    let mut refused = 0;
+    for room in 0..=most {
+        let attempt = Attempt::new(study);
+        let ended = start(&attempt, room, &attempt.run()).end();
+        let told = format!("room for {room} threads: {ended:?}");
+        if ended.code == Some(0) {
+            attempt.must_be_the_reference(&[told]);
+        } else {
+            must_be_named(&ended, if room < 2 { "ulimit -u" } else { "--backend cpu" }, &told);
+            refused += 1;
+        }
+    }
+    assert!(refused > 1, "{refused} refused");
+    Found::new(most + 1, format!("{refused} refused by name, 0 panics, 0 differing bytes"))
+}
+
+/// One line, with `remedy`.
+#[track_caller]
+fn must_be_named(ended: &Ended, remedy: &str, told: &str) {
+    assert!(ended.code == Some(1) && ended.said.lines().count() == 1, "{told}");
+    assert!(ended.errors().len() == 1 && ended.said.contains(remedy), "{told}");
+}
+
+/// Runs that have what they need, and find no further thread when they are to stop.
+pub fn none_left_for_signals(study: &'static Study, stops: &[(&str, i32, i32)]) -> Outcome {
+    // Two for signals and the clock, and one that computes.
+    const ROOM: usize = 3;
+    for (name, _, code) in stops {
+        let attempt = Attempt::new(study);
+        let mut running = start(&attempt, ROOM, &attempt.run());
+        running.wait_until(|_| attempt.has_state());
+        let asked = Instant::now();
+        running.signal(name);
+        let ended = running.end();
+        assert!(ended.code == Some(*code) && asked.elapsed() < SOON, "{name}: {ended:?}");
+        attempt.must_end_well(ended);
+    }
+    let attempt = Attempt::new(study);
+    let ended = start(&attempt, ROOM, &format!("{} --max-time 1s", attempt.run())).end();
+    assert!(matches!(ended.code, Some(0 | 75)), "{ended:?}");
+    attempt.must_end_well(ended);
+    Found::new(stops.len() + 1, "out in 5 s, 0 differing bytes")
+}
