@@ -105,7 +105,9 @@ mod system {
         let ignored = ignored();
         let heard = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
         let signals = Signals::new(heard).map_err(|e| {
-            Error::Failed(format!("cannot receive signals: {e}; raise the limit of open files (ulimit -n), or close some"))
+            Error::Failed(format!(
+                "cannot receive signals: {e}; raise the limit of open files (ulimit -n), or close some"
+            ))
         })?;
         let closing = signals.handle();
         Ok((Ears(signals), closing))

@@ -22,8 +22,11 @@ pub fn explain(error: &mut clap::Error, program: &Command, arguments: &[OsString
     // The program itself has no flag with a value that could stand before the command.
     let called = arguments.iter().skip(1).find_map(|argument| program.find_subcommand(argument));
     let command = called.unwrap_or(program);
-    let owners: Vec<&str> =
-        program.get_subcommands().filter(|command| flags(command).any(|flag| flag == word)).map(Command::get_name).collect();
+    let owners: Vec<&str> = program
+        .get_subcommands()
+        .filter(|command| flags(command).any(|flag| flag == word))
+        .map(Command::get_name)
+        .collect();
     if !owners.is_empty() {
         error.remove(ContextKind::SuggestedArg);
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(belongs(&word, &owners, called)));
@@ -108,7 +111,8 @@ mod tests {
     #[test]
     fn a_back_end_for_check_is_answered_with_what_check_does() {
         let error = said(&["check", "--backend", "gpu"]);
-        let parts = ["'--adapter'", "'--backend' belongs to 'run', 'resume', 'bench', 'convergence'", "Compare the GPU"];
+        let parts =
+            ["'--adapter'", "'--backend' belongs to 'run', 'resume', 'bench', 'convergence'", "Compare the GPU"];
         assert!(parts.iter().all(|part| error.contains(part)), "{error}");
     }
 

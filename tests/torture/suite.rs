@@ -263,7 +263,8 @@ fn the_rest(suite: &mut Suite, seed: u64) {
     suite.test_if(strace, "few_threads", NAMED, || threads::few(&SHORT_ZARR));
     let most = suite.of(4, 12);
     suite.test_if(strace.or(gpu), "few_threads_on_the_gpu", NAMED, move || threads::few_on_the_gpu(&GPU, most));
-    suite.test_if(strace, "no_threads_left_for_signals", "0 differing bytes, out in 5 s", || {
+    let limit = (!threads::can_limit()).then_some("prlimit and setpriv");
+    suite.test_if(limit, "no_threads_left_for_signals", "0 differing bytes, out in 5 s", || {
         threads::none_left_for_signals(&SECOND, &STOPS)
     });
     suite.test("no_rights_for_new_files", "refused by name", || surroundings::no_rights_for_new_files(&SHORT));

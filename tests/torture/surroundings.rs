@@ -22,15 +22,15 @@ use crate::{
 const NOBODY: [&str; 4] = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"];
 
 /// A run as a user whom permissions bind.
-struct AsNobody {
+pub struct AsNobody {
     /// A copy that this user may start, wherever the program was built.
     program: PathBuf,
-    home: TempDir,
+    pub home: TempDir,
     is_root: bool,
 }
 
 impl AsNobody {
-    fn new() -> AsNobody {
+    pub fn new() -> AsNobody {
         let home = TempDir::new().unwrap();
         let program = home.path().join("curvelax");
         fs::copy(binary(), &program).unwrap();
@@ -39,11 +39,20 @@ impl AsNobody {
     }
 
     fn go(&self, umask: &str, arguments: &str) -> Ended {
+        self.start(umask, arguments).end()
+    }
+
+    pub fn start(&self, umask: &str, arguments: &str) -> Running {
         let script = format!("umask {umask}; exec \"$0\" {arguments}");
+        Running::start(self.command(&["sh", "-c", &script]).arg(&self.program))
+    }
+
+    /// A command of this user.
+    pub fn command(&self, words: &[&str]) -> Command {
         let starter: &[&str] = if self.is_root { &NOBODY } else { &["env"] };
         let mut command = Command::new(starter[0]);
-        command.args(&starter[1..]).args(["sh", "-c", &script]).arg(&self.program).current_dir(self.home.path());
-        Running::start(&mut command).end()
+        command.args(&starter[1..]).args(words).current_dir(self.home.path());
+        command
     }
 }
 

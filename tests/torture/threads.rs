@@ -2,21 +2,21 @@
 //!
 //! `strace` lets the calls fail by which the main thread starts others: a limit of the user does not bind root.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::{
     Found, Outcome,
-    program::{Ended, Running, curvelax, through},
+    folder::copy,
+    program::{Ended, Running, curvelax, is_there, through},
     signals::SOON,
     study::{Attempt, Study},
+    surroundings::AsNobody,
 };
 
-
-/// Starts `arguments` where the main thread can start `room` threads and no more. `strace` stays a grandchild, so that
-/// signals reach the program.
+/// Starts `arguments` where the main thread can start `room` threads and no more.
 fn start(attempt: &Attempt, room: usize, arguments: &str) -> Running {
     let inject = format!("inject=clone,clone3:error=EAGAIN:when={}+", room + 1);
-    let starter = ["strace", "-D", "-f", "-qq", "-o", "/dev/null", "-e", "trace=clone,clone3", "-e", &inject];
+    let starter = ["strace", "-f", "-qq", "-o", "/dev/null", "-e", "trace=clone,clone3", "-e", &inject];
     Running::start(&mut through(attempt.home.path(), &starter, arguments))
 }
 
@@ -34,21 +34,34 @@ struct Case {
 
 /// Every command with room for no thread, for one, and so on until it is done.
 pub fn few(study: &'static Study) -> Outcome {
-    const BENCH: &str = "bench --backend cpu --threads 1 --points 34 --solver direct --precision f64 --seconds 0.1 --quiet";
+    const BENCH: &str =
+        "bench --backend cpu --threads 1 --points 34 --solver direct --precision f64 --seconds 0.1 --quiet";
     let run = Attempt::new(study).run();
     // Two for signals and the clock, and one that computes.
     let list = [
         Case { name: "run", arguments: run, least: 3, prepare: Attempt::new, writes: true },
-        Case { name: "resume", arguments: "resume out".into(), least: 3, prepare: Attempt::interrupted, writes: true },
-        Case { name: "merge", arguments: "merge 0 1 --out out".into(), least: 0, prepare: shards, writes: true },
-        Case { name: "plot", arguments: "plot out".into(), least: 0, prepare: finished, writes: true },
+        Case {
+            name: "resume",
+            arguments: "resume out --quiet".into(),
+            least: 3,
+            prepare: Attempt::interrupted,
+            writes: true,
+        },
+        Case {
+            name: "merge",
+            arguments: "merge 0 1 --quiet --out out".into(),
+            least: 0,
+            prepare: shards,
+            writes: true,
+        },
+        Case { name: "plot", arguments: "plot out --quiet".into(), least: 0, prepare: finished, writes: true },
         Case { name: "bench", arguments: BENCH.into(), least: 1, prepare: Attempt::new, writes: false },
     ];
     let mut cases = 0;
     for Case { name, arguments, least, prepare, writes } in list {
         for room in 0..=least {
             let attempt = prepare(study);
-            let ended = start(&attempt, room, &format!("{arguments} --quiet").replace("--quiet --quiet", "--quiet")).end();
+            let ended = start(&attempt, room, &arguments).end();
             let told = format!("{name} with room for {room} threads: {ended:?}");
             cases += 1;
             if room == least {
@@ -103,30 +116,41 @@ pub fn few_on_the_gpu(study: &'static Study, most: usize) -> Outcome {
     Found::new(most + 1, format!("{refused} refused by name, 0 panics, 0 differing bytes"))
 }
 
-/// One line, with `remedy`.
+/// One error with `remedy`; beside it a run may say that its state is kept.
 #[track_caller]
 fn must_be_named(ended: &Ended, remedy: &str, told: &str) {
-    assert!(ended.code == Some(1) && ended.said.lines().count() == 1, "{told}");
-    assert!(ended.errors().len() == 1 && ended.said.contains(remedy), "{told}");
+    let is_said = |line: &str| line.starts_with("error: ") || line.starts_with("note: the state of the run is kept");
+    assert!(ended.code == Some(1) && ended.said.lines().all(is_said), "{told}");
+    assert!(ended.errors().len() == 1 && ended.errors()[0].contains(remedy), "{told}");
 }
 
-/// Runs that have what they need, and find no further thread when they are to stop.
+/// Runs that have what they need, and find no further thread when they are to stop: `strace` counts the calls of every thread
+/// by itself, so here the user's limit is lowered as soon as the run has begun.
 pub fn none_left_for_signals(study: &'static Study, stops: &[(&str, i32, i32)]) -> Outcome {
-    // Two for signals and the clock, and one that computes.
-    const ROOM: usize = 3;
-    for (name, _, code) in stops {
-        let attempt = Attempt::new(study);
-        let mut running = start(&attempt, ROOM, &attempt.run());
-        running.wait_until(|_| attempt.has_state());
+    let max_time = [("--max-time 1s", 0, 75)];
+    for (cause, _, code) in stops.iter().chain(&max_time) {
+        let nobody = AsNobody::new();
+        let more = if cause.starts_with("--") { cause } else { "" };
+        let arguments = format!("run {} --quiet --checkpoint-every 1s {more} --out out", study.arguments);
+        let mut running = nobody.start("022", &arguments);
+        let out = nobody.home.path().join("out");
+        running.wait_until(|_| out.join(".curvelax.state").exists());
+        let id = running.id().to_string();
+        let lowered = nobody.command(&["prlimit", "--pid", &id, "--nproc=1:1"]).status().unwrap();
+        assert!(lowered.success(), "{cause}");
         let asked = Instant::now();
-        running.signal(name);
+        if more.is_empty() {
+            running.signal(cause);
+        }
         let ended = running.end();
-        assert!(ended.code == Some(*code) && asked.elapsed() < SOON, "{name}: {ended:?}");
+        assert!(ended.code == Some(*code) && asked.elapsed() < SOON + Duration::from_secs(1), "{cause}: {ended:?}");
+        let attempt = Attempt::new(study);
+        copy(&out, &attempt.out());
         attempt.must_end_well(ended);
     }
-    let attempt = Attempt::new(study);
-    let ended = start(&attempt, ROOM, &format!("{} --max-time 1s", attempt.run())).end();
-    assert!(matches!(ended.code, Some(0 | 75)), "{ended:?}");
-    attempt.must_end_well(ended);
     Found::new(stops.len() + 1, "out in 5 s, 0 differing bytes")
+}
+
+pub fn can_limit() -> bool {
+    is_there("prlimit") && is_there("setpriv")
 }
