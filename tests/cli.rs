@@ -208,6 +208,19 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
     assert!(foretold[2] > 1.4 * foretold[1], "{foretold:?}");
 }
 
+/// Vulkan's loader says what it loads; and where `XDG_RUNTIME_DIR` is not set a layer of Mesa says so.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_first_run_loads_no_driver_where_no_gpu_can_be() {
+    let home = TempDir::new().unwrap();
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
+    command.current_dir(home.path()).env_remove("XDG_RUNTIME_DIR").env("VK_LOADER_DEBUG", "all");
+    command.args(["run", "--curves", "3", "--t-end", "0.01", "--out", "out"]);
+    let said = String::from_utf8(command.output().unwrap().stderr).unwrap();
+    let has_nodes = ["/dev/dri", "/dev/nvidiactl", "/dev/kfd", "/dev/dxg"].iter().any(|node| Path::new(node).exists());
+    assert!(has_nodes || said == "back end: CPU, f64 (no hardware GPU found); Gauss-Seidel sweeps\n", "{said}");
+}
+
 #[test]
 fn completions_are_scripts_and_know_the_commands_and_flags() {
     let home = TempDir::new().unwrap();

@@ -3,7 +3,10 @@
 //!
 //! No adapter is a failure, unless `ALLOW_NO_GPU=1`: then every case is reported as ignored.
 
-use std::io::Write;
+use std::{
+    io::{BufRead, BufReader, Write},
+    process::Stdio,
+};
 
 use curvelax::{
     backend::{
@@ -59,6 +62,9 @@ fn main() {
         if gpu.capacity().best_precision() == Precision::F64 {
             cases::<f64>(index, &mut trials);
         }
+    }
+    if !trials.is_empty() {
+        trials.push(Trial::test("the program says which kernel it compares before it compiles it", check_tells));
     }
     let conclusion = libtest_mimic::run(&arguments, trials);
     println!("conformance cases: {}", conclusion.num_passed);
@@ -561,6 +567,24 @@ fn tables_agree<T: Real>(solver: Solver, n: usize, pace: &[&str]) -> Result<Vec<
     let error = gpu.1.iter().zip(&cpu.1).map(|(a, b)| (a - b).abs() / a.abs().max(1.0)).fold(0.0, f64::max);
     println!("{} numbers of the program's tables differ by at most {error:.1e}", gpu.1.len());
     if error > bound { Err(format!("the tables differ by {error:e}").into()) } else { Ok(cpu.0) }
+}
+
+/// `curvelax check` may take minutes, in which it is not silent. Its end is not waited for.
+fn check_tells() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
+    command.arg("check").env("XDG_RUNTIME_DIR", folder.path()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = command.spawn()?;
+    let said: Vec<String> =
+        BufReader::new(child.stderr.take().ok_or("no stderr")?).lines().take(3).collect::<Result<_, _>>()?;
+    child.kill()?;
+    child.wait()?;
+    let kernels =
+        ["1 of ", ": f32, gauss-seidel, n = 7, stages of a step", "2 of ", ": f32, gauss-seidel, n = 7, fixed steps"];
+    let told = said.len() == 3 && said[0].starts_with("comparing ") && said[1].starts_with(kernels[0]);
+    let told =
+        told && said[1].ends_with(kernels[1]) && said[2].starts_with(kernels[2]) && said[2].ends_with(kernels[3]);
+    if told { Ok(()) } else { Err(format!("{said:?}").into()) }
 }
 
 /// The same from outside: exit code 2, one message with both numbers, nothing written.

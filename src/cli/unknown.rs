@@ -28,6 +28,8 @@ pub fn explain(error: &mut clap::Error, program: &Command, arguments: &[OsString
         .map(Command::get_name)
         .collect();
     if !owners.is_empty() {
+        // A command that has it was named behind it.
+        let called = called.filter(|command| !owners.contains(&command.get_name()));
         error.remove(ContextKind::SuggestedArg);
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(belongs(&word, &owners, called)));
     } else if let Some(near) = nearest(&word, flags(command))
@@ -118,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_flag_before_the_command_is_sent_behind_it() {
-        for arguments in [&["--json"][..], &["--curves=3"]] {
+        for arguments in [&["--json"][..], &["--curves=3"], &["--curves", "3", "run"]] {
             let error = said(arguments);
             assert!(error.contains("goes behind a command: 'run'") && !error.contains("similar"), "{error}");
         }
