@@ -44,7 +44,8 @@ impl Progress {
         let colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         let bar = ProgressBar::new(TICKS);
         bar.set_style(style(colour).unwrap_or_else(|_| ProgressStyle::default_bar()));
-        Progress::Bar(bar)
+        // A terminal that cannot go back in a line, such as TERM=dumb, has no bars.
+        if bar.is_hidden() { Progress::Lines(Instant::now(), Lines::default()) } else { Progress::Bar(bar) }
     }
 
     /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done.
