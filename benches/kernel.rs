@@ -60,7 +60,7 @@ fn start<T: Real>(gpu: &Gpu, n: usize, variant: Variant) -> (Kernel<T>, f64) {
     let started = now();
     let mut kernel = Kernel::<T>::new(gpu, Blocks::new(n).unwrap(), MEMBERS, 1 << 30, variant).unwrap();
     let mut first =
-        if variant.adaptive { adaptive_members(n, 1, 1, 1e-3, T::EPSILON) } else { members(n, 1, 1, 1e-5) }.unwrap();
+        if variant.adaptive { adaptive_members(n, 1, 1, 1e-3, T::PRECISION) } else { members(n, 1, 1, 1e-5) }.unwrap();
     kernel.load(0, &first.remove(0)).unwrap();
     // Drivers compile at the first dispatch.
     kernel.advance().unwrap();

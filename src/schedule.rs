@@ -1,6 +1,8 @@
 //! Time: the clock of a run with fixed τ, that of adaptive steps, and the output times.
 
-use crate::scheme::decay;
+use std::ops::RangeInclusive;
+
+use crate::{number::Precision, scheme::decay};
 
 /// Relative distance from a step at which an output time counts as on it.
 const ON_A_STEP: f64 = 1e-9;
@@ -73,10 +75,12 @@ pub struct Ticks {
 }
 
 impl Ticks {
-    /// Parts for a run to `t_end` in numbers of relative spacing `epsilon`: ticks of about 2ε² of the end.
-    pub fn new(t_end: f64, epsilon: f64) -> Ticks {
+    /// Parts for a run to `t_end`, one of the [times](times) of a precision, in its numbers: ticks of about 2ε² of the end,
+    /// but never below its least normal number.
+    pub fn new(t_end: f64, precision: Precision) -> Ticks {
+        let epsilon = precision.epsilon();
         // The high part has to count to the end without rounding.
-        let unit = (2.0 * epsilon * t_end).log2().ceil().exp2();
+        let unit = (2.0 * epsilon * t_end).log2().ceil().exp2().max(range(precision).start() / epsilon);
         Ticks { unit, tick: unit * epsilon }
     }
 
@@ -85,6 +89,20 @@ impl Ticks {
         let high = (t / self.unit).floor() * self.unit;
         (high, ((t - high) / self.tick).ceil() * self.tick)
     }
+}
+
+/// The positive numbers of a precision, from the least normal to the largest one.
+pub fn range(precision: Precision) -> RangeInclusive<f64> {
+    match precision {
+        Precision::F32 => f32::MIN_POSITIVE.into()..=f32::MAX.into(),
+        Precision::F64 => f64::MIN_POSITIVE..=f64::MAX,
+    }
+}
+
+/// The times to which a precision counts in [`Ticks`]: their parts have all its digits.
+pub fn times(precision: Precision) -> RangeInclusive<f64> {
+    let (range, epsilon) = (range(precision), precision.epsilon());
+    range.start() / epsilon..=range.end() * epsilon
 }
 
 /// An output time.
@@ -199,13 +217,14 @@ mod tests {
 
     #[test]
     fn ticks_count_to_the_end_in_f32_and_f64() {
-        for t_end in [2.0, 1e6, 1e-20, 0.17] {
-            for epsilon in [f64::from(f32::EPSILON), f64::EPSILON] {
-                let ticks = Ticks::new(t_end, epsilon);
+        for t_end in [2.0, 1e6, 1e-20, 0.17, 1e-30, 1e31] {
+            for precision in [Precision::F32, Precision::F64] {
+                let (ticks, epsilon) = (Ticks::new(t_end, precision), precision.epsilon());
                 let (high, low) = ticks.split(t_end);
                 assert!(high / ticks.unit <= 1.0 / epsilon, "the end is {} units", high / ticks.unit);
                 assert!(low <= ticks.unit && (high + low - t_end).abs() <= ticks.tick.max(1e-15 * t_end));
-                assert_eq!(ticks.unit.log2().fract(), 0.0);
+                assert_eq!((ticks.unit.log2().fract(), ticks.tick.log2().fract()), (0.0, 0.0));
+                assert!(ticks.tick >= *range(precision).start() && times(precision).contains(&t_end));
             }
         }
     }

@@ -14,7 +14,7 @@ use crate::{
         spec::{Pace, Precision, Pull, Sor},
     },
     error::{Error, Result},
-    schedule::{Clock, Output, Ticks},
+    schedule::{self, Clock, Output, Ticks},
     scheme::{
         Curve, Parameters, State, decay,
         evolve::Run,
@@ -134,11 +134,18 @@ impl<'a> Trajectory<'a> {
         parameters.fit_from = threshold(FITTED[1] * start.excess);
         parameters.fit_to = (FITTED[0] * start.excess).max(resolution);
         parameters.least_length = SHRUNK * launch.report.now.length;
+        let mut status = beyond(&parameters, precision).then_some(Status::Nonfinite);
         let time = match spec.pace() {
             Pace::Fixed(tau) => Time::Fixed(Clock::new(tau, spec.t_end)),
             Pace::Adaptive(tolerance) => {
-                let end = spec.t_end / unit.powi(4);
-                let ticks = Ticks::new(end, precision.epsilon());
+                let (times, end) = (schedule::times(precision), spec.t_end / unit.powi(4));
+                status = status.or(match end {
+                    end if end < *times.start() => Some(Status::Nonfinite),
+                    end if end > *times.end() => Some(Status::Stalled),
+                    _ => None,
+                });
+                let end = end.clamp(*times.start(), *times.end());
+                let ticks = Ticks::new(end, precision);
                 parameters.adaptive = tolerance;
                 (parameters.time_unit, parameters.time_tick) = (ticks.unit, ticks.tick);
                 (parameters.end_high, parameters.end_low) = ticks.split(end);
@@ -149,7 +156,8 @@ impl<'a> Trajectory<'a> {
         };
         let clock = time.unit(unit);
         parameters.clock_end = spec.t_end / clock;
-        parameters.growth = spec.flow.growth(start.area).map_or(0.0, |growth| growth / clock);
+        parameters.growth =
+            spec.flow.growth(start.area).map_or(0.0, |growth| (growth / clock).min(*schedule::range(precision).end()));
         launch.parameters = parameters;
         launch.counters.stop_when_relaxed = spec.stop_when_relaxed.into();
         let mut trajectory = Trajectory {
@@ -173,8 +181,9 @@ impl<'a> Trajectory<'a> {
             portrait: false,
         };
         if course == Course::Round && spec.stop_when_relaxed {
-            trajectory.counters.status = Status::Relaxed as u32;
+            status = Some(Status::Relaxed);
         }
+        trajectory.counters.status = status.map_or(0, |status| status as u32);
         let state = trajectory.launch.state.clone();
         trajectory.look(&state.curve);
         trajectory.serve(Some(&state));
@@ -238,9 +247,18 @@ impl<'a> Trajectory<'a> {
         self.sweeps[0] += u64::from(counters.sweeps_k);
         self.sweeps[1] += u64::from(counters.sweeps_x);
         self.take(counters, report);
-        if self.counters.status == 0 && !self.is_at_end() && counters.steps >= self.most_steps() {
+        let creeps = self.counters.status == 0 && !self.is_at_end() && counters.steps >= self.most_steps();
+        let failed = Status::ALL.iter().any(|status| status.is_failure() && *status as u32 == self.counters.status);
+        if creeps || (failed && self.is_timed_too_coarsely()) {
             self.counters.status = Status::Stalled as u32;
         }
+    }
+
+    /// Whether no step that the clock can count is as short as the curve needs.
+    fn is_timed_too_coarsely(&self) -> bool {
+        let Time::Adaptive(ticks) = self.time else { return false };
+        let edge = self.report.now.length / self.launch.state.curve.len() as f64;
+        ticks.tick > FIRST_STEP * edge.powi(4)
     }
 
     fn take(&mut self, counters: Counters, report: &Report<f64>) {
@@ -516,6 +534,15 @@ fn unit_of(nodes: &[DVec2]) -> f64 {
     (polygon::length(nodes) / std::f64::consts::TAU).log2().floor().exp2()
 }
 
+/// Whether the law, a rate or the fixed step of a member is no number of a precision: too large, or a step too short.
+fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
+    let range = schedule::range(precision);
+    let law = [p.c1, p.c2, p.c3, p.c4, p.c5, p.c6, p.c7, p.c8, p.length_penalty];
+    let rates = [p.redistribution * p.omega, p.pull, p.tau];
+    let too_large = law.into_iter().chain(rates).any(|number| !(number.abs() <= *range.end()));
+    too_large || (p.tau != 0.0 && p.tau < *range.start())
+}
+
 /// The parameters of a member in units of `unit`, thresholds and times aside.
 fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parameters<f64> {
     let time = unit.powi(4);
@@ -531,6 +558,7 @@ fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parame
         c6: law(6, of_flow.c6),
         c7: law(7, of_flow.c7),
         c8: law(8, of_flow.c8),
+        tau: if let Pace::Fixed(tau) = spec.pace() { tau / time } else { 0.0 },
         omega: spec.omega * time,
         redistribution: f64::from(u8::from(!spec.no_redistribution)),
         pull: match spec.pull {

@@ -180,7 +180,7 @@ fn a_moved_node_fails_adaptive<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> 
 }
 
 fn adaptive_bits<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    let mut launches = adaptive_members(n, 5, 20, 1e-3, T::EPSILON)?;
+    let mut launches = adaptive_members(n, 5, 20, 1e-3, T::PRECISION)?;
     // Two members end when they are relaxed, which all are on the way.
     for launch in &mut launches[1..3] {
         launch.counters.stop_when_relaxed = 1;
@@ -206,7 +206,7 @@ fn adaptive_bits<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
         }
     }
     // The negative control: another tolerance takes other steps.
-    let other = on_gpu::<T>(gpu, solver, n, &adaptive_members(n, 5, 20, 2e-3, T::EPSILON)?, dispatches_of(1000))?;
+    let other = on_gpu::<T>(gpu, solver, n, &adaptive_members(n, 5, 20, 2e-3, T::PRECISION)?, dispatches_of(1000))?;
     if same(&other[0], &at_once[0], "").is_ok() {
         return Err("another tolerance changed nothing".into());
     }
@@ -214,7 +214,7 @@ fn adaptive_bits<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 }
 
 fn adaptive_bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    let good = adaptive_members(n, 5, 20, 1e-3, T::EPSILON)?;
+    let good = adaptive_members(n, 5, 20, 1e-3, T::PRECISION)?;
     let alone = on_gpu::<T>(gpu, solver, n, &good, dispatches_of(5))?;
     let mut mixed = good.clone();
     replace_nodes(&mut mixed[1], |nodes| nodes[n / 3] = DVec2::new(f64::NAN, 0.0));
@@ -354,7 +354,7 @@ fn exchanges<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
         return Err(format!("{by_shuffles:?} on subgroups of {}", gpu.capacity().least_subgroup).into());
     }
     let launches = members(n, 5, 50, 1e-4)?;
-    let adaptive_launches = adaptive_members(n, 5, 20, 1e-3, T::EPSILON)?;
+    let adaptive_launches = adaptive_members(n, 5, 20, 1e-3, T::PRECISION)?;
     for (adaptive, launches) in [(false, launches), (true, adaptive_launches)] {
         let by_shuffles = Variant { adaptive, ..by_shuffles };
         let by_barriers = Variant { subgroup: false, ..by_shuffles };
@@ -469,7 +469,7 @@ fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
 /// A dispatch that does as much as it may loses nothing: llvmpipe leaves all loops silently when they get too long.
 fn adaptive_largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let n = gpu.capacity().max_points::<T>(solver).min(1024);
-    let launches = adaptive_members(n, 2, 6, 1e-3, T::EPSILON)?;
+    let launches = adaptive_members(n, 2, 6, 1e-3, T::PRECISION)?;
     let little = on_gpu::<T>(gpu, solver, n, &launches, Budget { steps: 1, sweeps: 64 })?;
     let much = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(u32::MAX))?;
     for j in 0..launches.len() {

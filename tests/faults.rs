@@ -20,8 +20,8 @@ use curvelax::{
     },
     conformance::{adaptive_members, members, self_test},
     ensemble::{
-        Cell, Family, Spec, Status,
-        spec::{BackendChoice, Precision},
+        Cell, Ended, Family, Spec, Status,
+        spec::{BackendChoice, Precision, SolverChoice},
     },
     number::Real,
     scheme::{
@@ -80,6 +80,7 @@ fn main() {
         add("a device that is lost between dispatches is an error by name", lost_between_dispatches);
         add("a device that is lost during a dispatch is an error by name", lost_during_a_dispatch);
         add("on a lost device nothing is opened, and auto goes on with the CPU", lost_before);
+        add("a cap of one sweep fails members, not the self-test", a_cap_of_one_sweep);
         add("a device without room for the slots is an error with their bytes", no_room);
         add("a dispatch is given up at its limit, and waited for in slices", slow_dispatch);
     }
@@ -162,7 +163,7 @@ fn renew(run: &mut Run<f64>, change: impl FnOnce(&mut [DVec2])) {
 fn launches<T: Real>(count: usize, adaptive: bool) -> curvelax::Result<Vec<Run<f64>>> {
     let few = 13;
     let some = match adaptive {
-        true => adaptive_members(POINTS, few, 4, 1e-3, T::EPSILON)?,
+        true => adaptive_members(POINTS, few, 4, 1e-3, T::PRECISION)?,
         false => members(POINTS, few, 4, 1e-4)?,
     };
     let member = |j: usize| {
@@ -427,6 +428,31 @@ fn lost_during_a_dispatch(gpu: &Gpu) -> Outcome {
     }
     require(kernel.is_back(0, HANGS), || "a lost device is waited for".into())?;
     named(kernel.advance(), gpu, "the device was lost")
+}
+
+/// With the cap of the run the self-test compared solves that were none, and rounding decided how its members ended.
+fn a_cap_of_one_sweep(gpu: &Gpu) -> Outcome {
+    let spec = Spec {
+        backend: BackendChoice::Gpu,
+        adapter: Some(gpu.name().to_string()),
+        curves: 3,
+        points: 127,
+        adaptive: Some(0.005),
+        solver: SolverChoice::GaussSeidel,
+        max_sweeps: 1,
+        t_end: 1e-9,
+        ..Spec::default()
+    };
+    let spec = spec.validate()?;
+    let choice = backend::choose(&spec, spec.points)?;
+    let (mut backend, _) = choice.open(&spec, spec.points)?;
+    // The run has the cap that it asked for.
+    let mut all = All::default();
+    let cell = Cell::only(spec.clone(), Family::new(&spec)?);
+    simulate(&[cell], choice.precision(), backend.as_mut(), 0, &mut all)?;
+    require(all.0.len() == 3, || format!("{} members", all.0.len()))?;
+    let sweeps = |ended: &Ended| ended.outcome.sweeps_k <= 3 * (ended.outcome.steps + ended.outcome.rejected);
+    require(all.0.iter().all(sweeps), || format!("{:?}", all.0[0].outcome))
 }
 
 fn lost_before(gpu: &Gpu) -> Outcome {

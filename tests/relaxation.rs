@@ -255,7 +255,7 @@ fn rows_at_given_times_do_not_depend_on_where_steps_fell_and_change_no_step() {
 
 /// The clock of a run to `t_end` in numbers of type T.
 fn clock<T: Real>(t_end: f64, next: f64) -> (Ticks, Progress<T>, Parameters<T>) {
-    let ticks = Ticks::new(t_end, T::EPSILON);
+    let ticks = Ticks::new(t_end, T::PRECISION);
     let (end_high, end_low) = ticks.split(t_end);
     let p = Parameters { end_high, end_low, time_unit: ticks.unit, time_tick: ticks.tick, ..Parameters::default() };
     (ticks, Progress { next: T::of(next), ..Progress::default() }, p.convert())
@@ -489,7 +489,7 @@ fn single_precision_against_double() {
 /// A run without thresholds to steps of any error.
 fn unbounded(nodes: &[DVec2], flow: &Flow) -> Run<f64> {
     let end = 100.0;
-    let ticks = Ticks::new(end, f64::EPSILON);
+    let ticks = Ticks::new(end, Precision::F64);
     let p =
         Parameters { adaptive: 1.0, follow_to: 1e9, relax_at: -1.0, half_at: -1.0, ..Parameters::of_flow(flow, 0.0) };
     let p = Parameters { time_unit: ticks.unit, time_tick: ticks.tick, end_high: end, goal_high: end, ..p };

@@ -5,6 +5,7 @@ use crate::{
     ensemble::{Family, Spec},
     error::Result,
     flow::Flow,
+    number::Precision,
     schedule::Ticks,
     scheme::{Parameters, State, evolve::Run},
 };
@@ -61,13 +62,19 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
 }
 
 /// The same members with adaptive steps of `tolerance` to the time of `steps` of their own fixed ones, for a run in
-/// numbers of relative spacing `epsilon`.
-pub fn adaptive_members(n: usize, count: usize, steps: u32, tolerance: f64, epsilon: f64) -> Result<Vec<Run<f64>>> {
+/// `precision`.
+pub fn adaptive_members(
+    n: usize,
+    count: usize,
+    steps: u32,
+    tolerance: f64,
+    precision: Precision,
+) -> Result<Vec<Run<f64>>> {
     let mut runs = members(n, count, steps, SWEEPS)?;
     for (j, run) in runs.iter_mut().enumerate() {
         let (p, progress) = (&mut run.parameters, &mut run.report.progress);
         let end = p.tau * f64::from(steps);
-        let ticks = Ticks::new(end, epsilon);
+        let ticks = Ticks::new(end, precision);
         p.adaptive = tolerance;
         p.follow_to = 1e-3 * run.report.now.excess;
         p.clock_end = end;

@@ -121,7 +121,7 @@ fn method(solver: Solver) -> Method {
 }
 
 /// Sweeps at most in these comparisons.
-const MAX_SWEEPS: u32 = 200_000;
+pub const MAX_SWEEPS: u32 = 200_000;
 
 fn tampered(mut launches: Vec<Run<f64>>, tamper: Option<Tamper>) -> Vec<Run<f64>> {
     if let Some(Tamper { member, node, by }) = tamper {
@@ -210,7 +210,7 @@ pub fn adaptive<T: Real>(
     budget: Budget,
     tamper: Option<Tamper>,
 ) -> Result<Vec<Row>> {
-    let launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::EPSILON)?;
+    let launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?;
     ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
 }
 

@@ -38,7 +38,7 @@ pub fn self_test<T: Real>(
     let count = MEMBERS.min(backend.slots());
     let launches = match adaptive {
         false => members(n, count, STEPS, T::PRECISION.tolerance())?,
-        true => adaptive_members(n, count, STEPS, ADAPTIVE, T::EPSILON)?,
+        true => adaptive_members(n, count, STEPS, ADAPTIVE, T::PRECISION)?,
     };
     // In all batches.
     let slots: Vec<usize> = (0..count).map(|member| member * backend.slots() / count).collect();

@@ -19,6 +19,9 @@ use crate::{
 /// Largest number of points of an outline, and of nodes of a curve.
 pub const MAX_POINTS: usize = 1_000_000;
 
+/// Smallest extent: the same holds for their inverses.
+const MIN_EXTENT: f64 = 1e-30;
+
 /// Largest coordinate. Fourth powers of lengths, which times are measured in, stay finite.
 const MAX_COORDINATE: f64 = 1e30;
 
@@ -291,6 +294,12 @@ impl Source<'_> {
             return Err(self.refusal(None, "the file holds no points", "give at least three, x,y a line"));
         };
         let (low, high) = points.iter().fold((first, first), |(low, high), p| (low.min(*p), high.max(*p)));
+        let extent = (high - low).max_element();
+        if extent > 0.0 && extent < MIN_EXTENT {
+            let problem = format!("the outline extends over no more than {extent:e}");
+            let remedy = format!("give its points in a smaller unit of length, so that it extends over {MIN_EXTENT:e} or more");
+            return Err(self.refusal(None, &problem, &remedy));
+        }
         let coincide = |a: DVec2, b: DVec2| a.distance(b) <= COINCIDENT * low.distance(high);
         if points.len() > 1 && coincide(first, last) {
             points.pop();
@@ -360,6 +369,18 @@ mod tests {
         assert_eq!(vertices(SQUARE), square);
         assert_eq!(vertices("x,y\n# a square\n\n0,0\r\n1, 0\n 1 ,1\n0,1"), square);
         assert_eq!(vertices("\u{feff}\"name\",\"Y\",\"X\"\n\"a,b\",0,0\n,0,1\nc,1,1\nd,1,0\n"), square);
+    }
+
+    #[test]
+    fn an_outline_so_small_that_its_times_are_no_numbers_is_refused() {
+        let rhombus = |size: f64| format!("{size:e},0\n0,{0:e}\n-{size:e},0\n0,-{0:e}\n", 0.5 * size);
+        for size in [1e-31, 1e-160, 1e-170, 1e-300] {
+            let problem = format!("extends over no more than {:e}; give its points in a smaller unit", 2.0 * size);
+            assert_refused(&rhombus(size), &[&problem]);
+        }
+        for size in [1e-30, 1.0, 1e30] {
+            outline(&rhombus(size)).unwrap();
+        }
     }
 
     #[test]

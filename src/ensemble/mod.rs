@@ -5,6 +5,7 @@ pub mod member;
 pub mod mollifier;
 pub mod outcome;
 pub mod random;
+mod seed;
 pub mod shard;
 pub mod spec;
 pub mod standing;

@@ -7,7 +7,7 @@ use std::{fmt, marker::PhantomData, path::Path, str::FromStr};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::{shard::Shard, sweep::Sweep};
+use super::{seed, shard::Shard, sweep::Sweep};
 use crate::{
     curve::{Modes, Sampling, Shape},
     error::{Error, Result, did_you_mean, shortened},
@@ -105,6 +105,7 @@ pub struct Spec {
     /// Nodes per member, `n`.
     pub points: usize,
     /// Seed of the ensemble.
+    #[serde(with = "seed")]
     pub seed: u64,
     /// The curve that is perturbed.
     pub shape: Shape,
@@ -187,6 +188,8 @@ pub struct Spec {
 
 /// The paper's time step.
 pub const DEFAULT_TAU: f64 = 1e-3;
+/// A V-cycle of two sweeps halves the error at least, so a solve by them takes some 50 cycles; one of 500 never ends.
+const MOST_MULTIGRID_SWEEPS: u32 = 1000;
 /// Tolerance of `--adaptive` without a value.
 pub const DEFAULT_ADAPTIVE: f64 = 1e-3;
 /// Fraction of the initial excess at which a member is relaxed.
@@ -341,6 +344,14 @@ impl Spec {
         let drawn = (self.amplitude > 0.0).then(|| self.modes.low.max(2));
         let mode = self.shape.lowest_mode().into_iter().chain(drawn).min()?;
         self.flow.excess_rate(mode, area)
+    }
+
+    /// The cap of the sweeps of a solve in use.
+    pub fn most_sweeps(&self) -> u32 {
+        match self.solver() {
+            Solver::Multigrid => self.max_sweeps.min(MOST_MULTIGRID_SWEEPS),
+            Solver::GaussSeidel | Solver::Direct => self.max_sweeps,
+        }
     }
 
     /// The residual tolerance in use at `precision`.

@@ -77,18 +77,38 @@ impl FromStr for Axis {
     fn from_str(text: &str) -> Result<Axis, String> {
         let (key, values) = text.split_once('=').ok_or_else(|| format!("`{text}` has no `=`; write key=v1,v2,..."))?;
         let separator = if values.contains(';') { ';' } else { ',' };
+        let key = key.trim();
         let value = |word: &str| {
             let word = word.trim();
-            match (word.parse::<i64>(), word.parse::<f64>(), word.parse::<bool>()) {
-                (Ok(whole), ..) => Value::Integer(whole),
-                (_, Ok(real), _) => Value::Float(real),
+            match (word.parse::<u64>(), word.parse::<i64>(), word.parse::<f64>(), word.parse::<bool>()) {
+                (Ok(whole), ..) => from_whole(key, whole),
+                (_, Ok(whole), ..) => Value::Integer(whole),
+                (.., Ok(real), _) => Value::Float(real),
                 (.., Ok(truth)) => Value::Boolean(truth),
                 _ => Value::String(word.to_string()),
             }
         };
         let words = values.split(separator).filter(|word| !word.trim().is_empty());
-        Ok(Axis { key: key.trim().to_string(), values: words.map(value).collect() })
+        Ok(Axis { key: key.to_string(), values: words.map(value).collect() })
     }
+}
+
+/// A whole number as a value of `key`. Those of TOML end at 2⁶³: a larger seed is its digits, and other keys that have so
+/// large ones are reals.
+fn from_whole(key: &str, whole: u64) -> Value {
+    match i64::try_from(whole) {
+        Ok(whole) => Value::Integer(whole),
+        Err(_) if key == "seed" => Value::String(whole.to_string()),
+        Err(_) => Value::Float(whole as f64),
+    }
+}
+
+/// A value as it is read.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Read {
+    Value(Value),
+    Whole(u64),
 }
 
 impl Sweep {
@@ -226,7 +246,12 @@ impl<'de> Deserialize<'de> for Sweep {
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Sweep, A::Error> {
                 let mut axes = Vec::new();
-                while let Some((key, values)) = map.next_entry()? {
+                while let Some((key, values)) = map.next_entry::<String, Vec<Read>>()? {
+                    let value = |read| match read {
+                        Read::Value(value) => value,
+                        Read::Whole(whole) => from_whole(&key, whole),
+                    };
+                    let values = values.into_iter().map(value).collect();
                     axes.push(Axis { key, values });
                 }
                 Ok(Sweep(axes))
@@ -273,6 +298,24 @@ mod tests {
         let spec = Spec { sweep: sweep(&["tau=0.01,0.1", "flow=willmore,elastic:0.5", "decay=1"]), ..Spec::default() };
         let text = spec.to_toml().unwrap();
         assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");
+    }
+
+    #[test]
+    fn a_seed_that_is_no_number_of_toml_is_swept_and_reads_back() {
+        let axis: Axis = "seed=1,9223372036854775808,18446744073709551615".parse().unwrap();
+        let large = [9_223_372_036_854_775_808, u64::MAX];
+        assert_eq!(axis.labels(), ["1".into(), large[0].to_string(), large[1].to_string()]);
+        let base = Spec { seed: u64::MAX - 1, sweep: Sweep(vec![axis]), ..Spec::default() };
+        let unquoted = "seed = 18446744073709551614\n[sweep]\nseed = [1, 9223372036854775808, 18446744073709551615]";
+        assert_eq!(Spec::from_toml(unquoted).unwrap(), base);
+        assert_eq!(Spec::from_toml(&base.to_toml().unwrap()).unwrap(), base);
+        assert_eq!(serde_json::from_str::<Spec>(&serde_json::to_string(&base).unwrap()).unwrap(), base);
+        let seeds: Vec<u64> = (0..3).map(|cell| base.sweep.apply(&base, cell).unwrap().seed).collect();
+        assert_eq!(seeds, [1, large[0], large[1]]);
+        assert!("omega=18446744073709551615".parse::<Axis>().unwrap().values[0].is_float());
+        let plain = Spec { sweep: Sweep::default(), ..base.clone() };
+        let other = Spec { seed: u64::MAX, ..plain.clone() };
+        assert!(plain.difference(&other, &[]).is_some_and(|(key, ..)| key == "seed"));
     }
 
     #[test]

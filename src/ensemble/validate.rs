@@ -15,6 +15,8 @@ const FEWEST_POINTS: usize = crate::solver::ring::MIN_POINTS;
 const MOST_POINTS: usize = 1_000_000;
 /// A member with more steps than this would not end in a year.
 const MOST_STEPS: f64 = 1e9;
+/// Final times of which the smallest part in a table, and the sum over all members, are still numbers.
+const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
 /// The rows of a resident member stay in memory until it ends.
 const MOST_SERIES_ROWS: f64 = 1e6;
 const MOST_SNAPSHOTS: usize = 10_000;
@@ -85,6 +87,10 @@ impl Spec {
 
     fn check_times(&self) -> Result<()> {
         positive("t-end", self.t_end, "a final time", "2")?;
+        if !TIMES.contains(&self.t_end) {
+            let allowed = format!("take a time from {:e} to {:e}", TIMES.start(), TIMES.end());
+            return Err(Error::value("t-end", number(self.t_end), "parts or sums of it are no numbers", &allowed));
+        }
         match self.pace() {
             Pace::Fixed(tau) => self.check_fixed(tau)?,
             Pace::Adaptive(tolerance) => self.check_adaptive(tolerance)?,
@@ -367,6 +373,8 @@ mod tests {
         ("t-end = -2", "--t-end -2: "),
         ("t-end = nan", "--t-end NaN: "),
         ("t-end = inf", "--t-end inf: "),
+        ("t-end = 9e-301", "--t-end 9e-301: parts or sums of it are no numbers; take a time from 1e-300 to 1e300"),
+        ("t-end = 2e300", "--t-end 2e300: parts or sums of it are no numbers; take a time from 1e-300 to 1e300"),
         ("t-end = 1e300", "--tau 0.001: about 1.0e303 steps"),
         ("t-end = 1.1e6", "--tau 0.001: about 1.1e9 steps"),
         ("omega = -0.5", "--omega -0.5: "),

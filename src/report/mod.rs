@@ -287,9 +287,10 @@ impl Report {
 impl Sink for Report {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         let Ended { outcome, portrait, mollified, unresolved, excess, .. } = ended;
+        // First what may refuse it: rows that are written are rows that can be read again.
+        self.tally.add(outcome)?;
         self.growing.add(ended)?;
         self.has_begun = true;
-        self.tally.add(outcome)?;
         self.tally.add_excess(outcome.cell, excess);
         self.tally.add_aside(mollified, *unresolved);
         self.films.extend(portrait.as_ref().map(|portrait| Film::new(outcome, portrait)));

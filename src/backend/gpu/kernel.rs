@@ -123,6 +123,12 @@ impl<T: Real> Kernel<T> {
         self
     }
 
+    /// The same kernel with another cap of the sweeps of a solve.
+    pub fn with_max_sweeps(mut self, max_sweeps: u32) -> Self {
+        self.max_sweeps = max_sweeps;
+        self
+    }
+
     /// Gives a dispatch up after `limit`, in place of two minutes.
     pub fn with_limit(mut self, limit: Duration) -> Self {
         self.limit = limit;
