@@ -254,10 +254,10 @@ impl<'a> Trajectory<'a> {
         }
     }
 
-    /// Whether no step that the clock can count is as short as the curve needs.
+    /// Whether no step that the clock can count was as short as the curve needed at its start.
     fn is_timed_too_coarsely(&self) -> bool {
         let Time::Adaptive(ticks) = self.time else { return false };
-        let edge = self.report.now.length / self.launch.state.curve.len() as f64;
+        let edge = self.start.length / self.unit / self.launch.state.curve.len() as f64;
         ticks.tick > FIRST_STEP * edge.powi(4)
     }
 
