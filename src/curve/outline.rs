@@ -297,7 +297,8 @@ impl Source<'_> {
         let extent = (high - low).max_element();
         if extent > 0.0 && extent < MIN_EXTENT {
             let problem = format!("the outline extends over no more than {extent:e}");
-            let remedy = format!("give its points in a smaller unit of length, so that it extends over {MIN_EXTENT:e} or more");
+            let remedy =
+                format!("give its points in a smaller unit of length, so that it extends over {MIN_EXTENT:e} or more");
             return Err(self.refusal(None, &problem, &remedy));
         }
         let coincide = |a: DVec2, b: DVec2| a.distance(b) <= COINCIDENT * low.distance(high);
