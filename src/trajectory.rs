@@ -539,7 +539,7 @@ fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
     let range = schedule::range(precision);
     let law = [p.c1, p.c2, p.c3, p.c4, p.c5, p.c6, p.c7, p.c8, p.length_penalty];
     let rates = [p.redistribution * p.omega, p.pull, p.tau];
-    let too_large = law.into_iter().chain(rates).any(|number| !(number.abs() <= *range.end()));
+    let too_large = law.into_iter().chain(rates).any(|number| number.is_nan() || number.abs() > *range.end());
     too_large || (p.tau != 0.0 && p.tau < *range.start())
 }
 
