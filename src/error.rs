@@ -26,6 +26,9 @@ pub enum Error {
     /// A comparison or run ended badly, as reported in its table. Exit code 1.
     #[error("{0}")]
     Failed(String),
+    /// The folder of a command was taken from it while it was writing there. Exit code 1.
+    #[error("{0}")]
+    Lost(String),
     /// The run is done and its files are written, but members ended in a way that was to be an error. Exit code 3.
     #[error("{0}")]
     Strict(String),
@@ -56,7 +59,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Request(_) => 2,
-            Error::Io { .. } | Error::Device(_) | Error::Failed(_) => 1,
+            Error::Io { .. } | Error::Device(_) | Error::Failed(_) | Error::Lost(_) => 1,
             Error::Strict(_) => 3,
             Error::Stopped(_) => 75,
             Error::Interrupted(_) => 130,

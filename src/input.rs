@@ -1,9 +1,9 @@
-//! Files that a user names, read up to a size that no honest one has.
+//! The one way in which files are opened for reading, whoever wrote them: only files, and up to a size that no honest one has.
 //!
 //! A pipe may never end and a device never does, so neither is opened: the answer to a slip in a path comes at once.
 
 use std::{
-    fs::{self, File},
+    fs::{self, File, Metadata, OpenOptions},
     io::{self, Error, ErrorKind, Read},
     path::Path,
 };
@@ -19,18 +19,52 @@ pub(crate) const MOST_PORTRAITS: u64 = 1 << 23;
 /// Most bytes of a line of a table: a thousand numbers.
 pub(crate) const LONGEST_LINE: usize = 1 << 16;
 
-/// Opens the file at `path`.
+/// Most bytes of a state or a `shard.state`: what a run writes at once is in memory once more, beside its members.
+pub(crate) const MOST_STATE: u64 = 1 << 34;
+
+/// Opens the file at `path` for reading.
 ///
 /// # Errors
 /// As [`File::open`], and for what is no file.
 pub(crate) fn open(path: &Path) -> io::Result<File> {
-    // Before it is opened: to open a pipe is to wait for its writer.
-    let kind = fs::metadata(path)?.file_type();
-    match () {
-        _ if kind.is_dir() => Err(ErrorKind::IsADirectory.into()),
-        _ if !kind.is_file() => Err(Error::other("a pipe or a device; save what it holds in a file")),
-        _ => File::open(path),
+    open_as(path, File::options().read(true))
+}
+
+/// Opens the file at `path` as `options` say.
+///
+/// # Errors
+/// As [`open`].
+pub(crate) fn open_as(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
+    // Before it is opened, which some devices take for an order.
+    match fs::metadata(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => {}
+        there => is_file(&there?)?,
     }
+    let file = at_once(options).open(path)?;
+    // Another one may have come into its place.
+    is_file(&file.metadata()?)?;
+    Ok(file)
+}
+
+fn is_file(of: &Metadata) -> io::Result<()> {
+    match () {
+        _ if of.is_dir() => Err(ErrorKind::IsADirectory.into()),
+        _ if !of.is_file() => Err(Error::other("a pipe or a device; save what it holds in a file")),
+        _ => Ok(()),
+    }
+}
+
+/// To open a pipe is to wait for its writer, and some files of the system, such as `/proc/kmsg`, are read like one.
+#[cfg(unix)]
+fn at_once(options: &mut OpenOptions) -> &mut OpenOptions {
+    use std::os::unix::fs::OpenOptionsExt;
+    const O_NONBLOCK: i32 = if cfg!(any(target_os = "linux", target_os = "android")) { 0o4000 } else { 4 };
+    options.custom_flags(O_NONBLOCK)
+}
+
+#[cfg(not(unix))]
+fn at_once(options: &mut OpenOptions) -> &mut OpenOptions {
+    options
 }
 
 /// The content of the file at `path`, if it is of `most` bytes or less.

@@ -1,6 +1,6 @@
 //! `curvelax convergence`: how far the scheme is from exact solutions, and at which order it comes nearer.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{flags, note, print};
 use crate::{
@@ -10,7 +10,7 @@ use crate::{
         spec::{BackendChoice, Precision, SolverChoice},
     },
     error::{Error, Result},
-    report::{OutputFolder, folder, tables},
+    report::{OutputFolder, Owner, folder, tables},
     truth::{Problem, Row, problems, studies},
 };
 
@@ -47,7 +47,7 @@ pub struct ConvergenceArgs {
     /// Folder for convergence.csv, which must not exist yet [default: no file]
     #[arg(long, value_name = "DIR", help_heading = flags::OUTPUT)]
     out: Option<PathBuf>,
-    /// Write into an existing DIR, replacing the files of an earlier command
+    /// Write into an existing DIR, replacing the convergence.csv of an earlier one
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
     /// No notes and no table: only errors
@@ -72,7 +72,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     let choice = backend::choose(&method, method.points)?;
     // Settled once: adapters are looked for only now, and every run is of the same precision.
     choice.settle(&mut method);
-    let folder = args.out.map(|out| OutputFolder::open(&out, args.force)).transpose()?;
+    let folder = args.out.map(|out| open(&out, args.force)).transpose()?;
     if !args.quiet {
         note(&choice.sentence(&method));
     }
@@ -84,7 +84,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     }
     if let Some(folder) = folder {
         let file = tables::convergence(folder.file(folder::CONVERGENCE)?, &rows)?;
-        folder.publish(Vec::new(), None, file)?;
+        folder.publish_all(vec![file])?;
     }
     if !args.quiet {
         print(&table(&rows))?;
@@ -96,6 +96,10 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
             rows.len()
         ))),
     }
+}
+
+fn open(out: &Path, force: bool) -> Result<OutputFolder> {
+    OutputFolder::open_for(out, force, Owner::Convergence, vec![folder::CONVERGENCE.into()])
 }
 
 /// Aligned, the problems apart; a run that ended early has its status in place of its error.

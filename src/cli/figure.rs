@@ -9,7 +9,7 @@ use crate::{
     ensemble::{Ended, Spec},
     error::Result,
     figures::{FIGURES, Figure, OMEGA, POINTS},
-    report::{OutputFolder, plot::short, progress::Progress, tables::SnapshotTable},
+    report::{OutputFolder, Owner, plot::short, progress::Progress, tables::SnapshotTable},
 };
 
 const EXAMPLES: &str = "\
@@ -43,7 +43,7 @@ pub fn figure(args: FigureArgs) -> Result<()> {
     let chosen = FIGURES.iter().filter(|figure| args.names.iter().any(|name| name == figure.name));
     let chosen: Vec<(&Figure, Spec)> = chosen.map(|figure| Ok((figure, figure.spec()?))).collect::<Result<_>>()?;
     let names: Vec<[String; 2]> = chosen.iter().map(|(figure, _)| files(figure)).collect();
-    let folder = OutputFolder::open_for(&args.out, args.force, names.concat())?;
+    let folder = OutputFolder::open_for(&args.out, args.force, Owner::Figure, names.concat())?;
     if !args.quiet {
         note(SOLVED_DIRECTLY);
     }

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{flags, print};
+use super::{flags, print, run::check_name};
 use crate::{
     error::{Error, Result},
     report::{
@@ -61,6 +61,7 @@ pub fn merge(args: MergeArgs) -> Result<()> {
     }
     shards.check_complete()?;
     let out = args.out.ok_or_else(|| Error::Request("--out DIR: the results need a folder".into()))?;
+    check_name(args.json, &out)?;
     check_place(&out, &args.shards)?;
     let folder = OutputFolder::open(&out, args.force)?;
     let form = if args.json { Form::Json } else { Form::Overview };

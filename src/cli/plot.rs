@@ -1,11 +1,11 @@
 //! `curvelax plot`: the pictures of a finished run, drawn again from its files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{note, print};
 use crate::{
     error::Result,
-    report::{EnsembleStatistics, OutputFolder, folder, reader, reader::Finished, study::Study},
+    report::{EnsembleStatistics, OutputFolder, Owner, folder, reader, reader::Finished, study::Study},
 };
 
 const EXAMPLES: &str = "\
@@ -38,11 +38,12 @@ pub struct PlotArgs {
 pub fn plot(args: PlotArgs) -> Result<()> {
     // Before the folder is opened, which would make one that is not there.
     reader::provenance(&args.run)?;
-    let (out, force) = match &args.out {
-        Some(out) => (out, args.force),
-        None => (&args.run, true),
+    let (out, force, owner) = match &args.out {
+        Some(out) if !is_same(out, &args.run) => (out, args.force, Owner::Pictures),
+        Some(out) => (out, args.force, Owner::PicturesOfRun),
+        None => (&args.run, true, Owner::PicturesOfRun),
     };
-    let folder = OutputFolder::open_for(out, force, folder::PICTURES.map(String::from).into())?;
+    let folder = OutputFolder::open_for(out, force, owner, folder::PICTURES.map(String::from).into())?;
     let Finished { provenance, mut tally, excess, films } = Finished::read(&args.run)?;
     if films.is_empty() && !args.quiet {
         note(&format!("note: no {} in {}: without pictures of members", folder::PORTRAITS, args.run.display()));
@@ -57,4 +58,9 @@ pub fn plot(args: PlotArgs) -> Result<()> {
     }
     let names: Vec<&str> = pictures.iter().map(|(name, _)| *name).collect();
     print(&format!("results    {}: {}\n", out.display(), names.join(", ")))
+}
+
+/// Whether both paths lead to one folder.
+fn is_same(one: &Path, other: &Path) -> bool {
+    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }

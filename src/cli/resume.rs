@@ -49,6 +49,7 @@ pub struct ResumeArgs {
 
 /// Runs the command.
 pub fn resume(args: ResumeArgs) -> Result<()> {
+    args.manner.check_name(&args.run)?;
     let folder = OutputFolder::open_again(&args.run)?;
     let kept = checkpoint::find(&folder)?;
     let place = Place { backend: args.backend, adapter: args.adapter, threads: args.threads };
@@ -112,12 +113,12 @@ fn go_on(mut folder: OutputFolder, kept: Option<Kept>, place: Place, flags: Mann
     if !origin.outlines.is_empty() {
         folder.make_absolute()?;
         go_to(Path::new(&origin.base))?;
-        origin.check_outlines()?;
     }
     let began = origin.platform.clone();
     let elsewhere = place.backend.is_some() || place.adapter.is_some();
     let new_threads = place.threads.is_some();
-    let work = Work::new(spec(&origin.spec, place)?)?;
+    let work = spec(&origin.spec, place).and_then(Work::new).map_err(|error| origin.explain(error))?;
+    origin.check_outlines(&work.cells)?;
     let mut here = work.platform();
     here.reason = began.reason.clone();
     if !here.computes_like(&began) {

@@ -13,7 +13,8 @@ use crate::{
     error::{Error, Result},
     estimate::Estimate,
     report::{
-        Form, Manner, OutputFolder, Report, Stop, checkpoint::Origin, folder, gallery::MOST_PANELS, text::plural,
+        Existing, Form, Manner, OutputFolder, Report, Stop, checkpoint::Origin, folder, gallery::MOST_PANELS,
+        text::plural,
     },
     simulate::go_on,
 };
@@ -91,6 +92,14 @@ impl MannerFlags {
         if !self.quiet {
             note(line)
         }
+    }
+
+    /// That what is asked for can be said of results in `out`.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a name that JSON cannot hold.
+    pub fn check_name(&self, out: &Path) -> Result<()> {
+        check_name(self.json, out)
     }
 
     /// From now on the run can be stopped.
@@ -179,15 +188,14 @@ impl Work {
         let Work { spec, cells, companies, opened } = self;
         let done = advance(&cells, companies, opened, standing, &mut report, flags);
         if let Err(error) = done {
-            let stopped = matches!(error, Error::Stopped(_) | Error::Interrupted(_));
-            if report.give_up() && !stopped {
-                kept(&out);
+            if report.give_up() {
+                kept(&out, &error);
             }
             return Err(error);
         }
         let (late, failed) = (report.warnings(), report.failed());
         let form = if flags.json { Form::Json } else { Form::Overview };
-        let text = report.finish(&spec, &early, form).inspect_err(|_| kept(&out))?;
+        let text = report.finish(&spec, &early, form).inspect_err(|error| kept(&out, error))?;
         late.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
         if flags.json || !flags.quiet {
             print(&text)?;
@@ -221,22 +229,38 @@ pub fn run(args: RunArgs) -> Result<()> {
         };
     }
     let out = args.out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
+    flags.check_name(&out)?;
     let begun = if args.resume { resume::begun(&out)? } else { None };
     if let Some(begun) = begun {
         return resume::go_on_like(begun, work.spec, flags);
     }
     let manner = flags.manner()?;
-    // Without a run there is nothing to lose.
-    let folder = OutputFolder::open(&out, args.force || args.resume)?;
+    let existing = if args.resume { Existing::Filled } else { args.force.into() };
+    let folder = OutputFolder::open(&out, existing)?;
     let platform = work.open(&flags)?;
     let origin = Origin::new(work.spec.to_toml()?, &work.cells, platform)?;
     let report = Report::begin(folder, &work.spec, work.cells[0].spec.points, origin, manner)?;
     work.carry_out(report, Standing::default(), &flags)
 }
 
-/// Says how a run that failed goes on.
-fn kept(out: &Path) {
-    note(&format!("note: the state of the run is kept: curvelax resume {} goes on", out.display()));
+/// As [`MannerFlags::check_name`], where `json` is asked for.
+pub fn check_name(json: bool, out: &Path) -> Result<()> {
+    match json && out.to_str().is_none() {
+        true => Err(Error::value(
+            "out",
+            out.display(),
+            "no UTF-8, which JSON is in",
+            "name another folder, or leave --json out",
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Says how a run that failed goes on, unless the error does.
+fn kept(out: &Path, error: &Error) {
+    if !matches!(error, Error::Stopped(_) | Error::Interrupted(_) | Error::Lost(_)) {
+        note(&format!("note: the state of the run is kept: curvelax resume {} goes on", out.display()));
+    }
 }
 
 /// Opens the back end that was chosen for a company.

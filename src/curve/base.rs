@@ -1,5 +1,7 @@
 //! A shape that is ready to be evaluated: a closed formula or a polygon, as a map of `u ∈ [0, 1]`.
 
+use std::sync::Arc;
+
 use glam::DVec2;
 
 use super::{Outline, polygon};
@@ -18,7 +20,7 @@ pub struct BaseCurve {
 
 enum Kind {
     Formula(Box<dyn Fn(f64) -> DVec2 + Send + Sync>),
-    Polygon(Outline),
+    Polygon(Arc<Outline>),
 }
 
 impl BaseCurve {
@@ -37,7 +39,8 @@ impl BaseCurve {
     }
 
     /// The closed polygon of a file; `u` is the share of its length from the first vertex on.
-    pub fn from_outline(outline: Outline) -> BaseCurve {
+    pub fn from_outline(outline: impl Into<Arc<Outline>>) -> BaseCurve {
+        let outline = outline.into();
         let centroid = polygon::area_centroid(outline.vertices());
         BaseCurve { kind: Kind::Polygon(outline), centroid, cusps: Vec::new() }
     }
@@ -61,7 +64,7 @@ impl BaseCurve {
     }
 
     /// The polygon, if the curve is one.
-    pub fn outline(&self) -> Option<&Outline> {
+    pub fn outline(&self) -> Option<&Arc<Outline>> {
         match &self.kind {
             Kind::Formula(_) => None,
             Kind::Polygon(outline) => Some(outline),

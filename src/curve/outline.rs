@@ -41,6 +41,7 @@ pub struct Outline {
     reached: Vec<f64>,
     simple: bool,
     warnings: Vec<String>,
+    digest: u32,
 }
 
 impl Outline {
@@ -67,7 +68,7 @@ impl Outline {
         if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
             return Err(source.refusal(None, "the file is in UTF-16", "save it in UTF-8"));
         }
-        source.outline(bytes)
+        Ok(Outline { digest: crc32c::crc32c(bytes), ..source.outline(bytes)? })
     }
 
     /// The outline through a list of points, in either sense, with or without the first one again at the end.
@@ -97,7 +98,13 @@ impl Outline {
             *sum += edge.length();
             Some(*sum)
         }));
-        Outline { vertices, reached, simple: not_simple.is_none(), warnings: not_simple.into_iter().collect() }
+        Outline {
+            vertices,
+            reached,
+            simple: not_simple.is_none(),
+            warnings: not_simple.into_iter().collect(),
+            digest: 0,
+        }
     }
 
     /// Whether the polygon neither crosses nor touches itself; false also where that could not be told.
@@ -108,6 +115,11 @@ impl Outline {
     /// The vertices, without a repeated closing point.
     pub fn vertices(&self) -> &[DVec2] {
         &self.vertices
+    }
+
+    /// CRC-32C of the bytes that it was read from; 0 where there were none.
+    pub fn digest(&self) -> u32 {
+        self.digest
     }
 
     /// What the user should know about the outline, a sentence each.

@@ -11,12 +11,12 @@
 //! spaced; so spacings differ by half a node an arc at most, and by nothing where the arcs are equal and their
 //! number divides n.
 
-use std::{fmt, str::FromStr};
+use std::{fmt, str::FromStr, sync::Arc};
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{BaseCurve, MAX_POINTS, RadialFactor};
+use super::{BaseCurve, MAX_POINTS, Outline, RadialFactor};
 use crate::error::{Error, did_you_mean};
 
 /// Samples for each node, and the least number of them, that equal spacing is measured on. Half as many double the
@@ -134,6 +134,11 @@ impl Sampler {
     /// Number of nodes n.
     pub fn nodes(&self) -> usize {
         self.nodes
+    }
+
+    /// The polygon of its curve, if it is one.
+    pub fn outline(&self) -> Option<&Arc<Outline>> {
+        self.curve.outline()
     }
 
     /// Bytes of what is tabulated for `nodes` nodes, the vertices of an outline aside.

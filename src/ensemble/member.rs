@@ -86,7 +86,7 @@ impl Family {
             check_own_points(spec.points, own)?;
         }
         let has_corners = outline.is_some() && spec.sampling == Sampling::Arclength && spec.points >= MIN_POINTS;
-        let simple = outline.is_some_and(Outline::is_simple);
+        let simple = outline.is_some_and(|outline| outline.is_simple());
         let mut warnings = outline.map_or(Vec::new(), |outline| outline.warnings().to_vec());
         if let Shape::Lemniscate { .. } = spec.shape {
             warnings.push(NO_EXCESS.into());
@@ -111,6 +111,11 @@ impl Family {
         };
         let (sampler, warnings) = (Arc::clone(&other.sampler), other.warnings.clone());
         Ok(Family { sampler, law, seed: spec.seed, directions, warnings, ..*other })
+    }
+
+    /// The outline of its curve, if it has one.
+    pub fn outline(&self) -> Option<&Arc<Outline>> {
+        self.sampler.outline()
     }
 
     /// Whether the tables of its curve are those of `other`.

@@ -1,13 +1,13 @@
 //! A study: the cells of a spec, each an ensemble of its own, whose members run side by side.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use super::{
     Family, Member, Spec,
     spec::{Pace, Store},
 };
 use crate::{
-    curve::Sampler,
+    curve::{BaseCurve, Sampler},
     error::{Error, Result},
     solver::{Order, Solver},
 };
@@ -100,7 +100,13 @@ fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<C
                 let problem = format!("the curves of the first {} take more than {gigabytes} GB", index + 1);
                 return Err(Error::value("sweep", cells, &problem, "take fewer --points, or fewer cells at once"));
             }
-            Family::new(&own)?
+            // The file is read once: what one cell was checked with is what another has.
+            let outline =
+                before.iter().rfind(|cell| cell.spec.shape == own.shape).and_then(|cell| cell.family.outline());
+            match outline {
+                Some(outline) => Family::of(&own, BaseCurve::from_outline(Arc::clone(outline)))?,
+                None => Family::new(&own)?,
+            }
         }
     };
     // A file's own points are a number that no check has seen.

@@ -7,7 +7,8 @@
 
 use std::{
     collections::BTreeMap,
-    io::Read,
+    fs::File,
+    io::{self, Read, Seek},
     path::{Path, PathBuf},
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
@@ -15,6 +16,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{
+    disk,
     folder::{OutputFolder, STATE, STATE_OLD},
     part_file::Mark,
     portraits::Film,
@@ -23,7 +25,7 @@ use super::{
 };
 use crate::{
     backend::Platform,
-    curve::Shape,
+    curve::{Outline, Shape},
     ensemble::{Cell, Ended, Paused, Standing},
     error::{Error, Result},
     input,
@@ -35,6 +37,8 @@ const VERSION: u32 = 1;
 /// Bytes before the body, and after it.
 const BEFORE: usize = MAGIC.len() + 4 + 8;
 const AFTER: usize = 4;
+
+const WRONG_CHECKSUM: &str = "its checksum is wrong";
 
 /// What does not change while a run goes on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,31 +99,48 @@ impl Origin {
     /// That of a run of `cells` which begins now.
     ///
     /// # Errors
-    /// [`Error::Request`] for an outline that cannot be read.
+    /// [`Error::Request`] for outlines in a current folder without a name.
     pub fn new(spec: String, cells: &[Cell], platform: Platform) -> Result<Origin> {
         let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let mut paths: Vec<&PathBuf> = cells.iter().filter_map(outline).collect();
-        paths.sort();
-        paths.dedup();
-        let outlines = paths.into_iter().map(|path| Ok((path.clone(), checksum(path)?)));
-        let outlines = outlines.collect::<Result<Vec<_>>>()?;
+        let outlines: Vec<(PathBuf, u32)> = outlines(cells).into_iter().collect();
         let base = if outlines.is_empty() { String::new() } else { here()? };
         Ok(Origin { spec, platform, moves: Vec::new(), base, outlines, started })
     }
 
-    /// That the outlines are those of the beginning; paths in the spec begin at the current folder.
+    /// That the outlines of `cells`, as they were read, are those of the beginning.
     ///
     /// # Errors
     /// [`Error::Request`] naming the first that is not.
-    pub fn check_outlines(&self) -> Result<()> {
-        match self.outlines.iter().find(|(path, crc)| checksum(path).ok() != Some(*crc)) {
+    pub fn check_outlines(&self, cells: &[Cell]) -> Result<()> {
+        let read = outlines(cells);
+        match self.outlines.iter().find(|(path, crc)| read.get(path) != Some(crc)) {
             None => Ok(()),
-            Some((path, _)) => Err(Error::Request(format!(
-                "the outline {} has changed since the run began, or is gone: restore it, or begin anew",
-                Path::new(&self.base).join(path).display()
-            ))),
+            Some((path, _)) => Err(self.changed(path)),
         }
     }
+
+    /// The error of outlines that are not those of the beginning, or `error` where they are.
+    pub fn explain(&self, error: Error) -> Error {
+        let changed =
+            self.outlines.iter().find(|(path, crc)| Outline::read(path).ok().map(|o| o.digest()) != Some(*crc));
+        changed.map_or(error, |(path, _)| self.changed(path))
+    }
+
+    fn changed(&self, path: &Path) -> Error {
+        Error::Request(format!(
+            "the outline {} has changed since the run began, or is gone: restore it, or begin anew",
+            Path::new(&self.base).join(path).display()
+        ))
+    }
+}
+
+/// The outlines of `cells` with the CRC-32C of what was read of each.
+fn outlines(cells: &[Cell]) -> BTreeMap<PathBuf, u32> {
+    let outline = |cell: &Cell| match &cell.spec.shape {
+        Shape::File(path) => Some((path.clone(), cell.family.outline()?.digest())),
+        _ => None,
+    };
+    cells.iter().filter_map(outline).collect()
 }
 
 /// The current folder, by name.
@@ -128,19 +149,6 @@ fn here() -> Result<String> {
     let here = std::env::current_dir().map_err(|e| refuse(format!("cannot be found ({e})")))?;
     let name = here.to_str().map(String::from);
     name.ok_or_else(|| refuse(format!("has a name that is not UTF-8: {}; go to another one", here.display())))
-}
-
-fn outline(cell: &Cell) -> Option<&PathBuf> {
-    match &cell.spec.shape {
-        Shape::File(path) => Some(path),
-        _ => None,
-    }
-}
-
-fn checksum(path: &Path) -> Result<u32> {
-    let bytes = input::bytes(path, input::MOST_OUTLINE);
-    let bytes = bytes.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
-    Ok(crc32c::crc32c(&bytes))
 }
 
 /// The bytes of a state; `resident` takes the place of that in `standing`.
@@ -186,7 +194,7 @@ pub fn opened(bytes: &[u8]) -> Result<&[u8], Fault> {
     }
     let (all, crc) = bytes.split_at(bytes.len() - AFTER);
     if crc32c::crc32c(all).to_le_bytes() != *crc {
-        return damaged("its checksum is wrong");
+        return damaged(WRONG_CHECKSUM);
     }
     // Whole, so what follows is no accident.
     if magic != MAGIC {
@@ -237,31 +245,48 @@ fn take<const N: usize>(bytes: &mut &[u8]) -> Option<[u8; N]> {
     Some(*first)
 }
 
-/// Reads the state `name` in the folder of a run.
-pub fn read(folder: &Path, name: &str) -> Result<(Head, Standing), Fault> {
-    from_bytes(&bytes(&folder.join(name))?)
+/// Reads the state at `path`.
+pub fn read(path: &Path) -> Result<(Head, Standing), Fault> {
+    from_bytes(&bytes(path)?)
 }
 
 /// The bytes of the file at `path`, or the first of them if it is not sealed.
 pub fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
-    let bytes = input::open(path).and_then(|file| {
-        // No more than was there to begin with, should it grow.
-        let (mut bytes, length) = (Vec::new(), file.metadata()?.len());
-        let mut file = file.take(length);
+    let bytes = input::open(path).and_then(|mut file| {
+        let length = file.metadata()?.len();
+        let mut bytes = Vec::new();
         // Whatever else it is, it is not read to its end if that is not where it says.
-        (&mut file).take(BEFORE as u64).read_to_end(&mut bytes)?;
-        if told(&bytes).is_some_and(|told| told.checked_add((BEFORE + AFTER) as u64) == Some(length)) {
-            file.read_to_end(&mut bytes)?;
+        (&file).take(BEFORE as u64).read_to_end(&mut bytes)?;
+        let told = told(&bytes).and_then(|told| told.checked_add((BEFORE + AFTER) as u64));
+        if told == Some(length) {
+            // Nor into memory, if it is not what was written.
+            check_whole(&mut file, length)?;
+            file.rewind()?;
+            bytes.clear();
+            file.take(length).read_to_end(&mut bytes)?;
         }
         Ok(bytes)
     });
     bytes.map_err(|e| Fault::Damaged(e.to_string()))
 }
 
+/// That the last of the `length` bytes are the checksum of those before them, read piece by piece.
+fn check_whole(file: &mut File, length: u64) -> io::Result<()> {
+    if length > input::MOST_STATE {
+        return Err(io::Error::other(format!("it has {length} bytes; at most {} are read", input::MOST_STATE)));
+    }
+    file.rewind()?;
+    let (_, crc) = disk::checksum(&mut (&*file).take(length - AFTER as u64), 0)?;
+    let mut last = [0; AFTER];
+    file.read_exact(&mut last)?;
+    if crc.to_le_bytes() == last { Ok(()) } else { Err(io::Error::other(WRONG_CHECKSUM)) }
+}
+
 /// Members on their way by the last state in `folder`, of those that have not ended in `standing`: where they are lost,
 /// they go on from there.
-pub fn on_their_way(folder: &Path, company: u64, standing: &Standing) -> BTreeMap<u64, Paused> {
-    match read(folder, STATE).or_else(|_| read(folder, STATE_OLD)) {
+pub fn on_their_way(folder: &OutputFolder, company: u64, standing: &Standing) -> BTreeMap<u64, Paused> {
+    let read = |name| read(folder.place(name).at());
+    match read(STATE).or_else(|_| read(STATE_OLD)) {
         Ok((head, Standing { resident: Some(mut resident), .. })) if head.company == company => {
             resident.retain(|rank, _| *rank >= standing.next && !standing.early.contains_key(rank));
             resident
@@ -279,12 +304,12 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Kept>> {
     let refuse = |problem: String| Err(Error::Request(format!("{}: {problem}", path.display())));
     let mut faults = Vec::new();
     for name in [STATE, STATE_OLD] {
-        match path.join(name).try_exists() {
+        match folder.place(name).at().try_exists() {
             Ok(true) => {}
             Ok(false) => continue,
             Err(e) => return refuse(format!("cannot find {name} in it ({e})")),
         }
-        let found = read(path, name).and_then(|(head, standing)| {
+        let found = read(folder.place(name).at()).and_then(|(head, standing)| {
             let tables = head.tables.iter().try_for_each(|mark| folder.check(mark));
             let store = head.store.as_ref().map_or(Ok(()), |mark| folder.check_store(mark));
             let film = head.films.iter().find_map(|film| Some((film.member, film.fault()?)));

@@ -1,9 +1,6 @@
 //! The end of a run: statistics, pictures and provenance, and all files under their final names.
 
-use std::{
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::time::Duration;
 
 use super::{
     Form,
@@ -70,9 +67,9 @@ impl Complete<'_> {
         if let Some(shard) = shard {
             files.push(folder.write(folder::SHARD, shard)?);
         }
-        let written = files.iter().map(PartFile::target).chain(store.iter().map(PartFolder::target));
-        let written: Vec<PathBuf> = written.map(Path::to_path_buf).collect();
-        let is_written = |name: &&str| written.contains(&folder.path().join(name));
+        let mut written: Vec<String> = files.iter().map(|file| file.name().to_string()).collect();
+        written.extend(store.iter().map(|_| folder::STORE.to_string()));
+        let is_written = |name: &&str| written.iter().any(|own| own == name);
         let mut names: Vec<&str> = folder::TABLES.into_iter().filter(is_written).collect();
         let provenance = &Provenance::new(spec, platform, tally, warnings, started, wall);
         let run = folder.write(folder::RUN, provenance.to_json()?)?;

@@ -1,11 +1,12 @@
-//! What the file system is asked for: files that are no links, locks, checksums, names that last.
+//! What the file system is asked for: files that are no links, checksums, names that last.
 
 use std::{
-    fs::{self, File, TryLockError},
+    fs::{self, File},
     io::{self, Read},
     path::Path,
 };
 
+use super::place::Place;
 use crate::error::{Error, Result};
 
 /// In every folder of a store.
@@ -65,34 +66,9 @@ pub fn checksum(file: &mut impl Read, mut crc: u32) -> io::Result<(u64, u32)> {
     }
 }
 
-/// Locks the file at `path`, made if need be; none if another holds it.
-pub fn lock(path: &Path) -> io::Result<Option<File>> {
-    loop {
-        if path.is_symlink() {
-            remove(path)?;
-        }
-        let file = File::options().write(true).create(true).truncate(false).open(path)?;
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => return Ok(None),
-            Err(TryLockError::Error(e)) if !has_no_locks(&e) => return Err(e),
-            _ => {}
-        }
-        // The run before may have removed the file after it was opened here: a lock that nobody else sees.
-        if lies_at(&file, path)? {
-            return Ok(Some(file));
-        }
-    }
-}
-
-/// Whether the file system says that it has no locks, which is no reason not to run: NFS without its lock daemon calls
-/// that `ENOLCK`.
-fn has_no_locks(error: &io::Error) -> bool {
-    const ENOLCK: i32 = if cfg!(target_os = "linux") { 37 } else { 77 };
-    error.kind() == io::ErrorKind::Unsupported || (cfg!(unix) && error.raw_os_error() == Some(ENOLCK))
-}
-
+/// Whether `file` is what has this path; false where nothing has.
 #[cfg(unix)]
-fn lies_at(file: &File, path: &Path) -> io::Result<bool> {
+pub fn lies_at(file: &File, path: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
     let id = |of: fs::Metadata| (of.dev(), of.ino());
     match fs::metadata(path) {
@@ -102,20 +78,33 @@ fn lies_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
+/// How many names the file has.
+#[cfg(unix)]
+pub fn names_of(file: &File) -> io::Result<u64> {
+    use std::os::unix::fs::MetadataExt;
+    Ok(file.metadata()?.nlink())
+}
+
+/// Elsewhere that cannot be asked for in safe and stable Rust; a copy is never wrong.
+#[cfg(not(unix))]
+pub fn names_of(_: &File) -> io::Result<u64> {
+    Ok(2)
+}
+
 /// Elsewhere a file has no number to ask for in safe and stable Rust; a file at its place has to do.
 #[cfg(not(unix))]
-fn lies_at(_: &File, path: &Path) -> io::Result<bool> {
+pub fn lies_at(_: &File, path: &Path) -> io::Result<bool> {
     path.try_exists()
 }
 
 /// Makes a rename durable.
-pub fn sync_parent(path: &Path) -> Result<()> {
-    sync_folder(parent(path))
+pub fn sync_parent(place: &Place) -> Result<()> {
+    sync_names(parent(place.at())).map_err(Error::io("cannot write to", parent(place.shown())))
 }
 
 /// Makes the names of what is in a folder durable.
-pub fn sync_folder(path: &Path) -> Result<()> {
-    sync_names(path).map_err(Error::io("cannot write to", path))
+pub fn sync_folder(place: &Place) -> Result<()> {
+    sync_names(place.at()).map_err(place.io("cannot write to"))
 }
 
 /// The same; only Unix lets a folder be synced.

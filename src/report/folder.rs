@@ -7,9 +7,12 @@ use std::{
 };
 
 use super::{
-    disk::{IS_STORE, checksum, create, lock, parent, remove, remove_store, sync_folder, sync_names},
+    claim::Claim,
+    disk::{IS_STORE, checksum, create, names_of, parent, remove, remove_store, sync_folder, sync_names},
+    owner::{Existing, Owner},
     part_file::{Mark, PartFile},
     part_folder::PartFolder,
+    place::Place,
     zarr,
 };
 use crate::{
@@ -57,8 +60,12 @@ pub const REPORT: &str = "report.html";
 /// What a merge has to know of a shard beside its tables, see [`shard`](super::shard).
 pub const SHARD: &str = "shard.state";
 
-/// All that a command may write, the file that vouches for the others first.
-const OWN: [&str; 19] = [
+/// What `curvelax figure` writes.
+pub const FIGURES: [&str; 8] =
+    ["fig1a.svg", "fig1a.csv", "fig1b.svg", "fig1b.csv", "fig1c.svg", "fig1c.csv", "fig2.svg", "fig2.csv"];
+
+/// All that a run may write, the file that vouches for the others first.
+const OWN: [&str; 18] = [
     RUN,
     SHARD,
     SUMMARY,
@@ -77,7 +84,6 @@ const OWN: [&str; 19] = [
     DEPENDENCE,
     MESH,
     REPORT,
-    CONVERGENCE,
 ];
 
 /// The tables of a run and its store, in the order in which they are named to people.
@@ -90,22 +96,27 @@ pub const PICTURES: [&str; 8] = [REPORT, RELAXATION, SURVIVAL, EXCESS, RATE, DEP
 pub const REMEDY: &str = "restore the file, or run again";
 
 /// The folder of the plots.
-const PLOTS: &str = "plots";
-
-/// Locked while a run writes; what counts is the lock, which ends with its process, and not the file.
-pub(super) const LOCK: &str = ".curvelax.lock";
+pub(super) const PLOTS: &str = "plots";
 
 /// From which an interrupted run goes on, see [`checkpoint`](super::checkpoint).
 pub const STATE: &str = ".curvelax.state";
 /// The one before, for the case that the last one is damaged.
 pub const STATE_OLD: &str = ".curvelax.state.old";
 /// The next one, while it is written.
-const STATE_PART: &str = ".curvelax.state.part";
+pub(super) const STATE_PART: &str = ".curvelax.state.part";
 
-/// Says whether a folder can be written.
-const PROBE: &str = ".curvelax.part";
+/// Says whether a folder can be written, and holds what is about to take the place of another file.
+pub(super) const PROBE: &str = ".curvelax.part";
+
+/// The system knows no longer paths.
+const MOST_PATH: usize = if cfg!(target_os = "linux") { 4096 } else { 1024 };
+/// Bytes of the longest name in a folder: a chunk of a store, for more members than there are.
+const LONGEST_NAME: usize = 96;
 
 /// A folder that this run, and no other at the same time, may write into.
+///
+/// It is reached through what was opened: a folder that is moved away takes its files with it, and what comes into its place
+/// is not touched.
 ///
 /// Dropped while empty, the folders that were made for this run are removed again.
 #[derive(Debug)]
@@ -114,26 +125,35 @@ pub struct OutputFolder {
     /// The folders that were made for this run, outermost first.
     made: Vec<PathBuf>,
     new_plots: bool,
-    lock: Option<File>,
+    /// None until it is held.
+    claim: Option<Claim>,
+    /// What it is in it.
+    place: Place,
     /// The files that may be written.
     names: Vec<String>,
 }
 
 impl OutputFolder {
     /// The folder of a run, as [`OutputFolder::open_for`] makes it.
-    pub fn open(path: &Path, force: bool) -> Result<OutputFolder> {
-        OutputFolder::open_for(path, force, OWN.map(String::from).into())
+    pub fn open(path: &Path, existing: impl Into<Existing>) -> Result<OutputFolder> {
+        OutputFolder::open_for(path, existing, Owner::Run, OWN.map(String::from).into())
     }
 
-    /// Makes the folder and its parents, to write the files `names` into. One that exists is refused unless `force`
-    /// allows to replace in it the files of an earlier run; so is a place that cannot be written, or where another run
-    /// is writing.
-    pub fn open_for(path: &Path, force: bool, names: Vec<String>) -> Result<OutputFolder> {
+    /// Makes the folder and its parents, for `owner` to write the files `names` into. One that exists is refused but for
+    /// what `existing` allows; so is one that another command wrote, a place that cannot be written, and one where
+    /// another run is writing.
+    pub fn open_for(
+        path: &Path,
+        existing: impl Into<Existing>,
+        owner: Owner,
+        names: Vec<String>,
+    ) -> Result<OutputFolder> {
         let refuse = |e: io::Error| {
             Error::Request(format!("--out {}: cannot be written ({e}); name a folder that can", path.display()))
         };
-        let mut folder =
-            OutputFolder { path: path.to_path_buf(), made: Vec::new(), new_plots: false, lock: None, names };
+        let existing = existing.into();
+        check_length(path)?;
+        let mut folder = OutputFolder::of(path, names);
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             if parent.exists() && !parent.is_dir() {
                 let problem = format!("{} is no folder", parent.display());
@@ -147,24 +167,19 @@ impl OutputFolder {
             Err(_) if !path.is_dir() => {
                 return Err(Error::value("out", path.display(), "exists and is no folder", "name another"));
             }
-            Err(_) if !force && path.join(STATE).exists() => {
-                let resume = format!("curvelax resume {} goes on with it, --force begins anew", path.display());
-                return Err(Error::value("out", path.display(), "a run was interrupted here", &resume));
-            }
-            Err(_) if !force => {
-                let allowed = "name a new folder, or add --force to replace the files of an earlier run";
-                return Err(Error::value("out", path.display(), "already exists", allowed));
-            }
-            Err(_) => {}
+            // Before its lock is touched.
+            Err(_) => existing.check(path, path, &folder.names)?,
         }
-        folder.lock = lock(&path.join(LOCK)).map_err(refuse)?;
-        if folder.lock.is_none() {
+        if !folder.claim().map_err(refuse)? {
             return Err(Error::value("out", path.display(), "a run is writing here", "name another folder"));
         }
+        // Another run may have come and gone in between.
+        existing.check(folder.place.at(), path, &folder.names)?;
+        owner.check(folder.place.at(), path)?;
         folder.check_names()?;
         folder.probe().map_err(refuse)?;
         // What an interrupted run left; its lock is gone, so it is no longer writing.
-        if folder.names.iter().any(|name| name == RUN) {
+        if owner == Owner::Run {
             folder.forget_states()?;
         }
         folder.remove_parts(&[]).map_err(refuse)?;
@@ -190,10 +205,8 @@ impl OutputFolder {
         if !begun {
             return Err(refuse("no run was begun here; begin it with curvelax run and --force".into()));
         }
-        let (names, made) = (OWN.map(String::from).into(), Vec::new());
-        let mut folder = OutputFolder { path: path.to_path_buf(), made, new_plots: false, lock: None, names };
-        folder.lock = lock(&path.join(LOCK)).map_err(cannot)?;
-        if folder.lock.is_none() {
+        let mut folder = OutputFolder::of(path, OWN.map(String::from).into());
+        if !folder.claim().map_err(cannot)? {
             return Err(refuse("a run is writing here; wait for its end".into()));
         }
         folder.check_names()?;
@@ -201,22 +214,48 @@ impl OutputFolder {
         Ok(folder)
     }
 
+    fn of(path: &Path, names: Vec<String>) -> OutputFolder {
+        let place = Place::named(path);
+        OutputFolder { path: path.into(), made: Vec::new(), new_plots: false, claim: None, place, names }
+    }
+
+    /// Returns whether the folder is held by this run from now on.
+    fn claim(&mut self) -> io::Result<bool> {
+        self.claim = Claim::take(&self.path)?;
+        if let Some(claim) = &self.claim {
+            self.place = claim.place().clone();
+        }
+        Ok(self.claim.is_some())
+    }
+
     /// Stays where it is when the current folder changes.
     pub fn make_absolute(&mut self) -> Result<()> {
         self.path = std::path::absolute(&self.path).map_err(Error::io("cannot find", &self.path))?;
+        if let Some(claim) = &mut self.claim {
+            claim.make_absolute()?;
+            self.place = claim.place().clone();
+        }
         Ok(())
+    }
+
+    /// That the folder is still held by this run, and still where it was found.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] where it is not.
+    pub fn check_claim(&self) -> Result<()> {
+        self.claim.as_ref().map_or(Ok(()), Claim::check)
     }
 
     /// Whether files can be made here.
     fn probe(&self) -> io::Result<()> {
-        let probe = self.path.join(PROBE);
-        create(&probe).and_then(|_| fs::remove_file(&probe))
+        let probe = self.place.join(PROBE);
+        create(probe.at()).and_then(|_| fs::remove_file(probe.at()))
     }
 
     /// Removes what an interrupted run left, but for the files in `keep`.
     fn remove_parts(&self, keep: &[&str]) -> io::Result<()> {
         let parts = self.names.iter().filter(|name| !keep.contains(&name.as_str()));
-        parts.into_iter().try_for_each(|name| remove_any(&self.part(name)))
+        parts.into_iter().try_for_each(|name| remove_any(self.part(name).at()))
     }
 
     /// Removes what a run left beside the files of a complete one because it was killed before its first state.
@@ -225,18 +264,35 @@ impl OutputFolder {
         self.keep_only(&[])
     }
 
-    /// Where it is.
+    /// Where it was found.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
+    /// What is called `name` in it.
+    pub fn place(&self, name: &str) -> Place {
+        self.place.join(name)
+    }
+
     /// Begins the file `name` (with `/` between a subfolder and the file).
     pub fn file(&self, name: &str) -> Result<PartFile> {
-        let (target, part) = (self.path.join(name), self.part(name));
-        let parent = target.parent().unwrap_or(&self.path);
-        fs::create_dir_all(parent).map_err(Error::io("cannot make the folder", parent))?;
-        let file = create(&part).map_err(Error::io("cannot write", &part))?;
+        let (target, part) = (self.place(name), self.part(name));
+        if let Some(below) = Path::new(name).parent().filter(|below| !below.as_os_str().is_empty()) {
+            self.make_below(below)?;
+        }
+        let file = create(part.at()).map_err(part.io("cannot write"))?;
         Ok(PartFile::new(file, part, target, Mark { name: name.into(), length: 0, crc: 0 }))
+    }
+
+    /// Makes the folder `name` in it. A link to another one is none.
+    fn make_below(&self, name: &Path) -> Result<()> {
+        let below = self.place.join(name);
+        let made = match fs::create_dir(below.at()) {
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists && !is_real_folder(below.at()) => Err(e),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Ok(()),
+            made => made,
+        };
+        made.map_err(below.io("cannot make the folder"))
     }
 
     /// Whether the file is there, under its temporary or its final name, as far as `mark` goes; else what is wrong with it.
@@ -245,16 +301,17 @@ impl OutputFolder {
         if !self.names.contains(&mark.name) || is_store(Path::new(&mark.name)) {
             return Err(format!("it tells of {:?}, which no run writes", mark.name));
         }
-        let path = self.growing(&mark.name).map_err(|e| format!("cannot find {} ({e})", mark.name))?;
-        if path.is_symlink() {
-            return Err(format!("{} is a link, which no run writes", path.display()));
+        let place = self.growing(&mark.name).map_err(|e| format!("cannot find {} ({e})", mark.name))?;
+        let path = place.shown().display();
+        if place.at().is_symlink() {
+            return Err(format!("{path} is a link, which no run writes"));
         }
-        let same = input::open(&path)
+        let same = input::open(place.at())
             .and_then(|file| Ok(checksum(&mut file.take(mark.length), 0)? == (mark.length, mark.crc)));
         match same {
             Ok(true) => Ok(()),
-            Ok(false) => Err(format!("{} is not the file that it tells of", path.display())),
-            Err(e) => Err(format!("cannot read {} ({e})", path.display())),
+            Ok(false) => Err(format!("{path} is not the file that it tells of")),
+            Err(e) => Err(format!("cannot read {path} ({e})")),
         }
     }
 
@@ -271,79 +328,95 @@ impl OutputFolder {
     /// Goes on with a file of an interrupted run. What was written after `mark` is cut off.
     pub fn file_again(&self, mark: &Mark) -> Result<PartFile> {
         let part = self.back(&mark.name)?;
-        let cut = |part: &Path| {
-            let mut file = File::options().read(true).write(true).open(part)?;
+        let cut = |path: &Path| {
+            let mut file = input::open_as(path, File::options().read(true).write(true))?;
+            if names_of(&file)? > 1 {
+                file = self.copy(file, path, mark.length)?;
+            }
             file.set_len(mark.length)?;
             file.seek(SeekFrom::End(0))?;
             Ok(file)
         };
-        let file = cut(&part).map_err(Error::io("cannot write", &part))?;
-        Ok(PartFile::new(file, part, self.path.join(&mark.name), mark.clone()))
+        let file = cut(part.at()).map_err(part.io("cannot write"))?;
+        Ok(PartFile::new(file, part, self.place(&mark.name), mark.clone()))
+    }
+
+    /// Puts a copy of the first `length` bytes of `file` in its place at `path`: under its other names it stays what it is.
+    fn copy(&self, file: File, path: &Path, length: u64) -> io::Result<File> {
+        let spare = self.place(PROBE);
+        let mut copy = create(spare.at())?;
+        io::copy(&mut file.take(length), &mut copy)?;
+        copy.sync_all()?;
+        fs::rename(spare.at(), path)?;
+        Ok(copy)
     }
 
     /// The same for the folder of a store.
     pub fn store_again(&self, name: &str) -> Result<PartFolder> {
-        Ok(PartFolder::again(self.back(name)?, self.path.join(name)))
+        let store = PartFolder::again(self.back(name)?, self.place(name));
+        store.sweep()?;
+        Ok(store)
     }
 
     /// Where `name` lies of a run that was interrupted: if that was at its very end, under its final name.
-    fn growing(&self, name: &str) -> io::Result<PathBuf> {
+    fn growing(&self, name: &str) -> io::Result<Place> {
         let part = self.part(name);
-        match part.symlink_metadata() {
+        match part.at().symlink_metadata() {
             Ok(_) => Ok(part),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(self.path.join(name)),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(self.place(name)),
             Err(e) => Err(e),
         }
     }
 
     /// Gives `name` its temporary name back, which is returned.
-    fn back(&self, name: &str) -> Result<PathBuf> {
+    fn back(&self, name: &str) -> Result<Place> {
         let part = self.part(name);
-        let now = self.growing(name).map_err(Error::io("cannot find", &part))?;
-        if now != part {
-            fs::rename(&now, &part).map_err(Error::io("cannot rename", &now))?;
+        let now = self.growing(name).map_err(part.io("cannot find"))?;
+        if now.at() != part.at() {
+            fs::rename(now.at(), part.at()).map_err(now.io("cannot rename"))?;
         }
         Ok(part)
     }
 
     /// Puts a state in the place of the last one, which is kept as the one before.
     pub fn keep_state(&self, bytes: &[u8]) -> Result<()> {
-        let [state, old, part] = [STATE, STATE_OLD, STATE_PART].map(|name| self.path.join(name));
-        let written = create(&part).and_then(|mut file| {
+        self.check_claim()?;
+        let [state, old, part] = [STATE, STATE_OLD, STATE_PART].map(|name| self.place(name));
+        let written = create(part.at()).and_then(|mut file| {
             file.write_all(bytes)?;
             file.sync_all()
         });
         let renamed = written.and_then(|()| {
-            if state.exists() {
-                fs::rename(&state, &old)?;
+            if state.at().exists() {
+                fs::rename(state.at(), old.at())?;
             }
-            fs::rename(&part, &state)
+            fs::rename(part.at(), state.at())
         });
         renamed.map_err(|e| {
-            let _ = remove(&part);
-            Error::io("cannot write", &state)(e)
+            let _ = remove(part.at());
+            state.io("cannot write")(e)
         })?;
-        sync_folder(&self.path)
+        sync_folder(&self.place)
     }
 
     /// Removes a last state that is damaged, lest it become the one before.
     pub fn forget_last_state(&self) -> Result<()> {
-        let state = self.path.join(STATE);
-        remove(&state).map_err(Error::io("cannot remove", &state))
+        let state = self.place(STATE);
+        remove(state.at()).map_err(state.io("cannot remove"))
     }
 
     /// Removes the states, the older one first: alone it would go on with files that have their final names.
     pub fn forget_states(&self) -> Result<()> {
         for name in [STATE_PART, STATE_OLD, STATE] {
-            let path = self.path.join(name);
-            remove(&path).map_err(Error::io("cannot remove", &path))?;
+            let place = self.place(name);
+            remove(place.at()).map_err(place.io("cannot remove"))?;
         }
         Ok(())
     }
 
     /// Begins the folder `name`, which must be that of a store.
     pub fn store(&self, name: &str) -> Result<PartFolder> {
-        PartFolder::begin(self.part(name), self.path.join(name))
+        PartFolder::begin(self.part(name), self.place(name))
     }
 
     /// Writes the whole file `name`, ready for [`OutputFolder::publish`].
@@ -359,32 +432,32 @@ impl OutputFolder {
     /// All of them are on disk by now, so that little is left that can fail. The earlier `run.json` goes first: no
     /// moment has one that vouches for the files of two runs.
     pub fn publish(&self, files: Vec<PartFile>, store: Option<PartFolder>, run: PartFile) -> Result<()> {
-        let targets = files.iter().map(PartFile::target).chain(store.iter().map(PartFolder::target));
-        let written: Vec<PathBuf> = targets.map(Path::to_path_buf).collect();
+        self.check_claim()?;
+        let mut written: Vec<String> = files.iter().map(|file| file.name().to_string()).collect();
+        written.extend(store.iter().map(|_| STORE.to_string()));
         self.remove_own(RUN)?;
         files.into_iter().try_for_each(PartFile::finish)?;
         store.map_or(Ok(()), PartFolder::finish)?;
-        OWN.iter()
-            .filter(|name| !written.contains(&self.path.join(name)))
-            .try_for_each(|name| self.remove_own(name))?;
-        run.finish()
+        OWN.iter().filter(|name| !written.iter().any(|own| own == *name)).try_for_each(|name| self.remove_own(name))?;
+        run.finish()?;
+        self.check_claim()
     }
 
     /// Gives complete files their final names, and touches no others.
     pub fn publish_all(&self, files: Vec<PartFile>) -> Result<()> {
-        files.into_iter().try_for_each(PartFile::finish)
+        self.check_claim()?;
+        files.into_iter().try_for_each(PartFile::finish)?;
+        self.check_claim()
     }
 
     fn remove_own(&self, name: &str) -> Result<()> {
-        let path = self.path.join(name);
-        remove_any(&path).map_err(Error::io("cannot remove", &path))
+        let place = self.place(name);
+        remove_any(place.at()).map_err(place.io("cannot remove"))
     }
 
     /// The temporary name of `name`.
-    fn part(&self, name: &str) -> PathBuf {
-        let target = self.path.join(name);
-        let file_name = target.file_name().unwrap_or_default().to_string_lossy();
-        target.with_file_name(format!(".{file_name}.part"))
+    fn part(&self, name: &str) -> Place {
+        self.place.join(part(Path::new(name)))
     }
 
     /// As `fs::create_dir_all`, remembering what was made.
@@ -402,27 +475,29 @@ impl OutputFolder {
 
     /// Refuses, before any work, names that this run could not give to its files at the end.
     fn check_names(&mut self) -> Result<()> {
-        let in_the_way = |path: &Path, what: &str| {
-            let problem = format!("{} is {what}", path.display());
+        let in_the_way = |place: &Place, what: &str| {
+            let problem = format!("{} is {what}", place.shown().display());
             Err(Error::value("out", self.path.display(), &problem, "move it away, or name another folder"))
         };
-        let plots = self.path.join(PLOTS);
+        let plots = self.place(PLOTS);
         let needed = self.names.iter().any(|name| Path::new(name).starts_with(PLOTS));
-        let new_plots = needed && plots.symlink_metadata().is_err();
-        if needed && !new_plots && !plots.is_dir() {
-            return in_the_way(&plots, "no folder");
+        let new_plots = needed && plots.at().symlink_metadata().is_err();
+        if needed && !new_plots && !is_real_folder(plots.at()) {
+            return in_the_way(&plots, if plots.at().is_symlink() { "a link, and no folder" } else { "no folder" });
         }
-        for name in &self.names {
-            for path in [self.path.join(name), self.part(name)] {
-                match (is_store(&path), path.is_dir()) {
-                    (false, true) => return in_the_way(&path, "a folder"),
-                    (true, false) if path.symlink_metadata().is_ok() => return in_the_way(&path, "no folder"),
-                    // All in it would be removed.
-                    (true, true) if !is_own_store(&path) => {
-                        return in_the_way(&path, "not the folder of an earlier run");
-                    }
-                    _ => {}
+        let others = [STATE, STATE_OLD, STATE_PART, PROBE].map(|name| self.place(name));
+        let own = self.names.iter().flat_map(|name| [self.place(name), self.part(name)]);
+        for place in own.chain(others) {
+            let path = place.at();
+            match (is_store(path), path.is_dir()) {
+                // A link to a folder is removed like one to a file.
+                (false, true) if !path.is_symlink() => return in_the_way(&place, "a folder"),
+                (true, false) if path.symlink_metadata().is_ok() => return in_the_way(&place, "no folder"),
+                // All in it would be removed.
+                (true, true) if !is_own_store(path) => {
+                    return in_the_way(&place, "not the folder of an earlier run");
                 }
+                _ => {}
             }
         }
         self.new_plots = new_plots;
@@ -434,24 +509,48 @@ impl Drop for OutputFolder {
     fn drop(&mut self) {
         // Removing a folder fails, as it should, where there is something inside.
         if self.new_plots {
-            let _ = fs::remove_dir(self.path.join(PLOTS));
+            let _ = fs::remove_dir(self.place(PLOTS).at());
         }
-        // Still locked: unlocked first, it could be another run's by the time it is removed.
-        if self.lock.is_some() {
-            let _ = fs::remove_file(self.path.join(LOCK));
-        }
+        // Others may be where it was.
+        let stays = self.claim.as_ref().is_none_or(Claim::stays);
+        self.claim = None;
         // A folder that stays keeps those above it, also those that only its name goes through (`new/../out`).
-        let _ = self.made.iter().rev().try_for_each(fs::remove_dir);
+        if stays {
+            let _ = self.made.iter().rev().try_for_each(fs::remove_dir);
+        }
     }
 }
 
+/// The temporary name of `name`.
+pub(super) fn part(name: &Path) -> PathBuf {
+    let file_name = name.file_name().unwrap_or_default().to_string_lossy();
+    name.with_file_name(format!(".{file_name}.part"))
+}
+
+/// Refuses a path in which not every file would have one.
+fn check_length(path: &Path) -> Result<()> {
+    let (length, most) = (path.as_os_str().len(), MOST_PATH - LONGEST_NAME);
+    match length > most {
+        true => Err(Error::Request(format!(
+            "--out: a path of {length} bytes, and with the names of files the system knows none of more than {MOST_PATH}; \
+             name a folder by {most} bytes or less, for example from nearer by"
+        ))),
+        false => Ok(()),
+    }
+}
+
+/// Whether a folder is there, and no link to one.
+fn is_real_folder(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|of| of.is_dir())
+}
+
 /// Whether a folder, and not a file, has this name.
-fn is_store(path: &Path) -> bool {
+pub(super) fn is_store(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().trim_end_matches(".part").ends_with(STORE))
 }
 
 /// Whether a run may have left the folder of a store.
-fn is_own_store(path: &Path) -> bool {
+pub(super) fn is_own_store(path: &Path) -> bool {
     let empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
     !path.is_symlink() && (path.join(IS_STORE).is_file() || empty())
 }
@@ -466,7 +565,7 @@ fn remove_any(path: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::claim::LOCK, *};
 
     fn names(folder: &Path) -> Vec<String> {
         let mut names: Vec<String> =
@@ -524,16 +623,16 @@ mod tests {
     #[test]
     fn a_folder_of_other_files_leaves_those_of_a_run_alone() {
         let home = tempfile::tempdir().unwrap();
-        for name in [RUN, "plots", ".summary.csv.part", ".a.svg.part", "b.svg"] {
+        for name in [SUMMARY, "plots", ".summary.csv.part", ".a.svg.part", "b.svg"] {
             fs::write(home.path().join(name), "old").unwrap();
         }
-        let folder = OutputFolder::open_for(home.path(), true, vec!["a.svg".into()]).unwrap();
+        let folder = OutputFolder::open_for(home.path(), true, Owner::Figure, vec!["a.svg".into()]).unwrap();
         let file = folder.write("a.svg", "new").unwrap();
         folder.publish_all(vec![file]).unwrap();
         drop(folder);
-        assert_eq!(names(home.path()), [".summary.csv.part", "a.svg", "b.svg", "plots", RUN]);
+        assert_eq!(names(home.path()), [".summary.csv.part", "a.svg", "b.svg", "plots", SUMMARY]);
         fs::create_dir(home.path().join("c.svg")).unwrap();
-        let error = OutputFolder::open_for(home.path(), true, vec!["c.svg".into()]).unwrap_err();
+        let error = OutputFolder::open_for(home.path(), true, Owner::Figure, vec!["c.svg".into()]).unwrap_err();
         assert!(error.to_string().contains("c.svg is a folder"), "{error}");
     }
 

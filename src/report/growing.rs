@@ -1,11 +1,10 @@
 //! The files that grow as members end: tables, and the store of snapshots.
 
-use std::path::PathBuf;
-
 use super::{
     folder::{self, OutputFolder},
     part_file::{Mark, PartFile},
     part_folder::PartFolder,
+    place::Place,
     tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable, Table},
     zarr::{self, SnapshotStore},
 };
@@ -114,8 +113,8 @@ impl Growing {
     }
 
     /// Where the rows of the members lie as yet.
-    pub fn rows(&self) -> PathBuf {
-        self.summary.part().to_path_buf()
+    pub fn rows(&self) -> &Place {
+        self.summary.part()
     }
 
     /// How far all have grown, once that is on disk.

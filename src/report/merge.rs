@@ -185,8 +185,7 @@ impl Shards {
         films.sort_by_key(|film| film.member);
         let mut seen = BTreeSet::new();
         warnings.retain(|warning| seen.insert(warning.clone()));
-        let summary = files[0].part().to_path_buf();
-        let tally = reader::rows(&summary, spec, aside)?;
+        let tally = reader::rows(files[0].part(), spec, aside)?;
         if tally.members() != spec.member_count() {
             let (found, all) = (tally.members(), spec.member_count());
             return Err(Error::Request(format!("the shards have {found} members, and their spec has {all}")));

@@ -7,6 +7,7 @@ pub mod axis;
 pub mod chart;
 pub mod charts;
 pub mod checkpoint;
+pub mod claim;
 pub mod complete;
 pub mod disk;
 pub mod document;
@@ -16,9 +17,11 @@ pub mod gallery;
 pub mod growing;
 pub mod merge;
 pub mod overview;
+pub mod owner;
 pub mod page;
 pub mod part_file;
 pub mod part_folder;
+pub mod place;
 pub mod plot;
 pub mod portraits;
 pub mod progress;
@@ -43,6 +46,7 @@ use std::{
 
 pub use ensemble::EnsembleStatistics;
 pub use folder::OutputFolder;
+pub use owner::{Existing, Owner};
 pub use stop::{Cause, Stop};
 
 use crate::{
@@ -144,7 +148,7 @@ impl Report {
         if note.is_some() {
             folder.forget_last_state()?;
         }
-        let tally = reader::rows(&growing.rows(), spec, aside)?;
+        let tally = reader::rows(growing.rows(), spec, aside)?;
         let mut report = Report::new(folder, growing, spec, points, origin, manner);
         (report.tally, report.films, report.earlier, report.company) = (tally, films, wall, company);
         report.before = report.tally.members().saturating_sub(standing.next);
@@ -322,7 +326,7 @@ impl Sink for Report {
         let resident = match &standing.resident {
             Some(resident) => resident,
             None => {
-                known = checkpoint::on_their_way(self.folder.path(), self.company, standing);
+                known = checkpoint::on_their_way(&self.folder, self.company, standing);
                 &known
             }
         };

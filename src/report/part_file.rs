@@ -4,13 +4,13 @@ use std::{
     cell::Cell,
     fs::{self, File},
     io::{self, Write},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 use serde::{Deserialize, Serialize};
 
-use super::disk::sync_parent;
-use crate::error::{Error, Result};
+use super::{disk::sync_parent, place::Place};
+use crate::error::Result;
 
 /// What is said of a file that failed before.
 const TORN: &str = "an earlier write failed";
@@ -30,8 +30,8 @@ pub struct Mark {
 #[derive(Debug)]
 pub struct PartFile {
     file: File,
-    part: PathBuf,
-    target: PathBuf,
+    part: Place,
+    target: Place,
     /// What was written.
     mark: Mark,
     keep: Cell<bool>,
@@ -43,7 +43,7 @@ pub struct PartFile {
 
 impl PartFile {
     /// Goes on with `file`, which lies at `part` and holds what `mark` tells; it will be `target`.
-    pub(super) fn new(file: File, part: PathBuf, target: PathBuf, mark: Mark) -> PartFile {
+    pub(super) fn new(file: File, part: Place, target: Place, mark: Mark) -> PartFile {
         let (keep, torn) = (Cell::new(mark.length > 0), Cell::new(false));
         PartFile { file, part, target, mark, keep, broken: false, torn, finished: false }
     }
@@ -64,14 +64,19 @@ impl PartFile {
         Ok(self.mark.clone())
     }
 
-    /// Its temporary name.
-    pub fn part(&self) -> &Path {
+    /// Where it lies under its temporary name.
+    pub fn part(&self) -> &Place {
         &self.part
     }
 
-    /// Its final name.
+    /// The path of its final name, to be told.
     pub fn target(&self) -> &Path {
-        &self.target
+        self.target.shown()
+    }
+
+    /// Its final name in its folder.
+    pub fn name(&self) -> &str {
+        &self.mark.name
     }
 
     /// Returns once its content is on disk.
@@ -80,12 +85,12 @@ impl PartFile {
         // What was not synced once may be lost although it is synced the next time.
         self.torn.set(self.torn.get() || synced.is_err());
         let whole = if self.torn.get() && synced.is_ok() { Err(io::Error::other(TORN)) } else { synced };
-        whole.map_err(Error::io("cannot write", &self.target))
+        whole.map_err(self.target.io("cannot write"))
     }
 
     /// Gives the file its final name; its content should be on disk.
     pub(super) fn finish(mut self) -> Result<()> {
-        fs::rename(&self.part, &self.target).map_err(Error::io("cannot write", &self.target))?;
+        fs::rename(self.part.at(), self.target.at()).map_err(self.target.io("cannot write"))?;
         self.finished = true;
         sync_parent(&self.target)
     }
@@ -114,7 +119,7 @@ impl Write for PartFile {
 impl Drop for PartFile {
     fn drop(&mut self) {
         if !self.finished && !self.keep.get() {
-            let _ = fs::remove_file(&self.part);
+            let _ = fs::remove_file(self.part.at());
         }
     }
 }
@@ -126,10 +131,10 @@ mod tests {
     #[test]
     fn nothing_is_written_after_a_failed_write() {
         let home = tempfile::tempdir().unwrap();
-        let [part, target] = [".rows.part", "rows"].map(|name| home.path().join(name));
+        let [part, target] = [".rows.part", "rows"].map(|name| Place::named(&home.path().join(name)));
         let mark = Mark { name: "rows".into(), length: 0, crc: 0 };
-        let mut file = PartFile::new(File::create_new(&part).unwrap(), part, target, mark);
-        let good = std::mem::replace(&mut file.file, File::open(&file.part).unwrap());
+        let mut file = PartFile::new(File::create_new(part.at()).unwrap(), part, target, mark);
+        let good = std::mem::replace(&mut file.file, File::open(file.part.at()).unwrap());
         file.write_all(b"to a file that can only be read").unwrap_err();
         file.file = good;
         file.write_all(b"again").unwrap_err();

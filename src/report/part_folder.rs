@@ -2,21 +2,27 @@
 
 use std::{
     fs::{self, File},
-    io::Write,
-    path::{Path, PathBuf},
+    io::{self, Write},
+    path::Path,
 };
 
-use super::disk::{create, remove_store, sync_folder, sync_parent};
-use crate::error::{Error, Result};
+use super::{
+    disk::{create, remove_store, sync_folder, sync_parent},
+    place::Place,
+};
+use crate::{error::Result, input};
+
+/// What the name of a file ends in that is to take the place of another.
+const SUCCESSOR: &str = "part";
 
 /// A folder that is not complete yet; dropped so, it is removed with all that is in it unless
 /// [told](PartFolder::keep) otherwise.
 #[derive(Debug)]
 pub struct PartFolder {
-    part: PathBuf,
-    target: PathBuf,
+    part: Place,
+    target: Place,
     /// The folders in it.
-    below: Vec<PathBuf>,
+    below: Vec<Place>,
     /// It was begun by a run that was interrupted.
     again: bool,
     keep: bool,
@@ -25,13 +31,13 @@ pub struct PartFolder {
 
 impl PartFolder {
     /// Makes it, empty, at `part`; it will be `target`.
-    pub(super) fn begin(part: PathBuf, target: PathBuf) -> Result<PartFolder> {
-        fs::create_dir(&part).map_err(Error::io("cannot make the folder", &part))?;
+    pub(super) fn begin(part: Place, target: Place) -> Result<PartFolder> {
+        fs::create_dir(part.at()).map_err(part.io("cannot make the folder"))?;
         Ok(PartFolder { part, target, below: Vec::new(), again: false, keep: false, finished: false })
     }
 
     /// Goes on with the one at `part`, whose files may be written once more.
-    pub(super) fn again(part: PathBuf, target: PathBuf) -> PartFolder {
+    pub(super) fn again(part: Place, target: Place) -> PartFolder {
         PartFolder { part, target, below: Vec::new(), again: true, keep: true, finished: false }
     }
 
@@ -39,8 +45,8 @@ impl PartFolder {
     pub fn make(&mut self, name: &str) -> Result<()> {
         let path = self.part.join(name);
         // A link to a folder is none: what is in it is not ours.
-        if !(self.again && path.symlink_metadata().is_ok_and(|of| of.is_dir())) {
-            fs::create_dir(&path).map_err(Error::io("cannot make the folder", &path))?;
+        if !(self.again && path.at().symlink_metadata().is_ok_and(|of| of.is_dir())) {
+            fs::create_dir(path.at()).map_err(path.io("cannot make the folder"))?;
         }
         self.below.push(path);
         Ok(())
@@ -49,24 +55,30 @@ impl PartFolder {
     /// Writes the whole file `name` (with `/` between a folder in it and the file), whose content is on disk then.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let path = self.part.join(name);
+        let path = path.at();
         // What makes it a store stays there without a gap.
-        if self.again && fs::read(&path).is_ok_and(|old| old == bytes) {
+        if self.again && input::bytes(path, bytes.len() as u64).is_ok_and(|old| old == bytes) {
             return Ok(());
         }
         // What is there stays until it has a successor.
         let replaced = self.again && path.symlink_metadata().is_ok();
-        let place = if replaced { path.with_extension("part") } else { path.clone() };
+        let place = if replaced { path.with_extension(SUCCESSOR) } else { path.to_path_buf() };
         let file = if replaced { create(&place) } else { File::create_new(&place) };
         let written = file.and_then(|mut file| {
             file.write_all(bytes)?;
             file.sync_all()?;
-            if replaced { fs::rename(&place, &path) } else { Ok(()) }
+            if replaced { fs::rename(&place, path) } else { Ok(()) }
         });
         written.map_err(|e| {
             // Half a file would be taken for a whole one.
             let _ = fs::remove_file(&place);
-            Error::io("cannot write", &self.target.join(name))(e)
+            self.target.join(name).io("cannot write")(e)
         })
+    }
+
+    /// Removes what a run that was killed left of files that were to take the place of others.
+    pub(super) fn sweep(&self) -> Result<()> {
+        sweep(self.part.at(), true).map_err(self.part.io("cannot remove what a run left in"))
     }
 
     /// Whether what is written is worth keeping if the run fails.
@@ -75,13 +87,13 @@ impl PartFolder {
     }
 
     /// Its temporary name.
-    pub(super) fn part(&self) -> &Path {
+    pub(super) fn part(&self) -> &Place {
         &self.part
     }
 
-    /// Its final name.
+    /// The path of its final name, to be told.
     pub fn target(&self) -> &Path {
-        &self.target
+        self.target.shown()
     }
 
     /// Returns once the names of all files in it are on disk, as their contents are.
@@ -91,8 +103,8 @@ impl PartFolder {
 
     /// Gives the folder its final name, in the place of what an earlier run left there.
     pub(super) fn finish(mut self) -> Result<()> {
-        remove_store(&self.target).map_err(Error::io("cannot remove", &self.target))?;
-        fs::rename(&self.part, &self.target).map_err(Error::io("cannot write", &self.target))?;
+        remove_store(self.target.at()).map_err(self.target.io("cannot remove"))?;
+        fs::rename(self.part.at(), self.target.at()).map_err(self.target.io("cannot write"))?;
         self.finished = true;
         sync_parent(&self.target)
     }
@@ -101,9 +113,25 @@ impl PartFolder {
 impl Drop for PartFolder {
     fn drop(&mut self) {
         if !self.finished && !self.keep {
-            let _ = remove_store(&self.part);
+            let _ = remove_store(self.part.at());
         }
     }
+}
+
+/// Removes such files in `folder` and, where `below`, in the folders in it.
+fn sweep(folder: &Path, below: bool) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let (path, kind) = (entry.path(), entry.file_type()?);
+        if kind.is_dir() {
+            if below {
+                sweep(&path, false)?
+            }
+        } else if path.extension().is_some_and(|end| end == SUCCESSOR) {
+            fs::remove_file(&path)?;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use serde::Deserialize;
 
 use super::{
     folder::{self, REMEDY},
+    place::Place,
     portraits::{self, Film},
     provenance::{FORMAT, Provenance, by_status},
     tables,
@@ -137,9 +138,9 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
 ///
 /// # Errors
 /// [`Error::Request`] for rows that are not those of a run of `spec`.
-pub fn rows(path: &Path, spec: &Spec, aside: Aside) -> Result<Tally> {
+pub fn rows(place: &Place, spec: &Spec, aside: Aside) -> Result<Tally> {
     let mut tally = Tally::default();
-    for outcome in Summary::of(path, spec)? {
+    for outcome in Summary::of(place, spec)? {
         tally.add(&outcome?)?;
     }
     tally.set_aside(aside);
@@ -170,11 +171,11 @@ impl Summary {
     /// # Errors
     /// [`Error::Request`] where there is none, or one with other columns, or one that is cut off.
     pub fn open(folder: &Path, spec: &Spec) -> Result<Summary> {
-        Summary::of(&folder.join(folder::SUMMARY), spec)
+        Summary::of(&Place::named(&folder.join(folder::SUMMARY)), spec)
     }
 
-    fn of(path: &Path, spec: &Spec) -> Result<Summary> {
-        let table = Table::open(path.to_path_buf(), tables::SUMMARY)?;
+    fn of(place: &Place, spec: &Spec) -> Result<Summary> {
+        let table = Table::open(place, tables::SUMMARY)?;
         Ok(Summary { table, last: None, spec: spec.clone(), spec_of: None })
     }
 
@@ -241,7 +242,7 @@ impl Iterator for Summary {
 /// # Errors
 /// As [`Finished::read`].
 pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExcess>> {
-    let mut table = Table::open(folder.join(folder::MEAN_EXCESS), tables::MEAN_EXCESS)?;
+    let mut table = Table::open(&Place::named(&folder.join(folder::MEAN_EXCESS)), tables::MEAN_EXCESS)?;
     let (mut rows, mut count, mut last): (Vec<MeanExcess>, u64, _) = (Vec::new(), 0, None);
     while let Some(mut row) = table.read()? {
         let cell = row.whole()?;
@@ -268,8 +269,9 @@ struct Table {
 }
 
 impl Table {
-    fn open(path: PathBuf, columns: &'static str) -> Result<Table> {
-        let file = input::open(&path).and_then(|mut file| Ok((ends_with_a_line(&mut file)?, file)));
+    fn open(place: &Place, columns: &'static str) -> Result<Table> {
+        let path = place.shown().to_path_buf();
+        let file = input::open(place.at()).and_then(|mut file| Ok((ends_with_a_line(&mut file)?, file)));
         let (whole, file) =
             file.map_err(|e| Error::Request(format!("cannot read {}: {e}; {REMEDY}", path.display())))?;
         if !whole {

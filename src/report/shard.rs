@@ -4,7 +4,6 @@
 //! one that was copied by half is known.
 
 use std::{
-    fs::{File, TryLockError},
     io,
     path::{Path, PathBuf},
 };
@@ -13,7 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     checkpoint::{self, Fault, Head},
-    folder::{LOCK, RUN, SHARD, STATE, STATE_OLD},
+    claim,
+    folder::{RUN, SHARD, STATE, STATE_OLD},
     growing::Growing,
 };
 use crate::{
@@ -98,9 +98,9 @@ pub fn look(path: &Path) -> Result<Found> {
         Ok(of) if !of.is_dir() => return refuse("no folder; name that of a shard".into()),
         Ok(_) => {}
     }
-    let states = [STATE, STATE_OLD].map(|name| checkpoint::read(path, name).ok());
+    let states = [STATE, STATE_OLD].map(|name| checkpoint::read(&path.join(name)).ok());
     let spec = || states.iter().flatten().next().and_then(|(head, _)| Spec::from_toml(&head.origin.spec).ok());
-    if is_running(path) {
+    if claim::is_held(path) {
         return unfinished(spec(), "a run is writing here".into());
     }
     if there(STATE)? || there(STATE_OLD)? {
@@ -141,10 +141,4 @@ pub fn look(path: &Path) -> Result<Found> {
         return Err(Error::Request(faulty(&mark.name, &fault)));
     }
     Ok(Found::Done(Box::new(Part { path: path.to_path_buf(), shard, spec, record })))
-}
-
-/// Whether a run holds the lock of the folder.
-fn is_running(path: &Path) -> bool {
-    let lock = File::open(path.join(LOCK));
-    lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }

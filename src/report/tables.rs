@@ -2,13 +2,14 @@
 //!
 //! A float that is not finite is unknown. No clock times here: equal runs give equal bytes.
 
-use std::{marker::PhantomData, path::Path};
+use std::marker::PhantomData;
 
 use csv::{Writer, WriterBuilder};
 use serde::Serialize;
 
 use super::{
     part_file::{Mark, PartFile},
+    place::Place,
     tally::MeanExcess,
 };
 use crate::{
@@ -68,7 +69,7 @@ impl<K: Kind> Table<K> {
     }
 
     /// The temporary name under which its rows lie.
-    pub fn part(&self) -> &Path {
+    pub fn part(&self) -> &Place {
         self.writer.get_ref().part()
     }
 
@@ -282,7 +283,7 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let folder = OutputFolder::open(home.path(), true).unwrap();
         let file = fill(folder.file(name).unwrap()).unwrap();
-        fs::read_to_string(file.part()).unwrap()
+        fs::read_to_string(file.part().at()).unwrap()
     }
 
     fn summary(rows: &[Outcome]) -> String {

@@ -9,13 +9,14 @@
 
 use std::{
     fs,
+    io::Read,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{disk::checksum, part_folder::PartFolder, provenance::json as json_text};
+use super::{disk::checksum, part_folder::PartFolder, place::Place, provenance::json as json_text};
 use crate::{
     ensemble::{Snapshot, Spec, Status},
     error::{Error, Result},
@@ -449,7 +450,7 @@ fn key(number: u64, grid: &[u64]) -> String {
 
 impl Mark {
     /// That the chunks in `store` are those it vouches for; else what is wrong.
-    pub fn check(&self, store: &Path) -> std::result::Result<(), String> {
+    pub fn check(&self, store: &Place) -> std::result::Result<(), String> {
         let own = || FIELDS.iter().map(|(name, ..)| *name).chain([STATUS]);
         if !self.arrays.iter().map(|mark| mark.name.as_str()).eq(own()) {
             return Err(format!("it tells of other arrays than {}", own().collect::<Vec<_>>().join(", ")));
@@ -458,11 +459,11 @@ impl Mark {
     }
 
     /// Removes the chunks that were written later.
-    fn cut_off(&self, store: &Path) -> Result<()> {
+    fn cut_off(&self, store: &Place) -> Result<()> {
         for ArrayMark { name, grid, written, .. } in &self.arrays {
             let later = (*written..grid.iter().product()).map(|number| store.join(name).join(key(number, grid)));
-            for path in later.take_while(|path| path.exists()) {
-                fs::remove_file(&path).map_err(Error::io("cannot remove", &path))?;
+            for chunk in later.take_while(|chunk| chunk.at().exists()) {
+                fs::remove_file(chunk.at()).map_err(chunk.io("cannot remove"))?;
             }
         }
         Ok(())
@@ -470,25 +471,26 @@ impl Mark {
 }
 
 impl ArrayMark {
-    fn check(&self, array: &Path) -> std::result::Result<(), String> {
+    fn check(&self, array: &Place) -> std::result::Result<(), String> {
         let ArrayMark { grid, written, crc, .. } = self;
+        let path = array.shown().display();
         let all = grid.iter().try_fold(1_u64, |all, own| all.checked_mul(*own)).unwrap_or(0);
         if all == 0 || *written > all {
-            return Err(format!("it tells of {} with {written} of {grid:?} chunks", array.display()));
+            return Err(format!("it tells of {path} with {written} of {grid:?} chunks"));
         }
-        if array.is_symlink() {
-            return Err(format!("{} is a link, which no run writes", array.display()));
+        if array.at().is_symlink() {
+            return Err(format!("{path} is a link, which no run writes"));
         }
         let mut found = 0;
         for number in 0..*written {
-            let path = array.join(key(number, grid));
-            // Each chunk goes on where the one before it ended.
-            let sum = input::open(&path).and_then(|mut file| checksum(&mut file, found));
-            found = sum.map_err(|e| format!("cannot read {} ({e})", path.display()))?.1;
+            let chunk = array.join(key(number, grid));
+            // Each chunk goes on where the one before it ended. None is longer.
+            let sum = input::open(chunk.at()).and_then(|file| checksum(&mut file.take(CHUNK_BYTES as u64 + 1), found));
+            found = sum.map_err(|e| format!("cannot read {} ({e})", chunk.shown().display()))?.1;
         }
         match found == *crc {
             true => Ok(()),
-            false => Err(format!("the chunks in {} are not those that it tells of", array.display())),
+            false => Err(format!("the chunks in {path} are not those that it tells of")),
         }
     }
 }
@@ -765,7 +767,7 @@ mod tests {
         let out = OutputFolder::open(home.path(), true).unwrap();
         let mut table = SnapshotTable::new(out.file("snapshots.csv").unwrap()).unwrap();
         members.iter().flat_map(|(_, snapshots)| snapshots).for_each(|own| table.snapshot(own).unwrap());
-        let text = fs::read_to_string(table.ready().unwrap().part()).unwrap();
+        let text = fs::read_to_string(table.ready().unwrap().part().at()).unwrap();
         let lines: Vec<&str> = text.lines().skip(1).collect();
         assert!(rows.len() < 5 * 4 * 33 && rows.len() > 2 * 4 * 33, "{} rows: some, not all, end early", rows.len());
         assert_eq!(rows, lines);
@@ -818,7 +820,7 @@ mod tests {
         let out = OutputFolder::open(home.path(), true).unwrap();
         let mut straight = begin(out.store(folder::STORE).unwrap());
         add(&mut straight, &members);
-        let whole = contents(straight.folder.part());
+        let whole = contents(straight.folder.part().at());
         assert!(whole.len() > 9);
         drop(straight);
         for kept in 0..=members.len() {
@@ -827,12 +829,12 @@ mod tests {
             let mark = first.mark().unwrap();
             // Not in the state, so to be removed.
             add(&mut first, &members[kept..(kept + 3).min(members.len())]);
-            let part = first.folder.part().to_path_buf();
+            let part = first.folder.part().clone();
             first.keep(true);
             drop(first);
             out.check_store(&mark).unwrap();
             if kept > 2 {
-                let chunk = part.join("x/c.0.0.0");
+                let chunk = part.join("x/c.0.0.0").at().to_path_buf();
                 let bytes = fs::read(&chunk).unwrap();
                 fs::write(&chunk, [&[bytes[0] ^ 1], &bytes[1..]].concat()).unwrap();
                 assert!(out.check_store(&mark).unwrap_err().contains("/x are not those that it tells of"));
@@ -841,10 +843,11 @@ mod tests {
                 fs::write(&chunk, bytes).unwrap();
             }
             mark.cut_off(&part).unwrap();
-            let mut second =
-                begin(PartFolder::again(part.clone(), home.path().join(folder::STORE))).from(&mark).unwrap();
+            let mut second = begin(PartFolder::again(part.clone(), Place::named(&home.path().join(folder::STORE))))
+                .from(&mark)
+                .unwrap();
             add(&mut second, &members[kept..]);
-            assert!(contents(&part) == whole, "from {kept} members");
+            assert!(contents(part.at()) == whole, "from {kept} members");
             second.keep(false);
         }
         let other = Mark {
