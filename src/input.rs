@@ -80,7 +80,11 @@ pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     }
     // Files of the system have no size beforehand.
     let mut bytes = Vec::new();
-    match file.take(most + 1).read_to_end(&mut bytes)? as u64 > most {
+    let read = file.take(most + 1).read_to_end(&mut bytes).map_err(|e| match e.kind() {
+        ErrorKind::WouldBlock => Error::new(e.kind(), "it waits for more, as a pipe does; save what it holds in a file"),
+        _ => e,
+    });
+    match read? as u64 > most {
         true => Err(too_long(&format!("more than {most}"))),
         false => Ok(bytes),
     }

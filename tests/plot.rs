@@ -212,6 +212,18 @@ fn a_summary_that_is_not_whole_is_refused_with_its_place() {
 }
 
 #[test]
+fn areas_and_rates_at_the_ends_of_the_floats_are_drawn() {
+    let done = run("--curves 3 --points 32 --adaptive=1e-3 --t-end 2");
+    let (area_start, rate) = (14, 10);
+    assert!(done.summary().iter().all(|row| !row["rate"].is_empty()));
+    for (column, value) in [(area_start, "1e-320"), (area_start, "1e308"), (rate, "-1.7e308"), (area_start, "0.0")] {
+        field(&done.path().join("summary.csv"), 2, column, value);
+        let output = plot(done.home.path(), "out --quiet");
+        assert_eq!(output.status.code(), Some(0), "{value}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+#[test]
 fn a_mean_excess_that_is_not_that_of_the_run_is_refused() {
     let done = run(RUN);
     let table = |out: &Path| out.join("mean_excess.csv");

@@ -188,6 +188,7 @@ impl Work {
         let Work { spec, cells, companies, opened } = self;
         let done = advance(&cells, companies, opened, standing, &mut report, flags);
         if let Err(error) = done {
+            let error = report.explain(error);
             if report.give_up() {
                 kept(&out, &error);
             }

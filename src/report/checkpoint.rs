@@ -475,7 +475,7 @@ mod tests {
         let folder = OutputFolder::open(home.path(), true).unwrap();
         folder.keep_state(&bytes()).unwrap();
         let ranks = |company: u64, standing: &Standing| -> Vec<u64> {
-            on_their_way(home.path(), company, standing).into_keys().collect()
+            on_their_way(&folder, company, standing).into_keys().collect()
         };
         let none = Standing::default();
         assert_eq!(ranks(0, &none), [1, 3]);

@@ -246,6 +246,14 @@ impl OutputFolder {
         self.claim.as_ref().map_or(Ok(()), Claim::check)
     }
 
+    /// Why `error` came: because the folder was taken away, if it was.
+    pub fn explain(&self, error: Error) -> Error {
+        match self.check_claim() {
+            Err(lost @ Error::Lost(_)) => lost,
+            _ => error,
+        }
+    }
+
     /// Whether files can be made here.
     fn probe(&self) -> io::Result<()> {
         let probe = self.place.join(PROBE);

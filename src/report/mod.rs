@@ -52,7 +52,7 @@ pub use stop::{Cause, Stop};
 use crate::{
     backend::Platform,
     ensemble::{Ended, Sink, Spec, Standing, Wish},
-    error::Result,
+    error::{Error, Result},
 };
 use checkpoint::{Head, Kept, Origin};
 use complete::Complete;
@@ -125,6 +125,7 @@ impl Report {
         match report.keep(&Standing { resident: Some(BTreeMap::new()), ..Standing::default() }) {
             Ok(()) => Ok(report),
             Err(error) => {
+                let error = report.explain(error);
                 report.give_up();
                 Err(error)
             }
@@ -217,6 +218,11 @@ impl Report {
         self.tally.members()
     }
 
+    /// Why `error` came: because the folder was taken away, if it was.
+    pub fn explain(&self, error: Error) -> Error {
+        self.folder.explain(error)
+    }
+
     /// Ends a run that failed: its state and its rows stay where they are; unless there is nothing in them, then none do.
     /// Returns whether there is something to resume.
     pub fn give_up(mut self) -> bool {
@@ -282,9 +288,8 @@ impl Report {
         let Origin { platform, started, .. } = &origin;
         let warnings = &[early, &tally.warnings()].concat();
         let complete = Complete { spec, platform, tally, films: &films, warnings, started: *started, wall };
-        let text = complete.publish(&folder, files, store, shard.as_deref(), form)?;
-        folder.forget_states()?;
-        Ok(text)
+        let published = complete.publish(&folder, files, store, shard.as_deref(), form);
+        published.and_then(|text| folder.forget_states().map(|()| text)).map_err(|error| folder.explain(error))
     }
 }
 

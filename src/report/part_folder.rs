@@ -10,7 +10,10 @@ use super::{
     disk::{create, remove_store, sync_folder, sync_parent},
     place::Place,
 };
-use crate::{error::Result, input};
+use crate::{
+    error::{Error, Result},
+    input,
+};
 
 /// What the name of a file ends in that is to take the place of another.
 const SUCCESSOR: &str = "part";
@@ -78,7 +81,8 @@ impl PartFolder {
 
     /// Removes what a run that was killed left of files that were to take the place of others.
     pub(super) fn sweep(&self) -> Result<()> {
-        sweep(self.part.at(), true).map_err(self.part.io("cannot remove what a run left in"))
+        sweep(self.part.at(), true)
+            .map_err(|e| Error::Request(format!("{}: cannot go on with it ({e})", self.part.shown().display())))
     }
 
     /// Whether what is written is worth keeping if the run fails.
@@ -124,9 +128,13 @@ fn sweep(folder: &Path, below: bool) -> io::Result<()> {
         let entry = entry?;
         let (path, kind) = (entry.path(), entry.file_type()?);
         if kind.is_dir() {
-            if below {
-                sweep(&path, false)?
+            if !below {
+                return Err(io::Error::other(format!(
+                    "{} is a folder, which no run writes",
+                    entry.file_name().display()
+                )));
             }
+            sweep(&path, false)?;
         } else if path.extension().is_some_and(|end| end == SUCCESSOR) {
             fs::remove_file(&path)?;
         }

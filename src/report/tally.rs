@@ -43,14 +43,14 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// What linear theory gives, if anything.
+    /// What linear theory gives, if a number.
     pub fn theory(&self) -> Option<f64> {
-        Some(self.theory).filter(|theory| !theory.is_nan())
+        Some(self.theory).filter(|theory| theory.is_finite())
     }
 
-    /// Over that of theory.
+    /// Over that of theory, if a number: areas at the ends of the range of floats, which a table may tell, have none.
     pub fn ratio(&self) -> Option<f64> {
-        self.theory().map(|theory| self.fitted / theory)
+        self.theory().map(|theory| self.fitted / theory).filter(|ratio| ratio.is_finite())
     }
 }
 

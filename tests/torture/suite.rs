@@ -10,8 +10,9 @@ use std::{
 use libtest_mimic::{Arguments, Failed, Trial};
 
 use crate::{
+    attacks,
     calls::{self, From},
-    controls, differential, kills, order, program, races, signals, sizes, soak, space, state,
+    controls, differential, hostile, kills, order, program, races, signals, sizes, soak, space, state,
     study::Study,
     surroundings, threads,
 };
@@ -145,6 +146,7 @@ pub fn main() -> ExitCode {
     interruptions(&mut suite, seed);
     calls_of_the_system(&mut suite, seed);
     folders_and_states(&mut suite, seed);
+    attacks_on_files(&mut suite, seed);
     the_rest(&mut suite, seed);
     let conclusion = libtest_mimic::run(&arguments, suite.trials);
     println!("| test | bound | cases | result |\n|---|---|---|---|");
@@ -246,6 +248,27 @@ fn folders_and_states(suite: &mut Suite, seed: u64) {
     });
     suite.test("tables_that_do_not_belong_to_the_state", "refused by name, or 0 differing bytes", || {
         state::foreign_tables(&TINY, &SHORT)
+    });
+}
+
+fn attacks_on_files(suite: &mut Suite, seed: u64) {
+    let strace = (!calls::can_trace()).then_some("strace");
+    let stride = suite.of(23, 1);
+    suite.test_if(strace, "folders_taken_away_at_every_call", "the other run is not touched", move || {
+        attacks::taken_away(&SHORT, &OTHER, stride, seed)
+    });
+    suite.test_if(strace, "a_lock_that_is_removed", "exactly one proceeds", || attacks::lock_removed(&SHORT));
+    suite.test("copies_that_share_their_files", "0 differing bytes", || attacks::linked_copies(&[&TINY, &SHORT_ZARR]));
+    suite.test("folders_of_other_commands", "refused", || attacks::foreign_folders(&SHORT));
+    suite.test("folders_without_a_run", "nothing is lost", || attacks::folders_without_a_run(&SHORT));
+    suite.test_if(strace, "outlines_that_change", "read once", attacks::outlines);
+    suite.test("pipes_devices_and_endless_files", "named, in 1 GB", || {
+        hostile::in_the_place_of_files(&SHORT, &SHORT_ZARR)
+    });
+    suite.test("things_in_the_way", "named, nothing left over", || hostile::in_the_way(&TINY, &SECOND));
+    let lengths: Vec<usize> = suite.of((3980..4100).step_by(20).collect(), (3960..4100).collect());
+    suite.test("paths_of_any_length", "done, or refused with nothing left over", move || {
+        attacks::long_paths(&SHORT, &lengths)
     });
 }
 
