@@ -81,7 +81,9 @@ pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     // Files of the system have no size beforehand.
     let mut bytes = Vec::new();
     let read = file.take(most + 1).read_to_end(&mut bytes).map_err(|e| match e.kind() {
-        ErrorKind::WouldBlock => Error::new(e.kind(), "it waits for more, as a pipe does; save what it holds in a file"),
+        ErrorKind::WouldBlock => {
+            Error::new(e.kind(), "it waits for more, as a pipe does; save what it holds in a file")
+        }
         _ => e,
     });
     match read? as u64 > most {
