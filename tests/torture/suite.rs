@@ -287,7 +287,7 @@ fn the_rest(suite: &mut Suite, seed: u64) {
     let most = suite.of(4, 12);
     suite.test_if(strace.or(gpu), "few_threads_on_the_gpu", NAMED, move || threads::few_on_the_gpu(&GPU, most));
     let limit = (!threads::can_limit()).then_some("prlimit and setpriv");
-    suite.test_if(limit, "no_threads_left_for_signals", "0 differing bytes, out in 5 s", || {
+    suite.test_if(limit, "no_threads_left_for_signals", "stopped, 0 differing bytes", || {
         threads::none_left_for_signals(&SECOND, &STOPS)
     });
     suite.test("no_rights_for_new_files", "refused by name", || surroundings::no_rights_for_new_files(&SHORT));
