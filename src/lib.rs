@@ -29,7 +29,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`error`] | what, where, numbers, remedy, exit code |
-//! | `threads` | every thread is started there |
+//! | `threads`, `guard` | every thread is started there; panics of code that is not ours become errors there |
 //! | [`number`] | the number that the scheme is generic over |
 //! | [`flow`] | the law b(k) |
 //! | [`curve`] | plane curves in f64: shapes, perturbation, sampling, measures |
@@ -98,6 +98,7 @@ pub mod error;
 pub mod estimate;
 pub mod figures;
 pub mod flow;
+mod guard;
 mod input;
 pub mod number;
 pub mod report;

@@ -3,14 +3,26 @@
 use std::{
     fs::{self, File},
     io::{self, Read},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use super::place::Place;
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    guard::guarded,
+};
 
 /// In every folder of a store.
 pub const IS_STORE: &str = "zarr.json";
+
+/// What lies in a folder, in no order. A listing panics where the system cannot close the folder, which changes nothing of
+/// what was read.
+pub fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut listing = fs::read_dir(folder)?;
+    let paths = listing.by_ref().map(|entry| Ok(entry?.path())).collect();
+    let _ = guarded(|| drop(listing));
+    paths
+}
 
 /// Makes the file anew: what lies there is removed and not written into, as it may be a link to elsewhere.
 pub fn create(path: &Path) -> io::Result<File> {
@@ -24,16 +36,15 @@ pub fn remove_store(path: &Path) -> io::Result<()> {
     if path.is_symlink() {
         return fs::remove_file(path);
     }
-    let entries = match fs::read_dir(path) {
+    let entries = match entries(path) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
         entries => entries?,
     };
     for entry in entries {
-        let entry = entry?;
-        if entry.file_type()?.is_dir() {
-            fs::remove_dir_all(entry.path())?;
-        } else if entry.file_name() != IS_STORE {
-            fs::remove_file(entry.path())?;
+        if entry.symlink_metadata()?.is_dir() {
+            fs::remove_dir_all(entry)?;
+        } else if !entry.ends_with(IS_STORE) {
+            fs::remove_file(entry)?;
         }
     }
     remove(&path.join(IS_STORE))?;

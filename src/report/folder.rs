@@ -8,7 +8,7 @@ use std::{
 
 use super::{
     claim::Claim,
-    disk::{IS_STORE, checksum, create, names_of, parent, remove, remove_store, sync_folder, sync_names},
+    disk::{IS_STORE, checksum, create, entries, names_of, parent, remove, remove_store, sync_folder, sync_names},
     owner::{Existing, Owner},
     part_file::{Mark, PartFile},
     part_folder::PartFolder,
@@ -559,7 +559,7 @@ pub(super) fn is_store(path: &Path) -> bool {
 
 /// Whether a run may have left the folder of a store.
 pub(super) fn is_own_store(path: &Path) -> bool {
-    let empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+    let empty = || entries(path).is_ok_and(|entries| entries.is_empty());
     !path.is_symlink() && (path.join(IS_STORE).is_file() || empty())
 }
 

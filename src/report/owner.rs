@@ -2,12 +2,13 @@
 
 use std::{
     collections::BTreeSet,
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
 use super::{
     claim::LOCK,
+    disk::entries,
     folder::{
         CONVERGENCE, FIGURES, PLOTS, PROBE, RUN, SHARD, STATE, STATE_OLD, STATE_PART, is_own_store, is_store, part,
     },
@@ -124,13 +125,10 @@ fn is_only_begun(folder: &Path, names: &[String]) -> io::Result<bool> {
         own && if is_store(path) { is_own_store(path) } else { !path.is_dir() }
     };
     let mut count = 0;
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
+    for path in entries(folder)? {
         let is_plots = path.ends_with(PLOTS) && path.symlink_metadata()?.is_dir();
         let all = match is_plots {
-            true => {
-                fs::read_dir(&path)?.try_fold(true, |all, entry| Ok::<_, io::Error>(all && is_left(&entry?.path())))?
-            }
+            true => entries(&path)?.iter().all(|path| is_left(path)),
             false => is_left(&path),
         };
         if !all {

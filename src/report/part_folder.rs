@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{
-    disk::{create, remove_store, sync_folder, sync_parent},
+    disk::{create, entries, remove_store, sync_folder, sync_parent},
     place::Place,
 };
 use crate::{
@@ -124,15 +124,11 @@ impl Drop for PartFolder {
 
 /// Removes such files in `folder` and, where `below`, in the folders in it.
 fn sweep(folder: &Path, below: bool) -> io::Result<()> {
-    for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        let (path, kind) = (entry.path(), entry.file_type()?);
-        if kind.is_dir() {
+    for path in entries(folder)? {
+        if path.symlink_metadata()?.is_dir() {
             if !below {
-                return Err(io::Error::other(format!(
-                    "{} is a folder, which no run writes",
-                    entry.file_name().display()
-                )));
+                let name = path.file_name().unwrap_or_default();
+                return Err(io::Error::other(format!("{} is a folder, which no run writes", name.display())));
             }
             sweep(&path, false)?;
         } else if path.extension().is_some_and(|end| end == SUCCESSOR) {

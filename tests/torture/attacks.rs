@@ -178,6 +178,8 @@ pub fn foreign_folders(study: &Study) -> Outcome {
         assert_eq!(go(&arguments).code, Some(0), "{arguments}");
     }
     copy(&Attempt::interrupted(study).out(), &home.path().join("interrupted"));
+    // The file of a lock that nobody holds may go.
+    let _ = fs::remove_file(home.path().join("interrupted/.curvelax.lock"));
     let folders = ["runs", "interrupted", "convergences", "figures"];
     let commands = [
         (run.clone(), &["runs", "interrupted"][..]),

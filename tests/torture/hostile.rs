@@ -106,6 +106,8 @@ pub fn in_the_place_of_files(csv: &Study, zarr: &Study) -> Outcome {
 pub fn in_the_way(csv: &Study, zarr: &Study) -> Outcome {
     let mut cases = 0;
     let middle = Attempt::interrupted(csv);
+    // The file of a lock that nobody holds may go.
+    let _ = fs::remove_file(middle.out().join(".curvelax.lock"));
     for name in [".curvelax.state", ".curvelax.state.old", ".curvelax.state.part", ".curvelax.part"] {
         let attempt = middle.fork();
         let path = attempt.out().join(name);

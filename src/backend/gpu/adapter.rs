@@ -1,10 +1,8 @@
 //! Adapters: what is there, what each can do, and which one to take.
 
 use std::{
-    cell::Cell,
     collections::HashMap,
-    panic::{self, AssertUnwindSafe},
-    sync::{Arc, Mutex, Once, PoisonError},
+    sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
 
@@ -15,6 +13,7 @@ use crate::{
         shader,
     },
     error::{Error, Result, one_line},
+    guard::guarded,
     number::{Precision, Real},
     solver::{Blocks, Solver, ring::MIN_POINTS},
 };
@@ -275,44 +274,5 @@ impl Device {
             Err(wgpu::PollError::Timeout) => Ok(Waited::OnItsWay),
             Err(error) => Err(self.error(&format!("a dispatch was not taken ({error})"))),
         }
-    }
-}
-
-thread_local! {
-    /// Panics of this thread are caught and told as errors.
-    static GUARDED: Cell<bool> = const { Cell::new(false) };
-}
-
-/// What `call` returns, or the message with which it panicked: wgpu does where it waits for a device that is lost.
-fn guarded<R>(call: impl FnOnce() -> R) -> std::result::Result<R, String> {
-    static HOOK: Once = Once::new();
-    HOOK.call_once(|| {
-        let otherwise = panic::take_hook();
-        panic::set_hook(Box::new(move |info| {
-            if !GUARDED.get() {
-                otherwise(info);
-            }
-        }));
-    });
-    GUARDED.set(true);
-    let returned = panic::catch_unwind(AssertUnwindSafe(call));
-    GUARDED.set(false);
-    returned.map_err(|payload| {
-        let text = payload.downcast_ref::<String>().map(String::as_str);
-        let text = text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("a panic without a message");
-        one_line(text)
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_panic_of_the_driver_becomes_one_line() {
-        assert_eq!(guarded(|| 7), Ok(7));
-        let reset = |after: u32| -> u32 { panic!("Error in Device::poll:\n  parent device\n  is lost after {after}") };
-        assert_eq!(guarded(|| reset(3)), Err("Error in Device::poll: parent device is lost after 3".into()));
-        assert!(!GUARDED.get());
     }
 }
