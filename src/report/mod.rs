@@ -226,7 +226,8 @@ impl Report {
     /// Ends a run that failed: its state and its rows stay where they are; unless there is nothing in them, then none do.
     /// Returns whether there is something to resume.
     pub fn give_up(mut self) -> bool {
-        let wanted = self.has_begun || self.stop.asked().is_some();
+        // In a folder that was taken away nothing is touched any more.
+        let wanted = self.has_begun || self.stop.asked().is_some() || self.folder.check_claim().is_err();
         // A state that cannot be removed keeps its rows.
         let stays = wanted || self.folder.forget_states().is_err();
         self.growing.keep(stays);
