@@ -4,6 +4,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use curvelax::{
     ensemble::{Family, Spec, spec::Precision},
     number::Real,
+    schedule::Outputs,
     scheme::{
         Curve, Increments, Parameters, State, Workspace,
         curvature::Curvature,
@@ -28,7 +29,7 @@ impl<T: Real> Start<T> {
     fn new(points: usize) -> Start<T> {
         let spec = Spec { points, ..Spec::default() };
         let member = Family::new(&spec).and_then(|family| family.member(7)).expect("the default member");
-        let run = Trajectory::new(member, &spec, Precision::F64, &[]).launch().convert::<T>();
+        let run = Trajectory::new(member, &spec, Precision::F64, &Outputs::default()).launch().convert::<T>();
         let State { mut curve, mut increments, .. } = run.state;
         let (parameters, mut work) = (run.parameters, Workspace::new(Blocks::new(points).expect("n is at least 6")));
         let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };

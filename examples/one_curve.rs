@@ -14,7 +14,7 @@ struct Print;
 impl Sink for Print {
     fn member(&mut self, ended: &Ended) -> curvelax::Result<()> {
         println!("{:>5} {:>9} {:>9} {:>12}", "t", "length", "area", "excess");
-        for row in &ended.series {
+        for row in &ended.rows.series {
             println!("{:>5} {:>9.6} {:>9.6} {:>12.3e}", row.t, row.at.length, row.at.area, row.at.excess);
         }
         let t_relax = ended.outcome.t_relax.map_or("not reached".into(), |t| format!("t = {t:.4}"));

@@ -13,6 +13,7 @@ use crate::{
     ensemble::{Family, Spec, Status},
     error::{Error, Result},
     number::BIG,
+    schedule::Outputs,
     scheme::{
         evolve::Run,
         parameters::{Counters, Report},
@@ -78,7 +79,7 @@ impl Bench {
         let family = Family::new(spec)?;
         let count = usize::try_from(spec.curves).unwrap_or(usize::MAX);
         let member = |index: usize| {
-            let mut run = Trajectory::new(family.member(index as u64)?, spec, precision, &[]).launch();
+            let mut run = Trajectory::new(family.member(index as u64)?, spec, precision, &Outputs::default()).launch();
             // Nobody looks for crossings here, so nobody needs to be waited for.
             run.parameters.look_at = BIG;
             Ok(run)
@@ -251,7 +252,7 @@ mod tests {
     fn fives(stride: u32) -> (Bench, Rc<Cell<u64>>, Rc<Cell<u32>>) {
         let spec = spec(32, Spec { t_end: 0.012, curves: 2, ..Spec::default() }).unwrap();
         let member = Family::new(&spec).unwrap().member(0).unwrap();
-        let run = Trajectory::new(member, &spec, Precision::F64, &[]).launch();
+        let run = Trajectory::new(member, &spec, Precision::F64, &Outputs::default()).launch();
         let (steps, loads) = (Rc::default(), Rc::default());
         let backend = Fives { counters: [Counters::default(); 2], steps: Rc::clone(&steps), loads: Rc::clone(&loads) };
         let platform = Platform {

@@ -14,12 +14,12 @@ use serde::Serialize;
 
 use crate::{
     backend::{Backend, Choice, Platform},
-    ensemble::{Cell, Ended, Sink, Spec, spec::Pace, spec::Precision},
+    ensemble::{Cell, Ended, Extent, Portrait, SeriesRow, Sink, Snapshot, Spec, rows, spec::Pace, spec::Precision},
     error::{Error, Result},
     report::{gallery::MOST_PANELS, tally::Rate},
     schedule::Clock,
     scheme::decay,
-    simulate::simulate,
+    simulate::{MOST_HELD, simulate},
 };
 
 /// Time for the pilots of all companies.
@@ -38,9 +38,10 @@ const PROGRAM_BYTES: u64 = 10_000_000;
 const POOL_NUMBERS: usize = 68;
 /// Bytes of the page and its pictures a node, up to as many nodes as are drawn.
 const PAGE_BYTES: usize = 25_000;
-const DRAWN_NODES: usize = 600;
 /// Copies of the nodes of the members that are drawn.
 const PORTRAIT_COPIES: usize = 3;
+/// Bytes besides where rows go to disk before their members leave: as they are written and read again. Measured.
+const SPILL_BYTES: u64 = 24_000_000;
 
 /// What a run will take.
 #[derive(Clone, Debug, Serialize)]
@@ -100,6 +101,7 @@ impl Estimate {
         let members = cells.iter().map(|cell| cell.spec.member_count()).sum::<u64>();
         let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
         let (mut slots, mut resident) = (0, 0);
+        let mut rows = [0.0_f64; 2];
         let (every, count) = (companies.len().div_ceil(MOST_PILOTS), companies.len());
         let budget = PILOT / count.div_ceil(every).max(1) as u32;
         let mut total = Work { seconds: Some(0.0), dispatches: Some(0.0), steps: Some(0.0), ..Work::default() };
@@ -113,7 +115,8 @@ impl Estimate {
             start_up += started.elapsed().as_secs_f64();
             opened.get_or_insert(platform);
             slots = slots.max(backend.slots());
-            let (work, most) = sample(company, precision, backend.as_mut(), budget, &mut pilot)?;
+            let (work, most, of_member) = sample(company, precision, backend.as_mut(), budget, &mut pilot)?;
+            rows = [0, 1].map(|i| rows[i].max(of_member[i]));
             resident = resident.max(most.min(backend.slots() as u64) as usize);
             let add = |sum: Option<f64>, part: Option<f64>| Some(sum? + part?);
             total.members += work.members;
@@ -133,6 +136,7 @@ impl Estimate {
                 // Where none has ended yet, all may have one.
                 if pilot.ended == 0 { 1.0 } else { pilot.rated as f64 / pilot.ended as f64 },
                 [slots, resident],
+                rows,
                 cells[0].spec.points,
             ),
             platform,
@@ -154,6 +158,8 @@ struct Seen {
     relaxed: u64,
     rated: u64,
     steps: u64,
+    /// Bytes of their rows.
+    rows: f64,
     /// Share of its work that was done.
     share: f64,
     dispatches: u64,
@@ -163,7 +169,18 @@ struct Seen {
 
 impl Seen {
     fn new(members: u64, until: Instant) -> Seen {
-        Seen { members, left: 0, relaxed: 0, rated: 0, steps: 0, share: 0.0, dispatches: 0, seconds: 0.0, until }
+        Seen {
+            members,
+            left: 0,
+            relaxed: 0,
+            rated: 0,
+            steps: 0,
+            rows: 0.0,
+            share: 0.0,
+            dispatches: 0,
+            seconds: 0.0,
+            until,
+        }
     }
 }
 
@@ -173,7 +190,15 @@ impl Sink for Seen {
         self.relaxed += u64::from(ended.outcome.t_relax.is_some());
         self.rated += u64::from(ended.outcome.rate.is_some());
         self.steps += ended.outcome.steps;
+        let spilled: u64 = ended.rows.spilled.iter().map(|extent| extent.length).sum();
+        self.rows += ended.rows.bytes() as f64 + spilled as f64;
         Ok(())
+    }
+
+    /// Nobody wants the rows, but how much they are.
+    fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
+        let length = rows::bytes_of(series.len(), snapshots.len(), snapshots.first().map_or(0, |first| first.x.len()));
+        Ok(Some(Extent { length: length as u64, ..Extent::default() }))
     }
 
     fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
@@ -186,14 +211,15 @@ impl Sink for Seen {
     }
 }
 
-/// Pilots of a company: what all of it will take, and the members of the largest.
+/// Pilots of a company: what all of it will take, the members of the largest, and bytes of the rows of a member at its end
+/// and in that pilot.
 fn sample(
     company: &mut [Cell],
     precision: Precision,
     backend: &mut dyn Backend,
     budget: Duration,
     pilot: &mut Pilot,
-) -> Result<(Work, u64)> {
+) -> Result<(Work, u64, [f64; 2])> {
     let until = Instant::now() + budget;
     let own: Vec<Option<Vec<u64>>> = company.iter().map(|cell| cell.spec.only.clone()).collect();
     let all: u64 = company.iter().map(|cell| cell.spec.member_count()).sum();
@@ -232,7 +258,19 @@ fn sample(
         dispatches: extrapolated(&pilots, all, |seen| seen.dispatches as f64),
         steps: steps.or_else(|| certain_steps(company)).map(|each| each * all as f64),
     };
-    Ok((work, count))
+    let rows = pilots.iter().rfind(|seen| seen.left > 0).map(|seen| seen.rows / seen.left as f64);
+    let rows = rows.unwrap_or_else(|| all_rows(company));
+    let share = pilots.last().map_or(1.0, |seen| seen.share.clamp(0.0, 1.0));
+    Ok((work, count, [rows, share * rows]))
+}
+
+/// Bytes of the rows of a member that comes to the end of its time, the most of all cells.
+fn all_rows(company: &[Cell]) -> f64 {
+    let of_cell = |Cell { spec, family, .. }: &Cell| {
+        let series = spec.series.map_or(0.0, |every| spec.t_end / every + 1.0);
+        rows::bytes_of(series as usize, spec.snapshots.len(), family.points()) as f64
+    };
+    company.iter().map(of_cell).fold(0.0, f64::max)
 }
 
 /// A cost of `all` members from that of the pilots, each of which is scaled to its end.
@@ -277,25 +315,31 @@ fn choose(company: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) 
 }
 
 /// Peak resident size of a run of `members` of `n` nodes, in bytes, from that of this process, which had `resident` of
-/// up to `slots` members in its pool.
+/// up to `slots` members in its pool. A member has `rows` bytes of rows at its end, and had in this process: above
+/// [`MOST_HELD`] for all of the pool they go to disk.
 ///
 /// The peak is at the end of the run, with a full pool and the tally, or after that, with the statistics and the charts
 /// and without the pool. The tally has of each member its time and two numbers of its mesh, of half the size, and of the
 /// share `rated` its rate with that of theory. Times are sorted where they are, and rates one number at a time; in their
 /// place comes the one that is drawn. A chart sorts the numbers that it shows.
-fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], n: usize) -> u64 {
+fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2], n: usize) -> u64 {
     let numbers = |count: usize| (count * size_of::<f64>()) as u64;
     let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
     let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MOST_PANELS);
-    let portraits = numbers(2 * n * (decay::PARTS + 1) * drawn);
-    let page = (PAGE_BYTES * n.min(DRAWN_NODES) * drawn / MOST_PANELS) as u64;
+    let shown = n.min(Portrait::MOST_NODES);
+    let portraits = numbers(2 * shown * (decay::PARTS + 1) * drawn);
+    let page = (PAGE_BYTES * shown * drawn / MOST_PANELS) as u64;
     let rated = (rated * members as f64) as u64;
     let tally = members * (size_of::<f64>() + 2 * size_of::<f32>()) as u64 + rated * size_of::<Rate>() as u64;
     let [fitted, charted] = [rated, members.saturating_sub(rated)].map(|count| count * size_of::<f64>() as u64);
     let statistics = fitted.max(charted);
-    let program = peak_resident().map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(pool(resident)));
+    let held = |each: f64, members: usize| (each * members as f64).min(MOST_HELD as f64) as u64;
+    let in_pilot = pool(resident) + held(rows[1], resident);
+    let program = peak_resident().map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(in_pilot));
     let full = usize::try_from(members).unwrap_or(usize::MAX).min(slots);
-    let running = pool(full) + portraits;
+    let all_held = held(rows[0], full);
+    let spilling = if all_held < MOST_HELD as u64 { 0 } else { SPILL_BYTES };
+    let running = pool(full) + portraits + all_held + spilling;
     let reporting = PORTRAIT_COPIES as u64 * portraits + page + statistics;
     program + tally + running.max(reporting)
 }

@@ -162,8 +162,8 @@ impl Figure {
         simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut only)?;
         only.progress.finish();
         let ended = only.ended.ok_or_else(|| Error::Failed(format!("{}: no curve came back", self.name)))?;
-        let Ended { outcome, snapshots, .. } = &ended;
-        if outcome.status.is_failure() || snapshots.len() != spec.snapshots.len() {
+        let Ended { outcome, rows, .. } = &ended;
+        if outcome.status.is_failure() || rows.snapshots.len() != spec.snapshots.len() {
             let (status, t, steps) = (outcome.status.name(), outcome.t_end, outcome.steps);
             return Err(Error::Failed(format!("{}: the curve is {status} at t = {t} after {steps} steps", self.name)));
         }
@@ -172,7 +172,7 @@ impl Figure {
 
     /// The picture of what a run left.
     pub fn plot(&self, ended: &Ended) -> Plot {
-        let curves: Vec<Curve> = ended.snapshots.iter().map(Curve::from).collect();
+        let curves: Vec<Curve> = ended.rows.snapshots.iter().map(Curve::from).collect();
         let panels = match self.layout {
             Layout::Overlaid => vec![Panel { heading: None, curves }],
             Layout::SideBySide => curves

@@ -123,26 +123,109 @@ pub fn grid(t_end: f64) -> impl Iterator<Item = f64> {
     (0..=decay::PARTS).map(move |part| decay::share::<f64>(part) * t_end)
 }
 
-/// The output times of a run to `t_end`, in order: every `series` from 0 on, each of `snapshots` and of `frames`.
-pub fn outputs(t_end: f64, series: Option<f64>, snapshots: &[f64], frames: &[f64]) -> Vec<Output> {
-    let rows = series.map_or(0, |dt| (t_end / dt * (1.0 + ON_A_STEP)) as u64 + 1);
-    let last = |t: f64| if t >= t_end * (1.0 - ON_A_STEP) { t_end } else { t };
-    let mut outputs: Vec<Output> = (0..rows)
-        .map(|row| Output { t: last(row as f64 * series.unwrap_or(0.0)), series: true, snapshot: false, frame: false })
-        .chain(snapshots.iter().map(|t| Output { t: last(*t), series: false, snapshot: true, frame: false }))
-        .chain(frames.iter().map(|t| Output { t: last(*t), series: false, snapshot: false, frame: true }))
-        .collect();
-    outputs.sort_by(|a, b| a.t.total_cmp(&b.t));
-    outputs.dedup_by(|later, earlier| {
-        let same = later.t == earlier.t;
-        if same {
-            earlier.series |= later.series;
-            earlier.snapshot |= later.snapshot;
-            earlier.frame |= later.frame;
+/// The output times of a run, in order. Those that only the series has follow from their numbers: a million of them take
+/// no memory.
+#[derive(Clone, Debug, Default)]
+pub struct Outputs {
+    rows: Rows,
+    others: Vec<Other>,
+}
+
+/// The times of the series.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rows {
+    t_end: f64,
+    every: f64,
+    count: usize,
+}
+
+/// An output that is more than a row of the series.
+#[derive(Clone, Copy, Debug)]
+struct Other {
+    output: Output,
+    /// Its place among all outputs.
+    place: usize,
+    /// Outputs up to and with this one at which no row is due.
+    without_row: usize,
+}
+
+impl Rows {
+    fn time(&self, row: usize) -> f64 {
+        at_most(self.t_end, row as f64 * self.every)
+    }
+
+    /// Rows before `t`.
+    fn before(&self, t: f64) -> usize {
+        let (mut low, mut high) = (0, self.count);
+        while low < high {
+            let middle = low.midpoint(high);
+            if self.time(middle) < t { low = middle + 1 } else { high = middle }
         }
-        same
-    });
-    outputs
+        low
+    }
+}
+
+/// `t`, or the end where that is the same but for rounding.
+fn at_most(t_end: f64, t: f64) -> f64 {
+    if t >= t_end * (1.0 - ON_A_STEP) { t_end } else { t }
+}
+
+impl Outputs {
+    /// Those of a run to `t_end`: every `series` from 0 on, each of `snapshots` and of `frames`.
+    pub fn new(t_end: f64, series: Option<f64>, snapshots: &[f64], frames: &[f64]) -> Outputs {
+        let count = series.map_or(0, |dt| (t_end / dt * (1.0 + ON_A_STEP)) as usize + 1);
+        let rows = Rows { t_end, every: series.unwrap_or(0.0), count };
+        let output =
+            |t: f64, snapshot: bool| Output { t: at_most(t_end, t), series: false, snapshot, frame: !snapshot };
+        let all = snapshots.iter().map(|t| output(*t, true)).chain(frames.iter().map(|t| output(*t, false)));
+        let mut all: Vec<Output> = all.collect();
+        all.sort_by(|a, b| a.t.total_cmp(&b.t));
+        all.dedup_by(|later, earlier| {
+            let same = later.t == earlier.t;
+            if same {
+                earlier.snapshot |= later.snapshot;
+                earlier.frame |= later.frame;
+            }
+            same
+        });
+        let mut without_row = 0;
+        let other = |mut output: Output| {
+            let before = rows.before(output.t);
+            output.series = before < rows.count && rows.time(before) == output.t;
+            let place = before + without_row;
+            without_row += usize::from(!output.series);
+            Other { output, place, without_row }
+        };
+        let others = all.into_iter().map(other).collect();
+        Outputs { rows, others }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.rows.count + self.others.last().map_or(0, |last| last.without_row)
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The one at `place`, from 0.
+    pub fn get(&self, place: usize) -> Option<Output> {
+        let before = self.others.partition_point(|other| other.place < place);
+        match self.others.get(before) {
+            Some(other) if other.place == place => return Some(other.output),
+            _ => {}
+        }
+        let row = place - self.others[..before].last().map_or(0, |last| last.without_row);
+        let due = || Output { t: self.rows.time(row), series: true, snapshot: false, frame: false };
+        (row < self.rows.count).then(due)
+    }
+
+    /// All of them, from the one at `place` on.
+    pub fn from(&self, place: usize) -> impl Iterator<Item = Output> {
+        (place..).map_while(|place| self.get(place))
+    }
 }
 
 #[cfg(test)]
@@ -163,8 +246,8 @@ mod tests {
     #[test]
     fn output_times_fall_on_steps_or_between_them() {
         let clock = Clock::new(0.1, 1.0);
-        let outputs = outputs(1.0, Some(0.25), &[0.3, 0.5, 1.0], &[]);
-        let brief: Vec<_> = outputs.iter().map(|o| (o.t, clock.locate(o.t).0, o.series, o.snapshot)).collect();
+        let outputs = Outputs::new(1.0, Some(0.25), &[0.3, 0.5, 1.0], &[]);
+        let brief: Vec<_> = outputs.from(0).map(|o| (o.t, clock.locate(o.t).0, o.series, o.snapshot)).collect();
         assert_eq!(
             brief,
             [
@@ -180,6 +263,39 @@ mod tests {
         assert!((clock.locate(0.25).1 - 0.5).abs() < 1e-12);
     }
 
+    /// The outputs of a run as they are listed when all of them are sorted.
+    fn sorted(t_end: f64, series: Option<f64>, snapshots: &[f64], frames: &[f64]) -> Vec<(f64, [bool; 3])> {
+        let rows = series.map_or(0, |dt| (t_end / dt * (1.0 + ON_A_STEP)) as u64 + 1);
+        let rows = (0..rows).map(|row| (row as f64 * series.unwrap(), [true, false, false]));
+        let all = rows.chain(snapshots.iter().map(|t| (*t, [false, true, false])));
+        let all = all.chain(frames.iter().map(|t| (*t, [false, false, true])));
+        let mut all: Vec<_> = all.map(|(t, due)| (at_most(t_end, t), due)).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut merged: Vec<(f64, [bool; 3])> = Vec::new();
+        for (t, due) in all {
+            match merged.last_mut() {
+                Some(last) if last.0 == t => (0..3).for_each(|i| last.1[i] |= due[i]),
+                _ => merged.push((t, due)),
+            }
+        }
+        merged
+    }
+
+    #[test]
+    fn outputs_by_number_are_those_that_a_list_of_all_of_them_has() {
+        let frames: Vec<f64> = grid(1.7).collect();
+        for series in [None, Some(0.1), Some(0.17), Some(1.7 / 3.0), Some(1.7), Some(2.0), Some(1e-3)] {
+            for snapshots in [&[][..], &[0.0], &[0.1, 0.17, 0.3, 0.5], &[0.0, 1.0, 1.7 * (1.0 - 1e-12), 1.7]] {
+                for frames in [&[][..], &frames] {
+                    let outputs = Outputs::new(1.7, series, snapshots, frames);
+                    let found: Vec<_> = outputs.from(0).map(|o| (o.t, [o.series, o.snapshot, o.frame])).collect();
+                    assert_eq!(found, sorted(1.7, series, snapshots, frames), "{series:?} {snapshots:?}");
+                    assert_eq!(outputs.len(), found.len());
+                }
+            }
+        }
+    }
+
     #[test]
     fn every_output_time_lies_in_a_step_and_the_last_one_at_the_end() {
         for exponent in 1..=9 {
@@ -189,18 +305,18 @@ mod tests {
                     let t_end = tau * f64::from(steps);
                     let clock = Clock::new(tau, t_end);
                     let dt = t_end / f64::from(rows);
-                    let outputs = outputs(t_end, Some(dt), &[t_end, 0.5 * t_end], &[]);
-                    for output in &outputs {
+                    let outputs = Outputs::new(t_end, Some(dt), &[t_end, 0.5 * t_end], &[]);
+                    for output in outputs.from(0) {
                         let (step, fraction) = clock.locate(output.t);
                         assert!(fraction > 0.0 && fraction <= 1.0, "tau {tau}, t_end {t_end}: {output:?}");
                         assert!(step <= clock.steps, "{output:?}");
                         let t = if step == 0 { 0.0 } else { clock.inside(step - 1, fraction) };
                         assert!((t - output.t).abs() <= 1e-8 * tau.max(output.t), "tau {tau}: {output:?} is at {t}");
                     }
-                    let last = outputs[outputs.len() - 1];
+                    let last = outputs.get(outputs.len() - 1).unwrap();
                     assert_eq!((last.t, last.series, last.snapshot), (t_end, true, true));
                     assert_eq!(clock.locate(last.t), (clock.steps, 1.0));
-                    assert_eq!(outputs.iter().filter(|output| output.series).count(), rows as usize + 1);
+                    assert_eq!(outputs.from(0).filter(|output| output.series).count(), rows as usize + 1);
                 }
             }
         }

@@ -7,15 +7,15 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     ops::Range,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use crate::{
     backend::Backend,
-    ensemble::{Cell, Ended, Paused, Sink, Standing, Wish, spec::Precision},
+    ensemble::{Cell, Ended, Paused, Rows, Sink, Standing, Wish, spec::Precision},
     error::{Error, Result},
-    schedule::{Output, grid, outputs},
-    scheme::decay,
+    schedule::{Outputs, grid},
+    scheme::{decay, state::STATE_FIELDS},
     trajectory::Trajectory,
 };
 
@@ -28,8 +28,15 @@ const LONGEST_WAIT: Duration = Duration::from_millis(200);
 /// Members that end as they are made, between two words with the sink.
 const MOST_AT_ONCE: usize = 1000;
 
-/// States that are read back at once when a run is kept.
+/// States that are read back at once when a run is kept, and the most bytes of them.
 const READ_BACK: usize = 512;
+const BYTES_READ_BACK: usize = 64 << 20;
+
+/// Bytes of rows in memory above which the sink is handed all of them, and of one member at most.
+pub const MOST_HELD: usize = 32 << 20;
+const MOST_OF_ONE: usize = 8 << 20;
+/// Before the run is kept the sink is handed all rows if they are more than this: what is kept stays small.
+const MOST_KEPT: usize = 4 << 20;
 
 /// Runs the members of `cells`, which keep [company](crate::ensemble::study::companies), on `backend`, and hands each to
 /// `sink` in member order.
@@ -62,7 +69,7 @@ pub fn go_on(
             // The pictures show the start and the end anyway.
             let inside = if framed { decay::TIMES } else { 0 };
             let frames: Vec<f64> = grid(spec.t_end).skip(1).take(inside).collect();
-            outputs(spec.t_end, spec.series, &spec.snapshots, &frames)
+            Outputs::new(spec.t_end, spec.series, &spec.snapshots, &frames)
         };
         cells.iter().map(of_cell).collect()
     };
@@ -75,6 +82,7 @@ pub fn go_on(
         resident: (0..backend.slots()).map(|_| None).collect(),
         portraits,
         paused: resident.unwrap_or_default(),
+        held: 0,
     };
     let total = cells.iter().map(|cell| cell.spec.member_count()).sum();
     let [first, last] = [cells.first(), cells.last()].map(|cell| cell.map_or(0, |cell| cell.index));
@@ -83,7 +91,7 @@ pub fn go_on(
     if next > total || !early.iter().all(is_own) {
         return Err(Error::Request(format!("the state tells of members that are not among the {total} of the spec")));
     }
-    let mut queue = Queue { total, ended: next + early.len() as u64, next, early, kept: false };
+    let mut queue = Queue { total, ended: next + early.len() as u64, next, early, kept: false, told: Instant::now() };
     let done = run(&mut pool, &mut queue, backend, sink);
     if done.is_err() && !queue.kept {
         // What has ended is not to be lost. Why the run ends is told already.
@@ -95,6 +103,8 @@ pub fn go_on(
 fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut dyn Sink) -> Result<()> {
     let cells = pool.cells.iter().enumerate();
     let members = cells.flat_map(|(cell, own)| own.members().map(move |member| (cell, member)));
+    // A state may hold as many rows as a run.
+    pool.relieve(queue, MOST_HELD, sink)?;
     let ended: BTreeSet<u64> = queue.early.keys().copied().collect();
     let left = (0..).zip(members).skip(queue.next as usize).filter(|(rank, _)| !ended.contains(rank));
     let mut waiting = left.peekable();
@@ -113,9 +123,7 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
             }
             backend.finish(batch)?;
             on_the_way[batch] = false;
-            for (rank, ended) in pool.collect(backend, slots.clone())? {
-                queue.leave(rank, ended, sink)?;
-            }
+            pool.collect(backend, slots.clone(), queue, sink)?;
         }
         // Where members end at once, the sink is to be heard all the same.
         let mut over = 0;
@@ -136,6 +144,7 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
         let goes_on = matches!(wish, Wish::GoOn);
         // To be kept, all have to be back.
         if !goes_on && !on_the_way.contains(&true) {
+            pool.relieve(queue, MOST_KEPT, sink)?;
             queue.keep(Some(pool.pause(backend)?), sink)?;
             if let Wish::Stop(error) = wish {
                 return Err(error);
@@ -157,11 +166,13 @@ struct Pool<'a> {
     cells: &'a [Cell],
     precision: Precision,
     /// Of each cell: for members without a portrait, and for those with one.
-    outputs: [&'a [Vec<Output>]; 2],
+    outputs: [&'a [Outputs]; 2],
     resident: Vec<Option<(u64, Trajectory<'a>)>>,
     portraits: usize,
     /// Members that go on where they were, by rank.
     paused: BTreeMap<u64, Paused>,
+    /// No more bytes of rows than these are in memory, also of members that ended early.
+    held: usize,
 }
 
 impl Pool<'_> {
@@ -186,6 +197,7 @@ impl Pool<'_> {
         if let Some(paused) = self.paused.remove(&rank) {
             trajectory.go_on_from(paused)?;
         }
+        self.held += trajectory.rows().bytes();
         backend.load(slot, &trajectory.launch())?;
         self.resident[slot] = Some((rank, trajectory));
         Ok(None)
@@ -196,7 +208,7 @@ impl Pool<'_> {
         let occupied = self.resident.iter().enumerate().filter_map(|(slot, own)| Some((slot, own.as_ref()?)));
         let occupied: Vec<_> = occupied.collect();
         let mut all = self.paused.clone();
-        for part in occupied.chunks(READ_BACK) {
+        for part in occupied.chunks(self.states_at_once().min(READ_BACK)) {
             let slots: Vec<usize> = part.iter().map(|(slot, _)| *slot).collect();
             for ((slot, (rank, trajectory)), state) in part.iter().zip(backend.states(&slots)?) {
                 all.insert(*rank, trajectory.pause(backend.counters(*slot), backend.report(*slot), &state));
@@ -205,10 +217,33 @@ impl Pool<'_> {
         Ok(all)
     }
 
-    /// Looks at the members in `slots`: serves their output times, and aims them further or ends them, which are returned.
-    fn collect(&mut self, backend: &mut dyn Backend, slots: Range<usize>) -> Result<Vec<(u64, Ended)>> {
+    /// Looks at the members in `slots`: serves their output times, and aims them further or lets them leave.
+    fn collect(
+        &mut self,
+        backend: &mut dyn Backend,
+        slots: Range<usize>,
+        queue: &mut Queue,
+        sink: &mut dyn Sink,
+    ) -> Result<()> {
+        let occupied: Vec<usize> = slots.filter(|slot| self.resident[*slot].is_some()).collect();
+        occupied.chunks(self.states_at_once()).try_for_each(|part| self.collect_part(backend, part, queue, sink))
+    }
+
+    /// As many states as may be read back at once.
+    fn states_at_once(&self) -> usize {
+        let points = self.cells.first().map_or(1, |cell| cell.family.points());
+        (BYTES_READ_BACK / (STATE_FIELDS * size_of::<f64>() * points)).max(1)
+    }
+
+    fn collect_part(
+        &mut self,
+        backend: &mut dyn Backend,
+        slots: &[usize],
+        queue: &mut Queue,
+        sink: &mut dyn Sink,
+    ) -> Result<()> {
         let mut wanted = Vec::new();
-        for slot in slots.clone() {
+        for slot in slots.iter().copied() {
             let Some((_, trajectory)) = &mut self.resident[slot] else { continue };
             trajectory.observe(backend.counters(slot), &backend.report(slot));
             if trajectory.wants_state() || (trajectory.is_over() && trajectory.keeps_portrait()) {
@@ -217,21 +252,51 @@ impl Pool<'_> {
         }
         // One transfer for all.
         let mut states = wanted.iter().copied().zip(backend.states(&wanted)?).collect::<BTreeMap<_, _>>();
-        let mut over = Vec::new();
-        for slot in slots {
+        for slot in slots.iter().copied() {
             let Some((_, trajectory)) = &mut self.resident[slot] else { continue };
             let state = states.remove(&slot);
-            trajectory.serve(state.as_ref());
+            let before = trajectory.rows().bytes();
+            let mut most = MOST_OF_ONE;
+            // One step may pass more output times than memory has room for.
+            while !trajectory.serve(state.as_ref(), most) {
+                most = if trajectory.rows().spill(sink)? { MOST_OF_ONE } else { usize::MAX };
+            }
+            self.held += trajectory.rows().bytes().saturating_sub(before);
             if !trajectory.is_over() {
                 if let Some((goal, parameters)) = trajectory.next_aim() {
                     backend.aim(slot, goal, &parameters);
                 }
-                continue;
+            } else if let Some((rank, trajectory)) = self.resident[slot].take() {
+                backend.clear(slot);
+                queue.leave(rank, trajectory.end(state.as_ref()), sink)?;
             }
-            backend.clear(slot);
-            over.extend(self.resident[slot].take().map(|(rank, trajectory)| (rank, trajectory.end(state.as_ref()))));
+            if self.held > MOST_HELD {
+                self.relieve(queue, MOST_HELD / 4 * 3, sink)?;
+            }
+            // Many rows take long to write.
+            if queue.told.elapsed() >= LONGEST_WAIT {
+                queue.tell(self, sink)?;
+            }
         }
-        Ok(over)
+        Ok(())
+    }
+
+    /// Hands all rows in memory to the sink if they are more than `most` bytes.
+    fn relieve(&mut self, queue: &mut Queue, most: usize, sink: &mut dyn Sink) -> Result<()> {
+        let own = self.resident.iter_mut().flatten().map(|(_, trajectory)| trajectory.rows());
+        let own = own.chain(self.paused.values_mut().map(|paused| &mut paused.rows));
+        let all: Vec<&mut Rows> = own.chain(queue.early.values_mut().map(|ended| &mut ended.rows)).collect();
+        self.held = all.iter().map(|rows| rows.bytes()).sum();
+        if self.held <= most {
+            return Ok(());
+        }
+        self.held = 0;
+        for rows in all {
+            if !rows.spill(sink)? {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// Work done on the resident members, in members.
@@ -248,11 +313,14 @@ struct Queue {
     early: BTreeMap<u64, Ended>,
     /// The sink knows where the run stands, to the last member.
     kept: bool,
+    /// When the sink was last told how far the run is.
+    told: Instant,
 }
 
 impl Queue {
     /// Tells how far the run is, and hears whether it is to end at once.
-    fn tell(&self, pool: &Pool, sink: &mut dyn Sink) -> Result<()> {
+    fn tell(&mut self, pool: &Pool, sink: &mut dyn Sink) -> Result<()> {
+        self.told = Instant::now();
         let work = self.ended as f64 + pool.share();
         sink.progress(self.ended, self.total, work / self.total as f64)
     }

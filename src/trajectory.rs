@@ -9,12 +9,12 @@ use glam::DVec2;
 use crate::{
     curve::{clearance, crossing, polygon},
     ensemble::{
-        Ended, Member, Observables, Outcome, Paused, Portrait, SeriesRow, Snapshot, Spec, Status,
+        Ended, Member, Observables, Outcome, Paused, Portrait, Rows, SeriesRow, Snapshot, Spec, Status,
         member::{relaxation_rate, strongest_pull},
         spec::{Pace, Precision, Pull, Sor},
     },
     error::{Error, Result},
-    schedule::{self, Clock, Output, Ticks},
+    schedule::{self, Clock, Output, Outputs, Ticks},
     scheme::{
         Curve, Parameters, State, decay,
         evolve::Run,
@@ -91,14 +91,13 @@ pub struct Trajectory<'a> {
     time: Time,
     launch: Run<f64>,
     /// Output times, and how many of them are behind the member.
-    outputs: &'a [Output],
+    outputs: &'a Outputs,
     served: usize,
     counters: Counters,
     report: Report<f64>,
     start: Observables,
-    series: Vec<SeriesRow>,
-    snapshots: Vec<Snapshot>,
-    /// Times and nodes, in the user's frame.
+    rows: Rows,
+    /// Times and the nodes that are drawn, in the user's frame.
     frames: Vec<(f64, Vec<DVec2>)>,
     sweeps: [u64; 2],
     course: Course,
@@ -110,7 +109,7 @@ pub struct Trajectory<'a> {
 
 impl<'a> Trajectory<'a> {
     /// A member at its start; serves the output times that are due there.
-    pub fn new(member: Member, spec: &Spec, precision: Precision, outputs: &'a [Output]) -> Trajectory<'a> {
+    pub fn new(member: Member, spec: &Spec, precision: Precision, outputs: &'a Outputs) -> Trajectory<'a> {
         let unit = unit_of(&member.nodes);
         let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
         let mut parameters = parameters(spec, &nodes, unit, spec.tolerance_at(precision));
@@ -171,8 +170,7 @@ impl<'a> Trajectory<'a> {
             report: launch.report,
             launch,
             start,
-            series: Vec::new(),
-            snapshots: Vec::new(),
+            rows: Rows::default(),
             frames: Vec::new(),
             sweeps: [0; 2],
             course,
@@ -184,16 +182,19 @@ impl<'a> Trajectory<'a> {
             status = Some(Status::Relaxed);
         }
         trajectory.counters.status = status.map_or(0, |status| status as u32);
-        let state = trajectory.launch.state.clone();
+        let state = std::mem::replace(&mut trajectory.launch.state, State::zeros(0));
         trajectory.look(&state.curve);
-        trajectory.serve(Some(&state));
+        // At the start one row and one snapshot are due.
+        trajectory.serve(Some(&state), usize::MAX);
+        trajectory.launch.state = state;
         trajectory
     }
 
-    /// What the back end needs to start the member, or to go on with it.
-    pub fn launch(&self) -> Run<f64> {
+    /// What the back end needs to start the member, or to go on with it. Its state is there from now on, and not here.
+    pub fn launch(&mut self) -> Run<f64> {
         let (goal, parameters) = self.aim();
-        let mut run = Run { parameters, ..self.launch.clone() };
+        let state = std::mem::replace(&mut self.launch.state, State::zeros(0));
+        let mut run = Run { state, parameters, counters: self.launch.counters, report: self.launch.report };
         if self.needs_aim() {
             run.counters.goal = goal;
         }
@@ -208,8 +209,7 @@ impl<'a> Trajectory<'a> {
             state: state.to_numbers(),
             sweeps: self.sweeps,
             served: self.served as u64,
-            series: self.series.clone(),
-            snapshots: self.snapshots.clone(),
+            rows: self.rows.clone(),
             frames: self.frames.clone(),
             crossed: self.crossed,
             look_at: self.launch.parameters.look_at,
@@ -221,7 +221,7 @@ impl<'a> Trajectory<'a> {
     /// # Errors
     /// [`Error::Request`] where that was not this member.
     pub fn go_on_from(&mut self, paused: Paused) -> Result<()> {
-        let Paused { counters, report, state, sweeps, served, series, snapshots, frames, crossed, look_at } = paused;
+        let Paused { counters, report, state, sweeps, served, rows, frames, crossed, look_at } = paused;
         let (index, numbers) = (self.member.index, STATE_FIELDS * self.member.nodes.len());
         let served = usize::try_from(served).unwrap_or(usize::MAX);
         if state.len() != numbers || served > self.outputs.len() || counters.status != 0 {
@@ -235,7 +235,7 @@ impl<'a> Trajectory<'a> {
         }
         self.launch.state = State::from_numbers(&state);
         (self.launch.counters, self.launch.report, self.launch.parameters.look_at) = (counters, report, look_at);
-        (self.series, self.snapshots, self.frames) = (series, snapshots, frames);
+        (self.rows, self.frames) = (rows, frames);
         (self.served, self.crossed) = (served, crossed);
         self.sweeps = sweeps;
         self.take(counters, &report);
@@ -257,7 +257,7 @@ impl<'a> Trajectory<'a> {
     /// Whether no step that the clock can count was as short as the curve needed at its start.
     fn is_timed_too_coarsely(&self) -> bool {
         let Time::Adaptive(ticks) = self.time else { return false };
-        let edge = self.start.length / self.unit / self.launch.state.curve.len() as f64;
+        let edge = self.start.length / self.unit / self.member.nodes.len() as f64;
         ticks.tick > FIRST_STEP * edge.powi(4)
     }
 
@@ -321,22 +321,32 @@ impl<'a> Trajectory<'a> {
 
     /// Whether [`Trajectory::serve`] needs the state: for a snapshot, or for a look at the curve.
     pub fn wants_state(&self) -> bool {
-        let due = self.outputs[self.served..].iter().take_while(|output| self.place(output.t).is_some());
-        self.is_look_due() || due.into_iter().any(|output| output.snapshot || output.frame)
+        let mut due = self.outputs.from(self.served).take_while(|output| self.place(output.t).is_some());
+        self.is_look_due() || due.any(|output| output.snapshot || output.frame)
     }
 
     /// Serves the output times that the last step has reached, and looks at the curve where that is due; `state` is
-    /// needed if [`Trajectory::wants_state`].
-    pub fn serve(&mut self, state: Option<&State<f64>>) {
+    /// needed if [`Trajectory::wants_state`]. Returns whether all are served: no more are while `most` bytes of rows, or
+    /// more, are in memory.
+    pub fn serve(&mut self, state: Option<&State<f64>>, most: usize) -> bool {
         if let (true, Some(state)) = (self.is_look_due(), state) {
             self.look(&state.curve);
         }
         while let Some(output) = self.outputs.get(self.served)
             && let Some(fraction) = self.place(output.t)
         {
-            self.emit(output, fraction, state);
+            if self.rows.bytes() >= most {
+                return false;
+            }
+            self.emit(&output, fraction, state);
             self.served += 1;
         }
+        true
+    }
+
+    /// Its rows so far.
+    pub fn rows(&mut self) -> &mut Rows {
+        &mut self.rows
     }
 
     /// How far in the last step the time `t` lies, in (0, 1]; none where the step has not reached it.
@@ -362,7 +372,7 @@ impl<'a> Trajectory<'a> {
             let Report { before, middle, now, progress, .. } = &self.report;
             let at = self.between(fraction, &before.to_numbers(), &middle.to_numbers(), &now.to_numbers());
             let at = Observables::new(&Observed::from_numbers(&at), progress.turning, self.unit);
-            self.series.push(SeriesRow { member, t, at });
+            self.rows.series.push(SeriesRow { member, t, at });
         }
         if let (true, Some(state)) = (output.snapshot || output.frame, state) {
             let State { before, middle, curve, .. } = state;
@@ -380,11 +390,11 @@ impl<'a> Trajectory<'a> {
                 r: field(|curve| &curve.r, unit, 0.0),
             };
             if output.frame {
-                let nodes = snapshot.x.iter().zip(&snapshot.y).map(|(x, y)| DVec2::new(*x, *y)).collect();
-                self.frames.push((t, nodes));
+                let nodes = snapshot.x.iter().zip(&snapshot.y).map(|(x, y)| DVec2::new(*x, *y));
+                self.frames.push((t, nodes.step_by(Portrait::stride(snapshot.x.len())).collect()));
             }
             if output.snapshot {
-                self.snapshots.push(snapshot);
+                self.rows.snapshots.push(snapshot);
             }
         }
     }
@@ -520,8 +530,7 @@ impl<'a> Trajectory<'a> {
         Ended {
             excess: self.excess(),
             outcome,
-            series: self.series,
-            snapshots: self.snapshots,
+            rows: self.rows,
             portrait,
             mollified: self.member.mollified,
             unresolved: self.course == Course::Unresolved,

@@ -196,7 +196,14 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
         "--curves 300 --adaptive=1e-3 --stop-when-relaxed".to_string(),
         format!("--curves 250000 --t-end 0.02 {many}"),
         format!("--curves 350000 --t-end 0.9 --relax-to 1e-3 {many}"),
+        // More rows than memory is to hold, and members of very many nodes.
+        "--curves 12 --points 32 --adaptive=0.1 --t-end 1 --series 1e-5".to_string(),
+        "--curves 12 --points 500 --adaptive=0.1 --t-end 0.01 --snapshots SNAPSHOTS --store zarr".to_string(),
+        "--curves 1 --points 100000 --adaptive --t-end 1e-15".to_string(),
+        "--curves 7 --points 50000 --adaptive --t-end 1e-15".to_string(),
     ];
+    let snapshots = (0..400).map(|i| (f64::from(i) * 2.5e-5).to_string()).collect::<Vec<_>>().join(",");
+    let runs = runs.map(|spec| spec.replace("SNAPSHOTS", &snapshots));
     for (rank, spec) in runs.iter().enumerate() {
         let base = format!("run --backend cpu {spec} --quiet");
         let said = json(home.path(), &format!("{base} --dry-run --json"))["memory_bytes"].as_f64().unwrap();

@@ -304,8 +304,8 @@ fn dispatches<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 struct Outcomes(Vec<String>);
 
 impl Sink for Outcomes {
-    fn member(&mut self, Ended { outcome, series, snapshots, .. }: &Ended) -> curvelax::Result<()> {
-        self.0.push(format!("{outcome:?} {series:?} {snapshots:?}"));
+    fn member(&mut self, Ended { outcome, rows, .. }: &Ended) -> curvelax::Result<()> {
+        self.0.push(format!("{outcome:?} {rows:?}"));
         Ok(())
     }
 }

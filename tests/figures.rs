@@ -172,7 +172,7 @@ fn ended(figure: &Figure, solver: Solver) -> Ended {
 
 /// Largest distance of a node from itself.
 fn distance(a: &Ended, b: &Ended) -> f64 {
-    let pairs = a.snapshots.iter().zip(&b.snapshots);
+    let pairs = a.rows.snapshots.iter().zip(&b.rows.snapshots);
     let differences = pairs.flat_map(|(a, b)| {
         let x = a.x.iter().zip(&b.x).map(|(a, b)| a - b);
         x.zip(a.y.iter().zip(&b.y).map(|(a, b)| a - b))

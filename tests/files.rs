@@ -197,7 +197,7 @@ fn every_number_in_the_files_is_the_one_that_was_computed() {
     assert!(recorder.0.iter().any(|ended| ended.outcome.t_relax.is_some()));
 
     let series = done.rows("series.csv");
-    let computed: Vec<_> = recorder.0.iter().flat_map(|ended| &ended.series).collect();
+    let computed: Vec<_> = recorder.0.iter().flat_map(|ended| &ended.rows.series).collect();
     assert_eq!(series.len(), computed.len());
     for (row, c) in series.iter().zip(computed) {
         let at = &c.at;
@@ -206,7 +206,7 @@ fn every_number_in_the_files_is_the_one_that_was_computed() {
         assert_eq!(number(row, "t").to_bits(), c.t.to_bits());
     }
     let snapshots = done.rows("snapshots.csv");
-    let computed: Vec<_> = recorder.0.iter().flat_map(|ended| &ended.snapshots).collect();
+    let computed: Vec<_> = recorder.0.iter().flat_map(|ended| &ended.rows.snapshots).collect();
     assert_eq!(snapshots.len(), 37 * computed.len());
     for (i, row) in snapshots.iter().enumerate() {
         let (c, i) = (computed[i / 37], i % 37);

@@ -16,7 +16,7 @@ use curvelax::{
     },
     flow::Flow,
     number::Real,
-    schedule::{Ticks, outputs},
+    schedule::{Outputs, Ticks},
     scheme::{
         Parameters, State,
         evolve::{self, Run},
@@ -73,7 +73,7 @@ fn one(spec: &Spec) -> Outcome {
 /// Runs a member to its end by hand, so that its last state can be looked at, also where the program refuses its n.
 fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let n = member.nodes.len();
-    let outputs = outputs(spec.t_end, spec.series, &spec.snapshots, &[]);
+    let outputs = Outputs::new(spec.t_end, spec.series, &spec.snapshots, &[]);
     let mut trajectory = Trajectory::new(member, spec, T::PRECISION, &outputs);
     let mut run = trajectory.launch().convert::<T>();
     let mut work = evolve::Team::new(Blocks::new(n).unwrap());
@@ -82,7 +82,7 @@ fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
         evolve::evolve(&mut run, &method, &mut work, 64);
         trajectory.observe(run.counters, &run.report.convert());
         let state = trajectory.wants_state().then(|| run.state.convert());
-        trajectory.serve(state.as_ref());
+        trajectory.serve(state.as_ref(), usize::MAX);
         if let (false, Some((goal, parameters))) = (trajectory.is_over(), trajectory.next_aim()) {
             (run.counters.goal, run.parameters) = (goal, parameters.convert());
         }
@@ -228,23 +228,23 @@ fn rows_at_given_times_do_not_depend_on_where_steps_fell_and_change_no_step() {
         let rows = Spec { series: Some(t_end / 97.0), snapshots, ..spec.clone() };
         let (loose, tight) = (run(&rows).remove(0), run(&Spec { adaptive: Some(1e-5), ..rows }).remove(0));
         assert_eq!(one(&spec), loose.outcome, "{shape}");
-        assert_eq!((loose.series.len(), loose.snapshots.len()), (98, 2));
+        assert_eq!((loose.rows.series.len(), loose.rows.snapshots.len()), (98, 2));
         let excess = loose.outcome.start.excess;
         let gap = |a: &Observables, b: &Observables| {
             [(a.length / b.length - 1.0).abs(), (a.excess - b.excess).abs() / excess]
         };
         let within = |gap: [f64; 2], share: f64| gap.iter().zip(bounds).all(|(gap, bound)| *gap <= share * bound);
-        for (a, b) in loose.series.iter().zip(&tight.series) {
+        for (a, b) in loose.rows.series.iter().zip(&tight.rows.series) {
             assert!(a.t == b.t && within(gap(&a.at, &b.at), 1.0), "{shape}, t = {}: {:?}", a.t, gap(&a.at, &b.at));
         }
         // Where a row of another time, half a row off, would not pass.
-        let off = gap(&loose.series[20].at, &loose.series[21].at);
+        let off = gap(&loose.rows.series[20].at, &loose.rows.series[21].at);
         assert!(!within(off.map(|gap| 0.5 * gap), 1.0), "the control passes");
         // A run that ends at the time of a row, with a step that ends there.
         for j in [5, 20, 45, 60, 80, 90] {
-            let there = one(&Spec { t_end: loose.series[j].t, ..spec.clone() });
-            let gap = gap(&loose.series[j].at, &there.end);
-            println!("{shape}, t = {:.4}: interpolated to {gap:.1?}", loose.series[j].t);
+            let there = one(&Spec { t_end: loose.rows.series[j].t, ..spec.clone() });
+            let gap = gap(&loose.rows.series[j].at, &there.end);
+            println!("{shape}, t = {:.4}: interpolated to {gap:.1?}", loose.rows.series[j].t);
             assert!(within(gap, 0.25), "{shape}, row {j}: {gap:?}");
         }
         for (a, b) in [(loose.outcome.t_half, tight.outcome.t_half), (loose.outcome.t_relax, tight.outcome.t_relax)] {
@@ -381,7 +381,7 @@ fn a_crossing_is_seen_when_dense_snapshots_see_it_and_nowhere_else() {
             let snapshots: Vec<f64> = (1..=400).map(|i| until * f64::from(i) / 400.0).collect();
             let looked = run_of(&Spec { snapshots, ..spec }, file(corners)).remove(0);
             assert_eq!(looked.outcome, outcome, "looking at curve {j} has changed it");
-            let first = looked.snapshots.iter().find(|snapshot| crosses(snapshot)).map(|snapshot| snapshot.t);
+            let first = looked.rows.snapshots.iter().find(|snapshot| crosses(snapshot)).map(|snapshot| snapshot.t);
             println!("curve {j}, n = {n}: {:?}, snapshots {first:?}, {}", outcome.self_crossing, outcome.status.name());
             // It is seen at the end of a step, or after a sixteenth of a spacing.
             match (outcome.self_crossing, first) {

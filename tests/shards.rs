@@ -327,6 +327,32 @@ fn what_is_missing_is_printed_with_the_line_that_submits_it() {
     );
 }
 
+#[cfg(unix)]
+#[test]
+fn what_is_missing_of_a_billion_shards_is_told_as_ranges() {
+    let home = TempDir::new().unwrap();
+    let huge = "run --backend cpu --points 34 --tau 1e-3 --t-end 0.002 --curves 1000000000";
+    let only = "--only 0,7,8,400000005,999999999";
+    for (out, more) in [("all", ""), ("few", only)] {
+        // Of a shard with one member.
+        done(home.path(), &format!("{huge} {more} --shard 7/1000000000 --out {out}/7"));
+    }
+    let missing = |folder: &str| {
+        let mut limited = Command::new("sh");
+        // Each shard by its number would take 8 GB.
+        let line = "ulimit -v 1000000; exec \"$0\" merge --missing \"$1\"";
+        let program = assert_cmd::cargo::cargo_bin("curvelax");
+        let output = limited.current_dir(home.path()).args(["-c", line]).arg(program).arg(folder).output().unwrap();
+        assert_eq!(said(&output, 0), "");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    for (folder, ranges) in [("all/7", "0-6,8-999999999"), ("few/7", "0,8,400000005,999999999")] {
+        let told = format!("shards {ranges} of 1000000000: not among the folders");
+        let submit = format!("sbatch --array={ranges} --export=ALL,CURVELAX_SHARDS=1000000000 array.sh");
+        assert_eq!(missing(folder), format!("{told}\n{submit}\n"));
+    }
+}
+
 #[test]
 fn a_task_of_a_job_array_knows_its_shard() {
     let home = TempDir::new().unwrap();

@@ -7,6 +7,7 @@ use std::{convert::Infallible, sync::LazyLock};
 use curvelax::{
     ensemble::{Family, Member, Spec, spec::Precision},
     report::checkpoint::{from_bytes, sealed, to_bytes},
+    schedule::Outputs,
     trajectory::Trajectory,
 };
 use libfuzzer_sys::fuzz_target;
@@ -34,8 +35,9 @@ fuzz_target!(|data: &[u8]| {
     let (same, standing_again) = from_bytes(&again).expect("its own bytes");
     assert_eq!(format!("{head:?} {standing:?}"), format!("{same:?} {standing_again:?}"));
     let (spec, member) = &*START;
+    let outputs = Outputs::default();
     for paused in resident.into_values() {
-        let mut trajectory = Trajectory::new(member.clone(), spec, Precision::F64, &[]);
+        let mut trajectory = Trajectory::new(member.clone(), spec, Precision::F64, &outputs);
         match trajectory.go_on_from(paused) {
             Ok(()) => drop(trajectory.launch()),
             Err(error) => assert_eq!(error.exit_code(), 2),

@@ -120,7 +120,7 @@ impl Folder {
         };
         let tables = [folder::SUMMARY, folder::RATES].map(|name| Mark { name: name.into(), length: 0, crc: 0 }).into();
         let (wall, aside) = (Duration::ZERO, Aside::default());
-        let head = Head { origin, wall, company: 0, tables, store: None, aside, films: Vec::new() };
+        let head = Head { origin, wall, company: 0, tables, store: None, rows: None, aside, films: Vec::new() };
         let files =
             [folder::SHARD, folder::SUMMARY, folder::RATES].map(|name| (name, File::create(path.join(name)).unwrap()));
         let record = Record { head, points: 100, warnings: Vec::new() };

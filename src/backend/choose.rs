@@ -314,7 +314,7 @@ impl Choice {
         let blocks = ring(n)?;
         let method = Method { solver: spec.solver(), order: spec.order, max_sweeps: spec.most_sweeps() };
         let Some(gpu) = &self.gpu else {
-            let backend = CpuBackend::<T>::new(blocks, method, threads(spec))?;
+            let backend = CpuBackend::<T>::for_members(blocks, method, threads(spec), spec.member_count())?;
             return Ok((Box::new(backend), self.platform(spec)));
         };
         match open_gpu::<T>(gpu, blocks, spec, &method) {

@@ -51,7 +51,7 @@ pub fn figure(args: FigureArgs) -> Result<()> {
     for ((figure, spec), [picture, data]) in chosen.iter().zip(&names) {
         let ended = figure.simulate(spec, Progress::new(args.quiet))?;
         let mut rows = SnapshotTable::new(folder.file(data)?)?;
-        ended.snapshots.iter().try_for_each(|snapshot| rows.snapshot(snapshot))?;
+        ended.rows.snapshots.iter().try_for_each(|snapshot| rows.snapshot(snapshot))?;
         parts.push(rows.ready()?);
         parts.push(folder.write(picture, figure.plot(&ended).draw())?);
         made.push((*figure, ended));

@@ -10,7 +10,7 @@ use crate::{
     error::{Error, Result},
     report::{
         Form, OutputFolder,
-        merge::{Shards, ranges},
+        merge::{Shards, listed_ranges},
         shard,
         text::plural,
     },
@@ -75,7 +75,7 @@ fn missing(shards: &Shards, script: &str) -> String {
     if missing.is_empty() {
         return format!("all {count} {} are there\n", plural(count, "shard"));
     }
-    let array = ranges(&missing);
+    let array = listed_ranges(&missing);
     let submit = format!("sbatch --array={array} --export=ALL,{}={count} {script}", flags::SHARDS);
     shards.told().into_iter().chain([submit]).map(|line| line + "\n").collect()
 }

@@ -73,13 +73,13 @@ impl BaseCurve {
 
     /// `(u, point)` once round, the first point again at `u = 1`; at least `pieces` pieces, and every vertex of a
     /// polygon is among them, so that no corner is cut.
-    pub fn subdivision(&self, pieces: usize) -> Vec<(f64, DVec2)> {
+    pub fn subdivision(&self, pieces: usize) -> Box<dyn Iterator<Item = (f64, DVec2)> + '_> {
         match &self.kind {
             Kind::Formula(formula) => {
-                let at = |j: usize| (j as f64 / pieces as f64, formula((j % pieces) as f64 / pieces as f64));
-                (0..=pieces).map(at).collect()
+                let at = move |j: usize| (j as f64 / pieces as f64, formula((j % pieces) as f64 / pieces as f64));
+                Box::new((0..=pieces).map(at))
             }
-            Kind::Polygon(outline) => outline.subdivision(pieces),
+            Kind::Polygon(outline) => Box::new(outline.subdivision(pieces)),
         }
     }
 }
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn a_subdivision_starts_and_ends_at_the_same_point() {
         let curve = BaseCurve::from_formula(|u| DVec2::from_angle(std::f64::consts::TAU * u));
-        let samples = curve.subdivision(7);
+        let samples: Vec<_> = curve.subdivision(7).collect();
         assert_eq!(samples.len(), 8);
         assert_eq!((samples[0].0, samples[7].0), (0.0, 1.0));
         assert_eq!(samples[0].1, samples[7].1);

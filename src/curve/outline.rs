@@ -141,20 +141,18 @@ impl Outline {
     }
 
     /// `(u, point)` once round: every vertex, and between vertices pieces no longer than `length / pieces`.
-    pub(super) fn subdivision(&self, pieces: usize) -> Vec<(f64, DVec2)> {
+    pub(super) fn subdivision(&self, pieces: usize) -> impl Iterator<Item = (f64, DVec2)> {
         let (n, length) = (self.vertices.len(), self.length());
-        let mut samples = Vec::with_capacity(n + pieces + 1);
-        for i in 0..n {
+        let edge = move |i: usize| {
             let (start, end) = (self.reached[i], self.reached[i + 1]);
             let (a, b) = (self.vertices[i], self.vertices[(i + 1) % n]);
             let parts = ((end - start) / length * pieces as f64).ceil().max(1.0);
-            samples.extend((0..parts as usize).map(|j| {
+            (0..parts as usize).map(move |j| {
                 let share = j as f64 / parts;
                 ((start + share * (end - start)) / length, a.lerp(b, share))
-            }));
-        }
-        samples.push((1.0, self.vertices[0]));
-        samples
+            })
+        };
+        (0..n).flat_map(edge).chain([(1.0, self.vertices[0])])
     }
 }
 
@@ -551,7 +549,7 @@ mod tests {
     fn a_subdivision_contains_every_vertex_and_lies_on_the_polygon() {
         let triangle = outline("0,0\n10,0\n0,0.1\n").unwrap();
         for pieces in [1, 2, 50] {
-            let samples = triangle.subdivision(pieces);
+            let samples: Vec<_> = triangle.subdivision(pieces).collect();
             assert!(samples.len() > pieces);
             for vertex in triangle.vertices() {
                 assert!(samples.iter().any(|(_, p)| p == vertex), "{vertex} of {pieces}");

@@ -23,6 +23,8 @@ use crate::error::{Error, did_you_mean};
 /// error of the spacing; the time to make a member is proportional to them.
 const SAMPLES_PER_NODE: usize = 32;
 const MIN_SAMPLES: usize = 4096;
+/// Bytes of tabulated samples at most. More of them, those of 50 000 nodes, are made twice over for every member instead.
+const LARGEST_TABLE: usize = 64 << 20;
 
 /// How nodes are placed on a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -91,9 +93,12 @@ enum Plan {
     Fixed(Vec<DVec2>),
     /// A fine subdivision, mapped and measured for each member.
     Measured(Vec<Sample>),
+    /// The same in so many pieces, too many for a table.
+    Passing(usize),
 }
 
 /// A point of the base curve with its parameter and its direction from the centre.
+#[derive(Clone, Copy)]
 struct Sample {
     u: f64,
     point: DVec2,
@@ -115,7 +120,10 @@ impl Sampler {
             (Sampling::Parameter, _) => {
                 Plan::Fixed((1..=nodes).map(|i| curve.point(i as f64 / nodes as f64)).collect())
             }
-            (Sampling::Arclength, _) => Plan::Measured(samples(&curve, MIN_SAMPLES.max(SAMPLES_PER_NODE * nodes))),
+            (Sampling::Arclength, _) if pieces(nodes) * size_of::<Sample>() > LARGEST_TABLE => {
+                Plan::Passing(pieces(nodes))
+            }
+            (Sampling::Arclength, _) => Plan::Measured(samples(&curve, pieces(nodes)).collect()),
             (Sampling::Points, Some(outline)) => Plan::Fixed(outline.vertices().to_vec()),
             (Sampling::Points, None) => {
                 let problem = "only a file has points of its own";
@@ -145,7 +153,9 @@ impl Sampler {
     pub(crate) fn bytes(sampling: Sampling, nodes: usize) -> usize {
         match sampling {
             Sampling::Parameter | Sampling::Points => nodes * size_of::<DVec2>(),
-            Sampling::Arclength => MIN_SAMPLES.max(SAMPLES_PER_NODE * nodes) * size_of::<Sample>(),
+            Sampling::Arclength => {
+                Some(pieces(nodes) * size_of::<Sample>()).filter(|of| *of <= LARGEST_TABLE).unwrap_or(0)
+            }
         }
     }
 
@@ -154,26 +164,41 @@ impl Sampler {
         let centre = self.curve.centroid();
         match &self.plan {
             Plan::Fixed(points) => points.iter().map(|p| factor.apply(centre, *p)).collect(),
-            Plan::Measured(samples) => self.equally_spaced(samples, factor),
+            Plan::Measured(samples) => {
+                let passed: Vec<(f64, f64)> = measured(samples.iter().copied(), factor, centre).collect();
+                self.equally_spaced(|| passed.iter().copied(), factor)
+            }
+            Plan::Passing(pieces) => {
+                let walk = || measured(samples(&self.curve, *pieces), factor, centre);
+                self.equally_spaced(walk, factor)
+            }
         }
     }
 
-    fn equally_spaced(&self, samples: &[Sample], factor: &RadialFactor) -> Vec<DVec2> {
+    /// Nodes by the samples that `walk` passes: the parameter of each, and the length up to it.
+    fn equally_spaced<I>(&self, walk: impl Fn() -> I, factor: &RadialFactor) -> Vec<DVec2>
+    where
+        I: Iterator<Item = (f64, f64)>,
+    {
         let centre = self.curve.centroid();
-        let reached = cumulated_length(samples.iter().map(|s| factor.apply_towards(s.direction, centre, s.point)));
-        let arcs = self.arcs(samples, &reached);
-        let (mut piece, mut arc) = (0, 0);
+        let arcs = self.arcs(walk());
+        let mut rest = walk();
+        // The samples around the target.
+        let [mut before, mut after] = [(); 2].map(|()| rest.next().unwrap_or_default());
+        let mut arc = 0;
         let parameter = |i: usize| {
             while arcs[arc + 1].0 <= i {
                 arc += 1;
             }
             let [(first, start), (last, end)] = [arcs[arc], arcs[arc + 1]];
             let target = start + (i - first) as f64 * ((end - start) / (last - first) as f64);
-            while piece + 2 < samples.len() && reached[piece + 1] < target {
-                piece += 1;
+            while after.1 < target
+                && let Some(next) = rest.next()
+            {
+                (before, after) = (after, next);
             }
-            let share = (target - reached[piece]) / (reached[piece + 1] - reached[piece]);
-            samples[piece].u + share * (samples[piece + 1].u - samples[piece].u)
+            let share = (target - before.1) / (after.1 - before.1);
+            before.0 + share * (after.0 - before.0)
         };
         (1..self.nodes).map(parameter).chain([0.0]).map(|u| factor.apply(centre, self.curve.point(u))).collect()
     }
@@ -181,13 +206,18 @@ impl Sampler {
 
 impl Sampler {
     /// Node number and length at the start, at each cusp and at the end, where node n is node 0 again.
-    fn arcs(&self, samples: &[Sample], reached: &[f64]) -> Vec<(usize, f64)> {
-        let (n, length) = (self.nodes, reached[samples.len() - 1]);
-        let cusps = self.curve.cusps();
+    fn arcs(&self, walk: impl Iterator<Item = (f64, f64)>) -> Vec<(usize, f64)> {
+        let (n, cusps) = (self.nodes, self.curve.cusps());
+        let (mut starts, mut length) = (Vec::new(), 0.0);
+        for (u, reached) in walk {
+            while cusps.get(starts.len()).is_some_and(|cusp| u >= *cusp) {
+                starts.push(reached);
+            }
+            length = reached;
+        }
         let mut arcs = vec![(0, 0.0)];
         // With fewer nodes than arcs the cusps cannot all be nodes.
-        for (left, cusp) in (1..=cusps.len()).rev().zip(cusps).filter(|_| n > cusps.len()) {
-            let start = reached[samples.partition_point(|sample| sample.u < *cusp)];
+        for (left, start) in (1..=cusps.len()).rev().zip(starts).filter(|_| n > cusps.len()) {
             let (previous, _) = arcs[arcs.len() - 1];
             let node = (start / length * n as f64).round() as usize;
             arcs.push((node.clamp(previous + 1, n - left), start));
@@ -197,17 +227,36 @@ impl Sampler {
     }
 }
 
-fn samples(curve: &BaseCurve, pieces: usize) -> Vec<Sample> {
+/// The parameter of each sample, and the length up to it of the curve stretched by `factor`.
+fn measured(
+    samples: impl Iterator<Item = Sample>,
+    factor: &RadialFactor,
+    centre: DVec2,
+) -> impl Iterator<Item = (f64, f64)> {
+    let points = samples.map(move |s| (s.u, factor.apply_towards(s.direction, centre, s.point)));
+    let (mut previous, mut sum) = (None, 0.0);
+    points.map(move |(u, point)| {
+        sum += previous.replace(point).map_or(0.0, |p: DVec2| p.distance(point));
+        (u, sum)
+    })
+}
+
+/// Pieces that a curve of `nodes` nodes is measured in, at least.
+fn pieces(nodes: usize) -> usize {
+    MIN_SAMPLES.max(SAMPLES_PER_NODE * nodes)
+}
+
+fn samples(curve: &BaseCurve, pieces: usize) -> impl Iterator<Item = Sample> {
     let centre = curve.centroid();
-    let directed = |(u, point)| Sample { u, point, direction: (point - centre).normalize_or_zero() };
-    curve.subdivision(pieces).into_iter().map(directed).collect()
+    let directed = move |(u, point): (f64, DVec2)| Sample { u, point, direction: (point - centre).normalize_or_zero() };
+    curve.subdivision(pieces).map(directed)
 }
 
 /// As many nodes as `nodes` has, equally spaced along that closed polygon; the last one stays where it is.
 pub fn resample(nodes: &[DVec2]) -> Vec<DVec2> {
     let n = nodes.len();
     let closed: Vec<DVec2> = nodes[n - 1..].iter().chain(nodes).copied().collect();
-    let reached = cumulated_length(closed.iter().copied());
+    let reached = cumulated_length(&closed);
     let spacing = reached[n] / n as f64;
     let mut piece = 0;
     let at = |i: usize| {
@@ -221,13 +270,15 @@ pub fn resample(nodes: &[DVec2]) -> Vec<DVec2> {
 }
 
 /// Length along the polyline at each of its points, 0 at the first.
-fn cumulated_length(points: impl Iterator<Item = DVec2>) -> Vec<f64> {
-    let mut previous = None;
-    points
-        .scan(0.0, |sum, point| {
-            *sum += previous.replace(point).map_or(0.0, |p: DVec2| p.distance(point));
-            Some(*sum)
-        })
+fn cumulated_length(points: &[DVec2]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let steps = points.windows(2).map(|pair| pair[0].distance(pair[1]));
+    [0.0]
+        .into_iter()
+        .chain(steps.map(|step| {
+            sum += step;
+            sum
+        }))
         .collect()
 }
 
@@ -253,6 +304,19 @@ mod tests {
         let spacing = 4.0 / 6.0;
         assert!(nodes[0].distance(DVec2::new(spacing - 0.25, 0.0)) < 1e-12, "{}", nodes[0]);
         assert!(nodes[4].distance(DVec2::new(0.0, 0.25 + spacing)) < 1e-12, "{}", nodes[4]);
+    }
+
+    #[test]
+    fn samples_that_are_not_tabulated_give_the_same_nodes_to_the_last_bit() {
+        let law = crate::curve::RadialFactor::default();
+        for shape in ["ellipse:2,1", "astroid", island()] {
+            let table = sampler(shape, Sampling::Arclength, 101);
+            let passing = Sampler { plan: Plan::Passing(pieces(101)), ..sampler(shape, Sampling::Arclength, 101) };
+            assert!(matches!(table.plan, Plan::Measured(_)));
+            assert!(table.sample(&law) == passing.sample(&law), "{shape}");
+        }
+        let large = sampler("circle:1", Sampling::Arclength, 60_000);
+        assert!(matches!(large.plan, Plan::Passing(_)) && Sampler::bytes(Sampling::Arclength, 60_000) == 0);
     }
 
     #[test]

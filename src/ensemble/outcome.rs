@@ -3,7 +3,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{Mollified, Standing};
+use super::{Extent, Mollified, Rows, Standing};
 pub use crate::scheme::Status;
 use crate::{
     error::{Error, Result},
@@ -120,10 +120,20 @@ pub struct Snapshot {
 pub struct Portrait {
     /// At the start.
     pub before: Vec<DVec2>,
-    /// At some times on its way.
+    /// At some times on its way: every m-th node, m = [`Portrait::stride`].
     pub frames: Vec<(f64, Vec<DVec2>)>,
     /// In the last accepted state.
     pub after: Vec<DVec2>,
+}
+
+impl Portrait {
+    /// A picture has at most this many nodes of a curve: more do not show.
+    pub const MOST_NODES: usize = 600;
+
+    /// Of `n` nodes every so-many-th is drawn.
+    pub fn stride(n: usize) -> usize {
+        n.div_ceil(Self::MOST_NODES).max(1)
+    }
 }
 
 /// Everything that one member left.
@@ -133,10 +143,8 @@ pub struct Ended {
     pub outcome: Outcome,
     /// Its excess at the times of [`grid`](crate::schedule::grid) that it reached.
     pub excess: Vec<f64>,
-    /// Its rows of the series, in time order.
-    pub series: Vec<SeriesRow>,
-    /// Its snapshots, in time order.
-    pub snapshots: Vec<Snapshot>,
+    /// Its rows of the series and its snapshots.
+    pub rows: Rows,
     /// Its nodes at both ends, where they were asked for.
     pub portrait: Option<Portrait>,
     /// What rounding off did to its corners before the run.
@@ -160,6 +168,11 @@ pub enum Wish {
 pub trait Sink {
     /// A member has ended; called exactly once per member, in member order.
     fn member(&mut self, ended: &Ended) -> Result<()>;
+    /// Takes rows of a member that has not left, in time order, when more of them are in memory than should be. They come
+    /// back with the member as what this returns, also in a run that goes on from a standing; none where it has no place.
+    fn spill(&mut self, _series: &[SeriesRow], _snapshots: &[Snapshot]) -> Result<Option<Extent>> {
+        Ok(None)
+    }
     /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done. Called after every dispatch, and
     /// during long ones: an error stops the run.
     fn progress(&mut self, _done: u64, _total: u64, _share: f64) -> Result<()> {

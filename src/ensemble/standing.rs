@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{Ended, SeriesRow, Snapshot};
+use super::{Ended, Rows};
 use crate::scheme::parameters::{Counters, Report};
 
 /// The members of a run by rank, their place in the order in which they leave it, from 0.
@@ -34,10 +34,8 @@ pub struct Paused {
     pub sweeps: [u64; 2],
     /// How many of its output times it has reached.
     pub served: u64,
-    /// Its rows of the series so far.
-    pub series: Vec<SeriesRow>,
-    /// Its snapshots so far.
-    pub snapshots: Vec<Snapshot>,
+    /// Its rows so far.
+    pub rows: Rows,
     /// Its portrait so far, with times.
     pub frames: Vec<(f64, Vec<DVec2>)>,
     /// When it was first seen to cross itself.

@@ -33,7 +33,7 @@ use crate::{
 
 const MAGIC: [u8; 16] = *b"curvelax state\r\n";
 /// Version of the format.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Bytes before the body, and after it.
 const BEFORE: usize = MAGIC.len() + 4 + 8;
 const AFTER: usize = 4;
@@ -70,6 +70,8 @@ pub struct Head {
     pub tables: Vec<Mark>,
     /// The arrays of snapshots.
     pub store: Option<zarr::Mark>,
+    /// Rows of members that have not left yet, where they were too many for memory.
+    pub rows: Option<Mark>,
     /// Of the members that ended, what their rows do not say.
     pub aside: Aside,
     /// The first members.
@@ -310,7 +312,7 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Kept>> {
             Err(e) => return refuse(format!("cannot find {name} in it ({e})")),
         }
         let found = read(folder.place(name).at()).and_then(|(head, standing)| {
-            let tables = head.tables.iter().try_for_each(|mark| folder.check(mark));
+            let tables = head.tables.iter().chain(&head.rows).try_for_each(|mark| folder.check(mark));
             let store = head.store.as_ref().map_or(Ok(()), |mark| folder.check_store(mark));
             let film = head.films.iter().find_map(|film| Some((film.member, film.fault()?)));
             let films =
@@ -342,7 +344,7 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Kept>> {
 mod tests {
     use super::*;
     use crate::{
-        ensemble::{Mollified, SeriesRow, Snapshot, Status},
+        ensemble::{Extent, Mollified, Rows, SeriesRow, Snapshot, Status},
         report::{provenance::tests::platform, tally::tests::outcome},
         scheme::parameters::{Counters, Report},
     };
@@ -354,8 +356,11 @@ mod tests {
             state: vec![at, f64::NAN, -0.0],
             sweeps: [1, u64::MAX],
             served: 1,
-            series: vec![SeriesRow { member: 1, t: 0.5, at: Default::default() }],
-            snapshots: Vec::new(),
+            rows: Rows {
+                spilled: vec![Extent { at: 1 << 40, length: 9, crc: 3 }],
+                series: vec![SeriesRow { member: 1, t: 0.5, at: Default::default() }],
+                snapshots: Vec::new(),
+            },
             frames: vec![(0.25, vec![glam::DVec2::new(1.0, 2.0)])],
             crossed: Some(0.1),
             look_at: 0.2,
@@ -377,14 +382,17 @@ mod tests {
             company: 0,
             tables: vec![Mark { name: "summary.csv".into(), length: 300, crc: 5 }],
             store: None,
+            rows: Some(Mark { name: "curvelax.rows".into(), length: 1 << 41, crc: 6 }),
             aside: Aside::default(),
             films: Vec::new(),
         };
         let early = Ended {
             outcome: outcome(2, Status::Relaxed, Some(0.5)),
             excess: vec![0.5],
-            series: Vec::new(),
-            snapshots: vec![Snapshot { member: 2, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] }],
+            rows: Rows {
+                snapshots: vec![Snapshot { member: 2, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] }],
+                ..Rows::default()
+            },
             portrait: None,
             mollified: Mollified::default(),
             unresolved: true,
@@ -441,8 +449,8 @@ mod tests {
             from_bytes(&sealed_again(bytes)).unwrap_err()
         };
         assert_eq!(with(0, b'C'), Fault::Foreign("it is no state of curvelax".into()));
-        let newer = Fault::Foreign("its format is 2, and that of this version is 1".into());
-        assert_eq!(with(MAGIC.len(), 2), newer);
+        let newer = Fault::Foreign("its format is 3, and that of this version is 2".into());
+        assert_eq!(with(MAGIC.len(), 3), newer);
         let Fault::Foreign(message) = with(BEFORE + 1, b'9') else { panic!("another version of the program") };
         assert!(message.starts_with("it is of curvelax 9."), "{message}");
         // Whole, but no state: written by a program with the same numbers and other types.

@@ -64,8 +64,12 @@ pub const SHARD: &str = "shard.state";
 pub const FIGURES: [&str; 8] =
     ["fig1a.svg", "fig1a.csv", "fig1b.svg", "fig1b.csv", "fig1c.svg", "fig1c.csv", "fig2.svg", "fig2.csv"];
 
+/// Rows that wait for their members to leave, see [`spill`](super::spill): never under this name, but while a run goes on as
+/// `.curvelax.rows.part`.
+pub const ROWS: &str = "curvelax.rows";
+
 /// All that a run may write, the file that vouches for the others first.
-const OWN: [&str; 18] = [
+const OWN: [&str; 19] = [
     RUN,
     SHARD,
     SUMMARY,
@@ -84,6 +88,7 @@ const OWN: [&str; 18] = [
     DEPENDENCE,
     MESH,
     REPORT,
+    ROWS,
 ];
 
 /// The tables of a run and its store, in the order in which they are named to people.

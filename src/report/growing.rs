@@ -5,11 +5,12 @@ use super::{
     part_file::{Mark, PartFile},
     part_folder::PartFolder,
     place::Place,
+    spill::Spill,
     tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable, Table},
     zarr::{self, SnapshotStore},
 };
 use crate::{
-    ensemble::{Ended, Spec, spec::Store},
+    ensemble::{Ended, Extent, SeriesRow, Snapshot, Spec, spec::Store},
     error::{Error, Result},
 };
 
@@ -20,6 +21,8 @@ pub struct Growing {
     series: Option<SeriesTable>,
     snapshots: Option<SnapshotTable>,
     store: Option<SnapshotStore>,
+    /// Rows of members that have not left; begun when the first of them come.
+    spill: Option<Spill>,
     /// A member got into some of them only.
     torn: bool,
 }
@@ -57,6 +60,7 @@ impl Growing {
         points: usize,
         marks: &[Mark],
         store: Option<&zarr::Mark>,
+        rows: Option<&Mark>,
     ) -> Result<Growing> {
         let mut names: Vec<&str> = marks.iter().map(|mark| mark.name.as_str()).collect();
         let others = || {
@@ -67,15 +71,18 @@ impl Growing {
             return Err(others());
         }
         names.extend(store.map(|_| folder::STORE));
+        names.extend(rows.map(|_| folder::ROWS));
         folder.keep_only(&names)?;
         let store = match store {
             Some(mark) => Some(SnapshotStore::go_on(folder.store_again(folder::STORE)?, spec, points, mark)?),
             None => None,
         };
-        Growing::of(spec, store, |name| {
+        let spill = rows.map(|mark| Spill::go_on(folder, mark)).transpose()?;
+        let growing = Growing::of(spec, store, |name| {
             let mark = marks.iter().find(|mark| mark.name == name).ok_or_else(others)?;
             folder.file_again(mark)
-        })
+        })?;
+        Ok(Growing { spill, ..growing })
     }
 
     /// The tables in the files that `file` finds.
@@ -88,6 +95,7 @@ impl Growing {
             series: asked(folder::SERIES)?.map(Table::new).transpose()?,
             snapshots: asked(folder::SNAPSHOTS)?.map(Table::new).transpose()?,
             store,
+            spill: None,
             torn: false,
         })
     }
@@ -96,7 +104,23 @@ impl Growing {
     pub fn add(&mut self, ended: &Ended) -> Result<()> {
         // Until all of it is written.
         self.torn = true;
-        let Ended { outcome, series, snapshots, .. } = ended;
+        let Ended { outcome, rows, .. } = ended;
+        for extent in &rows.spilled {
+            let none = || Error::Failed(format!("the rows of member {} are not to be found", outcome.member));
+            let (series, snapshots) = self.spill.as_mut().ok_or_else(none)?.read(extent)?;
+            self.add_rows(&series, &snapshots)?;
+        }
+        self.add_rows(&rows.series, &rows.snapshots)?;
+        if let Some(store) = &mut self.store {
+            store.member(outcome.status)?;
+        }
+        self.summary.row(outcome)?;
+        self.rates.row(outcome)?;
+        self.torn = false;
+        Ok(())
+    }
+
+    fn add_rows(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<()> {
         if let Some(table) = &mut self.series {
             series.iter().try_for_each(|row| table.row(row))?;
         }
@@ -104,12 +128,18 @@ impl Growing {
             snapshots.iter().try_for_each(|snapshot| table.snapshot(snapshot))?;
         }
         if let Some(store) = &mut self.store {
-            store.member(outcome.status, snapshots)?;
+            snapshots.iter().try_for_each(|snapshot| store.snapshot(snapshot))?;
         }
-        self.summary.row(outcome)?;
-        self.rates.row(outcome)?;
-        self.torn = false;
         Ok(())
+    }
+
+    /// Takes rows of a member that has not left yet; [`Growing::add`] gets them back.
+    pub fn spill(&mut self, folder: &OutputFolder, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Extent> {
+        let spill = match self.spill.take() {
+            Some(spill) => spill,
+            None => Spill::begin(folder)?,
+        };
+        self.spill.insert(spill).add(series, snapshots)
     }
 
     /// Where the rows of the members lie as yet.
@@ -118,14 +148,15 @@ impl Growing {
     }
 
     /// How far all have grown, once that is on disk.
-    pub fn mark(&mut self) -> Result<(Vec<Mark>, Option<zarr::Mark>)> {
+    pub fn mark(&mut self) -> Result<(Vec<Mark>, Option<zarr::Mark>, Option<Mark>)> {
         if self.torn {
             return Err(Error::Failed("the rows of a member could not all be written".into()));
         }
         let mut marks = vec![self.summary.mark()?, self.rates.mark()?];
         marks.extend(self.series.as_mut().map(SeriesTable::mark).transpose()?);
         marks.extend(self.snapshots.as_mut().map(SnapshotTable::mark).transpose()?);
-        Ok((marks, self.store.as_ref().map(SnapshotStore::mark).transpose()?))
+        let store = self.store.as_ref().map(SnapshotStore::mark).transpose()?;
+        Ok((marks, store, self.spill.as_ref().map(Spill::mark).transpose()?))
     }
 
     /// Whether they are worth keeping if the run fails.
@@ -135,14 +166,15 @@ impl Growing {
         self.series.iter().for_each(|table| table.keep(keep));
         self.snapshots.iter().for_each(|table| table.keep(keep));
         self.store.iter_mut().for_each(|store| store.keep(keep));
+        self.spill.iter().for_each(|spill| spill.keep(keep));
     }
 
-    /// All of them, on disk and ready for their final names.
-    pub fn ready(self) -> Result<(Vec<PartFile>, Option<PartFolder>)> {
-        let Growing { summary, rates, series, snapshots, store, .. } = self;
+    /// All of them, on disk and ready for their final names; and what is to stay as long as the states of the run.
+    pub fn ready(self) -> Result<(Vec<PartFile>, Option<PartFolder>, Option<Spill>)> {
+        let Growing { summary, rates, series, snapshots, store, spill, .. } = self;
         let mut files = vec![summary.ready()?, rates.ready()?];
         files.extend(series.map(SeriesTable::ready).transpose()?);
         files.extend(snapshots.map(SnapshotTable::ready).transpose()?);
-        Ok((files, store.map(SnapshotStore::ready).transpose()?))
+        Ok((files, store.map(SnapshotStore::ready).transpose()?, spill))
     }
 }

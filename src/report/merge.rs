@@ -8,6 +8,7 @@ use std::{
     collections::{BTreeMap, BTreeSet, BinaryHeap},
     fs::File,
     io::{BufWriter, Read, Seek, SeekFrom, Write},
+    ops::RangeInclusive,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -131,30 +132,53 @@ impl Shards {
         self.count
     }
 
-    /// The numbers of the shards that are not done.
-    pub fn missing(&self) -> Vec<u64> {
-        let with_members: Box<dyn Iterator<Item = u64>> = match &self.spec.only {
-            Some(only) => Box::new(only.iter().map(|m| m % self.count).collect::<BTreeSet<_>>().into_iter()),
-            None => Box::new(0..self.count.min(self.spec.all_members())),
-        };
-        with_members.filter(|index| !self.parts.contains_key(index)).collect()
+    /// The shards that are not done, as ranges of their numbers: no more than there are folders and one, however many
+    /// shards the study has.
+    pub fn missing(&self) -> Vec<RangeInclusive<u64>> {
+        self.all_but(self.parts.keys().copied())
+    }
+
+    /// The shards with members but for `others`, which ascend.
+    fn all_but(&self, others: impl Iterator<Item = u64>) -> Vec<RangeInclusive<u64>> {
+        match &self.spec.only {
+            Some(only) => {
+                let mut own: BTreeSet<u64> = only.iter().map(|member| member % self.count).collect();
+                for index in others {
+                    own.remove(&index);
+                }
+                let own: Vec<u64> = own.into_iter().collect();
+                own.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..=run[run.len() - 1]).collect()
+            }
+            None => {
+                let end = self.count.min(self.spec.all_members());
+                let mut next = 0;
+                let mut gaps = Vec::new();
+                for taken in others.take_while(|index| *index < end).chain([end]) {
+                    if next < taken {
+                        gaps.push(next..=taken - 1);
+                    }
+                    next = taken + 1;
+                }
+                gaps
+            }
+        }
     }
 
     /// A line for each shard that is not done: its number, and what there is instead; those of which nothing is known in
     /// one line.
     pub fn told(&self) -> Vec<String> {
-        let missing = self.missing();
         let line = |(index, path, why): &(Option<u64>, PathBuf, String)| match index {
-            Some(index) if !missing.contains(index) => None,
+            Some(index) if self.parts.contains_key(index) => None,
             Some(index) => Some(format!("shard {index}/{}: {}: {why}", self.count, path.display())),
             None => Some(format!("{}: {why}", path.display())),
         };
         let mut lines: Vec<String> = self.unfinished.iter().filter_map(line).collect();
-        let known: BTreeSet<u64> = self.unfinished.iter().filter_map(|(index, ..)| *index).collect();
-        let nowhere: Vec<u64> = missing.into_iter().filter(|index| !known.contains(index)).collect();
+        let begun = self.unfinished.iter().filter_map(|(index, ..)| *index);
+        let known: BTreeSet<u64> = begun.chain(self.parts.keys().copied()).collect();
+        let nowhere = self.all_but(known.into_iter());
         if !nowhere.is_empty() {
-            let shards = if nowhere.len() == 1 { "shard" } else { "shards" };
-            lines.push(format!("{shards} {} of {}: not among the folders", ranges(&nowhere), self.count));
+            let shards = if total(&nowhere) == 1 { "shard" } else { "shards" };
+            lines.push(format!("{shards} {} of {}: not among the folders", listed_ranges(&nowhere), self.count));
         }
         lines
     }
@@ -214,7 +238,7 @@ impl Shards {
         let there = self.parts.len();
         Err(Error::Request(format!(
             "{there} of {} shards are done; {}; `curvelax merge --missing` prints what submits them",
-            there + missing.len(),
+            there as u64 + total(&missing),
             listed(&self.told(), "; ")
         )))
     }
@@ -253,13 +277,18 @@ fn listed(lines: &[String], between: &str) -> String {
     text
 }
 
-/// Ascending numbers as Slurm writes them: `0,3,5-9`.
-pub fn ranges(numbers: &[u64]) -> String {
-    let runs = numbers.chunk_by(|a, b| a + 1 == *b).map(|run| match run {
-        [first, .., last] => format!("{first}-{last}"),
-        one => one.iter().map(u64::to_string).collect(),
-    });
-    runs.collect::<Vec<_>>().join(",")
+/// Ascending ranges as Slurm writes them: `0,3,5-9`.
+pub fn listed_ranges(ranges: &[RangeInclusive<u64>]) -> String {
+    let text = |range: &RangeInclusive<u64>| match (range.start(), range.end()) {
+        (first, last) if first == last => first.to_string(),
+        (first, last) => format!("{first}-{last}"),
+    };
+    ranges.iter().map(text).collect::<Vec<_>>().join(",")
+}
+
+/// How many numbers are in them.
+fn total(ranges: &[RangeInclusive<u64>]) -> u64 {
+    ranges.iter().map(|range| range.end() - range.start() + 1).sum()
 }
 
 /// The rows of a table of one shard, which is opened for every block anew: any number of shards can be joined.

@@ -28,6 +28,7 @@ pub mod progress;
 pub mod provenance;
 pub mod reader;
 pub mod shard;
+pub mod spill;
 pub mod stop;
 pub mod study;
 pub mod style;
@@ -51,7 +52,7 @@ pub use stop::{Cause, Stop};
 
 use crate::{
     backend::Platform,
-    ensemble::{Ended, Sink, Spec, Standing, Wish},
+    ensemble::{Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Wish},
     error::{Error, Result},
 };
 use checkpoint::{Head, Kept, Origin};
@@ -144,8 +145,8 @@ impl Report {
         manner: Manner,
     ) -> Result<(Report, Standing)> {
         let Kept { head, standing, note } = kept;
-        let Head { origin, wall, company, tables, store, aside, films } = head;
-        let growing = Growing::go_on(&folder, spec, points, &tables, store.as_ref())?;
+        let Head { origin, wall, company, tables, store, rows, aside, films } = head;
+        let growing = Growing::go_on(&folder, spec, points, &tables, store.as_ref(), rows.as_ref())?;
         if note.is_some() {
             folder.forget_last_state()?;
         }
@@ -236,13 +237,14 @@ impl Report {
 
     /// How far it has come, once that is on disk.
     fn head(&mut self) -> Result<Head> {
-        let (tables, store) = self.growing.mark()?;
+        let (tables, store, rows) = self.growing.mark()?;
         Ok(Head {
             origin: self.origin.clone(),
             wall: self.wall(),
             company: self.company,
             tables,
             store,
+            rows,
             aside: self.tally.aside(),
             films: self.films.clone(),
         })
@@ -278,19 +280,23 @@ impl Report {
         let next = self.tally.members() - self.before;
         self.keep(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;
         let shard = match spec.shard {
-            Some(_) => Some(shard::to_bytes(&self.head()?, self.points, early)?),
+            Some(_) => Some(shard::to_bytes(&Head { rows: None, ..self.head()? }, self.points, early)?),
             None => None,
         };
         // In reverse order they are dropped: the folder last, after its files.
         let Report { folder, tally, films, progress, origin, clock, earlier, growing, .. } = self;
         progress.finish();
         let wall = earlier.saturating_add(clock.elapsed());
-        let (files, store) = growing.ready()?;
+        let (files, store, spill) = growing.ready()?;
         let Origin { platform, started, .. } = &origin;
         let warnings = &[early, &tally.warnings()].concat();
         let complete = Complete { spec, platform, tally, films: &films, warnings, started: *started, wall };
         let published = complete.publish(&folder, files, store, shard.as_deref(), form);
-        published.and_then(|text| folder.forget_states().map(|()| text)).map_err(|error| folder.explain(error))
+        let text =
+            published.and_then(|text| folder.forget_states().map(|()| text)).map_err(|error| folder.explain(error))?;
+        // No state refers to it any more.
+        spill.iter().for_each(|spill| spill.keep(false));
+        Ok(text)
     }
 }
 
@@ -305,6 +311,10 @@ impl Sink for Report {
         self.tally.add_aside(mollified, *unresolved);
         self.films.extend(portrait.as_ref().map(|portrait| Film::new(outcome, portrait)));
         Ok(())
+    }
+
+    fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
+        self.growing.spill(&self.folder, series, snapshots).map(Some)
     }
 
     fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
@@ -352,7 +362,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::ensemble::{Mollified, Observables, Portrait, SeriesRow, Snapshot, Status, spec::Store, study};
+    use crate::ensemble::{Mollified, Observables, Portrait, Rows, Status, spec::Store, study};
 
     fn files(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
@@ -375,8 +385,11 @@ mod tests {
         Ended {
             outcome: tally::tests::outcome(member, Status::Relaxed, Some(0.5)),
             excess: vec![0.2, 0.1],
-            series: vec![SeriesRow { member, t: 0.0, at: Observables::default() }],
-            snapshots: vec![Snapshot { member, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] }],
+            rows: Rows {
+                spilled: Vec::new(),
+                series: vec![SeriesRow { member, t: 0.0, at: Observables::default() }],
+                snapshots: vec![Snapshot { member, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] }],
+            },
             portrait,
             mollified: Mollified::default(),
             unresolved: false,

@@ -53,6 +53,11 @@ impl PartFile {
         self.mark.length == 0
     }
 
+    /// Bytes that were written.
+    pub fn length(&self) -> u64 {
+        self.mark.length
+    }
+
     /// Whether what is written is worth keeping if the run fails.
     pub fn keep(&self, keep: bool) {
         self.keep.set(keep);

@@ -21,8 +21,6 @@ use crate::{
 
 /// The largest coordinate.
 const LARGEST: f64 = 4095.0;
-/// A curve is kept with at most this many of its nodes: more do not show.
-const MOST_NODES: usize = 600;
 
 /// One member at several times.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,17 +53,17 @@ impl Film {
     /// Rounds what a member left. Times at which a node is not finite, or too large to be drawn, are left out.
     pub fn new(outcome: &Outcome, portrait: &Portrait) -> Film {
         let Portrait { before, frames, after } = portrait;
+        let stride = Portrait::stride(before.len());
+        let kept = |nodes: &[DVec2]| nodes.iter().copied().step_by(stride).collect::<Vec<_>>();
+        let (before_kept, after_kept) = (kept(before), kept(after));
         let inside = frames.iter().filter(|(t, _)| *t > 0.0 && *t < outcome.t_end);
         let inside = inside.map(|(t, nodes)| (*t, nodes));
         // A member that ended at once has one time only.
-        let end = (outcome.t_end > 0.0).then_some((outcome.t_end, after));
-        let all = [(0.0, before)].into_iter().chain(inside).chain(end);
+        let end = (outcome.t_end > 0.0).then_some((outcome.t_end, &after_kept));
+        let all = [(0.0, &before_kept)].into_iter().chain(inside).chain(end);
         let held = |nodes: &[DVec2]| nodes.iter().all(|p| p.to_array().iter().all(|v| Scale::Linear.holds(*v)));
         let shown: Vec<(f64, &Vec<DVec2>)> = all.filter(|(_, nodes)| held(nodes)).collect();
 
-        let stride = before.len().div_ceil(MOST_NODES).max(1);
-        let kept = |nodes: &'_ Vec<DVec2>| nodes.iter().copied().step_by(stride).collect::<Vec<_>>();
-        let shown: Vec<(f64, Vec<DVec2>)> = shown.into_iter().map(|(t, nodes)| (t, kept(nodes))).collect();
         let places = || shown.iter().flat_map(|(_, nodes)| nodes.iter().copied());
         let low = places().reduce(DVec2::min).unwrap_or_default();
         let largest = (places().reduce(DVec2::max).unwrap_or_default() - low).max_element();
@@ -167,7 +165,8 @@ pub(crate) mod tests {
             (0..n).map(|i| node(TAU * i as f64 / n as f64)).collect()
         };
         let end = Outcome { t_end: if t_relax.is_some() { 2.0 } else { 0.5 }, ..outcome(member, status, t_relax) };
-        let frames = (1..30).map(|i| 0.1 * f64::from(i)).map(|t| (t, nodes(t))).collect();
+        let kept = |t: f64| nodes(t).into_iter().step_by(Portrait::stride(n)).collect();
+        let frames = (1..30).map(|i| 0.1 * f64::from(i)).map(|t| (t, kept(t))).collect();
         Film::new(&end, &Portrait { before: nodes(0.0), frames, after: nodes(end.t_end) })
     }
 
@@ -225,7 +224,7 @@ pub(crate) mod tests {
 
     #[test]
     fn many_nodes_and_none_are_kept_small() {
-        assert!(film(0, 5000, Status::Relaxed, Some(0.1)).frames()[0].len() <= MOST_NODES);
+        assert!(film(0, 5000, Status::Relaxed, Some(0.1)).frames()[0].len() <= Portrait::MOST_NODES);
         let empty = Portrait { before: vec![DVec2::INFINITY; 9], frames: vec![], after: vec![DVec2::NAN; 9] };
         let film = Film::new(&outcome(0, Status::Nonfinite, None), &empty);
 

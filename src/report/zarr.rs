@@ -21,7 +21,7 @@ use crate::{
     ensemble::{Snapshot, Spec, Status},
     error::{Error, Result},
     input,
-    schedule::outputs,
+    schedule::Outputs,
 };
 
 /// About so many bytes make a chunk: few files for many members, and little to read for one.
@@ -66,6 +66,8 @@ pub struct SnapshotStore {
     points: usize,
     fields: Vec<Array>,
     status: Array,
+    /// Times of the next member that are written.
+    filled: usize,
 }
 
 /// An array that is written from its first element to its last.
@@ -136,30 +138,57 @@ impl SnapshotStore {
         }
         times.iter().try_for_each(|t| time.push(&folder, &t.to_le_bytes()))?;
         (1..=points as i64).try_for_each(|i| node.push(&folder, &i.to_le_bytes()))?;
-        Ok(SnapshotStore { folder, times, points, fields: fields.into(), status })
+        Ok(SnapshotStore { folder, times, points, fields: fields.into(), status, filled: 0 })
     }
 
-    /// Adds the next member: how it ended, and the snapshots that it left, in time order.
-    pub fn member(&mut self, status: Status, snapshots: &[Snapshot]) -> Result<()> {
-        let of: [fn(&Snapshot) -> &[f64]; 4] = [|s| &s.x, |s| &s.y, |s| &s.k, |s| &s.r];
-        for (array, of) in self.fields.iter_mut().zip(of) {
-            let mut values = vec![f64::NAN; self.times.len() * self.points];
-            for snapshot in snapshots {
-                let first = nearest(&self.times, snapshot.t) * self.points;
-                let own = values[first..].iter_mut().take(self.points);
-                // Unknown is NaN, as it is empty in tables.
-                own.zip(of(snapshot)).for_each(|(own, v)| *own = if v.is_finite() { *v } else { f64::NAN });
-            }
-            let bytes: Vec<u8> = values.into_iter().flat_map(f64::to_le_bytes).collect();
+    /// Adds a snapshot of the next member; they come in time order.
+    pub fn snapshot(&mut self, snapshot: &Snapshot) -> Result<()> {
+        let place = nearest(&self.times, snapshot.t);
+        // Two times that are one but for rounding: the first of them stands.
+        if place < self.filled {
+            return Ok(());
+        }
+        self.skip_to(place)?;
+        let Snapshot { x, y, k, r, .. } = snapshot;
+        for (array, values) in self.fields.iter_mut().zip([x, y, k, r]) {
+            // Unknown is NaN, as it is empty in tables.
+            let known = |value: f64| if value.is_finite() { value } else { f64::NAN };
+            let value = |i: usize| values.get(i).map_or(f64::NAN, |value| known(*value));
+            let bytes: Vec<u8> = (0..self.points).map(value).flat_map(f64::to_le_bytes).collect();
             array.push(&self.folder, &bytes)?;
         }
+        self.filled += 1;
+        Ok(())
+    }
+
+    /// Completes the next member, all of whose snapshots were added.
+    pub fn member(&mut self, status: Status) -> Result<()> {
+        self.skip_to(self.times.len())?;
+        self.filled = 0;
         self.status.push(&self.folder, &[status as u8])
+    }
+
+    /// Leaves the times up to the one at `place` unknown.
+    fn skip_to(&mut self, place: usize) -> Result<()> {
+        if self.filled < place {
+            let unknown: Vec<u8> = Kind::Float64.fill().repeat(self.points);
+            for array in &mut self.fields {
+                (self.filled..place).try_for_each(|_| array.push(&self.folder, &unknown))?;
+            }
+            self.filled = place;
+        }
+        Ok(())
     }
 
     /// Adds the next member of another store, as it is there.
     pub fn copy(&mut self, from: &mut StoredMembers) -> Result<()> {
         for (array, from) in self.fields.iter_mut().chain([&mut self.status]).zip(&mut from.arrays) {
-            array.push(&self.folder, from.next()?)?;
+            let mut left = from.size;
+            while left > 0 {
+                let part = from.next(left)?;
+                array.push(&self.folder, part)?;
+                left -= part.len();
+            }
         }
         Ok(())
     }
@@ -221,7 +250,6 @@ struct Elements {
     crc: u32,
     /// Bytes of a member.
     size: usize,
-    member: Vec<u8>,
     /// Bytes of the chunk that were taken.
     taken: usize,
 }
@@ -247,7 +275,6 @@ impl StoredMembers {
             size: (array.bytes / members) as usize,
             path: path.join(array.name),
             crc: mark.crc,
-            member: Vec::new(),
             taken: 0,
             array,
         };
@@ -274,19 +301,14 @@ impl Elements {
         ))
     }
 
-    /// Those of the next member.
-    fn next(&mut self) -> Result<&[u8]> {
-        self.member.clear();
-        while self.member.len() < self.size {
-            if self.taken == self.array.chunk.len() {
-                self.read()?;
-            }
-            let most = self.taken + self.size - self.member.len();
-            let now = &self.array.chunk[self.taken..most.min(self.array.chunk.len())];
-            self.member.extend_from_slice(now);
-            self.taken += now.len();
+    /// The next ones, `most` bytes or fewer.
+    fn next(&mut self, most: usize) -> Result<&[u8]> {
+        if self.taken == self.array.chunk.len() {
+            self.read()?;
         }
-        Ok(&self.member)
+        let first = self.taken;
+        self.taken = self.array.chunk.len().min(first + most);
+        Ok(&self.array.chunk[first..self.taken])
     }
 
     /// Reads the next chunk, and leaves of it what is in the array.
@@ -434,7 +456,7 @@ fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) -> Arrays {
 
 /// The times of the snapshots. Times that agree with the final one to rounding are that one, as in `snapshots.csv`.
 fn times(spec: &Spec) -> Vec<f64> {
-    outputs(spec.t_end, None, &spec.snapshots, &[]).iter().map(|output| output.t).collect()
+    Outputs::new(spec.t_end, None, &spec.snapshots, &[]).from(0).map(|output| output.t).collect()
 }
 
 /// The name of a chunk: `c`, and its place in the grid.
@@ -613,13 +635,19 @@ mod tests {
         Read { shape, chunk, elements }
     }
 
+    /// Adds a member.
+    fn add(store: &mut SnapshotStore, status: Status, snapshots: &[Snapshot]) {
+        snapshots.iter().for_each(|snapshot| store.snapshot(snapshot).unwrap());
+        store.member(status).unwrap();
+    }
+
     /// The store that members leave in chunks of at most `bytes`.
     fn stored(home: &Path, spec: &Spec, members: &[(Status, Vec<Snapshot>)], bytes: usize) -> std::path::PathBuf {
         let out = OutputFolder::open(home, true).unwrap();
         let points = members.iter().flat_map(|(_, snapshots)| snapshots).map(|s| s.x.len()).max().unwrap();
         let folder = out.store(folder::STORE).unwrap();
         let mut store = SnapshotStore::of_chunks(folder, spec, points, spec.snapshots.clone(), bytes).unwrap();
-        members.iter().for_each(|(status, snapshots)| store.member(*status, snapshots).unwrap());
+        members.iter().for_each(|(status, snapshots)| add(&mut store, *status, snapshots));
         let run = out.write(folder::RUN, "{}").unwrap();
         out.publish(Vec::new(), Some(store.ready().unwrap()), run).unwrap();
         home.join(folder::STORE)
@@ -745,7 +773,8 @@ mod tests {
         let mut recorder = Recorder::default();
         let backend: &mut dyn Backend = &mut backend;
         simulate(&[Cell::only(spec.clone(), family)], Precision::F64, backend, 0, &mut recorder).unwrap();
-        let members: Vec<_> = recorder.0.into_iter().map(|ended| (ended.outcome.status, ended.snapshots)).collect();
+        let members: Vec<_> =
+            recorder.0.into_iter().map(|ended| (ended.outcome.status, ended.rows.snapshots)).collect();
 
         let home = tempfile::tempdir().unwrap();
         let store = stored(home.path(), &spec, &members, 2 * 4 * 33 * 8);
@@ -814,7 +843,7 @@ mod tests {
         let begin =
             |folder: PartFolder| SnapshotStore::of_chunks(folder, &spec, 5, spec.snapshots.clone(), 360).unwrap();
         let add = |store: &mut SnapshotStore, of: &[(Status, Vec<Snapshot>)]| {
-            of.iter().for_each(|(status, snapshots)| store.member(*status, snapshots).unwrap());
+            of.iter().for_each(|(status, snapshots)| add(store, *status, snapshots));
         };
         let home = tempfile::tempdir().unwrap();
         let out = OutputFolder::open(home.path(), true).unwrap();

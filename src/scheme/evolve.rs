@@ -9,7 +9,7 @@ use super::{
     pace::{self, Stride},
     parameters::{Counters, NEVER, Observed, Report},
     start::Start,
-    state,
+    state::{self, STATE_FIELDS},
     step::{self, Method, Stepped},
 };
 use crate::{
@@ -160,16 +160,30 @@ pub fn evolve_abreast<N: Number, S: Solves>(group: Group<N::Real>, method: &Meth
 }
 
 impl<N: Number> Team<N> {
-    /// Room for members whose rings are cut by `blocks`.
+    /// Room for members whose rings are cut by `blocks`, whatever the solver.
     pub fn new(blocks: Blocks) -> Team<N> {
+        Team::with(Workspace::new(blocks))
+    }
+
+    /// Room to advance them by one solver.
+    pub fn for_solver(blocks: Blocks, solver: Solver) -> Team<N> {
+        Team::with(Workspace::for_solver(blocks, solver))
+    }
+
+    /// About the bytes of [`Team::for_solver`] for rings of `n` nodes.
+    pub fn bytes(n: usize, solver: Solver) -> usize {
+        (STATE_FIELDS + Workspace::<N>::numbers(solver)) * n * size_of::<N>()
+    }
+
+    fn with(work: Workspace<N>) -> Team<N> {
         let stride = Stride { length: N::Real::of(0.0), high: N::Real::of(0.0), low: N::Real::of(0.0), last: false };
         Team {
-            state: State::zeros(blocks.n),
+            state: State::zeros(work.blocks.n),
             parameters: Parameters::default(),
             excess: N::default(),
             turning: N::default(),
             strides: vec![stride; N::LANES],
-            work: Workspace::new(blocks),
+            work,
         }
     }
 

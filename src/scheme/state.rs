@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::{
     number::{Number, Real},
-    solver::{Blocks, Ring, System, direct::Factor, multigrid::Levels},
+    solver::{Blocks, Ring, Solver, System, direct::Factor, multigrid::Levels},
 };
 
 /// Fields of a curve.
@@ -229,21 +229,56 @@ pub struct Workspace<N> {
     pub levels: (Levels<N, 1>, Levels<N, 2>),
 }
 
+/// What only some solvers need.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Systems,
+    Factors,
+    Levels,
+}
+
+impl Part {
+    fn is_for(self, solver: Solver) -> bool {
+        match self {
+            Part::Systems => solver.sweeps(),
+            Part::Factors => solver == Solver::Direct,
+            Part::Levels => solver == Solver::Multigrid,
+        }
+    }
+}
+
 impl<N: Number> Workspace<N> {
-    /// A workspace for rings cut by `blocks`.
+    /// A workspace for rings cut by `blocks`, whatever the solver.
     pub fn new(blocks: Blocks) -> Workspace<N> {
+        Workspace::with(blocks, |_| true)
+    }
+
+    /// One with what `solver` needs.
+    pub fn for_solver(blocks: Blocks, solver: Solver) -> Workspace<N> {
+        Workspace::with(blocks, |part| part.is_for(solver))
+    }
+
+    /// Numbers that one with what `solver` needs has for each node; coarser levels have together as many nodes as the finest.
+    pub fn numbers(solver: Solver) -> usize {
+        let parts = [(Part::Systems, 13), (Part::Factors, 11), (Part::Levels, 65)];
+        let own: usize = parts.iter().filter(|(part, _)| part.is_for(solver)).map(|(_, numbers)| numbers).sum();
+        10 + own
+    }
+
+    fn with(blocks: Blocks, has: impl Fn(Part) -> bool) -> Workspace<N> {
         let n = blocks.n;
+        let room = |part: Part| if has(part) { n } else { 0 };
         let ring = || Ring::zeros(n);
         let nodes = || vec![N::default(); n];
         Workspace {
             blocks,
             motion: Motion { b: ring(), beta: nodes(), rkb: nodes(), alpha: ring(), ir: ring(), iq: ring() },
             new: Curve::zeros(n),
-            curvature: System::zeros(n),
-            position: System::zeros(n),
+            curvature: System::zeros(room(Part::Systems)),
+            position: System::zeros(room(Part::Systems)),
             traced: false,
-            factors: (Factor::new(n), Factor::new(n)),
-            levels: (Levels::new(n), Levels::new(n)),
+            factors: (Factor::new(room(Part::Factors)), Factor::new(room(Part::Factors))),
+            levels: (Levels::new(room(Part::Levels)), Levels::new(room(Part::Levels))),
         }
     }
 }

@@ -28,10 +28,10 @@ struct Eliminated<N, const F: usize> {
 pub struct Factor<N, const F: usize>(Vec<Eliminated<N, F>>);
 
 impl<N: Number, const F: usize> Factor<N, F> {
-    /// Room for systems of `n` ≥ 6 equations.
+    /// Room for systems of `n` ≥ 6 equations, or none for `n` = 0.
     pub fn new(n: usize) -> Self {
         let zero = N::default();
-        Factor(vec![Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] }; n - 2])
+        Factor(vec![Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] }; n.saturating_sub(2)])
     }
 }
 

@@ -25,6 +25,7 @@ use crate::{
         Parameters, State,
         evolve::{Group, Run},
         parameters::{Counters, Report},
+        state::STATE_FIELDS,
         step::Method,
     },
     solver::{Blocks, Solver},
@@ -38,6 +39,8 @@ const GROUPS_PER_THREAD: usize = 4;
 const SLOTS_PER_THREAD: usize = 8;
 /// While one is on its way, the host has time for the other.
 const BATCHES: usize = 2;
+/// Bytes for each thread: members of very many nodes have fewer lanes, slots and batches, so that they fit.
+const ROOM: usize = 128 << 20;
 
 /// A batch on its way is to be back after this time, so that progress shows; far more than it takes for usual n.
 const ADVANCE_TIME: Duration = Duration::from_secs(1);
@@ -52,7 +55,7 @@ fn most_steps(solver: Solver) -> u32 {
 
 /// Members of `n` nodes in numbers of type `T`.
 pub struct CpuBackend<T> {
-    batches: [Batch<T>; BATCHES],
+    batches: Vec<Batch<T>>,
     slots: usize,
     method: Method,
     crew: Arc<dyn Crew<T>>,
@@ -83,17 +86,33 @@ impl<T: Vectorised> CpuBackend<T> {
         Self::with_vectors(blocks, method, threads, Vectors::widest())
     }
 
+    /// The same for `members` members: with no wider vectors than they fill, and none that take more memory than there is
+    /// room for.
+    pub fn for_members(blocks: Blocks, method: Method, threads: usize, members: u64) -> Result<Self> {
+        let crew = |vectors: &Vectors| Some((*vectors, T::crew(*vectors, method.solver, blocks, 1).ok()?));
+        let crews: Vec<_> = Vectors::ALL.iter().filter(|vectors| vectors.are_available()).filter_map(crew).collect();
+        let fits = crews.iter().filter(|(_, crew)| crew.bytes_of_team() <= ROOM);
+        let most = fits.map(|(_, crew)| crew.lanes()).max().unwrap_or(1);
+        let enough = crews.iter().map(|(_, crew)| crew.lanes()).filter(|lanes| *lanes as u64 >= members).min();
+        let lanes = enough.map_or(most, |enough| enough.min(most));
+        let widest = crews.iter().rfind(|(_, crew)| crew.lanes() == lanes).map(|(vectors, _)| *vectors);
+        Self::with_vectors(blocks, method, threads, widest.unwrap_or(Vectors::None))
+    }
+
     /// The same with `vectors`, which the processor must have.
     pub fn with_vectors(blocks: Blocks, method: Method, threads: usize, vectors: Vectors) -> Result<Self> {
         // A panic is told by the batch that does not come back.
         let pool = threads::pool(threads)?;
         let threads = pool.current_num_threads();
         let crew = T::crew(vectors, method.solver, blocks, threads)?;
-        let slots = threads * SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * crew.lanes());
+        let of_member = STATE_FIELDS * blocks.n * size_of::<T>();
+        let batches = if BATCHES * crew.lanes() * of_member <= ROOM { BATCHES } else { 1 };
+        let usual = SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * crew.lanes());
+        let slots = threads * usual.min((ROOM / of_member / batches).max(crew.lanes()));
         let batch = || Batch { members: (0..slots).map(|_| None).collect(), coming: None, back: None };
         Ok(CpuBackend {
-            batches: [batch(), batch()],
-            slots: BATCHES * slots,
+            batches: (0..batches).map(|_| batch()).collect(),
+            slots: batches * slots,
             method,
             crew: crew.into(),
             pool,
@@ -107,12 +126,12 @@ impl<T: Vectorised> CpuBackend<T> {
     }
 
     fn place(&mut self, slot: usize) -> &mut Option<Box<Run<T>>> {
-        let size = self.slots / BATCHES;
+        let size = self.slots / self.batches.len();
         &mut self.batches[slot / size].members[slot % size]
     }
 
     fn run(&self, slot: usize) -> &Run<T> {
-        let size = self.slots / BATCHES;
+        let size = self.slots / self.batches.len();
         self.batches[slot / size].members[slot % size].as_ref().expect("an occupied slot")
     }
 }
@@ -138,7 +157,7 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
     }
 
     fn batches(&self) -> usize {
-        BATCHES
+        self.batches.len()
     }
 
     fn start(&mut self, batch: usize) -> Result<()> {

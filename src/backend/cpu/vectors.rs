@@ -160,33 +160,53 @@ pub trait Crew<T>: Send + Sync {
 
     /// Takes a group of at most that many members some steps further, in a thread of the pool.
     fn advance(&self, group: Group<T>, method: &Method, attempts: u32);
+
+    /// Bytes of what a thread needs to advance a group.
+    fn bytes_of_team(&self) -> usize;
 }
 
 /// Lanes of `N` in instructions `S`, which the token proves to be there, for the solver `M`; a team for each thread.
 struct Teams<S, M, N: Number> {
     simd: S,
     solver: PhantomData<fn() -> M>,
-    teams: Vec<Mutex<Team<N>>>,
+    blocks: Blocks,
+    /// Made when a thread has a group to advance; there are never more of them than groups on their way.
+    teams: Vec<Mutex<Option<Team<N>>>>,
 }
 
 impl<S: Simd, M: Solves + 'static, T: Real, N: Number<Real = T>> Teams<S, M, N> {
     fn crew(simd: S, blocks: Blocks, threads: usize) -> Box<dyn Crew<T>> {
-        let teams = (0..threads).map(|_| Mutex::new(Team::<N>::new(blocks))).collect();
-        Box::new(Teams { simd, solver: PhantomData::<fn() -> M>, teams })
+        let teams = (0..threads).map(|_| Mutex::new(None::<Team<N>>)).collect();
+        Box::new(Teams { simd, solver: PhantomData::<fn() -> M>, blocks, teams })
+    }
+
+    /// The team of a thread, which is still in its cache, or else one that nobody uses.
+    fn take_team(&self, thread: usize) -> Option<Team<N>> {
+        let (others, own) = self.teams.split_at(thread);
+        own.iter().chain(others).find_map(|team| unlocked(team).take())
     }
 }
 
-impl<S: Simd, M: Solves, N: Number> Crew<N::Real> for Teams<S, M, N> {
+impl<S: Simd, M: Solves + 'static, T: Real, N: Number<Real = T>> Crew<T> for Teams<S, M, N> {
     fn lanes(&self) -> usize {
         N::LANES
     }
 
-    fn advance(&self, group: Group<N::Real>, method: &Method, attempts: u32) {
-        let thread = rayon::current_thread_index().unwrap_or(0);
-        // A team that a panic left behind is taken over: members overwrite all of it.
-        let mut team = self.teams[thread].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        self.simd.vectorize(Advance { group, solver: self.solver, method, team: &mut team, attempts });
+    fn bytes_of_team(&self) -> usize {
+        Team::<N>::bytes(self.blocks.n, M::SOLVER)
     }
+
+    fn advance(&self, group: Group<T>, method: &Method, attempts: u32) {
+        let thread = rayon::current_thread_index().unwrap_or(0);
+        let mut team = self.take_team(thread).unwrap_or_else(|| Team::for_solver(self.blocks, M::SOLVER));
+        self.simd.vectorize(Advance { group, solver: self.solver, method, team: &mut team, attempts });
+        *unlocked(&self.teams[thread]) = Some(team);
+    }
+}
+
+/// What is locked; nothing can panic meanwhile.
+fn unlocked<T>(of: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 /// The call that is compiled for the instructions.

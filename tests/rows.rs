@@ -1,0 +1,146 @@
+//! Rows that wait for their members to leave: on disk where they are many, and in the tables the same bytes as those of a
+//! run that was never interrupted.
+
+use std::{collections::BTreeMap, fs, path::Path, time::Duration};
+
+use curvelax::{
+    Error, Result, backend,
+    ensemble::{
+        Cell, Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Wish,
+        spec::{BackendChoice, Store},
+        study,
+    },
+    report::{
+        Form, Manner, OutputFolder, Report, Stop,
+        checkpoint::{self, Origin},
+    },
+    simulate::go_on,
+};
+
+/// A report whose run is stopped when its patience is at an end.
+struct Impatient<'a> {
+    report: &'a mut Report,
+    patience: u32,
+    /// It does not wait for the members on their way.
+    at_once: bool,
+    /// It waits for a state.
+    waits: bool,
+    spilled: u64,
+}
+
+impl Impatient<'_> {
+    fn stopped(&self) -> Error {
+        Error::Stopped("enough".into())
+    }
+}
+
+impl Sink for Impatient<'_> {
+    fn member(&mut self, ended: &Ended) -> Result<()> {
+        self.report.member(ended)
+    }
+
+    fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
+        self.spilled += 1;
+        self.report.spill(series, snapshots)
+    }
+
+    fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
+        self.report.progress(done, total, share)?;
+        if self.at_once && self.patience == 0 { Err(self.stopped()) } else { Ok(()) }
+    }
+
+    fn wish(&mut self) -> Wish {
+        self.patience = self.patience.saturating_sub(1);
+        match self.patience {
+            0 if !self.at_once => return Wish::Stop(self.stopped()),
+            patience => self.waits |= patience.is_multiple_of(3),
+        }
+        if self.waits { Wish::Keep } else { Wish::GoOn }
+    }
+
+    fn keep(&mut self, standing: &Standing) -> Result<()> {
+        self.waits = false;
+        self.report.keep(standing)
+    }
+}
+
+fn manner() -> Manner {
+    Manner { quiet: true, every: Duration::from_secs(1000), stop: Stop::default() }
+}
+
+/// Runs `spec` into `out` in pieces of `patience` looks at the run and more; returns how many pieces there were, and how
+/// often rows were handed over.
+fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
+    let mut cells: Vec<Cell> = study::cells(spec)?;
+    let choice = backend::choose(spec, spec.points)?;
+    cells.iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
+    let spec = cells[0].spec.clone();
+    let origin = Origin::new(spec.to_toml()?, &cells, choice.platform(&spec))?;
+    let mut report = Report::begin(OutputFolder::open(out, false)?, &spec, spec.points, origin, manner())?;
+    let (mut standing, mut spilled) = (Standing::default(), 0);
+    for piece in 1.. {
+        // More each time, so that the run comes to an end although some of its work is lost.
+        let patience = patience.saturating_add(piece / 4);
+        let mut sink = Impatient { report: &mut report, patience, at_once: piece % 3 == 0, waits: false, spilled: 0 };
+        let (mut backend, _) = choice.open(&spec, spec.points)?;
+        let done = go_on(&cells, choice.precision(), backend.as_mut(), 2, standing, &mut sink);
+        spilled += sink.spilled;
+        match done {
+            Err(Error::Stopped(_)) => assert!(report.give_up()),
+            done => {
+                done?;
+                report.finish(&spec, &[], Form::Overview)?;
+                return Ok((piece, spilled));
+            }
+        }
+        let state = fs::metadata(out.join(".curvelax.state")).expect("a state").len();
+        assert!(state < 5 << 20, "a state of {state} bytes");
+        let folder = OutputFolder::open_again(out)?;
+        let kept = checkpoint::find(&folder)?.expect("a run that was interrupted");
+        (report, standing) = Report::go_on(folder, &spec, spec.points, kept, manner())?;
+    }
+    unreachable!("it ends")
+}
+
+/// All files below a folder, by name; `run.json` tells when it was.
+fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let (path, name) = entry.map(|entry| (entry.path(), entry.file_name().into_string().unwrap())).unwrap();
+        match path.is_dir() {
+            true => all.extend(content(&path).into_iter().map(|(below, bytes)| (format!("{name}/{below}"), bytes))),
+            false if name == "run.json" || name == "report.html" => {}
+            false => drop(all.insert(name, fs::read(&path).unwrap())),
+        }
+    }
+    all
+}
+
+fn same_in_pieces(spec: Spec, table: &str) {
+    let spec = Spec { curves: 11, adaptive: Some(0.1), t_end: 1.0, backend: BackendChoice::Cpu, ..spec };
+    let spec = spec.validate().unwrap();
+    let home = tempfile::tempdir().unwrap();
+    let [whole, pieces] = ["whole", "pieces"].map(|name| home.path().join(name));
+    let (_, straight) = run(&spec, &whole, u32::MAX / 2).unwrap();
+    let (count, spilled) = run(&spec, &pieces, 3).unwrap();
+    assert!(count > 3 && spilled >= 11, "{count} pieces, {spilled} times");
+    assert!(straight > 0, "as many rows as these do not stay in memory");
+    let (whole, pieces) = (content(&whole), content(&pieces));
+    assert!(whole.contains_key(table), "{:?}", whole.keys());
+    assert_eq!(whole.keys().collect::<Vec<_>>(), pieces.keys().collect::<Vec<_>>());
+    let differ: Vec<&String> = whole.keys().filter(|name| whole[*name] != pieces[*name]).collect();
+    assert!(differ.is_empty(), "{differ:?}");
+}
+
+#[test]
+fn a_series_of_many_rows_is_that_of_a_straight_run_however_often_it_is_interrupted() {
+    // 25 000 rows of 88 bytes.
+    same_in_pieces(Spec { points: 34, series: Some(4e-5), snapshots: vec![0.0, 0.5], ..Spec::default() }, "series.csv");
+}
+
+#[test]
+fn a_store_of_many_snapshots_is_that_of_a_straight_run_however_often_it_is_interrupted() {
+    let snapshots = (0..=1500).map(|i| f64::from(i) / 1500.0).collect();
+    let spec = Spec { points: 34, snapshots, store: Store::Zarr, ..Spec::default() };
+    same_in_pieces(spec, "snapshots.zarr/x/c.0.0.0");
+}
