@@ -18,24 +18,25 @@ use crate::{
     error::{Error, Result},
     report::{gallery::MOST_PANELS, tally::Rate},
     schedule::Clock,
-    scheme::decay,
-    simulate::{MOST_HELD, simulate},
+    scheme::{decay, state::STATE_FIELDS},
+    simulate::{MOST_HELD, simulate, states_at_once},
 };
 
 /// Time for the pilots of all companies.
 const PILOT: Duration = Duration::from_secs(2);
 /// Companies that have a pilot, at most: each gets its share of the time, and less would show nothing.
 const MOST_PILOTS: usize = 20;
-/// The first pilot has this share of the slots: on the CPU a vector of members for each thread.
-const FIRST_SHARE: usize = 8;
 /// Share of the time left that a larger pilot is to take; it may take longer than foreseen.
 const FILLED: f64 = 0.6;
 
 /// The program with nothing to do, in bytes.
 const PROGRAM_BYTES: u64 = 10_000_000;
-/// Numbers that a resident member takes a node: its state on the back end and the one at its start on the host, of
-/// 18 each, with what surrounds them. Measured, as the next one is.
-const POOL_NUMBERS: usize = 68;
+/// Numbers that a resident member takes a node: its state on the back end, and its nodes at the start on the host.
+const POOL_NUMBERS: usize = STATE_FIELDS + 4;
+/// The same while the state of the run is kept: the member as it was paused, and its bytes.
+const KEPT_NUMBERS: usize = 2 * STATE_FIELDS;
+/// A run that is longer has its state kept before it ends, in seconds.
+const FIRST_STATE: f64 = 5.0;
 /// Bytes of the page and its pictures a node, up to as many nodes as are drawn.
 const PAGE_BYTES: usize = 25_000;
 /// Copies of the nodes of the members that are drawn.
@@ -128,6 +129,7 @@ impl Estimate {
         // Companies without a pilot are like those that have one.
         let scale = members as f64 / total.members.max(1.0);
         start_up *= every as f64;
+        let seconds = total.seconds.map(|seconds| scale * seconds);
         Ok(Estimate {
             members,
             cells: cells.len(),
@@ -138,13 +140,14 @@ impl Estimate {
                 [slots, resident],
                 rows,
                 cells[0].spec.points,
+                seconds.is_none_or(|seconds| seconds > FIRST_STATE),
             ),
             platform,
             slots,
             steps_per_member: total.steps.map(|steps| steps / total.members.max(1.0)),
             dispatches: total.dispatches.map(|dispatches| (scale * dispatches).ceil() as u64),
             start_up_seconds: start_up,
-            seconds: total.seconds.map(|seconds| scale * seconds),
+            seconds,
             pilot,
         })
     }
@@ -224,7 +227,7 @@ fn sample(
     let own: Vec<Option<Vec<u64>>> = company.iter().map(|cell| cell.spec.only.clone()).collect();
     let all: u64 = company.iter().map(|cell| cell.spec.member_count()).sum();
     let mut pilots: Vec<Seen> = Vec::new();
-    let mut count = (backend.slots().div_ceil(FIRST_SHARE) as u64).min(all);
+    let mut count = (backend.abreast() as u64).min(all);
     loop {
         choose(company, &own, all, count);
         let mut seen = Seen::new(count, until);
@@ -316,13 +319,13 @@ fn choose(company: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) 
 
 /// Peak resident size of a run of `members` of `n` nodes, in bytes, from that of this process, which had `resident` of
 /// up to `slots` members in its pool. A member has `rows` bytes of rows at its end, and had in this process: above
-/// [`MOST_HELD`] for all of the pool they go to disk.
+/// [`MOST_HELD`] for all of the pool they go to disk. Its state may be `kept` on the way.
 ///
 /// The peak is at the end of the run, with a full pool and the tally, or after that, with the statistics and the charts
 /// and without the pool. The tally has of each member its time and two numbers of its mesh, of half the size, and of the
 /// share `rated` its rate with that of theory. Times are sorted where they are, and rates one number at a time; in their
 /// place comes the one that is drawn. A chart sorts the numbers that it shows.
-fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2], n: usize) -> u64 {
+fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2], n: usize, kept: bool) -> u64 {
     let numbers = |count: usize| (count * size_of::<f64>()) as u64;
     let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
     let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MOST_PANELS);
@@ -339,7 +342,10 @@ fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2
     let full = usize::try_from(members).unwrap_or(usize::MAX).min(slots);
     let all_held = held(rows[0], full);
     let spilling = if all_held < MOST_HELD as u64 { 0 } else { SPILL_BYTES };
-    let running = pool(full) + portraits + all_held + spilling;
+    let read_back = |members: usize| numbers(STATE_FIELDS * n * members.min(states_at_once(n)));
+    // Members that are drawn are read back at each of their pictures.
+    let passing = if kept { numbers(KEPT_NUMBERS * n * full) + read_back(full) } else { read_back(drawn.min(full)) };
+    let running = pool(full) + passing + portraits + all_held + spilling;
     let reporting = PORTRAIT_COPIES as u64 * portraits + page + statistics;
     program + tally + running.max(reporting)
 }

@@ -161,6 +161,11 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
     Ok(())
 }
 
+/// As many states of `n` nodes as may be read back at once.
+pub fn states_at_once(n: usize) -> usize {
+    (BYTES_READ_BACK / (STATE_FIELDS * size_of::<f64>() * n)).max(1)
+}
+
 /// The resident members of a run.
 struct Pool<'a> {
     cells: &'a [Cell],
@@ -203,12 +208,17 @@ impl Pool<'_> {
         Ok(None)
     }
 
+    /// Nodes of a member.
+    fn points(&self) -> usize {
+        self.cells.first().map_or(1, |cell| cell.family.points())
+    }
+
     /// All members on their way; none of them is in a batch that is.
     fn pause(&self, backend: &mut dyn Backend) -> Result<BTreeMap<u64, Paused>> {
         let occupied = self.resident.iter().enumerate().filter_map(|(slot, own)| Some((slot, own.as_ref()?)));
         let occupied: Vec<_> = occupied.collect();
         let mut all = self.paused.clone();
-        for part in occupied.chunks(self.states_at_once().min(READ_BACK)) {
+        for part in occupied.chunks(states_at_once(self.points()).min(READ_BACK)) {
             let slots: Vec<usize> = part.iter().map(|(slot, _)| *slot).collect();
             for ((slot, (rank, trajectory)), state) in part.iter().zip(backend.states(&slots)?) {
                 all.insert(*rank, trajectory.pause(backend.counters(*slot), backend.report(*slot), &state));
@@ -226,13 +236,9 @@ impl Pool<'_> {
         sink: &mut dyn Sink,
     ) -> Result<()> {
         let occupied: Vec<usize> = slots.filter(|slot| self.resident[*slot].is_some()).collect();
-        occupied.chunks(self.states_at_once()).try_for_each(|part| self.collect_part(backend, part, queue, sink))
-    }
-
-    /// As many states as may be read back at once.
-    fn states_at_once(&self) -> usize {
-        let points = self.cells.first().map_or(1, |cell| cell.family.points());
-        (BYTES_READ_BACK / (STATE_FIELDS * size_of::<f64>() * points)).max(1)
+        occupied
+            .chunks(states_at_once(self.points()))
+            .try_for_each(|part| self.collect_part(backend, part, queue, sink))
     }
 
     fn collect_part(

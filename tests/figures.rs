@@ -236,12 +236,12 @@ fn a_wrong_request_writes_nothing() {
 #[test]
 fn a_second_figure_joins_the_first_with_force() {
     let home = made("fig1a");
-    fs::write(home.path().join("out/run.json"), "mine").unwrap();
+    fs::write(home.path().join("out/notes.txt"), "mine").unwrap();
     let output = figure(home.path(), "fig1b --out out --force");
     let [said, notes] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
     assert!(output.status.success(), "{notes}");
     assert!(said.contains("fig1b   ellipse:2,1  surface-diffusion") && said.contains("fig1b.svg, fig1b.csv"), "{said}");
     assert!(notes.contains("solved directly"), "{notes}");
-    let all = ["fig1a.csv", "fig1a.svg", "fig1b.csv", "fig1b.svg", "run.json"];
+    let all = ["fig1a.csv", "fig1a.svg", "fig1b.csv", "fig1b.svg", "notes.txt"];
     assert_eq!(listing(&home.path().join("out")), all);
 }

@@ -25,6 +25,11 @@ pub trait Backend {
     /// How many members are resident at once.
     fn slots(&self) -> usize;
 
+    /// How many members are advanced at the same time, about: fewer leave some of the machine idle.
+    fn abreast(&self) -> usize {
+        self.slots().div_ceil(8)
+    }
+
     /// Puts a member into a slot, in place of whatever was there.
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()>;
 

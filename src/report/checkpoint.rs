@@ -161,7 +161,13 @@ pub fn to_bytes(head: &Head, standing: &Standing, resident: &BTreeMap<u64, Pause
 
 /// A file of this version of the program with this body.
 pub fn sealed_body(body: &impl Serialize) -> postcard::Result<Vec<u8>> {
-    sealed(|bytes| postcard::to_extend(&(env!("CARGO_PKG_VERSION"), body), bytes))
+    let body = (env!("CARGO_PKG_VERSION"), body);
+    let size = postcard::experimental::serialized_size(&body)?;
+    sealed(|mut bytes| {
+        // A state may be large: no more room for it than it takes.
+        bytes.reserve_exact(size + AFTER);
+        postcard::to_extend(&body, bytes)
+    })
 }
 
 /// A file with the body that `write` appends to its beginning.

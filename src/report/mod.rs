@@ -292,11 +292,12 @@ impl Report {
         let warnings = &[early, &tally.warnings()].concat();
         let complete = Complete { spec, platform, tally, films: &films, warnings, started: *started, wall };
         let published = complete.publish(&folder, files, store, shard.as_deref(), form);
-        let text =
-            published.and_then(|text| folder.forget_states().map(|()| text)).map_err(|error| folder.explain(error))?;
-        // No state refers to it any more.
-        spill.iter().for_each(|spill| spill.keep(false));
-        Ok(text)
+        let done = published.and_then(|text| folder.forget_states().map(|()| text));
+        if done.is_ok() {
+            // No state refers to it any more.
+            spill.iter().for_each(|spill| spill.keep(false));
+        }
+        done.map_err(|error| folder.explain(error))
     }
 }
 

@@ -54,9 +54,9 @@ impl Spill {
     /// # Errors
     /// [`Error::Failed`] where others lie there than were added.
     pub fn read(&mut self, extent: &Extent) -> Result<(Vec<SeriesRow>, Vec<Snapshot>)> {
-        let path = self.file.part();
+        let place = self.file.part();
         let changed = || {
-            let path = path.shown().display();
+            let path = place.shown().display();
             Error::Failed(format!("{path}: it has not the rows that were written; run again with --force"))
         };
         let Extent { at, length, crc } = *extent;
@@ -65,7 +65,7 @@ impl Spill {
         }
         let mut bytes = vec![0; usize::try_from(length).map_err(|_| changed())?];
         let read = self.reader.seek(SeekFrom::Start(at)).and_then(|_| self.reader.read_exact(&mut bytes));
-        read.map_err(path.io("cannot read"))?;
+        read.map_err(place.io("cannot read"))?;
         match postcard::from_bytes(&bytes) {
             Ok(rows) if crc32c::crc32c(&bytes) == crc => Ok(rows),
             _ => Err(changed()),

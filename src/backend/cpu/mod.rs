@@ -141,6 +141,10 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
         self.slots
     }
 
+    fn abreast(&self) -> usize {
+        self.crew.lanes() * self.threads()
+    }
+
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
         *self.place(slot) = Some(Box::new(run.convert()));
         Ok(())
