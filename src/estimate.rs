@@ -42,7 +42,7 @@ const PAGE_BYTES: usize = 25_000;
 /// Copies of the nodes of the members that are drawn.
 const PORTRAIT_COPIES: usize = 3;
 /// Bytes besides where rows go to disk before their members leave: as they are written and read again. Measured.
-const SPILL_BYTES: u64 = 24_000_000;
+const SPILL_BYTES: u64 = 6_000_000;
 
 /// What a run will take.
 #[derive(Clone, Debug, Serialize)]

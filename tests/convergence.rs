@@ -107,18 +107,31 @@ fn a_wrong_request_is_refused_by_name() {
     assert_eq!(fs::read_dir(home.path()).unwrap().count(), 1);
 }
 
-/// With --force the files of an earlier run do not stay beside those of this command.
+/// --force replaces what this command wrote, and nothing of another one.
 #[test]
 fn a_folder_holds_the_files_of_one_command() {
     let home = TempDir::new().unwrap();
-    fs::create_dir(home.path().join("out")).unwrap();
+    let out = home.path().join("out");
+    let names = || {
+        let entries = fs::read_dir(&out).unwrap();
+        let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    };
+    fs::create_dir(&out).unwrap();
     for name in ["run.json", "summary.csv", "mine.txt"] {
-        fs::write(home.path().join("out").join(name), "old").unwrap();
+        fs::write(out.join(name), "old").unwrap();
     }
-    let output = convergence(&home, "--problem ellipse-area --backend cpu --quiet --force --out out");
+    let force = "--problem ellipse-area --backend cpu --quiet --force --out out";
+    let output = convergence(&home, force);
+    let said = text(output.stderr);
+    assert!(output.status.code() == Some(2) && said.contains("curvelax run wrote run.json there"), "{said}");
+    assert_eq!(names(), ["mine.txt", "run.json", "summary.csv"]);
+    fs::remove_file(out.join("run.json")).unwrap();
+    fs::remove_file(out.join("summary.csv")).unwrap();
+    fs::write(out.join("convergence.csv"), "old").unwrap();
+    let output = convergence(&home, force);
     assert_eq!(output.status.code(), Some(0), "{}", text(output.stderr));
-    let entries = fs::read_dir(home.path().join("out")).unwrap();
-    let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    assert_eq!(names, ["convergence.csv", "mine.txt"]);
+    assert_eq!(names(), ["convergence.csv", "mine.txt"]);
+    assert_ne!(fs::read_to_string(out.join("convergence.csv")).unwrap(), "old");
 }
