@@ -102,7 +102,7 @@ impl PartFolder {
 
     /// Returns once the names of all files in it are on disk, as their contents are.
     pub fn sync(&self) -> Result<()> {
-        self.below.iter().chain([&self.part]).try_for_each(|folder| sync_folder(folder))
+        self.below.iter().chain([&self.part]).try_for_each(sync_folder)
     }
 
     /// Gives the folder its final name, in the place of what an earlier run left there.
