@@ -75,7 +75,7 @@ pub struct Ticks {
 }
 
 impl Ticks {
-    /// Parts for a run to `t_end`, one of the [times](times) of a precision, in its numbers: ticks of about 2ε² of the end,
+    /// Parts for a run to `t_end`, one of the [`times`] of a precision, in its numbers: ticks of about 2ε² of the end,
     /// but never below its least normal number.
     pub fn new(t_end: f64, precision: Precision) -> Ticks {
         let epsilon = precision.epsilon();

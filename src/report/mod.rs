@@ -136,7 +136,7 @@ impl Report {
     /// Goes on with the report of an interrupted run; returns where that stood.
     ///
     /// # Errors
-    /// [`Error::Request`](crate::Error::Request) where its files are not those of `spec`.
+    /// [`Error::Request`] where its files are not those of `spec`.
     pub fn go_on(
         folder: OutputFolder,
         spec: &Spec,
