@@ -143,12 +143,14 @@ fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
     }
     let found = Gpu::list();
     let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
-    match Gpu::find(found, spec.adapter.as_deref()) {
-        Some((adapter, by_number)) => {
+    let (mut chosen, by_number) = Gpu::select(found, spec.adapter.as_deref());
+    match chosen.is_empty() {
+        false => {
+            let adapter = chosen.swap_remove(0);
             let number = by_number.then(|| spec.adapter.clone()).flatten();
             Ok(Choice { number, ..take(spec, n, adapter, "asked for".into())? })
         }
-        None => Err(no_adapter(spec.adapter.as_deref(), &names)),
+        true => Err(no_adapter(spec.adapter.as_deref(), &names)),
     }
 }
 

@@ -66,7 +66,7 @@ pub struct BenchArgs {
     /// Back ends [default: the CPU and every GPU adapter, software ones included]
     #[arg(long, value_name = "WHERE,...", value_delimiter = ',', value_parser = flags::word::<BackendChoice>(BACKENDS), help_heading = flags::MACHINE)]
     backend: Vec<BackendChoice>,
-    /// Part of the name of the GPU adapters to measure; with it the CPU only if --backend says so [default: all]
+    /// Part of the name, or number in `curvelax adapters`, of the GPU adapters to measure; with it the CPU only if --backend says so [default: all]
     #[arg(long, value_name = "NAME", help_heading = flags::MACHINE)]
     adapter: Option<String>,
     /// Number types [default: f64,f32]
@@ -153,9 +153,14 @@ pub fn bench(args: BenchArgs) -> Result<()> {
     let rows: Vec<Row> = cases.iter().map(Case::row).collect();
     if args.json {
         let benches = Benches { curvelax: env!("CARGO_PKG_VERSION"), seconds, repeats, rows: &rows };
-        return print_json(&benches);
+        print_json(&benches)?;
+    } else {
+        print(&table(&rows))?;
     }
-    print(&table(&rows))
+    match rows.iter().all(|row| row.failed.is_some()) {
+        false => Ok(()),
+        true => Err(Error::Failed("nothing was measured: every case failed".into())),
+    }
 }
 
 /// The specs of all cases, checked: a wrong key ends the command before anything is started.
@@ -216,10 +221,13 @@ fn places(args: &BenchArgs) -> Result<Vec<Place>> {
     let found = Gpu::list();
     let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
     let mut seen = HashSet::new();
-    for gpu in found.iter().filter(|gpu| gpu.matches(args.adapter.as_deref())) {
+    let (chosen, by_number) = Gpu::select(found, args.adapter.as_deref());
+    for gpu in &chosen {
         if seen.insert(gpu.name()) {
             let enough = if gpu.is_hardware() { CURVES } else { CURVES_IN_SOFTWARE };
-            let (adapter, curves) = (Some(gpu.name().to_string()), args.curves.unwrap_or(enough));
+            // Of two adapters of one name the name would be the first.
+            let adapter = args.adapter.clone().filter(|_| by_number).or_else(|| Some(gpu.name().to_string()));
+            let curves = args.curves.unwrap_or(enough);
             places.push(Place { backend: BackendChoice::Gpu, adapter, curves });
         }
     }

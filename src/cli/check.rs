@@ -61,7 +61,7 @@ const KERNELS: usize = Solver::ALL.len() * SIZES.len() * Kind::ALL.len();
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct CheckArgs {
-    /// Part of the name of the adapter to check [default: all]
+    /// Part of the name, or number in `curvelax adapters`, of the adapter to check [default: all]
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// No remarks on stderr
@@ -101,7 +101,7 @@ struct Checks {
 pub fn check(args: CheckArgs) -> Result<()> {
     let found = Gpu::list();
     let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
-    let chosen: Vec<Gpu> = found.into_iter().filter(|gpu| gpu.matches(args.adapter.as_deref())).collect();
+    let (chosen, _) = Gpu::select(found, args.adapter.as_deref());
     if chosen.is_empty() {
         return Err(match args.adapter {
             Some(name) => no_adapter(Some(&name), &names),

@@ -164,9 +164,9 @@ impl Work {
         choice.platform(&self.cells[range.start].spec)
     }
 
-    /// What the user should know about the curves of all cells, each sentence once.
+    /// What the user should know about all cells, each sentence once.
     fn warnings(&self) -> Vec<String> {
-        let mut all: Vec<String> = self.cells.iter().flat_map(|cell| cell.family.warnings().iter().cloned()).collect();
+        let mut all: Vec<String> = self.cells.iter().flat_map(Cell::warnings).collect();
         all.sort();
         all.dedup();
         all
@@ -221,6 +221,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     }
     let flags = args.manner;
     if args.dry_run {
+        work.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
         let (companies, choices) = work.companies.into_iter().unzip();
         let estimate = Estimate::new(&mut work.cells, companies, choices)?;
         return match (flags.json, flags.quiet) {

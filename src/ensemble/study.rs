@@ -26,6 +26,9 @@ pub struct Cell {
     common: bool,
 }
 
+const LONG_SWEEPS: &str = "plain sweeps go on longer the longer the step, and adaptive steps grow: a solve may take tens of \
+                           thousands, where --solver multigrid takes some hundred and direct none";
+
 /// What members must have in common to be advanced side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Company {
@@ -67,6 +70,16 @@ impl Cell {
     pub fn member(&self, index: u64) -> Result<Member> {
         let drawn = if self.common { index - self.first } else { index };
         Ok(Member { index, cell: self.index, ..self.family.member(drawn)? })
+    }
+
+    /// What the user should know about it before it runs, a sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = self.family.warnings().to_vec();
+        let Company { solver, adaptive, .. } = self.company();
+        if adaptive && solver == Solver::GaussSeidel {
+            warnings.push(LONG_SWEEPS.into());
+        }
+        warnings
     }
 
     /// What it must have in common with others to run beside them.
@@ -156,6 +169,7 @@ pub fn companies(cells: &[Cell]) -> Vec<Range<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ensemble::spec::SolverChoice;
 
     fn swept(axes: &[&str], base: Spec) -> Spec {
         let mut spec = base;
@@ -179,6 +193,16 @@ mod tests {
             }
         }
         assert_ne!(cells[0].member(0).unwrap().nodes, cells[4].member(0).unwrap().nodes, "other modes");
+    }
+
+    #[test]
+    fn sweeps_that_take_long_are_warned_of_in_their_cells_alone() {
+        let cells = cells(&swept(&["solver=gauss-seidel,multigrid,direct", "adaptive=0.01"], Spec::default())).unwrap();
+        let warned: Vec<bool> = cells.iter().map(|cell| cell.warnings() == [LONG_SWEEPS]).collect();
+        assert_eq!(warned, [true, false, false]);
+        let fixed = Spec { solver: SolverChoice::GaussSeidel, ..Spec::default() }.validate().unwrap();
+        let family = Family::new(&fixed).unwrap();
+        assert!(Cell::only(fixed, family).warnings().is_empty());
     }
 
     #[test]

@@ -9,6 +9,7 @@ use std::{
 use crate::{
     backend::gpu::{
         Variant,
+        clock::Moment,
         pipeline::{self, Key},
         shader,
     },
@@ -32,6 +33,8 @@ pub struct Device {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     name: String,
+    /// Whether the process itself computes: a software GPU.
+    in_process: bool,
     fault: Arc<Mutex<Option<String>>>,
 }
 
@@ -121,16 +124,17 @@ impl Gpu {
     }
 
     /// Whether its name contains `part`, in any case; every name contains nothing.
-    pub fn matches(&self, part: Option<&str>) -> bool {
+    fn matches(&self, part: Option<&str>) -> bool {
         part.is_none_or(|part| self.name().to_lowercase().contains(&part.to_lowercase()))
     }
 
-    /// The first of `found` that [matches](Gpu::matches) `asked`, or that of this number, counted from 0; and whether it was
-    /// found by its number.
-    pub fn find(mut found: Vec<Gpu>, asked: Option<&str>) -> Option<(Gpu, bool)> {
-        let number = asked.and_then(|asked| asked.trim().parse::<usize>().ok()).filter(|number| *number < found.len());
-        let place = number.or_else(|| found.iter().position(|gpu| gpu.matches(asked)))?;
-        Some((found.swap_remove(place), number.is_some()))
+    /// Those of `found` that are asked for: the one of this number, counted from 0, or else all whose names contain it; and
+    /// whether it was a number.
+    pub fn select(mut found: Vec<Gpu>, asked: Option<&str>) -> (Vec<Gpu>, bool) {
+        match asked.and_then(|asked| asked.trim().parse::<usize>().ok()).filter(|number| *number < found.len()) {
+            Some(number) => (vec![found.swap_remove(number)], true),
+            None => (found.into_iter().filter(|gpu| gpu.matches(asked)).collect(), false),
+        }
     }
 
     /// `Vulkan`, `Metal` or `Dx12`.
@@ -224,7 +228,8 @@ impl Gpu {
         device.set_device_lost_callback(move |reason, message| {
             set(&at, &|_| one_line(&format!("the device was lost ({reason:?}) {message}")));
         });
-        Ok(Device { device, queue, name: self.name().to_string(), fault })
+        let in_process = self.info.device_type == wgpu::DeviceType::Cpu;
+        Ok(Device { device, queue, name: self.name().to_string(), in_process, fault })
     }
 }
 
@@ -238,6 +243,11 @@ pub(super) enum Waited {
 }
 
 impl Device {
+    /// This moment, from which the time of its work counts.
+    pub(super) fn now(&self) -> Moment {
+        Moment::now(self.in_process)
+    }
+
     /// Whether wgpu has reported a fault.
     pub fn check(&self) -> Result<()> {
         self.fault().map_or(Ok(()), |fault| Err(self.error(&fault)))

@@ -5,12 +5,13 @@
 
 use std::{
     sync::mpsc::{Receiver, channel},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use super::{
     adapter::{Device, Waited},
     budget::Budget,
+    clock::Moment,
     kernel::TRACE_FIELDS,
 };
 use crate::{
@@ -54,7 +55,7 @@ pub(super) struct Batch<T> {
 
 /// A dispatch on its way.
 struct Flight {
-    since: Instant,
+    since: Moment,
     back: Reading,
 }
 
@@ -154,11 +155,11 @@ impl<T: Real> Batch<T> {
         drop(pass);
         let Buffers { counters, reports, staging, .. } = &self.buffers;
         let reads = [counters, reports].map(|buffer| (buffer, 0, buffer.size()));
-        self.flight = Some(Flight { since: Instant::now(), back: Reading::submit(device, encoder, staging, &reads) });
+        self.flight = Some(Flight { since: device.now(), back: Reading::submit(device, encoder, staging, &reads) });
     }
 
     /// When what is on its way was started.
-    pub fn since(&self) -> Option<Instant> {
+    pub fn since(&self) -> Option<Moment> {
         self.flight.as_ref().map(|flight| flight.since)
     }
 
@@ -169,13 +170,13 @@ impl<T: Real> Batch<T> {
         !matches!(device.wait(&back.submission, most), Ok(Waited::OnItsWay))
     }
 
-    /// Waits for what was started, but no longer than `most`, and takes its records; returns when it was started.
-    pub fn finish(&mut self, device: &Device, most: Duration) -> Result<Option<Instant>> {
+    /// Waits for what was started, while there is time `left` for it, and takes its records; returns when it was started.
+    pub fn finish(&mut self, device: &Device, left: impl Fn(Moment) -> Duration) -> Result<Option<Moment>> {
         let Some(Flight { since, back }) = self.flight.take() else {
             self.forget_sweeps();
             return Ok(None);
         };
-        let bytes = back.wait(device, most, since)?;
+        let bytes = back.wait(device, since, left)?;
         let (counters, reports) = bytes.split_at(self.buffers.counters.size() as usize);
         let counters: Vec<Counters> = bytemuck::pod_collect_to_vec(counters);
         let reports: Vec<T> = bytemuck::pod_collect_to_vec(reports);
@@ -248,11 +249,13 @@ impl Reading {
         Reading { submission, staging: staging.clone(), bytes: at, mapped }
     }
 
-    /// Waits until it has arrived, but no longer than `most`; it is on its way `since` then.
-    pub fn wait(self, device: &Device, most: Duration, since: Instant) -> Result<Vec<u8>> {
-        if device.wait(&self.submission, most)? == Waited::OnItsWay {
-            let seconds = since.elapsed().as_secs_f64();
-            return Err(device.error(&format!("a dispatch did not end in {seconds:.3} s and is given up")));
+    /// Waits until it has arrived, while there is time `left`; it is on its way `since` then.
+    pub fn wait(self, device: &Device, since: Moment, left: impl Fn(Moment) -> Duration) -> Result<Vec<u8>> {
+        while device.wait(&self.submission, left(since))? == Waited::OnItsWay {
+            if left(since).is_zero() {
+                let seconds = since.elapsed().as_secs_f64();
+                return Err(device.error(&format!("a dispatch did not end in {seconds:.3} s and is given up")));
+            }
         }
         let failed = |what: String| device.error(&what);
         match self.mapped.try_recv() {

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use super::{
     adapter::{Device, Gpu},
     batch::{Batch, Reading, staging},
+    clock::Moment,
     shader::Variant,
 };
 use crate::{
@@ -25,8 +26,8 @@ use crate::{
 
 pub use super::{batch::DISPATCH_FIELDS, budget::Budget, pipeline::compile};
 
-/// A dispatch that takes longer than this is given up: drivers of hardware do so after some seconds, and one on lavapipe
-/// lasts a fraction of one.
+/// A dispatch that has had more time than this is given up: drivers of hardware do so after some seconds, and one on
+/// lavapipe lasts a fraction of one, or some while the driver compiles.
 const DISPATCH_LIMIT: Duration = Duration::from_secs(120);
 /// Slots of a batch at most; more members resident at once gain nothing.
 const MAX_SLOTS: usize = 8192;
@@ -50,7 +51,7 @@ pub struct Kernel<T> {
     fixed: bool,
     limit: Duration,
     /// When the last dispatch ended.
-    ended: Instant,
+    ended: Moment,
 }
 
 impl<T: Real> Kernel<T> {
@@ -100,6 +101,7 @@ impl<T: Real> Kernel<T> {
             let mebibytes = batches.iter().map(Batch::bytes).sum::<u64>().div_ceil(1 << 20);
             return Err(device.error(&format!("no room for {members} members of {n} points, {mebibytes} MiB: {fault}")));
         }
+        let ended = device.now();
         Ok(Kernel {
             gpu: device,
             pipeline,
@@ -111,7 +113,7 @@ impl<T: Real> Kernel<T> {
             most,
             fixed: false,
             limit: DISPATCH_LIMIT,
-            ended: Instant::now(),
+            ended,
         })
     }
 
@@ -137,8 +139,8 @@ impl<T: Real> Kernel<T> {
 
     /// What is left of the time of a batch that was started then. A device takes one dispatch after the other, so it works
     /// on this one from its start, or from the end of what was before it.
-    fn left(&self, since: Instant) -> Duration {
-        self.limit.saturating_sub(since.max(self.ended).elapsed())
+    fn left(&self, since: Moment) -> Duration {
+        self.limit.saturating_sub(since.later(self.ended).spent())
     }
 
     /// Overwrites the trace with NaN, so that nothing stale passes for a result.
@@ -163,8 +165,9 @@ impl<T: Real> Kernel<T> {
         }
         let staging = staging(&self.gpu.device, reads.iter().map(|read| read.2).sum());
         let encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let since = Instant::now();
-        let bytes = Reading::submit(&self.gpu, encoder, &staging, reads).wait(&self.gpu, self.limit, since)?;
+        let since = self.gpu.now();
+        let reading = Reading::submit(&self.gpu, encoder, &staging, reads);
+        let bytes = reading.wait(&self.gpu, since, |since| self.left(since))?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
@@ -211,17 +214,25 @@ impl<T: Real> Backend for Kernel<T> {
 
     fn is_back(&mut self, batch: usize, most: Duration) -> bool {
         let Some(since) = self.batches[batch].since() else { return true };
-        let left = self.left(since);
-        // One whose time is over is given up by `finish`.
-        self.batches[batch].is_back(&self.gpu, most.min(left)) || left <= most
+        let asked = Instant::now();
+        loop {
+            let slice = most.saturating_sub(asked.elapsed()).min(self.left(since));
+            // One whose time is over is given up by `finish`.
+            if self.batches[batch].is_back(&self.gpu, slice) || self.left(since).is_zero() {
+                return true;
+            }
+            if asked.elapsed() >= most {
+                return false;
+            }
+        }
     }
 
     fn finish(&mut self, batch: usize) -> Result<()> {
-        let left = self.batches[batch].since().map_or(self.limit, |since| self.left(since));
+        let (limit, ended) = (self.limit, self.ended);
+        let left = |since: Moment| limit.saturating_sub(since.later(ended).spent());
         let Some(since) = self.batches[batch].finish(&self.gpu, left)? else { return Ok(()) };
-        let now = Instant::now();
-        let took = now - since.max(self.ended);
-        self.ended = now;
+        let took = since.later(self.ended).elapsed();
+        self.ended = self.gpu.now();
         if !self.fixed {
             self.budget = self.budget.after(took, self.solver, self.most);
         }

@@ -3,6 +3,7 @@
 pub mod adapter;
 mod batch;
 mod budget;
+mod clock;
 pub mod kernel;
 mod nodes;
 mod pipeline;
