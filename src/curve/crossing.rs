@@ -46,9 +46,12 @@ fn search(points: &[DVec2], comparisons: u64) -> (Option<(usize, usize)>, u64) {
 /// A simple curve first touches itself where two strands of opposite directions meet, so until its nodes have gone half
 /// this far it stays simple, hairpins of less than three edges aside.
 pub fn clearance(points: &[DVec2], limit: f64) -> f64 {
-    let tree = BoxTree::over_edges(points);
+    let directions = BoxTree::over(points.len(), |i| {
+        let (a, b) = edge(points, i);
+        Bounds { low: b - a, high: b - a }
+    });
     let mut nearest = limit;
-    tree.nearest_opposed(1, 1, points, &mut nearest);
+    BoxTree::over_edges(points).nearest_opposed(1, 1, points, &directions, &mut nearest);
     nearest
 }
 
@@ -70,6 +73,13 @@ impl Bounds {
         (self.low - other.high).max(other.low - self.high).max(DVec2::ZERO).length()
     }
 
+    /// No vector of one box and vector of the other has a smaller dot product, not even a rounded one: rounding keeps order.
+    fn least_dot(self, other: Bounds) -> f64 {
+        let least = |x: [f64; 2], y: [f64; 2]| (x[0] * y[0]).min(x[0] * y[1]).min((x[1] * y[0]).min(x[1] * y[1]));
+        least([self.low.x, self.high.x], [other.low.x, other.high.x])
+            + least([self.low.y, self.high.y], [other.low.y, other.high.y])
+    }
+
     fn overlaps(self, other: Bounds) -> bool {
         self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
     }
@@ -83,11 +93,17 @@ struct BoxTree {
 
 impl BoxTree {
     fn over_edges(points: &[DVec2]) -> BoxTree {
-        let leaves = points.len().next_power_of_two();
-        let mut boxes = vec![Bounds::EMPTY; 2 * leaves];
-        for i in 0..points.len() {
+        BoxTree::over(points.len(), |i| {
             let (a, b) = edge(points, i);
-            boxes[leaves + i] = Bounds { low: a.min(b), high: a.max(b) };
+            Bounds { low: a.min(b), high: a.max(b) }
+        })
+    }
+
+    fn over(count: usize, leaf: impl Fn(usize) -> Bounds) -> BoxTree {
+        let leaves = count.next_power_of_two();
+        let mut boxes = vec![Bounds::EMPTY; 2 * leaves];
+        for i in 0..count {
+            boxes[leaves + i] = leaf(i);
         }
         for node in (1..leaves).rev() {
             boxes[node] = boxes[2 * node].union(boxes[2 * node + 1]);
@@ -111,9 +127,13 @@ impl BoxTree {
     }
 
     /// Lowers `nearest` to the distance of the opposed edges under `a` and `b`, two nodes of one level with `a <= b`.
-    fn nearest_opposed(&self, a: usize, b: usize, points: &[DVec2], nearest: &mut f64) {
+    /// `directions` bounds the edges as vectors: runs of a smooth curve that lie near each other mostly turn too little for
+    /// an opposed pair.
+    fn nearest_opposed(&self, a: usize, b: usize, points: &[DVec2], directions: &BoxTree, nearest: &mut f64) {
         // Empty boxes are infinitely far.
-        if self.boxes[a].distance(self.boxes[b]) >= *nearest {
+        if self.boxes[a].distance(self.boxes[b]) >= *nearest
+            || directions.boxes[a].least_dot(directions.boxes[b]) >= 0.0
+        {
             return;
         }
         if a >= self.leaves {
@@ -126,11 +146,11 @@ impl BoxTree {
             }
             return;
         }
-        self.nearest_opposed(2 * a, 2 * b, points, nearest);
-        self.nearest_opposed(2 * a + 1, 2 * b + 1, points, nearest);
-        self.nearest_opposed(2 * a, 2 * b + 1, points, nearest);
+        self.nearest_opposed(2 * a, 2 * b, points, directions, nearest);
+        self.nearest_opposed(2 * a + 1, 2 * b + 1, points, directions, nearest);
+        self.nearest_opposed(2 * a, 2 * b + 1, points, directions, nearest);
         if a != b {
-            self.nearest_opposed(2 * a + 1, 2 * b, points, nearest);
+            self.nearest_opposed(2 * a + 1, 2 * b, points, directions, nearest);
         }
     }
 }
