@@ -112,7 +112,9 @@ impl Drawn {
         sometimes(" --series 0.061", 2);
         sometimes(" --snapshots 0,0.02,0.15", 2);
         sometimes(" --store zarr", 4);
-        sometimes(" --max-sweeps 40", 6);
+        let few = random.below(6) == 0;
+        // A member that only stalls makes tens of thousands of steps, each with as many sweeps as it may.
+        rest.push_str(if few { " --max-sweeps 40" } else { " --max-sweeps 400" });
         let common = random.below(3) == 0;
         if common {
             rest.push_str(" --common-random-numbers");
