@@ -3,9 +3,9 @@
 //!     cargo run --release --example ensemble
 
 use curvelax::{
-    backend,
     ensemble::{Cell, Ended, Family, Sink, Spec},
     flow::Flow,
+    placement,
     simulate::simulate,
 };
 
@@ -25,7 +25,7 @@ fn main() -> curvelax::Result<()> {
     let spec = spec.validate()?;
     let family = Family::new(&spec)?;
 
-    let choice = backend::choose(&spec, family.points())?;
+    let choice = placement::choose(&spec, family.points())?;
     println!("{}", choice.sentence(&spec));
     let precision = choice.precision();
     let (mut backend, _) = choice.open(&spec, family.points())?;

@@ -3,8 +3,8 @@
 //!     cargo run --release --example one_curve
 
 use curvelax::{
-    backend,
     ensemble::{Cell, Ended, Family, Sink, Spec},
+    placement,
     simulate::simulate,
 };
 
@@ -26,7 +26,7 @@ impl Sink for Print {
 fn main() -> curvelax::Result<()> {
     let spec = Spec { curves: 1, amplitude: 0.0, series: Some(0.25), ..Spec::default() }.validate()?;
     let family = Family::new(&spec)?;
-    let choice = backend::choose(&spec, family.points())?;
+    let choice = placement::choose(&spec, family.points())?;
     let precision = choice.precision();
     let (mut backend, _) = choice.open(&spec, family.points())?;
     simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 0, &mut Print)

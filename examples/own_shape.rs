@@ -5,9 +5,9 @@
 use std::f64::consts::TAU;
 
 use curvelax::{
-    backend,
     curve::{BaseCurve, Outline},
     ensemble::{Cell, Ended, Family, Sink, Spec, spec::Pull},
+    placement,
     simulate::simulate,
 };
 use glam::DVec2;
@@ -60,7 +60,7 @@ fn main() -> curvelax::Result<()> {
         };
         let spec = spec.validate()?;
         let family = Family::of(&spec, curve)?;
-        let choice = backend::choose(&spec, family.points())?;
+        let choice = placement::choose(&spec, family.points())?;
         let precision = choice.precision();
         let (mut backend, _) = choice.open(&spec, family.points())?;
         simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 1, &mut Print(name))?;

@@ -8,11 +8,12 @@
 use std::time::{Duration, Instant};
 
 use crate::{
-    backend::{self, Backend, Platform},
+    backend::Backend,
     curve::Modes,
     ensemble::{Family, Spec, Status},
     error::{Error, Result},
     number::BIG,
+    placement::{self, Platform},
     schedule::Outputs,
     scheme::{
         evolve::Run,
@@ -74,7 +75,7 @@ impl Bench {
     /// [`Error::Request`] when the back end cannot do it, [`Error::Device`] when it fails, [`Error::Failed`] when a
     /// member does.
     pub fn open(spec: &Spec, window: Duration) -> Result<Bench> {
-        let choice = backend::choose(spec, spec.points)?;
+        let choice = placement::choose(spec, spec.points)?;
         let precision = choice.precision();
         let family = Family::new(spec)?;
         let count = usize::try_from(spec.curves).unwrap_or(usize::MAX);

@@ -13,10 +13,15 @@ use std::{
 use serde::Serialize;
 
 use crate::{
-    backend::{Backend, Choice, Platform},
-    ensemble::{Cell, Ended, Extent, Portrait, SeriesRow, Sink, Snapshot, Spec, rows, spec::Pace, spec::Precision},
+    backend::Backend,
+    ensemble::{
+        Cell, Ended, Extent, Portrait, SeriesRow, Sink, Snapshot, Spec, rows,
+        spec::{Pace, Precision},
+    },
     error::{Error, Result},
-    report::{gallery::MOST_PANELS, tally::Rate},
+    placement::{Choice, Platform},
+    report::gallery::MOST_PANELS,
+    results::tally::Rate,
     schedule::Clock,
     scheme::{decay, state::STATE_FIELDS},
     simulate::{MOST_HELD, simulate, states_at_once},
@@ -426,7 +431,7 @@ mod tests {
         let spec = Spec { curves: 10_000_000, adaptive: Some(1e-3), stop_when_relaxed: true, ..Spec::default() };
         let spec = Spec { backend: crate::ensemble::spec::BackendChoice::Cpu, points: 32, ..spec }.validate().unwrap();
         let mut cells = cells(spec.clone());
-        let choice = crate::backend::choose(&spec, spec.points).unwrap();
+        let choice = crate::placement::choose(&spec, spec.points).unwrap();
         let only_cell = std::iter::once(0..1).collect();
         let estimate = Estimate::new(&mut cells, only_cell, vec![choice]).unwrap();
         assert_eq!((estimate.members, estimate.cells), (10_000_000, 1));

@@ -11,17 +11,15 @@
 //! bounds the distance to sweeps of the default tolerance.
 
 use crate::{
-    backend,
     curve::Sampling,
+    draw::plot::{Curve, Panel, Plot, short},
     ensemble::{
         Cell, Ended, Family, Sink, Spec,
         spec::{BackendChoice, Precision, Solver},
     },
     error::{Error, Result},
-    report::{
-        plot::{Curve, Panel, Plot, short},
-        progress::Progress,
-    },
+    placement,
+    report::progress::Progress,
     simulate::simulate,
 };
 
@@ -155,7 +153,7 @@ impl Figure {
     /// [`Error::Failed`] if the curve does not get to the last time.
     pub fn simulate(&self, spec: &Spec, progress: Progress) -> Result<Ended> {
         let family = Family::new(spec)?;
-        let choice = backend::choose(spec, family.points())?;
+        let choice = placement::choose(spec, family.points())?;
         let precision = choice.precision();
         let (mut backend, _) = choice.open(spec, family.points())?;
         let mut only = Only { ended: None, progress };

@@ -9,10 +9,7 @@ use std::{
 };
 
 use curvelax::{
-    backend::{
-        choose::MAX_POINTS_F32,
-        gpu::{Gpu, Kernel, Variant, kernel::Budget},
-    },
+    backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
         Row, Tamper, adaptive_members,
         compare::{Left, adaptive, on_gpu, on_gpu_by, runs, stages},
@@ -20,6 +17,7 @@ use curvelax::{
     },
     ensemble::{Cell, Ended, Family, Sink, Spec, Status, spec::Precision},
     number::Real,
+    placement::MAX_POINTS_F32,
     scheme::{
         State,
         evolve::{Run, Team, evolve},

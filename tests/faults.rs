@@ -14,7 +14,7 @@ use std::{
 use curvelax::{
     Error,
     backend::{
-        self, Backend,
+        Backend,
         cpu::{CpuBackend, Vectorised, Vectors},
         gpu::{Gpu, Kernel, Variant, kernel::Budget},
     },
@@ -24,6 +24,7 @@ use curvelax::{
         spec::{BackendChoice, Precision, SolverChoice},
     },
     number::Real,
+    placement,
     scheme::{
         Parameters, State,
         evolve::Run,
@@ -444,7 +445,7 @@ fn a_cap_of_one_sweep(gpu: &Gpu) -> Outcome {
         ..Spec::default()
     };
     let spec = spec.validate()?;
-    let choice = backend::choose(&spec, spec.points)?;
+    let choice = placement::choose(&spec, spec.points)?;
     let (mut backend, _) = choice.open(&spec, spec.points)?;
     // The run has the cap that it asked for.
     let mut all = All::default();
@@ -458,8 +459,8 @@ fn a_cap_of_one_sweep(gpu: &Gpu) -> Outcome {
 fn lost_before(gpu: &Gpu) -> Outcome {
     let adapter = Some(gpu.name().to_string());
     let spec = Spec { backend: BackendChoice::Gpu, adapter, curves: 3, t_end: 0.01, ..Spec::default() }.validate()?;
-    let choice = || -> Result<backend::Choice, Failed> {
-        let choice = backend::choose(&spec, spec.points)?;
+    let choice = || -> Result<placement::Choice, Failed> {
+        let choice = placement::choose(&spec, spec.points)?;
         let gpu = choice.gpu().ok_or("no GPU")?;
         let blocks = Blocks::new(spec.points).ok_or("n")?;
         let _ = gpu.pipeline::<f64>(blocks, gpu.capacity().variant(blocks, spec.solver()))?;
@@ -492,8 +493,8 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     named(later.open(&spec, spec.points), gpu, "the device was lost")
 }
 
-fn choice_like(spec: &Spec) -> curvelax::Result<backend::Choice> {
-    backend::choose(spec, spec.points)
+fn choice_like(spec: &Spec) -> curvelax::Result<placement::Choice> {
+    placement::choose(spec, spec.points)
 }
 
 fn no_room(gpu: &Gpu) -> Outcome {

@@ -8,7 +8,6 @@ mod common;
 use std::f64::consts::TAU;
 
 use curvelax::{
-    backend::{self, choose::MAX_POINTS_F32},
     curve::{BaseCurve, Sampling, Shape, polygon},
     ensemble::{
         Cell, Ended, Family, Outcome, Sink, Spec, Status,
@@ -16,6 +15,7 @@ use curvelax::{
     },
     flow::Flow,
     number::Real,
+    placement::{self, MAX_POINTS_F32},
     scheme::{
         Parameters, State,
         evolve::{Run, Team, evolve},
@@ -42,7 +42,7 @@ impl Sink for Last {
 fn relaxed(spec: &Spec, curve: impl Fn(f64) -> DVec2 + Send + Sync + 'static) -> (Outcome, Vec<DVec2>) {
     let spec = spec.clone().validate().unwrap();
     let family = Family::of(&spec, BaseCurve::from_formula(curve)).unwrap();
-    let choice = backend::choose(&spec, spec.points).unwrap();
+    let choice = placement::choose(&spec, spec.points).unwrap();
     let precision = choice.precision();
     let (mut backend, _) = choice.open(&spec, spec.points).unwrap();
     let mut last = Last(None);

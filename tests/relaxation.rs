@@ -8,7 +8,6 @@ mod common;
 use std::{collections::BTreeMap, f64::consts::TAU, time::Instant};
 
 use curvelax::{
-    backend,
     curve::{BaseCurve, Sampling, crossing, polygon},
     ensemble::{
         Cell, Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
@@ -16,6 +15,7 @@ use curvelax::{
     },
     flow::Flow,
     number::Real,
+    placement,
     schedule::{Outputs, Ticks},
     scheme::{
         Parameters, State,
@@ -57,7 +57,7 @@ fn run(spec: &Spec) -> Vec<Ended> {
 fn run_of(spec: &Spec, curve: BaseCurve) -> Vec<Ended> {
     let spec = spec.clone().validate().unwrap();
     let family = Family::of(&spec, curve).unwrap();
-    let choice = backend::choose(&spec, family.points()).unwrap();
+    let choice = placement::choose(&spec, family.points()).unwrap();
     let precision = choice.precision();
     let (mut backend, _) = choice.open(&spec, family.points()).unwrap();
     let mut all = All::default();

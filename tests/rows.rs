@@ -4,14 +4,16 @@
 use std::{collections::BTreeMap, fs, path::Path, time::Duration};
 
 use curvelax::{
-    Error, Result, backend,
+    Error, Result,
     ensemble::{
         Cell, Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Wish,
         spec::{BackendChoice, Store},
         study,
     },
+    files::OutputFolder,
+    placement,
     report::{
-        Form, Manner, OutputFolder, Report, Stop,
+        Form, Manner, Report, Stop,
         checkpoint::{self, Origin},
     },
     simulate::go_on,
@@ -72,7 +74,7 @@ fn manner() -> Manner {
 /// often rows were handed over.
 fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
     let mut cells: Vec<Cell> = study::cells(spec)?;
-    let choice = backend::choose(spec, spec.points)?;
+    let choice = placement::choose(spec, spec.points)?;
     cells.iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
     let spec = cells[0].spec.clone();
     let origin = Origin::new(spec.to_toml()?, &cells, choice.platform(&spec))?;

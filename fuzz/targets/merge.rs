@@ -14,16 +14,15 @@ use std::{
 };
 
 use curvelax::{
-    backend::Platform,
     ensemble::{Shard, Spec, spec::Precision},
+    files::{names, part_file::Mark},
+    placement::Platform,
     report::{
         checkpoint::{Head, Origin, sealed},
-        folder,
         merge::{Shards, join_rows},
-        part_file::Mark,
         shard::{Found, Part, Record, from_bytes, look, to_bytes},
-        tally::Aside,
     },
+    results::tally::Aside,
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -51,12 +50,12 @@ fn state(body: &[u8]) {
     assert_eq!(format!("{record:?}"), format!("{:?}", from_bytes(&again).expect("its own bytes")));
     SHARDS.with_borrow_mut(|shards| {
         let [one, other] = shards;
-        one.hold(folder::SHARD, &again);
+        one.hold(names::SHARD, &again);
         // Beside a right one, which it may be of the same study with.
         let found = [&*one, other].into_iter().map(|shard| look(&shard.path)).collect::<Result<Vec<_>, _>>();
         one_line(found.and_then(Shards::new).map(|shards| shards.told()));
         let record = one.record.clone();
-        one.hold(folder::SHARD, &to_bytes(&record.head, record.points, &record.warnings).expect("bytes"));
+        one.hold(names::SHARD, &to_bytes(&record.head, record.points, &record.warnings).expect("bytes"));
     });
 }
 
@@ -66,7 +65,7 @@ fn tables(shards: &mut [Folder; 2], text: &[u8], told: bool) {
     let texts = [&text[..end], text.get(end + 1..).unwrap_or_default()];
     let parts = [0, 1].map(|i| shards[i].part(texts[i], told));
     let mut joined = Vec::new();
-    if one_line(join_rows(&parts, folder::SUMMARY, &mut joined, Path::new("joined"))).is_some() {
+    if one_line(join_rows(&parts, names::SUMMARY, &mut joined, Path::new("joined"))).is_some() {
         let lines = |text: &[u8]| text.split_inclusive(|byte| *byte == b'\n').skip(1).map(<[u8]>::to_vec).collect();
         let member = |line: &Vec<u8>| line.split(|byte| *byte == b',').next().map(<[u8]>::to_vec);
         let number = |line: &Vec<u8>| String::from_utf8(member(line)?).ok()?.parse::<u64>().ok();
@@ -118,15 +117,15 @@ impl Folder {
             outlines: Vec::new(),
             started: Duration::ZERO,
         };
-        let tables = [folder::SUMMARY, folder::RATES].map(|name| Mark { name: name.into(), length: 0, crc: 0 }).into();
+        let tables = [names::SUMMARY, names::RATES].map(|name| Mark { name: name.into(), length: 0, crc: 0 }).into();
         let (wall, aside) = (Duration::ZERO, Aside::default());
         let head = Head { origin, wall, company: 0, tables, store: None, rows: None, aside, films: Vec::new() };
         let files =
-            [folder::SHARD, folder::SUMMARY, folder::RATES].map(|name| (name, File::create(path.join(name)).unwrap()));
+            [names::SHARD, names::SUMMARY, names::RATES].map(|name| (name, File::create(path.join(name)).unwrap()));
         let record = Record { head, points: 100, warnings: Vec::new() };
         let mut folder = Folder { path, record, shard, spec, files };
         let state = to_bytes(&folder.record.head, 100, &[]).unwrap();
-        folder.hold(folder::SHARD, &state);
+        folder.hold(names::SHARD, &state);
         assert!(matches!(look(&folder.path), Ok(Found::Done(_))), "a right shard is not taken");
         folder
     }
@@ -140,11 +139,11 @@ impl Folder {
 
     /// The shard with this table, of whose length and checksum it tells, or of others.
     fn part(&mut self, table: &[u8], told: bool) -> Part {
-        self.hold(folder::SUMMARY, table);
+        self.hold(names::SUMMARY, table);
         let (path, shard, spec) = (self.path.clone(), self.shard, self.spec.clone());
         let mut record = self.record.clone();
         let crc = crc32c::crc32c(table) ^ u32::from(!told);
-        record.head.tables = vec![Mark { name: folder::SUMMARY.into(), length: table.len() as u64, crc }];
+        record.head.tables = vec![Mark { name: names::SUMMARY.into(), length: table.len() as u64, crc }];
         Part { path, shard, spec, record }
     }
 }

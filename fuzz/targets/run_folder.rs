@@ -11,15 +11,19 @@ use std::{
     path::PathBuf,
 };
 
-use curvelax::report::{EnsembleStatistics, folder, reader::Finished, study::Study};
+use curvelax::{
+    files::names,
+    report::{reader::Finished, study::Study},
+    results::EnsembleStatistics,
+};
 use libfuzzer_sys::fuzz_target;
 
 /// The letter of each file, its place and what it holds unless the input says something else.
 const FILES: [(u8, &str, &[u8]); 4] = [
-    (b'r', folder::RUN, include_bytes!("../base/run.json")),
-    (b's', folder::SUMMARY, include_bytes!("../base/summary.csv")),
-    (b'm', folder::MEAN_EXCESS, include_bytes!("../base/mean_excess.csv")),
-    (b'p', folder::PORTRAITS, include_bytes!("../base/portraits.json")),
+    (b'r', names::RUN, include_bytes!("../base/run.json")),
+    (b's', names::SUMMARY, include_bytes!("../base/summary.csv")),
+    (b'm', names::MEAN_EXCESS, include_bytes!("../base/mean_excess.csv")),
+    (b'p', names::PORTRAITS, include_bytes!("../base/portraits.json")),
 ];
 
 /// Of this many runs that could be read one is drawn: that takes a thousand times as long.

@@ -3,11 +3,8 @@
 //! A back end knows nothing of an ensemble. It holds as many members as it has slots, takes each towards the
 //! step it is aimed at, and reports; [`simulate`](crate::simulate) fills, collects and refills.
 
-pub mod choose;
 pub mod cpu;
 pub mod gpu;
-
-pub use choose::{Choice, Platform, choose, choose_all};
 
 use std::time::Duration;
 

@@ -4,12 +4,13 @@ use serde::Serialize;
 
 use super::{flags, print, print_json};
 use crate::{
-    backend::{self, choose::MAX_POINTS_F32, gpu::Gpu},
+    backend::gpu::Gpu,
     ensemble::{
         Spec,
         spec::{BackendChoice, Precision},
     },
     error::Result,
+    placement::{self, MAX_POINTS_F32},
 };
 
 const EXAMPLES: &str = "\
@@ -64,7 +65,7 @@ struct Auto {
 pub fn adapters(args: AdaptersArgs) -> Result<()> {
     let spec = Spec::default();
     let adapters: Vec<Adapter> = Gpu::list().iter().map(|gpu| Adapter::new(gpu, &spec)).collect();
-    let choice = backend::choose(&spec, spec.points)?;
+    let choice = placement::choose(&spec, spec.points)?;
     let mut settled = spec.clone();
     choice.settle_place(&mut settled);
     let Spec { backend, adapter, precision, .. } = settled;

@@ -6,13 +6,14 @@ use serde::Serialize;
 
 use super::{flags, note, print, print_json};
 use crate::{
-    backend::{choose::no_adapter, gpu::Gpu},
+    backend::gpu::Gpu,
     bench::{self, Bench, Sample},
     ensemble::{
         Spec,
         spec::{BackendChoice, Precision, Solver},
     },
     error::{Error, Result},
+    placement::no_adapter,
 };
 
 const EXAMPLES: &str = "\

@@ -4,13 +4,11 @@ use serde::Serialize;
 
 use super::{flags, note, print, print_json};
 use crate::{
-    backend::{
-        choose::no_adapter,
-        gpu::{Gpu, kernel::Budget},
-    },
+    backend::gpu::{Gpu, kernel::Budget},
     conformance::{Row, adaptive, compare::MEMBERS, runs, stages},
     error::{Error, Result},
     number::Real,
+    placement::no_adapter,
     report::progress::Progress,
     solver::Solver,
 };

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use super::{flags, note, print};
 use crate::{
-    backend,
     ensemble::{
         Spec,
         spec::{BackendChoice, Precision, SolverChoice},
     },
     error::{Error, Result},
-    report::{OutputFolder, Owner, folder, tables},
+    files::{OutputFolder, Owner, names, tables},
+    placement,
     truth::{Problem, Row, problems, studies},
 };
 
@@ -69,7 +69,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
         ..Spec::default()
     };
     let mut method = spec.validate()?;
-    let choice = backend::choose(&method, method.points)?;
+    let choice = placement::choose(&method, method.points)?;
     // Settled once: adapters are looked for only now, and every run is of the same precision.
     choice.settle(&mut method);
     let folder = args.out.map(|out| open(&out, args.force)).transpose()?;
@@ -83,7 +83,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
         }
     }
     if let Some(folder) = folder {
-        let file = tables::convergence(folder.file(folder::CONVERGENCE)?, &rows)?;
+        let file = tables::convergence(folder.file(names::CONVERGENCE)?, &rows)?;
         folder.publish_all(vec![file])?;
     }
     if !args.quiet {
@@ -99,7 +99,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
 }
 
 fn open(out: &Path, force: bool) -> Result<OutputFolder> {
-    OutputFolder::open_for(out, force, Owner::Convergence, vec![folder::CONVERGENCE.into()])
+    OutputFolder::open_for(out, force, Owner::Convergence, vec![names::CONVERGENCE.into()])
 }
 
 /// Aligned, the problems apart; a run that ended early has its status in place of its error.

@@ -3,7 +3,8 @@
 use crate::{
     ensemble::Spec,
     estimate::Estimate,
-    report::{overview::machine, progress::duration, text::plural},
+    report::overview::machine,
+    text::{duration, plural},
 };
 
 /// The table.
@@ -43,7 +44,7 @@ fn size(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{backend::Platform, estimate::Pilot, number::Precision};
+    use crate::{estimate::Pilot, number::Precision, placement::Platform};
 
     #[test]
     fn an_estimate_looks_like_this() {

@@ -6,10 +6,12 @@ use clap::builder::PossibleValuesParser;
 
 use super::{note, print};
 use crate::{
+    draw::plot::short,
     ensemble::{Ended, Spec},
     error::Result,
     figures::{FIGURES, Figure, OMEGA, POINTS},
-    report::{OutputFolder, Owner, plot::short, progress::Progress, tables::SnapshotTable},
+    files::{OutputFolder, Owner, tables::SnapshotTable},
+    report::progress::Progress,
 };
 
 const EXAMPLES: &str = "\

@@ -8,12 +8,13 @@ use std::{
 use super::{flags, print, run::check_name};
 use crate::{
     error::{Error, Result},
+    files::OutputFolder,
     report::{
-        Form, OutputFolder,
+        Form,
         merge::{Shards, listed_ranges},
         shard,
-        text::plural,
     },
+    text::plural,
 };
 
 const EXAMPLES: &str = "\

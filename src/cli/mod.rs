@@ -31,7 +31,7 @@ use serde::Serialize;
 
 use crate::{
     error::{Error, Result, without_controls},
-    report::provenance::json,
+    results::provenance::json,
 };
 
 const EXAMPLES: &str = "\

@@ -5,7 +5,12 @@ use std::path::{Path, PathBuf};
 use super::{note, print};
 use crate::{
     error::Result,
-    report::{EnsembleStatistics, OutputFolder, Owner, folder, reader, reader::Finished, study::Study},
+    files::{OutputFolder, Owner, names},
+    report::{
+        reader::{self, Finished},
+        study::Study,
+    },
+    results::EnsembleStatistics,
 };
 
 const EXAMPLES: &str = "\
@@ -43,10 +48,10 @@ pub fn plot(args: PlotArgs) -> Result<()> {
         Some(out) => (out, args.force, Owner::PicturesOfRun),
         None => (&args.run, true, Owner::PicturesOfRun),
     };
-    let folder = OutputFolder::open_for(out, force, owner, folder::PICTURES.map(String::from).into())?;
+    let folder = OutputFolder::open_for(out, force, owner, names::PICTURES.map(String::from).into())?;
     let Finished { provenance, mut tally, excess, films } = Finished::read(&args.run)?;
     if films.is_empty() && !args.quiet {
-        note(&format!("note: no {} in {}: without pictures of members", folder::PORTRAITS, args.run.display()));
+        note(&format!("note: no {} in {}: without pictures of members", names::PORTRAITS, args.run.display()));
     }
     let statistics = &EnsembleStatistics::new(&provenance.spec, &mut tally)?;
     let study = Study { provenance: &provenance, tally: &tally, statistics, excess: &excess, films: &films };

@@ -10,10 +10,11 @@ use super::{
 use crate::{
     ensemble::{Spec, spec::BackendChoice},
     error::{Error, Result},
+    files::{OutputFolder, names},
     report::{
-        OutputFolder, Report,
+        Report,
         checkpoint::{self, Kept},
-        folder, reader,
+        reader,
     },
 };
 
@@ -62,7 +63,7 @@ pub fn resume(args: ResumeArgs) -> Result<()> {
 /// As those of [`resume`].
 pub fn begun(path: &Path) -> Result<Option<(OutputFolder, Option<Kept>)>> {
     let there = |name: &&str| path.join(name).exists();
-    if ![folder::STATE, folder::STATE_OLD, folder::RUN].iter().any(there) {
+    if ![names::STATE, names::STATE_OLD, names::RUN].iter().any(there) {
         return Ok(None);
     }
     let folder = OutputFolder::open_again(path)?;

@@ -8,15 +8,15 @@ use std::{
 
 use super::{dry_run, flags, note, print, print_json, resume, signals};
 use crate::{
-    backend::{self, Backend, Choice, Platform},
+    backend::Backend,
     ensemble::{Cell, Spec, Standing, study},
     error::{Error, Result},
     estimate::Estimate,
-    report::{
-        Existing, Form, Manner, OutputFolder, Report, Stop, checkpoint::Origin, folder, gallery::MOST_PANELS,
-        text::plural,
-    },
+    files::{Existing, OutputFolder, names},
+    placement::{self, Choice, Platform},
+    report::{Form, Manner, Report, Stop, checkpoint::Origin, gallery::MOST_PANELS},
     simulate::go_on,
+    text::plural,
 };
 
 const EXAMPLES: &str = "\
@@ -128,7 +128,7 @@ impl Work {
         let mut cells = study::cells(&spec)?;
         let ranges = study::companies(&cells);
         let first = |range: &Range<usize>| (&cells[range.start].spec, cells[range.start].spec.points);
-        let choices = backend::choose_all(&ranges.iter().map(first).collect::<Vec<_>>())?;
+        let choices = placement::choose_all(&ranges.iter().map(first).collect::<Vec<_>>())?;
         for (range, choice) in ranges.iter().zip(&choices) {
             cells[range.clone()].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
         }
@@ -206,7 +206,7 @@ impl Work {
                 "--strict: {failed} of {} {} ended neither relaxed nor unfinished; see `status` in {}",
                 spec.member_count(),
                 plural(spec.member_count(), "member"),
-                out.join(folder::SUMMARY).display()
+                out.join(names::SUMMARY).display()
             ))),
             _ => Ok(()),
         }

@@ -201,7 +201,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
-    use crate::ensemble::random::Stream;
+    use crate::random::Stream;
 
     #[test]
     fn the_clearance_is_that_of_all_pairs() {

@@ -9,7 +9,8 @@ use std::{f64::consts::TAU, sync::Arc};
 
 use glam::DVec2;
 
-use super::{Mollified, Spec, mollifier::mollify, random::Stream, spec::Pull};
+use super::{Mollified, Spec, mollifier::mollify, spec::Pull};
+use crate::random::Stream;
 use crate::{
     curve::{BaseCurve, Outline, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions, polygon},
     error::{Error, Result},

@@ -4,7 +4,6 @@
 pub mod member;
 pub mod mollifier;
 pub mod outcome;
-pub mod random;
 pub mod rows;
 mod seed;
 pub mod shard;

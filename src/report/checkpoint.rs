@@ -15,20 +15,21 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    disk,
-    folder::{OutputFolder, STATE, STATE_OLD},
-    part_file::Mark,
-    portraits::Film,
-    tally::Aside,
-    zarr,
-};
 use crate::{
-    backend::Platform,
     curve::{Outline, Shape},
     ensemble::{Cell, Ended, Paused, Standing},
     error::{Error, Result},
+    files::{
+        disk,
+        folder::OutputFolder,
+        names::{self, STATE, STATE_OLD},
+        part_file::Mark,
+        portraits::Film,
+        zarr,
+    },
     input,
+    placement::Platform,
+    results::tally::Aside,
 };
 
 const MAGIC: [u8; 16] = *b"curvelax state\r\n";
@@ -338,7 +339,7 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Kept>> {
     }
     match faults.is_empty() {
         // What is left to do of a run that is complete is nothing.
-        true if path.join(super::folder::RUN).is_file() => super::reader::provenance(path).map(|_| None),
+        true if path.join(names::RUN).is_file() => super::reader::provenance(path).map(|_| None),
         true => refuse("no run that was interrupted: it had not begun; curvelax run with --force begins it".into()),
         false => {
             refuse(format!("no state to go on from: {}; begin anew with curvelax run and --force", faults.join(", ")))
@@ -351,7 +352,7 @@ mod tests {
     use super::*;
     use crate::{
         ensemble::{Extent, Mollified, Rows, SeriesRow, Snapshot, Status},
-        report::{provenance::tests::platform, tally::tests::outcome},
+        results::{provenance::tests::platform, tally::tests::outcome},
         scheme::parameters::{Counters, Report},
     };
 

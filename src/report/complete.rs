@@ -2,24 +2,20 @@
 
 use std::time::Duration;
 
-use super::{
-    Form,
-    document::Document,
-    ensemble::EnsembleStatistics,
-    folder::{self, OutputFolder},
-    overview::Overview,
-    part_file::PartFile,
-    part_folder::PartFolder,
-    portraits::{self, Film},
-    provenance::Provenance,
-    study::Study,
-    tables,
-    tally::Tally,
-};
+use super::{Form, document::Document, overview::Overview, study::Study};
 use crate::{
-    backend::Platform,
     ensemble::Spec,
     error::{Error, Result},
+    files::{
+        folder::OutputFolder,
+        names,
+        part_file::PartFile,
+        part_folder::PartFolder,
+        portraits::{self, Film},
+        tables,
+    },
+    placement::Platform,
+    results::{cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
 };
 
 /// How the overview names the pictures.
@@ -61,22 +57,22 @@ impl Complete<'_> {
         let statistics = &EnsembleStatistics::new(spec, &mut tally)?;
         let tally = &tally;
         // The rows of the members are first: where the disk fills up they are what is kept.
-        files.push(folder.write(folder::ENSEMBLE, statistics.to_csv(spec)?)?);
+        files.push(folder.write(names::ENSEMBLE, statistics.to_csv(spec)?)?);
         let excess = &tally.mean_excess(spec)?;
-        files.push(tables::mean_excess(folder.file(folder::MEAN_EXCESS)?, excess)?);
+        files.push(tables::mean_excess(folder.file(names::MEAN_EXCESS)?, excess)?);
         if let Some(shard) = shard {
-            files.push(folder.write(folder::SHARD, shard)?);
+            files.push(folder.write(names::SHARD, shard)?);
         }
         let mut written: Vec<String> = files.iter().map(|file| file.name().to_string()).collect();
-        written.extend(store.iter().map(|_| folder::STORE.to_string()));
+        written.extend(store.iter().map(|_| names::STORE.to_string()));
         let is_written = |name: &&str| written.iter().any(|own| own == name);
-        let mut names: Vec<&str> = folder::TABLES.into_iter().filter(is_written).collect();
+        let mut names: Vec<&str> = names::TABLES.into_iter().filter(is_written).collect();
         let provenance = &Provenance::new(spec, platform, tally, warnings, started, wall);
-        let run = folder.write(folder::RUN, provenance.to_json()?)?;
+        let run = folder.write(names::RUN, provenance.to_json()?)?;
         let study = Study { provenance, tally, statistics, excess, films };
         let mut drawn = Vec::new();
         let done = (|| {
-            drawn.push(folder.write(folder::PORTRAITS, portraits::to_json(films)?)?);
+            drawn.push(folder.write(names::PORTRAITS, portraits::to_json(films)?)?);
             for (name, text) in study.pictures()? {
                 drawn.push(folder.write(name, text)?);
             }
@@ -91,8 +87,8 @@ impl Complete<'_> {
             let folder = folder.path().display();
             Error::Failed(format!("{error}; the tables in {folder} are complete, some pictures are missing"))
         })?;
-        names.extend([folder::REPORT, PLOTS, folder::RUN]);
-        names.extend(shard.map(|_| folder::SHARD));
+        names.extend([names::REPORT, PLOTS, names::RUN]);
+        names.extend(shard.map(|_| names::SHARD));
         let (folder, files) = (folder.path(), &names[..]);
         match form {
             Form::Overview => {

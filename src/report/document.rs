@@ -6,8 +6,8 @@ use std::{collections::BTreeMap, path::Path};
 use serde::Serialize;
 use toml::Value;
 
-use super::{
-    ensemble::{CellStatistics, EnsembleStatistics, Numbers},
+use crate::results::{
+    cells::{CellStatistics, EnsembleStatistics, Numbers},
     provenance::{Provenance, json},
 };
 use crate::{
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
     use crate::{
         ensemble::Outcome,
-        report::{
+        results::{
             provenance::tests::platform,
             tally::{Tally, tests::outcome},
         },

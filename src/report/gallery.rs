@@ -2,9 +2,9 @@
 
 use glam::DVec2;
 
-use super::{
-    portraits::Film,
-    svg::{Svg, closed_path, coordinate, dots},
+use crate::{
+    draw::svg::{Svg, closed_path, coordinate, dots},
+    files::portraits::Film,
 };
 
 /// More members than this are not drawn.
@@ -195,7 +195,7 @@ fn rounded(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ensemble::Status, report::portraits::tests::film};
+    use crate::{ensemble::Status, files::portraits::tests::film};
 
     /// Perturbed ellipses of different sizes that end as circles or part of the way there.
     fn films(count: u64, n: usize) -> Vec<Film> {

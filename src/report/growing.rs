@@ -1,17 +1,18 @@
 //! The files that grow as members end: tables, and the store of snapshots.
 
-use super::{
-    folder::{self, OutputFolder},
-    part_file::{Mark, PartFile},
-    part_folder::PartFolder,
-    place::Place,
-    spill::Spill,
-    tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable, Table},
-    zarr::{self, SnapshotStore},
-};
 use crate::{
     ensemble::{Ended, Extent, SeriesRow, Snapshot, Spec, spec::Store},
     error::{Error, Result},
+    files::{
+        folder::OutputFolder,
+        names,
+        part_file::{Mark, PartFile},
+        part_folder::PartFolder,
+        place::Place,
+        spill::Spill,
+        tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable, Table},
+        zarr::{self, SnapshotStore},
+    },
 };
 
 /// Those that a spec asks for.
@@ -31,9 +32,9 @@ impl Growing {
     /// Their names for `spec`, the store aside.
     pub fn names(spec: &Spec) -> Vec<&'static str> {
         let snapshots = !spec.snapshots.is_empty() && spec.store == Store::Csv;
-        let optional = [(folder::SERIES, spec.series.is_some()), (folder::SNAPSHOTS, snapshots)];
+        let optional = [(names::SERIES, spec.series.is_some()), (names::SNAPSHOTS, snapshots)];
         let asked = optional.into_iter().filter(|(_, asked)| *asked).map(|(name, _)| name);
-        [folder::SUMMARY, folder::RATES].into_iter().chain(asked).collect()
+        [names::SUMMARY, names::RATES].into_iter().chain(asked).collect()
     }
 
     /// Whether `spec` asks for the store.
@@ -44,7 +45,7 @@ impl Growing {
     /// Begins them; `points` is the number of nodes of a member, which matters only where all have the same.
     pub fn begin(folder: &OutputFolder, spec: &Spec, points: usize) -> Result<Growing> {
         let store = match Growing::has_store(spec) {
-            true => Some(SnapshotStore::begin(folder.store(folder::STORE)?, spec, points)?),
+            true => Some(SnapshotStore::begin(folder.store(names::STORE)?, spec, points)?),
             false => None,
         };
         Growing::of(spec, store, |name| folder.file(name))
@@ -70,11 +71,11 @@ impl Growing {
         if names != Growing::names(spec) || store.is_some() != Growing::has_store(spec) {
             return Err(others());
         }
-        names.extend(store.map(|_| folder::STORE));
-        names.extend(rows.map(|_| folder::ROWS));
+        names.extend(store.map(|_| names::STORE));
+        names.extend(rows.map(|_| names::ROWS));
         folder.keep_only(&names)?;
         let store = match store {
-            Some(mark) => Some(SnapshotStore::go_on(folder.store_again(folder::STORE)?, spec, points, mark)?),
+            Some(mark) => Some(SnapshotStore::go_on(folder.store_again(names::STORE)?, spec, points, mark)?),
             None => None,
         };
         let spill = rows.map(|mark| Spill::go_on(folder, mark)).transpose()?;
@@ -90,10 +91,10 @@ impl Growing {
         let names = Growing::names(spec);
         let asked = |name: &str| names.contains(&name).then(|| file(name)).transpose();
         Ok(Growing {
-            summary: Table::new(file(folder::SUMMARY)?)?,
-            rates: Table::new(file(folder::RATES)?)?,
-            series: asked(folder::SERIES)?.map(Table::new).transpose()?,
-            snapshots: asked(folder::SNAPSHOTS)?.map(Table::new).transpose()?,
+            summary: Table::new(file(names::SUMMARY)?)?,
+            rates: Table::new(file(names::RATES)?)?,
+            series: asked(names::SERIES)?.map(Table::new).transpose()?,
+            snapshots: asked(names::SNAPSHOTS)?.map(Table::new).transpose()?,
             store,
             spill: None,
             torn: false,

@@ -16,20 +16,23 @@ use std::{
 use super::{
     Form,
     complete::Complete,
-    folder::{self, OutputFolder},
     growing::Growing,
-    part_file::{Mark, PartFile},
-    part_folder::PartFolder,
-    portraits::Film,
     reader,
     shard::{Found, Part},
-    tally::Aside,
-    zarr::{SnapshotStore, StoredMembers},
 };
 use crate::{
     ensemble::{Shard, Spec},
     error::{Error, Result, without_controls},
+    files::{
+        folder::OutputFolder,
+        names,
+        part_file::{Mark, PartFile},
+        part_folder::PartFolder,
+        portraits::Film,
+        zarr::{SnapshotStore, StoredMembers},
+    },
     input::{self, LONGEST_LINE},
+    results::tally::Aside,
 };
 
 /// Bytes of all shards together that are read at once, and of one at least.
@@ -436,13 +439,13 @@ fn join_stores(parts: &[Part], spec: &Spec, folder: &OutputFolder) -> Result<Par
     let points = parts[0].record.points;
     let mut stored = BTreeMap::new();
     for part in parts {
-        let path = part.path.join(folder::STORE);
+        let path = part.path.join(names::STORE);
         let missing = || Error::Request(format!("{}: the shard does not tell of it", path.display()));
         let mark = part.record.head.store.as_ref().ok_or_else(missing)?;
         stored.insert(part.shard.index(), StoredMembers::open(&path, &part.spec, points, mark)?);
     }
     let count = parts[0].shard.count();
-    let mut store = SnapshotStore::begin(folder.store(folder::STORE)?, spec, points)?;
+    let mut store = SnapshotStore::begin(folder.store(names::STORE)?, spec, points)?;
     for member in spec.members() {
         let missing = || Error::Request(format!("no shard has member {member}"));
         store.copy(stored.get_mut(&(member % count)).ok_or_else(missing)?)?;

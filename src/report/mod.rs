@@ -3,41 +3,19 @@
 //! A [`Report`] is opened before the work starts, so that a folder that cannot be written costs nothing. It is the
 //! [`Sink`] of the simulation: rows stream to disk, and only a few numbers per member stay in memory.
 
-pub mod axis;
-pub mod chart;
-pub mod charts;
 pub mod checkpoint;
-pub mod claim;
 pub mod complete;
-pub mod disk;
 pub mod document;
-pub mod ensemble;
-pub mod folder;
 pub mod gallery;
 pub mod growing;
 pub mod merge;
 pub mod overview;
-pub mod owner;
 pub mod page;
-pub mod part_file;
-pub mod part_folder;
-pub mod place;
-pub mod plot;
-pub mod portraits;
 pub mod progress;
-pub mod provenance;
 pub mod reader;
 pub mod shard;
-pub mod spill;
 pub mod stop;
 pub mod study;
-pub mod style;
-pub mod svg;
-pub mod tables;
-pub mod tally;
-pub mod text;
-pub mod trace;
-pub mod zarr;
 
 use std::{
     collections::BTreeMap,
@@ -45,23 +23,20 @@ use std::{
     time::{Duration, Instant},
 };
 
-pub use ensemble::EnsembleStatistics;
-pub use folder::OutputFolder;
-pub use owner::{Existing, Owner};
 pub use stop::{Cause, Stop};
 
 use crate::{
-    backend::Platform,
     ensemble::{Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Wish},
     error::{Error, Result},
+    files::{OutputFolder, portraits::Film},
+    placement::Platform,
+    results::tally::Tally,
+    text::{duration, plural},
 };
 use checkpoint::{Head, Kept, Origin};
 use complete::Complete;
 use growing::Growing;
-use portraits::Film;
-use progress::{Progress, duration};
-use tally::Tally;
-use text::plural;
+use progress::Progress;
 
 /// What is said on stdout of a run that is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -363,7 +338,11 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::ensemble::{Mollified, Observables, Portrait, Rows, Status, spec::Store, study};
+    use crate::{
+        ensemble::{Mollified, Observables, Portrait, Rows, Status, spec::Store, study},
+        files::names,
+        results::{provenance, tally},
+    };
 
     fn files(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
@@ -417,7 +396,7 @@ mod tests {
         assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());
         let plots = ["excess.svg", "mesh.svg", "portraits.json", "rate.svg", "relaxation.svg", "survival.svg"];
         assert_eq!(files(&out.join("plots")), [&["curves.svg"], &plots[..]].concat());
-        for name in [folder::SUMMARY, folder::SERIES, folder::SNAPSHOTS] {
+        for name in [names::SUMMARY, names::SERIES, names::SNAPSHOTS] {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 2, "{name}");
         }
         assert!(
@@ -508,7 +487,7 @@ mod tests {
             }
             if name == "zarr" {
                 for chunk in ["x/c.0.0.0", "k/c.0.0.0", "status/c.0", "zarr.json"] {
-                    let bytes = |folder: &Path| fs::read(folder.join(folder::STORE).join(chunk)).unwrap();
+                    let bytes = |folder: &Path| fs::read(folder.join(names::STORE).join(chunk)).unwrap();
                     assert_eq!(bytes(&straight), bytes(&broken), "{chunk}");
                 }
             }

@@ -2,17 +2,16 @@
 
 use std::{fmt, path::Path, time::Duration};
 
-use super::{
-    ensemble::{CellStatistics, EnsembleStatistics, Rates},
-    folder::ENSEMBLE,
-    progress::duration,
-    tally::{MollifiedMembers, Tally},
-    text::plural,
-};
 use crate::{
-    backend::Platform,
     ensemble::{Spec, spec::Pace},
+    files::names::ENSEMBLE,
+    placement::Platform,
+    results::{
+        cells::{CellStatistics, EnsembleStatistics, Rates},
+        tally::{MollifiedMembers, Tally},
+    },
     statistics::{LogRank, PowerLaw},
+    text::{duration, plural},
 };
 
 /// Cells at most of which there is a line; the table has them all.
@@ -236,13 +235,14 @@ mod tests {
     use super::*;
     use crate::{
         ensemble::Status,
-        report::{folder, provenance::tests::platform, tally::tests::outcome},
+        files::names,
+        results::{provenance::tests::platform, tally::tests::outcome},
     };
 
     fn overview(tally: &Tally) -> String {
         let (spec, platform, mut tally) = (Spec::default(), platform(), tally.clone());
         let wall = Duration::from_millis(12_345);
-        let files = &[folder::SUMMARY, folder::RUN];
+        let files = &[names::SUMMARY, names::RUN];
         let statistics = &EnsembleStatistics::new(&spec, &mut tally).unwrap();
         Overview { spec: &spec, platform: &platform, tally: &tally, statistics, wall, folder: Path::new("out"), files }
             .to_string()

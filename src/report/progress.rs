@@ -8,7 +8,7 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle, style::TemplateError};
 
-use super::text::plural;
+use crate::text::{duration, plural};
 
 /// Time between lines where there is no terminal.
 const PERIOD: Duration = Duration::from_secs(10);
@@ -114,17 +114,6 @@ fn members(done: u64, total: u64) -> String {
     format!("{done} of {total} {}", plural(total, "member"))
 }
 
-/// Seconds in the unit that a person would take.
-pub fn duration(seconds: f64) -> String {
-    let whole = seconds.round() as u64;
-    match whole {
-        0..10 => format!("{seconds:.2} s"),
-        10..60 => format!("{seconds:.1} s"),
-        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
-        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,11 +140,5 @@ mod tests {
     #[test]
     fn the_bar_is_well_formed() {
         assert!(style(true).is_ok() && style(false).is_ok());
-    }
-
-    #[test]
-    fn durations_read_as_people_say_them() {
-        let said = [0.123, 12.34, 75.0, 3600.0, 90_000.0].map(duration);
-        assert_eq!(said, ["0.12 s", "12.3 s", "1 min 15 s", "1 h 00 min", "25 h 00 min"]);
     }
 }

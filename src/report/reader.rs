@@ -13,18 +13,20 @@ use std::{
 use csv::{ReaderBuilder, StringRecord};
 use serde::Deserialize;
 
-use super::{
-    folder::{self, REMEDY},
-    place::Place,
-    portraits::{self, Film},
-    provenance::{FORMAT, Provenance, by_status},
-    tables,
-    tally::{Aside, MeanExcess, Tally},
-};
 use crate::{
     ensemble::{Observables, Outcome, Spec, Status},
     error::{Error, Result, shortened},
+    files::{
+        names::{self, REMEDY},
+        place::Place,
+        portraits::{self, Film},
+        tables,
+    },
     input::{self, Lines},
+    results::{
+        provenance::{FORMAT, Provenance, by_status},
+        tally::{Aside, MeanExcess, Tally},
+    },
 };
 
 /// Characters of foreign text in a message.
@@ -50,7 +52,7 @@ impl Finished {
     pub fn read(folder: &Path) -> Result<Finished> {
         let provenance = provenance(folder)?;
         let tally = tally(folder, &provenance)?;
-        let path = folder.join(folder::PORTRAITS);
+        let path = folder.join(names::PORTRAITS);
         let films = if path.exists() { portraits::read(&path)? } else { Vec::new() };
         let excess = mean_excess(folder, &provenance)?;
         Ok(Finished { provenance, tally, excess, films })
@@ -70,16 +72,16 @@ struct Head {
 /// # Errors
 /// As [`Finished::read`].
 pub fn provenance(folder: &Path) -> Result<Provenance> {
-    let path = folder.join(folder::RUN);
+    let path = folder.join(names::RUN);
     let refuse = |problem: String| Err(Error::Request(format!("{}{problem}", path.display())));
     if !folder.is_dir() {
         return Err(Error::Request(format!("{}: no such folder; name that of a run", folder.display())));
     }
     if !path.exists() {
-        let begun = folder.join(format!(".{}.part", folder::SUMMARY)).exists();
+        let begun = folder.join(format!(".{}.part", names::SUMMARY)).exists();
         let problem =
             if begun { "the run there did not finish; start it again" } else { "no run there; name its folder" };
-        return Err(Error::Request(format!("{}: {problem} (no {})", folder.display(), folder::RUN)));
+        return Err(Error::Request(format!("{}: {problem} (no {})", folder.display(), names::RUN)));
     }
     let text = input::text(&path, input::MOST_RUN);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
@@ -124,7 +126,7 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     for outcome in Summary::open(folder, spec)? {
         tally.add(&outcome?)?;
     }
-    let summary = |what: &str, told: u64, found: u64| expected(folder, folder::SUMMARY, what, told, found);
+    let summary = |what: &str, told: u64, found: u64| expected(folder, names::SUMMARY, what, told, found);
     summary("rows", provenance.members, tally.members())?;
     for (status, count) in by_status(&tally) {
         let told = provenance.members_by_status.get(&status).copied().unwrap_or(0);
@@ -152,7 +154,7 @@ fn expected(folder: &Path, name: &str, what: &str, expected: u64, found: u64) ->
     if expected == found {
         return Ok(());
     }
-    let (path, told) = (folder.join(name), folder::RUN);
+    let (path, told) = (folder.join(name), names::RUN);
     Err(Error::Request(format!("{}: expected {expected} {what} by {told}, found {found}; {REMEDY}", path.display())))
 }
 
@@ -171,7 +173,7 @@ impl Summary {
     /// # Errors
     /// [`Error::Request`] where there is none, or one with other columns, or one that is cut off.
     pub fn open(folder: &Path, spec: &Spec) -> Result<Summary> {
-        Summary::of(&Place::named(&folder.join(folder::SUMMARY)), spec)
+        Summary::of(&Place::named(&folder.join(names::SUMMARY)), spec)
     }
 
     fn of(place: &Place, spec: &Spec) -> Result<Summary> {
@@ -242,7 +244,7 @@ impl Iterator for Summary {
 /// # Errors
 /// As [`Finished::read`].
 pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExcess>> {
-    let mut table = Table::open(&Place::named(&folder.join(folder::MEAN_EXCESS)), tables::MEAN_EXCESS)?;
+    let mut table = Table::open(&Place::named(&folder.join(names::MEAN_EXCESS)), tables::MEAN_EXCESS)?;
     let (mut rows, mut count, mut last): (Vec<MeanExcess>, u64, _) = (Vec::new(), 0, None);
     while let Some(mut row) = table.read()? {
         let cell = row.whole()?;
@@ -256,7 +258,7 @@ pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExc
         // More than there should be are counted only.
         rows.extend((count <= provenance.excess_rows).then_some(row));
     }
-    expected(folder, folder::MEAN_EXCESS, "rows", provenance.excess_rows, count)?;
+    expected(folder, names::MEAN_EXCESS, "rows", provenance.excess_rows, count)?;
     Ok(rows)
 }
 
@@ -391,7 +393,10 @@ fn ends_with_a_line(file: &mut File) -> std::io::Result<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{OutputFolder, tables::SummaryTable, tally::tests::outcome};
+    use crate::{
+        files::{OutputFolder, tables::SummaryTable},
+        results::tally::tests::outcome,
+    };
 
     #[test]
     fn a_row_reads_back_to_the_outcome_that_was_written() {
@@ -412,7 +417,7 @@ mod tests {
             turning: -1,
         };
         let folder = OutputFolder::open(home.path(), true).unwrap();
-        let mut table = SummaryTable::new(folder.file(folder::SUMMARY).unwrap()).unwrap();
+        let mut table = SummaryTable::new(folder.file(names::SUMMARY).unwrap()).unwrap();
         table.row(&written).unwrap();
         folder.publish_all(vec![table.ready().unwrap()]).unwrap();
         let mut spec = Spec { curves: 2, ..Spec::default() };

@@ -12,9 +12,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     checkpoint::{self, Fault, Head},
-    claim,
-    folder::{RUN, SHARD, STATE, STATE_OLD},
     growing::Growing,
+};
+use crate::files::{
+    claim,
+    names::{RUN, SHARD, STATE, STATE_OLD},
 };
 use crate::{
     ensemble::{Shard, Spec},

@@ -1,24 +1,26 @@
 //! What people look at: the charts of a run and its page, from its statistics.
 
 use super::{
-    charts::{
+    gallery,
+    overview::{describe, place},
+    page::{Figure, Headline, MOST_MEMBERS, Page, Table, Trajectory, spread},
+};
+use crate::{
+    draw::charts::{
         Decay, DecayCurve, Dependence, Estimate, FittedRates, Law, Level, MeshQuality, PowerLaw, RelaxationTimes,
         Series, Setting, Survival, SurvivalCurve, Theory,
     },
-    ensemble::{CellStatistics, EnsembleStatistics, QUANTILES},
-    folder, gallery,
-    overview::{describe, place},
-    page::{Figure, Headline, MOST_MEMBERS, Page, Table, Trajectory, spread},
-    portraits::Film,
-    provenance::Provenance,
-    tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
-    text::{count, significant},
-};
-use crate::{
     ensemble::{Spec, Status},
     error::Result,
+    files::{names, portraits::Film},
     flow::Flow,
+    results::{
+        cells::{CellStatistics, EnsembleStatistics, QUANTILES},
+        provenance::Provenance,
+        tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
+    },
     statistics::{KaplanMeier, Step},
+    text::{count, significant},
 };
 
 /// Half the width of a 95 % band in standard errors.
@@ -55,8 +57,8 @@ impl Study<'_> {
         let gallery = (!self.films.is_empty()).then(|| gallery::draw(self.films));
         let page = self.page(&charts, gallery.as_deref())?;
         let charts = charts.into_iter().map(|chart| (chart.name, chart.figure.svg));
-        let gallery = gallery.map(|svg| (folder::CURVES, svg));
-        Ok(charts.chain(gallery).chain([(folder::REPORT, page)]).collect())
+        let gallery = gallery.map(|svg| (names::CURVES, svg));
+        Ok(charts.chain(gallery).chain([(names::REPORT, page)]).collect())
     }
 
     fn spec(&self) -> &Spec {
@@ -88,7 +90,7 @@ impl Study<'_> {
         let title = "Relaxation times";
         let svg = RelaxationTimes { title, note: &self.what(), times, others: &others, median }.draw();
         let caption = "How many members relaxed when, and which share of all had relaxed by then.";
-        chart(folder::RELAXATION, title, caption, svg)
+        chart(names::RELAXATION, title, caption, svg)
     }
 
     fn survival(&self) -> Chart {
@@ -111,7 +113,7 @@ impl Study<'_> {
         let survival = Survival { title, note: &self.what(), key: &key, curves: curves.collect(), time: None };
         let caption =
             "Kaplan-Meier estimate with Greenwood's 95 % band; a stroke marks a member that ended before it relaxed.";
-        chart(folder::SURVIVAL, title, caption, survival.draw())
+        chart(names::SURVIVAL, title, caption, survival.draw())
     }
 
     /// The mean excess as long as all members of a cell run.
@@ -149,7 +151,7 @@ impl Study<'_> {
         let svg = Decay { title, note: &note, band, key: &key, curves, theory, time: None }.draw();
         let caption =
             "How the excess, L²/(4πA) above that of a regular polygon, falls, and the slope that linear theory gives.";
-        Ok(Some(chart(folder::EXCESS, title, caption, svg)))
+        Ok(Some(chart(names::EXCESS, title, caption, svg)))
     }
 
     fn rates(&self) -> Chart {
@@ -161,7 +163,7 @@ impl Study<'_> {
         let svg = FittedRates { title, note: &self.what(), rates, relative, unit, without }.draw();
         let caption = "Slope of the line through ln excess, while that falls from a tenth to a thousandth of its start, over the \
                        rate that linear theory gives the slowest mode.";
-        chart(folder::RATE, title, caption, svg)
+        chart(names::RATE, title, caption, svg)
     }
 
     /// t_relax against the key that changes fastest, a series for each combination of the others.
@@ -200,7 +202,7 @@ impl Study<'_> {
         let (key, across, time) = (&axis.key[..], None, None);
         let svg = Dependence { title: &title, note: &note, key, other_key: &other_key, series, across, time }.draw();
         let caption = "Median with its 95 % bootstrap interval (thick) and the middle half of the members (thin).";
-        Some(chart(folder::DEPENDENCE, &title, caption, svg))
+        Some(chart(names::DEPENDENCE, &title, caption, svg))
     }
 
     fn mesh(&self) -> Chart {
@@ -213,7 +215,7 @@ impl Study<'_> {
             distrusted: Some((DISTRUSTED_DRIFT, self.tally.distrusted())),
         };
         let caption = "Longest over shortest edge, and how far the scheme's lengths have left the polygon's.";
-        chart(folder::MESH, title, caption, quality.draw())
+        chart(names::MESH, title, caption, quality.draw())
     }
 
     /// The text of `report.html`; `gallery` is the picture of the first members.
@@ -223,7 +225,7 @@ impl Study<'_> {
         let first = gallery.map(|svg| {
             let title = "The first members before, on their way and after";
             let caption = "Grey: the start. Light: on the way. Colour: the last state, by status.";
-            chart(folder::CURVES, title, caption, svg.into()).figure
+            chart(names::CURVES, title, caption, svg.into()).figure
         });
         let page = Page {
             title: "curvelax run",
@@ -348,7 +350,7 @@ impl Study<'_> {
             caption: "Members by status, statistics of t_relax (Kaplan-Meier), and rates of decay".into(),
             header: header.collect(),
             rows: self.statistics.cells.iter().map(row).collect(),
-            source: folder::ENSEMBLE.into(),
+            source: names::ENSEMBLE.into(),
         }
     }
 
@@ -434,11 +436,11 @@ mod tests {
 
     use super::*;
     use crate::{
+        draw::svg::dots,
         ensemble::Outcome,
-        report::{
-            portraits::tests::film,
+        files::portraits::tests::film,
+        results::{
             provenance::tests::platform,
-            svg::dots,
             tally::{Tally, tests::outcome},
         },
         schedule::grid,
@@ -484,7 +486,7 @@ mod tests {
             }
             let drawn = pictures(&spec, many(cells), &films);
             for (name, text) in &drawn {
-                let most = if *name == folder::REPORT { 800_000 } else { 120_000 };
+                let most = if *name == names::REPORT { 800_000 } else { 120_000 };
                 assert!(text.len() < most, "{name} of {cells} cells: {} bytes", text.len());
             }
             assert!(drawn.len() >= 5);
@@ -527,7 +529,7 @@ mod tests {
                 for (name, text) in pictures(&spec, tally.clone(), &[]) {
                     let bad = none_of(&text);
                     assert!(bad.is_empty(), "{name}: {bad:?}");
-                    assert!(name != folder::REPORT || text.contains(sentence), "no {sentence:?}");
+                    assert!(name != names::REPORT || text.contains(sentence), "no {sentence:?}");
                 }
             }
         }

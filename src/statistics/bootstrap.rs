@@ -208,7 +208,7 @@ const BLOCK: usize = 64;
 mod tests {
     use super::*;
     use crate::{
-        ensemble::random::Stream,
+        random::Stream,
         statistics::{KaplanMeier, Observation},
     };
 

@@ -1,6 +1,6 @@
 //! Random numbers for resampling, from the generator of the members.
 
-use crate::ensemble::random::Stream;
+use crate::random::Stream;
 
 /// The attempt in a stream's address that is kept for resampling: members count theirs from 0.
 const ATTEMPT: u32 = u32::MAX;

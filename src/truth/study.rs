@@ -2,12 +2,12 @@
 
 use super::Problem;
 use crate::{
-    backend,
     ensemble::{
         Cell, Ended, Family, Outcome, Sink, Spec, Status,
         spec::{Precision, Solver},
     },
     error::{Error, Result},
+    placement,
     simulate::simulate,
 };
 
@@ -63,7 +63,7 @@ impl Problem {
     /// that ends early is no error but has no ratio.
     pub fn solve(&self, method: &Spec, at: Resolution) -> Result<Solved> {
         let spec = self.spec(method, at).validate()?;
-        let choice = backend::choose(&spec, at.n)?;
+        let choice = placement::choose(&spec, at.n)?;
         let precision = choice.precision();
         let family = Family::of(&spec, self.curve.resolve(precision))?;
         let (mut backend, _) = choice.open(&spec, at.n)?;

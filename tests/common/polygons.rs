@@ -5,7 +5,7 @@
 
 use std::{collections::HashMap, f64::consts::TAU};
 
-use curvelax::{curve::crossing, ensemble::random::Stream};
+use curvelax::{curve::crossing, random::Stream};
 use glam::DVec2;
 
 /// Fewest and most corners.

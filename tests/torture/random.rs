@@ -1,6 +1,6 @@
 //! Random numbers one after the other.
 
-use curvelax::ensemble::random::Stream;
+use curvelax::random::Stream;
 
 pub struct Random {
     stream: Stream,

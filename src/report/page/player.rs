@@ -7,10 +7,13 @@ use std::fmt::Write;
 
 use glam::DVec2;
 
-use super::{colour, digest::DIGITS};
-use crate::report::{
-    axis::{Scale, tick_step},
-    svg::escape,
+use super::colour;
+use crate::{
+    draw::{
+        axis::{Scale, tick_step},
+        svg::escape,
+    },
+    files::portraits::DIGITS,
     text::significant,
 };
 

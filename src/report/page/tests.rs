@@ -2,8 +2,11 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
+use base64::Engine as _;
+use sha2::{Digest, Sha256};
+
 use super::*;
-use crate::report::charts::tests::pictures::pictures;
+use crate::draw::charts::tests::pictures::pictures;
 
 /// A perturbed ellipse whose modes decay as theory says, recorded often at first and seldom later.
 fn member(j: usize) -> Trajectory {
@@ -142,7 +145,9 @@ fn nothing_is_asked_of_the_network_and_only_the_script_may_run() {
     let html = page(&warnings).html();
     let policy = html.split("Content-Security-Policy\" content=\"").nth(1).unwrap().split('"').next().unwrap();
     let script = html.split("<script>").nth(1).unwrap().split("</script>").next().unwrap();
-    assert!(policy.starts_with("default-src 'none';") && policy.contains(&digest::source(script)), "{policy}");
+    let digest = base64::prelude::BASE64_STANDARD.encode(Sha256::digest(script));
+    assert_eq!(SCRIPT_DIGEST, format!("sha256-{digest}"), "the script has changed, and its digest must follow");
+    assert!(policy.starts_with("default-src 'none';") && policy.contains(SCRIPT_DIGEST), "{policy}");
     for word in ["src=", "@import", "url(", "fetch(", "https:", "<iframe", "<object"] {
         assert!(!html.contains(word), "{word}");
     }

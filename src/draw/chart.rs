@@ -1,0 +1,445 @@
+//! What all charts are made of: a heading with sentences and a legend, panels with axes, colours for curves.
+//!
+//! A chart is laid out from top to bottom in this order. Widths of text are known only [roughly](super::text), from above.
+
+use glam::DVec2;
+
+use super::{
+    axis::{Axis, Scale, range},
+    style,
+    svg::{Svg, coordinate, dots},
+    width::{SIZE, TITLE, shortened, width, wrapped},
+};
+use crate::text::significant;
+
+/// Width of every chart, in pixels.
+pub const WIDTH: f64 = 680.0;
+/// Free space at the left and right of a chart.
+pub const MARGIN: f64 = 20.0;
+/// Space below a panel for tick labels and the name of the axis.
+pub const FOOT: f64 = 52.0;
+/// Space above a panel that has a heading.
+pub const HEADING: f64 = 22.0;
+
+const TITLE_LINE: f64 = 20.0;
+const LINE: f64 = 17.0;
+const LEGEND_LINE: f64 = 20.0;
+const SAMPLE: f64 = 26.0;
+const AXIS_SIZE: f64 = 13.0;
+const TICK: f64 = 5.0;
+const MINOR_TICK: f64 = 3.0;
+/// More curves than this are not drawn: they would hide each other.
+const MOST_CURVES: usize = 24;
+/// Width of the colour bar itself.
+const BAR: f64 = 14.0;
+
+/// Unknown and known bounds of an estimated number.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// The number.
+    pub value: f64,
+    /// Its confidence interval, 95 % by convention; none where it is unknown.
+    pub interval: Option<(f64, f64)>,
+}
+
+impl Estimate {
+    /// `0.412 (0.401 to 0.420)`.
+    pub fn shown(&self) -> String {
+        let value = significant(self.value, 3);
+        match self.interval {
+            Some((low, high)) => format!("{value} ({} to {})", significant(low, 3), significant(high, 3)),
+            None => value,
+        }
+    }
+}
+
+/// How a legend's entry is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mark {
+    /// A line in the dash pattern of its class.
+    Series,
+    /// A dashed line.
+    Dashed,
+    /// A thin line, and a thick one.
+    Thin,
+    /// See [`Mark::Thin`].
+    Thick,
+    /// An area.
+    Band,
+    /// The [marker](draw_marker) of the series of this rank.
+    Marker(usize),
+    /// A triangle that points up, and one that points right.
+    Up,
+    /// See [`Mark::Up`].
+    Right,
+    /// The short stroke of a censored member.
+    Stroke,
+}
+
+/// A legend's entry.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// Class of its colour.
+    pub class: String,
+    /// How it is drawn.
+    pub mark: Mark,
+    /// What it stands for.
+    pub label: String,
+}
+
+impl Entry {
+    /// An entry in the colour of `class`.
+    pub fn new(class: &str, mark: Mark, label: &str) -> Entry {
+        Entry { class: class.into(), mark, label: label.into() }
+    }
+
+    /// Pixels of the sample before the label.
+    fn sample(&self) -> f64 {
+        match self.mark {
+            Mark::Marker(_) | Mark::Up | Mark::Right | Mark::Stroke => 10.0,
+            _ => SAMPLE,
+        }
+    }
+
+    fn draw(&self, svg: &mut Svg, at: DVec2) {
+        let [x, y] = at.to_array().map(coordinate);
+        let middle = at + DVec2::new(0.5 * self.sample(), 0.0);
+        let line = format!("M{x} {y}h{SAMPLE}");
+        svg.open(&self.class);
+        match self.mark {
+            Mark::Series => svg.path("series", &line),
+            Mark::Dashed => svg.path("dashed", &line),
+            Mark::Thin => svg.path("thin", &line),
+            Mark::Thick => svg.path("thick", &line),
+            Mark::Band => svg.rectangle("band", at - DVec2::new(0.0, 5.0), DVec2::new(SAMPLE, 10.0), 0.0),
+            Mark::Marker(rank) => draw_marker(svg, rank, middle),
+            Mark::Up => svg.path("solid", &triangle_up(middle)),
+            Mark::Right => svg.path("solid", &triangle_right(middle)),
+            Mark::Stroke => svg.path("thin", &stroke(middle)),
+        }
+        svg.close();
+    }
+}
+
+/// Draws the marker of the series of this rank, a shape of its own for each of the [series](style::SERIES).
+pub fn draw_marker(svg: &mut Svg, rank: usize, at: DVec2) {
+    let [x, y] = at.to_array().map(coordinate);
+    let square = format!("M{x} {y}m-3.6 -3.6h7.2v7.2h-7.2Z");
+    let diamond = format!("M{x} {y}m0 -5l5 5l-5 5l-5 -5Z");
+    match rank % style::SERIES {
+        0 => svg.path("dots", &dots(&[at])),
+        1 => svg.path("solid", &square),
+        2 => svg.path("solid", &diamond),
+        3 => svg.path("hollow", &format!("M{x} {y}m-4 0a4 4 0 0 0 8 0a4 4 0 0 0 -8 0Z")),
+        4 => svg.path("hollow", &square),
+        5 => svg.path("hollow", &diamond),
+        6 => svg.path("cross", &format!("M{x} {y}m-4 -4l8 8m0 -8l-8 8")),
+        _ => svg.path("cross", &format!("M{x} {y}m-5 0h10m-5 -5v10")),
+    }
+}
+
+/// Data of a triangle about `at` that points up.
+pub fn triangle_up(at: DVec2) -> String {
+    let [x, y] = (at - DVec2::new(0.0, 5.0)).to_array().map(coordinate);
+    format!("M{x} {y}l5 9h-10Z")
+}
+
+/// Data of a triangle about `at` that points right.
+pub fn triangle_right(at: DVec2) -> String {
+    let [x, y] = (at + DVec2::new(5.0, 0.0)).to_array().map(coordinate);
+    format!("M{x} {y}l-9 5v-10Z")
+}
+
+/// Data of a short upright stroke about `at`.
+pub fn stroke(at: DVec2) -> String {
+    let [x, y] = (at - DVec2::new(0.0, 4.0)).to_array().map(coordinate);
+    format!("M{x} {y}v8")
+}
+
+/// What stands above the panels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Heading<'a> {
+    /// The title, also for screen readers.
+    pub title: &'a str,
+    /// Sentences below it, each a paragraph; empty ones are left out.
+    pub sentences: Vec<String>,
+    /// The legend; entries without a label are left out.
+    pub legend: Vec<Entry>,
+}
+
+impl Heading<'_> {
+    /// A picture that begins with this heading and has `body` pixels below it; where those begin.
+    pub fn begin(&self, body: f64) -> (Svg, f64) {
+        let room = WIDTH - 2.0 * MARGIN;
+        let titles = wrapped(self.title, TITLE, room);
+        let lines: Vec<String> = self.sentences.iter().flat_map(|text| wrapped(text, SIZE, room)).collect();
+        let rows = self.rows(room);
+        let above = [(titles.len(), TITLE_LINE), (lines.len(), LINE), (rows.len(), LEGEND_LINE)];
+        let top = 22.0 + above.iter().map(|(count, height)| *count as f64 * height).sum::<f64>();
+
+        let mut svg = Svg::new(WIDTH, top + body, &style::chart(), self.title);
+        svg.rectangle("back", DVec2::ZERO, DVec2::new(WIDTH, top + body), 0.0);
+        let mut y = 6.0;
+        let mut next = |height: f64| {
+            y += height;
+            DVec2::new(MARGIN, y)
+        };
+        titles.iter().for_each(|line| svg.text("head", next(TITLE_LINE), line));
+        lines.iter().for_each(|line| svg.text("note", next(LINE), line));
+        for row in rows {
+            let left = next(LEGEND_LINE);
+            for (x, entry) in row {
+                let at = left + DVec2::new(x, 2.0);
+                entry.draw(&mut svg, at - DVec2::new(0.0, 4.0));
+                svg.text("label", at + DVec2::new(entry.sample() + 6.0, 0.0), &entry.label);
+            }
+        }
+        (svg, top)
+    }
+
+    /// The legend, entry after entry, with the place of each in its row.
+    fn rows(&self, room: f64) -> Vec<Vec<(f64, Entry)>> {
+        let most = room - SAMPLE - 6.0;
+        let fitted = |entry: &Entry| Entry { label: shortened(&entry.label, SIZE, most), ..entry.clone() };
+        let entries: Vec<Entry> = self.legend.iter().filter(|entry| !entry.label.is_empty()).map(fitted).collect();
+        let extent = |entry: &Entry| entry.sample() + 24.0 + width(&entry.label, SIZE);
+        let mut rows: Vec<Vec<(f64, Entry)>> = Vec::new();
+        let mut end = f64::INFINITY;
+        for entry in entries {
+            let extent = extent(&entry);
+            if end + extent - 18.0 > room {
+                rows.push(Vec::new());
+                end = 0.0;
+            }
+            rows.last_mut().expect("pushed above").push((end, entry));
+            end += extent;
+        }
+        rows
+    }
+}
+
+/// Axes with room for data.
+#[derive(Clone, Debug)]
+pub struct Panel<'a> {
+    /// A line above it; empty is none.
+    pub heading: &'a str,
+    /// The upper left corner, in pixels.
+    pub corner: DVec2,
+    /// Width and height, in pixels.
+    pub size: DVec2,
+    /// Horizontal axis.
+    pub x: &'a Axis,
+    /// Vertical axis.
+    pub y: &'a Axis,
+    /// Whether the horizontal axis has labels, or those of a panel below are its own.
+    pub labels_x: bool,
+}
+
+impl Panel<'_> {
+    /// Space at the left of a panel of this height for what is written there.
+    pub fn left(y: &Axis, height: f64) -> f64 {
+        let labels = y.ticks_upwards(height).labelled.into_iter().map(|(_, label)| width(&label, SIZE));
+        MARGIN + AXIS_SIZE + 16.0 + labels.fold(0.0, f64::max)
+    }
+
+    /// The lower right corner.
+    pub fn end(&self) -> DVec2 {
+        self.corner + self.size
+    }
+
+    /// Where a value stands on the horizontal axis, in pixels.
+    pub fn across(&self, x: f64) -> f64 {
+        self.corner.x + self.size.x * self.x.share(x)
+    }
+
+    /// Where a value stands on the vertical axis, in pixels, kept inside the panel.
+    pub fn height(&self, y: f64) -> f64 {
+        // y grows downwards in SVG.
+        self.end().y - self.size.y * self.y.share(y).clamp(0.0, 1.0)
+    }
+
+    /// Where a point stands, anywhere.
+    pub fn place(&self, x: f64, y: f64) -> DVec2 {
+        DVec2::new(self.across(x), self.end().y - self.size.y * self.y.share(y))
+    }
+
+    /// Draws the axes.
+    pub fn draw(&self, svg: &mut Svg) {
+        self.draw_x(svg);
+        self.draw_y(svg);
+        self.draw_frame(svg);
+    }
+
+    /// Draws the border and the heading.
+    pub fn draw_frame(&self, svg: &mut Svg) {
+        svg.rectangle("frame", self.corner, self.size, 0.0);
+        let middle = self.corner.x + 0.5 * self.size.x;
+        svg.text_unless_empty("middle", DVec2::new(middle, self.corner.y - 8.0), self.heading);
+    }
+
+    /// Draws grid, ticks, labels and name of the horizontal axis.
+    pub fn draw_x(&self, svg: &mut Svg) {
+        let [top, bottom] = [self.corner.y, self.end().y].map(coordinate);
+        let ticks = self.x.ticks_across(self.size.x);
+        let (mut grid, mut marks) = (String::new(), String::new());
+        for value in &ticks.minor {
+            marks += &format!("M{} {bottom}v-{MINOR_TICK}", coordinate(self.across(*value)));
+        }
+        for (value, label) in &ticks.labelled {
+            let x = self.across(*value);
+            grid += &format!("M{} {top}V{bottom}", coordinate(x));
+            marks += &format!("M{} {bottom}v-{TICK}", coordinate(x));
+            if self.labels_x {
+                svg.text("x tick middle", DVec2::new(x, self.end().y + 16.0), label);
+            }
+        }
+        svg.path("grid", &grid);
+        svg.path("ticks", &marks);
+        if self.labels_x {
+            let name = shortened(&self.x.title(&ticks), AXIS_SIZE, self.size.x);
+            svg.text("axis middle", DVec2::new(self.corner.x + 0.5 * self.size.x, self.end().y + 38.0), &name);
+        }
+    }
+
+    /// Draws grid, ticks, labels and name of the vertical axis.
+    pub fn draw_y(&self, svg: &mut Svg) {
+        let [left, right] = [self.corner.x, self.end().x].map(coordinate);
+        let ticks = self.y.ticks_upwards(self.size.y);
+        let (mut grid, mut marks) = (String::new(), String::new());
+        for value in &ticks.minor {
+            marks += &format!("M{left} {}h{MINOR_TICK}", coordinate(self.height(*value)));
+        }
+        for (value, label) in &ticks.labelled {
+            let y = self.height(*value);
+            grid += &format!("M{left} {}H{right}", coordinate(y));
+            marks += &format!("M{left} {}h{TICK}", coordinate(y));
+            svg.text("y tick end", DVec2::new(self.corner.x - 6.0, y + 4.0), label);
+        }
+        svg.path("grid", &grid);
+        svg.path("ticks", &marks);
+        let name = shortened(&self.y.title(&ticks), AXIS_SIZE, self.size.y);
+        let from_left = Panel::left(self.y, self.size.y) - MARGIN - AXIS_SIZE + 3.0;
+        let at = DVec2::new(self.corner.x - from_left, self.corner.y + 0.5 * self.size.y);
+        svg.text_upwards("axis middle", at, &name);
+    }
+
+    /// Writes a sentence in the middle, where there is nothing to draw.
+    pub fn say(&self, svg: &mut Svg, sentence: &str) {
+        svg.rectangle("frame", self.corner, self.size, 0.0);
+        let lines = wrapped(sentence, SIZE, self.size.x - 24.0);
+        let first = self.corner + 0.5 * self.size - DVec2::new(0.0, 0.5 * LINE * (lines.len() as f64 - 1.0) - 4.0);
+        for (i, line) in lines.iter().enumerate() {
+            svg.text("note middle", first + DVec2::new(0.0, i as f64 * LINE), line);
+        }
+    }
+}
+
+/// One picture that says why there is nothing to draw.
+pub fn nothing(title: &str, sentences: Vec<String>, reason: &str) -> String {
+    let (mut svg, top) = Heading { title, sentences, legend: Vec::new() }.begin(180.0);
+    let axis = Axis::new("", "", Scale::Linear, (0.0, 1.0));
+    let panel = Panel {
+        heading: "",
+        corner: DVec2::new(MARGIN, top),
+        size: DVec2::new(WIDTH - 2.0 * MARGIN, 180.0 - MARGIN),
+        x: &axis,
+        y: &axis,
+        labels_x: false,
+    };
+    panel.say(&mut svg, reason);
+    svg.finish()
+}
+
+/// Colours of curves: a few are told apart, many are put in order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Colours {
+    /// Which curves are drawn, and the class of each.
+    pub shown: Vec<(usize, String)>,
+    /// The scale of the colours, where they are ordered.
+    pub bar: Option<Axis>,
+}
+
+impl Colours {
+    /// Colours for one curve for each of `values`, which are those of `key`; where one is unknown, or there is none,
+    /// curves are ordered as they come, by their number from 0.
+    pub fn of(values: &[Option<f64>], key: &str) -> Colours {
+        let count = values.len();
+        if count <= style::SERIES {
+            return Colours { shown: (0..count).map(|i| (i, format!("s{i}"))).collect(), bar: None };
+        }
+        let known = |value: &f64| Scale::Linear.holds(*value);
+        let given: Option<Vec<f64>> = values.iter().map(|value| value.filter(known)).collect();
+        let key = if given.is_some() { key } else { "cell" };
+        let values = given.unwrap_or_else(|| (0..count).map(|i| i as f64).collect());
+        let scale = Scale::of(values.iter().copied());
+        let ends = range(values.iter().copied()).filter(|(low, high)| low < high);
+        let axis = match ends {
+            Some(ends) => Axis::new(key, "", scale, ends),
+            None => Axis::over(key, "", scale, values.iter().copied()),
+        };
+        let mut order: Vec<usize> = (0..count).collect();
+        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+        let most = count.min(MOST_CURVES);
+        let picked = (0..most).map(|i| order[i * (count - 1) / (most - 1)]);
+        let class = |i: usize| {
+            let step = (axis.share(values[i]) * style::RAMP as f64) as usize;
+            (i, format!("r{}", step.min(style::RAMP - 1)))
+        };
+        Colours { shown: picked.map(class).collect(), bar: Some(axis) }
+    }
+
+    /// The entries of curves that are told apart; `label` names them.
+    pub fn legend<'a>(&self, label: impl Fn(usize) -> &'a str) -> impl Iterator<Item = Entry> {
+        let told_apart = self.shown.iter().filter(|_| self.bar.is_none());
+        told_apart.map(move |(i, class)| Entry::new(class, Mark::Series, label(*i)))
+    }
+
+    /// The marker of the curve drawn at this rank: colours that are ordered need no shapes.
+    pub fn rank(&self, rank: usize) -> usize {
+        if self.bar.is_some() { 0 } else { rank }
+    }
+
+    /// What to say if not all of `count` curves are drawn.
+    pub fn sentence(&self, count: usize) -> String {
+        match self.shown.len() {
+            shown if shown < count => format!("{shown} of {count} cells are drawn, spread over all."),
+            _ => String::new(),
+        }
+    }
+
+    /// Space for the colour bar beside a panel of this height.
+    pub fn room(&self, height: f64) -> f64 {
+        self.bar.as_ref().map_or(0.0, |bar| 2.0 * BAR + Panel::left(bar, height) - MARGIN)
+    }
+
+    /// Draws the colour bar at the right of a panel.
+    pub fn draw_bar(&self, svg: &mut Svg, panel: &Panel) {
+        let Some(bar) = &self.bar else { return };
+        let corner = DVec2::new(panel.end().x + BAR, panel.corner.y);
+        let step = panel.size.y / style::RAMP as f64;
+        for i in 0..style::RAMP {
+            let at = corner + DVec2::new(0.0, (style::RAMP - 1 - i) as f64 * step);
+            svg.open(&format!("r{i}"));
+            // A little overlap, or seams show.
+            svg.rectangle("solid", at, DVec2::new(BAR, step + if i > 0 { 0.5 } else { 0.0 }), 0.0);
+            svg.close();
+        }
+        let ticks = bar.ticks_upwards(panel.size.y);
+        let mut right: f64 = 0.0;
+        for (value, label) in &ticks.labelled {
+            let y = panel.end().y - panel.size.y * bar.share(*value);
+            svg.path("ticks", &format!("M{} {}h3", coordinate(corner.x + BAR), coordinate(y)));
+            svg.text("tick", DVec2::new(corner.x + BAR + 6.0, y + 4.0), label);
+            right = right.max(width(label, SIZE));
+        }
+        svg.rectangle("frame", corner, DVec2::new(BAR, panel.size.y), 0.0);
+        let name = shortened(&bar.title(&ticks), AXIS_SIZE, panel.size.y);
+        let at = DVec2::new(corner.x + BAR + right + 12.0 + AXIS_SIZE, panel.corner.y + 0.5 * panel.size.y);
+        svg.text_upwards("axis middle", at, &name);
+    }
+}
+
+/// A point of a line, if both values have places on axes of these scales.
+pub fn drawable(x: (Scale, f64), y: (Scale, f64)) -> bool {
+    x.0.holds(x.1) && y.0.holds(y.1)
+}

@@ -1,0 +1,10 @@
+//! Pictures from plain numbers: SVG, its style, axes and charts. Nothing here knows of a run or a file.
+
+pub mod axis;
+pub mod chart;
+pub mod charts;
+pub mod plot;
+pub mod style;
+pub mod svg;
+pub mod trace;
+pub mod width;

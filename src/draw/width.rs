@@ -1,0 +1,88 @@
+//! How wide text is in a picture.
+//!
+//! A picture is laid out before any font is known, so widths are those of DejaVu Sans, among the widest of the fonts that
+//! are taken for `sans-serif`: what fits there fits elsewhere.
+
+/// Advance widths of U+0020 to U+007E in DejaVu Sans, in hundredths of the font size.
+const ADVANCE: [u8; 95] = [
+    32, 40, 46, 84, 64, 95, 78, 27, 39, 39, 50, 84, 32, 36, 32, 34, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 34, 34, 84,
+    84, 84, 53, 100, 68, 69, 70, 77, 63, 58, 77, 75, 29, 29, 66, 56, 86, 75, 79, 60, 79, 69, 63, 61, 73, 68, 99, 69,
+    61, 69, 39, 34, 39, 84, 50, 50, 61, 63, 55, 63, 62, 35, 63, 63, 28, 28, 58, 28, 97, 63, 61, 63, 63, 41, 52, 39, 63,
+    59, 82, 59, 59, 52, 64, 34, 64, 84,
+];
+
+/// Size of most text, in pixels.
+pub const SIZE: f64 = 12.0;
+/// Size of a title, as a multiple of [`SIZE`] that counts its bold face, too.
+pub const TITLE: f64 = 15.0 * 1.13;
+
+/// Width of `text` in a font of `size` pixels.
+pub fn width(text: &str, size: f64) -> f64 {
+    let advance = |c: char| match c {
+        ' '..='~' => f64::from(ADVANCE[c as usize - 32]) / 100.0,
+        '⁰'..='⁹' | '¹' | '²' | '³' | '·' => 0.41,
+        '\u{a0}'..='\u{10ff}' => 0.7,
+        '\u{2010}'..='\u{22ff}' => 0.86,
+        // East Asian scripts and pictographs.
+        _ => 1.1,
+    };
+    size * text.chars().map(advance).sum::<f64>()
+}
+
+/// `text` in lines of at most `most` pixels, broken at spaces, and inside words only where one is too long.
+pub fn wrapped(text: &str, size: f64, most: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    let mut line = String::new();
+    for word in text.split_whitespace() {
+        let longer = if line.is_empty() { word.to_owned() } else { format!("{line} {word}") };
+        if width(&longer, size) <= most {
+            line = longer;
+            continue;
+        }
+        lines.extend((!line.is_empty()).then(|| std::mem::take(&mut line)));
+        for c in word.chars() {
+            if !line.is_empty() && width(&format!("{line}{c}"), size) > most {
+                lines.push(std::mem::take(&mut line));
+            }
+            line.push(c);
+        }
+    }
+    lines.extend((!line.is_empty()).then_some(line));
+    lines
+}
+
+/// `text`, or as much of its beginning as fits into `most` pixels with an ellipsis.
+pub fn shortened(text: &str, size: f64, most: f64) -> String {
+    if width(text, size) <= most {
+        return text.into();
+    }
+    let mut short = String::new();
+    for c in text.chars() {
+        if width(&short, size) + width(&format!("{c}…"), size) > most {
+            break;
+        }
+        short.push(c);
+    }
+    short.trim_end().to_owned() + "…"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_broken_where_they_are_full() {
+        let lines = wrapped("one two three incomprehensibilities", SIZE, 60.0);
+        assert!(lines.iter().all(|line| width(line, SIZE) <= 60.0), "{lines:?}");
+        assert_eq!(lines[..2], ["one two", "three"]);
+        assert_eq!(lines[2..].concat(), "incomprehensibilities");
+        assert_eq!(wrapped("  ", SIZE, 60.0), [""; 0]);
+    }
+
+    #[test]
+    fn what_is_too_long_ends_in_an_ellipsis() {
+        assert_eq!(shortened("amplitude", SIZE, 100.0), "amplitude");
+        let short = shortened("amplitude", SIZE, 40.0);
+        assert!(short.ends_with('…') && short.len() > 4 && width(&short, SIZE) <= 40.0, "{short}");
+    }
+}

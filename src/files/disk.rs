@@ -1,0 +1,124 @@
+//! What the file system is asked for: files that are no links, checksums, names that last.
+
+use std::{
+    fs::{self, File},
+    io::{self, Read},
+    path::{Path, PathBuf},
+};
+
+use super::place::Place;
+use crate::{
+    error::{Error, Result},
+    guard::guarded,
+};
+
+/// In every folder of a store.
+pub const IS_STORE: &str = "zarr.json";
+
+/// What lies in a folder, in no order. A listing panics where the system cannot close the folder, which changes nothing of
+/// what was read.
+pub fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut listing = fs::read_dir(folder)?;
+    let paths = listing.by_ref().map(|entry| Ok(entry?.path())).collect();
+    let _ = guarded(|| drop(listing));
+    paths
+}
+
+/// Makes the file anew: what lies there is removed and not written into, as it may be a link to elsewhere.
+pub fn create(path: &Path) -> io::Result<File> {
+    remove(path)?;
+    File::create_new(path)
+}
+
+/// Removes the folder of a store and what is in it; it may be absent. What tells that it is a store goes last, so that what
+/// is left by one who is killed meanwhile still is one.
+pub fn remove_store(path: &Path) -> io::Result<()> {
+    if path.is_symlink() {
+        return fs::remove_file(path);
+    }
+    let entries = match entries(path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        if entry.symlink_metadata()?.is_dir() {
+            fs::remove_dir_all(entry)?;
+        } else if !entry.ends_with(IS_STORE) {
+            fs::remove_file(entry)?;
+        }
+    }
+    remove(&path.join(IS_STORE))?;
+    fs::remove_dir(path)
+}
+
+/// Removes a file, which may be absent.
+pub fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        // Below a folder that is absent, too.
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
+        _ => Ok(()),
+    }
+}
+
+/// Bytes of what is left of `file`, and the CRC-32C of them after those of `crc`.
+pub fn checksum(file: &mut impl Read, mut crc: u32) -> io::Result<(u64, u32)> {
+    let mut length = 0;
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer) {
+            Ok(0) => return Ok((length, crc)),
+            Ok(count) => {
+                length += count as u64;
+                crc = crc32c::crc32c_append(crc, &buffer[..count]);
+            }
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+}
+
+/// How many names the file has.
+#[cfg(unix)]
+pub fn names_of(file: &File) -> io::Result<u64> {
+    use std::os::unix::fs::MetadataExt;
+    Ok(file.metadata()?.nlink())
+}
+
+/// Elsewhere that cannot be asked for in safe and stable Rust; a copy is never wrong.
+#[cfg(not(unix))]
+pub fn names_of(_: &File) -> io::Result<u64> {
+    Ok(2)
+}
+
+/// Whether a run may have left the folder of a store.
+pub fn is_own_store(path: &Path) -> bool {
+    let empty = || entries(path).is_ok_and(|entries| entries.is_empty());
+    !path.is_symlink() && (path.join(IS_STORE).is_file() || empty())
+}
+
+/// Makes a rename durable.
+pub fn sync_parent(place: &Place) -> Result<()> {
+    sync_names(parent(place.at())).map_err(Error::io("cannot write to", parent(place.shown())))
+}
+
+/// Makes the names of what is in a folder durable.
+pub fn sync_folder(place: &Place) -> Result<()> {
+    sync_names(place.at()).map_err(place.io("cannot write to"))
+}
+
+/// The same; only Unix lets a folder be synced.
+pub fn sync_names(folder: &Path) -> io::Result<()> {
+    match cfg!(unix) {
+        true => File::open(folder).and_then(|folder| folder.sync_all()),
+        false => Ok(()),
+    }
+}
+
+/// The folder in which `path` is a name.
+pub fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        Some(_) => Path::new("."),
+        None => path,
+    }
+}

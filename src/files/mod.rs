@@ -1,0 +1,19 @@
+//! A run's folder and the files in it: who may write there, how a file becomes durable, and what each one holds.
+//!
+//! Files grow under names ending in `.part` and get their own names together, when all of them are whole.
+
+pub mod claim;
+pub mod disk;
+pub mod folder;
+pub mod names;
+pub mod owner;
+pub mod part_file;
+pub mod part_folder;
+pub mod place;
+pub mod portraits;
+pub mod spill;
+pub mod tables;
+pub mod zarr;
+
+pub use folder::OutputFolder;
+pub use owner::{Existing, Owner};

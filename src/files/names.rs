@@ -1,0 +1,107 @@
+//! The names of all files in a folder of results.
+
+use std::path::{Path, PathBuf};
+
+/// One row a member.
+pub const SUMMARY: &str = "summary.csv";
+/// Rates of decay, one row a member that has one.
+pub const RATES: &str = "rates.csv";
+/// Mean excess in time, by cell.
+pub const MEAN_EXCESS: &str = "mean_excess.csv";
+/// Observables over time.
+pub const SERIES: &str = "series.csv";
+/// Nodes at given times.
+pub const SNAPSHOTS: &str = "snapshots.csv";
+/// The same as arrays: a folder.
+pub const STORE: &str = "snapshots.zarr";
+/// Errors and orders against exact solutions.
+pub const CONVERGENCE: &str = "convergence.csv";
+/// Statistics by cell.
+pub const ENSEMBLE: &str = "ensemble.csv";
+/// How the run was made.
+pub const RUN: &str = "run.json";
+/// The first members before, on their way and after.
+pub const CURVES: &str = "plots/curves.svg";
+/// The nodes of the same members, from which pictures are drawn.
+pub const PORTRAITS: &str = "plots/portraits.json";
+/// Distribution of the relaxation times.
+pub const RELAXATION: &str = "plots/relaxation.svg";
+/// Fitted rates of decay.
+pub const RATE: &str = "plots/rate.svg";
+/// Kaplan-Meier curves.
+pub const SURVIVAL: &str = "plots/survival.svg";
+/// Mean excess in time.
+pub const EXCESS: &str = "plots/excess.svg";
+/// Relaxation times against a swept key.
+pub const DEPENDENCE: &str = "plots/dependence.svg";
+/// Spacing of nodes and metric drift.
+pub const MESH: &str = "plots/mesh.svg";
+/// Everything at a glance.
+pub const REPORT: &str = "report.html";
+
+/// What a merge has to know of a shard beside its tables, see [`shard`](crate::report::shard).
+pub const SHARD: &str = "shard.state";
+
+/// What `curvelax figure` writes.
+pub const FIGURES: [&str; 8] =
+    ["fig1a.svg", "fig1a.csv", "fig1b.svg", "fig1b.csv", "fig1c.svg", "fig1c.csv", "fig2.svg", "fig2.csv"];
+
+/// Rows that wait for their members to leave, see [`spill`](super::spill): never under this name, but while a run goes on as
+/// `.curvelax.rows.part`.
+pub const ROWS: &str = "curvelax.rows";
+
+/// All that a run may write, the file that vouches for the others first.
+pub const OWN: [&str; 19] = [
+    RUN,
+    SHARD,
+    SUMMARY,
+    ENSEMBLE,
+    MEAN_EXCESS,
+    RATES,
+    SERIES,
+    SNAPSHOTS,
+    STORE,
+    PORTRAITS,
+    CURVES,
+    RELAXATION,
+    RATE,
+    SURVIVAL,
+    EXCESS,
+    DEPENDENCE,
+    MESH,
+    REPORT,
+    ROWS,
+];
+
+/// The tables of a run and its store, in the order in which they are named to people.
+pub const TABLES: [&str; 7] = [SUMMARY, ENSEMBLE, RATES, MEAN_EXCESS, SERIES, SNAPSHOTS, STORE];
+
+/// The files that are drawn from the others.
+pub const PICTURES: [&str; 8] = [REPORT, RELAXATION, SURVIVAL, EXCESS, RATE, DEPENDENCE, MESH, CURVES];
+
+/// What helps against a file that was changed or cut off.
+pub const REMEDY: &str = "restore the file, or run again";
+
+/// The folder of the plots.
+pub const PLOTS: &str = "plots";
+
+/// From which an interrupted run goes on, see [`checkpoint`](crate::report::checkpoint).
+pub const STATE: &str = ".curvelax.state";
+/// The one before, for the case that the last one is damaged.
+pub const STATE_OLD: &str = ".curvelax.state.old";
+/// The next one, while it is written.
+pub const STATE_PART: &str = ".curvelax.state.part";
+
+/// Says whether a folder can be written, and holds what is about to take the place of another file.
+pub const PROBE: &str = ".curvelax.part";
+
+/// The temporary name of `name`.
+pub fn part(name: &Path) -> PathBuf {
+    let file_name = name.file_name().unwrap_or_default().to_string_lossy();
+    name.with_file_name(format!(".{file_name}.part"))
+}
+
+/// Whether a folder, and not a file, has this name.
+pub fn is_store(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().trim_end_matches(".part").ends_with(STORE))
+}

@@ -1,0 +1,142 @@
+//! Whose a folder is: what a command may take, and what it must leave alone.
+
+use std::{
+    collections::BTreeSet,
+    io,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    claim::LOCK,
+    disk::{entries, is_own_store},
+    names::{CONVERGENCE, FIGURES, PLOTS, PROBE, RUN, SHARD, STATE, STATE_OLD, STATE_PART, is_store, part},
+};
+use crate::error::{Error, Result};
+
+/// Who writes into a folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Owner {
+    /// `run`, `resume` and `merge`, whose files are the same.
+    Run,
+    /// `convergence`.
+    Convergence,
+    /// `figure`.
+    Figure,
+    /// `plot` with a folder of its own.
+    Pictures,
+    /// `plot` in the folder of the run that it draws.
+    PicturesOfRun,
+}
+
+/// What is done about a folder that exists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Existing {
+    /// It is refused, unless nothing is in it but what a run leaves that is killed before it began.
+    Refused,
+    /// It is taken unless a name in it is needed.
+    Filled,
+    /// Files of an earlier run of the same command are replaced.
+    Replaced,
+}
+
+impl From<bool> for Existing {
+    /// `--force`.
+    fn from(force: bool) -> Existing {
+        if force { Existing::Replaced } else { Existing::Refused }
+    }
+}
+
+impl Owner {
+    /// What only this command leaves.
+    fn marks(self) -> &'static [&'static str] {
+        match self {
+            Owner::Run => &[RUN, SHARD, STATE, STATE_OLD],
+            Owner::Convergence => &[CONVERGENCE],
+            Owner::Figure => &FIGURES,
+            // Those of a run that lost the rest.
+            Owner::Pictures | Owner::PicturesOfRun => &[],
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Owner::Run => "run",
+            Owner::Convergence => "convergence",
+            Owner::Figure => "figure",
+            Owner::Pictures | Owner::PicturesOfRun => "plot",
+        }
+    }
+
+    /// Refuses the folder at `place`, which is called `path`, if another command has written there.
+    ///
+    /// # Errors
+    /// [`Error::Request`] naming that command and its file.
+    pub fn check(self, place: &Path, path: &Path) -> Result<()> {
+        let own = if self == Owner::PicturesOfRun { Owner::Run } else { self };
+        for other in [Owner::Run, Owner::Convergence, Owner::Figure].into_iter().filter(|other| *other != own) {
+            if let Some(mark) = other.marks().iter().find(|mark| is_there(&place.join(mark))) {
+                let problem =
+                    format!("curvelax {} wrote {mark} there, and {} would mix with it", other.name(), self.name());
+                return Err(Error::value("out", path.display(), &problem, "name another folder, or remove that one"));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Existing {
+    /// Refuses the folder at `place`, which is called `path` and is to get the files `names`, as far as something in it
+    /// would be lost.
+    ///
+    /// # Errors
+    /// [`Error::Request`] that says what is there.
+    pub fn check(self, place: &Path, path: &Path, names: &[String]) -> Result<()> {
+        let refuse = |problem: &str, allowed: &str| Err(Error::value("out", path.display(), problem, allowed));
+        if self == Existing::Replaced {
+            return Ok(());
+        }
+        if [STATE, STATE_OLD].iter().any(|state| is_there(&place.join(state))) {
+            let resume = format!("curvelax resume {} goes on with it, --force begins anew", path.display());
+            return refuse("a run was interrupted here", &resume);
+        }
+        match self {
+            Existing::Filled => match names.iter().find(|name| is_there(&place.join(name))) {
+                None => Ok(()),
+                Some(name) => refuse(
+                    &format!("{name} is there, and no run that could be resumed"),
+                    "name another folder, or add --force instead of --resume to replace the files",
+                ),
+            },
+            _ if is_only_begun(place, names).unwrap_or(false) => Ok(()),
+            _ => refuse("already exists", "name a new folder, or add --force to replace the files of an earlier run"),
+        }
+    }
+}
+
+/// Whether `folder` holds what a run leaves that is killed before its first state, and nothing else. An empty one may be
+/// somebody's.
+fn is_only_begun(folder: &Path, names: &[String]) -> io::Result<bool> {
+    let parts: BTreeSet<PathBuf> = names.iter().map(|name| part(Path::new(name))).collect();
+    let is_left = |path: &Path| {
+        let name = path.strip_prefix(folder).unwrap_or(path);
+        let own = [LOCK, PROBE, STATE_PART].iter().any(|own| name == Path::new(own)) || parts.contains(name);
+        own && if is_store(path) { is_own_store(path) } else { !path.is_dir() }
+    };
+    let mut count = 0;
+    for path in entries(folder)? {
+        let is_plots = path.ends_with(PLOTS) && path.symlink_metadata()?.is_dir();
+        let all = match is_plots {
+            true => entries(&path)?.iter().all(|path| is_left(path)),
+            false => is_left(&path),
+        };
+        if !all {
+            return Ok(false);
+        }
+        count += 1;
+    }
+    Ok(count > 0)
+}
+
+fn is_there(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}

@@ -1,0 +1,401 @@
+//! Which back end a spec gets, and why: all that can be refused is refused here, before any work.
+
+use serde::{Deserialize, Serialize};
+
+use crate::backend::{
+    Backend,
+    cpu::{CpuBackend, Vectorised},
+    gpu::{Capacity, Gpu, Kernel, Variant, may_have_hardware},
+};
+use crate::{
+    conformance::{compare::MAX_SWEEPS, self_test},
+    ensemble::{
+        Spec,
+        spec::{BackendChoice, Precision},
+    },
+    error::{Error, Result},
+    scheme::step::Method,
+    solver::{Blocks, Order, Solver},
+};
+
+/// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
+pub const MAX_POINTS_F32: usize = 320;
+
+/// Where a run is computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Platform {
+    /// `gpu` or `cpu`.
+    pub backend: String,
+    /// Name of the GPU adapter.
+    pub adapter: Option<String>,
+    /// Its driver and the driver's version.
+    pub driver: Option<String>,
+    /// Hardware or software, integrated or discrete.
+    pub device_type: Option<String>,
+    /// Number type of the arithmetic.
+    pub precision: Precision,
+    /// Why this back end was taken.
+    pub reason: String,
+    /// Threads of the CPU back end.
+    pub threads: Option<usize>,
+}
+
+impl Platform {
+    /// Whether results are the same there to the last bit: those of the same program on the same adapter and driver, or on
+    /// any CPU, whatever its threads and vectors.
+    pub fn computes_like(&self, other: &Platform) -> bool {
+        let place = |of: &Platform| (of.backend.clone(), of.adapter.clone(), of.driver.clone(), of.precision);
+        place(self) == place(other)
+    }
+
+    /// Back end, adapter and driver.
+    pub fn name(&self) -> String {
+        let parts = [Some(self.backend.as_str()), self.adapter.as_deref(), self.driver.as_deref()];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(" ")
+    }
+
+    /// Writes into a spec where it ran, which is elsewhere than was chosen if the GPU failed.
+    pub fn settle_place(&self, spec: &mut Spec) {
+        spec.backend = if self.backend == "gpu" { BackendChoice::Gpu } else { BackendChoice::Cpu };
+        spec.adapter = self.adapter.clone();
+    }
+}
+
+/// A back end that suits a spec, not yet opened.
+pub struct Choice {
+    gpu: Option<Gpu>,
+    /// Its number, if it was asked for by that.
+    number: Option<String>,
+    /// Where the GPU cannot be opened the CPU is taken.
+    or_cpu: bool,
+    precision: Precision,
+    reason: String,
+}
+
+/// Chooses the back end for members of `n` nodes.
+///
+/// # Errors
+/// [`Error::Request`] when the adapter, the precision or n cannot be had.
+pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
+    match spec.backend {
+        BackendChoice::Cpu => cpu(spec, n, "asked for".into()),
+        BackendChoice::Gpu => gpu(spec, n),
+        BackendChoice::Auto if spec.adapter.is_some() => gpu(spec, n),
+        // Drivers are not loaded for nothing: that takes a tenth of a second, and Mesa's print what only matters to windows.
+        BackendChoice::Auto if !may_have_hardware() => auto(spec, n, Vec::new()),
+        BackendChoice::Auto => auto(spec, n, Gpu::list()),
+    }
+}
+
+/// Chooses back ends for several parts of a study, of so many nodes each: all in one place, that of the first part, or with
+/// `--backend auto` on the CPU where that cannot do all of them.
+///
+/// # Errors
+/// As [`choose`].
+pub fn choose_all(parts: &[(&Spec, usize)]) -> Result<Vec<Choice>> {
+    let Some(((first, n), others)) = parts.split_first() else { return Ok(Vec::new()) };
+    let choice = choose(first, *n)?;
+    let there = |(spec, n): &(&Spec, usize)| {
+        let mut spec = (*spec).clone();
+        choice.settle_place(&mut spec);
+        choose(&spec, *n)
+    };
+    let rest: Result<Vec<Choice>> = others.iter().map(there).collect();
+    match rest {
+        Err(error) if choice.or_cpu => {
+            let reason = format!("the GPU cannot do all cells: {error}");
+            parts.iter().map(|(spec, n)| cpu(spec, *n, reason.clone())).collect()
+        }
+        rest => {
+            let mut all = rest?;
+            all.insert(0, choice);
+            Ok(all)
+        }
+    }
+}
+
+/// What `--backend auto` takes: the first hardware GPU that can do the run, else the CPU.
+fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
+    if spec.order == Order::Lexicographic {
+        return cpu(spec, n, "lexicographic sweeps run on the CPU".into());
+    }
+    let mut reason = "no hardware GPU found".to_string();
+    for adapter in adapters.into_iter().filter(Gpu::is_hardware) {
+        let name = adapter.name().to_string();
+        match take(spec, n, adapter, format!("hardware GPU {name}")) {
+            Ok(choice) => return Ok(choice.or_cpu()),
+            Err(error) => reason = format!("GPU {name} cannot do it: {error}"),
+        }
+    }
+    cpu(spec, n, reason)
+}
+
+fn cpu(spec: &Spec, n: usize, reason: String) -> Result<Choice> {
+    let precision = spec.precision.unwrap_or(Precision::F64);
+    check_precision(n, precision)?;
+    Ok(Choice { gpu: None, number: None, or_cpu: false, precision, reason })
+}
+
+fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
+    if spec.order == Order::Lexicographic {
+        let message = "--adapter: lexicographic sweeps run on the CPU only; leave out --adapter";
+        return Err(Error::Request(message.into()));
+    }
+    let found = Gpu::list();
+    let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
+    let (mut chosen, by_number) = Gpu::select(found, spec.adapter.as_deref());
+    match chosen.is_empty() {
+        false => {
+            let adapter = chosen.swap_remove(0);
+            let number = by_number.then(|| spec.adapter.clone()).flatten();
+            Ok(Choice { number, ..take(spec, n, adapter, "asked for".into())? })
+        }
+        true => Err(no_adapter(spec.adapter.as_deref(), &names)),
+    }
+}
+
+/// The error of an adapter that is not there; `names` are those that are.
+pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
+    let there = if names.is_empty() {
+        "this machine has none; take --backend cpu, or install a GPU driver (Debian's software GPU is \
+         mesa-vulkan-drivers)"
+            .to_string()
+    } else {
+        format!("there are: {}", names.join(", "))
+    };
+    match asked {
+        Some(name) => Error::Request(format!("--adapter {name}: no such adapter; {there} (see `curvelax adapters`)")),
+        None => Error::Request(format!("--backend gpu: no GPU adapter; {there}")),
+    }
+}
+
+fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<Choice> {
+    let precision = fitting_precision(spec, n, adapter.name(), &adapter.capacity())?;
+    Ok(Choice { gpu: Some(adapter), number: None, or_cpu: false, precision, reason })
+}
+
+/// The precision of the run on an adapter, if members of `n` nodes fit it.
+fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> Result<Precision> {
+    let precision = spec.precision.unwrap_or(capacity.best_precision());
+    if precision == Precision::F64 && !capacity.f64 {
+        let problem = format!("adapter {name} has no f64");
+        return Err(Error::value("precision", "f64", &problem, "take --precision f32, or --backend cpu"));
+    }
+    check_precision(n, precision)?;
+    let (fits, most) = match precision {
+        Precision::F32 => (
+            capacity.check_size::<f32>(ring(n)?, spec.solver()),
+            capacity.max_points::<f32>(spec.solver()).min(MAX_POINTS_F32),
+        ),
+        Precision::F64 => {
+            (capacity.check_size::<f64>(ring(n)?, spec.solver()), capacity.max_points::<f64>(spec.solver()))
+        }
+    };
+    fits.map_err(|needs| {
+        let problem = format!("a member needs {needs}");
+        Error::value("points", n, &problem, &format!("take {most} or fewer, or --backend cpu"))
+    })?;
+    Ok(precision)
+}
+
+/// f32 has a resolution limit: rounding grows like (1/h)⁴, and beyond the verified n results would only look right.
+fn check_precision(n: usize, precision: Precision) -> Result<()> {
+    if precision == Precision::F32 && n > MAX_POINTS_F32 {
+        let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");
+        return Err(Error::value("points", n, &problem, "take fewer points, or --precision f64"));
+    }
+    Ok(())
+}
+
+fn ring(n: usize) -> Result<Blocks> {
+    Blocks::new(n)
+        .ok_or_else(|| Error::value("points", n, "a ring of fewer than 6 nodes cannot be coloured", "take 6 or more"))
+}
+
+impl Choice {
+    /// The number type of the run.
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+
+    /// One line: what was taken and why, and which solver.
+    pub fn sentence(&self, spec: &Spec) -> String {
+        let precision = match self.precision {
+            Precision::F32 => "f32",
+            Precision::F64 => "f64",
+        };
+        let device = match &self.gpu {
+            Some(gpu) => format!("GPU {} ({})", gpu.name(), gpu.api()),
+            None => "CPU".into(),
+        };
+        let solver = match spec.solver() {
+            Solver::GaussSeidel => "Gauss-Seidel sweeps",
+            Solver::Multigrid => "sweeps inside multigrid",
+            Solver::Direct => "direct solver",
+        };
+        format!("back end: {device}, {precision} ({}); {solver}", self.reason)
+    }
+
+    /// The spec with everything that this choice settled written out, so that it can be repeated as it is.
+    pub fn settle(&self, spec: &mut Spec) {
+        self.settle_place(spec);
+        if spec.solver().sweeps() {
+            spec.tolerance = Some(spec.tolerance_at(self.precision));
+        }
+        spec.solver = spec.solver().into();
+    }
+
+    /// Writes into a spec with cells what they all have in common: where they are computed.
+    pub fn settle_place(&self, spec: &mut Spec) {
+        spec.backend = if self.gpu.is_some() { BackendChoice::Gpu } else { BackendChoice::Cpu };
+        // Several of one name are told apart by their numbers only.
+        let name = || self.gpu.as_ref().map(|gpu| gpu.name().to_string());
+        spec.adapter = self.number.clone().or_else(name);
+        spec.precision = Some(self.precision);
+    }
+
+    /// Where the members of `spec` are computed by this choice.
+    pub fn platform(&self, spec: &Spec) -> Platform {
+        let mut platform = Platform {
+            backend: "cpu".into(),
+            adapter: None,
+            driver: None,
+            device_type: None,
+            precision: self.precision,
+            reason: self.reason.clone(),
+            threads: None,
+        };
+        match &self.gpu {
+            Some(gpu) => {
+                platform.backend = "gpu".into();
+                platform.adapter = Some(gpu.name().to_string());
+                platform.driver = Some(gpu.driver());
+                platform.device_type = Some(gpu.device_type());
+            }
+            None => platform.threads = Some(threads(spec)),
+        }
+        platform
+    }
+
+    /// The choice for a later part of a study whose first part runs `there`: a study does not move in its midst. Where the
+    /// GPU of the first part failed, it is the CPU; else a GPU that fails is an error.
+    pub fn after(self, there: &Platform) -> Choice {
+        match there.backend.as_str() {
+            "cpu" if self.gpu.is_some() => self.on_cpu(there.reason.clone()),
+            _ => Choice { or_cpu: false, ..self },
+        }
+    }
+
+    fn on_cpu(&self, reason: String) -> Choice {
+        Choice { gpu: None, number: None, or_cpu: false, precision: self.precision, reason }
+    }
+
+    /// The same, but the CPU where the GPU cannot be opened or computes wrongly.
+    pub fn or_cpu(self) -> Choice {
+        Choice { or_cpu: true, ..self }
+    }
+
+    /// The GPU, if it is one.
+    pub fn gpu(&self) -> Option<&Gpu> {
+        self.gpu.as_ref()
+    }
+
+    /// Opens it for the members of `spec`, of `n` nodes; a GPU has to pass a [self-test](crate::conformance::self_test()).
+    /// Where `--backend auto` chose a GPU that fails, it opens the CPU, and the platform's reason says why.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when a GPU that was asked for cannot be opened or computes wrongly.
+    pub fn open(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+        match self.precision {
+            Precision::F32 => self.open_in::<f32>(spec, n),
+            Precision::F64 => self.open_in::<f64>(spec, n),
+        }
+    }
+
+    fn open_in<T: Vectorised>(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+        let blocks = ring(n)?;
+        let method = Method { solver: spec.solver(), order: spec.order, max_sweeps: spec.most_sweeps() };
+        let Some(gpu) = &self.gpu else {
+            let backend = CpuBackend::<T>::for_members(blocks, method, threads(spec), spec.member_count())?;
+            return Ok((Box::new(backend), self.platform(spec)));
+        };
+        match open_gpu::<T>(gpu, blocks, spec, &method) {
+            Ok(kernel) => Ok((kernel, self.platform(spec))),
+            Err(Error::Device(fault)) if self.or_cpu => {
+                self.on_cpu(format!("the GPU failed: {fault}")).open_in::<T>(spec, n)
+            }
+            Err(error) => Err(error),
+        }
+    }
+}
+
+/// Threads of the CPU back end: all cores unless the spec says how many.
+fn threads(spec: &Spec) -> usize {
+    spec.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
+
+/// The kernel for the members of `spec`, which has passed its self-test.
+fn open_gpu<T: Vectorised>(gpu: &Gpu, blocks: Blocks, spec: &Spec, method: &Method) -> Result<Box<dyn Backend>> {
+    let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
+    let adaptive = spec.adaptive.is_some();
+    let variant = Variant { adaptive, ..gpu.capacity().variant(blocks, spec.solver()) };
+    // The self-test has settings of its own: by the run's a solve may end before it is one, and then roundings decide.
+    let tested = Method { max_sweeps: MAX_SWEEPS, ..*method };
+    let mut kernel = Kernel::<T>::new(gpu, blocks, members, tested.max_sweeps, variant)?;
+    let device = format!("{} ({})", gpu.name(), gpu.driver());
+    self_test::<T>(&mut kernel, &device, gpu.is_hardware(), &tested, blocks.n, adaptive)?;
+    Ok(Box::new(kernel.with_max_sweeps(method.max_sweeps)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What every WebGPU device has at least.
+    const LEAST: Capacity =
+        Capacity { f64: false, threads: 256, workgroup_bytes: 16_384, subgroup: 32, least_subgroup: 0 };
+
+    fn refused(precision: Option<Precision>, n: usize, capacity: &Capacity) -> String {
+        let spec = Spec { precision, ..Spec::default() };
+        fitting_precision(&spec, n, "toaster", capacity).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn f64_on_an_adapter_without_it_is_refused_by_name() {
+        let message = refused(Some(Precision::F64), 100, &LEAST);
+        for part in ["--precision f64", "adapter toaster has no f64", "--precision f32", "--backend cpu"] {
+            assert!(message.contains(part), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_run_that_asks_for_no_precision_gets_the_best_there_is() {
+        let spec = Spec::default();
+        assert_eq!(fitting_precision(&spec, 100, "toaster", &LEAST).unwrap(), Precision::F32);
+        let with_f64 = Capacity { f64: true, ..LEAST };
+        assert_eq!(fitting_precision(&spec, 100, "toaster", &with_f64).unwrap(), Precision::F64);
+    }
+
+    #[test]
+    fn more_points_than_the_workgroup_holds_are_refused_with_the_largest_number_that_fits() {
+        let capacity = Capacity { f64: true, ..LEAST };
+        let spec = Spec { precision: Some(Precision::F64), ..Spec::default() };
+        let most = capacity.max_points::<f64>(spec.solver());
+        assert!(most >= 512, "{most}");
+        fitting_precision(&spec, most, "toaster", &capacity).unwrap();
+        let message = refused(Some(Precision::F64), most + 1, &capacity);
+        for part in [format!("--points {}", most + 1), format!("take {most} or fewer"), "--backend cpu".into()] {
+            assert!(message.contains(&part), "{message}");
+        }
+        let few_threads = Capacity { threads: 32, ..capacity };
+        assert!(refused(Some(Precision::F64), 256, &few_threads).contains("threads a workgroup"));
+    }
+
+    #[test]
+    fn f32_beyond_what_was_verified_is_refused_with_the_reason() {
+        let spec = Spec { precision: Some(Precision::F32), backend: BackendChoice::Cpu, ..Spec::default() };
+        choose(&spec, MAX_POINTS_F32).unwrap();
+        let message = choose(&spec, MAX_POINTS_F32 + 1).err().unwrap().to_string();
+        assert!(message.contains("verified against f64 up to"), "{message}");
+    }
+}

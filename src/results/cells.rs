@@ -1,0 +1,271 @@
+//! `ensemble.csv`: the statistics of relaxation times and of rates of decay, one row a cell.
+//!
+//! A member whose time is not known is censored where it ended: one that is unfinished at the final time, and one that
+//! ended badly at its last good state. How many of these there are is in the row.
+
+use std::mem;
+
+use csv::WriterBuilder;
+use serde::{Serialize, Serializer, ser::SerializeMap};
+
+use super::tally::{CellTally, Rate, Tally};
+use crate::{
+    ensemble::{Spec, Status},
+    error::{Error, Result},
+    statistics::{Bootstrap, Description, Interval, KaplanMeier, LogRank, Mean, PowerLaw, Sample, log_rank},
+};
+
+/// Shares of the members whose times the table has, and what its columns are called.
+pub const QUANTILES: [(f64, &str); 5] = [(0.05, "q05"), (0.25, "q25"), (0.5, "median"), (0.75, "q75"), (0.95, "q95")];
+
+/// The test that compares cells takes the cube of their number.
+const MOST_COMPARED: usize = 500;
+
+/// Relaxation times of one cell.
+pub struct CellStatistics {
+    /// Index of the cell.
+    pub cell: u64,
+    /// Its swept values, in the order of the keys.
+    pub values: Vec<String>,
+    /// Members by status.
+    pub counts: [u64; Status::ALL.len()],
+    /// The times, sorted.
+    pub sample: Sample,
+    /// Mean time, restricted where the last member is censored.
+    pub mean: Option<Mean>,
+    /// Times of the [shares](QUANTILES) of the members.
+    pub quantiles: [Option<f64>; QUANTILES.len()],
+    /// 95 % interval of the median.
+    pub interval: Option<Interval>,
+    /// Rates of decay.
+    pub rates: Rates,
+}
+
+/// Fitted rates of decay of the members of one cell that have one: complete data.
+pub struct Rates {
+    /// What the table says of them.
+    pub numbers: Numbers,
+    /// What is drawn: the rates, or what they are over those of theory.
+    pub drawn: Description,
+}
+
+impl Rates {
+    /// Of `rates`, of which what they are over theory is drawn if they are `relative`.
+    fn new(bootstrap: &Bootstrap, rates: &[Rate], relative: bool) -> Result<Rates> {
+        let theory = Description::new(rates.iter().filter_map(Rate::theory))?.median();
+        let fitted = Description::new(rates.iter().map(|rate| rate.fitted))?;
+        let moments = [("mean", fitted.mean()), ("sd", fitted.standard_deviation()), ("se", fitted.standard_error())];
+        let quantiles = QUANTILES.map(|(share, _)| fitted.quantile(share));
+        let places = places(quantiles, bootstrap.median_of(&fitted));
+        let (known, mut named) = (fitted.count(), moments.into_iter().chain(places).collect::<Vec<_>>());
+        // Each is as large as all times of the cell: one at a time.
+        let kept = (!relative).then_some(fitted);
+        let ratio = Description::new(rates.iter().filter_map(Rate::ratio))?;
+        named.extend([("theory", theory), ("ratio", ratio.median())]);
+        Ok(Rates { numbers: Numbers { known, named }, drawn: kept.unwrap_or(ratio) })
+    }
+}
+
+/// The numbers of `ensemble.csv` on one quantity of a cell, in the order of its columns and named as these are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Numbers {
+    /// Members of which the quantity is known.
+    pub known: usize,
+    /// All others.
+    pub named: Vec<(&'static str, Option<f64>)>,
+}
+
+impl Numbers {
+    /// The one of this name, where it is known.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.named.iter().find(|(own, _)| *own == name).and_then(|(_, value)| *value)
+    }
+}
+
+impl Serialize for Numbers {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(1 + self.named.len()))?;
+        map.serialize_entry("known", &self.known)?;
+        self.named.iter().try_for_each(|(name, value)| map.serialize_entry(name, value))?;
+        map.end()
+    }
+}
+
+/// Quantiles, and the interval of the median.
+fn places(
+    quantiles: [Option<f64>; QUANTILES.len()],
+    interval: Option<Interval>,
+) -> impl Iterator<Item = (&'static str, Option<f64>)> {
+    let ends = interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
+    let names = QUANTILES.map(|(_, name)| name);
+    names.into_iter().zip(quantiles).chain(["median_low", "median_high"].into_iter().zip(ends))
+}
+
+/// Relaxation times of all cells, and how they compare.
+pub struct EnsembleStatistics {
+    /// Each cell.
+    pub cells: Vec<CellStatistics>,
+    /// Whether the cells could have one distribution; none for a single cell.
+    pub log_rank: Option<LogRank>,
+    /// The medians as a power of the swept value, where one key is swept whose values are positive numbers.
+    pub power_law: Option<PowerLaw>,
+    /// Rates are drawn over those of theory, which says something of every member that has one.
+    pub relative: bool,
+}
+
+impl CellStatistics {
+    /// Takes times and rates out of `tally`.
+    fn new(spec: &Spec, cell: u64, tally: &mut CellTally, relative: bool) -> Result<CellStatistics> {
+        let sample = Sample::from(mem::take(&mut tally.times));
+        let survival = KaplanMeier::new(&sample);
+        let bootstrap = Bootstrap { seed: spec.seed.wrapping_add(cell), ..Bootstrap::default() };
+        let (mean, interval) = (survival.mean(), bootstrap.median(&sample));
+        let quantiles = QUANTILES.map(|(share, _)| survival.quantile(share));
+        let (values, counts) = (spec.sweep.labels(cell), tally.counts);
+        let rates = Rates::new(&bootstrap, &mem::take(&mut tally.rates), relative)?;
+        Ok(CellStatistics { cell, values, counts, sample, mean, quantiles, interval, rates })
+    }
+
+    /// Members that ended.
+    pub fn members(&self) -> u64 {
+        self.counts.iter().sum()
+    }
+
+    /// What the table says of the times.
+    pub fn times(&self) -> Numbers {
+        let of = |number: fn(Mean) -> Option<f64>| self.mean.and_then(number);
+        let moments = [
+            ("mean", of(|mean| Some(mean.value))),
+            ("sd", of(|mean| mean.standard_deviation)),
+            ("se", of(|mean| mean.standard_error)),
+            ("restricted_to", of(|mean| mean.restricted_to)),
+        ];
+        let places = places(self.quantiles, self.interval);
+        Numbers { known: self.sample.events(), named: moments.into_iter().chain(places).collect() }
+    }
+
+    /// The time by which half of the members have relaxed.
+    pub fn median(&self) -> Option<f64> {
+        let [_, _, median, ..] = self.quantiles;
+        median
+    }
+
+    /// The interval of the median, where both its ends are known.
+    pub fn bounds(&self) -> Option<(f64, f64)> {
+        self.interval.and_then(|Interval { lower, upper, .. }| Some((lower?, upper?)))
+    }
+}
+
+impl EnsembleStatistics {
+    /// From the times and rates of a run of `spec`, which are taken out of `tally`: it keeps what is counted.
+    ///
+    /// Those of 10⁷ members are 240 MB, so they are sorted where they are.
+    pub fn new(spec: &Spec, tally: &mut Tally) -> Result<EnsembleStatistics> {
+        let relative = tally.cells.iter().flat_map(|cell| &cell.rates).all(|rate| rate.theory().is_some());
+        let mut none = CellTally::default();
+        let cells = (0..spec.sweep.cells())
+            .map(|cell| {
+                let of_cell = tally.cells.get_mut(cell as usize).unwrap_or(&mut none);
+                CellStatistics::new(spec, cell, of_cell, relative)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let compared = (2..=MOST_COMPARED).contains(&cells.len());
+        let samples = || cells.iter().map(|cell| &cell.sample).collect::<Vec<_>>();
+        let log_rank = if compared { log_rank(&samples()) } else { None };
+        let power_law = match spec.sweep.axes() {
+            [axis] => axis.numbers().and_then(|values| {
+                let medians = cells.iter().map(CellStatistics::median);
+                let points: Vec<(f64, f64)> =
+                    values.into_iter().zip(medians).filter_map(|(x, y)| Some((x, y?))).collect();
+                // Values that are not positive have no power law, which is no fault.
+                PowerLaw::fit(&points).ok().flatten()
+            }),
+            _ => None,
+        };
+        Ok(EnsembleStatistics { cells, log_rank, power_law, relative })
+    }
+
+    /// The text of `ensemble.csv`.
+    pub fn to_csv(&self, spec: &Spec) -> Result<String> {
+        let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write ensemble.csv: {e}"));
+        let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+        let keys = spec.sweep.axes().iter().map(|axis| axis.key.clone());
+        let statuses = Status::ALL.iter().map(|status| status.name().to_string());
+        let header = ["cell".to_string()].into_iter().chain(keys).chain(["members".to_string()]).chain(statuses);
+        let quantities = |cell: &CellStatistics| [("t_relax", cell.times()), ("rate", cell.rates.numbers.clone())];
+        let columns = self.cells.first().into_iter().flat_map(quantities).flat_map(|(quantity, numbers)| {
+            let names = ["known"].into_iter().chain(numbers.named.into_iter().map(|(name, _)| name));
+            names.map(move |name| format!("{quantity}_{name}"))
+        });
+        writer.write_record(header.chain(columns)).map_err(|e| failed(&e))?;
+        for cell in &self.cells {
+            let numbers = quantities(cell).map(|(_, Numbers { known, named })| {
+                (known, named.into_iter().map(|(_, value)| value).collect::<Vec<_>>())
+            });
+            let row = (cell.cell, &cell.values, cell.members(), cell.counts, numbers);
+            writer.serialize(row).map_err(|e| failed(&e))?;
+        }
+        let bytes = writer.into_inner().map_err(|e| failed(&e))?;
+        String::from_utf8(bytes).map_err(|e| failed(&e))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::tally::tests::outcome;
+
+    fn statistics(sweep: &str, members: &[(u64, Option<f64>)]) -> (Spec, EnsembleStatistics) {
+        let mut spec = Spec { curves: 2, ..Spec::default() };
+        if !sweep.is_empty() {
+            spec.sweep.set(sweep.parse().unwrap());
+        }
+        let mut tally = Tally::default();
+        for (cell, t_relax) in members {
+            let status = if t_relax.is_some() { Status::Relaxed } else { Status::Unfinished };
+            tally.add(&crate::ensemble::Outcome { cell: *cell, ..outcome(0, status, *t_relax) }).unwrap();
+        }
+        let statistics = EnsembleStatistics::new(&spec, &mut tally).unwrap();
+        (spec, statistics)
+    }
+
+    #[test]
+    fn a_table_looks_like_this() {
+        let members = [(0, Some(0.5)), (0, Some(1.5)), (1, Some(1.0)), (1, None)];
+        let (spec, statistics) = statistics("shape=ellipse:2,1;circle:1", &members);
+        let text = statistics.to_csv(&spec).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines[0],
+            "cell,shape,members,relaxed,unfinished,singular,nonfinite,stalled,t_relax_known,t_relax_mean,t_relax_sd,\
+             t_relax_se,t_relax_restricted_to,t_relax_q05,t_relax_q25,t_relax_median,t_relax_q75,t_relax_q95,\
+             t_relax_median_low,t_relax_median_high,rate_known,rate_mean,rate_sd,rate_se,rate_q05,rate_q25,\
+             rate_median,rate_q75,rate_q95,rate_median_low,rate_median_high,rate_theory,rate_ratio"
+        );
+        assert!(lines[1].starts_with("0,\"ellipse:2,1\",2,2,0,0,0,0,2,1.0,0.7071"), "{}", lines[1]);
+        assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
+        assert!(lines[2].contains(",2.0,1.0,1.0,1.0,,,"), "the mean is restricted, the tail unknown: {}", lines[2]);
+        assert_eq!(statistics.log_rank.unwrap().degrees_of_freedom, 1);
+        assert_eq!(statistics.power_law, None);
+    }
+
+    #[test]
+    fn medians_follow_a_power_of_the_swept_number() {
+        let members: Vec<(u64, Option<f64>)> =
+            (0..6).map(|member| (member / 2, Some(3.0 * [1.0, 4.0, 16.0][member as usize / 2]))).collect();
+        let law = statistics("amplitude=0.1,0.2,0.4", &members).1.power_law.unwrap();
+        assert!((law.exponent - 2.0).abs() < 1e-12 && (law.factor - 300.0).abs() < 1e-9, "{law:?}");
+        assert_eq!(statistics("omega=0,1,2", &members).1.power_law, None);
+    }
+
+    #[test]
+    fn cells_without_times_have_empty_fields_and_no_nan() {
+        let (spec, statistics) = statistics("omega=1,2,3", &[(0, None), (0, None), (2, Some(0.0))]);
+        let text = statistics.to_csv(&spec).unwrap();
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0{}0{}", ",".repeat(12), ",".repeat(12)));
+        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0{}0{}", ",".repeat(12), ",".repeat(12)));
+        assert!(lines[2].starts_with("2,3,1,1,0,0,0,0,1,0.0,,,,0.0,"), "{}", lines[2]);
+    }
+}

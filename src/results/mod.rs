@@ -1,0 +1,7 @@
+//! What the members of a study add up to: sums over members as they end, statistics by cell, and the record of the run.
+
+pub mod cells;
+pub mod provenance;
+pub mod tally;
+
+pub use cells::EnsembleStatistics;

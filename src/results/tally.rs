@@ -1,0 +1,395 @@
+//! Running totals over members: what the overview and `run.json` say, without keeping the members.
+
+use serde::{Deserialize, Serialize};
+
+use crate::text::plural;
+use crate::{
+    ensemble::{Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
+    error::Result,
+    schedule::grid,
+    statistics::{Moments, Observation, Observations},
+};
+
+/// Counts and sums over the members that ended.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    /// By cell.
+    pub cells: Vec<CellTally>,
+    /// Steps of all members.
+    pub steps: u64,
+    /// Sweeps on curvature systems of all members.
+    pub sweeps_k: u64,
+    /// Sweeps on position systems of all members.
+    pub sweeps_x: u64,
+    /// Members whose corners were rounded off before the run.
+    pub mollified: MollifiedMembers,
+    /// Members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
+    drifted: (u64, f64),
+    /// Members whose relaxation cannot be told: their threshold lies in the rounding of the precision.
+    pub below_rounding: u64,
+    /// Longest over shortest edge of each at its end, for a picture.
+    pub mesh_ratios: Vec<f32>,
+    /// Metric drift of each at its end, likewise.
+    pub metric_drifts: Vec<f32>,
+}
+
+/// Rate of decay of a member.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate {
+    /// As fitted, in length⁻⁴.
+    pub fitted: f64,
+    /// NaN where theory says nothing.
+    theory: f64,
+}
+
+impl Rate {
+    /// What linear theory gives, if a number.
+    pub fn theory(&self) -> Option<f64> {
+        Some(self.theory).filter(|theory| theory.is_finite())
+    }
+
+    /// Over that of theory, if a number: areas at the ends of the range of floats, which a table may tell, have none.
+    pub fn ratio(&self) -> Option<f64> {
+        self.theory().map(|theory| self.fitted / theory).filter(|ratio| ratio.is_finite())
+    }
+}
+
+/// What the members of one cell came to.
+#[derive(Clone, Debug, Default)]
+pub struct CellTally {
+    /// Members by status, in the order of [`Status::ALL`].
+    pub counts: [u64; Status::ALL.len()],
+    /// When each relaxed, or until when it had not.
+    pub times: Observations,
+    /// Those that have not relaxed, by status.
+    pub others: [u64; Status::ALL.len()],
+    /// Sum of the areas at the start.
+    pub area: f64,
+    /// Those that have a rate of decay.
+    pub rates: Vec<Rate>,
+    /// Excess at the times of [`grid`], of the members that reached them.
+    pub excess: Vec<Moments>,
+}
+
+/// What a [`Tally`] knows of the members that ended beside what their rows in `summary.csv` say.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Aside {
+    mollified: MollifiedMembers,
+    drifted: (u64, f64),
+    below_rounding: u64,
+    /// By cell.
+    excess: Vec<Vec<Moments>>,
+}
+
+impl Aside {
+    /// Adds what is known of other members.
+    pub fn merge(&mut self, other: &Aside) {
+        let Aside { mollified, drifted, below_rounding, excess } = other;
+        self.mollified.merge(mollified);
+        self.drifted = (self.drifted.0.saturating_add(drifted.0), self.drifted.1.max(drifted.1));
+        self.below_rounding = self.below_rounding.saturating_add(*below_rounding);
+        self.excess.resize_with(self.excess.len().max(excess.len()), Vec::new);
+        for (own, other) in self.excess.iter_mut().zip(excess) {
+            own.resize_with(own.len().max(other.len()), Moments::default);
+            own.iter_mut().zip(other).for_each(|(own, other)| own.merge(other));
+        }
+    }
+}
+
+/// A row of `mean_excess.csv`: the excess of the members of a cell that reached a time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MeanExcess {
+    /// Index of the cell.
+    pub cell: u64,
+    /// The time.
+    pub t: f64,
+    /// How many reached it.
+    pub members: u64,
+    /// Their mean excess.
+    pub mean: Option<f64>,
+    /// Its standard deviation.
+    pub sd: Option<f64>,
+}
+
+impl MeanExcess {
+    fn new(cell: u64, t: f64, of: &Moments) -> MeanExcess {
+        MeanExcess { cell, t, members: of.count(), mean: of.mean(), sd: of.deviation() }
+    }
+}
+
+/// Metric drift above which the scheme's lengths are so far from the polygon's that times mean little.
+pub const DISTRUSTED_DRIFT: f64 = 0.1;
+
+/// What rounding off corners did to the members (`ensemble/mollifier.rs`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MollifiedMembers {
+    /// How many were not left alone.
+    pub members: u64,
+    /// Most rounds that one took.
+    pub most_rounds: u32,
+    /// Largest relative change of area.
+    pub largest_area_change: f64,
+    /// How many are not resolved: one of the next three.
+    pub unresolved: u64,
+    /// How many cross themselves at the start, though the outline does not.
+    pub crossed: u64,
+    /// How many start with a node that turns by more than 1.5 rad.
+    pub sharp: u64,
+    /// How many changed their area by more than a tenth.
+    pub distorted: u64,
+}
+
+impl MollifiedMembers {
+    /// Adds one member.
+    fn add(&mut self, mollified: &Mollified) {
+        self.members += u64::from(mollified.rounds > 0);
+        self.most_rounds = self.most_rounds.max(mollified.rounds);
+        self.largest_area_change = self.largest_area_change.max(mollified.area_change.abs());
+        let faults = [mollified.crossed, mollified.sharp, mollified.distorted()];
+        self.unresolved += u64::from(faults.contains(&true));
+        for (count, fault) in [&mut self.crossed, &mut self.sharp, &mut self.distorted].into_iter().zip(faults) {
+            *count += u64::from(fault);
+        }
+    }
+
+    /// Adds others.
+    fn merge(&mut self, other: &MollifiedMembers) {
+        let MollifiedMembers { members, most_rounds, largest_area_change, unresolved, crossed, sharp, distorted } =
+            other;
+        self.members = self.members.saturating_add(*members);
+        self.most_rounds = self.most_rounds.max(*most_rounds);
+        self.largest_area_change = self.largest_area_change.max(*largest_area_change);
+        self.unresolved = self.unresolved.saturating_add(*unresolved);
+        self.crossed = self.crossed.saturating_add(*crossed);
+        self.sharp = self.sharp.saturating_add(*sharp);
+        self.distorted = self.distorted.saturating_add(*distorted);
+    }
+
+    /// What the user should know, unless all is well.
+    fn warning(&self, all: u64) -> Option<String> {
+        let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = self;
+        (*unresolved > 0).then(|| {
+            let parts = [
+                (crossed, "with crossings that the outline has not".to_owned()),
+                (sharp, format!("with a turn left above {MAX_VERTEX_TURN} rad")),
+                (distorted, format!("with an area changed by more than {} %", 100.0 * Mollified::DISTORTED)),
+            ];
+            let parts = parts.into_iter().filter(|(count, _)| **count > 0);
+            let parts: Vec<String> = parts.map(|(count, what)| format!("{count} {what}")).collect();
+            format!(
+                "{unresolved} of {all} {} started from an outline with parts thinner than the spacing of the nodes: {}; \
+                 take more --points or a simpler outline",
+                plural(all, "member"),
+                parts.join(", ")
+            )
+        })
+    }
+}
+
+impl Tally {
+    /// Adds one member.
+    ///
+    /// # Errors
+    /// For a time that is none.
+    pub fn add(&mut self, outcome: &Outcome) -> Result<()> {
+        let cell = outcome.cell as usize;
+        if self.cells.len() <= cell {
+            self.cells.resize_with(cell + 1, CellTally::default);
+        }
+        let CellTally { counts, times, others, area, rates, .. } = &mut self.cells[cell];
+        times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
+        *area += outcome.start.area.abs();
+        rates.extend(outcome.rate.map(|fitted| Rate { fitted, theory: outcome.rate_theory.unwrap_or(f64::NAN) }));
+        self.mesh_ratios.push(outcome.end.mesh_ratio as f32);
+        self.metric_drifts.push(outcome.end.metric_drift as f32);
+        for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
+            for (count, status) in counts.iter_mut().zip(Status::ALL) {
+                *count += u64::from(counted && status == outcome.status);
+            }
+        }
+        let drift = outcome.end.metric_drift;
+        self.drifted.0 += u64::from(drift > DISTRUSTED_DRIFT);
+        self.drifted.1 = self.drifted.1.max(drift);
+        // A table that was read may say anything.
+        self.steps = self.steps.saturating_add(outcome.steps);
+        self.sweeps_k = self.sweeps_k.saturating_add(outcome.sweeps_k);
+        self.sweeps_x = self.sweeps_x.saturating_add(outcome.sweeps_x);
+        Ok(())
+    }
+
+    /// Members that ended with a metric drift above [`DISTRUSTED_DRIFT`].
+    pub fn distrusted(&self) -> u64 {
+        self.drifted.0
+    }
+
+    /// Adds the excess of a member of `cell` at the times of [`grid`] that it reached.
+    pub fn add_excess(&mut self, cell: u64, excess: &[f64]) {
+        let Some(tally) = self.cells.get_mut(cell as usize) else { return };
+        tally.excess.resize_with(tally.excess.len().max(excess.len()), Moments::default);
+        tally.excess.iter_mut().zip(excess).for_each(|(moments, excess)| moments.add(*excess));
+    }
+
+    /// Adds what is not in the summary's row.
+    pub fn add_aside(&mut self, mollified: &Mollified, unresolved: bool) {
+        self.mollified.add(mollified);
+        self.below_rounding += u64::from(unresolved);
+    }
+
+    /// What rows do not say.
+    pub fn aside(&self) -> Aside {
+        let Tally { mollified, drifted, below_rounding, .. } = *self;
+        Aside {
+            mollified,
+            drifted,
+            below_rounding,
+            excess: self.cells.iter().map(|cell| cell.excess.clone()).collect(),
+        }
+    }
+
+    /// Takes it back, after all rows.
+    pub fn set_aside(&mut self, aside: Aside) {
+        let Aside { mollified, drifted, below_rounding, excess } = aside;
+        (self.mollified, self.drifted, self.below_rounding) = (mollified, drifted, below_rounding);
+        self.cells.iter_mut().zip(excess).for_each(|(cell, excess)| cell.excess = excess);
+    }
+
+    /// The rows of `mean_excess.csv`.
+    ///
+    /// # Errors
+    /// [`Error::Request`](crate::Error::Request) where the values of a cell do not fit `spec`.
+    pub fn mean_excess(&self, spec: &Spec) -> Result<Vec<MeanExcess>> {
+        let mut rows = Vec::new();
+        for (cell, CellTally { excess, .. }) in (0..).zip(&self.cells) {
+            let t_end = spec.sweep.apply(spec, cell)?.t_end;
+            let row = |(t, of): (f64, &Moments)| MeanExcess::new(cell, t, of);
+            rows.extend(grid(t_end).zip(excess).map(row));
+        }
+        Ok(rows)
+    }
+
+    /// What the user should know about the results, a sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings: Vec<String> = self.mollified.warning(self.members()).into_iter().collect();
+        let members = format!("{} {}", self.members(), plural(self.members(), "member"));
+        let failed = self.failed();
+        if failed > 0 {
+            warnings.push(format!(
+                "{failed} of {members} ended badly (see `status`); unless the flow itself goes wrong there, a \
+                 smaller --tau or --adaptive, or more --points, helps"
+            ));
+        }
+        if self.below_rounding > 0 {
+            warnings.push(format!(
+                "{} of {members} started so nearly round that the threshold lies in the rounding of the precision: no \
+                 t_relax can be told; take --precision f64 or a larger --relax-to",
+                self.below_rounding
+            ));
+        }
+        let (drifted, worst) = self.drifted;
+        if drifted > 0 {
+            warnings.push(format!(
+                "{drifted} of {members} ended with a metric drift above {DISTRUSTED_DRIFT} (worst {worst:.2}): \
+                 their times and areas are not to be trusted; take --pull auto, a smaller --tau or --adaptive, or \
+                 more --points"
+            ));
+        }
+        warnings
+    }
+
+    /// Members that ended neither relaxed nor unfinished.
+    pub fn failed(&self) -> u64 {
+        self.counts().filter(|(status, _)| status.is_failure()).map(|(_, count)| count).sum()
+    }
+
+    /// Members that ended.
+    pub fn members(&self) -> u64 {
+        self.counts().map(|(_, count)| count).sum()
+    }
+
+    /// Each status with its number of members, in the order of [`Status::ALL`].
+    pub fn counts(&self) -> impl Iterator<Item = (Status, u64)> {
+        let of = |rank: usize| self.cells.iter().map(|cell| cell.counts[rank]).sum();
+        Status::ALL.into_iter().enumerate().map(move |(rank, status)| (status, of(rank)))
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::ensemble::Observables;
+
+    pub fn outcome(member: u64, status: Status, t_relax: Option<f64>) -> Outcome {
+        let (start, end) = (Observables::default(), Observables::default());
+        Outcome {
+            member,
+            cell: 0,
+            status,
+            t_end: 2.0,
+            steps: 10,
+            sweeps_k: 20,
+            sweeps_x: 5,
+            t_relax,
+            t_half: None,
+            rate: None,
+            rate_r2: None,
+            rate_theory: None,
+            start,
+            end,
+            rejected: 0,
+            self_crossing: None,
+        }
+    }
+
+    fn tally(times: &[f64], censored: u64) -> Tally {
+        let mut tally = Tally::default();
+        times.iter().for_each(|t| tally.add(&outcome(0, Status::Relaxed, Some(*t))).unwrap());
+        (0..censored).for_each(|_| tally.add(&outcome(0, Status::Unfinished, None)).unwrap());
+        tally
+    }
+
+    #[test]
+    fn totals_count_every_member_once() {
+        let tally = tally(&[1.0, 2.0], 3);
+        assert_eq!((tally.members(), tally.steps, tally.sweeps_k, tally.sweeps_x), (5, 50, 100, 25));
+        let counts: Vec<u64> = tally.counts().map(|(_, count)| count).collect();
+        assert_eq!(counts, [2, 3, 0, 0, 0]);
+    }
+
+    #[test]
+    fn outlines_that_the_nodes_do_not_resolve_are_warned_of() {
+        let mut tally = tally(&[1.0, 2.0, 3.0, 4.0], 0);
+        let well = Mollified { rounds: 7, area_change: -0.05, ..Mollified::default() };
+        tally.add_aside(&well, false);
+        assert_eq!((tally.warnings(), tally.mollified.members), (vec![], 1));
+        tally.add_aside(&Mollified { crossed: true, sharp: true, ..well }, false);
+        tally.add_aside(&Mollified { area_change: -0.2, ..well }, false);
+        let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = tally.mollified;
+        assert_eq!((unresolved, crossed, sharp, distorted), (2, 1, 1, 1));
+        let warnings = tally.warnings();
+        assert!(warnings[0].starts_with("2 of 4 members started from an outline with parts thinner"), "{warnings:?}");
+        let parts =
+            "1 with crossings that the outline has not, 1 with a turn left above 1.5 rad, 1 with an area changed";
+        assert!(warnings[0].contains(parts) && warnings[0].contains("more than 10 %; take more --points"));
+        tally.mollified.crossed = 0;
+        assert!(!tally.warnings()[0].contains("crossings"));
+    }
+
+    #[test]
+    fn bad_ends_and_drift_are_warned_of_and_nothing_else_is() {
+        let mut tally = Tally::default();
+        tally.add(&outcome(0, Status::Relaxed, Some(0.5))).unwrap();
+        tally.add(&outcome(1, Status::Unfinished, None)).unwrap();
+        assert_eq!(tally.warnings(), [""; 0]);
+        tally.add(&outcome(2, Status::Stalled, None)).unwrap();
+        let mut drifted = outcome(3, Status::Relaxed, Some(0.5));
+        drifted.end.metric_drift = 0.25;
+        tally.add(&drifted).unwrap();
+        let warnings = tally.warnings();
+        assert!(warnings[0].starts_with("1 of 4 members ended badly"), "{warnings:?}");
+        assert!(
+            warnings[1].contains("1 of 4 members ended with a metric drift above 0.1 (worst 0.25)"),
+            "{warnings:?}"
+        );
+        assert_eq!(warnings.len(), 2);
+    }
+}

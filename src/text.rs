@@ -1,0 +1,85 @@
+//! Numbers, counts and durations as people read them.
+
+/// `value` with this many significant digits: plainly from 10⁻³ up to 10⁶, else with a power of ten.
+pub fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    let scientific = format!("{value:.*e}", digits.max(1) - 1);
+    // Rounding may have raised the power, so it is read back.
+    let Some((mantissa, power)) = scientific.split_once('e').and_then(|(m, p)| Some((m, p.parse::<i32>().ok()?)))
+    else {
+        return scientific;
+    };
+    let text = match power {
+        -3..6 => format!("{value:.*}", (digits as i32 - 1 - power).max(0) as usize),
+        _ => format!("{mantissa}·{}", power_of_ten(power)),
+    };
+    text.replace('-', "\u{2212}")
+}
+
+/// `10⁻⁶`.
+pub fn power_of_ten(power: i32) -> String {
+    let raised = |c: char| match c.to_digit(10) {
+        Some(digit) => ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][digit as usize],
+        None => '⁻',
+    };
+    format!("10{}", power.to_string().chars().map(raised).collect::<String>())
+}
+
+/// `1 member`, `2 members`.
+pub fn count(number: u64, one: &str) -> String {
+    format!("{} {}", grouped(number), plural(number, one))
+}
+
+/// The noun for `number` of what is called `one`.
+pub fn plural(number: u64, one: &str) -> String {
+    format!("{one}{}", if number == 1 { "" } else { "s" })
+}
+
+/// `number` with its thousands apart from 10 000 on.
+pub fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && digits.len() > 4 && (digits.len() - i).is_multiple_of(3) {
+            text.push('\u{a0}');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Seconds in the unit that a person would take.
+pub fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..10 => format!("{seconds:.2} s"),
+        10..60 => format!("{seconds:.1} s"),
+        60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
+        _ => format!("{} h {:02} min", whole / 3600, whole / 60 % 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thousands_are_apart_in_long_numbers() {
+        assert_eq!([0, 9999, 10_000, 1_234_567].map(grouped), ["0", "9999", "10\u{a0}000", "1\u{a0}234\u{a0}567"]);
+        assert_eq!([1, 2].map(|number| count(number, "member")), ["1 member", "2 members"]);
+    }
+
+    #[test]
+    fn numbers_have_the_digits_asked_for() {
+        let shown = [0.0, 0.41234, -2.0, 9.9996, 1234.5, 1e-7, 2e6].map(|value| significant(value, 3));
+        assert_eq!(shown, ["0", "0.412", "\u{2212}2.00", "10.0", "1234", "1.00·10⁻⁷", "2.00·10⁶"]);
+    }
+
+    #[test]
+    fn durations_read_as_people_say_them() {
+        let said = [0.123, 12.34, 75.0, 3600.0, 90_000.0].map(duration);
+        assert_eq!(said, ["0.12 s", "12.3 s", "1 min 15 s", "1 h 00 min", "25 h 00 min"]);
+    }
+}
