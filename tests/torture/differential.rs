@@ -34,7 +34,7 @@ const KEYS: [(&str, &[&str]); 20] = [
     ("decay", &["0", "1", "2.5"]),
     ("flow", &["surface-diffusion", "willmore", "elastic:0.5", "poly:0,-0.3", "poly:0.1,0,-0.5,0.01"]),
     ("tau", &["1e-3", "5e-4", "2e-4"]),
-    ("adaptive", &["1e-2", "1e-3", "4e-3"]),
+    ("adaptive", &["1e-1", "3e-2", "1e-2"]),
     ("t-end", &["0.2", "0.5", "0.81"]),
     ("omega", &["0", "1", "5"]),
     ("no-redistribution", &["true", "false"]),
@@ -113,8 +113,8 @@ impl Drawn {
         sometimes(" --snapshots 0,0.02,0.15", 2);
         sometimes(" --store zarr", 4);
         let few = random.below(6) == 0;
-        // A member that only stalls makes tens of thousands of steps, each with as many sweeps as it may.
-        rest.push_str(if few { " --max-sweeps 40" } else { " --max-sweeps 400" });
+        // A member that only stalls makes thousands of steps, each with as many sweeps as it may.
+        rest.push_str(if few { " --max-sweeps 40" } else { " --max-sweeps 3000" });
         let common = random.below(3) == 0;
         if common {
             rest.push_str(" --common-random-numbers");
