@@ -1,0 +1,233 @@
+//! The documents: flags as the program has them, a README of at most a thousand words, and links that lead somewhere.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    env, fs,
+    path::{Path, PathBuf},
+};
+
+use assert_cmd::Command;
+
+/// The page of flags, and what stands around its generated part.
+const FLAGS: &str = "docs/flags.md";
+const BEGIN: &str = "<!-- Generated from the help texts: UPDATE_DOCS=1 cargo test --test documents -->\n";
+const END: &str = "<!-- The end of what is generated. -->\n";
+const REMEDY: &str = "UPDATE_DOCS=1 cargo test --test documents rewrites it";
+
+const MOST_WORDS: usize = 1000;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// The help of a command, or of the program.
+fn help(command: Option<&str>) -> String {
+    let output = Command::cargo_bin("curvelax").unwrap().args(command).arg("--help").output().unwrap();
+    assert!(output.status.success(), "{command:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// One entry of a help text: a flag, an argument or a command, and what is said of it.
+#[derive(Debug, PartialEq)]
+struct Entry<'a> {
+    heading: &'a str,
+    name: &'a str,
+    text: &'a str,
+}
+
+/// The entries of a help text up to its examples.
+fn entries(help: &str) -> Vec<Entry<'_>> {
+    let (mut heading, mut all) = ("", Vec::new());
+    for line in help.lines().take_while(|line| *line != "Examples:") {
+        match line.strip_suffix(':') {
+            Some(title) if !line.starts_with(' ') => heading = title,
+            _ => {
+                if let Some((name, text)) = line.trim_start().split_once("  ").filter(|_| line.starts_with("  ")) {
+                    all.push(Entry { heading, name, text: text.trim_start() });
+                }
+            }
+        }
+    }
+    all
+}
+
+/// `text` without `[label: …]` at its end, and what stood there.
+fn noted<'a>(text: &'a str, label: &str) -> (&'a str, Option<&'a str>) {
+    let note = text.rsplit_once(&format!(" [{label}: ")).and_then(|(text, note)| Some((text, note.strip_suffix(']')?)));
+    note.map_or((text, None), |(text, note)| (text, Some(note)))
+}
+
+/// As the cell of a table.
+fn cell(text: &str) -> String {
+    ["\\", "|", "<", "*", "["].iter().fold(text.to_owned(), |text, c| text.replace(c, &format!("\\{c}")))
+}
+
+/// A row of the table: the flag, what it means with the values that it may have, its default.
+fn row(entry: &Entry) -> String {
+    let (text, values) = noted(entry.text, "possible values");
+    let (text, default) = noted(text, "default");
+    let values = values.map_or(String::new(), |values| format!(": `{}`", values.replace(", ", "`, `")));
+    format!("| `{}` | {}{values} | {} |\n", entry.name, cell(text), cell(default.unwrap_or_default()))
+}
+
+/// The tables of all commands.
+fn flags() -> String {
+    let program = help(None);
+    let mut page = String::new();
+    for command in entries(&program).iter().filter(|entry| entry.heading == "Commands" && entry.name != "help") {
+        let help = help(Some(command.name));
+        let usage = help.lines().find_map(|line| line.strip_prefix("Usage: ")).expect("usage");
+        page += &format!("\n## curvelax {}\n\n{}.\n\n    {usage}\n", command.name, cell(command.text));
+        let entries = entries(&help);
+        let told: Vec<&Entry> = entries.iter().filter(|entry| entry.name != "-h, --help").collect();
+        let mut heading = None;
+        for entry in told {
+            if heading != Some(entry.heading) {
+                let title = if command.name == "run" { format!("\n### {}\n", entry.heading) } else { String::new() };
+                // One table for a command with few flags.
+                if command.name == "run" || heading.is_none() {
+                    page += &format!("{title}\n| | | default |\n|---|---|---|\n");
+                }
+                heading = Some(entry.heading);
+            }
+            page += &row(entry);
+        }
+    }
+    page
+}
+
+#[test]
+fn the_page_of_flags_is_that_of_the_program() {
+    let path = root().join(FLAGS);
+    let old = read(&path);
+    let (head, rest) = old.split_once(BEGIN).expect("the beginning of the generated part");
+    let (_, tail) = rest.split_once(END).expect("the end of the generated part");
+    let new = format!("{head}{BEGIN}{}\n{END}{tail}", flags());
+    for flag in ["`--shape <SHAPE>`", "`--checkpoint-every <DURATION>`", "| `--missing` |", "## curvelax man\n"] {
+        assert!(new.contains(flag), "{flag} is not in the page: {new}");
+    }
+    if env::var_os("UPDATE_DOCS").is_some() {
+        fs::write(&path, new).unwrap();
+    } else {
+        assert!(old == new, "{FLAGS} differs from the help texts: {REMEDY}");
+    }
+}
+
+#[test]
+fn a_help_text_is_taken_apart() {
+    let help = "Does it\n\nUsage: x [OPTIONS]\n\nMethod:\n      --a <B>  Text: a|b  [default: 1] [possible values: c, d]\n  -h, \
+                --help   Print help\n\nExamples:\n  x --a c  d\n";
+    let found = entries(help);
+    assert_eq!(found.len(), 2);
+    assert_eq!(
+        found[0],
+        Entry { heading: "Method", name: "--a <B>", text: "Text: a|b  [default: 1] [possible values: c, d]" }
+    );
+    assert_eq!(row(&found[0]), "| `--a <B>` | Text: a\\|b : `c`, `d` | 1 |\n");
+}
+
+#[test]
+fn the_readme_has_at_most_a_thousand_words() {
+    let words = read(&root().join("README.md")).split_whitespace().count();
+    assert!(words <= MOST_WORDS, "README.md has {words} words, and may have {MOST_WORDS}: move what is too much to docs/");
+}
+
+/// The Markdown files that users read.
+fn documents() -> BTreeSet<PathBuf> {
+    let mut all: BTreeSet<PathBuf> = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md"].map(PathBuf::from).into();
+    let mut folders: Vec<PathBuf> = ["docs", "examples", "shaders", "benches", "tests"].map(PathBuf::from).into();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(root().join(&folder)).unwrap() {
+            let entry = entry.unwrap();
+            let path = folder.join(entry.file_name());
+            if entry.file_type().unwrap().is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "md") {
+                all.insert(path);
+            }
+        }
+    }
+    all
+}
+
+/// The text outside of code: no blocks, no spans, in which brackets mean something else.
+fn prose(text: &str) -> String {
+    let (mut prose, mut fenced, mut blank) = (String::new(), false, true);
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        } else if !(fenced || blank && line.starts_with("    ")) {
+            prose += line;
+            prose.push('\n');
+        }
+        // Code that is indented begins after an empty line, and its own lines are followed by more of it.
+        blank = line.is_empty() || blank && line.starts_with("    ");
+    }
+    prose.split('`').step_by(2).collect::<Vec<_>>().join("`")
+}
+
+/// Targets of the links and pictures in `prose`.
+fn links(prose: &str) -> Vec<&str> {
+    prose.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(target, _)| target).collect()
+}
+
+/// What links may name after a `#`: headings as GitHub names them, and `<a id=…>`.
+fn anchors(text: &str) -> BTreeSet<String> {
+    let (mut all, mut seen) = (BTreeSet::new(), BTreeMap::<String, u32>::new());
+    let mut fenced = false;
+    for line in text.lines() {
+        fenced ^= line.starts_with("```");
+        let title = line.trim_start_matches('#');
+        if !fenced && title.len() < line.len() && title.starts_with(' ') {
+            let kept = title.trim().to_lowercase().replace(' ', "-");
+            let kept: String = kept.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '_')).collect();
+            let times = seen.entry(kept.clone()).or_default();
+            all.insert(if *times == 0 { kept } else { format!("{kept}-{times}") });
+            *times += 1;
+        }
+    }
+    all.extend(text.split("<a id=\"").skip(1).filter_map(|rest| Some(rest.split_once('"')?.0.to_owned())));
+    all
+}
+
+/// Links of `text` that lead nowhere; `at` finds a file by its path from that of the text.
+fn broken(text: &str, at: impl Fn(&str) -> Option<String>) -> Vec<String> {
+    let outside = |target: &str| ["https://", "http://", "mailto:"].iter().any(|scheme| target.starts_with(scheme));
+    let leads = |target: &str| {
+        let (file, anchor) = target.split_once('#').map_or((target, None), |(file, anchor)| (file, Some(anchor)));
+        let there = if file.is_empty() { Some(text.to_owned()) } else { at(file) };
+        there.is_some_and(|there| anchor.is_none_or(|anchor| anchors(&there).contains(anchor)))
+    };
+    let prose = prose(text);
+    links(&prose).into_iter().filter(|target| !outside(target) && !leads(target)).map(str::to_owned).collect()
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let (mut count, mut wrong) = (0, Vec::new());
+    for document in documents() {
+        let path = root().join(&document);
+        let text = read(&path);
+        let folder = path.parent().unwrap();
+        let at = |file: &str| match folder.join(file) {
+            found if found.is_file() => Some(fs::read_to_string(found).unwrap_or_default()),
+            found => found.is_dir().then(String::new),
+        };
+        count += links(&prose(&text)).len();
+        wrong.extend(broken(&text, at).iter().map(|link| format!("{}: {link}", document.display())));
+    }
+    assert!(count >= 80, "{count} links");
+    assert!(wrong.is_empty(), "links that lead nowhere:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_link_that_leads_nowhere_is_found() {
+    let text = "# A title, `b`\n<a id=\"c\"></a>\n[1](#a-title-b) [2](#c) [3](there.md#d) [4](#e) `[5](#f)` [6](gone.md)\n\n    \
+                [7](#g)\n\n```\n[8](#h)\n```\n[9](there.md#i) ![10](there.md) [11](https://x.y#z)\n# A title, b\n[12](#a-title-b-1)";
+    let at = |file: &str| (file == "there.md").then(|| "## D".to_owned());
+    assert_eq!(broken(text, at), ["#e", "gone.md", "there.md#i"]);
+}
