@@ -70,7 +70,8 @@ fn cell(text: &str) -> String {
 fn row(entry: &Entry) -> String {
     let (text, values) = noted(entry.text, "possible values");
     let (text, default) = noted(text, "default");
-    let values = values.map_or(String::new(), |values| format!(": `{}`", values.replace(", ", "`, `")));
+    let how_many = if entry.name.contains(",...") { "Any" } else { "One" };
+    let values = values.map_or(String::new(), |values| format!(". {how_many} of `{}`", values.replace(", ", "`, `")));
     format!("| `{}` | {}{values} | {} |\n", entry.name, cell(text), cell(default.unwrap_or_default()))
 }
 
@@ -119,21 +120,24 @@ fn the_page_of_flags_is_that_of_the_program() {
 
 #[test]
 fn a_help_text_is_taken_apart() {
-    let help = "Does it\n\nUsage: x [OPTIONS]\n\nMethod:\n      --a <B>  Text: a|b  [default: 1] [possible values: c, d]\n  -h, \
+    let help = "Does it\n\nUsage: x [OPTIONS]\n\nMethod:\n      --a <B>  Text: a|b [default: 1] [possible values: c, d]\n  -h, \
                 --help   Print help\n\nExamples:\n  x --a c  d\n";
     let found = entries(help);
     assert_eq!(found.len(), 2);
     assert_eq!(
         found[0],
-        Entry { heading: "Method", name: "--a <B>", text: "Text: a|b  [default: 1] [possible values: c, d]" }
+        Entry { heading: "Method", name: "--a <B>", text: "Text: a|b [default: 1] [possible values: c, d]" }
     );
-    assert_eq!(row(&found[0]), "| `--a <B>` | Text: a\\|b : `c`, `d` | 1 |\n");
+    assert_eq!(row(&found[0]), "| `--a <B>` | Text: a\\|b. One of `c`, `d` | 1 |\n");
 }
 
 #[test]
 fn the_readme_has_at_most_a_thousand_words() {
     let words = read(&root().join("README.md")).split_whitespace().count();
-    assert!(words <= MOST_WORDS, "README.md has {words} words, and may have {MOST_WORDS}: move what is too much to docs/");
+    assert!(
+        words <= MOST_WORDS,
+        "README.md has {words} words, and may have {MOST_WORDS}: move what is too much to docs/"
+    );
 }
 
 /// The Markdown files that users read.

@@ -18,11 +18,11 @@ Examples:
   curvelax adapters
   curvelax adapters --json";
 
-/// List the GPU adapters, their features and limits, and which one `--backend auto` takes and why.
+/// List the GPU adapters, their features and limits, and which one `--backend auto` uses and why.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct AdaptersArgs {
-    /// The list as JSON
+    /// Print the list as JSON
     #[arg(long, help_heading = flags::OUTPUT)]
     json: bool,
 }

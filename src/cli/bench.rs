@@ -23,9 +23,9 @@ Examples:
   curvelax bench --adapter llvmpipe --precision f32 --json > bench.json
 
 A curve-step is one step of the paper's scheme for one curve; an adaptive attempt makes three. Members of the default
-ensemble (perturbed 2:1 ellipses, surface diffusion, tau = 0.001) go forward as in a run, the cases taking turns, so
-that what else the machine does meets all of them. Start-up is the time to open the back end and make the first step,
-in which kernels are compiled; it is not in the rates, nor is a warm-up. The default takes less than a minute.";
+ensemble (perturbed 2:1 ellipses, surface diffusion, tau = 0.001) are advanced as in a run. The cases alternate, so that
+other load on the machine affects all of them. Start-up is the time to open the back end and make the first step, in which
+kernels are compiled. The rates exclude it and a warm-up. The default takes less than a minute.";
 
 /// Names of the back ends that can be asked for.
 const BACKENDS: &[&str] = &["cpu", "gpu"];
@@ -42,23 +42,23 @@ const MOST_REPEATS: usize = 1000;
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct BenchArgs {
-    /// Nodes per member, n; several in turn [default: 100]
+    /// Nodes per member, n; several values are measured in turn [default: 100]
     #[arg(long, value_name = "N1,N2,...", value_delimiter = ',', value_parser = flags::whole::<usize>, allow_hyphen_values = true)]
     points: Vec<usize>,
-    /// Members at once, as far as the back end has slots [default: 8192 on hardware GPUs, 32 on software ones, all
+    /// Members resident at once, limited by the slots of the back end [default: 8192 on hardware GPUs, 32 on software ones, all
     /// slots of the CPU]
     #[arg(long, value_name = "COUNT", value_parser = flags::whole::<u64>, allow_hyphen_values = true)]
     curves: Option<u64>,
-    /// Measuring time of each case, in seconds [default: 2]
+    /// Measuring time per case, in seconds [default: 2]
     #[arg(long, value_name = "SECONDS", value_parser = flags::real, allow_hyphen_values = true)]
     seconds: Option<f64>,
-    /// Windows into which this time is cut; the table has their median, least and most [default: 5]
+    /// Windows into which this time is divided; the table shows their median, minimum and maximum [default: 5]
     #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true)]
     repeats: Option<usize>,
     /// Solvers of the pentadiagonal systems [default: all; direct and multigrid with --adaptive]
     #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = flags::word::<Solver>(SOLVERS), help_heading = flags::METHOD)]
     solver: Vec<Solver>,
-    /// Steps that adapt to this local error; alone it means 0.001 [default: fixed steps]
+    /// Adapt the steps to this local error; without TOL it is 0.001 [default: fixed steps]
     #[arg(
         long, value_name = "TOL", value_parser = flags::real, allow_negative_numbers = true, num_args = 0..=1,
         default_missing_value = "0.001", help_heading = flags::METHOD
@@ -67,7 +67,8 @@ pub struct BenchArgs {
     /// Back ends [default: the CPU and every GPU adapter, software ones included]
     #[arg(long, value_name = "WHERE,...", value_delimiter = ',', value_parser = flags::word::<BackendChoice>(BACKENDS), help_heading = flags::MACHINE)]
     backend: Vec<BackendChoice>,
-    /// Part of the name, or number in `curvelax adapters`, of the GPU adapters to measure; with it the CPU only if --backend says so [default: all]
+    /// GPU adapters to measure: part of the name, or the number in `curvelax adapters`. The CPU is then measured only with
+    /// --backend [default: all]
     #[arg(long, value_name = "NAME", help_heading = flags::MACHINE)]
     adapter: Option<String>,
     /// Number types [default: f64,f32]
@@ -76,10 +77,10 @@ pub struct BenchArgs {
     /// Threads of the CPU back end [default: all cores]
     #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true, help_heading = flags::MACHINE)]
     threads: Option<usize>,
-    /// The rows as JSON, with every window, instead of the table
+    /// Print the rows as JSON, with every window, instead of the table
     #[arg(long, help_heading = flags::OUTPUT)]
     json: bool,
-    /// No notes on stderr
+    /// Print no notes on stderr
     #[arg(long, help_heading = flags::OUTPUT)]
     quiet: bool,
 }

@@ -18,9 +18,9 @@ Examples:
   curvelax check
   curvelax check --adapter llvmpipe --json > check.json
 
-An error is the largest difference between GPU and CPU over all members and nodes; a bound is a small multiple of
-the rounding error of the quantity's natural scale. Exit code 1 if one is exceeded. Most of the time goes into compiling
-kernels, unless the driver has them in its cache: minutes the first time, seconds from then on.";
+An error is the largest difference between GPU and CPU over all members and nodes. A bound is a small multiple of the rounding
+error of the quantity's natural scale. The exit code is 1 if an error exceeds its bound. Most of the time is spent compiling
+kernels, unless the driver has them in its cache: minutes the first time, seconds afterwards.";
 
 /// Sizes of the rings that are compared: odd, a power of two, the default, a prime.
 const SIZES: [usize; 4] = [7, 64, 100, 101];
@@ -59,13 +59,13 @@ const KERNELS: usize = Solver::ALL.len() * SIZES.len() * Kind::ALL.len();
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct CheckArgs {
-    /// Part of the name, or number in `curvelax adapters`, of the adapter to check [default: all]
+    /// Adapter to check: part of its name, or its number in `curvelax adapters` [default: all]
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// No remarks on stderr
+    /// Print no notes on stderr
     #[arg(long)]
     quiet: bool,
-    /// The rows as JSON instead of the table
+    /// Print the rows as JSON instead of the table
     #[arg(long, help_heading = flags::OUTPUT)]
     json: bool,
 }

@@ -20,25 +20,25 @@ Examples:
   curvelax convergence --problem willmore-circle --problem lemniscate --out convergence
   curvelax convergence --backend gpu --precision f32
 
-An error is measured/exact - 1. In n, with tau in proportion to 1/n^2, the order should be 2. In tau, at a fixed n, it
-should be 1, and in the length of adaptive steps, which goes with the root of their tolerance, 2: these are orders of
-the differences of three errors, which the error of the spacing does not enter. There is no order where the error
-changes by rounding only.";
+An error is measured/exact - 1. In n, with tau proportional to 1/n^2, the order should be 2. In tau, at a fixed n, it
+should be 1. In the length of adaptive steps, proportional to the root of their tolerance, it should be 2. The last two are
+orders of the differences of three errors, which cancels the error of the spacing. No order is printed where the error changes
+by rounding only.";
 
 /// Solve problems with exact solutions; print errors and observed orders as a table.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct ConvergenceArgs {
-    /// Only this problem; may be repeated [default: all]
+    /// Solve only this problem; may be repeated [default: all]
     #[arg(long, value_name = "NAME")]
     problem: Vec<String>,
     /// Solver of the pentadiagonal systems; sweeps take longer [default: direct]
     #[arg(long, value_name = "SOLVER", value_parser = flags::word::<SolverChoice>(flags::SOLVERS), help_heading = flags::METHOD)]
     solver: Option<SolverChoice>,
-    /// Where to run; auto takes a hardware GPU, else the CPU [default: auto]
+    /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]
     #[arg(long, value_name = "WHERE", value_parser = flags::word::<BackendChoice>(flags::BACKENDS), help_heading = flags::MACHINE)]
     backend: Option<BackendChoice>,
-    /// Part of the name of the GPU adapter to take [default: the best]
+    /// GPU adapter to use, given by a part of its name [default: the best]
     #[arg(long, value_name = "NAME", help_heading = flags::MACHINE)]
     adapter: Option<String>,
     /// Number type [default: f64 where the device has it]
@@ -47,10 +47,10 @@ pub struct ConvergenceArgs {
     /// Folder for convergence.csv, which must not exist yet [default: no file]
     #[arg(long, value_name = "DIR", help_heading = flags::OUTPUT)]
     out: Option<PathBuf>,
-    /// Write into an existing DIR, replacing the convergence.csv of an earlier one
+    /// Write into an existing DIR, replacing its convergence.csv
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
-    /// No notes and no table: only errors
+    /// Print no notes and no table: only errors
     #[arg(long, help_heading = flags::OUTPUT)]
     quiet: bool,
 }

@@ -19,13 +19,13 @@ Examples:
   curvelax figure fig1a --out figures
   curvelax figure fig1a fig1b fig1c fig2 --out figures
 
-Writes DIR/NAME.svg and DIR/NAME.csv, with the columns of snapshots.csv. A few seconds on the CPU.";
+Writes DIR/NAME.svg and DIR/NAME.csv, with the columns of snapshots.csv. It takes a few seconds on the CPU.";
 
 /// Draw the paper's figures and write their data.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct FigureArgs {
-    /// Figures to make
+    /// Figures to draw
     #[arg(value_name = "NAME", required = true, value_parser = PossibleValuesParser::new(FIGURES.map(|f| f.name)))]
     names: Vec<String>,
     /// Folder for the files, which must not exist yet
@@ -34,7 +34,7 @@ pub struct FigureArgs {
     /// Write into an existing DIR, replacing the files of these figures
     #[arg(long)]
     force: bool,
-    /// No progress, no notes, no table: only errors
+    /// Print no progress, notes or table: only errors
     #[arg(long)]
     quiet: bool,
 }

@@ -36,7 +36,7 @@ pub struct SpecFlags {
         help_heading = ENSEMBLE
     )]
     curves: Option<u64>,
-    /// Nodes per member, n [default: 100]
+    /// Nodes per member, n ≥ 6 [default: 100]
     #[arg(
         long, value_name = "N", value_parser = whole::<usize>, allow_hyphen_values = true,
         help_heading = ENSEMBLE
@@ -48,14 +48,14 @@ pub struct SpecFlags {
         help_heading = ENSEMBLE
     )]
     seed: Option<u64>,
-    /// Curve that is perturbed: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],... or
-    /// file:PATH, a CSV file x,y; PATH is relative to the current folder, also in a spec file [default: ellipse:2,1]
+    /// Base curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],... or file:PATH, a CSV
+    /// file with columns x,y. PATH is relative to the current folder, also in a spec file [default: ellipse:2,1]
     #[arg(
         long, value_name = "SHAPE", value_parser = text::<Shape>, allow_hyphen_values = true,
         help_heading = ENSEMBLE
     )]
     shape: Option<Shape>,
-    /// How nodes are placed on the curve [default: arclength]
+    /// Placement of the nodes on the curve [default: arclength]
     #[arg(long, value_name = "HOW", value_parser = word::<Sampling>(SAMPLINGS), help_heading = ENSEMBLE)]
     sampling: Option<Sampling>,
     /// Size σ of the random perturbation, 0 for none [default: 0.05]
@@ -72,8 +72,8 @@ pub struct SpecFlags {
     /// Power p: mode m has standard deviation σ m^-p [default: 1]
     #[arg(long, value_name = "P", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE)]
     decay: Option<f64>,
-    /// Run a cell for each value of this key, and for each combination where several are swept; semicolons stand between
-    /// values that have commas: --sweep 'shape=ellipse:2,1;circle:1' [default: none]
+    /// Run a cell for each value of this key, and for each combination if several keys are swept. Separate values that
+    /// contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1' [default: none]
     #[arg(long, value_name = "KEY=V1,V2,...", value_parser = text_of::<Axis>, help_heading = ENSEMBLE)]
     sweep: Vec<Axis>,
     /// Draw member j of every cell from the same random numbers [default: false]
@@ -82,29 +82,29 @@ pub struct SpecFlags {
         hide_possible_values = true, help_heading = ENSEMBLE
     )]
     common_random_numbers: Option<bool>,
-    /// Run only these members, bit for bit as in the whole ensemble [default: all]
+    /// Run only these members; each is bit-identical to its run in the whole ensemble [default: all]
     #[arg(
         long, value_name = "J1,J2,...", value_delimiter = ',', value_parser = whole::<u64>,
         allow_hyphen_values = true, help_heading = ENSEMBLE
     )]
     only: Option<Vec<u64>>,
-    /// Run only the members j with j mod N = I, for `curvelax merge`; `slurm` takes I/N from a job array [default: all]
+    /// Run only the members j with j mod N = I, for `curvelax merge`; `slurm` reads I/N from the job array [default: all]
     #[arg(long, value_name = "I/N", value_parser = shard, allow_hyphen_values = true, help_heading = ENSEMBLE)]
     shard: Option<Shard>,
 
-    /// surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,... [default: surface-diffusion]
+    /// Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,... [default: surface-diffusion]
     #[arg(
         long, value_name = "FLOW", value_parser = text::<Flow>, allow_hyphen_values = true,
         help_heading = EVOLUTION
     )]
     flow: Option<Flow>,
-    /// Time step τ [default: 0.001]
+    /// Fixed time step τ [default: 0.001]
     #[arg(
         long, value_name = "TAU", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION
     )]
     tau: Option<f64>,
-    /// Steps that adapt to this local error instead of --tau; alone it means 0.001, before SPEC.toml write --adaptive=TOL
-    /// [default: off]
+    /// Adapt the steps to this local error instead of using --tau. Without TOL it is 0.001; write --adaptive=TOL before
+    /// SPEC.toml [default: off]
     #[arg(
         long, value_name = "TOL", value_parser = real, allow_negative_numbers = true, num_args = 0..=1,
         default_missing_value = "0.001", help_heading = EVOLUTION
@@ -113,7 +113,7 @@ pub struct SpecFlags {
     /// Final time [default: 2]
     #[arg(long, value_name = "T", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
     t_end: Option<f64>,
-    /// Speed ω of the redistribution towards equal spacing [default: 1]
+    /// Rate ω, in 1/time, of the redistribution towards equal spacing [default: 1]
     #[arg(
         long, value_name = "OMEGA", value_parser = real, allow_hyphen_values = true,
         help_heading = EVOLUTION
@@ -125,58 +125,58 @@ pub struct SpecFlags {
         hide_possible_values = true, help_heading = EVOLUTION
     )]
     no_redistribution: Option<bool>,
-    /// A member is relaxed at this fraction of its initial excess [default: 0.01]
+    /// Count a member as relaxed at this fraction of its initial excess [default: 0.01]
     #[arg(
         long, value_name = "FRACTION", value_parser = real, allow_hyphen_values = true,
         help_heading = EVOLUTION
     )]
     relax_to: Option<f64>,
-    /// A member is relaxed at this excess L^2/(4 pi A) over the regular polygon's, instead of --relax-to; the choice for
-    /// rough outlines [default: off]
+    /// Count a member as relaxed at this excess, L^2/(4 pi A) minus that of the regular polygon, instead of --relax-to.
+    /// Use it for rough outlines [default: off]
     #[arg(
         long, value_name = "EXCESS", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION
     )]
     relax_at: Option<f64>,
-    /// End a member when it is relaxed [default: false]
+    /// End a member as soon as it is relaxed [default: false]
     #[arg(
         long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
         hide_possible_values = true, help_heading = EVOLUTION
     )]
     stop_when_relaxed: Option<bool>,
 
-    /// Rate κ, in 1/time, at which the scheme's k and r are drawn to the polygon's; auto is 4 x 24/R^4 for each member, 0
-    /// the paper [default: 0]
+    /// Rate κ, in 1/time, at which the scheme's k and r are pulled to the polygon's. auto is 4 x 24/R^4 for each member;
+    /// 0 is the paper's scheme [default: 0]
     #[arg(
         long, value_name = "KAPPA", value_parser = text_of::<Pull>, allow_hyphen_values = true, help_heading = METHOD
     )]
     pull: Option<Pull>,
-    /// Solver of the pentadiagonal systems; multigrid is gauss-seidel inside V-cycles, auto is gauss-seidel with --tau,
-    /// direct with --adaptive [default: auto]
+    /// Solver of the pentadiagonal systems. multigrid is gauss-seidel inside V-cycles; auto is gauss-seidel with --tau
+    /// and direct with --adaptive [default: auto]
     #[arg(long, value_name = "SOLVER", value_parser = word::<SolverChoice>(SOLVERS), help_heading = METHOD)]
     solver: Option<SolverChoice>,
     /// Order in which a sweep visits the nodes [default: coloured]
     #[arg(long, value_name = "ORDER", value_parser = word::<Order>(ORDERS), help_heading = METHOD)]
     order: Option<Order>,
-    /// Residual tolerance of the sweeps (only of them) [default: 1e-3 in f32, 1e-5 in f64]
+    /// Residual tolerance at which sweeps stop [default: 1e-3 in f32, 1e-5 in f64]
     #[arg(long, value_name = "TOL", value_parser = real, allow_hyphen_values = true, help_heading = METHOD)]
     tolerance: Option<f64>,
-    /// Over-relaxation of the sweeps of gauss-seidel; 1 is the paper's, auto follows the stiffness of each system
+    /// Over-relaxation of the sweeps of gauss-seidel. 1 is the paper's; auto follows the stiffness of each system
     /// [default: 1]
     #[arg(
         long, value_name = "FACTOR", value_parser = text_of::<Sor>, allow_hyphen_values = true, help_heading = METHOD
     )]
     sor: Option<Sor>,
-    /// Sweeps per system after which a member has stalled [default: 200000]
+    /// Maximum sweeps per system; a member that needs more has stalled [default: 200000]
     #[arg(
         long, value_name = "COUNT", value_parser = whole::<u32>, allow_hyphen_values = true,
         help_heading = METHOD
     )]
     max_sweeps: Option<u32>,
 
-    /// Where to run; auto takes a hardware GPU, else the CPU [default: auto]
+    /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]
     #[arg(long, value_name = "WHERE", value_parser = word::<BackendChoice>(BACKENDS), help_heading = MACHINE)]
     backend: Option<BackendChoice>,
-    /// Part of the name of the GPU adapter to take, or its number in `curvelax adapters` [default: the best]
+    /// GPU adapter to use: part of its name, or its number in `curvelax adapters` [default: the best]
     #[arg(long, value_name = "NAME", help_heading = MACHINE)]
     adapter: Option<String>,
     /// Number type [default: f64 where the device has it]
@@ -189,16 +189,16 @@ pub struct SpecFlags {
     )]
     threads: Option<usize>,
 
-    /// Write series.csv, a row per member every DT [default: off]
+    /// Write series.csv: one row per member every DT [default: off]
     #[arg(long, value_name = "DT", value_parser = real, allow_hyphen_values = true, help_heading = OUTPUT)]
     series: Option<f64>,
-    /// Write snapshots.csv, all nodes at these times [default: off]
+    /// Write snapshots.csv: all nodes at these times [default: off]
     #[arg(
         long, value_name = "T1,T2,...", value_delimiter = ',', value_parser = real,
         allow_hyphen_values = true, help_heading = OUTPUT
     )]
     snapshots: Option<Vec<f64>>,
-    /// How snapshots are stored: as the table snapshots.csv, or as the arrays of snapshots.zarr, for xarray
+    /// Format of the snapshots: the table snapshots.csv, or the arrays of snapshots.zarr, for xarray
     /// [default: csv]
     #[arg(long, value_name = "HOW", value_parser = word::<Store>(STORES), help_heading = OUTPUT)]
     store: Option<Store>,

@@ -21,10 +21,11 @@ const EXAMPLES: &str = "\
 Examples:
   curvelax merge shards/* --out study
   curvelax merge shards/* --missing
-      what is not done yet, and the line that submits it to Slurm again
+      shards that are not finished, and the line that submits them to Slurm again
 
-The files are those that one run without --shard would have written, byte for byte but for the times in run.json. Shards of
-other specs, seeds, versions or back ends are refused.";
+The files are those that one run without --shard would have written, byte for byte except the times in run.json. Shards that
+are missing, unfinished, duplicated or modified are rejected by name, and so are those of another spec, seed, version or back
+end.";
 
 /// Join the shards of a study.
 #[derive(clap::Args)]
@@ -39,13 +40,13 @@ pub struct MergeArgs {
     /// Write into an existing --out DIR, replacing the files of an earlier run
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
-    /// Print the shards that are missing and the line that submits them to Slurm, and stop
+    /// Print the missing shards and the line that submits them to Slurm, and stop
     #[arg(long, conflicts_with_all = ["out", "force", "json"], help_heading = flags::OUTPUT)]
     missing: bool,
     /// The job script in that line
     #[arg(long, value_name = "FILE", default_value = "array.sh", requires = "missing", help_heading = flags::OUTPUT)]
     script: String,
-    /// No table: only errors, and what --json asks for
+    /// Print no table: only errors, and the results if --json is given
     #[arg(long, conflicts_with = "missing", help_heading = flags::OUTPUT)]
     quiet: bool,
     /// Print the results as one JSON document instead of the table

@@ -38,7 +38,7 @@ const EXAMPLES: &str = "\
 Examples:
   curvelax run --out ellipses
   curvelax resume ellipses
-      goes on with it if it was interrupted
+      resumes it if it was interrupted
   curvelax run --help";
 
 /// Relaxes ensembles of closed plane curves by fourth-order geometric flows, on the GPU and the CPU.

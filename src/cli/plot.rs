@@ -18,8 +18,8 @@ Examples:
   curvelax plot ellipses
   curvelax plot ellipses --out pictures
 
-Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, mean_excess.csv and plots/portraits.json in DIR: the same
-bytes as the run, with the same version of the program.";
+Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, mean_excess.csv and plots/portraits.json in DIR. The
+same version of the program writes the same bytes as the run.";
 
 /// Redraw the plots and the report of a finished run.
 #[derive(clap::Args)]
@@ -34,7 +34,7 @@ pub struct PlotArgs {
     /// Write into an existing --out DIR, replacing earlier pictures
     #[arg(long)]
     force: bool,
-    /// No table: only errors
+    /// Print no table: only errors
     #[arg(long)]
     quiet: bool,
 }

@@ -23,25 +23,26 @@ Examples:
   curvelax resume ellipses
   curvelax resume ellipses --max-time 1h
   curvelax resume ellipses --backend cpu
-      goes on on the CPU, whatever it began on: digits then differ from those of an uninterrupted run
+      continues on the CPU, wherever it began: digits then differ from those of an uninterrupted run
 
-A run that was killed, stopped or failed goes on from its last state, at most --checkpoint-every old. Members that have ended
-are not computed again, and all files end as those of an uninterrupted run, byte for byte but for the times in run.json.";
+A run that was killed, was stopped or failed resumes from its last checkpoint, at most --checkpoint-every old. Members that
+have ended are not computed again. All files end up as those of an uninterrupted run, byte for byte except the times in
+run.json.";
 
-/// Continue an interrupted run.
+/// Resume an interrupted run.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct ResumeArgs {
     /// Folder of the run
     #[arg(value_name = "DIR")]
     run: PathBuf,
-    /// Go on here instead of where the run began; digits then differ [default: where it began]
+    /// Continue here instead of where the run began; digits then differ [default: where it began]
     #[arg(long, value_name = "WHERE", value_parser = flags::word::<BackendChoice>(BACKENDS), help_heading = MACHINE)]
     backend: Option<BackendChoice>,
-    /// Go on on this GPU adapter, by a part of its name [default: the one on which it began]
+    /// Continue on this GPU adapter, given by a part of its name [default: the one on which it began]
     #[arg(long, value_name = "NAME", help_heading = MACHINE)]
     adapter: Option<String>,
-    /// Threads of the CPU back end [default: those of its spec, or all cores]
+    /// Threads of the CPU back end [default: as in the spec, otherwise all cores]
     #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true, help_heading = MACHINE)]
     threads: Option<usize>,
     #[command(flatten)]

@@ -25,20 +25,20 @@ Examples:
       256 perturbed 2:1 ellipses under surface diffusion, with the paper's n, τ and ω
   curvelax run --flow willmore --curves 10000 --stop-when-relaxed --out willmore
   curvelax run --adaptive --pull auto --relax-at 0.01 --shape file:island.csv --out island
-      relaxation times of an outline, with steps of the right length
+      accurate relaxation times of an outline, with adaptive steps
   curvelax run --curves 8 --tau 1e-4 --print-spec > spec.toml
   curvelax run spec.toml --seed 2 --out second
   curvelax run spec.toml --shard 3/8 --resume --out shards/3
-      an eighth of the members, for curvelax merge; the same line goes on with it if it was interrupted
+      an eighth of the members, for curvelax merge; the same line resumes it after an interruption
   curvelax run spec.toml --dry-run
 
-The keys of SPEC.toml are the names of the flags; a flag wins over the file.";
+The keys of SPEC.toml are the names of the flags; a flag overrides the file.";
 
 /// Simulate one ensemble.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct RunArgs {
-    /// Spec file; what it does not set takes its default
+    /// Spec file; keys that it does not set have their defaults
     #[arg(value_name = "SPEC.toml")]
     spec: Option<PathBuf>,
     #[command(flatten)]
@@ -49,13 +49,13 @@ pub struct RunArgs {
     /// Write into an existing DIR, replacing the files of an earlier run
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
-    /// Go on with the run in DIR if it was interrupted, leave it if it is finished, begin it if there is none: the same line
-    /// starts a job and starts it again
+    /// Resume the run in DIR if it was interrupted, leave it if it is finished, start it if there is none. The same line
+    /// then starts and restarts a job
     #[arg(long, conflicts_with_all = ["force", "dry_run", "print_spec"], help_heading = flags::OUTPUT)]
     resume: bool,
     #[command(flatten)]
     manner: MannerFlags,
-    /// Print what the run will take, from a pilot of about two seconds, and stop: memory, steps, time
+    /// Predict memory, steps and time of the run from a pilot of about two seconds, and stop
     #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
     dry_run: bool,
     /// Print the resolved spec and stop
@@ -66,19 +66,19 @@ pub struct RunArgs {
 /// How a run goes about its work: nothing of it changes a result.
 #[derive(clap::Args)]
 pub struct MannerFlags {
-    /// No progress, no notes, no table: only errors, and what --json asks for
+    /// Print no progress, notes or table: only errors, and the results if --json is given
     #[arg(long, help_heading = flags::OUTPUT)]
     quiet: bool,
     /// Print the results as one JSON document instead of the table
     #[arg(long, help_heading = flags::OUTPUT)]
     json: bool,
-    /// Exit code 3 if a member ends neither relaxed nor unfinished
+    /// Exit with code 3 if a member ends neither relaxed nor unfinished
     #[arg(long, help_heading = flags::OUTPUT)]
     strict: bool,
-    /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; `curvelax resume` goes on
+    /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; `curvelax resume` continues
     #[arg(long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, help_heading = flags::OUTPUT)]
     max_time: Option<Duration>,
-    /// Keep the state of the run so often, for `curvelax resume`: at most so much work is lost if the run is killed
+    /// Interval between checkpoints for `curvelax resume`: a run that is killed loses at most this much work
     #[arg(
         long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, default_value = "5s",
         help_heading = flags::OUTPUT
