@@ -16,8 +16,8 @@ use crate::{
     placement::{self, Platform},
     schedule::Outputs,
     scheme::{
-        evolve::Run,
-        parameters::{Counters, Report},
+        member::{Counters, Report},
+        run::Run,
     },
     trajectory::Trajectory,
 };

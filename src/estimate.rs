@@ -23,7 +23,7 @@ use crate::{
     report::gallery::MOST_PANELS,
     results::tally::Rate,
     schedule::Clock,
-    scheme::{decay, state::STATE_FIELDS},
+    scheme::{member, state::STATE_FIELDS},
     simulate::{MOST_HELD, simulate, states_at_once},
 };
 
@@ -335,7 +335,7 @@ fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2
     let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
     let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MOST_PANELS);
     let shown = n.min(Portrait::MOST_NODES);
-    let portraits = numbers(2 * shown * (decay::PARTS + 1) * drawn);
+    let portraits = numbers(2 * shown * (member::PARTS + 1) * drawn);
     let page = (PAGE_BYTES * shown * drawn / MOST_PANELS) as u64;
     let rated = (rated * members as f64) as u64;
     let tally = members * (size_of::<f64>() + 2 * size_of::<f32>()) as u64 + rated * size_of::<Rate>() as u64;

@@ -2,7 +2,10 @@
 
 use std::ops::RangeInclusive;
 
-use crate::{number::Precision, scheme::decay};
+use crate::{
+    number::Precision,
+    scheme::{decay, member},
+};
 
 /// Relative distance from a step at which an output time counts as on it.
 const ON_A_STEP: f64 = 1e-9;
@@ -120,7 +123,7 @@ pub struct Output {
 
 /// The times at which every member's excess is noted, both ends included.
 pub fn grid(t_end: f64) -> impl Iterator<Item = f64> {
-    (0..=decay::PARTS).map(move |part| decay::share::<f64>(part) * t_end)
+    (0..=member::PARTS).map(move |part| decay::share::<f64>(part) * t_end)
 }
 
 /// The output times of a run, in order. Those that only the series has follow from their numbers: a million of them take

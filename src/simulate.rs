@@ -15,7 +15,7 @@ use crate::{
     ensemble::{Cell, Ended, Paused, Rows, Sink, Standing, Wish, spec::Precision},
     error::{Error, Result},
     schedule::{Outputs, grid},
-    scheme::{decay, state::STATE_FIELDS},
+    scheme::{member, state::STATE_FIELDS},
     trajectory::Trajectory,
 };
 
@@ -67,7 +67,7 @@ pub fn go_on(
     let outputs = |framed: bool| -> Vec<_> {
         let of_cell = |Cell { spec, .. }: &Cell| {
             // The pictures show the start and the end anyway.
-            let inside = if framed { decay::TIMES } else { 0 };
+            let inside = if framed { member::TIMES } else { 0 };
             let frames: Vec<f64> = grid(spec.t_end).skip(1).take(inside).collect();
             Outputs::new(spec.t_end, spec.series, &spec.snapshots, &frames)
         };
@@ -368,8 +368,8 @@ mod tests {
         ensemble::{Spec, study},
         scheme::{
             Parameters, State,
-            evolve::Run,
-            parameters::{Counters, Report},
+            member::{Counters, Report},
+            run::Run,
         },
     };
 

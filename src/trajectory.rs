@@ -16,10 +16,9 @@ use crate::{
     error::{Error, Result},
     schedule::{self, Clock, Output, Outputs, Ticks},
     scheme::{
-        Curve, Parameters, State, decay,
-        evolve::Run,
-        extrapolation,
-        parameters::{Counters, Decay, NEVER, Observed, Report},
+        Curve, Parameters, State, extrapolation,
+        member::{self, Counters, Decay, NEVER, Observed, Report},
+        run::Run,
         state::STATE_FIELDS,
     },
     solver::Ring,
@@ -480,7 +479,7 @@ impl<'a> Trajectory<'a> {
 
     /// The excess at the times of [`schedule::grid`](crate::schedule::grid) that the member has reached.
     fn excess(&self) -> Vec<f64> {
-        let noted = &self.report.excess_at[..(self.counters.noted as usize).min(decay::TIMES)];
+        let noted = &self.report.excess_at[..(self.counters.noted as usize).min(member::TIMES)];
         let end = self.is_at_end().then_some(self.report.now.excess);
         [self.start.excess].into_iter().chain(noted.iter().copied()).chain(end).collect()
     }

@@ -20,8 +20,9 @@ use curvelax::{
     placement::MAX_POINTS_F32,
     scheme::{
         State,
-        evolve::{Run, Team, evolve},
-        parameters::{Counters, NEVER},
+        evolve::{Team, evolve},
+        member::{Counters, NEVER},
+        run::Run,
         step::Method,
     },
     simulate::simulate,

@@ -8,7 +8,7 @@ use assert_cmd::Command;
 use curvelax::{
     backend::{Backend, cpu::CpuBackend},
     ensemble::{Family, Spec},
-    scheme::{Parameters, State, Status, evolve::Run, parameters::Counters, step::Method},
+    scheme::{Parameters, State, Status, member::Counters, run::Run, step::Method},
     solver::Blocks,
 };
 use glam::DVec2;

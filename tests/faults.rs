@@ -27,8 +27,8 @@ use curvelax::{
     placement,
     scheme::{
         Parameters, State,
-        evolve::Run,
-        parameters::{Counters, Report},
+        member::{Counters, Report},
+        run::Run,
         step::Method,
     },
     simulate::simulate,

@@ -18,7 +18,8 @@ use curvelax::{
     placement::{self, MAX_POINTS_F32},
     scheme::{
         Parameters, State,
-        evolve::{Run, Team, evolve},
+        evolve::{Team, evolve},
+        run::Run,
         step::Method,
     },
     simulate::simulate,

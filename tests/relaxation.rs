@@ -19,9 +19,10 @@ use curvelax::{
     schedule::{Outputs, Ticks},
     scheme::{
         Parameters, State,
-        evolve::{self, Run},
+        evolve::{self},
+        member::Progress,
         observe, pace,
-        parameters::Progress,
+        run::Run,
         step::Method,
     },
     simulate::simulate,

@@ -9,9 +9,9 @@ use curvelax::{
     number::{BIG, Real},
     scheme::{
         decay,
+        member::{self, Counters, Decay, NEVER, Observed, Parameters, Progress, Report},
         observe::{MAX_DRIFT, MAX_GAP, MAX_TURN, MIN_EDGE},
         pace,
-        parameters::{Counters, Decay, NEVER, Observed, Parameters, Progress, Report},
         state::{CURVE_FIELDS, STATE_FIELDS},
         step::NEGLIGIBLE,
     },
@@ -299,8 +299,8 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("MOST_GROWTH", pace::MOST_GROWTH),
         ("LEAST_GROWTH", pace::LEAST_GROWTH),
         ("LEAST_STEP", pace::LEAST_STEP),
-        ("PARTS", decay::PARTS as f64),
-        ("TIMES", decay::TIMES as f64),
+        ("PARTS", member::PARTS as f64),
+        ("TIMES", member::TIMES as f64),
         ("HALVINGS", f64::from(decay::HALVINGS)),
         ("TERMS", f64::from(decay::TERMS)),
         ("STATE_FIELDS", STATE_FIELDS as f64),
@@ -324,7 +324,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("STALLED", f64::from(Status::Stalled as u32)),
         ("FOUR_PI", 4.0 * std::f64::consts::PI),
         ("HALF_OVER_PI", 0.5 / std::f64::consts::PI),
-        ("TRACE_FIELDS", kernel::TRACE_FIELDS as f64),
+        ("TRACE_FIELDS", shader::TRACE_FIELDS as f64),
     ] {
         assert_eq!(constant(name), value, "{name}");
     }

@@ -12,8 +12,8 @@ use curvelax::{
     ensemble::{Cell, Ended, Spec, Status, spec::Solver, study},
     scheme::{
         Parameters, State,
-        evolve::Run,
-        parameters::{Counters, Report},
+        member::{Counters, Report},
+        run::Run,
         step::Method,
     },
     simulate::simulate,

@@ -16,7 +16,7 @@ fuzz_target!(|text: &str| {
     for cell in [0, valid.sweep.cells() - 1] {
         assert_eq!(valid.sweep.labels(cell).len(), valid.sweep.axes().len());
         let _ = valid.sweep.name(cell);
-        if let Ok(own) = valid.sweep.apply(&valid, cell).and_then(Spec::validate) {
+        if let Ok(own) = valid.of_cell(cell).and_then(Spec::validate) {
             assert!(own.sweep.is_empty());
             same_again(&own);
         }

@@ -12,8 +12,8 @@ use crate::{
     error::Result,
     scheme::{
         Parameters, State,
-        evolve::Run,
-        parameters::{Counters, Report},
+        member::{Counters, Report},
+        run::Run,
     },
 };
 

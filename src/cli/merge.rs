@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{flags, print, run::check_name};
+use super::{flags, print, work::check_name};
 use crate::{
     error::{Error, Result},
     files::OutputFolder,

@@ -18,6 +18,7 @@ mod resume;
 mod run;
 mod signals;
 mod unknown;
+mod work;
 
 use std::{
     ffi::OsString,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{
     flags::{self, BACKENDS, MACHINE},
     note,
-    run::{MannerFlags, Work},
+    work::{MannerFlags, Work},
 };
 use crate::{
     ensemble::{Spec, spec::BackendChoice},

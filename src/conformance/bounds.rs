@@ -1,7 +1,7 @@
 //! The one table of tolerances: quantity, natural scale, factor. Measured maxima are in `docs/conformance.md`.
 
 use crate::{
-    backend::gpu::kernel::TRACE_FIELDS,
+    backend::gpu::shader::TRACE_FIELDS,
     scheme::{Curve, Parameters, Workspace},
     solver::Row as Coefficients,
 };

@@ -7,7 +7,7 @@ use crate::{
     flow::Flow,
     number::Precision,
     schedule::Ticks,
-    scheme::{Parameters, State, evolve::Run},
+    scheme::{Parameters, State, run::Run},
 };
 
 /// Members of the comparison: a prime number, so that nothing divides it.

@@ -8,18 +8,16 @@ use super::{
 };
 use crate::{
     backend::{
-        Backend, gpu,
-        gpu::{
-            Variant,
-            kernel::{Budget, TRACE_FIELDS},
-        },
+        Backend,
+        gpu::{self, Variant, kernel::Budget, shader::TRACE_FIELDS},
     },
     error::{Error, Result},
     number::Real,
     scheme::{
         Curve, Increments, Parameters, State, Workspace,
-        evolve::{Run, Team, evolve},
-        parameters::{Counters, Decay, NEVER, Progress, Report},
+        evolve::{Team, evolve},
+        member::{Counters, Decay, NEVER, Progress, Report},
+        run::Run,
         step::{self, Method},
     },
     solver::{Blocks, Order, Ring, Solver},

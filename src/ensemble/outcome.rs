@@ -3,12 +3,8 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Mollified, Rows, Standing};
 pub use crate::scheme::Status;
-use crate::{
-    error::{Error, Result},
-    scheme::parameters::Observed,
-};
+use crate::scheme::member::Observed;
 
 /// Scalar observables of one curve at one time (f64 whatever the precision of the run).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -133,57 +129,5 @@ impl Portrait {
     /// Of `n` nodes every so-many-th is drawn.
     pub fn stride(n: usize) -> usize {
         n.div_ceil(Self::MOST_NODES).max(1)
-    }
-}
-
-/// Everything that one member left.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Ended {
-    /// Its row of the summary.
-    pub outcome: Outcome,
-    /// Its excess at the times of [`grid`](crate::schedule::grid) that it reached.
-    pub excess: Vec<f64>,
-    /// Its rows of the series and its snapshots.
-    pub rows: Rows,
-    /// Its nodes at both ends, where they were asked for.
-    pub portrait: Option<Portrait>,
-    /// What rounding off did to its corners before the run.
-    pub mollified: Mollified,
-    /// Its threshold lies in the rounding of the precision, so no relaxation time can be told.
-    pub unresolved: bool,
-}
-
-/// What a sink wishes of a run between two dispatches.
-#[derive(Debug)]
-pub enum Wish {
-    /// To go on.
-    GoOn,
-    /// To be told where the run stands, and to go on.
-    Keep,
-    /// To be told where the run stands, and to end with this error.
-    Stop(Error),
-}
-
-/// Receives everything that the members leave.
-pub trait Sink {
-    /// A member has ended; called exactly once per member, in member order.
-    fn member(&mut self, ended: &Ended) -> Result<()>;
-    /// Takes rows of a member that has not left, in time order, when more of them are in memory than should be. They come
-    /// back with the member as what this returns, also in a run that goes on from a standing; none where it has no place.
-    fn spill(&mut self, _series: &[SeriesRow], _snapshots: &[Snapshot]) -> Result<Option<Extent>> {
-        Ok(None)
-    }
-    /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done. Called after every dispatch, and
-    /// during long ones: an error stops the run.
-    fn progress(&mut self, _done: u64, _total: u64, _share: f64) -> Result<()> {
-        Ok(())
-    }
-    /// What it wishes now; asked after every dispatch, and during long ones.
-    fn wish(&mut self) -> Wish {
-        Wish::GoOn
-    }
-    /// Where the run stands: as was wished for, or as it comes to a bad end.
-    fn keep(&mut self, _standing: &Standing) -> Result<()> {
-        Ok(())
     }
 }

@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{SeriesRow, Sink, Snapshot};
-use crate::error::Result;
+use super::{SeriesRow, Snapshot};
 
 /// Where rows lie that a sink took: what it answers to [`Sink::spill`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,17 +31,6 @@ impl Rows {
     pub fn bytes(&self) -> usize {
         let points = self.snapshots.first().map_or(0, |first| first.x.len());
         bytes_of(self.series.capacity(), self.snapshots.len(), points)
-    }
-
-    /// Hands those in memory to `sink`; whether it has taken them.
-    pub fn spill(&mut self, sink: &mut dyn Sink) -> Result<bool> {
-        if self.series.is_empty() && self.snapshots.is_empty() {
-            return Ok(true);
-        }
-        let Some(extent) = sink.spill(&self.series, &self.snapshots)? else { return Ok(false) };
-        self.spilled.push(extent);
-        (self.series, self.snapshots) = (Vec::new(), Vec::new());
-        Ok(true)
     }
 }
 

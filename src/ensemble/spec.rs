@@ -7,7 +7,11 @@ use std::{fmt, marker::PhantomData, path::Path, str::FromStr};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::{seed, shard::Shard, sweep::Sweep};
+use super::{
+    seed,
+    shard::Shard,
+    sweep::{self, Sweep},
+};
 use crate::{
     curve::{Modes, Sampling, Shape},
     error::{Error, Result, did_you_mean, shortened},
@@ -271,6 +275,35 @@ impl Spec {
     pub fn keys() -> Vec<String> {
         let refused = toml::from_str::<Spec>("\"\" = 0").expect_err("the empty key is unknown");
         quoted(refused.message()).skip(1).map(str::to_owned).collect()
+    }
+
+    /// The spec of cell `index` of its sweep, not yet validated.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a value that the key cannot have.
+    pub fn of_cell(&self, index: u64) -> Result<Spec> {
+        let failed = |e: &dyn fmt::Display| Error::Failed(format!("cannot write the spec as TOML: {e}"));
+        // The lists, which are long and cannot vary, go beside.
+        let Spec { snapshots, only, sweep, .. } = self;
+        let short = Spec { sweep: Sweep::default(), snapshots: Vec::new(), only: None, ..self.clone() };
+        let mut table = toml::Table::try_from(short).map_err(|e| failed(&e))?;
+        for (axis, value) in sweep.axes().iter().zip(sweep.values(index)) {
+            // What stands instead of each other.
+            match axis.key.as_str() {
+                "tau" => drop(table.remove("adaptive")),
+                "adaptive" => drop(table.remove("tau")),
+                "relax-to" => drop(table.remove("relax-at")),
+                "relax-at" => drop(table.remove("relax-to")),
+                _ => {}
+            }
+            table.insert(axis.key.clone(), value.clone());
+            // Key by key, so that the message names the one that is wrong.
+            Spec::deserialize(table.clone()).map_err(|e| {
+                Error::Request(format!("--sweep {}={}: {}", axis.key, sweep::label(value), e.message().trim_end()))
+            })?;
+        }
+        let spec = Spec::deserialize(table).map_err(|e| failed(&e))?;
+        Ok(Spec { snapshots: snapshots.clone(), only: only.clone(), ..spec })
     }
 
     /// The indices of the members to run, ascending.

@@ -6,7 +6,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{Ended, Rows};
-use crate::scheme::parameters::{Counters, Report};
+use crate::scheme::member::{Counters, Report};
 
 /// The members of a run by rank, their place in the order in which they leave it, from 0.
 ///

@@ -102,7 +102,7 @@ fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<C
         let below = |member: u64| only.partition_point(|m| *m < member);
         only[below(first)..below(first + spec.curves)].iter().map(|member| member - first).collect()
     });
-    let own = Spec { only: None, shard: None, ..spec.sweep.apply(spec, index)? }.validate()?;
+    let own = Spec { only: None, shard: None, ..spec.of_cell(index)? }.validate()?;
     let curve = |other: &Spec| (own.points, own.sampling) == (other.points, other.sampling) && own.shape == other.shape;
     let family = match before.iter().rfind(|cell| curve(&cell.spec)) {
         Some(other) => Family::like(&other.family, &own)?,

@@ -9,9 +9,8 @@ use serde::{
     de::{MapAccess, Visitor},
     ser::SerializeMap,
 };
-use toml::{Table, Value};
+use toml::Value;
 
-use super::Spec;
 use crate::error::{Error, Result, did_you_mean};
 
 /// Keys that all members of a run have in common.
@@ -60,7 +59,7 @@ impl Axis {
 }
 
 /// A value as it stands in tables and messages.
-fn label(value: &Value) -> String {
+pub(super) fn label(value: &Value) -> String {
     match value {
         Value::String(word) => word.clone(),
         // 1e-12, not 0.000000000001; both read back exactly.
@@ -160,12 +159,11 @@ impl Sweep {
         self.values(index).into_iter().map(label).collect()
     }
 
-    /// Checks keys and numbers of values; whether the values themselves can be had is checked cell by cell.
+    /// Checks keys, which must be among `keys`, and numbers of values; whether the values themselves can be had is checked cell by cell.
     ///
     /// # Errors
     /// [`Error::Request`] for a key that is unknown, cannot vary, or has no values, and for too many cells.
-    pub fn check(&self) -> Result<()> {
-        let keys = Spec::keys();
+    pub fn check(&self, keys: &[String]) -> Result<()> {
         for (i, Axis { key, values }) in self.0.iter().enumerate() {
             if !keys.contains(key) {
                 let hint = did_you_mean(key, keys.iter().map(String::as_str));
@@ -191,35 +189,6 @@ impl Sweep {
                 Err(Error::value("sweep", format!("({cells} cells)"), "too many", &format!("at most {MOST_CELLS}")))
             }
         }
-    }
-
-    /// The spec of cell `index` of a study with this `base`, not yet validated.
-    ///
-    /// # Errors
-    /// [`Error::Request`] for a value that the key cannot have.
-    pub fn apply(&self, base: &Spec, index: u64) -> Result<Spec> {
-        let failed = |e: &dyn fmt::Display| Error::Failed(format!("cannot write the spec as TOML: {e}"));
-        // The lists, which are long and cannot vary, go beside.
-        let Spec { snapshots, only, .. } = base;
-        let short = Spec { sweep: Sweep::default(), snapshots: Vec::new(), only: None, ..base.clone() };
-        let mut table = Table::try_from(short).map_err(|e| failed(&e))?;
-        for (axis, value) in self.0.iter().zip(self.values(index)) {
-            // What stands instead of each other.
-            match axis.key.as_str() {
-                "tau" => drop(table.remove("adaptive")),
-                "adaptive" => drop(table.remove("tau")),
-                "relax-to" => drop(table.remove("relax-at")),
-                "relax-at" => drop(table.remove("relax-to")),
-                _ => {}
-            }
-            table.insert(axis.key.clone(), value.clone());
-            // Key by key, so that the message names the one that is wrong.
-            Spec::deserialize(table.clone()).map_err(|e| {
-                Error::Request(format!("--sweep {}={}: {}", axis.key, label(value), e.message().trim_end()))
-            })?;
-        }
-        let spec = Spec::deserialize(table).map_err(|e| failed(&e))?;
-        Ok(Spec { snapshots: snapshots.clone(), only: only.clone(), ..spec })
     }
 }
 
@@ -265,6 +234,11 @@ impl<'de> Deserialize<'de> for Sweep {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ensemble::Spec;
+
+    fn of_cell(sweep: &Sweep, base: &Spec, index: u64) -> Result<Spec> {
+        Spec { sweep: sweep.clone(), ..base.clone() }.of_cell(index)
+    }
 
     fn sweep(axes: &[&str]) -> Sweep {
         let mut sweep = Sweep::default();
@@ -275,7 +249,7 @@ mod tests {
     #[test]
     fn cells_are_the_cross_product_with_the_last_key_fastest() {
         let sweep = sweep(&["shape=ellipse:2,1;circle:1", "amplitude=0.1,1"]);
-        sweep.check().unwrap();
+        sweep.check(&Spec::keys()).unwrap();
         assert_eq!(sweep.cells(), 4);
         let names: Vec<String> = (0..4).map(|cell| sweep.name(cell)).collect();
         assert_eq!(
@@ -287,7 +261,7 @@ mod tests {
                 "shape = circle:1, amplitude = 1"
             ]
         );
-        let spec = sweep.apply(&Spec::default(), 1).unwrap();
+        let spec = of_cell(&sweep, &Spec::default(), 1).unwrap();
         assert_eq!(spec, Spec { amplitude: 1.0, ..Spec::default() });
         let tiny = self::sweep(&["tolerance=1e-12,0.0001,0.0"]);
         assert_eq!(tiny.axes()[0].labels(), ["1e-12", "0.0001", "0"]);
@@ -310,7 +284,7 @@ mod tests {
         assert_eq!(Spec::from_toml(unquoted).unwrap(), base);
         assert_eq!(Spec::from_toml(&base.to_toml().unwrap()).unwrap(), base);
         assert_eq!(serde_json::from_str::<Spec>(&serde_json::to_string(&base).unwrap()).unwrap(), base);
-        let seeds: Vec<u64> = (0..3).map(|cell| base.sweep.apply(&base, cell).unwrap().seed).collect();
+        let seeds: Vec<u64> = (0..3).map(|cell| base.of_cell(cell).unwrap().seed).collect();
         assert_eq!(seeds, [1, large[0], large[1]]);
         assert!("omega=18446744073709551615".parse::<Axis>().unwrap().values[0].is_float());
         let plain = Spec { sweep: Sweep::default(), ..base.clone() };
@@ -321,14 +295,14 @@ mod tests {
     #[test]
     fn a_cell_keeps_the_lists_of_its_base() {
         let base = Spec { snapshots: vec![0.0, 0.5], only: Some(vec![3, 4]), ..Spec::default() };
-        let spec = sweep(&["omega=2"]).apply(&base, 0).unwrap();
+        let spec = of_cell(&sweep(&["omega=2"]), &base, 0).unwrap();
         assert_eq!(spec, Spec { omega: 2.0, ..base });
     }
 
     #[test]
     fn what_stands_instead_of_a_swept_key_makes_room() {
         let base = Spec { adaptive: Some(1e-3), relax_at: Some(0.01), ..Spec::default() };
-        let spec = sweep(&["tau=0.01", "relax-to=0.1"]).apply(&base, 0).unwrap();
+        let spec = of_cell(&sweep(&["tau=0.01", "relax-to=0.1"]), &base, 0).unwrap();
         assert_eq!((spec.tau, spec.adaptive, spec.relax_to, spec.relax_at), (Some(0.01), None, Some(0.1), None));
     }
 
@@ -340,15 +314,16 @@ mod tests {
             (&["amplitude="], "--sweep amplitude: no values"),
             (&["seed=1,2,3,4,5,6,7,8,9,10", "decay=1,2,3,4,5,6,7,8,9,10"], ""),
         ] {
-            match sweep(axes).check() {
+            match sweep(axes).check(&Spec::keys()) {
                 Err(error) => assert!(!part.is_empty() && error.to_string().contains(part), "{error}"),
                 Ok(()) => assert_eq!(part, "", "{axes:?}"),
             }
         }
         let thousand = format!("seed={}", (0..1000).map(|i| i.to_string()).collect::<Vec<_>>().join(","));
-        let many = sweep(&[&thousand, &thousand.replace("seed", "omega")]).check().unwrap_err().to_string();
+        let many =
+            sweep(&[&thousand, &thousand.replace("seed", "omega")]).check(&Spec::keys()).unwrap_err().to_string();
         assert!(many.contains("--sweep (1000000 cells): too many; at most 10000"), "{many}");
-        let wrong = sweep(&["amplitude=0.1,word"]).apply(&Spec::default(), 1).unwrap_err().to_string();
+        let wrong = of_cell(&sweep(&["amplitude=0.1,word"]), &Spec::default(), 1).unwrap_err().to_string();
         assert!(wrong.starts_with("--sweep amplitude=word: "), "{wrong}");
         assert!("amplitude".parse::<Axis>().is_err());
     }

@@ -34,7 +34,7 @@ const MOST_THREADS: usize = 1024;
 impl Spec {
     /// Checks every range and combination and returns the spec with its lists sorted and free of repetitions.
     pub fn validate(mut self) -> Result<Spec> {
-        self.sweep.check()?;
+        self.sweep.check(&Spec::keys())?;
         self.check_counts()?;
         self.check_times()?;
         self.check_method()?;

@@ -353,7 +353,7 @@ mod tests {
     use crate::{
         ensemble::{Extent, Mollified, Rows, SeriesRow, Snapshot, Status},
         results::{provenance::tests::platform, tally::tests::outcome},
-        scheme::parameters::{Counters, Report},
+        scheme::member::{Counters, Report},
     };
 
     fn paused(at: f64) -> Paused {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Form, document::Document, overview::Overview, study::Study};
+use super::{document::Document, overview::Overview, study::Study};
 use crate::{
     ensemble::Spec,
     error::{Error, Result},
@@ -17,6 +17,15 @@ use crate::{
     placement::Platform,
     results::{cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
 };
+
+/// What is said on stdout of a run that is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A table and some lines for people.
+    Overview,
+    /// One document for programs.
+    Json,
+}
 
 /// How the overview names the pictures.
 const PLOTS: &str = "plots/*.svg";

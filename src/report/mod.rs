@@ -23,6 +23,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+pub use complete::Form;
 pub use stop::{Cause, Stop};
 
 use crate::{
@@ -37,15 +38,6 @@ use checkpoint::{Head, Kept, Origin};
 use complete::Complete;
 use growing::Growing;
 use progress::Progress;
-
-/// What is said on stdout of a run that is done.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
-    /// A table and some lines for people.
-    Overview,
-    /// One document for programs.
-    Json,
-}
 
 /// A run that is asked to stop and does not come to a place where it can ends after this time all the same.
 const PATIENCE: Duration = Duration::from_millis(2500);

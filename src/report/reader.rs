@@ -224,7 +224,7 @@ impl Summary {
         let self_crossing = row.event()?;
         // What theory says is in no table, since the spec says it.
         if self.spec_of.as_ref().is_none_or(|(of, _)| *of != cell) {
-            self.spec_of = Some((cell, self.spec.sweep.apply(&self.spec, cell)?));
+            self.spec_of = Some((cell, self.spec.of_cell(cell)?));
         }
         let rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| spec.rate_in_theory(start.area));
         Ok(Some(Outcome { start, end, self_crossing, rate_theory, ..outcome }))

@@ -141,7 +141,7 @@ impl Study<'_> {
         }
         // One line of theory is a help, many are not.
         let theory = match (&self.tally.cells[..], &curves[..]) {
-            ([cell], [curve]) => law(&self.spec().sweep.apply(self.spec(), 0)?, cell, curve),
+            ([cell], [curve]) => law(&self.spec().of_cell(0)?, cell, curve),
             _ => None,
         };
         let theory = theory.into_iter().collect();

@@ -5,16 +5,12 @@
 //! logarithm goes along from step to step, as what one step adds to it, so that no difference of large numbers is taken.
 
 use super::{
-    Parameters,
-    evolve::{Run, Taken},
-    extrapolation,
+    Parameters, extrapolation,
+    member::{PARTS, TIMES},
+    run::{Run, Taken},
 };
 use crate::number::Real;
 
-/// Parts of the run between whose ends the excess is noted.
-pub const PARTS: usize = 32;
-/// The times between its ends.
-pub const TIMES: usize = PARTS - 1;
 /// Halvings at most that bring a ratio near 1.
 pub const HALVINGS: u32 = 64;
 /// Terms of the series of the logarithm; the last one is below 10⁻¹⁶.

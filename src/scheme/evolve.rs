@@ -5,9 +5,10 @@
 
 use super::{
     Branches, Parameters, State, Status, Workspace, decay, extrapolation,
+    member::NEVER,
     observe::{self, Glance},
     pace::{self, Stride},
-    parameters::{Counters, NEVER, Observed, Report},
+    run::{Run, Taken},
     start::Start,
     state::{self, STATE_FIELDS},
     step::{self, Method, Stepped},
@@ -16,56 +17,6 @@ use crate::{
     number::{Mask, Number, Real},
     solver::{Blocks, Cycles, Elimination, Solver, Solves, Sweeps},
 };
-
-/// One member on its way: everything that a dispatch reads and writes.
-#[derive(Clone, Debug)]
-pub struct Run<T> {
-    /// The curve.
-    pub state: State<T>,
-    /// What governs it.
-    pub parameters: Parameters<T>,
-    /// Its counters.
-    pub counters: Counters,
-    /// Its report; the excess of the last accepted curve is the start of the next step's events.
-    pub report: Report<T>,
-}
-
-impl<T: Real> Run<T> {
-    /// A member at its start, with no step to make and no events behind it.
-    pub fn new(state: State<T>, parameters: Parameters<T>) -> Run<T> {
-        let blocks = Blocks::new(state.curve.len()).expect("a ring of 6 nodes or more");
-        let sums = observe::sums(&state.curve, &parameters, blocks);
-        let now = Observed::new(&sums, &observe::maxima(&state.curve), &parameters);
-        let mut report = Report { before: now, middle: now, now, ..Report::default() };
-        report.progress.turning = sums.turning;
-        let counters = Counters { relax_step: NEVER, half_step: NEVER, ..Counters::default() };
-        Run { state, parameters, counters, report }
-    }
-
-    /// Reports what its curves are; not compiled into the vector code, since it is one member's.
-    #[inline(never)]
-    fn report_on(&mut self, blocks: Blocks, adaptive: bool) {
-        let Run { state, parameters, report, counters } = self;
-        // The start is known as it was handed in; observed here it may be a rounding away, and the next step's events with
-        // it, which must not depend on where a dispatch ended.
-        if counters.steps == 0 {
-            return;
-        }
-        report.before = Observed::of(&state.before, parameters, blocks);
-        report.now = Observed::of(&state.curve, parameters, blocks);
-        report.middle = if adaptive { Observed::of(&state.middle, parameters, blocks) } else { report.before };
-    }
-
-    /// The same member in another precision, rounded.
-    pub fn convert<U: Real>(&self) -> Run<U> {
-        Run {
-            state: self.state.convert(),
-            parameters: self.parameters.convert(),
-            counters: self.counters,
-            report: self.report.convert(),
-        }
-    }
-}
 
 /// Members that take the same branches of the scheme, and so can go abreast.
 pub struct Group<'a, 'b, T> {
@@ -392,15 +343,6 @@ fn refuse<T: Real>(run: &mut Run<T>, n: usize, next: T, least: f64, cause: Statu
     if !least.le(next) {
         run.counters.status = cause as u32;
     }
-}
-
-/// A step that is taken: its length where it is adaptive, the excess on its way, and the gap between k and the polygon.
-pub(super) struct Taken<T> {
-    pub(super) h: T,
-    pub(super) before: T,
-    pub(super) middle: T,
-    pub(super) after: T,
-    gap: T,
 }
 
 /// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.

@@ -3,9 +3,9 @@
 //!
 //! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r.
 
-use super::{Curve, Parameters, pull};
+use super::{Curve, Parameters, member::Observed, pull, state::edge};
 use crate::{
-    number::{BIG, Mask, Number},
+    number::{BIG, Mask, Number, Real},
     solver::{self, Blocks},
 };
 
@@ -161,14 +161,6 @@ pub fn gap<N: Number>(curve: &Curve<N>) -> N {
     gap
 }
 
-/// Edge that ends at node i: `[Δx, Δy, |e|]`.
-#[inline(always)]
-pub fn edge<N: Number>(curve: &Curve<N>, i: usize) -> [N; 3] {
-    let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
-    let (dx, dy) = (x - xm, y - ym);
-    [dx, dy, (dx * dx + dy * dy).sqrt()]
-}
-
 /// +1 (-1) where the edge vector turns from `e_i` to `e_{i+1}` across the positive x axis, the short way round.
 #[inline(always)]
 fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
@@ -179,4 +171,26 @@ fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
     // +1 upwards across the axis, which counts with the origin on the left; -1 downwards, with it on the right.
     let across = N::select(fy.le(zero), zero, one) - N::select(ey.le(zero), zero, one);
     N::select((across * side).le(zero), zero, across)
+}
+
+impl<T: Real> Observed<T> {
+    /// What can be observed of a curve.
+    #[inline(never)]
+    pub fn of(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
+        Observed::new(&sums(curve, p, blocks), &maxima(curve), p)
+    }
+
+    /// What the sums and maxima of a curve say.
+    pub fn new(sums: &Sums<T>, maxima: &Maxima<T>, p: &Parameters<T>) -> Observed<T> {
+        Observed {
+            length: sums.length,
+            area: sums.area,
+            excess: excess(sums.length, sums.area, p),
+            energy: sums.energy,
+            k_min: -maxima.minus_k_min,
+            k_max: maxima.k_max,
+            mesh_ratio: maxima.longest / -maxima.minus_shortest,
+            metric_drift: maxima.drift,
+        }
+    }
 }

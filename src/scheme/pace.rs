@@ -5,7 +5,7 @@
 //! exact in every precision, however many and however small the steps are. Nothing here relies on the order in which
 //! a compiler adds.
 
-use super::{Parameters, parameters::Progress};
+use super::{Parameters, member::Progress};
 use crate::number::Real;
 
 /// Share of the step predicted to meet the tolerance that is taken.

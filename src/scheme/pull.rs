@@ -8,7 +8,7 @@
 //! which the position equation leaves it at rest. With θ itself k is larger by θ²/24 and circles grow for ever.
 //! κ = 0 is the paper.
 
-use super::{Branches, Curve, Parameters, observe::edge};
+use super::{Branches, Curve, Parameters, state::edge};
 use crate::number::Number;
 
 /// By how much the polygon turns at both ends of segment i together, and the length it turns over.

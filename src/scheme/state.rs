@@ -282,3 +282,11 @@ impl<N: Number> Workspace<N> {
         }
     }
 }
+
+/// Edge that ends at node i: `[Δx, Δy, |e|]`.
+#[inline(always)]
+pub fn edge<N: Number>(curve: &Curve<N>, i: usize) -> [N; 3] {
+    let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
+    let (dx, dy) = (x - xm, y - ym);
+    [dx, dy, (dx * dx + dy * dy).sqrt()]
+}

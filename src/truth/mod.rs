@@ -25,6 +25,6 @@ mod study;
 mod theory;
 
 pub use measure::{Measure, mode_amplitude};
-pub use problems::{Bound, Curve, LEMNISCATE_LIFE, Problem, problems};
-pub use study::{Resolution, Row, Solved, Study, Varied, studies};
+pub use problems::{Bound, Curve, LEMNISCATE_LIFE, Problem, Resolution, problems};
+pub use study::{Row, Solved, Study, Varied, studies};
 pub use theory::{CircleMode, circle_mode};

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::{Measure, Resolution, circle_mode};
+use super::{Measure, circle_mode};
 use crate::{
     curve::{BaseCurve, Sampling},
     ensemble::spec::Precision,
@@ -15,6 +15,17 @@ use crate::{
 
 /// Length of the lemniscate of half-width 1: 4·∫₀¹ dx/√(1-x⁴).
 const LEMNISCATE: f64 = 5.244_115_108_584_239;
+
+/// How finely a problem is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resolution {
+    /// Nodes.
+    pub n: usize,
+    /// Time step τ.
+    pub tau: f64,
+    /// Local error tolerance of adaptive steps, which take the place of τ.
+    pub tolerance: Option<f64>,
+}
 
 /// Time after which the lemniscate of half-width 1 has vanished under surface diffusion: `a(t) = (1 - 24t)^(1/4)`.
 pub const LEMNISCATE_LIFE: f64 = 1.0 / 24.0;

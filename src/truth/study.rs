@@ -1,6 +1,6 @@
 //! A problem at one resolution, and at several: error and order.
 
-use super::Problem;
+use super::{Problem, problems::Resolution};
 use crate::{
     ensemble::{
         Cell, Ended, Family, Outcome, Sink, Spec, Status,
@@ -10,17 +10,6 @@ use crate::{
     placement,
     simulate::simulate,
 };
-
-/// How finely a problem is solved.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Resolution {
-    /// Nodes.
-    pub n: usize,
-    /// Time step τ.
-    pub tau: f64,
-    /// Local error tolerance of adaptive steps, which take the place of τ.
-    pub tolerance: Option<f64>,
-}
 
 /// A problem solved.
 #[derive(Clone, Debug)]

@@ -23,8 +23,9 @@ use crate::{
     error::{Error, Result},
     scheme::{
         Parameters, State,
-        evolve::{Group, Run},
-        parameters::{Counters, Report},
+        evolve::Group,
+        member::{Counters, Report},
+        run::Run,
         state::STATE_FIELDS,
         step::Method,
     },

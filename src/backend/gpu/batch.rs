@@ -12,15 +12,15 @@ use super::{
     adapter::{Device, Waited},
     budget::Budget,
     clock::Moment,
-    kernel::TRACE_FIELDS,
+    shader::TRACE_FIELDS,
 };
 use crate::{
     error::Result,
     number::Real,
     scheme::{
         Parameters,
-        evolve::Run,
-        parameters::{Counters, Report},
+        member::{Counters, Report},
+        run::Run,
         state::STATE_FIELDS,
     },
     solver::Blocks,

@@ -9,7 +9,7 @@ use super::{
     adapter::{Device, Gpu},
     batch::{Batch, Reading, staging},
     clock::Moment,
-    shader::Variant,
+    shader::{TRACE_FIELDS, Variant},
 };
 use crate::{
     backend::Backend,
@@ -17,8 +17,8 @@ use crate::{
     number::Real,
     scheme::{
         Parameters, State,
-        evolve::Run,
-        parameters::{Counters, Report},
+        member::{Counters, Report},
+        run::Run,
         state::STATE_FIELDS,
     },
     solver::{Blocks, Solver},
@@ -34,9 +34,6 @@ const MAX_SLOTS: usize = 8192;
 /// Members of a batch at least, where there are two: enough to fill a large GPU several times over, which holds some thousand
 /// at once, or the threads of a software one.
 const LEAST_SLOTS: [usize; 2] = [32, 4096];
-
-/// Fields that a traced kernel keeps per member; `conformance::bounds::STAGES` names them in their order.
-pub const TRACE_FIELDS: usize = 20;
 
 /// Compiled kernel and resident members of `n` nodes in numbers of type `T`.
 pub struct Kernel<T> {

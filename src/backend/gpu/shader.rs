@@ -14,6 +14,9 @@ macro_rules! parts {
     };
 }
 
+/// Fields that a traced kernel keeps per member; `conformance::bounds::STAGES` names them in their order.
+pub const TRACE_FIELDS: usize = 20;
+
 /// What a kernel is made for, besides its number and sizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {

@@ -16,7 +16,7 @@ use crate::{
     draw::svg::escape,
     text::{count, grouped},
 };
-use player::Player;
+use player::{Player, colour};
 use scope::Sheets;
 
 const STYLE: &str = include_str!("page.css");
@@ -306,12 +306,6 @@ fn paragraph(class: &str, text: &str) -> String {
         ("", text) => format!("<p>{}</p>\n", escape(text)),
         (class, text) => format!("<p class=\"{class}\">{}</p>\n", escape(text)),
     }
-}
-
-/// The class of a status.
-fn colour(status: &str) -> &str {
-    let known = ["relaxed", "unfinished", "singular", "nonfinite", "stalled"];
-    known.into_iter().find(|name| *name == status).unwrap_or("other")
 }
 
 /// A percentage, which is 0 only of none and 100 only of all.

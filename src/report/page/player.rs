@@ -7,7 +7,6 @@ use std::fmt::Write;
 
 use glam::DVec2;
 
-use super::colour;
 use crate::{
     draw::{
         axis::{Scale, tick_step},
@@ -192,6 +191,12 @@ fn dots(frame: &[u16]) -> String {
 /// Two digits for each coordinate.
 fn digits(frame: &[u16]) -> String {
     frame.iter().flat_map(|v| [v >> 6, v & 63]).map(|digit| char::from(DIGITS[usize::from(digit)])).collect()
+}
+
+/// The class of a status.
+pub(super) fn colour(status: &str) -> &str {
+    let known = ["relaxed", "unfinished", "singular", "nonfinite", "stalled"];
+    known.into_iter().find(|name| *name == status).unwrap_or("other")
 }
 
 #[cfg(test)]

@@ -5,16 +5,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Branches, Curve,
-    decay::TIMES,
-    observe::{self, Maxima, Sums},
-};
 use crate::{
     flow::{Flow, MAX_DEGREE},
     number::{BIG, Number, Real},
-    solver::Blocks,
 };
+
+/// Parts of the run between whose ends the excess is noted.
+pub const PARTS: usize = 32;
+/// The times between its ends.
+pub const TIMES: usize = PARTS - 1;
 
 /// A struct of numbers of one type, convertible to and from an array in declaration order.
 macro_rules! numbers {
@@ -293,28 +292,6 @@ fn convert<T: Real, U: Real>(numbers: Vec<T>) -> Vec<U> {
     numbers.into_iter().map(|v| U::of(v.to_f64())).collect()
 }
 
-impl<T: Real> Observed<T> {
-    /// What can be observed of a curve.
-    #[inline(never)]
-    pub fn of(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
-        Observed::new(&observe::sums(curve, p, blocks), &observe::maxima(curve), p)
-    }
-
-    /// What the sums and maxima of a curve say.
-    pub fn new(sums: &Sums<T>, maxima: &Maxima<T>, p: &Parameters<T>) -> Observed<T> {
-        Observed {
-            length: sums.length,
-            area: sums.area,
-            excess: observe::excess(sums.length, sums.area, p),
-            energy: sums.energy,
-            k_min: -maxima.minus_k_min,
-            k_max: maxima.k_max,
-            mesh_ratio: maxima.longest / -maxima.minus_shortest,
-            metric_drift: maxima.drift,
-        }
-    }
-}
-
 impl<T: Real> Report<T> {
     /// All numbers in memory order.
     pub fn to_numbers(&self) -> Vec<T> {
@@ -382,41 +359,5 @@ impl<N: Number> Parameters<N> {
     #[inline(always)]
     pub(super) fn coefficients(&self) -> [N; MAX_DEGREE] {
         [self.c1, self.c2, self.c3, self.c4, self.c5, self.c6, self.c7, self.c8]
-    }
-
-    /// The law, whose degree is that of the `branches`.
-    #[inline(always)]
-    pub fn law(&self, branches: Branches) -> Law<N> {
-        Law { coefficients: self.coefficients(), degree: branches.degree }
-    }
-}
-
-/// `b(k) = c₁k + c₂k² + …`, up to its degree.
-#[derive(Clone, Copy, Debug)]
-pub struct Law<N> {
-    coefficients: [N; MAX_DEGREE],
-    degree: usize,
-}
-
-impl<N: Number> Law<N> {
-    /// `b(k)` by Horner's rule.
-    #[inline(always)]
-    pub fn b(&self, k: N) -> N {
-        self.b_over_k(k) * k
-    }
-
-    /// `φ(k) = k² - b(k)/k`, without division.
-    #[inline(always)]
-    pub fn phi(&self, k: N) -> N {
-        k * k - self.b_over_k(k)
-    }
-
-    #[inline(always)]
-    fn b_over_k(&self, k: N) -> N {
-        let mut sum = N::of(0.0);
-        for c in self.coefficients[..self.degree].iter().rev() {
-            sum = sum * k + *c;
-        }
-        sum
     }
 }

@@ -1,0 +1,218 @@
+//! A study on its way, for `run` and `resume`: what was asked for, where it is computed, and how it is carried out.
+
+use std::{ops::Range, path::Path, time::Duration};
+
+use super::{flags, note, print, signals};
+use crate::{
+    backend::Backend,
+    ensemble::{Cell, Spec, Standing, study},
+    error::{Error, Result},
+    files::names,
+    placement::{self, Choice, Platform},
+    report::{Form, Manner, Report, Stop, gallery::MOST_PANELS},
+    simulate::go_on,
+    text::plural,
+};
+
+/// How a run goes about its work: nothing of it changes a result.
+#[derive(clap::Args)]
+pub struct MannerFlags {
+    /// Print no progress, notes or table: only errors, and the results if --json is given
+    #[arg(long, help_heading = flags::OUTPUT)]
+    pub quiet: bool,
+    /// Print the results as one JSON document instead of the table
+    #[arg(long, help_heading = flags::OUTPUT)]
+    pub json: bool,
+    /// Exit with code 3 if a member ends neither relaxed nor unfinished
+    #[arg(long, help_heading = flags::OUTPUT)]
+    strict: bool,
+    /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; `curvelax resume` continues
+    #[arg(long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, help_heading = flags::OUTPUT)]
+    max_time: Option<Duration>,
+    /// Interval between checkpoints for `curvelax resume`: a run that is killed loses at most this much work
+    #[arg(
+        long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, default_value = "5s",
+        help_heading = flags::OUTPUT
+    )]
+    checkpoint_every: Duration,
+}
+
+impl MannerFlags {
+    /// Says a line on stderr, unless all should be quiet.
+    pub fn say(&self, line: &str) {
+        if !self.quiet {
+            note(line)
+        }
+    }
+
+    /// That what is asked for can be said of results in `out`.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a name that JSON cannot hold.
+    pub fn check_name(&self, out: &Path) -> Result<()> {
+        check_name(self.json, out)
+    }
+
+    /// From now on the run can be stopped.
+    pub fn manner(&self) -> Result<Manner> {
+        let stop = Stop::default();
+        signals::watch(&stop, self.max_time)?;
+        Ok(Manner { quiet: self.quiet, every: self.checkpoint_every, stop })
+    }
+}
+
+/// A study, ready to run: its companies of cells, and where each is computed.
+pub struct Work {
+    /// Resolved, with everything that was settled by the choices.
+    pub spec: Spec,
+    /// All cells.
+    pub cells: Vec<Cell>,
+    /// Cells that are computed together, and where.
+    pub companies: Vec<(Range<usize>, Choice)>,
+    /// The back end of the first company, once it is open.
+    opened: Option<Box<dyn Backend>>,
+}
+
+impl Work {
+    /// Checks everything that can be wrong with `spec` on this machine.
+    pub fn new(mut spec: Spec) -> Result<Work> {
+        let mut cells = study::cells(&spec)?;
+        let ranges = study::companies(&cells);
+        let first = |range: &Range<usize>| (&cells[range.start].spec, cells[range.start].spec.points);
+        let choices = placement::choose_all(&ranges.iter().map(first).collect::<Vec<_>>())?;
+        for (range, choice) in ranges.iter().zip(&choices) {
+            cells[range.clone()].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
+        }
+        if spec.sweep.is_empty() {
+            spec = Spec { only: spec.only, shard: spec.shard, ..cells[0].spec.clone() };
+        } else {
+            choices[0].settle_place(&mut spec);
+        }
+        Ok(Work { spec, cells, companies: ranges.into_iter().zip(choices).collect(), opened: None })
+    }
+
+    /// Opens the back end of the first company: where that is not the chosen one, the spec tells. Returns where it is.
+    pub fn open(&mut self, flags: &MannerFlags) -> Result<Platform> {
+        let (range, choice) = &self.companies[0];
+        let (backend, platform) = open(&self.cells[range.clone()], choice, flags)?;
+        if choice.gpu().is_some() && platform.backend == "cpu" {
+            flags.say(&format!("note: on the CPU instead: {}", platform.reason));
+            platform.settle_place(&mut self.spec);
+        }
+        self.opened = Some(backend);
+        Ok(platform)
+    }
+
+    /// Members of the companies before `company`.
+    fn members_before(&self, company: usize) -> u64 {
+        let before = self.companies.iter().take(company).flat_map(|(range, _)| &self.cells[range.clone()]);
+        before.map(|cell| cell.spec.member_count()).sum()
+    }
+
+    /// Where all is computed.
+    pub fn platform(&self) -> Platform {
+        let (range, choice) = &self.companies[0];
+        choice.platform(&self.cells[range.start].spec)
+    }
+
+    /// What the user should know about all cells, each sentence once.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut all: Vec<String> = self.cells.iter().flat_map(Cell::warnings).collect();
+        all.sort();
+        all.dedup();
+        all
+    }
+
+    /// Runs what is left to do, and publishes all results.
+    ///
+    /// # Errors
+    /// Beside those of the run, [`Error::Request`] where `standing` is not that of the report.
+    pub fn carry_out(self, mut report: Report, standing: Standing, flags: &MannerFlags) -> Result<()> {
+        let (told, rows) = (self.members_before(report.company()).saturating_add(standing.next), report.members());
+        if told != rows {
+            let path = report.folder().display();
+            return Err(Error::Request(format!("{path}: the state tells of {told} members, and the table has {rows}")));
+        }
+        let early = [&self.warnings()[..], report.moves()].concat();
+        early.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
+        let out = report.folder().to_path_buf();
+        let Work { spec, cells, companies, opened } = self;
+        let done = advance(&cells, companies, opened, standing, &mut report, flags);
+        if let Err(error) = done {
+            let error = report.explain(error);
+            if report.give_up() {
+                kept(&out, &error);
+            }
+            return Err(error);
+        }
+        let (late, failed) = (report.warnings(), report.failed());
+        let form = if flags.json { Form::Json } else { Form::Overview };
+        let text = report.finish(&spec, &early, form).inspect_err(|error| kept(&out, error))?;
+        late.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
+        if flags.json || !flags.quiet {
+            print(&text)?;
+        }
+        match failed {
+            1.. if flags.strict => Err(Error::Strict(format!(
+                "--strict: {failed} of {} {} ended neither relaxed nor unfinished; see `status` in {}",
+                spec.member_count(),
+                plural(spec.member_count(), "member"),
+                out.join(names::SUMMARY).display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// As [`MannerFlags::check_name`], where `json` is asked for.
+pub fn check_name(json: bool, out: &Path) -> Result<()> {
+    match json && out.to_str().is_none() {
+        true => Err(Error::value(
+            "out",
+            out.display(),
+            "no UTF-8, which JSON is in",
+            "name another folder, or leave --json out",
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Says how a run that failed goes on, unless the error does.
+fn kept(out: &Path, error: &Error) {
+    if !matches!(error, Error::Stopped(_) | Error::Interrupted(_) | Error::Lost(_)) {
+        note(&format!("note: the state of the run is kept: curvelax resume {} goes on", out.display()));
+    }
+}
+
+/// Opens the back end that was chosen for a company.
+fn open(company: &[Cell], choice: &Choice, flags: &MannerFlags) -> Result<(Box<dyn Backend>, Platform)> {
+    flags.say(&choice.sentence(&company[0].spec));
+    let curves = company.iter().map(|cell| cell.spec.member_count()).sum();
+    let whole = Spec { curves, only: None, shard: None, ..company[0].spec.clone() };
+    choice.open(&whole, whole.points)
+}
+
+/// Runs one company of cells after another, from where `standing` is in that of the report; `opened` is the back end of the
+/// first one, where it is open.
+fn advance(
+    cells: &[Cell],
+    companies: Vec<(Range<usize>, Choice)>,
+    mut opened: Option<Box<dyn Backend>>,
+    mut standing: Standing,
+    report: &mut Report,
+    flags: &MannerFlags,
+) -> Result<()> {
+    let precision = report.platform().precision;
+    for (number, (range, choice)) in companies.into_iter().enumerate().skip(report.company()) {
+        let company = &cells[range];
+        let mut backend = match opened.take() {
+            Some(backend) => backend,
+            // A run that has begun does not move.
+            None => open(company, &choice.after(report.platform()), flags)?.0,
+        };
+        let portraits = (MOST_PANELS * company.len()).div_ceil(cells.len());
+        report.begin_company(number);
+        go_on(company, precision, backend.as_mut(), portraits, std::mem::take(&mut standing), report)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,22 @@
+//! What a member leaves as a whole.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Mollified, Outcome, Portrait, Rows};
+
+/// Everything that one member left.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ended {
+    /// Its row of the summary.
+    pub outcome: Outcome,
+    /// Its excess at the times of [`grid`](crate::schedule::grid) that it reached.
+    pub excess: Vec<f64>,
+    /// Its rows of the series and its snapshots.
+    pub rows: Rows,
+    /// Its nodes at both ends, where they were asked for.
+    pub portrait: Option<Portrait>,
+    /// What rounding off did to its corners before the run.
+    pub mollified: Mollified,
+    /// Its threshold lies in the rounding of the precision, so no relaxation time can be told.
+    pub unresolved: bool,
+}
