@@ -1,5 +1,5 @@
 // The law b(k) = c1 k + ... + c8 k^8 and phi(k) = k^2 - b(k)/k, by Horner's rule without division. Twin of the
-// methods in src/scheme/parameters.rs.
+// methods in src/scheme/member.rs.
 
 fn b_over_k(curvature: vec) -> vec {
     var sum = vec(p.c8);

@@ -26,25 +26,30 @@
 //!
 //! # Modules
 //!
+//! Each uses only those above it (`tests/modules_depend_downward.rs`).
+//!
 //! | module | holds |
 //! |---|---|
 //! | [`error`] | what, where, numbers, remedy, exit code |
-//! | `threads`, `guard` | every thread is started there; panics of code that is not ours become errors there |
+//! | `guard`, `threads` | panics of other crates become errors; every thread is started here |
+//! | `input`, `text`, [`random`] | files opened for reading; numbers as people read them; random numbers addressed by key |
 //! | [`number`] | the number that the scheme is generic over |
 //! | [`flow`] | the law b(k) |
 //! | [`curve`] | plane curves in f64: shapes, perturbation, sampling, measures |
 //! | [`solver`] | periodic pentadiagonal systems: rows, sweeps, direct solution |
-//! | [`scheme`] | the paper's step, one file a stage, with the stems of `shaders/` |
-//! | [`ensemble`] | the spec, its members and their random numbers, what a member leaves |
-//! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
-//! | [`schedule`], [`trajectory`], [`simulate`] | steps and output times; one member's way; the loop over all |
-//! | [`truth`] | problems with exact solutions, and the error and order against them |
 //! | [`statistics`] | censored times, their mean and median with intervals, tests between groups, fits |
-//! | [`report`] | tables, plots, provenance |
-//! | [`figures`] | the paper's figures, as data |
-//! | [`mod@bench`] | how fast a back end advances members |
-//! | [`estimate`] | what a run will take, from a short pilot |
+//! | [`scheme`] | the paper's step, one file a stage, with the stems of `shaders/` |
+//! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
+//! | [`ensemble`] | the spec, its members, what a member leaves |
+//! | [`schedule`], [`trajectory`], [`simulate`] | steps and output times; one member's way; the loop over all |
 //! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
+//! | [`placement`] | which back end a spec gets, and why |
+//! | [`truth`] | problems with exact solutions, and the error and order against them |
+//! | [`results`] | what the members of a study add up to: sums, statistics by cell, the record of the run |
+//! | [`draw`] | SVG, axes and charts from plain numbers |
+//! | [`files`] | the folder of results: who may write there, and what each file holds |
+//! | [`report`] | a run's sink: tables, checkpoints, merge, `report.html` |
+//! | [`mod@bench`], [`estimate`], [`figures`] | how fast a back end is; what a run will take; the paper's figures |
 //! | [`cli`] | the commands |
 //!
 //! # Example

@@ -101,6 +101,19 @@ impl Drawn {
         if keys.contains(&"order") {
             set(&mut base, "solver", "gauss-seidel");
         }
+        // A strong pull brings so few nodes into disorder where nothing redistributes them: such a member stalls after
+        // thousands of steps, and by sweeps it takes minutes.
+        let swept = |key: &str| keys.contains(&key);
+        let has = |base: &Settings, key: &str, value: &str| base.get(key).is_some_and(|own| own == value);
+        if (swept("pull") || has(&base, "pull", "auto"))
+            && (swept("no-redistribution") || has(&base, "no-redistribution", "true"))
+        {
+            match (swept("pull"), swept("no-redistribution")) {
+                (false, _) => set(&mut base, "pull", "3"),
+                (true, false) => set(&mut base, "no-redistribution", "false"),
+                (true, true) => set(&mut base, "solver", "direct"),
+            }
+        }
         let mut rest = format!("--backend {backend}");
         let mut sometimes = |words: &str, of: usize| {
             if random.below(of) == 0 {
@@ -112,9 +125,7 @@ impl Drawn {
         sometimes(" --series 0.061", 2);
         sometimes(" --snapshots 0,0.02,0.15", 2);
         sometimes(" --store zarr", 4);
-        let few = random.below(6) == 0;
-        // A member that only stalls makes thousands of steps, each with as many sweeps as it may.
-        rest.push_str(if few { " --max-sweeps 40" } else { " --max-sweeps 3000" });
+        sometimes(" --max-sweeps 40", 6);
         let common = random.below(3) == 0;
         if common {
             rest.push_str(" --common-random-numbers");

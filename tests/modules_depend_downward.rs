@@ -1,0 +1,263 @@
+//! Modules depend downward only: no folder or file of `src` uses one above it in [`LAYERS`], and no files use each other in
+//! a circle. Tests inside the files may use anything.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::Path,
+};
+
+use syn::{
+    Attribute, Item, ItemMod, ItemUse, UseTree,
+    visit::{self, Visit},
+};
+
+/// The modules of the crate, each above all that it may use.
+const LAYERS: [&str; 28] = [
+    "error",
+    "guard",
+    "threads",
+    "input",
+    "text",
+    "random",
+    "number",
+    "flow",
+    "curve",
+    "solver",
+    "statistics",
+    "scheme",
+    "backend",
+    "ensemble",
+    "schedule",
+    "trajectory",
+    "simulate",
+    "conformance",
+    "placement",
+    "truth",
+    "results",
+    "draw",
+    "files",
+    "report",
+    "bench",
+    "estimate",
+    "figures",
+    "cli",
+];
+
+type Module = Vec<String>;
+
+/// Paths that a file names outside its tests, from the root of the crate; re-exports apart, by the name that they get.
+#[derive(Default)]
+struct Names {
+    module: Module,
+    used: Vec<Module>,
+    exported: BTreeMap<String, Module>,
+}
+
+fn is_of_tests(attributes: &[Attribute]) -> bool {
+    let words = |a: &Attribute| match &a.meta {
+        syn::Meta::List(list) if list.path.is_ident("cfg") => list.tokens.to_string(),
+        _ => String::new(),
+    };
+    attributes.iter().any(|a| words(a).split(|c: char| !c.is_alphanumeric()).any(|word| word == "test"))
+}
+
+impl Names {
+    /// From the root of the crate; none for a path into another crate, unless it is that of a module beside this file's.
+    fn absolute(&self, path: &[String]) -> Option<Module> {
+        let mut base = self.module.clone();
+        match path.first()?.as_str() {
+            "crate" => Some(path[1..].to_vec()),
+            "self" => Some([&base[..], &path[1..]].concat()),
+            "super" => {
+                let up = path.iter().take_while(|part| *part == "super").count();
+                base.truncate(base.len().saturating_sub(up));
+                Some([&base[..], &path[up..]].concat())
+            }
+            _ => Some([&base[..], path].concat()),
+        }
+    }
+
+    fn tree(&mut self, tree: &UseTree, before: &[String], public: bool) {
+        let mut path = before.to_vec();
+        let (name, last) = match tree {
+            UseTree::Path(part) => {
+                path.push(part.ident.to_string());
+                return self.tree(&part.tree, &path, public);
+            }
+            UseTree::Group(group) => return group.items.iter().for_each(|item| self.tree(item, &path, public)),
+            UseTree::Name(name) => (name.ident.to_string(), Some(name.ident.to_string())),
+            UseTree::Rename(new) => (new.rename.to_string(), Some(new.ident.to_string())),
+            UseTree::Glob(_) => (String::new(), None),
+        };
+        path.extend(last.filter(|last| last != "self"));
+        let Some(path) = self.absolute(&path) else { return };
+        match public {
+            true => drop(self.exported.insert(name, path)),
+            false => self.used.push(path),
+        }
+    }
+}
+
+impl<'a> Visit<'a> for Names {
+    fn visit_item(&mut self, item: &'a Item) {
+        let attributes = match item {
+            Item::Mod(item) => &item.attrs,
+            Item::Use(item) => &item.attrs,
+            Item::Fn(item) => &item.attrs,
+            Item::Impl(item) => &item.attrs,
+            _ => return visit::visit_item(self, item),
+        };
+        if !is_of_tests(attributes) {
+            visit::visit_item(self, item);
+        }
+    }
+
+    fn visit_item_mod(&mut self, item: &'a ItemMod) {
+        self.module.push(item.ident.to_string());
+        visit::visit_item_mod(self, item);
+        self.module.pop();
+    }
+
+    fn visit_item_use(&mut self, item: &'a ItemUse) {
+        self.tree(&item.tree, &[], !matches!(item.vis, syn::Visibility::Inherited));
+    }
+
+    fn visit_path(&mut self, path: &'a syn::Path) {
+        let parts: Vec<String> = path.segments.iter().map(|part| part.ident.to_string()).collect();
+        if parts.len() > 1 && ["crate", "super", "self"].contains(&parts[0].as_str()) {
+            self.used.extend(self.absolute(&parts));
+        }
+        visit::visit_path(self, path);
+    }
+}
+
+/// All files of `src` by their modules.
+fn sources() -> BTreeMap<Module, String> {
+    fn walk(folder: &Path, module: &Module, all: &mut BTreeMap<Module, String>) {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
+            let child = [&module[..], &[stem.clone()]].concat();
+            if path.is_dir() {
+                walk(&path, &child, all);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let module = if ["mod", "lib", "main"].contains(&stem.as_str()) { module.clone() } else { child };
+                if !module.is_empty() {
+                    all.insert(module, fs::read_to_string(&path).unwrap());
+                }
+            }
+        }
+    }
+    let mut all = BTreeMap::new();
+    walk(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &Vec::new(), &mut all);
+    // Files that are modules of tests only.
+    let of_tests = |module: &Module| module.iter().any(|part| part == "tests");
+    all.retain(|module, _| !of_tests(module));
+    all
+}
+
+/// Which file uses which others, re-exports followed.
+fn arrows(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>> {
+    let names: BTreeMap<&Module, Names> = sources
+        .iter()
+        .map(|(module, text)| {
+            let mut names = Names { module: module.clone(), ..Names::default() };
+            names.visit_file(&syn::parse_file(text).unwrap());
+            (module, names)
+        })
+        .collect();
+    let leads_to = |path: &Module| {
+        let mut path = path.clone();
+        // A chain of re-exports is short.
+        for _ in 0..8 {
+            let known = (1..=path.len()).rev().find(|length| sources.contains_key(&path[..*length]))?;
+            let module = path[..known].to_vec();
+            let exported = path.get(known).and_then(|name| names[&module].exported.get(name));
+            match exported {
+                Some(other) if sources.contains_key(&other[..1]) => path = [&other[..], &path[known + 1..]].concat(),
+                _ => return Some(module),
+            }
+        }
+        None
+    };
+    let uses = |(module, names): (&&Module, &Names)| {
+        let others = names.used.iter().filter_map(leads_to).filter(|other| other != *module).collect();
+        ((*module).clone(), others)
+    };
+    names.iter().map(uses).collect()
+}
+
+/// What breaks the rule, a line each.
+fn faults(sources: &BTreeMap<Module, String>) -> Vec<String> {
+    let arrows = arrows(sources);
+    let layer = |module: &Module| LAYERS.iter().position(|name| *name == module[0]);
+    let mut faults = Vec::new();
+    for (from, others) in &arrows {
+        let shown = from.join("/");
+        let Some(own) = layer(from) else {
+            faults.push(format!("{shown} is in no layer"));
+            continue;
+        };
+        let upward = others.iter().filter(|to| layer(to).is_none_or(|other| other > own));
+        faults.extend(upward.map(|to| format!("{shown} uses {}, which is above it", to.join("/"))));
+    }
+    // Files are taken away that use none of the rest; what stays is in a circle or above one.
+    let mut rest = arrows;
+    loop {
+        let done: Vec<Module> = rest
+            .iter()
+            .filter(|(_, others)| !others.iter().any(|to| rest.contains_key(to)))
+            .map(|(m, _)| m.clone())
+            .collect();
+        if done.is_empty() {
+            break;
+        }
+        done.iter().for_each(|module| drop(rest.remove(module)));
+    }
+    loop {
+        let used: BTreeSet<Module> = rest.values().flatten().cloned().collect();
+        let above: Vec<Module> = rest.keys().filter(|module| !used.contains(*module)).cloned().collect();
+        if above.is_empty() {
+            break;
+        }
+        above.iter().for_each(|module| drop(rest.remove(module)));
+    }
+    if !rest.is_empty() {
+        let names: Vec<String> = rest.keys().map(|module| module.join("/")).collect();
+        faults.push(format!("in a circle: {}", names.join(", ")));
+    }
+    faults
+}
+
+#[test]
+fn no_file_uses_one_above_it_and_none_are_in_a_circle() {
+    let sources = sources();
+    assert!(sources.len() > 100, "{} files", sources.len());
+    let used: usize = arrows(&sources).values().map(BTreeSet::len).sum();
+    assert!(used > 400, "{used} arrows: the test has lost its eyes");
+    assert_eq!(faults(&sources), [""; 0]);
+}
+
+#[test]
+fn arrows_upward_and_circles_are_found() {
+    let with = |changes: &[(&str, &str)]| {
+        let mut sources = sources();
+        for (path, line) in changes {
+            let module: Module = path.split('/').map(str::to_owned).collect();
+            sources.get_mut(&module).unwrap_or_else(|| panic!("no {path}")).push_str(line);
+        }
+        faults(&sources)
+    };
+    let up = ["statistics/fit uses ensemble/spec, which is above it"];
+    assert_eq!(with(&[("statistics/fit", "use crate::{ensemble::Spec, number::Real};")]), up);
+    assert_eq!(with(&[("statistics/fit", "fn f() -> Option<crate::ensemble::Spec> { None }")]), up);
+    assert_eq!(with(&[("statistics/fit", "#[cfg(test)] mod more { use crate::ensemble::Spec; }")]), [""; 0]);
+    let circle = with(&[("statistics/sum", "use super::fit::Line;"), ("statistics/fit", "use super::sum::sum;")]);
+    assert!(circle.len() == 1 && circle[0].contains("statistics/fit, statistics/sum"), "{circle:?}");
+    // Through a re-export, and to the folder that holds the file.
+    let circle = with(&[("statistics/sum", "use super::Line;"), ("statistics/fit", "use super::sum::sum;")]);
+    assert!(circle.len() == 1 && circle[0].contains("statistics/fit, statistics/sum"), "{circle:?}");
+    let circle = with(&[("report/complete", "use super::Report;")]);
+    assert!(circle.len() == 1 && circle[0].contains("report, report/complete"), "{circle:?}");
+}
