@@ -138,7 +138,7 @@ fn sources() -> BTreeMap<Module, String> {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
-            let child = [&module[..], &[stem.clone()]].concat();
+            let child = [&module[..], std::slice::from_ref(&stem)].concat();
             if path.is_dir() {
                 walk(&path, &child, all);
             } else if path.extension().is_some_and(|extension| extension == "rs") {

@@ -1,6 +1,6 @@
 //! What all charts are made of: a heading with sentences and a legend, panels with axes, colours for curves.
 //!
-//! A chart is laid out from top to bottom in this order. Widths of text are known only [roughly](super::text), from above.
+//! A chart is laid out from top to bottom in this order. Widths of text are known only [roughly](super::width), from above.
 
 use glam::DVec2;
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{SeriesRow, Snapshot};
 
-/// Where rows lie that a sink took: what it answers to [`Sink::spill`].
+/// Where rows lie that a sink took: what it answers to [`Sink::spill`](super::Sink::spill).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Extent {
     /// First byte.

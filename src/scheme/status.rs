@@ -1,4 +1,4 @@
-//! How a member ends: the codes that the kernel and its twin leave in [`Counters`](super::parameters::Counters).
+//! How a member ends: the codes that the kernel and its twin leave in [`Counters`](super::member::Counters).
 
 use serde::{Deserialize, Serialize};
 
