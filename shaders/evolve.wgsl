@@ -62,7 +62,7 @@ fn advance() -> u32 {
         if uniform_decision(select(1u, 0u, error <= p.adaptive)) == 1u {
             let next = next_length(h, error, 1.0);
             start_after_refused(next / (real(0.5) * h));
-            return refuse(next, real(LEAST_STEP), SINGULAR);
+            return refuse(next, real(MIN_STEP), SINGULAR);
         }
         extrapolate();
         load_curve(CURVE);
@@ -81,7 +81,7 @@ fn advance() -> u32 {
     record_events(h);
     follow(h);
     if ADAPTIVE {
-        let next = next_length(h, error, select(real(1.0), real(MOST_GROWTH), counters.refused == 0u));
+        let next = next_length(h, error, select(real(1.0), real(MAX_GROWTH), counters.refused == 0u));
         report.progress.next = next;
         start_after_taken(next / (real(0.5) * h));
         pass_time(by);
@@ -143,7 +143,7 @@ fn refuse(next: real, least: real, cause: u32) -> u32 {
 /// Refuses a step of length h that failed outright; after that the increments may be anything.
 fn refuse_failure(h: real, cause: u32) -> u32 {
     start_nowhere();
-    return refuse(real(LEAST_GROWTH) * h, select(real(LEAST_STEP), real(LEAST_TO_SINGULAR), cause == SINGULAR), cause);
+    return refuse(real(MIN_GROWTH) * h, select(real(MIN_STEP), real(MIN_TO_SINGULAR), cause == SINGULAR), cause);
 }
 
 /// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.

@@ -1,10 +1,10 @@
 // Adaptive time: the length of the next step, and a clock that loses nothing. Twin of src/scheme/pace.rs.
 
 const SAFETY = 0.95;
-const MOST_GROWTH = 4.0;
-const LEAST_GROWTH = 0.25;
-const LEAST_STEP = 1e-12;
-const LEAST_TO_SINGULAR = 1e-3;
+const MAX_GROWTH = 4.0;
+const MIN_GROWTH = 0.25;
+const MIN_STEP = 1e-12;
+const MIN_TO_SINGULAR = 1e-3;
 
 /// A step to be attempted: its length, the high and the low part of that, and whether it reaches the final time.
 struct Stride { length: real, high: real, low: real, last: bool }
@@ -45,7 +45,7 @@ fn is_at_goal() -> bool {
 /// The step after one of `length` whose error was `error`; the error goes with the square of the length.
 fn next_length(length: real, error: real, most_growth: real) -> real {
     let growth = real(SAFETY) * sqrt(p.adaptive / max(error, real(1e-6) * p.adaptive));
-    return length * min(max(growth, real(LEAST_GROWTH)), most_growth);
+    return length * min(max(growth, real(MIN_GROWTH)), most_growth);
 }
 
 /// The shortest step that is tried, `share` of `(L/n)⁴`.

@@ -68,12 +68,12 @@ impl Error {
 }
 
 /// Longer than any word that can be meant.
-const LONGEST_WORD: usize = 64;
+const MAX_WORD: usize = 64;
 
 /// The candidate nearest to `word`, if one is near enough to be meant.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // Likeness takes the product of the lengths.
-    if word.len() > LONGEST_WORD {
+    if word.len() > MAX_WORD {
         return None;
     }
     candidates

@@ -20,17 +20,17 @@ use crate::{
     },
     error::{Error, Result},
     placement::{Choice, Platform},
-    report::gallery::MOST_PANELS,
+    report::gallery::MAX_PANELS,
     results::tally::Rate,
     schedule::Clock,
     scheme::{member, state::STATE_FIELDS},
-    simulate::{MOST_HELD, simulate, states_at_once},
+    simulate::{MAX_HELD, simulate, states_at_once},
 };
 
-/// Time for the pilots of all companies.
+/// Time for the pilots of all cohorts.
 const PILOT: Duration = Duration::from_secs(2);
-/// Companies that have a pilot, at most: each gets its share of the time, and less would show nothing.
-const MOST_PILOTS: usize = 20;
+/// Cohorts that have a pilot, at most: each gets its share of the time, and less would show nothing.
+const MAX_PILOTS: usize = 20;
 /// Share of the time left that a larger pilot is to take; it may take longer than foreseen.
 const FILLED: f64 = 0.6;
 
@@ -58,7 +58,7 @@ pub struct Estimate {
     pub cells: usize,
     /// Where it would run.
     pub platform: Platform,
-    /// Members resident at once, the most of all companies.
+    /// Members resident at once, the most of all cohorts.
     pub slots: usize,
     /// Peak resident size of the process.
     pub memory_bytes: u64,
@@ -74,7 +74,7 @@ pub struct Estimate {
     pub pilot: Pilot,
 }
 
-/// The pilots of all companies together.
+/// The pilots of all cohorts together.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Pilot {
     /// Members that were started.
@@ -89,7 +89,7 @@ pub struct Pilot {
     pub seconds: f64,
 }
 
-/// What companies of cells will take together, and how many members of theirs a pilot stands for.
+/// What cohorts of cells will take together, and how many members of theirs a pilot stands for.
 #[derive(Default)]
 struct Work {
     members: f64,
@@ -99,29 +99,29 @@ struct Work {
 }
 
 impl Estimate {
-    /// Estimates the run of `companies` of `cells`, each on its choice.
+    /// Estimates the run of `cohorts` of `cells`, each on its choice.
     ///
     /// # Errors
     /// As the run itself.
-    pub fn new(cells: &mut [Cell], companies: Vec<Range<usize>>, choices: Vec<Choice>) -> Result<Estimate> {
+    pub fn new(cells: &mut [Cell], cohorts: Vec<Range<usize>>, choices: Vec<Choice>) -> Result<Estimate> {
         let members = cells.iter().map(|cell| cell.spec.member_count()).sum::<u64>();
         let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
         let (mut slots, mut resident) = (0, 0);
         let mut rows = [0.0_f64; 2];
-        let (every, count) = (companies.len().div_ceil(MOST_PILOTS), companies.len());
+        let (every, count) = (cohorts.len().div_ceil(MAX_PILOTS), cohorts.len());
         let budget = PILOT / count.div_ceil(every).max(1) as u32;
         let mut total = Work { seconds: Some(0.0), dispatches: Some(0.0), steps: Some(0.0), ..Work::default() };
-        for (range, choice) in companies.into_iter().zip(choices).step_by(every) {
-            let company = &mut cells[range];
+        for (range, choice) in cohorts.into_iter().zip(choices).step_by(every) {
+            let cohort = &mut cells[range];
             let precision = choice.precision();
-            let all: u64 = company.iter().map(|cell| cell.spec.member_count()).sum();
-            let whole = Spec { curves: all, only: None, shard: None, ..company[0].spec.clone() };
+            let all: u64 = cohort.iter().map(|cell| cell.spec.member_count()).sum();
+            let whole = Spec { curves: all, only: None, shard: None, ..cohort[0].spec.clone() };
             let started = Instant::now();
             let (mut backend, platform) = choice.open(&whole, whole.points)?;
             start_up += started.elapsed().as_secs_f64();
             opened.get_or_insert(platform);
             slots = slots.max(backend.slots());
-            let (work, most, of_member) = sample(company, precision, backend.as_mut(), budget, &mut pilot)?;
+            let (work, most, of_member) = sample(cohort, precision, backend.as_mut(), budget, &mut pilot)?;
             rows = [0, 1].map(|i| rows[i].max(of_member[i]));
             resident = resident.max(most.min(backend.slots() as u64) as usize);
             let add = |sum: Option<f64>, part: Option<f64>| Some(sum? + part?);
@@ -131,7 +131,7 @@ impl Estimate {
             total.steps = add(total.steps, work.steps);
         }
         let platform = opened.ok_or_else(|| Error::Failed("a study has no cell".into()))?;
-        // Companies without a pilot are like those that have one.
+        // Cohorts without a pilot are like those that have one.
         let scale = members as f64 / total.members.max(1.0);
         start_up *= every as f64;
         let seconds = total.seconds.map(|seconds| scale * seconds);
@@ -219,25 +219,25 @@ impl Sink for Seen {
     }
 }
 
-/// Pilots of a company: what all of it will take, the members of the largest, and bytes of the rows of a member at its end
+/// Pilots of a cohort: what all of it will take, the members of the largest, and bytes of the rows of a member at its end
 /// and in that pilot.
 fn sample(
-    company: &mut [Cell],
+    cohort: &mut [Cell],
     precision: Precision,
     backend: &mut dyn Backend,
     budget: Duration,
     pilot: &mut Pilot,
 ) -> Result<(Work, u64, [f64; 2])> {
     let until = Instant::now() + budget;
-    let own: Vec<Option<Vec<u64>>> = company.iter().map(|cell| cell.spec.only.clone()).collect();
-    let all: u64 = company.iter().map(|cell| cell.spec.member_count()).sum();
+    let own: Vec<Option<Vec<u64>>> = cohort.iter().map(|cell| cell.spec.only.clone()).collect();
+    let all: u64 = cohort.iter().map(|cell| cell.spec.member_count()).sum();
     let mut pilots: Vec<Seen> = Vec::new();
     let mut count = (backend.abreast() as u64).min(all);
     loop {
-        choose(company, &own, all, count);
+        choose(cohort, &own, all, count);
         let mut seen = Seen::new(count, until);
         let started = Instant::now();
-        let stopped = match simulate(company, precision, backend, 0, &mut seen) {
+        let stopped = match simulate(cohort, precision, backend, 0, &mut seen) {
             Err(Error::Stopped(_)) => true,
             done => done.map(|()| false)?,
         };
@@ -251,7 +251,7 @@ fn sample(
         }
         count = more.min(all);
     }
-    company.iter_mut().zip(own).for_each(|(cell, only)| cell.spec.only = only);
+    cohort.iter_mut().zip(own).for_each(|(cell, only)| cell.spec.only = only);
     for seen in &pilots {
         pilot.members += seen.members;
         pilot.ended += seen.left;
@@ -264,21 +264,21 @@ fn sample(
         members: all as f64,
         seconds: extrapolated(&pilots, all, |seen| seen.seconds),
         dispatches: extrapolated(&pilots, all, |seen| seen.dispatches as f64),
-        steps: steps.or_else(|| certain_steps(company)).map(|each| each * all as f64),
+        steps: steps.or_else(|| certain_steps(cohort)).map(|each| each * all as f64),
     };
     let rows = pilots.iter().rfind(|seen| seen.left > 0).map(|seen| seen.rows / seen.left as f64);
-    let rows = rows.unwrap_or_else(|| all_rows(company));
+    let rows = rows.unwrap_or_else(|| all_rows(cohort));
     let share = pilots.last().map_or(1.0, |seen| seen.share.clamp(0.0, 1.0));
     Ok((work, count, [rows, share * rows]))
 }
 
 /// Bytes of the rows of a member that comes to the end of its time, the most of all cells.
-fn all_rows(company: &[Cell]) -> f64 {
+fn all_rows(cohort: &[Cell]) -> f64 {
     let of_cell = |Cell { spec, family, .. }: &Cell| {
         let series = spec.series.map_or(0.0, |every| spec.t_end / every + 1.0);
         rows::bytes_of(series as usize, spec.snapshots.len(), family.points()) as f64
     };
-    company.iter().map(of_cell).fold(0.0, f64::max)
+    cohort.iter().map(of_cell).fold(0.0, f64::max)
 }
 
 /// A cost of `all` members from that of the pilots, each of which is scaled to its end.
@@ -294,21 +294,21 @@ fn extrapolated(pilots: &[Seen], all: u64, cost: impl Fn(&Seen) -> f64) -> Optio
 }
 
 /// Steps of a member where these do not depend on its curve.
-fn certain_steps(company: &[Cell]) -> Option<f64> {
+fn certain_steps(cohort: &[Cell]) -> Option<f64> {
     let of_cell = |Cell { spec, .. }: &Cell| match spec.pace() {
         Pace::Fixed(tau) if !spec.stop_when_relaxed => Some(f64::from(Clock::new(tau, spec.t_end).steps)),
         _ => None,
     };
-    let steps = company.iter().map(of_cell).sum::<Option<f64>>()?;
-    Some(steps / company.len() as f64)
+    let steps = cohort.iter().map(of_cell).sum::<Option<f64>>()?;
+    Some(steps / cohort.len() as f64)
 }
 
-/// Leaves `count` of the members of `company`, which has `all`, spread evenly; `own` are those that its cells were to run.
-fn choose(company: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) {
+/// Leaves `count` of the members of `cohort`, which has `all`, spread evenly; `own` are those that its cells were to run.
+fn choose(cohort: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) {
     let place = |i: u64| ((2 * u128::from(i) + 1) * u128::from(all) / (2 * u128::from(count))) as u64;
     let mut places = (0..count).map(place).peekable();
     let mut before = 0;
-    for (cell, own) in company.iter_mut().zip(own) {
+    for (cell, own) in cohort.iter_mut().zip(own) {
         cell.spec.only.clone_from(own);
         let members = cell.spec.member_count();
         let (mut own, mut taken, mut only) = (cell.spec.members(), 0, Vec::new());
@@ -324,7 +324,7 @@ fn choose(company: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) 
 
 /// Peak resident size of a run of `members` of `n` nodes, in bytes, from that of this process, which had `resident` of
 /// up to `slots` members in its pool. A member has `rows` bytes of rows at its end, and had in this process: above
-/// [`MOST_HELD`] for all of the pool they go to disk. Its state may be `kept` on the way.
+/// [`MAX_HELD`] for all of the pool they go to disk. Its state may be `kept` on the way.
 ///
 /// The peak is at the end of the run, with a full pool and the tally, or after that, with the statistics and the charts
 /// and without the pool. The tally has of each member its time and two numbers of its mesh, of half the size, and of the
@@ -333,20 +333,20 @@ fn choose(company: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) 
 fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2], n: usize, kept: bool) -> u64 {
     let numbers = |count: usize| (count * size_of::<f64>()) as u64;
     let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
-    let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MOST_PANELS);
-    let shown = n.min(Portrait::MOST_NODES);
+    let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MAX_PANELS);
+    let shown = n.min(Portrait::MAX_NODES);
     let portraits = numbers(2 * shown * (member::PARTS + 1) * drawn);
-    let page = (PAGE_BYTES * shown * drawn / MOST_PANELS) as u64;
+    let page = (PAGE_BYTES * shown * drawn / MAX_PANELS) as u64;
     let rated = (rated * members as f64) as u64;
     let tally = members * (size_of::<f64>() + 2 * size_of::<f32>()) as u64 + rated * size_of::<Rate>() as u64;
     let [fitted, charted] = [rated, members.saturating_sub(rated)].map(|count| count * size_of::<f64>() as u64);
     let statistics = fitted.max(charted);
-    let held = |each: f64, members: usize| (each * members as f64).min(MOST_HELD as f64) as u64;
+    let held = |each: f64, members: usize| (each * members as f64).min(MAX_HELD as f64) as u64;
     let in_pilot = pool(resident) + held(rows[1], resident);
     let program = peak_resident().map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(in_pilot));
     let full = usize::try_from(members).unwrap_or(usize::MAX).min(slots);
     let all_held = held(rows[0], full);
-    let spilling = if all_held < MOST_HELD as u64 { 0 } else { SPILL_BYTES };
+    let spilling = if all_held < MAX_HELD as u64 { 0 } else { SPILL_BYTES };
     let read_back = |members: usize| numbers(STATE_FIELDS * n * members.min(states_at_once(n)));
     // Members that are drawn are read back at each of their pictures.
     let passing = if kept { numbers(KEPT_NUMBERS * n * full) + read_back(full) } else { read_back(drawn.min(full)) };

@@ -9,18 +9,18 @@ use std::{
 };
 
 /// Most bytes of a spec: half a million members by number.
-pub(crate) const MOST_SPEC: u64 = 1 << 20;
+pub(crate) const MAX_SPEC: u64 = 1 << 20;
 /// Most bytes of an outline: a million points with all their digits.
-pub(crate) const MOST_OUTLINE: u64 = 1 << 26;
+pub(crate) const MAX_OUTLINE: u64 = 1 << 26;
 /// Most bytes of a `run.json`: the longest spec, in lines.
-pub(crate) const MOST_RUN: u64 = 1 << 22;
+pub(crate) const MAX_RUN: u64 = 1 << 22;
 /// Most bytes of the first members: ten times what twelve of them take.
-pub(crate) const MOST_PORTRAITS: u64 = 1 << 23;
+pub(crate) const MAX_PORTRAITS: u64 = 1 << 23;
 /// Most bytes of a line of a table: a thousand numbers.
-pub(crate) const LONGEST_LINE: usize = 1 << 16;
+pub(crate) const MAX_LINE: usize = 1 << 16;
 
 /// Most bytes of a state or a `shard.state`: what a run writes at once is in memory once more, beside its members.
-pub(crate) const MOST_STATE: u64 = 1 << 34;
+pub(crate) const MAX_STATE: u64 = 1 << 34;
 
 /// Opens the file at `path` for reading.
 ///
@@ -103,7 +103,7 @@ pub(crate) fn text(path: &Path, most: u64) -> io::Result<String> {
     })
 }
 
-/// A reader that ends with an error where a line has not ended after [`LONGEST_LINE`] bytes: nobody who reads line by line
+/// A reader that ends with an error where a line has not ended after [`MAX_LINE`] bytes: nobody who reads line by line
 /// then holds more than that.
 pub(crate) struct Lines<R> {
     inner: R,
@@ -126,8 +126,8 @@ impl<R: Read> Read for Lines<R> {
             Some(last) => count - last - 1,
             None => first,
         };
-        if first > LONGEST_LINE {
-            let problem = format!("a line of more than {LONGEST_LINE} bytes");
+        if first > MAX_LINE {
+            let problem = format!("a line of more than {MAX_LINE} bytes");
             return Err(Error::new(ErrorKind::InvalidData, problem));
         }
         Ok(count)
@@ -172,13 +172,13 @@ mod tests {
                 }
             }
         };
-        for step in [1, 7, 4096, LONGEST_LINE + 1, 10 * LONGEST_LINE] {
-            let longest = line(LONGEST_LINE);
+        for step in [1, 7, 4096, MAX_LINE + 1, 10 * MAX_LINE] {
+            let longest = line(MAX_LINE);
             assert_eq!(read(&[&longest[..], &longest, b"\n\n", &longest].concat(), step), Ok(()), "{step}");
-            let longer = [&longest[..], &line(LONGEST_LINE + 1)].concat();
+            let longer = [&longest[..], &line(MAX_LINE + 1)].concat();
             // Of what one read brings only the beginning and the end are looked at: that much is held anyhow.
-            assert_eq!(read(&longer, step).is_err(), step <= LONGEST_LINE + 1, "{step}");
-            assert!(read(&vec![b'x'; 30 * LONGEST_LINE], step).is_err(), "{step}");
+            assert_eq!(read(&longer, step).is_err(), step <= MAX_LINE + 1, "{step}");
+            assert!(read(&vec![b'x'; 30 * MAX_LINE], step).is_err(), "{step}");
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Nothing here depends on where the members are advanced or on how many are resident: a member's steps are its
 //! own, its output times are reached by pausing it there, and rows leave in member order. So a run may be interrupted
-//! between any two dispatches: the [`Standing`] then has all that [`go_on`] needs to end it as it would have ended.
+//! between any two dispatches: the [`Standing`] then has all that [`resume`] needs to end it as it would have ended.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -23,22 +23,22 @@ use crate::{
 const MEMBERS_AHEAD: usize = 8;
 
 /// Where a dispatch takes longer, the sink is told in between, and may stop the run.
-const LONGEST_WAIT: Duration = Duration::from_millis(200);
+const MAX_WAIT: Duration = Duration::from_millis(200);
 
 /// Members that end as they are made, between two words with the sink.
-const MOST_AT_ONCE: usize = 1000;
+const MAX_AT_ONCE: usize = 1000;
 
 /// States that are read back at once when a run is kept, and the most bytes of them.
 const READ_BACK: usize = 512;
 const BYTES_READ_BACK: usize = 64 << 20;
 
 /// Bytes of rows in memory above which the sink is handed all of them, and of one member at most.
-pub const MOST_HELD: usize = 32 << 20;
-const MOST_OF_ONE: usize = 8 << 20;
+pub const MAX_HELD: usize = 32 << 20;
+const MAX_OF_ONE: usize = 8 << 20;
 /// Before the run is kept the sink is handed all rows if they are more than this: what is kept stays small.
-const MOST_KEPT: usize = 4 << 20;
+const MAX_KEPT: usize = 4 << 20;
 
-/// Runs the members of `cells`, which keep [company](crate::ensemble::study::companies), on `backend`, and hands each to
+/// Runs the members of `cells`, which keep [cohort](crate::ensemble::study::cohorts), on `backend`, and hands each to
 /// `sink` in member order.
 ///
 /// The first members come with their nodes before, on their way and after, `portraits` of them over all cells.
@@ -49,14 +49,14 @@ pub fn simulate(
     portraits: usize,
     sink: &mut dyn Sink,
 ) -> Result<()> {
-    go_on(cells, precision, backend, portraits, Standing::default(), sink)
+    resume(cells, precision, backend, portraits, Standing::default(), sink)
 }
 
 /// As [`simulate`], from where an earlier one of the same cells stood.
 ///
 /// # Errors
 /// Beside those of the back end and the sink, [`Error::Request`] where members in `standing` are not those of `cells`.
-pub fn go_on(
+pub fn resume(
     cells: &[Cell],
     precision: Precision,
     backend: &mut dyn Backend,
@@ -95,7 +95,7 @@ pub fn go_on(
     let done = run(&mut pool, &mut queue, backend, sink);
     if done.is_err() && !queue.kept {
         // What has ended is not to be lost. Why the run ends is told already.
-        let _ = queue.keep(None, sink);
+        let _ = queue.checkpoint(None, sink);
     }
     done
 }
@@ -104,7 +104,7 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
     let cells = pool.cells.iter().enumerate();
     let members = cells.flat_map(|(cell, own)| own.members().map(move |member| (cell, member)));
     // A state may hold as many rows as a run.
-    pool.relieve(queue, MOST_HELD, sink)?;
+    pool.relieve(queue, MAX_HELD, sink)?;
     let ended: BTreeSet<u64> = queue.early.keys().copied().collect();
     let left = (0..).zip(members).skip(queue.next as usize).filter(|(rank, _)| !ended.contains(rank));
     let mut waiting = left.peekable();
@@ -117,9 +117,9 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
     for batch in (0..backend.batches()).cycle() {
         let slots = batch * size..(batch + 1) * size;
         if on_the_way[batch] {
-            while !backend.is_back(batch, LONGEST_WAIT) {
+            while !backend.is_back(batch, MAX_WAIT) {
                 queue.tell(pool, sink)?;
-                told = told || queue.keep_before_the_stop(sink)?;
+                told = told || queue.checkpoint_before_the_stop(sink)?;
             }
             backend.finish(batch)?;
             on_the_way[batch] = false;
@@ -128,7 +128,7 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
         // Where members end at once, the sink is to be heard all the same.
         let mut over = 0;
         for slot in slots.clone() {
-            while pool.resident[slot].is_none() && over < MOST_AT_ONCE {
+            while pool.resident[slot].is_none() && over < MAX_AT_ONCE {
                 let Some((rank, who)) = waiting.next_if(|(rank, _)| *rank < queue.next + ahead) else { break };
                 if let Some(ended) = pool.admit(backend, slot, rank, who)? {
                     over += 1;
@@ -141,16 +141,16 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
             break;
         }
         let wish = sink.wish();
-        let goes_on = matches!(wish, Wish::GoOn);
+        let goes_on = matches!(wish, Wish::Continue);
         // To be kept, all have to be back.
         if !goes_on && !on_the_way.contains(&true) {
-            pool.relieve(queue, MOST_KEPT, sink)?;
-            queue.keep(Some(pool.pause(backend)?), sink)?;
+            pool.relieve(queue, MAX_KEPT, sink)?;
+            queue.checkpoint(Some(pool.pause(backend)?), sink)?;
             if let Wish::Stop(error) = wish {
                 return Err(error);
             }
         } else if !goes_on {
-            told = told || queue.keep_before_the_stop(sink)?;
+            told = told || queue.checkpoint_before_the_stop(sink)?;
             continue;
         }
         if pool.resident[slots].iter().any(Option::is_some) {
@@ -200,7 +200,7 @@ impl Pool<'_> {
             return Ok(Some(trajectory.end(None)));
         }
         if let Some(paused) = self.paused.remove(&rank) {
-            trajectory.go_on_from(paused)?;
+            trajectory.resume_from(paused)?;
         }
         self.held += trajectory.rows().bytes();
         backend.load(slot, &trajectory.launch())?;
@@ -262,10 +262,10 @@ impl Pool<'_> {
             let Some((_, trajectory)) = &mut self.resident[slot] else { continue };
             let state = states.remove(&slot);
             let before = trajectory.rows().bytes();
-            let mut most = MOST_OF_ONE;
+            let mut most = MAX_OF_ONE;
             // One step may pass more output times than memory has room for.
             while !trajectory.serve(state.as_ref(), most) {
-                most = if trajectory.rows().spill(sink)? { MOST_OF_ONE } else { usize::MAX };
+                most = if trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
             }
             self.held += trajectory.rows().bytes().saturating_sub(before);
             if !trajectory.is_over() {
@@ -276,11 +276,11 @@ impl Pool<'_> {
                 backend.clear(slot);
                 queue.leave(rank, trajectory.end(state.as_ref()), sink)?;
             }
-            if self.held > MOST_HELD {
-                self.relieve(queue, MOST_HELD / 4 * 3, sink)?;
+            if self.held > MAX_HELD {
+                self.relieve(queue, MAX_HELD / 4 * 3, sink)?;
             }
             // Many rows take long to write.
-            if queue.told.elapsed() >= LONGEST_WAIT {
+            if queue.told.elapsed() >= MAX_WAIT {
                 queue.tell(self, sink)?;
             }
         }
@@ -343,19 +343,19 @@ impl Queue {
     }
 
     /// Has the members kept that have ended, and those on their way where they are known.
-    fn keep(&mut self, resident: Option<BTreeMap<u64, Paused>>, sink: &mut dyn Sink) -> Result<()> {
+    fn checkpoint(&mut self, resident: Option<BTreeMap<u64, Paused>>, sink: &mut dyn Sink) -> Result<()> {
         let standing = Standing { next: self.next, early: std::mem::take(&mut self.early), resident };
-        let done = sink.keep(&standing);
+        let done = sink.checkpoint(&standing);
         self.kept = done.is_ok() && standing.resident.is_some();
         self.early = standing.early;
         done
     }
 
     /// Where the run is to stop: has kept what is known at once, since nobody may wait for those on their way.
-    fn keep_before_the_stop(&mut self, sink: &mut dyn Sink) -> Result<bool> {
+    fn checkpoint_before_the_stop(&mut self, sink: &mut dyn Sink) -> Result<bool> {
         let stops = matches!(sink.wish(), Wish::Stop(_));
         if stops {
-            self.keep(None, sink)?;
+            self.checkpoint(None, sink)?;
         }
         Ok(stops)
     }

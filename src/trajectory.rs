@@ -34,7 +34,7 @@ const NO_THRESHOLD: f64 = -1.0;
 /// end of the fit, or to half the threshold.
 const FITTED: [f64; 2] = [1e-3, 1e-1];
 /// A fit with fewer points says nothing.
-const LEAST_POINTS: u32 = 8;
+const MIN_POINTS: u32 = 8;
 /// A curve that has shrunk to this fraction of its length is gone.
 const SHRUNK: f64 = 1e-3;
 /// The first adaptive step in units of the fourth power of the shortest segment, the fastest time scale there is.
@@ -43,9 +43,9 @@ const FIRST_STEP: f64 = 0.1;
 const PULL_PER_RATE: f64 = 4.0;
 /// Adaptive steps to a tolerance of 1 after which a member is stalled; their number goes with its root. Curves that
 /// relax take some 3 to 30; one that creeps, because only tiny steps can be solved, would never end.
-const MOST_STEPS: f64 = 1000.0;
+const MAX_STEPS: f64 = 1000.0;
 /// Steps in a time 1/ω besides: a curve at rest takes one or two, since lengths approach their mean explicitly.
-const MOST_STEPS_AT_REST: f64 = 4.0;
+const MAX_STEPS_AT_REST: f64 = 4.0;
 /// Shares of a spacing that nodes go at most between two looks at a curve about to cross itself.
 const LOOKS_PER_SPACING: f64 = 16.0;
 /// Ticks of the clock in the first adaptive step at least.
@@ -219,7 +219,7 @@ impl<'a> Trajectory<'a> {
     ///
     /// # Errors
     /// [`Error::Request`] where that was not this member.
-    pub fn go_on_from(&mut self, paused: Paused) -> Result<()> {
+    pub fn resume_from(&mut self, paused: Paused) -> Result<()> {
         let Paused { counters, report, state, sweeps, served, rows, frames, crossed, look_at } = paused;
         let (index, numbers) = (self.member.index, STATE_FIELDS * self.member.nodes.len());
         let served = usize::try_from(served).unwrap_or(usize::MAX);
@@ -275,7 +275,7 @@ impl<'a> Trajectory<'a> {
             Time::Adaptive(_) => {
                 let p = &self.launch.parameters;
                 let turnovers = p.redistribution * p.omega * (p.end_high + p.end_low);
-                (MOST_STEPS / p.adaptive.sqrt() + MOST_STEPS_AT_REST * turnovers).ceil() as u32
+                (MAX_STEPS / p.adaptive.sqrt() + MAX_STEPS_AT_REST * turnovers).ceil() as u32
             }
         }
     }
@@ -474,7 +474,7 @@ impl<'a> Trajectory<'a> {
         let Decay { xx, xy, yy, .. } = self.report.decay;
         let clock = if self.launch.parameters.growth > 0.0 { 1.0 } else { self.time.unit(self.unit) };
         let (rate, r2) = (-xy / xx / clock, xy * xy / (xx * yy));
-        (self.counters.fit_points >= LEAST_POINTS && rate.is_finite() && r2.is_finite()).then_some((rate, r2))
+        (self.counters.fit_points >= MIN_POINTS && rate.is_finite() && r2.is_finite()).then_some((rate, r2))
     }
 
     /// The excess at the times of [`schedule::grid`](crate::schedule::grid) that the member has reached.

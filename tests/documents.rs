@@ -14,7 +14,7 @@ const BEGIN: &str = "<!-- Generated from the help texts: UPDATE_DOCS=1 cargo tes
 const END: &str = "<!-- The end of what is generated. -->\n";
 const REMEDY: &str = "UPDATE_DOCS=1 cargo test --test documents rewrites it";
 
-const MOST_WORDS: usize = 1000;
+const MAX_WORDS: usize = 1000;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -135,8 +135,8 @@ fn a_help_text_is_taken_apart() {
 fn the_readme_has_at_most_a_thousand_words() {
     let words = read(&root().join("README.md")).split_whitespace().count();
     assert!(
-        words <= MOST_WORDS,
-        "README.md has {words} words, and may have {MOST_WORDS}: move what is too much to docs/"
+        words <= MAX_WORDS,
+        "README.md has {words} words, and may have {MAX_WORDS}: move what is too much to docs/"
     );
 }
 

@@ -43,8 +43,8 @@ type Outcome = Result<(), Failed>;
 
 /// Nodes of the members among which one is poison.
 const POINTS: usize = 11;
-/// Its company: every lane of the widest vectors is met twice, and not all vectors are full.
-const COMPANY: usize = 40;
+/// Its cohort: every lane of the widest vectors is met twice, and not all vectors are full.
+const COHORT: usize = 40;
 /// What is waited for so long hangs.
 const HANGS: Duration = Duration::from_secs(600);
 /// More advances than members of a few steps can take.
@@ -106,7 +106,7 @@ fn on_the_gpu<T: Real>(index: usize, solver: Solver, adaptive: bool, trials: &mu
         let blocks = Blocks::new(POINTS).ok_or("n")?;
         let variant = Variant { adaptive, ..gpu.capacity().variant(blocks, solver) };
         let started = Instant::now();
-        let mut kernel = Kernel::<T>::new(gpu, blocks, COMPANY + 1, method(solver).max_sweeps, variant)?;
+        let mut kernel = Kernel::<T>::new(gpu, blocks, COHORT + 1, method(solver).max_sweeps, variant)?;
         the_self_test_passes(&mut kernel, gpu, solver, adaptive, started)?;
         poison_on_the_gpu(kernel, gpu, solver, adaptive)
     };
@@ -210,7 +210,7 @@ fn poison<T: Real>(
     where_: &str,
     takes: impl Fn(usize, usize) -> bool,
 ) -> Outcome {
-    let good = launches::<T>(COMPANY, adaptive)?;
+    let good = launches::<T>(COHORT, adaptive)?;
     let alone = finished(backend, &good)?;
     if let Some(j) = alone.iter().position(|(counters, _)| counters.status != 0 || counters.steps < 2) {
         return Err(format!("{where_}: good member {j}: {:?}", alone[j].0).into());
@@ -222,9 +222,9 @@ fn poison<T: Real>(
     let differ = finished(backend, &other)?.iter().zip(&alone).map(|(a, b)| a.1 != b.1).collect::<Vec<_>>();
     require(differ.iter().filter(|differs| **differs).count() == 1 && differ[7], || format!("{where_}: {differ:?}"))?;
     let mut cases = 0;
-    for place in 0..=COMPANY {
+    for place in 0..=COHORT {
         for (_, (what, poison)) in POISONS.iter().enumerate().filter(|(kind, _)| takes(place, *kind)) {
-            let mut bad = good[place % COMPANY].clone();
+            let mut bad = good[place % COHORT].clone();
             poison(&mut bad);
             let mut mixed = good.clone();
             mixed.insert(place, bad);
@@ -234,14 +234,14 @@ fn poison<T: Real>(
             let failed = [Status::Singular, Status::Nonfinite, Status::Stalled].map(|status| status as u32);
             let at = || format!("{where_}: {what}, place {place}");
             require(failed.contains(&poisoned.status), || format!("{}: it ends as {poisoned:?}", at()))?;
-            if let Some(j) = (0..COMPANY).find(|j| together[*j].1 != alone[*j].1) {
+            if let Some(j) = (0..COHORT).find(|j| together[*j].1 != alone[*j].1) {
                 return Err(format!("{}: member {j} ends as {:?} in place of {:?}", at(), together[j], alone[j]).into());
             }
             cases += 1;
         }
     }
     println!("{where_}: {cases} poisoned members");
-    require(cases >= COMPANY, || format!("{where_}: only {cases} cases"))
+    require(cases >= COHORT, || format!("{where_}: only {cases} cases"))
 }
 
 fn poison_on_the_cpu<T: Vectorised>(solver: Solver, adaptive: bool) -> Outcome {

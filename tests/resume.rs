@@ -18,7 +18,7 @@ use curvelax::{
         spec::{Precision, Pull, Solver},
     },
     scheme::step::Method,
-    simulate::go_on,
+    simulate::resume,
     solver::{Blocks, Order},
 };
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -46,12 +46,12 @@ impl Sink for Interrupting {
         self.patience = self.patience.saturating_sub(1);
         match self.patience {
             0 => Wish::Stop(Error::Stopped("enough".into())),
-            1 => Wish::Keep,
-            _ => Wish::GoOn,
+            1 => Wish::Checkpoint,
+            _ => Wish::Continue,
         }
     }
 
-    fn keep(&mut self, standing: &Standing) -> Result<()> {
+    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
         assert_eq!(standing.next as usize, self.ended.len());
         let Standing { next, early, resident } = standing;
         if let Some(resident) = resident {
@@ -78,7 +78,7 @@ fn cells(name: &str, spec: &Spec) -> Result<[Cell; 1]> {
 
 fn straight(name: &str, spec: &Spec, precision: Precision, open: Open) -> Result<Vec<Ended>> {
     let mut all = Interrupting { patience: u32::MAX, ..Interrupting::default() };
-    go_on(&cells(name, spec)?, precision, open(spec)?.as_mut(), 2, Standing::default(), &mut all)?;
+    resume(&cells(name, spec)?, precision, open(spec)?.as_mut(), 2, Standing::default(), &mut all)?;
     Ok(all.ended)
 }
 
@@ -98,7 +98,7 @@ fn in_pieces(name: &str, spec: &Spec, precision: Precision, open: Open, patience
         // As it comes back from the disk.
         let bytes = postcard::to_allocvec(&standing).expect("a state");
         let standing = postcard::from_bytes(&bytes).expect("the same");
-        match go_on(&cells, precision, open(spec)?.as_mut(), 2, standing, &mut sink) {
+        match resume(&cells, precision, open(spec)?.as_mut(), 2, standing, &mut sink) {
             Err(Error::Stopped(_)) => {}
             done => return done.map(|()| (sink.ended, piece)),
         }

@@ -16,7 +16,7 @@ use curvelax::{
         Form, Manner, Report, Stop,
         checkpoint::{self, Origin},
     },
-    simulate::go_on,
+    simulate::resume,
 };
 
 /// A report whose run is stopped when its patience is at an end.
@@ -57,12 +57,12 @@ impl Sink for Impatient<'_> {
             0 if !self.at_once => return Wish::Stop(self.stopped()),
             patience => self.waits |= patience.is_multiple_of(3),
         }
-        if self.waits { Wish::Keep } else { Wish::GoOn }
+        if self.waits { Wish::Checkpoint } else { Wish::Continue }
     }
 
-    fn keep(&mut self, standing: &Standing) -> Result<()> {
+    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
         self.waits = false;
-        self.report.keep(standing)
+        self.report.checkpoint(standing)
     }
 }
 
@@ -85,7 +85,7 @@ fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
         let patience = patience.saturating_add(piece / 4);
         let mut sink = Impatient { report: &mut report, patience, at_once: piece % 3 == 0, waits: false, spilled: 0 };
         let (mut backend, _) = choice.open(&spec, spec.points)?;
-        let done = go_on(&cells, choice.precision(), backend.as_mut(), 2, standing, &mut sink);
+        let done = resume(&cells, choice.precision(), backend.as_mut(), 2, standing, &mut sink);
         spilled += sink.spilled;
         match done {
             Err(Error::Stopped(_)) => assert!(report.give_up()),
@@ -99,7 +99,7 @@ fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
         assert!(state < 5 << 20, "a state of {state} bytes");
         let folder = OutputFolder::open_again(out)?;
         let kept = checkpoint::find(&folder)?.expect("a run that was interrupted");
-        (report, standing) = Report::go_on(folder, &spec, spec.points, kept, manner())?;
+        (report, standing) = Report::resume(folder, &spec, spec.points, kept, manner())?;
     }
     unreachable!("it ends")
 }

@@ -38,7 +38,7 @@ fuzz_target!(|data: &[u8]| {
     let outputs = Outputs::default();
     for paused in resident.into_values() {
         let mut trajectory = Trajectory::new(member.clone(), spec, Precision::F64, &outputs);
-        match trajectory.go_on_from(paused) {
+        match trajectory.resume_from(paused) {
             Ok(()) => drop(trajectory.launch()),
             Err(error) => assert_eq!(error.exit_code(), 2),
         }

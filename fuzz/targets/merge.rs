@@ -119,7 +119,7 @@ impl Folder {
         };
         let tables = [names::SUMMARY, names::RATES].map(|name| Mark { name: name.into(), length: 0, crc: 0 }).into();
         let (wall, aside) = (Duration::ZERO, Aside::default());
-        let head = Head { origin, wall, company: 0, tables, store: None, rows: None, aside, films: Vec::new() };
+        let head = Head { origin, wall, cohort: 0, tables, store: None, rows: None, aside, films: Vec::new() };
         let files =
             [names::SHARD, names::SUMMARY, names::RATES].map(|name| (name, File::create(path.join(name)).unwrap()));
         let record = Record { head, points: 100, warnings: Vec::new() };

@@ -35,8 +35,8 @@ const SOLVERS: &[&str] = &["gauss-seidel", "multigrid", "direct"];
 const CURVES: u64 = 8192;
 /// Members at once elsewhere: the CPU back end has fewer slots, and a software GPU as few cores.
 const CURVES_IN_SOFTWARE: u64 = 32;
-const MOST_SECONDS: f64 = 3600.0;
-const MOST_REPEATS: usize = 1000;
+const MAX_SECONDS: f64 = 3600.0;
+const MAX_REPEATS: usize = 1000;
 
 /// Measure curve-steps per second on this machine, as a table.
 #[derive(clap::Args)]
@@ -127,11 +127,11 @@ struct Benches<'a> {
 /// Runs the measurements and prints their table.
 pub fn bench(args: BenchArgs) -> Result<()> {
     let (seconds, repeats) = (args.seconds.unwrap_or(2.0), args.repeats.unwrap_or(5));
-    if !(seconds > 0.0 && seconds <= MOST_SECONDS) {
-        return Err(Error::value("seconds", seconds, "no time to measure in", &format!("take up to {MOST_SECONDS}")));
+    if !(seconds > 0.0 && seconds <= MAX_SECONDS) {
+        return Err(Error::value("seconds", seconds, "no time to measure in", &format!("take up to {MAX_SECONDS}")));
     }
-    if !(1..=MOST_REPEATS).contains(&repeats) {
-        return Err(Error::value("repeats", repeats, "no number of windows", &format!("take 1 to {MOST_REPEATS}")));
+    if !(1..=MAX_REPEATS).contains(&repeats) {
+        return Err(Error::value("repeats", repeats, "no number of windows", &format!("take 1 to {MAX_REPEATS}")));
     }
     let window = Duration::from_secs_f64(seconds / repeats as f64);
     let mut cases = cases(&args)?.into_iter().map(Case::new).collect::<Vec<_>>();

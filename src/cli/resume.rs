@@ -13,7 +13,7 @@ use crate::{
     files::{OutputFolder, names},
     report::{
         Report,
-        checkpoint::{self, Kept},
+        checkpoint::{self, Saved},
         reader,
     },
 };
@@ -53,33 +53,33 @@ pub struct ResumeArgs {
 pub fn resume(args: ResumeArgs) -> Result<()> {
     args.manner.check_name(&args.run)?;
     let folder = OutputFolder::open_again(&args.run)?;
-    let kept = checkpoint::find(&folder)?;
+    let saved = checkpoint::find(&folder)?;
     let place = Place { backend: args.backend, adapter: args.adapter, threads: args.threads };
-    go_on(folder, kept, place, args.manner)
+    resume_in(folder, saved, place, args.manner)
 }
 
 /// The run that was begun in the folder at `path`, if one was: its folder, and its state unless it is finished.
 ///
 /// # Errors
 /// As those of [`resume`].
-pub fn begun(path: &Path) -> Result<Option<(OutputFolder, Option<Kept>)>> {
+pub fn begun(path: &Path) -> Result<Option<(OutputFolder, Option<Saved>)>> {
     let there = |name: &&str| path.join(name).exists();
     if ![names::STATE, names::STATE_OLD, names::RUN].iter().any(there) {
         return Ok(None);
     }
     let folder = OutputFolder::open_again(path)?;
-    let kept = checkpoint::find(&folder)?;
-    Ok(Some((folder, kept)))
+    let saved = checkpoint::find(&folder)?;
+    Ok(Some((folder, saved)))
 }
 
 /// Goes on with a run that was begun, if it is one of `spec`.
 ///
 /// # Errors
 /// [`Error::Request`] for one of another spec, and as [`resume`].
-pub fn go_on_like((folder, kept): (OutputFolder, Option<Kept>), spec: Spec, flags: MannerFlags) -> Result<()> {
+pub fn resume_like((folder, saved): (OutputFolder, Option<Saved>), spec: Spec, flags: MannerFlags) -> Result<()> {
     let path = folder.path().display().to_string();
-    let own = match &kept {
-        Some(kept) => Spec::from_toml(&kept.head.origin.spec).map_err(|e| state_spec(&e))?,
+    let own = match &saved {
+        Some(saved) => Spec::from_toml(&saved.head.origin.spec).map_err(|e| state_spec(&e))?,
         None => reader::provenance(folder.path())?.spec,
     };
     // Where it goes on is checked by itself, and on how many threads makes no difference.
@@ -88,7 +88,7 @@ pub fn go_on_like((folder, kept): (OutputFolder, Option<Kept>), spec: Spec, flag
             "--resume: the run in {path} is of another spec: {key} is {there} there, and {here} here; name another folder"
         )));
     }
-    go_on(folder, kept, Place { threads: spec.threads, ..Place::default() }, flags)
+    resume_in(folder, saved, Place { threads: spec.threads, ..Place::default() }, flags)
 }
 
 /// Where a run is to go on, if not where it was.
@@ -99,19 +99,19 @@ struct Place {
     threads: Option<usize>,
 }
 
-fn go_on(mut folder: OutputFolder, kept: Option<Kept>, place: Place, flags: MannerFlags) -> Result<()> {
+fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: Place, flags: MannerFlags) -> Result<()> {
     let path = folder.path().to_path_buf();
-    let Some(mut kept) = kept else {
+    let Some(mut saved) = saved else {
         folder.tidy()?;
         flags.say(&format!("note: the run in {} is finished: nothing is left to do", path.display()));
         return Ok(());
     };
     // Before a device is looked for, which takes its time.
     let manner = flags.manner()?;
-    if let Some(fault) = &kept.note {
+    if let Some(fault) = &saved.note {
         note(&format!("warning: {}: {fault}", path.display()));
     }
-    let origin = &mut kept.head.origin;
+    let origin = &mut saved.head.origin;
     if !origin.outlines.is_empty() {
         folder.make_absolute()?;
         go_to(Path::new(&origin.base))?;
@@ -138,7 +138,7 @@ fn go_on(mut folder: OutputFolder, kept: Option<Kept>, place: Place, flags: Mann
     } else if new_threads {
         (origin.platform.threads, origin.spec) = (here.threads, work.spec.to_toml()?);
     }
-    let (report, standing) = Report::go_on(folder, &work.spec, work.cells[0].spec.points, kept, manner)?;
+    let (report, standing) = Report::resume(folder, &work.spec, work.cells[0].spec.points, saved, manner)?;
     flags.say(&format!("resuming: {} of {} members are in the table", report.members(), work.spec.member_count()));
     work.carry_out(report, standing, &flags)
 }

@@ -67,8 +67,8 @@ pub fn run(args: RunArgs) -> Result<()> {
     let flags = args.manner;
     if args.dry_run {
         work.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
-        let (companies, choices) = work.companies.into_iter().unzip();
-        let estimate = Estimate::new(&mut work.cells, companies, choices)?;
+        let (cohorts, choices) = work.cohorts.into_iter().unzip();
+        let estimate = Estimate::new(&mut work.cells, cohorts, choices)?;
         return match (flags.json, flags.quiet) {
             (true, _) => print_json(&estimate),
             (false, false) => print(&dry_run::table(&estimate, &work.cells[0].spec)),
@@ -79,7 +79,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     flags.check_name(&out)?;
     let begun = if args.resume { resume::begun(&out)? } else { None };
     if let Some(begun) = begun {
-        return resume::go_on_like(begun, work.spec, flags);
+        return resume::resume_like(begun, work.spec, flags);
     }
     let manner = flags.manner()?;
     let existing = if args.resume { Existing::Filled } else { args.force.into() };

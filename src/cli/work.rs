@@ -9,8 +9,8 @@ use crate::{
     error::{Error, Result},
     files::names,
     placement::{self, Choice, Platform},
-    report::{Form, Manner, Report, Stop, gallery::MOST_PANELS},
-    simulate::go_on,
+    report::{Form, Manner, Report, Stop, gallery::MAX_PANELS},
+    simulate::resume,
     text::plural,
 };
 
@@ -61,15 +61,15 @@ impl MannerFlags {
     }
 }
 
-/// A study, ready to run: its companies of cells, and where each is computed.
+/// A study, ready to run: its cohorts of cells, and where each is computed.
 pub struct Work {
     /// Resolved, with everything that was settled by the choices.
     pub spec: Spec,
     /// All cells.
     pub cells: Vec<Cell>,
     /// Cells that are computed together, and where.
-    pub companies: Vec<(Range<usize>, Choice)>,
-    /// The back end of the first company, once it is open.
+    pub cohorts: Vec<(Range<usize>, Choice)>,
+    /// The back end of the first cohort, once it is open.
     opened: Option<Box<dyn Backend>>,
 }
 
@@ -77,7 +77,7 @@ impl Work {
     /// Checks everything that can be wrong with `spec` on this machine.
     pub fn new(mut spec: Spec) -> Result<Work> {
         let mut cells = study::cells(&spec)?;
-        let ranges = study::companies(&cells);
+        let ranges = study::cohorts(&cells);
         let first = |range: &Range<usize>| (&cells[range.start].spec, cells[range.start].spec.points);
         let choices = placement::choose_all(&ranges.iter().map(first).collect::<Vec<_>>())?;
         for (range, choice) in ranges.iter().zip(&choices) {
@@ -88,12 +88,12 @@ impl Work {
         } else {
             choices[0].settle_place(&mut spec);
         }
-        Ok(Work { spec, cells, companies: ranges.into_iter().zip(choices).collect(), opened: None })
+        Ok(Work { spec, cells, cohorts: ranges.into_iter().zip(choices).collect(), opened: None })
     }
 
-    /// Opens the back end of the first company: where that is not the chosen one, the spec tells. Returns where it is.
+    /// Opens the back end of the first cohort: where that is not the chosen one, the spec tells. Returns where it is.
     pub fn open(&mut self, flags: &MannerFlags) -> Result<Platform> {
-        let (range, choice) = &self.companies[0];
+        let (range, choice) = &self.cohorts[0];
         let (backend, platform) = open(&self.cells[range.clone()], choice, flags)?;
         if choice.gpu().is_some() && platform.backend == "cpu" {
             flags.say(&format!("note: on the CPU instead: {}", platform.reason));
@@ -103,15 +103,15 @@ impl Work {
         Ok(platform)
     }
 
-    /// Members of the companies before `company`.
-    fn members_before(&self, company: usize) -> u64 {
-        let before = self.companies.iter().take(company).flat_map(|(range, _)| &self.cells[range.clone()]);
+    /// Members of the cohorts before `cohort`.
+    fn members_before(&self, cohort: usize) -> u64 {
+        let before = self.cohorts.iter().take(cohort).flat_map(|(range, _)| &self.cells[range.clone()]);
         before.map(|cell| cell.spec.member_count()).sum()
     }
 
     /// Where all is computed.
     pub fn platform(&self) -> Platform {
-        let (range, choice) = &self.companies[0];
+        let (range, choice) = &self.cohorts[0];
         choice.platform(&self.cells[range.start].spec)
     }
 
@@ -128,7 +128,7 @@ impl Work {
     /// # Errors
     /// Beside those of the run, [`Error::Request`] where `standing` is not that of the report.
     pub fn carry_out(self, mut report: Report, standing: Standing, flags: &MannerFlags) -> Result<()> {
-        let (told, rows) = (self.members_before(report.company()).saturating_add(standing.next), report.members());
+        let (told, rows) = (self.members_before(report.cohort()).saturating_add(standing.next), report.members());
         if told != rows {
             let path = report.folder().display();
             return Err(Error::Request(format!("{path}: the state tells of {told} members, and the table has {rows}")));
@@ -136,8 +136,8 @@ impl Work {
         let early = [&self.warnings()[..], report.moves()].concat();
         early.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
         let out = report.folder().to_path_buf();
-        let Work { spec, cells, companies, opened } = self;
-        let done = advance(&cells, companies, opened, standing, &mut report, flags);
+        let Work { spec, cells, cohorts, opened } = self;
+        let done = advance(&cells, cohorts, opened, standing, &mut report, flags);
         if let Err(error) = done {
             let error = report.explain(error);
             if report.give_up() {
@@ -184,35 +184,35 @@ fn kept(out: &Path, error: &Error) {
     }
 }
 
-/// Opens the back end that was chosen for a company.
-fn open(company: &[Cell], choice: &Choice, flags: &MannerFlags) -> Result<(Box<dyn Backend>, Platform)> {
-    flags.say(&choice.sentence(&company[0].spec));
-    let curves = company.iter().map(|cell| cell.spec.member_count()).sum();
-    let whole = Spec { curves, only: None, shard: None, ..company[0].spec.clone() };
+/// Opens the back end that was chosen for a cohort.
+fn open(cohort: &[Cell], choice: &Choice, flags: &MannerFlags) -> Result<(Box<dyn Backend>, Platform)> {
+    flags.say(&choice.sentence(&cohort[0].spec));
+    let curves = cohort.iter().map(|cell| cell.spec.member_count()).sum();
+    let whole = Spec { curves, only: None, shard: None, ..cohort[0].spec.clone() };
     choice.open(&whole, whole.points)
 }
 
-/// Runs one company of cells after another, from where `standing` is in that of the report; `opened` is the back end of the
+/// Runs one cohort of cells after another, from where `standing` is in that of the report; `opened` is the back end of the
 /// first one, where it is open.
 fn advance(
     cells: &[Cell],
-    companies: Vec<(Range<usize>, Choice)>,
+    cohorts: Vec<(Range<usize>, Choice)>,
     mut opened: Option<Box<dyn Backend>>,
     mut standing: Standing,
     report: &mut Report,
     flags: &MannerFlags,
 ) -> Result<()> {
     let precision = report.platform().precision;
-    for (number, (range, choice)) in companies.into_iter().enumerate().skip(report.company()) {
-        let company = &cells[range];
+    for (number, (range, choice)) in cohorts.into_iter().enumerate().skip(report.cohort()) {
+        let cohort = &cells[range];
         let mut backend = match opened.take() {
             Some(backend) => backend,
             // A run that has begun does not move.
-            None => open(company, &choice.after(report.platform()), flags)?.0,
+            None => open(cohort, &choice.after(report.platform()), flags)?.0,
         };
-        let portraits = (MOST_PANELS * company.len()).div_ceil(cells.len());
-        report.begin_company(number);
-        go_on(company, precision, backend.as_mut(), portraits, std::mem::take(&mut standing), report)?;
+        let portraits = (MAX_PANELS * cohort.len()).div_ceil(cells.len());
+        report.begin_cohort(number);
+        resume(cohort, precision, backend.as_mut(), portraits, std::mem::take(&mut standing), report)?;
     }
     Ok(())
 }

@@ -13,7 +13,7 @@ use glam::DVec2;
 use super::{Undecided, crossing_within, polygon};
 use crate::{
     error::{Error, Result, shortened},
-    input::{self, LONGEST_LINE, MOST_OUTLINE},
+    input::{self, MAX_LINE, MAX_OUTLINE},
 };
 
 /// Largest number of points of an outline, and of nodes of a curve.
@@ -53,8 +53,8 @@ impl Outline {
     /// numbers, or longer than 65 536 bytes; neighbouring points coincide; no net area is enclosed. An outline that crosses itself is
     /// accepted with a warning.
     pub fn read(path: &Path) -> Result<Outline> {
-        let remedy = format!("give a CSV file x,y of at most {MOST_OUTLINE} bytes");
-        let bytes = input::bytes(path, MOST_OUTLINE);
+        let remedy = format!("give a CSV file x,y of at most {MAX_OUTLINE} bytes");
+        let bytes = input::bytes(path, MAX_OUTLINE);
         let bytes = bytes.map_err(|e| Source { path }.refusal(None, &format!("cannot read it: {e}"), &remedy))?;
         Outline::from_csv(path, &bytes)
     }
@@ -226,9 +226,9 @@ impl Source<'_> {
         let mut table = Table::default();
         let mut columns = None;
         for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
-            if content.len() > LONGEST_LINE {
+            if content.len() > MAX_LINE {
                 let problem = format!("a line of {} bytes", content.len());
-                let remedy = format!("write a point a line, x,y, of at most {LONGEST_LINE} bytes");
+                let remedy = format!("write a point a line, x,y, of at most {MAX_LINE} bytes");
                 return Err(self.refusal(Some(line), &problem, &remedy));
             }
             // Other columns may be in any encoding.
@@ -515,8 +515,8 @@ mod tests {
     #[test]
     fn a_line_without_end_is_refused_before_it_is_cut_into_columns() {
         let long = |columns: usize| format!("x,y{}\n0,0\n1,0\n1,1\n", ",".repeat(columns));
-        assert_eq!(vertices(&long(LONGEST_LINE - 3)).len(), 3);
-        assert_refused(&long(LONGEST_LINE - 2), &["line 1: a line of 65537 bytes; ", "x,y, of at most 65536 bytes"]);
+        assert_eq!(vertices(&long(MAX_LINE - 3)).len(), 3);
+        assert_refused(&long(MAX_LINE - 2), &["line 1: a line of 65537 bytes; ", "x,y, of at most 65536 bytes"]);
         assert_refused(&format!("0,0\n{}", " ".repeat(1 << 20)), &["line 2: a line of 1048576 bytes"]);
     }
 

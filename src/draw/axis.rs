@@ -16,7 +16,7 @@ const BETWEEN: f64 = 16.0;
 const LINE: f64 = 34.0;
 /// Least pixels of a decade that is divided by smaller ticks, and from tick to tick.
 const DIVIDED: f64 = 30.0;
-const LEAST_TICK: f64 = 4.0;
+const MIN_TICK: f64 = 4.0;
 
 /// How values are spread along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -218,7 +218,7 @@ impl Axis {
         };
         let minor = match length / decades {
             decade if decade >= DIVIDED => digits(&[1, 2, 3, 4, 5, 6, 7, 8, 9], 1),
-            decade if decade >= LEAST_TICK => digits(&[1], 1),
+            decade if decade >= MIN_TICK => digits(&[1], 1),
             _ => Vec::new(),
         };
         let minor: Vec<f64> = minor.iter().map(|(digit, power)| f64::from(*digit) * ten_to(*power)).collect();

@@ -29,7 +29,7 @@ const AXIS_SIZE: f64 = 13.0;
 const TICK: f64 = 5.0;
 const MINOR_TICK: f64 = 3.0;
 /// More curves than this are not drawn: they would hide each other.
-const MOST_CURVES: usize = 24;
+const MAX_CURVES: usize = 24;
 /// Width of the colour bar itself.
 const BAR: f64 = 14.0;
 
@@ -379,7 +379,7 @@ impl Colours {
         };
         let mut order: Vec<usize> = (0..count).collect();
         order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
-        let most = count.min(MOST_CURVES);
+        let most = count.min(MAX_CURVES);
         let picked = (0..most).map(|i| order[i * (count - 1) / (most - 1)]);
         let class = |i: usize| {
             let step = (axis.share(values[i]) * style::RAMP as f64) as usize;

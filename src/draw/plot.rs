@@ -10,8 +10,8 @@ use super::{
 use crate::{curve::polygon, ensemble::Snapshot};
 
 /// Most width of all panels together and most height of one, in pixels.
-const MOST_WIDTH: f64 = 600.0;
-const MOST_HEIGHT: f64 = 440.0;
+const MAX_WIDTH: f64 = 600.0;
+const MAX_HEIGHT: f64 = 440.0;
 /// Free space round the curves, as a share of the larger extent.
 const PADDING: f64 = 0.05;
 /// Pixels between panels, and round them for what stands there: title and legend, tick labels, names of the axes.
@@ -23,9 +23,9 @@ const LEFT: f64 = 56.0;
 const RIGHT: f64 = 20.0;
 const FOOT: f64 = 48.0;
 /// Titles need this width, in pixels.
-const LEAST_WIDTH: f64 = 560.0;
+const MIN_WIDTH: f64 = 560.0;
 /// Least pixels from tick to tick.
-const LEAST_TICK: f64 = 45.0;
+const MIN_TICK: f64 = 45.0;
 /// Length of a tick, in pixels.
 const TICK: f64 = 5.0;
 /// Nodes closer than this on average, in pixels, get smaller dots.
@@ -100,7 +100,7 @@ impl Plot {
         let heading = if self.panels.iter().any(|panel| panel.heading.is_some()) { HEADING } else { 0.0 };
         let count = self.panels.len().max(1) as f64;
         let panels_width = count * (frame.size.x + GAP) - GAP;
-        let width = (LEFT + panels_width + RIGHT).max(LEAST_WIDTH);
+        let width = (LEFT + panels_width + RIGHT).max(MIN_WIDTH);
         let top = HEAD + legend + heading;
         let left = 0.5 * (width - panels_width + LEFT - RIGHT);
 
@@ -156,9 +156,9 @@ impl Frame {
         let room = DVec2::splat(if largest > 0.0 { PADDING * largest } else { 1.0 });
         let (low, high) = (low - room, high + room);
         let count = panels.len().max(1) as f64;
-        let most = DVec2::new((MOST_WIDTH - (count - 1.0) * GAP) / count, MOST_HEIGHT);
+        let most = DVec2::new((MAX_WIDTH - (count - 1.0) * GAP) / count, MAX_HEIGHT);
         let scale = (most / (high - low)).min_element();
-        Frame { low, high, scale, size: (high - low) * scale, step: tick_step(LEAST_TICK / scale) }
+        Frame { low, high, scale, size: (high - low) * scale, step: tick_step(MIN_TICK / scale) }
     }
 
     /// Draws `panel` with the upper left corner of its axes at `corner`.
@@ -232,7 +232,7 @@ mod tests {
         for (width, height) in [(4.0, 2.0), (1e-6, 3e-6), (1e9, 1.0), (0.0, 0.0)] {
             let plot = plot(&[&[rectangle(width, height), rectangle(0.5 * width, 0.5 * height)]]);
             let frame = Frame::new(&plot.panels);
-            assert!(frame.size.x < MOST_WIDTH + 1e-9 && frame.size.y < MOST_HEIGHT + 1e-9);
+            assert!(frame.size.x < MAX_WIDTH + 1e-9 && frame.size.y < MAX_HEIGHT + 1e-9);
             assert!(frame.high.x > 0.5 * width && frame.high.y > 0.5 * height);
             let text = plot.draw();
             assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");

@@ -124,10 +124,10 @@ pub struct Portrait {
 
 impl Portrait {
     /// A picture has at most this many nodes of a curve: more do not show.
-    pub const MOST_NODES: usize = 600;
+    pub const MAX_NODES: usize = 600;
 
     /// Of `n` nodes every so-many-th is drawn.
     pub fn stride(n: usize) -> usize {
-        n.div_ceil(Self::MOST_NODES).max(1)
+        n.div_ceil(Self::MAX_NODES).max(1)
     }
 }

@@ -7,9 +7,9 @@ use crate::error::{Error, Result};
 #[derive(Debug)]
 pub enum Wish {
     /// To go on.
-    GoOn,
+    Continue,
     /// To be told where the run stands, and to go on.
-    Keep,
+    Checkpoint,
     /// To be told where the run stands, and to end with this error.
     Stop(Error),
 }
@@ -30,10 +30,10 @@ pub trait Sink {
     }
     /// What it wishes now; asked after every dispatch, and during long ones.
     fn wish(&mut self) -> Wish {
-        Wish::GoOn
+        Wish::Continue
     }
     /// Where the run stands: as was wished for, or as it comes to a bad end.
-    fn keep(&mut self, _standing: &Standing) -> Result<()> {
+    fn checkpoint(&mut self, _standing: &Standing) -> Result<()> {
         Ok(())
     }
 }

@@ -193,7 +193,7 @@ pub struct Spec {
 /// The paper's time step.
 pub const DEFAULT_TAU: f64 = 1e-3;
 /// A V-cycle of two sweeps halves the error at least, so a solve by them takes some 50 cycles; one of 500 never ends.
-const MOST_MULTIGRID_SWEEPS: u32 = 1000;
+const MAX_MULTIGRID_SWEEPS: u32 = 1000;
 /// Tolerance of `--adaptive` without a value.
 pub const DEFAULT_ADAPTIVE: f64 = 1e-3;
 /// Fraction of the initial excess at which a member is relaxed.
@@ -245,7 +245,7 @@ impl Spec {
     ///
     /// Not yet [validated](Spec::validate): flags may still replace what is wrong in it.
     pub fn read(path: &Path) -> Result<Spec> {
-        let text = input::text(path, input::MOST_SPEC)
+        let text = input::text(path, input::MAX_SPEC)
             .map_err(|e| Error::Request(format!("cannot read the spec {}: {e}", path.display())))?;
         Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", path.display())))
     }
@@ -382,7 +382,7 @@ impl Spec {
     /// The cap of the sweeps of a solve in use.
     pub fn most_sweeps(&self) -> u32 {
         match self.solver() {
-            Solver::Multigrid => self.max_sweeps.min(MOST_MULTIGRID_SWEEPS),
+            Solver::Multigrid => self.max_sweeps.min(MAX_MULTIGRID_SWEEPS),
             Solver::GaussSeidel | Solver::Direct => self.max_sweeps,
         }
     }
@@ -394,16 +394,16 @@ impl Spec {
 }
 
 /// Characters of a line that is still shown with its caret: the list of all keys has half as many.
-const LONGEST_SHOWN: usize = 1000;
+const MAX_SHOWN: usize = 1000;
 
 /// What is wrong, with the line and a caret; of a line without end only where in it.
 fn told(error: &toml::de::Error) -> String {
     let whole = error.to_string();
-    if whole.lines().all(|line| line.len() <= LONGEST_SHOWN) {
+    if whole.lines().all(|line| line.len() <= MAX_SHOWN) {
         return whole.trim_end().to_owned();
     }
     let place = whole.lines().next().unwrap_or_default();
-    format!("{}: {}", shortened(place, LONGEST_SHOWN), shortened(error.message().trim_end(), LONGEST_SHOWN))
+    format!("{}: {}", shortened(place, MAX_SHOWN), shortened(error.message().trim_end(), MAX_SHOWN))
 }
 
 /// The nearest of the names that serde lists after "unknown field `x`, expected one of `a`, `b`".

@@ -31,7 +31,7 @@ const LONG_SWEEPS: &str = "plain sweeps go on longer the longer the step, and ad
 
 /// What members must have in common to be advanced side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Company {
+pub struct Cohort {
     points: usize,
     solver: Solver,
     order: Order,
@@ -75,7 +75,7 @@ impl Cell {
     /// What the user should know about it before it runs, a sentence each.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.family.warnings().to_vec();
-        let Company { solver, adaptive, .. } = self.company();
+        let Cohort { solver, adaptive, .. } = self.cohort();
         if adaptive && solver == Solver::GaussSeidel {
             warnings.push(LONG_SWEEPS.into());
         }
@@ -83,16 +83,16 @@ impl Cell {
     }
 
     /// What it must have in common with others to run beside them.
-    pub fn company(&self) -> Company {
+    pub fn cohort(&self) -> Cohort {
         let Spec { points, order, .. } = self.spec;
         let adaptive = matches!(self.spec.pace(), Pace::Adaptive(_));
-        Company { points, solver: self.spec.solver(), order, adaptive }
+        Cohort { points, solver: self.spec.solver(), order, adaptive }
     }
 }
 
 /// The curves of all cells are made before the first of them runs, and may take this much memory: those of three cells of
 /// a million nodes.
-const MOST_BYTES: usize = 4_000_000_000;
+const MAX_BYTES: usize = 4_000_000_000;
 
 /// Cell `index` of `spec`, after the cells `before`, whose curves take `bytes`.
 fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<Cell> {
@@ -108,8 +108,8 @@ fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<C
         Some(other) => Family::like(&other.family, &own)?,
         None => {
             *bytes += Sampler::bytes(own.sampling, own.points);
-            if *bytes > MOST_BYTES {
-                let (cells, gigabytes) = (format!("({} cells)", spec.sweep.cells()), MOST_BYTES as f64 / 1e9);
+            if *bytes > MAX_BYTES {
+                let (cells, gigabytes) = (format!("({} cells)", spec.sweep.cells()), MAX_BYTES as f64 / 1e9);
                 let problem = format!("the curves of the first {} take more than {gigabytes} GB", index + 1);
                 return Err(Error::value("sweep", cells, &problem, "take fewer --points, or fewer cells at once"));
             }
@@ -155,15 +155,15 @@ pub fn cells(spec: &Spec) -> Result<Vec<Cell>> {
 }
 
 /// Ranges of cells whose members run side by side, in order.
-pub fn companies(cells: &[Cell]) -> Vec<Range<usize>> {
-    let mut companies: Vec<Range<usize>> = Vec::new();
+pub fn cohorts(cells: &[Cell]) -> Vec<Range<usize>> {
+    let mut cohorts: Vec<Range<usize>> = Vec::new();
     for (i, cell) in cells.iter().enumerate() {
-        match companies.last_mut() {
-            Some(range) if cells[range.start].company() == cell.company() => range.end = i + 1,
-            _ => companies.push(i..i + 1),
+        match cohorts.last_mut() {
+            Some(range) if cells[range.start].cohort() == cell.cohort() => range.end = i + 1,
+            _ => cohorts.push(i..i + 1),
         }
     }
-    companies
+    cohorts
 }
 
 #[cfg(test)]
@@ -210,8 +210,8 @@ mod tests {
         // Equal parameters take little time; their tables are a share of those of equal spacing.
         let spec = swept(&["sampling=parameter,arclength"], Spec { points: 1_000_000, ..Spec::default() });
         let bytes = |held: usize| cell(&spec, 0, &[], &mut { held });
-        assert!(bytes(MOST_BYTES - 16_000_000).is_ok());
-        let message = bytes(MOST_BYTES - 15_999_999).err().unwrap().to_string();
+        assert!(bytes(MAX_BYTES - 16_000_000).is_ok());
+        let message = bytes(MAX_BYTES - 15_999_999).err().unwrap().to_string();
         assert!(message.starts_with("--sweep (2 cells): the curves of the first 1 take more than 4 GB; "), "{message}");
     }
 

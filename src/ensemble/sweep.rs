@@ -31,7 +31,7 @@ const COMMON: [&str; 14] = [
     "max-sweeps",
 ];
 /// More cells than this are a slip of the keyboard.
-pub const MOST_CELLS: u64 = 10_000;
+pub const MAX_CELLS: u64 = 10_000;
 
 /// The swept keys in order, each with its values.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -184,9 +184,9 @@ impl Sweep {
             }
         }
         match self.cells() {
-            0..=MOST_CELLS => Ok(()),
+            0..=MAX_CELLS => Ok(()),
             cells => {
-                Err(Error::value("sweep", format!("({cells} cells)"), "too many", &format!("at most {MOST_CELLS}")))
+                Err(Error::value("sweep", format!("({cells} cells)"), "too many", &format!("at most {MAX_CELLS}")))
             }
         }
     }

@@ -9,27 +9,27 @@ use super::spec::{
 use crate::error::{Error, Result};
 
 /// More members than this is a slip of the keyboard.
-const MOST_CURVES: u64 = 1_000_000_000;
+const MAX_CURVES: u64 = 1_000_000_000;
 /// With fewer nodes the five-point rows reach around the ring and its colours meet.
 const FEWEST_POINTS: usize = crate::solver::ring::MIN_POINTS;
-const MOST_POINTS: usize = 1_000_000;
+const MAX_POINTS: usize = 1_000_000;
 /// A member with more steps than this would not end in a year.
-const MOST_STEPS: f64 = 1e9;
+const MAX_STEPS: f64 = 1e9;
 /// Final times of which the smallest part in a table, and the sum over all members, are still numbers.
 const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
 /// The rows of a resident member stay in memory until it ends.
-const MOST_SERIES_ROWS: f64 = 1e6;
-const MOST_SNAPSHOTS: usize = 10_000;
+const MAX_SERIES_ROWS: f64 = 1e6;
+const MAX_SNAPSHOTS: usize = 10_000;
 /// Likewise: four numbers a row.
-const MOST_SNAPSHOT_ROWS: usize = 100_000_000;
+const MAX_SNAPSHOT_ROWS: usize = 100_000_000;
 /// The lengths approach their mean explicitly, by a factor 1 - ωτ a step.
-const MOST_OMEGA_TAU: f64 = 1.0;
+const MAX_OMEGA_TAU: f64 = 1.0;
 /// Above this local error a step says nothing about the curve.
 const LOOSEST_ADAPTIVE: f64 = 1.0;
 /// A sweep residual above this no longer says that a system is solved.
 const LOOSEST_TOLERANCE: f64 = 0.1;
-const MOST_SWEEPS: u32 = 100_000_000;
-const MOST_THREADS: usize = 1024;
+const MAX_SWEEPS: u32 = 100_000_000;
+const MAX_THREADS: usize = 1024;
 
 impl Spec {
     /// Checks every range and combination and returns the spec with its lists sorted and free of repetitions.
@@ -59,28 +59,28 @@ impl Spec {
 
     fn check_counts(&self) -> Result<()> {
         let members = self.all_members();
-        if self.curves > 0 && self.curves <= MOST_CURVES && members > MOST_CURVES {
+        if self.curves > 0 && self.curves <= MAX_CURVES && members > MAX_CURVES {
             let problem = format!("{} cells make {members} members, too many", self.sweep.cells());
-            return Err(Error::value("curves", self.curves, &problem, &format!("at most {MOST_CURVES} in all")));
+            return Err(Error::value("curves", self.curves, &problem, &format!("at most {MAX_CURVES} in all")));
         }
-        if !(1..=MOST_CURVES).contains(&self.curves) {
+        if !(1..=MAX_CURVES).contains(&self.curves) {
             let problem = if self.curves == 0 { "an ensemble needs a member" } else { "too many members" };
-            return Err(Error::value("curves", self.curves, problem, &format!("take 1 to {MOST_CURVES}")));
+            return Err(Error::value("curves", self.curves, problem, &format!("take 1 to {MAX_CURVES}")));
         }
-        if !(FEWEST_POINTS..=MOST_POINTS).contains(&self.points) {
+        if !(FEWEST_POINTS..=MAX_POINTS).contains(&self.points) {
             let problem = if self.points < FEWEST_POINTS {
                 "a ring of fewer than 6 nodes cannot be coloured"
             } else {
                 "too many nodes"
             };
-            let allowed = format!("take {FEWEST_POINTS} to {MOST_POINTS}");
+            let allowed = format!("take {FEWEST_POINTS} to {MAX_POINTS}");
             return Err(Error::value("points", self.points, problem, &allowed));
         }
         if let Some(threads) = self.threads
-            && !(1..=MOST_THREADS).contains(&threads)
+            && !(1..=MAX_THREADS).contains(&threads)
         {
             let problem = if threads == 0 { "no thread to run on" } else { "too many threads" };
-            return Err(Error::value("threads", threads, problem, &format!("take 1 to {MOST_THREADS}")));
+            return Err(Error::value("threads", threads, problem, &format!("take 1 to {MAX_THREADS}")));
         }
         Ok(())
     }
@@ -98,8 +98,8 @@ impl Spec {
         let Some(series) = self.series else { return Ok(()) };
         positive("series", series, "an interval of time", "0.01")?;
         let rows = self.t_end / series;
-        if rows > MOST_SERIES_ROWS {
-            let allowed = format!("at most {MOST_SERIES_ROWS:e} rows: take a longer interval");
+        if rows > MAX_SERIES_ROWS {
+            let allowed = format!("at most {MAX_SERIES_ROWS:e} rows: take a longer interval");
             return Err(Error::value("series", number(series), &format!("about {rows:.1e} rows per member"), &allowed));
         }
         Ok(())
@@ -114,9 +114,9 @@ impl Spec {
             return Err(Error::value("tau", number(tau), &problem, &allowed));
         }
         let steps = self.t_end / tau;
-        if steps > MOST_STEPS {
+        if steps > MAX_STEPS {
             let problem = format!("about {steps:.1e} steps of {} to --t-end {t_end}", number(tau));
-            let allowed = format!("at most {MOST_STEPS:e} steps: take a larger --tau or an earlier --t-end");
+            let allowed = format!("at most {MAX_STEPS:e} steps: take a larger --tau or an earlier --t-end");
             return Err(Error::value("tau", number(tau), &problem, &allowed));
         }
         Ok(())
@@ -154,7 +154,7 @@ impl Spec {
             return Err(Error::value("omega", number(self.omega), "not a redistribution speed", allowed));
         }
         if let Pace::Fixed(tau) = self.pace()
-            && self.omega * tau > MOST_OMEGA_TAU
+            && self.omega * tau > MAX_OMEGA_TAU
             && !self.no_redistribution
         {
             let turns = number(self.omega * tau);
@@ -163,12 +163,12 @@ impl Spec {
             return Err(Error::value("omega", number(self.omega), &problem, &allowed));
         }
         if let Pace::Adaptive(_) = self.pace()
-            && self.omega * self.t_end > MOST_STEPS
+            && self.omega * self.t_end > MAX_STEPS
             && !self.no_redistribution
         {
             let problem =
                 format!("adaptive steps are at most about 1/omega long, and --t-end is {}", number(self.t_end));
-            let allowed = format!("take --omega {} or less, or an earlier --t-end", number(MOST_STEPS / self.t_end));
+            let allowed = format!("take --omega {} or less, or an earlier --t-end", number(MAX_STEPS / self.t_end));
             return Err(Error::value("omega", number(self.omega), &problem, &allowed));
         }
         self.check_pull()?;
@@ -185,9 +185,9 @@ impl Spec {
             let allowed = "take a number between 0 and 2, both excluded, or auto; 1 is plain Gauss-Seidel";
             return Err(Error::value("sor", number(factor), problem, allowed));
         }
-        if !(1..=MOST_SWEEPS).contains(&self.max_sweeps) {
+        if !(1..=MAX_SWEEPS).contains(&self.max_sweeps) {
             let problem = if self.max_sweeps == 0 { "no sweep to solve with" } else { "too many sweeps" };
-            return Err(Error::value("max-sweeps", self.max_sweeps, problem, &format!("take 1 to {MOST_SWEEPS}")));
+            return Err(Error::value("max-sweeps", self.max_sweeps, problem, &format!("take 1 to {MAX_SWEEPS}")));
         }
         let resolved = self.points / 4;
         if let Some(mode) = self.shape.highest_mode()
@@ -279,19 +279,19 @@ impl Spec {
         self.snapshots.iter_mut().for_each(|t| *t += 0.0); // -0 becomes 0
         self.snapshots.sort_by(f64::total_cmp);
         self.snapshots.dedup();
-        if self.snapshots.len() > MOST_SNAPSHOTS {
+        if self.snapshots.len() > MAX_SNAPSHOTS {
             let problem = "too many times";
             return Err(Error::value(
                 "snapshots",
                 format!("({} times)", self.snapshots.len()),
                 problem,
-                &format!("at most {MOST_SNAPSHOTS}"),
+                &format!("at most {MAX_SNAPSHOTS}"),
             ));
         }
         let rows = self.snapshots.len().saturating_mul(self.points);
-        if rows > MOST_SNAPSHOT_ROWS {
+        if rows > MAX_SNAPSHOT_ROWS {
             let problem = format!("{rows} rows per member");
-            let allowed = format!("at most {MOST_SNAPSHOT_ROWS}: take fewer times, or fewer --points");
+            let allowed = format!("at most {MAX_SNAPSHOT_ROWS}: take fewer times, or fewer --points");
             return Err(Error::value("snapshots", format!("({} times)", self.snapshots.len()), &problem, &allowed));
         }
         Ok(())
@@ -530,7 +530,7 @@ mod tests {
 
     #[test]
     fn too_many_snapshots_are_refused() {
-        let snapshots: Vec<f64> = (0..=MOST_SNAPSHOTS).map(|i| i as f64 * 1e-4).collect();
+        let snapshots: Vec<f64> = (0..=MAX_SNAPSHOTS).map(|i| i as f64 * 1e-4).collect();
         let message = Spec { snapshots, ..Spec::default() }.validate().unwrap_err().to_string();
         assert!(message.starts_with("--snapshots (10001 times): "), "{message}");
         let rows = |points| Spec { snapshots: (0..1000).map(|i| i as f64 * 1e-3).collect(), points, ..Spec::default() };

@@ -22,9 +22,9 @@ use crate::{
 };
 
 /// The system knows no longer paths.
-const MOST_PATH: usize = if cfg!(target_os = "linux") { 4096 } else { 1024 };
+const MAX_PATH: usize = if cfg!(target_os = "linux") { 4096 } else { 1024 };
 /// Bytes of the longest name in a folder: a chunk of a store, for more members than there are.
-const LONGEST_NAME: usize = 96;
+const MAX_NAME: usize = 96;
 
 /// A folder that this run, and no other at the same time, may write into.
 ///
@@ -444,10 +444,10 @@ impl Drop for OutputFolder {
 
 /// Refuses a path in which not every file would have one.
 fn check_length(path: &Path) -> Result<()> {
-    let (length, most) = (path.as_os_str().len(), MOST_PATH - LONGEST_NAME);
+    let (length, most) = (path.as_os_str().len(), MAX_PATH - MAX_NAME);
     match length > most {
         true => Err(Error::Request(format!(
-            "--out: a path of {length} bytes, and with the names of files the system knows none of more than {MOST_PATH}; \
+            "--out: a path of {length} bytes, and with the names of files the system knows none of more than {MAX_PATH}; \
              name a folder by {most} bytes or less, for example from nearer by"
         ))),
         false => Ok(()),

@@ -116,7 +116,7 @@ pub fn to_json(films: &[Film]) -> Result<String> {
 /// # Errors
 /// [`Error::Request`] that names the file, and the member where it has one.
 pub fn read(path: &Path) -> Result<Vec<Film>> {
-    let text = input::text(path, input::MOST_PORTRAITS);
+    let text = input::text(path, input::MAX_PORTRAITS);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
     let Portraits { members } = serde_json::from_str(&text).map_err(|e| {
         let problem = shortened(&e.to_string(), 200);
@@ -224,7 +224,7 @@ pub(crate) mod tests {
 
     #[test]
     fn many_nodes_and_none_are_kept_small() {
-        assert!(film(0, 5000, Status::Relaxed, Some(0.1)).frames()[0].len() <= Portrait::MOST_NODES);
+        assert!(film(0, 5000, Status::Relaxed, Some(0.1)).frames()[0].len() <= Portrait::MAX_NODES);
         let empty = Portrait { before: vec![DVec2::INFINITY; 9], frames: vec![], after: vec![DVec2::NAN; 9] };
         let film = Film::new(&outcome(0, Status::Nonfinite, None), &empty);
 

@@ -32,7 +32,7 @@ impl Spill {
     }
 
     /// Goes on with that of an interrupted run.
-    pub fn go_on(folder: &OutputFolder, mark: &Mark) -> Result<Spill> {
+    pub fn resume(folder: &OutputFolder, mark: &Mark) -> Result<Spill> {
         Spill::of(folder.file_again(mark)?)
     }
 
@@ -110,7 +110,7 @@ mod tests {
         drop(spill);
 
         folder.check(&mark).unwrap();
-        let mut again = Spill::go_on(&folder, &mark).unwrap();
+        let mut again = Spill::resume(&folder, &mark).unwrap();
         assert!(again.read(&late).is_err(), "what came after the mark is cut off");
         assert_eq!((again.read(&one).unwrap(), again.read(&two).unwrap()), (rows(1), rows(2)));
         let other = add(&mut again, 4);

@@ -209,7 +209,7 @@ impl SnapshotStore {
     ///
     /// # Errors
     /// [`Error::Request`] where the mark is of the arrays of another spec.
-    pub fn go_on(folder: PartFolder, spec: &Spec, points: usize, mark: &Mark) -> Result<SnapshotStore> {
+    pub fn resume(folder: PartFolder, spec: &Spec, points: usize, mark: &Mark) -> Result<SnapshotStore> {
         mark.cut_off(folder.part())?;
         SnapshotStore::begin(folder, spec, points)?.from(mark)
     }
@@ -217,7 +217,7 @@ impl SnapshotStore {
     fn from(mut self, mark: &Mark) -> Result<SnapshotStore> {
         let mut fits = true;
         for (array, mark) in self.fields.iter_mut().chain([&mut self.status]).zip(&mark.arrays) {
-            fits &= array.go_on_from(mark);
+            fits &= array.resume_from(mark);
         }
         match fits {
             true => Ok(self),
@@ -410,7 +410,7 @@ impl Array {
     }
 
     /// Goes on as marked, if the mark is of this array.
-    fn go_on_from(&mut self, mark: &ArrayMark) -> bool {
+    fn resume_from(&mut self, mark: &ArrayMark) -> bool {
         let ArrayMark { name, grid, written, crc, chunk, run_left } = mark;
         let fits = chunk.len() < self.chunk_bytes && *written <= grid.iter().product();
         let fits = fits && name == self.name && *grid == self.grid && *run_left <= self.run_bytes;

@@ -65,8 +65,8 @@ pub struct Head {
     pub origin: Origin,
     /// Wall time of the run so far.
     pub wall: Duration,
-    /// Which of the [companies](crate::ensemble::study::companies) the ranks are of.
-    pub company: u64,
+    /// Which of the [cohorts](crate::ensemble::study::cohorts) the ranks are of.
+    pub cohort: u64,
     /// Tables, as far as they are told by this state.
     pub tables: Vec<Mark>,
     /// The arrays of snapshots.
@@ -80,7 +80,7 @@ pub struct Head {
 }
 
 /// A state that was read back and found whole.
-pub struct Kept {
+pub struct Saved {
     /// Where the run stood.
     pub head: Head,
     /// Its members.
@@ -281,8 +281,8 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
 
 /// That the last of the `length` bytes are the checksum of those before them, read piece by piece.
 fn check_whole(file: &mut File, length: u64) -> io::Result<()> {
-    if length > input::MOST_STATE {
-        return Err(io::Error::other(format!("it has {length} bytes; at most {} are read", input::MOST_STATE)));
+    if length > input::MAX_STATE {
+        return Err(io::Error::other(format!("it has {length} bytes; at most {} are read", input::MAX_STATE)));
     }
     file.rewind()?;
     let (_, crc) = disk::checksum(&mut (&*file).take(length - AFTER as u64), 0)?;
@@ -293,10 +293,10 @@ fn check_whole(file: &mut File, length: u64) -> io::Result<()> {
 
 /// Members on their way by the last state in `folder`, of those that have not ended in `standing`: where they are lost,
 /// they go on from there.
-pub fn on_their_way(folder: &OutputFolder, company: u64, standing: &Standing) -> BTreeMap<u64, Paused> {
+pub fn on_their_way(folder: &OutputFolder, cohort: u64, standing: &Standing) -> BTreeMap<u64, Paused> {
     let read = |name| read(folder.place(name).at());
     match read(STATE).or_else(|_| read(STATE_OLD)) {
-        Ok((head, Standing { resident: Some(mut resident), .. })) if head.company == company => {
+        Ok((head, Standing { resident: Some(mut resident), .. })) if head.cohort == cohort => {
             resident.retain(|rank, _| *rank >= standing.next && !standing.early.contains_key(rank));
             resident
         }
@@ -308,7 +308,7 @@ pub fn on_their_way(folder: &OutputFolder, company: u64, standing: &Standing) ->
 ///
 /// # Errors
 /// [`Error::Request`] where there is no run, or none that can go on, with the reason.
-pub fn find(folder: &OutputFolder) -> Result<Option<Kept>> {
+pub fn find(folder: &OutputFolder) -> Result<Option<Saved>> {
     let path = folder.path();
     let refuse = |problem: String| Err(Error::Request(format!("{}: {problem}", path.display())));
     let mut faults = Vec::new();
@@ -329,7 +329,7 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Kept>> {
         match found {
             Ok((head, standing)) => {
                 let note = faults.pop().map(|fault| format!("{fault}; going on from the state before it"));
-                return Ok(Some(Kept { head, standing, note }));
+                return Ok(Some(Saved { head, standing, note }));
             }
             Err(Fault::Foreign(what)) => {
                 return refuse(format!("{name}: {what}; resume with the program that began it, or begin anew"));
@@ -386,7 +386,7 @@ mod tests {
         let head = Head {
             origin,
             wall: Duration::from_millis(1500),
-            company: 0,
+            cohort: 0,
             tables: vec![Mark { name: "summary.csv".into(), length: 300, crc: 5 }],
             store: None,
             rows: Some(Mark { name: "curvelax.rows".into(), length: 1 << 41, crc: 6 }),
@@ -489,8 +489,8 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let folder = OutputFolder::open(home.path(), true).unwrap();
         folder.keep_state(&bytes()).unwrap();
-        let ranks = |company: u64, standing: &Standing| -> Vec<u64> {
-            on_their_way(&folder, company, standing).into_keys().collect()
+        let ranks = |cohort: u64, standing: &Standing| -> Vec<u64> {
+            on_their_way(&folder, cohort, standing).into_keys().collect()
         };
         let none = Standing::default();
         assert_eq!(ranks(0, &none), [1, 3]);
@@ -499,6 +499,6 @@ mod tests {
             ranks(0, &Standing { early: BTreeMap::from([(3, state().1.early[&2].clone())]), ..none.clone() }),
             [1]
         );
-        assert_eq!(ranks(1, &none), [0; 0], "of another company");
+        assert_eq!(ranks(1, &none), [0; 0], "of another cohort");
     }
 }

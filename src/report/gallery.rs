@@ -8,12 +8,12 @@ use crate::{
 };
 
 /// More members than this are not drawn.
-pub const MOST_PANELS: usize = 12;
+pub const MAX_PANELS: usize = 12;
 
 const COLUMNS: usize = 4;
 /// Width of a panel and the most of its height, in pixels, and the free space inside it.
 const SIDE: f64 = 200.0;
-const LEAST_HEIGHT: f64 = 100.0;
+const MIN_HEIGHT: f64 = 100.0;
 const PADDING: f64 = 14.0;
 const CAPTION: f64 = 44.0;
 const GAP: f64 = 14.0;
@@ -21,14 +21,14 @@ const MARGIN: f64 = 24.0;
 const HEAD: f64 = 48.0;
 const FOOT: f64 = 40.0;
 /// A picture this wide holds the head line.
-const LEAST_COLUMNS: usize = 2;
+const MIN_COLUMNS: usize = 2;
 /// States on the way: those in which about this share of the way to the end is left. The excess, which goes with the
 /// square, has then fallen to a half and to a tenth.
 const LEFT: [f64; 2] = [0.71, 0.32];
 /// A state with more or less left than this looks like the start or the end.
 const APART: std::ops::RangeInclusive<f64> = 0.12..=0.88;
 /// Nodes closer than this, in pixels, are a line already, and are not marked.
-const LEAST_SPACING: f64 = 2.5;
+const MIN_SPACING: f64 = 2.5;
 
 const STYLE: &str = "
 .back { fill: #ffffff }
@@ -67,10 +67,10 @@ text { fill: #e6edf3 }
 }
 ";
 
-/// The gallery of the first [`MOST_PANELS`] of `films`, as the text of an SVG file.
+/// The gallery of the first [`MAX_PANELS`] of `films`, as the text of an SVG file.
 pub fn draw(films: &[Film]) -> String {
-    let panels: Vec<Panel> = films.iter().take(MOST_PANELS).map(Panel::new).collect();
-    let columns = panels.len().clamp(LEAST_COLUMNS, COLUMNS);
+    let panels: Vec<Panel> = films.iter().take(MAX_PANELS).map(Panel::new).collect();
+    let columns = panels.len().clamp(MIN_COLUMNS, COLUMNS);
     let rows = panels.len().div_ceil(columns).max(1);
     let Layout { scale, frame } = layout(&panels);
     let pitch = frame + DVec2::new(GAP, CAPTION);
@@ -137,7 +137,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, corner: DVec2, frame: DVec2, scale: 
             let nodes: Vec<DVec2> = nodes.iter().map(place).collect();
             let class = if i == last { "after" } else { ["before", "way"][usize::from(i > 0)] };
             svg.path(class, &closed_path(&nodes));
-            if i == last && nodes.len() == *points && mean_spacing(&nodes) >= LEAST_SPACING {
+            if i == last && nodes.len() == *points && mean_spacing(&nodes) >= MIN_SPACING {
                 svg.path("nodes", &dots(&nodes));
             }
         }
@@ -177,7 +177,7 @@ fn layout(panels: &[Panel]) -> Layout {
     let extent = panels.iter().filter_map(Panel::bounds).map(|(low, high)| high - low).fold(DVec2::ZERO, DVec2::max);
     let largest = extent.max_element();
     let scale = if largest > 0.0 && largest.is_finite() { (SIDE - 2.0 * PADDING) / largest } else { 1.0 };
-    let height = (extent.y * scale + 2.0 * PADDING).clamp(LEAST_HEIGHT, SIDE);
+    let height = (extent.y * scale + 2.0 * PADDING).clamp(MIN_HEIGHT, SIDE);
     Layout { scale, frame: DVec2::new(SIDE, height) }
 }
 

@@ -55,7 +55,7 @@ impl Growing {
     ///
     /// # Errors
     /// [`Error::Request`] where the marks are not of the files of `spec`.
-    pub fn go_on(
+    pub fn resume(
         folder: &OutputFolder,
         spec: &Spec,
         points: usize,
@@ -75,10 +75,10 @@ impl Growing {
         names.extend(rows.map(|_| names::ROWS));
         folder.keep_only(&names)?;
         let store = match store {
-            Some(mark) => Some(SnapshotStore::go_on(folder.store_again(names::STORE)?, spec, points, mark)?),
+            Some(mark) => Some(SnapshotStore::resume(folder.store_again(names::STORE)?, spec, points, mark)?),
             None => None,
         };
-        let spill = rows.map(|mark| Spill::go_on(folder, mark)).transpose()?;
+        let spill = rows.map(|mark| Spill::resume(folder, mark)).transpose()?;
         let growing = Growing::of(spec, store, |name| {
             let mark = marks.iter().find(|mark| mark.name == name).ok_or_else(others)?;
             folder.file_again(mark)

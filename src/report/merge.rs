@@ -31,14 +31,14 @@ use crate::{
         portraits::Film,
         zarr::{SnapshotStore, StoredMembers},
     },
-    input::{self, LONGEST_LINE},
+    input::{self, MAX_LINE},
     results::tally::Aside,
 };
 
 /// Bytes of all shards together that are read at once, and of one at least.
 const BLOCKS: usize = 64 << 20;
-const LEAST_BLOCK: usize = LONGEST_LINE;
-const MOST_BLOCK: usize = 1 << 20;
+const MIN_BLOCK: usize = MAX_LINE;
+const MAX_BLOCK: usize = 1 << 20;
 
 /// Shards that are named one by one in a message.
 const NAMED: usize = 8;
@@ -336,8 +336,8 @@ impl Rows {
             if self.read.length == self.mark.length {
                 break;
             }
-            if self.buffer.len() - self.at > LONGEST_LINE {
-                return Err(self.changed(&format!("a line of more than {LONGEST_LINE} bytes")));
+            if self.buffer.len() - self.at > MAX_LINE {
+                return Err(self.changed(&format!("a line of more than {MAX_LINE} bytes")));
             }
             self.fill()?;
         }
@@ -392,7 +392,7 @@ impl Rows {
 fn join(parts: &[Part], name: &str, folder: &OutputFolder) -> Result<PartFile> {
     let file = folder.file(name)?;
     let target = file.target().to_path_buf();
-    let mut out = BufWriter::with_capacity(MOST_BLOCK, file);
+    let mut out = BufWriter::with_capacity(MAX_BLOCK, file);
     join_rows(parts, name, &mut out, &target)?;
     let file = out.into_inner().map_err(|e| Error::io("cannot write", &target)(e.into_error()))?;
     file.sync()?;
@@ -405,7 +405,7 @@ fn join(parts: &[Part], name: &str, folder: &OutputFolder) -> Result<PartFile> {
 /// [`Error::Request`] naming a file that is not what its shard wrote.
 pub fn join_rows(parts: &[Part], name: &str, out: &mut impl Write, target: &Path) -> Result<()> {
     let cannot = |e| Error::io("cannot write", target)(e);
-    let block = (BLOCKS / parts.len().max(1)).clamp(LEAST_BLOCK, MOST_BLOCK);
+    let block = (BLOCKS / parts.len().max(1)).clamp(MIN_BLOCK, MAX_BLOCK);
     let mut all = parts.iter().map(|part| Rows::new(part, name, block)).collect::<Result<Vec<_>>>()?;
     let mut header: Option<Vec<u8>> = None;
     for rows in &mut all {

@@ -34,7 +34,7 @@ use crate::{
     results::tally::Tally,
     text::{duration, plural},
 };
-use checkpoint::{Head, Kept, Origin};
+use checkpoint::{Head, Origin, Saved};
 use complete::Complete;
 use growing::Growing;
 use progress::Progress;
@@ -70,7 +70,7 @@ pub struct Report {
     total: u64,
     before: u64,
     /// Which simulation this is.
-    company: u64,
+    cohort: u64,
     progress: Progress,
     clock: Instant,
     /// Wall time before it was interrupted.
@@ -90,7 +90,7 @@ impl Report {
     pub fn begin(folder: OutputFolder, spec: &Spec, points: usize, origin: Origin, manner: Manner) -> Result<Report> {
         let growing = Growing::begin(&folder, spec, points)?;
         let mut report = Report::new(folder, growing, spec, points, origin, manner);
-        match report.keep(&Standing { resident: Some(BTreeMap::new()), ..Standing::default() }) {
+        match report.checkpoint(&Standing { resident: Some(BTreeMap::new()), ..Standing::default() }) {
             Ok(()) => Ok(report),
             Err(error) => {
                 let error = report.explain(error);
@@ -104,22 +104,22 @@ impl Report {
     ///
     /// # Errors
     /// [`Error::Request`] where its files are not those of `spec`.
-    pub fn go_on(
+    pub fn resume(
         folder: OutputFolder,
         spec: &Spec,
         points: usize,
-        kept: Kept,
+        kept: Saved,
         manner: Manner,
     ) -> Result<(Report, Standing)> {
-        let Kept { head, standing, note } = kept;
-        let Head { origin, wall, company, tables, store, rows, aside, films } = head;
-        let growing = Growing::go_on(&folder, spec, points, &tables, store.as_ref(), rows.as_ref())?;
+        let Saved { head, standing, note } = kept;
+        let Head { origin, wall, cohort, tables, store, rows, aside, films } = head;
+        let growing = Growing::resume(&folder, spec, points, &tables, store.as_ref(), rows.as_ref())?;
         if note.is_some() {
             folder.forget_last_state()?;
         }
         let tally = reader::rows(growing.rows(), spec, aside)?;
         let mut report = Report::new(folder, growing, spec, points, origin, manner);
-        (report.tally, report.films, report.earlier, report.company) = (tally, films, wall, company);
+        (report.tally, report.films, report.earlier, report.cohort) = (tally, films, wall, cohort);
         report.before = report.tally.members().saturating_sub(standing.next);
         report.has_begun = true;
         Ok((report, standing))
@@ -143,7 +143,7 @@ impl Report {
             films: Vec::new(),
             total: spec.member_count(),
             before: 0,
-            company: 0,
+            cohort: 0,
             progress: Progress::new(quiet),
             clock: Instant::now(),
             earlier: Duration::ZERO,
@@ -154,10 +154,10 @@ impl Report {
         }
     }
 
-    /// The members that come now are simulated by themselves, as the `company`-th; those before have all ended.
-    pub fn begin_company(&mut self, company: usize) {
-        if self.company != company as u64 {
-            (self.company, self.before) = (company as u64, self.tally.members());
+    /// The members that come now are simulated by themselves, as the `cohort`-th; those before have all ended.
+    pub fn begin_cohort(&mut self, cohort: usize) {
+        if self.cohort != cohort as u64 {
+            (self.cohort, self.before) = (cohort as u64, self.tally.members());
         }
     }
 
@@ -177,8 +177,8 @@ impl Report {
     }
 
     /// Which simulation of the study comes now, from 0.
-    pub fn company(&self) -> usize {
-        self.company as usize
+    pub fn cohort(&self) -> usize {
+        self.cohort as usize
     }
 
     /// Members whose rows are written.
@@ -208,7 +208,7 @@ impl Report {
         Ok(Head {
             origin: self.origin.clone(),
             wall: self.wall(),
-            company: self.company,
+            cohort: self.cohort,
             tables,
             store,
             rows,
@@ -245,7 +245,7 @@ impl Report {
     pub fn finish(mut self, spec: &Spec, early: &[String], form: Form) -> Result<String> {
         // All rows are there: a run that is killed from now on draws its pictures again, and nothing else.
         let next = self.tally.members() - self.before;
-        self.keep(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;
+        self.checkpoint(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;
         let shard = match spec.shard {
             Some(_) => Some(shard::to_bytes(&Head { rows: None, ..self.head()? }, self.points, early)?),
             None => None,
@@ -298,19 +298,19 @@ impl Sink for Report {
         let (since, took) = self.kept;
         match self.stop.asked() {
             Some((cause, _)) => Wish::Stop(cause.error(&self.so_far())),
-            None if since.elapsed() >= self.every.max(SHARE_OF_STATES * took) => Wish::Keep,
-            None => Wish::GoOn,
+            None if since.elapsed() >= self.every.max(SHARE_OF_STATES * took) => Wish::Checkpoint,
+            None => Wish::Continue,
         }
     }
 
-    fn keep(&mut self, standing: &Standing) -> Result<()> {
+    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
         let begun = Instant::now();
         let head = self.head()?;
         let known;
         let resident = match &standing.resident {
             Some(resident) => resident,
             None => {
-                known = checkpoint::on_their_way(&self.folder, self.company, standing);
+                known = checkpoint::on_their_way(&self.folder, self.cohort, standing);
                 &known
             }
         };
@@ -411,7 +411,7 @@ mod tests {
         let (spec, stop) = (Spec::default(), Stop::default());
         let mut running = begun(&home.path().join("out"), &spec, &stop);
         running.member(&ended(0, None)).unwrap();
-        assert!(matches!(running.wish(), Wish::GoOn) && running.progress(1, 256, 0.1).is_ok());
+        assert!(matches!(running.wish(), Wish::Continue) && running.progress(1, 256, 0.1).is_ok());
         let before = Instant::now();
         stop.ask(Cause::MaxTime);
         stop.ask(Cause::Interrupt);
@@ -422,7 +422,7 @@ mod tests {
         // Where this thread had to wait for long, its patience may be over.
         let goes_on = running.progress(1, 256, 0.1).is_ok();
         assert!((goes_on || before.elapsed() > PATIENCE) && !stop.is_kept());
-        running.keep(&Standing { next: 1, ..Standing::default() }).unwrap();
+        running.checkpoint(&Standing { next: 1, ..Standing::default() }).unwrap();
         assert!(stop.is_kept());
         std::thread::sleep(PATIENCE);
         assert_eq!(running.progress(1, 256, 0.1).unwrap_err().exit_code(), 75);
@@ -437,12 +437,12 @@ mod tests {
         let hour = Duration::from_secs(3600);
         running.every = hour;
         running.kept = (Instant::now(), Duration::ZERO);
-        assert!(matches!(running.wish(), Wish::GoOn));
+        assert!(matches!(running.wish(), Wish::Continue));
         running.every = Duration::ZERO;
-        assert!(matches!(running.wish(), Wish::Keep));
+        assert!(matches!(running.wish(), Wish::Checkpoint));
         // A state that took long is not written again soon.
         running.kept.1 = hour;
-        assert!(matches!(running.wish(), Wish::GoOn));
+        assert!(matches!(running.wish(), Wish::Continue));
     }
 
     #[test]
@@ -459,14 +459,14 @@ mod tests {
             let mut first = begun(&broken, &spec, &Stop::default());
             first.member(&ended(0, None)).unwrap();
             let early = BTreeMap::from([(2, ended(2, None))]);
-            first.keep(&Standing { next: 1, early, resident: Some(BTreeMap::new()) }).unwrap();
+            first.checkpoint(&Standing { next: 1, early, resident: Some(BTreeMap::new()) }).unwrap();
             // Not in the state: to be cut off.
             first.member(&ended(1, None)).unwrap();
             assert!(first.give_up(), "there is something to go on with");
             let folder = OutputFolder::open_again(&broken).unwrap();
             let kept = checkpoint::find(&folder).unwrap().unwrap();
             assert_eq!(kept.note, None);
-            let (mut second, standing) = Report::go_on(folder, &spec, 1, kept, manner(&Stop::default())).unwrap();
+            let (mut second, standing) = Report::resume(folder, &spec, 1, kept, manner(&Stop::default())).unwrap();
             assert_eq!((standing.next, second.members()), (1, 1));
             second.member(&ended(1, None)).unwrap();
             second.member(&standing.early[&2]).unwrap();

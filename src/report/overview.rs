@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Cells at most of which there is a line; the table has them all.
-const MOST_CELLS: usize = 40;
+const MAX_CELLS: usize = 40;
 
 /// A finished run at a glance; its `Display` is the text for stdout.
 pub struct Overview<'a> {
@@ -108,10 +108,10 @@ impl Overview<'_> {
         if cells.len() < 2 {
             return Ok(());
         }
-        for cell in cells.iter().take(MOST_CELLS) {
+        for cell in cells.iter().take(MAX_CELLS) {
             writeln!(f, "{:<11}{}: t_relax {}", cell.cell, self.spec.sweep.name(cell.cell), times(cell))?;
         }
-        match cells.len().saturating_sub(MOST_CELLS) {
+        match cells.len().saturating_sub(MAX_CELLS) {
             0 => {}
             1 => writeln!(f, "{:<11}1 more cell is in {ENSEMBLE}", "...")?,
             more => writeln!(f, "{:<11}{more} more cells are in {ENSEMBLE}", "...")?,

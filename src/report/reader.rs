@@ -83,7 +83,7 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
             if begun { "the run there did not finish; start it again" } else { "no run there; name its folder" };
         return Err(Error::Request(format!("{}: {problem} (no {})", folder.display(), names::RUN)));
     }
-    let text = input::text(&path, input::MOST_RUN);
+    let text = input::text(&path, input::MAX_RUN);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
     let no_json = |e: serde_json::Error| format!(": {}; {REMEDY}", shortened(&e.to_string(), SHOWN));
     let Head { curvelax, format } = match serde_json::from_str(&text) {

@@ -3,7 +3,7 @@
 use super::{
     gallery,
     overview::{describe, place},
-    page::{Figure, Headline, MOST_MEMBERS, Page, Table, Trajectory, spread},
+    page::{Figure, Headline, MAX_MEMBERS, Page, Table, Trajectory, spread},
 };
 use crate::{
     draw::charts::{
@@ -254,7 +254,7 @@ impl Study<'_> {
             let label = format!("member {}{cell}: {}{at}", film.member, film.status.name());
             Trajectory { label, status: film.status.name(), times: film.times.clone(), nodes: film.frames() }
         };
-        let shown = if sweep.is_empty() { self.films.len() } else { MOST_MEMBERS };
+        let shown = if sweep.is_empty() { self.films.len() } else { MAX_MEMBERS };
         spread(self.films.len(), shown).map(|i| trajectory(&self.films[i])).collect()
     }
 

@@ -19,7 +19,7 @@ use crate::{
 pub const QUANTILES: [(f64, &str); 5] = [(0.05, "q05"), (0.25, "q25"), (0.5, "median"), (0.75, "q75"), (0.95, "q95")];
 
 /// The test that compares cells takes the cube of their number.
-const MOST_COMPARED: usize = 500;
+const MAX_COMPARED: usize = 500;
 
 /// Relaxation times of one cell.
 pub struct CellStatistics {
@@ -169,7 +169,7 @@ impl EnsembleStatistics {
                 CellStatistics::new(spec, cell, of_cell, relative)
             })
             .collect::<Result<Vec<_>>>()?;
-        let compared = (2..=MOST_COMPARED).contains(&cells.len());
+        let compared = (2..=MAX_COMPARED).contains(&cells.len());
         let samples = || cells.iter().map(|cell| &cell.sample).collect::<Vec<_>>();
         let log_rank = if compared { log_rank(&samples()) } else { None };
         let power_law = match spec.sweep.axes() {

@@ -263,7 +263,7 @@ impl<N: Number> Team<N> {
             };
             if adaptive && of_step.is_none() && !exact.lane(lane) {
                 let next = pace::next_length(h, error, 1.0, &run.parameters);
-                refuse(run, n, next, pace::LEAST_STEP, Status::Singular);
+                refuse(run, n, next, pace::MIN_STEP, Status::Singular);
                 start.set_lane(lane, Start::after_refused(next / (half * h)));
                 kept.set_lane(lane, true);
                 continue;
@@ -276,8 +276,8 @@ impl<N: Number> Team<N> {
             if let Some(cause) = failure {
                 kept.set_lane(lane, true);
                 if adaptive {
-                    let least = if cause == Status::Singular { pace::LEAST_TO_SINGULAR } else { pace::LEAST_STEP };
-                    refuse(run, n, N::Real::of(pace::LEAST_GROWTH) * h, least, cause);
+                    let least = if cause == Status::Singular { pace::MIN_TO_SINGULAR } else { pace::MIN_STEP };
+                    refuse(run, n, N::Real::of(pace::MIN_GROWTH) * h, least, cause);
                     // After that the increments may be anything.
                     start.set_lane(lane, Start::nowhere());
                 } else {
@@ -297,7 +297,7 @@ impl<N: Number> Team<N> {
             let Run { parameters, counters, report, .. } = &mut **run;
             let progress = &mut report.progress;
             if adaptive {
-                let most_growth = if counters.refused == 0 { pace::MOST_GROWTH } else { 1.0 };
+                let most_growth = if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 };
                 progress.next = pace::next_length(h, error, most_growth, parameters);
                 start.set_lane(lane, Start::after_taken(progress.next / (half * h)));
                 pace::pass(progress, self.strides[lane], parameters);

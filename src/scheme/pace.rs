@@ -11,14 +11,14 @@ use crate::number::Real;
 /// Share of the step predicted to meet the tolerance that is taken.
 pub const SAFETY: f64 = 0.95;
 /// A step is at most this many times the one before,
-pub const MOST_GROWTH: f64 = 4.0;
+pub const MAX_GROWTH: f64 = 4.0;
 /// and at least this fraction of it; after a failure exactly this fraction.
-pub const LEAST_GROWTH: f64 = 0.25;
+pub const MIN_GROWTH: f64 = 0.25;
 /// A step below this many times `(L/n)⁴`, far below all time scales of a curve that n nodes resolve, ends the member.
-pub const LEAST_STEP: f64 = 1e-12;
+pub const MIN_STEP: f64 = 1e-12;
 /// The same for a step that is accurate but ends in a singular curve: shorter ones only creep towards the bound that it
 /// passed, until rounding lets them stay beside it.
-pub const LEAST_TO_SINGULAR: f64 = 1e-3;
+pub const MIN_TO_SINGULAR: f64 = 1e-3;
 
 /// A step to be attempted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,7 +71,7 @@ pub fn at_goal<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> bool {
 pub fn next_length<T: Real>(length: T, error: T, most_growth: f64, p: &Parameters<T>) -> T {
     // An error of nothing allows any growth.
     let growth = T::of(SAFETY) * (p.adaptive / error.max(T::of(1e-6) * p.adaptive)).sqrt();
-    length * growth.max(T::of(LEAST_GROWTH)).min(T::of(most_growth))
+    length * growth.max(T::of(MIN_GROWTH)).min(T::of(most_growth))
 }
 
 /// The shortest step that is tried, `share` of `(L/n)⁴`.

@@ -41,7 +41,7 @@ impl Held {
         Some(Held { program: children.split_whitespace().next().unwrap().parse().unwrap(), running })
     }
 
-    fn go_on(self) -> Ended {
+    fn resume(self) -> Ended {
         signal(self.program, "CONT");
         self.running.end()
     }
@@ -70,7 +70,7 @@ pub fn taken_away(study: &Study, other: &Study, stride: usize, seed: u64) -> Out
                 let second = Running::start(&mut curvelax(attempt.home.path(), &arguments)).end();
                 assert_eq!(second.code, Some(0), "{call} {n}: {second:?}");
             }
-            let first = held.go_on();
+            let first = held.resume();
             cases += 1;
             if !attempt.home.path().join("gone").exists() && !out.exists() {
                 panic!("{call} {n}: {first:?}");
@@ -113,7 +113,7 @@ pub fn lock_removed(study: &Study) -> Outcome {
         fs::remove_file(attempt.out().join(".curvelax.lock")).unwrap();
         let second = attempt.resume().end();
         assert!(second.code == Some(2) && second.said.contains("a run is writing here"), "{n}: {second:?}");
-        let first = held.go_on();
+        let first = held.resume();
         assert_eq!(first.code, Some(0), "{n}: {first:?}");
         attempt.must_be_the_reference(&[format!("{n}: {first:?} {second:?}")]);
         cases += 1;

@@ -329,18 +329,18 @@ impl Trial {
                 return interruptions;
             }
             interruptions += usize::from(!ended.had_not_begun());
-            running = self.go_on(&study, &ended);
+            running = self.resume(&study, &ended);
         }
         let mut ended = running.end();
         while ended.code != Some(0) {
             assert!(ended.had_not_begun(), "{ended:?}: {:#?}", self.story);
-            ended = self.go_on(&study, &ended).end();
+            ended = self.resume(&study, &ended).end();
         }
         self.must_be_the_study(expected, "stopped", true);
         interruptions
     }
 
-    fn go_on(&mut self, study: &str, last: &Ended) -> Running {
+    fn resume(&mut self, study: &str, last: &Ended) -> Running {
         let begun = self.home.path().join("stopped").exists() && !last.had_not_begun();
         self.start(&if begun { "resume stopped".into() } else { format!("{study} --out stopped --force") })
     }

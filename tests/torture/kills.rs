@@ -65,7 +65,7 @@ pub fn at_random_times(study: &Study, earlier: Option<&Study>, kills: usize, see
                 begun |= attempt.has_state();
                 early += usize::from(!begun);
             }
-            running = attempt.go_on(&ended);
+            running = attempt.resume_after(&ended);
         }
         let ended = running.end();
         story.push(format!("{ended:?}"));

@@ -77,7 +77,7 @@ pub fn stop_at_random_times(studies: &[&Study], signals: &[(&str, i32, i32)], ca
                 (Some(0), _) => {}
                 _ => return Err(told.into()),
             }
-            running = attempt.go_on(&ended);
+            running = attempt.resume_after(&ended);
         }
         let last = running.end();
         assert!(last.code == Some(0) || last.had_not_begun(), "{last:?}");

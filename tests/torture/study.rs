@@ -117,7 +117,7 @@ impl<'a> Attempt<'a> {
     }
 
     /// Goes on as a user would who reads what was said: resumes what has begun, and else begins again.
-    pub fn go_on(&self, last: &Ended) -> Running {
+    pub fn resume_after(&self, last: &Ended) -> Running {
         if last.had_not_begun() {
             assert!(!self.has_state(), "there is a state, but {last:?}");
             let anew = if self.earlier.is_some() { self.run() } else { format!("{} --force", self.run()) };
@@ -135,7 +135,7 @@ impl<'a> Attempt<'a> {
         let begun = self.has_state();
         let mut story = vec![format!("{last:?}")];
         for _ in 0..3 {
-            last = self.go_on(&last).end();
+            last = self.resume_after(&last).end();
             story.push(format!("{last:?}"));
             if last.code == Some(0) {
                 return self.must_be_whole(begun, &story);

@@ -43,9 +43,9 @@ static FIXED: Study = Study::new(
     "fixed, zarr",
     "--backend cpu --threads 1 --points 34 --curves 150 --tau 5e-5 --t-end 1 --series 0.2 --snapshots 0,0.5,1 --store zarr",
 );
-/// Two companies, one of adaptive and one of fixed steps would be two runs; two numbers of nodes are two companies.
-static COMPANIES: Study = Study::new(
-    "two companies",
+/// Two cohorts, one of adaptive and one of fixed steps would be two runs; two numbers of nodes are two cohorts.
+static COHORTS: Study = Study::new(
+    "two cohorts",
     "--backend cpu --threads 1 --curves 500 --adaptive=2e-6 --stop-when-relaxed --series 0.2 --snapshots 0.1 \
      --sweep points=34,52",
 );
@@ -55,7 +55,7 @@ static GPU: Study = Study::new(
     "--backend gpu --points 34 --curves 60 --adaptive=1e-5 --stop-when-relaxed --series 0.1 --snapshots 0,0.1",
 );
 static GPU_ZARR: Study = Study::new(
-    "lavapipe, fixed, zarr, two companies",
+    "lavapipe, fixed, zarr, two cohorts",
     "--backend gpu --curves 60 --tau 1e-3 --t-end 0.5 --solver direct --snapshots 0,0.1 --series 0.1 --sweep points=34,52",
 );
 /// So short that it can be repeated for every call of the system.
@@ -173,14 +173,14 @@ fn interruptions(suite: &mut Suite, seed: u64) {
     for (name, study, small, full) in [
         ("killed_at_random_times_with_adaptive_steps", &ADAPTIVE, 12, 120),
         ("killed_at_random_times_with_fixed_steps_and_arrays", &FIXED, 12, 120),
-        ("killed_at_random_times_with_two_companies", &COMPANIES, 10, 110),
+        ("killed_at_random_times_with_two_cohorts", &COHORTS, 10, 110),
     ] {
         let kills = suite.of(small, full);
         suite.test(name, SAME, move || kills::at_random_times(study, None, kills, seed));
     }
     for (name, study, small, full) in [
         ("killed_at_random_times_on_the_gpu", &GPU, 8, 80),
-        ("killed_at_random_times_on_the_gpu_with_two_companies", &GPU_ZARR, 8, 80),
+        ("killed_at_random_times_on_the_gpu_with_two_cohorts", &GPU_ZARR, 8, 80),
     ] {
         let kills = suite.of(small, full);
         suite.test_if(gpu, name, SAME, move || kills::at_random_times(study, None, kills, seed));
@@ -192,7 +192,7 @@ fn interruptions(suite: &mut Suite, seed: u64) {
     const STOPPED: &str = "0 differing bytes, out after 5 s of work";
     let cases = suite.of(8, 80);
     suite.test("stopped_by_signals_at_random_times", STOPPED, move || {
-        signals::stop_at_random_times(&[&ADAPTIVE, &FIXED, &COMPANIES], &STOPS, cases, seed)
+        signals::stop_at_random_times(&[&ADAPTIVE, &FIXED, &COHORTS], &STOPS, cases, seed)
     });
     let cases = suite.of(3, 30);
     suite.test_if(gpu, "stopped_by_signals_on_the_gpu", STOPPED, move || {
@@ -202,7 +202,7 @@ fn interruptions(suite: &mut Suite, seed: u64) {
     suite.test("a_second_signal_does_not_wait", "0 differing bytes, out after 1 s of work", move || {
         signals::stop_twice(&SECOND, cases, seed)
     });
-    let all: Vec<&'static Study> = suite.of(vec![&FIXED], vec![&FIXED, &ADAPTIVE, &COMPANIES]);
+    let all: Vec<&'static Study> = suite.of(vec![&FIXED], vec![&FIXED, &ADAPTIVE, &COHORTS]);
     suite.test("a_second_at_a_time", SAME, move || signals::a_second_at_a_time(&all));
 }
 

@@ -7,7 +7,7 @@
 use std::time::{Duration, Instant};
 
 /// A software GPU that gets this many times less than all processors is taken for stuck all the same.
-const MOST_CROWDED: u32 = 30;
+const MAX_CROWDED: u32 = 30;
 
 /// When something began.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +38,7 @@ impl Moment {
         let elapsed = self.at.elapsed();
         let Some((before, now)) = self.worked.zip(processor_time()) else { return elapsed };
         let processors = std::thread::available_parallelism().map_or(1, usize::from) as u32;
-        (now.saturating_sub(before) / processors).max(elapsed / MOST_CROWDED)
+        (now.saturating_sub(before) / processors).max(elapsed / MAX_CROWDED)
     }
 }
 
@@ -65,10 +65,10 @@ mod tests {
         std::thread::sleep(Duration::from_millis(300));
         assert!(hardware.spent() >= Duration::from_millis(300));
         let (spent, elapsed) = (software.spent(), software.elapsed());
-        assert!(spent >= Duration::from_millis(300) / MOST_CROWDED && spent <= elapsed + Duration::from_millis(50));
+        assert!(spent >= Duration::from_millis(300) / MAX_CROWDED && spent <= elapsed + Duration::from_millis(50));
         if let (Some(before), Some(now)) = (software.worked, processor_time()) {
             let processors = std::thread::available_parallelism().map_or(1, usize::from) as u32;
-            assert!(now >= before && spent <= ((now - before) / processors).max(software.elapsed() / MOST_CROWDED));
+            assert!(now >= before && spent <= ((now - before) / processors).max(software.elapsed() / MAX_CROWDED));
         }
         assert_eq!(hardware.later(software).at, software.at);
         assert_eq!(software.later(hardware).at, software.at);

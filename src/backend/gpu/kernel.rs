@@ -33,7 +33,7 @@ const DISPATCH_LIMIT: Duration = Duration::from_secs(120);
 const MAX_SLOTS: usize = 8192;
 /// Members of a batch at least, where there are two: enough to fill a large GPU several times over, which holds some thousand
 /// at once, or the threads of a software one.
-const LEAST_SLOTS: [usize; 2] = [32, 4096];
+const MIN_SLOTS: [usize; 2] = [32, 4096];
 
 /// Compiled kernel and resident members of `n` nodes in numbers of type `T`.
 pub struct Kernel<T> {
@@ -54,7 +54,7 @@ pub struct Kernel<T> {
 impl<T: Real> Kernel<T> {
     /// Compiles the kernel for rings cut by `blocks` and makes room for up to `members` members.
     pub fn new(gpu: &Gpu, blocks: Blocks, members: usize, max_sweeps: u32, variant: Variant) -> Result<Self> {
-        let batches = if members < 2 * LEAST_SLOTS[usize::from(gpu.is_hardware())] { 1 } else { 2 };
+        let batches = if members < 2 * MIN_SLOTS[usize::from(gpu.is_hardware())] { 1 } else { 2 };
         Self::in_batches(gpu, blocks, [batches, members.div_ceil(batches)], max_sweeps, variant)
     }
 

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{MOST_BANDS, TIME, only_panel};
+use super::{MAX_BANDS, TIME, only_panel};
 use crate::draw::{
     axis::{Axis, Scale},
     chart::{Colours, Entry, FOOT, Heading, Mark, Panel, drawable, nothing},
@@ -141,7 +141,7 @@ impl Decay<'_> {
             }
             _ => {}
         }
-        let bands = curves.len() <= MOST_BANDS && curves.iter().any(|curve| curve.band.is_some());
+        let bands = curves.len() <= MAX_BANDS && curves.iter().any(|curve| curve.band.is_some());
         let heading = Heading { title, sentences, legend: self.legend(&colours, bands) };
         let (mut svg, top) = heading.begin(8.0 + HEIGHT + FOOT);
 

@@ -22,9 +22,9 @@ const HEIGHT: f64 = 300.0;
 const ROW: f64 = 26.0;
 const FURTHER: f64 = 12.0;
 /// More named settings than this are not drawn.
-const MOST_ROWS: usize = 40;
+const MAX_ROWS: usize = 40;
 /// Most pixels for the name of a setting.
-const MOST_NAME: f64 = 200.0;
+const MAX_NAME: f64 = 200.0;
 /// Most pixels between the series at one setting of a numeric key, and from the first to the last of them.
 const ASIDE: f64 = 5.0;
 const SPREAD: f64 = 24.0;
@@ -266,9 +266,9 @@ impl Dependence<'_> {
                 names.push(name);
             }
         }
-        if names.len() > MOST_ROWS {
-            sentences.push(format!("The first {MOST_ROWS} of {} settings are drawn.", names.len()));
-            names.truncate(MOST_ROWS);
+        if names.len() > MAX_ROWS {
+            sentences.push(format!("The first {MAX_ROWS} of {} settings are drawn.", names.len()));
+            names.truncate(MAX_ROWS);
         }
         let row = ROW + FURTHER * (colours.shown.len().min(crate::draw::style::SERIES) as f64 - 1.0).max(0.0);
         let height = row * names.len() as f64;
@@ -276,16 +276,16 @@ impl Dependence<'_> {
         let (mut svg, top) = heading.begin(28.0 + height + FOOT);
 
         let time = self.time_axis();
-        let shown: Vec<String> = names.iter().map(|name| shortened(name, SIZE, MOST_NAME)).collect();
+        let shown: Vec<String> = names.iter().map(|name| shortened(name, SIZE, MAX_NAME)).collect();
         let left = MARGIN
             + 8.0
-            + shown.iter().map(|name| width(name, SIZE)).fold(width(self.key, SIZE), f64::max).min(MOST_NAME);
+            + shown.iter().map(|name| width(name, SIZE)).fold(width(self.key, SIZE), f64::max).min(MAX_NAME);
         let rows = Axis::new("", "", Scale::Linear, (0.0, names.len() as f64));
         let size = DVec2::new(WIDTH - left - MARGIN - colours.room(height), height);
         let corner = DVec2::new(left, top + 28.0);
         let panel = Panel { heading: "", corner, size, x: &time, y: &rows, labels_x: true };
         panel.draw_x(&mut svg);
-        let key = shortened(self.key, SIZE, MOST_NAME);
+        let key = shortened(self.key, SIZE, MAX_NAME);
         svg.text("note end", DVec2::new(left - 8.0, panel.corner.y - 9.0), &key);
         let middle = |i: usize| panel.corner.y + (i as f64 + 0.5) * row;
         for (i, name) in shown.iter().enumerate() {

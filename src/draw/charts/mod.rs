@@ -31,7 +31,7 @@ use super::{
 /// The unit of all times.
 const TIME: &str = "length⁴";
 /// With more curves than this, bands would hide each other.
-const MOST_BANDS: usize = 4;
+const MAX_BANDS: usize = 4;
 
 /// The panel of a picture that has one, `height` high below `top`, with `room` for a colour bar at its right.
 fn only_panel<'a>([x, y]: [&'a Axis; 2], top: f64, height: f64, room: f64) -> Panel<'a> {

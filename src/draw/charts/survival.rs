@@ -4,7 +4,7 @@ use std::iter;
 
 use glam::DVec2;
 
-use super::{MOST_BANDS, TIME, only_panel};
+use super::{MAX_BANDS, TIME, only_panel};
 use crate::draw::{
     axis::{Axis, Scale},
     chart::{Colours, Entry, FOOT, Heading, Mark, Panel, nothing, stroke},
@@ -15,7 +15,7 @@ const HEIGHT: f64 = 300.0;
 /// Share of the members, and of a time, that is less than a tenth of a pixel.
 const FINEST: f64 = 1.0 / 4096.0;
 /// Censoring strokes of all curves together.
-const MOST_STROKES: f64 = 1200.0;
+const MAX_STROKES: f64 = 1200.0;
 /// Least pixels between two of them on a curve.
 const STROKE_GAP: f64 = 3.0;
 
@@ -128,7 +128,7 @@ impl Survival<'_> {
         if curves.iter().all(|curve| curve.end(Scale::Linear).is_none()) {
             return nothing(title, sentences, "There are no members, so there is nothing to survive.");
         }
-        let bands = curves.len() <= MOST_BANDS && curves.iter().any(|curve| curve.band.is_some());
+        let bands = curves.len() <= MAX_BANDS && curves.iter().any(|curve| curve.band.is_some());
         let censored = curves.iter().any(|curve| !curve.censored.is_empty());
         let heading = Heading { title, sentences, legend: self.legend(&colours, bands, censored) };
         let (mut svg, top) = heading.begin(8.0 + HEIGHT + FOOT);
@@ -143,7 +143,7 @@ impl Survival<'_> {
         panel.draw(&mut svg);
         let lines = colours.shown.len() * if bands { 3 } else { 1 };
         let least = trace::tolerance(lines, HEIGHT);
-        let stroke_gap = (colours.shown.len() as f64 * panel.size.x / MOST_STROKES).max(STROKE_GAP);
+        let stroke_gap = (colours.shown.len() as f64 * panel.size.x / MAX_STROKES).max(STROKE_GAP);
         for (i, class) in &colours.shown {
             let curve = &curves[*i];
             svg.open(class);

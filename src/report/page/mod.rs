@@ -10,7 +10,7 @@ mod scope;
 
 use std::fmt::Write;
 
-pub use player::{MOST_MEMBERS, Trajectory, spread};
+pub use player::{MAX_MEMBERS, Trajectory, spread};
 
 use crate::{
     draw::svg::escape,
@@ -25,7 +25,7 @@ const SCRIPT: &str = include_str!("page.js");
 const SCRIPT_DIGEST: &str = "sha256-775RypILJTOY0aphVAygxJe5VXjKB+pvwd32GxoMr5M=";
 
 /// Longer tables are cut, and say so.
-const MOST_ROWS: usize = 200;
+const MAX_ROWS: usize = 200;
 
 /// What a page shows.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -246,7 +246,7 @@ impl Table {
             let _ = write!(html, "<th scope=\"col\"{}>{}</th>", class(j), cell(&self.header, j));
         }
         html += "</tr></thead>\n<tbody>\n";
-        for row in self.rows.iter().take(MOST_ROWS) {
+        for row in self.rows.iter().take(MAX_ROWS) {
             html += "<tr>";
             for j in 0..columns {
                 let (class, cell) = (class(j), cell(row, j));
@@ -259,12 +259,10 @@ impl Table {
             html += "</tr>\n";
         }
         html += "</tbody>\n</table>\n";
-        if self.rows.len() > MOST_ROWS {
+        if self.rows.len() > MAX_ROWS {
             let all = if self.source.is_empty() { String::new() } else { format!("; all are in {}", self.source) };
-            html += &paragraph(
-                "small",
-                &format!("The first {MOST_ROWS} of {} rows{all}.", grouped(self.rows.len() as u64)),
-            );
+            html +=
+                &paragraph("small", &format!("The first {MAX_ROWS} of {} rows{all}.", grouped(self.rows.len() as u64)));
         }
         html + "</div>\n"
     }

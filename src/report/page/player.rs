@@ -17,19 +17,19 @@ use crate::{
 };
 
 /// More members than these are not shown.
-pub const MOST_MEMBERS: usize = 6;
+pub const MAX_MEMBERS: usize = 6;
 /// More times of one member, and nodes, than these do not fit into a small page, and show no more.
-const MOST_TIMES: usize = 61;
-const MOST_NODES: usize = 200;
+const MAX_TIMES: usize = 61;
+const MAX_NODES: usize = 200;
 /// Places of the slider that stand for times.
-const MOST_MARKS: usize = 121;
+const MAX_MARKS: usize = 121;
 /// Nodes are marked where there are no more than these.
-const MOST_DOTS: usize = 120;
+const MAX_DOTS: usize = 120;
 /// The largest coordinate, and the free space round a curve.
 const LARGEST: f64 = 4095.0;
 const PADDING: f64 = 200.0;
 /// Least height of a panel, as a share of its width.
-const LEAST_HEIGHT: f64 = 0.5;
+const MIN_HEIGHT: f64 = 0.5;
 
 /// One member on its way.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,9 +53,9 @@ impl Trajectory {
             t.is_finite() && nodes.len() == count && count > 0 && nodes.iter().all(known)
         };
         let frames: Vec<(&f64, &Vec<DVec2>)> = self.times.iter().zip(&self.nodes).filter(usable).collect();
-        let stride = count.div_ceil(MOST_NODES).max(1);
+        let stride = count.div_ceil(MAX_NODES).max(1);
         let node = |nodes: &Vec<DVec2>| nodes.iter().copied().step_by(stride).collect();
-        spread(frames.len(), MOST_TIMES).map(|i| (*frames[i].0, node(frames[i].1))).collect()
+        spread(frames.len(), MAX_TIMES).map(|i| (*frames[i].0, node(frames[i].1))).collect()
     }
 }
 
@@ -82,12 +82,12 @@ impl Player {
     /// The first of `trajectories` that have a time to show; none if none has.
     pub fn new(trajectories: &[Trajectory]) -> Option<Player> {
         let shown = trajectories.iter().map(|trajectory| (trajectory, trajectory.frames()));
-        let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MOST_MEMBERS).collect();
+        let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MAX_MEMBERS).collect();
         let boxes: Vec<(DVec2, DVec2)> = shown.iter().filter_map(|(_, frames)| bounds(frames)).collect();
         let extent = boxes.iter().map(|(low, high)| *high - *low).reduce(DVec2::max)?;
         let largest = extent.max_element();
         let unit = if largest > 0.0 { largest / (LARGEST - 2.0 * PADDING) } else { 1.0 };
-        let height = (extent.y / unit + 2.0 * PADDING).clamp(LEAST_HEIGHT * LARGEST, LARGEST).round();
+        let height = (extent.y / unit + 2.0 * PADDING).clamp(MIN_HEIGHT * LARGEST, LARGEST).round();
         let members = shown.into_iter().zip(boxes).map(|((trajectory, frames), (low, high))| {
             // y grows downwards in SVG.
             let place =
@@ -111,7 +111,7 @@ impl Player {
         let mut html = String::from("<div class=\"members\">\n");
         for Member { label, status, frames, times } in &self.members {
             let (start, label) = (path(&frames[0]), escape(label));
-            let dots = if frames[0].len() <= 2 * MOST_DOTS { dots(&frames[0]) } else { String::new() };
+            let dots = if frames[0].len() <= 2 * MAX_DOTS { dots(&frames[0]) } else { String::new() };
             let (height, colour) = (self.height, colour(status));
             // Writing into a string cannot fail.
             let _ = writeln!(
@@ -153,7 +153,7 @@ impl Player {
         let mut all: Vec<f64> = self.members.iter().flat_map(|member| member.times.iter().copied()).collect();
         all.sort_by(f64::total_cmp);
         all.dedup();
-        spread(all.len(), MOST_MARKS).map(|i| all[i]).collect()
+        spread(all.len(), MAX_MARKS).map(|i| all[i]).collect()
     }
 
     /// A round length and the coordinates that it takes.
@@ -239,8 +239,8 @@ mod tests {
     #[test]
     fn a_player_stays_small() {
         let player = Player::new(&vec![ellipse(1.0, 1000, 5000); 20]).unwrap();
-        assert_eq!(player.members.len(), MOST_MEMBERS);
-        assert_eq!(player.members[0].frames.len(), MOST_TIMES);
+        assert_eq!(player.members.len(), MAX_MEMBERS);
+        assert_eq!(player.members[0].frames.len(), MAX_TIMES);
         assert_eq!(player.members[0].times.last(), Some(&(0.1 * 999.0)));
         let bytes = player.html().len() + player.data().len();
         assert!(bytes < 350_000, "{bytes}");
