@@ -59,8 +59,8 @@
 //!
 //! ```
 //! use curvelax::{
-//!     backend,
 //!     ensemble::{Cell, Ended, Family, Sink, Spec, Status, spec::{BackendChoice, Solver}},
+//!     placement,
 //!     simulate::simulate,
 //! };
 //!
