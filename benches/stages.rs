@@ -13,7 +13,7 @@ use curvelax::{
         redistribution,
         step::{self, Method},
     },
-    solver::{Blocks, Order, Solver, direct, gauss_seidel},
+    solver::{Blocks, Memory, Order, Solver, direct, gauss_seidel},
     trajectory::Trajectory,
 };
 
@@ -48,7 +48,9 @@ fn stages<T: Real>(c: &mut Criterion) {
     let points = 100;
     let mut group = c.benchmark_group(format!("stages/{}/n={points}", T::NAME));
     let Start { curve, mut increments, parameters: p, mut work } = Start::<T>::new(points);
-    let Workspace { blocks, motion, new, curvature, position, factors, .. } = &mut work;
+    let Workspace { blocks, motion, new, curvature, position, .. } = &mut work;
+    let Memory { system: curvature, factor, .. } = curvature;
+    let Memory { system: position, factor: factor_of_both, .. } = position;
     group.bench_function("redistribution", |b| {
         b.iter(|| redistribution::redistribute(&curve, &p, p.branches(), *blocks, motion, &mut new.r));
     });
@@ -57,10 +59,10 @@ fn stages<T: Real>(c: &mut Criterion) {
         b.iter(|| position.assemble(&Position::new(&curve, new, motion, &p, p.branches())))
     });
     group.bench_function("direct, curvature", |b| {
-        b.iter(|| direct::solve(curvature, [&mut increments.k], &mut factors.0));
+        b.iter(|| direct::solve(curvature, [&mut increments.k], factor));
     });
     group.bench_function("direct, position", |b| {
-        b.iter(|| direct::solve(position, [&mut increments.x, &mut increments.y], &mut factors.1));
+        b.iter(|| direct::solve(position, [&mut increments.x, &mut increments.y], factor_of_both));
     });
     // A cap that ends the solve at its first look at the residual: the cost of sweeps, not of their number.
     let control = gauss_seidel::Control {

@@ -31,6 +31,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`error`] | what, where, numbers, remedy, exit code |
+//! | `wgsl` | the files of `shaders/`, compiled in |
 //! | `guard`, `threads` | panics of other crates become errors; every thread is started here |
 //! | `input`, `text`, [`random`] | files opened for reading; numbers as people read them; random numbers addressed by key |
 //! | [`number`] | the number that the scheme is generic over |
@@ -121,5 +122,6 @@ mod text;
 mod threads;
 pub mod trajectory;
 pub mod truth;
+mod wgsl;
 
 pub use error::{Error, Result};

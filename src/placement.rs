@@ -15,7 +15,7 @@ use crate::{
     },
     error::{Error, Result},
     scheme::step::Method,
-    solver::{Blocks, Order, Solver},
+    solver::{Blocks, Order},
 };
 
 /// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
@@ -228,11 +228,7 @@ impl Choice {
             Some(gpu) => format!("GPU {} ({})", gpu.name(), gpu.api()),
             None => "CPU".into(),
         };
-        let solver = match spec.solver() {
-            Solver::GaussSeidel => "Gauss-Seidel sweeps",
-            Solver::Multigrid => "sweeps inside multigrid",
-            Solver::Direct => "direct solver",
-        };
+        let solver = spec.solver().facts().title;
         format!("back end: {device}, {precision} ({}); {solver}", self.reason)
     }
 

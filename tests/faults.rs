@@ -21,7 +21,7 @@ use curvelax::{
     conformance::{adaptive_members, members, self_test},
     ensemble::{
         Cell, Ended, Family, Spec, Status,
-        spec::{BackendChoice, Precision, SolverChoice},
+        spec::{BackendChoice, Precision},
     },
     number::Real,
     placement,
@@ -439,7 +439,7 @@ fn a_cap_of_one_sweep(gpu: &Gpu) -> Outcome {
         curves: 3,
         points: 127,
         adaptive: Some(0.005),
-        solver: SolverChoice::GaussSeidel,
+        solver: Solver::GaussSeidel.into(),
         max_sweeps: 1,
         t_end: 1e-9,
         ..Spec::default()

@@ -235,10 +235,10 @@ fn the_work_of_a_run_is_what_it_was() {
     let direct = Spec { solver: Solver::Direct.into(), ..spec(Flow::Willmore, 61, 1.0) };
     let adaptive =
         Spec { tau: None, adaptive: Some(1e-3), solver: SolverChoice::Auto, ..spec(Flow::Willmore, 61, 1.0) };
-    let swept = Spec { solver: SolverChoice::GaussSeidel, ..adaptive.clone() };
+    let swept = Spec { solver: Solver::GaussSeidel.into(), ..adaptive.clone() };
     let automatic = Spec { sor: Sor::Auto, ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
-    let cycles = Spec { solver: SolverChoice::Multigrid, ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
-    let adaptive_cycles = Spec { solver: SolverChoice::Multigrid, ..adaptive.clone() };
+    let cycles = Spec { solver: Solver::Multigrid.into(), ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
+    let adaptive_cycles = Spec { solver: Solver::Multigrid.into(), ..adaptive.clone() };
     let stops = Spec { stop_when_relaxed: true, t_end: 2.0, ..spec(Flow::SurfaceDiffusion, 50, 1.7) };
     for (name, spec, expected) in [
         ("surface diffusion", spec(Flow::SurfaceDiffusion, 100, 1.0), [100, 281616, 259784]),

@@ -13,7 +13,8 @@ use syn::{
 };
 
 /// The modules of the crate, each above all that it may use.
-const LAYERS: [&str; 28] = [
+const LAYERS: [&str; 29] = [
+    "wgsl",
     "error",
     "guard",
     "threads",

@@ -11,7 +11,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, crossing, polygon},
     ensemble::{
         Cell, Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
-        spec::{BackendChoice, Precision, Pull, SolverChoice, Sor},
+        spec::{BackendChoice, Precision, Pull, Sor},
     },
     flow::Flow,
     number::Real,
@@ -43,7 +43,7 @@ fn adaptive(shape: &str, points: usize) -> Spec {
         curves: 1,
         amplitude: 0.0,
         adaptive: Some(1e-3),
-        solver: SolverChoice::Direct,
+        solver: Solver::Direct.into(),
         backend: BackendChoice::Cpu,
         precision: Some(Precision::F64),
         ..Spec::default()
@@ -309,7 +309,7 @@ fn a_circle_stays_at_rest_through_a_long_run_in_either_precision() {
 
 #[test]
 fn a_lemniscate_is_singular_when_its_life_is_over_with_both_solvers() {
-    let (direct, sweeps) = (SolverChoice::Direct, SolverChoice::GaussSeidel);
+    let (direct, sweeps) = (Solver::Direct.into(), Solver::GaussSeidel.into());
     for (solver, size, precision) in [
         (direct, 1.0_f64, Precision::F64),
         (direct, 0.1, Precision::F64),
@@ -355,7 +355,7 @@ fn a_curve_whose_curvature_has_left_it_is_never_relaxed() {
 
 #[test]
 fn one_sweep_is_too_few_and_the_member_stalls_in_finite_time() {
-    let spec = Spec { solver: SolverChoice::GaussSeidel, max_sweeps: 1, ..adaptive("ellipse:2,1", 50) };
+    let spec = Spec { solver: Solver::GaussSeidel.into(), max_sweeps: 1, ..adaptive("ellipse:2,1", 50) };
     let outcome = one(&spec);
     assert_eq!((outcome.status, outcome.t_relax), (Status::Stalled, None));
     // Steps of any length are solved once they are short enough; the member creeps on until it has made its share.

@@ -14,7 +14,7 @@ use curvelax::{
     },
     flow::Flow,
     scheme::{Parameters, State, Workspace, curvature::Curvature, position::Position, redistribution, step},
-    solver::{Blocks, direct},
+    solver::{Blocks, Memory, direct},
     truth::{LEMNISCATE_LIFE, Measure, Problem, Solved, Varied, problems, studies},
 };
 use glam::DVec2;
@@ -179,10 +179,12 @@ fn correct_step(Linear { state, work, p }: &mut Linear) {
 /// A step whose 𝓑_i has `φ(k_i) + φ(k_{i-1})`, as the paper prints it.
 fn misprinted_step(Linear { state, work, p }: &mut Linear) {
     let State { curve, increments, .. } = state;
-    let Workspace { blocks, motion, new, curvature, position, factors, .. } = work;
+    let Workspace { blocks, motion, new, curvature, position, .. } = work;
+    let Memory { system: curvature, factor, .. } = curvature;
+    let Memory { system: position, factor: factor_of_both, .. } = position;
     redistribution::redistribute(curve, p, p.branches(), *blocks, motion, &mut new.r);
     curvature.assemble(&Curvature::new(curve, new, motion, p));
-    direct::solve(curvature, [&mut increments.k], &mut factors.0);
+    direct::solve(curvature, [&mut increments.k], factor);
     (0..curve.len()).for_each(|i| new.k[i] = curve.k[i] + increments.k[i]);
     new.k.close();
 
@@ -202,7 +204,7 @@ fn misprinted_step(Linear { state, work, p }: &mut Linear) {
         row.b += change / c;
         [row.a, row.b, row.d, row.e] = [row.a, row.b, row.d, row.e].map(|entry| entry * rescale);
     }
-    direct::solve(position, [&mut increments.x, &mut increments.y], &mut factors.1);
+    direct::solve(position, [&mut increments.x, &mut increments.y], factor_of_both);
     for i in 0..curve.len() {
         new.x[i] = curve.x[i] + increments.x[i];
         new.y[i] = curve.y[i] + increments.y[i];

@@ -30,7 +30,6 @@ kernels are compiled. The rates exclude it and a warm-up. The default takes less
 /// Names of the back ends that can be asked for.
 const BACKENDS: &[&str] = &["cpu", "gpu"];
 /// Names of the solvers that can be asked for.
-const SOLVERS: &[&str] = &["gauss-seidel", "multigrid", "direct"];
 /// Members at once on hardware: enough to fill it.
 const CURVES: u64 = 8192;
 /// Members at once elsewhere: the CPU back end has fewer slots, and a software GPU as few cores.
@@ -56,7 +55,7 @@ pub struct BenchArgs {
     #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true)]
     repeats: Option<usize>,
     /// Solvers of the pentadiagonal systems [default: all; direct and multigrid with --adaptive]
-    #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = flags::word::<Solver>(SOLVERS), help_heading = flags::METHOD)]
+    #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = flags::word::<Solver>(&Solver::NAMES), help_heading = flags::METHOD)]
     solver: Vec<Solver>,
     /// Adapt the steps to this local error; without TOL it is 0.001 [default: fixed steps]
     #[arg(
@@ -171,10 +170,9 @@ fn cases(args: &BenchArgs) -> Result<Vec<Spec>> {
         if given.is_empty() { all.to_vec() } else { given.to_vec() }
     }
     let base = Spec { adaptive: args.adaptive, threads: args.threads, ..Spec::default() };
-    let solvers = match args.adaptive {
-        Some(_) => or(&args.solver, &[Solver::Direct, Solver::Multigrid]),
-        None => or(&args.solver, &[Solver::Direct, Solver::Multigrid, Solver::GaussSeidel]),
-    };
+    // Fast ones first; where steps grow, without what slows with them.
+    let suits = |solver: &Solver| args.adaptive.is_none() || !solver.facts().slows_with_step;
+    let solvers = or(&args.solver, &Solver::ALL.into_iter().rev().filter(suits).collect::<Vec<_>>());
     let mut cases = Vec::new();
     for place in places(args)? {
         for points in or(&args.points, &[base.points]) {

@@ -179,7 +179,7 @@ fn compare_kernel<T: Real>(gpu: &Gpu, solver: Solver, n: usize, kind: Kind) -> R
     match kind {
         Kind::Stages => {
             rows = stages::<T>(gpu, solver, n, None)?;
-            rows.retain(|row| solver == Solver::GaussSeidel || row.quantity.starts_with('δ'));
+            rows.retain(|row| solver == Solver::ALL[0] || row.quantity.starts_with('δ'));
         }
         Kind::Fixed => {
             for steps in STEPS {

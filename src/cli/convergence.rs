@@ -6,7 +6,7 @@ use super::{flags, note, print};
 use crate::{
     ensemble::{
         Spec,
-        spec::{BackendChoice, Precision, SolverChoice},
+        spec::{BackendChoice, Precision, Solver, SolverChoice},
     },
     error::{Error, Result},
     files::{OutputFolder, Owner, names, tables},
@@ -33,7 +33,7 @@ pub struct ConvergenceArgs {
     #[arg(long, value_name = "NAME")]
     problem: Vec<String>,
     /// Solver of the pentadiagonal systems; sweeps take longer [default: direct]
-    #[arg(long, value_name = "SOLVER", value_parser = flags::word::<SolverChoice>(flags::SOLVERS), help_heading = flags::METHOD)]
+    #[arg(long, value_name = "SOLVER", value_parser = flags::word::<SolverChoice>(&SolverChoice::NAMES), help_heading = flags::METHOD)]
     solver: Option<SolverChoice>,
     /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]
     #[arg(long, value_name = "WHERE", value_parser = flags::word::<BackendChoice>(flags::BACKENDS), help_heading = flags::MACHINE)]
@@ -62,7 +62,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
         false => args.problem.iter().map(|name| Problem::named(name)).collect::<Result<_>>()?,
     };
     let spec = Spec {
-        solver: args.solver.unwrap_or(SolverChoice::Direct),
+        solver: args.solver.unwrap_or(Solver::Direct.into()),
         backend: args.backend.unwrap_or(BackendChoice::Auto),
         adapter: args.adapter,
         precision: args.precision,

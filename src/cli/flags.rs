@@ -19,7 +19,6 @@ use crate::{
 };
 
 const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
-pub(super) const SOLVERS: &[&str] = &["auto", "gauss-seidel", "multigrid", "direct"];
 const ORDERS: &[&str] = &["coloured", "lexicographic"];
 pub(super) const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
 pub(super) const PRECISIONS: &[&str] = &["f32", "f64"];
@@ -152,7 +151,7 @@ pub struct SpecFlags {
     pull: Option<Pull>,
     /// Solver of the pentadiagonal systems. multigrid is gauss-seidel inside V-cycles; auto is gauss-seidel with --tau
     /// and direct with --adaptive [default: auto]
-    #[arg(long, value_name = "SOLVER", value_parser = word::<SolverChoice>(SOLVERS), help_heading = METHOD)]
+    #[arg(long, value_name = "SOLVER", value_parser = word::<SolverChoice>(&SolverChoice::NAMES), help_heading = METHOD)]
     solver: Option<SolverChoice>,
     /// Order in which a sweep visits the nodes [default: coloured]
     #[arg(long, value_name = "ORDER", value_parser = word::<Order>(ORDERS), help_heading = METHOD)]
@@ -325,6 +324,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
+    use crate::solver::Solver;
     use clap::{Args, FromArgMatches};
 
     fn command() -> clap::Command {
@@ -443,7 +443,8 @@ mod tests {
             let refused = T::deserialize(StrDeserializer::<serde::de::value::Error>::new("")).unwrap_err().to_string();
             refused.split('`').skip(3).step_by(2).map(str::to_owned).collect()
         }
-        assert_eq!(words::<SolverChoice>(), SOLVERS);
+        assert_eq!(words::<Solver>(), Solver::NAMES);
+        assert_eq!(words::<SolverChoice>(), SolverChoice::NAMES);
         assert_eq!(words::<Order>(), ORDERS);
         assert_eq!(words::<BackendChoice>(), BACKENDS);
         assert_eq!(words::<Precision>(), PRECISIONS);

@@ -142,9 +142,9 @@ impl Scale {
             Scale::Tangential => work.motion.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
             Scale::Length => longest(),
             Scale::One => 1.0,
-            Scale::Weight => weight(&work.curvature.rows).max(weight(&work.position.rows)),
+            Scale::Weight => weight(&work.curvature.system.rows).max(weight(&work.position.system.rows)),
             Scale::Curvature => k(),
-            Scale::SolvedCurvature => k() * weight(&work.curvature.rows).sqrt(),
+            Scale::SolvedCurvature => k() * weight(&work.curvature.system.rows).sqrt(),
             Scale::Position => length / std::f64::consts::TAU,
             Scale::Area => length * length / (4.0 * std::f64::consts::PI),
             Scale::Energy => {
@@ -155,7 +155,7 @@ impl Scale {
                 let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
                 length / std::f64::consts::TAU / shortest
             }
-            Scale::SolvedPosition => longest() * weight(&work.position.rows).sqrt(),
+            Scale::SolvedPosition => longest() * weight(&work.position.system.rows).sqrt(),
         }
     }
 }

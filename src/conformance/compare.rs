@@ -444,12 +444,12 @@ fn traced<T: Real>(work: &Workspace<T>, increments: &Increments<T>) -> Vec<Vec<f
         [column(|row| row.a), column(|row| row.b), column(|row| row.d), column(|row| row.e), column(|row| row.weight)]
     };
     let mut fields = vec![wide(&work.motion.beta), ring(&work.motion.alpha), ring(&work.new.r)];
-    fields.extend(rows(&work.curvature.rows));
-    fields.extend([wide(&work.curvature.rhs[0]), ring(&increments.k)]);
-    fields.extend(rows(&work.position.rows));
+    fields.extend(rows(&work.curvature.system.rows));
+    fields.extend([wide(&work.curvature.system.rhs[0]), ring(&increments.k)]);
+    fields.extend(rows(&work.position.system.rows));
     fields.extend([
-        wide(&work.position.rhs[0]),
-        wide(&work.position.rhs[1]),
+        wide(&work.position.system.rhs[0]),
+        wide(&work.position.system.rhs[1]),
         ring(&increments.x),
         ring(&increments.y),
         ring(&work.new.k),

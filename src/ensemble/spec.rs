@@ -37,26 +37,50 @@ pub enum BackendChoice {
 }
 
 /// The solver asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolverChoice {
     /// Gauss–Seidel sweeps with a fixed τ, as in the paper; the direct solver with adaptive steps, whose sweeps would
     /// grow in number as the steps grow in length.
     Auto,
-    /// Gauss–Seidel sweeps.
-    GaussSeidel,
-    /// The same sweeps inside V-cycles, whose number hardly depends on the length of a step.
-    Multigrid,
-    /// Periodic pentadiagonal elimination.
-    Direct,
+    /// This one.
+    Only(Solver),
+}
+
+impl SolverChoice {
+    /// As in flags and files: `auto`, then the solvers.
+    pub const NAMES: [&str; 1 + Solver::NAMES.len()] = {
+        let mut names = ["auto"; 1 + Solver::NAMES.len()];
+        let mut i = 0;
+        while i < Solver::NAMES.len() {
+            names[1 + i] = Solver::NAMES[i];
+            i += 1;
+        }
+        names
+    };
 }
 
 impl From<Solver> for SolverChoice {
     fn from(solver: Solver) -> SolverChoice {
-        match solver {
-            Solver::GaussSeidel => SolverChoice::GaussSeidel,
-            Solver::Multigrid => SolverChoice::Multigrid,
-            Solver::Direct => SolverChoice::Direct,
+        SolverChoice::Only(solver)
+    }
+}
+
+impl Serialize for SolverChoice {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        match self {
+            SolverChoice::Auto => serializer.serialize_str(SolverChoice::NAMES[0]),
+            SolverChoice::Only(solver) => solver.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for SolverChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        match SolverChoice::NAMES.iter().position(|own| *own == name) {
+            Some(0) => Ok(SolverChoice::Auto),
+            Some(i) => Ok(SolverChoice::Only(Solver::ALL[i - 1])),
+            None => Err(de::Error::unknown_variant(&name, &SolverChoice::NAMES)),
         }
     }
 }
@@ -192,8 +216,6 @@ pub struct Spec {
 
 /// The paper's time step.
 pub const DEFAULT_TAU: f64 = 1e-3;
-/// A V-cycle of two sweeps halves the error at least, so a solve by them takes some 50 cycles; one of 500 never ends.
-const MAX_MULTIGRID_SWEEPS: u32 = 1000;
 /// Tolerance of `--adaptive` without a value.
 pub const DEFAULT_ADAPTIVE: f64 = 1e-3;
 /// Fraction of the initial excess at which a member is relaxed.
@@ -359,9 +381,9 @@ impl Spec {
     /// The solver in use.
     pub fn solver(&self) -> Solver {
         match (self.solver, self.pace()) {
-            (SolverChoice::GaussSeidel, _) | (SolverChoice::Auto, Pace::Fixed(_)) => Solver::GaussSeidel,
-            (SolverChoice::Multigrid, _) => Solver::Multigrid,
-            (SolverChoice::Direct, _) | (SolverChoice::Auto, Pace::Adaptive(_)) => Solver::Direct,
+            (SolverChoice::Only(solver), _) => solver,
+            (SolverChoice::Auto, Pace::Fixed(_)) => Solver::GaussSeidel,
+            (SolverChoice::Auto, Pace::Adaptive(_)) => Solver::Direct,
         }
     }
 
@@ -381,10 +403,7 @@ impl Spec {
 
     /// The cap of the sweeps of a solve in use.
     pub fn most_sweeps(&self) -> u32 {
-        match self.solver() {
-            Solver::Multigrid => self.max_sweeps.min(MAX_MULTIGRID_SWEEPS),
-            Solver::GaussSeidel | Solver::Direct => self.max_sweeps,
-        }
+        self.max_sweeps.min(self.solver().facts().max_sweeps)
     }
 
     /// The residual tolerance in use at `precision`.

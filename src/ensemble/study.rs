@@ -76,7 +76,7 @@ impl Cell {
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.family.warnings().to_vec();
         let Cohort { solver, adaptive, .. } = self.cohort();
-        if adaptive && solver == Solver::GaussSeidel {
+        if adaptive && solver.facts().slows_with_step {
             warnings.push(LONG_SWEEPS.into());
         }
         warnings
@@ -169,7 +169,6 @@ pub fn cohorts(cells: &[Cell]) -> Vec<Range<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ensemble::spec::SolverChoice;
 
     fn swept(axes: &[&str], base: Spec) -> Spec {
         let mut spec = base;
@@ -200,7 +199,7 @@ mod tests {
         let cells = cells(&swept(&["solver=gauss-seidel,multigrid,direct", "adaptive=0.01"], Spec::default())).unwrap();
         let warned: Vec<bool> = cells.iter().map(|cell| cell.warnings() == [LONG_SWEEPS]).collect();
         assert_eq!(warned, [true, false, false]);
-        let fixed = Spec { solver: SolverChoice::GaussSeidel, ..Spec::default() }.validate().unwrap();
+        let fixed = Spec { solver: Solver::GaussSeidel.into(), ..Spec::default() }.validate().unwrap();
         let family = Family::new(&fixed).unwrap();
         assert!(Cell::only(fixed, family).warnings().is_empty());
     }

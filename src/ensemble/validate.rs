@@ -3,15 +3,14 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that
 //! takes the file they come from; only the resolution of the highest mode is checked here.
 
-use super::spec::{
-    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Solver, Sor, Spec, Store,
+use super::spec::{BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Sor, Spec, Store};
+use crate::{
+    error::{Error, Result},
+    solver::{Facts, ring::MIN_POINTS},
 };
-use crate::error::{Error, Result};
 
 /// More members than this is a slip of the keyboard.
 const MAX_CURVES: u64 = 1_000_000_000;
-/// With fewer nodes the five-point rows reach around the ring and its colours meet.
-const FEWEST_POINTS: usize = crate::solver::ring::MIN_POINTS;
 const MAX_POINTS: usize = 1_000_000;
 /// A member with more steps than this would not end in a year.
 const MAX_STEPS: f64 = 1e9;
@@ -67,13 +66,13 @@ impl Spec {
             let problem = if self.curves == 0 { "an ensemble needs a member" } else { "too many members" };
             return Err(Error::value("curves", self.curves, problem, &format!("take 1 to {MAX_CURVES}")));
         }
-        if !(FEWEST_POINTS..=MAX_POINTS).contains(&self.points) {
-            let problem = if self.points < FEWEST_POINTS {
+        if !(MIN_POINTS..=MAX_POINTS).contains(&self.points) {
+            let problem = if self.points < MIN_POINTS {
                 "a ring of fewer than 6 nodes cannot be coloured"
             } else {
                 "too many nodes"
             };
-            let allowed = format!("take {FEWEST_POINTS} to {MAX_POINTS}");
+            let allowed = format!("take {MIN_POINTS} to {MAX_POINTS}");
             return Err(Error::value("points", self.points, problem, &allowed));
         }
         if let Some(threads) = self.threads
@@ -250,19 +249,17 @@ impl Spec {
     /// Nothing may be asked for that the solver does not do: the direct one makes no sweeps, and multigrid makes its own.
     fn check_sweeps(&self) -> Result<()> {
         let default = Spec::default();
-        let order = (self.order != default.order).then(|| ("order", "lexicographic".to_string()));
-        let sor = (self.sor != default.sor).then(|| match self.sor {
-            Sor::Factor(factor) => ("sor", number(factor)),
-            Sor::Auto => ("sor", "auto".to_string()),
-        });
-        let tolerance = self.tolerance.map(|tolerance| ("tolerance", number(tolerance)));
-        let most = (self.max_sweeps != default.max_sweeps).then(|| ("max-sweeps", self.max_sweeps.to_string()));
-        let (asked, problem) = match self.solver() {
-            Solver::GaussSeidel => return Ok(()),
-            Solver::Multigrid => (vec![order, sor], "multigrid sweeps by colours and without over-relaxation"),
-            Solver::Direct => (vec![order, tolerance, sor, most], "the direct solver makes no sweeps"),
-        };
-        match asked.into_iter().flatten().next() {
+        let asked = [
+            (self.order != default.order).then(|| ("order", "lexicographic".to_string())),
+            self.tolerance.map(|tolerance| ("tolerance", number(tolerance))),
+            (self.sor != default.sor).then(|| match self.sor {
+                Sor::Factor(factor) => ("sor", number(factor)),
+                Sor::Auto => ("sor", "auto".to_string()),
+            }),
+            (self.max_sweeps != default.max_sweeps).then(|| ("max-sweeps", self.max_sweeps.to_string())),
+        ];
+        let Facts { refuses, refuses_because: problem, .. } = *self.solver().facts();
+        match asked.into_iter().flatten().find(|(key, _)| refuses.contains(key)) {
             None => Ok(()),
             Some((key, value)) => {
                 let allowed = format!("leave out --{key}, or take --solver gauss-seidel");

@@ -14,10 +14,11 @@ use crate::{
 /// The equations, from the old curve, its motion and the new lengths.
 pub struct Curvature<'a, N> {
     old: &'a Curve<N>,
-    new: &'a Curve<N>,
-    motion: &'a Motion<N>,
+    pub(super) new: &'a Curve<N>,
+    pub(super) motion: &'a Motion<N>,
     tau: N,
-    rate: N,
+    /// 1/τ.
+    pub(super) rate: N,
 }
 
 impl<'a, N: Number> Curvature<'a, N> {

@@ -5,7 +5,7 @@
 
 use super::{
     Branches, Parameters, State, Status, Workspace, decay, extrapolation,
-    member::NEVER,
+    member::{Counters, NEVER},
     observe::{self, Glance},
     pace::{self, Stride},
     run::{Run, Taken},
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     number::{Mask, Number, Real},
-    solver::{Blocks, Cycles, Elimination, Solver, Solves, Sweeps},
+    solver::{Blocks, Solves, by_solver},
 };
 
 /// Members that take the same branches of the scheme, and so can go abreast.
@@ -66,11 +66,7 @@ struct Attempt<N: Number> {
 pub fn evolve<T: Real>(run: &mut Run<T>, method: &Method, team: &mut Team<T>, attempts: u32) {
     let branches = run.parameters.branches();
     let alone = Group { runs: &mut [run], branches };
-    match method.solver {
-        Solver::GaussSeidel => evolve_abreast::<T, Sweeps>(alone, method, team, attempts),
-        Solver::Multigrid => evolve_abreast::<T, Cycles>(alone, method, team, attempts),
-        Solver::Direct => evolve_abreast::<T, Elimination>(alone, method, team, attempts),
-    }
+    by_solver!(method.solver, S => evolve_abreast::<T, S>(alone, method, team, attempts))
 }
 
 /// Advances a group of at most as many members as there are lanes by the solver `S`; returns earlier when less than half of
@@ -116,14 +112,14 @@ impl<N: Number> Team<N> {
         Team::with(Workspace::new(blocks))
     }
 
-    /// Room to advance them by one solver.
-    pub fn for_solver(blocks: Blocks, solver: Solver) -> Team<N> {
-        Team::with(Workspace::for_solver(blocks, solver))
+    /// Room to advance them by the solver `S`.
+    pub fn for_solver<S: Solves>(blocks: Blocks) -> Team<N> {
+        Team::with(Workspace::for_solver::<S>(blocks))
     }
 
     /// About the bytes of [`Team::for_solver`] for rings of `n` nodes.
-    pub fn bytes(n: usize, solver: Solver) -> usize {
-        (STATE_FIELDS + Workspace::<N>::numbers(solver)) * n * size_of::<N>()
+    pub fn bytes<S: Solves>(n: usize) -> usize {
+        (STATE_FIELDS + Workspace::<N>::numbers::<S>()) * n * size_of::<N>()
     }
 
     fn with(work: Workspace<N>) -> Team<N> {
@@ -205,7 +201,7 @@ impl<N: Number> Team<N> {
             if adaptive && part < 2 {
                 let kept = if part == 0 { &mut state.middle } else { &mut state.before };
                 std::mem::swap(kept, &mut work.new);
-                if S::SOLVER.sweeps() {
+                if S::FACTS.sweeps {
                     Start::after_part(part).put(&mut state.increments, &mut state.earlier);
                 }
             }
@@ -233,92 +229,63 @@ impl<N: Number> Team<N> {
         adaptive: bool,
         attempt: &Attempt<N>,
     ) {
-        let Attempt { stepped, error, middle, seen, excess } = attempt;
-        let (zero, half) = (N::Real::of(0.0), N::Real::of(0.5));
         let n = self.work.blocks.n;
-        let exact = error.le(self.parameters.adaptive);
-        let finite = seen.is_finite();
-        let singular = seen.is_singular(self.turning, &self.parameters, n);
-        // The gap costs a fifth of a direct step, and is asked for once.
-        let mut waiting = N::Mask::all_of(false);
-        for (lane, run) in runs.iter().enumerate() {
-            waiting.set_lane(lane, run.counters.relax_step == NEVER);
-        }
-        let at_threshold = excess.le(self.parameters.relax_at).and(live).and(waiting);
-        let gap = if at_threshold.any() { observe::gap(&self.work.new) } else { N::of(0.0) };
+        let gap = self.gap_at_threshold(runs, live, attempt.excess);
+        let exact = attempt.error.le(self.parameters.adaptive);
+        let (finite, singular) =
+            (attempt.seen.is_finite(), attempt.seen.is_singular(self.turning, &self.parameters, n));
         let mut kept = N::Mask::all_of(false);
         let mut start = Start::after_fixed();
         for (lane, run) in runs.iter_mut().enumerate() {
             if !live.lane(lane) {
                 continue;
             }
-            let counters = &mut run.counters;
-            counters.sweeps_k = counters.sweeps_k.saturating_add(stepped.sweeps_k.lane(lane).to_f64() as u32);
-            counters.sweeps_x = counters.sweeps_x.saturating_add(stepped.sweeps_x.lane(lane).to_f64() as u32);
-            let (h, error) = (self.strides[lane].length, error.lane(lane));
-            let of_step = match (stepped.finite.lane(lane), stepped.solved.lane(lane)) {
-                (false, _) => Some(Status::Nonfinite),
-                (true, false) => Some(Status::Stalled),
-                (true, true) => None,
-            };
-            if adaptive && of_step.is_none() && !exact.lane(lane) {
-                let next = pace::next_length(h, error, 1.0, &run.parameters);
-                refuse(run, n, next, pace::MIN_STEP, Status::Singular);
-                start.set_lane(lane, Start::after_refused(next / (half * h)));
+            count_sweeps(&mut run.counters, &attempt.stepped, lane);
+            let (stride, error) = (self.strides[lane], attempt.error.lane(lane));
+            let of_solves = failure_of_solves(&attempt.stepped, lane);
+            let failure = of_solves.or(failure_of_curve(finite.lane(lane), singular.lane(lane)));
+            if adaptive && of_solves.is_none() && !exact.lane(lane) {
                 kept.set_lane(lane, true);
-                continue;
-            }
-            let failure = of_step.or(match (finite.lane(lane), singular.lane(lane)) {
-                (false, _) => Some(Status::Nonfinite),
-                (true, true) => Some(Status::Singular),
-                (true, false) => None,
-            });
-            if let Some(cause) = failure {
+                start.set_lane(lane, refuse_inaccurate(run, n, stride.length, error));
+            } else if let Some(cause) = failure {
                 kept.set_lane(lane, true);
                 if adaptive {
-                    let least = if cause == Status::Singular { pace::MIN_TO_SINGULAR } else { pace::MIN_STEP };
-                    refuse(run, n, N::Real::of(pace::MIN_GROWTH) * h, least, cause);
-                    // After that the increments may be anything.
-                    start.set_lane(lane, Start::nowhere());
+                    start.set_lane(lane, refuse_failure(run, n, stride.length, cause));
                 } else {
                     run.counters.status = cause as u32;
                 }
-                continue;
-            }
-            let taken = Taken {
-                h: if adaptive { h } else { zero },
-                before: self.excess.lane(lane),
-                middle: middle.lane(lane),
-                after: excess.lane(lane),
-                gap: gap.lane(lane),
-            };
-            record_events(run, &taken);
-            decay::follow(run, &taken);
-            let Run { parameters, counters, report, .. } = &mut **run;
-            let progress = &mut report.progress;
-            if adaptive {
-                let most_growth = if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 };
-                progress.next = pace::next_length(h, error, most_growth, parameters);
-                start.set_lane(lane, Start::after_taken(progress.next / (half * h)));
-                pace::pass(progress, self.strides[lane], parameters);
-                counters.refused = 0;
-            }
-            (report.now.excess, report.now.length) = (taken.after, seen.length.lane(lane));
-            counters.steps += 1;
-            progress.travel += seen.farthest.lane(lane);
-            if counters.relax_step != NEVER && counters.stop_when_relaxed != 0 {
-                counters.status = Status::Relaxed as u32;
-            }
-            let concave = zero.le(seen.minus_k_min.lane(lane));
-            let looked_at = parameters.look_at.le(progress.travel) && concave;
-            if looked_at || (adaptive && pace::at_goal(progress, parameters)) {
-                counters.goal = counters.steps;
+            } else {
+                let taken = Taken {
+                    h: if adaptive { stride.length } else { N::Real::of(0.0) },
+                    before: self.excess.lane(lane),
+                    middle: attempt.middle.lane(lane),
+                    after: attempt.excess.lane(lane),
+                    gap: gap.lane(lane),
+                };
+                record_events(run, &taken);
+                decay::follow(run, &taken);
+                if adaptive {
+                    start.set_lane(lane, lengthen(run, stride, error));
+                }
+                accepted(run, taken.after, &attempt.seen, lane, adaptive);
             }
         }
-        if S::SOLVER.sweeps() {
+        if S::FACTS.sweeps {
             start.put(&mut self.state.increments, &mut self.state.earlier);
         }
-        self.accept(kept, *excess);
+        self.accept(kept, attempt.excess);
+    }
+
+    /// The gap between k and the polygon of the new curves, if one of them may have relaxed: it costs a fifth of a direct
+    /// step, and is asked for once.
+    #[inline(always)]
+    fn gap_at_threshold(&self, runs: &[&mut Run<N::Real>], live: N::Mask, excess: N) -> N {
+        let mut waiting = N::Mask::all_of(false);
+        for (lane, run) in runs.iter().enumerate() {
+            waiting.set_lane(lane, run.counters.relax_step == NEVER);
+        }
+        let at_threshold = excess.le(self.parameters.relax_at).and(live).and(waiting);
+        if at_threshold.any() { observe::gap(&self.work.new) } else { N::of(0.0) }
     }
 
     /// Takes the new curves, but not in the lanes whose curve is kept.
@@ -332,6 +299,75 @@ impl<N: Number> Team<N> {
         std::mem::swap(&mut state.before, &mut state.curve);
         std::mem::swap(&mut state.curve, &mut work.new);
     }
+}
+
+#[inline(always)]
+fn count_sweeps<N: Number>(counters: &mut Counters, stepped: &Stepped<N>, lane: usize) {
+    counters.sweeps_k = counters.sweeps_k.saturating_add(stepped.sweeps_k.lane(lane).to_f64() as u32);
+    counters.sweeps_x = counters.sweeps_x.saturating_add(stepped.sweeps_x.lane(lane).to_f64() as u32);
+}
+
+/// How the solves of a step failed.
+#[inline(always)]
+fn failure_of_solves<N: Number>(stepped: &Stepped<N>, lane: usize) -> Option<Status> {
+    match (stepped.finite.lane(lane), stepped.solved.lane(lane)) {
+        (false, _) => Some(Status::Nonfinite),
+        (true, false) => Some(Status::Stalled),
+        (true, true) => None,
+    }
+}
+
+/// What is wrong with the curve after a step that was solved.
+fn failure_of_curve(finite: bool, singular: bool) -> Option<Status> {
+    match (finite, singular) {
+        (false, _) => Some(Status::Nonfinite),
+        (true, true) => Some(Status::Singular),
+        (true, false) => None,
+    }
+}
+
+/// Counts a step that was taken, and decides whether the member goes on.
+#[inline(always)]
+fn accepted<N: Number>(run: &mut Run<N::Real>, excess: N::Real, seen: &Glance<N>, lane: usize, adaptive: bool) {
+    let Run { parameters, counters, report, .. } = run;
+    let progress = &mut report.progress;
+    (report.now.excess, report.now.length) = (excess, seen.length.lane(lane));
+    counters.steps += 1;
+    progress.travel += seen.farthest.lane(lane);
+    if counters.relax_step != NEVER && counters.stop_when_relaxed != 0 {
+        counters.status = Status::Relaxed as u32;
+    }
+    let concave = N::Real::of(0.0).le(seen.minus_k_min.lane(lane));
+    let looked_at = parameters.look_at.le(progress.travel) && concave;
+    if looked_at || (adaptive && pace::at_goal(progress, parameters)) {
+        counters.goal = counters.steps;
+    }
+}
+
+/// Passes the time of an adaptive step that was taken, and chooses the length of the next one.
+fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, error: T) -> Start<T> {
+    let Run { parameters, counters, report, .. } = run;
+    let progress = &mut report.progress;
+    let most_growth = if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 };
+    progress.next = pace::next_length(stride.length, error, most_growth, parameters);
+    let start = Start::after_taken(progress.next / (T::of(0.5) * stride.length));
+    pace::pass(progress, stride, parameters);
+    counters.refused = 0;
+    start
+}
+
+/// Refuses a step of length h whose error is too large.
+fn refuse_inaccurate<T: Real>(run: &mut Run<T>, n: usize, h: T, error: T) -> Start<T> {
+    let next = pace::next_length(h, error, 1.0, &run.parameters);
+    refuse(run, n, next, pace::MIN_STEP, Status::Singular);
+    Start::after_refused(next / (T::of(0.5) * h))
+}
+
+/// Refuses a step of length h that failed outright; after that the increments may be anything.
+fn refuse_failure<T: Real>(run: &mut Run<T>, n: usize, h: T, cause: Status) -> Start<T> {
+    let least = if cause == Status::Singular { pace::MIN_TO_SINGULAR } else { pace::MIN_STEP };
+    refuse(run, n, T::of(pace::MIN_GROWTH) * h, least, cause);
+    Start::nowhere()
 }
 
 /// Tries again with a step of length `next`, or gives the member up for `cause` where that is below `least` of `(L/n)⁴`.

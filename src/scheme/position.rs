@@ -14,11 +14,12 @@ use crate::{
 /// The equations, from the old positions and the new lengths and curvatures.
 pub struct Position<'a, N> {
     old: &'a Curve<N>,
-    new: &'a Curve<N>,
-    motion: &'a Motion<N>,
-    law: Law<N>,
+    pub(super) new: &'a Curve<N>,
+    pub(super) motion: &'a Motion<N>,
+    pub(super) law: Law<N>,
     tau: N,
-    rate: N,
+    /// 1/τ.
+    pub(super) rate: N,
 }
 
 impl<'a, N: Number> Position<'a, N> {

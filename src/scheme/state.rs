@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::{
     number::{Number, Real},
-    solver::{Blocks, Ring, Solver, System, direct::Factor, multigrid::Levels},
+    solver::{Blocks, Memory, Ring, Solves},
 };
 
 /// Fields of a curve.
@@ -217,68 +217,41 @@ pub struct Workspace<N> {
     pub motion: Motion<N>,
     /// The new curve.
     pub new: Curve<N>,
-    /// Curvature system, as sweeps take it.
-    pub curvature: System<N, 1>,
-    /// Position system, as sweeps take it.
-    pub position: System<N, 2>,
-    /// Fill the systems also where a direct solve does not need them.
+    /// The curvature system and its solver.
+    pub curvature: Memory<N, 1>,
+    /// The position system and its solver.
+    pub position: Memory<N, 2>,
+    /// Fill the rows of the systems also where the solver does not need them.
     pub traced: bool,
-    /// Triangular factors of the two systems.
-    pub factors: (Factor<N, 1>, Factor<N, 2>),
-    /// Coarser levels of the two systems.
-    pub levels: (Levels<N, 1>, Levels<N, 2>),
-}
-
-/// What only some solvers need.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
-    Systems,
-    Factors,
-    Levels,
-}
-
-impl Part {
-    fn is_for(self, solver: Solver) -> bool {
-        match self {
-            Part::Systems => solver.sweeps(),
-            Part::Factors => solver == Solver::Direct,
-            Part::Levels => solver == Solver::Multigrid,
-        }
-    }
 }
 
 impl<N: Number> Workspace<N> {
     /// A workspace for rings cut by `blocks`, whatever the solver.
     pub fn new(blocks: Blocks) -> Workspace<N> {
-        Workspace::with(blocks, |_| true)
+        Workspace::with(blocks, Memory::any(blocks.n), Memory::any(blocks.n))
     }
 
-    /// One with what `solver` needs.
-    pub fn for_solver(blocks: Blocks, solver: Solver) -> Workspace<N> {
-        Workspace::with(blocks, |part| part.is_for(solver))
+    /// One with what the solver `S` needs.
+    pub fn for_solver<S: Solves>(blocks: Blocks) -> Workspace<N> {
+        Workspace::with(blocks, S::memory(blocks.n), S::memory(blocks.n))
     }
 
-    /// Numbers that one with what `solver` needs has for each node; coarser levels have together as many nodes as the finest.
-    pub fn numbers(solver: Solver) -> usize {
-        let parts = [(Part::Systems, 13), (Part::Factors, 11), (Part::Levels, 65)];
-        let own: usize = parts.iter().filter(|(part, _)| part.is_for(solver)).map(|(_, numbers)| numbers).sum();
-        10 + own
+    /// Numbers that this has for each node.
+    pub const fn numbers<S: Solves>() -> usize {
+        10 + S::FACTS.numbers_per_node
     }
 
-    fn with(blocks: Blocks, has: impl Fn(Part) -> bool) -> Workspace<N> {
+    fn with(blocks: Blocks, curvature: Memory<N, 1>, position: Memory<N, 2>) -> Workspace<N> {
         let n = blocks.n;
-        let room = |part: Part| if has(part) { n } else { 0 };
         let ring = || Ring::zeros(n);
         let nodes = || vec![N::default(); n];
         Workspace {
             blocks,
             motion: Motion { b: ring(), beta: nodes(), rkb: nodes(), alpha: ring(), ir: ring(), iq: ring() },
             new: Curve::zeros(n),
-            curvature: System::zeros(room(Part::Systems)),
-            position: System::zeros(room(Part::Systems)),
+            curvature,
+            position,
             traced: false,
-            factors: (Factor::new(room(Part::Factors)), Factor::new(room(Part::Factors))),
-            levels: (Levels::new(room(Part::Levels)), Levels::new(room(Part::Levels))),
         }
     }
 }

@@ -1,16 +1,11 @@
 //! One step of the paper's scheme, from an old curve to the new one in the workspace. Twin of `shaders/step.wgsl`.
 
 use super::{
-    Branches, Curve, Increments, Parameters, Workspace, coarse, curvature::Curvature, position::Position, pull,
-    redistribution,
+    Branches, Curve, Increments, Parameters, Workspace, curvature::Curvature, position::Position, pull, redistribution,
 };
 use crate::{
     number::{Mask, Number, Real},
-    solver::{
-        Cycles, Elimination, Order, Ring, Solver, Solves, Sweeps, direct,
-        gauss_seidel::{self, Swept},
-        multigrid,
-    },
+    solver::{Order, Ring, Solver, Solves, by_solver, gauss_seidel::Control},
 };
 
 /// What the members of a run have in common.
@@ -49,11 +44,7 @@ pub fn step<T: Real>(
     work: &mut Workspace<T>,
 ) -> Stepped<T> {
     let branches = p.branches();
-    match method.solver {
-        Solver::GaussSeidel => step_by::<T, Sweeps>(old, increments, p, branches, true, method, work),
-        Solver::Multigrid => step_by::<T, Cycles>(old, increments, p, branches, true, method, work),
-        Solver::Direct => step_by::<T, Elimination>(old, increments, p, branches, true, method, work),
-    }
+    by_solver!(method.solver, S => step_by::<T, S>(old, increments, p, branches, true, method, work))
 }
 
 /// The same for members side by side that share `branches`, by the solver `S`. Lanes that are not `live` cost no sweeps and mean nothing
@@ -68,12 +59,12 @@ pub fn step_by<N: Number, S: Solves>(
     method: &Method,
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
-    let Workspace { blocks, motion, new, curvature, position, traced, factors, levels } = work;
+    let Workspace { blocks, motion, new, curvature, position, traced } = work;
     let length = redistribution::redistribute(old, p, branches, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
     let rounding = N::of(NEGLIGIBLE * N::EPSILON);
-    let control = gauss_seidel::Control {
+    let control = Control {
         tolerance: p.tolerance,
         negligible: rounding / radius,
         sor: p.sor,
@@ -82,34 +73,19 @@ pub fn step_by<N: Number, S: Solves>(
     };
 
     let equations = Curvature::new(old, new, motion, p);
-    if S::SOLVER.sweeps() || *traced {
-        curvature.assemble(&equations);
+    if *traced {
+        curvature.system.assemble(&equations);
     }
-    let unknown = [&mut increments.k];
-    let for_k = match S::SOLVER {
-        Solver::Direct => unswept(direct::solve(&equations, unknown, &mut factors.0)),
-        Solver::GaussSeidel => gauss_seidel::solve(curvature, unknown, *blocks, &control, live),
-        Solver::Multigrid => {
-            coarse::curvature(motion, &new.r, p, &mut levels.0);
-            multigrid::solve(curvature, unknown, *blocks, &control, live, &mut levels.0)
-        }
-    };
+    let for_k = S::solve(&equations, [&mut increments.k], curvature, *blocks, &control, live);
     add(&old.k, &increments.k, &mut new.k);
 
     let equations = Position::new(old, new, motion, p, branches);
-    if S::SOLVER.sweeps() || *traced {
-        position.assemble(&equations);
+    if *traced {
+        position.system.assemble(&equations);
     }
-    let control = gauss_seidel::Control { negligible: rounding * radius, ..control };
+    let control = Control { negligible: rounding * radius, ..control };
     let unknowns = [&mut increments.x, &mut increments.y];
-    let for_x = match S::SOLVER {
-        Solver::Direct => unswept(direct::solve(&equations, unknowns, &mut factors.1)),
-        Solver::GaussSeidel => gauss_seidel::solve(position, unknowns, *blocks, &control, live),
-        Solver::Multigrid => {
-            coarse::position(motion, &new.r, &new.k, p, branches, &mut levels.1);
-            multigrid::solve(position, unknowns, *blocks, &control, live, &mut levels.1)
-        }
-    };
+    let for_x = S::solve(&equations, unknowns, position, *blocks, &control, live);
     add(&old.x, &increments.x, &mut new.x);
     add(&old.y, &increments.y, &mut new.y);
     pull::pull(new, p, branches);
@@ -121,12 +97,6 @@ pub fn step_by<N: Number, S: Solves>(
         solved: for_k.converged.and(for_x.converged),
         finite: for_k.finite.and(for_x.finite.or(for_k.converged.not())),
     }
-}
-
-/// What a direct solve says, in the words of the sweeps.
-#[inline(always)]
-fn unswept<N: Number>(finite: N::Mask) -> Swept<N> {
-    Swept { sweeps: N::of(0.0), converged: finite, finite }
 }
 
 #[inline(always)]

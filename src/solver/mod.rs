@@ -1,4 +1,6 @@
 //! Periodic pentadiagonal systems on a ring of nodes: the rows, Gauss–Seidel sweeps, alone or in V-cycles, and a direct solve.
+//!
+//! A solver is a type that implements [`Solves`]. Its [`Facts`] are all that the rest of the program knows of it.
 
 pub mod direct;
 pub mod gauss_seidel;
@@ -12,6 +14,13 @@ pub use gauss_seidel::Order;
 pub use ring::{Blocks, Ring, Sums};
 pub use system::{Equation, Equations, Row, System};
 
+use crate::{
+    number::Number,
+    wgsl::{self, Part},
+};
+use gauss_seidel::{Control, SWEEPS_PER_CHECK, Swept};
+use multigrid::{Discretisation, KERNEL_LEVELS, Levels, SWEEPS_PER_CYCLE};
+
 /// Which solver takes the periodic pentadiagonal systems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -24,44 +33,274 @@ pub enum Solver {
     Direct,
 }
 
+/// Evaluates `$body` with `$S` as the type of a [`Solver`], for code that is compiled for one solver at a time.
+macro_rules! by_solver {
+    ($solver:expr, $S:ident => $body:expr) => {
+        match $solver {
+            $crate::solver::Solver::GaussSeidel => {
+                type $S = $crate::solver::Sweeps;
+                $body
+            }
+            $crate::solver::Solver::Multigrid => {
+                type $S = $crate::solver::Cycles;
+                $body
+            }
+            $crate::solver::Solver::Direct => {
+                type $S = $crate::solver::Elimination;
+                $body
+            }
+        }
+    };
+}
+
+pub(crate) use by_solver;
+
 impl Solver {
     /// All of them.
     pub const ALL: [Solver; 3] = [Solver::GaussSeidel, Solver::Multigrid, Solver::Direct];
 
-    /// As in flags and files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Solver::GaussSeidel => "gauss-seidel",
-            Solver::Multigrid => "multigrid",
-            Solver::Direct => "direct",
+    /// Their names, in the same order.
+    pub const NAMES: [&str; Solver::ALL.len()] = {
+        let mut names = [""; Solver::ALL.len()];
+        let mut i = 0;
+        while i < names.len() {
+            names[i] = Solver::ALL[i].name();
+            i += 1;
         }
+        names
+    };
+
+    /// What the rest of the program knows of it.
+    pub const fn facts(self) -> &'static Facts {
+        by_solver!(self, S => &<S as Solves>::FACTS)
+    }
+
+    /// As in flags and files.
+    pub const fn name(self) -> &'static str {
+        self.facts().name
     }
 
     /// Whether it sweeps until a tolerance is met.
     pub const fn sweeps(self) -> bool {
-        !matches!(self, Solver::Direct)
+        self.facts().sweeps
     }
 }
 
-/// A solver as a type, for code that is compiled for one solver at a time.
-pub trait Solves {
-    /// Which one.
-    const SOLVER: Solver;
+/// A solver as a type.
+pub trait Solves: 'static {
+    /// What the rest of the program knows of it.
+    const FACTS: Facts;
+
+    /// What it computes with, besides the unknowns, for systems of `n` equations.
+    fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F>;
+
+    /// Solves `system` for `unknown`, one ring for each right-hand side, in the lanes that are `live`; sweeps start from what
+    /// is there. Other lanes cost no sweeps and mean nothing afterwards.
+    fn solve<N: Number, const F: usize>(
+        system: &impl Discretisation<N, F>,
+        unknown: [&mut Ring<N>; F],
+        memory: &mut Memory<N, F>,
+        blocks: Blocks,
+        control: &Control<N>,
+        live: N::Mask,
+    ) -> Swept<N>;
+}
+
+/// What a solver is called, needs and does.
+#[derive(Debug)]
+pub struct Facts {
+    /// As in flags and files.
+    pub name: &'static str,
+    /// As in messages.
+    pub title: &'static str,
+    /// Whether it sweeps until a tolerance is met.
+    pub sweeps: bool,
+    /// Whether it needs the more sweeps the longer a step is.
+    pub slows_with_step: bool,
+    /// Sweeps of a solve at most, whatever is asked for.
+    pub max_sweeps: u32,
+    /// Keys of the spec that mean nothing to it.
+    pub refuses: &'static [&'static str],
+    /// Why they do not.
+    pub refuses_because: &'static str,
+    /// Numbers per node of its [`Memory`], both systems of a step together.
+    pub numbers_per_node: usize,
+    /// What the kernel needs to know.
+    pub kernel: KernelFacts,
+}
+
+/// What the kernel needs to know of a solver.
+#[derive(Debug)]
+pub struct KernelFacts {
+    /// Its files.
+    pub files: &'static [Part],
+    /// Whether a member that is one subgroup may exchange by shuffles.
+    pub shuffles: bool,
+    /// Rows of four numbers that a block has in workgroup memory, where threads exchange by barriers.
+    pub rows_per_block: usize,
+    /// Numbers that a ring of n nodes has there besides.
+    pub numbers: fn(usize) -> usize,
+    /// Sweeps between two looks at the residual.
+    pub sweeps_per_look: u32,
+    /// Iterations of loops between two looks.
+    pub iterations_per_look: u32,
+    /// And before the first.
+    pub iterations_per_solve: u32,
+}
+
+/// What solvers compute with: each has room in what it needs, and leaves the rest empty.
+#[derive(Clone, Debug)]
+pub struct Memory<N, const F: usize> {
+    /// The rows, as sweeps take them.
+    pub system: System<N, F>,
+    /// Triangular factor.
+    pub factor: direct::Factor<N, F>,
+    /// Coarser levels.
+    pub levels: Levels<N, F>,
+}
+
+impl<N: Number, const F: usize> Memory<N, F> {
+    /// None.
+    pub fn none() -> Self {
+        Self::with([0; 3])
+    }
+
+    /// What any solver needs for systems of `n` equations.
+    pub fn any(n: usize) -> Self {
+        Self::with([n; 3])
+    }
+
+    fn with([system, factor, levels]: [usize; 3]) -> Self {
+        Memory { system: System::zeros(system), factor: direct::Factor::new(factor), levels: Levels::new(levels) }
+    }
 }
 
 /// [`Solver::GaussSeidel`] as a type.
 pub struct Sweeps;
+
+impl Solves for Sweeps {
+    const FACTS: Facts = Facts {
+        name: "gauss-seidel",
+        title: "Gauss-Seidel sweeps",
+        sweeps: true,
+        slows_with_step: true,
+        max_sweeps: u32::MAX,
+        refuses: &[],
+        refuses_because: "",
+        numbers_per_node: 13,
+        kernel: KernelFacts {
+            files: &wgsl::parts!["sweeps.wgsl", "gauss_seidel.wgsl"],
+            shuffles: true,
+            rows_per_block: 3,
+            numbers: |_| 0,
+            sweeps_per_look: SWEEPS_PER_CHECK,
+            iterations_per_look: SWEEPS_PER_CHECK,
+            iterations_per_solve: 0,
+        },
+    };
+
+    fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F> {
+        Memory { system: System::zeros(n), ..Memory::none() }
+    }
+
+    #[inline(always)]
+    fn solve<N: Number, const F: usize>(
+        system: &impl Discretisation<N, F>,
+        unknown: [&mut Ring<N>; F],
+        memory: &mut Memory<N, F>,
+        blocks: Blocks,
+        control: &Control<N>,
+        live: N::Mask,
+    ) -> Swept<N> {
+        memory.system.assemble(system);
+        gauss_seidel::solve(&memory.system, unknown, blocks, control, live)
+    }
+}
+
 /// [`Solver::Multigrid`] as a type.
 pub struct Cycles;
+
+impl Solves for Cycles {
+    const FACTS: Facts = Facts {
+        name: "multigrid",
+        title: "sweeps inside multigrid",
+        sweeps: true,
+        slows_with_step: false,
+        // A V-cycle of two sweeps halves the error at least, so a solve takes some 50 cycles; one of 500 never ends.
+        max_sweeps: 1000,
+        refuses: &["order", "sor"],
+        refuses_because: "multigrid sweeps by colours and without over-relaxation",
+        numbers_per_node: 13 + 65,
+        kernel: KernelFacts {
+            files: &wgsl::parts!["sweeps.wgsl", "coarse.wgsl", "multigrid.wgsl"],
+            shuffles: false,
+            rows_per_block: 3,
+            numbers: |n| 13 * multigrid::coarse_nodes(n) + 4 * KERNEL_LEVELS,
+            sweeps_per_look: SWEEPS_PER_CYCLE,
+            // Over 11 levels at most of 4 colours.
+            iterations_per_look: 300,
+            // Down to the inverse of a matrix of 5 rows.
+            iterations_per_solve: 300,
+        },
+    };
+
+    fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F> {
+        Memory { system: System::zeros(n), levels: Levels::new(n), ..Memory::none() }
+    }
+
+    #[inline(always)]
+    fn solve<N: Number, const F: usize>(
+        system: &impl Discretisation<N, F>,
+        unknown: [&mut Ring<N>; F],
+        memory: &mut Memory<N, F>,
+        blocks: Blocks,
+        control: &Control<N>,
+        live: N::Mask,
+    ) -> Swept<N> {
+        memory.system.assemble(system);
+        system.discretised(&mut memory.levels);
+        multigrid::solve(&memory.system, unknown, blocks, control, live, &mut memory.levels)
+    }
+}
+
 /// [`Solver::Direct`] as a type.
 pub struct Elimination;
 
-impl Solves for Sweeps {
-    const SOLVER: Solver = Solver::GaussSeidel;
-}
-impl Solves for Cycles {
-    const SOLVER: Solver = Solver::Multigrid;
-}
 impl Solves for Elimination {
-    const SOLVER: Solver = Solver::Direct;
+    const FACTS: Facts = Facts {
+        name: "direct",
+        title: "direct solver",
+        sweeps: false,
+        slows_with_step: false,
+        max_sweeps: u32::MAX,
+        refuses: &["order", "tolerance", "sor", "max-sweeps"],
+        refuses_because: "the direct solver makes no sweeps",
+        numbers_per_node: 11,
+        kernel: KernelFacts {
+            files: &wgsl::parts!["direct.wgsl"],
+            shuffles: false,
+            rows_per_block: 6,
+            numbers: |_| 0,
+            sweeps_per_look: SWEEPS_PER_CHECK,
+            iterations_per_look: SWEEPS_PER_CHECK,
+            iterations_per_solve: 0,
+        },
+    };
+
+    fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F> {
+        Memory { factor: direct::Factor::new(n), ..Memory::none() }
+    }
+
+    #[inline(always)]
+    fn solve<N: Number, const F: usize>(
+        system: &impl Discretisation<N, F>,
+        unknown: [&mut Ring<N>; F],
+        memory: &mut Memory<N, F>,
+        _: Blocks,
+        _: &Control<N>,
+        _: N::Mask,
+    ) -> Swept<N> {
+        let finite = direct::solve(system, unknown, &mut memory.factor);
+        Swept { sweeps: N::of(0.0), converged: finite, finite }
+    }
 }

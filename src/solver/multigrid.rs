@@ -21,9 +21,18 @@
 use super::{
     gauss_seidel::{Control, Swept, Target, coloured_sweep},
     ring::{Blocks, MIN_POINTS, Ring},
-    system::{Row, System},
+    system::{Equations, Row, System},
 };
 use crate::number::{BIG, Mask, Number};
+
+/// The equations of a discretised `ρu + ∂⁴u + p ∂²u + w ∂u`, which can be discretised anew on coarser rings.
+pub trait Discretisation<N: Number, const F: usize>: Equations<N, F> {
+    /// Writes ρ, p, w and the mesh into the finest level.
+    fn discretised(&self, levels: &mut Levels<N, F>);
+}
+
+/// Levels in the kernel at most.
+pub const KERNEL_LEVELS: usize = 8;
 
 /// Sweeps of the finest level in a cycle.
 pub const SWEEPS_PER_CYCLE: u32 = 2;

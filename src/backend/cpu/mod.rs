@@ -48,10 +48,7 @@ const ADVANCE_TIME: Duration = Duration::from_secs(1);
 
 /// Steps between two looks at the members at most, so that stops are reached soon.
 fn most_steps(solver: Solver) -> u32 {
-    match solver {
-        Solver::Direct => 256,
-        Solver::GaussSeidel | Solver::Multigrid => 64,
-    }
+    if solver.sweeps() { 64 } else { 256 }
 }
 
 /// Members of `n` nodes in numbers of type `T`.

@@ -11,7 +11,7 @@ use crate::{
         evolve::{Group, Team, evolve_abreast},
         step::Method,
     },
-    solver::{Blocks, Cycles, Elimination, Solver, Solves, Sweeps},
+    solver::{Blocks, Solver, Solves, by_solver},
 };
 
 /// Instructions for members side by side.
@@ -74,11 +74,7 @@ macro_rules! vectorised {
                     blocks: Blocks,
                     threads: usize,
                 ) -> Result<Box<dyn Crew<$real>>> {
-                    let crew = match solver {
-                        Solver::GaussSeidel => crew_by::<Sweeps, $real>(vectors, blocks, threads),
-                        Solver::Multigrid => crew_by::<Cycles, $real>(vectors, blocks, threads),
-                        Solver::Direct => crew_by::<Elimination, $real>(vectors, blocks, threads),
-                    };
+                    let crew = by_solver!(solver, S => crew_by::<S, $real>(vectors, blocks, threads));
                     crew.ok_or_else(|| Error::Failed(format!("this processor has no vectors of {vectors:?}")))
                 }
             }
@@ -92,19 +88,19 @@ vectorised!(f64 f32);
 ///
 /// An elimination is a chain of results that wait for each other, so two of the smaller registers go in turn. Sweeps wait
 /// for nothing, and go over their rows so often that these have to stay in the nearest cache: fewer members go abreast.
-fn crew_by<M: Solves + 'static, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Crew<T>>> {
+fn crew_by<M: Solves, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Crew<T>>> {
     match vectors {
         Vectors::None => Some(Teams::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
         // Fuzzing (`fuzz/run`) advances no member, and would take minutes to count the branches of all this.
         _ if cfg!(fuzzing) => None,
         #[cfg(target_arch = "x86_64")]
-        Vectors::Bits128 if M::SOLVER.sweeps() => abreast::<_, M, T, 1>(pulp::x86::V2::try_new(), blocks, threads),
+        Vectors::Bits128 if M::FACTS.sweeps => abreast::<_, M, T, 1>(pulp::x86::V2::try_new(), blocks, threads),
         #[cfg(target_arch = "x86_64")]
         Vectors::Bits128 => abreast::<_, M, T, 2>(pulp::x86::V2::try_new(), blocks, threads),
         #[cfg(target_arch = "aarch64")]
         Vectors::Bits128 => abreast::<_, M, T, 2>(pulp::aarch64::Neon::try_new(), blocks, threads),
         #[cfg(target_arch = "x86_64")]
-        Vectors::Bits256 if M::SOLVER.sweeps() => abreast::<_, M, T, 1>(pulp::x86::V3::try_new(), blocks, threads),
+        Vectors::Bits256 if M::FACTS.sweeps => abreast::<_, M, T, 1>(pulp::x86::V3::try_new(), blocks, threads),
         #[cfg(target_arch = "x86_64")]
         Vectors::Bits256 => abreast::<_, M, T, 2>(pulp::x86::V3::try_new(), blocks, threads),
         #[cfg(target_arch = "x86_64")]
@@ -115,7 +111,7 @@ fn crew_by<M: Solves + 'static, T: Lane>(vectors: Vectors, blocks: Blocks, threa
 }
 
 /// A crew whose members go abreast in `R` registers of the instructions, if the processor has them.
-fn abreast<S: Instructions, M: Solves + 'static, T: Element<S>, const R: usize>(
+fn abreast<S: Instructions, M: Solves, T: Element<S>, const R: usize>(
     simd: Option<S>,
     blocks: Blocks,
     threads: usize,
@@ -132,7 +128,7 @@ struct Abreast<S, M> {
     threads: usize,
 }
 
-impl<S: Simd, M: Solves + 'static, T: Real> WithLanes<T> for Abreast<S, M> {
+impl<S: Simd, M: Solves, T: Real> WithLanes<T> for Abreast<S, M> {
     type Output = Box<dyn Crew<T>>;
 
     fn call<N: Number<Real = T>>(self) -> Box<dyn Crew<T>> {
@@ -174,7 +170,7 @@ struct Teams<S, M, N: Number> {
     teams: Vec<Mutex<Option<Team<N>>>>,
 }
 
-impl<S: Simd, M: Solves + 'static, T: Real, N: Number<Real = T>> Teams<S, M, N> {
+impl<S: Simd, M: Solves, T: Real, N: Number<Real = T>> Teams<S, M, N> {
     fn crew(simd: S, blocks: Blocks, threads: usize) -> Box<dyn Crew<T>> {
         let teams = (0..threads).map(|_| Mutex::new(None::<Team<N>>)).collect();
         Box::new(Teams { simd, solver: PhantomData::<fn() -> M>, blocks, teams })
@@ -187,18 +183,18 @@ impl<S: Simd, M: Solves + 'static, T: Real, N: Number<Real = T>> Teams<S, M, N> 
     }
 }
 
-impl<S: Simd, M: Solves + 'static, T: Real, N: Number<Real = T>> Crew<T> for Teams<S, M, N> {
+impl<S: Simd, M: Solves, T: Real, N: Number<Real = T>> Crew<T> for Teams<S, M, N> {
     fn lanes(&self) -> usize {
         N::LANES
     }
 
     fn bytes_of_team(&self) -> usize {
-        Team::<N>::bytes(self.blocks.n, M::SOLVER)
+        Team::<N>::bytes::<M>(self.blocks.n)
     }
 
     fn advance(&self, group: Group<T>, method: &Method, attempts: u32) {
         let thread = rayon::current_thread_index().unwrap_or(0);
-        let mut team = self.take_team(thread).unwrap_or_else(|| Team::for_solver(self.blocks, M::SOLVER));
+        let mut team = self.take_team(thread).unwrap_or_else(|| Team::for_solver::<M>(self.blocks));
         self.simd.vectorize(Advance { group, solver: self.solver, method, team: &mut team, attempts });
         *unlocked(&self.teams[thread]) = Some(team);
     }

@@ -80,7 +80,7 @@ impl Capacity {
 
     /// The kernel of fixed steps that suits a ring: sweeps by shuffles where every subgroup there may be holds it.
     pub fn variant(&self, blocks: Blocks, solver: Solver) -> Variant {
-        let subgroup = solver == Solver::GaussSeidel && blocks.count() <= self.least_subgroup as usize;
+        let subgroup = solver.facts().kernel.shuffles && blocks.count() <= self.least_subgroup as usize;
         Variant { subgroup, ..Variant::of(solver) }
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::{adapter::Gpu, shader::Variant};
-use crate::solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK, multigrid::SWEEPS_PER_CYCLE};
+use crate::solver::{Blocks, Solver};
 
 /// A dispatch aims to last this long: short enough for every watchdog, long enough to hide its overhead, some 0.1 ms.
 const DISPATCH_TIME: Duration = Duration::from_millis(40);
@@ -18,10 +18,6 @@ pub struct Budget {
     pub sweeps: u32,
 }
 
-/// Iterations of all loops in a cycle of multigrid, besides looks at the residual: over 11 levels at most of 4 colours.
-const ITERATIONS_PER_CYCLE: u32 = 300;
-/// And where its levels are built, down to the inverse of a matrix of 5 rows.
-const ITERATIONS_PER_BUILD: u32 = 300;
 /// llvmpipe leaves all loops of a shader, without a word, once they have made 65 535 iterations together.
 const SOFTWARE_ITERATIONS: u32 = 50_000;
 
@@ -36,21 +32,20 @@ impl Budget {
         let walk = blocks.count() as u32 + 1;
         let walks = if adaptive { 40 } else { 10 };
         // The rings below the finest one are walked over in every cycle, and built twice in each of the paper's steps.
-        let (sweeps, cycle, build) = match solver {
-            Solver::Multigrid => (SWEEPS_PER_CYCLE, ITERATIONS_PER_CYCLE, walks / 5 * ITERATIONS_PER_BUILD),
-            Solver::GaussSeidel | Solver::Direct => (SWEEPS_PER_CHECK, SWEEPS_PER_CHECK, 0),
-        };
+        let kernel = &solver.facts().kernel;
+        let build = walks / 5 * kernel.iterations_per_solve;
+        let (sweeps, look) = (kernel.sweeps_per_look, kernel.iterations_per_look);
         Budget {
             steps: (SOFTWARE_ITERATIONS / 2 / (walks * walk + build)).max(1),
-            sweeps: (SOFTWARE_ITERATIONS / 2 / (cycle + walk) * sweeps).max(sweeps),
+            sweeps: (SOFTWARE_ITERATIONS / 2 / (look + walk) * sweeps).max(sweeps),
         }
     }
 
     /// Of the first dispatch: certainly little.
     pub(super) fn first(solver: Solver, most: Budget) -> Budget {
-        match solver {
-            Solver::GaussSeidel | Solver::Multigrid => Budget { sweeps: most.sweeps.min(256), ..most },
-            Solver::Direct => Budget { steps: 1, ..most },
+        match solver.sweeps() {
+            true => Budget { sweeps: most.sweeps.min(256), ..most },
+            false => Budget { steps: 1, ..most },
         }
     }
 
@@ -58,9 +53,9 @@ impl Budget {
     pub(super) fn after(self, took: Duration, solver: Solver, most: Budget) -> Budget {
         let share = DISPATCH_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
         let next = |now: u32, most: u32| ((f64::from(now) * share) as u32).clamp(1, 2 * now).min(most);
-        match solver {
-            Solver::GaussSeidel | Solver::Multigrid => Budget { sweeps: next(self.sweeps, most.sweeps), ..self },
-            Solver::Direct => Budget { steps: next(self.steps, most.steps), ..self },
+        match solver.sweeps() {
+            true => Budget { sweeps: next(self.sweeps, most.sweeps), ..self },
+            false => Budget { steps: next(self.steps, most.steps), ..self },
         }
     }
 }
@@ -74,7 +69,7 @@ mod tests {
         let most = Budget { steps: 1 << 20, sweeps: 1 << 24 };
         for solver in Solver::ALL {
             for nanoseconds_per_unit in [3_u32, 700, 90_000, 3_000_000] {
-                let units = |b: Budget| if solver == Solver::Direct { b.steps } else { b.sweeps };
+                let units = |b: Budget| if solver.sweeps() { b.sweeps } else { b.steps };
                 let time = |b: Budget| Duration::from_nanos(u64::from(nanoseconds_per_unit)) * units(b);
                 let mut budget = Budget::first(solver, most);
                 for _ in 0..30 {

@@ -3,16 +3,8 @@
 use crate::{
     number::Real,
     solver::{Blocks, Solver, multigrid::coarse_nodes},
+    wgsl::{Part, parts},
 };
-
-/// A part of the source: its file name in `shaders/` and its text.
-pub type Part = (&'static str, &'static str);
-
-macro_rules! parts {
-    ($($file:literal),+ $(,)?) => {
-        [$(($file, include_str!(concat!("../../../shaders/", $file)))),+]
-    };
-}
 
 /// Fields that a traced kernel keeps per member; `conformance::bounds::STAGES` names them in their order.
 pub const TRACE_FIELDS: usize = 20;
@@ -32,20 +24,13 @@ pub struct Variant {
 
 impl Variant {
     /// All that are used; adaptive steps are made of traced ones.
-    pub const ALL: [Variant; 12] = [
-        Variant::of(Solver::GaussSeidel),
-        Variant { traced: true, ..Variant::of(Solver::GaussSeidel) },
-        Variant { adaptive: true, ..Variant::of(Solver::GaussSeidel) },
-        Variant { subgroup: true, ..Variant::of(Solver::GaussSeidel) },
-        Variant { subgroup: true, traced: true, ..Variant::of(Solver::GaussSeidel) },
-        Variant { subgroup: true, adaptive: true, ..Variant::of(Solver::GaussSeidel) },
-        Variant::of(Solver::Multigrid),
-        Variant { traced: true, ..Variant::of(Solver::Multigrid) },
-        Variant { adaptive: true, ..Variant::of(Solver::Multigrid) },
-        Variant::of(Solver::Direct),
-        Variant { traced: true, ..Variant::of(Solver::Direct) },
-        Variant { adaptive: true, ..Variant::of(Solver::Direct) },
-    ];
+    pub fn all() -> Vec<Variant> {
+        let exchanges =
+            |solver: Solver| [false, true].into_iter().filter(move |by| !by || solver.facts().kernel.shuffles);
+        let exchanging = |solver| exchanges(solver).map(move |subgroup| Variant { subgroup, ..Variant::of(solver) });
+        let made_for = |own| [own, Variant { traced: true, ..own }, Variant { adaptive: true, ..own }];
+        Solver::ALL.into_iter().flat_map(exchanging).flat_map(made_for).collect()
+    }
 
     /// The kernel of fixed steps.
     pub const fn of(solver: Solver) -> Variant {
@@ -54,11 +39,7 @@ impl Variant {
 
     /// The files of the kernel, in the order of the step.
     pub fn parts(self) -> impl Iterator<Item = Part> {
-        let solver: &[Part] = match self.solver {
-            Solver::GaussSeidel => &GAUSS_SEIDEL,
-            Solver::Multigrid => &MULTIGRID,
-            Solver::Direct => &DIRECT,
-        };
+        let solver = self.solver.facts().kernel.files;
         let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
         let exchange = if self.subgroup { EXCHANGE_SUBGROUP } else { EXCHANGE };
         COMMON.into_iter().chain(exchange).chain(solver.iter().copied()).chain(trace)
@@ -85,9 +66,6 @@ const COMMON: [Part; 16] = parts![
 ];
 const EXCHANGE: [Part; 1] = parts!["exchange.wgsl"];
 const EXCHANGE_SUBGROUP: [Part; 1] = parts!["exchange_subgroup.wgsl"];
-const GAUSS_SEIDEL: [Part; 2] = parts!["sweeps.wgsl", "gauss_seidel.wgsl"];
-const MULTIGRID: [Part; 3] = parts!["sweeps.wgsl", "coarse.wgsl", "multigrid.wgsl"];
-const DIRECT: [Part; 1] = parts!["direct.wgsl"];
 const TRACE_OFF: [Part; 1] = parts!["trace_off.wgsl"];
 const TRACE_ON: [Part; 1] = parts!["trace_on.wgsl"];
 
@@ -118,9 +96,6 @@ pub fn locate(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
     None
 }
 
-/// Levels of multigrid at most, in the kernel.
-pub const LEVELS: usize = 8;
-
 /// Threads of a workgroup: one a block, filled up to whole subgroups of `subgroup` threads; the kernel that is one
 /// subgroup wants the smallest subgroup there is.
 pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
@@ -138,18 +113,14 @@ pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 5] {
     ]
 }
 
-/// Bytes of workgroup memory that the kernel takes: rows of four numbers a block, and one decision; for multigrid 13 numbers
-/// a coarse node and a row a level besides.
+/// Bytes of workgroup memory that the kernel takes: rows of four numbers a block, what its solver needs besides, and one
+/// decision.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
 pub fn workgroup_bytes<T: Real>(blocks: Blocks, variant: Variant) -> usize {
-    let rows = match variant {
-        Variant { subgroup: true, .. } => 1,
-        Variant { solver: Solver::GaussSeidel | Solver::Multigrid, .. } => 3,
-        Variant { solver: Solver::Direct, .. } => 6,
-    };
-    let coarse = if variant.solver == Solver::Multigrid { 13 * coarse_nodes(blocks.n) + 4 * LEVELS } else { 0 };
-    (4 * rows * blocks.count() + coarse) * size_of::<T>() + 16
+    let kernel = &variant.solver.facts().kernel;
+    let rows = if variant.subgroup { 1 } else { kernel.rows_per_block };
+    (4 * rows * blocks.count() + (kernel.numbers)(blocks.n)) * size_of::<T>() + 16
 }
 
 #[cfg(test)]
@@ -158,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_line_of_the_source_is_found_in_its_file() {
-        for variant in Variant::ALL {
+        for variant in Variant::all() {
             let text = source::<f64>(variant);
             for (number, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.is_empty()) {
                 let (file, at) = locate(number + 1, variant).unwrap();
@@ -166,6 +137,6 @@ mod tests {
                 assert_eq!(part.lines().nth(at - 1), Some(line), "{file}:{at}");
             }
         }
-        assert_eq!(locate(1, Variant::ALL[0]), None);
+        assert_eq!(locate(1, Variant::of(Solver::GaussSeidel)), None);
     }
 }
