@@ -199,6 +199,7 @@ mod tests {
 
     use super::*;
     use crate::{
+        backend::DeviceKind,
         number::Precision,
         scheme::{Parameters, State},
     };
@@ -257,7 +258,7 @@ mod tests {
         let (steps, loads) = (Rc::default(), Rc::default());
         let backend = Fives { counters: [Counters::default(); 2], steps: Rc::clone(&steps), loads: Rc::clone(&loads) };
         let platform = Platform {
-            backend: "cpu".into(),
+            backend: DeviceKind::Cpu,
             adapter: None,
             driver: None,
             device_type: None,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::backend::{
-    Backend,
+    Backend, Device, DeviceKind,
     cpu::{CpuBackend, Vectorised},
     gpu::{Capacity, Gpu, Kernel, Variant, may_have_hardware},
 };
@@ -24,8 +24,8 @@ pub const MAX_POINTS_F32: usize = 320;
 /// Where a run is computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Platform {
-    /// `gpu` or `cpu`.
-    pub backend: String,
+    /// Kind of device.
+    pub backend: DeviceKind,
     /// Name of the GPU adapter.
     pub adapter: Option<String>,
     /// Its driver and the driver's version.
@@ -44,26 +44,27 @@ impl Platform {
     /// Whether results are the same there to the last bit: those of the same program on the same adapter and driver, or on
     /// any CPU, whatever its threads and vectors.
     pub fn computes_like(&self, other: &Platform) -> bool {
-        let place = |of: &Platform| (of.backend.clone(), of.adapter.clone(), of.driver.clone(), of.precision);
+        let place = |of: &Platform| (of.backend, of.adapter.clone(), of.driver.clone(), of.precision);
         place(self) == place(other)
     }
 
     /// Back end, adapter and driver.
     pub fn name(&self) -> String {
-        let parts = [Some(self.backend.as_str()), self.adapter.as_deref(), self.driver.as_deref()];
+        let backend = self.backend.to_string();
+        let parts = [Some(backend.as_str()), self.adapter.as_deref(), self.driver.as_deref()];
         parts.into_iter().flatten().collect::<Vec<_>>().join(" ")
     }
 
     /// Writes into a spec where it ran, which is elsewhere than was chosen if the GPU failed.
     pub fn settle_place(&self, spec: &mut Spec) {
-        spec.backend = if self.backend == "gpu" { BackendChoice::Gpu } else { BackendChoice::Cpu };
+        spec.backend = self.backend.into();
         spec.adapter = self.adapter.clone();
     }
 }
 
 /// A back end that suits a spec, not yet opened.
 pub struct Choice {
-    gpu: Option<Gpu>,
+    device: Device,
     /// Its number, if it was asked for by that.
     number: Option<String>,
     /// Where the GPU cannot be opened the CPU is taken.
@@ -133,7 +134,7 @@ fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
 fn cpu(spec: &Spec, n: usize, reason: String) -> Result<Choice> {
     let precision = spec.precision.unwrap_or(Precision::F64);
     check_precision(n, precision)?;
-    Ok(Choice { gpu: None, number: None, or_cpu: false, precision, reason })
+    Ok(Choice { device: Device::Cpu, number: None, or_cpu: false, precision, reason })
 }
 
 fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
@@ -171,7 +172,7 @@ pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
 
 fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<Choice> {
     let precision = fitting_precision(spec, n, adapter.name(), &adapter.capacity())?;
-    Ok(Choice { gpu: Some(adapter), number: None, or_cpu: false, precision, reason })
+    Ok(Choice { device: Device::Gpu(adapter), number: None, or_cpu: false, precision, reason })
 }
 
 /// The precision of the run on an adapter, if members of `n` nodes fit it.
@@ -224,12 +225,8 @@ impl Choice {
             Precision::F32 => "f32",
             Precision::F64 => "f64",
         };
-        let device = match &self.gpu {
-            Some(gpu) => format!("GPU {} ({})", gpu.name(), gpu.api()),
-            None => "CPU".into(),
-        };
         let solver = spec.solver().facts().title;
-        format!("back end: {device}, {precision} ({}); {solver}", self.reason)
+        format!("back end: {}, {precision} ({}); {solver}", self.device, self.reason)
     }
 
     /// The spec with everything that this choice settled written out, so that it can be repeated as it is.
@@ -243,9 +240,9 @@ impl Choice {
 
     /// Writes into a spec with cells what they all have in common: where they are computed.
     pub fn settle_place(&self, spec: &mut Spec) {
-        spec.backend = if self.gpu.is_some() { BackendChoice::Gpu } else { BackendChoice::Cpu };
+        spec.backend = self.device.kind().into();
         // Several of one name are told apart by their numbers only.
-        let name = || self.gpu.as_ref().map(|gpu| gpu.name().to_string());
+        let name = || self.device.gpu().map(|gpu| gpu.name().to_string());
         spec.adapter = self.number.clone().or_else(name);
         spec.precision = Some(self.precision);
     }
@@ -253,7 +250,7 @@ impl Choice {
     /// Where the members of `spec` are computed by this choice.
     pub fn platform(&self, spec: &Spec) -> Platform {
         let mut platform = Platform {
-            backend: "cpu".into(),
+            backend: self.device.kind(),
             adapter: None,
             driver: None,
             device_type: None,
@@ -261,14 +258,13 @@ impl Choice {
             reason: self.reason.clone(),
             threads: None,
         };
-        match &self.gpu {
-            Some(gpu) => {
-                platform.backend = "gpu".into();
+        match &self.device {
+            Device::Gpu(gpu) => {
                 platform.adapter = Some(gpu.name().to_string());
                 platform.driver = Some(gpu.driver());
                 platform.device_type = Some(gpu.device_type());
             }
-            None => platform.threads = Some(threads(spec)),
+            Device::Cpu => platform.threads = Some(threads(spec)),
         }
         platform
     }
@@ -276,14 +272,14 @@ impl Choice {
     /// The choice for a later part of a study whose first part runs `there`: a study does not move in its midst. Where the
     /// GPU of the first part failed, it is the CPU; else a GPU that fails is an error.
     pub fn after(self, there: &Platform) -> Choice {
-        match there.backend.as_str() {
-            "cpu" if self.gpu.is_some() => self.on_cpu(there.reason.clone()),
+        match (self.device.kind(), there.backend) {
+            (DeviceKind::Gpu, DeviceKind::Cpu) => self.on_cpu(there.reason.clone()),
             _ => Choice { or_cpu: false, ..self },
         }
     }
 
     fn on_cpu(&self, reason: String) -> Choice {
-        Choice { gpu: None, number: None, or_cpu: false, precision: self.precision, reason }
+        Choice { device: Device::Cpu, number: None, or_cpu: false, precision: self.precision, reason }
     }
 
     /// The same, but the CPU where the GPU cannot be opened or computes wrongly.
@@ -291,9 +287,9 @@ impl Choice {
         Choice { or_cpu: true, ..self }
     }
 
-    /// The GPU, if it is one.
-    pub fn gpu(&self) -> Option<&Gpu> {
-        self.gpu.as_ref()
+    /// What was chosen.
+    pub fn device(&self) -> &Device {
+        &self.device
     }
 
     /// Opens it for the members of `spec`, of `n` nodes; a GPU has to pass a [self-test](crate::conformance::self_test()).
@@ -311,7 +307,7 @@ impl Choice {
     fn open_in<T: Vectorised>(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         let blocks = ring(n)?;
         let method = Method { solver: spec.solver(), order: spec.order, max_sweeps: spec.most_sweeps() };
-        let Some(gpu) = &self.gpu else {
+        let Device::Gpu(gpu) = &self.device else {
             let backend = CpuBackend::<T>::for_members(blocks, method, threads(spec), spec.member_count())?;
             return Ok((Box::new(backend), self.platform(spec)));
         };

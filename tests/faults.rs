@@ -14,7 +14,7 @@ use std::{
 use curvelax::{
     Error,
     backend::{
-        Backend,
+        Backend, DeviceKind,
         cpu::{CpuBackend, Vectorised, Vectors},
         gpu::{Gpu, Kernel, Variant, kernel::Budget},
     },
@@ -461,7 +461,7 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     let spec = Spec { backend: BackendChoice::Gpu, adapter, curves: 3, t_end: 0.01, ..Spec::default() }.validate()?;
     let choice = || -> Result<placement::Choice, Failed> {
         let choice = placement::choose(&spec, spec.points)?;
-        let gpu = choice.gpu().ok_or("no GPU")?;
+        let gpu = choice.device().gpu().ok_or("no GPU")?;
         let blocks = Blocks::new(spec.points).ok_or("n")?;
         let _ = gpu.pipeline::<f64>(blocks, gpu.capacity().variant(blocks, spec.solver()))?;
         gpu.lose();
@@ -472,7 +472,7 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     let precision = choice.precision();
     let (mut backend, platform) = choice.open(&spec, spec.points)?;
     let told = platform.reason.starts_with("the GPU failed: ") && platform.reason.contains("the device was lost");
-    require(platform.backend == "cpu" && platform.adapter.is_none() && told, || format!("{platform:?}"))?;
+    require(platform.backend == DeviceKind::Cpu && platform.adapter.is_none() && told, || format!("{platform:?}"))?;
     let mut settled = spec.clone();
     platform.settle_place(&mut settled);
     require((settled.backend, settled.adapter) == (BackendChoice::Cpu, None), || "the spec says another place".into())?;
@@ -482,11 +482,11 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     require(all.0.len() == 3, || format!("{} members", all.0.len()))?;
     // A later part of the same study goes the same way, and one of a study that is on a GPU stays there.
     let later = choice_like(&spec)?.or_cpu().after(&platform);
-    require(later.gpu().is_none(), || "a later part goes back to the GPU".into())?;
+    require(later.device().gpu().is_none(), || "a later part goes back to the GPU".into())?;
     let (_, there) = choice_like(&spec)?.open(&spec, spec.points)?;
-    require(there.backend == "gpu", || format!("{there:?}"))?;
+    require(there.backend == DeviceKind::Gpu, || format!("{there:?}"))?;
     let later = choice_like(&spec)?.or_cpu().after(&there);
-    let own = later.gpu().ok_or("no GPU")?;
+    let own = later.device().gpu().ok_or("no GPU")?;
     let blocks = Blocks::new(spec.points).ok_or("n")?;
     let _ = own.pipeline::<f64>(blocks, own.capacity().variant(blocks, spec.solver()))?;
     own.lose();

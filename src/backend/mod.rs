@@ -4,9 +4,12 @@
 //! step it is aimed at, and reports; [`simulate`](crate::simulate) fills, collects and refills.
 
 pub mod cpu;
+pub mod device;
 pub mod gpu;
 
 use std::time::Duration;
+
+pub use device::{Device, DeviceKind};
 
 use crate::{
     error::Result,

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{flags, note, print, print_json};
 use crate::{
-    backend::gpu::Gpu,
+    backend::{DeviceKind, gpu::Gpu},
     bench::{self, Bench, Sample},
     ensemble::{
         Spec,
@@ -28,7 +28,6 @@ other load on the machine affects all of them. Start-up is the time to open the 
 kernels are compiled. The rates exclude it and a warm-up. The default takes less than a minute.";
 
 /// Names of the back ends that can be asked for.
-const BACKENDS: &[&str] = &["cpu", "gpu"];
 /// Names of the solvers that can be asked for.
 /// Members at once on hardware: enough to fill it.
 const CURVES: u64 = 8192;
@@ -64,8 +63,8 @@ pub struct BenchArgs {
     )]
     adaptive: Option<f64>,
     /// Back ends [default: the CPU and every GPU adapter, software ones included]
-    #[arg(long, value_name = "WHERE,...", value_delimiter = ',', value_parser = flags::word::<BackendChoice>(BACKENDS), help_heading = flags::MACHINE)]
-    backend: Vec<BackendChoice>,
+    #[arg(long, value_name = "WHERE,...", value_delimiter = ',', value_parser = flags::word::<DeviceKind>(&DeviceKind::NAMES), help_heading = flags::MACHINE)]
+    backend: Vec<DeviceKind>,
     /// GPU adapters to measure: part of the name, or the number in `curvelax adapters`. The CPU is then measured only with
     /// --backend [default: all]
     #[arg(long, value_name = "NAME", help_heading = flags::MACHINE)]
@@ -87,7 +86,7 @@ pub struct BenchArgs {
 /// A line of the table. Unknown is none: a case that failed has its reason instead of numbers.
 #[derive(Serialize)]
 struct Row {
-    backend: &'static str,
+    backend: DeviceKind,
     adapter: Option<String>,
     driver: Option<String>,
     device_type: Option<String>,
@@ -193,14 +192,14 @@ fn cases(args: &BenchArgs) -> Result<Vec<Spec>> {
 /// Where a case runs: the CPU, or the adapter of this name, and with how many members.
 #[derive(Clone)]
 struct Place {
-    backend: BackendChoice,
+    backend: DeviceKind,
     adapter: Option<String>,
     curves: u64,
 }
 
 impl Place {
     fn over(self, base: &Spec) -> Spec {
-        Spec { backend: self.backend, adapter: self.adapter, curves: self.curves, ..base.clone() }
+        Spec { backend: self.backend.into(), adapter: self.adapter, curves: self.curves, ..base.clone() }
     }
 }
 
@@ -208,11 +207,11 @@ impl Place {
 fn places(args: &BenchArgs) -> Result<Vec<Place>> {
     let asked = |backend| args.backend.contains(&backend);
     let mut places = Vec::new();
-    if asked(BackendChoice::Cpu) || (args.backend.is_empty() && args.adapter.is_none()) {
+    if asked(DeviceKind::Cpu) || (args.backend.is_empty() && args.adapter.is_none()) {
         let curves = args.curves.unwrap_or(CURVES);
-        places.push(Place { backend: BackendChoice::Cpu, adapter: None, curves });
+        places.push(Place { backend: DeviceKind::Cpu, adapter: None, curves });
     }
-    if !args.backend.is_empty() && !asked(BackendChoice::Gpu) {
+    if !args.backend.is_empty() && !asked(DeviceKind::Gpu) {
         return match &args.adapter {
             Some(name) => Err(Error::value("adapter", name, "the CPU has no adapters", "leave out --adapter")),
             None => Ok(places),
@@ -228,10 +227,10 @@ fn places(args: &BenchArgs) -> Result<Vec<Place>> {
             // Of two adapters of one name the name would be the first.
             let adapter = args.adapter.clone().filter(|_| by_number).or_else(|| Some(gpu.name().to_string()));
             let curves = args.curves.unwrap_or(enough);
-            places.push(Place { backend: BackendChoice::Gpu, adapter, curves });
+            places.push(Place { backend: DeviceKind::Gpu, adapter, curves });
         }
     }
-    if seen.is_empty() && (args.adapter.is_some() || asked(BackendChoice::Gpu)) {
+    if seen.is_empty() && (args.adapter.is_some() || asked(DeviceKind::Gpu)) {
         return Err(no_adapter(args.adapter.as_deref(), &names));
     }
     Ok(places)
@@ -284,7 +283,7 @@ impl Case {
             Ok(_) => None,
         };
         Row {
-            backend: if self.spec.backend == BackendChoice::Cpu { "cpu" } else { "gpu" },
+            backend: if self.spec.backend == BackendChoice::Cpu { DeviceKind::Cpu } else { DeviceKind::Gpu },
             adapter: self.spec.adapter.clone(),
             driver: platform.and_then(|platform| platform.driver.clone()),
             device_type: platform.and_then(|platform| platform.device_type.clone()),

@@ -44,12 +44,13 @@ fn size(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::backend::DeviceKind;
     use crate::{estimate::Pilot, number::Precision, placement::Platform};
 
     #[test]
     fn an_estimate_looks_like_this() {
         let platform = Platform {
-            backend: "cpu".into(),
+            backend: DeviceKind::Cpu,
             adapter: None,
             driver: None,
             device_type: None,

@@ -95,7 +95,7 @@ impl Work {
     pub fn open(&mut self, flags: &MannerFlags) -> Result<Platform> {
         let (range, choice) = &self.cohorts[0];
         let (backend, platform) = open(&self.cells[range.clone()], choice, flags)?;
-        if choice.gpu().is_some() && platform.backend == "cpu" {
+        if choice.device().kind() != platform.backend {
             flags.say(&format!("note: on the CPU instead: {}", platform.reason));
             platform.settle_place(&mut self.spec);
         }

@@ -13,6 +13,7 @@ use super::{
     sweep::{self, Sweep},
 };
 use crate::{
+    backend::DeviceKind,
     curve::{Modes, Sampling, Shape},
     error::{Error, Result, did_you_mean, shortened},
     flow::Flow,
@@ -34,6 +35,15 @@ pub enum BackendChoice {
     Gpu,
     /// The CPU back end.
     Cpu,
+}
+
+impl From<DeviceKind> for BackendChoice {
+    fn from(kind: DeviceKind) -> BackendChoice {
+        match kind {
+            DeviceKind::Cpu => BackendChoice::Cpu,
+            DeviceKind::Gpu => BackendChoice::Gpu,
+        }
+    }
 }
 
 /// The solver asked for.

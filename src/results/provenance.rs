@@ -125,10 +125,11 @@ pub fn rfc3339(since: Duration) -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::backend::DeviceKind;
 
     pub fn platform() -> Platform {
         Platform {
-            backend: "cpu".into(),
+            backend: DeviceKind::Cpu,
             adapter: None,
             driver: None,
             device_type: None,

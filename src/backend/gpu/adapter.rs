@@ -24,12 +24,12 @@ pub struct Gpu {
     adapter: wgpu::Adapter,
     info: wgpu::AdapterInfo,
     /// The device and its pipelines, once one was needed.
-    opened: Mutex<Option<(Device, HashMap<Key, wgpu::ComputePipeline>)>>,
+    opened: Mutex<Option<(OpenGpu, HashMap<Key, wgpu::ComputePipeline>)>>,
 }
 
 /// An opened device: where kernels are made and run.
 #[derive(Clone)]
-pub struct Device {
+pub struct OpenGpu {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     name: String,
@@ -182,7 +182,7 @@ impl Gpu {
     }
 
     /// The pipeline for a ring and a variant, compiled once, and the device that it is for, opened once.
-    pub fn pipeline<T: Real>(&self, blocks: Blocks, variant: Variant) -> Result<(Device, wgpu::ComputePipeline)> {
+    pub fn pipeline<T: Real>(&self, blocks: Blocks, variant: Variant) -> Result<(OpenGpu, wgpu::ComputePipeline)> {
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
         let (device, pipelines) = match &mut *opened {
             Some(opened) => opened,
@@ -205,7 +205,7 @@ impl Gpu {
     }
 
     /// Opens the adapter with all its limits, and with f64 and subgroups where it has them.
-    fn open(&self) -> Result<Device> {
+    fn open(&self) -> Result<OpenGpu> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("curvelax"),
             required_features: self.adapter.features() & (wgpu::Features::SHADER_F64 | wgpu::Features::SUBGROUP),
@@ -229,7 +229,7 @@ impl Gpu {
             set(&at, &|_| one_line(&format!("the device was lost ({reason:?}) {message}")));
         });
         let in_process = self.info.device_type == wgpu::DeviceType::Cpu;
-        Ok(Device { device, queue, name: self.name().to_string(), in_process, fault })
+        Ok(OpenGpu { device, queue, name: self.name().to_string(), in_process, fault })
     }
 }
 
@@ -242,7 +242,7 @@ pub(super) enum Waited {
     OnItsWay,
 }
 
-impl Device {
+impl OpenGpu {
     /// This moment, from which the time of its work counts.
     pub(super) fn now(&self) -> Moment {
         Moment::now(self.in_process)
@@ -265,7 +265,7 @@ impl Device {
 
     /// The error of a fault of this device.
     pub(super) fn error(&self, fault: &str) -> Error {
-        let Device { name, .. } = self;
+        let OpenGpu { name, .. } = self;
         Error::Device(format!("GPU {name}: {fault}; see `curvelax adapters`, or take --backend cpu"))
     }
 

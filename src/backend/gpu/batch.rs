@@ -9,7 +9,7 @@ use std::{
 };
 
 use super::{
-    adapter::{Device, Waited},
+    adapter::{OpenGpu, Waited},
     budget::Budget,
     clock::Moment,
     shader::TRACE_FIELDS,
@@ -80,7 +80,7 @@ struct Buffers {
 
 impl<T: Real> Batch<T> {
     /// Room for `slots` members.
-    pub fn new(device: &Device, pipeline: &wgpu::ComputePipeline, blocks: Blocks, slots: usize, traced: bool) -> Self {
+    pub fn new(device: &OpenGpu, pipeline: &wgpu::ComputePipeline, blocks: Blocks, slots: usize, traced: bool) -> Self {
         let buffers = Buffers::new::<T>(&device.device, blocks.n, slots, traced);
         Batch {
             bindings: buffers.bind(&device.device, pipeline),
@@ -120,7 +120,7 @@ impl<T: Real> Batch<T> {
         self.buffers.trace.as_ref()
     }
 
-    pub fn load(&mut self, device: &Device, slot: usize, run: &Run<T>) {
+    pub fn load(&mut self, device: &OpenGpu, slot: usize, run: &Run<T>) {
         let (states, offset, _) = self.state_at(slot);
         device.queue.write_buffer(states, offset, bytemuck::cast_slice(&run.state.to_numbers()));
         self.counters[slot] = run.counters;
@@ -140,7 +140,7 @@ impl<T: Real> Batch<T> {
     }
 
     /// Sends the members that are due on their way, if any are.
-    pub fn start(&mut self, device: &Device, pipeline: &wgpu::ComputePipeline, budget: Budget, max_sweeps: u32) {
+    pub fn start(&mut self, device: &OpenGpu, pipeline: &wgpu::ComputePipeline, budget: Budget, max_sweeps: u32) {
         self.due.clear();
         self.due.extend((0..).zip(&self.counters).filter(|(_, counters)| counters.is_running()).map(|(slot, _)| slot));
         if self.due.is_empty() {
@@ -165,13 +165,13 @@ impl<T: Real> Batch<T> {
 
     /// Waits for what was started, but no longer than `most`; whether there is nothing left to wait for, be it for a fault,
     /// which `finish` tells.
-    pub fn is_back(&self, device: &Device, most: Duration) -> bool {
+    pub fn is_back(&self, device: &OpenGpu, most: Duration) -> bool {
         let Some(Flight { back, .. }) = &self.flight else { return true };
         !matches!(device.wait(&back.submission, most), Ok(Waited::OnItsWay))
     }
 
     /// Waits for what was started, while there is time `left` for it, and takes its records; returns when it was started.
-    pub fn finish(&mut self, device: &Device, left: impl Fn(Moment) -> Duration) -> Result<Option<Moment>> {
+    pub fn finish(&mut self, device: &OpenGpu, left: impl Fn(Moment) -> Duration) -> Result<Option<Moment>> {
         let Some(Flight { since, back }) = self.flight.take() else {
             self.forget_sweeps();
             return Ok(None);
@@ -222,7 +222,7 @@ impl<T: Real> Batch<T> {
 }
 
 /// A member that was due has made a step or a sweep, or ended: a kernel that does nothing must not be awaited.
-fn check_progress(device: &Device, slot: usize, before: &Counters, after: &Counters) -> Result<()> {
+fn check_progress(device: &OpenGpu, slot: usize, before: &Counters, after: &Counters) -> Result<()> {
     let position = |c: &Counters| (c.status, c.steps, c.rejected, c.phase, c.solve_sweeps);
     if position(before) == position(after) && after.sweeps_k + after.sweeps_x == 0 {
         return Err(device.error(&format!("a dispatch did nothing for the member in slot {slot}")));
@@ -233,7 +233,7 @@ fn check_progress(device: &Device, slot: usize, before: &Counters, after: &Count
 impl Reading {
     /// Runs `encoder`, then copies `bytes` of each buffer towards the host through `staging`.
     pub fn submit(
-        device: &Device,
+        device: &OpenGpu,
         mut encoder: wgpu::CommandEncoder,
         staging: &wgpu::Buffer,
         reads: &[(&wgpu::Buffer, u64, u64)],
@@ -250,7 +250,7 @@ impl Reading {
     }
 
     /// Waits until it has arrived, while there is time `left`; it is on its way `since` then.
-    pub fn wait(self, device: &Device, since: Moment, left: impl Fn(Moment) -> Duration) -> Result<Vec<u8>> {
+    pub fn wait(self, device: &OpenGpu, since: Moment, left: impl Fn(Moment) -> Duration) -> Result<Vec<u8>> {
         while device.wait(&self.submission, left(since))? == Waited::OnItsWay {
             if left(since).is_zero() {
                 let seconds = since.elapsed().as_secs_f64();

@@ -6,7 +6,7 @@
 use std::time::{Duration, Instant};
 
 use super::{
-    adapter::{Device, Gpu},
+    adapter::{Gpu, OpenGpu},
     batch::{Batch, Reading, staging},
     clock::Moment,
     shader::{TRACE_FIELDS, Variant},
@@ -37,7 +37,7 @@ const MIN_SLOTS: [usize; 2] = [32, 4096];
 
 /// Compiled kernel and resident members of `n` nodes in numbers of type `T`.
 pub struct Kernel<T> {
-    gpu: Device,
+    gpu: OpenGpu,
     pipeline: wgpu::ComputePipeline,
     batches: Vec<Batch<T>>,
     slots_per_batch: usize,

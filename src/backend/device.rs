@@ -1,0 +1,63 @@
+//! What members are advanced on.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::gpu::Gpu;
+
+/// What members are advanced on, not yet opened.
+pub enum Device {
+    /// The cores of this machine.
+    Cpu,
+    /// This adapter.
+    Gpu(Gpu),
+}
+
+/// The kinds of [`Device`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeviceKind {
+    /// The cores of a machine.
+    Cpu,
+    /// A graphics processor, or software that acts as one.
+    Gpu,
+}
+
+impl DeviceKind {
+    /// As in flags and files.
+    pub const NAMES: [&str; 2] = ["cpu", "gpu"];
+}
+
+impl fmt::Display for DeviceKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(DeviceKind::NAMES[*self as usize])
+    }
+}
+
+impl Device {
+    /// Which kind it is.
+    pub fn kind(&self) -> DeviceKind {
+        match self {
+            Device::Cpu => DeviceKind::Cpu,
+            Device::Gpu(_) => DeviceKind::Gpu,
+        }
+    }
+
+    /// The adapter, if it is one.
+    pub fn gpu(&self) -> Option<&Gpu> {
+        match self {
+            Device::Cpu => None,
+            Device::Gpu(gpu) => Some(gpu),
+        }
+    }
+}
+
+impl fmt::Display for Device {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Device::Cpu => f.write_str("CPU"),
+            Device::Gpu(gpu) => write!(f, "GPU {} ({})", gpu.name(), gpu.api()),
+        }
+    }
+}
