@@ -172,7 +172,7 @@ pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
 
 fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<Choice> {
     let precision = fitting_precision(spec, n, adapter.name(), &adapter.capacity())?;
-    Ok(Choice { device: Device::Gpu(adapter), number: None, or_cpu: false, precision, reason })
+    Ok(Choice { device: Device::Gpu(Box::new(adapter)), number: None, or_cpu: false, precision, reason })
 }
 
 /// The precision of the run on an adapter, if members of `n` nodes fit it.

@@ -1,4 +1,4 @@
-//! The documents: flags as the program has them, a README of at most a thousand words, and links that lead somewhere.
+//! The documents: flags and columns as the program has them, a README of at most a thousand words, and links that lead somewhere.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -7,10 +7,22 @@ use std::{
 };
 
 use assert_cmd::Command;
+use curvelax::{
+    ensemble::{Outcome, SeriesRow, Spec},
+    files::{
+        Record, names,
+        tables::{ErrorRow, NodeRow, RateRow},
+    },
+    results::{
+        cells::EnsembleStatistics,
+        tally::{MeanExcess, Tally},
+    },
+};
 
-/// The page of flags, and what stands around its generated part.
+/// The pages with a generated part, and what stands around that.
 const FLAGS: &str = "docs/flags.md";
-const BEGIN: &str = "<!-- Generated from the help texts: UPDATE_DOCS=1 cargo test --test documents -->\n";
+const FILES: &str = "docs/files.md";
+const BEGIN: &str = "<!-- Generated from the program: UPDATE_DOCS=1 cargo test --test documents -->\n";
 const END: &str = "<!-- The end of what is generated. -->\n";
 const REMEDY: &str = "UPDATE_DOCS=1 cargo test --test documents rewrites it";
 
@@ -101,20 +113,67 @@ fn flags() -> String {
     page
 }
 
+/// A table with a name, and of each column its heading, what it holds and what it means.
+fn table(name: &str, rows: &str, columns: impl Iterator<Item = [String; 3]>) -> String {
+    let lines = columns.map(|[heading, holds, meaning]| format!("| `{heading}` | {holds} | {} |\n", cell(&meaning)));
+    format!(
+        "\n### {name}\n\nOne row per {rows}.\n\n| column | holds | meaning |\n|---|---|---|\n{}",
+        lines.collect::<String>()
+    )
+}
+
+fn table_of<R: Record>(name: &str, rows: &str) -> String {
+    let columns = R::COLUMNS.iter().map(|column| [column.name, column.holds, column.meaning].map(str::to_owned));
+    table(name, rows, columns)
+}
+
+/// The columns of all tables.
+fn columns() -> String {
+    let mut spec = Spec::default();
+    spec.sweep.set("amplitude=0.05,0.1".parse().unwrap());
+    let cells = EnsembleStatistics::new(&spec, &mut Tally::default()).unwrap().columns(&spec);
+    let of_cells = cells.into_iter().map(|column| [column.name, column.holds.to_owned(), column.meaning]);
+    [
+        table_of::<Outcome>(names::SUMMARY, "member"),
+        table(names::ENSEMBLE, "cell; here with `--sweep amplitude=0.05,0.1`", of_cells),
+        table_of::<RateRow>(names::RATES, "member with a rate"),
+        table_of::<MeanExcess>(names::MEAN_EXCESS, "cell and time"),
+        table_of::<SeriesRow>(names::SERIES, "member and time, with `--series`"),
+        table_of::<NodeRow>(names::SNAPSHOTS, "member, time and node, with `--snapshots`"),
+        table_of::<ErrorRow>(names::CONVERGENCE, "run of a problem, from `curvelax convergence --out`"),
+    ]
+    .concat()
+}
+
+#[test]
+fn the_page_of_files_has_the_columns_of_the_program() {
+    let columns = columns();
+    for line in ["| `t_relax` | float | first time", "| `t_relax_q05` | float |", "| `i` | integer |"] {
+        assert!(columns.contains(line), "{line} is not in the page: {columns}");
+    }
+    generated(FILES, &columns);
+}
+
 #[test]
 fn the_page_of_flags_is_that_of_the_program() {
-    let path = root().join(FLAGS);
+    let flags = flags();
+    for flag in ["`--shape <SHAPE>`", "`--checkpoint-every <DURATION>`", "| `--missing` |", "## curvelax man\n"] {
+        assert!(flags.contains(flag), "{flag} is not in the page: {flags}");
+    }
+    generated(FLAGS, &flags);
+}
+
+/// That the generated part of a page is `text`; or makes it so, where that is asked for.
+fn generated(page: &str, text: &str) {
+    let path = root().join(page);
     let old = read(&path);
     let (head, rest) = old.split_once(BEGIN).expect("the beginning of the generated part");
     let (_, tail) = rest.split_once(END).expect("the end of the generated part");
-    let new = format!("{head}{BEGIN}{}\n{END}{tail}", flags());
-    for flag in ["`--shape <SHAPE>`", "`--checkpoint-every <DURATION>`", "| `--missing` |", "## curvelax man\n"] {
-        assert!(new.contains(flag), "{flag} is not in the page: {new}");
-    }
+    let new = format!("{head}{BEGIN}{text}\n{END}{tail}");
     if env::var_os("UPDATE_DOCS").is_some() {
         fs::write(&path, new).unwrap();
     } else {
-        assert!(old == new, "{FLAGS} differs from the help texts: {REMEDY}");
+        assert!(old == new, "{page} differs from the program: {REMEDY}");
     }
 }
 

@@ -11,7 +11,7 @@ pub enum Device {
     /// The cores of this machine.
     Cpu,
     /// This adapter.
-    Gpu(Gpu),
+    Gpu(Box<Gpu>),
 }
 
 /// The kinds of [`Device`].

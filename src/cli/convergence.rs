@@ -9,7 +9,10 @@ use crate::{
         spec::{BackendChoice, Precision, Solver, SolverChoice},
     },
     error::{Error, Result},
-    files::{OutputFolder, Owner, names, tables},
+    files::{
+        OutputFolder, Owner, names,
+        tables::{ErrorRow, Table},
+    },
     placement,
     truth::{Problem, Row, problems, studies},
 };
@@ -83,7 +86,8 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
         }
     }
     if let Some(folder) = folder {
-        let file = tables::convergence(folder.file(names::CONVERGENCE)?, &rows)?;
+        let errors: Vec<ErrorRow> = rows.iter().map(ErrorRow::of).collect();
+        let file = Table::of(folder.file(names::CONVERGENCE)?, &errors)?;
         folder.publish_all(vec![file])?;
     }
     if !args.quiet {

@@ -47,7 +47,7 @@ impl Observables {
 }
 
 /// One row of `summary.csv`. Times are in the curve's own units (length⁴).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Index of the member, from 0.
     pub member: u64,

@@ -3,6 +3,7 @@
 //! Files grow under names ending in `.part` and get their own names together, when all of them are whole.
 
 pub mod claim;
+mod column;
 pub mod disk;
 pub mod folder;
 pub mod names;
@@ -12,8 +13,11 @@ pub mod part_folder;
 pub mod place;
 pub mod portraits;
 pub mod spill;
+mod table_reader;
 pub mod tables;
 pub mod zarr;
 
+pub use column::{Column, Record};
 pub use folder::OutputFolder;
 pub use owner::{Existing, Owner};
+pub use table_reader::TableReader;

@@ -5,9 +5,9 @@
 use std::marker::PhantomData;
 
 use csv::{Writer, WriterBuilder};
-use serde::Serialize;
 
 use super::{
+    column::{Field, Record, columns},
     part_file::{Mark, PartFile},
     place::Place,
 };
@@ -18,41 +18,147 @@ use crate::{
     truth::Row,
 };
 
-/// Columns of `summary.csv`.
-pub const SUMMARY: &str = "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,\
-    length_start,length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
-    mesh_ratio,metric_drift,self_crossing";
-const RATES: &str = "member,cell,rate,rate_r2,rate_theory,rate_ratio";
-/// Columns of `mean_excess.csv`.
-pub const MEAN_EXCESS: &str = "cell,t,members,mean,sd";
-const SERIES: &str = "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift";
-const SNAPSHOTS: &str = "member,t,i,x,y,k,r";
-const CONVERGENCE: &str = "problem,varied,n,tau,tolerance,error,order";
-
 /// Bytes gathered before they are written.
 const BUFFER: usize = 1 << 16;
 
-/// What a table has in its columns.
-pub trait Kind {
-    /// Their names.
-    const COLUMNS: &str;
+columns! { Outcome:
+    member: whole = member, "index of the member, from 0";
+    cell: whole = cell, "index of its cell, from 0";
+    status: status = status, "how the member ended";
+    t_end: time = t_end, "time of the last accepted state";
+    steps: whole = steps, "accepted steps";
+    rejected: whole = rejected, "adaptive steps that were refused";
+    sweeps_k: whole = sweeps_k, "sweeps on the curvature systems, 0 with the direct solver";
+    sweeps_x: whole = sweeps_x, "sweeps on the position systems";
+    t_relax: event = t_relax, "first time at which the excess reaches `relax-to` times its start, or `relax-at`, interpolated inside the step";
+    t_half: event = t_half, "first time at which the excess reaches half its start";
+    rate: optional = rate, "slope of -ln excess against time while the excess falls from a tenth to a thousandth of its start; for Willmore flow against ln(1 + 2t/R₀⁴); empty below 8 points";
+    rate_r2: optional = rate_r2, "share of the variance of ln excess that the line explains";
+    length_start: number = start.length, "length of the initial polygon";
+    length_end: number = end.length, "length of the last polygon";
+    area_start: number = start.area, "signed area of the initial polygon, positive counter-clockwise";
+    area_end: number = end.area, "signed area of the last polygon";
+    excess_start: number = start.excess, "L²/(4πA) - (n/π)·tan(π/n) of the initial polygon, 0 on a regular one";
+    excess_end: number = end.excess, "the same of the last polygon";
+    energy_start: number = start.energy, "∮(½k² + λ) ds at the start; λ is 0 unless the flow is elastic";
+    energy_end: number = end.energy, "the same at the end";
+    k_min: number = end.k_min, "smallest curvature of the last state";
+    k_max: number = end.k_max, "largest curvature of the last state";
+    turning: signed = end.turning, "turning number of the last polygon";
+    mesh_ratio: number = end.mesh_ratio, "longest over shortest edge of the last polygon";
+    metric_drift: number = end.metric_drift, "max |r_i - |e_i||/|e_i| of the last state: how far the scheme's own lengths have left those of the polygon";
+    self_crossing: event = self_crossing, "time at which the polygon was first seen to cross itself, which does not stop the member";
+}
+
+/// A row of `rates.csv`: the fitted rate of a member, beside that of linear theory.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RateRow {
+    member: u64,
+    cell: u64,
+    rate: Option<f64>,
+    rate_r2: Option<f64>,
+    rate_theory: Option<f64>,
+    rate_ratio: Option<f64>,
+}
+
+columns! { RateRow:
+    member: whole = member, "index of the member";
+    cell: whole = cell, "index of its cell";
+    rate: optional = rate, "as in `summary.csv`";
+    rate_r2: optional = rate_r2, "as in `summary.csv`";
+    rate_theory: optional = rate_theory, "rate of the slowest mode by linear theory, 24/R⁴ for mode 2 and surface diffusion; empty where there is none";
+    rate_ratio: optional = rate_ratio, "rate / rate_theory";
+}
+
+columns! { SeriesRow:
+    member: whole = member, "index of the member";
+    t: time = t, "time";
+    length: number = at.length, "length of the polygon";
+    area: number = at.area, "signed area of the polygon";
+    excess: number = at.excess, "L²/(4πA) - (n/π)·tan(π/n)";
+    energy: number = at.energy, "∮(½k² + λ) ds";
+    k_min: number = at.k_min, "smallest curvature";
+    k_max: number = at.k_max, "largest curvature";
+    mesh_ratio: number = at.mesh_ratio, "longest over shortest edge";
+    metric_drift: number = at.metric_drift, "max |r_i - |e_i||/|e_i|";
+}
+
+/// A row of `snapshots.csv`: a node of a member at a time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NodeRow {
+    member: u64,
+    t: f64,
+    i: u64,
+    x: f64,
+    y: f64,
+    k: f64,
+    r: f64,
+}
+
+columns! { NodeRow:
+    member: whole = member, "index of the member";
+    t: time = t, "time";
+    i: whole = i, "node, from 1 to n";
+    x: number = x, "x coordinate of the node";
+    y: number = y, "y coordinate of the node";
+    k: number = k, "signed curvature of the segment that ends at the node";
+    r: number = r, "length of the segment that ends at the node, as the scheme evolves it";
+}
+
+columns! { MeanExcess:
+    cell: whole = cell, "index of the cell";
+    t: time = t, "time, one of 33 that are dense at the start";
+    members: whole = members, "members of the cell that reached t";
+    mean: optional = mean, "their mean excess";
+    sd: optional = sd, "its standard deviation";
+}
+
+/// A row of `convergence.csv`: the error of a run against an exact solution.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ErrorRow {
+    problem: String,
+    varied: String,
+    n: u64,
+    tau: Option<f64>,
+    tolerance: Option<f64>,
+    error: Option<f64>,
+    order: Option<f64>,
+}
+
+columns! { ErrorRow:
+    problem: word = problem, "name of the problem";
+    varied: word = varied, "what is refined: n, tau or tolerance";
+    n: whole = n, "nodes";
+    tau: optional = tau, "time step; empty where steps adapt";
+    tolerance: optional = tolerance, "local error tolerance of adaptive steps";
+    error: optional = error, "measured / exact - 1; empty where the run ended early";
+    order: optional = order, "observed order against the row before";
 }
 
 /// A table that grows row by row.
-pub struct Table<K> {
+pub struct Table<R> {
     // Flushes when dropped.
     writer: Writer<PartFile>,
-    kind: PhantomData<K>,
+    kind: PhantomData<fn(R)>,
 }
 
-impl<K: Kind> Table<K> {
+/// `summary.csv`: one row a member.
+pub type SummaryTable = Table<Outcome>;
+/// `rates.csv`: the fitted rate of each member that has one.
+pub type RateTable = Table<RateRow>;
+/// `series.csv`: the observables of each member over time.
+pub type SeriesTable = Table<SeriesRow>;
+/// `snapshots.csv`: the nodes of each member at given times.
+pub type SnapshotTable = Table<NodeRow>;
+
+impl<R: Record> Table<R> {
     /// Begins a table with its header, or goes on with the rows that are in `file`.
     pub fn new(file: PartFile) -> Result<Self> {
         let begins = file.is_empty();
         let writer = WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
         let mut table = Table { writer, kind: PhantomData };
         if begins {
-            table.write(K::COLUMNS.split(',').collect::<Vec<_>>())?;
+            table.write(R::COLUMNS.iter().map(|column| Field::Word(column.name)))?;
         }
         Ok(table)
     }
@@ -81,129 +187,30 @@ impl<K: Kind> Table<K> {
         Ok(file)
     }
 
-    fn write(&mut self, row: impl Serialize) -> Result<()> {
+    /// Writes a row.
+    pub fn row(&mut self, record: &R) -> Result<()> {
+        self.write(R::COLUMNS.iter().map(|column| (column.write)(record)))
+    }
+
+    fn write<'a>(&mut self, fields: impl Iterator<Item = Field<'a>>) -> Result<()> {
+        let row: Vec<Field<'_>> = fields.collect();
         self.writer.serialize(row).map_err(|e| Error::io("cannot write", self.writer.get_ref().target())(e.into()))
     }
-}
 
-macro_rules! kinds {
-    ($($(#[$outer:meta])* $table:ident of $kind:ident: $columns:expr;)*) => {$(
-        #[doc(hidden)]
-        pub enum $kind {}
-
-        impl Kind for $kind {
-            const COLUMNS: &str = $columns;
-        }
-
-        $(#[$outer])*
-        pub type $table = Table<$kind>;
-    )*};
-}
-
-kinds! {
-    /// `summary.csv`: one row a member.
-    SummaryTable of Summary: SUMMARY;
-    /// `rates.csv`: the fitted rate of each member that has one, beside that of linear theory.
-    RateTable of Rates: RATES;
-    /// `series.csv`: the observables of each member over time.
-    SeriesTable of Series: SERIES;
-    /// `snapshots.csv`: the nodes of each member at given times.
-    SnapshotTable of Snapshots: SNAPSHOTS;
-    /// `mean_excess.csv`: the mean excess of each cell over time.
-    ExcessTable of Excess: MEAN_EXCESS;
-    /// `convergence.csv`: errors and orders against exact solutions.
-    ConvergenceTable of Convergence: CONVERGENCE;
-}
-
-/// Columns of `summary.csv`.
-#[derive(Serialize)]
-struct SummaryRow {
-    member: u64,
-    cell: u64,
-    status: &'static str,
-    t_end: Option<f64>,
-    steps: u64,
-    rejected: u64,
-    sweeps_k: u64,
-    sweeps_x: u64,
-    t_relax: Option<f64>,
-    t_half: Option<f64>,
-    rate: Option<f64>,
-    rate_r2: Option<f64>,
-    length_start: Option<f64>,
-    length_end: Option<f64>,
-    area_start: Option<f64>,
-    area_end: Option<f64>,
-    excess_start: Option<f64>,
-    excess_end: Option<f64>,
-    energy_start: Option<f64>,
-    energy_end: Option<f64>,
-    k_min: Option<f64>,
-    k_max: Option<f64>,
-    turning: i32,
-    mesh_ratio: Option<f64>,
-    metric_drift: Option<f64>,
-    self_crossing: Option<f64>,
-}
-
-impl SummaryTable {
-    /// Writes the row of one member.
-    pub fn row(&mut self, member: &Outcome) -> Result<()> {
-        let Outcome { start, end, .. } = member;
-        self.write(SummaryRow {
-            member: member.member,
-            cell: member.cell,
-            status: member.status.name(),
-            t_end: known(member.t_end),
-            steps: member.steps,
-            rejected: member.rejected,
-            sweeps_k: member.sweeps_k,
-            sweeps_x: member.sweeps_x,
-            t_relax: member.t_relax.and_then(known),
-            t_half: member.t_half.and_then(known),
-            rate: member.rate.and_then(known),
-            rate_r2: member.rate_r2.and_then(known),
-            length_start: known(start.length),
-            length_end: known(end.length),
-            area_start: known(start.area),
-            area_end: known(end.area),
-            excess_start: known(start.excess),
-            excess_end: known(end.excess),
-            energy_start: known(start.energy),
-            energy_end: known(end.energy),
-            k_min: known(end.k_min),
-            k_max: known(end.k_max),
-            turning: end.turning,
-            mesh_ratio: known(end.mesh_ratio),
-            metric_drift: known(end.metric_drift),
-            self_crossing: member.self_crossing.and_then(known),
-        })
+    /// The whole table in `file`, ready for its final name.
+    pub fn of(file: PartFile, rows: &[R]) -> Result<PartFile> {
+        let mut table = Table::new(file)?;
+        rows.iter().try_for_each(|row| table.row(row))?;
+        table.ready()
     }
 }
 
-impl RateTable {
-    /// Writes the row of one member, if it has a rate.
-    pub fn row(&mut self, member: &Outcome) -> Result<()> {
+impl RateRow {
+    /// That of a member, if it has a rate.
+    pub fn of(member: &Outcome) -> Option<RateRow> {
         let Outcome { member, cell, rate, rate_r2, rate_theory, .. } = *member;
-        let Some(rate) = rate else { return Ok(()) };
-        let ratio = rate_theory.map(|theory| rate / theory).and_then(known);
-        self.write((member, cell, rate, rate_r2.and_then(known), rate_theory.and_then(known), ratio))
-    }
-}
-
-/// Writes `mean_excess.csv`.
-pub fn mean_excess(file: PartFile, rows: &[MeanExcess]) -> Result<PartFile> {
-    let mut table = ExcessTable::new(file)?;
-    rows.iter().try_for_each(|row| table.write(row))?;
-    table.ready()
-}
-
-impl SeriesTable {
-    /// Writes one row.
-    pub fn row(&mut self, row: &SeriesRow) -> Result<()> {
-        let at = &row.at;
-        let scalars = [at.length, at.area, at.excess, at.energy, at.k_min, at.k_max, at.mesh_ratio, at.metric_drift];
-        self.write((row.member, row.t, scalars.map(known)))
+        let rate_ratio = rate_theory.map(|theory| rate.unwrap_or_default() / theory);
+        rate.map(|_| RateRow { member, cell, rate, rate_r2, rate_theory, rate_ratio })
     }
 }
 
@@ -213,24 +220,26 @@ impl SnapshotTable {
         let Snapshot { member, t, x, y, k, r } = snapshot;
         let nodes = x.iter().zip(y).zip(k).zip(r);
         for (i, (((x, y), k), r)) in (1_u64..).zip(nodes) {
-            self.write((member, t, i, [x, y, k, r].map(|value| known(*value))))?;
+            self.row(&NodeRow { member: *member, t: *t, i, x: *x, y: *y, k: *k, r: *r })?;
         }
         Ok(())
     }
 }
 
-/// `convergence.csv`, the whole table: one row a run, τ or the tolerance of adaptive steps empty.
-pub fn convergence(file: PartFile, rows: &[Row]) -> Result<PartFile> {
-    let mut table = ConvergenceTable::new(file)?;
-    for Row { problem, varied, at, error, order, .. } in rows {
-        let tau = at.tolerance.is_none().then_some(at.tau);
-        table.write((problem, varied.name(), at.n as u64, tau, at.tolerance, error, order))?;
+impl ErrorRow {
+    /// That of a run: τ or the tolerance of adaptive steps is empty.
+    pub fn of(run: &Row) -> ErrorRow {
+        let Row { problem, varied, at, error, order, .. } = run;
+        ErrorRow {
+            problem: problem.clone(),
+            varied: varied.name().to_string(),
+            n: at.n as u64,
+            tau: at.tolerance.is_none().then_some(at.tau),
+            tolerance: at.tolerance,
+            error: *error,
+            order: *order,
+        }
     }
-    table.ready()
-}
-
-fn known(value: f64) -> Option<f64> {
-    value.is_finite().then_some(value)
 }
 
 #[cfg(test)]
@@ -309,7 +318,7 @@ mod tests {
 
     #[test]
     fn an_empty_table_is_a_header() {
-        assert_eq!(summary(&[]), format!("{SUMMARY}\n"));
+        assert_eq!(summary(&[]).lines().count(), 1);
     }
 
     #[test]
@@ -318,15 +327,16 @@ mod tests {
             let mut table = RateTable::new(file)?;
             let at = Observables::default();
             for rate_theory in [None, Some(6.0)] {
-                table.row(&Outcome { rate: Some(6.0), rate_r2: Some(0.5), rate_theory, ..outcome(at, at) })?;
+                let member = Outcome { rate: Some(6.0), rate_r2: Some(0.5), rate_theory, ..outcome(at, at) };
+                table.row(&RateRow::of(&member).unwrap())?;
             }
-            table.row(&Outcome { rate: None, ..outcome(at, at) })?;
+            assert_eq!(RateRow::of(&Outcome { rate: None, ..outcome(at, at) }), None);
             table.ready()
         });
         assert_eq!(text, "member,cell,rate,rate_r2,rate_theory,rate_ratio\n3,0,6.0,0.5,,\n3,0,6.0,0.5,6.0,1.0\n");
         let two = MeanExcess { cell: 0, t: 0.0, members: 2, mean: Some(0.375), sd: Some(0.1767766952966369) };
         let one = MeanExcess { t: 0.5, members: 1, mean: Some(0.5), sd: None, ..two };
-        let text = written("mean_excess.csv", |file| mean_excess(file, &[two, one]));
+        let text = written("mean_excess.csv", |file| Table::of(file, &[two, one]));
         assert_eq!(text, "cell,t,members,mean,sd\n0,0.0,2,0.375,0.1767766952966369\n0,0.5,1,0.5,\n");
     }
 
@@ -361,7 +371,9 @@ mod tests {
             error,
             order,
         };
-        let text = written("convergence.csv", |file| convergence(file, &[row(Some(-0.1), Some(1.5)), row(None, None)]));
+        let text = written("convergence.csv", |file| {
+            Table::of(file, &[row(Some(-0.1), Some(1.5)), row(None, None)].map(|row| ErrorRow::of(&row)))
+        });
         assert_eq!(
             text,
             "problem,varied,n,tau,tolerance,error,order\nlemniscate,tau,100,0.25,,-0.1,1.5\nlemniscate,tau,100,0.25,,,\n"

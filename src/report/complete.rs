@@ -12,7 +12,7 @@ use crate::{
         part_file::PartFile,
         part_folder::PartFolder,
         portraits::{self, Film},
-        tables,
+        tables::Table,
     },
     placement::Platform,
     results::{cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
@@ -68,7 +68,7 @@ impl Complete<'_> {
         // The rows of the members are first: where the disk fills up they are what is kept.
         files.push(folder.write(names::ENSEMBLE, statistics.to_csv(spec)?)?);
         let excess = &tally.mean_excess(spec)?;
-        files.push(tables::mean_excess(folder.file(names::MEAN_EXCESS)?, excess)?);
+        files.push(Table::of(folder.file(names::MEAN_EXCESS)?, excess)?);
         if let Some(shard) = shard {
             files.push(folder.write(names::SHARD, shard)?);
         }

@@ -10,7 +10,7 @@ use crate::{
         part_folder::PartFolder,
         place::Place,
         spill::Spill,
-        tables::{RateTable, SeriesTable, SnapshotTable, SummaryTable, Table},
+        tables::{RateRow, RateTable, SeriesTable, SnapshotTable, SummaryTable, Table},
         zarr::{self, SnapshotStore},
     },
 };
@@ -116,7 +116,7 @@ impl Growing {
             store.member(outcome.status)?;
         }
         self.summary.row(outcome)?;
-        self.rates.row(outcome)?;
+        RateRow::of(outcome).iter().try_for_each(|row| self.rates.row(row))?;
         self.torn = false;
         Ok(())
     }

@@ -1,28 +1,21 @@
 //! A finished run, read back from its folder: what `plot` draws again.
 //!
-//! Tables are read row by row. Nothing is taken on trust: whatever this program would not have written is refused, with
-//! file, line and column, what was expected there and what was found.
+//! Tables are read row by row, and each row is checked against the spec and those before it.
 
-use std::{
-    fs::File,
-    io::{Read, Seek, SeekFrom},
-    path::{Path, PathBuf},
-    str::FromStr,
-};
+use std::path::Path;
 
-use csv::{ReaderBuilder, StringRecord};
 use serde::Deserialize;
 
 use crate::{
-    ensemble::{Observables, Outcome, Spec, Status},
+    ensemble::{Outcome, Spec},
     error::{Error, Result, shortened},
     files::{
+        TableReader,
         names::{self, REMEDY},
         place::Place,
         portraits::{self, Film},
-        tables,
     },
-    input::{self, Lines},
+    input,
     results::{
         provenance::{FORMAT, Provenance, by_status},
         tally::{Aside, MeanExcess, Tally},
@@ -160,7 +153,7 @@ fn expected(folder: &Path, name: &str, what: &str, expected: u64, found: u64) ->
 
 /// The rows of a `summary.csv`, in order; members ascend.
 pub struct Summary {
-    table: Table,
+    table: TableReader<Outcome>,
     last: Option<u64>,
     spec: Spec,
     /// The last cell and its spec.
@@ -177,57 +170,30 @@ impl Summary {
     }
 
     fn of(place: &Place, spec: &Spec) -> Result<Summary> {
-        let table = Table::open(place, tables::SUMMARY)?;
-        Ok(Summary { table, last: None, spec: spec.clone(), spec_of: None })
+        Ok(Summary { table: TableReader::open(place)?, last: None, spec: spec.clone(), spec_of: None })
     }
 
     fn read(&mut self) -> Result<Option<Outcome>> {
-        let Some(mut row) = self.table.read()? else { return Ok(None) };
-        let member = row.whole()?;
+        let Some((mut outcome, fields)) = self.table.read()? else { return Ok(None) };
+        let Outcome { member, cell, start, .. } = outcome;
         if let Some(last) = self.last.filter(|last| member <= *last) {
-            return Err(row.unexpected(&format!("a member after {last}: members ascend, each once")));
+            return Err(fields.unexpected_in("member", &format!("a member after {last}: members ascend, each once")));
         }
         let all = self.spec.all_members();
         if member >= all {
-            return Err(row.unexpected(&format!("a member below {all}")));
+            return Err(fields.unexpected_in("member", &format!("a member below {all}")));
         }
         self.last = Some(member);
-        let cell = row.whole()?;
-        if cell != member / self.spec.curves {
-            return Err(row.unexpected(&format!("{}, the cell of member {member}", member / self.spec.curves)));
+        let own = member / self.spec.curves;
+        if cell != own {
+            return Err(fields.unexpected_in("cell", &format!("{own}, the cell of member {member}")));
         }
-        let outcome = Outcome {
-            member,
-            cell,
-            status: row.status()?,
-            t_end: row.time()?,
-            steps: row.whole()?,
-            rejected: row.whole()?,
-            sweeps_k: row.whole()?,
-            sweeps_x: row.whole()?,
-            t_relax: row.event()?,
-            t_half: row.event()?,
-            rate: row.number()?,
-            rate_r2: row.number()?,
-            rate_theory: None,
-            start: Observables::default(),
-            end: Observables::default(),
-            self_crossing: None,
-        };
-        let [mut start, mut end] = [Observables::default(); 2];
-        (start.length, end.length) = (row.known()?, row.known()?);
-        (start.area, end.area) = (row.known()?, row.known()?);
-        (start.excess, end.excess) = (row.known()?, row.known()?);
-        (start.energy, end.energy) = (row.known()?, row.known()?);
-        (end.k_min, end.k_max, end.turning) = (row.known()?, row.known()?, row.whole()?);
-        (end.mesh_ratio, end.metric_drift) = (row.known()?, row.known()?);
-        let self_crossing = row.event()?;
         // What theory says is in no table, since the spec says it.
         if self.spec_of.as_ref().is_none_or(|(of, _)| *of != cell) {
             self.spec_of = Some((cell, self.spec.of_cell(cell)?));
         }
-        let rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| spec.rate_in_theory(start.area));
-        Ok(Some(Outcome { start, end, self_crossing, rate_theory, ..outcome }))
+        outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| spec.rate_in_theory(start.area));
+        Ok(Some(outcome))
     }
 }
 
@@ -244,17 +210,15 @@ impl Iterator for Summary {
 /// # Errors
 /// As [`Finished::read`].
 pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExcess>> {
-    let mut table = Table::open(&Place::named(&folder.join(names::MEAN_EXCESS)), tables::MEAN_EXCESS)?;
+    let mut table = TableReader::<MeanExcess>::open(&Place::named(&folder.join(names::MEAN_EXCESS)))?;
     let (mut rows, mut count, mut last): (Vec<MeanExcess>, u64, _) = (Vec::new(), 0, None);
-    while let Some(mut row) = table.read()? {
-        let cell = row.whole()?;
-        let t = row.time()?;
-        if let Some((last_cell, last)) = last.filter(|last| (cell, t) <= *last) {
-            return Err(row.unexpected(&format!("a time after {last} of cell {last_cell}")));
+    while let Some((row, fields)) = table.read()? {
+        let at = (row.cell, row.t);
+        if let Some((cell, t)) = last.filter(|last| at <= *last) {
+            return Err(fields.unexpected_in("t", &format!("a time after {t} of cell {cell}")));
         }
-        last = Some((cell, t));
+        last = Some(at);
         count += 1;
-        let row = MeanExcess { cell, t, members: row.whole()?, mean: row.number()?, sd: row.number()? };
         // More than there should be are counted only.
         rows.extend((count <= provenance.excess_rows).then_some(row));
     }
@@ -262,138 +226,11 @@ pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExc
     Ok(rows)
 }
 
-/// A CSV file with known columns.
-struct Table {
-    path: PathBuf,
-    columns: &'static str,
-    reader: csv::Reader<Lines<File>>,
-    record: StringRecord,
-}
-
-impl Table {
-    fn open(place: &Place, columns: &'static str) -> Result<Table> {
-        let path = place.shown().to_path_buf();
-        let file = input::open(place.at()).and_then(|mut file| Ok((ends_with_a_line(&mut file)?, file)));
-        let (whole, file) =
-            file.map_err(|e| Error::Request(format!("cannot read {}: {e}; {REMEDY}", path.display())))?;
-        if !whole {
-            let problem = "expected an end of line, found the end of the file: it was cut off";
-            return Err(Error::Request(format!("{}: {problem}; {REMEDY}", path.display())));
-        }
-        // Rows are checked here, where more can be said about them.
-        let reader =
-            ReaderBuilder::new().has_headers(false).flexible(true).quoting(false).from_reader(Lines::new(file));
-        let mut table = Table { path, columns, reader, record: StringRecord::new() };
-        if let Some(mut row) = table.read()? {
-            for name in columns.split(',') {
-                if row.word() != name {
-                    return Err(row.unexpected(&format!("the heading `{name}`")));
-                }
-            }
-        }
-        Ok(table)
-    }
-
-    /// The next row, with as many fields as there are columns.
-    fn read(&mut self) -> Result<Option<Row<'_>>> {
-        let Table { path, columns, reader, record } = self;
-        let path = path.as_path();
-        let some =
-            reader.read_record(record).map_err(|e| Error::Request(format!("{}: {e}; {REMEDY}", path.display())))?;
-        let (expected, found) = (columns.split(',').count(), record.len());
-        if some && found != expected {
-            let line = line(record);
-            let problem = format!("line {line}: expected {expected} fields, found {found}");
-            return Err(Error::Request(format!("{}, {problem}; {REMEDY}", path.display())));
-        }
-        Ok(some.then_some(Row { path, columns, record, taken: 0 }))
-    }
-}
-
-/// A row whose fields are taken from left to right.
-struct Row<'a> {
-    path: &'a Path,
-    columns: &'static str,
-    record: &'a StringRecord,
-    taken: usize,
-}
-
-impl Row<'_> {
-    fn word(&mut self) -> &str {
-        self.taken += 1;
-        &self.record[self.taken - 1]
-    }
-
-    fn whole<T: FromStr>(&mut self) -> Result<T> {
-        let value = self.word().parse();
-        value.map_err(|_| self.unexpected("a whole number"))
-    }
-
-    fn status(&mut self) -> Result<Status> {
-        let word = self.word();
-        let status = Status::ALL.into_iter().find(|status| status.name() == word);
-        status.ok_or_else(|| self.unexpected(&Status::ALL.map(Status::name).join(", ")))
-    }
-
-    /// A float; none if it is unknown.
-    fn number(&mut self) -> Result<Option<f64>> {
-        match self.word() {
-            "" => Ok(None),
-            word => match word.parse().ok().filter(|value: &f64| value.is_finite()) {
-                None => Err(self.unexpected("a number or nothing")),
-                known => Ok(known),
-            },
-        }
-    }
-
-    /// A float; not a number if it is unknown.
-    fn known(&mut self) -> Result<f64> {
-        Ok(self.number()?.unwrap_or(f64::NAN))
-    }
-
-    /// A time that may be unknown.
-    fn event(&mut self) -> Result<Option<f64>> {
-        match self.number()? {
-            Some(t) if t < 0.0 => Err(self.unexpected("a time or nothing")),
-            t => Ok(t),
-        }
-    }
-
-    fn time(&mut self) -> Result<f64> {
-        self.event()?.ok_or_else(|| self.unexpected("a time"))
-    }
-
-    /// That the field taken last is not what was expected.
-    fn unexpected(&self, expected: &str) -> Error {
-        let last = self.taken - 1;
-        let (line, column) = (line(self.record), self.columns.split(',').nth(last).unwrap_or_default());
-        Error::Request(format!(
-            "{}, line {line}, column {column}: expected {expected}, found `{}`; {REMEDY}",
-            self.path.display(),
-            shortened(&self.record[last], SHOWN)
-        ))
-    }
-}
-
-fn line(record: &StringRecord) -> u64 {
-    record.position().map_or(0, csv::Position::line)
-}
-
-/// Whether the file is complete as far as its last byte tells; it is then read from its start.
-fn ends_with_a_line(file: &mut File) -> std::io::Result<bool> {
-    let mut last = [0];
-    if file.metadata()?.len() > 0 {
-        file.seek(SeekFrom::End(-1))?;
-        file.read_exact(&mut last)?;
-        file.rewind()?;
-    }
-    Ok(last == *b"\n")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
+        ensemble::{Observables, Status},
         files::{OutputFolder, tables::SummaryTable},
         results::tally::tests::outcome,
     };

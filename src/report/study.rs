@@ -329,7 +329,7 @@ impl Study<'_> {
     fn table(&self) -> Table {
         let keys = self.spec().sweep.axes().iter().map(|axis| axis.key.clone());
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
-        let numbers = ["mean", "standard error"].into_iter().chain(QUANTILES.map(|(_, name)| name));
+        let numbers = ["mean", "standard error"].into_iter().chain(QUANTILES.map(|(_, name, _)| name));
         let numbers = numbers.chain(["median rate", "over theory"]);
         let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
         let row = |cell: &CellStatistics| {

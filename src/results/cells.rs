@@ -15,8 +15,14 @@ use crate::{
     statistics::{Bootstrap, Description, Interval, KaplanMeier, LogRank, Mean, PowerLaw, Sample, log_rank},
 };
 
-/// Shares of the members whose times the table has, and what its columns are called.
-pub const QUANTILES: [(f64, &str); 5] = [(0.05, "q05"), (0.25, "q25"), (0.5, "median"), (0.75, "q75"), (0.95, "q95")];
+/// Shares of the members whose times the table has, what its columns are called, and what they mean.
+pub const QUANTILES: [(f64, &str, &str); 5] = [
+    (0.05, "q05", "5 % quantile"),
+    (0.25, "q25", "25 % quantile"),
+    (0.5, "median", "median"),
+    (0.75, "q75", "75 % quantile"),
+    (0.95, "q95", "95 % quantile"),
+];
 
 /// The test that compares cells takes the cube of their number.
 const MAX_COMPARED: usize = 500;
@@ -54,14 +60,23 @@ impl Rates {
     fn new(bootstrap: &Bootstrap, rates: &[Rate], relative: bool) -> Result<Rates> {
         let theory = Description::new(rates.iter().filter_map(Rate::theory))?.median();
         let fitted = Description::new(rates.iter().map(|rate| rate.fitted))?;
-        let moments = [("mean", fitted.mean()), ("sd", fitted.standard_deviation()), ("se", fitted.standard_error())];
-        let quantiles = QUANTILES.map(|(share, _)| fitted.quantile(share));
+        let moments = [
+            Number { name: "mean", value: fitted.mean(), meaning: "mean" },
+            Number { name: "sd", value: fitted.standard_deviation(), meaning: "standard deviation" },
+            Number { name: "se", value: fitted.standard_error(), meaning: "standard error of the mean" },
+        ];
+        let quantiles = QUANTILES.map(|(share, ..)| fitted.quantile(share));
         let places = places(quantiles, bootstrap.median_of(&fitted));
         let (known, mut named) = (fitted.count(), moments.into_iter().chain(places).collect::<Vec<_>>());
         // Each is as large as all times of the cell: one at a time.
         let kept = (!relative).then_some(fitted);
         let ratio = Description::new(rates.iter().filter_map(Rate::ratio))?;
-        named.extend([("theory", theory), ("ratio", ratio.median())]);
+        named.push(Number { name: "theory", value: theory, meaning: "median of the rates of linear theory" });
+        named.push(Number {
+            name: "ratio",
+            value: ratio.median(),
+            meaning: "median of rate over that of linear theory",
+        });
         Ok(Rates { numbers: Numbers { known, named }, drawn: kept.unwrap_or(ratio) })
     }
 }
@@ -72,13 +87,34 @@ pub struct Numbers {
     /// Members of which the quantity is known.
     pub known: usize,
     /// All others.
-    pub named: Vec<(&'static str, Option<f64>)>,
+    pub named: Vec<Number>,
+}
+
+/// A number of a cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Number {
+    /// Its column, without the quantity.
+    pub name: &'static str,
+    /// The number, where it is known.
+    pub value: Option<f64>,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+/// A column of `ensemble.csv`.
+pub struct CellColumn {
+    /// The heading.
+    pub name: String,
+    /// What a field holds.
+    pub holds: &'static str,
+    /// What it means.
+    pub meaning: String,
 }
 
 impl Numbers {
     /// The one of this name, where it is known.
     pub fn get(&self, name: &str) -> Option<f64> {
-        self.named.iter().find(|(own, _)| *own == name).and_then(|(_, value)| *value)
+        self.named.iter().find(|number| number.name == name).and_then(|number| number.value)
     }
 }
 
@@ -86,19 +122,20 @@ impl Serialize for Numbers {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(1 + self.named.len()))?;
         map.serialize_entry("known", &self.known)?;
-        self.named.iter().try_for_each(|(name, value)| map.serialize_entry(name, value))?;
+        self.named.iter().try_for_each(|Number { name, value, .. }| map.serialize_entry(name, value))?;
         map.end()
     }
 }
 
 /// Quantiles, and the interval of the median.
-fn places(
-    quantiles: [Option<f64>; QUANTILES.len()],
-    interval: Option<Interval>,
-) -> impl Iterator<Item = (&'static str, Option<f64>)> {
-    let ends = interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
-    let names = QUANTILES.map(|(_, name)| name);
-    names.into_iter().zip(quantiles).chain(["median_low", "median_high"].into_iter().zip(ends))
+fn places(quantiles: [Option<f64>; QUANTILES.len()], interval: Option<Interval>) -> impl Iterator<Item = Number> {
+    let [lower, upper] = interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
+    let ends = [
+        Number { name: "median_low", value: lower, meaning: "lower end of the 95 % bootstrap interval of the median" },
+        Number { name: "median_high", value: upper, meaning: "upper end of that interval" },
+    ];
+    let quantiles = QUANTILES.into_iter().zip(quantiles);
+    quantiles.map(|((_, name, meaning), value)| Number { name, value, meaning }).chain(ends)
 }
 
 /// Relaxation times of all cells, and how they compare.
@@ -120,7 +157,7 @@ impl CellStatistics {
         let survival = KaplanMeier::new(&sample);
         let bootstrap = Bootstrap { seed: spec.seed.wrapping_add(cell), ..Bootstrap::default() };
         let (mean, interval) = (survival.mean(), bootstrap.median(&sample));
-        let quantiles = QUANTILES.map(|(share, _)| survival.quantile(share));
+        let quantiles = QUANTILES.map(|(share, ..)| survival.quantile(share));
         let (values, counts) = (spec.sweep.labels(cell), tally.counts);
         let rates = Rates::new(&bootstrap, &mem::take(&mut tally.rates), relative)?;
         Ok(CellStatistics { cell, values, counts, sample, mean, quantiles, interval, rates })
@@ -134,14 +171,23 @@ impl CellStatistics {
     /// What the table says of the times.
     pub fn times(&self) -> Numbers {
         let of = |number: fn(Mean) -> Option<f64>| self.mean.and_then(number);
+        let (mean, sd) = (of(|mean| Some(mean.value)), of(|mean| mean.standard_deviation));
+        let (se, restricted_to) = (of(|mean| mean.standard_error), of(|mean| mean.restricted_to));
+        let restricted =
+            "time to which the mean is restricted, a lower bound then, since the last members are censored";
         let moments = [
-            ("mean", of(|mean| Some(mean.value))),
-            ("sd", of(|mean| mean.standard_deviation)),
-            ("se", of(|mean| mean.standard_error)),
-            ("restricted_to", of(|mean| mean.restricted_to)),
+            Number { name: "mean", value: mean, meaning: "mean, by Kaplan–Meier" },
+            Number { name: "sd", value: sd, meaning: "standard deviation" },
+            Number { name: "se", value: se, meaning: "standard error of the mean" },
+            Number { name: "restricted_to", value: restricted_to, meaning: restricted },
         ];
         let places = places(self.quantiles, self.interval);
         Numbers { known: self.sample.events(), named: moments.into_iter().chain(places).collect() }
+    }
+
+    /// The quantities of which the table tells, and what it says of them.
+    fn quantities(&self) -> [(&'static str, Numbers); 2] {
+        [("t_relax", self.times()), ("rate", self.rates.numbers.clone())]
     }
 
     /// The time by which half of the members have relaxed.
@@ -185,22 +231,36 @@ impl EnsembleStatistics {
         Ok(EnsembleStatistics { cells, log_rank, power_law, relative })
     }
 
+    /// The columns of `ensemble.csv`.
+    pub fn columns(&self, spec: &Spec) -> Vec<CellColumn> {
+        let column = |name: String, holds, meaning: String| CellColumn { name, holds, meaning };
+        let keys = spec.sweep.axes().iter();
+        let keys = keys.map(|axis| column(axis.key.clone(), "swept value", format!("--{} of the cell", axis.key)));
+        let statuses = Status::ALL.into_iter().map(Status::name);
+        let statuses = statuses.map(|name| column(name.into(), "integer", format!("members that ended {name}")));
+        let numbers = self.cells.first().into_iter().flat_map(CellStatistics::quantities);
+        let numbers = numbers.flat_map(|(quantity, numbers)| {
+            let known = column(format!("{quantity}_known"), "integer", format!("members with a {quantity}"));
+            let named = numbers.named.into_iter().map(move |Number { name, meaning, .. }| {
+                column(format!("{quantity}_{name}"), "float", format!("{quantity}: {meaning}"))
+            });
+            [known].into_iter().chain(named)
+        });
+        let mut all = vec![column("cell".into(), "integer", "index of the cell, from 0".into())];
+        all.extend(keys);
+        all.push(column("members".into(), "integer", "members that ended".into()));
+        all.extend(statuses.chain(numbers));
+        all
+    }
+
     /// The text of `ensemble.csv`.
     pub fn to_csv(&self, spec: &Spec) -> Result<String> {
         let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write ensemble.csv: {e}"));
         let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
-        let keys = spec.sweep.axes().iter().map(|axis| axis.key.clone());
-        let statuses = Status::ALL.iter().map(|status| status.name().to_string());
-        let header = ["cell".to_string()].into_iter().chain(keys).chain(["members".to_string()]).chain(statuses);
-        let quantities = |cell: &CellStatistics| [("t_relax", cell.times()), ("rate", cell.rates.numbers.clone())];
-        let columns = self.cells.first().into_iter().flat_map(quantities).flat_map(|(quantity, numbers)| {
-            let names = ["known"].into_iter().chain(numbers.named.into_iter().map(|(name, _)| name));
-            names.map(move |name| format!("{quantity}_{name}"))
-        });
-        writer.write_record(header.chain(columns)).map_err(|e| failed(&e))?;
+        writer.write_record(self.columns(spec).into_iter().map(|column| column.name)).map_err(|e| failed(&e))?;
         for cell in &self.cells {
-            let numbers = quantities(cell).map(|(_, Numbers { known, named })| {
-                (known, named.into_iter().map(|(_, value)| value).collect::<Vec<_>>())
+            let numbers = cell.quantities().map(|(_, Numbers { known, named })| {
+                (known, named.into_iter().map(|number| number.value).collect::<Vec<_>>())
             });
             let row = (cell.cell, &cell.values, cell.members(), cell.counts, numbers);
             writer.serialize(row).map_err(|e| failed(&e))?;

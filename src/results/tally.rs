@@ -97,7 +97,7 @@ impl Aside {
 }
 
 /// A row of `mean_excess.csv`: the excess of the members of a cell that reached a time.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeanExcess {
     /// Index of the cell.
     pub cell: u64,

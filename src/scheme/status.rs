@@ -3,13 +3,14 @@
 use serde::{Deserialize, Serialize};
 
 /// How a member ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u32)]
 pub enum Status {
     /// Its excess reached the threshold.
     Relaxed = 1,
-    /// The final time came first.
+    /// The final time came first, so far.
+    #[default]
     Unfinished = 2,
     /// Curvature times spacing too large, an edge vanished, the metric was lost, or the turning number; or no adaptive
     /// step was short enough for the tolerance.
