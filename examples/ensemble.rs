@@ -3,39 +3,19 @@
 //!     cargo run --release --example ensemble
 
 use curvelax::{
-    ensemble::{Cell, Ended, Family, Sink, Spec},
+    ensemble::{Spec, Study},
     flow::Flow,
-    placement,
-    simulate::simulate,
+    relax,
 };
-
-/// Keeps the relaxation times, in member order.
-#[derive(Default)]
-struct Times(Vec<f64>);
-
-impl Sink for Times {
-    fn member(&mut self, ended: &Ended) -> curvelax::Result<()> {
-        self.0.extend(ended.outcome.t_relax);
-        Ok(())
-    }
-}
 
 fn main() -> curvelax::Result<()> {
     let spec = Spec { curves: 32, flow: Flow::Willmore, t_end: 8.0, stop_when_relaxed: true, ..Spec::default() };
-    let spec = spec.validate()?;
-    let family = Family::new(&spec)?;
+    let mut members = Vec::new();
+    let platform = relax(&Study::new(spec)?, &mut members)?;
 
-    let choice = placement::choose(&spec, family.points())?;
-    println!("{}", choice.sentence(&spec));
-    let precision = choice.precision();
-    let (mut backend, _) = choice.open(&spec, family.points())?;
-
-    let mut times = Times::default();
-    simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut times)?;
-
-    let Times(mut times) = times;
+    let mut times: Vec<f64> = members.iter().filter_map(|member| member.outcome.t_relax).collect();
     times.sort_by(f64::total_cmp);
-    println!("{} of {} members relaxed", times.len(), spec.curves);
+    println!("on {}: {} of {} members relaxed", platform.name(), times.len(), members.len());
     if let (Some(first), Some(last)) = (times.first(), times.last()) {
         println!("t_relax from {first:.4} to {last:.4}, median {:.4}", times[times.len() / 2]);
     }

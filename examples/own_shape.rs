@@ -6,36 +6,10 @@ use std::f64::consts::TAU;
 
 use curvelax::{
     curve::{BaseCurve, Outline},
-    ensemble::{Cell, Ended, Family, Sink, Spec, spec::Pull},
-    placement,
-    simulate::simulate,
+    ensemble::{Spec, Study, spec::Pull},
+    relax,
 };
 use glam::DVec2;
-
-/// Prints what became of a member.
-struct Print(&'static str);
-
-impl Sink for Print {
-    fn member(&mut self, ended: &Ended) -> curvelax::Result<()> {
-        let outcome = &ended.outcome;
-        let t_relax = outcome.t_relax.map_or("not reached".into(), |t| format!("{t:.5}"));
-        println!(
-            "{:<8} area {:.4} to {:.4}, length {:.4} to {:.4}, {} after {} steps, t_relax {t_relax}",
-            self.0,
-            outcome.start.area,
-            outcome.end.area,
-            outcome.start.length,
-            outcome.end.length,
-            outcome.status.name(),
-            outcome.steps,
-        );
-        if let Some(portrait) = &ended.portrait {
-            let shown = portrait.after.iter().step_by(portrait.after.len() / 4);
-            println!("{:<8} some nodes: {}", "", shown.map(|node| format!("{node:.3}")).collect::<Vec<_>>().join(" "));
-        }
-        Ok(())
-    }
-}
 
 fn main() -> curvelax::Result<()> {
     // A bean: u in [0, 1] goes round once, in either sense.
@@ -58,12 +32,25 @@ fn main() -> curvelax::Result<()> {
             stop_when_relaxed: true,
             ..Spec::default()
         };
-        let spec = spec.validate()?;
-        let family = Family::of(&spec, curve)?;
-        let choice = placement::choose(&spec, family.points())?;
-        let precision = choice.precision();
-        let (mut backend, _) = choice.open(&spec, family.points())?;
-        simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 1, &mut Print(name))?;
+        let mut members = Vec::new();
+        relax(&Study::of_curve(spec, curve)?, &mut members)?;
+
+        let outcome = &members[0].outcome;
+        let (start, end) = (outcome.start, outcome.end);
+        let t_relax = outcome.t_relax.map_or("not reached".into(), |t| format!("{t:.5}"));
+        println!(
+            "{name:<8} area {:.4} to {:.4}, length {:.4} to {:.4}, {} after {} steps, t_relax {t_relax}",
+            start.area,
+            end.area,
+            start.length,
+            end.length,
+            outcome.status.name(),
+            outcome.steps,
+        );
+        if let Some(portrait) = &members[0].portrait {
+            let shown = portrait.after.iter().step_by(portrait.after.len() / 4);
+            println!("{:<8} some nodes: {}", "", shown.map(|node| format!("{node:.3}")).collect::<Vec<_>>().join(" "));
+        }
     }
     Ok(())
 }

@@ -5,17 +5,14 @@
 //! about two seconds: first as many as go abreast, then, where these are done early, as many more as there is time for.
 //! Between the two pilots lies the time of one more member, free of what is the same for any number of them.
 
-use std::{
-    ops::Range,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
 use crate::{
     backend::Backend,
     ensemble::{
-        Cell, Ended, Extent, Portrait, SeriesRow, Sink, Snapshot, Spec, rows,
+        Cell, Ended, Extent, Portrait, SeriesRow, Sink, Snapshot, Study, rows,
         spec::{Pace, Precision},
     },
     error::{Error, Result},
@@ -99,11 +96,13 @@ struct Work {
 }
 
 impl Estimate {
-    /// Estimates the run of `cohorts` of `cells`, each on its choice.
+    /// Estimates the run of a study, each cohort on its choice. It leaves the study with the members of its pilot.
     ///
     /// # Errors
     /// As the run itself.
-    pub fn new(cells: &mut [Cell], cohorts: Vec<Range<usize>>, choices: Vec<Choice>) -> Result<Estimate> {
+    pub fn new(study: &mut Study, choices: Vec<Choice>) -> Result<Estimate> {
+        let cohorts = study.cohorts();
+        let cells = study.cells_mut();
         let members = cells.iter().map(|cell| cell.spec.member_count()).sum::<u64>();
         let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
         let (mut slots, mut resident) = (0, 0);
@@ -114,10 +113,8 @@ impl Estimate {
         for (range, choice) in cohorts.into_iter().zip(choices).step_by(every) {
             let cohort = &mut cells[range];
             let precision = choice.precision();
-            let all: u64 = cohort.iter().map(|cell| cell.spec.member_count()).sum();
-            let whole = Spec { curves: all, only: None, shard: None, ..cohort[0].spec.clone() };
             let started = Instant::now();
-            let (mut backend, platform) = choice.open(&whole, whole.points)?;
+            let (mut backend, platform) = choice.open_for(cohort)?;
             start_up += started.elapsed().as_secs_f64();
             opened.get_or_insert(platform);
             slots = slots.max(backend.slots());
@@ -366,10 +363,13 @@ pub fn peak_resident() -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ensemble::study;
+    use crate::{
+        ensemble::{Spec, spec::BackendChoice},
+        placement::{choose_all, settle},
+    };
 
-    fn cells(spec: Spec) -> Vec<Cell> {
-        study::cells(&spec.validate().unwrap()).unwrap()
+    fn study(spec: Spec) -> Study {
+        Study::new(spec).unwrap()
     }
 
     fn chosen(cells: &[Cell]) -> Vec<u64> {
@@ -380,23 +380,23 @@ mod tests {
     fn a_pilot_is_spread_over_all_cells() {
         let mut spec = Spec { curves: 1000, ..Spec::default() };
         spec.sweep.set("amplitude=0.01,0.02,0.05".parse().unwrap());
-        let mut cells = cells(spec);
-        let own = vec![None; 3];
-        choose(&mut cells, &own, 3000, 3);
-        assert_eq!(chosen(&cells), [500, 1500, 2500]);
-        choose(&mut cells, &own, 3000, 3000);
-        assert_eq!(chosen(&cells), (0..3000).collect::<Vec<u64>>());
-        choose(&mut cells, &own, 3000, 7);
+        let mut study = study(spec);
+        let (cells, own) = (study.cells_mut(), vec![None; 3]);
+        choose(cells, &own, 3000, 3);
+        assert_eq!(chosen(cells), [500, 1500, 2500]);
+        choose(cells, &own, 3000, 3000);
+        assert_eq!(chosen(cells), (0..3000).collect::<Vec<u64>>());
+        choose(cells, &own, 3000, 7);
         assert_eq!(cells.iter().map(|cell| cell.spec.member_count()).collect::<Vec<_>>(), [2, 3, 2]);
     }
 
     #[test]
     fn a_pilot_takes_members_that_are_to_run() {
         let only: Vec<u64> = (0..90).map(|i| 11 * i).collect();
-        let mut cells = cells(Spec { curves: 1000, only: Some(only.clone()), ..Spec::default() });
-        let own = vec![cells[0].spec.only.clone()];
-        choose(&mut cells, &own, 90, 13);
-        let chosen = chosen(&cells);
+        let mut study = study(Spec { curves: 1000, only: Some(only.clone()), ..Spec::default() });
+        let own = vec![study.cells()[0].spec.only.clone()];
+        choose(study.cells_mut(), &own, 90, 13);
+        let chosen = chosen(study.cells());
         assert!(chosen.len() == 13 && chosen.iter().all(|member| only.contains(member)), "{chosen:?}");
         assert!(chosen[0] < 100 && chosen[12] > 880, "{chosen:?}");
     }
@@ -420,20 +420,19 @@ mod tests {
     #[test]
     fn steps_of_fixed_length_are_certain_unless_members_stop() {
         let fixed = Spec { tau: Some(0.01), t_end: 0.055, ..Spec::default() };
-        assert_eq!(certain_steps(&cells(fixed.clone())), Some(6.0));
-        assert_eq!(certain_steps(&cells(Spec { stop_when_relaxed: true, ..fixed })), None);
-        assert_eq!(certain_steps(&cells(Spec { adaptive: Some(1e-3), ..Spec::default() })), None);
+        assert_eq!(certain_steps(study(fixed.clone()).cells()), Some(6.0));
+        assert_eq!(certain_steps(study(Spec { stop_when_relaxed: true, ..fixed }).cells()), None);
+        assert_eq!(certain_steps(study(Spec { adaptive: Some(1e-3), ..Spec::default() }).cells()), None);
     }
 
     #[test]
     fn ten_million_members_are_estimated_without_room_for_them() {
         let before = peak_resident();
         let spec = Spec { curves: 10_000_000, adaptive: Some(1e-3), stop_when_relaxed: true, ..Spec::default() };
-        let spec = Spec { backend: crate::ensemble::spec::BackendChoice::Cpu, points: 32, ..spec }.validate().unwrap();
-        let mut cells = cells(spec.clone());
-        let choice = crate::placement::choose(&spec, spec.points).unwrap();
-        let only_cell = std::iter::once(0..1).collect();
-        let estimate = Estimate::new(&mut cells, only_cell, vec![choice]).unwrap();
+        let mut study = study(Spec { backend: BackendChoice::Cpu, points: 32, ..spec });
+        let choices = choose_all(&study).unwrap();
+        settle(&mut study, &choices);
+        let estimate = Estimate::new(&mut study, choices).unwrap();
         assert_eq!((estimate.members, estimate.cells), (10_000_000, 1));
         assert!(estimate.memory_bytes > 300_000_000, "{estimate:?}");
         assert!(estimate.pilot.members < 5_000_000 && estimate.pilot.seconds < 60.0, "{estimate:?}");

@@ -42,86 +42,75 @@
 //! | [`scheme`] | the paper's step, one file a stage, with the stems of `shaders/` |
 //! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
 //! | [`ensemble`] | the spec, its members, what a member leaves |
-//! | [`schedule`], [`trajectory`], [`simulate`] | steps and output times; one member's way; the loop over all |
+//! | `schedule`, `trajectory`, [`simulate`] | steps and output times; one member's way; the loop over all |
 //! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
 //! | [`placement`] | which back end a spec gets, and why |
+//! | [`relax`](fn@relax) | a study in, what its members leave out |
 //! | [`truth`] | problems with exact solutions, and the error and order against them |
 //! | [`results`] | what the members of a study add up to: sums, statistics by cell, the record of the run |
-//! | [`draw`] | SVG, axes and charts from plain numbers |
-//! | [`files`] | the folder of results: who may write there, and what each file holds |
-//! | [`report`] | a run's sink: tables, checkpoints, merge, `report.html` |
-//! | [`mod@bench`], [`estimate`], [`figures`] | how fast a back end is; what a run will take; the paper's figures |
-//! | [`cli`] | the commands |
+//! | `draw` | SVG, axes and charts from plain numbers |
+//! | `files` | the folder of results: who may write there, and what each file holds |
+//! | `report` | a run's sink: tables, checkpoints, merge, `report.html` |
+//! | `bench`, `estimate`, `figures` | how fast a back end is; what a run will take; the paper's figures |
+//! | `cli` | the commands |
 //!
 //! # Example
 //!
-//! A run is a [`Spec`](ensemble::Spec), validated once, whose members are handed to a [`Sink`](ensemble::Sink). One
-//! ellipse under surface diffusion keeps its area and loses length:
+//! A [`Spec`](ensemble::Spec) says what to run, a [`Study`](ensemble::Study) is a spec that was checked, and
+//! [`relax`](fn@relax) hands what its members leave to a [`Sink`](ensemble::Sink), such as a `Vec`. One ellipse under
+//! surface diffusion keeps its area and loses length:
 //!
 //! ```
-//! use curvelax::{
-//!     ensemble::{Cell, Ended, Family, Sink, Spec, Status, spec::{BackendChoice, Solver}},
-//!     placement,
-//!     simulate::simulate,
-//! };
+//! use curvelax::{ensemble::{Spec, Study}, relax};
 //!
-//! struct Check;
-//!
-//! impl Sink for Check {
-//!     fn member(&mut self, ended: &Ended) -> curvelax::Result<()> {
-//!         let (start, end) = (ended.outcome.start, ended.outcome.end);
-//!         assert!((end.area / start.area - 1.0).abs() < 1e-3);
-//!         assert!(end.length < 0.96 * start.length);
-//!         assert_eq!(ended.outcome.status, Status::Unfinished);
-//!         Ok(())
-//!     }
-//! }
-//!
-//! let spec = Spec {
-//!     curves: 1,
-//!     amplitude: 0.0,
-//!     t_end: 0.2,
-//!     solver: Solver::Direct.into(),
-//!     backend: BackendChoice::Cpu,
-//!     ..Spec::default()
-//! };
-//! let spec = spec.validate()?;
-//! let family = Family::new(&spec)?;
-//! let choice = placement::choose(&spec, family.points())?;
-//! let precision = choice.precision();
-//! let (mut backend, _) = choice.open(&spec, family.points())?;
-//! simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 0, &mut Check)?;
+//! let study = Study::new(Spec { curves: 1, amplitude: 0.0, t_end: 0.2, ..Spec::default() })?;
+//! let mut members = Vec::new();
+//! relax(&study, &mut members)?;
+//! let (start, end) = (members[0].outcome.start, members[0].outcome.end);
+//! assert!((end.area / start.area - 1.0).abs() < 1e-3 && end.length < 0.96 * start.length);
 //! # Ok::<(), curvelax::Error>(())
 //! ```
 
 pub mod backend;
-pub mod bench;
-pub mod cli;
 pub mod conformance;
 pub mod curve;
-pub mod draw;
 pub mod ensemble;
 pub mod error;
-pub mod estimate;
-pub mod figures;
-pub mod files;
 pub mod flow;
-mod guard;
-mod input;
 pub mod number;
 pub mod placement;
 pub mod random;
-pub mod report;
 pub mod results;
-pub mod schedule;
 pub mod scheme;
 pub mod simulate;
 pub mod solver;
 pub mod statistics;
+pub mod truth;
+
+// Public for the program, and for the project's own tests, benchmarks and fuzzing only.
+#[doc(hidden)]
+pub mod bench;
+#[doc(hidden)]
+pub mod cli;
+#[doc(hidden)]
+pub mod figures;
+#[doc(hidden)]
+pub mod files;
+#[doc(hidden)]
+pub mod report;
+#[doc(hidden)]
+pub mod schedule;
+#[doc(hidden)]
+pub mod trajectory;
+
+mod draw;
+mod estimate;
+mod guard;
+mod input;
+mod relax;
 mod text;
 mod threads;
-pub mod trajectory;
-pub mod truth;
 mod wgsl;
 
 pub use error::{Error, Result};
+pub use relax::relax;

@@ -10,7 +10,7 @@ use crate::backend::{
 use crate::{
     conformance::{compare::MAX_SWEEPS, self_test},
     ensemble::{
-        Spec,
+        Cell, Spec, Study,
         spec::{BackendChoice, Precision},
     },
     error::{Error, Result},
@@ -88,12 +88,14 @@ pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
     }
 }
 
-/// Chooses back ends for several parts of a study, of so many nodes each: all in one place, that of the first part, or with
-/// `--backend auto` on the CPU where that cannot do all of them.
+/// Chooses back ends for the cohorts of a study: all in one place, that of the first one, or with `--backend auto` on the
+/// CPU where that cannot do all of them.
 ///
 /// # Errors
 /// As [`choose`].
-pub fn choose_all(parts: &[(&Spec, usize)]) -> Result<Vec<Choice>> {
+pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
+    let cells = study.cohorts().into_iter().map(|range| &study.cells()[range.start].spec);
+    let parts: Vec<(&Spec, usize)> = cells.map(|spec| (spec, spec.points)).collect();
     let Some(((first, n), others)) = parts.split_first() else { return Ok(Vec::new()) };
     let choice = choose(first, *n)?;
     let there = |(spec, n): &(&Spec, usize)| {
@@ -113,6 +115,17 @@ pub fn choose_all(parts: &[(&Spec, usize)]) -> Result<Vec<Choice>> {
             Ok(all)
         }
     }
+}
+
+/// Writes into a study what the choices for its cohorts settled, so that it can be repeated as it is.
+pub fn settle(study: &mut Study, choices: &[Choice]) {
+    let cohorts = study.cohorts();
+    let each = |cells: &mut [Cell]| {
+        for (range, choice) in cohorts.iter().zip(choices) {
+            cells[range.clone()].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
+        }
+    };
+    study.settle(each, |spec| choices.iter().take(1).for_each(|first| first.settle_place(spec)));
 }
 
 /// What `--backend auto` takes: the first hardware GPU that can do the run, else the CPU.
@@ -290,6 +303,16 @@ impl Choice {
     /// What was chosen.
     pub fn device(&self) -> &Device {
         &self.device
+    }
+
+    /// Opens it for a cohort of cells.
+    ///
+    /// # Errors
+    /// As [`open`](Choice::open).
+    pub fn open_for(&self, cohort: &[Cell]) -> Result<(Box<dyn Backend>, Platform)> {
+        let curves = cohort.iter().map(|cell| cell.spec.member_count()).sum();
+        let whole = Spec { curves, only: None, shard: None, ..cohort[0].spec.clone() };
+        self.open(&whole, whole.points)
     }
 
     /// Opens it for the members of `spec`, of `n` nodes; a GPU has to pass a [self-test](crate::conformance::self_test()).

@@ -38,7 +38,7 @@ const MAX_OF_ONE: usize = 8 << 20;
 /// Before the run is kept the sink is handed all rows if they are more than this: what is kept stays small.
 const MAX_KEPT: usize = 4 << 20;
 
-/// Runs the members of `cells`, which keep [cohort](crate::ensemble::study::cohorts), on `backend`, and hands each to
+/// Runs the members of `cells`, which keep [cohort](crate::ensemble::Study::cohorts), on `backend`, and hands each to
 /// `sink` in member order.
 ///
 /// The first members come with their nodes before, on their way and after, `portraits` of them over all cells.
@@ -365,7 +365,7 @@ impl Queue {
 mod tests {
     use super::*;
     use crate::{
-        ensemble::{Spec, study},
+        ensemble::{Spec, Study},
         scheme::{
             Parameters, State,
             member::{Counters, Report},
@@ -424,11 +424,11 @@ mod tests {
 
     #[test]
     fn a_sink_stops_a_run_between_dispatches_and_during_one() {
-        let spec = Spec { curves: 3, ..Spec::default() }.validate().unwrap();
-        let cells = study::cells(&spec).unwrap();
+        let study = Study::new(Spec { curves: 3, ..Spec::default() }).unwrap();
+        let cells = study.cells();
         for patience in [1, 2, 7] {
             let mut sink = Patience(patience);
-            let stopped = simulate(&cells, Precision::F64, &mut Never, 0, &mut sink).unwrap_err();
+            let stopped = simulate(cells, Precision::F64, &mut Never, 0, &mut sink).unwrap_err();
             assert_eq!((stopped.exit_code(), sink.0), (75, 0), "{stopped}");
         }
     }

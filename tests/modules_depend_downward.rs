@@ -13,7 +13,7 @@ use syn::{
 };
 
 /// The modules of the crate, each above all that it may use.
-const LAYERS: [&str; 29] = [
+const LAYERS: [&str; 30] = [
     "wgsl",
     "error",
     "guard",
@@ -34,6 +34,7 @@ const LAYERS: [&str; 29] = [
     "simulate",
     "conformance",
     "placement",
+    "relax",
     "truth",
     "results",
     "draw",

@@ -6,9 +6,8 @@ use std::{collections::BTreeMap, fs, path::Path, time::Duration};
 use curvelax::{
     Error, Result,
     ensemble::{
-        Cell, Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Wish,
+        Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish,
         spec::{BackendChoice, Store},
-        study,
     },
     files::OutputFolder,
     placement,
@@ -73,25 +72,25 @@ fn manner() -> Manner {
 /// Runs `spec` into `out` in pieces of `patience` looks at the run and more; returns how many pieces there were, and how
 /// often rows were handed over.
 fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
-    let mut cells: Vec<Cell> = study::cells(spec)?;
-    let choice = placement::choose(spec, spec.points)?;
-    cells.iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
-    let spec = cells[0].spec.clone();
-    let origin = Origin::new(spec.to_toml()?, &cells, choice.platform(&spec))?;
-    let mut report = Report::begin(OutputFolder::open(out, false)?, &spec, spec.points, origin, manner())?;
+    let mut study = Study::new(spec.clone())?;
+    let choices = placement::choose_all(&study)?;
+    placement::settle(&mut study, &choices);
+    let (choice, cells) = (&choices[0], study.cells());
+    let origin = Origin::new(&study, choice.platform(study.spec()))?;
+    let mut report = Report::begin(OutputFolder::open(out, false)?, &study, origin, manner())?;
     let (mut standing, mut spilled) = (Standing::default(), 0);
     for piece in 1.. {
         // More each time, so that the run comes to an end although some of its work is lost.
         let patience = patience.saturating_add(piece / 4);
         let mut sink = Impatient { report: &mut report, patience, at_once: piece % 3 == 0, waits: false, spilled: 0 };
-        let (mut backend, _) = choice.open(&spec, spec.points)?;
-        let done = resume(&cells, choice.precision(), backend.as_mut(), 2, standing, &mut sink);
+        let (mut backend, _) = choice.open_for(cells)?;
+        let done = resume(cells, choice.precision(), backend.as_mut(), 2, standing, &mut sink);
         spilled += sink.spilled;
         match done {
             Err(Error::Stopped(_)) => assert!(report.give_up()),
             done => {
                 done?;
-                report.finish(&spec, &[], Form::Overview)?;
+                report.finish(study.spec(), &[], Form::Overview)?;
                 return Ok((piece, spilled));
             }
         }
@@ -99,7 +98,7 @@ fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
         assert!(state < 5 << 20, "a state of {state} bytes");
         let folder = OutputFolder::open_again(out)?;
         let kept = checkpoint::find(&folder)?.expect("a run that was interrupted");
-        (report, standing) = Report::resume(folder, &spec, spec.points, kept, manner())?;
+        (report, standing) = Report::resume(folder, &study, kept, manner())?;
     }
     unreachable!("it ends")
 }
@@ -120,7 +119,6 @@ fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 
 fn same_in_pieces(spec: Spec, table: &str) {
     let spec = Spec { curves: 11, adaptive: Some(0.1), t_end: 1.0, backend: BackendChoice::Cpu, ..spec };
-    let spec = spec.validate().unwrap();
     let home = tempfile::tempdir().unwrap();
     let [whole, pieces] = ["whole", "pieces"].map(|name| home.path().join(name));
     let (_, straight) = run(&spec, &whole, u32::MAX / 2).unwrap();

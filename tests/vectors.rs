@@ -9,7 +9,7 @@ use curvelax::{
         Backend,
         cpu::{CpuBackend, Vectorised, Vectors},
     },
-    ensemble::{Cell, Ended, Spec, Status, spec::Solver, study},
+    ensemble::{Cell, Ended, Spec, Status, Study, spec::Solver},
     scheme::{
         Parameters, State,
         member::{Counters, Report},
@@ -70,7 +70,7 @@ fn run<T: Vectorised>(specs: &[Spec], vectors: Vectors, threads: usize, slots: u
     let blocks = Blocks::new(specs[0].points).unwrap();
     let backend = CpuBackend::<T>::with_vectors(blocks, method, threads, vectors).unwrap();
     let mut all = All::default();
-    let cells: Vec<Cell> = specs.iter().flat_map(|spec| study::cells(spec).unwrap()).collect();
+    let cells: Vec<Cell> = specs.iter().flat_map(|spec| Study::new(spec.clone()).unwrap().into_cells()).collect();
     simulate(&cells, T::PRECISION, &mut Fewer(Box::new(backend), slots), 2, &mut all).unwrap();
     all.0
 }

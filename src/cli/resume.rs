@@ -76,7 +76,7 @@ pub fn begun(path: &Path) -> Result<Option<(OutputFolder, Option<Saved>)>> {
 ///
 /// # Errors
 /// [`Error::Request`] for one of another spec, and as [`resume`].
-pub fn resume_like((folder, saved): (OutputFolder, Option<Saved>), spec: Spec, flags: MannerFlags) -> Result<()> {
+pub fn resume_like((folder, saved): (OutputFolder, Option<Saved>), spec: &Spec, flags: MannerFlags) -> Result<()> {
     let path = folder.path().display().to_string();
     let own = match &saved {
         Some(saved) => Spec::from_toml(&saved.head.origin.spec).map_err(|e| state_spec(&e))?,
@@ -120,7 +120,7 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: Place, flags
     let elsewhere = place.backend.is_some() || place.adapter.is_some();
     let new_threads = place.threads.is_some();
     let work = spec(&origin.spec, place).and_then(Work::new).map_err(|error| origin.explain(error))?;
-    origin.check_outlines(&work.cells)?;
+    origin.check_outlines(&work.study)?;
     let mut here = work.platform();
     here.reason = began.reason.clone();
     if !here.computes_like(&began) {
@@ -133,13 +133,13 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: Place, flags
             )));
         }
         origin.moves.push(format!("the run was on {} and went on on {}", began.name(), here.name()));
-        origin.spec = work.spec.to_toml()?;
+        origin.spec = work.study.spec().to_toml()?;
         origin.platform = here;
     } else if new_threads {
-        (origin.platform.threads, origin.spec) = (here.threads, work.spec.to_toml()?);
+        (origin.platform.threads, origin.spec) = (here.threads, work.study.spec().to_toml()?);
     }
-    let (report, standing) = Report::resume(folder, &work.spec, work.cells[0].spec.points, saved, manner)?;
-    flags.say(&format!("resuming: {} of {} members are in the table", report.members(), work.spec.member_count()));
+    let (report, standing) = Report::resume(folder, &work.study, saved, manner)?;
+    flags.say(&format!("resuming: {} of {} members are in the table", report.members(), work.study.member_count()));
     work.carry_out(report, standing, &flags)
 }
 
@@ -153,7 +153,7 @@ fn spec(text: &str, Place { backend, adapter, threads }: Place) -> Result<Spec> 
     if threads.is_some() {
         spec.threads = threads;
     }
-    spec.validate()
+    Ok(spec)
 }
 
 fn state_spec(fault: &str) -> Error {

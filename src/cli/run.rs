@@ -62,16 +62,15 @@ pub struct RunArgs {
 pub fn run(args: RunArgs) -> Result<()> {
     let mut work = Work::new(resolve(args.spec, args.flags)?)?;
     if args.print_spec {
-        return print(&work.spec.to_toml()?);
+        return print(&work.study.spec().to_toml()?);
     }
     let flags = args.manner;
     if args.dry_run {
-        work.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
-        let (cohorts, choices) = work.cohorts.into_iter().unzip();
-        let estimate = Estimate::new(&mut work.cells, cohorts, choices)?;
+        work.study.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
+        let estimate = Estimate::new(&mut work.study, work.choices)?;
         return match (flags.json, flags.quiet) {
             (true, _) => print_json(&estimate),
-            (false, false) => print(&dry_run::table(&estimate, &work.cells[0].spec)),
+            (false, false) => print(&dry_run::table(&estimate, &work.study.cells()[0].spec)),
             (false, true) => Ok(()),
         };
     }
@@ -79,20 +78,20 @@ pub fn run(args: RunArgs) -> Result<()> {
     flags.check_name(&out)?;
     let begun = if args.resume { resume::begun(&out)? } else { None };
     if let Some(begun) = begun {
-        return resume::resume_like(begun, work.spec, flags);
+        return resume::resume_like(begun, work.study.spec(), flags);
     }
     let manner = flags.manner()?;
     let existing = if args.resume { Existing::Filled } else { args.force.into() };
     let folder = OutputFolder::open(&out, existing)?;
     let platform = work.open(&flags)?;
-    let origin = Origin::new(work.spec.to_toml()?, &work.cells, platform)?;
-    let report = Report::begin(folder, &work.spec, work.cells[0].spec.points, origin, manner)?;
+    let origin = Origin::new(&work.study, platform)?;
+    let report = Report::begin(folder, &work.study, origin, manner)?;
     work.carry_out(report, Standing::default(), &flags)
 }
 
-/// The spec file, overlaid with the flags, checked.
+/// The spec file, overlaid with the flags.
 fn resolve(file: Option<PathBuf>, flags: flags::SpecFlags) -> Result<Spec> {
     let mut spec = file.map_or_else(|| Ok(Spec::default()), |path| Spec::read(&path))?;
     flags.overlay(&mut spec);
-    spec.validate()
+    Ok(spec)
 }

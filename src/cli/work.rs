@@ -1,15 +1,15 @@
 //! A study on its way, for `run` and `resume`: what was asked for, where it is computed, and how it is carried out.
 
-use std::{ops::Range, path::Path, time::Duration};
+use std::{path::Path, time::Duration};
 
 use super::{flags, note, print, signals};
 use crate::{
     backend::Backend,
-    ensemble::{Cell, Spec, Standing, study},
+    ensemble::{Cell, Spec, Standing, Study},
     error::{Error, Result},
     files::names,
     placement::{self, Choice, Platform},
-    report::{Form, Manner, Report, Stop, gallery::MAX_PANELS},
+    report::{Form, Manner, Report, Stop},
     simulate::resume,
     text::plural,
 };
@@ -61,66 +61,51 @@ impl MannerFlags {
     }
 }
 
-/// A study, ready to run: its cohorts of cells, and where each is computed.
+/// A study, ready to run: where each cohort of its cells is computed.
 pub struct Work {
     /// Resolved, with everything that was settled by the choices.
-    pub spec: Spec,
-    /// All cells.
-    pub cells: Vec<Cell>,
-    /// Cells that are computed together, and where.
-    pub cohorts: Vec<(Range<usize>, Choice)>,
+    pub study: Study,
+    /// Where its cohorts are computed.
+    pub choices: Vec<Choice>,
     /// The back end of the first cohort, once it is open.
     opened: Option<Box<dyn Backend>>,
 }
 
 impl Work {
     /// Checks everything that can be wrong with `spec` on this machine.
-    pub fn new(mut spec: Spec) -> Result<Work> {
-        let mut cells = study::cells(&spec)?;
-        let ranges = study::cohorts(&cells);
-        let first = |range: &Range<usize>| (&cells[range.start].spec, cells[range.start].spec.points);
-        let choices = placement::choose_all(&ranges.iter().map(first).collect::<Vec<_>>())?;
-        for (range, choice) in ranges.iter().zip(&choices) {
-            cells[range.clone()].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
-        }
-        if spec.sweep.is_empty() {
-            spec = Spec { only: spec.only, shard: spec.shard, ..cells[0].spec.clone() };
-        } else {
-            choices[0].settle_place(&mut spec);
-        }
-        Ok(Work { spec, cells, cohorts: ranges.into_iter().zip(choices).collect(), opened: None })
+    pub fn new(spec: Spec) -> Result<Work> {
+        let mut study = Study::new(spec)?;
+        let choices = placement::choose_all(&study)?;
+        placement::settle(&mut study, &choices);
+        Ok(Work { study, choices, opened: None })
     }
 
     /// Opens the back end of the first cohort: where that is not the chosen one, the spec tells. Returns where it is.
     pub fn open(&mut self, flags: &MannerFlags) -> Result<Platform> {
-        let (range, choice) = &self.cohorts[0];
-        let (backend, platform) = open(&self.cells[range.clone()], choice, flags)?;
+        let choice = &self.choices[0];
+        let (backend, platform) = open(self.first_cohort(), choice, flags)?;
         if choice.device().kind() != platform.backend {
             flags.say(&format!("note: on the CPU instead: {}", platform.reason));
-            platform.settle_place(&mut self.spec);
+            let moved = |cells: &mut [Cell]| cells.iter_mut().for_each(|cell| platform.settle_place(&mut cell.spec));
+            self.study.settle(moved, |spec| platform.settle_place(spec));
         }
         self.opened = Some(backend);
         Ok(platform)
     }
 
+    fn first_cohort(&self) -> &[Cell] {
+        &self.study.cells()[self.study.cohorts()[0].clone()]
+    }
+
     /// Members of the cohorts before `cohort`.
     fn members_before(&self, cohort: usize) -> u64 {
-        let before = self.cohorts.iter().take(cohort).flat_map(|(range, _)| &self.cells[range.clone()]);
+        let before = self.study.cohorts().into_iter().take(cohort).flat_map(|range| &self.study.cells()[range]);
         before.map(|cell| cell.spec.member_count()).sum()
     }
 
     /// Where all is computed.
     pub fn platform(&self) -> Platform {
-        let (range, choice) = &self.cohorts[0];
-        choice.platform(&self.cells[range.start].spec)
-    }
-
-    /// What the user should know about all cells, each sentence once.
-    pub fn warnings(&self) -> Vec<String> {
-        let mut all: Vec<String> = self.cells.iter().flat_map(Cell::warnings).collect();
-        all.sort();
-        all.dedup();
-        all
+        self.choices[0].platform(&self.first_cohort()[0].spec)
     }
 
     /// Runs what is left to do, and publishes all results.
@@ -133,11 +118,11 @@ impl Work {
             let path = report.folder().display();
             return Err(Error::Request(format!("{path}: the state tells of {told} members, and the table has {rows}")));
         }
-        let early = [&self.warnings()[..], report.moves()].concat();
+        let early = [&self.study.warnings()[..], report.moves()].concat();
         early.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
         let out = report.folder().to_path_buf();
-        let Work { spec, cells, cohorts, opened } = self;
-        let done = advance(&cells, cohorts, opened, standing, &mut report, flags);
+        let Work { study, choices, opened } = self;
+        let done = advance(&study, choices, opened, standing, &mut report, flags);
         if let Err(error) = done {
             let error = report.explain(error);
             if report.give_up() {
@@ -147,7 +132,7 @@ impl Work {
         }
         let (late, failed) = (report.warnings(), report.failed());
         let form = if flags.json { Form::Json } else { Form::Overview };
-        let text = report.finish(&spec, &early, form).inspect_err(|error| kept(&out, error))?;
+        let text = report.finish(study.spec(), &early, form).inspect_err(|error| kept(&out, error))?;
         late.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
         if flags.json || !flags.quiet {
             print(&text)?;
@@ -155,8 +140,8 @@ impl Work {
         match failed {
             1.. if flags.strict => Err(Error::Strict(format!(
                 "--strict: {failed} of {} {} ended neither relaxed nor unfinished; see `status` in {}",
-                spec.member_count(),
-                plural(spec.member_count(), "member"),
+                study.member_count(),
+                plural(study.member_count(), "member"),
                 out.join(names::SUMMARY).display()
             ))),
             _ => Ok(()),
@@ -187,32 +172,36 @@ fn kept(out: &Path, error: &Error) {
 /// Opens the back end that was chosen for a cohort.
 fn open(cohort: &[Cell], choice: &Choice, flags: &MannerFlags) -> Result<(Box<dyn Backend>, Platform)> {
     flags.say(&choice.sentence(&cohort[0].spec));
-    let curves = cohort.iter().map(|cell| cell.spec.member_count()).sum();
-    let whole = Spec { curves, only: None, shard: None, ..cohort[0].spec.clone() };
-    choice.open(&whole, whole.points)
+    choice.open_for(cohort)
 }
 
 /// Runs one cohort of cells after another, from where `standing` is in that of the report; `opened` is the back end of the
 /// first one, where it is open.
 fn advance(
-    cells: &[Cell],
-    cohorts: Vec<(Range<usize>, Choice)>,
+    study: &Study,
+    choices: Vec<Choice>,
     mut opened: Option<Box<dyn Backend>>,
     mut standing: Standing,
     report: &mut Report,
     flags: &MannerFlags,
 ) -> Result<()> {
     let precision = report.platform().precision;
-    for (number, (range, choice)) in cohorts.into_iter().enumerate().skip(report.cohort()) {
-        let cohort = &cells[range];
+    for (number, (range, choice)) in study.cohorts().into_iter().zip(choices).enumerate().skip(report.cohort()) {
+        let cohort = &study.cells()[range];
         let mut backend = match opened.take() {
             Some(backend) => backend,
             // A run that has begun does not move.
             None => open(cohort, &choice.after(report.platform()), flags)?.0,
         };
-        let portraits = (MAX_PANELS * cohort.len()).div_ceil(cells.len());
         report.begin_cohort(number);
-        resume(cohort, precision, backend.as_mut(), portraits, std::mem::take(&mut standing), report)?;
+        resume(
+            cohort,
+            precision,
+            backend.as_mut(),
+            study.portraits(cohort.len()),
+            std::mem::take(&mut standing),
+            report,
+        )?;
     }
     Ok(())
 }

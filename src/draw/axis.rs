@@ -123,7 +123,7 @@ impl Axis {
     }
 
     /// The same from 0 on, if it is linear and no more than its padding is below 0.
-    pub fn from_zero(self) -> Axis {
+    pub fn with_zero(self) -> Axis {
         let positive = self.low > -2.0 * PADDING * (self.high - self.low);
         if self.scale == Scale::Linear && positive { Axis { low: 0.0, ..self } } else { self }
     }

@@ -24,4 +24,4 @@ pub use shard::Shard;
 pub use sink::{Sink, Wish};
 pub use spec::Spec;
 pub use standing::{Paused, Standing};
-pub use study::Cell;
+pub use study::{Cell, Study};

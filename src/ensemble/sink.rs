@@ -38,6 +38,14 @@ pub trait Sink {
     }
 }
 
+/// Collects what members leave, in member order.
+impl Sink for Vec<Ended> {
+    fn member(&mut self, ended: &Ended) -> Result<()> {
+        self.push(ended.clone());
+        Ok(())
+    }
+}
+
 impl Rows {
     /// Hands those in memory to `sink`; whether it has taken them.
     pub fn spill(&mut self, sink: &mut dyn Sink) -> Result<bool> {

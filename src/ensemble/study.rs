@@ -12,6 +12,122 @@ use crate::{
     solver::{Order, Solver},
 };
 
+/// Members of a study that leave a [portrait](crate::ensemble::Portrait), the first ones of its cells.
+pub const PORTRAITS: usize = 12;
+
+/// What a spec asks for, checked: its cells, each with its curves. Whatever runs a spec takes this.
+pub struct Study {
+    spec: Spec,
+    cells: Vec<Cell>,
+}
+
+impl Study {
+    /// Checks everything that can be wrong with `spec` on any machine, and makes the curves of its cells.
+    ///
+    /// ```
+    /// use curvelax::ensemble::{Spec, Study};
+    ///
+    /// let study = Study::new(Spec { curves: 3, ..Spec::default() })?;
+    /// assert_eq!(study.cells()[0].members().collect::<Vec<_>>(), [0, 1, 2]);
+    /// # Ok::<(), curvelax::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a value that is out of range, with the cell that has it, for curves of unequal numbers of
+    /// nodes that are to share an array, and for more curves than a memory holds.
+    pub fn new(spec: Spec) -> Result<Study> {
+        let spec = spec.validate()?;
+        let cells = cells(&spec)?;
+        Ok(Study { spec, cells }.with_spec_of_the_cell())
+    }
+
+    /// The same, with members that are perturbations of `curve` in place of the shape of `spec`.
+    ///
+    /// # Errors
+    /// As [`Study::new`], and for a spec that sweeps.
+    pub fn of_curve(spec: Spec, curve: BaseCurve) -> Result<Study> {
+        let spec = spec.validate()?;
+        if !spec.sweep.is_empty() {
+            let (problem, remedy) = ("one curve has no cells", "make a study for each value");
+            return Err(Error::value("sweep", spec.sweep.axes().len(), problem, remedy));
+        }
+        let family = Family::of(&spec, curve)?;
+        let own = Spec { points: family.points(), ..spec.clone() }.validate()?;
+        Ok(Study { cells: vec![Cell::only(own, family)], spec }.with_spec_of_the_cell())
+    }
+
+    /// What was asked for.
+    pub fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    /// Its cells, one if nothing is swept.
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
+    /// Ranges of cells whose members run side by side, in order.
+    pub fn cohorts(&self) -> Vec<Range<usize>> {
+        cohorts(&self.cells)
+    }
+
+    /// Nodes of a member, which matters only where all have the same.
+    pub fn points(&self) -> usize {
+        self.cells[0].spec.points
+    }
+
+    /// Members of a cohort of so many cells that leave a portrait: [`PORTRAITS`] of the study, spread over all cells.
+    pub fn portraits(&self, cells: usize) -> usize {
+        (PORTRAITS * cells).div_ceil(self.cells.len())
+    }
+
+    /// Members to run, of all cells.
+    pub fn member_count(&self) -> u64 {
+        self.spec.member_count()
+    }
+
+    /// What the user should know before it runs, each sentence once.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut all: Vec<String> = self.cells.iter().flat_map(Cell::warnings).collect();
+        all.sort();
+        all.dedup();
+        all
+    }
+
+    /// Writes out what is settled later: `each` in the spec of every cell, `all` what cells have in common.
+    pub(crate) fn settle(&mut self, each: impl Fn(&mut [Cell]), all: impl Fn(&mut Spec)) {
+        each(&mut self.cells);
+        if self.spec.sweep.is_empty() {
+            self.spec = self.spec_of_the_cell();
+        } else {
+            all(&mut self.spec);
+        }
+    }
+
+    /// Its cells alone.
+    pub fn into_cells(self) -> Vec<Cell> {
+        self.cells
+    }
+
+    /// Its cells, to be changed.
+    pub(crate) fn cells_mut(&mut self) -> &mut [Cell] {
+        &mut self.cells
+    }
+
+    fn with_spec_of_the_cell(self) -> Study {
+        match self.spec.sweep.is_empty() {
+            true => Study { spec: self.spec_of_the_cell(), ..self },
+            false => self,
+        }
+    }
+
+    /// A file's own points are known once it was read.
+    fn spec_of_the_cell(&self) -> Spec {
+        let Spec { only, shard, .. } = self.spec.clone();
+        Spec { only, shard, ..self.cells[0].spec.clone() }
+    }
+}
+
 /// One ensemble of a study.
 pub struct Cell {
     /// Index of the cell, from 0.
@@ -41,14 +157,6 @@ pub struct Cohort {
 impl Cell {
     /// The only cell of a spec without a sweep.
     ///
-    /// ```
-    /// use curvelax::ensemble::{Cell, Family, Spec};
-    ///
-    /// let spec = Spec { curves: 3, ..Spec::default() }.validate()?;
-    /// let family = Family::new(&spec)?;
-    /// assert_eq!(Cell::only(spec, family).members().collect::<Vec<_>>(), [0, 1, 2]);
-    /// # Ok::<(), curvelax::Error>(())
-    /// ```
     pub fn only(spec: Spec, family: Family) -> Cell {
         Cell { index: 0, spec, family, first: 0, common: false }
     }
@@ -129,11 +237,7 @@ fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<C
 }
 
 /// All cells of `spec`, checked; one if nothing is swept.
-///
-/// # Errors
-/// [`Error::Request`] for a value that is out of range, with the cell that has it, and for curves of unequal numbers of
-/// nodes that are to share an array, and for more curves than a memory holds.
-pub fn cells(spec: &Spec) -> Result<Vec<Cell>> {
+fn cells(spec: &Spec) -> Result<Vec<Cell>> {
     let mut cells: Vec<Cell> = Vec::new();
     let mut bytes = 0;
     for index in 0..spec.sweep.cells() {
@@ -154,8 +258,7 @@ pub fn cells(spec: &Spec) -> Result<Vec<Cell>> {
     Ok(cells)
 }
 
-/// Ranges of cells whose members run side by side, in order.
-pub fn cohorts(cells: &[Cell]) -> Vec<Range<usize>> {
+fn cohorts(cells: &[Cell]) -> Vec<Range<usize>> {
     let mut cohorts: Vec<Range<usize>> = Vec::new();
     for (i, cell) in cells.iter().enumerate() {
         match cohorts.last_mut() {

@@ -74,6 +74,8 @@ macro_rules! kinds {
 
             pub const HOLDS: &str = $holds;
 
+            // One signature for all kinds.
+            #[allow(clippy::ptr_arg)]
             pub fn write($v: &$value) -> Field<'_> {
                 $write
             }

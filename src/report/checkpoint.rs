@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     curve::{Outline, Shape},
-    ensemble::{Cell, Ended, Paused, Standing},
+    ensemble::{Cell, Ended, Paused, Standing, Study},
     error::{Error, Result},
     files::{
         disk,
@@ -65,7 +65,7 @@ pub struct Head {
     pub origin: Origin,
     /// Wall time of the run so far.
     pub wall: Duration,
-    /// Which of the [cohorts](crate::ensemble::study::cohorts) the ranks are of.
+    /// Which of the [cohorts](crate::ensemble::Study::cohorts) the ranks are of.
     pub cohort: u64,
     /// Tables, as far as they are told by this state.
     pub tables: Vec<Mark>,
@@ -103,19 +103,19 @@ impl Origin {
     ///
     /// # Errors
     /// [`Error::Request`] for outlines in a current folder without a name.
-    pub fn new(spec: String, cells: &[Cell], platform: Platform) -> Result<Origin> {
+    pub fn new(study: &Study, platform: Platform) -> Result<Origin> {
         let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let outlines: Vec<(PathBuf, u32)> = outlines(cells).into_iter().collect();
+        let outlines: Vec<(PathBuf, u32)> = outlines(study).into_iter().collect();
         let base = if outlines.is_empty() { String::new() } else { here()? };
-        Ok(Origin { spec, platform, moves: Vec::new(), base, outlines, started })
+        Ok(Origin { spec: study.spec().to_toml()?, platform, moves: Vec::new(), base, outlines, started })
     }
 
-    /// That the outlines of `cells`, as they were read, are those of the beginning.
+    /// That the outlines of `study`, as they were read, are those of the beginning.
     ///
     /// # Errors
     /// [`Error::Request`] naming the first that is not.
-    pub fn check_outlines(&self, cells: &[Cell]) -> Result<()> {
-        let read = outlines(cells);
+    pub fn check_outlines(&self, study: &Study) -> Result<()> {
+        let read = outlines(study);
         match self.outlines.iter().find(|(path, crc)| read.get(path) != Some(crc)) {
             None => Ok(()),
             Some((path, _)) => Err(self.changed(path)),
@@ -137,13 +137,13 @@ impl Origin {
     }
 }
 
-/// The outlines of `cells` with the CRC-32C of what was read of each.
-fn outlines(cells: &[Cell]) -> BTreeMap<PathBuf, u32> {
+/// The outlines of a study with the CRC-32C of what was read of each.
+fn outlines(study: &Study) -> BTreeMap<PathBuf, u32> {
     let outline = |cell: &Cell| match &cell.spec.shape {
         Shape::File(path) => Some((path.clone(), cell.family.outline()?.digest())),
         _ => None,
     };
-    cells.iter().filter_map(outline).collect()
+    study.cells().iter().filter_map(outline).collect()
 }
 
 /// The current folder, by name.

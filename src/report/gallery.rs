@@ -4,11 +4,12 @@ use glam::DVec2;
 
 use crate::{
     draw::svg::{Svg, closed_path, coordinate, dots},
+    ensemble::study::PORTRAITS,
     files::portraits::Film,
 };
 
 /// More members than this are not drawn.
-pub const MAX_PANELS: usize = 12;
+pub const MAX_PANELS: usize = PORTRAITS;
 
 const COLUMNS: usize = 4;
 /// Width of a panel and the most of its height, in pixels, and the free space inside it.

@@ -27,7 +27,7 @@ pub use complete::Form;
 pub use stop::{Cause, Stop};
 
 use crate::{
-    ensemble::{Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Wish},
+    ensemble::{Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish},
     error::{Error, Result},
     files::{OutputFolder, portraits::Film},
     placement::Platform,
@@ -84,12 +84,10 @@ pub struct Report {
 }
 
 impl Report {
-    /// Opens the tables that `spec` asks for, and keeps the first state, from which a run that is killed goes on.
-    ///
-    /// `points` is the number of nodes of a member, which matters only where all have the same.
-    pub fn begin(folder: OutputFolder, spec: &Spec, points: usize, origin: Origin, manner: Manner) -> Result<Report> {
-        let growing = Growing::begin(&folder, spec, points)?;
-        let mut report = Report::new(folder, growing, spec, points, origin, manner);
+    /// Opens the tables that a study asks for, and saves the first checkpoint, from which a run that is killed resumes.
+    pub fn begin(folder: OutputFolder, study: &Study, origin: Origin, manner: Manner) -> Result<Report> {
+        let growing = Growing::begin(&folder, study.spec(), study.points())?;
+        let mut report = Report::new(folder, growing, study, origin, manner);
         match report.checkpoint(&Standing { resident: Some(BTreeMap::new()), ..Standing::default() }) {
             Ok(()) => Ok(report),
             Err(error) => {
@@ -103,45 +101,32 @@ impl Report {
     /// Goes on with the report of an interrupted run; returns where that stood.
     ///
     /// # Errors
-    /// [`Error::Request`] where its files are not those of `spec`.
-    pub fn resume(
-        folder: OutputFolder,
-        spec: &Spec,
-        points: usize,
-        kept: Saved,
-        manner: Manner,
-    ) -> Result<(Report, Standing)> {
+    /// [`Error::Request`] where its files are not those of the study.
+    pub fn resume(folder: OutputFolder, study: &Study, kept: Saved, manner: Manner) -> Result<(Report, Standing)> {
         let Saved { head, standing, note } = kept;
         let Head { origin, wall, cohort, tables, store, rows, aside, films } = head;
-        let growing = Growing::resume(&folder, spec, points, &tables, store.as_ref(), rows.as_ref())?;
+        let growing = Growing::resume(&folder, study.spec(), study.points(), &tables, store.as_ref(), rows.as_ref())?;
         if note.is_some() {
             folder.forget_last_state()?;
         }
-        let tally = reader::rows(growing.rows(), spec, aside)?;
-        let mut report = Report::new(folder, growing, spec, points, origin, manner);
+        let tally = reader::rows(growing.rows(), study.spec(), aside)?;
+        let mut report = Report::new(folder, growing, study, origin, manner);
         (report.tally, report.films, report.earlier, report.cohort) = (tally, films, wall, cohort);
         report.before = report.tally.members().saturating_sub(standing.next);
         report.has_begun = true;
         Ok((report, standing))
     }
 
-    fn new(
-        folder: OutputFolder,
-        growing: Growing,
-        spec: &Spec,
-        points: usize,
-        origin: Origin,
-        manner: Manner,
-    ) -> Report {
+    fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, manner: Manner) -> Report {
         let Manner { quiet, every, stop } = manner;
         Report {
             growing,
             folder,
             origin,
-            points,
+            points: study.points(),
             tally: Tally::default(),
             films: Vec::new(),
-            total: spec.member_count(),
+            total: study.member_count(),
             before: 0,
             cohort: 0,
             progress: Progress::new(quiet),
@@ -331,7 +316,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        ensemble::{Mollified, Observables, Portrait, Rows, Status, spec::Store, study},
+        ensemble::{Mollified, Observables, Portrait, Rows, Status, spec::Store},
         files::names,
         results::{provenance, tally},
     };
@@ -348,19 +333,24 @@ mod tests {
     }
 
     fn begun(out: &Path, spec: &Spec, stop: &Stop) -> Report {
-        let origin = Origin::new(spec.to_toml().unwrap(), &study::cells(spec).unwrap(), provenance::tests::platform());
-        Report::begin(OutputFolder::open(out, true).unwrap(), spec, 1, origin.unwrap(), manner(stop)).unwrap()
+        let study = Study::new(spec.clone()).unwrap();
+        let origin = Origin::new(&study, provenance::tests::platform()).unwrap();
+        Report::begin(OutputFolder::open(out, true).unwrap(), &study, origin, manner(stop)).unwrap()
     }
+
+    /// Nodes of the members here.
+    const POINTS: usize = 6;
 
     /// What a member leaves.
     fn ended(member: u64, portrait: Option<Portrait>) -> Ended {
+        let of = |value| vec![value; POINTS];
         Ended {
             outcome: tally::tests::outcome(member, Status::Relaxed, Some(0.5)),
             excess: vec![0.2, 0.1],
             rows: Rows {
                 spilled: Vec::new(),
                 series: vec![SeriesRow { member, t: 0.0, at: Observables::default() }],
-                snapshots: vec![Snapshot { member, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] }],
+                snapshots: vec![Snapshot { member, t: 0.0, x: of(1.0), y: of(2.0), k: of(3.0), r: of(4.0) }],
             },
             portrait,
             mollified: Mollified::default(),
@@ -448,7 +438,14 @@ mod tests {
     #[test]
     fn a_report_goes_on_from_its_state_to_the_same_bytes() {
         let home = tempfile::tempdir().unwrap();
-        let csv = Spec { curves: 3, series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
+        let csv = Spec {
+            curves: 3,
+            points: POINTS,
+            amplitude: 0.0,
+            series: Some(0.1),
+            snapshots: vec![0.0],
+            ..Spec::default()
+        };
         let zarr = Spec { store: Store::Zarr, ..csv.clone() };
         for (name, spec) in [("csv", csv), ("zarr", zarr)] {
             let [straight, broken] = ["straight", "broken"].map(|way| home.path().join(name).join(way));
@@ -466,7 +463,8 @@ mod tests {
             let folder = OutputFolder::open_again(&broken).unwrap();
             let kept = checkpoint::find(&folder).unwrap().unwrap();
             assert_eq!(kept.note, None);
-            let (mut second, standing) = Report::resume(folder, &spec, 1, kept, manner(&Stop::default())).unwrap();
+            let study = Study::new(spec.clone()).unwrap();
+            let (mut second, standing) = Report::resume(folder, &study, kept, manner(&Stop::default())).unwrap();
             assert_eq!((standing.next, second.members()), (1, 1));
             second.member(&ended(1, None)).unwrap();
             second.member(&standing.early[&2]).unwrap();

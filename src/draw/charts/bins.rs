@@ -73,7 +73,7 @@ impl Bins {
         }
         let axis = Axis::over(name, unit, scale, self.bounds.iter().copied());
         let (low, high) = axis.range();
-        if self.bounds[0] >= 0.0 && low < 0.3 * high { axis.from_zero() } else { axis }
+        if self.bounds[0] >= 0.0 && low < 0.3 * high { axis.with_zero() } else { axis }
     }
 
     /// Draws the bars.

@@ -145,7 +145,7 @@ impl Decay<'_> {
         let heading = Heading { title, sentences, legend: self.legend(&colours, bands) };
         let (mut svg, top) = heading.begin(8.0 + HEIGHT + FOOT);
 
-        let across = Axis::over("t", TIME, scale, times()).from_zero();
+        let across = Axis::over("t", TIME, scale, times()).with_zero();
         let upwards = self.excess(bands);
         let panel = only_panel([&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);

@@ -216,7 +216,7 @@ impl Dependence<'_> {
         let times: Vec<f64> = self.levels().flat_map(Level::times).collect();
         let axis = Axis::over("t_relax", TIME, self.scale(self.time, &times), times.iter().copied());
         match range(times) {
-            Some((low, high)) if low >= 0.0 && low < 0.5 * high => axis.from_zero(),
+            Some((low, high)) if low >= 0.0 && low < 0.5 * high => axis.with_zero(),
             _ => axis,
         }
     }

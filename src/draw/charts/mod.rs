@@ -19,7 +19,7 @@ pub use rates::FittedRates;
 pub use relaxation::RelaxationTimes;
 pub use survival::{Survival, SurvivalCurve};
 
-pub use super::{axis::Scale, chart::Estimate};
+pub use super::chart::Estimate;
 
 use glam::DVec2;
 

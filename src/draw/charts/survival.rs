@@ -137,7 +137,7 @@ impl Survival<'_> {
         let middle = |curve: &SurvivalCurve| curve.t.get(curve.t.len() / 2).copied();
         let scale = self.time.unwrap_or_else(|| Scale::of(curves.iter().filter_map(middle)));
         let scale = if times().any(|t| scale.holds(t)) { scale } else { Scale::Linear };
-        let across = Axis::over("t", TIME, scale, times()).from_zero();
+        let across = Axis::over("t", TIME, scale, times()).with_zero();
         let upwards = Axis::new("share not relaxed", "", Scale::Linear, (0.0, 1.02));
         let panel = only_panel([&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::draw::charts::*;
+use crate::draw::{axis::Scale, charts::*};
 
 /// Numbers in (0, 1), equal on every machine: halton of base 2 or 3.
 fn spread(i: usize, base: usize) -> f64 {
