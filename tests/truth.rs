@@ -79,7 +79,7 @@ fn extinction(method: &Spec) -> Outcome {
     let life = outcome.t_end / LEMNISCATE_LIFE;
     let line = format!("{} after {life:.4} of its life", outcome.status.name());
     println!("{line}");
-    let expected = if method.solver() == Solver::Direct { Status::Singular } else { Status::Stalled };
+    let expected = if method.solver().sweeps() { Status::Stalled } else { Status::Singular };
     if outcome.status == expected && (life - 1.0).abs() < 0.01 { Ok(()) } else { Err(line.into()) }
 }
 
