@@ -1,0 +1,94 @@
+//! How an array is cut into chunks of equal size, and what each is called.
+
+use serde_json::Value;
+
+/// About so many bytes make a chunk: few files for many members, and little to read for one.
+pub(super) const CHUNK_BYTES: usize = 4 << 20;
+
+/// Type of an element.
+#[derive(Clone, Copy)]
+pub(super) enum Kind {
+    Float64,
+    Int64,
+    Int8,
+}
+
+impl Kind {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Kind::Float64 => "float64",
+            Kind::Int64 => "int64",
+            Kind::Int8 => "int8",
+        }
+    }
+
+    pub(super) fn fill_value(self) -> Value {
+        match self {
+            Kind::Float64 => "NaN".into(),
+            Kind::Int64 | Kind::Int8 => 0.into(),
+        }
+    }
+
+    /// The bytes of the fill value.
+    pub(super) fn fill(self) -> Vec<u8> {
+        match self {
+            Kind::Float64 => f64::NAN.to_le_bytes().into(),
+            Kind::Int64 => 0_i64.to_le_bytes().into(),
+            Kind::Int8 => vec![0],
+        }
+    }
+}
+
+/// Extents of chunks of at most `room` elements: whole dimensions from the last on, then equal parts of one, then single
+/// elements.
+pub(super) fn chunk_shape(shape: &[u64], mut room: u64) -> Vec<u64> {
+    let mut chunk: Vec<u64> = shape
+        .iter()
+        .rev()
+        .map(|extent| {
+            let parts = extent.div_ceil(room.max(1));
+            let part = extent.div_ceil(parts);
+            // What is cut takes more than half of the room, and leaves 1 for the dimensions before it.
+            room /= part;
+            part
+        })
+        .collect();
+    chunk.reverse();
+    chunk
+}
+
+/// The name of a chunk: `c`, and its place in the grid.
+pub(super) fn key(number: u64, grid: &[u64]) -> String {
+    let mut rest = number;
+    let mut key = String::new();
+    for chunks in grid.iter().rev() {
+        key = format!(".{}{key}", rest % chunks);
+        rest /= chunks;
+    }
+    format!("c{key}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chunks_are_called_by_their_place_in_the_grid() {
+        let names: Vec<String> = (0..6).map(|number| key(number, &[2, 1, 3])).collect();
+        assert_eq!(names, ["c.0.0.0", "c.0.0.1", "c.0.0.2", "c.1.0.0", "c.1.0.1", "c.1.0.2"]);
+    }
+
+    #[test]
+    fn chunks_are_full_and_of_equal_size() {
+        for (shape, room, chunk) in [
+            (&[1_000_000, 1, 100][..], 524_288, &[5236, 1, 100][..]),
+            (&[256, 11, 100], 524_288, &[256, 11, 100]),
+            (&[10, 10_000, 100], 524_288, &[1, 5000, 100]),
+            (&[3, 2, 1_000_000], 524_288, &[1, 1, 500_000]),
+            (&[600_000], 524_288, &[300_000]),
+            (&[1], 524_288, &[1]),
+        ] {
+            assert_eq!(chunk_shape(shape, room), chunk, "{shape:?}");
+        }
+    }
+}

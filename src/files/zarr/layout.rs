@@ -1,0 +1,109 @@
+//! The arrays of a store: their names, units and dimensions.
+
+use serde_json::json;
+
+use super::{array::Array, chunks::Kind};
+use crate::{
+    ensemble::{Spec, Status},
+    schedule::Outputs,
+};
+
+/// The array of how members ended.
+pub(super) const STATUS: &str = "status";
+
+/// The arrays of nodes, with units and what they are.
+pub(super) const FIELDS: [(&str, &str, &str); 4] = [
+    ("x", "length", "x coordinate of the node"),
+    ("y", "length", "y coordinate of the node"),
+    ("k", "1/length", "signed curvature of the segment that ends at the node"),
+    ("r", "length", "length of the segment that ends at the node, as the scheme evolves it"),
+];
+
+/// All of a store.
+pub(super) struct Arrays {
+    pub(super) member: Array,
+    pub(super) time: Array,
+    pub(super) node: Array,
+    pub(super) cell: Array,
+    pub(super) fields: [Array; FIELDS.len()],
+    pub(super) status: Array,
+}
+
+/// Those of the members of `spec`, with chunks of at most `bytes`.
+pub(super) fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) -> Arrays {
+    let members = ("member", spec.member_count());
+    let (instants, nodes) = (("time", times.len() as u64), ("node", points as u64));
+    let vector = |name, kind, along, attributes| Array::new(name, kind, &[along], attributes, bytes);
+    let of_member = |name: &str| json!({ "long_name": name });
+    let flags = json!({
+        "long_name": "how the member ended",
+        "flag_values": Status::ALL.map(|status| status as u32),
+        "flag_meanings": Status::ALL.map(Status::name).join(" "),
+    });
+    let time = json!({ "long_name": "time", "units": "length^4" });
+    Arrays {
+        member: vector("member", Kind::Int64, members, of_member("index of the member")),
+        time: vector("time", Kind::Float64, instants, time),
+        node: vector("node", Kind::Int64, nodes, json!({ "long_name": "number of the node along the curve" })),
+        cell: vector("cell", Kind::Int64, members, of_member("index of the cell of the sweep")),
+        fields: FIELDS.map(|(name, units, what)| {
+            let attributes = json!({ "long_name": what, "units": units, "coordinates": "cell status" });
+            Array::new(name, Kind::Float64, &[members, instants, nodes], attributes, bytes)
+        }),
+        status: vector(STATUS, Kind::Int8, members, flags),
+    }
+}
+
+/// The times of the snapshots. Times that agree with the final one to rounding are that one, as in `snapshots.csv`.
+pub(super) fn times(spec: &Spec) -> Vec<f64> {
+    Outputs::new(spec.t_end, None, &spec.snapshots, &[]).from(0).map(|output| output.t).collect()
+}
+
+/// The index of the time nearest to `t`, which is among them but for rounding where final times differ from cell to cell.
+pub(super) fn nearest(times: &[f64], t: f64) -> usize {
+    let after = times.partition_point(|own| *own < t).min(times.len() - 1);
+    if after > 0 && t - times[after - 1] < times[after] - t { after - 1 } else { after }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use serde_json::Value;
+
+    use super::*;
+    use crate::files::zarr::tests::{members, spec, stored};
+
+    #[test]
+    fn the_metadata_hold_the_spec_and_repeat_that_of_each_array() {
+        let home = tempfile::tempdir().unwrap();
+        let spec = Spec { threads: Some(3), ..spec(7, &[0.0, 1.0, 2.0]) };
+        let store = stored(home.path(), &spec, &members(), 1 << 20);
+        let json = |name: &str| -> Value {
+            serde_json::from_str(&fs::read_to_string(store.join(name).join("zarr.json")).unwrap()).unwrap()
+        };
+        let group = json("");
+        let text = group["attributes"]["spec"].as_str().unwrap();
+        assert_eq!(Spec::from_toml(text).unwrap(), Spec { threads: None, ..spec });
+        assert_eq!(group["attributes"]["curvelax"], env!("CARGO_PKG_VERSION"));
+        let all = group["consolidated_metadata"]["metadata"].as_object().unwrap();
+        assert_eq!(all.len(), 9);
+        all.iter().for_each(|(name, metadata)| assert_eq!(json(name), *metadata, "{name}"));
+        assert_eq!(json("k")["attributes"]["units"], "1/length");
+        assert_eq!(json("time")["attributes"]["units"], "length^4");
+        let meanings = json("status")["attributes"]["flag_meanings"].as_str().unwrap().to_string();
+        let words: Vec<&str> = meanings.split(' ').collect();
+        let codes = json("status")["attributes"]["flag_values"].clone();
+        for (i, status) in Status::ALL.into_iter().enumerate() {
+            assert_eq!((words[i], &codes[i]), (status.name(), &json!(status as u32)));
+        }
+    }
+
+    #[test]
+    fn a_time_that_rounding_moved_finds_its_place() {
+        let times = [0.0, 0.5, 1.0];
+        for (t, place) in [(0.0, 0), (0.5, 1), (0.5 + 1e-12, 1), (0.5 - 1e-12, 1), (1.0, 2), (1.0 + 1e-12, 2)] {
+            assert_eq!(nearest(&times, t), place, "{t}");
+        }
+    }
+}
