@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::place::Place;
+use super::{names::is_store, place::Place};
 use crate::{
     error::{Error, Result},
     guard::guarded,
@@ -57,6 +57,19 @@ pub fn remove(path: &Path) -> io::Result<()> {
         // Below a folder that is absent, too.
         Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
         _ => Ok(()),
+    }
+}
+
+/// Whether a folder is there, and no link to one.
+pub fn is_real_folder(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|of| of.is_dir())
+}
+
+/// Removes a file, or the folder of a store; either may be absent.
+pub fn remove_any(path: &Path) -> io::Result<()> {
+    match is_store(path) {
+        true => remove_store(path),
+        false => remove(path),
     }
 }
 

@@ -1,0 +1,204 @@
+//! The output folder. A file grows as `.NAME.part` and takes its final name only when it is complete and on disk.
+
+mod checkpoints;
+mod leftovers;
+mod publish;
+mod resumed;
+#[cfg(test)]
+mod tests;
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    claim::Claim,
+    disk::{create, parent, sync_names},
+    names::{OWN, PLOTS, PROBE, part},
+    owner::{Existing, Owner},
+    place::Place,
+};
+use crate::error::{Error, Result};
+
+/// The system knows no longer paths.
+const MAX_PATH: usize = if cfg!(target_os = "linux") { 4096 } else { 1024 };
+/// Bytes of the longest name in a folder: a chunk of a store, for more members than there are.
+const MAX_NAME: usize = 96;
+
+/// A folder that this run, and no other at the same time, may write into.
+///
+/// It is reached through what was opened: a folder that is moved away takes its files with it, and what comes into its place
+/// is not touched.
+///
+/// Dropped while empty, the folders that were made for this run are removed again.
+#[derive(Debug)]
+pub struct OutputFolder {
+    path: PathBuf,
+    /// The folders that were made for this run, outermost first.
+    made: Vec<PathBuf>,
+    new_plots: bool,
+    /// None until it is held.
+    claim: Option<Claim>,
+    /// What it is in it.
+    place: Place,
+    /// The files that may be written.
+    names: Vec<String>,
+}
+
+impl OutputFolder {
+    /// The folder of a run, as [`OutputFolder::open_for`] makes it.
+    pub fn open(path: &Path, existing: impl Into<Existing>) -> Result<OutputFolder> {
+        OutputFolder::open_for(path, existing, Owner::Run, OWN.map(String::from).into())
+    }
+
+    /// Makes the folder and its parents, for `owner` to write the files `names` into. One that exists is refused but for
+    /// what `existing` allows; so is one that another command wrote, a place that cannot be written, and one where
+    /// another run is writing.
+    pub fn open_for(
+        path: &Path,
+        existing: impl Into<Existing>,
+        owner: Owner,
+        names: Vec<String>,
+    ) -> Result<OutputFolder> {
+        let refuse = |e: io::Error| {
+            Error::Request(format!("--out {}: cannot be written ({e}); name a folder that can", path.display()))
+        };
+        let existing = existing.into();
+        check_length(path)?;
+        let mut folder = OutputFolder::of(path, names);
+        if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+            if parent.exists() && !parent.is_dir() {
+                let problem = format!("{} is no folder", parent.display());
+                return Err(Error::value("out", path.display(), &problem, "name a place inside a folder"));
+            }
+            folder.make_all(parent).map_err(refuse)?;
+        }
+        match fs::create_dir(path) {
+            Ok(()) => folder.made.push(path.to_path_buf()),
+            Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(refuse(e)),
+            Err(_) if !path.is_dir() => {
+                return Err(Error::value("out", path.display(), "exists and is no folder", "name another"));
+            }
+            // Before its lock is touched.
+            Err(_) => existing.check(path, path, &folder.names)?,
+        }
+        if !folder.claim().map_err(refuse)? {
+            return Err(Error::value("out", path.display(), "a run is writing here", "name another folder"));
+        }
+        // Another run may have come and gone in between.
+        existing.check(folder.place.at(), path, &folder.names)?;
+        owner.check(folder.place.at(), path)?;
+        folder.check_names()?;
+        folder.probe().map_err(refuse)?;
+        // What an interrupted run left; its lock is gone, so it is no longer writing.
+        if owner == Owner::Run {
+            folder.forget_states()?;
+        }
+        folder.remove_parts(&[]).map_err(refuse)?;
+        folder.made.iter().try_for_each(|made| sync_names(parent(made))).map_err(refuse)?;
+        Ok(folder)
+    }
+
+    /// As `fs::create_dir_all`, remembering what was made.
+    fn make_all(&mut self, path: &Path) -> io::Result<()> {
+        let missing: Vec<&Path> = path.ancestors().take_while(|folder| !folder.is_dir()).collect();
+        for folder in missing.into_iter().rev().filter(|folder| !folder.as_os_str().is_empty()) {
+            match fs::create_dir(folder) {
+                Ok(()) => self.made.push(folder.to_path_buf()),
+                Err(_) if folder.is_dir() => {}
+                Err(e) => return Err(e),
+            }
+        }
+        Ok(())
+    }
+
+    fn of(path: &Path, names: Vec<String>) -> OutputFolder {
+        let place = Place::named(path);
+        OutputFolder { path: path.into(), made: Vec::new(), new_plots: false, claim: None, place, names }
+    }
+
+    /// Returns whether the folder is held by this run from now on.
+    fn claim(&mut self) -> io::Result<bool> {
+        self.claim = Claim::take(&self.path)?;
+        if let Some(claim) = &self.claim {
+            self.place = claim.place().clone();
+        }
+        Ok(self.claim.is_some())
+    }
+
+    /// Stays where it is when the current folder changes.
+    pub fn make_absolute(&mut self) -> Result<()> {
+        self.path = std::path::absolute(&self.path).map_err(Error::io("cannot find", &self.path))?;
+        if let Some(claim) = &mut self.claim {
+            claim.make_absolute()?;
+            self.place = claim.place().clone();
+        }
+        Ok(())
+    }
+
+    /// That the folder is still held by this run, and still where it was found.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] where it is not.
+    pub fn check_claim(&self) -> Result<()> {
+        self.claim.as_ref().map_or(Ok(()), Claim::check)
+    }
+
+    /// Why `error` came: because the folder was taken away, if it was.
+    pub fn explain(&self, error: Error) -> Error {
+        match self.check_claim() {
+            Err(lost @ Error::Lost(_)) => lost,
+            _ => error,
+        }
+    }
+
+    /// Whether files can be made here.
+    fn probe(&self) -> io::Result<()> {
+        let probe = self.place.join(PROBE);
+        create(probe.at()).and_then(|_| fs::remove_file(probe.at()))
+    }
+
+    /// Where it was found.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What is called `name` in it.
+    pub fn place(&self, name: &str) -> Place {
+        self.place.join(name)
+    }
+
+    /// The temporary name of `name`.
+    fn part(&self, name: &str) -> Place {
+        self.place.join(part(Path::new(name)))
+    }
+}
+
+impl Drop for OutputFolder {
+    fn drop(&mut self) {
+        // Removing a folder fails, as it should, where there is something inside.
+        if self.new_plots {
+            let _ = fs::remove_dir(self.place(PLOTS).at());
+        }
+        // Others may be where it was.
+        let stays = self.claim.as_ref().is_none_or(Claim::stays);
+        self.claim = None;
+        // A folder that stays keeps those above it, also those that only its name goes through (`new/../out`).
+        if stays {
+            let _ = self.made.iter().rev().try_for_each(fs::remove_dir);
+        }
+    }
+}
+
+/// Refuses a path in which not every file would have one.
+fn check_length(path: &Path) -> Result<()> {
+    let (length, most) = (path.as_os_str().len(), MAX_PATH - MAX_NAME);
+    match length > most {
+        true => Err(Error::Request(format!(
+            "--out: a path of {length} bytes, and with the names of files the system knows none of more than {MAX_PATH}; \
+             name a folder by {most} bytes or less, for example from nearer by"
+        ))),
+        false => Ok(()),
+    }
+}
