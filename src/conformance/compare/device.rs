@@ -1,0 +1,62 @@
+//! What members leave on a device.
+
+use super::setup::{MAX_SWEEPS, blocks};
+use crate::{
+    backend::{
+        Backend,
+        gpu::{self, Variant, kernel::Budget},
+    },
+    error::Result,
+    number::Real,
+    scheme::{
+        State,
+        member::{Counters, Report},
+        run::Run,
+    },
+    solver::Solver,
+};
+
+/// What a member leaves on the GPU.
+#[derive(Clone, Debug)]
+pub struct Left {
+    /// Its last accepted state.
+    pub state: State<f64>,
+    /// Its counters; the sweeps are those of the last dispatch.
+    pub counters: Counters,
+    /// Its report.
+    pub report: Report<f64>,
+}
+
+/// Runs `launches` to their goals on the GPU.
+pub fn on_gpu<T: Real>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    launches: &[Run<f64>],
+    budget: Budget,
+) -> Result<Vec<Left>> {
+    let adaptive = launches.iter().any(|launch| launch.parameters.adaptive > 0.0);
+    let variant = Variant { adaptive, ..adapter.capacity().variant(blocks(n)?, solver) };
+    on_gpu_by::<T>(adapter, variant, n, launches, budget)
+}
+
+/// The same by a kernel of choice.
+pub fn on_gpu_by<T: Real>(
+    adapter: &gpu::Gpu,
+    variant: Variant,
+    n: usize,
+    launches: &[Run<f64>],
+    budget: Budget,
+) -> Result<Vec<Left>> {
+    let kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, launches.len(), MAX_SWEEPS, variant)?;
+    let mut kernel = kernel.with_budget(budget);
+    for (slot, launch) in launches.iter().enumerate() {
+        kernel.load(slot, launch)?;
+    }
+    while (0..launches.len()).any(|slot| kernel.counters(slot).is_running()) {
+        kernel.advance()?;
+    }
+    let left =
+        |slot| Ok(Left { state: kernel.state(slot)?, counters: kernel.counters(slot), report: kernel.report(slot) });
+    (0..launches.len()).map(left).collect()
+}

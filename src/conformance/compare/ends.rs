@@ -1,0 +1,269 @@
+//! What whole runs leave.
+
+use super::{
+    device::{Left, on_gpu},
+    row::{Cpu, Gpu, Row},
+    scales::Scales,
+    setup::{Tamper, blocks, method, tampered},
+};
+use crate::{
+    backend::gpu::{self, kernel::Budget},
+    conformance::{
+        bounds::{Bound, DECAY, FIELDS, PACE, REPORT},
+        cases::{MEMBERS, adaptive_members, members},
+    },
+    error::{Error, Result},
+    number::Real,
+    scheme::{
+        Curve, State,
+        evolve::{Team, evolve},
+        member::{Counters, Decay, NEVER, Progress, Report},
+        run::Run,
+        step::Method,
+    },
+    solver::Solver,
+};
+
+/// Tolerance of adaptive steps in the comparison.
+const ADAPTIVE: f64 = 1e-3;
+
+/// Fixed steps of a member in whose time it is compared with adaptive ones.
+pub const ADAPTIVE_STEPS: u32 = 40;
+
+/// The curve after `steps` steps, in dispatches of `budget`.
+pub fn runs<T: Real>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    steps: u32,
+    budget: Budget,
+    tamper: Option<Tamper>,
+) -> Result<Vec<Row>> {
+    let launches = members(n, MEMBERS, steps, T::PRECISION.tolerance())?;
+    ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
+}
+
+/// The curve after adaptive steps to the same time, in dispatches of `budget`.
+///
+/// What rounding changes in a step length is what it changes in the error estimate, relative to the tolerance; what a
+/// changed length changes in the curve is the tolerance times that. So rounding changes the curve no more than with fixed
+/// steps of the longest length taken, five of them a step, and the bounds are the same. Those of what lies inside the run
+/// are in [`PACE`].
+pub fn adaptive<T: Real>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    budget: Budget,
+    tamper: Option<Tamper>,
+) -> Result<Vec<Row>> {
+    let launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?;
+    ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
+}
+
+/// Both sides of `launches` at their ends.
+fn ends_agree<T: Real>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    launches: Vec<Run<f64>>,
+    budget: Budget,
+    tamper: Option<Tamper>,
+) -> Result<Vec<Row>> {
+    let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
+    compare_ends::<T>(adapter.is_hardware(), &method(solver), n, &launches, &ours)
+}
+
+/// What a device left of `launches`, within the bounds of hardware or of software, against the twin by `method`.
+pub(in crate::conformance) fn compare_ends<T: Real>(
+    hardware: bool,
+    method: &Method,
+    n: usize,
+    launches: &[Run<f64>],
+    ours: &[Left],
+) -> Result<Vec<Row>> {
+    let steps = ours.iter().map(|left| left.counters.steps).max().unwrap_or(0);
+    let adaptive = launches.iter().all(|launch| launch.parameters.adaptive > 0.0);
+    let quantities: Vec<Bound> = FIELDS.iter().chain(&REPORT).copied().collect();
+    let inside: &[Bound] = if adaptive { &PACE } else { &[] };
+    let begin = |bound| Row { adaptive, ..Row::begin::<T>(bound, method.solver, n, steps) };
+    let mut rows: Vec<Row> = quantities.iter().chain(&DECAY).chain(inside).map(begin).collect();
+    for (member, (launch, left)) in launches.iter().zip(ours).enumerate() {
+        let twin = twin::<T>(launch, method, n)?;
+        same_events(left, &twin.left).map_err(|differ| {
+            let place = format!("{} n = {n}, member {member}", T::NAME);
+            Error::Failed(format!("{place}: {differ}"))
+        })?;
+        let mut at = launch.clone();
+        at.parameters.tau = at.parameters.tau.max(twin.longest);
+        let scales = Scales::of(&at)?;
+        let grown = growth(twin.left.counters.steps);
+        // 2B - A takes the roundings of both half steps twice and those of the whole one once.
+        let roundings = grown * if adaptive { 5.0 } else { 1.0 };
+        let limit = |bound: &Bound, scale: f64| bound.factor(hardware) * T::EPSILON * scale * roundings;
+        let (of_curve, rest) = rows.split_at_mut(quantities.len());
+        let (of_decay, inside) = rest.split_at_mut(DECAY.len());
+        curves_agree(of_curve, member, &quantities, &scales, limit, Gpu(left), Cpu(&twin.left));
+        // What a changed step length changes inside the run: nothing with fixed steps.
+        let estimate = T::EPSILON * grown * scales.stiffness() / launch.parameters.adaptive;
+        let change = if adaptive { estimate * twin.steepest } else { 0.0 };
+        let factors = DECAY.map(|bound| bound.factor(hardware));
+        let rounding = T::EPSILON * roundings + change;
+        decays_agree(of_decay, member, launch, factors, rounding, Gpu(&left.report), Cpu(&twin.left.report));
+        if adaptive {
+            let roundings = [T::EPSILON * roundings, estimate];
+            let factors = PACE.map(|bound| bound.factor(hardware));
+            insides_agree(inside, member, &scales, factors, roundings, Gpu(left), Cpu(&twin.left));
+        }
+    }
+    Ok(rows)
+}
+
+/// A member's run on the CPU.
+struct Twin {
+    left: Left,
+    /// Its longest step.
+    longest: f64,
+    /// The most that one step took off the excess.
+    steepest: f64,
+}
+
+/// Runs the twin of `launch` to its goal.
+fn twin<T: Real>(launch: &Run<f64>, method: &Method, n: usize) -> Result<Twin> {
+    let mut run: Run<T> = launch.convert();
+    let (mut longest, mut steepest) = (0.0_f64, 0.0_f64);
+    let mut work = Team::new(blocks(n)?);
+    while run.counters.is_running() {
+        let before = run.report.now.excess.to_f64();
+        evolve(&mut run, method, &mut work, 1);
+        steepest = steepest.max((run.report.now.excess.to_f64() - before).abs());
+        longest = longest.max(run.report.progress.taken.to_f64());
+    }
+    let left = Left { state: run.state.convert(), counters: run.counters, report: run.report.convert() };
+    Ok(Twin { left, longest, steepest })
+}
+
+/// That both sides ended alike, after as many steps and with their events in the same ones; else what differs.
+fn same_events(ours: &Left, theirs: &Left) -> Result<(), String> {
+    let end = |Left { counters, report, .. }: &Left| {
+        let Counters { status, steps, rejected, half_step, relax_step, fit_points, noted, .. } = *counters;
+        let Progress { time_high, time_low, .. } = report.progress;
+        format!(
+            "status {status} after {steps} steps and {rejected} refused at t = {time_high:e} + {time_low:e}, events in \
+             steps {half_step} and {relax_step}, {fit_points} points and {noted} times noted"
+        )
+    };
+    let (on_gpu, on_cpu) = (end(ours), end(theirs));
+    match on_gpu == on_cpu {
+        true => Ok(()),
+        false => Err(format!("{on_gpu} on the GPU, {on_cpu} on the CPU")),
+    }
+}
+
+/// The last curve and its report, see [`FIELDS`] and [`REPORT`]; `limit` is the bound at a scale.
+fn curves_agree(
+    rows: &mut [Row],
+    member: usize,
+    quantities: &[Bound],
+    scales: &Scales,
+    limit: impl Fn(&Bound, f64) -> f64,
+    Gpu(ours): Gpu<&Left>,
+    Cpu(theirs): Cpu<&Left>,
+) {
+    let (our_report, their_report) = (reported(&ours.report), reported(&theirs.report));
+    let ours = ours.state.curve.fields().into_iter().map(|field| field.nodes()).chain(our_report.chunks(1));
+    let theirs = theirs.state.curve.fields().into_iter().map(|field| field.nodes()).chain(their_report.chunks(1));
+    for ((row, bound), (ours, theirs)) in rows.iter_mut().zip(quantities).zip(ours.zip(theirs)) {
+        let scale = scales.get(bound.scale);
+        row.add(member, scale, limit(bound, scale), Gpu(ours), Cpu(theirs));
+    }
+}
+
+fn before(state: &State<f64>) -> &Curve<f64> {
+    &state.before
+}
+
+fn between(state: &State<f64>) -> &Curve<f64> {
+    &state.middle
+}
+
+/// What a member keeps of its way down, see [`DECAY`]; `rounding` is that of an excess.
+fn decays_agree(
+    rows: &mut [Row],
+    member: usize,
+    launch: &Run<f64>,
+    factors: [f64; 2],
+    rounding: f64,
+    ours: Gpu<&Report<f64>>,
+    theirs: Cpu<&Report<f64>>,
+) {
+    let (Gpu(ours), Cpu(theirs)) = (ours, theirs);
+    let [way, rate] = rows else { panic!("{} rows of DECAY", rows.len()) };
+    way.add(member, 1.0, factors[0] * rounding, Gpu(&ours.excess_at), Cpu(&theirs.excess_at));
+    let slope = |decay: &Decay<f64>| if decay.xx > 0.0 { decay.xy / decay.xx } else { 0.0 };
+    let (least, span) = (theirs.now.excess.max(launch.parameters.fit_to), theirs.decay.x);
+    let scale = if span > 0.0 { 1.0 / (least * span) } else { 0.0 };
+    rate.add(member, scale, factors[1] * rounding * scale, Gpu(&[slope(&ours.decay)]), Cpu(&[slope(&theirs.decay)]));
+}
+
+/// What a member's run leaves besides its end, see [`PACE`]. `rounding` is what rounding does relative to a scale,
+/// `estimate` what it does to a step length, relative to it.
+fn insides_agree(
+    rows: &mut [Row],
+    member: usize,
+    scales: &Scales,
+    factors: [f64; 6],
+    [rounding, estimate]: [f64; 2],
+    ours: Gpu<&Left>,
+    theirs: Cpu<&Left>,
+) {
+    let (Gpu(ours), Cpu(theirs)) = (ours, theirs);
+    let [start, middle, reports, last, next, events] = rows else { panic!("{} rows of PACE", rows.len()) };
+    let (a, b) = (&ours.report, &theirs.report);
+    // Of a quantity that changes by `change` in a step.
+    let inside = |scale: f64, change: f64| rounding * scale + estimate * change;
+    let largest = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let bounds = FIELDS.map(|bound| scales.get(bound.scale));
+    let curves = [(start, factors[0], before as fn(&State<f64>) -> &Curve<f64>), (middle, factors[1], between)];
+    for (row, factor, of) in curves {
+        let (a, b) = (of(&ours.state).fields(), of(&theirs.state).fields());
+        let fields = a.into_iter().zip(b).zip(theirs.state.curve.fields()).zip(bounds);
+        for (((a, b), end), scale) in fields {
+            let bound = factor * inside(scale, largest(end.nodes(), b.nodes()));
+            row.add(member, scale, bound, Gpu(a.nodes()), Cpu(b.nodes()));
+        }
+    }
+    for (a, b) in [(&a.before, &b.before), (&a.middle, &b.middle)] {
+        let (a, b, end) = (a.to_numbers(), b.to_numbers(), theirs.report.now.to_numbers());
+        for (j, bound) in REPORT.iter().take(a.len()).enumerate() {
+            let scale = scales.get(bound.scale);
+            let bound = factors[2] * inside(scale, (b[j] - end[j]).abs());
+            reports.add(member, scale, bound, Gpu(&a[j..=j]), Cpu(&b[j..=j]));
+        }
+    }
+    let (a, b) = (&a.progress, &b.progress);
+    // The last step reaches the final time, so its length is off by what the ones before it were off together.
+    let longest = scales.parameters.tau;
+    last.add(member, longest, factors[3] * estimate * longest, Gpu(&[a.taken]), Cpu(&[b.taken]));
+    next.add(member, b.next, factors[4] * estimate * b.next, Gpu(&[a.next]), Cpu(&[b.next]));
+    let half = |p: &Progress<f64>| p.half_high + (p.half_low + p.half_fraction * p.half_length);
+    let relaxed = |p: &Progress<f64>| p.relax_high + (p.relax_low + p.relax_fraction * p.relax_length);
+    if theirs.counters.half_step != NEVER && theirs.counters.relax_step != NEVER {
+        // The rounding of an excess over the rate at which it falls, and what the place of a parabola inside its step does.
+        let p = &scales.parameters;
+        let rate = (p.half_at - p.relax_at) / (relaxed(b) - half(b));
+        let bound = factors[5] * (rounding / rate + estimate * b.half_length.max(b.relax_length));
+        events.add(member, b.relax_length, bound, Gpu(&[half(a), relaxed(a)]), Cpu(&[half(b), relaxed(b)]));
+    }
+}
+
+/// What of a report is compared, in the order of [`REPORT`].
+fn reported(report: &Report<f64>) -> Vec<f64> {
+    let mut numbers = report.now.to_numbers();
+    numbers.extend([report.progress.turning, report.progress.travel]);
+    numbers
+}
+
+/// How roundings add up over steps: like a random walk, since the flow itself damps what they leave.
+fn growth(steps: u32) -> f64 {
+    f64::from(steps).sqrt()
+}

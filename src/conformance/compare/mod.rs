@@ -1,0 +1,16 @@
+//! The two comparisons: [everything that one step computes](stages()), and [what whole runs leave](runs).
+
+mod device;
+mod ends;
+mod row;
+mod scales;
+mod setup;
+mod stages;
+
+pub use super::cases::MEMBERS;
+pub use device::{Left, on_gpu, on_gpu_by};
+pub(super) use ends::compare_ends;
+pub use ends::{ADAPTIVE_STEPS, adaptive, runs};
+pub use row::Row;
+pub use setup::{MAX_SWEEPS, Tamper};
+pub use stages::stages;

@@ -1,0 +1,90 @@
+//! One line of the table of comparisons.
+
+use serde::Serialize;
+
+use crate::{conformance::bounds::Bound, number::Real, solver::Solver};
+
+/// What the kernel computed.
+pub(super) struct Gpu<V>(pub(super) V);
+/// What its twin computed. A type of its own, so that one side cannot be passed twice.
+pub(super) struct Cpu<V>(pub(super) V);
+
+/// One line of the table: the worst case of a quantity over all members and nodes.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// The quantity.
+    pub quantity: &'static str,
+    /// Solver of the systems.
+    pub solver: Solver,
+    /// `f32` or `f64`.
+    pub precision: &'static str,
+    /// Nodes per member.
+    pub n: usize,
+    /// Steps after which it was compared; of adaptive ones the most that a member took.
+    pub steps: u32,
+    /// The steps were adaptive.
+    pub adaptive: bool,
+    /// Natural scale where the error is worst.
+    pub scale: f64,
+    /// The difference that takes the largest share of its bound.
+    pub error: f64,
+    /// The bound there, `k · ε · scale`.
+    pub bound: f64,
+    /// Member and node of the largest difference.
+    pub at: (usize, usize),
+}
+
+impl Row {
+    /// Whether the error is within its bound; NaN is not, and neither is a row that compared nothing.
+    pub fn passes(&self) -> bool {
+        self.error <= self.bound && self.bound.is_finite()
+    }
+
+    /// Whether nothing was compared.
+    pub(in crate::conformance) fn is_empty(&self) -> bool {
+        self.bound == f64::INFINITY
+    }
+
+    /// The error as a share of its bound.
+    pub fn share(&self) -> f64 {
+        if self.error == 0.0 { 0.0 } else { self.error / self.bound }
+    }
+
+    pub(super) fn begin<T: Real>(bound: &Bound, solver: Solver, n: usize, steps: u32) -> Row {
+        Row {
+            quantity: bound.quantity,
+            solver,
+            precision: T::NAME,
+            n,
+            steps,
+            adaptive: false,
+            scale: 1.0,
+            error: f64::NAN,
+            bound: f64::INFINITY,
+            at: (0, 0),
+        }
+    }
+
+    /// Takes a member into account; the larger share of the bound wins, and NaN wins always.
+    pub(super) fn add(
+        &mut self,
+        member: usize,
+        scale: f64,
+        bound: f64,
+        Gpu(ours): Gpu<&[f64]>,
+        Cpu(theirs): Cpu<&[f64]>,
+    ) {
+        assert!(!ours.is_empty() && ours.len() == theirs.len(), "{}: sides of different length", self.quantity);
+        for (node, (a, b)) in ours.iter().zip(theirs).enumerate() {
+            let error = (a - b).abs();
+            let first = self.is_empty();
+            let share = if error == 0.0 { 0.0 } else { error / bound };
+            if first || error.is_nan() || share > self.share() {
+                (self.scale, self.error, self.bound, self.at) = (scale, error, bound, (member, node));
+            }
+            if error.is_nan() {
+                return;
+            }
+        }
+    }
+}
