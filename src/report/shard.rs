@@ -17,6 +17,7 @@ use super::{
 use crate::files::{
     claim,
     names::{RUN, SHARD, STATE, STATE_OLD},
+    part_file::Mark,
 };
 use crate::{
     ensemble::{Shard, Spec},
@@ -86,61 +87,76 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Record, Fault> {
 /// # Errors
 /// [`Error::Request`] where it is the folder of something else, or has what no shard of this program wrote.
 pub fn look(path: &Path) -> Result<Found> {
-    let refuse = |problem: String| Err(Error::Request(format!("{}: {problem}", path.display())));
     let unfinished = |spec: Option<Spec>, why: String| {
         Ok(Found::Unfinished { path: path.to_path_buf(), spec: spec.map(Box::new), why })
     };
-    let there = |name: &str| {
-        let found = path.join(name).try_exists();
-        found.map_err(|e| Error::Request(format!("{}: cannot find {name} in it ({e})", path.display())))
-    };
     match path.metadata() {
         Err(e) if e.kind() == io::ErrorKind::NotFound => return unfinished(None, "no such folder".into()),
-        Err(e) => return refuse(format!("cannot be found ({e})")),
-        Ok(of) if !of.is_dir() => return refuse("no folder; name that of a shard".into()),
+        Err(e) => return Err(refused(path, &format!("cannot be found ({e})"))),
+        Ok(of) if !of.is_dir() => return Err(refused(path, "no folder; name that of a shard")),
         Ok(_) => {}
     }
+    // Before anything else: a run that ends meanwhile takes its states with it.
     let states = [STATE, STATE_OLD].map(|name| checkpoint::read(&path.join(name)).ok());
-    let spec = || states.iter().flatten().next().and_then(|(head, _)| Spec::from_toml(&head.origin.spec).ok());
+    if let Some(why) = unfinished_run(path)? {
+        let head = states.iter().flatten().next().map(|(head, _)| head);
+        return unfinished(head.and_then(|head| Spec::from_toml(&head.origin.spec).ok()), why);
+    }
+    if there(path, SHARD)? {
+        return Ok(Found::Done(Box::new(part(path)?)));
+    }
+    match there(path, RUN)? {
+        true => Err(refused(path, &format!("the run there is no shard: it has no {SHARD}"))),
+        false => unfinished(None, "no shard was finished here".into()),
+    }
+}
+
+/// Why the run at `path` has not ended, if there is one.
+fn unfinished_run(path: &Path) -> Result<Option<String>> {
     if claim::is_held(path) {
-        return unfinished(spec(), "a run is writing here".into());
+        return Ok(Some("a run is writing here".into()));
     }
-    if there(STATE)? || there(STATE_OLD)? {
-        let resume = format!("interrupted; curvelax resume {} goes on with it", path.display());
-        return unfinished(spec(), resume);
-    }
-    if !there(SHARD)? {
-        return match there(RUN)? {
-            true => refuse(format!("the run there is no shard: it has no {SHARD}")),
-            false => unfinished(None, "no shard was finished here".into()),
-        };
-    }
-    let faulty = |name: &str, fault: &str| {
-        format!("{}: {fault}; copy the shard again, or run it again", path.join(name).display())
-    };
+    let interrupted = there(path, STATE)? || there(path, STATE_OLD)?;
+    Ok(interrupted.then(|| format!("interrupted; curvelax resume {} goes on with it", path.display())))
+}
+
+/// The shard at `path`, which is finished, with its tables as long as they were.
+fn part(path: &Path) -> Result<Part> {
+    let faulty = |fault: &str| faulty(path, SHARD, fault);
     let read = checkpoint::bytes(&path.join(SHARD)).and_then(|bytes| from_bytes(&bytes));
-    let record = read.map_err(|fault| {
-        let (Fault::Foreign(what) | Fault::Damaged(what)) = fault;
-        Error::Request(faulty(SHARD, &what))
-    })?;
+    let record = read.map_err(|(Fault::Foreign(what) | Fault::Damaged(what))| faulty(&what))?;
     let spec = Spec::from_toml(&record.head.origin.spec).map_err(|e| e.to_string());
     let spec = spec.and_then(|spec| spec.validate().map_err(|e| e.to_string()));
-    let fault = |e: String| faulty(SHARD, &format!("its spec: {}", shortened(&one_line(&e), SHOWN)));
-    let spec = spec.map_err(|e| Error::Request(fault(e)))?;
+    let spec = spec.map_err(|e| faulty(&format!("its spec: {}", shortened(&one_line(&e), SHOWN))))?;
     let Some(shard) = spec.shard else {
-        return Err(Error::Request(faulty(SHARD, "its spec is not of a shard")));
+        return Err(faulty("its spec is not of a shard"));
     };
     if !record.head.tables.iter().map(|mark| mark.name.as_str()).eq(Growing::names(&spec)) {
-        return Err(Error::Request(faulty(SHARD, "it tells of other files than its spec asks for")));
+        return Err(faulty("it tells of other files than its spec asks for"));
     }
-    for mark in &record.head.tables {
-        let length = path.join(&mark.name).metadata().map(|of| of.len());
-        let fault = match length {
-            Ok(length) if length == mark.length => continue,
-            Ok(length) => format!("{length} bytes, and the shard wrote {}", mark.length),
-            Err(e) => format!("cannot be found ({e})"),
-        };
-        return Err(Error::Request(faulty(&mark.name, &fault)));
-    }
-    Ok(Found::Done(Box::new(Part { path: path.to_path_buf(), shard, spec, record })))
+    record.head.tables.iter().try_for_each(|mark| check_length(path, mark))?;
+    Ok(Part { path: path.to_path_buf(), shard, spec, record })
+}
+
+/// That the table in the folder at `path` is as long as the shard wrote it.
+fn check_length(path: &Path, mark: &Mark) -> Result<()> {
+    let fault = match path.join(&mark.name).metadata().map(|of| of.len()) {
+        Ok(length) if length == mark.length => return Ok(()),
+        Ok(length) => format!("{length} bytes, and the shard wrote {}", mark.length),
+        Err(e) => format!("cannot be found ({e})"),
+    };
+    Err(faulty(path, &mark.name, &fault))
+}
+
+fn there(path: &Path, name: &str) -> Result<bool> {
+    let found = path.join(name).try_exists();
+    found.map_err(|e| refused(path, &format!("cannot find {name} in it ({e})")))
+}
+
+fn refused(path: &Path, problem: &str) -> Error {
+    Error::Request(format!("{}: {problem}", path.display()))
+}
+
+fn faulty(path: &Path, name: &str, fault: &str) -> Error {
+    Error::Request(format!("{}: {fault}; copy the shard again, or run it again", path.join(name).display()))
 }

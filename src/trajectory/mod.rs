@@ -1,0 +1,241 @@
+//! One member's way through a run, seen from the host: where it starts, where it pauses next, what it leaves.
+//!
+//! A member is advanced in units of its own size: lengths are divided by a power of two near its radius and times by
+//! the fourth power of that, which rounds nothing, so that no threshold of the scheme and no range of a precision
+//! depends on the unit in which a user measures.
+
+mod end;
+mod outputs;
+mod start;
+
+use glam::DVec2;
+
+use crate::{
+    ensemble::{Member, Observables, Paused, Rows, Status},
+    error::{Error, Result},
+    schedule::{Clock, Outputs, Ticks},
+    scheme::{
+        Parameters, State,
+        member::{Counters, Report},
+        run::Run,
+        state::STATE_FIELDS,
+    },
+};
+
+/// Excess below which a curve is a regular polygon to rounding: such a member is relaxed at time 0.
+const ROUND: f64 = 1e-13;
+/// The first adaptive step in units of the fourth power of the shortest segment, the fastest time scale there is.
+const FIRST_STEP: f64 = 0.1;
+/// Adaptive steps to a tolerance of 1 after which a member is stalled; their number goes with its root. Curves that
+/// relax take some 3 to 30; one that creeps, because only tiny steps can be solved, would never end.
+const MAX_STEPS: f64 = 1000.0;
+/// Steps in a time 1/ω besides: a curve at rest takes one or two, since lengths approach their mean explicitly.
+const MAX_STEPS_AT_REST: f64 = 4.0;
+
+/// What can be said of the relaxation of a member.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Course {
+    /// Its excess is followed to the threshold.
+    Followed,
+    /// It is at or under the threshold from the start, or a regular polygon.
+    Round,
+    /// It is so nearly round that its threshold lies in the rounding of the precision.
+    Unresolved,
+    /// It is no simple curve: whatever its excess, it does not relax to a circle.
+    Immersed,
+}
+
+/// How the time of a member passes.
+#[derive(Clone, Copy, Debug)]
+enum Time {
+    Fixed(Clock),
+    Adaptive(Ticks),
+}
+
+impl Time {
+    /// The unit of the clock of [`decay`], for a member advanced in lengths of `unit`.
+    fn unit(self, unit: f64) -> f64 {
+        match self {
+            Time::Fixed(clock) => clock.tau,
+            Time::Adaptive(_) => unit.powi(4),
+        }
+    }
+}
+
+/// A resident member.
+pub struct Trajectory<'a> {
+    member: Member,
+    /// A power of two near the member's radius: the unit of length in which it is advanced.
+    unit: f64,
+    t_end: f64,
+    time: Time,
+    launch: Run<f64>,
+    /// Output times, and how many of them are behind the member.
+    outputs: &'a Outputs,
+    served: usize,
+    counters: Counters,
+    report: Report<f64>,
+    start: Observables,
+    rows: Rows,
+    /// Times and the nodes that are drawn, in the user's frame.
+    frames: Vec<(f64, Vec<DVec2>)>,
+    sweeps: [u64; 2],
+    course: Course,
+    rate_theory: Option<f64>,
+    /// When the polygon was first seen to cross itself.
+    crossed: Option<f64>,
+    portrait: bool,
+}
+
+impl Trajectory<'_> {
+    /// What the back end needs to start the member, or to go on with it. Its state is there from now on, and not here.
+    pub fn launch(&mut self) -> Run<f64> {
+        let (goal, parameters) = self.aim();
+        let state = std::mem::replace(&mut self.launch.state, State::zeros(0));
+        let mut run = Run { state, parameters, counters: self.launch.counters, report: self.launch.report };
+        if self.needs_aim() {
+            run.counters.goal = goal;
+        }
+        run
+    }
+
+    /// The member between two dispatches, with what the back end has of it.
+    pub fn pause(&self, counters: Counters, report: Report<f64>, state: &State<f64>) -> Paused {
+        Paused {
+            counters,
+            report,
+            state: state.to_numbers(),
+            sweeps: self.sweeps,
+            served: self.served as u64,
+            rows: self.rows.clone(),
+            frames: self.frames.clone(),
+            crossed: self.crossed,
+            look_at: self.launch.parameters.look_at,
+        }
+    }
+
+    /// Puts a member that has just been made where it was [paused](Trajectory::pause).
+    ///
+    /// # Errors
+    /// [`Error::Request`] where that was not this member.
+    pub fn resume_from(&mut self, paused: Paused) -> Result<()> {
+        let Paused { counters, report, state, sweeps, served, rows, frames, crossed, look_at } = paused;
+        let (index, numbers) = (self.member.index, STATE_FIELDS * self.member.nodes.len());
+        let served = usize::try_from(served).unwrap_or(usize::MAX);
+        if state.len() != numbers || served > self.outputs.len() || counters.status != 0 {
+            return Err(Error::Request(format!(
+                "member {index} in the state is not that of the spec: {} numbers of {numbers}, {served} output times of \
+                 {}, status {}",
+                state.len(),
+                self.outputs.len(),
+                counters.status
+            )));
+        }
+        self.launch.state = State::from_numbers(&state);
+        (self.launch.counters, self.launch.report, self.launch.parameters.look_at) = (counters, report, look_at);
+        (self.rows, self.frames) = (rows, frames);
+        (self.served, self.crossed) = (served, crossed);
+        self.sweeps = sweeps;
+        self.take(counters, &report);
+        Ok(())
+    }
+
+    /// Takes what the back end reports.
+    pub fn observe(&mut self, counters: Counters, report: &Report<f64>) {
+        self.sweeps[0] += u64::from(counters.sweeps_k);
+        self.sweeps[1] += u64::from(counters.sweeps_x);
+        self.take(counters, report);
+        let creeps = self.counters.status == 0 && !self.is_at_end() && counters.steps >= self.most_steps();
+        let failed = Status::ALL.iter().any(|status| status.is_failure() && *status as u32 == self.counters.status);
+        if creeps || (failed && self.is_timed_too_coarsely()) {
+            self.counters.status = Status::Stalled as u32;
+        }
+    }
+
+    /// Whether no step that the clock can count was as short as the curve needed at its start.
+    fn is_timed_too_coarsely(&self) -> bool {
+        let Time::Adaptive(ticks) = self.time else { return false };
+        let edge = self.start.length / self.unit / self.member.nodes.len() as f64;
+        ticks.tick > FIRST_STEP * edge.powi(4)
+    }
+
+    fn take(&mut self, counters: Counters, report: &Report<f64>) {
+        self.counters = counters;
+        // Until the first step is accepted the start is known better here, in f64.
+        if counters.steps > 0 {
+            self.report = *report;
+        }
+    }
+
+    /// Accepted steps after which the member has stalled.
+    fn most_steps(&self) -> u32 {
+        match self.time {
+            Time::Fixed(_) => u32::MAX,
+            Time::Adaptive(_) => {
+                let p = &self.launch.parameters;
+                let turnovers = p.redistribution * p.omega * (p.end_high + p.end_low);
+                (MAX_STEPS / p.adaptive.sqrt() + MAX_STEPS_AT_REST * turnovers).ceil() as u32
+            }
+        }
+    }
+
+    /// Whether the member has ended.
+    pub fn is_over(&self) -> bool {
+        self.counters.status != 0 || self.is_at_end()
+    }
+
+    fn is_at_end(&self) -> bool {
+        let (progress, p) = (&self.report.progress, &self.launch.parameters);
+        match self.time {
+            Time::Fixed(clock) => self.counters.steps >= clock.steps,
+            Time::Adaptive(_) => (progress.time_high, progress.time_low) == (p.end_high, p.end_low),
+        }
+    }
+
+    /// Time of the last accepted state.
+    pub fn now(&self) -> f64 {
+        let progress = &self.report.progress;
+        match self.time {
+            _ if self.is_at_end() => self.t_end,
+            Time::Fixed(clock) => clock.time(self.counters.steps),
+            Time::Adaptive(_) => (progress.time_high + progress.time_low) * self.unit.powi(4),
+        }
+    }
+
+    /// Share of its time that has passed.
+    pub fn share(&self) -> f64 {
+        self.now() / self.t_end
+    }
+
+    /// Where to run to next, as a number of steps and the parameters on the way; none where the goal still stands.
+    pub fn next_aim(&self) -> Option<(u32, Parameters<f64>)> {
+        self.needs_aim().then(|| self.aim())
+    }
+
+    fn needs_aim(&self) -> bool {
+        self.counters.steps >= self.counters.goal
+    }
+
+    fn aim(&self) -> (u32, Parameters<f64>) {
+        let steps = self.counters.steps;
+        let mut parameters = self.launch.parameters;
+        let output = self.outputs.get(self.served).map(|output| output.t);
+        let goal = match self.time {
+            Time::Fixed(clock) => {
+                let goal = output.map_or(clock.steps, |t| clock.locate(t).0);
+                let ends_short = clock.ends_short() && goal == clock.steps;
+                let before_last = ends_short && steps + 1 < clock.steps;
+                let tau = if ends_short && !before_last { clock.last() } else { clock.tau };
+                parameters.tau = tau / self.unit.powi(4);
+                if before_last { clock.steps - 1 } else { goal }
+            }
+            Time::Adaptive(ticks) => {
+                let end = (parameters.end_high, parameters.end_low);
+                let split = |t: f64| if t >= self.t_end { end } else { ticks.split(t / self.unit.powi(4)) };
+                (parameters.goal_high, parameters.goal_low) = output.map_or(end, split);
+                self.most_steps()
+            }
+        };
+        (goal, parameters)
+    }
+}
