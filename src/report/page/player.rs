@@ -3,9 +3,11 @@
 //! All members share one scale. A coordinate is a whole number below 4096 and two digits of base64; the script
 //! `page.js` reads them and moves the nodes on straight lines from time to time.
 
-use std::fmt::Write;
+use std::{fmt::Write as _, io};
 
 use glam::DVec2;
+use serde::Serialize;
+use serde_json::{Serializer, ser::Formatter};
 
 use crate::{
     draw::{
@@ -78,6 +80,75 @@ struct Member {
     frames: Vec<Vec<u16>>,
 }
 
+/// What the script reads.
+#[derive(Serialize)]
+struct PlayerData {
+    marks: Vec<f64>,
+    members: Vec<MemberData>,
+}
+
+/// The same of a member; a frame is a string of digits.
+#[derive(Serialize)]
+struct MemberData {
+    times: Vec<f64>,
+    frames: Vec<String>,
+}
+
+/// JSON with a line for each member and each of its frames, so that no line of the page is endless. Numbers are as short as
+/// elsewhere on the page: `0`, and not `0.0`.
+#[derive(Default)]
+struct LineBreaks {
+    /// Objects that are open.
+    depth: usize,
+    /// A comma was written, and what follows it in the list is not known yet.
+    after_comma: bool,
+}
+
+impl LineBreaks {
+    fn break_line<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        match std::mem::take(&mut self.after_comma) {
+            true => writer.write_all(b"\n"),
+            false => Ok(()),
+        }
+    }
+}
+
+impl Formatter for LineBreaks {
+    fn write_f64<W: io::Write + ?Sized>(&mut self, writer: &mut W, value: f64) -> io::Result<()> {
+        self.after_comma = false;
+        write!(writer, "{value}")
+    }
+
+    fn begin_array_value<W: io::Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        self.after_comma = !first;
+        if first { Ok(()) } else { writer.write_all(b",") }
+    }
+
+    fn begin_string<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.break_line(writer)?;
+        writer.write_all(b"\"")
+    }
+
+    fn begin_object<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.depth += 1;
+        self.break_line(writer)?;
+        writer.write_all(b"{")
+    }
+
+    fn end_object<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.depth -= 1;
+        writer.write_all(b"}")
+    }
+
+    fn begin_object_key<W: io::Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        match (first, self.depth) {
+            (true, _) => Ok(()),
+            (false, 1) => writer.write_all(b",\n"),
+            (false, _) => writer.write_all(b","),
+        }
+    }
+}
+
 impl Player {
     /// The first of `trajectories` that have a time to show; none if none has.
     pub fn new(trajectories: &[Trajectory]) -> Option<Player> {
@@ -139,13 +210,15 @@ impl Player {
 
     /// What the script reads: numbers and digits of base64 only.
     pub fn data(&self) -> String {
-        let list = |times: &[f64]| times.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
-        let member = |Member { times, frames, .. }: &Member| {
-            let frames: Vec<String> = frames.iter().map(|frame| format!("\"{}\"", digits(frame))).collect();
-            format!("{{\"times\":[{}],\"frames\":[{}]}}", list(times), frames.join(",\n"))
+        let member = |Member { times, frames, .. }: &Member| MemberData {
+            times: times.clone(),
+            frames: frames.iter().map(|frame| digits(frame)).collect(),
         };
-        let members: Vec<String> = self.members.iter().map(member).collect();
-        format!("{{\"marks\":[{}],\n\"members\":[{}]}}", list(&self.marks()), members.join(",\n"))
+        let data = PlayerData { marks: self.marks(), members: self.members.iter().map(member).collect() };
+        let mut bytes = Vec::new();
+        let written = data.serialize(&mut Serializer::with_formatter(&mut bytes, LineBreaks::default()));
+        written.expect("numbers and strings are JSON, and memory takes them");
+        String::from_utf8(bytes).expect("JSON is UTF-8")
     }
 
     /// Times at equal distances along the slider: where there are many, it moves slowly.
@@ -266,5 +339,24 @@ mod tests {
         let player = Player::new(&[ellipse(1.0, 3, 12)]).unwrap();
         assert!(player.html().contains("member &lt;0&gt;") && !player.html().contains("<0>"));
         assert!(!player.data().contains('<') && !player.data().contains("member <"));
+    }
+
+    #[test]
+    fn the_data_are_json_with_short_numbers_and_short_lines() {
+        let nodes = |x: f64| vec![DVec2::new(x, 0.0), DVec2::new(-x, 1.0), DVec2::new(0.0, 2.0)];
+        let times = vec![0.0, 1e-7, 0.1, 1e21];
+        let nodes: Vec<_> = [1.0, 0.5, 0.25, 0.125].map(nodes).into();
+        let one = Trajectory { label: "one".into(), status: "relaxed", times, nodes };
+        let two = Trajectory { label: "two".into(), times: vec![0.0], nodes: one.nodes[..1].to_vec(), ..one.clone() };
+        let data = Player::new(&[one, two]).unwrap().data();
+        let parts = [
+            "{\"marks\":[0,0.0000001,0.1,1000000000000000000000],",
+            "\"members\":[{\"times\":[0,0.0000001,0.1,1000000000000000000000],\"frames\":[\"8383DIgAgADI\",",
+            "\"ub83RkgAgADI\",",
+            "\"nN83YygAgADI\",",
+            "\"jm83cZgAgADI\"]},",
+            "{\"times\":[0],\"frames\":[\"8383DIgAgADI\"]}]}",
+        ];
+        assert_eq!(data, parts.join("\n"));
     }
 }
