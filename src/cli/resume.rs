@@ -112,14 +112,17 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: Place, flags
         note(&format!("warning: {}: {fault}", path.display()));
     }
     let origin = &mut saved.head.origin;
+    let base = PathBuf::from(&origin.base);
     if !origin.outlines.is_empty() {
         folder.make_absolute()?;
-        go_to(Path::new(&origin.base))?;
+        check_base(&base)?;
     }
     let began = origin.platform.clone();
     let elsewhere = place.backend.is_some() || place.adapter.is_some();
     let new_threads = place.threads.is_some();
-    let work = spec(&origin.spec, place).and_then(Work::new).map_err(|error| origin.explain(error))?;
+    let work = spec(&origin.spec, place)
+        .and_then(|spec| Work::new_from(spec, &base))
+        .map_err(|error| origin.explain(error))?;
     origin.check_outlines(&work.study)?;
     let mut here = work.platform();
     here.reason = began.reason.clone();
@@ -160,9 +163,10 @@ fn state_spec(fault: &str) -> Error {
     Error::Request(format!("the spec in the state: {fault}"))
 }
 
-/// Where paths in the spec begin.
-fn go_to(base: &Path) -> Result<()> {
-    std::env::set_current_dir(base).map_err(|e| {
+/// That paths in the spec can begin at `base`.
+fn check_base(base: &Path) -> Result<()> {
+    // A name in it is found only where it is a folder that may be entered.
+    base.join(".").metadata().map(drop).map_err(|e| {
         let base = base.display();
         Error::Request(format!("{base}: the run was begun in this folder, and its outline is named from there ({e})"))
     })

@@ -74,7 +74,12 @@ pub struct Work {
 impl Work {
     /// Checks everything that can be wrong with `spec` on this machine.
     pub fn new(spec: Spec) -> Result<Work> {
-        let mut study = Study::new(spec)?;
+        Work::new_from(spec, Path::new(""))
+    }
+
+    /// As [`Work::new`], with paths in the spec relative to the directory `base`.
+    pub fn new_from(spec: Spec, base: &Path) -> Result<Work> {
+        let mut study = Study::new_from(spec, base)?;
         let choices = placement::choose_all(&study)?;
         placement::settle(&mut study, &choices);
         Ok(Work { study, choices, opened: None })

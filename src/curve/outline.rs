@@ -53,8 +53,16 @@ impl Outline {
     /// numbers, or longer than 65 536 bytes; neighbouring points coincide; no net area is enclosed. An outline that crosses itself is
     /// accepted with a warning.
     pub fn read(path: &Path) -> Result<Outline> {
+        Outline::read_from(Path::new(""), path)
+    }
+
+    /// As [`Outline::read`], with `path` relative to the directory `base`; messages name `path` alone.
+    ///
+    /// # Errors
+    /// As [`Outline::read`].
+    pub fn read_from(base: &Path, path: &Path) -> Result<Outline> {
         let remedy = format!("give a CSV file x,y of at most {MAX_OUTLINE} bytes");
-        let bytes = input::bytes(path, MAX_OUTLINE);
+        let bytes = input::bytes(&base.join(path), MAX_OUTLINE);
         let bytes = bytes.map_err(|e| Source { path }.refusal(None, &format!("cannot read it: {e}"), &remedy))?;
         Outline::from_csv(path, &bytes)
     }
@@ -502,6 +510,18 @@ mod tests {
         let crossed = outline("x,y\n0,0\n3,3\n3,0\n0,1\n").unwrap();
         assert!(crossed.warnings()[0].contains("from line 2 to 3 and from line 4 to 5"), "{:?}", crossed.warnings());
         assert!(outline(SQUARE).unwrap().warnings().is_empty());
+    }
+
+    #[test]
+    fn an_outline_is_read_below_a_directory_and_named_without_it() {
+        let home = tempfile::tempdir().unwrap();
+        std::fs::write(home.path().join("eight.csv"), "0,0\n2,2\n2,0\n0,1\n").unwrap();
+        let outline = Outline::read_from(home.path(), Path::new("eight.csv")).unwrap();
+        assert!(outline.warnings()[0].starts_with("eight.csv: the outline crosses"), "{:?}", outline.warnings());
+        let error = Outline::read_from(home.path(), Path::new("none.csv")).unwrap_err().to_string();
+        assert!(error.starts_with("--shape file:none.csv: cannot read it"), "{error}");
+        // A whole path has no directory before it.
+        assert!(Outline::read_from(Path::new("/none"), &home.path().join("eight.csv")).is_ok());
     }
 
     #[test]

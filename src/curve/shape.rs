@@ -3,7 +3,12 @@
 //! Every closed formula is a map of `u ∈ [0, 1]`, traversed counter-clockwise, with `u = 0` and `u = 1` the same
 //! point. Lengths are in the user's unit; so areas are its square and times its fourth power.
 
-use std::{f64::consts::TAU, fmt, path::PathBuf, str::FromStr};
+use std::{
+    f64::consts::TAU,
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -66,6 +71,14 @@ impl Shape {
     /// # Errors
     /// [`Error::Request`] for numbers out of range and for everything that [`Outline::read`] refuses.
     pub fn resolve(&self) -> Result<BaseCurve, Error> {
+        self.resolve_from(Path::new(""))
+    }
+
+    /// As [`Shape::resolve`], with the path of a file relative to the directory `base`.
+    ///
+    /// # Errors
+    /// As [`Shape::resolve`].
+    pub fn resolve_from(&self, base: &Path) -> Result<BaseCurve, Error> {
         self.check().map_err(|message| Error::Request(format!("--shape {self}: {message}")))?;
         Ok(match self.clone() {
             Shape::Ellipse { a, b } => BaseCurve::from_formula(move |u| ellipse(a, b, u)),
@@ -74,7 +87,7 @@ impl Shape {
             Shape::Astroid => BaseCurve::from_formula(astroid).with_cusps(&[0.25, 0.5, 0.75]),
             Shape::Lemniscate { half_width } => BaseCurve::from_formula(move |u| lemniscate(half_width, u)),
             Shape::Flower(modes) => BaseCurve::from_formula(move |u| flower(&modes, u)),
-            Shape::File(path) => BaseCurve::from_outline(Outline::read(&path)?),
+            Shape::File(path) => BaseCurve::from_outline(Outline::read_from(base, &path)?),
         })
     }
 

@@ -1,6 +1,6 @@
 //! A study: the cells of a spec, each an ensemble of its own, whose members run side by side.
 
-use std::{ops::Range, sync::Arc};
+use std::{ops::Range, path::Path, sync::Arc};
 
 use super::{
     Family, Member, Spec,
@@ -36,8 +36,16 @@ impl Study {
     /// [`Error::Request`] for a value that is out of range, with the cell that has it, for curves of unequal numbers of
     /// nodes that are to share an array, and for more curves than a memory holds.
     pub fn new(spec: Spec) -> Result<Study> {
+        Study::new_from(spec, Path::new(""))
+    }
+
+    /// As [`Study::new`], with paths in the spec relative to the directory `base`.
+    ///
+    /// # Errors
+    /// As [`Study::new`].
+    pub fn new_from(spec: Spec, base: &Path) -> Result<Study> {
         let spec = spec.validate()?;
-        let cells = cells(&spec)?;
+        let cells = cells(&spec, base)?;
         Ok(Study { spec, cells }.with_spec_of_the_cell())
     }
 
@@ -202,8 +210,8 @@ impl Cell {
 /// a million nodes.
 const MAX_BYTES: usize = 4_000_000_000;
 
-/// Cell `index` of `spec`, after the cells `before`, whose curves take `bytes`.
-fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<Cell> {
+/// Cell `index` of `spec`, after the cells `before`, whose curves take `bytes`; paths are relative to `base`.
+fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize) -> Result<Cell> {
     let first = index * spec.curves;
     let only = spec.only.as_ref().map(|only| {
         // They ascend.
@@ -226,7 +234,7 @@ fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<C
                 before.iter().rfind(|cell| cell.spec.shape == own.shape).and_then(|cell| cell.family.outline());
             match outline {
                 Some(outline) => Family::of(&own, BaseCurve::from_outline(Arc::clone(outline)))?,
-                None => Family::new(&own)?,
+                None => Family::of(&own, own.shape.resolve_from(base)?)?,
             }
         }
     };
@@ -237,11 +245,13 @@ fn cell(spec: &Spec, index: u64, before: &[Cell], bytes: &mut usize) -> Result<C
 }
 
 /// All cells of `spec`, checked; one if nothing is swept.
-fn cells(spec: &Spec) -> Result<Vec<Cell>> {
+///
+/// Paths in it are relative to the directory `base`.
+fn cells(spec: &Spec, base: &Path) -> Result<Vec<Cell>> {
     let mut cells: Vec<Cell> = Vec::new();
     let mut bytes = 0;
     for index in 0..spec.sweep.cells() {
-        let cell = cell(spec, index, &cells, &mut bytes).map_err(|error| match error {
+        let cell = cell(spec, base, index, &cells, &mut bytes).map_err(|error| match error {
             Error::Request(message) if !spec.sweep.is_empty() => {
                 Error::Request(format!("{message} (in the cell {})", spec.sweep.name(index)))
             }
@@ -311,7 +321,7 @@ mod tests {
     fn more_curves_than_a_memory_holds_are_refused_before_they_are_made() {
         // Equal parameters take little time; their tables are a share of those of equal spacing.
         let spec = swept(&["sampling=parameter,arclength"], Spec { points: 1_000_000, ..Spec::default() });
-        let bytes = |held: usize| cell(&spec, 0, &[], &mut { held });
+        let bytes = |held: usize| cell(&spec, Path::new(""), 0, &[], &mut { held });
         assert!(bytes(MAX_BYTES - 16_000_000).is_ok());
         let message = bytes(MAX_BYTES - 15_999_999).err().unwrap().to_string();
         assert!(message.starts_with("--sweep (2 cells): the curves of the first 1 take more than 4 GB; "), "{message}");

@@ -64,7 +64,7 @@ impl Claim {
         &self.place
     }
 
-    /// Stays where it is when the current folder changes.
+    /// Is called by its whole path from now on.
     pub fn make_absolute(&mut self) -> Result<()> {
         self.path = std::path::absolute(&self.path).map_err(Error::io("cannot find", &self.path))?;
         self.place = match &self.folder {

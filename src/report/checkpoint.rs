@@ -124,8 +124,8 @@ impl Origin {
 
     /// The error of outlines that are not those of the beginning, or `error` where they are.
     pub fn explain(&self, error: Error) -> Error {
-        let changed =
-            self.outlines.iter().find(|(path, crc)| Outline::read(path).ok().map(|o| o.digest()) != Some(*crc));
+        let read = |path| Outline::read_from(Path::new(&self.base), path).ok();
+        let changed = self.outlines.iter().find(|(path, crc)| read(path).map(|outline| outline.digest()) != Some(*crc));
         changed.map_or(error, |(path, _)| self.changed(path))
     }
 

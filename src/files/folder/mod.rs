@@ -127,7 +127,8 @@ impl OutputFolder {
         Ok(self.claim.is_some())
     }
 
-    /// Stays where it is when the current folder changes.
+    /// Is called by its whole path from now on: the outlines of a run are named from the directory that it began in, which
+    /// may be another one.
     pub fn make_absolute(&mut self) -> Result<()> {
         self.path = std::path::absolute(&self.path).map_err(Error::io("cannot find", &self.path))?;
         if let Some(claim) = &mut self.claim {
