@@ -9,7 +9,7 @@ use std::{
 
 use curvelax::{
     backend::gpu::Gpu,
-    report::{checkpoint, shard},
+    report::{envelope, shard},
 };
 use serde_json::Value;
 use tempfile::TempDir;
@@ -274,8 +274,12 @@ fn shards_that_are_not_what_they_were_are_refused_by_name() {
 
     // Whole, but of another program, or from elsewhere.
     let record = shard::from_bytes(&state).unwrap();
-    let older = checkpoint::sealed(|bytes| postcard::to_extend(&("0.0.1", &record), bytes)).unwrap();
+    let older = envelope::sealed(*shard::LAYOUT, |bytes| postcard::to_extend(&("0.0.1", &record), bytes)).unwrap();
     spoil("s/2/shard.state", &older, &["it is of curvelax 0.0.1, and this is"]);
+    let own = (env!("CARGO_PKG_VERSION"), &record);
+    let built = envelope::sealed(*shard::LAYOUT ^ 1, |bytes| postcard::to_extend(&own, bytes)).unwrap();
+    let layout = format!("and that of this build is {:08x}; copy the shard again, or run it again", *shard::LAYOUT);
+    spoil("s/2/shard.state", &built, &["shard.state: another build of curvelax", &layout]);
     let mut elsewhere = record.clone();
     elsewhere.head.origin.platform.driver = Some("another".into());
     let elsewhere = shard::to_bytes(&elsewhere.head, elsewhere.points, &elsewhere.warnings).unwrap();

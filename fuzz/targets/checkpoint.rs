@@ -6,7 +6,10 @@ use std::{convert::Infallible, sync::LazyLock};
 
 use curvelax::{
     ensemble::{Family, Member, Spec, spec::Precision},
-    report::checkpoint::{from_bytes, sealed, to_bytes},
+    report::{
+        checkpoint::{LAYOUT, from_bytes, to_bytes},
+        envelope::sealed,
+    },
     schedule::Outputs,
     trajectory::Trajectory,
 };
@@ -26,7 +29,7 @@ fuzz_target!(|data: &[u8]| {
             bytes.extend(body);
             Ok::<_, Infallible>(bytes)
         };
-        sealed(write).expect("no error can be made")
+        sealed(*LAYOUT, write).expect("no error can be made")
     });
     let Ok((head, standing)) = from_bytes(body.as_deref().unwrap_or(data)) else { return };
     // What is read is written and read back the same.

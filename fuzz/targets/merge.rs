@@ -18,9 +18,10 @@ use curvelax::{
     files::{names, part_file::Mark},
     placement::Platform,
     report::{
-        checkpoint::{Head, Origin, sealed},
+        checkpoint::{Head, Origin},
+        envelope::sealed,
         merge::{Shards, join_rows},
-        shard::{Found, Part, Record, from_bytes, look, to_bytes},
+        shard::{Found, LAYOUT, Part, Record, from_bytes, look, to_bytes},
     },
     results::tally::Aside,
 };
@@ -45,7 +46,7 @@ fn state(body: &[u8]) {
         bytes.extend(body);
         Ok::<_, Infallible>(bytes)
     };
-    let Ok(record) = from_bytes(&sealed(write).expect("no error can be made")) else { return };
+    let Ok(record) = from_bytes(&sealed(*LAYOUT, write).expect("no error can be made")) else { return };
     let again = to_bytes(&record.head, record.points, &record.warnings).expect("bytes");
     assert_eq!(format!("{record:?}"), format!("{:?}", from_bytes(&again).expect("its own bytes")));
     SHARDS.with_borrow_mut(|shards| {

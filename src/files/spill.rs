@@ -19,6 +19,9 @@ use crate::{
     input,
 };
 
+/// Rows that were added together, as they are written.
+pub type SpilledRows = (Vec<SeriesRow>, Vec<Snapshot>);
+
 /// The file.
 pub struct Spill {
     file: PartFile,
@@ -54,7 +57,7 @@ impl Spill {
     ///
     /// # Errors
     /// [`Error::Failed`] where others lie there than were added.
-    pub fn read(&mut self, extent: &Extent) -> Result<(Vec<SeriesRow>, Vec<Snapshot>)> {
+    pub fn read(&mut self, extent: &Extent) -> Result<SpilledRows> {
         let place = self.file.part();
         let changed = || {
             let path = place.shown().display();

@@ -1,45 +1,43 @@
 //! The state of a run on disk, from which `resume` goes on: the files `.curvelax.state` and, one older,
 //! `.curvelax.state.old`.
 //!
-//! A file is 16 bytes of magic, the version of the format (4), the length of the body (8), the body, and the CRC-32C of all
-//! of it (4), integers little-endian. The body is what [`Head`] and [`Standing`] are, as postcard writes it. Tables are not
-//! in it, but how long they were and their checksums: a run that goes on cuts off what came later.
+//! Each is an [envelope](super::envelope) round what [`Head`] and [`Standing`] are. Tables are not in it, but how long they
+//! were and their checksums: a run that goes on cuts off what came later.
 
 use std::{
     collections::BTreeMap,
-    fs::File,
-    io::{self, Read, Seek},
     path::{Path, PathBuf},
+    sync::LazyLock,
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
 
 use serde::{Deserialize, Serialize};
 
+use super::{
+    envelope::{Fault, body, bytes, opened, sealed_body},
+    fingerprint::fingerprint,
+};
 use crate::{
     curve::{Outline, Shape},
     ensemble::{Cell, Ended, Paused, Standing, Study},
     error::{Error, Result},
     files::{
-        disk,
         folder::OutputFolder,
         names::{self, STATE, STATE_OLD},
         part_file::Mark,
         portraits::Film,
+        spill::SpilledRows,
         zarr,
     },
-    input,
     placement::Platform,
     results::tally::Aside,
 };
 
-const MAGIC: [u8; 16] = *b"curvelax state\r\n";
-/// Version of the format.
-const VERSION: u32 = 2;
-/// Bytes before the body, and after it.
-const BEFORE: usize = MAGIC.len() + 4 + 8;
-const AFTER: usize = 4;
+/// What is in the file.
+type Body = (Head, u64, BTreeMap<u64, Ended>, BTreeMap<u64, Paused>);
 
-const WRONG_CHECKSUM: &str = "its checksum is wrong";
+/// The fingerprint of the layout of all that `resume` reads.
+pub static LAYOUT: LazyLock<u32> = LazyLock::new(fingerprint::<(Body, SpilledRows)>);
 
 /// What does not change while a run goes on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,15 +85,6 @@ pub struct Saved {
     pub standing: Standing,
     /// Why it is not the last state, if so.
     pub note: Option<String>,
-}
-
-/// Why bytes are no state.
-#[derive(Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// They are no state of this program, or of another version of it: nothing else is to be tried.
-    Foreign(String),
-    /// They are one that was changed or cut off.
-    Damaged(String),
 }
 
 impl Origin {
@@ -157,80 +146,7 @@ fn here() -> Result<String> {
 /// The bytes of a state; `resident` takes the place of that in `standing`.
 pub fn to_bytes(head: &Head, standing: &Standing, resident: &BTreeMap<u64, Paused>) -> Result<Vec<u8>> {
     let body = (head, standing.next, &standing.early, resident);
-    sealed_body(&body).map_err(|e| Error::Failed(format!("cannot write {STATE}: {e}")))
-}
-
-/// A file of this version of the program with this body.
-pub fn sealed_body(body: &impl Serialize) -> postcard::Result<Vec<u8>> {
-    let body = (env!("CARGO_PKG_VERSION"), body);
-    let size = postcard::experimental::serialized_size(&body)?;
-    sealed(|mut bytes| {
-        // A state may be large: no more room for it than it takes.
-        bytes.reserve_exact(size + AFTER);
-        postcard::to_extend(&body, bytes)
-    })
-}
-
-/// A file with the body that `write` appends to its beginning.
-pub fn sealed<E>(write: impl FnOnce(Vec<u8>) -> Result<Vec<u8>, E>) -> Result<Vec<u8>, E> {
-    let mut before = MAGIC.to_vec();
-    before.extend(VERSION.to_le_bytes());
-    before.extend([0; 8]);
-    let mut bytes = write(before)?;
-    let length = (bytes.len() - BEFORE) as u64;
-    bytes[BEFORE - 8..BEFORE].copy_from_slice(&length.to_le_bytes());
-    let crc = crc32c::crc32c(&bytes);
-    bytes.extend(crc.to_le_bytes());
-    Ok(bytes)
-}
-
-/// The body of a [sealed](sealed_body) file.
-///
-/// # Errors
-/// A [`Fault`] for anything but all the bytes that this version of the program wrote.
-pub fn opened(bytes: &[u8]) -> Result<&[u8], Fault> {
-    let damaged = |what: &str| Err(Fault::Damaged(what.into()));
-    let mut rest = bytes;
-    let (Some(magic), Some(version), Some(length)) =
-        (take::<16>(&mut rest), take::<4>(&mut rest), take::<8>(&mut rest))
-    else {
-        return damaged(&format!("it has {} bytes, fewer than any state", bytes.len()));
-    };
-    let (version, length) = (u32::from_le_bytes(version), u64::from_le_bytes(length));
-    let whole = length.checked_add((BEFORE + AFTER) as u64);
-    if whole != Some(bytes.len() as u64) {
-        return damaged(&format!("it has {} bytes where {length} and {} are told", bytes.len(), BEFORE + AFTER));
-    }
-    let (all, crc) = bytes.split_at(bytes.len() - AFTER);
-    if crc32c::crc32c(all).to_le_bytes() != *crc {
-        return damaged(WRONG_CHECKSUM);
-    }
-    // Whole, so what follows is no accident.
-    if magic != MAGIC {
-        return Err(Fault::Foreign("it is no state of curvelax".into()));
-    }
-    if version != VERSION {
-        let message = format!("its format is {version}, and that of this version is {VERSION}");
-        return Err(Fault::Foreign(message));
-    }
-    let own = env!("CARGO_PKG_VERSION");
-    let (program, body) = postcard::take_from_bytes::<&str>(&rest[..rest.len() - AFTER]).map_err(unreadable)?;
-    if program != own {
-        return Err(Fault::Foreign(format!("it is of curvelax {program}, and this is {own}, whose digits may differ")));
-    }
-    Ok(body)
-}
-
-/// Reads what [`opened`] gave.
-pub fn body<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Fault> {
-    match postcard::take_from_bytes(bytes).map_err(unreadable)? {
-        (body, []) => Ok(body),
-        _ => Err(Fault::Damaged("there is more in it than a state".into())),
-    }
-}
-
-fn unreadable(e: postcard::Error) -> Fault {
-    Fault::Damaged(format!("it cannot be read ({e})"))
+    sealed_body(*LAYOUT, &body).map_err(|e| Error::Failed(format!("cannot write {STATE}: {e}")))
 }
 
 /// Reads a state back.
@@ -238,57 +154,13 @@ fn unreadable(e: postcard::Error) -> Fault {
 /// # Errors
 /// As [`opened`].
 pub fn from_bytes(bytes: &[u8]) -> Result<(Head, Standing), Fault> {
-    type Body = (Head, u64, BTreeMap<u64, Ended>, BTreeMap<u64, Paused>);
-    let (head, next, early, resident): Body = body(opened(bytes)?)?;
+    let (head, next, early, resident): Body = body(opened(*LAYOUT, bytes)?)?;
     Ok((head, Standing { next, early, resident: Some(resident) }))
-}
-
-/// The length of the body, as the bytes before it tell.
-fn told(before: &[u8]) -> Option<u64> {
-    before.get(BEFORE - 8..BEFORE)?.try_into().ok().map(u64::from_le_bytes)
-}
-
-fn take<const N: usize>(bytes: &mut &[u8]) -> Option<[u8; N]> {
-    let (first, rest) = bytes.split_first_chunk()?;
-    *bytes = rest;
-    Some(*first)
 }
 
 /// Reads the state at `path`.
 pub fn read(path: &Path) -> Result<(Head, Standing), Fault> {
     from_bytes(&bytes(path)?)
-}
-
-/// The bytes of the file at `path`, or the first of them if it is not sealed.
-pub fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
-    let bytes = input::open(path).and_then(|mut file| {
-        let length = file.metadata()?.len();
-        let mut bytes = Vec::new();
-        // Whatever else it is, it is not read to its end if that is not where it says.
-        (&file).take(BEFORE as u64).read_to_end(&mut bytes)?;
-        let told = told(&bytes).and_then(|told| told.checked_add((BEFORE + AFTER) as u64));
-        if told == Some(length) {
-            // Nor into memory, if it is not what was written.
-            check_whole(&mut file, length)?;
-            file.rewind()?;
-            bytes.clear();
-            file.take(length).read_to_end(&mut bytes)?;
-        }
-        Ok(bytes)
-    });
-    bytes.map_err(|e| Fault::Damaged(e.to_string()))
-}
-
-/// That the last of the `length` bytes are the checksum of those before them, read piece by piece.
-fn check_whole(file: &mut File, length: u64) -> io::Result<()> {
-    if length > input::MAX_STATE {
-        return Err(io::Error::other(format!("it has {length} bytes; at most {} are read", input::MAX_STATE)));
-    }
-    file.rewind()?;
-    let (_, crc) = disk::checksum(&mut (&*file).take(length - AFTER as u64), 0)?;
-    let mut last = [0; AFTER];
-    file.read_exact(&mut last)?;
-    if crc.to_le_bytes() == last { Ok(()) } else { Err(io::Error::other(WRONG_CHECKSUM)) }
 }
 
 /// Members on their way by the last state in `folder`, of those that have not ended in `standing`: where they are lost,
@@ -349,9 +221,12 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Saved>> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
     use crate::{
         ensemble::{Extent, Mollified, Rows, SeriesRow, Snapshot, Status},
+        report::{envelope::sealed, fingerprint::layout},
         results::{provenance::tests::platform, tally::tests::outcome},
         scheme::member::{Counters, Report},
     };
@@ -439,36 +314,40 @@ mod tests {
         assert!(matches!(from_bytes(&[&whole[..], &[0]].concat()), Err(Fault::Damaged(_))));
     }
 
-    /// The bytes with a right length and checksum again.
-    fn sealed_again(mut bytes: Vec<u8>) -> Vec<u8> {
-        bytes.truncate(bytes.len() - AFTER);
-        let length = (bytes.len() - BEFORE) as u64;
-        bytes[BEFORE - 8..BEFORE].copy_from_slice(&length.to_le_bytes());
-        bytes.extend(crc32c::crc32c(&bytes).to_le_bytes());
-        bytes
+    #[test]
+    fn the_layout_has_every_type_that_is_written() {
+        let layout = layout::<(Body, SpilledRows)>().unwrap();
+        let named: BTreeSet<&str> = layout.split(' ').filter(|word| word.starts_with(char::is_uppercase)).collect();
+        let expected = [
+            ["Head", "Origin", "Platform", "Precision", "Duration", "Mark", "ArrayMark", "Film"],
+            ["Aside", "MollifiedMembers", "Moments", "ExactSum", "Ended", "Outcome", "Status", "Observables"],
+            ["Rows", "Extent", "SeriesRow", "Snapshot", "Portrait", "Mollified", "DVec2", "Paused"],
+            ["Counters", "Report", "Observed", "Progress", "Decay", "", "", ""],
+        ];
+        let expected: BTreeSet<&str> = expected.into_iter().flatten().filter(|name| !name.is_empty()).collect();
+        assert_eq!(named, expected);
+        for part in
+            ["spec: string", "state: list f64", "outlines: list ( string u32", "low: u128", "excess_at: ( f64 f64"]
+        {
+            assert!(layout.contains(part), "{part}: {layout}");
+        }
     }
 
     #[test]
-    fn what_another_program_wrote_is_told_from_damage() {
-        let with = |at: usize, byte: u8| {
-            let mut bytes = bytes();
-            bytes[at] = byte;
-            from_bytes(&sealed_again(bytes)).unwrap_err()
-        };
-        assert_eq!(with(0, b'C'), Fault::Foreign("it is no state of curvelax".into()));
-        let newer = Fault::Foreign("its format is 3, and that of this version is 2".into());
-        assert_eq!(with(MAGIC.len(), 3), newer);
-        let Fault::Foreign(message) = with(BEFORE + 1, b'9') else { panic!("another version of the program") };
-        assert!(message.starts_with("it is of curvelax 9."), "{message}");
-        // Whole, but no state: written by a program with the same numbers and other types.
-        let mut longer = bytes();
-        longer.push(0);
-        assert_eq!(from_bytes(&sealed_again(longer)), Err(Fault::Damaged("there is more in it than a state".into())));
-        let mut shorter = bytes();
-        shorter.truncate(shorter.len() - 9);
-        assert!(
-            matches!(from_bytes(&sealed_again(shorter)), Err(Fault::Damaged(what)) if what.starts_with("it cannot be read"))
+    fn a_state_of_a_build_with_other_types_is_refused_with_the_remedy() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = OutputFolder::open(home.path(), true).unwrap();
+        let (head, standing) = state();
+        let body = (&head, standing.next, &standing.early, standing.resident.as_ref().unwrap());
+        folder.keep_state(&sealed_body(*LAYOUT ^ 1, &body).unwrap()).unwrap();
+        let Err(error) = find(&folder) else { panic!("it is read") };
+        let (path, own, other) = (home.path().display(), *LAYOUT, *LAYOUT ^ 1);
+        let expected = format!(
+            "{path}: .curvelax.state: another build of curvelax {} wrote it: its layout is {other:08x}, and that of this \
+             build is {own:08x}; resume with the program that began it, or begin anew",
+            env!("CARGO_PKG_VERSION")
         );
+        assert_eq!(error.to_string(), expected);
     }
 
     #[test]
@@ -478,7 +357,7 @@ mod tests {
         for seed in std::fs::read_dir(&seeds).unwrap() {
             let body = std::fs::read(seed.unwrap().path()).unwrap();
             let write = |bytes: Vec<u8>| Ok::<_, ()>([&bytes[..], body.strip_prefix(b"s").unwrap()].concat());
-            let (_, standing) = from_bytes(&sealed(write).unwrap()).unwrap();
+            let (_, standing) = from_bytes(&sealed(*LAYOUT, write).unwrap()).unwrap();
             members += standing.resident.unwrap().len();
         }
         assert!(members >= 3, "{members}");

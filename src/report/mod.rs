@@ -6,6 +6,8 @@
 pub mod checkpoint;
 pub mod complete;
 pub mod document;
+pub mod envelope;
+pub mod fingerprint;
 pub mod gallery;
 pub mod growing;
 pub mod merge;

@@ -1,17 +1,20 @@
 //! `shard.state`: what a [merge](super::merge) has to know of a shard beside its tables.
 //!
-//! It is sealed as a [state](super::checkpoint) is, and has the length and the checksum of every table of the shard, so that
+//! It is [sealed](super::envelope) as a checkpoint is, and has the length and the checksum of every table of the shard, so that
 //! one that was copied by half is known.
 
 use std::{
     io,
     path::{Path, PathBuf},
+    sync::LazyLock,
 };
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    checkpoint::{self, Fault, Head},
+    checkpoint::{self, Head},
+    envelope::{self, Fault, opened, sealed_body},
+    fingerprint::fingerprint,
     growing::Growing,
 };
 use crate::files::{
@@ -26,6 +29,9 @@ use crate::{
 
 /// Characters of a fault in a message.
 const SHOWN: usize = 200;
+
+/// The fingerprint of the layout of what is in the file.
+pub static LAYOUT: LazyLock<u32> = LazyLock::new(fingerprint::<Record>);
 
 /// What is in the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,7 +73,8 @@ pub enum Found {
 
 /// The bytes of the file.
 pub fn to_bytes(head: &Head, points: usize, warnings: &[String]) -> Result<Vec<u8>> {
-    checkpoint::sealed_body(&(head, points, warnings)).map_err(|e| Error::Failed(format!("cannot write {SHARD}: {e}")))
+    let bytes = sealed_body(*LAYOUT, &(head, points, warnings));
+    bytes.map_err(|e| Error::Failed(format!("cannot write {SHARD}: {e}")))
 }
 
 /// Reads it back.
@@ -75,7 +82,7 @@ pub fn to_bytes(head: &Head, points: usize, warnings: &[String]) -> Result<Vec<u
 /// # Errors
 /// A [`Fault`] for anything but all the bytes that this version of the program wrote.
 pub fn from_bytes(bytes: &[u8]) -> Result<Record, Fault> {
-    let record: Record = checkpoint::body(checkpoint::opened(bytes)?)?;
+    let record: Record = envelope::body(opened(*LAYOUT, bytes)?)?;
     match record.head.films.iter().find_map(|film| Some((film.member, film.fault()?))) {
         Some((member, fault)) => Err(Fault::Damaged(format!("the portrait of member {member} has not {fault}"))),
         None => Ok(record),
@@ -123,7 +130,7 @@ fn unfinished_run(path: &Path) -> Result<Option<String>> {
 /// The shard at `path`, which is finished, with its tables as long as they were.
 fn part(path: &Path) -> Result<Part> {
     let faulty = |fault: &str| faulty(path, SHARD, fault);
-    let read = checkpoint::bytes(&path.join(SHARD)).and_then(|bytes| from_bytes(&bytes));
+    let read = envelope::bytes(&path.join(SHARD)).and_then(|bytes| from_bytes(&bytes));
     let record = read.map_err(|(Fault::Foreign(what) | Fault::Damaged(what))| faulty(&what))?;
     let spec = Spec::from_toml(&record.head.origin.spec).map_err(|e| e.to_string());
     let spec = spec.and_then(|spec| spec.validate().map_err(|e| e.to_string()));

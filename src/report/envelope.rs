@@ -1,0 +1,213 @@
+//! The envelope of what only this program reads: checkpoints, and what a merge has to know of a shard.
+//!
+//! A file is 16 bytes of magic, the version of the format (4), the length of what follows without the checksum (8), the
+//! [fingerprint](super::fingerprint) of the body's layout (4), the version of the program and the body, as postcard writes
+//! them, and the CRC-32C of all of it (4), integers little-endian.
+
+use std::{
+    fs::File,
+    io::{self, Read, Seek},
+    path::Path,
+};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{files::disk, input};
+
+const MAGIC: [u8; 16] = *b"curvelax state\r\n";
+/// Version of the format, that of the envelope and of numbers whose order no layout tells.
+const VERSION: u32 = 3;
+/// Bytes before what the length counts, and after it.
+const BEFORE: usize = MAGIC.len() + 4 + 8;
+const AFTER: usize = 4;
+
+const WRONG_CHECKSUM: &str = "its checksum is wrong";
+
+/// Why bytes are no state.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// They are no state of this program, or of another version of it: nothing else is to be tried.
+    Foreign(String),
+    /// They are one that was changed or cut off.
+    Damaged(String),
+}
+
+/// A file of this version of the program with this body, whose layout has this fingerprint.
+pub fn sealed_body(layout: u32, body: &impl Serialize) -> postcard::Result<Vec<u8>> {
+    let body = (env!("CARGO_PKG_VERSION"), body);
+    let size = postcard::experimental::serialized_size(&body)?;
+    sealed(layout, |mut bytes| {
+        // A state may be large: no more room for it than it takes.
+        bytes.reserve_exact(size + AFTER);
+        postcard::to_extend(&body, bytes)
+    })
+}
+
+/// A file with the body that `write` appends to its beginning.
+pub fn sealed<E>(layout: u32, write: impl FnOnce(Vec<u8>) -> Result<Vec<u8>, E>) -> Result<Vec<u8>, E> {
+    let mut before = MAGIC.to_vec();
+    before.extend(VERSION.to_le_bytes());
+    before.extend([0; 8]);
+    before.extend(layout.to_le_bytes());
+    let mut bytes = write(before)?;
+    let length = (bytes.len() - BEFORE) as u64;
+    bytes[BEFORE - 8..BEFORE].copy_from_slice(&length.to_le_bytes());
+    let crc = crc32c::crc32c(&bytes);
+    bytes.extend(crc.to_le_bytes());
+    Ok(bytes)
+}
+
+/// The body of a [sealed](sealed_body) file.
+///
+/// # Errors
+/// A [`Fault`] for anything but all the bytes that this version of the program wrote, with types of the same layout.
+pub fn opened(layout: u32, bytes: &[u8]) -> Result<&[u8], Fault> {
+    let damaged = |what: &str| Err(Fault::Damaged(what.into()));
+    let mut rest = bytes;
+    let (Some(magic), Some(version), Some(length)) =
+        (take::<16>(&mut rest), take::<4>(&mut rest), take::<8>(&mut rest))
+    else {
+        return damaged(&format!("it has {} bytes, fewer than any state", bytes.len()));
+    };
+    let (version, length) = (u32::from_le_bytes(version), u64::from_le_bytes(length));
+    let whole = length.checked_add((BEFORE + AFTER) as u64);
+    if whole != Some(bytes.len() as u64) {
+        return damaged(&format!("it has {} bytes where {length} and {} are told", bytes.len(), BEFORE + AFTER));
+    }
+    let (all, crc) = bytes.split_at(bytes.len() - AFTER);
+    if crc32c::crc32c(all).to_le_bytes() != *crc {
+        return damaged(WRONG_CHECKSUM);
+    }
+    // Whole, so what follows is no accident.
+    if magic != MAGIC {
+        return Err(Fault::Foreign("it is no state of curvelax".into()));
+    }
+    if version != VERSION {
+        let message = format!("its format is {version}, and that of this version is {VERSION}");
+        return Err(Fault::Foreign(message));
+    }
+    rest = &rest[..rest.len() - AFTER];
+    let Some(written) = take::<4>(&mut rest) else { return damaged("it has no layout") };
+    let (own, written) = (env!("CARGO_PKG_VERSION"), u32::from_le_bytes(written));
+    let (program, body) = postcard::take_from_bytes::<&str>(rest).map_err(unreadable)?;
+    if program != own {
+        return Err(Fault::Foreign(format!("it is of curvelax {program}, and this is {own}, whose digits may differ")));
+    }
+    if written != layout {
+        return Err(Fault::Foreign(format!(
+            "another build of curvelax {own} wrote it: its layout is {written:08x}, and that of this build is {layout:08x}"
+        )));
+    }
+    Ok(body)
+}
+
+/// Reads what [`opened`] gave.
+pub fn body<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Fault> {
+    match postcard::take_from_bytes(bytes).map_err(unreadable)? {
+        (body, []) => Ok(body),
+        _ => Err(Fault::Damaged("there is more in it than a state".into())),
+    }
+}
+
+fn unreadable(e: postcard::Error) -> Fault {
+    Fault::Damaged(format!("it cannot be read ({e})"))
+}
+
+/// The length of the body, as the bytes before it tell.
+fn told(before: &[u8]) -> Option<u64> {
+    before.get(BEFORE - 8..BEFORE)?.try_into().ok().map(u64::from_le_bytes)
+}
+
+fn take<const N: usize>(bytes: &mut &[u8]) -> Option<[u8; N]> {
+    let (first, rest) = bytes.split_first_chunk()?;
+    *bytes = rest;
+    Some(*first)
+}
+
+/// The bytes of the file at `path`, or the first of them if it is not sealed.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
+    let bytes = input::open(path).and_then(|mut file| {
+        let length = file.metadata()?.len();
+        let mut bytes = Vec::new();
+        // Whatever else it is, it is not read to its end if that is not where it says.
+        (&file).take(BEFORE as u64).read_to_end(&mut bytes)?;
+        let told = told(&bytes).and_then(|told| told.checked_add((BEFORE + AFTER) as u64));
+        if told == Some(length) {
+            // Nor into memory, if it is not what was written.
+            check_whole(&mut file, length)?;
+            file.rewind()?;
+            bytes.clear();
+            file.take(length).read_to_end(&mut bytes)?;
+        }
+        Ok(bytes)
+    });
+    bytes.map_err(|e| Fault::Damaged(e.to_string()))
+}
+
+/// That the last of the `length` bytes are the checksum of those before them, read piece by piece.
+fn check_whole(file: &mut File, length: u64) -> io::Result<()> {
+    if length > input::MAX_STATE {
+        return Err(io::Error::other(format!("it has {length} bytes; at most {} are read", input::MAX_STATE)));
+    }
+    file.rewind()?;
+    let (_, crc) = disk::checksum(&mut (&*file).take(length - AFTER as u64), 0)?;
+    let mut last = [0; AFTER];
+    file.read_exact(&mut last)?;
+    if crc.to_le_bytes() == last { Ok(()) } else { Err(io::Error::other(WRONG_CHECKSUM)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAYOUT: u32 = 0x1234_5678;
+
+    fn sample() -> Vec<u8> {
+        sealed_body(LAYOUT, &(7_u64, "text")).unwrap()
+    }
+
+    fn read(bytes: &[u8]) -> Result<(u64, &str), Fault> {
+        body(opened(LAYOUT, bytes)?)
+    }
+
+    /// The bytes with a right length and checksum again.
+    fn sealed_again(mut bytes: Vec<u8>) -> Vec<u8> {
+        bytes.truncate(bytes.len() - AFTER);
+        let length = (bytes.len() - BEFORE) as u64;
+        bytes[BEFORE - 8..BEFORE].copy_from_slice(&length.to_le_bytes());
+        bytes.extend(crc32c::crc32c(&bytes).to_le_bytes());
+        bytes
+    }
+
+    #[test]
+    fn what_another_program_wrote_is_told_from_damage() {
+        assert_eq!(read(&sample()), Ok((7, "text")));
+        let with = |at: usize, byte: u8| {
+            let mut bytes = sample();
+            bytes[at] = byte;
+            read(&sealed_again(bytes)).unwrap_err()
+        };
+        assert_eq!(with(0, b'C'), Fault::Foreign("it is no state of curvelax".into()));
+        let older = Fault::Foreign("its format is 2, and that of this version is 3".into());
+        assert_eq!(with(MAGIC.len(), 2), older);
+        let Fault::Foreign(message) = with(BEFORE + 5, b'9') else { panic!("another version of the program") };
+        assert!(message.starts_with("it is of curvelax 9."), "{message}");
+        // Whole, but no state.
+        let cut = |length: usize| read(&sealed_again(sample()[..length].to_vec())).unwrap_err();
+        let mut longer = sample();
+        longer.push(0);
+        assert_eq!(read(&sealed_again(longer)), Err(Fault::Damaged("there is more in it than a state".into())));
+        assert!(matches!(cut(sample().len() - 2), Fault::Damaged(what) if what.starts_with("it cannot be read")));
+        assert_eq!(cut(BEFORE + AFTER), Fault::Damaged("it has no layout".into()));
+    }
+
+    #[test]
+    fn a_build_with_other_types_is_another_program() {
+        let error = opened(LAYOUT + 1, &sample()).unwrap_err();
+        let own = env!("CARGO_PKG_VERSION");
+        let message = format!(
+            "another build of curvelax {own} wrote it: its layout is 12345678, and that of this build is 12345679"
+        );
+        assert_eq!(error, Fault::Foreign(message));
+    }
+}
