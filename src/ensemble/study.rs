@@ -293,7 +293,7 @@ mod tests {
     fn cells_of_one_curve_share_it_and_have_the_members_of_cells_that_do_not() {
         let axes = ["amplitude=0.05,0.1", "modes=2..=4;2..=8", "shape=ellipse:2,1;circle:1", "seed=1,2"];
         let spec = swept(&axes, Spec { points: 48, curves: 2, ..Spec::default() });
-        let cells = cells(&spec).unwrap();
+        let cells = Study::new(spec.clone()).unwrap().into_cells();
         assert_eq!(cells.len(), 16);
         for (one, other) in cells.iter().flat_map(|one| cells.iter().map(move |other| (one, other))) {
             assert_eq!(one.family.shares_with(&other.family), one.spec.shape == other.spec.shape);
@@ -309,7 +309,8 @@ mod tests {
 
     #[test]
     fn sweeps_that_take_long_are_warned_of_in_their_cells_alone() {
-        let cells = cells(&swept(&["solver=gauss-seidel,multigrid,direct", "adaptive=0.01"], Spec::default())).unwrap();
+        let spec = swept(&["solver=gauss-seidel,multigrid,direct", "adaptive=0.01"], Spec::default());
+        let cells = Study::new(spec).unwrap().into_cells();
         let warned: Vec<bool> = cells.iter().map(|cell| cell.warnings() == [LONG_SWEEPS]).collect();
         assert_eq!(warned, [true, false, false]);
         let fixed = Spec { solver: Solver::GaussSeidel.into(), ..Spec::default() }.validate().unwrap();
@@ -331,7 +332,7 @@ mod tests {
     fn the_members_to_run_fall_to_their_cells() {
         let only = Some(vec![0, 2, 3, 8]);
         let spec = swept(&["omega=1,2,3"], Spec { points: 48, curves: 3, only, ..Spec::default() });
-        let cells = cells(&spec).unwrap();
+        let cells = Study::new(spec.clone()).unwrap().into_cells();
         let members: Vec<Vec<u64>> = cells.iter().map(|cell| cell.members().collect()).collect();
         assert_eq!(members, [vec![0, 2], vec![3], vec![8]]);
     }
