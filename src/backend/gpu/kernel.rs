@@ -134,10 +134,11 @@ impl<T: Real> Kernel<T> {
         self
     }
 
-    /// What is left of the time of a batch that was started then. A device takes one dispatch after the other, so it works
-    /// on this one from its start, or from the end of what was before it.
-    fn left(&self, since: Moment) -> Duration {
-        self.limit.saturating_sub(since.later(self.ended).spent())
+    /// How much time is left for a batch that was started at a given moment. A device runs one dispatch after the other,
+    /// so this one has its attention from its start, or from the end of the one before.
+    fn left(&self) -> impl Fn(Moment) -> Duration + use<T> {
+        let (limit, ended) = (self.limit, self.ended);
+        move |since| limit.saturating_sub(since.later(ended).spent())
     }
 
     /// Overwrites the trace with NaN, so that nothing stale passes for a result.
@@ -164,7 +165,7 @@ impl<T: Real> Kernel<T> {
         let encoder = self.gpu.device.create_command_encoder(&Default::default());
         let since = self.gpu.now();
         let reading = Reading::submit(&self.gpu, encoder, &staging, reads);
-        let bytes = reading.wait(&self.gpu, since, |since| self.left(since))?;
+        let bytes = reading.wait(&self.gpu, since, self.left())?;
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
@@ -211,11 +212,11 @@ impl<T: Real> Backend for Kernel<T> {
 
     fn is_back(&mut self, batch: usize, most: Duration) -> bool {
         let Some(since) = self.batches[batch].since() else { return true };
-        let asked = Instant::now();
+        let (asked, left) = (Instant::now(), self.left());
         loop {
-            let slice = most.saturating_sub(asked.elapsed()).min(self.left(since));
+            let slice = most.saturating_sub(asked.elapsed()).min(left(since));
             // One whose time is over is given up by `finish`.
-            if self.batches[batch].is_back(&self.gpu, slice) || self.left(since).is_zero() {
+            if self.batches[batch].is_back(&self.gpu, slice) || left(since).is_zero() {
                 return true;
             }
             if asked.elapsed() >= most {
@@ -225,8 +226,7 @@ impl<T: Real> Backend for Kernel<T> {
     }
 
     fn finish(&mut self, batch: usize) -> Result<()> {
-        let (limit, ended) = (self.limit, self.ended);
-        let left = |since: Moment| limit.saturating_sub(since.later(ended).spent());
+        let left = self.left();
         let Some(since) = self.batches[batch].finish(&self.gpu, left)? else { return Ok(()) };
         let took = since.later(self.ended).elapsed();
         self.ended = self.gpu.now();
