@@ -13,7 +13,7 @@ use curvelax::{
         redistribution,
         step::{self, Method},
     },
-    solver::{Blocks, Memory, Order, Solver, direct, gauss_seidel},
+    solver::{Blocks, Memory, Order, Solver, direct, gauss_seidel, sweeps::Control},
     trajectory::Trajectory,
 };
 
@@ -65,7 +65,7 @@ fn stages<T: Real>(c: &mut Criterion) {
         b.iter(|| direct::solve(position, [&mut increments.x, &mut increments.y], factor_of_both));
     });
     // A cap that ends the solve at its first look at the residual: the cost of sweeps, not of their number.
-    let control = gauss_seidel::Control {
+    let control = Control {
         tolerance: T::of(0.0),
         negligible: T::of(0.0),
         sor: p.sor,

@@ -140,9 +140,10 @@ pub trait Number:
 
     /// `e^self` to 2 ulp for |self| ≤ 40, clamped beyond: reduction by ln 2, then a Horner polynomial.
     ///
-    /// Written out because WGSL has no `exp` for `f64`; `shaders/number.wgsl` has the same steps.
+    /// Written out because WGSL has no `exp` for `f64`; `shaders/number.wgsl` has the same steps. Not called `exp`, since
+    /// that of `f64` itself would be called instead.
     #[inline(always)]
-    fn exp(self) -> Self {
+    fn exponential(self) -> Self {
         let x = self.max(Self::of(-40.0)).min(Self::of(40.0));
         let n = (x * Self::of(std::f64::consts::LOG2_E) + Self::of(0.5)).small_floor();
         let reduced = (x - n * Self::of(LN2_HIGH)) - n * Self::of(LN2_LOW);
@@ -304,7 +305,7 @@ mod tests {
         for j in -3999..=3999 {
             let x = T::of(f64::from(j) * 0.01 + 1.234e-4);
             let exact = x.to_f64().exp();
-            worst = worst.max((x.exp().to_f64() / exact - 1.0).abs() / T::EPSILON);
+            worst = worst.max((x.exponential().to_f64() / exact - 1.0).abs() / T::EPSILON);
         }
         worst
     }
@@ -313,7 +314,7 @@ mod tests {
     fn exp_is_accurate_to_two_ulp_in_both_precisions() {
         assert!(worst_exp::<f64>() < 2.0, "{}", worst_exp::<f64>());
         assert!(worst_exp::<f32>() < 2.0, "{}", worst_exp::<f32>());
-        assert_eq!(Number::exp(0.0_f64), 1.0);
+        assert_eq!(0.0_f64.exponential(), 1.0);
     }
 
     #[test]

@@ -273,7 +273,7 @@ fn a_million_tiny_steps_add_up_exactly_in_f32() {
         assert!(!stride.last && stride.length > 0.0);
         exact += (f64::from(stride.length) / ticks.tick) as u64;
         naive += stride.length;
-        pace::pass(&mut progress, stride, &p);
+        pace::pass_time(&mut progress, stride, &p);
     }
     let time = f64::from(progress.time_high) + f64::from(progress.time_low);
     assert_eq!(time, exact as f64 * ticks.tick);
@@ -286,7 +286,7 @@ fn a_step_below_a_tick_moves_the_clock_by_one() {
     assert!(1e-9 < ticks.tick);
     for j in 1..=1000 {
         let stride = pace::stride(&progress, &p);
-        pace::pass(&mut progress, stride, &p);
+        pace::pass_time(&mut progress, stride, &p);
         assert_eq!(f64::from(progress.time_high) + f64::from(progress.time_low), f64::from(j) * ticks.tick);
     }
 }

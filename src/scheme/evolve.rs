@@ -210,7 +210,7 @@ impl<N: Number> Team<N> {
         let (mut error, mut middle) = (none, none);
         if adaptive {
             let followed = excess.le(parameters.follow_to).not();
-            error = extrapolation::error(&state.middle, &work.new, followed);
+            error = extrapolation::error_of_attempt(&state.middle, &work.new, followed);
             extrapolation::extrapolate(&mut state.middle, &state.before, &mut work.new);
             let sums = observe::sums(&state.middle, parameters, work.blocks);
             middle = observe::excess(sums.length, sums.area, parameters);
@@ -339,7 +339,7 @@ fn accepted<N: Number>(run: &mut Run<N::Real>, excess: N::Real, seen: &Glance<N>
     }
     let concave = N::Real::of(0.0).le(seen.minus_k_min.lane(lane));
     let looked_at = parameters.look_at.le(progress.travel) && concave;
-    if looked_at || (adaptive && pace::at_goal(progress, parameters)) {
+    if looked_at || (adaptive && pace::is_at_goal(progress, parameters)) {
         counters.goal = counters.steps;
     }
 }
@@ -351,7 +351,7 @@ fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, error: T) -> Start<T> 
     let most_growth = if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 };
     progress.next = pace::next_length(stride.length, error, most_growth, parameters);
     let start = Start::after_taken(progress.next / (T::of(0.5) * stride.length));
-    pace::pass(progress, stride, parameters);
+    pace::pass_time(progress, stride, parameters);
     counters.refused = 0;
     start
 }

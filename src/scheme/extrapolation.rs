@@ -14,7 +14,7 @@ use crate::number::{BIG, Number, Real};
 /// not negligible, it is taken relative to the geometric mean of the largest |k| and the spread of k: a curve close to
 /// a circle must not lose its modes in a tolerance that is measured by the circle.
 #[inline(always)]
-pub fn error<N: Number>(whole: &Curve<N>, halves: &Curve<N>, followed: N::Mask) -> N {
+pub fn error_of_attempt<N: Number>(whole: &Curve<N>, halves: &Curve<N>, followed: N::Mask) -> N {
     let low = N::of(-2.0 * BIG);
     let (mut gap_k, mut gap_r, mut k_max, mut minus_k_min) = (N::of(0.0), N::of(0.0), low, low);
     for i in 0..whole.len() {

@@ -21,7 +21,6 @@
 //! doubles as its trace for the conformance test.
 
 pub mod branches;
-pub mod coarse;
 pub mod curvature;
 pub mod decay;
 pub mod evolve;
@@ -38,6 +37,7 @@ pub mod start;
 pub mod state;
 pub mod status;
 pub mod step;
+pub mod terms;
 
 pub use branches::Branches;
 pub use member::Parameters;

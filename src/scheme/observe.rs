@@ -173,24 +173,22 @@ fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
     N::select((across * side).le(zero), zero, across)
 }
 
-impl<T: Real> Observed<T> {
-    /// What can be observed of a curve.
-    #[inline(never)]
-    pub fn of(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
-        Observed::new(&sums(curve, p, blocks), &maxima(curve), p)
-    }
+/// Observes a curve.
+#[inline(never)]
+pub fn observe<T: Real>(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
+    observed(&sums(curve, p, blocks), &maxima(curve), p)
+}
 
-    /// What the sums and maxima of a curve say.
-    pub fn new(sums: &Sums<T>, maxima: &Maxima<T>, p: &Parameters<T>) -> Observed<T> {
-        Observed {
-            length: sums.length,
-            area: sums.area,
-            excess: excess(sums.length, sums.area, p),
-            energy: sums.energy,
-            k_min: -maxima.minus_k_min,
-            k_max: maxima.k_max,
-            mesh_ratio: maxima.longest / -maxima.minus_shortest,
-            metric_drift: maxima.drift,
-        }
+/// What the sums and maxima of a curve say.
+pub fn observed<T: Real>(sums: &Sums<T>, maxima: &Maxima<T>, p: &Parameters<T>) -> Observed<T> {
+    Observed {
+        length: sums.length,
+        area: sums.area,
+        excess: excess(sums.length, sums.area, p),
+        energy: sums.energy,
+        k_min: -maxima.minus_k_min,
+        k_max: maxima.k_max,
+        mesh_ratio: maxima.longest / -maxima.minus_shortest,
+        metric_drift: maxima.drift,
     }
 }

@@ -48,7 +48,7 @@ pub fn stride<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> Stride<T> {
 }
 
 /// Moves the clock on by `stride`.
-pub fn pass<T: Real>(progress: &mut Progress<T>, stride: Stride<T>, p: &Parameters<T>) {
+pub fn pass_time<T: Real>(progress: &mut Progress<T>, stride: Stride<T>, p: &Parameters<T>) {
     progress.taken = stride.length;
     if stride.last {
         (progress.time_high, progress.time_low) = (p.end_high, p.end_low);
@@ -63,7 +63,7 @@ pub fn pass<T: Real>(progress: &mut Progress<T>, stride: Stride<T>, p: &Paramete
 }
 
 /// Whether the clock has reached the goal.
-pub fn at_goal<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> bool {
+pub fn is_at_goal<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> bool {
     ((p.goal_high - progress.time_high) + (p.goal_low - progress.time_low)).le(T::of(0.0))
 }
 

@@ -56,12 +56,12 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
         let d = (phi * irp - drift) - (middle + high + e);
         let c = q * self.rate - (a + b + d + e);
         let off = [a, b, d, e];
-        let rhs = [residual(off, self.old.x.window(i)), residual(off, self.old.y.window(i))];
+        let rhs = [residual_of_old(off, self.old.x.window(i)), residual_of_old(off, self.old.y.window(i))];
         Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }
     }
 }
 
 #[inline(always)]
-fn residual<N: Number>([a, b, d, e]: [N; 4], [mm, m, x, p, pp]: [N; 5]) -> N {
+fn residual_of_old<N: Number>([a, b, d, e]: [N; 4], [mm, m, x, p, pp]: [N; 5]) -> N {
     -(a * (mm - x) + b * (m - x) + d * (p - x) + e * (pp - x))
 }

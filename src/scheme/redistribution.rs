@@ -45,12 +45,12 @@ pub fn redistribute<N: Number>(
         tangential_velocity(old, p, [mean_rkb, mean_length], blocks, motion);
         for i in 0..old.len() {
             let rate = p.omega * (mean_length * motion.ir[i] - N::of(1.0)) - mean_rkb;
-            r[i] = old.r[i] * (p.tau * rate).exp();
+            r[i] = old.r[i] * (p.tau * rate).exponential();
         }
     } else {
         for i in 0..old.len() {
             motion.alpha[i] = N::of(0.0);
-            r[i] = old.r[i] * (-(p.tau * (old.k[i] * motion.beta[i]))).exp();
+            r[i] = old.r[i] * (-(p.tau * (old.k[i] * motion.beta[i]))).exponential();
         }
     }
     motion.alpha.close();

@@ -2,7 +2,7 @@
 
 use super::{
     Parameters, State,
-    member::{Counters, NEVER, Observed, Report},
+    member::{Counters, NEVER, Report},
     observe,
 };
 use crate::{number::Real, solver::Blocks};
@@ -25,7 +25,7 @@ impl<T: Real> Run<T> {
     pub fn new(state: State<T>, parameters: Parameters<T>) -> Run<T> {
         let blocks = Blocks::new(state.curve.len()).expect("a ring of 6 nodes or more");
         let sums = observe::sums(&state.curve, &parameters, blocks);
-        let now = Observed::new(&sums, &observe::maxima(&state.curve), &parameters);
+        let now = observe::observed(&sums, &observe::maxima(&state.curve), &parameters);
         let mut report = Report { before: now, middle: now, now, ..Report::default() };
         report.progress.turning = sums.turning;
         let counters = Counters { relax_step: NEVER, half_step: NEVER, ..Counters::default() };
@@ -41,9 +41,9 @@ impl<T: Real> Run<T> {
         if counters.steps == 0 {
             return;
         }
-        report.before = Observed::of(&state.before, parameters, blocks);
-        report.now = Observed::of(&state.curve, parameters, blocks);
-        report.middle = if adaptive { Observed::of(&state.middle, parameters, blocks) } else { report.before };
+        report.before = observe::observe(&state.before, parameters, blocks);
+        report.now = observe::observe(&state.curve, parameters, blocks);
+        report.middle = if adaptive { observe::observe(&state.middle, parameters, blocks) } else { report.before };
     }
 
     /// The same member in another precision, rounded.

@@ -5,7 +5,7 @@ use super::{
 };
 use crate::{
     number::{Mask, Number, Real},
-    solver::{Order, Ring, Solver, Solves, by_solver, gauss_seidel::Control},
+    solver::{Order, Ring, Solver, Solves, by_solver, sweeps::Control},
 };
 
 /// What the members of a run have in common.

@@ -8,81 +8,18 @@
 //! Stopping on the update instead stops hundreds of times too early.
 //!
 //! *Practice.* Coloured order gives the kernel its parallelism and needs the same number of sweeps as the
-//! lexicographic order of the paper. Twin of `shaders/gauss_seidel.wgsl`: same order, same arithmetic.
-
-use std::ops::Range;
-
-use serde::{Deserialize, Serialize};
+//! lexicographic order of the paper. The sweeps themselves are in [`sweeps`](super::sweeps). Twin of
+//! `shaders/gauss_seidel.wgsl`: same order, same arithmetic.
 
 use super::{
-    ring::{self, Blocks, COLOURS, Ring},
-    system::{Row, System},
+    ring::{Blocks, Ring},
+    sweeps::{Control, Order, Swept, Target, coloured_sweep, lexicographic_sweep, norms},
+    system::System,
 };
-use crate::number::{BIG, Mask, Number};
+use crate::number::{Mask, Number};
 
 /// Sweeps between two looks at the residual; a look costs about as much as a sweep.
 pub const SWEEPS_PER_CHECK: u32 = 8;
-
-/// The order in which a sweep visits the nodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Order {
-    /// Colour by colour: what the kernel does.
-    Coloured,
-    /// Node by node, as the paper does (CPU only).
-    Lexicographic,
-}
-
-/// When to stop, and how to sweep.
-#[derive(Clone, Copy, Debug)]
-pub struct Control<N> {
-    /// Bound of the scaled residual relative to the largest increment.
-    pub tolerance: N,
-    /// Absolute error that is not worth a sweep: a fraction of the rounding error of the unknown.
-    pub negligible: N,
-    /// ω_SOR; 0 to have it chosen by the size of the system.
-    pub sor: N,
-    /// Sweeps after which the solve gives up.
-    pub max_sweeps: u32,
-    /// Order of a sweep.
-    pub order: Order,
-}
-
-/// What a solve did.
-#[derive(Clone, Copy, Debug)]
-pub struct Swept<N: Number> {
-    /// Sweeps made, per lane.
-    pub sweeps: N,
-    /// Where the residual reached its bound; false after the cap, or where the sweeps diverged.
-    pub converged: N::Mask,
-    /// Where the system itself was finite; no sweep is made of one that is not.
-    pub finite: N::Mask,
-}
-
-/// When the sweeps on a system have done enough.
-pub(super) struct Target<N: Number> {
-    /// See [`size`].
-    pub size: N,
-    tolerance: N,
-    negligible: N,
-    /// Whether the system is finite.
-    pub finite: N::Mask,
-}
-
-impl<N: Number> Target<N> {
-    #[inline(always)]
-    pub fn of<const F: usize>(system: &System<N, F>, control: &Control<N>) -> Target<N> {
-        let size = size(system);
-        let tolerance = control.tolerance.max(N::of(N::EPSILON) * size);
-        Target { size, tolerance, negligible: control.negligible, finite: size.le(N::of(BIG)) }
-    }
-
-    /// Whether an error that is bounded by the scaled residual is small enough for increments of this size.
-    #[inline(always)]
-    pub fn is_met(&self, [error, increment]: [N; 2]) -> N::Mask {
-        self.finite.and(error.le((self.tolerance * increment).max(self.negligible)))
-    }
-}
 
 /// Sweeps `unknown` (one ring per right-hand side) until its residual is small, in the lanes that are `live`. Lanes that are
 /// done stay as they are.
@@ -109,15 +46,15 @@ pub fn solve<N: Number, const F: usize>(
         }
         done += sweeps;
         swept.sweeps += N::select(active, N::of(f64::from(sweeps)), N::of(0.0));
-        let norms = norms(system, &unknown);
-        swept.converged = target.is_met(norms);
-        active = active.and(norms[0].le(N::of(BIG))).and(swept.converged.not());
+        let (converged, unsolved) = target.judge(norms(system, &unknown));
+        swept.converged = converged;
+        active = active.and(unsolved);
     }
     swept
 }
 
-/// The over-relaxation that needs about the fewest sweeps for a system of this [`size`]: 2g/(1 + g) with
-/// g = (⅝·size)^¼, about (10 τ/h⁴)^¼, measured (`docs/method.md`).
+/// The over-relaxation that needs about the fewest sweeps for a system of this size: 2g/(1 + g) with g = (⅝·size)^¼,
+/// about (10 τ/h⁴)^¼, measured (`docs/method.md`).
 #[inline(always)]
 fn over_relaxation<N: Number>(size: N) -> N {
     let g = (N::of(AUTO_SCALE) * size).sqrt().sqrt();
@@ -126,115 +63,6 @@ fn over_relaxation<N: Number>(size: N) -> N {
 
 /// The ⅝ in the over-relaxation of its own choice.
 pub const AUTO_SCALE: f64 = 0.625;
-
-/// A sweep, colour by colour.
-#[inline(always)]
-pub(super) fn coloured_sweep<N: Number, const F: usize>(
-    system: &System<N, F>,
-    unknown: &mut [&mut Ring<N>; F],
-    blocks: Blocks,
-    sor: N,
-    active: N::Mask,
-) {
-    let mut relaxation = Relaxation::new(system, unknown, sor, active);
-    for colour in 0..COLOURS {
-        for (range, stride) in blocks.of_colour(colour) {
-            relaxation.every(stride, range);
-        }
-        relaxation.close();
-    }
-}
-
-/// A sweep node by node.
-#[inline(always)]
-fn lexicographic_sweep<N: Number, const F: usize>(
-    system: &System<N, F>,
-    unknown: &mut [&mut Ring<N>; F],
-    sor: N,
-    active: N::Mask,
-) {
-    let n = system.rows.len();
-    let mut relaxation = Relaxation::new(system, unknown, sor, active);
-    relaxation.every(1, 0..n - 2);
-    // Only the last two nodes read ghosts that this sweep has changed.
-    relaxation.close();
-    relaxation.every(1, n - 2..n);
-    relaxation.close();
-}
-
-/// What a sweep reads and writes, as slices: their places then stay in registers.
-struct Relaxation<'a, N: Number, const F: usize> {
-    rows: &'a [Row<N>],
-    rhs: [&'a [N]; F],
-    padded: [Option<&'a mut [N]>; F],
-    sor: N,
-}
-
-impl<'a, N: Number, const F: usize> Relaxation<'a, N, F> {
-    #[inline(always)]
-    fn new(system: &'a System<N, F>, unknown: &'a mut [&mut Ring<N>; F], sor: N, active: N::Mask) -> Self {
-        let (mut rhs, mut padded) = ([&[][..]; F], [const { None }; F]);
-        for (f, ring) in unknown.iter_mut().enumerate() {
-            rhs[f] = &system.rhs[f][..];
-            padded[f] = Some(ring.padded_mut());
-        }
-        // Lanes that are done move by 0: a masked store is slow on many processors.
-        Relaxation { rows: &system.rows, rhs, padded, sor: N::select(active, sor, N::of(0.0)) }
-    }
-
-    /// Relaxes every `stride`-th node of a range.
-    #[inline(always)]
-    fn every(&mut self, stride: usize, range: Range<usize>) {
-        let mut i = range.start;
-        while i < range.end {
-            let row = self.rows[i];
-            for f in 0..F {
-                let Some(padded) = &mut self.padded[f] else { continue };
-                let u = &mut padded[i..i + 5];
-                u[2] += self.sor * row.residual(self.rhs[f][i], [u[0], u[1], u[2], u[3], u[4]]);
-            }
-            i += stride;
-        }
-    }
-
-    #[inline(always)]
-    fn close(&mut self) {
-        for padded in self.padded.iter_mut().flatten() {
-            ring::close(padded);
-        }
-    }
-}
-
-/// Largest scaled row sum; more than [`BIG`] where an entry or a right-hand side is not finite.
-///
-/// Times ε it is the tolerance below which a scaled residual is rounding error: no sweep, and no direct solve, gets
-/// further.
-#[inline(always)]
-fn size<N: Number, const F: usize>(system: &System<N, F>) -> N {
-    let mut largest = N::of(0.0);
-    for (i, row) in system.rows.iter().enumerate() {
-        let terms = N::of(1.0) + row.a.abs() + row.b.abs() + row.d.abs() + row.e.abs();
-        largest = largest.max((row.weight * terms).bounded_abs());
-        for rhs in &system.rhs {
-            let huge = rhs[i].bounded_abs().le(N::of(BIG)).not();
-            largest = N::select(huge, N::of(2.0 * BIG), largest);
-        }
-    }
-    largest
-}
-
-/// `[max weight·|residual|, max |u|]` over nodes and right-hand sides; not finite shows as more than [`BIG`].
-#[inline(always)]
-fn norms<N: Number, const F: usize>(system: &System<N, F>, unknown: &[&mut Ring<N>; F]) -> [N; 2] {
-    let mut norms = [N::of(0.0); 2];
-    for (f, u) in unknown.iter().enumerate() {
-        for i in 0..system.rows.len() {
-            let error = system.rows[i].weight * system.residual(f, i, u);
-            norms = [norms[0].max(error.bounded_abs()), norms[1].max(u[i].bounded_abs())];
-        }
-    }
-    norms
-}
 
 #[cfg(test)]
 mod tests {

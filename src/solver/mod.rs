@@ -6,20 +6,22 @@ pub mod direct;
 pub mod gauss_seidel;
 pub mod multigrid;
 pub mod ring;
+pub mod sweeps;
 pub mod system;
 
 use serde::{Deserialize, Serialize};
 
-pub use gauss_seidel::Order;
 pub use ring::{Blocks, Ring, Sums};
+pub use sweeps::Order;
 pub use system::{Equation, Equations, Row, System};
 
 use crate::{
     number::Number,
     wgsl::{self, Part},
 };
-use gauss_seidel::{Control, SWEEPS_PER_CHECK, Swept};
+use gauss_seidel::SWEEPS_PER_CHECK;
 use multigrid::{Discretisation, KERNEL_LEVELS, Levels, SWEEPS_PER_CYCLE};
+use sweeps::{Control, Swept};
 
 /// Which solver takes the periodic pentadiagonal systems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -44,6 +44,22 @@ pub struct Row<N> {
     pub weight: N,
 }
 
+impl<N: Number, const F: usize> Equation<N, F> {
+    /// The row and the right-hand sides, divided by the diagonal entry.
+    #[inline(always)]
+    fn normalise(self) -> (Row<N>, [N; F]) {
+        let Equation { a, b, c, d, e, mut rhs, time_over_length } = self;
+        let inverse = c.recip();
+        let weight = time_over_length * c;
+        let row = Row { a: a * inverse, b: b * inverse, d: d * inverse, e: e * inverse, weight };
+        // A loop, not a closure, which would not be compiled into the vector code.
+        for f in 0..F {
+            rhs[f] = rhs[f] * inverse;
+        }
+        (row, rhs)
+    }
+}
+
 impl<N: Number> Row<N> {
     /// `rhs - (row · u)` at the centre of a window of `u`.
     #[inline(always)]
@@ -71,12 +87,10 @@ impl<N: Number, const F: usize> System<N, F> {
     #[inline(always)]
     pub fn assemble(&mut self, equations: &impl Equations<N, F>) {
         for i in 0..self.rows.len() {
-            let Equation { a, b, c, d, e, rhs, time_over_length } = equations.equation(i);
-            let inverse = c.recip();
-            let weight = time_over_length * c;
-            self.rows[i] = Row { a: a * inverse, b: b * inverse, d: d * inverse, e: e * inverse, weight };
+            let (row, rhs) = equations.equation(i).normalise();
+            self.rows[i] = row;
             for f in 0..F {
-                self.rhs[f][i] = rhs[f] * inverse;
+                self.rhs[f][i] = rhs[f];
             }
         }
     }

@@ -1,0 +1,184 @@
+//! Coloured Gauss–Seidel sweeps, and when they have done enough: what [`gauss_seidel`](super::gauss_seidel) and
+//! [`multigrid`](super::multigrid) share. Twin of `shaders/sweeps.wgsl`: same order, same arithmetic.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    ring::{self, Blocks, COLOURS, Ring},
+    system::{Row, System},
+};
+use crate::number::{BIG, Mask, Number};
+
+/// The order in which a sweep visits the nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Order {
+    /// Colour by colour: what the kernel does.
+    Coloured,
+    /// Node by node, as the paper does (CPU only).
+    Lexicographic,
+}
+
+/// When to stop, and how to sweep.
+#[derive(Clone, Copy, Debug)]
+pub struct Control<N> {
+    /// Bound of the scaled residual relative to the largest increment.
+    pub tolerance: N,
+    /// Absolute error that is not worth a sweep: a fraction of the rounding error of the unknown.
+    pub negligible: N,
+    /// ω_SOR; 0 to have it chosen by the size of the system.
+    pub sor: N,
+    /// Sweeps after which the solve gives up.
+    pub max_sweeps: u32,
+    /// Order of a sweep.
+    pub order: Order,
+}
+
+/// What a solve did.
+#[derive(Clone, Copy, Debug)]
+pub struct Swept<N: Number> {
+    /// Sweeps made, per lane.
+    pub sweeps: N,
+    /// Where the residual reached its bound; false after the cap, or where the sweeps diverged.
+    pub converged: N::Mask,
+    /// Where the system itself was finite; no sweep is made of one that is not.
+    pub finite: N::Mask,
+}
+
+/// When the sweeps on a system have done enough.
+pub(super) struct Target<N: Number> {
+    /// See [`system_size`].
+    pub size: N,
+    tolerance: N,
+    negligible: N,
+    /// Whether the system is finite.
+    pub finite: N::Mask,
+}
+
+/// Largest scaled row sum; more than [`BIG`] where an entry or a right-hand side is not finite.
+///
+/// Times ε it is the tolerance below which a scaled residual is rounding error: no sweep, and no direct solve, gets
+/// further.
+#[inline(always)]
+fn system_size<N: Number, const F: usize>(system: &System<N, F>) -> N {
+    let mut largest = N::of(0.0);
+    for (i, row) in system.rows.iter().enumerate() {
+        let terms = N::of(1.0) + row.a.abs() + row.b.abs() + row.d.abs() + row.e.abs();
+        largest = largest.max((row.weight * terms).bounded_abs());
+        for rhs in &system.rhs {
+            let huge = rhs[i].bounded_abs().le(N::of(BIG)).not();
+            largest = N::select(huge, N::of(2.0 * BIG), largest);
+        }
+    }
+    largest
+}
+
+impl<N: Number> Target<N> {
+    #[inline(always)]
+    pub fn of<const F: usize>(system: &System<N, F>, control: &Control<N>) -> Target<N> {
+        let size = system_size(system);
+        let tolerance = control.tolerance.max(N::of(N::EPSILON) * size);
+        Target { size, tolerance, negligible: control.negligible, finite: size.le(N::of(BIG)) }
+    }
+
+    /// Of `[error, increment]`, an error that is bounded by the scaled residual and the largest increment: whether the
+    /// error is small enough for it, and whether more sweeps may make it so.
+    #[inline(always)]
+    pub fn judge(&self, [error, increment]: [N; 2]) -> (N::Mask, N::Mask) {
+        let solved = self.finite.and(error.le((self.tolerance * increment).max(self.negligible)));
+        (solved, error.le(N::of(BIG)).and(solved.not()))
+    }
+}
+
+/// `[max weight·|residual|, max |u|]` over nodes and right-hand sides; not finite shows as more than [`BIG`].
+#[inline(always)]
+pub(super) fn norms<N: Number, const F: usize>(system: &System<N, F>, unknown: &[&mut Ring<N>; F]) -> [N; 2] {
+    let mut norms = [N::of(0.0); 2];
+    for (f, u) in unknown.iter().enumerate() {
+        for i in 0..system.rows.len() {
+            let error = system.rows[i].weight * system.residual(f, i, u);
+            norms = [norms[0].max(error.bounded_abs()), norms[1].max(u[i].bounded_abs())];
+        }
+    }
+    norms
+}
+
+/// A sweep, colour by colour.
+#[inline(always)]
+pub(super) fn coloured_sweep<N: Number, const F: usize>(
+    system: &System<N, F>,
+    unknown: &mut [&mut Ring<N>; F],
+    blocks: Blocks,
+    sor: N,
+    active: N::Mask,
+) {
+    let mut relaxation = Relaxation::new(system, unknown, sor, active);
+    for colour in 0..COLOURS {
+        for (range, stride) in blocks.of_colour(colour) {
+            relaxation.relax(stride, range);
+        }
+        relaxation.close();
+    }
+}
+
+/// A sweep node by node.
+#[inline(always)]
+pub(super) fn lexicographic_sweep<N: Number, const F: usize>(
+    system: &System<N, F>,
+    unknown: &mut [&mut Ring<N>; F],
+    sor: N,
+    active: N::Mask,
+) {
+    let n = system.rows.len();
+    let mut relaxation = Relaxation::new(system, unknown, sor, active);
+    relaxation.relax(1, 0..n - 2);
+    // Only the last two nodes read ghosts that this sweep has changed.
+    relaxation.close();
+    relaxation.relax(1, n - 2..n);
+    relaxation.close();
+}
+
+/// What a sweep reads and writes, as slices: their places then stay in registers.
+struct Relaxation<'a, N: Number, const F: usize> {
+    rows: &'a [Row<N>],
+    rhs: [&'a [N]; F],
+    padded: [Option<&'a mut [N]>; F],
+    sor: N,
+}
+
+impl<'a, N: Number, const F: usize> Relaxation<'a, N, F> {
+    #[inline(always)]
+    fn new(system: &'a System<N, F>, unknown: &'a mut [&mut Ring<N>; F], sor: N, active: N::Mask) -> Self {
+        let (mut rhs, mut padded) = ([&[][..]; F], [const { None }; F]);
+        for (f, ring) in unknown.iter_mut().enumerate() {
+            rhs[f] = &system.rhs[f][..];
+            padded[f] = Some(ring.padded_mut());
+        }
+        // Lanes that are done move by 0: a masked store is slow on many processors.
+        Relaxation { rows: &system.rows, rhs, padded, sor: N::select(active, sor, N::of(0.0)) }
+    }
+
+    /// Relaxes every `stride`-th node of a range.
+    #[inline(always)]
+    fn relax(&mut self, stride: usize, range: Range<usize>) {
+        let mut i = range.start;
+        while i < range.end {
+            let row = self.rows[i];
+            for f in 0..F {
+                let Some(padded) = &mut self.padded[f] else { continue };
+                let u = &mut padded[i..i + 5];
+                u[2] += self.sor * row.residual(self.rhs[f][i], [u[0], u[1], u[2], u[3], u[4]]);
+            }
+            i += stride;
+        }
+    }
+
+    #[inline(always)]
+    fn close(&mut self) {
+        for padded in self.padded.iter_mut().flatten() {
+            ring::close(padded);
+        }
+    }
+}
