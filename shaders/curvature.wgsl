@@ -1,6 +1,6 @@
-// Rows of the system for the increment of k. Twin of src/scheme/curvature.rs.
+// The system for the increment of k: the equations of the block. Twin of src/scheme/curvature.rs.
 
-fn assemble_curvature() {
+fn curvature_equation() {
     let wk = k_window;
     let irm = minus1(ir);
     let irh = here(ir);

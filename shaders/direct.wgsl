@@ -111,8 +111,7 @@ fn solve_ring(row: PairRow) -> vec {
     var stride = 1u;
     // The bound is BLOCKS, see `ring_sums`.
     for (; stride < dispatch.blocks; stride = 2u * stride) {
-        let place = block % (2u * stride);
-        if place == stride {
+        if leaves(stride) {
             let inverse = invert(own);
             low = multiply(inverse, low);
             high = multiply(inverse, high);
@@ -124,16 +123,15 @@ fn solve_ring(row: PairRow) -> vec {
             }
         }
         workgroupBarrier();
-        if place == 0u {
-            let last = (BLOCKS - 1u) / stride;
-            if block > 0u || last % 2u == 1u {
-                let at = select(block - stride, last * stride, block == 0u);
+        if stays(stride) {
+            if before_leaves(stride) {
+                let at = before_by(stride);
                 own = own - multiply(low, ring_high[at]);
                 rhs = rhs - apply(low, ring_rhs[at]);
                 low = -multiply(low, ring_low[at]);
             }
-            if block + stride < BLOCKS {
-                let at = block + stride;
+            if after_leaves(stride) {
+                let at = after_by(stride);
                 own = own - multiply(high, ring_low[at]);
                 rhs = rhs - apply(high, ring_rhs[at]);
                 high = -multiply(high, ring_high[at]);
@@ -145,10 +143,8 @@ fn solve_ring(row: PairRow) -> vec {
     if lane == 0u { ring_rhs[0] = rhs; }
     for (stride = stride / 2u; stride > 0u; stride = stride / 2u) {
         workgroupBarrier();
-        let place = block % (2u * stride);
-        if place == stride {
-            let up = block + stride;
-            rhs = rhs - apply(low, ring_rhs[block - stride]) - apply(high, ring_rhs[select(0u, up, up < BLOCKS)]);
+        if leaves(stride) {
+            rhs = rhs - apply(low, ring_rhs[before_by(stride)]) - apply(high, ring_rhs[after_by(stride)]);
             if owns > 0u { ring_rhs[lane] = rhs; }
         }
     }

@@ -159,7 +159,7 @@ fn record_events(h: real) {
     // A curve whose curvature is not that of its polygon does not count as relaxed.
     let due = counters.relax_step == NEVER && report.now.excess <= p.relax_at;
     if uniform_decision(select(0u, 1u, due)) == 0u { return; }
-    if gap_of_new() <= real(MAX_GAP) {
+    if gap() <= real(MAX_GAP) {
         counters.relax_step = counters.steps;
         report.progress.relax_high = report.progress.time_high;
         report.progress.relax_low = report.progress.time_low;

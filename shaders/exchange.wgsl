@@ -58,7 +58,7 @@ fn ring_maxima(part: vec) -> vec {
     if owns > 0u { partials[lane] = part; }
     workgroupBarrier();
     var some = part;
-    for (var t = block % dispatch.groups; t < dispatch.blocks; t += dispatch.groups) {
+    for (var t = group(); t < dispatch.blocks; t += dispatch.groups) {
         some = max(some, partials[t]);
     }
     if owns > 0u { ring_a[lane] = some; }

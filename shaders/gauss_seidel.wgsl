@@ -22,7 +22,7 @@ fn solve_one(negligible: real) -> u32 {
         for (var s = 0u; s < batch; s++) { sweep_one(); }
         sweeps += batch;
         budget -= min(budget, batch);
-        let error = bounded_abs(row_of.weight * residual(rhs_x, swept(behind.xy, u, ahead.xy)));
+        let error = bounded_abs(row_of.weight * residual(rhs_x, narrow_window(behind.xy, u, ahead.xy)));
         ended = judge(block_max(error), block_max(bounded_abs(u)), tolerance, negligible);
     }
     return paused_or(ended);
@@ -41,8 +41,8 @@ fn solve_two(negligible: real) -> u32 {
         for (var s = 0u; s < batch; s++) { sweep_two(); }
         sweeps += batch;
         budget -= min(budget, batch);
-        let error_u = bounded_abs(row_of.weight * residual(rhs_x, swept(behind.xy, u, ahead.xy)));
-        let error_v = bounded_abs(row_of.weight * residual(rhs_y, swept(behind.zw, v, ahead.zw)));
+        let error_u = bounded_abs(row_of.weight * residual(rhs_x, narrow_window(behind.xy, u, ahead.xy)));
+        let error_v = bounded_abs(row_of.weight * residual(rhs_y, narrow_window(behind.zw, v, ahead.zw)));
         let increment = max(bounded_abs(u), bounded_abs(v));
         ended = judge(block_max(max(error_u, error_v)), block_max(increment), tolerance, negligible);
     }

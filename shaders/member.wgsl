@@ -165,7 +165,7 @@ fn load_field(field: u32) -> vec {
     let base = (member * STATE_FIELDS + field) * NODES;
     return vec(
         all_states[base + first], all_states[base + first + 1u],
-        all_states[base + first + 2u], all_states[base + (first + 3u) % NODES],
+        all_states[base + first + 2u], all_states[base + node(3u)],
     );
 }
 

@@ -17,6 +17,46 @@ var<private> extremes: vec;
 /// Largest curvature, minus the smallest, largest way that a node went.
 var<private> others: vec;
 
+/// Whether the sums and the curvature are finite.
+fn is_finite() -> bool {
+    let big = real(BIG);
+    return sums.x <= big && abs(sums.y) <= big && extremes.x <= big;
+}
+
+/// Whether the curve has become singular: it is not resolved, an edge has vanished, its lengths say nothing, it has
+/// shrunk, or its turning number is no longer `turning`.
+fn is_singular(turning: real) -> bool {
+    let mean_edge = sums.x / real(NODES);
+    let resolved = extremes.x <= real(MAX_TURN);
+    let apart = real(MIN_EDGE) * mean_edge <= -extremes.w;
+    let measured = extremes.y <= real(MAX_DRIFT);
+    let extended = p.least_length <= sums.x;
+    return !(resolved && apart && measured && extended && sums.w == turning);
+}
+
+/// `L²/(4π|A|)` above that of the regular polygon.
+fn excess(length: real, area: real) -> real {
+    return length * length / (real(FOUR_PI) * abs(area)) - p.polygon_ratio;
+}
+
+/// Largest gap between the angle by which the new curvature turns the tangent over a segment and the angle by which the
+/// new polygon turns there.
+fn gap() -> real {
+    let turned = turn(new_x, new_y);
+    let apart = bounded_abs(new_k * turned.span - turned.angle);
+    return ring_maxima(vec(block_max(apart), 0.0, 0.0, 0.0)).x;
+}
+
+/// +1 (-1) where the edge vector turns from e to f across the positive x axis, the short way round.
+fn winding(ex: vec, ey: vec, fx: vec, fy: vec) -> vec {
+    let side = ex * fy - fx * ey;
+    let e_below = select(vec(0.0), vec(1.0), ey <= vec(0.0));
+    let f_below = select(vec(0.0), vec(1.0), fy <= vec(0.0));
+    let left = select(vec(1.0), vec(0.0), side <= vec(0.0));
+    let right = select(vec(1.0), vec(0.0), vec(0.0) <= side);
+    return e_below * (vec(1.0) - f_below) * left - (vec(1.0) - e_below) * f_below * right;
+}
+
 /// Observes the curve whose windows of x and y and nodes of k and r are given; `moved` is how far its nodes went.
 fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     let ex = here(wx) - minus1(wx);
@@ -41,45 +81,9 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     others = all.others;
 }
 
-/// Largest gap between the angle by which the new curvature turns the tangent over a segment and the angle by which the
-/// new polygon turns there.
-fn gap_of_new() -> real {
-    let turned = turn(new_x, new_y);
-    let gap = bounded_abs(new_k * turned.span - turned.angle);
-    return ring_maxima(vec(block_max(gap), 0.0, 0.0, 0.0)).x;
-}
-
 /// What the last `observe` says of its curve.
 fn observed() -> Observed {
     return Observed(
-        sums.x, sums.y, excess_of_sums(), sums.z, -others.y, others.x, extremes.z / -extremes.w, extremes.y,
+        sums.x, sums.y, excess(sums.x, sums.y), sums.z, -others.y, others.x, extremes.z / -extremes.w, extremes.y,
     );
-}
-
-/// +1 (-1) where the edge vector turns from e to f across the positive x axis, the short way round.
-fn winding(ex: vec, ey: vec, fx: vec, fy: vec) -> vec {
-    let side = ex * fy - fx * ey;
-    let e_below = select(vec(0.0), vec(1.0), ey <= vec(0.0));
-    let f_below = select(vec(0.0), vec(1.0), fy <= vec(0.0));
-    let left = select(vec(1.0), vec(0.0), side <= vec(0.0));
-    let right = select(vec(1.0), vec(0.0), vec(0.0) <= side);
-    return e_below * (vec(1.0) - f_below) * left - (vec(1.0) - e_below) * f_below * right;
-}
-
-fn excess_of_sums() -> real {
-    return sums.x * sums.x / (real(FOUR_PI) * abs(sums.y)) - p.polygon_ratio;
-}
-
-fn is_finite() -> bool {
-    let big = real(BIG);
-    return sums.x <= big && abs(sums.y) <= big && extremes.x <= big;
-}
-
-fn is_singular(turning: real) -> bool {
-    let mean_edge = sums.x / real(NODES);
-    let resolved = extremes.x <= real(MAX_TURN);
-    let apart = real(MIN_EDGE) * mean_edge <= -extremes.w;
-    let measured = extremes.y <= real(MAX_DRIFT);
-    let extended = p.least_length <= sums.x;
-    return !(resolved && apart && measured && extended && sums.w == turning);
 }

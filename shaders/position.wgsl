@@ -1,7 +1,7 @@
-// Rows of the system for the increments of x and y. Twin of src/scheme/position.rs.
+// The system for the increments of x and y: the equations of the block. Twin of src/scheme/position.rs.
 
 /// `wk`: the new curvatures; `wy`: the old y.
-fn assemble_position(wk: Window, wy: Window) {
+fn position_equation(wk: Window, wy: Window) {
     let kh = here(wk);
     let kp = plus1(wk);
     let irm = minus1(ir);

@@ -15,10 +15,6 @@ var<private> r_new: Window;
 var<private> ir: Window;
 var<private> iq: Window;
 
-fn velocity(wk: Window) -> vec {
-    return b(k) - ((plus1(wk) - k) * here(iq) - (k - minus1(wk)) * minus1(iq)) * here(ir);
-}
-
 /// Fills the variables above; returns the length L of the old state.
 fn redistribute() -> real {
     let old = windows(k, r);
@@ -48,24 +44,27 @@ fn redistribute() -> real {
     return length;
 }
 
+/// beta on the window `wk` of the old curvatures.
+fn velocity(wk: Window) -> vec {
+    return b(k) - ((plus1(wk) - k) * here(iq) - (k - minus1(wk)) * minus1(iq)) * here(ir);
+}
+
 /// alpha by a running sum that restarts from the sum of whole blocks.
 fn tangential_velocity(mean_rkb: real, mean_length: real) {
     let growth = rkb - r * mean_rkb + p.omega * (vec(mean_length) - r);
     let start = ring_sums(vec(block_sum(growth), 0.0, 0.0, 0.0)).earlier.x;
     let two = growth.x + growth.y;
     let three = two + growth.z;
-    alpha = vec(start + growth.x, start + two, start + three, start + (three + growth.w));
-    alpha_before = vec(start, alpha.xyz);
-    if block == BLOCKS - 1u {
-        if is_four { alpha.w = real(0.0); } else { alpha.z = real(0.0); }
-    }
+    let running = vec(start + growth.x, start + two, start + three, start + (three + growth.w));
+    alpha_before = vec(start, running.xyz);
+    alpha = without_last_node(running);
 }
 
-/// 1/r and 1/q from one division: of the two, which are of one size, 1/(r q).
+/// 1/r and 1/q from one division: of r and q, which are of one size, 1/(r q).
 fn reciprocals(w: Window) {
     let low_q = (w.low + minus1(w)) * real(0.5);
-    // The last q would need first+6; no row asks for it, and its r serves as well.
-    let high_q = (w.high + vec(w.high.yzw, w.high.w)) * real(0.5);
+    // No row asks for the last q.
+    let high_q = (w.high + plus3(w)) * real(0.5);
     let low = vec(1.0) / (w.low * low_q);
     let high = vec(1.0) / (w.high * high_q);
     ir = Window(low * low_q, high * high_q);

@@ -1,4 +1,6 @@
-// The ring of nodes: the only index arithmetic, and what a thread knows of its neighbours. Twin of src/solver/ring.rs.
+// The ring of nodes, cut into blocks: which node or block is next to which, and what a thread knows of its neighbours.
+// Twin of src/solver/ring.rs. All arithmetic on indices of nodes and blocks is here and, for the coarse rings of
+// multigrid, in levels.wgsl. Addresses in storage buffers are made in member.wgsl and trace_on.wgsl.
 //
 // A thread owns one block of four or three consecutive nodes, kept in the components of a `vec`; a node's colour is
 // its place in the block. For a block of three the fourth component repeats the first node of the next block: it is
@@ -16,9 +18,6 @@ override BLOCKS: u32;
 override THREADS: u32;
 /// Nodes of all coarser rings together, for multigrid.
 override COARSE: u32;
-
-/// One row a block, for sums over the ring.
-var<workgroup> partials: array<vec, BLOCKS>;
 
 /// This thread, its block, and the first node of that.
 var<private> lane: u32;
@@ -49,6 +48,59 @@ fn has_threes() -> bool {
     return FOURS < BLOCKS;
 }
 
+/// The node in component c of the block.
+fn node(c: u32) -> u32 {
+    return (first + c) % NODES;
+}
+
+/// The block of node i.
+fn block_of(i: u32) -> u32 {
+    return select((i - FOURS) / 3u, i / 4u, i < 4u * FOURS);
+}
+
+/// The colour of node i.
+fn colour_of(i: u32) -> u32 {
+    return select((i - FOURS) % 3u, i % 4u, i < 4u * FOURS);
+}
+
+/// Of the groups in which maxima are taken, the one of the block.
+fn group() -> u32 {
+    return block % dispatch.groups;
+}
+
+// The direct solve halves the ring of blocks round by round: in a round every second of those that are left, `stride`
+// apart, leaves.
+
+/// Whether the block leaves the ring in this round.
+fn leaves(stride: u32) -> bool {
+    return stride == block % (2u * stride);
+}
+
+/// Whether it stays in the ring after this round.
+fn stays(stride: u32) -> bool {
+    return block % (2u * stride) == 0u;
+}
+
+/// Whether the block before it in the ring leaves. In a ring of an odd number the first and the last block both stay.
+fn before_leaves(stride: u32) -> bool {
+    return block > 0u || ((BLOCKS - 1u) / stride) % 2u == 1u;
+}
+
+/// Whether the block after it in the ring leaves.
+fn after_leaves(stride: u32) -> bool {
+    return block + stride < BLOCKS;
+}
+
+/// The block before it in the ring.
+fn before_by(stride: u32) -> u32 {
+    return select(block - stride, (BLOCKS - 1u) / stride * stride, block == 0u);
+}
+
+/// The block after it in the ring.
+fn after_by(stride: u32) -> u32 {
+    return select(0u, block + stride, block + stride < BLOCKS);
+}
+
 /// A field on the nodes first-2 ... first+5.
 struct Window { low: vec, high: vec }
 
@@ -61,6 +113,8 @@ fn minus1(w: Window) -> vec { return vec(w.low.yzw, w.high.x); }
 fn here(w: Window) -> vec { return vec(w.low.zw, w.high.xy); }
 fn plus1(w: Window) -> vec { return vec(w.low.w, w.high.xyz); }
 fn plus2(w: Window) -> vec { return w.high; }
+/// The field at i+3, but for the last node: first+6 is outside the window, and first+5 stands in its place.
+fn plus3(w: Window) -> vec { return vec(w.high.yzw, w.high.w); }
 
 /// The window of a block between the blocks before and after it.
 fn window(of_before: vec, own: vec, of_after: vec) -> Window {
@@ -69,51 +123,34 @@ fn window(of_before: vec, own: vec, of_after: vec) -> Window {
     return Window(vec(tail, own.xy), high);
 }
 
+/// The window of a block between the tail of the block before and the front of the block after, two nodes each. The
+/// fourth component of a block of three has no second neighbour in it; the first one stands in its place.
+fn narrow_window(tail: vec2<real>, own: vec, front: vec2<real>) -> Window {
+    return Window(vec(tail, own.xy), select(vec(own.z, front, front.y), vec(own.zw, front), is_four));
+}
+
 /// The last two nodes of the block, of two fields.
 fn tails(a: vec, b: vec) -> vec {
     return select(vec(a.yz, b.yz), vec(a.zw, b.zw), is_four);
 }
 
-/// `v` with the component that is not owned set to zero.
-fn owned(v: vec) -> vec {
-    return vec(v.xyz, select(real(0.0), v.w, owns == 4u));
+/// The last two nodes of the block before, of two fields.
+fn tails_before(a: Window, b: Window) -> vec {
+    return vec(a.low.xy, b.low.xy);
 }
 
-/// Sum over the block, in node order.
-fn block_sum(v: vec) -> real {
-    let own = owned(v);
-    return own.x + own.y + own.z + own.w;
+/// The first two nodes of the block after, of two fields.
+fn fronts_after(a: Window, b: Window) -> vec {
+    return tails(a.high, b.high);
 }
 
-/// Largest component over the block of values that are not negative.
-fn block_max(v: vec) -> real {
-    let own = owned(v);
-    return max(max(own.x, own.y), max(own.z, own.w));
+/// The two nodes after the third one of the block, with `front` the first two nodes of the block after.
+fn after_third(own: vec, front: vec2<real>) -> vec2<real> {
+    return select(front, vec2(own.w, front.x), is_four);
 }
 
-/// Largest owned component, of either sign.
-fn block_max_signed(v: vec) -> real {
-    return max(max(v.x, v.y), select(v.z, max(v.z, v.w), owns == 4u));
-}
-
-/// What is summed over the ring: the blocks before this one, and all.
-struct Sums { earlier: vec, all: vec }
-
-/// What is known of a curve after its new nodes are.
-struct Summary { sums: vec, extremes: vec, others: vec }
-
-/// Four sums over the ring from the sums over each block, added in block order.
-///
-/// The bound of the loop is read from the dispatch: a constant one is unrolled, which takes lavapipe's compiler as long as
-/// everything else together, and runs no faster.
-fn ring_sums(part: vec) -> Sums {
-    workgroupBarrier();
-    if owns > 0u { partials[lane] = part; }
-    workgroupBarrier();
-    var sums = Sums(vec(0.0), vec(0.0));
-    for (var t = 0u; t < dispatch.blocks; t++) {
-        sums.earlier = select(sums.earlier, sums.all, t == block);
-        sums.all = sums.all + partials[t];
-    }
-    return sums;
+/// `v` with the last node of the ring set to zero.
+fn without_last_node(v: vec) -> vec {
+    if block < BLOCKS - 1u { return v; }
+    return select(vec(v.xy, 0.0, v.w), vec(v.xyz, 0.0), is_four);
 }

@@ -1,8 +1,33 @@
 // Where sweeps start: increments predicted from those of the last two solves. Twin of src/scheme/start.rs.
 
+fn start_nowhere() {
+    dk = vec(0.0);
+    dx = vec(0.0);
+    dy = vec(0.0);
+    if !SWEEPS { return; }
+    store_field(EARLIER, dk);
+    store_field(EARLIER + 1u, dx);
+    store_field(EARLIER + 2u, dy);
+}
+
+fn start_after_fixed() { start_put(2.0, -1.0, 1.0, 0.0); }
+
+/// `ratio`: the next whole step over half the one before.
+fn start_after_taken(ratio: real) { start_put(ratio * (real(1.0) + ratio), -(ratio * ratio), ratio, 0.0); }
+
+fn start_after_refused(ratio: real) {
+    let from_end = ratio - real(2.0);
+    start_put(ratio * (real(1.0) + from_end), -(ratio * from_end), -ratio, real(2.0) * ratio);
+}
+
+/// After the whole step (part 0) and after the first half.
+fn start_after_part(part: u32) {
+    start_put(select(real(0.0), real(0.25), part == 0u), select(real(0.5), real(0.25), part == 0u), 1.0, 0.0);
+}
+
 /// Puts `a` times the increments plus `b` times those remembered into the increments, and `c`, `d` times into what is
 /// remembered, which is in EARLIER.
-fn start_from(a: real, b: real, c: real, d: real) {
+fn start_put(a: real, b: real, c: real, d: real) {
     if !SWEEPS { return; }
     let last_k = dk;
     let last_x = dx;
@@ -16,29 +41,4 @@ fn start_from(a: real, b: real, c: real, d: real) {
     store_field(EARLIER, c * last_k + d * before_k);
     store_field(EARLIER + 1u, c * last_x + d * before_x);
     store_field(EARLIER + 2u, c * last_y + d * before_y);
-}
-
-fn start_nowhere() {
-    dk = vec(0.0);
-    dx = vec(0.0);
-    dy = vec(0.0);
-    if !SWEEPS { return; }
-    store_field(EARLIER, dk);
-    store_field(EARLIER + 1u, dx);
-    store_field(EARLIER + 2u, dy);
-}
-
-fn start_after_fixed() { start_from(2.0, -1.0, 1.0, 0.0); }
-
-/// `ratio`: the next whole step over half the one before.
-fn start_after_taken(ratio: real) { start_from(ratio * (real(1.0) + ratio), -(ratio * ratio), ratio, 0.0); }
-
-fn start_after_refused(ratio: real) {
-    let from_end = ratio - real(2.0);
-    start_from(ratio * (real(1.0) + from_end), -(ratio * from_end), -ratio, real(2.0) * ratio);
-}
-
-/// After the whole step (part 0) and after the first half.
-fn start_after_part(part: u32) {
-    start_from(select(real(0.0), real(0.25), part == 0u), select(real(0.5), real(0.25), part == 0u), 1.0, 0.0);
 }

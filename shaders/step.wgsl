@@ -38,7 +38,7 @@ fn step() -> u32 {
 }
 
 fn begin_curvature() {
-    assemble_curvature();
+    curvature_equation();
     trace_system(3u);
     trace(8u, rhs_x);
     u = dk;
@@ -54,7 +54,7 @@ fn begin_positions() {
     new_k = k + dk;
     let exchanged = windows(new_k, y);
     k_window = exchanged.a;
-    assemble_position(k_window, exchanged.b);
+    position_equation(k_window, exchanged.b);
     trace_system(10u);
     trace(15u, rhs_x);
     trace(16u, rhs_y);

@@ -1,5 +1,5 @@
-// Coloured Gauss–Seidel sweeps, and when they have done enough. Twin of what src/solver/gauss_seidel.rs shares with
-// src/solver/multigrid.rs.
+// Coloured Gauss–Seidel sweeps, and when they have done enough: what gauss_seidel.wgsl and multigrid.wgsl share. Twin of
+// src/solver/sweeps.rs.
 //
 // Rows, right-hand sides and unknowns stay in registers. Of a block of four, neighbours need the first two nodes (its front)
 // and the last two (its tail), and the first two need none of another block's first two: so colours 0 and 1 are one
@@ -15,8 +15,8 @@ var<private> ahead: vec;
 /// Begins sweeps from `u` and `v`: what the blocks around have of them.
 fn start_sweeps() {
     let start = windows(u, v);
-    behind = vec(start.a.low.xy, start.b.low.xy);
-    ahead = tails(start.a.high, start.b.high);
+    behind = tails_before(start.a, start.b);
+    ahead = fronts_after(start.a, start.b);
 }
 
 /// A solve that neither ended nor reached the cap has run out of this dispatch's sweeps.
@@ -51,18 +51,13 @@ fn judge(error: real, increment: real, tolerance: real, negligible: real) -> u32
     return uniform_decision(ended);
 }
 
-/// The window of an unknown after a sweep.
-fn swept(tail: vec2<real>, own: vec, front: vec2<real>) -> Window {
-    return Window(vec(tail, own.xy), select(vec(own.z, front, front.y), vec(own.zw, front), is_four));
-}
-
 /// One sweep over u.
 fn sweep_one() {
     u.x = relax(0u, rhs_x.x, behind.x, behind.y, u.x, u.y, u.z);
     if has_threes() { ahead = pass_down_early(vec(u.xy, v.xy)); }
-    u.y = relax(1u, rhs_x.y, behind.y, u.x, u.y, u.z, select(ahead.x, u.w, is_four));
+    u.y = relax(1u, rhs_x.y, behind.y, u.x, u.y, u.z, after_third(u, ahead.xy).x);
     ahead = pass_down(vec(u.xy, v.xy));
-    let next = select(ahead.xy, vec2(u.w, ahead.x), is_four);
+    let next = after_third(u, ahead.xy);
     u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, next.x, next.y);
     u.w = select(u.w, relax(3u, rhs_x.w, u.y, u.z, u.w, ahead.x, ahead.y), is_four);
     behind = pass_up(tails(u, v));
@@ -73,12 +68,13 @@ fn sweep_two() {
     u.x = relax(0u, rhs_x.x, behind.x, behind.y, u.x, u.y, u.z);
     v.x = relax(0u, rhs_y.x, behind.z, behind.w, v.x, v.y, v.z);
     if has_threes() { ahead = pass_down_early(vec(u.xy, v.xy)); }
-    u.y = relax(1u, rhs_x.y, behind.y, u.x, u.y, u.z, select(ahead.x, u.w, is_four));
-    v.y = relax(1u, rhs_y.y, behind.w, v.x, v.y, v.z, select(ahead.z, v.w, is_four));
+    u.y = relax(1u, rhs_x.y, behind.y, u.x, u.y, u.z, after_third(u, ahead.xy).x);
+    v.y = relax(1u, rhs_y.y, behind.w, v.x, v.y, v.z, after_third(v, ahead.zw).x);
     ahead = pass_down(vec(u.xy, v.xy));
-    let next = select(ahead, vec(u.w, ahead.x, v.w, ahead.z), is_four);
-    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, next.x, next.y);
-    v.z = relax(2u, rhs_y.z, v.x, v.y, v.z, next.z, next.w);
+    let next_u = after_third(u, ahead.xy);
+    let next_v = after_third(v, ahead.zw);
+    u.z = relax(2u, rhs_x.z, u.x, u.y, u.z, next_u.x, next_u.y);
+    v.z = relax(2u, rhs_y.z, v.x, v.y, v.z, next_v.x, next_v.y);
     u.w = select(u.w, relax(3u, rhs_x.w, u.y, u.z, u.w, ahead.x, ahead.y), is_four);
     v.w = select(v.w, relax(3u, rhs_y.w, v.y, v.z, v.w, ahead.z, ahead.w), is_four);
     behind = pass_up(tails(u, v));

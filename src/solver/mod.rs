@@ -234,7 +234,15 @@ impl Solves for Cycles {
         refuses_because: "multigrid sweeps by colours and without over-relaxation",
         numbers_per_node: 13 + 65,
         kernel: KernelFacts {
-            files: &wgsl::parts!["sweeps.wgsl", "coarse.wgsl", "multigrid.wgsl"],
+            files: &wgsl::parts![
+                "sweeps.wgsl",
+                "terms.wgsl",
+                "levels.wgsl",
+                "coarse.wgsl",
+                "transfer.wgsl",
+                "cycle.wgsl",
+                "multigrid.wgsl",
+            ],
             shuffles: false,
             rows_per_block: 3,
             numbers: |n| 13 * multigrid::coarse_nodes(n) + 4 * KERNEL_LEVELS,

@@ -46,9 +46,10 @@ impl Variant {
     }
 }
 
-const COMMON: [Part; 16] = parts![
+const COMMON: [Part; 17] = parts![
     "number.wgsl",
     "ring.wgsl",
+    "sums.wgsl",
     "member.wgsl",
     "flow.wgsl",
     "redistribution.wgsl",

@@ -1,0 +1,49 @@
+// Sums and maxima over a block, and sums over the ring of blocks. In Rust `Sums` (src/solver/ring.rs) adds node after
+// node, in the same order.
+
+/// One row a block, for sums over the ring.
+var<workgroup> partials: array<vec, BLOCKS>;
+
+/// `v` with the component that is not owned set to zero.
+fn owned(v: vec) -> vec {
+    return vec(v.xyz, select(real(0.0), v.w, owns == 4u));
+}
+
+/// Sum over the block, in node order.
+fn block_sum(v: vec) -> real {
+    let own = owned(v);
+    return own.x + own.y + own.z + own.w;
+}
+
+/// Largest component over the block of values that are not negative.
+fn block_max(v: vec) -> real {
+    let own = owned(v);
+    return max(max(own.x, own.y), max(own.z, own.w));
+}
+
+/// Largest owned component, of either sign.
+fn block_max_signed(v: vec) -> real {
+    return max(max(v.x, v.y), select(v.z, max(v.z, v.w), owns == 4u));
+}
+
+/// What is summed over the ring: the blocks before this one, and all.
+struct Sums { earlier: vec, all: vec }
+
+/// What is known of a curve after its new nodes are.
+struct Summary { sums: vec, extremes: vec, others: vec }
+
+/// Four sums over the ring from the sums over each block, added in block order.
+///
+/// The bound of the loop is read from the dispatch: a constant one is unrolled, which takes lavapipe's compiler as long as
+/// everything else together, and runs no faster.
+fn ring_sums(part: vec) -> Sums {
+    workgroupBarrier();
+    if owns > 0u { partials[lane] = part; }
+    workgroupBarrier();
+    var sums = Sums(vec(0.0), vec(0.0));
+    for (var t = 0u; t < dispatch.blocks; t++) {
+        sums.earlier = select(sums.earlier, sums.all, t == block);
+        sums.all = sums.all + partials[t];
+    }
+    return sums;
+}
