@@ -326,50 +326,6 @@ fn failure_of_curve(finite: bool, singular: bool) -> Option<Status> {
     }
 }
 
-/// Counts a step that was taken, and decides whether the member goes on.
-#[inline(always)]
-fn accepted<N: Number>(run: &mut Run<N::Real>, excess: N::Real, seen: &Glance<N>, lane: usize, adaptive: bool) {
-    let Run { parameters, counters, report, .. } = run;
-    let progress = &mut report.progress;
-    (report.now.excess, report.now.length) = (excess, seen.length.lane(lane));
-    counters.steps += 1;
-    progress.travel += seen.farthest.lane(lane);
-    if counters.relax_step != NEVER && counters.stop_when_relaxed != 0 {
-        counters.status = Status::Relaxed as u32;
-    }
-    let concave = N::Real::of(0.0).le(seen.minus_k_min.lane(lane));
-    let looked_at = parameters.look_at.le(progress.travel) && concave;
-    if looked_at || (adaptive && pace::is_at_goal(progress, parameters)) {
-        counters.goal = counters.steps;
-    }
-}
-
-/// Passes the time of an adaptive step that was taken, and chooses the length of the next one.
-fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, error: T) -> Start<T> {
-    let Run { parameters, counters, report, .. } = run;
-    let progress = &mut report.progress;
-    let most_growth = if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 };
-    progress.next = pace::next_length(stride.length, error, most_growth, parameters);
-    let start = Start::after_taken(progress.next / (T::of(0.5) * stride.length));
-    pace::pass_time(progress, stride, parameters);
-    counters.refused = 0;
-    start
-}
-
-/// Refuses a step of length h whose error is too large.
-fn refuse_inaccurate<T: Real>(run: &mut Run<T>, n: usize, h: T, error: T) -> Start<T> {
-    let next = pace::next_length(h, error, 1.0, &run.parameters);
-    refuse(run, n, next, pace::MIN_STEP, Status::Singular);
-    Start::after_refused(next / (T::of(0.5) * h))
-}
-
-/// Refuses a step of length h that failed outright; after that the increments may be anything.
-fn refuse_failure<T: Real>(run: &mut Run<T>, n: usize, h: T, cause: Status) -> Start<T> {
-    let least = if cause == Status::Singular { pace::MIN_TO_SINGULAR } else { pace::MIN_STEP };
-    refuse(run, n, T::of(pace::MIN_GROWTH) * h, least, cause);
-    Start::nowhere()
-}
-
 /// Tries again with a step of length `next`, or gives the member up for `cause` where that is below `least` of `(L/n)⁴`.
 fn refuse<T: Real>(run: &mut Run<T>, n: usize, next: T, least: f64, cause: Status) {
     run.counters.rejected += 1;
@@ -379,6 +335,20 @@ fn refuse<T: Real>(run: &mut Run<T>, n: usize, next: T, least: f64, cause: Statu
     if !least.le(next) {
         run.counters.status = cause as u32;
     }
+}
+
+/// Refuses a step of length h that failed outright; after that the increments may be anything.
+fn refuse_failure<T: Real>(run: &mut Run<T>, n: usize, h: T, cause: Status) -> Start<T> {
+    let least = if cause == Status::Singular { pace::MIN_TO_SINGULAR } else { pace::MIN_STEP };
+    refuse(run, n, T::of(pace::MIN_GROWTH) * h, least, cause);
+    Start::nowhere()
+}
+
+/// Refuses a step of length h whose error is too large.
+fn refuse_inaccurate<T: Real>(run: &mut Run<T>, n: usize, h: T, error: T) -> Start<T> {
+    let next = pace::next_length(h, error, 1.0, &run.parameters);
+    refuse(run, n, next, pace::MIN_STEP, Status::Singular);
+    Start::after_refused(next / (T::of(0.5) * h))
 }
 
 /// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.
@@ -407,5 +377,35 @@ fn fraction_at<T: Real>(&Taken { before, middle, after, .. }: &Taken<T>, excess:
         (before - excess) / (before - after)
     } else {
         extrapolation::crossing(before, middle, after, excess)
+    }
+}
+
+/// Passes the time of an adaptive step that was taken, and chooses the length of the next one.
+fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, error: T) -> Start<T> {
+    let Run { parameters, counters, report, .. } = run;
+    let progress = &mut report.progress;
+    let most_growth = if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 };
+    progress.next = pace::next_length(stride.length, error, most_growth, parameters);
+    let start = Start::after_taken(progress.next / (T::of(0.5) * stride.length));
+    pace::pass_time(progress, stride, parameters);
+    counters.refused = 0;
+    start
+}
+
+/// Counts a step that was taken, and decides whether the member goes on.
+#[inline(always)]
+fn accepted<N: Number>(run: &mut Run<N::Real>, excess: N::Real, seen: &Glance<N>, lane: usize, adaptive: bool) {
+    let Run { parameters, counters, report, .. } = run;
+    let progress = &mut report.progress;
+    (report.now.excess, report.now.length) = (excess, seen.length.lane(lane));
+    counters.steps += 1;
+    progress.travel += seen.farthest.lane(lane);
+    if counters.relax_step != NEVER && counters.stop_when_relaxed != 0 {
+        counters.status = Status::Relaxed as u32;
+    }
+    let concave = N::Real::of(0.0).le(seen.minus_k_min.lane(lane));
+    let looked_at = parameters.look_at.le(progress.travel) && concave;
+    if looked_at || (adaptive && pace::is_at_goal(progress, parameters)) {
+        counters.goal = counters.steps;
     }
 }
