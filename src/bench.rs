@@ -56,7 +56,7 @@ pub struct Bench {
 
 /// What was made in a time.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sample {
+pub struct BenchSample {
     /// Time taken.
     pub elapsed: Duration,
     /// Curve-steps.
@@ -119,10 +119,10 @@ impl Bench {
     ///
     /// # Errors
     /// As [`Bench::open`].
-    pub fn sample(&mut self, window: Duration) -> Result<Sample> {
-        let mut total = Sample::default();
+    pub fn sample(&mut self, window: Duration) -> Result<BenchSample> {
+        let mut total = BenchSample::default();
         while total.elapsed < window {
-            let Sample { elapsed, steps, sweeps, .. } = self.advance()?;
+            let BenchSample { elapsed, steps, sweeps, .. } = self.advance()?;
             total.elapsed += elapsed;
             total.steps += steps;
             total.sweeps += sweeps;
@@ -133,7 +133,7 @@ impl Bench {
     /// Doubles the stride until an advance takes its share of a window, or the back end pauses before.
     fn find_stride(&mut self, window: Duration) -> Result<()> {
         while self.stride < u32::MAX {
-            let Sample { elapsed, paused, .. } = self.advance()?;
+            let BenchSample { elapsed, paused, .. } = self.advance()?;
             if elapsed > window / ADVANCES_PER_WINDOW {
                 break;
             }
@@ -143,10 +143,10 @@ impl Bench {
     }
 
     /// Advances all members once, and aims or replaces those that got where they were to.
-    fn advance(&mut self) -> Result<Sample> {
+    fn advance(&mut self) -> Result<BenchSample> {
         let started = Instant::now();
         self.backend.advance()?;
-        let mut sample = Sample::default();
+        let mut sample = BenchSample::default();
         for slot in 0..self.curves() {
             let (run, counters) = (&self.members[slot % self.members.len()], self.backend.counters(slot));
             let made = made(run, &counters);
@@ -277,7 +277,7 @@ mod tests {
     fn what_is_counted_is_what_was_made_also_over_the_ends_of_members() {
         for stride in [1, 3, 4, u32::MAX] {
             let (mut bench, steps, loads) = fives(stride);
-            let mut total = Sample::default();
+            let mut total = BenchSample::default();
             for _ in 0..100 {
                 let sample = bench.advance().unwrap();
                 total.steps += sample.steps;

@@ -88,7 +88,7 @@ pub struct Pilot {
 
 /// What cohorts of cells will take together, and how many members of theirs a pilot stands for.
 #[derive(Default)]
-struct Work {
+struct CohortWork {
     members: f64,
     seconds: Option<f64>,
     dispatches: Option<f64>,
@@ -109,7 +109,8 @@ impl Estimate {
         let mut rows = [0.0_f64; 2];
         let (every, count) = (cohorts.len().div_ceil(MAX_PILOTS), cohorts.len());
         let budget = PILOT / count.div_ceil(every).max(1) as u32;
-        let mut total = Work { seconds: Some(0.0), dispatches: Some(0.0), steps: Some(0.0), ..Work::default() };
+        let mut total =
+            CohortWork { seconds: Some(0.0), dispatches: Some(0.0), steps: Some(0.0), ..CohortWork::default() };
         for (range, choice) in cohorts.into_iter().zip(choices).step_by(every) {
             let cohort = &mut cells[range];
             let precision = choice.precision();
@@ -224,7 +225,7 @@ fn sample(
     backend: &mut dyn Backend,
     budget: Duration,
     pilot: &mut Pilot,
-) -> Result<(Work, u64, [f64; 2])> {
+) -> Result<(CohortWork, u64, [f64; 2])> {
     let until = Instant::now() + budget;
     let own: Vec<Option<Vec<u64>>> = cohort.iter().map(|cell| cell.spec.only.clone()).collect();
     let all: u64 = cohort.iter().map(|cell| cell.spec.member_count()).sum();
@@ -257,7 +258,7 @@ fn sample(
         pilot.seconds += seen.seconds;
     }
     let steps = pilots.iter().rfind(|seen| seen.left > 0).map(|seen| seen.steps as f64 / seen.left as f64);
-    let work = Work {
+    let work = CohortWork {
         members: all as f64,
         seconds: extrapolated(&pilots, all, |seen| seen.seconds),
         dispatches: extrapolated(&pilots, all, |seen| seen.dispatches as f64),

@@ -12,7 +12,7 @@
 
 use crate::{
     curve::Sampling,
-    draw::plot::{Curve, Panel, Plot, short},
+    draw::plot::{Plot, PlotPanel, PlottedCurve, short},
     ensemble::{
         Cell, Ended, Family, Sink, Spec,
         spec::{BackendChoice, Precision, Solver},
@@ -170,12 +170,12 @@ impl Figure {
 
     /// The picture of what a run left.
     pub fn plot(&self, ended: &Ended) -> Plot {
-        let curves: Vec<Curve> = ended.rows.snapshots.iter().map(Curve::from).collect();
+        let curves: Vec<PlottedCurve> = ended.rows.snapshots.iter().map(PlottedCurve::from).collect();
         let panels = match self.layout {
-            Layout::Overlaid => vec![Panel { heading: None, curves }],
+            Layout::Overlaid => vec![PlotPanel { heading: None, curves }],
             Layout::SideBySide => curves
                 .into_iter()
-                .map(|curve| Panel { heading: Some(curve.label.clone()), curves: vec![curve] })
+                .map(|curve| PlotPanel { heading: Some(curve.label.clone()), curves: vec![curve] })
                 .collect(),
         };
         Plot { title: self.title.into(), subtitle: self.parameters(), panels }

@@ -130,13 +130,13 @@ pub fn grid(t_end: f64) -> impl Iterator<Item = f64> {
 /// no memory.
 #[derive(Clone, Debug, Default)]
 pub struct Outputs {
-    rows: Rows,
+    rows: SeriesTimes,
     others: Vec<Other>,
 }
 
 /// The times of the series.
 #[derive(Clone, Copy, Debug, Default)]
-struct Rows {
+struct SeriesTimes {
     t_end: f64,
     every: f64,
     count: usize,
@@ -152,7 +152,7 @@ struct Other {
     without_row: usize,
 }
 
-impl Rows {
+impl SeriesTimes {
     fn time(&self, row: usize) -> f64 {
         at_most(self.t_end, row as f64 * self.every)
     }
@@ -177,7 +177,7 @@ impl Outputs {
     /// Those of a run to `t_end`: every `series` from 0 on, each of `snapshots` and of `frames`.
     pub fn new(t_end: f64, series: Option<f64>, snapshots: &[f64], frames: &[f64]) -> Outputs {
         let count = series.map_or(0, |dt| (t_end / dt * (1.0 + ON_A_STEP)) as usize + 1);
-        let rows = Rows { t_end, every: series.unwrap_or(0.0), count };
+        let rows = SeriesTimes { t_end, every: series.unwrap_or(0.0), count };
         let output =
             |t: f64, snapshot: bool| Output { t: at_most(t_end, t), series: false, snapshot, frame: !snapshot };
         let all = snapshots.iter().map(|t| output(*t, true)).chain(frames.iter().map(|t| output(*t, false)));

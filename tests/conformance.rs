@@ -11,7 +11,7 @@ use std::{
 use curvelax::{
     backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
-        Row, Tamper, adaptive_members,
+        ConformanceRow, Tamper, adaptive_members,
         compare::{Left, adaptive, on_gpu, on_gpu_by, runs, stages},
         members,
     },
@@ -127,7 +127,7 @@ fn dispatches_of(steps: u32) -> Budget {
     Budget { steps, sweeps: u32::MAX }
 }
 
-fn check(rows: &[Row]) -> Outcome {
+fn check(rows: &[ConformanceRow]) -> Outcome {
     for row in rows {
         println!("{}", line(row));
     }
@@ -137,8 +137,8 @@ fn check(rows: &[Row]) -> Outcome {
     }
 }
 
-fn line(row: &Row) -> String {
-    let Row { quantity, solver, precision, n, steps, scale, error, bound, at, .. } = row;
+fn line(row: &ConformanceRow) -> String {
+    let ConformanceRow { quantity, solver, precision, n, steps, scale, error, bound, at, .. } = row;
     let (member, node) = at;
     let share = row.share();
     format!(
@@ -168,7 +168,7 @@ fn a_moved_node_fails_adaptive<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> 
     let tamper = Tamper { member: 4, node: n / 2, by: 65536.0 * T::EPSILON };
     // Either a row fails, or the member takes other steps.
     match adaptive::<T>(gpu, solver, n, dispatches_of(7), Some(tamper)) {
-        Ok(rows) if rows.iter().all(Row::passes) => Err("a moved node was not noticed".into()),
+        Ok(rows) if rows.iter().all(ConformanceRow::passes) => Err("a moved node was not noticed".into()),
         Ok(rows) => match rows.iter().find(|row| !row.passes() && row.at.0 != tamper.member) {
             Some(row) => Err(format!("the wrong member was named: {}", line(row)).into()),
             None => Ok(()),
@@ -237,13 +237,13 @@ fn a_moved_node_fails<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let after_step = stages::<T>(gpu, solver, n, Some(tamper))?;
     let after_run = runs::<T>(gpu, solver, n, 1, dispatches_of(1), Some(tamper))?;
     for rows in [after_step, after_run] {
-        let caught: Vec<&Row> = rows.iter().filter(|row| !row.passes()).collect();
+        let caught: Vec<&ConformanceRow> = rows.iter().filter(|row| !row.passes()).collect();
         if caught.is_empty() {
             return Err("a moved node was not noticed".into());
         }
         // In the first stages the trace is local: the row names the node too, or a neighbour.
-        let local = |row: &&&Row| ["β", "a", "𝓐"].contains(&row.quantity);
-        let far = |row: &Row| (row.at.1 + n - tamper.node + 3) % n > 6;
+        let local = |row: &&&ConformanceRow| ["β", "a", "𝓐"].contains(&row.quantity);
+        let far = |row: &ConformanceRow| (row.at.1 + n - tamper.node + 3) % n > 6;
         if let Some(row) = caught.iter().filter(local).find(|row| far(row)) {
             return Err(format!("the wrong node was named: {}", line(row)).into());
         }

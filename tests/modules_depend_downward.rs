@@ -1,5 +1,5 @@
 //! Modules depend downward only: no folder or file of `src` uses one above it in [`LAYERS`], and no files use each other in
-//! a circle. Tests inside the files may use anything.
+//! a circle. Tests inside the files may use anything. Type names are unique across the crate.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -260,6 +260,61 @@ fn arrows_upward_and_circles_are_found() {
     // Through a re-export, and to the folder that holds the file.
     let circle = with(&[("statistics/sum", "use super::Line;"), ("statistics/fit", "use super::sum::sum;")]);
     assert!(circle.len() == 1 && circle[0].contains("statistics/fit, statistics/sum"), "{circle:?}");
-    let circle = with(&[("report/complete", "use super::Report;")]);
+    let circle = with(&[("report/complete", "use super::RunReport;")]);
     assert!(circle.len() == 1 && circle[0].contains("report, report/complete"), "{circle:?}");
+}
+
+/// The types that a file defines outside its tests and its functions.
+#[derive(Default)]
+struct Types(BTreeSet<String>);
+
+impl<'a> Visit<'a> for Types {
+    fn visit_item(&mut self, item: &'a Item) {
+        let (name, attributes) = match item {
+            Item::Struct(item) => (&item.ident, &item.attrs),
+            Item::Enum(item) => (&item.ident, &item.attrs),
+            Item::Union(item) => (&item.ident, &item.attrs),
+            Item::Trait(item) => (&item.ident, &item.attrs),
+            Item::Type(item) => (&item.ident, &item.attrs),
+            Item::Mod(item) if !is_of_tests(&item.attrs) => return visit::visit_item_mod(self, item),
+            _ => return,
+        };
+        if !is_of_tests(attributes) {
+            self.0.insert(name.to_string());
+        }
+    }
+}
+
+/// Names of types with the files that define them, where these are several; one file may define a type once for each
+/// system.
+fn shared_names(sources: &BTreeMap<Module, String>) -> Vec<String> {
+    let mut files: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for (module, text) in sources {
+        let mut types = Types::default();
+        types.visit_file(&syn::parse_file(text).unwrap());
+        types.0.into_iter().for_each(|name| files.entry(name).or_default().push(module.join("/")));
+    }
+    assert!(files.len() > 200, "{} types: the test has lost its eyes", files.len());
+    let shared = files.into_iter().filter(|(_, files)| files.len() > 1);
+    shared.map(|(name, files)| format!("{name}: {}", files.join(", "))).collect()
+}
+
+#[test]
+fn type_names_are_unique() {
+    assert_eq!(shared_names(&sources()), [""; 0]);
+}
+
+#[test]
+fn a_type_name_that_is_used_twice_is_found() {
+    let with = |line: &str| {
+        let mut sources = sources();
+        sources.get_mut(&vec!["error".to_owned()]).unwrap().push_str(line);
+        shared_names(&sources)
+    };
+    let shared = ["Outline: curve/outline, error"];
+    assert_eq!(with("struct Outline;"), shared);
+    assert_eq!(with("mod inner { pub enum Outline {} }"), shared);
+    assert_eq!(with("type Outline<T> = Option<T>;"), shared);
+    assert_eq!(with("#[cfg(test)] mod more { struct Outline; }"), [""; 0]);
+    assert_eq!(with("fn f() { struct Outline; }"), [""; 0]);
 }

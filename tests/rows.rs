@@ -12,7 +12,7 @@ use curvelax::{
     files::OutputFolder,
     placement,
     report::{
-        Form, Manner, Report, Stop,
+        Form, Manner, RunReport, Stop,
         checkpoint::{self, Origin},
     },
     simulate::resume,
@@ -20,7 +20,7 @@ use curvelax::{
 
 /// A report whose run is stopped when its patience is at an end.
 struct Impatient<'a> {
-    report: &'a mut Report,
+    report: &'a mut RunReport,
     patience: u32,
     /// It does not wait for the members on their way.
     at_once: bool,
@@ -77,7 +77,7 @@ fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
     placement::settle(&mut study, &choices);
     let (choice, cells) = (&choices[0], study.cells());
     let origin = Origin::new(&study, choice.platform(study.spec()))?;
-    let mut report = Report::begin(OutputFolder::open(out, false)?, &study, origin, manner())?;
+    let mut report = RunReport::begin(OutputFolder::open(out, false)?, &study, origin, manner())?;
     let (mut standing, mut spilled) = (Standing::default(), 0);
     for piece in 1.. {
         // More each time, so that the run comes to an end although some of its work is lost.
@@ -98,7 +98,7 @@ fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
         assert!(state < 5 << 20, "a state of {state} bytes");
         let folder = OutputFolder::open_again(out)?;
         let kept = checkpoint::find(&folder)?.expect("a run that was interrupted");
-        (report, standing) = Report::resume(folder, &study, kept, manner())?;
+        (report, standing) = RunReport::resume(folder, &study, kept, manner())?;
     }
     unreachable!("it ends")
 }

@@ -21,7 +21,7 @@ use curvelax::{
         checkpoint::{Head, Origin},
         envelope::sealed,
         merge::{Shards, join_rows},
-        shard::{Found, LAYOUT, Part, Record, from_bytes, look, to_bytes},
+        shard::{FinishedShard, Found, LAYOUT, Record, from_bytes, look, to_bytes},
     },
     results::tally::Aside,
 };
@@ -139,12 +139,12 @@ impl Folder {
     }
 
     /// The shard with this table, of whose length and checksum it tells, or of others.
-    fn part(&mut self, table: &[u8], told: bool) -> Part {
+    fn part(&mut self, table: &[u8], told: bool) -> FinishedShard {
         self.hold(names::SUMMARY, table);
         let (path, shard, spec) = (self.path.clone(), self.shard, self.spec.clone());
         let mut record = self.record.clone();
         let crc = crc32c::crc32c(table) ^ u32::from(!told);
         record.head.tables = vec![Mark { name: names::SUMMARY.into(), length: table.len() as u64, crc }];
-        Part { path, shard, spec, record }
+        FinishedShard { path, shard, spec, record }
     }
 }

@@ -13,7 +13,7 @@ use std::{
 
 use curvelax::{
     files::names,
-    report::{reader::Finished, study::Study},
+    report::{pictures::FinishedRun, reader::Finished},
     results::EnsembleStatistics,
 };
 use libfuzzer_sys::fuzz_target;
@@ -59,7 +59,7 @@ fn draw(run: Finished, told: bool) {
     let Finished { provenance, mut tally, excess, films } = run;
     let drawn = EnsembleStatistics::new(&provenance.spec, &mut tally).and_then(|statistics| {
         let (provenance, tally, statistics) = (&provenance, &tally, &statistics);
-        Study { provenance, tally, statistics, excess: &excess, films: &films }.pictures()
+        FinishedRun { provenance, tally, statistics, excess: &excess, films: &films }.pictures()
     });
     if let Ok(pictures) = drawn {
         for (name, text) in pictures {

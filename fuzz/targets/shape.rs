@@ -9,7 +9,7 @@ use curvelax::{
     ensemble::{
         Family, Spec,
         spec::{Pull, Sor},
-        sweep::Axis,
+        sweep::SweepAxis,
     },
     flow::Flow,
 };
@@ -44,7 +44,7 @@ fn words(bytes: &[u8]) {
         assert_eq!(modes.to_string().parse(), Ok(modes));
     }
     let _ = (text.parse::<Sampling>(), text.parse::<Pull>(), text.parse::<Sor>());
-    if let Ok(axis) = text.parse::<Axis>() {
+    if let Ok(axis) = text.parse::<SweepAxis>() {
         assert_eq!(axis.labels().len(), axis.values.len());
     }
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{flags, note, print, print_json};
 use crate::{
     backend::{DeviceKind, gpu::Gpu},
-    bench::{self, Bench, Sample},
+    bench::{self, Bench, BenchSample},
     ensemble::{
         Spec,
         spec::{BackendChoice, Precision, Solver},
@@ -85,7 +85,7 @@ pub struct BenchArgs {
 
 /// A line of the table. Unknown is none: a case that failed has its reason instead of numbers.
 #[derive(Serialize)]
-struct Row {
+struct BenchRow {
     backend: DeviceKind,
     adapter: Option<String>,
     driver: Option<String>,
@@ -119,7 +119,7 @@ struct Benches<'a> {
     curvelax: &'static str,
     seconds: f64,
     repeats: usize,
-    rows: &'a [Row],
+    rows: &'a [BenchRow],
 }
 
 /// Runs the measurements and prints their table.
@@ -150,7 +150,7 @@ pub fn bench(args: BenchArgs) -> Result<()> {
         }
         cases.iter_mut().for_each(|case| case.measure(window));
     }
-    let rows: Vec<Row> = cases.iter().map(Case::row).collect();
+    let rows: Vec<BenchRow> = cases.iter().map(Case::row).collect();
     if args.json {
         let benches = Benches { curvelax: env!("CARGO_PKG_VERSION"), seconds, repeats, rows: &rows };
         print_json(&benches)?;
@@ -191,25 +191,25 @@ fn cases(args: &BenchArgs) -> Result<Vec<Spec>> {
 
 /// Where a case runs: the CPU, or the adapter of this name, and with how many members.
 #[derive(Clone)]
-struct Place {
+struct BenchPlace {
     backend: DeviceKind,
     adapter: Option<String>,
     curves: u64,
 }
 
-impl Place {
+impl BenchPlace {
     fn over(self, base: &Spec) -> Spec {
         Spec { backend: self.backend.into(), adapter: self.adapter, curves: self.curves, ..base.clone() }
     }
 }
 
 /// The back ends asked for. An adapter that several interfaces list is measured once, through the first.
-fn places(args: &BenchArgs) -> Result<Vec<Place>> {
+fn places(args: &BenchArgs) -> Result<Vec<BenchPlace>> {
     let asked = |backend| args.backend.contains(&backend);
     let mut places = Vec::new();
     if asked(DeviceKind::Cpu) || (args.backend.is_empty() && args.adapter.is_none()) {
         let curves = args.curves.unwrap_or(CURVES);
-        places.push(Place { backend: DeviceKind::Cpu, adapter: None, curves });
+        places.push(BenchPlace { backend: DeviceKind::Cpu, adapter: None, curves });
     }
     if !args.backend.is_empty() && !asked(DeviceKind::Gpu) {
         return match &args.adapter {
@@ -227,7 +227,7 @@ fn places(args: &BenchArgs) -> Result<Vec<Place>> {
             // Of two adapters of one name the name would be the first.
             let adapter = args.adapter.clone().filter(|_| by_number).or_else(|| Some(gpu.name().to_string()));
             let curves = args.curves.unwrap_or(enough);
-            places.push(Place { backend: DeviceKind::Gpu, adapter, curves });
+            places.push(BenchPlace { backend: DeviceKind::Gpu, adapter, curves });
         }
     }
     if seen.is_empty() && (args.adapter.is_some() || asked(DeviceKind::Gpu)) {
@@ -240,7 +240,7 @@ fn places(args: &BenchArgs) -> Result<Vec<Place>> {
 struct Case {
     spec: Spec,
     bench: Result<Bench>,
-    samples: Vec<Sample>,
+    samples: Vec<BenchSample>,
 }
 
 impl Case {
@@ -269,7 +269,7 @@ impl Case {
         self.spec.precision.unwrap_or(Precision::F64)
     }
 
-    fn row(&self) -> Row {
+    fn row(&self) -> BenchRow {
         let bench = self.bench.as_ref().ok();
         let platform = bench.map(Bench::platform);
         let steps: u64 = self.samples.iter().map(|sample| sample.steps).sum();
@@ -282,7 +282,7 @@ impl Case {
             Ok(_) if steps == 0 => Some("no step was finished in this time; take more --seconds".into()),
             Ok(_) => None,
         };
-        Row {
+        BenchRow {
             backend: if self.spec.backend == BackendChoice::Cpu { DeviceKind::Cpu } else { DeviceKind::Gpu },
             adapter: self.spec.adapter.clone(),
             driver: platform.and_then(|platform| platform.driver.clone()),
@@ -324,8 +324,8 @@ fn precision_name(precision: Precision) -> &'static str {
 }
 
 /// Aligned; a case that failed has the reason in place of its numbers.
-fn table(rows: &[Row]) -> String {
-    let place = |row: &Row| match (&row.adapter, row.threads) {
+fn table(rows: &[BenchRow]) -> String {
+    let place = |row: &BenchRow| match (&row.adapter, row.threads) {
         (Some(adapter), _) => adapter.clone(),
         (None, Some(1)) => "cpu, 1 thread".into(),
         (None, Some(threads)) => format!("cpu, {threads} threads"),

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{flags, note, print, print_json};
 use crate::{
     backend::gpu::{Gpu, kernel::Budget},
-    conformance::{Row, adaptive, compare::MEMBERS, runs, stages},
+    conformance::{ConformanceRow, adaptive, compare::MEMBERS, runs, stages},
     error::{Error, Result},
     number::Real,
     placement::no_adapter,
@@ -31,7 +31,7 @@ const BUDGET: Budget = Budget { steps: 16, sweeps: u32::MAX };
 
 /// What is compared by a kernel of its own.
 #[derive(Clone, Copy)]
-enum Kind {
+enum Compared {
     /// The stages of a step.
     Stages,
     /// Whole runs in fixed steps.
@@ -40,20 +40,20 @@ enum Kind {
     Adaptive,
 }
 
-impl Kind {
-    const ALL: [Kind; 3] = [Kind::Stages, Kind::Fixed, Kind::Adaptive];
+impl Compared {
+    const ALL: [Compared; 3] = [Compared::Stages, Compared::Fixed, Compared::Adaptive];
 
     fn name(self) -> &'static str {
         match self {
-            Kind::Stages => "stages of a step",
-            Kind::Fixed => "fixed steps",
-            Kind::Adaptive => "adaptive steps",
+            Compared::Stages => "stages of a step",
+            Compared::Fixed => "fixed steps",
+            Compared::Adaptive => "adaptive steps",
         }
     }
 }
 
 /// Kernels that are compiled and compared for each adapter and precision.
-const KERNELS: usize = Solver::ALL.len() * SIZES.len() * Kind::ALL.len();
+const KERNELS: usize = Solver::ALL.len() * SIZES.len() * Compared::ALL.len();
 
 /// Compare the GPU with the CPU on this machine's adapters, as a table; exit code 1 on failure.
 #[derive(clap::Args)]
@@ -83,7 +83,7 @@ struct Comparison {
 #[derive(Serialize)]
 struct Verdict {
     #[serde(flatten)]
-    row: Row,
+    row: ConformanceRow,
     passes: bool,
 }
 
@@ -133,10 +133,10 @@ pub fn check(args: CheckArgs) -> Result<()> {
 }
 
 /// All rows of an adapter.
-fn compare(gpu: &Gpu, progress: Progress) -> Result<Vec<Row>> {
+fn compare(gpu: &Gpu, progress: Progress) -> Result<Vec<ConformanceRow>> {
     let total = if gpu.has_f64() { 2 * KERNELS } else { KERNELS };
     let mut done = 0;
-    let mut tell = |precision: &str, solver: Solver, n: usize, kind: Kind| {
+    let mut tell = |precision: &str, solver: Solver, n: usize, kind: Compared| {
         progress.step(done, total, &format!("{precision}, {}, n = {n}, {}", solver.name(), kind.name()));
         done += 1;
     };
@@ -150,13 +150,13 @@ fn compare(gpu: &Gpu, progress: Progress) -> Result<Vec<Row>> {
 
 /// The worst row of every quantity over all sizes; of all solvers but the first what does not come before a solve. Every
 /// kernel is told before it is compiled.
-fn compare_in<T: Real>(gpu: &Gpu, tell: &mut impl FnMut(&str, Solver, usize, Kind)) -> Result<Vec<Row>> {
+fn compare_in<T: Real>(gpu: &Gpu, tell: &mut impl FnMut(&str, Solver, usize, Compared)) -> Result<Vec<ConformanceRow>> {
     let mut all = Vec::new();
     for solver in Solver::ALL {
-        let mut worst: Vec<Row> = Vec::new();
+        let mut worst: Vec<ConformanceRow> = Vec::new();
         for n in SIZES {
             let mut rows = Vec::new();
-            for kind in Kind::ALL {
+            for kind in Compared::ALL {
                 tell(T::NAME, solver, n, kind);
                 rows.extend(compare_kernel::<T>(gpu, solver, n, kind)?);
             }
@@ -174,24 +174,24 @@ fn compare_in<T: Real>(gpu: &Gpu, tell: &mut impl FnMut(&str, Solver, usize, Kin
     Ok(all)
 }
 
-fn compare_kernel<T: Real>(gpu: &Gpu, solver: Solver, n: usize, kind: Kind) -> Result<Vec<Row>> {
+fn compare_kernel<T: Real>(gpu: &Gpu, solver: Solver, n: usize, kind: Compared) -> Result<Vec<ConformanceRow>> {
     let mut rows = Vec::new();
     match kind {
-        Kind::Stages => {
+        Compared::Stages => {
             rows = stages::<T>(gpu, solver, n, None)?;
             rows.retain(|row| solver == Solver::ALL[0] || row.quantity.starts_with('δ'));
         }
-        Kind::Fixed => {
+        Compared::Fixed => {
             for steps in STEPS {
                 rows.extend(runs::<T>(gpu, solver, n, steps, BUDGET, None)?);
             }
         }
-        Kind::Adaptive => rows = adaptive::<T>(gpu, solver, n, BUDGET, None)?,
+        Compared::Adaptive => rows = adaptive::<T>(gpu, solver, n, BUDGET, None)?,
     }
     Ok(rows)
 }
 
-fn table(gpu: &Gpu, rows: &[Row]) -> String {
+fn table(gpu: &Gpu, rows: &[ConformanceRow]) -> String {
     let sizes = SIZES.map(|n| n.to_string()).join(", ");
     let mut text = format!(
         "{} ({}): {MEMBERS} members, n = {sizes}\n\n{:<5}{:<13}{:>5}  {:<24}{:>10}{:>13}{:>10}  {:<8}at\n",
@@ -207,7 +207,8 @@ fn table(gpu: &Gpu, rows: &[Row]) -> String {
         "verdict",
     );
     for row in rows {
-        let Row { quantity, solver, precision, n, steps, adaptive, scale, error, bound, at: (member, node) } = row;
+        let ConformanceRow { quantity, solver, precision, n, steps, adaptive, scale, error, bound, at: (member, node) } =
+            row;
         let steps = format!("{}{steps}", if *adaptive { "~" } else { "" });
         let solver = solver.name();
         let verdict = if row.passes() { "ok" } else { "FAILED" };

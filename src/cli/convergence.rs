@@ -14,7 +14,7 @@ use crate::{
         tables::{ErrorRow, Table},
     },
     placement,
-    truth::{Problem, Row, problems, studies},
+    truth::{ConvergenceRow, Problem, problems, studies},
 };
 
 const EXAMPLES: &str = "\
@@ -107,7 +107,7 @@ fn open(out: &Path, force: bool) -> Result<OutputFolder> {
 }
 
 /// Aligned, the problems apart; a run that ended early has its status in place of its error.
-fn table(rows: &[Row]) -> String {
+fn table(rows: &[ConvergenceRow]) -> String {
     let width = rows.iter().map(|row| row.problem.len()).max().unwrap_or(0).max("problem".len());
     let line = |cells: [&str; 7]| {
         let [problem, varied, n, tau, tolerance, error, order] = cells;
@@ -116,7 +116,7 @@ fn table(rows: &[Row]) -> String {
     };
     let mut text = line(["problem", "varied", "n", "tau", "tolerance", "error", "order"]);
     let mut before = "";
-    for Row { problem, varied, at, status, error, order } in rows {
+    for ConvergenceRow { problem, varied, at, status, error, order } in rows {
         if problem != before {
             text += "\n";
             before = problem;
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_table_is_aligned_and_says_how_a_run_ended_that_has_no_error() {
-        let row = |problem: &str, status, error| Row {
+        let row = |problem: &str, status, error| ConvergenceRow {
             problem: problem.into(),
             varied: Varied::Nodes,
             at: Resolution { n: 50, tau: 0.001, tolerance: None },

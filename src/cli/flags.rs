@@ -13,7 +13,7 @@ use crate::{
     ensemble::{
         Shard, Spec,
         spec::{BackendChoice, Order, Precision, Pull, SolverChoice, Sor, Store},
-        sweep::Axis,
+        sweep::SweepAxis,
     },
     flow::Flow,
 };
@@ -73,8 +73,8 @@ pub struct SpecFlags {
     decay: Option<f64>,
     /// Run a cell for each value of this key, and for each combination if several keys are swept. Separate values that
     /// contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1' [default: none]
-    #[arg(long, value_name = "KEY=V1,V2,...", value_parser = text_of::<Axis>, help_heading = ENSEMBLE)]
-    sweep: Vec<Axis>,
+    #[arg(long, value_name = "KEY=V1,V2,...", value_parser = text_of::<SweepAxis>, help_heading = ENSEMBLE)]
+    sweep: Vec<SweepAxis>,
     /// Draw member j of every cell from the same random numbers [default: false]
     #[arg(
         long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",

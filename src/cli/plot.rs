@@ -7,8 +7,8 @@ use crate::{
     error::Result,
     files::{OutputFolder, Owner, names},
     report::{
+        pictures::FinishedRun,
         reader::{self, Finished},
-        study::Study,
     },
     results::EnsembleStatistics,
 };
@@ -54,7 +54,7 @@ pub fn plot(args: PlotArgs) -> Result<()> {
         note(&format!("note: no {} in {}: without pictures of members", names::PORTRAITS, args.run.display()));
     }
     let statistics = &EnsembleStatistics::new(&provenance.spec, &mut tally)?;
-    let study = Study { provenance: &provenance, tally: &tally, statistics, excess: &excess, films: &films };
+    let study = FinishedRun { provenance: &provenance, tally: &tally, statistics, excess: &excess, films: &films };
     let pictures = study.pictures()?;
     let files = pictures.iter().map(|(name, text)| folder.write(name, text)).collect::<Result<_>>()?;
     folder.publish_all(files)?;

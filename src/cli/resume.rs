@@ -12,7 +12,7 @@ use crate::{
     error::{Error, Result},
     files::{OutputFolder, names},
     report::{
-        Report,
+        RunReport,
         checkpoint::{self, Saved},
         reader,
     },
@@ -54,7 +54,7 @@ pub fn resume(args: ResumeArgs) -> Result<()> {
     args.manner.check_name(&args.run)?;
     let folder = OutputFolder::open_again(&args.run)?;
     let saved = checkpoint::find(&folder)?;
-    let place = Place { backend: args.backend, adapter: args.adapter, threads: args.threads };
+    let place = ResumePlace { backend: args.backend, adapter: args.adapter, threads: args.threads };
     resume_in(folder, saved, place, args.manner)
 }
 
@@ -88,18 +88,18 @@ pub fn resume_like((folder, saved): (OutputFolder, Option<Saved>), spec: &Spec, 
             "--resume: the run in {path} is of another spec: {key} is {there} there, and {here} here; name another folder"
         )));
     }
-    resume_in(folder, saved, Place { threads: spec.threads, ..Place::default() }, flags)
+    resume_in(folder, saved, ResumePlace { threads: spec.threads, ..ResumePlace::default() }, flags)
 }
 
 /// Where a run is to go on, if not where it was.
 #[derive(Default)]
-struct Place {
+struct ResumePlace {
     backend: Option<BackendChoice>,
     adapter: Option<String>,
     threads: Option<usize>,
 }
 
-fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: Place, flags: MannerFlags) -> Result<()> {
+fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: ResumePlace, flags: MannerFlags) -> Result<()> {
     let path = folder.path().to_path_buf();
     let Some(mut saved) = saved else {
         folder.tidy()?;
@@ -141,13 +141,13 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: Place, flags
     } else if new_threads {
         (origin.platform.threads, origin.spec) = (here.threads, work.study.spec().to_toml()?);
     }
-    let (report, standing) = Report::resume(folder, &work.study, saved, manner)?;
+    let (report, standing) = RunReport::resume(folder, &work.study, saved, manner)?;
     flags.say(&format!("resuming: {} of {} members are in the table", report.members(), work.study.member_count()));
     work.carry_out(report, standing, &flags)
 }
 
 /// The spec of the state, with what this command line asks for instead.
-fn spec(text: &str, Place { backend, adapter, threads }: Place) -> Result<Spec> {
+fn spec(text: &str, ResumePlace { backend, adapter, threads }: ResumePlace) -> Result<Spec> {
     let mut spec = Spec::from_toml(text).map_err(|e| state_spec(&e))?;
     if backend.is_some() || adapter.is_some() {
         spec.backend = backend.unwrap_or(BackendChoice::Gpu);

@@ -11,7 +11,7 @@ use crate::{
     error::{Error, Result},
     estimate::Estimate,
     files::{Existing, OutputFolder},
-    report::{Report, checkpoint::Origin},
+    report::{RunReport, checkpoint::Origin},
 };
 
 const EXAMPLES: &str = "\
@@ -85,7 +85,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     let folder = OutputFolder::open(&out, existing)?;
     let platform = work.open(&flags)?;
     let origin = Origin::new(&work.study, platform)?;
-    let report = Report::begin(folder, &work.study, origin, manner)?;
+    let report = RunReport::begin(folder, &work.study, origin, manner)?;
     work.carry_out(report, Standing::default(), &flags)
 }
 

@@ -9,7 +9,7 @@ use crate::{
     error::{Error, Result},
     files::names,
     placement::{self, Choice, Platform},
-    report::{Form, Manner, Report, Stop},
+    report::{Form, Manner, RunReport, Stop},
     simulate::resume,
     text::plural,
 };
@@ -117,7 +117,7 @@ impl Work {
     ///
     /// # Errors
     /// Beside those of the run, [`Error::Request`] where `standing` is not that of the report.
-    pub fn carry_out(self, mut report: Report, standing: Standing, flags: &MannerFlags) -> Result<()> {
+    pub fn carry_out(self, mut report: RunReport, standing: Standing, flags: &MannerFlags) -> Result<()> {
         let (told, rows) = (self.members_before(report.cohort()).saturating_add(standing.next), report.members());
         if told != rows {
             let path = report.folder().display();
@@ -187,7 +187,7 @@ fn advance(
     choices: Vec<Choice>,
     mut opened: Option<Box<dyn Backend>>,
     mut standing: Standing,
-    report: &mut Report,
+    report: &mut RunReport,
     flags: &MannerFlags,
 ) -> Result<()> {
     let precision = report.platform().precision;

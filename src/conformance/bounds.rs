@@ -8,7 +8,7 @@ use crate::{
 
 /// What a bound is measured in: the size of the terms whose rounding the quantity inherits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
+pub enum NaturalScale {
     /// Largest of `|k|/r²` (the terms of a second difference) and `|b(k)|`.
     Velocity,
     /// `Σ|r k β| + ω L`: α is a running sum.
@@ -41,61 +41,61 @@ pub struct Bound {
     /// The quantity.
     pub quantity: &'static str,
     /// What its rounding errors are measured in.
-    pub scale: Scale,
+    pub scale: NaturalScale,
     /// k on a software adapter, which rounds as Rust does.
     pub software: f64,
     /// k on hardware, which may fuse `a*b + c`.
     pub hardware: f64,
 }
 
-const fn bound(quantity: &'static str, scale: Scale, software: f64, hardware: f64) -> Bound {
+const fn bound(quantity: &'static str, scale: NaturalScale, software: f64, hardware: f64) -> Bound {
     Bound { quantity, scale, software, hardware }
 }
 
 /// The stages of a step, in the order of the kernel's trace.
 pub const STAGES: [Bound; TRACE_FIELDS] = [
-    bound("β", Scale::Velocity, 4.0, 16.0),
-    bound("α", Scale::Tangential, 4.0, 16.0),
-    bound("r", Scale::Length, 4.0, 16.0),
-    bound("a", Scale::One, 8.0, 32.0),
-    bound("b", Scale::One, 8.0, 32.0),
-    bound("d", Scale::One, 8.0, 32.0),
-    bound("e", Scale::One, 8.0, 32.0),
-    bound("weight of k", Scale::Weight, 8.0, 32.0),
-    bound("right-hand side of k", Scale::Curvature, 8.0, 32.0),
-    bound("δk", Scale::SolvedCurvature, 16.0, 64.0),
-    bound("𝓐", Scale::One, 8.0, 32.0),
-    bound("𝓑", Scale::One, 8.0, 32.0),
-    bound("𝓓", Scale::One, 8.0, 32.0),
-    bound("𝓔", Scale::One, 8.0, 32.0),
-    bound("weight of x", Scale::Weight, 8.0, 32.0),
-    bound("right-hand side of x", Scale::Length, 8.0, 32.0),
-    bound("right-hand side of y", Scale::Length, 8.0, 32.0),
-    bound("δx", Scale::SolvedPosition, 16.0, 64.0),
-    bound("δy", Scale::SolvedPosition, 16.0, 64.0),
-    bound("k", Scale::SolvedCurvature, 16.0, 64.0),
+    bound("β", NaturalScale::Velocity, 4.0, 16.0),
+    bound("α", NaturalScale::Tangential, 4.0, 16.0),
+    bound("r", NaturalScale::Length, 4.0, 16.0),
+    bound("a", NaturalScale::One, 8.0, 32.0),
+    bound("b", NaturalScale::One, 8.0, 32.0),
+    bound("d", NaturalScale::One, 8.0, 32.0),
+    bound("e", NaturalScale::One, 8.0, 32.0),
+    bound("weight of k", NaturalScale::Weight, 8.0, 32.0),
+    bound("right-hand side of k", NaturalScale::Curvature, 8.0, 32.0),
+    bound("δk", NaturalScale::SolvedCurvature, 16.0, 64.0),
+    bound("𝓐", NaturalScale::One, 8.0, 32.0),
+    bound("𝓑", NaturalScale::One, 8.0, 32.0),
+    bound("𝓓", NaturalScale::One, 8.0, 32.0),
+    bound("𝓔", NaturalScale::One, 8.0, 32.0),
+    bound("weight of x", NaturalScale::Weight, 8.0, 32.0),
+    bound("right-hand side of x", NaturalScale::Length, 8.0, 32.0),
+    bound("right-hand side of y", NaturalScale::Length, 8.0, 32.0),
+    bound("δx", NaturalScale::SolvedPosition, 16.0, 64.0),
+    bound("δy", NaturalScale::SolvedPosition, 16.0, 64.0),
+    bound("k", NaturalScale::SolvedCurvature, 16.0, 64.0),
 ];
 
 /// The curve after a run.
 pub const FIELDS: [Bound; 4] = [
-    bound("x", Scale::Position, 16.0, 64.0),
-    bound("y", Scale::Position, 16.0, 64.0),
-    bound("k", Scale::SolvedCurvature, 16.0, 64.0),
-    bound("r", Scale::Length, 16.0, 64.0),
+    bound("x", NaturalScale::Position, 16.0, 64.0),
+    bound("y", NaturalScale::Position, 16.0, 64.0),
+    bound("k", NaturalScale::SolvedCurvature, 16.0, 64.0),
+    bound("r", NaturalScale::Length, 16.0, 64.0),
 ];
 
 /// What the members report after a run: the fields of `Observed`, then the turning number and the travel.
 pub const REPORT: [Bound; 10] = [
-    bound("length", Scale::Position, 16.0, 64.0),
-    bound("area", Scale::Area, 16.0, 64.0),
-    bound("excess", Scale::One, 16.0, 64.0),
-    bound("energy", Scale::Energy, 16.0, 64.0),
-    bound("k_min", Scale::SolvedCurvature, 16.0, 64.0),
-    bound("k_max", Scale::SolvedCurvature, 16.0, 64.0),
-    bound("mesh ratio", Scale::Mesh, 16.0, 64.0),
-    bound("metric drift", Scale::Mesh, 16.0, 64.0),
-    bound("turning", Scale::One, 0.0, 0.0),
-    bound("travel", Scale::Position, 16.0, 64.0),
+    bound("length", NaturalScale::Position, 16.0, 64.0),
+    bound("area", NaturalScale::Area, 16.0, 64.0),
+    bound("excess", NaturalScale::One, 16.0, 64.0),
+    bound("energy", NaturalScale::Energy, 16.0, 64.0),
+    bound("k_min", NaturalScale::SolvedCurvature, 16.0, 64.0),
+    bound("k_max", NaturalScale::SolvedCurvature, 16.0, 64.0),
+    bound("mesh ratio", NaturalScale::Mesh, 16.0, 64.0),
+    bound("metric drift", NaturalScale::Mesh, 16.0, 64.0),
+    bound("turning", NaturalScale::One, 0.0, 0.0),
+    bound("travel", NaturalScale::Position, 16.0, 64.0),
 ];
 
 /// What a run keeps of how the excess falls: its values at the times of the grid, and the fitted rate.
@@ -103,7 +103,7 @@ pub const REPORT: [Bound; 10] = [
 /// An excess is off by its rounding, and inside an adaptive run by what a changed step length changes; its logarithm by
 /// that over the excess; the slope of a line by twice that over the time it spans.
 pub const DECAY: [Bound; 2] =
-    [bound("excess on the way", Scale::One, 16.0, 64.0), bound("fitted rate", Scale::One, 32.0, 128.0)];
+    [bound("excess on the way", NaturalScale::One, 16.0, 64.0), bound("fitted rate", NaturalScale::One, 32.0, 128.0)];
 
 /// What adaptive runs leave besides their ends: the last step's start and middle, how long steps are, when events were.
 ///
@@ -111,12 +111,12 @@ pub const DECAY: [Bound; 2] =
 /// w the largest weight, so relative to the tolerance by ε·√w/tolerance, and a step length by half of that. What lies
 /// inside the run is off by as much of what it changes in a step, on top of what its own scale says.
 pub const PACE: [Bound; 6] = [
-    bound("last step's start", Scale::Position, 16.0, 64.0),
-    bound("its middle", Scale::Position, 16.0, 64.0),
-    bound("their reports", Scale::One, 16.0, 64.0),
-    bound("last step", Scale::One, 4.0, 16.0),
-    bound("next step", Scale::One, 4.0, 16.0),
-    bound("t_half, t_relax", Scale::One, 1.0, 4.0),
+    bound("last step's start", NaturalScale::Position, 16.0, 64.0),
+    bound("its middle", NaturalScale::Position, 16.0, 64.0),
+    bound("their reports", NaturalScale::One, 16.0, 64.0),
+    bound("last step", NaturalScale::One, 4.0, 16.0),
+    bound("next step", NaturalScale::One, 4.0, 16.0),
+    bound("t_half, t_relax", NaturalScale::One, 1.0, 4.0),
 ];
 
 impl Bound {
@@ -126,7 +126,7 @@ impl Bound {
     }
 }
 
-impl Scale {
+impl NaturalScale {
     /// The scale of one member, from the curve before the step and what the step computed.
     pub fn of(self, curve: &Curve<f64>, p: &Parameters<f64>, work: &Workspace<f64>) -> f64 {
         let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
@@ -135,27 +135,27 @@ impl Scale {
         let weight = |rows: &[Coefficients<f64>]| largest(&mut rows.iter().map(|row| row.weight));
         let length: f64 = curve.r.nodes().iter().sum();
         match self {
-            Scale::Velocity => {
+            NaturalScale::Velocity => {
                 let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
                 k() / (shortest * shortest) + p.law(p.branches()).b(k()).abs()
             }
-            Scale::Tangential => work.motion.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
-            Scale::Length => longest(),
-            Scale::One => 1.0,
-            Scale::Weight => weight(&work.curvature.system.rows).max(weight(&work.position.system.rows)),
-            Scale::Curvature => k(),
-            Scale::SolvedCurvature => k() * weight(&work.curvature.system.rows).sqrt(),
-            Scale::Position => length / std::f64::consts::TAU,
-            Scale::Area => length * length / (4.0 * std::f64::consts::PI),
-            Scale::Energy => {
+            NaturalScale::Tangential => work.motion.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
+            NaturalScale::Length => longest(),
+            NaturalScale::One => 1.0,
+            NaturalScale::Weight => weight(&work.curvature.system.rows).max(weight(&work.position.system.rows)),
+            NaturalScale::Curvature => k(),
+            NaturalScale::SolvedCurvature => k() * weight(&work.curvature.system.rows).sqrt(),
+            NaturalScale::Position => length / std::f64::consts::TAU,
+            NaturalScale::Area => length * length / (4.0 * std::f64::consts::PI),
+            NaturalScale::Energy => {
                 curve.k.nodes().iter().zip(curve.r.nodes()).map(|(k, r)| k * k * r).sum::<f64>()
                     + p.length_penalty * length
             }
-            Scale::Mesh => {
+            NaturalScale::Mesh => {
                 let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
                 length / std::f64::consts::TAU / shortest
             }
-            Scale::SolvedPosition => longest() * weight(&work.position.system.rows).sqrt(),
+            NaturalScale::SolvedPosition => longest() * weight(&work.position.system.rows).sqrt(),
         }
     }
 }

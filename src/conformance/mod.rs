@@ -16,5 +16,5 @@ pub mod compare;
 pub mod self_test;
 
 pub use cases::{adaptive_members, members};
-pub use compare::{Row, Tamper, adaptive, runs, stages};
+pub use compare::{ConformanceRow, Tamper, adaptive, runs, stages};
 pub use self_test::self_test;

@@ -5,7 +5,7 @@
 
 use super::{
     adaptive_members,
-    compare::{Left, Row, compare_ends},
+    compare::{ConformanceRow, Left, compare_ends},
     members,
 };
 use crate::{
@@ -60,7 +60,7 @@ pub fn self_test<T: Real>(
     let rows = compare_ends::<T>(hardware, method, n, &launches, &left).map_err(|error| wrong(error.to_string()))?;
     match rows.iter().filter(|row| !row.is_empty()).find(|row| !row.passes()) {
         None => Ok(()),
-        Some(Row { quantity, error, bound, at: (member, node), .. }) => Err(wrong(format!(
+        Some(ConformanceRow { quantity, error, bound, at: (member, node), .. }) => Err(wrong(format!(
             "{quantity} of member {member}, node {node}, of {n} in {}, is off by {error:.1e}, bound {bound:.1e}",
             T::NAME
         ))),

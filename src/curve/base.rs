@@ -13,12 +13,12 @@ const CENTROID_SAMPLES: usize = 1 << 14;
 
 /// A closed plane curve, counter-clockwise if it has a sense, at any parameter `u ∈ [0, 1]`.
 pub struct BaseCurve {
-    kind: Kind,
+    kind: CurveKind,
     centroid: DVec2,
     cusps: Vec<f64>,
 }
 
-enum Kind {
+enum CurveKind {
     Formula(Box<dyn Fn(f64) -> DVec2 + Send + Sync>),
     Polygon(Arc<Outline>),
 }
@@ -28,7 +28,7 @@ impl BaseCurve {
     pub fn from_formula(formula: impl Fn(f64) -> DVec2 + Send + Sync + 'static) -> BaseCurve {
         let samples: Vec<DVec2> = (0..CENTROID_SAMPLES).map(|j| formula(j as f64 / CENTROID_SAMPLES as f64)).collect();
         let centroid = polygon::area_centroid(&samples);
-        BaseCurve { kind: Kind::Formula(Box::new(formula)), centroid, cusps: Vec::new() }
+        BaseCurve { kind: CurveKind::Formula(Box::new(formula)), centroid, cusps: Vec::new() }
     }
 
     /// The same curve with cusps at the parameters `cusps`, increasing multiples of 1/32 between 0 and 1.
@@ -42,14 +42,14 @@ impl BaseCurve {
     pub fn from_outline(outline: impl Into<Arc<Outline>>) -> BaseCurve {
         let outline = outline.into();
         let centroid = polygon::area_centroid(outline.vertices());
-        BaseCurve { kind: Kind::Polygon(outline), centroid, cusps: Vec::new() }
+        BaseCurve { kind: CurveKind::Polygon(outline), centroid, cusps: Vec::new() }
     }
 
     /// The point at `u ∈ [0, 1]`.
     pub fn point(&self, u: f64) -> DVec2 {
         match &self.kind {
-            Kind::Formula(formula) => formula(u),
-            Kind::Polygon(outline) => outline.point(u),
+            CurveKind::Formula(formula) => formula(u),
+            CurveKind::Polygon(outline) => outline.point(u),
         }
     }
 
@@ -66,8 +66,8 @@ impl BaseCurve {
     /// The polygon, if the curve is one.
     pub fn outline(&self) -> Option<&Arc<Outline>> {
         match &self.kind {
-            Kind::Formula(_) => None,
-            Kind::Polygon(outline) => Some(outline),
+            CurveKind::Formula(_) => None,
+            CurveKind::Polygon(outline) => Some(outline),
         }
     }
 
@@ -75,11 +75,11 @@ impl BaseCurve {
     /// polygon is among them, so that no corner is cut.
     pub fn subdivision(&self, pieces: usize) -> Box<dyn Iterator<Item = (f64, DVec2)> + '_> {
         match &self.kind {
-            Kind::Formula(formula) => {
+            CurveKind::Formula(formula) => {
                 let at = move |j: usize| (j as f64 / pieces as f64, formula((j % pieces) as f64 / pieces as f64));
                 Box::new((0..=pieces).map(at))
             }
-            Kind::Polygon(outline) => Box::new(outline.subdivision(pieces)),
+            CurveKind::Polygon(outline) => Box::new(outline.subdivision(pieces)),
         }
     }
 }

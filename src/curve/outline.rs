@@ -166,7 +166,7 @@ impl Outline {
 
 /// The points of a file with the lines that they came from.
 #[derive(Default)]
-struct Table {
+struct PointTable {
     points: Vec<DVec2>,
     lines: Vec<usize>,
 }
@@ -230,8 +230,8 @@ impl Source<'_> {
     }
 
     /// Parses the lines into points.
-    fn table(&self, bytes: &[u8]) -> Result<Table> {
-        let mut table = Table::default();
+    fn table(&self, bytes: &[u8]) -> Result<PointTable> {
+        let mut table = PointTable::default();
         let mut columns = None;
         for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
             if content.len() > MAX_LINE {
@@ -306,8 +306,8 @@ impl Source<'_> {
     }
 
     /// Drops a closing point that repeats the first, and refuses every other coincidence.
-    fn make_distinct(&self, table: &mut Table) -> Result<()> {
-        let Table { points, lines } = table;
+    fn make_distinct(&self, table: &mut PointTable) -> Result<()> {
+        let PointTable { points, lines } = table;
         let [Some(&first), Some(&last)] = [points.first(), points.last()] else {
             return Err(self.refusal(None, "the file holds no points", "give at least three, x,y a line"));
         };

@@ -92,14 +92,14 @@ enum Plan {
     /// The base curve's nodes, each mapped.
     Fixed(Vec<DVec2>),
     /// A fine subdivision, mapped and measured for each member.
-    Measured(Vec<Sample>),
+    Measured(Vec<CurvePoint>),
     /// The same in so many pieces, too many for a table.
     Passing(usize),
 }
 
 /// A point of the base curve with its parameter and its direction from the centre.
 #[derive(Clone, Copy)]
-struct Sample {
+struct CurvePoint {
     u: f64,
     point: DVec2,
     direction: DVec2,
@@ -120,7 +120,7 @@ impl Sampler {
             (Sampling::Parameter, _) => {
                 Plan::Fixed((1..=nodes).map(|i| curve.point(i as f64 / nodes as f64)).collect())
             }
-            (Sampling::Arclength, _) if pieces(nodes) * size_of::<Sample>() > LARGEST_TABLE => {
+            (Sampling::Arclength, _) if pieces(nodes) * size_of::<CurvePoint>() > LARGEST_TABLE => {
                 Plan::Passing(pieces(nodes))
             }
             (Sampling::Arclength, _) => Plan::Measured(samples(&curve, pieces(nodes)).collect()),
@@ -154,7 +154,7 @@ impl Sampler {
         match sampling {
             Sampling::Parameter | Sampling::Points => nodes * size_of::<DVec2>(),
             Sampling::Arclength => {
-                Some(pieces(nodes) * size_of::<Sample>()).filter(|of| *of <= LARGEST_TABLE).unwrap_or(0)
+                Some(pieces(nodes) * size_of::<CurvePoint>()).filter(|of| *of <= LARGEST_TABLE).unwrap_or(0)
             }
         }
     }
@@ -229,7 +229,7 @@ impl Sampler {
 
 /// The parameter of each sample, and the length up to it of the curve stretched by `factor`.
 fn measured(
-    samples: impl Iterator<Item = Sample>,
+    samples: impl Iterator<Item = CurvePoint>,
     factor: &RadialFactor,
     centre: DVec2,
 ) -> impl Iterator<Item = (f64, f64)> {
@@ -246,9 +246,10 @@ fn pieces(nodes: usize) -> usize {
     MIN_SAMPLES.max(SAMPLES_PER_NODE * nodes)
 }
 
-fn samples(curve: &BaseCurve, pieces: usize) -> impl Iterator<Item = Sample> {
+fn samples(curve: &BaseCurve, pieces: usize) -> impl Iterator<Item = CurvePoint> {
     let centre = curve.centroid();
-    let directed = move |(u, point): (f64, DVec2)| Sample { u, point, direction: (point - centre).normalize_or_zero() };
+    let directed =
+        move |(u, point): (f64, DVec2)| CurvePoint { u, point, direction: (point - centre).normalize_or_zero() };
     curve.subdivision(pieces).map(directed)
 }
 

@@ -83,7 +83,7 @@ pub struct Axis {
 
 /// Where an axis is marked.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ticks {
+pub struct AxisTicks {
     /// Ascending values and their labels.
     pub labelled: Vec<(f64, String)>,
     /// Values between them.
@@ -150,7 +150,7 @@ impl Axis {
     }
 
     /// Name and unit, with the power of ten that the labels count.
-    pub fn title(&self, ticks: &Ticks) -> String {
+    pub fn title(&self, ticks: &AxisTicks) -> String {
         let power = if ticks.power == 0 { String::new() } else { power_of_ten(ticks.power) };
         match format!("{power} {}", self.unit).trim() {
             "" => self.name.clone(),
@@ -159,18 +159,18 @@ impl Axis {
     }
 
     /// Ticks of a horizontal axis of this many pixels.
-    pub fn ticks_across(&self, length: f64) -> Ticks {
+    pub fn ticks_across(&self, length: f64) -> AxisTicks {
         self.ticks(length, &|label| width(label, SIZE) + BETWEEN)
     }
 
     /// Ticks of a vertical axis of this many pixels.
-    pub fn ticks_upwards(&self, length: f64) -> Ticks {
+    pub fn ticks_upwards(&self, length: f64) -> AxisTicks {
         self.ticks(length, &|_| LINE)
     }
 
     /// The closest ticks whose labels, each taking as many pixels as `extent` says, do not touch.
-    fn ticks(&self, length: f64, extent: &dyn Fn(&str) -> f64) -> Ticks {
-        let fits = |ticks: &Ticks| {
+    fn ticks(&self, length: f64, extent: &dyn Fn(&str) -> f64) -> AxisTicks {
+        let fits = |ticks: &AxisTicks| {
             ticks.labelled.windows(2).all(|pair| {
                 let [a, b] = [&pair[0], &pair[1]];
                 (self.share(b.0) - self.share(a.0)) * length >= 0.5 * (extent(&a.1) + extent(&b.1))
@@ -194,10 +194,10 @@ impl Axis {
     }
 
     /// The multiples of `step`, a power of ten times 1, 2 or 5.
-    fn linear(&self, step: f64) -> Ticks {
+    fn linear(&self, step: f64) -> AxisTicks {
         let power = self.power();
         let labelled = multiples(step / ten_to(power), self.low / ten_to(power), self.high / ten_to(power));
-        Ticks {
+        AxisTicks {
             labelled: labelled.map(|(label, value)| (value * ten_to(power), label)).collect(),
             minor: vec![],
             power,
@@ -205,7 +205,7 @@ impl Axis {
     }
 
     /// From dense to sparse; none of a linear axis.
-    fn log_candidates(&self, length: f64) -> Vec<Ticks> {
+    fn log_candidates(&self, length: f64) -> Vec<AxisTicks> {
         if self.scale == Scale::Linear {
             return Vec::new();
         }
@@ -235,7 +235,7 @@ impl Axis {
         };
         let candidate = |values: Vec<(u8, i32)>| {
             let labelled = values.into_iter().map(label).collect();
-            Ticks { labelled, minor: minor.clone(), power }
+            AxisTicks { labelled, minor: minor.clone(), power }
         };
         let short = !powers && decades <= 2.5;
         let dense = [&[1, 2, 3, 5][..], &[1, 2, 5]].into_iter().filter(|_| short).map(|list| digits(list, 1));

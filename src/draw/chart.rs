@@ -35,14 +35,14 @@ const BAR: f64 = 14.0;
 
 /// Unknown and known bounds of an estimated number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Estimate {
+pub struct EstimatedNumber {
     /// The number.
     pub value: f64,
     /// Its confidence interval, 95 % by convention; none where it is unknown.
     pub interval: Option<(f64, f64)>,
 }
 
-impl Estimate {
+impl EstimatedNumber {
     /// `0.412 (0.401 to 0.420)`.
     pub fn shown(&self) -> String {
         let value = significant(self.value, 3);
@@ -55,14 +55,14 @@ impl Estimate {
 
 /// How a legend's entry is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mark {
+pub enum LegendMark {
     /// A line in the dash pattern of its class.
     Series,
     /// A dashed line.
     Dashed,
     /// A thin line, and a thick one.
     Thin,
-    /// See [`Mark::Thin`].
+    /// See [`LegendMark::Thin`].
     Thick,
     /// An area.
     Band,
@@ -70,7 +70,7 @@ pub enum Mark {
     Marker(usize),
     /// A triangle that points up, and one that points right.
     Up,
-    /// See [`Mark::Up`].
+    /// See [`LegendMark::Up`].
     Right,
     /// The short stroke of a censored member.
     Stroke,
@@ -82,21 +82,21 @@ pub struct Entry {
     /// Class of its colour.
     pub class: String,
     /// How it is drawn.
-    pub mark: Mark,
+    pub mark: LegendMark,
     /// What it stands for.
     pub label: String,
 }
 
 impl Entry {
     /// An entry in the colour of `class`.
-    pub fn new(class: &str, mark: Mark, label: &str) -> Entry {
+    pub fn new(class: &str, mark: LegendMark, label: &str) -> Entry {
         Entry { class: class.into(), mark, label: label.into() }
     }
 
     /// Pixels of the sample before the label.
     fn sample(&self) -> f64 {
         match self.mark {
-            Mark::Marker(_) | Mark::Up | Mark::Right | Mark::Stroke => 10.0,
+            LegendMark::Marker(_) | LegendMark::Up | LegendMark::Right | LegendMark::Stroke => 10.0,
             _ => SAMPLE,
         }
     }
@@ -107,15 +107,15 @@ impl Entry {
         let line = format!("M{x} {y}h{SAMPLE}");
         svg.open(&self.class);
         match self.mark {
-            Mark::Series => svg.path("series", &line),
-            Mark::Dashed => svg.path("dashed", &line),
-            Mark::Thin => svg.path("thin", &line),
-            Mark::Thick => svg.path("thick", &line),
-            Mark::Band => svg.rectangle("band", at - DVec2::new(0.0, 5.0), DVec2::new(SAMPLE, 10.0), 0.0),
-            Mark::Marker(rank) => draw_marker(svg, rank, middle),
-            Mark::Up => svg.path("solid", &triangle_up(middle)),
-            Mark::Right => svg.path("solid", &triangle_right(middle)),
-            Mark::Stroke => svg.path("thin", &stroke(middle)),
+            LegendMark::Series => svg.path("series", &line),
+            LegendMark::Dashed => svg.path("dashed", &line),
+            LegendMark::Thin => svg.path("thin", &line),
+            LegendMark::Thick => svg.path("thick", &line),
+            LegendMark::Band => svg.rectangle("band", at - DVec2::new(0.0, 5.0), DVec2::new(SAMPLE, 10.0), 0.0),
+            LegendMark::Marker(rank) => draw_marker(svg, rank, middle),
+            LegendMark::Up => svg.path("solid", &triangle_up(middle)),
+            LegendMark::Right => svg.path("solid", &triangle_right(middle)),
+            LegendMark::Stroke => svg.path("thin", &stroke(middle)),
         }
         svg.close();
     }
@@ -391,7 +391,7 @@ impl Colours {
     /// The entries of curves that are told apart; `label` names them.
     pub fn legend<'a>(&self, label: impl Fn(usize) -> &'a str) -> impl Iterator<Item = Entry> {
         let told_apart = self.shown.iter().filter(|_| self.bar.is_none());
-        told_apart.map(move |(i, class)| Entry::new(class, Mark::Series, label(*i)))
+        told_apart.map(move |(i, class)| Entry::new(class, LegendMark::Series, label(*i)))
     }
 
     /// The marker of the curve drawn at this rank: colours that are ordered need no shapes.

@@ -63,31 +63,31 @@ pub struct Plot {
     /// Second line.
     pub subtitle: String,
     /// From left to right. Where one holds several curves a legend tells them apart.
-    pub panels: Vec<Panel>,
+    pub panels: Vec<PlotPanel>,
 }
 
 /// Axes with curves in them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Panel {
+pub struct PlotPanel {
     /// A line above the axes.
     pub heading: Option<String>,
     /// The curves, first to last.
-    pub curves: Vec<Curve>,
+    pub curves: Vec<PlottedCurve>,
 }
 
 /// A closed polygon, drawn as a line with a dot on each node.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Curve {
+pub struct PlottedCurve {
     /// Its entry in the legend.
     pub label: String,
     /// Its nodes, all finite.
     pub nodes: Vec<DVec2>,
 }
 
-impl From<&Snapshot> for Curve {
-    fn from(Snapshot { t, x, y, .. }: &Snapshot) -> Curve {
+impl From<&Snapshot> for PlottedCurve {
+    fn from(Snapshot { t, x, y, .. }: &Snapshot) -> PlottedCurve {
         let nodes = x.iter().zip(y).map(|(x, y)| DVec2::new(*x, *y)).collect();
-        Curve { label: format!("t = {}", short(*t)), nodes }
+        PlottedCurve { label: format!("t = {}", short(*t)), nodes }
     }
 }
 
@@ -119,7 +119,7 @@ impl Plot {
     }
 }
 
-fn draw_legend(svg: &mut Svg, panel: &Panel, left: DVec2) {
+fn draw_legend(svg: &mut Svg, panel: &PlotPanel, left: DVec2) {
     for (i, curve) in panel.curves.iter().enumerate() {
         let at = left + DVec2::new(i as f64 * ENTRY, 0.0);
         svg.open(&colour(i));
@@ -148,7 +148,7 @@ struct Frame {
 
 impl Frame {
     /// The least that holds all curves.
-    fn new(panels: &[Panel]) -> Frame {
+    fn new(panels: &[PlotPanel]) -> Frame {
         let nodes = || panels.iter().flat_map(|panel| &panel.curves).flat_map(|curve| curve.nodes.iter().copied());
         let low = nodes().reduce(DVec2::min).unwrap_or(DVec2::ZERO);
         let high = nodes().reduce(DVec2::max).unwrap_or(DVec2::ONE);
@@ -162,7 +162,7 @@ impl Frame {
     }
 
     /// Draws `panel` with the upper left corner of its axes at `corner`.
-    fn draw(&self, svg: &mut Svg, panel: &Panel, corner: DVec2, names_y: bool) {
+    fn draw(&self, svg: &mut Svg, panel: &PlotPanel, corner: DVec2, names_y: bool) {
         // y grows downwards in SVG.
         let place = |p: DVec2| corner + DVec2::new(p.x - self.low.x, self.high.y - p.y) * self.scale;
         let end = corner + self.size;
@@ -216,14 +216,14 @@ mod tests {
 
     use super::*;
 
-    fn rectangle(width: f64, height: f64) -> Curve {
+    fn rectangle(width: f64, height: f64) -> PlottedCurve {
         let corner = 0.5 * DVec2::new(width, height);
         let nodes = [DVec2::ONE, DVec2::new(-1.0, 1.0), -DVec2::ONE, DVec2::new(1.0, -1.0)].map(|p| p * corner);
-        Curve { label: "t = 0".into(), nodes: nodes.into() }
+        PlottedCurve { label: "t = 0".into(), nodes: nodes.into() }
     }
 
-    fn plot(panels: &[&[Curve]]) -> Plot {
-        let panel = |curves: &&[Curve]| Panel { heading: None, curves: curves.to_vec() };
+    fn plot(panels: &[&[PlottedCurve]]) -> Plot {
+        let panel = |curves: &&[PlottedCurve]| PlotPanel { heading: None, curves: curves.to_vec() };
         Plot { title: "a".into(), subtitle: "b".into(), panels: panels.iter().map(panel).collect() }
     }
 

@@ -35,18 +35,18 @@ pub const MAX_CELLS: u64 = 10_000;
 
 /// The swept keys in order, each with its values.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sweep(Vec<Axis>);
+pub struct Sweep(Vec<SweepAxis>);
 
 /// One key and the values that it takes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
+pub struct SweepAxis {
     /// A key of the spec.
     pub key: String,
     /// Its values: numbers, words or truths.
     pub values: Vec<Value>,
 }
 
-impl Axis {
+impl SweepAxis {
     /// The values as they stand in tables.
     pub fn labels(&self) -> Vec<String> {
         self.values.iter().map(label).collect()
@@ -69,11 +69,11 @@ pub(super) fn label(value: &Value) -> String {
     }
 }
 
-impl FromStr for Axis {
+impl FromStr for SweepAxis {
     type Err = String;
 
     /// `key=v1,v2`; where a value has commas itself, semicolons stand between the values.
-    fn from_str(text: &str) -> Result<Axis, String> {
+    fn from_str(text: &str) -> Result<SweepAxis, String> {
         let (key, values) = text.split_once('=').ok_or_else(|| format!("`{text}` has no `=`; write key=v1,v2,..."))?;
         let separator = if values.contains(';') { ';' } else { ',' };
         let key = key.trim();
@@ -88,7 +88,7 @@ impl FromStr for Axis {
             }
         };
         let words = values.split(separator).filter(|word| !word.trim().is_empty());
-        Ok(Axis { key: key.to_string(), values: words.map(value).collect() })
+        Ok(SweepAxis { key: key.to_string(), values: words.map(value).collect() })
     }
 }
 
@@ -117,12 +117,12 @@ impl Sweep {
     }
 
     /// The keys and their values, in order.
-    pub fn axes(&self) -> &[Axis] {
+    pub fn axes(&self) -> &[SweepAxis] {
         &self.0
     }
 
     /// Sets the values of a key: those of a flag stand instead of those of the file.
-    pub fn set(&mut self, axis: Axis) {
+    pub fn set(&mut self, axis: SweepAxis) {
         match self.0.iter_mut().find(|own| own.key == axis.key) {
             Some(own) => *own = axis,
             None => self.0.push(axis),
@@ -164,7 +164,7 @@ impl Sweep {
     /// # Errors
     /// [`Error::Request`] for a key that is unknown, cannot vary, or has no values, and for too many cells.
     pub fn check(&self, keys: &[String]) -> Result<()> {
-        for (i, Axis { key, values }) in self.0.iter().enumerate() {
+        for (i, SweepAxis { key, values }) in self.0.iter().enumerate() {
             if !keys.contains(key) {
                 let hint = did_you_mean(key, keys.iter().map(String::as_str));
                 return Err(Error::Request(format!("--sweep {key}: no such key{hint}; see --print-spec for the keys")));
@@ -195,7 +195,7 @@ impl Sweep {
 impl Serialize for Sweep {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len()))?;
-        for Axis { key, values } in &self.0 {
+        for SweepAxis { key, values } in &self.0 {
             map.serialize_entry(key, values)?;
         }
         map.end()
@@ -221,7 +221,7 @@ impl<'de> Deserialize<'de> for Sweep {
                         Read::Whole(whole) => from_whole(&key, whole),
                     };
                     let values = values.into_iter().map(value).collect();
-                    axes.push(Axis { key, values });
+                    axes.push(SweepAxis { key, values });
                 }
                 Ok(Sweep(axes))
             }
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn a_seed_that_is_no_number_of_toml_is_swept_and_reads_back() {
-        let axis: Axis = "seed=1,9223372036854775808,18446744073709551615".parse().unwrap();
+        let axis: SweepAxis = "seed=1,9223372036854775808,18446744073709551615".parse().unwrap();
         let large = [9_223_372_036_854_775_808, u64::MAX];
         assert_eq!(axis.labels(), ["1".into(), large[0].to_string(), large[1].to_string()]);
         let base = Spec { seed: u64::MAX - 1, sweep: Sweep(vec![axis]), ..Spec::default() };
@@ -286,7 +286,7 @@ mod tests {
         assert_eq!(serde_json::from_str::<Spec>(&serde_json::to_string(&base).unwrap()).unwrap(), base);
         let seeds: Vec<u64> = (0..3).map(|cell| base.of_cell(cell).unwrap().seed).collect();
         assert_eq!(seeds, [1, large[0], large[1]]);
-        assert!("omega=18446744073709551615".parse::<Axis>().unwrap().values[0].is_float());
+        assert!("omega=18446744073709551615".parse::<SweepAxis>().unwrap().values[0].is_float());
         let plain = Spec { sweep: Sweep::default(), ..base.clone() };
         let other = Spec { seed: u64::MAX, ..plain.clone() };
         assert!(plain.difference(&other, &[]).is_some_and(|(key, ..)| key == "seed"));
@@ -325,6 +325,6 @@ mod tests {
         assert!(many.contains("--sweep (1000000 cells): too many; at most 10000"), "{many}");
         let wrong = of_cell(&sweep(&["amplitude=0.1,word"]), &Spec::default(), 1).unwrap_err().to_string();
         assert!(wrong.starts_with("--sweep amplitude=word: "), "{wrong}");
-        assert!("amplitude".parse::<Axis>().is_err());
+        assert!("amplitude".parse::<SweepAxis>().is_err());
     }
 }

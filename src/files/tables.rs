@@ -15,7 +15,7 @@ use crate::results::tally::MeanExcess;
 use crate::{
     ensemble::{Outcome, SeriesRow, Snapshot},
     error::{Error, Result},
-    truth::Row,
+    truth::ConvergenceRow,
 };
 
 /// Bytes gathered before they are written.
@@ -228,8 +228,8 @@ impl SnapshotTable {
 
 impl ErrorRow {
     /// That of a run: τ or the tolerance of adaptive steps is empty.
-    pub fn of(run: &Row) -> ErrorRow {
-        let Row { problem, varied, at, error, order, .. } = run;
+    pub fn of(run: &ConvergenceRow) -> ErrorRow {
+        let ConvergenceRow { problem, varied, at, error, order, .. } = run;
         ErrorRow {
             problem: problem.clone(),
             varied: varied.name().to_string(),
@@ -363,7 +363,7 @@ mod tests {
 
     #[test]
     fn a_table_of_convergence_has_these_bytes() {
-        let row = |error, order| Row {
+        let row = |error, order| ConvergenceRow {
             problem: "lemniscate".into(),
             varied: crate::truth::Varied::Step,
             at: crate::truth::Resolution { n: 100, tau: 0.25, tolerance: None },

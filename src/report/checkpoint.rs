@@ -68,7 +68,7 @@ pub struct Head {
     /// Tables, as far as they are told by this state.
     pub tables: Vec<Mark>,
     /// The arrays of snapshots.
-    pub store: Option<zarr::Mark>,
+    pub store: Option<zarr::StoreMark>,
     /// Rows of members that have not left yet, where they were too many for memory.
     pub rows: Option<Mark>,
     /// Of the members that ended, what their rows do not say.
@@ -322,7 +322,7 @@ mod tests {
             ["Head", "Origin", "Platform", "Precision", "Duration", "Mark", "ArrayMark", "Film"],
             ["Aside", "MollifiedMembers", "Moments", "ExactSum", "Ended", "Outcome", "Status", "Observables"],
             ["Rows", "Extent", "SeriesRow", "Snapshot", "Portrait", "Mollified", "DVec2", "Paused"],
-            ["Counters", "Report", "Observed", "Progress", "Decay", "", "", ""],
+            ["Counters", "Report", "Observed", "Progress", "Decay", "StoreMark", "", ""],
         ];
         let expected: BTreeSet<&str> = expected.into_iter().flatten().filter(|name| !name.is_empty()).collect();
         assert_eq!(named, expected);

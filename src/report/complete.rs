@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{document::Document, overview::Overview, study::Study};
+use super::{document::Document, overview::Overview, pictures::FinishedRun};
 use crate::{
     ensemble::Spec,
     error::{Error, Result},
@@ -78,7 +78,7 @@ impl Complete<'_> {
         let mut names: Vec<&str> = names::TABLES.into_iter().filter(is_written).collect();
         let provenance = &Provenance::new(spec, platform, tally, warnings, started, wall);
         let run = folder.write(names::RUN, provenance.to_json()?)?;
-        let study = Study { provenance, tally, statistics, excess, films };
+        let study = FinishedRun { provenance, tally, statistics, excess, films };
         let mut drawn = Vec::new();
         let done = (|| {
             drawn.push(folder.write(names::PORTRAITS, portraits::to_json(films)?)?);

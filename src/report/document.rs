@@ -22,16 +22,16 @@ pub struct Document<'a> {
     run: &'a Provenance,
     folder: &'a Path,
     files: &'a [&'static str],
-    cells: Vec<Cell<'a>>,
+    cells: Vec<CellDocument<'a>>,
     /// Whether the cells could have one distribution; null where they were not compared.
-    log_rank: Option<Comparison>,
+    log_rank: Option<LogRankDocument>,
     /// The medians as a power of the swept value; null where there is no such law.
-    power_law: Option<Law>,
+    power_law: Option<PowerLawDocument>,
 }
 
 /// A row of `ensemble.csv`, under the names of its columns.
 #[derive(Serialize)]
-struct Cell<'a> {
+struct CellDocument<'a> {
     cell: u64,
     values: BTreeMap<&'a str, &'a Value>,
     members: u64,
@@ -41,14 +41,14 @@ struct Cell<'a> {
 }
 
 #[derive(Serialize)]
-struct Comparison {
+struct LogRankDocument {
     chi2: f64,
     degrees_of_freedom: usize,
     p: f64,
 }
 
 #[derive(Serialize)]
-struct Law {
+struct PowerLawDocument {
     factor: f64,
     exponent: f64,
     exponent_se: Option<f64>,
@@ -65,18 +65,18 @@ impl<'a> Document<'a> {
         files: &'a [&'static str],
     ) -> Document<'a> {
         let EnsembleStatistics { cells, log_rank, power_law, .. } = statistics;
-        let log_rank = log_rank.as_ref().map(|test| Comparison {
+        let log_rank = log_rank.as_ref().map(|test| LogRankDocument {
             chi2: test.statistic,
             degrees_of_freedom: test.degrees_of_freedom,
             p: test.p_value,
         });
-        let power_law = power_law.as_ref().map(|law| Law {
+        let power_law = power_law.as_ref().map(|law| PowerLawDocument {
             factor: law.factor,
             exponent: law.exponent,
             exponent_se: law.exponent_error,
             r2: law.r2,
         });
-        let cells = cells.iter().map(|cell| Cell::new(spec, cell)).collect();
+        let cells = cells.iter().map(|cell| CellDocument::new(spec, cell)).collect();
         Document { run, folder, files, cells, log_rank, power_law }
     }
 
@@ -86,10 +86,10 @@ impl<'a> Document<'a> {
     }
 }
 
-impl<'a> Cell<'a> {
-    fn new(spec: &'a Spec, statistics: &CellStatistics) -> Cell<'a> {
+impl<'a> CellDocument<'a> {
+    fn new(spec: &'a Spec, statistics: &CellStatistics) -> CellDocument<'a> {
         let (cell, counts) = (statistics.cell, statistics.counts);
-        Cell {
+        CellDocument {
             cell,
             values: spec.sweep.axes().iter().map(|axis| &axis.key[..]).zip(spec.sweep.values(cell)).collect(),
             members: statistics.members(),

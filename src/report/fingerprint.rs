@@ -125,12 +125,12 @@ impl<'de> MapAccess<'de> for Values<'_> {
 }
 
 /// One variant of an enum.
-struct Choice<'a> {
+struct ChosenVariant<'a> {
     tracer: &'a mut Tracer,
     index: u32,
 }
 
-impl<'a, 'de> EnumAccess<'de> for Choice<'a> {
+impl<'a, 'de> EnumAccess<'de> for ChosenVariant<'a> {
     type Error = Error;
     type Variant = &'a mut Tracer;
 
@@ -257,7 +257,7 @@ impl<'de> Deserializer<'de> for &mut Tracer {
         let index = if *seen < *all { *seen } else { 0 };
         *seen = (*all).min(*seen + 1);
         self.note(&format!("{name} {} of {}", index, variants.join("|")));
-        visitor.visit_enum(Choice { tracer: self, index: index as u32 })
+        visitor.visit_enum(ChosenVariant { tracer: self, index: index as u32 })
     }
 
     fn deserialize_any<V: Visitor<'de>>(self, _: V) -> Result<V::Value, Error> {

@@ -70,10 +70,10 @@ text { fill: #e6edf3 }
 
 /// The gallery of the first [`MAX_PANELS`] of `films`, as the text of an SVG file.
 pub fn draw(films: &[Film]) -> String {
-    let panels: Vec<Panel> = films.iter().take(MAX_PANELS).map(Panel::new).collect();
+    let panels: Vec<MemberPanel> = films.iter().take(MAX_PANELS).map(MemberPanel::new).collect();
     let columns = panels.len().clamp(MIN_COLUMNS, COLUMNS);
     let rows = panels.len().div_ceil(columns).max(1);
-    let Layout { scale, frame } = layout(&panels);
+    let PanelLayout { scale, frame } = layout(&panels);
     let pitch = frame + DVec2::new(GAP, CAPTION);
     let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
     let height = HEAD + rows as f64 * pitch.y + FOOT;
@@ -91,17 +91,17 @@ pub fn draw(films: &[Film]) -> String {
 }
 
 /// One member of the gallery.
-struct Panel<'a> {
+struct MemberPanel<'a> {
     film: &'a Film,
     /// Its nodes at the start, on the way and at the end; none where nothing can be drawn.
     states: Vec<Vec<DVec2>>,
 }
 
-impl Panel<'_> {
-    fn new(film: &Film) -> Panel<'_> {
+impl MemberPanel<'_> {
+    fn new(film: &Film) -> MemberPanel<'_> {
         let frames = film.frames();
         let states = shown(&frames).into_iter().map(|i| frames[i].clone()).collect();
-        Panel { film, states }
+        MemberPanel { film, states }
     }
 
     /// Lower left and upper right corner of all states.
@@ -125,7 +125,7 @@ fn shown(frames: &[Vec<DVec2>]) -> Vec<usize> {
     shown
 }
 
-fn draw_panel(svg: &mut Svg, panel: &Panel, corner: DVec2, frame: DVec2, scale: f64) {
+fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, frame: DVec2, scale: f64) {
     let middle = corner + 0.5 * frame;
     let Film { member, status, t_relax, points, .. } = panel.film;
     svg.open(&format!("panel {}", status.name()));
@@ -166,7 +166,7 @@ fn draw_scale(svg: &mut Svg, left: DVec2, scale: f64) {
 }
 
 /// What all panels share.
-struct Layout {
+struct PanelLayout {
     /// Pixels per unit of length.
     scale: f64,
     /// Size of a panel.
@@ -174,12 +174,13 @@ struct Layout {
 }
 
 /// The largest of `panels` fills its frame, which is as low as the tallest allows.
-fn layout(panels: &[Panel]) -> Layout {
-    let extent = panels.iter().filter_map(Panel::bounds).map(|(low, high)| high - low).fold(DVec2::ZERO, DVec2::max);
+fn layout(panels: &[MemberPanel]) -> PanelLayout {
+    let extent =
+        panels.iter().filter_map(MemberPanel::bounds).map(|(low, high)| high - low).fold(DVec2::ZERO, DVec2::max);
     let largest = extent.max_element();
     let scale = if largest > 0.0 && largest.is_finite() { (SIDE - 2.0 * PADDING) / largest } else { 1.0 };
     let height = (extent.y * scale + 2.0 * PADDING).clamp(MIN_HEIGHT, SIDE);
-    Layout { scale, frame: DVec2::new(SIDE, height) }
+    PanelLayout { scale, frame: DVec2::new(SIDE, height) }
 }
 
 fn mean_spacing(points: &[DVec2]) -> f64 {
@@ -243,9 +244,9 @@ mod tests {
     #[test]
     fn one_scale_fits_the_largest_member() {
         let films = films(3, 60);
-        let mut panels: Vec<Panel> = films.iter().map(Panel::new).collect();
+        let mut panels: Vec<MemberPanel> = films.iter().map(MemberPanel::new).collect();
         panels[1].states[0].iter_mut().for_each(|p| *p *= 10.0);
-        let Layout { scale, frame } = layout(&panels);
+        let PanelLayout { scale, frame } = layout(&panels);
         let (low, high) = panels[1].bounds().unwrap();
         let slack = frame - (high - low) * scale - 2.0 * PADDING;
         assert!(slack.x.abs() < 1e-9 && slack.y.abs() < 1e-9, "{slack}");

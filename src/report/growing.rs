@@ -60,7 +60,7 @@ impl Growing {
         spec: &Spec,
         points: usize,
         marks: &[Mark],
-        store: Option<&zarr::Mark>,
+        store: Option<&zarr::StoreMark>,
         rows: Option<&Mark>,
     ) -> Result<Growing> {
         let mut names: Vec<&str> = marks.iter().map(|mark| mark.name.as_str()).collect();
@@ -149,7 +149,7 @@ impl Growing {
     }
 
     /// How far all have grown, once that is on disk.
-    pub fn mark(&mut self) -> Result<(Vec<Mark>, Option<zarr::Mark>, Option<Mark>)> {
+    pub fn mark(&mut self) -> Result<(Vec<Mark>, Option<zarr::StoreMark>, Option<Mark>)> {
         if self.torn {
             return Err(Error::Failed("the rows of a member could not all be written".into()));
         }

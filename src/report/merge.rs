@@ -18,7 +18,7 @@ use super::{
     complete::Complete,
     growing::Growing,
     reader,
-    shard::{Found, Part},
+    shard::{FinishedShard, Found},
 };
 use crate::{
     ensemble::{Shard, Spec},
@@ -49,7 +49,7 @@ const OWN_KEYS: [&str; 4] = ["shard", "threads", "backend", "adapter"];
 /// Shards of one study.
 pub struct Shards {
     /// Those that are done, by number.
-    parts: BTreeMap<u64, Part>,
+    parts: BTreeMap<u64, FinishedShard>,
     /// What is known of the others.
     unfinished: Vec<(Option<u64>, PathBuf, String)>,
     /// The spec of the whole.
@@ -194,7 +194,7 @@ impl Shards {
         self.check_complete()?;
         let Shards { parts, spec, .. } = self;
         let spec = &spec;
-        let parts: Vec<Part> = parts.into_values().collect();
+        let parts: Vec<FinishedShard> = parts.into_values().collect();
         let mut files = Vec::new();
         for name in Growing::names(spec) {
             files.push(join(&parts, name, folder)?);
@@ -204,7 +204,7 @@ impl Shards {
             false => None,
         };
         let (mut aside, mut films, mut warnings) = (Aside::default(), Vec::<Film>::new(), Vec::<String>::new());
-        for Part { record, .. } in &parts {
+        for FinishedShard { record, .. } in &parts {
             aside.merge(&record.head.aside);
             films.extend(record.head.films.iter().cloned());
             warnings.extend(record.warnings.iter().cloned());
@@ -295,7 +295,7 @@ fn total(ranges: &[RangeInclusive<u64>]) -> u64 {
 }
 
 /// The rows of a table of one shard, which is opened for every block anew: any number of shards can be joined.
-struct Rows {
+struct ShardRows {
     path: PathBuf,
     shard: Shard,
     mark: Mark,
@@ -308,14 +308,14 @@ struct Rows {
     line: usize,
 }
 
-impl Rows {
-    fn new(part: &Part, name: &str, block: usize) -> Result<Rows> {
+impl ShardRows {
+    fn new(part: &FinishedShard, name: &str, block: usize) -> Result<ShardRows> {
         let path = part.path.join(name);
         let mark = part.record.head.tables.iter().find(|mark| mark.name == name).cloned();
         let missing = || Error::Request(format!("{}: the shard does not tell of it", path.display()));
         let mark = mark.ok_or_else(missing)?;
         let read = Mark { name: String::new(), length: 0, crc: 0 };
-        Ok(Rows { path, shard: part.shard, mark, read, block, buffer: Vec::new(), at: 0, line: 0 })
+        Ok(ShardRows { path, shard: part.shard, mark, read, block, buffer: Vec::new(), at: 0, line: 0 })
     }
 
     fn changed(&self, what: &str) -> Error {
@@ -389,7 +389,7 @@ impl Rows {
 }
 
 /// The table `name` of all parts, in the order of the members.
-fn join(parts: &[Part], name: &str, folder: &OutputFolder) -> Result<PartFile> {
+fn join(parts: &[FinishedShard], name: &str, folder: &OutputFolder) -> Result<PartFile> {
     let file = folder.file(name)?;
     let target = file.target().to_path_buf();
     let mut out = BufWriter::with_capacity(MAX_BLOCK, file);
@@ -403,10 +403,10 @@ fn join(parts: &[Part], name: &str, folder: &OutputFolder) -> Result<PartFile> {
 ///
 /// # Errors
 /// [`Error::Request`] naming a file that is not what its shard wrote.
-pub fn join_rows(parts: &[Part], name: &str, out: &mut impl Write, target: &Path) -> Result<()> {
+pub fn join_rows(parts: &[FinishedShard], name: &str, out: &mut impl Write, target: &Path) -> Result<()> {
     let cannot = |e| Error::io("cannot write", target)(e);
     let block = (BLOCKS / parts.len().max(1)).clamp(MIN_BLOCK, MAX_BLOCK);
-    let mut all = parts.iter().map(|part| Rows::new(part, name, block)).collect::<Result<Vec<_>>>()?;
+    let mut all = parts.iter().map(|part| ShardRows::new(part, name, block)).collect::<Result<Vec<_>>>()?;
     let mut header: Option<Vec<u8>> = None;
     for rows in &mut all {
         let own = rows.next()?.map(<[u8]>::to_vec);
@@ -435,7 +435,7 @@ pub fn join_rows(parts: &[Part], name: &str, out: &mut impl Write, target: &Path
 }
 
 /// The arrays of all parts, in the order of the members.
-fn join_stores(parts: &[Part], spec: &Spec, folder: &OutputFolder) -> Result<PartFolder> {
+fn join_stores(parts: &[FinishedShard], spec: &Spec, folder: &OutputFolder) -> Result<PartFolder> {
     let points = parts[0].record.points;
     let mut stored = BTreeMap::new();
     for part in parts {

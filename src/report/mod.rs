@@ -1,6 +1,6 @@
 //! What a run leaves for people and programs: tables, plots and provenance in a folder, and an overview.
 //!
-//! A [`Report`] is opened before the work starts, so that a folder that cannot be written costs nothing. It is the
+//! A [`RunReport`] is opened before the work starts, so that a folder that cannot be written costs nothing. It is the
 //! [`Sink`] of the simulation: rows stream to disk, and only a few numbers per member stay in memory.
 
 pub mod checkpoint;
@@ -13,11 +13,11 @@ pub mod growing;
 pub mod merge;
 pub mod overview;
 pub mod page;
+pub mod pictures;
 pub mod progress;
 pub mod reader;
 pub mod shard;
 pub mod stop;
-pub mod study;
 
 use std::{
     collections::BTreeMap,
@@ -59,7 +59,7 @@ pub struct Manner {
 
 /// Everything that is written about one run.
 // The tables come before the folder: dropped first, they leave it empty for its own clean-up.
-pub struct Report {
+pub struct RunReport {
     growing: Growing,
     folder: OutputFolder,
     origin: Origin,
@@ -85,11 +85,11 @@ pub struct Report {
     has_begun: bool,
 }
 
-impl Report {
+impl RunReport {
     /// Opens the tables that a study asks for, and saves the first checkpoint, from which a run that is killed resumes.
-    pub fn begin(folder: OutputFolder, study: &Study, origin: Origin, manner: Manner) -> Result<Report> {
+    pub fn begin(folder: OutputFolder, study: &Study, origin: Origin, manner: Manner) -> Result<RunReport> {
         let growing = Growing::begin(&folder, study.spec(), study.points())?;
-        let mut report = Report::new(folder, growing, study, origin, manner);
+        let mut report = RunReport::new(folder, growing, study, origin, manner);
         match report.checkpoint(&Standing { resident: Some(BTreeMap::new()), ..Standing::default() }) {
             Ok(()) => Ok(report),
             Err(error) => {
@@ -104,7 +104,7 @@ impl Report {
     ///
     /// # Errors
     /// [`Error::Request`] where its files are not those of the study.
-    pub fn resume(folder: OutputFolder, study: &Study, kept: Saved, manner: Manner) -> Result<(Report, Standing)> {
+    pub fn resume(folder: OutputFolder, study: &Study, kept: Saved, manner: Manner) -> Result<(RunReport, Standing)> {
         let Saved { head, standing, note } = kept;
         let Head { origin, wall, cohort, tables, store, rows, aside, films } = head;
         let growing = Growing::resume(&folder, study.spec(), study.points(), &tables, store.as_ref(), rows.as_ref())?;
@@ -112,16 +112,16 @@ impl Report {
             folder.forget_last_state()?;
         }
         let tally = reader::rows(growing.rows(), study.spec(), aside)?;
-        let mut report = Report::new(folder, growing, study, origin, manner);
+        let mut report = RunReport::new(folder, growing, study, origin, manner);
         (report.tally, report.films, report.earlier, report.cohort) = (tally, films, wall, cohort);
         report.before = report.tally.members().saturating_sub(standing.next);
         report.has_begun = true;
         Ok((report, standing))
     }
 
-    fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, manner: Manner) -> Report {
+    fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, manner: Manner) -> RunReport {
         let Manner { quiet, every, stop } = manner;
-        Report {
+        RunReport {
             growing,
             folder,
             origin,
@@ -238,7 +238,7 @@ impl Report {
             None => None,
         };
         // In reverse order they are dropped: the folder last, after its files.
-        let Report { folder, tally, films, progress, origin, clock, earlier, growing, .. } = self;
+        let RunReport { folder, tally, films, progress, origin, clock, earlier, growing, .. } = self;
         progress.finish();
         let wall = earlier.saturating_add(clock.elapsed());
         let (files, store, spill) = growing.ready()?;
@@ -255,7 +255,7 @@ impl Report {
     }
 }
 
-impl Sink for Report {
+impl Sink for RunReport {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         let Ended { outcome, portrait, mollified, unresolved, excess, .. } = ended;
         // First what may refuse it: rows that are written are rows that can be read again.
@@ -334,10 +334,10 @@ mod tests {
         Manner { quiet: true, every: Duration::from_secs(1000), stop: stop.clone() }
     }
 
-    fn begun(out: &Path, spec: &Spec, stop: &Stop) -> Report {
+    fn begun(out: &Path, spec: &Spec, stop: &Stop) -> RunReport {
         let study = Study::new(spec.clone()).unwrap();
         let origin = Origin::new(&study, provenance::tests::platform()).unwrap();
-        Report::begin(OutputFolder::open(out, true).unwrap(), &study, origin, manner(stop)).unwrap()
+        RunReport::begin(OutputFolder::open(out, true).unwrap(), &study, origin, manner(stop)).unwrap()
     }
 
     /// Nodes of the members here.
@@ -361,7 +361,7 @@ mod tests {
     }
 
     /// A report into `out` that has received one member.
-    fn report(out: &Path, spec: &Spec, portrait: Option<Portrait>) -> Report {
+    fn report(out: &Path, spec: &Spec, portrait: Option<Portrait>) -> RunReport {
         let mut report = begun(out, spec, &Stop::default());
         report.member(&ended(0, portrait)).unwrap();
         report
@@ -466,7 +466,7 @@ mod tests {
             let kept = checkpoint::find(&folder).unwrap().unwrap();
             assert_eq!(kept.note, None);
             let study = Study::new(spec.clone()).unwrap();
-            let (mut second, standing) = Report::resume(folder, &study, kept, manner(&Stop::default())).unwrap();
+            let (mut second, standing) = RunReport::resume(folder, &study, kept, manner(&Stop::default())).unwrap();
             assert_eq!((standing.next, second.members()), (1, 1));
             second.member(&ended(1, None)).unwrap();
             second.member(&standing.early[&2]).unwrap();

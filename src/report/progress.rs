@@ -22,12 +22,12 @@ pub enum Progress {
     /// On a terminal.
     Bar(ProgressBar),
     /// In a file or a pipe, since the run began.
-    Lines(Instant, Lines),
+    Lines(Instant, ProgressLines),
 }
 
 /// Lines at even times, none in a run that is over before the first.
 #[derive(Default)]
-pub struct Lines {
+pub struct ProgressLines {
     /// Periods that have passed at the last line.
     periods: u64,
 }
@@ -39,13 +39,13 @@ impl Progress {
             return Progress::Quiet;
         }
         if !io::stderr().is_terminal() {
-            return Progress::Lines(Instant::now(), Lines::default());
+            return Progress::Lines(Instant::now(), ProgressLines::default());
         }
         let colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         let bar = ProgressBar::new(TICKS);
         bar.set_style(style(colour).unwrap_or_else(|_| ProgressStyle::default_bar()));
         // A terminal that cannot go back in a line, such as TERM=dumb, has no bars.
-        if bar.is_hidden() { Progress::Lines(Instant::now(), Lines::default()) } else { Progress::Bar(bar) }
+        if bar.is_hidden() { Progress::Lines(Instant::now(), ProgressLines::default()) } else { Progress::Bar(bar) }
     }
 
     /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done.
@@ -87,7 +87,7 @@ impl Progress {
     }
 }
 
-impl Lines {
+impl ProgressLines {
     /// The line that is due `elapsed` after the begin of the run, if one is.
     fn at(&mut self, elapsed: Duration, done: u64, total: u64, share: f64) -> Option<String> {
         let periods = elapsed.as_secs() / PERIOD.as_secs();
@@ -128,8 +128,10 @@ mod tests {
 
     #[test]
     fn a_line_is_due_every_ten_seconds_and_not_before() {
-        let mut lines = Lines::default();
-        let at = |lines: &mut Lines, milliseconds| lines.at(Duration::from_millis(milliseconds), 1, 4, 0.5).is_some();
+        let mut lines = ProgressLines::default();
+        let at = |lines: &mut ProgressLines, milliseconds| {
+            lines.at(Duration::from_millis(milliseconds), 1, 4, 0.5).is_some()
+        };
         let due: Vec<u64> = (0..60_000).step_by(70).filter(|elapsed| at(&mut lines, *elapsed)).collect();
         assert_eq!(due, [10_010, 20_020, 30_030, 40_040, 50_050]);
         // Dispatches that take long leave lines out; none follow to make up for them.

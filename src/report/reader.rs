@@ -55,7 +55,7 @@ impl Finished {
 /// What tells whether the rest can be understood, and nothing of the rest.
 #[derive(Default, Deserialize)]
 #[serde(default)]
-struct Head {
+struct RunHead {
     curvelax: serde_json::Value,
     format: serde_json::Value,
 }
@@ -79,7 +79,7 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
     let text = input::text(&path, input::MAX_RUN);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
     let no_json = |e: serde_json::Error| format!(": {}; {REMEDY}", shortened(&e.to_string(), SHOWN));
-    let Head { curvelax, format } = match serde_json::from_str(&text) {
+    let RunHead { curvelax, format } = match serde_json::from_str(&text) {
         Ok(head) => head,
         Err(e) => return refuse(no_json(e)),
     };

@@ -45,7 +45,7 @@ pub struct Record {
 }
 
 /// A shard that is done.
-pub struct Part {
+pub struct FinishedShard {
     /// Its folder.
     pub path: PathBuf,
     /// Which one it is.
@@ -59,7 +59,7 @@ pub struct Part {
 /// What the folder of a shard has.
 pub enum Found {
     /// All of it.
-    Done(Box<Part>),
+    Done(Box<FinishedShard>),
     /// Not all, and why.
     Unfinished {
         /// The folder.
@@ -128,7 +128,7 @@ fn unfinished_run(path: &Path) -> Result<Option<String>> {
 }
 
 /// The shard at `path`, which is finished, with its tables as long as they were.
-fn part(path: &Path) -> Result<Part> {
+fn part(path: &Path) -> Result<FinishedShard> {
     let faulty = |fault: &str| faulty(path, SHARD, fault);
     let read = envelope::bytes(&path.join(SHARD)).and_then(|bytes| from_bytes(&bytes));
     let record = read.map_err(|(Fault::Foreign(what) | Fault::Damaged(what))| faulty(&what))?;
@@ -142,7 +142,7 @@ fn part(path: &Path) -> Result<Part> {
         return Err(faulty("it tells of other files than its spec asks for"));
     }
     record.head.tables.iter().try_for_each(|mark| check_length(path, mark))?;
-    Ok(Part { path: path.to_path_buf(), shard, spec, record })
+    Ok(FinishedShard { path: path.to_path_buf(), shard, spec, record })
 }
 
 /// That the table in the folder at `path` is as long as the shard wrote it.

@@ -116,7 +116,7 @@ impl Ranges<'_> {
     /// Where the median of one resample stands, if its S comes down to ½.
     fn median(&self, draws: Draws) -> Option<usize> {
         let n = self.members;
-        let curve = Curve { survival: 1.0, at_risk: n as f64 };
+        let curve = SurvivalPoint { survival: 1.0, at_risk: n as f64 };
         let mut resample = Resample { ranges: self, draws, curve, counts: Vec::new() };
         resample.crossing(0..n, n)
     }
@@ -128,18 +128,18 @@ fn events(sample: &Sample, range: Range<usize>) -> usize {
 
 /// S and the members at risk, before the range that is looked at.
 #[derive(Clone, Copy)]
-struct Curve {
+struct SurvivalPoint {
     survival: f64,
     at_risk: f64,
 }
 
-impl Curve {
+impl SurvivalPoint {
     /// After `events` at times between which nothing is censored, among `leaving` members in all.
     ///
     /// Without a branch, since in a resample nothing can be foretold; with none at risk S stays.
-    fn after(self, events: f64, leaving: f64) -> Curve {
+    fn after(self, events: f64, leaving: f64) -> SurvivalPoint {
         let at_risk = self.at_risk.max(1.0);
-        Curve { survival: self.survival * ((at_risk - events) / at_risk), at_risk: self.at_risk - leaving }
+        SurvivalPoint { survival: self.survival * ((at_risk - events) / at_risk), at_risk: self.at_risk - leaving }
     }
 
     fn is_half_down(self) -> bool {
@@ -151,7 +151,7 @@ impl Curve {
 struct Resample<'a> {
     ranges: &'a Ranges<'a>,
     draws: Draws,
-    curve: Curve,
+    curve: SurvivalPoint,
     /// How often each member of a short range was drawn.
     counts: Vec<u32>,
 }
@@ -192,7 +192,7 @@ impl Resample<'_> {
         // The curve only falls: if it is not down at the end of the range it never was, and nothing is asked before.
         let after = curves.clone().last()?;
         if after.is_half_down() {
-            return curves.position(Curve::is_half_down).map(|i| range.start + i);
+            return curves.position(SurvivalPoint::is_half_down).map(|i| range.start + i);
         }
         self.curve = after;
         None
@@ -291,7 +291,7 @@ mod tests {
     fn without_censorings_before_the_median_a_resample_takes_few_random_numbers() {
         for end in [f64::INFINITY, 1.0] {
             let (sample, n) = (sample(100_003, 0.0, end), 100_003);
-            let (ranges, curve) = (Ranges::new(&sample), Curve { survival: 1.0, at_risk: n as f64 });
+            let (ranges, curve) = (Ranges::new(&sample), SurvivalPoint { survival: 1.0, at_risk: n as f64 });
             let mut resample = Resample { ranges: &ranges, draws: Draws::new(1, 0), curve, counts: Vec::new() };
             assert!(resample.crossing(0..n, n).is_some());
             // At most one for each level of the tree.

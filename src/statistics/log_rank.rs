@@ -25,12 +25,12 @@ pub struct LogRank {
     /// Probability of a statistic at least as large if the groups are alike.
     pub p_value: f64,
     /// The groups, in the order given.
-    pub groups: Vec<Group>,
+    pub groups: Vec<GroupEvents>,
 }
 
 /// Events of a group.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Group {
+pub struct GroupEvents {
     /// That happened.
     pub observed: usize,
     /// That would have if its members were like all others.
@@ -44,17 +44,17 @@ pub struct Group {
 /// operations and groups² numbers.
 pub fn log_rank(samples: &[impl Borrow<Sample>]) -> Option<LogRank> {
     let samples: &[&Sample] = &samples.iter().map(Borrow::borrow).collect::<Vec<_>>();
-    let tally = Tally::of(samples);
+    let tally = LogRankSums::of(samples);
     // All groups at risk at the first event are at risk together there, so V has the rank of their number, less one.
     let compared: Vec<usize> = (0..samples.len()).filter(|j| tally.expected[*j].value() > 0.0).collect();
     let (_, free) = compared.split_last()?;
     if free.is_empty() {
         return None;
     }
-    let groups: Vec<Group> = samples
+    let groups: Vec<GroupEvents> = samples
         .iter()
         .zip(&tally.expected)
-        .map(|(sample, expected)| Group { observed: sample.events(), expected: expected.value() })
+        .map(|(sample, expected)| GroupEvents { observed: sample.events(), expected: expected.value() })
         .collect();
     let surplus = free.iter().map(|j| groups[*j].observed as f64 - groups[*j].expected).collect();
     let variance = free.iter().map(|j| free.iter().map(|l| tally.variance(*j, *l)).collect()).collect();
@@ -64,16 +64,16 @@ pub fn log_rank(samples: &[impl Borrow<Sample>]) -> Option<LogRank> {
 }
 
 /// The sums over all members.
-struct Tally {
+struct LogRankSums {
     expected: Vec<Sum>,
     /// Σ over pairs, the first to leave in group j and the other in l.
     pairs: Vec<Vec<f64>>,
 }
 
-impl Tally {
-    fn of(samples: &[&Sample]) -> Tally {
+impl LogRankSums {
+    fn of(samples: &[&Sample]) -> LogRankSums {
         let k = samples.len();
-        let mut tally = Tally { expected: vec![Sum::default(); k], pairs: vec![vec![0.0; k]; k] };
+        let mut tally = LogRankSums { expected: vec![Sum::default(); k], pairs: vec![vec![0.0; k]; k] };
         let mut at_risk: Vec<f64> = samples.iter().map(|sample| sample.len() as f64).collect();
         let (mut n, mut hazard, mut covariance) = (at_risk.iter().sum::<f64>(), Sum::default(), Sum::default());
         let mut groups: Vec<_> = samples.iter().map(|sample| sample.times()).collect();
@@ -180,7 +180,7 @@ mod tests {
         let more = test(&["", "1 2 4", "0.5+ 0.9+", "3 5+"]).unwrap();
         assert!((two.statistic - more.statistic).abs() < 1e-14 && two.p_value == more.p_value, "{two:?} {more:?}");
         assert_eq!((more.degrees_of_freedom, more.groups.len()), (1, 4));
-        assert_eq!(more.groups[2], Group { observed: 0, expected: 0.0 });
+        assert_eq!(more.groups[2], GroupEvents { observed: 0, expected: 0.0 });
     }
 
     #[test]

@@ -60,7 +60,7 @@ pub use bootstrap::{Bootstrap, Interval};
 pub use describe::Description;
 pub use exact::{ExactSum, Moments};
 pub use fit::{Line, PowerLaw};
-pub use log_rank::{Group, LogRank, log_rank};
+pub use log_rank::{GroupEvents, LogRank, log_rank};
 pub use sample::{Observation, Observations, Sample};
 pub use survival::{Caveat, KaplanMeier, Mean, Step};
 

@@ -53,7 +53,7 @@ enum Time {
 }
 
 impl Time {
-    /// The unit of the clock of [`decay`], for a member advanced in lengths of `unit`.
+    /// The unit of the clock of [`decay`](crate::scheme::decay), for a member advanced in lengths of `unit`.
     fn unit(self, unit: f64) -> f64 {
         match self {
             Time::Fixed(clock) => clock.tau,

@@ -17,14 +17,14 @@
 //!
 //! A [`Problem`] is a value: flow, curve, final time, what is measured, what it should be, and how far off it may be.
 //! [`problems`] is the one table of them, for the tests on every back end and for `curvelax convergence`.
-//! [`Problem::solve`] takes it at a [`Resolution`] through the same way as any run; a [`Study`] refines one number.
+//! [`Problem::solve`] takes it at a [`Resolution`] through the same way as any run; a [`ConvergenceStudy`] refines one number.
 
+mod convergence;
 mod measure;
 mod problems;
-mod study;
 mod theory;
 
+pub use convergence::{ConvergenceRow, ConvergenceStudy, Solved, Varied, studies};
 pub use measure::{Measure, mode_amplitude};
-pub use problems::{Bound, Curve, LEMNISCATE_LIFE, Problem, Resolution, problems};
-pub use study::{Row, Solved, Study, Varied, studies};
+pub use problems::{ErrorBound, LEMNISCATE_LIFE, Problem, Resolution, StartCurve, problems};
 pub use theory::{CircleMode, circle_mode};

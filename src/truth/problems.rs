@@ -35,7 +35,7 @@ const ELLIPSE_LENGTH: f64 = 9.357_700_6;
 
 /// A curve at the start of a problem, as a function of `u ∈ [0, 1]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Curve {
+pub enum StartCurve {
     /// A circle traversed `turns` times.
     Circle {
         /// Radius R.
@@ -59,7 +59,7 @@ pub struct Problem {
     /// The law of motion.
     pub flow: Flow,
     /// The start.
-    pub curve: Curve,
+    pub curve: StartCurve,
     /// Final time.
     pub t_end: f64,
     /// What is measured there.
@@ -71,7 +71,7 @@ pub struct Problem {
     /// The mistake.
     pub mistake: &'static str,
     /// How far off, relative to `exact`, it may be.
-    pub bound: Bound,
+    pub bound: ErrorBound,
     /// Nodes at which it is tested: enough to tell the mistake.
     pub n: usize,
     /// Steps in which it is tested.
@@ -80,7 +80,7 @@ pub struct Problem {
 
 /// Largest relative error, as a sum: `space·(100/n)² + time·(100/steps) + rounding`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bound {
+pub struct ErrorBound {
     /// At n = 100 with a vanishing step.
     pub space: f64,
     /// Of 100 steps on a vanishing spacing.
@@ -89,7 +89,7 @@ pub struct Bound {
     pub single: f64,
 }
 
-impl Bound {
+impl ErrorBound {
     /// The bound at n nodes after `steps` steps.
     fn at(&self, n: usize, steps: f64, precision: Precision) -> f64 {
         let rounding = if precision == Precision::F32 { self.single } else { 1e-9 };
@@ -136,7 +136,7 @@ impl Problem {
     }
 }
 
-impl Curve {
+impl StartCurve {
     /// Relative amplitude of a small mode. The terms that the linear theory leaves out are of its square, rounding is of
     /// its inverse.
     fn amplitude(precision: Precision) -> f64 {
@@ -146,17 +146,17 @@ impl Curve {
     /// The curve for a run in `precision`.
     pub fn resolve(self, precision: Precision) -> BaseCurve {
         match self {
-            Curve::Circle { radius, turns } => {
+            StartCurve::Circle { radius, turns } => {
                 let whole = TAU * f64::from(turns);
                 BaseCurve::from_formula(move |u| radius * DVec2::from_angle(whole * u))
             }
-            Curve::Mode(m) => {
-                let a = Curve::amplitude(precision);
+            StartCurve::Mode(m) => {
+                let a = StartCurve::amplitude(precision);
                 let radius = move |theta: f64| 1.0 + a * (f64::from(m) * theta).cos();
                 BaseCurve::from_formula(move |u| radius(TAU * u) * DVec2::from_angle(TAU * u))
             }
-            Curve::Ellipse => BaseCurve::from_formula(|u| DVec2::new(2.0, 1.0) * DVec2::from_angle(TAU * u)),
-            Curve::Lemniscate => BaseCurve::from_formula(|u| {
+            StartCurve::Ellipse => BaseCurve::from_formula(|u| DVec2::new(2.0, 1.0) * DVec2::from_angle(TAU * u)),
+            StartCurve::Lemniscate => BaseCurve::from_formula(|u| {
                 let (sin, cos) = (TAU * u).sin_cos();
                 DVec2::new(cos, sin * cos) / (1.0 + sin * sin)
             }),
@@ -166,8 +166,8 @@ impl Curve {
     /// Nodes of a circle and its modes are equally spaced in the angle, those of the others along the curve.
     pub fn sampling(self) -> Sampling {
         match self {
-            Curve::Circle { .. } | Curve::Mode(_) => Sampling::Parameter,
-            Curve::Ellipse | Curve::Lemniscate => Sampling::Arclength,
+            StartCurve::Circle { .. } | StartCurve::Mode(_) => Sampling::Parameter,
+            StartCurve::Ellipse | StartCurve::Lemniscate => Sampling::Arclength,
         }
     }
 }
@@ -186,13 +186,13 @@ fn circles() -> Vec<Problem> {
     let circle = |name: &str, flow: Flow, turns: u32, space: f64| Problem {
         name: name.into(),
         flow,
-        curve: Curve::Circle { radius: 1.0, turns },
+        curve: StartCurve::Circle { radius: 1.0, turns },
         t_end: 1.0,
         measure: Measure::Radius,
         exact: grown,
         mistaken: 2.0_f64.powf(0.25),
         mistake: "R⁴ grows by t",
-        bound: Bound { space, time: 1.3e-3, single: 1e-4 },
+        bound: ErrorBound { space, time: 1.3e-3, single: 1e-4 },
         n: 66,
         steps: 200,
     };
@@ -200,7 +200,7 @@ fn circles() -> Vec<Problem> {
         exact: 1.0,
         mistaken: grown,
         mistake: "the circle grows as under Willmore flow",
-        bound: Bound { time: 1e-6, ..problem.bound },
+        bound: ErrorBound { time: 1e-6, ..problem.bound },
         ..problem
     };
     vec![
@@ -219,14 +219,14 @@ fn modes(m: u32) -> Vec<Problem> {
         Problem {
             name: format!("{name}-mode-{m}"),
             flow,
-            curve: Curve::Mode(m),
+            curve: StartCurve::Mode(m),
             t_end,
             measure: Measure::Decay(m),
             exact: exact(t_end),
             mistaken: mistaken(t_end),
             mistake,
             // The step is implicit: it misses half a step's worth of the decay, and the fourth differences miss O(m²h²).
-            bound: Bound { space: 2.5e-3 + 8.7e-4 * m2, time: 6e-3, single: 4e-3 },
+            bound: ErrorBound { space: 2.5e-3 + 8.7e-4 * m2, time: 6e-3, single: 4e-3 },
             n: if m < 4 { 66 } else { 198 },
             steps: 100,
         }
@@ -265,13 +265,13 @@ fn ellipse_area() -> Problem {
     Problem {
         name: "ellipse-area".into(),
         flow: Flow::SurfaceDiffusion,
-        curve: Curve::Ellipse,
+        curve: StartCurve::Ellipse,
         t_end: 0.1,
         measure: Measure::Area,
         exact: TAU,
         mistaken: 1.06 * TAU,
         mistake: "the drift of sweeps that end too early",
-        bound: Bound { space: 8.5e-4, time: 1e-4, single: 1e-4 },
+        bound: ErrorBound { space: 8.5e-4, time: 1e-4, single: 1e-4 },
         n: 66,
         steps: 200,
     }
@@ -284,7 +284,7 @@ fn ellipse_length() -> Problem {
         measure: Measure::Length,
         exact: ELLIPSE_LENGTH,
         mistaken: TAU * 2.0_f64.sqrt(),
-        bound: Bound { space: 8e-5, time: 4.2e-4, single: 1e-5 },
+        bound: ErrorBound { space: 8e-5, time: 4.2e-4, single: 1e-5 },
         mistake: "the circle of the same area",
         ..ellipse_area()
     }
@@ -297,13 +297,13 @@ fn lemniscate() -> Problem {
     Problem {
         name: "lemniscate".into(),
         flow: Flow::SurfaceDiffusion,
-        curve: Curve::Lemniscate,
+        curve: StartCurve::Lemniscate,
         t_end,
         measure: Measure::Length,
         exact: LEMNISCATE * left.powf(0.25),
         mistaken: LEMNISCATE * (1.0 - 20.0 * t_end).powf(0.25),
         mistake: "extinct at a⁴/20",
-        bound: Bound { space: 5.3e-3, time: 5e-2, single: 1e-3 },
+        bound: ErrorBound { space: 5.3e-3, time: 5e-2, single: 1e-3 },
         n: 66,
         steps: 200,
     }
@@ -315,7 +315,7 @@ mod tests {
 
     #[test]
     fn a_wrong_name_is_answered_with_the_nearest() {
-        assert_eq!(Problem::named("lemniscate").unwrap().curve, Curve::Lemniscate);
+        assert_eq!(Problem::named("lemniscate").unwrap().curve, StartCurve::Lemniscate);
         let message = Problem::named("wilmore-circle").unwrap_err().to_string();
         assert!(message.starts_with("--problem wilmore-circle: "), "{message}");
         assert!(message.contains("did you mean `willmore-circle`?"), "{message}");
@@ -331,14 +331,14 @@ mod tests {
 
     #[test]
     fn the_curves_have_the_size_that_their_problems_say() {
-        let length = |curve: Curve| {
+        let length = |curve: StartCurve| {
             let curve = curve.resolve(Precision::F64);
             let nodes: Vec<DVec2> = (0..20_000).map(|i| curve.point(f64::from(i) / 20_000.0)).collect();
             crate::curve::polygon::length(&nodes)
         };
-        assert!((length(Curve::Lemniscate) - LEMNISCATE).abs() < 1e-6);
-        assert!((length(Curve::Circle { radius: 0.5, turns: 2 }) - TAU).abs() < 1e-6);
-        assert!((length(Curve::Ellipse) - 9.688_448_220_547_675).abs() < 1e-6);
-        assert!((length(Curve::Mode(5)) - TAU).abs() < 1e-6);
+        assert!((length(StartCurve::Lemniscate) - LEMNISCATE).abs() < 1e-6);
+        assert!((length(StartCurve::Circle { radius: 0.5, turns: 2 }) - TAU).abs() < 1e-6);
+        assert!((length(StartCurve::Ellipse) - 9.688_448_220_547_675).abs() < 1e-6);
+        assert!((length(StartCurve::Mode(5)) - TAU).abs() < 1e-6);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     device::{Left, on_gpu},
-    row::{Cpu, Gpu, Row},
+    row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
     setup::{Tamper, blocks, method, tampered},
 };
@@ -38,7 +38,7 @@ pub fn runs<T: Real>(
     steps: u32,
     budget: Budget,
     tamper: Option<Tamper>,
-) -> Result<Vec<Row>> {
+) -> Result<Vec<ConformanceRow>> {
     let launches = members(n, MEMBERS, steps, T::PRECISION.tolerance())?;
     ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
 }
@@ -55,7 +55,7 @@ pub fn adaptive<T: Real>(
     n: usize,
     budget: Budget,
     tamper: Option<Tamper>,
-) -> Result<Vec<Row>> {
+) -> Result<Vec<ConformanceRow>> {
     let launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?;
     ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
 }
@@ -68,7 +68,7 @@ fn ends_agree<T: Real>(
     launches: Vec<Run<f64>>,
     budget: Budget,
     tamper: Option<Tamper>,
-) -> Result<Vec<Row>> {
+) -> Result<Vec<ConformanceRow>> {
     let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
     compare_ends::<T>(adapter.is_hardware(), &method(solver), n, &launches, &ours)
 }
@@ -80,13 +80,13 @@ pub(in crate::conformance) fn compare_ends<T: Real>(
     n: usize,
     launches: &[Run<f64>],
     ours: &[Left],
-) -> Result<Vec<Row>> {
+) -> Result<Vec<ConformanceRow>> {
     let steps = ours.iter().map(|left| left.counters.steps).max().unwrap_or(0);
     let adaptive = launches.iter().all(|launch| launch.parameters.adaptive > 0.0);
     let quantities: Vec<Bound> = FIELDS.iter().chain(&REPORT).copied().collect();
     let inside: &[Bound] = if adaptive { &PACE } else { &[] };
-    let begin = |bound| Row { adaptive, ..Row::begin::<T>(bound, method.solver, n, steps) };
-    let mut rows: Vec<Row> = quantities.iter().chain(&DECAY).chain(inside).map(begin).collect();
+    let begin = |bound| ConformanceRow { adaptive, ..ConformanceRow::begin::<T>(bound, method.solver, n, steps) };
+    let mut rows: Vec<ConformanceRow> = quantities.iter().chain(&DECAY).chain(inside).map(begin).collect();
     for (member, (launch, left)) in launches.iter().zip(ours).enumerate() {
         let twin = twin::<T>(launch, method, n)?;
         same_events(left, &twin.left).map_err(|differ| {
@@ -102,17 +102,17 @@ pub(in crate::conformance) fn compare_ends<T: Real>(
         let limit = |bound: &Bound, scale: f64| bound.factor(hardware) * T::EPSILON * scale * roundings;
         let (of_curve, rest) = rows.split_at_mut(quantities.len());
         let (of_decay, inside) = rest.split_at_mut(DECAY.len());
-        curves_agree(of_curve, member, &quantities, &scales, limit, Gpu(left), Cpu(&twin.left));
+        curves_agree(of_curve, member, &quantities, &scales, limit, OnGpu(left), OnCpu(&twin.left));
         // What a changed step length changes inside the run: nothing with fixed steps.
         let estimate = T::EPSILON * grown * scales.stiffness() / launch.parameters.adaptive;
         let change = if adaptive { estimate * twin.steepest } else { 0.0 };
         let factors = DECAY.map(|bound| bound.factor(hardware));
         let rounding = T::EPSILON * roundings + change;
-        decays_agree(of_decay, member, launch, factors, rounding, Gpu(&left.report), Cpu(&twin.left.report));
+        decays_agree(of_decay, member, launch, factors, rounding, OnGpu(&left.report), OnCpu(&twin.left.report));
         if adaptive {
             let roundings = [T::EPSILON * roundings, estimate];
             let factors = PACE.map(|bound| bound.factor(hardware));
-            insides_agree(inside, member, &scales, factors, roundings, Gpu(left), Cpu(&twin.left));
+            insides_agree(inside, member, &scales, factors, roundings, OnGpu(left), OnCpu(&twin.left));
         }
     }
     Ok(rows)
@@ -161,20 +161,20 @@ fn same_events(ours: &Left, theirs: &Left) -> Result<(), String> {
 
 /// The last curve and its report, see [`FIELDS`] and [`REPORT`]; `limit` is the bound at a scale.
 fn curves_agree(
-    rows: &mut [Row],
+    rows: &mut [ConformanceRow],
     member: usize,
     quantities: &[Bound],
     scales: &Scales,
     limit: impl Fn(&Bound, f64) -> f64,
-    Gpu(ours): Gpu<&Left>,
-    Cpu(theirs): Cpu<&Left>,
+    OnGpu(ours): OnGpu<&Left>,
+    OnCpu(theirs): OnCpu<&Left>,
 ) {
     let (our_report, their_report) = (reported(&ours.report), reported(&theirs.report));
     let ours = ours.state.curve.fields().into_iter().map(|field| field.nodes()).chain(our_report.chunks(1));
     let theirs = theirs.state.curve.fields().into_iter().map(|field| field.nodes()).chain(their_report.chunks(1));
     for ((row, bound), (ours, theirs)) in rows.iter_mut().zip(quantities).zip(ours.zip(theirs)) {
         let scale = scales.get(bound.scale);
-        row.add(member, scale, limit(bound, scale), Gpu(ours), Cpu(theirs));
+        row.add(member, scale, limit(bound, scale), OnGpu(ours), OnCpu(theirs));
     }
 }
 
@@ -188,35 +188,41 @@ fn between(state: &State<f64>) -> &Curve<f64> {
 
 /// What a member keeps of its way down, see [`DECAY`]; `rounding` is that of an excess.
 fn decays_agree(
-    rows: &mut [Row],
+    rows: &mut [ConformanceRow],
     member: usize,
     launch: &Run<f64>,
     factors: [f64; 2],
     rounding: f64,
-    ours: Gpu<&Report<f64>>,
-    theirs: Cpu<&Report<f64>>,
+    ours: OnGpu<&Report<f64>>,
+    theirs: OnCpu<&Report<f64>>,
 ) {
-    let (Gpu(ours), Cpu(theirs)) = (ours, theirs);
+    let (OnGpu(ours), OnCpu(theirs)) = (ours, theirs);
     let [way, rate] = rows else { panic!("{} rows of DECAY", rows.len()) };
-    way.add(member, 1.0, factors[0] * rounding, Gpu(&ours.excess_at), Cpu(&theirs.excess_at));
+    way.add(member, 1.0, factors[0] * rounding, OnGpu(&ours.excess_at), OnCpu(&theirs.excess_at));
     let slope = |decay: &Decay<f64>| if decay.xx > 0.0 { decay.xy / decay.xx } else { 0.0 };
     let (least, span) = (theirs.now.excess.max(launch.parameters.fit_to), theirs.decay.x);
     let scale = if span > 0.0 { 1.0 / (least * span) } else { 0.0 };
-    rate.add(member, scale, factors[1] * rounding * scale, Gpu(&[slope(&ours.decay)]), Cpu(&[slope(&theirs.decay)]));
+    rate.add(
+        member,
+        scale,
+        factors[1] * rounding * scale,
+        OnGpu(&[slope(&ours.decay)]),
+        OnCpu(&[slope(&theirs.decay)]),
+    );
 }
 
 /// What a member's run leaves besides its end, see [`PACE`]. `rounding` is what rounding does relative to a scale,
 /// `estimate` what it does to a step length, relative to it.
 fn insides_agree(
-    rows: &mut [Row],
+    rows: &mut [ConformanceRow],
     member: usize,
     scales: &Scales,
     factors: [f64; 6],
     [rounding, estimate]: [f64; 2],
-    ours: Gpu<&Left>,
-    theirs: Cpu<&Left>,
+    ours: OnGpu<&Left>,
+    theirs: OnCpu<&Left>,
 ) {
-    let (Gpu(ours), Cpu(theirs)) = (ours, theirs);
+    let (OnGpu(ours), OnCpu(theirs)) = (ours, theirs);
     let [start, middle, reports, last, next, events] = rows else { panic!("{} rows of PACE", rows.len()) };
     let (a, b) = (&ours.report, &theirs.report);
     // Of a quantity that changes by `change` in a step.
@@ -229,7 +235,7 @@ fn insides_agree(
         let fields = a.into_iter().zip(b).zip(theirs.state.curve.fields()).zip(bounds);
         for (((a, b), end), scale) in fields {
             let bound = factor * inside(scale, largest(end.nodes(), b.nodes()));
-            row.add(member, scale, bound, Gpu(a.nodes()), Cpu(b.nodes()));
+            row.add(member, scale, bound, OnGpu(a.nodes()), OnCpu(b.nodes()));
         }
     }
     for (a, b) in [(&a.before, &b.before), (&a.middle, &b.middle)] {
@@ -237,14 +243,14 @@ fn insides_agree(
         for (j, bound) in REPORT.iter().take(a.len()).enumerate() {
             let scale = scales.get(bound.scale);
             let bound = factors[2] * inside(scale, (b[j] - end[j]).abs());
-            reports.add(member, scale, bound, Gpu(&a[j..=j]), Cpu(&b[j..=j]));
+            reports.add(member, scale, bound, OnGpu(&a[j..=j]), OnCpu(&b[j..=j]));
         }
     }
     let (a, b) = (&a.progress, &b.progress);
     // The last step reaches the final time, so its length is off by what the ones before it were off together.
     let longest = scales.parameters.tau;
-    last.add(member, longest, factors[3] * estimate * longest, Gpu(&[a.taken]), Cpu(&[b.taken]));
-    next.add(member, b.next, factors[4] * estimate * b.next, Gpu(&[a.next]), Cpu(&[b.next]));
+    last.add(member, longest, factors[3] * estimate * longest, OnGpu(&[a.taken]), OnCpu(&[b.taken]));
+    next.add(member, b.next, factors[4] * estimate * b.next, OnGpu(&[a.next]), OnCpu(&[b.next]));
     let half = |p: &Progress<f64>| p.half_high + (p.half_low + p.half_fraction * p.half_length);
     let relaxed = |p: &Progress<f64>| p.relax_high + (p.relax_low + p.relax_fraction * p.relax_length);
     if theirs.counters.half_step != NEVER && theirs.counters.relax_step != NEVER {
@@ -252,7 +258,7 @@ fn insides_agree(
         let p = &scales.parameters;
         let rate = (p.half_at - p.relax_at) / (relaxed(b) - half(b));
         let bound = factors[5] * (rounding / rate + estimate * b.half_length.max(b.relax_length));
-        events.add(member, b.relax_length, bound, Gpu(&[half(a), relaxed(a)]), Cpu(&[half(b), relaxed(b)]));
+        events.add(member, b.relax_length, bound, OnGpu(&[half(a), relaxed(a)]), OnCpu(&[half(b), relaxed(b)]));
     }
 }
 

@@ -5,13 +5,13 @@ use serde::Serialize;
 use crate::{conformance::bounds::Bound, number::Real, solver::Solver};
 
 /// What the kernel computed.
-pub(super) struct Gpu<V>(pub(super) V);
+pub(super) struct OnGpu<V>(pub(super) V);
 /// What its twin computed. A type of its own, so that one side cannot be passed twice.
-pub(super) struct Cpu<V>(pub(super) V);
+pub(super) struct OnCpu<V>(pub(super) V);
 
 /// One line of the table: the worst case of a quantity over all members and nodes.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct ConformanceRow {
     /// The quantity.
     pub quantity: &'static str,
     /// Solver of the systems.
@@ -34,7 +34,7 @@ pub struct Row {
     pub at: (usize, usize),
 }
 
-impl Row {
+impl ConformanceRow {
     /// Whether the error is within its bound; NaN is not, and neither is a row that compared nothing.
     pub fn passes(&self) -> bool {
         self.error <= self.bound && self.bound.is_finite()
@@ -50,8 +50,8 @@ impl Row {
         if self.error == 0.0 { 0.0 } else { self.error / self.bound }
     }
 
-    pub(super) fn begin<T: Real>(bound: &Bound, solver: Solver, n: usize, steps: u32) -> Row {
-        Row {
+    pub(super) fn begin<T: Real>(bound: &Bound, solver: Solver, n: usize, steps: u32) -> ConformanceRow {
+        ConformanceRow {
             quantity: bound.quantity,
             solver,
             precision: T::NAME,
@@ -71,8 +71,8 @@ impl Row {
         member: usize,
         scale: f64,
         bound: f64,
-        Gpu(ours): Gpu<&[f64]>,
-        Cpu(theirs): Cpu<&[f64]>,
+        OnGpu(ours): OnGpu<&[f64]>,
+        OnCpu(theirs): OnCpu<&[f64]>,
     ) {
         assert!(!ours.is_empty() && ours.len() == theirs.len(), "{}: sides of different length", self.quantity);
         for (node, (a, b)) in ours.iter().zip(theirs).enumerate() {

@@ -2,7 +2,7 @@
 
 use super::setup::{method, traced_workspace};
 use crate::{
-    conformance::bounds::Scale,
+    conformance::bounds::NaturalScale,
     error::Result,
     scheme::{Curve, Parameters, Workspace, run::Run, step},
     solver::Solver,
@@ -26,10 +26,10 @@ impl Scales {
 
     /// How much a solve passes rounding on: the root of the largest weight.
     pub(super) fn stiffness(&self) -> f64 {
-        (self.get(Scale::SolvedCurvature) / self.get(Scale::Curvature)).max(1.0)
+        (self.get(NaturalScale::SolvedCurvature) / self.get(NaturalScale::Curvature)).max(1.0)
     }
 
-    pub(super) fn get(&self, scale: Scale) -> f64 {
+    pub(super) fn get(&self, scale: NaturalScale) -> f64 {
         scale.of(&self.curve, &self.parameters, &self.work)
     }
 }

@@ -1,7 +1,7 @@
 //! Everything that one step computes, stage by stage.
 
 use super::{
-    row::{Cpu, Gpu, Row},
+    row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
     setup::{MAX_SWEEPS, Tamper, blocks, method, tampered, traced_workspace},
 };
@@ -21,7 +21,12 @@ use crate::{
 };
 
 /// Everything that one step computes, stage by stage.
-pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Option<Tamper>) -> Result<Vec<Row>> {
+pub fn stages<T: Real>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    tamper: Option<Tamper>,
+) -> Result<Vec<ConformanceRow>> {
     let launches = members(n, MEMBERS, 1, T::PRECISION.tolerance())?;
     let mut kernel = gpu::Kernel::<T>::new(
         adapter,
@@ -38,7 +43,8 @@ pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Opt
         kernel.advance()?;
     }
     let trace = kernel.trace()?;
-    let mut rows: Vec<Row> = STAGES.iter().map(|bound| Row::begin::<T>(bound, solver, n, 1)).collect();
+    let mut rows: Vec<ConformanceRow> =
+        STAGES.iter().map(|bound| ConformanceRow::begin::<T>(bound, solver, n, 1)).collect();
     for (member, launch) in launches.iter().enumerate() {
         let mut run: Run<T> = launch.convert();
         let mut work = traced_workspace(n)?;
@@ -50,7 +56,7 @@ pub fn stages<T: Real>(adapter: &gpu::Gpu, solver: Solver, n: usize, tamper: Opt
             let at = (member * TRACE_FIELDS + field) * n;
             let scale = scales.get(bound.scale);
             let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale;
-            row.add(member, scale, limit, Gpu(&trace[at..at + n]), Cpu(&twin[field]));
+            row.add(member, scale, limit, OnGpu(&trace[at..at + n]), OnCpu(&twin[field]));
         }
     }
     Ok(rows)

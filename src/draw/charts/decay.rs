@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::{MAX_BANDS, TIME, only_panel};
 use crate::draw::{
     axis::{Axis, Scale},
-    chart::{Colours, Entry, FOOT, Heading, Mark, Panel, drawable, nothing},
+    chart::{Colours, Entry, FOOT, Heading, LegendMark, Panel, drawable, nothing},
     trace,
 };
 
@@ -57,12 +57,12 @@ pub struct Theory {
     /// Its entry in the legend, such as `exp(−24 t/R⁴)`.
     pub label: String,
     /// The line.
-    pub law: Law,
+    pub law: DecayLaw,
 }
 
 /// How excess falls in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Law {
+pub enum DecayLaw {
     /// start·exp(−rate·t).
     Exponential {
         /// Excess at t = 0.
@@ -81,12 +81,12 @@ pub enum Law {
     },
 }
 
-impl Law {
+impl DecayLaw {
     /// The excess at this time.
     pub fn at(self, t: f64) -> f64 {
         match self {
-            Law::Exponential { start, rate } => start * (-rate * t).exp(),
-            Law::Algebraic { start, time, power } => start * (1.0 + t / time).powf(-power),
+            DecayLaw::Exponential { start, rate } => start * (-rate * t).exp(),
+            DecayLaw::Algebraic { start, time, power } => start * (1.0 + t / time).powf(-power),
         }
     }
 
@@ -181,8 +181,8 @@ impl Decay<'_> {
 
     fn legend(&self, colours: &Colours, bands: bool) -> Vec<Entry> {
         let curves = colours.legend(|i| &self.curves[i].label);
-        let band = bands.then(|| Entry::new("faint", Mark::Band, self.band));
-        let theory = self.theory.iter().map(|theory| Entry::new("ink", Mark::Dashed, &theory.label));
+        let band = bands.then(|| Entry::new("faint", LegendMark::Band, self.band));
+        let theory = self.theory.iter().map(|theory| Entry::new("ink", LegendMark::Dashed, &theory.label));
         curves.chain(band).chain(theory).collect()
     }
 }

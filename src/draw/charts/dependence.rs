@@ -7,8 +7,8 @@ use crate::{
     draw::{
         axis::{Axis, Scale, range},
         chart::{
-            Colours, Entry, Estimate, FOOT, Heading, MARGIN, Mark, Panel, WIDTH, draw_marker, drawable, nothing,
-            triangle_right, triangle_up,
+            Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, draw_marker, drawable,
+            nothing, triangle_right, triangle_up,
         },
         svg::{Svg, coordinate},
         trace,
@@ -56,18 +56,18 @@ pub struct Series {
     /// The value of the other key if it is a number, for the colour bar.
     pub value: Option<f64>,
     /// The settings; those of a numeric key ascend.
-    pub levels: Vec<Level>,
+    pub levels: Vec<DependencePoint>,
     /// The law fitted to them.
-    pub fit: Option<PowerLaw>,
+    pub fit: Option<PowerLawLine>,
 }
 
 /// t_relax at one setting of the key.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Level {
+pub struct DependencePoint {
     /// The setting.
     pub at: Setting,
     /// The median with its interval, in length⁴; none where too few members relaxed.
-    pub median: Option<Estimate>,
+    pub median: Option<EstimatedNumber>,
     /// The quantiles 25 and 75 %, in length⁴; the upper one is none where too few members relaxed.
     pub quartiles: (Option<f64>, Option<f64>),
 }
@@ -83,14 +83,14 @@ pub enum Setting {
 
 /// t_relax = factor·keyᵖ.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PowerLaw {
+pub struct PowerLawLine {
     /// p.
-    pub exponent: Estimate,
+    pub exponent: EstimatedNumber,
     /// t_relax where the key is 1, in length⁴.
     pub factor: f64,
 }
 
-impl Level {
+impl DependencePoint {
     /// All its times that can be drawn.
     fn times(&self) -> impl Iterator<Item = f64> {
         let (value, interval) = self.median.map_or((None, None), |median| (Some(median.value), median.interval));
@@ -140,19 +140,19 @@ impl Level {
 impl Series {
     /// The least and the largest of its settings that a power law holds for.
     fn span(&self) -> Option<(f64, f64)> {
-        let positive = self.levels.iter().filter_map(Level::number).filter(|x| Scale::Log.holds(*x));
+        let positive = self.levels.iter().filter_map(DependencePoint::number).filter(|x| Scale::Log.holds(*x));
         range(positive).filter(|(low, high)| low < high)
     }
 
     /// Its law, if there is one and it can be drawn.
-    fn law(&self) -> Option<PowerLaw> {
-        let known = |fit: &PowerLaw| Scale::Log.holds(fit.factor) && Scale::Linear.holds(fit.exponent.value);
+    fn law(&self) -> Option<PowerLawLine> {
+        let known = |fit: &PowerLawLine| Scale::Log.holds(fit.factor) && Scale::Linear.holds(fit.exponent.value);
         self.fit.filter(known).filter(|_| self.span().is_some())
     }
 
     /// Data of the line of its law.
     fn line(&self, panel: &Panel) -> String {
-        let (Some(PowerLaw { exponent, factor }), Some((low, high))) = (self.law(), self.span()) else {
+        let (Some(PowerLawLine { exponent, factor }), Some((low, high))) = (self.law(), self.span()) else {
             return String::new();
         };
         let at = |share: f64| low * (high / low).powf(share);
@@ -187,7 +187,7 @@ impl Dependence<'_> {
         self.draw_numeric(&colours, sentences)
     }
 
-    fn levels(&self) -> impl Iterator<Item = &Level> {
+    fn levels(&self) -> impl Iterator<Item = &DependencePoint> {
         self.series.iter().flat_map(|series| &series.levels)
     }
 
@@ -213,7 +213,7 @@ impl Dependence<'_> {
     }
 
     fn time_axis(&self) -> Axis {
-        let times: Vec<f64> = self.levels().flat_map(Level::times).collect();
+        let times: Vec<f64> = self.levels().flat_map(DependencePoint::times).collect();
         let axis = Axis::over("t_relax", TIME, self.scale(self.time, &times), times.iter().copied());
         match range(times) {
             Some((low, high)) if low >= 0.0 && low < 0.5 * high => axis.with_zero(),
@@ -222,7 +222,7 @@ impl Dependence<'_> {
     }
 
     fn draw_numeric(&self, colours: &Colours, sentences: Vec<String>) -> String {
-        let settings: Vec<f64> = self.levels().filter_map(Level::number).collect();
+        let settings: Vec<f64> = self.levels().filter_map(DependencePoint::number).collect();
         let across = Axis::over(self.key, "", self.scale(self.across, &settings), settings);
         let time = self.time_axis();
         let heading = Heading { title: self.title, sentences, legend: self.legend(colours) };
@@ -322,22 +322,22 @@ impl Dependence<'_> {
             Some(fit) => format!("{}: p = {}", series.label, fit.exponent.shown()),
             None => series.label.clone(),
         };
-        let series = told_apart.map(|(i, class)| Entry::new(class, Mark::Marker(*i), &label(&self.series[*i])));
-        let any = |has: &dyn Fn(&Level) -> bool, mark: Mark, label: &str| {
+        let series = told_apart.map(|(i, class)| Entry::new(class, LegendMark::Marker(*i), &label(&self.series[*i])));
+        let any = |has: &dyn Fn(&DependencePoint) -> bool, mark: LegendMark, label: &str| {
             self.levels().any(has).then(|| Entry::new(neutral, mark, label))
         };
-        let median = any(&|level| level.median.is_some() && !several, Mark::Marker(0), "median");
+        let median = any(&|level| level.median.is_some() && !several, LegendMark::Marker(0), "median");
         let interval = any(
             &|level| level.median.is_some_and(|m| m.interval.is_some()),
-            Mark::Thick,
+            LegendMark::Thick,
             "95 % interval of the median",
         );
-        let quartiles = any(&|level| level.quartiles.0.is_some(), Mark::Thin, "25 to 75 % of the members");
-        let pointer = if self.named() { Mark::Right } else { Mark::Up };
+        let quartiles = any(&|level| level.quartiles.0.is_some(), LegendMark::Thin, "25 to 75 % of the members");
+        let pointer = if self.named() { LegendMark::Right } else { LegendMark::Up };
         let beyond = any(&|level| level.median.is_none(), pointer, "median not reached");
         let fit = self.series.iter().find_map(Series::law).map(|fit| {
             let exponent = if several { String::new() } else { format!(", p = {}", fit.exponent.shown()) };
-            Entry::new(neutral, Mark::Dashed, &format!("fit: t_relax ∝ {}ᵖ{exponent}", self.key))
+            Entry::new(neutral, LegendMark::Dashed, &format!("fit: t_relax ∝ {}ᵖ{exponent}", self.key))
         });
         series.chain(median).chain(interval).chain(quartiles).chain(beyond).chain(fit).collect()
     }

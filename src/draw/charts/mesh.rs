@@ -6,7 +6,7 @@ use super::bins::{Bins, guide};
 use crate::{
     draw::{
         axis::{Axis, Scale},
-        chart::{Entry, FOOT, HEADING, Heading, MARGIN, Mark, Panel, WIDTH},
+        chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH},
         svg::Svg,
         width::{SIZE, shortened},
     },
@@ -32,7 +32,7 @@ pub struct MeshQuality<'a> {
 }
 
 /// The values of one panel.
-struct Measure {
+struct MeshMeasure {
     name: &'static str,
     scale: Scale,
     /// Where there are any.
@@ -43,8 +43,8 @@ struct Measure {
     unknown: usize,
 }
 
-impl Measure {
-    fn new(name: &'static str, values: &[f32]) -> Measure {
+impl MeshMeasure {
+    fn new(name: &'static str, values: &[f32]) -> MeshMeasure {
         let known = || values.iter().map(|value| f64::from(*value)).filter(|value| Scale::Linear.holds(*value));
         // A drift of 0 is no reason to crowd all others at the left.
         let positive = || known().filter(|value| *value > 0.0);
@@ -52,7 +52,7 @@ impl Measure {
         let mut sorted: Vec<f64> = known().filter(|value| scale.holds(*value)).collect();
         sorted.sort_unstable_by(f64::total_cmp);
         let known = known().count();
-        Measure {
+        MeshMeasure {
             name,
             scale,
             bins: (!sorted.is_empty()).then(|| Bins::of(&sorted, scale)),
@@ -110,8 +110,8 @@ fn middle_and_most(sorted: &[f64]) -> String {
 impl MeshQuality<'_> {
     /// The text of an SVG file.
     pub fn draw(&self) -> String {
-        let ratio = Measure::new("mesh_ratio", self.mesh_ratio);
-        let drift = Measure::new("metric_drift", self.metric_drift);
+        let ratio = MeshMeasure::new("mesh_ratio", self.mesh_ratio);
+        let drift = MeshMeasure::new("metric_drift", self.metric_drift);
         let distrusted = self.distrusted.filter(|(bound, _)| Scale::Log.holds(*bound));
         let verdict = match distrusted {
             Some((bound, above)) if above > 0 => {
@@ -122,7 +122,7 @@ impl MeshQuality<'_> {
         let sentences = vec![self.note.into(), verdict, ratio.sentence(), drift.sentence()];
         let label = |(bound, _)| format!("metric_drift {}, above which results are distrusted", significant(bound, 1));
         let shown = distrusted.filter(|(_, above)| *above > 0).map(label);
-        let legend = shown.iter().map(|label| Entry::new("ink", Mark::Dashed, label)).collect();
+        let legend = shown.iter().map(|label| Entry::new("ink", LegendMark::Dashed, label)).collect();
         let (mut svg, top) = Heading { title: self.title, sentences, legend }.begin(HEADING + HEIGHT + FOOT);
         let width = 0.5 * (WIDTH - MARGIN - GAP);
         let corner = DVec2::new(0.0, top + HEADING);

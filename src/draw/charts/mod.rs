@@ -12,14 +12,14 @@ pub mod rates;
 pub mod relaxation;
 pub mod survival;
 
-pub use decay::{Decay, DecayCurve, Law, Theory};
-pub use dependence::{Dependence, Level, PowerLaw, Series, Setting};
+pub use decay::{Decay, DecayCurve, DecayLaw, Theory};
+pub use dependence::{Dependence, DependencePoint, PowerLawLine, Series, Setting};
 pub use mesh::MeshQuality;
 pub use rates::FittedRates;
 pub use relaxation::RelaxationTimes;
 pub use survival::{Survival, SurvivalCurve};
 
-pub use super::chart::Estimate;
+pub use super::chart::EstimatedNumber;
 
 use glam::DVec2;
 

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     draw::{
         axis::{Axis, Scale},
-        chart::{Entry, FOOT, Heading, Mark, nothing},
+        chart::{Entry, FOOT, Heading, LegendMark, nothing},
     },
     text::{count, significant},
 };
@@ -51,7 +51,8 @@ impl FittedRates<'_> {
         let (name, unit) = if relative { ("rate / theory", "") } else { ("rate", unit) };
         let (across, members) = (bins.axis(name, unit, scale), Axis::counts("members", bins.most()));
         let shown = relative && across.holds(1.0);
-        let legend = if shown { vec![Entry::new("ink", Mark::Dashed, "as linear theory has it")] } else { Vec::new() };
+        let legend =
+            if shown { vec![Entry::new("ink", LegendMark::Dashed, "as linear theory has it")] } else { Vec::new() };
         let sentences = vec![note.into(), median, without];
         let (mut svg, top) = Heading { title, sentences, legend }.begin(HEIGHT + FOOT + 8.0);
         let panel = only_panel([&across, &members], top, HEIGHT, 0.0);

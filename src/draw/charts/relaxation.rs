@@ -11,7 +11,7 @@ use super::{
 use crate::{
     draw::{
         axis::{Axis, Scale},
-        chart::{Entry, Estimate, FOOT, Heading, MARGIN, Mark, Panel, WIDTH, nothing},
+        chart::{Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, nothing},
         trace,
     },
     text::{count, grouped},
@@ -33,7 +33,7 @@ pub struct RelaxationTimes<'a> {
     /// The members without t_relax, counted by their status.
     pub others: &'a [(&'a str, u64)],
     /// The median over all, with censored members counted as such, in length⁴.
-    pub median: Option<Estimate>,
+    pub median: Option<EstimatedNumber>,
 }
 
 impl RelaxationTimes<'_> {
@@ -48,7 +48,7 @@ impl RelaxationTimes<'_> {
             return nothing(title, sentences, "No member relaxed, so there are no relaxation times to count.");
         }
         let median = median.filter(|median| Scale::Linear.holds(median.value));
-        let legend = median.iter().map(|median| Entry::new("ink", Mark::Dashed, &label(median))).collect();
+        let legend = median.iter().map(|median| Entry::new("ink", LegendMark::Dashed, &label(median))).collect();
         let heading = Heading { title, sentences, legend };
         let (mut svg, top) = heading.begin(HISTOGRAM + GAP + SHARE + FOOT + 8.0);
 
@@ -121,7 +121,7 @@ fn counts(relaxed: u64, members: u64, others: &[(&str, u64)]) -> String {
     format!("{} of {} relaxed; {others} no t_relax{named}.", grouped(relaxed), count(members, "member"))
 }
 
-fn label(median: &Estimate) -> String {
+fn label(median: &EstimatedNumber) -> String {
     let interval = if median.interval.is_some() { ", shaded: its 95 % interval" } else { "" };
     format!("median {}{interval}", median.shown())
 }

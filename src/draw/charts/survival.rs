@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{MAX_BANDS, TIME, only_panel};
 use crate::draw::{
     axis::{Axis, Scale},
-    chart::{Colours, Entry, FOOT, Heading, Mark, Panel, nothing, stroke},
+    chart::{Colours, Entry, FOOT, Heading, LegendMark, Panel, nothing, stroke},
     trace,
 };
 
@@ -161,8 +161,8 @@ impl Survival<'_> {
 
     fn legend(&self, colours: &Colours, bands: bool, censored: bool) -> Vec<Entry> {
         let curves = colours.legend(|i| &self.curves[i].label);
-        let band = bands.then(|| Entry::new("faint", Mark::Band, "95 % band"));
-        let stroke = censored.then(|| Entry::new("faint", Mark::Stroke, "censored"));
+        let band = bands.then(|| Entry::new("faint", LegendMark::Band, "95 % band"));
+        let stroke = censored.then(|| Entry::new("faint", LegendMark::Stroke, "censored"));
         curves.chain(band).chain(stroke).collect()
     }
 }

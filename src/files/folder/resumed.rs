@@ -69,7 +69,7 @@ impl OutputFolder {
     }
 
     /// The same for the folder of a store.
-    pub fn check_store(&self, mark: &zarr::Mark) -> std::result::Result<(), String> {
+    pub fn check_store(&self, mark: &zarr::StoreMark) -> std::result::Result<(), String> {
         mark.check(&self.growing(STORE).map_err(|e| format!("cannot find {STORE} ({e})"))?)
     }
 

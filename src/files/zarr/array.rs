@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::chunks::{Kind, chunk_shape, key};
+use super::chunks::{DataType, chunk_shape, key};
 use crate::{error::Result, files::part_folder::PartFolder};
 
 /// An array that is written from its first element to its last.
@@ -30,7 +30,7 @@ impl Array {
     /// With extents by name of the dimension, chunks of at most `bytes`, and these attributes.
     pub(super) fn new(
         name: &'static str,
-        kind: Kind,
+        kind: DataType,
         dimensions: &[(&str, u64)],
         attributes: Value,
         bytes: usize,

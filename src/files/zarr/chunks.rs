@@ -7,34 +7,34 @@ pub(super) const CHUNK_BYTES: usize = 4 << 20;
 
 /// Type of an element.
 #[derive(Clone, Copy)]
-pub(super) enum Kind {
+pub(super) enum DataType {
     Float64,
     Int64,
     Int8,
 }
 
-impl Kind {
+impl DataType {
     pub(super) fn name(self) -> &'static str {
         match self {
-            Kind::Float64 => "float64",
-            Kind::Int64 => "int64",
-            Kind::Int8 => "int8",
+            DataType::Float64 => "float64",
+            DataType::Int64 => "int64",
+            DataType::Int8 => "int8",
         }
     }
 
     pub(super) fn fill_value(self) -> Value {
         match self {
-            Kind::Float64 => "NaN".into(),
-            Kind::Int64 | Kind::Int8 => 0.into(),
+            DataType::Float64 => "NaN".into(),
+            DataType::Int64 | DataType::Int8 => 0.into(),
         }
     }
 
     /// The bytes of the fill value.
     pub(super) fn fill(self) -> Vec<u8> {
         match self {
-            Kind::Float64 => f64::NAN.to_le_bytes().into(),
-            Kind::Int64 => 0_i64.to_le_bytes().into(),
-            Kind::Int8 => vec![0],
+            DataType::Float64 => f64::NAN.to_le_bytes().into(),
+            DataType::Int64 => 0_i64.to_le_bytes().into(),
+            DataType::Int8 => vec![0],
         }
     }
 }

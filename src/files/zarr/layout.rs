@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::{array::Array, chunks::Kind};
+use super::{array::Array, chunks::DataType};
 use crate::{
     ensemble::{Spec, Status},
     schedule::Outputs,
@@ -42,15 +42,15 @@ pub(super) fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) ->
     });
     let time = json!({ "long_name": "time", "units": "length^4" });
     Arrays {
-        member: vector("member", Kind::Int64, members, of_member("index of the member")),
-        time: vector("time", Kind::Float64, instants, time),
-        node: vector("node", Kind::Int64, nodes, json!({ "long_name": "number of the node along the curve" })),
-        cell: vector("cell", Kind::Int64, members, of_member("index of the cell of the sweep")),
+        member: vector("member", DataType::Int64, members, of_member("index of the member")),
+        time: vector("time", DataType::Float64, instants, time),
+        node: vector("node", DataType::Int64, nodes, json!({ "long_name": "number of the node along the curve" })),
+        cell: vector("cell", DataType::Int64, members, of_member("index of the cell of the sweep")),
         fields: FIELDS.map(|(name, units, what)| {
             let attributes = json!({ "long_name": what, "units": units, "coordinates": "cell status" });
-            Array::new(name, Kind::Float64, &[members, instants, nodes], attributes, bytes)
+            Array::new(name, DataType::Float64, &[members, instants, nodes], attributes, bytes)
         }),
-        status: vector(STATUS, Kind::Int8, members, flags),
+        status: vector(STATUS, DataType::Int8, members, flags),
     }
 }
 

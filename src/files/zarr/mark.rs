@@ -17,7 +17,7 @@ use crate::{
 
 /// A growing store as far as a state vouches for it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Mark {
+pub struct StoreMark {
     /// Its arrays that grow.
     pub(super) arrays: Vec<ArrayMark>,
 }
@@ -59,7 +59,7 @@ impl Array {
     }
 }
 
-impl Mark {
+impl StoreMark {
     /// That the chunks in `store` are those it vouches for; else what is wrong.
     pub fn check(&self, store: &Place) -> std::result::Result<(), String> {
         let own = || FIELDS.iter().map(|(name, ..)| *name).chain([STATUS]);

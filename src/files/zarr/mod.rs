@@ -16,6 +16,6 @@ mod store;
 #[cfg(test)]
 mod tests;
 
-pub use mark::Mark;
+pub use mark::StoreMark;
 pub use reading::StoredMembers;
 pub use store::SnapshotStore;

@@ -6,7 +6,7 @@ use super::{
     array::Array,
     chunks::{CHUNK_BYTES, key},
     layout::{Arrays, arrays, times},
-    mark::{ArrayMark, Mark},
+    mark::{ArrayMark, StoreMark},
 };
 use crate::{
     ensemble::Spec,
@@ -39,7 +39,7 @@ impl StoredMembers {
     ///
     /// # Errors
     /// [`Error::Request`] where `mark` is not that of such a store.
-    pub fn open(path: &Path, spec: &Spec, points: usize, mark: &Mark) -> Result<StoredMembers> {
+    pub fn open(path: &Path, spec: &Spec, points: usize, mark: &StoreMark) -> Result<StoredMembers> {
         let arrays = arrays(spec, points, &times(spec), CHUNK_BYTES);
         let Arrays { fields, status, .. } = arrays;
         let own: Vec<Array> = fields.into_iter().chain([status]).collect();

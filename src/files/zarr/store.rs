@@ -4,9 +4,9 @@ use serde_json::{Map, Value, json};
 
 use super::{
     array::Array,
-    chunks::{CHUNK_BYTES, Kind},
+    chunks::{CHUNK_BYTES, DataType},
     layout::{Arrays, arrays, nearest, times},
-    mark::Mark,
+    mark::StoreMark,
     reading::StoredMembers,
 };
 use crate::{
@@ -99,7 +99,7 @@ impl SnapshotStore {
     /// Leaves the times up to the one at `place` unknown.
     fn skip_to(&mut self, place: usize) -> Result<()> {
         if self.filled < place {
-            let unknown: Vec<u8> = Kind::Float64.fill().repeat(self.points);
+            let unknown: Vec<u8> = DataType::Float64.fill().repeat(self.points);
             for array in &mut self.fields {
                 (self.filled..place).try_for_each(|_| array.push(&self.folder, &unknown))?;
             }
@@ -122,9 +122,9 @@ impl SnapshotStore {
     }
 
     /// How far it has grown, once that is on disk.
-    pub fn mark(&self) -> Result<Mark> {
+    pub fn mark(&self) -> Result<StoreMark> {
         self.folder.sync()?;
-        Ok(Mark { arrays: self.fields.iter().chain([&self.status]).map(Array::mark).collect() })
+        Ok(StoreMark { arrays: self.fields.iter().chain([&self.status]).map(Array::mark).collect() })
     }
 
     /// Whether what is written is worth keeping if the run fails.
@@ -132,16 +132,16 @@ impl SnapshotStore {
         self.folder.keep(keep);
     }
 
-    /// Goes on with one that [was checked](Mark::check); what was written after `mark` is removed.
+    /// Goes on with one that [was checked](StoreMark::check); what was written after `mark` is removed.
     ///
     /// # Errors
     /// [`Error::Request`] where the mark is of the arrays of another spec.
-    pub fn resume(folder: PartFolder, spec: &Spec, points: usize, mark: &Mark) -> Result<SnapshotStore> {
+    pub fn resume(folder: PartFolder, spec: &Spec, points: usize, mark: &StoreMark) -> Result<SnapshotStore> {
         mark.cut_off(folder.part())?;
         SnapshotStore::begin(folder, spec, points)?.from(mark)
     }
 
-    fn from(mut self, mark: &Mark) -> Result<SnapshotStore> {
+    fn from(mut self, mark: &StoreMark) -> Result<SnapshotStore> {
         let mut fits = true;
         for (array, mark) in self.fields.iter_mut().chain([&mut self.status]).zip(&mark.arrays) {
             fits &= array.resume_from(mark);

@@ -10,7 +10,7 @@ mod scope;
 
 use std::fmt::Write;
 
-pub use player::{MAX_MEMBERS, Trajectory, spread};
+pub use player::{MAX_MEMBERS, MovingMember, spread};
 
 use crate::{
     draw::svg::escape,
@@ -41,11 +41,11 @@ pub struct Page<'a> {
     /// What the reader should know, a sentence each.
     pub warnings: &'a [String],
     /// A few members to watch; the first six are shown.
-    pub members: Vec<Trajectory>,
+    pub members: Vec<MovingMember>,
     /// The pictures.
-    pub plots: Vec<Figure>,
+    pub plots: Vec<PageFigure>,
     /// The tables.
-    pub tables: Vec<Table>,
+    pub tables: Vec<PageTable>,
     /// The resolved spec as TOML.
     pub spec: &'a str,
     /// How and when it was made: name and value.
@@ -65,7 +65,7 @@ pub struct Headline {
 
 /// A picture.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Figure {
+pub struct PageFigure {
     /// Its title, which the picture itself shows: here for screen readers.
     pub title: String,
     /// A sentence below it; may be empty.
@@ -76,7 +76,7 @@ pub struct Figure {
 
 /// A table.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
+pub struct PageTable {
     /// What it holds.
     pub caption: String,
     /// Names of the columns.
@@ -94,7 +94,7 @@ impl Page<'_> {
         let script = player.as_ref().filter(|player| player.moves()).map(|player| script(&player.data()));
         let mut sheets = Sheets::default();
         let plots: String = self.plots.iter().map(|figure| figure.html(&mut sheets)).collect();
-        let tables: String = self.tables.iter().map(Table::html).collect();
+        let tables: String = self.tables.iter().map(PageTable::html).collect();
         let spec = if self.spec.is_empty() {
             String::new()
         } else {
@@ -217,7 +217,7 @@ impl Headline {
     }
 }
 
-impl Figure {
+impl PageFigure {
     fn html(&self, sheets: &mut Sheets) -> String {
         let caption = escape(&self.caption);
         let caption = if caption.is_empty() { caption } else { format!("<figcaption>{caption}</figcaption>\n") };
@@ -229,7 +229,7 @@ impl Figure {
     }
 }
 
-impl Table {
+impl PageTable {
     fn html(&self) -> String {
         let caption = escape(&self.caption);
         let columns = self.header.len();

@@ -35,7 +35,7 @@ const MIN_HEIGHT: f64 = 0.5;
 
 /// One member on its way.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Trajectory {
+pub struct MovingMember {
     /// What it is, and how it ended: `member 3: relaxed at t = 0.41`.
     pub label: String,
     /// How it ended, which its colour shows.
@@ -46,7 +46,7 @@ pub struct Trajectory {
     pub nodes: Vec<Vec<DVec2>>,
 }
 
-impl Trajectory {
+impl MovingMember {
     /// The times that can be shown, thinned, and the nodes at each.
     fn frames(&self) -> Vec<(f64, Vec<DVec2>)> {
         let count = self.nodes.first().map_or(0, Vec::len);
@@ -64,7 +64,7 @@ impl Trajectory {
 /// Members that can be shown, to one scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Player {
-    members: Vec<Member>,
+    members: Vec<PlayedMember>,
     /// Units of length in one unit of the coordinates.
     unit: f64,
     /// Height of a panel, in coordinates.
@@ -72,7 +72,7 @@ pub struct Player {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Member {
+struct PlayedMember {
     label: String,
     status: &'static str,
     times: Vec<f64>,
@@ -151,7 +151,7 @@ impl Formatter for LineBreaks {
 
 impl Player {
     /// The first of `trajectories` that have a time to show; none if none has.
-    pub fn new(trajectories: &[Trajectory]) -> Option<Player> {
+    pub fn new(trajectories: &[MovingMember]) -> Option<Player> {
         let shown = trajectories.iter().map(|trajectory| (trajectory, trajectory.frames()));
         let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MAX_MEMBERS).collect();
         let boxes: Vec<(DVec2, DVec2)> = shown.iter().filter_map(|(_, frames)| bounds(frames)).collect();
@@ -167,7 +167,7 @@ impl Player {
                 nodes.iter().flat_map(|p| place(*p).to_array()).map(|v| v.round().clamp(0.0, LARGEST) as u16).collect()
             };
             let (times, frames) = frames.iter().map(|(t, nodes)| (*t, whole(nodes))).unzip();
-            Member { label: trajectory.label.clone(), status: trajectory.status, times, frames }
+            PlayedMember { label: trajectory.label.clone(), status: trajectory.status, times, frames }
         });
         Some(Player { members: members.collect(), unit, height })
     }
@@ -180,7 +180,7 @@ impl Player {
     /// Its part of the page. Without the script it shows the members at their first time.
     pub fn html(&self) -> String {
         let mut html = String::from("<div class=\"members\">\n");
-        for Member { label, status, frames, times } in &self.members {
+        for PlayedMember { label, status, frames, times } in &self.members {
             let (start, label) = (path(&frames[0]), escape(label));
             let dots = if frames[0].len() <= 2 * MAX_DOTS { dots(&frames[0]) } else { String::new() };
             let (height, colour) = (self.height, colour(status));
@@ -210,7 +210,7 @@ impl Player {
 
     /// What the script reads: numbers and digits of base64 only.
     pub fn data(&self) -> String {
-        let member = |Member { times, frames, .. }: &Member| MemberData {
+        let member = |PlayedMember { times, frames, .. }: &PlayedMember| MemberData {
             times: times.clone(),
             frames: frames.iter().map(|frame| digits(frame)).collect(),
         };
@@ -279,13 +279,13 @@ mod tests {
     use super::*;
 
     /// An ellipse that becomes a circle, of this size.
-    fn ellipse(size: f64, times: usize, n: usize) -> Trajectory {
+    fn ellipse(size: f64, times: usize, n: usize) -> MovingMember {
         let nodes = |t: f64| {
             let a = 1.0 + (-t).exp();
             (0..n).map(|i| size * DVec2::new(a, 1.0 / a) * DVec2::from_angle(TAU * i as f64 / n as f64)).collect()
         };
         let times: Vec<f64> = (0..times).map(|i| 0.1 * i as f64).collect();
-        Trajectory {
+        MovingMember {
             label: "member <0>".into(),
             status: "relaxed",
             nodes: times.iter().map(|t| nodes(*t)).collect(),
@@ -323,13 +323,13 @@ mod tests {
     fn what_cannot_be_shown_is_left_out() {
         let mut broken = ellipse(1.0, 3, 12);
         broken.nodes[1][4].x = f64::NAN;
-        let player = Player::new(&[Trajectory::default(), broken]).unwrap();
+        let player = Player::new(&[MovingMember::default(), broken]).unwrap();
         assert_eq!(player.members.len(), 1);
         assert_eq!(player.members[0].times, [0.0, 0.2]);
-        assert_eq!(Player::new(&[Trajectory::default()]), None);
+        assert_eq!(Player::new(&[MovingMember::default()]), None);
         assert_eq!(Player::new(&[]), None);
         let nodes = vec![vec![DVec2::ONE; 6]];
-        let point = Trajectory { times: vec![0.0], nodes, ..Trajectory::default() };
+        let point = MovingMember { times: vec![0.0], nodes, ..MovingMember::default() };
         let html = Player::new(&[point]).unwrap().html();
         assert!(!html.contains("NaN") && !html.contains("inf") && !html.contains("type=\"range\""), "{html}");
     }
@@ -346,8 +346,8 @@ mod tests {
         let nodes = |x: f64| vec![DVec2::new(x, 0.0), DVec2::new(-x, 1.0), DVec2::new(0.0, 2.0)];
         let times = vec![0.0, 1e-7, 0.1, 1e21];
         let nodes: Vec<_> = [1.0, 0.5, 0.25, 0.125].map(nodes).into();
-        let one = Trajectory { label: "one".into(), status: "relaxed", times, nodes };
-        let two = Trajectory { label: "two".into(), times: vec![0.0], nodes: one.nodes[..1].to_vec(), ..one.clone() };
+        let one = MovingMember { label: "one".into(), status: "relaxed", times, nodes };
+        let two = MovingMember { label: "two".into(), times: vec![0.0], nodes: one.nodes[..1].to_vec(), ..one.clone() };
         let data = Player::new(&[one, two]).unwrap().data();
         let parts = [
             "{\"marks\":[0,0.0000001,0.1,1000000000000000000000],",

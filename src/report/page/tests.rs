@@ -9,7 +9,7 @@ use super::*;
 use crate::draw::charts::tests::pictures::pictures;
 
 /// A perturbed ellipse whose modes decay as theory says, recorded often at first and seldom later.
-fn member(j: usize) -> Trajectory {
+fn member(j: usize) -> MovingMember {
     let nodes = |t: f64| -> Vec<DVec2> {
         let node = |i: usize| {
             let u = TAU * i as f64 / 100.0;
@@ -22,10 +22,10 @@ fn member(j: usize) -> Trajectory {
     };
     let times: Vec<f64> = (0..=40).map(|i| 0.5 * (i as f64 / 40.0).powi(2)).collect();
     let label = format!("member {j}: relaxed at t = {:.3}", 0.38 + 0.01 * j as f64);
-    Trajectory { label, status: "relaxed", nodes: times.iter().map(|t| nodes(*t)).collect(), times }
+    MovingMember { label, status: "relaxed", nodes: times.iter().map(|t| nodes(*t)).collect(), times }
 }
 
-fn table(rows: usize) -> Table {
+fn table(rows: usize) -> PageTable {
     let row = |i: usize| {
         [
             format!("{}", 0.01 * i as f64),
@@ -35,7 +35,7 @@ fn table(rows: usize) -> Table {
             if i == 0 { "" } else { "0.41" }.into(),
         ]
     };
-    Table {
+    PageTable {
         caption: "Relaxation times by cell".into(),
         header: ["amplitude", "members", "relaxed", "median t_relax", "low"].map(String::from).into(),
         rows: (1..=rows).map(|i| row(i).into()).collect(),
@@ -58,7 +58,7 @@ fn page(warnings: &[String]) -> Page<'_> {
     let figure = |name: &&str| {
         let (_, svg) = pictures().iter().find(|(found, _)| found == name).unwrap();
         let caption = "Members without t_relax are censored at the end of the run.".into();
-        Figure { title: (*name).into(), caption, svg: svg.clone() }
+        PageFigure { title: (*name).into(), caption, svg: svg.clone() }
     };
     let headline = [
         ("median t_relax", "0.412 length⁴", "95 %: 0.407 to 0.418"),
@@ -167,9 +167,9 @@ fn everything_is_escaped() {
         statuses: vec![(evil, 3)],
         headline: vec![Headline { label: owned(), value: owned(), note: owned() }],
         warnings: &warnings,
-        members: vec![Trajectory { label: owned(), ..member(0) }],
-        plots: vec![Figure { title: owned(), caption: owned(), svg: "<svg></svg>".into() }],
-        tables: vec![Table {
+        members: vec![MovingMember { label: owned(), ..member(0) }],
+        plots: vec![PageFigure { title: owned(), caption: owned(), svg: "<svg></svg>".into() }],
+        tables: vec![PageTable {
             caption: owned(),
             header: vec![owned()],
             rows: vec![vec![owned()]; 300],
@@ -190,8 +190,12 @@ fn an_empty_page_says_so_and_holds_no_number_that_is_none() {
     assert!(is_well_formed(&html));
     assert!(html.contains("There are no members.") && html.contains("Nothing: there are no warnings."), "{html}");
     let statuses = vec![("relaxed", 0), ("unfinished", 1)];
-    let censored =
-        Page { statuses, members: vec![Trajectory::default()], tables: vec![Table::default()], ..Page::default() };
+    let censored = Page {
+        statuses,
+        members: vec![MovingMember::default()],
+        tables: vec![PageTable::default()],
+        ..Page::default()
+    };
     let censored = censored.html();
     assert!(censored.contains("<strong>0</strong> of 1 member relaxed (0.0 %)"), "{censored}");
     assert!(censored.contains("1 member had not relaxed when time was up"), "{censored}");
@@ -218,7 +222,7 @@ fn shares_are_0_and_100_only_where_they_are() {
 #[test]
 fn the_page_of_a_large_study_stays_small() {
     let figure =
-        |(name, svg): &(String, String)| Figure { title: name.clone(), caption: name.clone(), svg: svg.clone() };
+        |(name, svg): &(String, String)| PageFigure { title: name.clone(), caption: name.clone(), svg: svg.clone() };
     let mut long = member(0);
     long.times = (0..200).map(f64::from).collect();
     long.nodes = vec![long.nodes[0].repeat(10); 200];

@@ -56,9 +56,9 @@ pub fn decay(label: &str, value: Option<f64>, rate: f64, count: usize) -> DecayC
     DecayCurve { label: label.into(), value, t, mean, band: Some(band) }
 }
 
-fn level(at: Setting, median: f64) -> Level {
-    let median = Estimate { value: median, interval: Some((0.95 * median, 1.06 * median)) };
-    Level { at, median: Some(median), quartiles: (Some(0.8 * median.value), Some(1.3 * median.value)) }
+fn level(at: Setting, median: f64) -> DependencePoint {
+    let median = EstimatedNumber { value: median, interval: Some((0.95 * median, 1.06 * median)) };
+    DependencePoint { at, median: Some(median), quartiles: (Some(0.8 * median.value), Some(1.3 * median.value)) }
 }
 
 /// Medians scattered round factor·amplitude^(−0.31), at `count` amplitudes from 0.01 on.
@@ -66,8 +66,8 @@ pub fn amplitudes(label: &str, factor: f64, count: usize) -> Series {
     let amplitude = |i: usize| 0.01 * 1.6_f64.powi(i as i32);
     let law = |x: f64| factor * x.powf(-0.31);
     let levels = (0..count).map(|i| level(Setting::Number(amplitude(i)), law(amplitude(i)) * (1.0 + 0.05 * normal(i))));
-    let exponent = Estimate { value: -0.312, interval: Some((-0.33, -0.294)) };
-    let fit = Some(PowerLaw { exponent, factor });
+    let exponent = EstimatedNumber { value: -0.312, interval: Some((-0.33, -0.294)) };
+    let fit = Some(PowerLawLine { exponent, factor });
     Series { label: label.into(), value: Some(factor), levels: levels.collect(), fit }
 }
 
@@ -87,7 +87,7 @@ pub fn draw_all() -> Vec<(String, String)> {
     let some = [("unfinished", 88), ("stalled", 12), ("singular", 0)];
 
     let relaxation = |times: &[f64], others: &[(&str, u64)], median: Option<f64>| {
-        let median = median.map(|value| Estimate { value, interval: Some((0.97 * value, 1.04 * value)) });
+        let median = median.map(|value| EstimatedNumber { value, interval: Some((0.97 * value, 1.04 * value)) });
         RelaxationTimes { title: "Relaxation times", note: NOTE, times: times.to_vec(), others, median }.draw()
     };
     add("relaxation", relaxation(&times(412, 0.4, 0.2), &some, Some(0.42)));
@@ -139,8 +139,8 @@ pub fn draw_all() -> Vec<(String, String)> {
     add("survival-unknown", survive(vec![SurvivalCurve { t, survival, ..alone }], Some(Scale::Log)));
 
     let theory =
-        Theory { label: "exp(−24 t/R⁴), R = 1.41".into(), law: Law::Exponential { start: 0.06, rate: 6.0 } };
-    let algebraic = Law::Algebraic { start: 0.09, time: 0.5, power: 4.0 };
+        Theory { label: "exp(−24 t/R⁴), R = 1.41".into(), law: DecayLaw::Exponential { start: 0.06, rate: 6.0 } };
+    let algebraic = DecayLaw::Algebraic { start: 0.09, time: 0.5, power: 4.0 };
     let algebraic = Theory { label: "(1 + 2t/R₀⁴)⁻⁴".into(), law: algebraic };
     let fall = |curves: Vec<DecayCurve>, time: Option<Scale>| {
         let theory = if time == Some(Scale::Log) { &algebraic } else { &theory };
@@ -209,15 +209,17 @@ pub fn draw_all() -> Vec<(String, String)> {
     add("dependence-names", depend(vec![named(&names.iter().map(String::as_str).collect::<Vec<_>>(), 0.3)], "shape"));
     add("dependence-none", depend(vec![], "amplitude"));
     add("dependence-one", depend(vec![amplitudes("all", 0.12, 1)], "amplitude"));
-    let level = Level { at: Setting::Number(f64::NAN), median: None, quartiles: (None, None) };
+    let level = DependencePoint { at: Setting::Number(f64::NAN), median: None, quartiles: (None, None) };
     add(
         "dependence-unreached",
         depend(vec![Series { levels: vec![level.clone(); 3], ..Series::default() }], "amplitude"),
     );
-    let median = Some(Estimate { value: 0.4, interval: Some((f64::NAN, f64::INFINITY)) });
-    let (at, fit) =
-        (Setting::Number(0.0), Some(PowerLaw { exponent: Estimate { value: f64::NAN, interval: None }, factor: 0.0 }));
-    let levels = vec![Level { at, median, quartiles: (Some(f64::NAN), None) }, level];
+    let median = Some(EstimatedNumber { value: 0.4, interval: Some((f64::NAN, f64::INFINITY)) });
+    let (at, fit) = (
+        Setting::Number(0.0),
+        Some(PowerLawLine { exponent: EstimatedNumber { value: f64::NAN, interval: None }, factor: 0.0 }),
+    );
+    let levels = vec![DependencePoint { at, median, quartiles: (Some(f64::NAN), None) }, level];
     add("dependence-unknown", depend(vec![Series { levels, fit, ..Series::default() }], "amplitude"));
 
     let mesh = |mesh_ratio: &[f64], metric_drift: &[f64]| {

@@ -109,7 +109,7 @@ impl Varied {
 
 /// Resolutions, the coarsest first, each refined by the same factor.
 #[derive(Clone, Debug)]
-pub struct Study {
+pub struct ConvergenceStudy {
     /// What is refined.
     pub varied: Varied,
     /// The resolutions.
@@ -118,7 +118,7 @@ pub struct Study {
 
 /// A row of the table.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct ConvergenceRow {
     /// Name of the problem.
     pub problem: String,
     /// What is refined.
@@ -134,16 +134,16 @@ pub struct Row {
 }
 
 /// The studies of `problem` by `solver`.
-pub fn studies(problem: &Problem, solver: Solver) -> Vec<Study> {
+pub fn studies(problem: &Problem, solver: Solver) -> Vec<ConvergenceStudy> {
     let nodes: &[u32] = if solver.facts().slows_with_step { &SWEPT_NODES } else { &NODES };
     let by_nodes = |&n: &u32| problem.in_steps(n as usize, n * n / 25);
     vec![
-        Study { varied: Varied::Nodes, at: nodes.iter().map(by_nodes).collect() },
-        Study {
+        ConvergenceStudy { varied: Varied::Nodes, at: nodes.iter().map(by_nodes).collect() },
+        ConvergenceStudy {
             varied: Varied::Tolerance,
             at: TOLERANCES.map(|tolerance| problem.to_tolerance(FIXED_NODES, tolerance)).into(),
         },
-        Study { varied: Varied::Step, at: STEPS.map(|steps| problem.in_steps(FIXED_NODES, steps)).into() },
+        ConvergenceStudy { varied: Varied::Step, at: STEPS.map(|steps| problem.in_steps(FIXED_NODES, steps)).into() },
     ]
 }
 
@@ -162,18 +162,18 @@ const TOLERANCES: [f64; 4] = [6.4e-4, 1.6e-4, 4e-5, 1e-5];
 /// Change of the relative error, in ε, below which there is rounding only and no order to be seen.
 const ROUNDING: f64 = 1e3;
 
-impl Study {
+impl ConvergenceStudy {
     /// Solves `problem` at each resolution.
     ///
     /// # Errors
     /// Those of [`Problem::solve`].
-    pub fn rows(&self, problem: &Problem, method: &Spec) -> Result<Vec<Row>> {
+    pub fn rows(&self, problem: &Problem, method: &Spec) -> Result<Vec<ConvergenceRow>> {
         let mut errors = Vec::new();
         let mut rows = Vec::new();
         for &at in &self.at {
             let solved = problem.solve(method, at)?;
             errors.push(solved.error());
-            rows.push(Row {
+            rows.push(ConvergenceRow {
                 problem: problem.name.clone(),
                 varied: self.varied,
                 at,
@@ -205,9 +205,9 @@ impl Study {
 mod tests {
     use super::*;
 
-    fn study(varied: Varied) -> Study {
+    fn study(varied: Varied) -> ConvergenceStudy {
         let at = [10, 20, 40].map(|n| Resolution { n, tau: 1.0 / n as f64, tolerance: None });
-        Study { varied, at: at.into() }
+        ConvergenceStudy { varied, at: at.into() }
     }
 
     #[test]

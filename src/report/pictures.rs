@@ -3,12 +3,12 @@
 use super::{
     gallery,
     overview::{describe, place},
-    page::{Figure, Headline, MAX_MEMBERS, Page, Table, Trajectory, spread},
+    page::{Headline, MAX_MEMBERS, MovingMember, Page, PageFigure, PageTable, spread},
 };
 use crate::{
     draw::charts::{
-        Decay, DecayCurve, Dependence, Estimate, FittedRates, Law, Level, MeshQuality, PowerLaw, RelaxationTimes,
-        Series, Setting, Survival, SurvivalCurve, Theory,
+        Decay, DecayCurve, DecayLaw, Dependence, DependencePoint, EstimatedNumber, FittedRates, MeshQuality,
+        PowerLawLine, RelaxationTimes, Series, Setting, Survival, SurvivalCurve, Theory,
     },
     ensemble::{Spec, Status},
     error::Result,
@@ -29,7 +29,7 @@ const BAND: f64 = 1.96;
 const DIGITS: usize = 4;
 
 /// A finished run.
-pub struct Study<'a> {
+pub struct FinishedRun<'a> {
     /// What was asked for, where and when it was computed.
     pub provenance: &'a Provenance,
     /// What came out, but for what the statistics have taken.
@@ -47,10 +47,10 @@ pub struct Chart {
     /// The file.
     pub name: &'static str,
     /// The picture, with its words.
-    pub figure: Figure,
+    pub figure: PageFigure,
 }
 
-impl Study<'_> {
+impl FinishedRun<'_> {
     /// The files that are drawn: name and text.
     pub fn pictures(&self) -> Result<Vec<(&'static str, String)>> {
         let charts = self.charts()?;
@@ -174,7 +174,7 @@ impl Study<'_> {
         let series = cells.chunks(axis.values.len().max(1)).map(|cells| {
             let values = &cells[0].values[..others.len()];
             let named = others.iter().zip(values).map(|(other, value)| format!("{} = {value}", other.key));
-            let level = |(rank, cell): (usize, &CellStatistics)| Level {
+            let level = |(rank, cell): (usize, &CellStatistics)| DependencePoint {
                 at: match &numbers {
                     Some(numbers) => Setting::Number(numbers[rank]),
                     None => Setting::Name(cell.values[others.len()].clone()),
@@ -182,15 +182,15 @@ impl Study<'_> {
                 median: median(cell),
                 quartiles: quartiles(cell),
             };
-            let mut levels: Vec<Level> = cells.iter().enumerate().map(level).collect();
+            let mut levels: Vec<DependencePoint> = cells.iter().enumerate().map(level).collect();
             if numbers.is_some() {
-                let place = |level: &Level| if let Setting::Number(x) = level.at { x } else { 0.0 };
+                let place = |level: &DependencePoint| if let Setting::Number(x) = level.at { x } else { 0.0 };
                 levels.sort_by(|a, b| place(a).total_cmp(&place(b)));
             }
             let fit = self.statistics.power_law.as_ref().filter(|_| others.is_empty()).map(|law| {
                 let around = |error: f64| (law.exponent - BAND * error, law.exponent + BAND * error);
-                let exponent = Estimate { value: law.exponent, interval: law.exponent_error.map(around) };
-                PowerLaw { exponent, factor: law.factor }
+                let exponent = EstimatedNumber { value: law.exponent, interval: law.exponent_error.map(around) };
+                PowerLawLine { exponent, factor: law.factor }
             });
             let label = named.collect::<Vec<_>>().join(", ");
             let value = if let [other] = others { value_of(other, values) } else { None };
@@ -243,7 +243,7 @@ impl Study<'_> {
     }
 
     /// The members to watch: the first ones, or some of all cells.
-    fn trajectories(&self) -> Vec<Trajectory> {
+    fn trajectories(&self) -> Vec<MovingMember> {
         let sweep = &self.spec().sweep;
         let trajectory = |film: &Film| {
             let at = film.t_relax.map_or(String::new(), |t| format!(" at t = {}", significant(t, 3)));
@@ -252,7 +252,7 @@ impl Study<'_> {
                 false => format!(" ({})", sweep.name(film.member / self.spec().curves)),
             };
             let label = format!("member {}{cell}: {}{at}", film.member, film.status.name());
-            Trajectory { label, status: film.status.name(), times: film.times.clone(), nodes: film.frames() }
+            MovingMember { label, status: film.status.name(), times: film.times.clone(), nodes: film.frames() }
         };
         let shown = if sweep.is_empty() { self.films.len() } else { MAX_MEMBERS };
         spread(self.films.len(), shown).map(|i| trajectory(&self.films[i])).collect()
@@ -326,7 +326,7 @@ impl Study<'_> {
         headline
     }
 
-    fn table(&self) -> Table {
+    fn table(&self) -> PageTable {
         let keys = self.spec().sweep.axes().iter().map(|axis| axis.key.clone());
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
         let numbers = ["mean", "standard error"].into_iter().chain(QUANTILES.map(|(_, name, _)| name));
@@ -346,7 +346,7 @@ impl Study<'_> {
             let rates = ["median", "ratio"].map(|name| shown(cell.rates.numbers.get(name)));
             start.chain(counts).chain(moments).chain(quantiles).chain(rates).collect()
         };
-        Table {
+        PageTable {
             caption: "Members by status, statistics of t_relax (Kaplan-Meier), and rates of decay".into(),
             header: header.collect(),
             rows: self.statistics.cells.iter().map(row).collect(),
@@ -376,7 +376,7 @@ impl Study<'_> {
 }
 
 fn chart(name: &'static str, title: &str, caption: &str, svg: String) -> Chart {
-    Chart { name, figure: Figure { title: title.into(), caption: caption.into(), svg } }
+    Chart { name, figure: PageFigure { title: title.into(), caption: caption.into(), svg } }
 }
 
 /// Times of the members of a cell that relaxed, or of those that ended before.
@@ -401,7 +401,7 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
     Some(match (spec.flow.growth(area), &spec.flow) {
         (Some(time), _) => Theory {
             label: format!("(1 + 2t/R⁴)^−{}", brief(rate)),
-            law: Law::Algebraic { start: mean * (1.0 + t / time).powf(rate), time, power: rate },
+            law: DecayLaw::Algebraic { start: mean * (1.0 + t / time).powf(rate), time, power: rate },
         },
         (None, flow) => {
             let fourth_power = (area / std::f64::consts::PI).powi(2);
@@ -409,13 +409,13 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
                 Flow::SurfaceDiffusion => format!("exp(−{} t/R⁴)", brief(rate * fourth_power)),
                 _ => format!("exp(−{} t)", brief(rate)),
             };
-            Theory { label, law: Law::Exponential { start: mean * (rate * t).exp(), rate } }
+            Theory { label, law: DecayLaw::Exponential { start: mean * (rate * t).exp(), rate } }
         }
     })
 }
 
-fn median(cell: &CellStatistics) -> Option<Estimate> {
-    cell.median().map(|value| Estimate { value, interval: cell.bounds() })
+fn median(cell: &CellStatistics) -> Option<EstimatedNumber> {
+    cell.median().map(|value| EstimatedNumber { value, interval: cell.bounds() })
 }
 
 fn quartiles(cell: &CellStatistics) -> (Option<f64>, Option<f64>) {
@@ -424,7 +424,7 @@ fn quartiles(cell: &CellStatistics) -> (Option<f64>, Option<f64>) {
 }
 
 /// The number among `values` of a key whose values are numbers.
-fn value_of(axis: &crate::ensemble::sweep::Axis, values: &[String]) -> Option<f64> {
+fn value_of(axis: &crate::ensemble::sweep::SweepAxis, values: &[String]) -> Option<f64> {
     axis.numbers().and_then(|_| values.first()?.parse().ok())
 }
 
@@ -451,7 +451,7 @@ mod tests {
         let provenance = &Provenance::new(spec, &platform(), &tally, &[], Duration::ZERO, Duration::from_secs(1));
         let statistics = &EnsembleStatistics::new(spec, &mut tally).unwrap();
         let excess = &tally.mean_excess(spec).unwrap();
-        Study { provenance, tally: &tally, statistics, excess, films }.pictures().unwrap()
+        FinishedRun { provenance, tally: &tally, statistics, excess, films }.pictures().unwrap()
     }
 
     /// 10⁵ members, no two alike, a third of them censored at times of their own.
