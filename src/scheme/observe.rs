@@ -22,7 +22,7 @@ pub const MAX_GAP: f64 = 0.5;
 
 /// The four sums, in the order of the kernel's `vec4`.
 #[derive(Clone, Copy, Debug)]
-pub struct Sums<N> {
+pub struct CurveSums<N> {
     /// `Σ |e_i|`.
     pub length: N,
     /// `½ Σ x_{i-1} × x_i`.
@@ -115,7 +115,7 @@ impl<N: Number> Glance<N> {
 
 /// Sums over the ring.
 #[inline(always)]
-pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> Sums<N> {
+pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> CurveSums<N> {
     let half = N::of(0.5);
     let mut sums = solver::Sums::new(blocks);
     for i in 0..curve.len() {
@@ -125,7 +125,7 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> S
         sums.add(i, [edge(curve, i)[2], xm * y - x * ym, energy, winding(curve, i)]);
     }
     let [length, area, energy, turning] = sums.totals();
-    Sums { length, area: half * area, energy, turning }
+    CurveSums { length, area: half * area, energy, turning }
 }
 
 /// Maxima over the ring.
@@ -180,7 +180,7 @@ pub fn observe<T: Real>(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> 
 }
 
 /// What the sums and maxima of a curve say.
-pub fn observed<T: Real>(sums: &Sums<T>, maxima: &Maxima<T>, p: &Parameters<T>) -> Observed<T> {
+pub fn observed<T: Real>(sums: &CurveSums<T>, maxima: &Maxima<T>, p: &Parameters<T>) -> Observed<T> {
     Observed {
         length: sums.length,
         area: sums.area,

@@ -17,7 +17,7 @@ pub use system::{Equation, Equations, Row, System};
 
 use crate::{
     number::Number,
-    wgsl::{self, Part},
+    wgsl::{self, ShaderPart},
 };
 use gauss_seidel::SWEEPS_PER_CHECK;
 use multigrid::{Discretisation, KERNEL_LEVELS, Levels, SWEEPS_PER_CYCLE};
@@ -135,7 +135,7 @@ pub struct Facts {
 #[derive(Debug)]
 pub struct KernelFacts {
     /// Its files.
-    pub files: &'static [Part],
+    pub files: &'static [ShaderPart],
     /// Whether a member that is one subgroup may exchange by shuffles.
     pub shuffles: bool,
     /// Rows of four numbers that a block has in workgroup memory, where threads exchange by barriers.

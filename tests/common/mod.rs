@@ -13,7 +13,7 @@ use curvelax::{
     number::Real,
     scheme::{
         Parameters, State, Workspace,
-        observe::{self, Sums},
+        observe::{self, CurveSums},
         step::{self, Method},
     },
     solver::{Blocks, Order, Solver},
@@ -81,7 +81,7 @@ impl<T: Real> Stepper<T> {
         self
     }
 
-    pub fn sums(&self) -> Sums<T> {
+    pub fn sums(&self) -> CurveSums<T> {
         observe::sums(&self.state.curve, &self.p, self.work.blocks)
     }
 

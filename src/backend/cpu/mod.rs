@@ -53,7 +53,7 @@ fn most_steps(solver: Solver) -> u32 {
 
 /// Members of `n` nodes in numbers of type `T`.
 pub struct CpuBackend<T> {
-    batches: Vec<Batch<T>>,
+    batches: Vec<CpuBatch<T>>,
     slots: usize,
     method: Method,
     crew: Arc<dyn Crew<T>>,
@@ -69,7 +69,7 @@ type Members<T> = Vec<Option<Box<Run<T>>>>;
 type Back<T> = (Members<T>, Duration);
 
 /// Part of the slots.
-struct Batch<T> {
+struct CpuBatch<T> {
     /// Empty while the batch is on its way.
     members: Members<T>,
     /// Where they come back from there.
@@ -107,7 +107,7 @@ impl<T: Vectorised> CpuBackend<T> {
         let batches = if BATCHES * crew.lanes() * of_member <= ROOM { BATCHES } else { 1 };
         let usual = SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * crew.lanes());
         let slots = threads * usual.min((ROOM / of_member / batches).max(crew.lanes()));
-        let batch = || Batch { members: (0..slots).map(|_| None).collect(), coming: None, back: None };
+        let batch = || CpuBatch { members: (0..slots).map(|_| None).collect(), coming: None, back: None };
         Ok(CpuBackend {
             batches: (0..batches).map(|_| batch()).collect(),
             slots: batches * slots,
@@ -181,7 +181,7 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
     }
 
     fn is_back(&mut self, batch: usize, most: Duration) -> bool {
-        let Batch { coming, back, .. } = &mut self.batches[batch];
+        let CpuBatch { coming, back, .. } = &mut self.batches[batch];
         if let (None, Some(coming)) = (&back, coming) {
             match coming.recv_timeout(most) {
                 Ok(members) => *back = Some(members),

@@ -3,7 +3,7 @@
 use crate::{
     number::Real,
     solver::{Blocks, Solver, multigrid::coarse_nodes},
-    wgsl::{Part, parts},
+    wgsl::{ShaderPart, parts},
 };
 
 /// Fields that a traced kernel keeps per member; `conformance::bounds::STAGES` names them in their order.
@@ -38,7 +38,7 @@ impl Variant {
     }
 
     /// The files of the kernel, in the order of the step.
-    pub fn parts(self) -> impl Iterator<Item = Part> {
+    pub fn parts(self) -> impl Iterator<Item = ShaderPart> {
         let solver = self.solver.facts().kernel.files;
         let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
         let exchange = if self.subgroup { EXCHANGE_SUBGROUP } else { EXCHANGE };
@@ -46,7 +46,7 @@ impl Variant {
     }
 }
 
-const COMMON: [Part; 17] = parts![
+const COMMON: [ShaderPart; 17] = parts![
     "number.wgsl",
     "ring.wgsl",
     "sums.wgsl",
@@ -65,10 +65,10 @@ const COMMON: [Part; 17] = parts![
     "decay.wgsl",
     "evolve.wgsl",
 ];
-const EXCHANGE: [Part; 1] = parts!["exchange.wgsl"];
-const EXCHANGE_SUBGROUP: [Part; 1] = parts!["exchange_subgroup.wgsl"];
-const TRACE_OFF: [Part; 1] = parts!["trace_off.wgsl"];
-const TRACE_ON: [Part; 1] = parts!["trace_on.wgsl"];
+const EXCHANGE: [ShaderPart; 1] = parts!["exchange.wgsl"];
+const EXCHANGE_SUBGROUP: [ShaderPart; 1] = parts!["exchange_subgroup.wgsl"];
+const TRACE_OFF: [ShaderPart; 1] = parts!["trace_off.wgsl"];
+const TRACE_ON: [ShaderPart; 1] = parts!["trace_on.wgsl"];
 
 /// The whole source in precision `T`.
 pub fn source<T: Real>(variant: Variant) -> String {
