@@ -36,7 +36,7 @@ const FEWEST_POINTS: usize = 8;
 pub fn spec(points: usize, spec: Spec) -> Result<Spec> {
     if points < FEWEST_POINTS {
         let problem = "too few nodes for a perturbed ellipse";
-        return Err(Error::value("points", points, problem, &format!("take {FEWEST_POINTS} or more")));
+        return Err(Error::value("points", points, problem, &format!("use {FEWEST_POINTS} or more")));
     }
     let modes = Modes { low: 2, high: spec.modes.high.min((points / 4) as u32) };
     Spec { points, modes, ..spec }.validate()
@@ -155,7 +155,7 @@ impl Bench {
             self.made[slot] = made;
             if let Some(status) = Status::ALL.into_iter().find(|status| *status as u32 == counters.status) {
                 let (member, steps) = (slot % self.members.len(), counters.steps);
-                let what = format!("member {member} ended {} after {steps} steps; take other --points", status.name());
+                let what = format!("member {member} ended {} after {steps} steps; use other --points", status.name());
                 return Err(Error::Failed(what));
             }
             if counters.steps < counters.goal {

@@ -99,7 +99,7 @@ pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 pub(crate) fn text(path: &Path, most: u64) -> io::Result<String> {
     String::from_utf8(bytes(path, most)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
-        Error::new(ErrorKind::InvalidData, format!("byte {at} is no UTF-8; save it in UTF-8"))
+        Error::new(ErrorKind::InvalidData, format!("byte {at} is not UTF-8; save it as UTF-8"))
     })
 }
 
@@ -147,7 +147,7 @@ mod tests {
         assert_eq!(bytes(&path, 3).unwrap_err().to_string(), "4 bytes; at most 3 are read");
         assert_eq!(bytes(home.path(), 4).unwrap_err().kind(), ErrorKind::IsADirectory);
         fs::write(&path, b"ab\xff").unwrap();
-        assert_eq!(text(&path, 4).unwrap_err().to_string(), "byte 2 is no UTF-8; save it in UTF-8");
+        assert_eq!(text(&path, 4).unwrap_err().to_string(), "byte 2 is not UTF-8; save it as UTF-8");
     }
 
     #[test]

@@ -171,7 +171,7 @@ fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
 /// The error of an adapter that is not there; `names` are those that are.
 pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
     let there = if names.is_empty() {
-        "this machine has none; take --backend cpu, or install a GPU driver (Debian's software GPU is \
+        "this machine has none; use --backend cpu, or install a GPU driver (Debian's software GPU is \
          mesa-vulkan-drivers)"
             .to_string()
     } else {
@@ -193,7 +193,7 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
     let precision = spec.precision.unwrap_or(capacity.best_precision());
     if precision == Precision::F64 && !capacity.f64 {
         let problem = format!("adapter {name} has no f64");
-        return Err(Error::value("precision", "f64", &problem, "take --precision f32, or --backend cpu"));
+        return Err(Error::value("precision", "f64", &problem, "use --precision f32, or --backend cpu"));
     }
     check_precision(n, precision)?;
     let (fits, most) = match precision {
@@ -207,7 +207,7 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
     };
     fits.map_err(|needs| {
         let problem = format!("a member needs {needs}");
-        Error::value("points", n, &problem, &format!("take {most} or fewer, or --backend cpu"))
+        Error::value("points", n, &problem, &format!("use {most} or fewer, or --backend cpu"))
     })?;
     Ok(precision)
 }
@@ -216,14 +216,14 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
 fn check_precision(n: usize, precision: Precision) -> Result<()> {
     if precision == Precision::F32 && n > MAX_POINTS_F32 {
         let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");
-        return Err(Error::value("points", n, &problem, "take fewer points, or --precision f64"));
+        return Err(Error::value("points", n, &problem, "use fewer points, or --precision f64"));
     }
     Ok(())
 }
 
 fn ring(n: usize) -> Result<Blocks> {
     Blocks::new(n)
-        .ok_or_else(|| Error::value("points", n, "a ring of fewer than 6 nodes cannot be coloured", "take 6 or more"))
+        .ok_or_else(|| Error::value("points", n, "a ring of fewer than 6 nodes cannot be coloured", "use 6 or more"))
 }
 
 impl Choice {
@@ -399,7 +399,7 @@ mod tests {
         assert!(most >= 512, "{most}");
         fitting_precision(&spec, most, "toaster", &capacity).unwrap();
         let message = refused(Some(Precision::F64), most + 1, &capacity);
-        for part in [format!("--points {}", most + 1), format!("take {most} or fewer"), "--backend cpu".into()] {
+        for part in [format!("--points {}", most + 1), format!("use {most} or fewer"), "--backend cpu".into()] {
             assert!(message.contains(&part), "{message}");
         }
         let few_threads = Capacity { threads: 32, ..capacity };

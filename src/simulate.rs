@@ -89,7 +89,7 @@ pub fn resume(
     let is_own =
         |(rank, ended): (&u64, &Ended)| (next..total).contains(rank) && (first..=last).contains(&ended.outcome.cell);
     if next > total || !early.iter().all(is_own) {
-        return Err(Error::Request(format!("the state tells of members that are not among the {total} of the spec")));
+        return Err(Error::Request(format!("the checkpoint has members that are not among the {total} of the spec")));
     }
     let mut queue = Queue { total, ended: next + early.len() as u64, next, early, kept: false, told: Instant::now() };
     let done = run(&mut pool, &mut queue, backend, sink);

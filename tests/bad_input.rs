@@ -97,20 +97,20 @@ fn a_value_that_cannot_be_read_is_named_with_its_flag() {
 #[test]
 fn combinations_without_sense_name_a_remedy() {
     for (arguments, parts) in [
-        ("--order lexicographic --backend gpu", ["--order lexicographic: ", "take --backend cpu"]),
+        ("--order lexicographic --backend gpu", ["--order lexicographic: ", "use --backend cpu"]),
         ("--order lexicographic --solver direct", ["--order lexicographic: ", "leave out --order"]),
-        ("--order lexicographic --solver multigrid", ["multigrid sweeps by colours", "take --solver gauss-seidel"]),
+        ("--order lexicographic --solver multigrid", ["multigrid sweeps by colours", "use --solver gauss-seidel"]),
         ("--sor 1.5 --solver multigrid", ["--sor 1.5: ", "leave out --sor"]),
         ("--sor auto --solver direct", ["--sor auto: ", "leave out --sor"]),
         ("--adapter llvmpipe --backend cpu", ["--adapter llvmpipe: ", "leave out --adapter"]),
-        ("--points 20", ["--modes 2..=8: ", "take --points 32 or more"]),
+        ("--points 20", ["--modes 2..=8: ", "use --points 32 or more"]),
         (
             "--store zarr",
             ["--store zarr: there are no snapshots to store; ", "add --snapshots T1,T2,..., or leave out"],
         ),
         (
             "--store zarr --snapshots 0 --sweep points=40,50 --sweep decay=1,2",
-            ["50 in points = 50, decay = 1; ", "take --store csv, or one number of --points"],
+            ["50 in points = 50, decay = 1; ", "use --store csv, or one number of --points"],
         ),
     ] {
         assert_says(&refused(&arguments.split(' ').collect::<Vec<_>>(), &[]), &parts);
@@ -260,7 +260,7 @@ fn a_spec_without_end_is_refused_at_once() {
         ("pipe", "error: cannot read the spec pipe: a pipe or a device; save what it holds in a file"),
         ("/dev/zero", "error: cannot read the spec /dev/zero: a pipe or a device; "),
         ("folder", "error: cannot read the spec folder: is a directory"),
-        ("latin.toml", "error: cannot read the spec latin.toml: byte 13 is no UTF-8; save it in UTF-8"),
+        ("latin.toml", "error: cannot read the spec latin.toml: byte 13 is not UTF-8; save it as UTF-8"),
         ("deep.toml", "error: in the spec deep.toml: TOML parse error at line 1, column 89: cannot recurse further"),
         ("dotted.toml", "error: in the spec dotted.toml: recursion limit"),
         ("nested.toml", "error: --sweep omega: [[[["),
@@ -275,8 +275,8 @@ fn a_spec_without_end_is_refused_at_once() {
             "flower.toml",
             "error: in the spec flower.toml: TOML parse error at line 1, column 9: a flower of 130000 modes",
         ),
-        ("curves.toml", "error: --curves 18446744073709551615: too many members; take 1 to 1000000000"),
-        ("points.toml", "error: --points 1000000000000: too many nodes; take 6 to 1000000"),
+        ("curves.toml", "error: --curves 18446744073709551615: too many members; use 1 to 1000000000"),
+        ("points.toml", "error: --points 1000000000000: too many nodes; use 6 to 1000000"),
     ] {
         refused_at_once(home.path(), &["run", spec, "--out", "new/out"], start);
     }
@@ -414,8 +414,8 @@ fn a_folder_that_exists_or_cannot_be_made_is_refused() {
     fs::create_dir(home.path().join("old")).unwrap();
     for (out, force, reason) in [
         ("old", false, "--out old: already exists; name a new folder, or add --force"),
-        ("file", false, "--out file: exists and is no folder"),
-        ("file", true, "--out file: exists and is no folder"),
+        ("file", false, "--out file: exists but is not a directory"),
+        ("file", true, "--out file: exists but is not a directory"),
         ("file/below", false, "--out file/below: file is no folder"),
     ] {
         let force = if force { "--force" } else { "--quiet" };

@@ -93,11 +93,11 @@ fn the_table_has_a_line_for_each_row_under_a_header() {
 #[test]
 fn a_wrong_request_is_refused_with_the_flag_and_a_remedy() {
     for (arguments, parts) in [
-        ("--seconds 0", &["--seconds 0: ", "take up to"][..]),
+        ("--seconds 0", &["--seconds 0: ", "use up to"][..]),
         ("--seconds NaN", &["--seconds NaN: "]),
         ("--seconds 1e9", &["--seconds 1000000000: "]),
-        ("--repeats 0", &["--repeats 0: ", "take 1 to"]),
-        ("--points 6", &["--points 6: ", "take 8 or more"]),
+        ("--repeats 0", &["--repeats 0: ", "use 1 to"]),
+        ("--points 6", &["--points 6: ", "use 8 or more"]),
         ("--points 100,3", &["--points 3: "]),
         ("--curves 0", &["--curves 0: "]),
         ("--threads 0", &["--threads 0: "]),

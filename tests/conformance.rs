@@ -603,7 +603,7 @@ fn program_refuses<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let output = command.output()?;
     let message = String::from_utf8(output.stderr)?;
     let beyond_f32 = T::NAME == "f32" && most >= MAX_POINTS_F32;
-    let remedy = if beyond_f32 { "take fewer points".to_string() } else { format!("take {most} or fewer") };
+    let remedy = if beyond_f32 { "use fewer points".to_string() } else { format!("use {most} or fewer") };
     let named = message.starts_with(&format!("error: --points {points}: ")) && message.contains(&remedy);
     if output.status.code() != Some(2) || !named || message.lines().count() != 1 || folder.path().join("out").exists() {
         return Err(format!("{:?}: {message}", output.status).into());

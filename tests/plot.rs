@@ -239,8 +239,8 @@ fn a_mean_excess_that_is_not_that_of_the_run_is_refused() {
 fn what_is_no_finished_run_of_this_program_is_refused() {
     let done = run(RUN);
     let json = |out: &Path| out.join("run.json");
-    refused(&done, |out| fs::remove_dir_all(out).unwrap(), "out: no such folder; name that of a run");
-    refused(&done, |out| fs::remove_file(json(out)).unwrap(), "out: no run there; name its folder (no run.json)");
+    refused(&done, |out| fs::remove_dir_all(out).unwrap(), "out: no such folder; give that of a run");
+    refused(&done, |out| fs::remove_file(json(out)).unwrap(), "out: no run there; give its folder (no run.json)");
     let unfinished = |out: &Path| {
         fs::remove_file(json(out)).unwrap();
         fs::rename(out.join("summary.csv"), out.join(".summary.csv.part")).unwrap();

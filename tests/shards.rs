@@ -173,7 +173,7 @@ fn some_members_are_sharded_by_their_numbers() {
         &format!("run {SMALL} --shard 0/5 --only 1,3 --out no"),
         &[
             "--shard 0/5: there are 2 members to run, and none of them falls to it",
-            "take fewer shards, or leave this one out",
+            "use fewer shards, or leave this one out",
         ],
     );
     // 0/4 has member 4, and 2/4 has 10.
@@ -222,14 +222,14 @@ fn what_are_not_the_shards_of_one_study_is_refused_by_name() {
         ("s/0 s/2 seed", &["seed is of another study than s/0: seed is 2, and 1 there"]),
         ("s/0 s/2 quarter", &["quarter is of another study than s/0: it is shard 1/4, and there is 0/3"]),
         ("s/0 s/2 f32", &["f32 is of another study than s/0: precision is \"f32\", and \"f64\" there"]),
-        ("s/0 s/1 s/2 whole", &["whole: the run there is no shard: it has no shard.state"]),
+        ("s/0 s/1 s/2 whole", &["whole: the run there is not a shard: it has no shard.state"]),
         ("s/0 s/1 nowhere", &["nowhere: no such folder", "shard 2 of 3"]),
         ("s/0 s/1 empty", &["empty: no shard was finished here"]),
         (
             "empty nowhere",
             &["no folder tells of which study it is a shard: empty: no shard was", "nowhere: no such folder"],
         ),
-        ("s/0 s/1 s/2/summary.csv", &["s/2/summary.csv: no folder; name that of a shard"]),
+        ("s/0 s/1 s/2/summary.csv", &["s/2/summary.csv: not a folder; give that of a shard"]),
     ] {
         refused(path, &format!("merge {arguments} --out no"), words);
     }
@@ -377,15 +377,15 @@ fn a_task_of_a_job_array_knows_its_shard() {
     assert!(code == Some(0) && text.contains("shard = \"5/8\""), "{text}");
     for (variables, told) in [
         (array("5", "2", "3", "5"), "the array has 2 tasks from 3 to 5, and shards count from 0 to N - 1"),
-        (array("8", "8", "1", "8"), "take --array=0-7, or export CURVELAX_SHARDS=N"),
-        (Vec::new(), "no SLURM_ARRAY_TASK_ID: this is no task of a Slurm job array"),
-        (vec![("SLURM_ARRAY_TASK_ID", "8"), ("CURVELAX_SHARDS", "8")], "take I from 0 to 7"),
+        (array("8", "8", "1", "8"), "use --array=0-7, or export CURVELAX_SHARDS=N"),
+        (Vec::new(), "no SLURM_ARRAY_TASK_ID: this is not a task of a Slurm job array"),
+        (vec![("SLURM_ARRAY_TASK_ID", "8"), ("CURVELAX_SHARDS", "8")], "use I from 0 to 7"),
         (vec![("SLURM_ARRAY_TASK_ID", "8"), ("CURVELAX_SHARDS", "many")], "CURVELAX_SHARDS=many is no whole number"),
     ] {
         let (code, text) = run(&variables);
         assert!(code == Some(2) && text.contains(told), "{text}");
     }
-    for (shard, told) in [("3/3", "take I from 0 to 2"), ("0/0", "N from 1"), ("-1/3", "write I/N"), ("1", "write I/N")]
+    for (shard, told) in [("3/3", "use I from 0 to 2"), ("0/0", "N from 1"), ("-1/3", "write I/N"), ("1", "write I/N")]
     {
         refused(home.path(), &format!("run {SMALL} --out no --shard {shard}"), &[]);
         let message = said(&curvelax(home.path(), &format!("run {SMALL} --out no --shard {shard}")), 2);
@@ -393,7 +393,7 @@ fn a_task_of_a_job_array_knows_its_shard() {
     }
     fs::write(home.path().join("spec.toml"), "shard = '4/4'\n").unwrap();
     let message = said(&curvelax(home.path(), "run spec.toml --out no"), 2);
-    assert!(message.contains("take I from 0 to 3") && message.contains("shard = '4/4'"), "{message}");
+    assert!(message.contains("use I from 0 to 3") && message.contains("shard = '4/4'"), "{message}");
 }
 
 #[test]

@@ -128,7 +128,7 @@ pub fn check(args: CheckArgs) -> Result<()> {
     }
     match failed {
         0 => Ok(()),
-        _ => Err(Error::Failed(format!("{failed} quantities differ by more than their bound; take --backend cpu"))),
+        _ => Err(Error::Failed(format!("{failed} quantities differ by more than their bound; use --backend cpu"))),
     }
 }
 

@@ -96,7 +96,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     match rows.iter().filter(|row| row.error.is_none()).count() {
         0 => Ok(()),
         early => Err(Error::Failed(format!(
-            "{early} of {} runs ended before their final time; take f64, or another problem",
+            "{early} of {} runs ended before their final time; use f64, or another problem",
             rows.len()
         ))),
     }

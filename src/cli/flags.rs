@@ -261,8 +261,8 @@ fn shard(text: &str) -> Result<Shard, String> {
 /// `CURVELAX_SHARDS`, since the array's own count is then not N.
 fn slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
     let number = |name: &str| {
-        let text = variable(name).ok_or_else(|| format!("no {name}: this is no task of a Slurm job array"))?;
-        text.parse::<u64>().map_err(|_| format!("{name}={text} is no whole number"))
+        let text = variable(name).ok_or_else(|| format!("no {name}: this is not a task of a Slurm job array"))?;
+        text.parse::<u64>().map_err(|_| format!("{name}={text} is not a whole number"))
     };
     let index = number("SLURM_ARRAY_TASK_ID")?;
     if variable(SHARDS).is_some() {
@@ -272,7 +272,8 @@ fn slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
     let (first, last) = (number("SLURM_ARRAY_TASK_MIN")?, number("SLURM_ARRAY_TASK_MAX")?);
     if first != 0 || last.checked_add(1) != Some(count) {
         return Err(format!(
-            "the array has {count} tasks from {first} to {last}, and shards count from 0 to N - 1: take --array=0-{}, or \
+            "the array has {count} tasks from {first} to {last}, and shards count from 0 to N - 1: use --array=0-{}, \
+             or \
              export {SHARDS}=N to run some of N",
             count.saturating_sub(1)
         ));

@@ -75,7 +75,7 @@ pub fn merge(args: MergeArgs) -> Result<()> {
 fn missing(shards: &Shards, script: &str) -> String {
     let (missing, count) = (shards.missing(), shards.count());
     if missing.is_empty() {
-        return format!("all {count} {} are there\n", plural(count, "shard"));
+        return format!("all {count} {} are present\n", plural(count, "shard"));
     }
     let array = listed_ranges(&missing);
     let submit = format!("sbatch --array={array} --export=ALL,{}={count} {script}", flags::SHARDS);
@@ -89,7 +89,7 @@ fn check_place(out: &Path, shards: &[PathBuf]) -> Result<()> {
     for shard in shards {
         if out_is.starts_with(place(shard).map_err(cannot)?) {
             let problem = format!("it is inside the shard {}", shard.display());
-            return Err(Error::value("out", out.display(), &problem, "name a folder beside the shards"));
+            return Err(Error::value("out", out.display(), &problem, "use a folder outside the shards"));
         }
     }
     Ok(())

@@ -85,7 +85,7 @@ pub fn resume_like((folder, saved): (OutputFolder, Option<Saved>), spec: &Spec, 
     // Where it goes on is checked by itself, and on how many threads makes no difference.
     if let Some((key, here, there)) = spec.difference(&own, &["backend", "adapter", "threads"]) {
         return Err(Error::Request(format!(
-            "--resume: the run in {path} is of another spec: {key} is {there} there, and {here} here; name another folder"
+            "--resume: the run in {path} has another spec: {key} is {there} there and {here} here; use another folder"
         )));
     }
     resume_in(folder, saved, ResumePlace { threads: spec.threads, ..ResumePlace::default() }, flags)
@@ -129,13 +129,14 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: ResumePlace,
     if !here.computes_like(&began) {
         if !elsewhere {
             return Err(Error::Request(format!(
-                "the run is on {}, and here it would go on on {}, where digits differ; add --backend {} if it should",
+                "the run began on {}; here it would continue on {}, where digits differ; add --backend {} to accept \
+                 that",
                 began.name(),
                 here.name(),
                 here.backend
             )));
         }
-        origin.moves.push(format!("the run was on {} and went on on {}", began.name(), here.name()));
+        origin.moves.push(format!("the run began on {} and continued on {}", began.name(), here.name()));
         origin.spec = work.study.spec().to_toml()?;
         origin.platform = here;
     } else if new_threads {

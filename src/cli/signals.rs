@@ -47,7 +47,7 @@ pub fn watch(stop: &Stop, most: Option<Duration>) -> Result<()> {
 }
 
 fn last_word(cause: Cause) -> crate::Error {
-    cause.error(" at once; curvelax resume goes on from the last state")
+    cause.error(" at once; curvelax resume continues from the last checkpoint")
 }
 
 /// Waits until the run is `asked` to stop or `most` is over, and then for its end; whatever is running when its time is up,

@@ -121,7 +121,10 @@ impl Work {
         let (told, rows) = (self.members_before(report.cohort()).saturating_add(standing.next), report.members());
         if told != rows {
             let path = report.folder().display();
-            return Err(Error::Request(format!("{path}: the state tells of {told} members, and the table has {rows}")));
+            return Err(Error::Request(format!(
+                "{path}: the checkpoint counts {told} members, but the table has \
+                                               {rows}"
+            )));
         }
         let early = [&self.study.warnings()[..], report.moves()].concat();
         early.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
@@ -160,8 +163,8 @@ pub fn check_name(json: bool, out: &Path) -> Result<()> {
         true => Err(Error::value(
             "out",
             out.display(),
-            "no UTF-8, which JSON is in",
-            "name another folder, or leave --json out",
+            "not UTF-8, which JSON requires",
+            "use another folder, or leave --json out",
         )),
         false => Ok(()),
     }
@@ -170,7 +173,7 @@ pub fn check_name(json: bool, out: &Path) -> Result<()> {
 /// Says how a run that failed goes on, unless the error does.
 fn kept(out: &Path, error: &Error) {
     if !matches!(error, Error::Stopped(_) | Error::Interrupted(_) | Error::Lost(_)) {
-        note(&format!("note: the state of the run is kept: curvelax resume {} goes on", out.display()));
+        note(&format!("note: the run was saved: curvelax resume {} continues it", out.display()));
     }
 }
 

@@ -54,7 +54,7 @@ pub fn self_test<T: Real>(
         backend.clear(slot);
     }
     let wrong = |what: String| {
-        let remedy = "see `curvelax check`, or take --backend cpu";
+        let remedy = "see `curvelax check`, or use --backend cpu";
         Error::Device(format!("GPU {device} computes wrongly: {what}; {remedy}"))
     };
     let rows = compare_ends::<T>(hardware, method, n, &launches, &left).map_err(|error| wrong(error.to_string()))?;

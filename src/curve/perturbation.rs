@@ -110,7 +110,7 @@ impl RadialLaw {
         let deviation = law.radial_deviation();
         if deviation > MAX_DEVIATION {
             let problem = format!("with --modes {modes} --decay {decay} the radius deviates by {deviation:.3}");
-            let allowed = format!("at most {MAX_DEVIATION}: lower --amplitude, raise --decay or take fewer modes");
+            let allowed = format!("at most {MAX_DEVIATION}: lower --amplitude, raise --decay or use fewer modes");
             return Err(Error::value("amplitude", amplitude, &problem, &allowed));
         }
         Ok(law)

@@ -131,7 +131,7 @@ impl Sampler {
                     "sampling",
                     sampling,
                     problem,
-                    "take --shape file:PATH, parameter or arclength",
+                    "use --shape file:PATH, parameter or arclength",
                 ));
             }
         };

@@ -198,7 +198,7 @@ fn check_pull(pull: Pull, nodes: &[DVec2]) -> Result<()> {
     match pull {
         Pull::Rate(rate) if rate > most => {
             let problem = format!("so strong that it destroys the mesh of {} nodes on this curve", nodes.len());
-            Err(Error::value("pull", rate, &problem, &format!("take {most:.3} or less, or auto")))
+            Err(Error::value("pull", rate, &problem, &format!("use {most:.3} or less, or auto")))
         }
         _ => Ok(()),
     }

@@ -29,9 +29,9 @@ impl Shard {
     /// What is wrong with the numbers.
     pub fn new(index: u64, count: u64) -> Result<Shard, String> {
         match (index, count) {
-            (_, 0) => Err(format!("shard {index}/{count}: there are no shards; take I/N with N from 1")),
+            (_, 0) => Err(format!("shard {index}/{count}: there are no shards; use I/N with N from 1")),
             _ if index >= count => {
-                Err(format!("shard {index}/{count}: shards count from 0; take I from 0 to {}", count - 1))
+                Err(format!("shard {index}/{count}: shards count from 0; use I from 0 to {}", count - 1))
             }
             _ => Ok(Shard { index, count }),
         }
@@ -64,7 +64,7 @@ impl FromStr for Shard {
     fn from_str(text: &str) -> Result<Shard, String> {
         let whole = |text: &str| text.trim().parse::<u64>().ok();
         let parts = text.split_once('/').and_then(|(index, count)| Some((whole(index)?, whole(count)?)));
-        let (index, count) = parts.ok_or_else(|| format!("`{text}` is no shard; write I/N, such as 0/8"))?;
+        let (index, count) = parts.ok_or_else(|| format!("`{text}` is not a shard; write I/N, such as 0/8"))?;
         Shard::new(index, count)
     }
 }
@@ -108,8 +108,8 @@ mod tests {
     #[test]
     fn what_is_no_shard_is_refused_with_what_is_one() {
         for (text, told) in [
-            ("3/3", "take I from 0 to 2"),
-            ("0/0", "take I/N with N from 1"),
+            ("3/3", "use I from 0 to 2"),
+            ("0/0", "use I/N with N from 1"),
             ("3", "such as 0/8"),
             ("-1/3", "such as 0/8"),
             ("1/3/5", "such as 0/8"),

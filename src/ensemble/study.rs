@@ -150,8 +150,8 @@ pub struct Cell {
     common: bool,
 }
 
-const LONG_SWEEPS: &str = "plain sweeps go on longer the longer the step, and adaptive steps grow: a solve may take tens of \
-                           thousands, where --solver multigrid takes some hundred and direct none";
+const LONG_SWEEPS: &str = "plain sweeps need more iterations the longer the step, and adaptive steps grow: a solve \
+                           may need tens of thousands, where --solver multigrid needs a few hundred and direct none";
 
 /// What members must have in common to be advanced side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -227,7 +227,7 @@ fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize
             if *bytes > MAX_BYTES {
                 let (cells, gigabytes) = (format!("({} cells)", spec.sweep.cells()), MAX_BYTES as f64 / 1e9);
                 let problem = format!("the curves of the first {} take more than {gigabytes} GB", index + 1);
-                return Err(Error::value("sweep", cells, &problem, "take fewer --points, or fewer cells at once"));
+                return Err(Error::value("sweep", cells, &problem, "use fewer --points, or fewer cells at once"));
             }
             // The file is read once: what one cell was checked with is what another has.
             let outline =
@@ -263,7 +263,7 @@ fn cells(spec: &Spec, base: &Path) -> Result<Vec<Cell>> {
     if let (Store::Zarr, Some([one, other])) = (spec.store, unequal) {
         let [(one, own), (other, others)] = [one, other].map(|cell| (spec.sweep.name(cell.index), cell.spec.points));
         let problem = format!("an array has as many nodes for all members: {own} in {one}, {others} in {other}");
-        return Err(Error::value("store", "zarr", &problem, "take --store csv, or one number of --points"));
+        return Err(Error::value("store", "zarr", &problem, "use --store csv, or one number of --points"));
     }
     Ok(cells)
 }

@@ -177,7 +177,7 @@ impl Sweep {
                 return Err(Error::Request(format!("--sweep {key}: no values; write {key}=v1,v2,...")));
             }
             if let Some(value) = values.iter().find(|value| value.is_array() || value.is_table()) {
-                return Err(Error::Request(format!("--sweep {key}: {value} is no single value")));
+                return Err(Error::Request(format!("--sweep {key}: {value} is not a single value")));
             }
             if self.0[..i].iter().any(|before| before.key == *key) {
                 return Err(Error::Request(format!("--sweep {key}: named twice; put all its values behind one")));

@@ -64,7 +64,7 @@ impl Spec {
         }
         if !(1..=MAX_CURVES).contains(&self.curves) {
             let problem = if self.curves == 0 { "an ensemble needs a member" } else { "too many members" };
-            return Err(Error::value("curves", self.curves, problem, &format!("take 1 to {MAX_CURVES}")));
+            return Err(Error::value("curves", self.curves, problem, &format!("use 1 to {MAX_CURVES}")));
         }
         if !(MIN_POINTS..=MAX_POINTS).contains(&self.points) {
             let problem = if self.points < MIN_POINTS {
@@ -72,14 +72,14 @@ impl Spec {
             } else {
                 "too many nodes"
             };
-            let allowed = format!("take {MIN_POINTS} to {MAX_POINTS}");
+            let allowed = format!("use {MIN_POINTS} to {MAX_POINTS}");
             return Err(Error::value("points", self.points, problem, &allowed));
         }
         if let Some(threads) = self.threads
             && !(1..=MAX_THREADS).contains(&threads)
         {
             let problem = if threads == 0 { "no thread to run on" } else { "too many threads" };
-            return Err(Error::value("threads", threads, problem, &format!("take 1 to {MAX_THREADS}")));
+            return Err(Error::value("threads", threads, problem, &format!("use 1 to {MAX_THREADS}")));
         }
         Ok(())
     }
@@ -87,8 +87,8 @@ impl Spec {
     fn check_times(&self) -> Result<()> {
         positive("t-end", self.t_end, "a final time", "2")?;
         if !TIMES.contains(&self.t_end) {
-            let allowed = format!("take a time from {:e} to {:e}", TIMES.start(), TIMES.end());
-            return Err(Error::value("t-end", number(self.t_end), "parts or sums of it are no numbers", &allowed));
+            let allowed = format!("use a time from {:e} to {:e}", TIMES.start(), TIMES.end());
+            return Err(Error::value("t-end", number(self.t_end), "parts or sums of it are not finite", &allowed));
         }
         match self.pace() {
             Pace::Fixed(tau) => self.check_fixed(tau)?,
@@ -98,7 +98,7 @@ impl Spec {
         positive("series", series, "an interval of time", "0.01")?;
         let rows = self.t_end / series;
         if rows > MAX_SERIES_ROWS {
-            let allowed = format!("at most {MAX_SERIES_ROWS:e} rows: take a longer interval");
+            let allowed = format!("at most {MAX_SERIES_ROWS:e} rows: use a longer interval");
             return Err(Error::value("series", number(series), &format!("about {rows:.1e} rows per member"), &allowed));
         }
         Ok(())
@@ -109,13 +109,13 @@ impl Spec {
         let t_end = number(self.t_end);
         if tau > self.t_end {
             let problem = format!("the step is longer than the whole run of {t_end}");
-            let allowed = format!("take a step of at most {t_end}, or a later --t-end");
+            let allowed = format!("use a step of at most {t_end}, or a later --t-end");
             return Err(Error::value("tau", number(tau), &problem, &allowed));
         }
         let steps = self.t_end / tau;
         if steps > MAX_STEPS {
             let problem = format!("about {steps:.1e} steps of {} to --t-end {t_end}", number(tau));
-            let allowed = format!("at most {MAX_STEPS:e} steps: take a larger --tau or an earlier --t-end");
+            let allowed = format!("at most {MAX_STEPS:e} steps: use a larger --tau or an earlier --t-end");
             return Err(Error::value("tau", number(tau), &problem, &allowed));
         }
         Ok(())
@@ -123,17 +123,17 @@ impl Spec {
 
     fn check_adaptive(&self, tolerance: f64) -> Result<()> {
         if let Some(tau) = self.tau {
-            let problem = format!("steps are either fixed or adaptive, and there is --adaptive {}", number(tolerance));
+            let problem = format!("steps are either fixed or adaptive, and --adaptive {} is given", number(tolerance));
             return Err(Error::value("tau", number(tau), &problem, "leave out one of the two"));
         }
         if !(tolerance > 0.0 && tolerance <= LOOSEST_ADAPTIVE) {
-            let allowed = format!("take a number above 0, up to {LOOSEST_ADAPTIVE}, for example {DEFAULT_ADAPTIVE}");
+            let allowed = format!("use a number above 0, up to {LOOSEST_ADAPTIVE}, for example {DEFAULT_ADAPTIVE}");
             return Err(Error::value("adaptive", number(tolerance), "not a local error tolerance", &allowed));
         }
         let tightest = tightest_adaptive(self.precision.unwrap_or(Precision::F64));
         if tolerance < tightest {
             let problem = "the rounding of the precision is larger";
-            return Err(Error::value("adaptive", number(tolerance), problem, &format!("take {tightest:e} or more")));
+            return Err(Error::value("adaptive", number(tolerance), problem, &format!("use {tightest:e} or more")));
         }
         Ok(())
     }
@@ -141,7 +141,7 @@ impl Spec {
     fn check_pull(&self) -> Result<()> {
         let Pull::Rate(rate) = self.pull else { return Ok(()) };
         if !(rate.is_finite() && rate >= 0.0) {
-            let allowed = "take 0 for the paper's scheme, a positive number, or auto";
+            let allowed = "use 0 for the paper's scheme, a positive number, or auto";
             return Err(Error::value("pull", number(rate), "not a rate", allowed));
         }
         Ok(())
@@ -149,7 +149,7 @@ impl Spec {
 
     fn check_method(&self) -> Result<()> {
         if !(self.omega.is_finite() && self.omega >= 0.0) {
-            let allowed = "take 0 or any positive number, for example 1";
+            let allowed = "use 0 or any positive number, for example 1";
             return Err(Error::value("omega", number(self.omega), "not a redistribution speed", allowed));
         }
         if let Pace::Fixed(tau) = self.pace()
@@ -158,7 +158,7 @@ impl Spec {
         {
             let turns = number(self.omega * tau);
             let problem = format!("omega tau = {turns}, and the redistribution overshoots above 1");
-            let allowed = format!("it is a rate: take --omega {} or less", number(1.0 / tau));
+            let allowed = format!("it is a rate: use --omega {} or less", number(1.0 / tau));
             return Err(Error::value("omega", number(self.omega), &problem, &allowed));
         }
         if let Pace::Adaptive(_) = self.pace()
@@ -167,39 +167,39 @@ impl Spec {
         {
             let problem =
                 format!("adaptive steps are at most about 1/omega long, and --t-end is {}", number(self.t_end));
-            let allowed = format!("take --omega {} or less, or an earlier --t-end", number(MAX_STEPS / self.t_end));
+            let allowed = format!("use --omega {} or less, or an earlier --t-end", number(MAX_STEPS / self.t_end));
             return Err(Error::value("omega", number(self.omega), &problem, &allowed));
         }
         self.check_pull()?;
         if let Some(tolerance) = self.tolerance
             && !(tolerance > 0.0 && tolerance <= LOOSEST_TOLERANCE)
         {
-            let allowed = format!("take a number above 0, up to {LOOSEST_TOLERANCE}, for example 1e-5");
+            let allowed = format!("use a number above 0, up to {LOOSEST_TOLERANCE}, for example 1e-5");
             return Err(Error::value("tolerance", number(tolerance), "not a residual tolerance", &allowed));
         }
         if let Sor::Factor(factor) = self.sor
             && !(factor > 0.0 && factor < 2.0)
         {
             let problem = "sweeps do not converge with this over-relaxation";
-            let allowed = "take a number between 0 and 2, both excluded, or auto; 1 is plain Gauss-Seidel";
+            let allowed = "use a number between 0 and 2, both excluded, or auto; 1 is plain Gauss-Seidel";
             return Err(Error::value("sor", number(factor), problem, allowed));
         }
         if !(1..=MAX_SWEEPS).contains(&self.max_sweeps) {
             let problem = if self.max_sweeps == 0 { "no sweep to solve with" } else { "too many sweeps" };
-            return Err(Error::value("max-sweeps", self.max_sweeps, problem, &format!("take 1 to {MAX_SWEEPS}")));
+            return Err(Error::value("max-sweeps", self.max_sweeps, problem, &format!("use 1 to {MAX_SWEEPS}")));
         }
         let resolved = self.points / 4;
         if let Some(mode) = self.shape.highest_mode()
             && mode as usize > resolved
         {
             let problem = format!("{} nodes resolve no mode above {resolved}", self.points);
-            let allowed = format!("take --points {} or more, or lower modes", 4 * u64::from(mode));
+            let allowed = format!("use --points {} or more, or lower modes", 4 * u64::from(mode));
             return Err(Error::value("shape", &self.shape, &problem, &allowed));
         }
         if self.amplitude != 0.0 && self.modes.high as usize > resolved {
             let modes = String::from(self.modes);
             let problem = format!("{} nodes resolve no mode above {resolved}", self.points);
-            let allowed = format!("take --points {} or more, or lower modes", 4 * u64::from(self.modes.high));
+            let allowed = format!("use --points {} or more, or lower modes", 4 * u64::from(self.modes.high));
             return Err(Error::value("modes", modes, &problem, &allowed));
         }
         Ok(())
@@ -212,7 +212,7 @@ impl Spec {
                 Err(Error::value("relax-at", number(excess), problem, "leave out --relax-to or --relax-at"))
             }
             (Some(fraction), None) if !(fraction > 0.0 && fraction < 1.0) => {
-                let allowed = "take a number between 0 and 1, both excluded, for example 0.01";
+                let allowed = "use a number between 0 and 1, both excluded, for example 0.01";
                 Err(Error::value("relax-to", number(fraction), "not a fraction of the initial excess", allowed))
             }
             (None, Some(excess)) => positive("relax-at", excess, "an excess", "0.01"),
@@ -228,7 +228,7 @@ impl Spec {
             return Err(Error::value("store", "zarr", "there are no snapshots to store", allowed));
         }
         if self.backend == BackendChoice::Gpu {
-            let cpu = "take --backend cpu";
+            let cpu = "use --backend cpu";
             if lexicographic {
                 let problem = "a GPU sweeps colour by colour only";
                 return Err(Error::value("order", "lexicographic", problem, cpu));
@@ -236,7 +236,7 @@ impl Spec {
         }
         match &self.adapter {
             Some(name) if self.backend == BackendChoice::Cpu => {
-                let allowed = "leave out --adapter, or take --backend gpu";
+                let allowed = "leave out --adapter, or use --backend gpu";
                 Err(Error::value("adapter", name, "the CPU back end uses no adapter", allowed))
             }
             Some(name) if name.trim().is_empty() => {
@@ -262,7 +262,7 @@ impl Spec {
         match asked.into_iter().flatten().find(|(key, _)| refuses.contains(key)) {
             None => Ok(()),
             Some((key, value)) => {
-                let allowed = format!("leave out --{key}, or take --solver gauss-seidel");
+                let allowed = format!("leave out --{key}, or use --solver gauss-seidel");
                 Err(Error::value(key, value, problem, &allowed))
             }
         }
@@ -270,7 +270,7 @@ impl Spec {
 
     fn tidy_snapshots(&mut self) -> Result<()> {
         if let Some(&t) = self.snapshots.iter().find(|t| !(**t >= 0.0 && **t <= self.t_end)) {
-            let allowed = format!("take times from 0 to --t-end {}", number(self.t_end));
+            let allowed = format!("use times from 0 to --t-end {}", number(self.t_end));
             return Err(Error::value("snapshots", number(t), "not a time of the run", &allowed));
         }
         self.snapshots.iter_mut().for_each(|t| *t += 0.0); // -0 becomes 0
@@ -288,7 +288,7 @@ impl Spec {
         let rows = self.snapshots.len().saturating_mul(self.points);
         if rows > MAX_SNAPSHOT_ROWS {
             let problem = format!("{rows} rows per member");
-            let allowed = format!("at most {MAX_SNAPSHOT_ROWS}: take fewer times, or fewer --points");
+            let allowed = format!("at most {MAX_SNAPSHOT_ROWS}: use fewer times, or fewer --points");
             return Err(Error::value("snapshots", format!("({} times)", self.snapshots.len()), &problem, &allowed));
         }
         Ok(())
@@ -302,7 +302,7 @@ impl Spec {
         }
         if let Some(member) = only.iter().find(|member| **member >= members) {
             let problem = format!("no such member among {members}");
-            return Err(Error::value("only", member, &problem, &format!("take members from 0 to {}", members - 1)));
+            return Err(Error::value("only", member, &problem, &format!("use members from 0 to {}", members - 1)));
         }
         only.sort_unstable();
         only.dedup();
@@ -313,8 +313,8 @@ impl Spec {
         match self.shard {
             Some(shard) if self.member_count() == 0 => {
                 let members = self.only.as_ref().map_or(self.all_members(), |only| only.len() as u64);
-                let problem = format!("there are {members} members to run, and none of them falls to it");
-                Err(Error::value("shard", shard, &problem, "take fewer shards, or leave this one out"))
+                let problem = format!("none of the {members} members to run belongs to it");
+                Err(Error::value("shard", shard, &problem, "use fewer shards, or leave this one out"))
             }
             _ => Ok(()),
         }
@@ -333,7 +333,7 @@ fn positive(key: &str, value: f64, what: &str, example: &str) -> Result<()> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
-    let allowed = format!("take a finite number above 0, for example {example}");
+    let allowed = format!("use a finite number above 0, for example {example}");
     Err(Error::value(key, number(value), &format!("not {what}"), &allowed))
 }
 
@@ -355,13 +355,13 @@ mod tests {
     const REFUSED: &[(&str, &str)] = &[
         ("curves = 0", "--curves 0: "),
         ("curves = 1000000001", "--curves 1000000001: "),
-        ("points = 0", "--points 0: a ring of fewer than 6 nodes cannot be coloured; take 6 to 1000000"),
+        ("points = 0", "--points 0: a ring of fewer than 6 nodes cannot be coloured; use 6 to 1000000"),
         ("points = 5", "--points 5: "),
         ("points = 1000001", "--points 1000001: "),
         ("threads = 0", "--threads 0: "),
         ("threads = 1025", "--threads 1025: "),
         ("tau = 0", "--tau 0: "),
-        ("tau = -1", "--tau -1: not a time step; take a finite number above 0, for example 0.001"),
+        ("tau = -1", "--tau -1: not a time step; use a finite number above 0, for example 0.001"),
         ("tau = nan", "--tau NaN: "),
         ("tau = inf", "--tau inf: "),
         ("tau = 1e-300", "--tau 1e-300: about 2.0e300 steps"),
@@ -370,8 +370,8 @@ mod tests {
         ("t-end = -2", "--t-end -2: "),
         ("t-end = nan", "--t-end NaN: "),
         ("t-end = inf", "--t-end inf: "),
-        ("t-end = 9e-301", "--t-end 9e-301: parts or sums of it are no numbers; take a time from 1e-300 to 1e300"),
-        ("t-end = 2e300", "--t-end 2e300: parts or sums of it are no numbers; take a time from 1e-300 to 1e300"),
+        ("t-end = 9e-301", "--t-end 9e-301: parts or sums of it are not finite; use a time from 1e-300 to 1e300"),
+        ("t-end = 2e300", "--t-end 2e300: parts or sums of it are not finite; use a time from 1e-300 to 1e300"),
         ("t-end = 1e300", "--tau 0.001: about 1.0e303 steps"),
         ("t-end = 1.1e6", "--tau 0.001: about 1.1e9 steps"),
         ("omega = -0.5", "--omega -0.5: "),
@@ -379,7 +379,7 @@ mod tests {
         ("omega = inf", "--omega inf: "),
         ("omega = 2000", "--omega 2000: omega tau = 2, and the redistribution overshoots above 1"),
         ("tau = 1.5", "--omega 1: omega tau = 1.5"),
-        ("shape = 'flower:26:0.1'", "--shape flower:26:0.1: 100 nodes resolve no mode above 25; take --points 104"),
+        ("shape = 'flower:26:0.1'", "--shape flower:26:0.1: 100 nodes resolve no mode above 25; use --points 104"),
         ("tolerance = 0", "--tolerance 0: "),
         ("tolerance = -1e-3", "--tolerance -0.001: "),
         ("tolerance = 0.2", "--tolerance 0.2: "),
@@ -401,16 +401,16 @@ mod tests {
         ("series = inf", "--series inf: "),
         ("series = 1e-9", "--series 1e-9: about 2.0e9 rows"),
         ("series = 1e-6", "--series 1e-6: about 2.0e6 rows"),
-        ("snapshots = [0, 3]", "--snapshots 3: not a time of the run; take times from 0 to --t-end 2"),
+        ("snapshots = [0, 3]", "--snapshots 3: not a time of the run; use times from 0 to --t-end 2"),
         ("snapshots = [-1]", "--snapshots -1: "),
         ("snapshots = [nan]", "--snapshots NaN: "),
         ("snapshots = [inf]", "--snapshots inf: "),
         ("store = 'zarr'", "--store zarr: there are no snapshots to store; add --snapshots T1,T2,..."),
         ("store = 'zarr'\nsnapshots = []", "--store zarr: "),
         ("only = []", "--only []: "),
-        ("only = [256]", "--only 256: no such member among 256; take members from 0 to 255"),
+        ("only = [256]", "--only 256: no such member among 256; use members from 0 to 255"),
         ("only = [18446744073709551615]", "--only 18446744073709551615: "),
-        ("modes = '2..=26'", "--modes 2..=26: 100 nodes resolve no mode above 25; take --points 104"),
+        ("modes = '2..=26'", "--modes 2..=26: 100 nodes resolve no mode above 25; use --points 104"),
         ("points = 31", "--modes 2..=8: 31 nodes resolve no mode above 7"),
         ("order = 'lexicographic'\nbackend = 'gpu'", "--order lexicographic: "),
         ("order = 'lexicographic'\nsolver = 'direct'", "--order lexicographic: the direct solver makes no sweeps; "),
@@ -418,12 +418,12 @@ mod tests {
         ("tolerance = 1e-4\nadaptive = 0.001", "--tolerance 0.0001: the direct solver makes no sweeps; "),
         ("sor = 1.5\nsolver = 'direct'", "--sor 1.5: the direct solver makes no sweeps; "),
         ("max-sweeps = 9\nsolver = 'direct'", "--max-sweeps 9: the direct solver makes no sweeps; "),
-        ("adaptive = 0", "--adaptive 0: not a local error tolerance; take a number above 0, up to 1"),
+        ("adaptive = 0", "--adaptive 0: not a local error tolerance; use a number above 0, up to 1"),
         ("adaptive = -1", "--adaptive -1: "),
         ("adaptive = nan", "--adaptive NaN: "),
         ("adaptive = 1.001", "--adaptive 1.001: "),
-        ("adaptive = 9e-9", "--adaptive 9e-9: the rounding of the precision is larger; take 1e-8"),
-        ("adaptive = 9e-6\nprecision = 'f32'", "--adaptive 9e-6: the rounding of the precision is larger; take 1e-5"),
+        ("adaptive = 9e-9", "--adaptive 9e-9: the rounding of the precision is larger; use 1e-8"),
+        ("adaptive = 9e-6\nprecision = 'f32'", "--adaptive 9e-6: the rounding of the precision is larger; use 1e-5"),
         ("adaptive = 0.001\ntau = 0.001", "--tau 0.001: steps are either fixed or adaptive"),
         ("adaptive = 0.001\nomega = 1e9", "--omega 1000000000: adaptive steps are at most about 1/omega long"),
         ("pull = -1", "--pull -1: not a rate"),

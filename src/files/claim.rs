@@ -86,12 +86,12 @@ impl Claim {
             Err(e) => Err(cannot(e)),
             Ok((true, true)) => Ok(()),
             Ok((false, _)) => Err(Error::Lost(format!(
-                "{path}: the folder was moved, removed or replaced while it was written, and what is there now was not touched; \
-                 what was kept went with it, and curvelax resume goes on where that is"
+                "{path}: the folder was moved, removed or replaced during the run, and what is there now was not \
+                 touched; the checkpoint went with the old one, where curvelax resume continues"
             ))),
             Ok((true, false)) => Err(Error::Lost(format!(
-                "{path}: its lock {LOCK} was removed or replaced while it was written, so that another run may be writing there; \
-                 curvelax resume goes on from the last state"
+                "{path}: its lock {LOCK} was removed or replaced during the run, so another run may be writing \
+                 there; curvelax resume continues from the last checkpoint"
             ))),
         }
     }

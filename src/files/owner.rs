@@ -77,7 +77,7 @@ impl Owner {
             if let Some(mark) = other.marks().iter().find(|mark| is_there(&place.join(mark))) {
                 let problem =
                     format!("curvelax {} wrote {mark} there, and {} would mix with it", other.name(), self.name());
-                return Err(Error::value("out", path.display(), &problem, "name another folder, or remove that one"));
+                return Err(Error::value("out", path.display(), &problem, "use another folder, or remove that one"));
             }
         }
         Ok(())
@@ -96,15 +96,15 @@ impl Existing {
             return Ok(());
         }
         if [STATE, STATE_OLD].iter().any(|state| is_there(&place.join(state))) {
-            let resume = format!("curvelax resume {} goes on with it, --force begins anew", path.display());
+            let resume = format!("curvelax resume {} continues it, --force starts over", path.display());
             return refuse("a run was interrupted here", &resume);
         }
         match self {
             Existing::Filled => match names.iter().find(|name| is_there(&place.join(name))) {
                 None => Ok(()),
                 Some(name) => refuse(
-                    &format!("{name} is there, and no run that could be resumed"),
-                    "name another folder, or add --force instead of --resume to replace the files",
+                    &format!("{name} exists, but there is no run to resume"),
+                    "use another folder, or add --force instead of --resume to replace the files",
                 ),
             },
             _ if is_only_begun(place, names).unwrap_or(false) => Ok(()),

@@ -120,7 +120,7 @@ impl Origin {
 
     fn changed(&self, path: &Path) -> Error {
         Error::Request(format!(
-            "the outline {} has changed since the run began, or is gone: restore it, or begin anew",
+            "the outline {} has changed or disappeared since the run began: restore it, or start over",
             Path::new(&self.base).join(path).display()
         ))
     }
@@ -140,7 +140,7 @@ fn here() -> Result<String> {
     let refuse = |what: String| Error::Request(format!("the current folder, where the outline is named from, {what}"));
     let here = std::env::current_dir().map_err(|e| refuse(format!("cannot be found ({e})")))?;
     let name = here.to_str().map(String::from);
-    name.ok_or_else(|| refuse(format!("has a name that is not UTF-8: {}; go to another one", here.display())))
+    name.ok_or_else(|| refuse(format!("has a name that is not UTF-8: {}; use another one", here.display())))
 }
 
 /// The bytes of a state; `resident` takes the place of that in `standing`.
@@ -200,11 +200,11 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Saved>> {
         });
         match found {
             Ok((head, standing)) => {
-                let note = faults.pop().map(|fault| format!("{fault}; going on from the state before it"));
+                let note = faults.pop().map(|fault| format!("{fault}; continuing from the checkpoint before it"));
                 return Ok(Some(Saved { head, standing, note }));
             }
             Err(Fault::Foreign(what)) => {
-                return refuse(format!("{name}: {what}; resume with the program that began it, or begin anew"));
+                return refuse(format!("{name}: {what}; resume with the version that started it, or start over"));
             }
             Err(Fault::Damaged(what)) => faults.push(format!("{name}: {what}")),
         }
@@ -212,10 +212,11 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Saved>> {
     match faults.is_empty() {
         // What is left to do of a run that is complete is nothing.
         true if path.join(names::RUN).is_file() => super::reader::provenance(path).map(|_| None),
-        true => refuse("no run that was interrupted: it had not begun; curvelax run with --force begins it".into()),
-        false => {
-            refuse(format!("no state to go on from: {}; begin anew with curvelax run and --force", faults.join(", ")))
-        }
+        true => refuse("no interrupted run: it had not started; curvelax run with --force starts it".into()),
+        false => refuse(format!(
+            "no checkpoint to continue from: {}; start over with curvelax run and --force",
+            faults.join(", ")
+        )),
     }
 }
 
@@ -344,7 +345,7 @@ mod tests {
         let (path, own, other) = (home.path().display(), *LAYOUT, *LAYOUT ^ 1);
         let expected = format!(
             "{path}: .curvelax.state: another build of curvelax {} wrote it: its layout is {other:08x}, and that of this \
-             build is {own:08x}; resume with the program that began it, or begin anew",
+             build is {own:08x}; resume with the version that started it, or start over",
             env!("CARGO_PKG_VERSION")
         );
         assert_eq!(error.to_string(), expected);

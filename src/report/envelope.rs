@@ -80,7 +80,7 @@ pub fn opened(layout: u32, bytes: &[u8]) -> Result<&[u8], Fault> {
     }
     // Whole, so what follows is no accident.
     if magic != MAGIC {
-        return Err(Fault::Foreign("it is no state of curvelax".into()));
+        return Err(Fault::Foreign("it is not a checkpoint of curvelax".into()));
     }
     if version != VERSION {
         let message = format!("its format is {version}, and that of this version is {VERSION}");
@@ -105,7 +105,7 @@ pub fn opened(layout: u32, bytes: &[u8]) -> Result<&[u8], Fault> {
 pub fn body<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Fault> {
     match postcard::take_from_bytes(bytes).map_err(unreadable)? {
         (body, []) => Ok(body),
-        _ => Err(Fault::Damaged("there is more in it than a state".into())),
+        _ => Err(Fault::Damaged("there is more in it than a checkpoint".into())),
     }
 }
 
@@ -187,7 +187,7 @@ mod tests {
             bytes[at] = byte;
             read(&sealed_again(bytes)).unwrap_err()
         };
-        assert_eq!(with(0, b'C'), Fault::Foreign("it is no state of curvelax".into()));
+        assert_eq!(with(0, b'C'), Fault::Foreign("it is not a checkpoint of curvelax".into()));
         let older = Fault::Foreign("its format is 2, and that of this version is 3".into());
         assert_eq!(with(MAGIC.len(), 2), older);
         let Fault::Foreign(message) = with(BEFORE + 5, b'9') else { panic!("another version of the program") };
@@ -196,7 +196,7 @@ mod tests {
         let cut = |length: usize| read(&sealed_again(sample()[..length].to_vec())).unwrap_err();
         let mut longer = sample();
         longer.push(0);
-        assert_eq!(read(&sealed_again(longer)), Err(Fault::Damaged("there is more in it than a state".into())));
+        assert_eq!(read(&sealed_again(longer)), Err(Fault::Damaged("there is more in it than a checkpoint".into())));
         assert!(matches!(cut(sample().len() - 2), Fault::Damaged(what) if what.starts_with("it cannot be read")));
         assert_eq!(cut(BEFORE + AFTER), Fault::Damaged("it has no layout".into()));
     }

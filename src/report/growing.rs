@@ -66,7 +66,7 @@ impl Growing {
         let mut names: Vec<&str> = marks.iter().map(|mark| mark.name.as_str()).collect();
         let others = || {
             let path = folder.path().display();
-            Error::Request(format!("{path}: the state tells of other files than its spec asks for"))
+            Error::Request(format!("{path}: the checkpoint lists other files than its spec asks for"))
         };
         if names != Growing::names(spec) || store.is_some() != Growing::has_store(spec) {
             return Err(others());

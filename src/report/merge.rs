@@ -70,11 +70,11 @@ impl Shards {
         };
         let Some((first, own)) = found.iter().find_map(of) else {
             let folders: Vec<String> = found.iter().map(unfinished).collect();
-            let message = format!("no folder tells of which study it is a shard: {}", listed(&folders, "; "));
+            let message = format!("no folder says which study it is a shard of: {}", listed(&folders, "; "));
             return Err(Error::Request(message));
         };
         let Some(shard) = own.shard else {
-            return Err(Error::Request(format!("{}: the run there is no shard", first.display())));
+            return Err(Error::Request(format!("{}: the run there is not a shard", first.display())));
         };
         let mut shards = Shards {
             parts: BTreeMap::new(),
@@ -93,7 +93,7 @@ impl Shards {
                 Found::Done(part) => {
                     if let Some(other) = places.insert(part.shard.index(), part.path.clone()) {
                         let (one, other) = (part.path.display(), other.display());
-                        let message = format!("{one}: shard {} is there twice, also in {other}; name one", part.shard);
+                        let message = format!("{one}: shard {} is duplicated in {other}; give one of them", part.shard);
                         return Err(Error::Request(message));
                     }
                     shards.parts.insert(part.shard.index(), *part);
@@ -259,7 +259,7 @@ fn same_study(one: (&PathBuf, &Spec), own: (&PathBuf, &Spec)) -> Result<u64> {
     }
     match (one.shard, own.shard) {
         (Some(shard), Some(own)) if shard.count() == own.count() => Ok(shard.index()),
-        (Some(shard), Some(own)) => refuse(format!("it is shard {shard}, and there is {own}")),
+        (Some(shard), Some(own)) => refuse(format!("it says shard {shard}, but {own} is there")),
         _ => refuse("it is no shard".into()),
     }
 }
@@ -312,7 +312,7 @@ impl ShardRows {
     fn new(part: &FinishedShard, name: &str, block: usize) -> Result<ShardRows> {
         let path = part.path.join(name);
         let mark = part.record.head.tables.iter().find(|mark| mark.name == name).cloned();
-        let missing = || Error::Request(format!("{}: the shard does not tell of it", path.display()));
+        let missing = || Error::Request(format!("{}: the shard does not list it", path.display()));
         let mark = mark.ok_or_else(missing)?;
         let read = Mark { name: String::new(), length: 0, crc: 0 };
         Ok(ShardRows { path, shard: part.shard, mark, read, block, buffer: Vec::new(), at: 0, line: 0 })
@@ -440,7 +440,7 @@ fn join_stores(parts: &[FinishedShard], spec: &Spec, folder: &OutputFolder) -> R
     let mut stored = BTreeMap::new();
     for part in parts {
         let path = part.path.join(names::STORE);
-        let missing = || Error::Request(format!("{}: the shard does not tell of it", path.display()));
+        let missing = || Error::Request(format!("{}: the shard does not list it", path.display()));
         let mark = part.record.head.store.as_ref().ok_or_else(missing)?;
         stored.insert(part.shard.index(), StoredMembers::open(&path, &part.spec, points, mark)?);
     }

@@ -211,7 +211,7 @@ impl RunReport {
     fn so_far(&self) -> String {
         let (rows, all) = (self.tally.members(), plural(self.total, "member"));
         format!(
-            " after {} with {rows} of {} {all} in the table; curvelax resume {} goes on",
+            " after {} with {rows} of {} {all} in the table; curvelax resume {} continues",
             duration(self.wall().as_secs_f64()),
             self.total,
             self.folder.path().display(),

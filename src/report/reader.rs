@@ -68,12 +68,12 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
     let path = folder.join(names::RUN);
     let refuse = |problem: String| Err(Error::Request(format!("{}{problem}", path.display())));
     if !folder.is_dir() {
-        return Err(Error::Request(format!("{}: no such folder; name that of a run", folder.display())));
+        return Err(Error::Request(format!("{}: no such folder; give that of a run", folder.display())));
     }
     if !path.exists() {
         let begun = folder.join(format!(".{}.part", names::SUMMARY)).exists();
         let problem =
-            if begun { "the run there did not finish; start it again" } else { "no run there; name its folder" };
+            if begun { "the run there did not finish; start it again" } else { "no run there; give its folder" };
         return Err(Error::Request(format!("{}: {problem} (no {})", folder.display(), names::RUN)));
     }
     let text = input::text(&path, input::MAX_RUN);
@@ -91,7 +91,7 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
         Some(format) => {
             let (version, own) = (shortened(version, SHOWN), env!("CARGO_PKG_VERSION"));
             return refuse(format!(
-                ": expected format {FORMAT} at most, found {format}, of curvelax {version}; this is {own}: take a newer \
+                ": expected format {FORMAT} at most, found {format}, of curvelax {version}; this is {own}: use a newer \
                  one"
             ));
         }

@@ -100,7 +100,7 @@ pub fn look(path: &Path) -> Result<Found> {
     match path.metadata() {
         Err(e) if e.kind() == io::ErrorKind::NotFound => return unfinished(None, "no such folder".into()),
         Err(e) => return Err(refused(path, &format!("cannot be found ({e})"))),
-        Ok(of) if !of.is_dir() => return Err(refused(path, "no folder; name that of a shard")),
+        Ok(of) if !of.is_dir() => return Err(refused(path, "not a folder; give that of a shard")),
         Ok(_) => {}
     }
     // Before anything else: a run that ends meanwhile takes its states with it.
@@ -113,7 +113,7 @@ pub fn look(path: &Path) -> Result<Found> {
         return Ok(Found::Done(Box::new(part(path)?)));
     }
     match there(path, RUN)? {
-        true => Err(refused(path, &format!("the run there is no shard: it has no {SHARD}"))),
+        true => Err(refused(path, &format!("the run there is not a shard: it has no {SHARD}"))),
         false => unfinished(None, "no shard was finished here".into()),
     }
 }
@@ -124,7 +124,7 @@ fn unfinished_run(path: &Path) -> Result<Option<String>> {
         return Ok(Some("a run is writing here".into()));
     }
     let interrupted = there(path, STATE)? || there(path, STATE_OLD)?;
-    Ok(interrupted.then(|| format!("interrupted; curvelax resume {} goes on with it", path.display())))
+    Ok(interrupted.then(|| format!("interrupted; curvelax resume {} continues it", path.display())))
 }
 
 /// The shard at `path`, which is finished, with its tables as long as they were.
@@ -139,7 +139,7 @@ fn part(path: &Path) -> Result<FinishedShard> {
         return Err(faulty("its spec is not of a shard"));
     };
     if !record.head.tables.iter().map(|mark| mark.name.as_str()).eq(Growing::names(&spec)) {
-        return Err(faulty("it tells of other files than its spec asks for"));
+        return Err(faulty("it lists other files than its spec asks for"));
     }
     record.head.tables.iter().try_for_each(|mark| check_length(path, mark))?;
     Ok(FinishedShard { path: path.to_path_buf(), shard, spec, record })

@@ -178,7 +178,7 @@ impl MollifiedMembers {
             let parts: Vec<String> = parts.map(|(count, what)| format!("{count} {what}")).collect();
             format!(
                 "{unresolved} of {all} {} started from an outline with parts thinner than the spacing of the nodes: {}; \
-                 take more --points or a simpler outline",
+                 use more --points or a simpler outline",
                 plural(all, "member"),
                 parts.join(", ")
             )
@@ -274,14 +274,14 @@ impl Tally {
         let failed = self.failed();
         if failed > 0 {
             warnings.push(format!(
-                "{failed} of {members} ended badly (see `status`); unless the flow itself goes wrong there, a \
-                 smaller --tau or --adaptive, or more --points, helps"
+                "{failed} of {members} failed (see `status`); unless the flow itself becomes singular, a smaller \
+                 --tau or --adaptive, or more --points, helps"
             ));
         }
         if self.below_rounding > 0 {
             warnings.push(format!(
-                "{} of {members} started so nearly round that the threshold lies in the rounding of the precision: no \
-                 t_relax can be told; take --precision f64 or a larger --relax-to",
+                "{} of {members} started so nearly round that rounding hides the threshold: t_relax cannot be \
+                 determined; use --precision f64 or a larger --relax-to",
                 self.below_rounding
             ));
         }
@@ -289,7 +289,7 @@ impl Tally {
         if drifted > 0 {
             warnings.push(format!(
                 "{drifted} of {members} ended with a metric drift above {DISTRUSTED_DRIFT} (worst {worst:.2}): \
-                 their times and areas are not to be trusted; take --pull auto, a smaller --tau or --adaptive, or \
+                 their times and areas are unreliable; use --pull auto, a smaller --tau or --adaptive, or \
                  more --points"
             ));
         }
@@ -369,7 +369,7 @@ pub(crate) mod tests {
         assert!(warnings[0].starts_with("2 of 4 members started from an outline with parts thinner"), "{warnings:?}");
         let parts =
             "1 with crossings that the outline has not, 1 with a turn left above 1.5 rad, 1 with an area changed";
-        assert!(warnings[0].contains(parts) && warnings[0].contains("more than 10 %; take more --points"));
+        assert!(warnings[0].contains(parts) && warnings[0].contains("more than 10 %; use more --points"));
         tally.mollified.crossed = 0;
         assert!(!tally.warnings()[0].contains("crossings"));
     }

@@ -221,12 +221,16 @@ impl fmt::Display for Caveat {
         match *self {
             Caveat::NoMembers => write!(f, "no members, so there is nothing to estimate"),
             Caveat::SingleEvent { members } => {
-                write!(f, "a single event ({members} members): no standard deviation and no standard error can be told")
+                write!(
+                    f,
+                    "a single event ({members} members): no standard deviation and no standard error can be \
+                           estimated"
+                )
             }
             Caveat::AllCensored { members, last } => write!(
                 f,
-                "all {members} members are censored, the last at {last}: no mean and no quantile can be told before \
-                 some have their event"
+                "all {members} members are censored, the last at {last}: no mean and no quantile can be estimated \
+                 before some have their event"
             ),
             Caveat::TailCensored { members, censored, last, survival } => write!(
                 f,

@@ -199,7 +199,7 @@ pub fn foreign_folders(study: &Study) -> Outcome {
                 true => assert_eq!(ended.code, Some(0), "{command}, {folder}: {ended:?}"),
                 false => {
                     assert!(
-                        ended.code == Some(2) && ended.said.contains("name another folder"),
+                        ended.code == Some(2) && ended.said.contains("use another folder"),
                         "{command}, {folder}: {ended:?}"
                     );
                     assert!(content(&place) == before, "{command}, {folder}");

@@ -20,7 +20,7 @@ pub fn rings(sizes: &[usize]) -> Outcome {
     for size in [0, 1, 2, 3, 4, 5, 1_000_001] {
         let (home, ended) = run(&format!("{few} --amplitude 0 --points {size}"));
         assert_eq!(ended.code, Some(2), "{ended:?}");
-        assert!(ended.errors().len() == 1 && ended.said.contains("take 6 to 1000000"), "{ended:?}");
+        assert!(ended.errors().len() == 1 && ended.said.contains("use 6 to 1000000"), "{ended:?}");
         assert_eq!(std::fs::read_dir(home.path()).unwrap().count(), 0, "{size}: something was written");
     }
     for size in sizes {
@@ -45,5 +45,5 @@ pub fn members() -> Outcome {
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
     let bytes = json["memory_bytes"].as_f64().unwrap();
     assert!(output.status.success() && (1e8..5e8).contains(&bytes) && json["members"] == 10_000_000, "{json}");
-    Found::new(3, format!("10⁷ members take {:.0} MB by the dry run", bytes / 1e6))
+    Found::new(3, format!("10⁷ members use {:.0} MB by the dry run", bytes / 1e6))
 }

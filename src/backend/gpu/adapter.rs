@@ -266,7 +266,7 @@ impl OpenGpu {
     /// The error of a fault of this device.
     pub(super) fn error(&self, fault: &str) -> Error {
         let OpenGpu { name, .. } = self;
-        Error::Device(format!("GPU {name}: {fault}; see `curvelax adapters`, or take --backend cpu"))
+        Error::Device(format!("GPU {name}: {fault}; see `curvelax adapters`, or use --backend cpu"))
     }
 
     /// Waits for what was submitted, but no longer than `most`.

@@ -17,7 +17,7 @@ impl OutputFolder {
     pub(super) fn check_names(&mut self) -> Result<()> {
         let in_the_way = |place: &Place, what: &str| {
             let problem = format!("{} is {what}", place.shown().display());
-            Err(Error::value("out", self.path.display(), &problem, "move it away, or name another folder"))
+            Err(Error::value("out", self.path.display(), &problem, "move it away, or use another folder"))
         };
         let plots = self.place(PLOTS);
         let needed = self.names.iter().any(|name| Path::new(name).starts_with(PLOTS));

@@ -62,7 +62,7 @@ impl OutputFolder {
         names: Vec<String>,
     ) -> Result<OutputFolder> {
         let refuse = |e: io::Error| {
-            Error::Request(format!("--out {}: cannot be written ({e}); name a folder that can", path.display()))
+            Error::Request(format!("--out {}: cannot be written ({e}); use one that can be written", path.display()))
         };
         let existing = existing.into();
         check_length(path)?;
@@ -78,13 +78,13 @@ impl OutputFolder {
             Ok(()) => folder.made.push(path.to_path_buf()),
             Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(refuse(e)),
             Err(_) if !path.is_dir() => {
-                return Err(Error::value("out", path.display(), "exists and is no folder", "name another"));
+                return Err(Error::value("out", path.display(), "exists but is not a directory", "name another"));
             }
             // Before its lock is touched.
             Err(_) => existing.check(path, path, &folder.names)?,
         }
         if !folder.claim().map_err(refuse)? {
-            return Err(Error::value("out", path.display(), "a run is writing here", "name another folder"));
+            return Err(Error::value("out", path.display(), "a run is writing here", "use another folder"));
         }
         // Another run may have come and gone in between.
         existing.check(folder.place.at(), path, &folder.names)?;
@@ -197,8 +197,8 @@ fn check_length(path: &Path) -> Result<()> {
     let (length, most) = (path.as_os_str().len(), MAX_PATH - MAX_NAME);
     match length > most {
         true => Err(Error::Request(format!(
-            "--out: a path of {length} bytes, and with the names of files the system knows none of more than {MAX_PATH}; \
-             name a folder by {most} bytes or less, for example from nearer by"
+            "--out: the path has {length} bytes; with file names it exceeds the system's {MAX_PATH}; use a path of \
+             {most} bytes or fewer, for example a relative one"
         ))),
         false => Ok(()),
     }

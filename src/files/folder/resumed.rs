@@ -29,7 +29,7 @@ impl OutputFolder {
         let refuse = |problem: String| Error::Request(format!("{}: {problem}", path.display()));
         let cannot = |e: io::Error| refuse(format!("cannot be written ({e})"));
         if !path.is_dir() {
-            return Err(refuse("no such folder; name that of a run".into()));
+            return Err(refuse("no such folder; give that of a run".into()));
         }
         // A folder that no run has begun in is left as it is.
         let mut begun = false;
@@ -37,7 +37,7 @@ impl OutputFolder {
             begun |= path.join(name).try_exists().map_err(|e| refuse(format!("cannot find {name} in it ({e})")))?;
         }
         if !begun {
-            return Err(refuse("no run was begun here; begin it with curvelax run and --force".into()));
+            return Err(refuse("no run was started here; start one with curvelax run and --force".into()));
         }
         let mut folder = OutputFolder::of(path, OWN.map(String::from).into());
         if !folder.claim().map_err(cannot)? {
@@ -52,7 +52,7 @@ impl OutputFolder {
     pub fn check(&self, mark: &Mark) -> std::result::Result<(), String> {
         // A state that was not written by this program could name any file.
         if !self.names.contains(&mark.name) || is_store(Path::new(&mark.name)) {
-            return Err(format!("it tells of {:?}, which no run writes", mark.name));
+            return Err(format!("it lists {:?}, which no run writes", mark.name));
         }
         let place = self.growing(&mark.name).map_err(|e| format!("cannot find {} ({e})", mark.name))?;
         let path = place.shown().display();
@@ -63,7 +63,7 @@ impl OutputFolder {
             .and_then(|file| Ok(checksum(&mut file.take(mark.length), 0)? == (mark.length, mark.crc)));
         match same {
             Ok(true) => Ok(()),
-            Ok(false) => Err(format!("{path} is not the file that it tells of")),
+            Ok(false) => Err(format!("{path} is not the file that it lists")),
             Err(e) => Err(format!("cannot read {path} ({e})")),
         }
     }

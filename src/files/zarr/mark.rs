@@ -64,7 +64,7 @@ impl StoreMark {
     pub fn check(&self, store: &Place) -> std::result::Result<(), String> {
         let own = || FIELDS.iter().map(|(name, ..)| *name).chain([STATUS]);
         if !self.arrays.iter().map(|mark| mark.name.as_str()).eq(own()) {
-            return Err(format!("it tells of other arrays than {}", own().collect::<Vec<_>>().join(", ")));
+            return Err(format!("it lists other arrays than {}", own().collect::<Vec<_>>().join(", ")));
         }
         self.arrays.iter().try_for_each(|mark| mark.check(&store.join(&mark.name)))
     }
@@ -87,7 +87,7 @@ impl ArrayMark {
         let path = array.shown().display();
         let all = grid.iter().try_fold(1_u64, |all, own| all.checked_mul(*own)).unwrap_or(0);
         if all == 0 || *written > all {
-            return Err(format!("it tells of {path} with {written} of {grid:?} chunks"));
+            return Err(format!("it lists {path} with {written} of {grid:?} chunks"));
         }
         if array.at().is_symlink() {
             return Err(format!("{path} is a link, which no run writes"));
@@ -101,7 +101,7 @@ impl ArrayMark {
         }
         match found == *crc {
             true => Ok(()),
-            false => Err(format!("the chunks in {path} are not those that it tells of")),
+            false => Err(format!("the chunks in {path} are not those that it lists")),
         }
     }
 }
@@ -129,7 +129,7 @@ mod tests {
         out.check_store(&mark).unwrap();
         let bytes = fs::read(&chunk).unwrap();
         fs::write(&chunk, [&[bytes[0] ^ 1], &bytes[1..]].concat()).unwrap();
-        assert!(out.check_store(&mark).unwrap_err().contains("/x are not those that it tells of"));
+        assert!(out.check_store(&mark).unwrap_err().contains("/x are not those that it lists"));
         fs::remove_file(&chunk).unwrap();
         assert!(out.check_store(&mark).unwrap_err().contains("cannot read "));
         fs::write(&chunk, bytes).unwrap();
