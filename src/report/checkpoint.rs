@@ -320,10 +320,10 @@ mod tests {
         let layout = layout::<(Body, SpilledRows)>().unwrap();
         let named: BTreeSet<&str> = layout.split(' ').filter(|word| word.starts_with(char::is_uppercase)).collect();
         let expected = [
-            ["Head", "Origin", "Platform", "Precision", "Duration", "Mark", "ArrayMark", "Film"],
+            ["Head", "Origin", "Platform", "DeviceKind", "Precision", "Duration", "Mark", "Film"],
             ["Aside", "MollifiedMembers", "Moments", "ExactSum", "Ended", "Outcome", "Status", "Observables"],
             ["Rows", "Extent", "SeriesRow", "Snapshot", "Portrait", "Mollified", "DVec2", "Paused"],
-            ["Counters", "Report", "Observed", "Progress", "Decay", "StoreMark", "", ""],
+            ["Counters", "Report", "Observed", "Progress", "Decay", "StoreMark", "ArrayMark", ""],
         ];
         let expected: BTreeSet<&str> = expected.into_iter().flatten().filter(|name| !name.is_empty()).collect();
         assert_eq!(named, expected);
