@@ -10,7 +10,7 @@ use assert_cmd::Command;
 use curvelax::{
     ensemble::{Outcome, SeriesRow, Spec},
     files::{
-        Record, names,
+        TableRow, names,
         tables::{ErrorRow, NodeRow, RateRow},
     },
     results::{
@@ -122,7 +122,7 @@ fn table(name: &str, rows: &str, columns: impl Iterator<Item = [String; 3]>) -> 
     )
 }
 
-fn table_of<R: Record>(name: &str, rows: &str) -> String {
+fn table_of<R: TableRow>(name: &str, rows: &str) -> String {
     let columns = R::COLUMNS.iter().map(|column| [column.name, column.holds, column.meaning].map(str::to_owned));
     table(name, rows, columns)
 }

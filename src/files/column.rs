@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::table_reader::Fields;
+use super::fields::Fields;
 use crate::error::Result;
 
 /// A row of a table, as the program holds it.
-pub trait Record: Sized + 'static {
+pub trait TableRow: Sized + 'static {
     /// Its columns, from left to right.
     const COLUMNS: &'static [Column<Self>];
 }
@@ -39,10 +39,10 @@ pub enum Field<'a> {
     Word(&'a str),
 }
 
-/// The columns of a [`Record`]: `heading: kind = path of the field, "meaning";` a line. The kinds are the modules below.
+/// The columns of a [`TableRow`]: `heading: kind = path of the field, "meaning";` a line. The kinds are the modules below.
 macro_rules! columns {
     ($record:ty: $($name:ident: $kind:ident = $($field:ident).+, $meaning:literal;)+) => {
-        impl $crate::files::column::Record for $record {
+        impl $crate::files::column::TableRow for $record {
             const COLUMNS: &'static [$crate::files::column::Column<Self>] = &[$(
                 $crate::files::column::Column {
                     name: stringify!($name),

@@ -5,6 +5,7 @@
 pub mod claim;
 mod column;
 pub mod disk;
+mod fields;
 pub mod folder;
 pub mod names;
 pub mod owner;
@@ -17,7 +18,7 @@ mod table_reader;
 pub mod tables;
 pub mod zarr;
 
-pub use column::{Column, Record};
+pub use column::{Column, TableRow};
 pub use folder::OutputFolder;
 pub use owner::{Existing, Owner};
 pub use table_reader::TableReader;

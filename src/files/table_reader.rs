@@ -5,21 +5,21 @@ use std::{
     fs::File,
     io::{Read, Seek, SeekFrom},
     marker::PhantomData,
-    path::{Path, PathBuf},
-    str::FromStr,
+    path::PathBuf,
 };
 
 use csv::{ReaderBuilder, StringRecord};
 
-use super::{column::Record, names::REMEDY, place::Place};
+use super::{
+    column::TableRow,
+    fields::{Fields, number_of},
+    names::REMEDY,
+    place::Place,
+};
 use crate::{
-    ensemble::Status,
-    error::{Error, Result, shortened},
+    error::{Error, Result},
     input::{self, Lines},
 };
-
-/// Characters of foreign text in a message.
-const SHOWN: usize = 200;
 
 /// A table with the columns of `R`, read row by row.
 pub struct TableReader<R> {
@@ -30,7 +30,7 @@ pub struct TableReader<R> {
     kind: PhantomData<fn() -> R>,
 }
 
-impl<R: Record + Default> TableReader<R> {
+impl<R: TableRow + Default> TableReader<R> {
     /// Opens the table at `place`, and reads its header.
     ///
     /// # Errors
@@ -82,90 +82,8 @@ impl<R: Record + Default> TableReader<R> {
             let problem = format!("line {}: expected {expected} fields, found {found}", number_of(line));
             return Err(Error::Request(format!("{}, {problem}; {REMEDY}", path.display())));
         }
-        Ok(some.then_some(Fields { path, names, line, taken: 0 }))
+        Ok(some.then(|| Fields::new(path, names, line)))
     }
-}
-
-/// The fields of a line, taken from left to right.
-pub struct Fields<'a> {
-    path: &'a Path,
-    names: &'a [&'static str],
-    line: &'a StringRecord,
-    taken: usize,
-}
-
-impl Fields<'_> {
-    /// The next one.
-    pub fn word(&mut self) -> &str {
-        self.taken += 1;
-        &self.line[self.taken - 1]
-    }
-
-    /// A whole number.
-    pub fn whole<T: FromStr>(&mut self) -> Result<T> {
-        let value = self.word().parse();
-        value.map_err(|_| self.unexpected("a whole number"))
-    }
-
-    /// The name of a status.
-    pub fn status(&mut self) -> Result<Status> {
-        let word = self.word();
-        let status = Status::ALL.into_iter().find(|status| status.name() == word);
-        status.ok_or_else(|| self.unexpected(&Status::ALL.map(Status::name).join(", ")))
-    }
-
-    /// A float; none if it is unknown.
-    pub fn number(&mut self) -> Result<Option<f64>> {
-        match self.word() {
-            "" => Ok(None),
-            word => match word.parse().ok().filter(|value: &f64| value.is_finite()) {
-                None => Err(self.unexpected("a number or nothing")),
-                known => Ok(known),
-            },
-        }
-    }
-
-    /// A float; not a number if it is unknown.
-    pub fn known(&mut self) -> Result<f64> {
-        Ok(self.number()?.unwrap_or(f64::NAN))
-    }
-
-    /// A time that may be unknown.
-    pub fn event(&mut self) -> Result<Option<f64>> {
-        match self.number()? {
-            Some(t) if t < 0.0 => Err(self.unexpected("a time or nothing")),
-            t => Ok(t),
-        }
-    }
-
-    /// A time.
-    pub fn time(&mut self) -> Result<f64> {
-        self.event()?.ok_or_else(|| self.unexpected("a time"))
-    }
-
-    /// That the field taken last is not what was expected.
-    pub fn unexpected(&self, expected: &str) -> Error {
-        self.refused(self.taken - 1, expected)
-    }
-
-    /// That the field of the column `name` is not what was expected.
-    pub fn unexpected_in(&self, name: &str, expected: &str) -> Error {
-        self.refused(self.names.iter().position(|own| *own == name).unwrap_or(0), expected)
-    }
-
-    fn refused(&self, field: usize, expected: &str) -> Error {
-        Error::Request(format!(
-            "{}, line {}, column {}: expected {expected}, found `{}`; {REMEDY}",
-            self.path.display(),
-            number_of(self.line),
-            self.names[field],
-            shortened(&self.line[field], SHOWN)
-        ))
-    }
-}
-
-fn number_of(line: &StringRecord) -> u64 {
-    line.position().map_or(0, csv::Position::line)
 }
 
 /// Whether the file is complete as far as its last byte tells; it is then read from its start.

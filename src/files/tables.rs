@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 use csv::{Writer, WriterBuilder};
 
 use super::{
-    column::{Field, Record, columns},
+    column::{Field, TableRow, columns},
     part_file::{Mark, PartFile},
     place::Place,
 };
@@ -151,7 +151,7 @@ pub type SeriesTable = Table<SeriesRow>;
 /// `snapshots.csv`: the nodes of each member at given times.
 pub type SnapshotTable = Table<NodeRow>;
 
-impl<R: Record> Table<R> {
+impl<R: TableRow> Table<R> {
     /// Begins a table with its header, or goes on with the rows that are in `file`.
     pub fn new(file: PartFile) -> Result<Self> {
         let begins = file.is_empty();

@@ -61,9 +61,9 @@ impl Rates {
         let theory = Description::new(rates.iter().filter_map(Rate::theory))?.median();
         let fitted = Description::new(rates.iter().map(|rate| rate.fitted))?;
         let moments = [
-            Number { name: "mean", value: fitted.mean(), meaning: "mean" },
-            Number { name: "sd", value: fitted.standard_deviation(), meaning: "standard deviation" },
-            Number { name: "se", value: fitted.standard_error(), meaning: "standard error of the mean" },
+            Statistic { name: "mean", value: fitted.mean(), meaning: "mean" },
+            Statistic { name: "sd", value: fitted.standard_deviation(), meaning: "standard deviation" },
+            Statistic { name: "se", value: fitted.standard_error(), meaning: "standard error of the mean" },
         ];
         let quantiles = QUANTILES.map(|(share, ..)| fitted.quantile(share));
         let places = places(quantiles, bootstrap.median_of(&fitted));
@@ -71,12 +71,8 @@ impl Rates {
         // Each is as large as all times of the cell: one at a time.
         let kept = (!relative).then_some(fitted);
         let ratio = Description::new(rates.iter().filter_map(Rate::ratio))?;
-        named.push(Number { name: "theory", value: theory, meaning: "median of the rates of linear theory" });
-        named.push(Number {
-            name: "ratio",
-            value: ratio.median(),
-            meaning: "median of rate over that of linear theory",
-        });
+        named.push(Statistic { name: "theory", value: theory, meaning: "median of the rates of linear theory" });
+        named.push(Statistic { name: "ratio", value: ratio.median(), meaning: "median of rate over linear theory" });
         Ok(Rates { numbers: Numbers { known, named }, drawn: kept.unwrap_or(ratio) })
     }
 }
@@ -87,12 +83,12 @@ pub struct Numbers {
     /// Members of which the quantity is known.
     pub known: usize,
     /// All others.
-    pub named: Vec<Number>,
+    pub named: Vec<Statistic>,
 }
 
 /// A number of a cell.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Number {
+pub struct Statistic {
     /// Its column, without the quantity.
     pub name: &'static str,
     /// The number, where it is known.
@@ -114,7 +110,7 @@ pub struct CellColumn {
 impl Numbers {
     /// The one of this name, where it is known.
     pub fn get(&self, name: &str) -> Option<f64> {
-        self.named.iter().find(|number| number.name == name).and_then(|number| number.value)
+        self.named.iter().find(|statistic| statistic.name == name).and_then(|statistic| statistic.value)
     }
 }
 
@@ -122,20 +118,20 @@ impl Serialize for Numbers {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(1 + self.named.len()))?;
         map.serialize_entry("known", &self.known)?;
-        self.named.iter().try_for_each(|Number { name, value, .. }| map.serialize_entry(name, value))?;
+        self.named.iter().try_for_each(|Statistic { name, value, .. }| map.serialize_entry(name, value))?;
         map.end()
     }
 }
 
 /// Quantiles, and the interval of the median.
-fn places(quantiles: [Option<f64>; QUANTILES.len()], interval: Option<Interval>) -> impl Iterator<Item = Number> {
+fn places(quantiles: [Option<f64>; QUANTILES.len()], interval: Option<Interval>) -> impl Iterator<Item = Statistic> {
     let [lower, upper] = interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
     let ends = [
-        Number { name: "median_low", value: lower, meaning: "lower end of the 95 % bootstrap interval of the median" },
-        Number { name: "median_high", value: upper, meaning: "upper end of that interval" },
+        Statistic { name: "median_low", value: lower, meaning: "lower end of the 95 % interval of the median" },
+        Statistic { name: "median_high", value: upper, meaning: "upper end of the 95 % interval of the median" },
     ];
     let quantiles = QUANTILES.into_iter().zip(quantiles);
-    quantiles.map(|((_, name, meaning), value)| Number { name, value, meaning }).chain(ends)
+    quantiles.map(|((_, name, meaning), value)| Statistic { name, value, meaning }).chain(ends)
 }
 
 /// Relaxation times of all cells, and how they compare.
@@ -176,10 +172,10 @@ impl CellStatistics {
         let restricted =
             "time to which the mean is restricted, a lower bound then, since the last members are censored";
         let moments = [
-            Number { name: "mean", value: mean, meaning: "mean, by Kaplan–Meier" },
-            Number { name: "sd", value: sd, meaning: "standard deviation" },
-            Number { name: "se", value: se, meaning: "standard error of the mean" },
-            Number { name: "restricted_to", value: restricted_to, meaning: restricted },
+            Statistic { name: "mean", value: mean, meaning: "mean, by Kaplan–Meier" },
+            Statistic { name: "sd", value: sd, meaning: "standard deviation" },
+            Statistic { name: "se", value: se, meaning: "standard error of the mean" },
+            Statistic { name: "restricted_to", value: restricted_to, meaning: restricted },
         ];
         let places = places(self.quantiles, self.interval);
         Numbers { known: self.sample.events(), named: moments.into_iter().chain(places).collect() }
@@ -241,7 +237,7 @@ impl EnsembleStatistics {
         let numbers = self.cells.first().into_iter().flat_map(CellStatistics::quantities);
         let numbers = numbers.flat_map(|(quantity, numbers)| {
             let known = column(format!("{quantity}_known"), "integer", format!("members with a {quantity}"));
-            let named = numbers.named.into_iter().map(move |Number { name, meaning, .. }| {
+            let named = numbers.named.into_iter().map(move |Statistic { name, meaning, .. }| {
                 column(format!("{quantity}_{name}"), "float", format!("{quantity}: {meaning}"))
             });
             [known].into_iter().chain(named)
