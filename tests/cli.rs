@@ -107,7 +107,7 @@ fn a_run_out_of_time_keeps_its_state() {
     assert_eq!(output.status.code(), Some(75), "{message}");
     assert!(started.elapsed().as_secs() >= 2, "{message}");
     assert!(message.contains("error: stopped by --max-time after "), "{message}");
-    assert!(message.contains("members in the table; curvelax resume out goes on\n"), "{message}");
+    assert!(message.contains("members in the table; curvelax resume out continues\n"), "{message}");
     let rows = || fs::read_to_string(home.path().join("out/.summary.csv.part")).unwrap().lines().count() - 1;
     let kept = rows();
     assert!(message.contains(&format!("with {kept} of 100000000 members in the table")), "{kept}: {message}");

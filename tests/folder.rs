@@ -9,7 +9,7 @@ use std::{
 
 use tempfile::TempDir;
 
-const NOTE: &str = "note: the state of the run is kept: curvelax resume out goes on\n";
+const NOTE: &str = "note: the run was saved: curvelax resume out continues it\n";
 
 /// Runs `curvelax run ARGUMENTS` where no file can grow beyond `limit` blocks of 512 or 1024 bytes, as on a full disk.
 fn curvelax(home: &Path, limit: &str, arguments: &str) -> Output {

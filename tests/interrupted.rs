@@ -54,7 +54,7 @@ fn what_is_no_interrupted_run_is_refused_or_left_alone() {
     let home = TempDir::new().unwrap();
     refused_place(home.path(), "nowhere", "no such folder");
     fs::create_dir(home.path().join("empty")).unwrap();
-    refused(home.path(), "empty", "", &["empty: no run was begun here", "--force"]);
+    refused(home.path(), "empty", "", &["empty: no run was started here", "--force"]);
     let small = "run --backend cpu --curves 2 --points 34 --t-end 0.01 --out done --quiet";
     said(&curvelax(home.path(), small), 0);
     let before = contents(&home.path().join("done"));
@@ -82,9 +82,9 @@ fn an_outline_is_found_again_from_anywhere_and_has_to_be_the_same() {
     let run = format!("run --backend cpu --shape file:square.csv {LONG}");
     said(&curvelax(&begun, &format!("{run} --out out")), 75);
     fs::write(begun.join("square.csv"), square.replace("1,1", "1,1.5")).unwrap();
-    refused(&elsewhere, "../begun/out", "", &["square.csv has changed since the run began"]);
+    refused(&elsewhere, "../begun/out", "", &["square.csv has changed or disappeared since the run began"]);
     fs::remove_file(begun.join("square.csv")).unwrap();
-    refused(&elsewhere, "../begun/out", "", &["square.csv has changed since the run began, or is gone"]);
+    refused(&elsewhere, "../begun/out", "", &["square.csv has changed or disappeared since the run began"]);
     fs::write(begun.join("square.csv"), square).unwrap();
     let message = said(&curvelax(&elsewhere, "resume ../begun/out --max-time 1s"), 75);
     assert!(message.contains("resuming: 0 of 3 members"), "{message}");
@@ -160,7 +160,7 @@ mod unix {
         head.origin.platform.driver = Some("another".into());
         let resident = standing.resident.clone().unwrap();
         fs::write(&state, curvelax::report::checkpoint::to_bytes(&head, &standing, &resident).unwrap()).unwrap();
-        let words = ["the run is on cpu another", "go on on cpu", "add --backend cpu"];
+        let words = ["the run began on cpu another", "continue on cpu", "add --backend cpu"];
         refused(home.path(), "out", "", &words);
         let message = said(&curvelax(home.path(), "resume out --backend cpu"), 0);
         assert!(message.contains("resuming: 0 of 3 members"), "{message}");

@@ -49,7 +49,10 @@ fn runs_of_one_member_of_none_in_a_cell_and_of_none_that_relaxed_leave_no_number
         ("--curves 5 --points 40 --adaptive=1e-3 --t-end 0.01 --series 0.002", none_relaxed),
         ("--curves 2 --points 40 --adaptive=1e-3 --t-end 0.1 --sweep omega=1,2 --only 1 --series 0.01", none_relaxed),
         ("--curves 2 --points 40 --shape circle:1 --amplitude 0 --stop-when-relaxed", "All 2 members relaxed."),
-        ("--curves 4 --points 32 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct --series 0.1", "ended badly"),
+        (
+            "--curves 4 --points 32 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct --series 0.1",
+            " failed: see the statuses",
+        ),
     ] {
         let done = run(arguments);
         assert!(done.text("report.html").contains(said), "{arguments}: no {said:?}");

@@ -171,10 +171,7 @@ fn some_members_are_sharded_by_their_numbers() {
     refused(
         home.path(),
         &format!("run {SMALL} --shard 0/5 --only 1,3 --out no"),
-        &[
-            "--shard 0/5: there are 2 members to run, and none of them falls to it",
-            "use fewer shards, or leave this one out",
-        ],
+        &["--shard 0/5: none of the 2 members to run belongs to it", "use fewer shards, or leave this one out"],
     );
     // 0/4 has member 4, and 2/4 has 10.
     refused(
@@ -218,16 +215,16 @@ fn what_are_not_the_shards_of_one_study_is_refused_by_name() {
     for (arguments, words) in [
         ("s/0 s/2", &["2 of 3 shards are done", "shard 1 of 3: not among the folders", "--missing"][..]),
         ("s/1", &["1 of 3 shards are done", "shards 0,2 of 3: not among the folders"]),
-        ("s/0 s/1 s/2 s/1", &["s/1: shard 1/3 is there twice, also in s/1; name one"]),
+        ("s/0 s/1 s/2 s/1", &["s/1: shard 1/3 is duplicated in s/1; give one of them"]),
         ("s/0 s/2 seed", &["seed is of another study than s/0: seed is 2, and 1 there"]),
-        ("s/0 s/2 quarter", &["quarter is of another study than s/0: it is shard 1/4, and there is 0/3"]),
+        ("s/0 s/2 quarter", &["quarter is of another study than s/0: it says shard 1/4, but 0/3 is there"]),
         ("s/0 s/2 f32", &["f32 is of another study than s/0: precision is \"f32\", and \"f64\" there"]),
         ("s/0 s/1 s/2 whole", &["whole: the run there is not a shard: it has no shard.state"]),
         ("s/0 s/1 nowhere", &["nowhere: no such folder", "shard 2 of 3"]),
         ("s/0 s/1 empty", &["empty: no shard was finished here"]),
         (
             "empty nowhere",
-            &["no folder tells of which study it is a shard: empty: no shard was", "nowhere: no such folder"],
+            &["no folder says which study it is a shard of: empty: no shard was", "nowhere: no such folder"],
         ),
         ("s/0 s/1 s/2/summary.csv", &["s/2/summary.csv: not a folder; give that of a shard"]),
     ] {
@@ -295,7 +292,7 @@ fn shards_that_are_not_what_they_were_are_refused_by_name() {
     fs::remove_file(path.join("s/0/.curvelax.lock")).unwrap();
     let long = SMALL.replace("1e-3", "1e-9").replace("0.01", "1");
     said(&curvelax(path, &format!("run {long} --shard 2/3 --max-time 1s --out long")), 75);
-    refused(path, "merge long --out no", &["shard 2/3: long: interrupted; curvelax resume long goes on with it"]);
+    refused(path, "merge long --out no", &["shard 2/3: long: interrupted; curvelax resume long continues it"]);
     done(path, MERGE);
 }
 
@@ -321,7 +318,7 @@ fn what_is_missing_is_printed_with_the_line_that_submits_it() {
     let words = "s/5 is of another study than s/0: tau is 0.000000001, and 0.001 there";
     refused(home.path(), &format!("merge --missing {all} {five}"), &[words]);
     let lines = printed(&format!("merge --missing {five}"));
-    assert!(lines.starts_with("shard 5/12: s/5: interrupted; curvelax resume s/5 goes on with it\n"), "{lines}");
+    assert!(lines.starts_with("shard 5/12: s/5: interrupted; curvelax resume s/5 continues it\n"), "{lines}");
     for index in [1, 4, 5, 6, 7, 8, 10, 11] {
         done(home.path(), &format!("run {SMALL} --shard {index}/12 --out t/{index}"));
     }
@@ -380,7 +377,7 @@ fn a_task_of_a_job_array_knows_its_shard() {
         (array("8", "8", "1", "8"), "use --array=0-7, or export CURVELAX_SHARDS=N"),
         (Vec::new(), "no SLURM_ARRAY_TASK_ID: this is not a task of a Slurm job array"),
         (vec![("SLURM_ARRAY_TASK_ID", "8"), ("CURVELAX_SHARDS", "8")], "use I from 0 to 7"),
-        (vec![("SLURM_ARRAY_TASK_ID", "8"), ("CURVELAX_SHARDS", "many")], "CURVELAX_SHARDS=many is no whole number"),
+        (vec![("SLURM_ARRAY_TASK_ID", "8"), ("CURVELAX_SHARDS", "many")], "CURVELAX_SHARDS=many is not a whole number"),
     ] {
         let (code, text) = run(&variables);
         assert!(code == Some(2) && text.contains(told), "{text}");
@@ -411,7 +408,7 @@ fn one_line_begins_a_run_goes_on_with_it_and_leaves_it() {
     refused(
         home.path(),
         &format!("{line} --seed 2"),
-        &["--resume: the run in out is of another spec: seed is 1 there, and 2 here"],
+        &["--resume: the run in out has another spec: seed is 1 there and 2 here"],
     );
     let message = said(&curvelax(home.path(), &format!("{line} --max-time 1s")), 75);
     assert!(message.contains("resuming: 0 of 2 members are in the table"), "{message}");
@@ -422,6 +419,6 @@ fn one_line_begins_a_run_goes_on_with_it_and_leaves_it() {
     let before = content(&home.path().join("short"));
     let message = said(&curvelax(home.path(), &short), 0);
     assert!(message.ends_with("note: the run in short is finished: nothing is left to do\n"), "{message}");
-    refused(home.path(), &short.replace("1e-3", "2e-3"), &["tau is 0.001 there, and 0.002 here"]);
+    refused(home.path(), &short.replace("1e-3", "2e-3"), &["tau is 0.001 there and 0.002 here"]);
     assert!(content(&home.path().join("short")) == before);
 }

@@ -385,7 +385,7 @@ pub(crate) mod tests {
         drifted.end.metric_drift = 0.25;
         tally.add(&drifted).unwrap();
         let warnings = tally.warnings();
-        assert!(warnings[0].starts_with("1 of 4 members ended badly"), "{warnings:?}");
+        assert!(warnings[0].starts_with("1 of 4 members failed"), "{warnings:?}");
         assert!(
             warnings[1].contains("1 of 4 members ended with a metric drift above 0.1 (worst 0.25)"),
             "{warnings:?}"

@@ -118,7 +118,7 @@ pub fn few_on_the_gpu(study: &'static Study, most: usize) -> Outcome {
 /// One error with `remedy`; beside it a run may say that its state is kept.
 #[track_caller]
 fn must_be_named(ended: &Ended, remedy: &str, told: &str) {
-    let is_said = |line: &str| line.starts_with("error: ") || line.starts_with("note: the state of the run is kept");
+    let is_said = |line: &str| line.starts_with("error: ") || line.starts_with("note: the run was saved");
     assert!(ended.code == Some(1) && ended.said.lines().all(is_said), "{told}");
     assert!(ended.errors().len() == 1 && ended.errors()[0].contains(remedy), "{told}");
 }

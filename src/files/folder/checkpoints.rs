@@ -77,7 +77,7 @@ mod tests {
         drop(folder);
         assert_eq!(names(home.path()), [""; 0]);
         let error = OutputFolder::open_again(home.path()).unwrap_err().to_string();
-        assert!(error.contains("no run was begun here"), "{error}");
+        assert!(error.contains("no run was started here"), "{error}");
         assert_eq!(names(home.path()), [""; 0], "it is left as it was");
     }
 }

@@ -191,11 +191,11 @@ impl Page<'_> {
                 (0, 0) if relaxed > 0 => "Nothing: every member relaxed, and there are no warnings.".into(),
                 (0, 0) => "Nothing: there are no warnings.".into(),
                 (0, _) => format!(
-                    "Nothing: no member ended badly, and there are no warnings. {} had not relaxed when time was up, and \
+                    "Nothing: no member failed, and there are no warnings. {} had not relaxed when time was up, and \
                  count as censored.",
                     count(unfinished, "member")
                 ),
-                _ => format!("{} ended badly: see the statuses.", count(bad, "member")),
+                _ => format!("{} failed: see the statuses.", count(bad, "member")),
             },
         )
     }

@@ -45,7 +45,7 @@ fn table(rows: usize) -> PageTable {
 
 fn warnings() -> Vec<String> {
     vec![
-        "12 of 4096 members ended badly (see status); unless the flow itself goes wrong there, a smaller --tau or --adaptive, \
+        "12 of 4096 members failed (see status); unless the flow itself becomes singular, a smaller --tau or --adaptive, \
          or more --points, helps"
             .into(),
         "88 members are censored: the mean t_relax is biased low, so read the median".into(),
@@ -130,7 +130,7 @@ fn the_first_screen_answers_the_four_questions_in_order() {
         "unfinished 88 (2.1 %)",
         "median t_relax",
         "0.412 length⁴",
-        "12 of 4096 members ended badly",
+        "12 of 4096 members failed",
         "member 0: relaxed at t = 0.380",
         "<h2 id=\"plots\">",
     ]
