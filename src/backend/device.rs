@@ -1,4 +1,4 @@
-//! What members are advanced on.
+//! The device that advances members.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::gpu::Gpu;
 
-/// What members are advanced on, not yet opened.
+/// A device that advances members, not yet opened.
 pub enum Device {
     /// The cores of this machine.
     Cpu,
@@ -25,7 +25,7 @@ pub enum DeviceKind {
 }
 
 impl DeviceKind {
-    /// As in flags and files.
+    /// Names used in flags and files.
     pub const NAMES: [&str; 2] = ["cpu", "gpu"];
 }
 
@@ -36,7 +36,7 @@ impl fmt::Display for DeviceKind {
 }
 
 impl Device {
-    /// Which kind it is.
+    /// Returns the kind of this device.
     pub fn kind(&self) -> DeviceKind {
         match self {
             Device::Cpu => DeviceKind::Cpu,
@@ -44,7 +44,7 @@ impl Device {
         }
     }
 
-    /// The adapter, if it is one.
+    /// Returns the adapter, if this is one.
     pub fn gpu(&self) -> Option<&Gpu> {
         match self {
             Device::Cpu => None,

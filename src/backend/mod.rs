@@ -1,7 +1,7 @@
-//! Where members are advanced: slots for resident members, on the CPU or on a GPU.
+//! Back ends, which advance members: slots for resident members, on the CPU or on a GPU.
 //!
-//! A back end knows nothing of an ensemble. It holds as many members as it has slots, takes each towards the
-//! step it is aimed at, and reports; [`simulate`](crate::simulate) fills, collects and refills.
+//! A back end knows nothing of an ensemble. It holds as many members as it has slots, advances each towards the step it
+//! is aimed at, and reports; [`simulate`](crate::simulate) fills, collects and refills.
 
 pub mod cpu;
 pub mod device;
@@ -20,34 +20,34 @@ use crate::{
     },
 };
 
-/// Members on their way, side by side.
+/// Members being advanced side by side.
 pub trait Backend {
-    /// How many members are resident at once.
+    /// Returns the number of members that are resident at once.
     fn slots(&self) -> usize;
 
-    /// How many members are advanced at the same time, about: fewer leave some of the machine idle.
+    /// Returns roughly how many members are advanced at the same time; with fewer, part of the machine is idle.
     fn abreast(&self) -> usize {
         self.slots().div_ceil(8)
     }
 
-    /// Puts a member into a slot, in place of whatever was there.
+    /// Puts a member into a slot, replacing any member there.
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()>;
 
-    /// Lets the member in `slot` run on under `parameters` until it has made `goal` steps or pauses by itself.
+    /// Lets the member in `slot` continue under `parameters` until it has made `goal` steps or pauses by itself.
     fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>);
 
     /// Empties a slot.
     fn clear(&mut self, slot: usize);
 
-    /// Equal parts of the slots, one after the other, that can be advanced on their own: while one is on its way, the host
-    /// has time for another.
+    /// Returns the number of equal consecutive parts of the slots that can be advanced separately: while one is being
+    /// advanced, the host can handle another.
     fn batches(&self) -> usize;
 
-    /// Begins to advance a batch; until `finish` its slots are left alone.
+    /// Starts to advance a batch; its slots must not be touched until `finish`.
     fn start(&mut self, batch: usize) -> Result<()>;
 
-    /// Waits until the batch has advanced, but no longer than `most`; whether it has. Where waits are short by nature, it
-    /// may leave them to `finish`.
+    /// Waits until the batch has advanced, but no longer than `most`; returns whether it has. Back ends with short
+    /// waits may leave them to `finish`.
     fn is_back(&mut self, _batch: usize, _most: Duration) -> bool {
         true
     }
@@ -55,22 +55,22 @@ pub trait Backend {
     /// Waits until the batch has advanced.
     fn finish(&mut self, batch: usize) -> Result<()>;
 
-    /// Takes every member that is running and short of its goal some steps further.
+    /// Advances every running member that is short of its goal by some steps.
     fn advance(&mut self) -> Result<()> {
         (0..self.batches()).try_for_each(|batch| self.start(batch))?;
         (0..self.batches()).try_for_each(|batch| self.finish(batch))
     }
 
-    /// Counters after the last `advance`; the sweeps are those of that call.
+    /// Returns the counters after the last `advance`; the sweeps are those of that call.
     fn counters(&self, slot: usize) -> Counters;
 
-    /// The report after the last `advance`.
+    /// Returns the report after the last `advance`.
     fn report(&self, slot: usize) -> Report<f64>;
 
-    /// The state of a member, read back and widened.
+    /// Returns the state of a member, read back and widened.
     fn state(&mut self, slot: usize) -> Result<State<f64>>;
 
-    /// The states of several members of a batch that is not on its way.
+    /// Returns the states of several members of a batch that is not being advanced.
     fn states(&mut self, slots: &[usize]) -> Result<Vec<State<f64>>> {
         slots.iter().map(|slot| self.state(*slot)).collect()
     }

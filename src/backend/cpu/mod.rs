@@ -1,8 +1,8 @@
-//! The CPU back end: the scheme itself, members abreast in the lanes of vector instructions, groups of them spread over
-//! threads.
+//! The CPU back end: the scheme itself, with members in the lanes of vector instructions and groups of members spread
+//! over threads.
 //!
-//! Every call groups the members that are running anew, so that no lane is idle for long; no bit of a member depends on
-//! its group. There are two batches of slots: while the threads advance one, the host looks after the other.
+//! Every call regroups the running members, so that no lane stays idle for long. A member's results do not depend on
+//! its group, to the last bit. There are two batches of slots: while threads advance one, the host handles the other.
 
 mod vectors;
 
@@ -34,19 +34,19 @@ use crate::{
 };
 use vectors::Crew;
 
-/// Resident groups per thread and batch: enough that threads end together, few enough that members end in order.
+/// Resident groups per thread and batch: enough that threads finish together, few enough that members finish in order.
 const GROUPS_PER_THREAD: usize = 4;
-/// Resident members per thread and batch at least.
+/// Minimum number of resident members per thread and batch.
 const SLOTS_PER_THREAD: usize = 8;
-/// While one is on its way, the host has time for the other.
+/// While one is being advanced, the host handles the other.
 const BATCHES: usize = 2;
-/// Bytes for each thread: members of very many nodes have fewer lanes, slots and batches, so that they fit.
+/// Bytes per thread: members with very many nodes get fewer lanes, slots and batches so that they fit.
 const ROOM: usize = 128 << 20;
 
-/// A batch on its way is to be back after this time, so that progress shows; far more than it takes for usual n.
+/// Target time for a batch, so that progress shows; far more than usual n need.
 const ADVANCE_TIME: Duration = Duration::from_secs(1);
 
-/// Steps between two looks at the members at most, so that stops are reached soon.
+/// Maximum steps between two checks of the members, so that stops are reached soon.
 fn most_steps(solver: Solver) -> u32 {
     if solver.sweeps() { 64 } else { 256 }
 }
@@ -58,34 +58,34 @@ pub struct CpuBackend<T> {
     method: Method,
     crew: Arc<dyn Crew<T>>,
     pool: rayon::ThreadPool,
-    /// Steps of the next batch; no bit of a result depends on it.
+    /// Steps of the next batch; results do not depend on it, to the last bit.
     steps: u32,
 }
 
-/// The members in a part of the slots.
+/// The members in one part of the slots.
 type Members<T> = Vec<Option<Box<Run<T>>>>;
 
-/// Members that come back, and the time that they took.
+/// Returned members, and the time they took.
 type Back<T> = (Members<T>, Duration);
 
-/// Part of the slots.
+/// One part of the slots.
 struct CpuBatch<T> {
-    /// Empty while the batch is on its way.
+    /// Empty while the batch is being advanced.
     members: Members<T>,
-    /// Where they come back from there.
+    /// Channel on which the members come back.
     coming: Option<Receiver<Back<T>>>,
-    /// What came.
+    /// The members that came back.
     back: Option<Back<T>>,
 }
 
 impl<T: Vectorised> CpuBackend<T> {
-    /// A back end on `threads` threads (0: all cores), with the widest vectors that the processor has.
+    /// Creates a back end on `threads` threads (0: all cores), with the widest vectors of the processor.
     pub fn new(blocks: Blocks, method: Method, threads: usize) -> Result<Self> {
         Self::with_vectors(blocks, method, threads, Vectors::widest())
     }
 
-    /// The same for `members` members: with no wider vectors than they fill, and none that take more memory than there is
-    /// room for.
+    /// Like [`CpuBackend::new`], for `members` members: with vectors no wider than the members fill and than memory
+    /// allows.
     pub fn for_members(blocks: Blocks, method: Method, threads: usize, members: u64) -> Result<Self> {
         let crew = |vectors: &Vectors| Some((*vectors, T::crew(*vectors, method.solver, blocks, 1).ok()?));
         let crews: Vec<_> = Vectors::ALL.iter().filter(|vectors| vectors.are_available()).filter_map(crew).collect();
@@ -97,9 +97,9 @@ impl<T: Vectorised> CpuBackend<T> {
         Self::with_vectors(blocks, method, threads, widest.unwrap_or(Vectors::None))
     }
 
-    /// The same with `vectors`, which the processor must have.
+    /// Like [`CpuBackend::new`], with `vectors`, which the processor must have.
     pub fn with_vectors(blocks: Blocks, method: Method, threads: usize, vectors: Vectors) -> Result<Self> {
-        // A panic is told by the batch that does not come back.
+        // A panic shows as a batch that does not come back.
         let pool = threads::pool(threads)?;
         let threads = pool.current_num_threads();
         let crew = T::crew(vectors, method.solver, blocks, threads)?;
@@ -118,7 +118,7 @@ impl<T: Vectorised> CpuBackend<T> {
         })
     }
 
-    /// Threads in use.
+    /// Returns the number of threads in use.
     pub fn threads(&self) -> usize {
         self.pool.current_num_threads()
     }
@@ -174,7 +174,7 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
                 members.iter_mut().flatten().map(|run| &mut **run).filter(|run| run.counters.is_running()).collect();
             let groups = Group::of(&mut running, crew.lanes());
             groups.into_par_iter().for_each(|group| crew.advance(group, &method, attempts));
-            // Where nobody waits any more the run has ended.
+            // If nobody waits any more, the run has ended.
             let _ = back.send((members, started.elapsed()));
         });
         Ok(())
@@ -186,7 +186,7 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
             match coming.recv_timeout(most) {
                 Ok(members) => *back = Some(members),
                 Err(RecvTimeoutError::Timeout) => return false,
-                // `finish` tells.
+                // `finish` reports this.
                 Err(RecvTimeoutError::Disconnected) => {}
             }
         }

@@ -1,4 +1,4 @@
-//! Vector instructions, chosen at run time: the same source, compiled once for each.
+//! Vector instructions, chosen at run time: the same source, compiled once for each set.
 
 use std::{marker::PhantomData, sync::Mutex};
 
@@ -14,7 +14,7 @@ use crate::{
     solver::{Blocks, Solver, Solves, by_solver},
 };
 
-/// Instructions for members side by side.
+/// Vector instructions for members side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Vectors {
     /// One member at a time: the reference.
@@ -28,10 +28,10 @@ pub enum Vectors {
 }
 
 impl Vectors {
-    /// All of them, the widest last.
+    /// All variants, the widest last.
     pub const ALL: [Vectors; 4] = [Vectors::None, Vectors::Bits128, Vectors::Bits256, Vectors::Bits512];
 
-    /// Whether this processor has them.
+    /// Returns whether this processor has them.
     pub fn are_available(self) -> bool {
         #[cfg(target_arch = "x86_64")]
         match self {
@@ -50,16 +50,16 @@ impl Vectors {
         matches!(self, Vectors::None)
     }
 
-    /// The widest that this processor has.
+    /// Returns the widest vectors of this processor.
     pub fn widest() -> Vectors {
         Self::ALL.into_iter().rfind(|vectors| vectors.are_available()).unwrap_or(Vectors::None)
     }
 }
 
-/// A number with vector code. Implemented for each number by name, so that the code is compiled here, once, and not again
-/// in every program that uses a back end.
+/// A number with vector code. Implemented for each number by name, so that the code is compiled once, here, and not in
+/// every program that uses a back end.
 pub trait Vectorised: Real {
-    /// A crew of `threads` threads for rings cut by `blocks`.
+    /// Creates a crew of `threads` threads for rings cut by `blocks`.
     #[doc(hidden)]
     fn crew(vectors: Vectors, solver: Solver, blocks: Blocks, threads: usize) -> Result<Box<dyn Crew<Self>>>;
 }
@@ -84,14 +84,14 @@ macro_rules! vectorised {
 
 vectorised!(f64 f32);
 
-/// A crew for the solver `M`, if the processor has the vectors.
+/// Creates a crew for the solver `M` if the processor has the vectors.
 ///
-/// An elimination is a chain of results that wait for each other, so two of the smaller registers go in turn. Sweeps wait
-/// for nothing, and go over their rows so often that these have to stay in the nearest cache: fewer members go abreast.
+/// An elimination is a chain of dependent results, so two of the smaller registers are interleaved. Sweeps have no such
+/// chain, and visit their rows so often that these must stay in the nearest cache, so fewer members run side by side.
 fn crew_by<M: Solves, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Crew<T>>> {
     match vectors {
         Vectors::None => Some(Teams::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
-        // Fuzzing (`fuzz/run`) advances no member, and would take minutes to count the branches of all this.
+        // Fuzzing (`fuzz/run`) advances no member, and would take minutes to count the branches of all this code.
         _ if cfg!(fuzzing) => None,
         #[cfg(target_arch = "x86_64")]
         Vectors::Bits128 if M::FACTS.sweeps => abreast::<_, M, T, 1>(pulp::x86::V2::try_new(), blocks, threads),
@@ -110,7 +110,7 @@ fn crew_by<M: Solves, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize)
     }
 }
 
-/// A crew whose members go abreast in `R` registers of the instructions, if the processor has them.
+/// Creates a crew whose members fill `R` registers of the instructions, if the processor has them.
 fn abreast<S: Instructions, M: Solves, T: Element<S>, const R: usize>(
     simd: Option<S>,
     blocks: Blocks,
@@ -120,7 +120,7 @@ fn abreast<S: Instructions, M: Solves, T: Element<S>, const R: usize>(
     simd.map(|simd| with_lanes::<S, T, R, _>(simd, Abreast { simd, solver, blocks, threads }))
 }
 
-/// What a crew is made of, but for its lanes.
+/// Everything that defines a crew, except its lanes.
 struct Abreast<S, M> {
     simd: S,
     solver: PhantomData<fn() -> M>,
@@ -136,7 +136,7 @@ impl<S: Simd, M: Solves, T: Real> WithLanes<T> for Abreast<S, M> {
     }
 }
 
-/// A number that fits into all vectors of this kind of processor.
+/// A number that fits all vectors of this processor architecture.
 #[cfg(target_arch = "x86_64")]
 trait Lane: Element<pulp::x86::V2> + Element<pulp::x86::V3> + Element<pulp::x86::V4> {}
 #[cfg(target_arch = "x86_64")]
@@ -151,22 +151,22 @@ use Real as Lane;
 /// Threads that advance groups of members.
 #[doc(hidden)]
 pub trait Crew<T>: Send + Sync {
-    /// Members abreast in a group.
+    /// Returns the number of members side by side in a group.
     fn lanes(&self) -> usize;
 
-    /// Takes a group of at most that many members some steps further, in a thread of the pool.
+    /// Advances a group of at most `lanes` members by some steps, in a thread of the pool.
     fn advance(&self, group: Group<T>, method: &Method, attempts: u32);
 
-    /// Bytes of what a thread needs to advance a group.
+    /// Returns the bytes that a thread needs to advance a group.
     fn bytes_of_team(&self) -> usize;
 }
 
-/// Lanes of `N` in instructions `S`, which the token proves to be there, for the solver `M`; a team for each thread.
+/// Lanes of `N` in the instructions `S`, whose presence the token proves, for the solver `M`; one team per thread.
 struct Teams<S, M, N: Number> {
     simd: S,
     solver: PhantomData<fn() -> M>,
     blocks: Blocks,
-    /// Made when a thread has a group to advance; there are never more of them than groups on their way.
+    /// Created when a thread has a group to advance; never more than groups being advanced.
     teams: Vec<Mutex<Option<Team<N>>>>,
 }
 
@@ -176,7 +176,7 @@ impl<S: Simd, M: Solves, T: Real, N: Number<Real = T>> Teams<S, M, N> {
         Box::new(Teams { simd, solver: PhantomData::<fn() -> M>, blocks, teams })
     }
 
-    /// The team of a thread, which is still in its cache, or else one that nobody uses.
+    /// Returns the team of a thread, which is still in its cache, or else an unused one.
     fn take_team(&self, thread: usize) -> Option<Team<N>> {
         let (others, own) = self.teams.split_at(thread);
         own.iter().chain(others).find_map(|team| unlocked(team).take())
@@ -200,7 +200,7 @@ impl<S: Simd, M: Solves, T: Real, N: Number<Real = T>> Crew<T> for Teams<S, M, N
     }
 }
 
-/// What is locked; nothing can panic meanwhile.
+/// Locks the mutex; nothing can panic while it is held.
 fn unlocked<T>(of: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     of.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

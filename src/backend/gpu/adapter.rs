@@ -1,4 +1,4 @@
-//! Adapters: what is there, what each can do, and which one to take.
+//! Adapters: which exist, what each can do, and which one to use.
 
 use std::{
     collections::HashMap,
@@ -23,49 +23,49 @@ use crate::{
 pub struct Gpu {
     adapter: wgpu::Adapter,
     info: wgpu::AdapterInfo,
-    /// The device and its pipelines, once one was needed.
+    /// The device and its pipelines, once they are needed.
     opened: Mutex<Option<(OpenGpu, HashMap<Key, wgpu::ComputePipeline>)>>,
 }
 
-/// An opened device: where kernels are made and run.
+/// An opened device, on which kernels are compiled and run.
 #[derive(Clone)]
 pub struct OpenGpu {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     name: String,
-    /// Whether the process itself computes: a software GPU.
+    /// Whether the process itself computes, as with a software GPU.
     in_process: bool,
     fault: Arc<Mutex<Option<String>>>,
 }
 
-/// What an adapter's workgroups can hold.
+/// What a workgroup of an adapter can hold.
 #[derive(Clone, Copy, Debug)]
 pub struct Capacity {
     /// Whether shaders may use f64.
     pub f64: bool,
-    /// Threads of a workgroup at most.
+    /// Maximum threads in a workgroup.
     pub threads: usize,
-    /// Bytes of workgroup memory at most.
+    /// Maximum bytes of workgroup memory.
     pub workgroup_bytes: usize,
     /// Threads of the largest subgroup.
     pub subgroup: u32,
-    /// Threads of the smallest subgroup, 0 where shaders may not use subgroups.
+    /// Threads of the smallest subgroup; 0 if shaders may not use subgroups.
     pub least_subgroup: u32,
 }
 
 impl Capacity {
-    /// The precision of a run that asks for none.
+    /// Returns the precision of a run that does not ask for one.
     pub fn best_precision(&self) -> Precision {
         if self.f64 { Precision::F64 } else { Precision::F32 }
     }
 
-    /// The largest n that fits in precision `T`.
+    /// Returns the largest n that fits in precision `T`.
     pub fn max_points<T: Real>(&self, solver: Solver) -> usize {
         let fits = |n: &usize| Blocks::new(*n).is_some_and(|blocks| self.check_size::<T>(blocks, solver).is_ok());
         (MIN_POINTS..1 << 16).take_while(fits).last().unwrap_or(0)
     }
 
-    /// Whether members of this size fit: threads and workgroup memory.
+    /// Checks that members of this size fit: threads and workgroup memory.
     pub fn check_size<T: Real>(&self, blocks: Blocks, solver: Solver) -> std::result::Result<(), String> {
         let threads = shader::threads(blocks, self.subgroup);
         if threads > self.threads {
@@ -78,7 +78,7 @@ impl Capacity {
         Ok(())
     }
 
-    /// The kernel of fixed steps that suits a ring: sweeps by shuffles where every subgroup there may be holds it.
+    /// Returns the fixed-step kernel that suits a ring: sweeps by shuffles if every possible subgroup holds it.
     pub fn variant(&self, blocks: Blocks, solver: Solver) -> Variant {
         let subgroup = solver.facts().kernel.shuffles && blocks.count() <= self.least_subgroup as usize;
         Variant { subgroup, ..Variant::of(solver) }
@@ -86,7 +86,7 @@ impl Capacity {
 }
 
 impl Gpu {
-    /// Every adapter of this machine, hardware first, in the order in which `auto` prefers them.
+    /// Lists the adapters of this machine, hardware first, in the order in which `auto` prefers them.
     pub fn list() -> Vec<Gpu> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.flags = wgpu::InstanceFlags::empty();
@@ -113,23 +113,23 @@ impl Gpu {
         }
     }
 
-    /// Whether it is hardware, not a software GPU on the CPU.
+    /// Returns whether it is hardware, not a software GPU on the CPU.
     pub fn is_hardware(&self) -> bool {
         self.rank() < 3
     }
 
-    /// Its name, as `--adapter` matches it.
+    /// Returns its name, as `--adapter` matches it.
     pub fn name(&self) -> &str {
         &self.info.name
     }
 
-    /// Whether its name contains `part`, in any case; every name contains nothing.
+    /// Whether its name contains `part`, ignoring case; without a `part` every name matches.
     fn matches(&self, part: Option<&str>) -> bool {
         part.is_none_or(|part| self.name().to_lowercase().contains(&part.to_lowercase()))
     }
 
-    /// Those of `found` that are asked for: the one of this number, counted from 0, or else all whose names contain it; and
-    /// whether it was a number.
+    /// Selects the requested adapters from `found`: the one with this number, counted from 0, or else all whose names
+    /// contain the text. Also returns whether it was a number.
     pub fn select(mut found: Vec<Gpu>, asked: Option<&str>) -> (Vec<Gpu>, bool) {
         match asked.and_then(|asked| asked.trim().parse::<usize>().ok()).filter(|number| *number < found.len()) {
             Some(number) => (vec![found.swap_remove(number)], true),
@@ -137,37 +137,37 @@ impl Gpu {
         }
     }
 
-    /// `Vulkan`, `Metal` or `Dx12`.
+    /// Returns `Vulkan`, `Metal` or `Dx12`.
     pub fn api(&self) -> String {
         format!("{:?}", self.info.backend)
     }
 
-    /// `DiscreteGpu`, `IntegratedGpu`, `VirtualGpu`, `Cpu` or `Other`.
+    /// Returns `DiscreteGpu`, `IntegratedGpu`, `VirtualGpu`, `Cpu` or `Other`.
     pub fn device_type(&self) -> String {
         format!("{:?}", self.info.device_type)
     }
 
-    /// Driver name and version.
+    /// Returns the driver's name and version.
     pub fn driver(&self) -> String {
         format!("{} {}", self.info.driver, self.info.driver_info).trim().to_string()
     }
 
-    /// Whether shaders may use f64.
+    /// Returns whether shaders may use f64.
     pub fn has_f64(&self) -> bool {
         self.adapter.features().contains(wgpu::Features::SHADER_F64)
     }
 
-    /// The limits that bound a run.
+    /// Returns the limits that bound a run.
     pub fn limits(&self) -> wgpu::Limits {
         self.adapter.limits()
     }
 
-    /// Threads of the smallest and of the largest subgroup that a shader may meet.
+    /// Returns the threads of the smallest and the largest subgroup that a shader may meet.
     pub fn subgroups(&self) -> [u32; 2] {
         [self.info.subgroup_min_size, self.info.subgroup_max_size].map(|size| size.clamp(1, 64))
     }
 
-    /// What decides whether a run fits.
+    /// Returns what decides whether a run fits.
     pub fn capacity(&self) -> Capacity {
         let limits = self.limits();
         let [least, most] = self.subgroups();
@@ -181,7 +181,7 @@ impl Gpu {
         }
     }
 
-    /// The pipeline for a ring and a variant, compiled once, and the device that it is for, opened once.
+    /// Returns the pipeline for a ring and a variant, compiled once, and its device, opened once.
     pub fn pipeline<T: Real>(&self, blocks: Blocks, variant: Variant) -> Result<(OpenGpu, wgpu::ComputePipeline)> {
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
         let (device, pipelines) = match &mut *opened {
@@ -196,7 +196,7 @@ impl Gpu {
         Ok((device.clone(), pipeline.clone()))
     }
 
-    /// Takes the device away from all kernels that are on it, as a reset of the driver does: for tests of what follows.
+    /// Makes all kernels lose the device, as a driver reset does, to test the recovery.
     #[doc(hidden)]
     pub fn lose(&self) {
         if let Some((device, _)) = &*self.opened.lock().unwrap_or_else(PoisonError::into_inner) {
@@ -224,7 +224,7 @@ impl Gpu {
             set(&at, &|first| first.unwrap_or_else(|| one_line(&error.to_string())));
         }));
         let at = fault.clone();
-        // Dropping the device also calls back; then nobody is left who asks.
+        // Dropping the device also calls back, but then nobody is listening.
         device.set_device_lost_callback(move |reason, message| {
             set(&at, &|_| one_line(&format!("the device was lost ({reason:?}) {message}")));
         });
@@ -233,22 +233,22 @@ impl Gpu {
     }
 }
 
-/// What became of a wait.
+/// Result of a wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Waited {
     /// The work is done.
     Done,
-    /// It is still on its way.
+    /// The work is still in progress.
     OnItsWay,
 }
 
 impl OpenGpu {
-    /// This moment, from which the time of its work counts.
+    /// The current moment, from which the time of its work counts.
     pub(super) fn now(&self) -> Moment {
         Moment::now(self.in_process)
     }
 
-    /// Whether wgpu has reported a fault.
+    /// Checks whether wgpu has reported a fault.
     pub fn check(&self) -> Result<()> {
         self.fault().map_or(Ok(()), |fault| Err(self.error(&fault)))
     }
@@ -257,25 +257,25 @@ impl OpenGpu {
     pub(super) fn fault(&self) -> Option<String> {
         let known = || self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if known().is_some() {
-            // Calls on a device that is gone look like wrong ones; that it is gone is told when it is polled.
+            // Calls on a lost device look invalid; polling it reports the loss.
             let _ = guarded(|| self.device.poll(wgpu::PollType::Poll));
         }
         known()
     }
 
-    /// The error of a fault of this device.
+    /// Converts a fault of this device into an error.
     pub(super) fn error(&self, fault: &str) -> Error {
         let OpenGpu { name, .. } = self;
         Error::Device(format!("GPU {name}: {fault}; see `curvelax adapters`, or use --backend cpu"))
     }
 
-    /// Waits for what was submitted, but no longer than `most`.
+    /// Waits for the submission, but no longer than `most`.
     pub(super) fn wait(&self, submission: &wgpu::SubmissionIndex, most: Duration) -> Result<Waited> {
         let wait =
             |poll| guarded(|| self.device.poll(poll)).map_err(|fault| self.error(&self.fault().unwrap_or(fault)));
         let polled = wait(wgpu::PollType::Wait { submission_index: Some(submission.clone()), timeout: Some(most) })?;
         if polled.is_err() {
-            // A lost device takes no submission, so there is none to wait for; this hears what became of it.
+            // A lost device accepts no submission, so there is none to wait for; this poll reports the loss.
             let _ = wait(wgpu::PollType::Poll)?;
         }
         self.check()?;

@@ -1,7 +1,7 @@
-//! A batch of slots: its buffers, the host's mirror of the small ones, and at most one dispatch on its way.
+//! A batch of slots: its buffers, the host's mirror of the small ones, and at most one dispatch in progress.
 //!
-//! Before a dispatch what changed in the mirror is uploaded, and with it the list of members that are due: only they get a
-//! workgroup. After it their counters and reports come back.
+//! Before a dispatch, the changed part of the mirror is uploaded together with the list of members that are due; only
+//! they get a workgroup. Afterwards their counters and reports come back.
 
 use std::{
     sync::mpsc::{Receiver, channel},
@@ -26,10 +26,10 @@ use crate::{
     solver::Blocks,
 };
 
-/// Field names of what one dispatch asks for, in memory order.
+/// Field names of the parameters of one dispatch, in memory order.
 pub const DISPATCH_FIELDS: [&str; 5] = ["steps", "max_sweeps", "sweeps", "blocks", "groups"];
 
-/// What one dispatch asks for.
+/// Parameters of one dispatch.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Dispatch {
@@ -53,13 +53,13 @@ pub(super) struct Batch<T> {
     flight: Option<Flight>,
 }
 
-/// A dispatch on its way.
+/// A dispatch in progress.
 struct Flight {
     since: Moment,
     back: Reading,
 }
 
-/// A copy to the host on its way.
+/// A copy to the host in progress.
 pub(super) struct Reading {
     submission: wgpu::SubmissionIndex,
     staging: wgpu::Buffer,
@@ -79,7 +79,7 @@ struct Buffers {
 }
 
 impl<T: Real> Batch<T> {
-    /// Room for `slots` members.
+    /// Allocates room for `slots` members.
     pub fn new(device: &OpenGpu, pipeline: &wgpu::ComputePipeline, blocks: Blocks, slots: usize, traced: bool) -> Self {
         let buffers = Buffers::new::<T>(&device.device, blocks.n, slots, traced);
         Batch {
@@ -95,7 +95,7 @@ impl<T: Real> Batch<T> {
         }
     }
 
-    /// Bytes of its buffers.
+    /// Returns the bytes of its buffers.
     pub fn bytes(&self) -> u64 {
         let Buffers { dispatch, parameters, counters, reports, states, due, trace, staging } = &self.buffers;
         let all = [dispatch, parameters, counters, reports, states, due, staging].into_iter().chain(trace);
@@ -110,7 +110,7 @@ impl<T: Real> Batch<T> {
         &self.reports[slot]
     }
 
-    /// Where the state of `slot` lies.
+    /// Returns where the state of `slot` is stored.
     pub fn state_at(&self, slot: usize) -> (&wgpu::Buffer, u64, u64) {
         let bytes = (STATE_FIELDS * self.blocks.n * size_of::<T>()) as u64;
         (&self.buffers.states, slot as u64 * bytes, bytes)
@@ -139,7 +139,7 @@ impl<T: Real> Batch<T> {
         self.changed[slot] = true;
     }
 
-    /// Sends the members that are due on their way, if any are.
+    /// Dispatches the members that are due, if any.
     pub fn start(&mut self, device: &OpenGpu, pipeline: &wgpu::ComputePipeline, budget: Budget, max_sweeps: u32) {
         self.due.clear();
         self.due.extend((0..).zip(&self.counters).filter(|(_, counters)| counters.is_running()).map(|(slot, _)| slot));
@@ -158,19 +158,19 @@ impl<T: Real> Batch<T> {
         self.flight = Some(Flight { since: device.now(), back: Reading::submit(device, encoder, staging, &reads) });
     }
 
-    /// When what is on its way was started.
+    /// Returns when the dispatch in progress was started.
     pub fn since(&self) -> Option<Moment> {
         self.flight.as_ref().map(|flight| flight.since)
     }
 
-    /// Waits for what was started, but no longer than `most`; whether there is nothing left to wait for, be it for a fault,
-    /// which `finish` tells.
+    /// Waits for the dispatch, but no longer than `most`. Returns whether nothing is left to wait for, even because of
+    /// a fault, which `finish` reports.
     pub fn is_back(&self, device: &OpenGpu, most: Duration) -> bool {
         let Some(Flight { back, .. }) = &self.flight else { return true };
         !matches!(device.wait(&back.submission, most), Ok(Waited::OnItsWay))
     }
 
-    /// Waits for what was started, while there is time `left` for it, and takes its records; returns when it was started.
+    /// Waits for the dispatch while it has time `left`, and reads its records; returns when it was started.
     pub fn finish(&mut self, device: &OpenGpu, left: impl Fn(Moment) -> Duration) -> Result<Option<Moment>> {
         let Some(Flight { since, back }) = self.flight.take() else {
             self.forget_sweeps();
@@ -189,7 +189,7 @@ impl<T: Real> Batch<T> {
         Ok(Some(since))
     }
 
-    /// Members that were not due have made none.
+    /// Members that were not due have made no sweeps.
     fn forget_sweeps(&mut self) {
         for counters in &mut self.counters {
             (counters.sweeps_k, counters.sweeps_x) = (0, 0);
@@ -201,7 +201,8 @@ impl<T: Real> Batch<T> {
         let asked = Dispatch { steps, max_sweeps, sweeps, blocks, groups: blocks.isqrt() };
         queue.write_buffer(&self.buffers.dispatch, 0, bytemuck::bytes_of(&asked));
         queue.write_buffer(&self.buffers.due, 0, bytemuck::cast_slice(&self.due));
-        // From the first slot that changed to the last one: what is uploaded needlessly between them is what came back.
+        // From the first changed slot to the last: needless uploads in between only write back what came from the
+        // device.
         let Some(first) = self.changed.iter().position(|changed| *changed) else { return };
         let end = self.changed.iter().rposition(|changed| *changed).map_or(first, |last| last + 1);
         self.changed[first..end].fill(false);
@@ -221,7 +222,7 @@ impl<T: Real> Batch<T> {
     }
 }
 
-/// A member that was due has made a step or a sweep, or ended: a kernel that does nothing must not be awaited.
+/// Checks that a due member has made a step or a sweep, or ended: a kernel that does nothing must not be waited for.
 fn check_progress(device: &OpenGpu, slot: usize, before: &Counters, after: &Counters) -> Result<()> {
     let position = |c: &Counters| (c.status, c.steps, c.rejected, c.phase, c.solve_sweeps);
     if position(before) == position(after) && after.sweeps_k + after.sweeps_x == 0 {
@@ -231,7 +232,7 @@ fn check_progress(device: &OpenGpu, slot: usize, before: &Counters, after: &Coun
 }
 
 impl Reading {
-    /// Runs `encoder`, then copies `bytes` of each buffer towards the host through `staging`.
+    /// Runs `encoder`, then copies `bytes` of each buffer to the host through `staging`.
     pub fn submit(
         device: &OpenGpu,
         mut encoder: wgpu::CommandEncoder,
@@ -249,7 +250,7 @@ impl Reading {
         Reading { submission, staging: staging.clone(), bytes: at, mapped }
     }
 
-    /// Waits until it has arrived, while there is time `left`; it is on its way `since` then.
+    /// Waits for the copy, in progress `since` then, while there is time `left`.
     pub fn wait(self, device: &OpenGpu, since: Moment, left: impl Fn(Moment) -> Duration) -> Result<Vec<u8>> {
         while device.wait(&self.submission, left(since))? == Waited::OnItsWay {
             if left(since).is_zero() {

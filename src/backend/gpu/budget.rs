@@ -1,33 +1,33 @@
-//! How much one dispatch may do, and how that follows the time that dispatches take.
+//! The budget of one dispatch, and how it follows the time that dispatches take.
 
 use std::time::Duration;
 
 use super::{adapter::Gpu, shader::Variant};
 use crate::solver::{Blocks, Solver};
 
-/// A dispatch aims to last this long: short enough for every watchdog, long enough to hide its overhead, some 0.1 ms.
+/// Target time of a dispatch: short enough for every watchdog, long enough to hide its overhead of some 0.1 ms.
 const DISPATCH_TIME: Duration = Duration::from_millis(40);
 
-/// How much one dispatch may do. No bit of a result depends on it: a dispatch that runs out pauses, even inside a
-/// solve, and the next one goes on.
+/// How much one dispatch may do. Results do not depend on it, to the last bit: a dispatch that runs out pauses, even
+/// inside a solve, and the next one continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     /// Steps per member.
     pub steps: u32,
-    /// Sweeps per member, rounded up to the next look at the residual.
+    /// Sweeps per member, rounded up to the next check of the residual.
     pub sweeps: u32,
 }
 
-/// llvmpipe leaves all loops of a shader, without a word, once they have made 65 535 iterations together.
+/// llvmpipe silently leaves all loops of a shader once they have made 65 535 iterations together.
 const SOFTWARE_ITERATIONS: u32 = 50_000;
 
 impl Budget {
-    /// The most that one dispatch may do on this adapter.
+    /// The maximum budget of a dispatch on this adapter.
     pub(super) fn most(gpu: &Gpu, blocks: Blocks, Variant { solver, adaptive, .. }: Variant) -> Budget {
         if gpu.is_hardware() {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
-        // A sweep is one iteration; a look at the residual walks over all blocks at most, and a step does so ten times, an
+        // A sweep is one iteration. A check of the residual walks over at most all blocks; a step does so ten times, an
         // adaptive one, which is three of the paper's, forty times.
         let walk = blocks.count() as u32 + 1;
         let walks = if adaptive { 40 } else { 10 };
@@ -41,7 +41,7 @@ impl Budget {
         }
     }
 
-    /// Of the first dispatch: certainly little.
+    /// The budget of the first dispatch: small, to be safe.
     pub(super) fn first(solver: Solver, most: Budget) -> Budget {
         match solver.sweeps() {
             true => Budget { sweeps: most.sweeps.min(256), ..most },
@@ -49,7 +49,7 @@ impl Budget {
         }
     }
 
-    /// Of the dispatch after one that took so long: at most twice the sweeps, or steps where there are no sweeps.
+    /// The budget after a dispatch that took `took`: at most twice the sweeps, or steps where there are no sweeps.
     pub(super) fn after(self, took: Duration, solver: Solver, most: Budget) -> Budget {
         let share = DISPATCH_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
         let next = |now: u32, most: u32| ((f64::from(now) * share) as u32).clamp(1, 2 * now).min(most);

@@ -1,39 +1,39 @@
 //! The time that a dispatch has had.
 //!
-//! A hardware GPU computes while the process waits, so its time is that of the wall. A software one computes in threads of
-//! the process itself, and gets no further while other programs have the processors: its time is what the process was given
-//! of them.
+//! A hardware GPU computes while the process waits, so its time is wall time. A software GPU computes in threads of the
+//! process itself, and makes no progress while other programs use the processors, so its time is the process's
+//! processor time.
 
 use std::time::{Duration, Instant};
 
-/// A software GPU that gets this many times less than all processors is taken for stuck all the same.
+/// A software GPU that gets this many times less than all processors is considered stuck nevertheless.
 const MAX_CROWDED: u32 = 30;
 
 /// When something began.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moment {
     at: Instant,
-    /// Processor time of the process until then, where that is what counts.
+    /// Processor time of the process until then, where that counts.
     worked: Option<Duration>,
 }
 
 impl Moment {
-    /// This moment, for work that the process itself does or for that of a device.
+    /// The current moment, for work done by the process itself or by a device.
     pub fn now(in_process: bool) -> Moment {
         Moment { at: Instant::now(), worked: if in_process { processor_time() } else { None } }
     }
 
-    /// The later one of two.
+    /// The later of two moments.
     pub fn later(self, other: Moment) -> Moment {
         if other.at > self.at { other } else { self }
     }
 
-    /// Time on the wall since then.
+    /// Wall time since then.
     pub fn elapsed(self) -> Duration {
         self.at.elapsed()
     }
 
-    /// The time that work begun then has had: in processor time, per processor, where it is the process that computes.
+    /// Time spent on work started then: processor time per processor if the process itself computes.
     pub fn spent(self) -> Duration {
         let elapsed = self.at.elapsed();
         let Some((before, now)) = self.worked.zip(processor_time()) else { return elapsed };
@@ -42,7 +42,7 @@ impl Moment {
     }
 }
 
-/// What all threads of the process have computed so far, together, where the system tells.
+/// Processor time of all threads of the process so far, where the system reports it.
 #[cfg(unix)]
 fn processor_time() -> Option<Duration> {
     use rustix::time::{ClockId, clock_gettime};
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn only_on_a_software_gpu_does_time_without_a_processor_count_little() {
         let [hardware, software] = [false, true].map(Moment::now);
-        // Other tests of this process compute meanwhile: at most on all processors, but no clock is that exact.
+        // Other tests of this process also compute: at most on all processors, but no clock is that exact.
         std::thread::sleep(Duration::from_millis(300));
         assert!(hardware.spent() >= Duration::from_millis(300));
         let (spent, elapsed) = (software.spent(), software.elapsed());

@@ -1,7 +1,7 @@
-//! The kernel with its slots: resident members, one workgroup each, in one batch or in two.
+//! The kernel with its slots: resident members, one workgroup each, in one or two batches.
 //!
-//! With two batches the device advances one while the host collects and refills the other. A batch has buffers of its own,
-//! so that nothing makes the device wait between them either.
+//! With two batches, the device advances one while the host collects and refills the other. Each batch has its own
+//! buffers, so that the device never waits between them.
 
 use std::time::{Duration, Instant};
 
@@ -26,16 +26,16 @@ use crate::{
 
 pub use super::{batch::DISPATCH_FIELDS, budget::Budget, pipeline::compile};
 
-/// A dispatch that has had more time than this is given up: drivers of hardware do so after some seconds, and one on
-/// lavapipe lasts a fraction of one, or some while the driver compiles.
+/// Time after which a dispatch is abandoned. Drivers of hardware do so after some seconds; a dispatch on lavapipe lasts
+/// a fraction of a second, or longer while the driver compiles.
 const DISPATCH_LIMIT: Duration = Duration::from_secs(120);
-/// Slots of a batch at most; more members resident at once gain nothing.
+/// Maximum slots of a batch; more resident members gain nothing.
 const MAX_SLOTS: usize = 8192;
-/// Members of a batch at least, where there are two: enough to fill a large GPU several times over, which holds some thousand
-/// at once, or the threads of a software one.
+/// Minimum members of a batch if there are two: enough for the threads of a software GPU, or to fill a large GPU, which
+/// holds some thousand at once, several times over.
 const MIN_SLOTS: [usize; 2] = [32, 4096];
 
-/// Compiled kernel and resident members of `n` nodes in numbers of type `T`.
+/// A compiled kernel and resident members of `n` nodes in numbers of type `T`.
 pub struct Kernel<T> {
     gpu: OpenGpu,
     pipeline: wgpu::ComputePipeline,
@@ -58,7 +58,7 @@ impl<T: Real> Kernel<T> {
         Self::in_batches(gpu, blocks, [batches, members.div_ceil(batches)], max_sweeps, variant)
     }
 
-    /// The same with so many batches of at most so many slots.
+    /// Like [`Kernel::new`], with the given number of batches and at most the given number of slots in each.
     pub fn in_batches(
         gpu: &Gpu,
         blocks: Blocks,
@@ -77,7 +77,7 @@ impl<T: Real> Kernel<T> {
         Self::with_slots(gpu, blocks, [batches, slots], max_sweeps, variant)
     }
 
-    /// The same with exactly so many slots, for which the device may have no room.
+    /// Like [`Kernel::in_batches`], with exactly the given slots, for which the device may not have room.
     ///
     /// # Errors
     /// [`Error::Device`] with their bytes.
@@ -114,7 +114,7 @@ impl<T: Real> Kernel<T> {
         })
     }
 
-    /// Fixes what a dispatch may do; otherwise it follows the time that dispatches take.
+    /// Fixes the budget of a dispatch, which otherwise follows the time that dispatches take.
     pub fn with_budget(mut self, budget: Budget) -> Self {
         self.budget =
             Budget { steps: budget.steps.clamp(1, self.most.steps), sweeps: budget.sweeps.clamp(1, self.most.sweeps) };
@@ -122,26 +122,26 @@ impl<T: Real> Kernel<T> {
         self
     }
 
-    /// The same kernel with another cap of the sweeps of a solve.
+    /// Changes the cap on the sweeps of a solve.
     pub fn with_max_sweeps(mut self, max_sweeps: u32) -> Self {
         self.max_sweeps = max_sweeps;
         self
     }
 
-    /// Gives a dispatch up after `limit`, in place of two minutes.
+    /// Abandons a dispatch after `limit` instead of two minutes.
     pub fn with_limit(mut self, limit: Duration) -> Self {
         self.limit = limit;
         self
     }
 
-    /// How much time is left for a batch that was started at a given moment. A device runs one dispatch after the other,
-    /// so this one has its attention from its start, or from the end of the one before.
+    /// Time left for a batch started at a given moment. A device runs one dispatch after another, so the time counts
+    /// from the start of this one or the end of the one before, whichever is later.
     fn left(&self) -> impl Fn(Moment) -> Duration + use<T> {
         let (limit, ended) = (self.limit, self.ended);
         move |since| limit.saturating_sub(since.later(ended).spent())
     }
 
-    /// Overwrites the trace with NaN, so that nothing stale passes for a result.
+    /// Overwrites the trace with NaN, so that nothing stale passes as a result.
     pub fn poison_trace(&mut self) -> Result<()> {
         for buffer in self.batches.iter().filter_map(Batch::trace) {
             let numbers = vec![T::of(f64::NAN); buffer.size() as usize / size_of::<T>()];
@@ -150,7 +150,7 @@ impl<T: Real> Kernel<T> {
         self.gpu.check()
     }
 
-    /// The traced fields of the last dispatch, `[slot][field][node]`; empty if the kernel is not traced.
+    /// Returns the traced fields of the last dispatch, `[slot][field][node]`; empty if the kernel is not traced.
     pub fn trace(&self) -> Result<Vec<f64>> {
         let reads: Vec<_> =
             self.batches.iter().filter_map(Batch::trace).map(|buffer| (buffer, 0, buffer.size())).collect();
@@ -200,7 +200,7 @@ impl<T: Real> Backend for Kernel<T> {
     }
 
     fn clear(&mut self, slot: usize) {
-        // A goal that is reached already: the slot is never due.
+        // A goal that has already been reached: the slot is never due.
         let (batch, slot) = self.place_mut(slot);
         batch.set_counters(slot, |counters| *counters = Counters::default());
     }
@@ -215,7 +215,7 @@ impl<T: Real> Backend for Kernel<T> {
         let (asked, left) = (Instant::now(), self.left());
         loop {
             let slice = most.saturating_sub(asked.elapsed()).min(left(since));
-            // One whose time is over is given up by `finish`.
+            // `finish` abandons a batch whose time is over.
             if self.batches[batch].is_back(&self.gpu, slice) || left(since).is_zero() {
                 return true;
             }

@@ -1,4 +1,5 @@
-//! The GPU back end: adapters, the assembled shaders, the kernel with its batches of slots. The only place that names wgpu.
+//! The GPU back end: adapters, assembled shaders, and the kernel with its batches of slots. The only place that names
+//! wgpu.
 
 pub mod adapter;
 mod batch;

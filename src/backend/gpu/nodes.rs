@@ -1,6 +1,6 @@
-//! Device nodes: whether a hardware GPU can be there, as far as can be known without its driver.
+//! Device nodes: whether a hardware GPU may be present, as far as can be seen without its driver.
 
-/// Whether this machine may have a hardware GPU. On Linux none is reached without a node in `/dev`.
+/// Returns whether this machine may have a hardware GPU. On Linux, none is reachable without a node in `/dev`.
 pub fn may_have_hardware() -> bool {
     #[cfg(target_os = "linux")]
     return linux::has_nodes("/dev".as_ref());
@@ -12,17 +12,17 @@ pub fn may_have_hardware() -> bool {
 mod linux {
     use std::{fs, path::Path};
 
-    /// Names begin so that drivers of GPUs give: NVIDIA's (also on Tegra), AMD's, Windows' for its Linux, and those of Mali,
+    /// Prefixes of the names that GPU drivers use: NVIDIA (also on Tegra), AMD, Windows for its Linux, and Mali,
     /// Adreno, PowerVR and Vivante.
     const VENDORS: [&str; 9] = ["nvidia", "nvhost", "nvgpu", "kfd", "dxg", "mali", "kgsl", "pvr", "galcore"];
-    /// And those in `dri` that compute. A `card` alone only shows pictures.
+    /// Prefixes of compute nodes in `dri`. A `card` alone only displays.
     const RENDER: [&str; 1] = ["renderD"];
 
     pub fn has_nodes(dev: &Path) -> bool {
         has(dev, &VENDORS) || has(&dev.join("dri"), &RENDER)
     }
 
-    /// Whether a name in `folder` begins so.
+    /// Whether a name in `folder` has one of these prefixes.
     fn has(folder: &Path, begins: &[&str]) -> bool {
         let Ok(entries) = fs::read_dir(folder) else { return false };
         let names = entries.flatten().map(|entry| entry.file_name());

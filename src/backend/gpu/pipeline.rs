@@ -3,13 +3,13 @@
 use super::shader::{self, Variant};
 use crate::{number::Real, solver::Blocks};
 
-/// What a pipeline is made for: its ring, its number, its variant.
+/// The key of a pipeline: its ring, number and variant.
 pub(super) type Key = (usize, &'static str, Variant);
 
-/// Compiles it for subgroups of `subgroup` threads.
+/// Compiles the pipeline for subgroups of `subgroup` threads.
 ///
-/// Across processes the driver keeps what it compiled (Mesa in `MESA_SHADER_CACHE_DIR`, NVIDIA in its ComputeCache); wgpu's own
-/// pipeline cache needs `unsafe`, see `docs/decisions.md`.
+/// The driver caches compiled code across processes (Mesa in `MESA_SHADER_CACHE_DIR`, NVIDIA in its ComputeCache);
+/// wgpu's own pipeline cache needs `unsafe`, see `docs/decisions.md`.
 pub fn compile<T: Real>(
     device: &wgpu::Device,
     blocks: Blocks,

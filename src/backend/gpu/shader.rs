@@ -1,4 +1,4 @@
-//! The kernel's source: a fixed list of WGSL files behind one line that chooses the number and the kind of steps.
+//! The kernel's source: a fixed list of WGSL files after one line that chooses the number and the kind of steps.
 
 use crate::{
     number::Real,
@@ -6,24 +6,24 @@ use crate::{
     wgsl::{ShaderPart, parts},
 };
 
-/// Fields that a traced kernel keeps per member; `conformance::bounds::STAGES` names them in their order.
+/// Fields that a traced kernel records per member; `conformance::bounds::STAGES` names them in the same order.
 pub const TRACE_FIELDS: usize = 20;
 
-/// What a kernel is made for, besides its number and sizes.
+/// The variant of a kernel: everything but its number and sizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
     /// Solver of the pentadiagonal systems.
     pub solver: Solver,
-    /// Makes adaptive steps. A constant, since a kernel with both kinds of steps takes compilers twice as long.
+    /// Makes adaptive steps. A constant, since a kernel with both kinds of steps takes twice as long to compile.
     pub adaptive: bool,
-    /// Keeps what every stage of a step computes.
+    /// Records what every stage of a step computes.
     pub traced: bool,
-    /// A workgroup is one subgroup, whose threads exchange by shuffles instead of barriers.
+    /// A workgroup is one subgroup, whose threads exchange values by shuffles instead of barriers.
     pub subgroup: bool,
 }
 
 impl Variant {
-    /// All that are used; adaptive steps are made of traced ones.
+    /// Returns all variants in use; traces need only fixed steps, since adaptive ones are made of them.
     pub fn all() -> Vec<Variant> {
         let exchanges =
             |solver: Solver| [false, true].into_iter().filter(move |by| !by || solver.facts().kernel.shuffles);
@@ -32,12 +32,12 @@ impl Variant {
         Solver::ALL.into_iter().flat_map(exchanging).flat_map(made_for).collect()
     }
 
-    /// The kernel of fixed steps.
+    /// Returns the variant for fixed steps.
     pub const fn of(solver: Solver) -> Variant {
         Variant { solver, adaptive: false, traced: false, subgroup: false }
     }
 
-    /// The files of the kernel, in the order of the step.
+    /// Returns the files of the kernel, in the order of the step.
     pub fn parts(self) -> impl Iterator<Item = ShaderPart> {
         let solver = self.solver.facts().kernel.files;
         let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
@@ -70,7 +70,7 @@ const EXCHANGE_SUBGROUP: [ShaderPart; 1] = parts!["exchange_subgroup.wgsl"];
 const TRACE_OFF: [ShaderPart; 1] = parts!["trace_off.wgsl"];
 const TRACE_ON: [ShaderPart; 1] = parts!["trace_on.wgsl"];
 
-/// The whole source in precision `T`.
+/// Returns the whole source in precision `T`.
 pub fn source<T: Real>(variant: Variant) -> String {
     let Variant { solver, adaptive, .. } = variant;
     let (number, epsilon, sweeps) = (T::NAME, T::EPSILON, solver.sweeps());
@@ -84,7 +84,7 @@ pub fn source<T: Real>(variant: Variant) -> String {
     text
 }
 
-/// File and line, within `shaders/`, of a line (from 1) of [`source`].
+/// Returns the file and line, within `shaders/`, of a line (from 1) of [`source`].
 pub fn locate(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
     let mut before = 1;
     for (file, part) in variant.parts() {
@@ -97,13 +97,13 @@ pub fn locate(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
     None
 }
 
-/// Threads of a workgroup: one a block, filled up to whole subgroups of `subgroup` threads; the kernel that is one
-/// subgroup wants the smallest subgroup there is.
+/// Returns the threads of a workgroup: one per block, rounded up to whole subgroups of `subgroup` threads. The
+/// one-subgroup kernel needs the smallest subgroup there is.
 pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
     blocks.count().next_multiple_of(subgroup as usize)
 }
 
-/// The `override` constants that size the kernel.
+/// Returns the `override` constants that size the kernel.
 pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 5] {
     [
         ("NODES", blocks.n as f64),
@@ -114,7 +114,7 @@ pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 5] {
     ]
 }
 
-/// Bytes of workgroup memory that the kernel takes: rows of four numbers a block, what its solver needs besides, and one
+/// Returns the bytes of workgroup memory of the kernel: rows of four numbers per block, the solver's own needs, and one
 /// decision.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
