@@ -1,9 +1,9 @@
-//! Which branches of the scheme a member takes: what members must share to go abreast.
+//! The branches of the scheme that a member takes: members must share them to run side by side.
 //!
-//! Members in the lanes of a number are advanced by one stream of instructions. What differs from lane to lane is
-//! selected by masks; what decides which instructions are run at all is here, and nowhere else. It is read from the
-//! parameters of single members only, [`Group`](super::evolve::Group) compares it, and the stages are handed it: no stage
-//! asks a number of several lanes which way to go.
+//! Members in the lanes of a number are advanced by one stream of instructions. Masks select what differs from lane to
+//! lane; what decides which instructions are run at all is here, and nowhere else. Branches are read only from the
+//! parameters of single members, compared by [`Group`](super::evolve::Group), and passed to the stages: no stage asks a
+//! number of several lanes which branch to take.
 
 use super::Parameters;
 use crate::number::Real;
@@ -11,18 +11,18 @@ use crate::number::Real;
 /// The branches of one member, or of a group of members that share them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Branches {
-    /// Three steps are extrapolated to one whose length adapts.
+    /// The step is adaptive, extrapolated from three steps.
     pub adaptive: bool,
     /// Nodes are redistributed along the curve.
     pub redistributed: bool,
-    /// k and r are pulled to the polygon's own.
+    /// k and r are pulled towards the polygon's own.
     pub pulled: bool,
     /// Degree of `b(k)`.
     pub degree: usize,
 }
 
 impl<T: Real> Parameters<T> {
-    /// The branches that a member with these parameters takes.
+    /// Returns the branches that a member with these parameters takes.
     pub fn branches(&self) -> Branches {
         let zero = T::of(0.0);
         let positive = |value: T| !value.le(zero);

@@ -22,7 +22,7 @@ pub struct Curvature<'a, N> {
 }
 
 impl<'a, N: Number> Curvature<'a, N> {
-    /// The system of a step of `p.tau` from `old`, with the lengths of `new`.
+    /// Returns the system of a step of `p.tau` from `old`, with the lengths of `new`.
     #[inline(always)]
     pub fn new(old: &'a Curve<N>, new: &'a Curve<N>, motion: &'a Motion<N>, p: &Parameters<N>) -> Self {
         Curvature { old, new, motion, tau: p.tau, rate: p.tau.recip() }

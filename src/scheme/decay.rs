@@ -1,8 +1,8 @@
-//! How the excess of a member falls: the line fitted to its logarithm, and its values at the times of a grid. Twin of
+//! The decay of a member's excess: the line fitted to its logarithm, and its values at the times of a grid. Twin of
 //! `shaders/decay.wgsl`.
 //!
-//! Times count in units of the member's clock: fixed steps, or its own unit of time where steps are adaptive. The
-//! logarithm goes along from step to step, as what one step adds to it, so that no difference of large numbers is taken.
+//! Times are in units of the member's clock: fixed steps, or its own unit of time if steps are adaptive. The logarithm
+//! is accumulated from step to step, so that no difference of large numbers is taken.
 
 use super::{
     Parameters, extrapolation,
@@ -11,18 +11,18 @@ use super::{
 };
 use crate::number::Real;
 
-/// Halvings at most that bring a ratio near 1.
+/// Maximum number of halvings that bring a ratio near 1.
 pub const HALVINGS: u32 = 64;
-/// Terms of the series of the logarithm; the last one is below 10⁻¹⁶.
+/// Terms of the series of the logarithm; the last is below 10⁻¹⁶.
 pub const TERMS: u32 = 10;
 
-/// Where the `part`-th time of the grid lies, as a share of the run: dense at the start, where curves change most.
+/// The `part`-th time of the grid, as a fraction of the run: dense at the start, where curves change most.
 pub fn share<T: Real>(part: usize) -> T {
     let share = T::of(part as f64) / T::of(PARTS as f64);
     share * share * share
 }
 
-/// Notes what a step that is taken adds.
+/// Records what an accepted step adds.
 pub(super) fn follow<T: Real>(run: &mut Run<T>, taken: &Taken<T>) {
     let (from, to) = clock(run, taken);
     let Taken { before, middle, after, .. } = *taken;
@@ -47,8 +47,8 @@ fn clock<T: Real>(run: &Run<T>, taken: &Taken<T>) -> (T, T) {
     (from, from + taken.h)
 }
 
-/// Takes the excess at the end of a step, or of half an adaptive one, into the fit while it is inside the window, from the
-/// first time there to the first time below it.
+/// Adds the excess at the end of a step, or of half an adaptive one, to the fit while it is inside the window: from the
+/// first time in the window to the first time below it.
 fn fit<T: Real>(run: &mut Run<T>, [from, to]: [T; 2], [before, after]: [T; 2]) {
     let Run { report, counters, parameters: p, .. } = run;
     let decay = &mut report.decay;
@@ -77,13 +77,13 @@ fn fit<T: Real>(run: &mut Run<T>, [from, to]: [T; 2], [before, after]: [T; 2]) {
     decay.yy += dy * (decay.y - decay.mean_y);
 }
 
-/// What the step adds to the abscissa: its length, or, where the excess falls as a power of `growth + t`, the logarithm's
-/// change.
+/// The change of the abscissa over the step: its length, or the change of the logarithm where the excess falls as a
+/// power of `growth + t`.
 fn abscissa<T: Real>(from: T, to: T, p: &Parameters<T>) -> T {
     if p.growth.le(T::of(0.0)) { to - from } else { ln_ratio(p.growth + from, p.growth + to) }
 }
 
-/// Notes the excess at the times of the grid that lie in the step.
+/// Records the excess at the grid times inside the step.
 fn note<T: Real>(run: &mut Run<T>, from: T, to: T, taken: &Taken<T>) {
     let Run { report, counters, parameters: p, .. } = run;
     while (counters.noted as usize) < TIMES {
@@ -102,7 +102,7 @@ fn note<T: Real>(run: &mut Run<T>, from: T, to: T, taken: &Taken<T>) {
     }
 }
 
-/// `ln(b/a)` of positive numbers, by halvings and `2·artanh((q-1)/(q+1))` of what is left; WGSL has no logarithm in f64.
+/// `ln(b/a)` of positive numbers, by halvings and `2·artanh((q-1)/(q+1))` of the rest; WGSL has no logarithm in f64.
 pub fn ln_ratio<T: Real>(a: T, b: T) -> T {
     let (one, half, two) = (T::of(1.0), T::of(0.5), T::of(2.0));
     let ln_2 = T::of(std::f64::consts::LN_2);

@@ -1,7 +1,8 @@
 //! A member's run: steps, acceptance, status and relaxation events. Twin of `shaders/evolve.wgsl`.
 //!
-//! Members of a [`Group`] go abreast, one a lane of a number: they run the same instructions, and every decision is made
-//! for each of them. With a plain `f64` it is one member alone, the reference; no bit of a member depends on the others.
+//! Members of a [`Group`] run side by side, one per lane of a number: they run the same instructions, and every
+//! decision is made for each of them. With a plain `f64` this is one member alone, the reference. A member does not
+//! depend on the others, to the last bit.
 
 use super::{
     Branches, Parameters, State, Status, Workspace, decay, extrapolation,
@@ -18,14 +19,14 @@ use crate::{
     solver::{Blocks, Solves, by_solver},
 };
 
-/// Members that take the same branches of the scheme, and so can go abreast.
+/// Members that take the same branches of the scheme, and so can run side by side.
 pub struct Group<'a, 'b, T> {
     runs: &'a mut [&'b mut Run<T>],
     branches: Branches,
 }
 
 impl<'a, 'b, T: Real> Group<'a, 'b, T> {
-    /// Members sorted into groups of `most` at most.
+    /// Sorts members into groups of at most `most`.
     pub fn of(runs: &'a mut [&'b mut Run<T>], most: usize) -> Vec<Group<'a, 'b, T>> {
         let branches = |run: &Run<T>| run.parameters.branches();
         runs.sort_by_key(|run| branches(run));
@@ -35,7 +36,7 @@ impl<'a, 'b, T: Real> Group<'a, 'b, T> {
     }
 }
 
-/// Members abreast: one a lane.
+/// Members side by side, one per lane.
 pub struct Team<N: Number> {
     state: State<N>,
     parameters: Parameters<N>,
@@ -47,10 +48,10 @@ pub struct Team<N: Number> {
     work: Workspace<N>,
 }
 
-/// What an attempt at a step led to.
+/// Result of an attempted step.
 struct Attempt<N: Number> {
     stepped: Stepped<N>,
-    /// Error of an adaptive step; 0 of a fixed one.
+    /// Error of an adaptive step; 0 for a fixed one.
     error: N,
     /// Excess in the middle of an adaptive step.
     middle: N,
@@ -58,19 +59,19 @@ struct Attempt<N: Number> {
     excess: N,
 }
 
-/// Advances a running member by at most `attempts` steps, refused ones included, towards its goal.
+/// Advances a running member by at most `attempts` steps towards its goal, including refused ones.
 ///
-/// A fixed step that fails (stalled, not finite, singular) ends the member in its last good state. An adaptive one
-/// is tried again with a shorter step, until that is too short to mean anything; one that is too inaccurate at every
-/// length follows a curve that n nodes do not resolve, which is singular.
+/// A fixed step that fails (stalled, not finite, singular) ends the member in its last good state. An adaptive step is
+/// retried with a shorter length until that is too short to mean anything. A step that is too inaccurate at every
+/// length follows a curve that n nodes do not resolve; this counts as singular.
 pub fn evolve<T: Real>(run: &mut Run<T>, method: &Method, team: &mut Team<T>, attempts: u32) {
     let branches = run.parameters.branches();
     let alone = Group { runs: &mut [run], branches };
     by_solver!(method.solver, S => evolve_abreast::<T, S>(alone, method, team, attempts))
 }
 
-/// Advances a group of at most as many members as there are lanes by the solver `S`; returns earlier when less than half of
-/// them are still running: the others would pay for lanes that are idle.
+/// Advances a group of at most as many members as there are lanes by the solver `S`. Returns early when less than half
+/// of them are still running, since the others would pay for idle lanes.
 #[inline(always)]
 pub fn evolve_abreast<N: Number, S: Solves>(group: Group<N::Real>, method: &Method, team: &mut Team<N>, attempts: u32) {
     let Group { runs, branches } = group;
@@ -86,7 +87,7 @@ pub fn evolve_abreast<N: Number, S: Solves>(group: Group<N::Real>, method: &Meth
     }
     let Some(first) = runs.iter().position(|run| run.counters.is_running()) else { return };
     for lane in 0..N::LANES {
-        // A lane without a member goes along with the first one.
+        // A lane without a member copies the first one.
         team.take_in(lane, if live.lane(lane) { &*runs[lane] } else { &*runs[first] });
     }
     let enough = running.div_ceil(2);
@@ -107,17 +108,17 @@ pub fn evolve_abreast<N: Number, S: Solves>(group: Group<N::Real>, method: &Meth
 }
 
 impl<N: Number> Team<N> {
-    /// Room for members whose rings are cut by `blocks`, whatever the solver.
+    /// Allocates room for members whose rings are cut by `blocks`, whatever the solver.
     pub fn new(blocks: Blocks) -> Team<N> {
         Team::with(Workspace::new(blocks))
     }
 
-    /// Room to advance them by the solver `S`.
+    /// Allocates room to advance members by the solver `S`.
     pub fn for_solver<S: Solves>(blocks: Blocks) -> Team<N> {
         Team::with(Workspace::for_solver::<S>(blocks))
     }
 
-    /// About the bytes of [`Team::for_solver`] for rings of `n` nodes.
+    /// Returns the approximate bytes of [`Team::for_solver`] for rings of `n` nodes.
     pub fn bytes<S: Solves>(n: usize) -> usize {
         (STATE_FIELDS + Workspace::<N>::numbers::<S>()) * n * size_of::<N>()
     }
@@ -134,7 +135,7 @@ impl<N: Number> Team<N> {
         }
     }
 
-    /// Puts a member into a lane.
+    /// Copies a member into a lane.
     #[inline(always)]
     fn take_in(&mut self, lane: usize, run: &Run<N::Real>) {
         let from = run.state.fields();
@@ -149,7 +150,7 @@ impl<N: Number> Team<N> {
         self.turning.set_lane(lane, run.report.progress.turning);
     }
 
-    /// Hands a member back as it is now, with its report.
+    /// Copies a member back from its lane, with its report.
     #[inline(always)]
     fn let_out(&self, lane: usize, run: &mut Run<N::Real>, adaptive: bool) {
         for (from, to) in self.state.fields().into_iter().zip(run.state.fields_mut()) {
@@ -163,7 +164,7 @@ impl<N: Number> Team<N> {
 
     /// Makes a fixed step, or the three steps of an adaptive one, in all lanes.
     ///
-    /// A step is called in one place only, since its whole body is compiled there.
+    /// The step is called in one place only, since its whole body is inlined there.
     #[inline(always)]
     fn attempt<S: Solves>(
         &mut self,
@@ -189,7 +190,7 @@ impl<N: Number> Team<N> {
             parameters.tau = if part == 0 { h } else { half * h };
             let from = if part == 2 { &state.before } else { &state.curve };
             let stepped = step::step_by::<N, S>(from, &mut state.increments, parameters, branches, ok, method, work);
-            // What failed before says why, and makes no more sweeps.
+            // An earlier failure determines the cause; its lane makes no more sweeps.
             all.finite = all.finite.and(stepped.finite.or(ok.not()));
             all.solved = all.solved.and(stepped.solved.or(ok.not()));
             all.sweeps_k += N::select(ok, stepped.sweeps_k, none);
@@ -220,7 +221,7 @@ impl<N: Number> Team<N> {
         Attempt { stepped: all, error, middle, seen, excess }
     }
 
-    /// Decides for every member whether it takes the step, and notes what came with it.
+    /// Decides for every member whether to accept the step, and records its results.
     #[inline(always)]
     fn conclude<S: Solves>(
         &mut self,
@@ -276,8 +277,8 @@ impl<N: Number> Team<N> {
         self.accept(kept, attempt.excess);
     }
 
-    /// The gap between k and the polygon of the new curves, if one of them may have relaxed: it costs a fifth of a direct
-    /// step, and is asked for once.
+    /// The gap between k and the polygon of the new curves, if one of them may have relaxed. It costs a fifth of a
+    /// direct step, and is computed once.
     #[inline(always)]
     fn gap_at_threshold(&self, runs: &[&mut Run<N::Real>], live: N::Mask, excess: N) -> N {
         let mut waiting = N::Mask::all_of(false);
@@ -288,7 +289,7 @@ impl<N: Number> Team<N> {
         if at_threshold.any() { observe::gap(&self.work.new) } else { N::of(0.0) }
     }
 
-    /// Takes the new curves, but not in the lanes whose curve is kept.
+    /// Accepts the new curves, except in the lanes that keep theirs.
     #[inline(always)]
     fn accept(&mut self, kept: N::Mask, excess: N) {
         let Team { state, work, .. } = self;
@@ -326,7 +327,7 @@ fn failure_of_curve(finite: bool, singular: bool) -> Option<Status> {
     }
 }
 
-/// Tries again with a step of length `next`, or gives the member up for `cause` where that is below `least` of `(L/n)⁴`.
+/// Retries with a step of length `next`, or ends the member for `cause` if that is below `least` of `(L/n)⁴`.
 fn refuse<T: Real>(run: &mut Run<T>, n: usize, next: T, least: f64, cause: Status) {
     run.counters.rejected += 1;
     run.counters.refused = 1;
@@ -337,7 +338,7 @@ fn refuse<T: Real>(run: &mut Run<T>, n: usize, next: T, least: f64, cause: Statu
     }
 }
 
-/// Refuses a step of length h that failed outright; after that the increments may be anything.
+/// Refuses a step of length h that failed outright; its increments may then be anything.
 fn refuse_failure<T: Real>(run: &mut Run<T>, n: usize, h: T, cause: Status) -> Start<T> {
     let least = if cause == Status::Singular { pace::MIN_TO_SINGULAR } else { pace::MIN_STEP };
     refuse(run, n, T::of(pace::MIN_GROWTH) * h, least, cause);
@@ -351,8 +352,8 @@ fn refuse_inaccurate<T: Real>(run: &mut Run<T>, n: usize, h: T, error: T) -> Sta
     Start::after_refused(next / (T::of(0.5) * h))
 }
 
-/// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.
-/// A curve whose curvature is not that of its polygon does not count as relaxed.
+/// Records the steps in which the excess falls to half its start and to the relaxation threshold, and where inside
+/// them. A curve whose curvature is not that of its polygon does not count as relaxed.
 fn record_events<T: Real>(run: &mut Run<T>, taken: &Taken<T>) {
     let Run { report, counters, parameters: p, .. } = run;
     let progress = &mut report.progress;
@@ -369,7 +370,7 @@ fn record_events<T: Real>(run: &mut Run<T>, taken: &Taken<T>) {
     }
 }
 
-/// Where in the last step the excess fell to `excess`; at its end if it was there before.
+/// Where in the last step the excess fell to `excess`; at its end if it already had before.
 fn fraction_at<T: Real>(&Taken { before, middle, after, .. }: &Taken<T>, excess: T, p: &Parameters<T>) -> T {
     if before.le(excess) {
         T::of(1.0)
@@ -380,7 +381,7 @@ fn fraction_at<T: Real>(&Taken { before, middle, after, .. }: &Taken<T>, excess:
     }
 }
 
-/// Passes the time of an adaptive step that was taken, and chooses the length of the next one.
+/// Advances the clock by an accepted adaptive step, and chooses the length of the next one.
 fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, error: T) -> Start<T> {
     let Run { parameters, counters, report, .. } = run;
     let progress = &mut report.progress;
@@ -392,7 +393,7 @@ fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, error: T) -> Start<T> 
     start
 }
 
-/// Counts a step that was taken, and decides whether the member goes on.
+/// Counts an accepted step, and decides whether the member continues.
 #[inline(always)]
 fn accepted<N: Number>(run: &mut Run<N::Real>, excess: N::Real, seen: &Glance<N>, lane: usize, adaptive: bool) {
     let Run { parameters, counters, report, .. } = run;

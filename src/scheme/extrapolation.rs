@@ -1,18 +1,19 @@
-//! The adaptive step: one step of the paper's scheme against two half ones. Twin of `shaders/extrapolation.wgsl`.
+//! The adaptive step: one step of the paper's scheme compared with two half steps. Twin of
+//! `shaders/extrapolation.wgsl`.
 //!
 //! With A the result of one step of length h and B that of two steps of h/2, the scheme of first order makes errors
 //! `c h²` and `c h²/2`. So `A - B` measures the error, `2B - A` is of second order, and so is, in the middle,
-//! `B₁ + (B - A)/2` with B₁ the first half step. Every part is the paper's step; the lengths, which are positive, are
+//! `B₁ + (B - A)/2` with B₁ the first half step. Every part is the paper's step; lengths, which are positive, are
 //! extrapolated as `r_B²/r_A`.
 
 use super::Curve;
 use crate::number::{BIG, Number, Real};
 
-/// How far apart the whole step and the two half steps are: of k, and of ln r.
+/// The difference between the whole step and the two half steps, in k and in ln r.
 ///
-/// The gap in k is taken relative to the largest |k|. While the shape is followed, that is as long as the excess is
-/// not negligible, it is taken relative to the geometric mean of the largest |k| and the spread of k: a curve close to
-/// a circle must not lose its modes in a tolerance that is measured by the circle.
+/// The difference in k is relative to the largest |k|. While the shape is followed, i.e. until the excess is
+/// negligible, it is relative to the geometric mean of the largest |k| and the spread of k: a curve close to a circle
+/// must not lose its modes in a tolerance measured by the circle.
 #[inline(always)]
 pub fn error_of_attempt<N: Number>(whole: &Curve<N>, halves: &Curve<N>, followed: N::Mask) -> N {
     let low = N::of(-2.0 * BIG);
@@ -29,7 +30,7 @@ pub fn error_of_attempt<N: Number>(whole: &Curve<N>, halves: &Curve<N>, followed
     (gap_k / scale).bounded_abs().max(gap_r)
 }
 
-/// Puts the extrapolated curve into `halves` and the one in the middle of the step into `whole`.
+/// Puts the extrapolated curve into `halves` and the curve in the middle of the step into `whole`.
 #[inline(always)]
 pub fn extrapolate<N: Number>(whole: &mut Curve<N>, first: &Curve<N>, halves: &mut Curve<N>) {
     let half = N::of(0.5);
@@ -49,7 +50,7 @@ pub fn extrapolate<N: Number>(whole: &mut Curve<N>, first: &Curve<N>, halves: &m
     }
 }
 
-/// Makes of A, B₁ and B the value in the middle of the step, in place of A, and the one at its end, in place of B.
+/// Replaces A by the value in the middle of the step, and B by the one at its end, from A, B₁ and B.
 #[inline(always)]
 fn between<N: Number>(a: &mut N, b1: N, b: &mut N) {
     let gap = *b - *a;
@@ -57,8 +58,7 @@ fn between<N: Number>(a: &mut N, b1: N, b: &mut N) {
     *b += gap;
 }
 
-/// A quantity at the fraction `at` of a step in which it goes from `start` over `middle` to `end`: on the parabola
-/// through the three.
+/// A quantity at the fraction `at` of a step, on the parabola through its values `start`, `middle` and `end`.
 pub fn inside<T: Real>(start: T, middle: T, end: T, at: T) -> T {
     let (two, four) = (T::of(2.0), T::of(4.0));
     let slope = four * middle - T::of(3.0) * start - end;
@@ -66,8 +66,8 @@ pub fn inside<T: Real>(start: T, middle: T, end: T, at: T) -> T {
     start + at * (slope + at * bend)
 }
 
-/// Where in a step a quantity that goes from `start` over `middle` to `end` first falls to `target`, as a fraction of
-/// the step; `start > target >= end`.
+/// The fraction of a step at which a quantity that goes from `start` over `middle` to `end` first falls to `target`;
+/// `start > target >= end`.
 pub fn crossing<T: Real>(start: T, middle: T, end: T, target: T) -> T {
     let (zero, two, four) = (T::of(0.0), T::of(2.0), T::of(4.0));
     // The parabola through the three: above + slope θ + bend θ².

@@ -4,7 +4,7 @@ use super::{Branches, Parameters};
 use crate::{flow::MAX_DEGREE, number::Number};
 
 impl<N: Number> Parameters<N> {
-    /// The law, whose degree is that of the `branches`.
+    /// Returns the law, with the degree given by `branches`.
     #[inline(always)]
     pub fn law(&self, branches: Branches) -> Law<N> {
         Law { coefficients: self.coefficients(), degree: branches.degree }

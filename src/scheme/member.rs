@@ -1,4 +1,4 @@
-//! What a member's run is governed by, and what it reports: the structs shared with the kernel.
+//! The parameters of a member's run and its reports: the structs shared with the kernel.
 //!
 //! Every field is one number of the run's precision, in declaration order, so that host and WGSL agree by
 //! construction; a test compares names and offsets with naga's view of `shaders/member.wgsl`.
@@ -10,9 +10,9 @@ use crate::{
     number::{BIG, Number, Real},
 };
 
-/// Parts of the run between whose ends the excess is noted.
+/// Parts of the run; the excess is recorded at the times between them.
 pub const PARTS: usize = 32;
-/// The times between its ends.
+/// Times between the parts.
 pub const TIMES: usize = PARTS - 1;
 
 /// A struct of numbers of one type, convertible to and from an array in declaration order.
@@ -27,12 +27,12 @@ macro_rules! numbers {
             /// Field names in memory order.
             pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),+];
 
-            /// The fields in memory order.
+            /// Returns the fields in memory order.
             pub fn to_numbers(&self) -> Vec<N> {
                 vec![$(self.$field),+]
             }
 
-            /// From the fields in memory order; `numbers` has one entry per field.
+            /// Creates the struct from the fields in memory order; `numbers` has one entry per field.
             pub fn from_numbers(numbers: &[N]) -> Self {
                 let [$($field),+] = *numbers else { panic!("{} numbers for {}", numbers.len(), stringify!($name)) };
                 $name { $($field),+ }
@@ -67,7 +67,7 @@ numbers! {
         c7,
         /// c₈.
         c8,
-        /// Length τ of a fixed step; of the step under way where steps are adaptive.
+        /// Length τ of a fixed step, or of the current step if steps are adaptive.
         tau,
         /// ω of the redistribution, in 1/time.
         omega,
@@ -87,7 +87,7 @@ numbers! {
         relax_at,
         /// Half the excess at the start.
         half_at,
-        /// Excess down to which adaptive steps follow the shape, not only the size, of the curve.
+        /// Travel at which the member pauses for inspection, if its curvature changes sign.
         follow_to,
         /// Length below which the curve has shrunk to a point.
         least_length,
@@ -107,13 +107,13 @@ numbers! {
         end_high,
         /// Low part.
         end_low,
-        /// Final time by the clock of [`decay`](super::decay).
+        /// Final time on the clock of [`decay`](super::decay).
         clock_end,
-        /// Excess from which its decay is fitted.
+        /// Excess at which the fit of its decay begins.
         fit_from,
-        /// Excess down to which it is.
+        /// Excess at which the fit ends.
         fit_to,
-        /// Where the excess falls as a power of `growth + t`, this time; else 0, and it falls exponentially.
+        /// The time `growth` if the excess falls as a power of `growth + t`; 0 if it falls exponentially.
         growth,
     }
 }
@@ -133,7 +133,7 @@ numbers! {
         k_min,
         /// Largest curvature.
         k_max,
-        /// Longest over shortest edge.
+        /// Longest edge over the shortest.
         mesh_ratio,
         /// `max |r_i - |e_i|| / |e_i|`.
         metric_drift,
@@ -141,13 +141,13 @@ numbers! {
 }
 
 numbers! {
-    /// Where a member is in time, and when its events were.
+    /// A member's time, and the times of its events.
     Progress {
         /// Turning number.
         turning,
-        /// Sum over the steps of the largest way that a node went.
+        /// Sum over the steps of the largest displacement of a node.
         travel,
-        /// Time of the last accepted curve where steps are adaptive, high part.
+        /// Time of the last accepted curve, if steps are adaptive; high part.
         time_high,
         /// Low part.
         time_low,
@@ -155,29 +155,29 @@ numbers! {
         taken,
         /// Length of the next one.
         next,
-        /// Start of the step in which the member relaxed where steps are adaptive, high part.
+        /// Start of the step in which the member relaxed, if steps are adaptive; high part.
         relax_high,
         /// Low part.
         relax_low,
         /// Length of that step.
         relax_length,
-        /// Where in that step: as a fraction of it.
+        /// Position of the event in that step, as a fraction.
         relax_fraction,
-        /// Start of the step in which its excess halved, high part.
+        /// Start of the step in which its excess halved; high part.
         half_high,
         /// Low part.
         half_low,
         /// Length of that step.
         half_length,
-        /// Where in that step.
+        /// Position of the event in that step.
         half_fraction,
     }
 }
 
 numbers! {
-    /// The line fitted to ln excess: the last point, and the means and sums of squares of all.
+    /// The line fitted to ln excess: the last point, and the means and sums of squares of all points.
     Decay {
-        /// Abscissa of the last curve, from the first point on.
+        /// Abscissa of the last curve, relative to the first point.
         x,
         /// ln of its excess over that of the first point.
         y,
@@ -194,7 +194,7 @@ numbers! {
     }
 }
 
-/// What a member reports when a dispatch ends.
+/// A member's report at the end of a dispatch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Report<N> {
@@ -204,9 +204,9 @@ pub struct Report<N> {
     pub middle: Observed<N>,
     /// The last accepted curve; only the excess is known before the first step.
     pub now: Observed<N>,
-    /// Its time, its events.
+    /// Its time and events.
     pub progress: Progress<N>,
-    /// How its excess falls.
+    /// The decay of its excess.
     pub decay: Decay<N>,
     /// Its excess at the first `noted` times of the grid of [`decay`](super::decay).
     pub excess_at: [N; TIMES],
@@ -227,9 +227,9 @@ pub struct Counters {
     pub rejected: u32,
     /// 1: the last adaptive step was refused.
     pub refused: u32,
-    /// Run until this many steps; a member that pauses before sets it to its steps.
+    /// Steps at which to stop; a member that pauses earlier sets this to its steps.
     pub goal: u32,
-    /// 1: end the member when it is relaxed.
+    /// 1: end the member once it is relaxed.
     pub stop_when_relaxed: u32,
     /// Steps before the one in which the member relaxed, or [`NEVER`].
     pub relax_step: u32,
@@ -237,7 +237,8 @@ pub struct Counters {
     pub half_step: u32,
     /// Sweeps on curvature systems in this dispatch.
     pub sweeps_k: u32,
-    /// Sweeps on position systems in this dispatch.
+    /// Where the kernel paused inside an attempt: twice the number of finished steps of the paper, plus one after a
+    /// curvature solve. The CPU never pauses.
     pub sweeps_x: u32,
     /// Where the kernel paused inside an attempt: twice the paper's steps that are done, one more after a curvature
     /// solve. The CPU never pauses.
@@ -248,13 +249,13 @@ pub struct Counters {
     pub fit_points: u32,
     /// 1: the excess has left the window of the fit.
     pub fit_over: u32,
-    /// Times of the grid that are behind the member.
+    /// Times of the grid that the member has passed.
     pub noted: u32,
 }
 
 impl Parameters<f64> {
-    /// The law of `flow` with fixed steps `tau`, the paper's ω = 1, redistribution and plain sweeps to 1e-5; no pull
-    /// and no thresholds.
+    /// Returns the law of `flow` with fixed steps `tau`, the paper's ω = 1, redistribution and plain sweeps to 1e-5; no
+    /// pull and no thresholds.
     pub fn of_flow(flow: &Flow, tau: f64) -> Parameters<f64> {
         let [c1, c2, c3, c4, c5, c6, c7, c8] = flow.coefficients();
         Parameters {
@@ -282,7 +283,7 @@ impl Parameters<f64> {
 }
 
 impl<T: Real> Parameters<T> {
-    /// The same in another precision, rounded.
+    /// Converts the parameters to another precision, rounding.
     pub fn convert<U: Real>(&self) -> Parameters<U> {
         Parameters::from_numbers(&convert(self.to_numbers()))
     }
@@ -293,7 +294,7 @@ fn convert<T: Real, U: Real>(numbers: Vec<T>) -> Vec<U> {
 }
 
 impl<T: Real> Report<T> {
-    /// All numbers in memory order.
+    /// Returns all numbers in memory order.
     pub fn to_numbers(&self) -> Vec<T> {
         let Report { before, middle, now, progress, decay, excess_at } = self;
         let observed = [before, middle, now].into_iter().flat_map(Observed::to_numbers);
@@ -301,7 +302,7 @@ impl<T: Real> Report<T> {
         observed.chain(rest).collect()
     }
 
-    /// The inverse of [`Report::to_numbers`].
+    /// Inverts [`Report::to_numbers`].
     pub fn from_numbers(numbers: &[T]) -> Report<T> {
         let mut rest = numbers;
         let mut next = |fields: usize| {
@@ -318,18 +319,18 @@ impl<T: Real> Report<T> {
         Report { before, middle, now, progress, decay, excess_at }
     }
 
-    /// How many numbers it is.
+    /// Number of numbers.
     pub const LEN: usize =
         3 * Observed::<T>::FIELDS.len() + Progress::<T>::FIELDS.len() + Decay::<T>::FIELDS.len() + TIMES;
 
-    /// The same in another precision, rounded.
+    /// Converts the report to another precision, rounding.
     pub fn convert<U: Real>(&self) -> Report<U> {
         Report::from_numbers(&convert(self.to_numbers()))
     }
 }
 
 impl Counters {
-    /// Whether the member has steps to make.
+    /// Returns whether the member has steps to make.
     pub fn is_running(&self) -> bool {
         self.status == 0 && self.steps < self.goal
     }

@@ -1,4 +1,4 @@
-//! The semi-implicit Lagrangian scheme of Mikula and Ševčovič, once, generic over the number.
+//! The semi-implicit Lagrangian scheme of Mikula and Ševčovič, written once, generic over the number.
 //!
 //! *Theory.* One step of length τ ([`step`](step::step)) goes through four stages, each in its own file with a
 //! WGSL twin of the same stem in `shaders/`:
@@ -6,19 +6,19 @@
 //! 1. [`redistribution`]: velocity β and tangential velocity α of the old state, then the new lengths r;
 //! 2. [`curvature`]: the pentadiagonal system for the increment of k;
 //! 3. [`position`]: one matrix, two right-hand sides, for the increments of x and y;
-//! 4. [`observe`]: sums and maxima of the new state, from which status and relaxation events follow.
+//! 4. [`observe`]: sums and maxima of the new state, which determine status and relaxation events.
 //!
-//! The paper's `𝓑_i` averages φ over segments i and i-1; that is a misprint (`docs/method.md`), and the average
+//! The paper's `𝓑_i` averages φ over segments i and i-1; this is a misprint (`docs/method.md`), and the average
 //! here is over i and i+1. Both systems are written for the increment δ over the step: the right-hand side is
 //! the residual of the old state in node differences, so no digits are lost to the size of x.
 //!
-//! With adaptive steps, [`extrapolation`] makes three of them, of τ, τ/2 and τ/2, into one of second order, and
-//! [`pace`] chooses its length and keeps the time. [`decay`] keeps of every step what says how fast the excess falls.
+//! With adaptive steps, [`extrapolation`] combines three of them, of τ, τ/2 and τ/2, into one of second order, and
+//! [`pace`] chooses the length and tracks the time. [`decay`] records how fast the excess falls.
 //!
-//! *Practice.* Node i = 1…n of the paper is index i-1 here. `k[i]` and `r[i]` live on the segment that ends at
-//! node i, `q[i]` between the middles of segments i and i+1. A [`Curve`] is x, y, k and r; a [`State`]
-//! is a curve with what the next step needs of the last one; a [`Workspace`] holds what a step computes on the way, and
-//! doubles as its trace for the conformance test.
+//! *Practice.* Node i = 1…n of the paper is index i-1 here. `k[i]` and `r[i]` live on the segment that ends at node i,
+//! `q[i]` between the middles of segments i and i+1. A [`Curve`] is x, y, k and r; a [`State`] is a curve with what the
+//! next step needs from the last one; a [`Workspace`] holds the intermediate results of a step, and serves as its trace
+//! for the conformance test.
 
 pub mod branches;
 pub mod curvature;

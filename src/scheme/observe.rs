@@ -1,4 +1,4 @@
-//! Sums and maxima of a curve, from which its report, its status and its events follow. Twin of
+//! Sums and maxima of a curve, which determine its report, status and events. Twin of
 //! `shaders/observe.wgsl`.
 //!
 //! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r.
@@ -9,15 +9,15 @@ use crate::{
     solver::{self, Blocks},
 };
 
-/// `|k|·r` from which on a curve counts as not resolved: its tangent turns by 2 rad from segment to segment.
+/// `|k|·r` at which a curve counts as unresolved: its tangent turns by 2 rad from segment to segment.
 pub const MAX_TURN: f64 = 2.0;
-/// Shortest over mean edge below which an edge counts as vanished.
+/// Ratio of the shortest edge to the mean below which an edge counts as vanished.
 pub const MIN_EDGE: f64 = 1e-5;
-/// Metric drift above which the scheme's lengths say nothing about the polygon: with far too large a step k and r
+/// Metric drift above which the scheme's lengths say nothing about the polygon: if steps are far too large, k and r
 /// lose x, and the polygon shrinks to a point that would look round.
 pub const MAX_DRIFT: f64 = 1.0;
-/// Gap between k and the polygon's turn, in rad, above which no member counts as relaxed: its curvature, which moves it,
-/// is not that of the polygon, which looks round.
+/// Gap between k and the polygon's turn, in rad, above which no member counts as relaxed: the curvature, which moves
+/// the member, is not that of the polygon, which looks round.
 pub const MAX_GAP: f64 = 0.5;
 
 /// The four sums, in the order of the kernel's `vec4`.
@@ -42,13 +42,13 @@ pub struct Maxima<N> {
     pub longest: N,
     /// Minus the shortest edge.
     pub minus_shortest: N,
-    /// Largest curvature.
+    /// Minus the shortest edge length.
     pub k_max: N,
     /// Minus the smallest curvature.
     pub minus_k_min: N,
 }
 
-/// What every step is judged by: the part of the sums and maxima that decides, without a division.
+/// What every step is judged by: the decisive part of the sums and maxima, without a division.
 #[derive(Clone, Copy, Debug)]
 pub struct Glance<N> {
     /// `Σ |e_i|`.
@@ -57,7 +57,7 @@ pub struct Glance<N> {
     pub area: N,
     /// Windings of the edge vector round the origin.
     pub turning: N,
-    /// `max |k_i| r_i`; not finite shows as more than [`BIG`].
+    /// `max |k_i| r_i`; a value that is not finite shows as more than [`BIG`].
     pub turn: N,
     /// `max (|r_i - |e_i|| - MAX_DRIFT·|e_i|)`, positive where the metric drift is above [`MAX_DRIFT`].
     pub slack: N,
@@ -65,11 +65,11 @@ pub struct Glance<N> {
     pub minus_shortest: N,
     /// Minus the smallest curvature.
     pub minus_k_min: N,
-    /// Largest way that a node went from the old curve.
+    /// Largest displacement of a node from the old curve.
     pub farthest: N,
 }
 
-/// Looks at the curve that a step made of `old`.
+/// Examines the curve that a step made from `old`.
 #[inline(always)]
 pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, blocks: Blocks) -> Glance<N> {
     let low = N::of(-2.0 * BIG);
@@ -92,15 +92,15 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, blocks: Blocks) -> Glan
 }
 
 impl<N: Number> Glance<N> {
-    /// Whether the sums and the curvature are finite.
+    /// Returns whether the sums and the curvature are finite.
     #[inline(always)]
     pub fn is_finite(&self) -> N::Mask {
         let big = N::of(BIG);
         self.length.le(big).and(self.area.abs().le(big)).and(self.turn.le(big))
     }
 
-    /// Whether the curve has become singular: it is not resolved, an edge has vanished, its lengths say nothing, it has
-    /// shrunk, or its turning number is no longer `turning`.
+    /// Returns whether the curve has become singular: it is unresolved, an edge has vanished, its lengths mean nothing,
+    /// it has shrunk, or its turning number is no longer `turning`.
     #[inline(always)]
     pub fn is_singular(&self, turning: N, p: &Parameters<N>, n: usize) -> N::Mask {
         let mean_edge = self.length / N::of(n as f64);
@@ -113,7 +113,7 @@ impl<N: Number> Glance<N> {
     }
 }
 
-/// Sums over the ring.
+/// Computes the sums over the ring.
 #[inline(always)]
 pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> CurveSums<N> {
     let half = N::of(0.5);
@@ -128,7 +128,7 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> C
     CurveSums { length, area: half * area, energy, turning }
 }
 
-/// Maxima over the ring.
+/// Computes the maxima over the ring.
 pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
     let low = N::of(-2.0 * BIG);
     let mut m = Maxima { drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
@@ -143,14 +143,14 @@ pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
     m
 }
 
-/// `L²/(4π|A|)` above that of the regular polygon.
+/// `L²/(4π|A|)` minus that of the regular polygon.
 #[inline(always)]
 pub fn excess<N: Number>(length: N, area: N, p: &Parameters<N>) -> N {
     length * length / (N::of(4.0 * std::f64::consts::PI) * area.abs()) - p.polygon_ratio
 }
 
-/// Largest gap between the angle by which the curvature turns the tangent over a segment, from middle to middle of its
-/// neighbours, and the angle by which the polygon turns there.
+/// The largest difference between the angle by which the curvature turns the tangent over a segment, from middle to
+/// middle of its neighbours, and the angle by which the polygon turns there.
 #[inline(always)]
 pub fn gap<N: Number>(curve: &Curve<N>) -> N {
     let mut gap = N::of(0.0);
@@ -161,7 +161,7 @@ pub fn gap<N: Number>(curve: &Curve<N>) -> N {
     gap
 }
 
-/// +1 (-1) where the edge vector turns from `e_i` to `e_{i+1}` across the positive x axis, the short way round.
+/// +1 (-1) if the edge vector turns from `e_i` to `e_{i+1}` across the positive x axis, the short way round.
 #[inline(always)]
 fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
     let ([_, xm, x, xp, _], [_, ym, y, yp, _]) = (curve.x.window(i), curve.y.window(i));
@@ -179,7 +179,7 @@ pub fn observe<T: Real>(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> 
     observed(&sums(curve, p, blocks), &maxima(curve), p)
 }
 
-/// What the sums and maxima of a curve say.
+/// Derives the observables from the sums and maxima of a curve.
 pub fn observed<T: Real>(sums: &CurveSums<T>, maxima: &Maxima<T>, p: &Parameters<T>) -> Observed<T> {
     Observed {
         length: sums.length,

@@ -8,19 +8,19 @@
 use super::{Parameters, member::Progress};
 use crate::number::Real;
 
-/// Share of the step predicted to meet the tolerance that is taken.
+/// Fraction taken of the step length that is predicted to meet the tolerance.
 pub const SAFETY: f64 = 0.95;
-/// A step is at most this many times the one before,
+/// Maximum ratio of a step to the one before.
 pub const MAX_GROWTH: f64 = 4.0;
-/// and at least this fraction of it; after a failure exactly this fraction.
+/// Minimum ratio of a step to the one before; the ratio after a failure.
 pub const MIN_GROWTH: f64 = 0.25;
-/// A step below this many times `(L/n)⁴`, far below all time scales of a curve that n nodes resolve, ends the member.
+/// A step below this multiple of `(L/n)⁴`, far below all time scales of a curve that n nodes resolve, ends the member.
 pub const MIN_STEP: f64 = 1e-12;
-/// The same for a step that is accurate but ends in a singular curve: shorter ones only creep towards the bound that it
-/// passed, until rounding lets them stay beside it.
+/// Like [`MIN_STEP`], for a step that is accurate but ends in a singular curve: shorter ones only creep towards the
+/// bound that it passed, until rounding holds them there.
 pub const MIN_TO_SINGULAR: f64 = 1e-3;
 
-/// A step to be attempted.
+/// A step to attempt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stride<T> {
     /// Its length.
@@ -29,25 +29,25 @@ pub struct Stride<T> {
     pub high: T,
     /// Its low part.
     pub low: T,
-    /// It reaches the final time.
+    /// Whether it reaches the final time.
     pub last: bool,
 }
 
-/// The next step: as long as asked for, or half of what is left or all of it.
+/// Returns the next step: the requested length, half of the remaining time, or all of it.
 pub fn stride<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> Stride<T> {
     let left = (p.end_high - progress.time_high) + (p.end_low - progress.time_low);
     if left.le(progress.next) {
         return Stride { length: left, high: T::of(0.0), low: T::of(0.0), last: true };
     }
     let half = T::of(0.5) * left;
-    // An accepted step of one tick may ask for a little less.
+    // An accepted step of one tick may ask for slightly less.
     let wanted = (if half.le(progress.next) { half } else { progress.next }).max(p.time_tick);
     let high = (wanted / p.time_unit).floor() * p.time_unit;
     let low = ((wanted - high) / p.time_tick).floor() * p.time_tick;
     Stride { length: high + low, high, low, last: false }
 }
 
-/// Moves the clock on by `stride`.
+/// Advances the clock by `stride`.
 pub fn pass_time<T: Real>(progress: &mut Progress<T>, stride: Stride<T>, p: &Parameters<T>) {
     progress.taken = stride.length;
     if stride.last {
@@ -62,19 +62,19 @@ pub fn pass_time<T: Real>(progress: &mut Progress<T>, stride: Stride<T>, p: &Par
     }
 }
 
-/// Whether the clock has reached the goal.
+/// Returns whether the clock has reached the goal.
 pub fn is_at_goal<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> bool {
     ((p.goal_high - progress.time_high) + (p.goal_low - progress.time_low)).le(T::of(0.0))
 }
 
-/// The step after one of `length` whose error was `error`; the error goes with the square of the length.
+/// Returns the length after a step of `length` with error `error`; the error scales with the square of the length.
 pub fn next_length<T: Real>(length: T, error: T, most_growth: f64, p: &Parameters<T>) -> T {
-    // An error of nothing allows any growth.
+    // A zero error allows any growth.
     let growth = T::of(SAFETY) * (p.adaptive / error.max(T::of(1e-6) * p.adaptive)).sqrt();
     length * growth.max(T::of(MIN_GROWTH)).min(T::of(most_growth))
 }
 
-/// The shortest step that is tried, `share` of `(L/n)⁴`.
+/// Returns the shortest step to try, `share` of `(L/n)⁴`.
 pub fn least_step<T: Real>(length: T, n: T, share: f64, p: &Parameters<T>) -> T {
     let edge = length / n;
     (T::of(share) * (edge * edge) * (edge * edge)).max(p.time_tick)

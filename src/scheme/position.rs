@@ -23,7 +23,7 @@ pub struct Position<'a, N> {
 }
 
 impl<'a, N: Number> Position<'a, N> {
-    /// The system of a step of `p.tau` from `old`, with the lengths and curvatures of `new`.
+    /// Returns the system of a step of `p.tau` from `old`, with the lengths and curvatures of `new`.
     #[inline(always)]
     pub fn new(
         old: &'a Curve<N>,

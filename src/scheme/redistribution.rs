@@ -66,7 +66,7 @@ fn velocity<N: Number>(motion: &Motion<N>, [_, km, k, kp, _]: [N; 5], i: usize) 
     motion.b[i] - ((kp - k) * iq - (k - km) * iqm) * motion.ir[i]
 }
 
-/// α by a running sum that restarts from the sum of whole blocks, as the kernel's prefix sum does.
+/// Computes α by a running sum that restarts from the sum of whole blocks, like the kernel's prefix sum.
 #[inline(always)]
 fn tangential_velocity<N: Number>(
     old: &Curve<N>,
@@ -84,7 +84,7 @@ fn tangential_velocity<N: Number>(
     motion.alpha[old.len() - 1] = N::of(0.0);
 }
 
-/// `1/r` and `1/q` from one division: of the two, which are of one size, `1/(r q)`.
+/// Computes `1/r` and `1/q` from one division, `1/(r q)`, since both are of the same size.
 #[inline(always)]
 fn reciprocals<N: Number>(r: &Ring<N>, motion: &mut Motion<N>) {
     for i in 0..r.len() {

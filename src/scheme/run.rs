@@ -1,4 +1,4 @@
-//! A member's run between two dispatches, and a step that it takes.
+//! A member's run between two dispatches, and a step of it.
 
 use super::{
     Parameters, State,
@@ -7,21 +7,21 @@ use super::{
 };
 use crate::{number::Real, solver::Blocks};
 
-/// One member on its way: everything that a dispatch reads and writes.
+/// One member in progress: everything that a dispatch reads and writes.
 #[derive(Clone, Debug)]
 pub struct Run<T> {
     /// The curve.
     pub state: State<T>,
-    /// What governs it.
+    /// Its parameters.
     pub parameters: Parameters<T>,
     /// Its counters.
     pub counters: Counters,
-    /// Its report; the excess of the last accepted curve is the start of the next step's events.
+    /// Its report; the excess of the last accepted curve is where the next step's events start.
     pub report: Report<T>,
 }
 
 impl<T: Real> Run<T> {
-    /// A member at its start, with no step to make and no events behind it.
+    /// Creates a member at its start, without steps to make and without past events.
     pub fn new(state: State<T>, parameters: Parameters<T>) -> Run<T> {
         let blocks = Blocks::new(state.curve.len()).expect("a ring of 6 nodes or more");
         let sums = observe::sums(&state.curve, &parameters, blocks);
@@ -32,12 +32,12 @@ impl<T: Real> Run<T> {
         Run { state, parameters, counters, report }
     }
 
-    /// Reports what its curves are; not compiled into the vector code, since it is one member's.
+    /// Reports on its curves; not compiled into the vector code, since it concerns a single member.
     #[inline(never)]
     pub(super) fn report_on(&mut self, blocks: Blocks, adaptive: bool) {
         let Run { state, parameters, report, counters } = self;
-        // The start is known as it was handed in; observed here it may be a rounding away, and the next step's events with
-        // it, which must not depend on where a dispatch ended.
+        // The start is known as it was passed in. Observing it here could change it, and the next step's events, by a
+        // rounding, which must not depend on where a dispatch ended.
         if counters.steps == 0 {
             return;
         }
@@ -46,7 +46,7 @@ impl<T: Real> Run<T> {
         report.middle = if adaptive { observe::observe(&state.middle, parameters, blocks) } else { report.before };
     }
 
-    /// The same member in another precision, rounded.
+    /// Converts the member to another precision, rounding.
     pub fn convert<U: Real>(&self) -> Run<U> {
         Run {
             state: self.state.convert(),
@@ -57,7 +57,7 @@ impl<T: Real> Run<T> {
     }
 }
 
-/// A step that is taken: its length where it is adaptive, the excess on its way, and the gap between k and the polygon.
+/// An accepted step: its length if adaptive, the excess along it, and the gap between k and the polygon.
 pub(super) struct Taken<T> {
     pub(super) h: T,
     pub(super) before: T,

@@ -1,51 +1,51 @@
 //! Where sweeps start: increments predicted from those of the last two solves. Twin of `shaders/start.wgsl`.
 //!
-//! An increment over a time τ that ends at t is τ·v(t), and v is smooth. So two increments say where the next one lies to
-//! second order, which saves most of the sweeps from the last one alone. In an adaptive attempt of length h, with the
-//! whole step W and the half steps H₁ and H₂:
+//! An increment over a time τ that ends at t is τ·v(t), and v is smooth. Two increments therefore predict the next one
+//! to second order, which saves most of the sweeps needed with the last one alone. In an adaptive attempt of length h,
+//! with the whole step W and the half steps H₁ and H₂:
 //!
 //! | start of | from | because |
 //! |---|---|---|
-//! | W, after a step that was taken | H₁, H₂ | the line through v(t - h'/2) and v(t), drawn on to t + h |
-//! | W, after a step that was refused | its H₁, H₂ | the line through v(t + h'/2) and v(t + h') |
+//! | W, after an accepted step | H₁, H₂ | the line through v(t - h'/2) and v(t), extended to t + h |
+//! | W, after a refused step | its H₁, H₂ | the line through v(t + h'/2) and v(t + h') |
 //! | H₁ | (V + W)/4 | the mean of v(t) and v(t + h); V is h·v(t) |
 //! | H₂ | W/2 | both end at t + h |
 
 use super::Increments;
 use crate::number::Number;
 
-/// The matrix that makes the start of the next solve, and what is remembered beside it, of the increments and of those
-/// remembered so far.
+/// The matrix that turns the increments and the remembered ones into the start of the next solve, and what to remember
+/// then.
 #[derive(Clone, Copy, Debug)]
 pub struct Start<N>([[N; 2]; 2]);
 
 impl<N: Number> Start<N> {
-    /// From zero, whatever the increments are.
+    /// Starts from zero, whatever the increments are.
     #[inline(always)]
     pub fn nowhere() -> Self {
         Start([[N::of(0.0); 2]; 2])
     }
 
-    /// After a fixed step: in a straight line.
+    /// After a fixed step: extrapolates linearly.
     #[inline(always)]
     pub fn after_fixed() -> Self {
         Start([[N::of(2.0), N::of(-1.0)], [N::of(1.0), N::of(0.0)]])
     }
 
-    /// After an attempt that was taken, for a whole step `ratio` times as long as one of its halves. It leaves V.
+    /// After an accepted attempt, for a whole step `ratio` times as long as one of its halves; remembers V.
     #[inline(always)]
     pub fn after_taken(ratio: N) -> Self {
         Start([[ratio * (N::of(1.0) + ratio), -(ratio * ratio)], [ratio, N::of(0.0)]])
     }
 
-    /// After an attempt that was refused, for a whole step `ratio` times as long as one of its halves. It leaves V.
+    /// After a refused attempt, for a whole step `ratio` times as long as one of its halves; remembers V.
     #[inline(always)]
     pub fn after_refused(ratio: N) -> Self {
         let from_end = ratio - N::of(2.0);
         Start([[ratio * (N::of(1.0) + from_end), -(ratio * from_end)], [-ratio, N::of(2.0) * ratio]])
     }
 
-    /// After part 0 or 1 of an attempt, the whole step and the first half. It leaves what that part computed.
+    /// After part 0 or 1 of an attempt, the whole step and the first half; remembers what that part computed.
     #[inline(always)]
     pub fn after_part(part: usize) -> Self {
         let quarter = N::of(0.25);
@@ -53,7 +53,7 @@ impl<N: Number> Start<N> {
         Start([to_next, [N::of(1.0), N::of(0.0)]])
     }
 
-    /// Takes over one lane.
+    /// Sets one lane.
     #[inline(always)]
     pub fn set_lane(&mut self, lane: usize, of: Start<N::Real>) {
         for row in 0..2 {
@@ -63,7 +63,7 @@ impl<N: Number> Start<N> {
         }
     }
 
-    /// Puts the start into `increments` and what is to be remembered into `earlier`.
+    /// Puts the start into `increments` and what to remember into `earlier`.
     #[inline(always)]
     pub fn put(&self, increments: &mut Increments<N>, earlier: &mut Increments<N>) {
         let Start([[a, b], [c, d]]) = *self;

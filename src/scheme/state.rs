@@ -11,7 +11,7 @@ use crate::{
 pub const CURVE_FIELDS: usize = 4;
 /// Fields of a state, in the order of [`State::fields`].
 pub const STATE_FIELDS: usize = 3 * CURVE_FIELDS + 6;
-/// Fields of a state that the next step reads, which come first: the curve and both increments.
+/// Fields of a state that the next step reads, which come first: the curve, the increments and the earlier ones.
 pub const NEEDED_FIELDS: usize = CURVE_FIELDS + 6;
 
 /// A polygon of `n` nodes with the scheme's own curvatures and lengths.
@@ -27,7 +27,7 @@ pub struct Curve<N> {
     pub r: Ring<N>,
 }
 
-/// By how much a step changes k, x and y.
+/// The change of k, x and y over a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Increments<N> {
     /// Of the curvatures.
@@ -38,14 +38,14 @@ pub struct Increments<N> {
     pub y: Ring<N>,
 }
 
-/// A curve on its way: what a member is between two steps.
+/// A curve in progress: the state of a member between two steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State<N> {
     /// The last accepted curve.
     pub curve: Curve<N>,
-    /// Increments of the last solve; where sweeps start, see [`Start`](super::start::Start).
+    /// Increments of the last solve, where sweeps start; see [`Start`](super::start::Start).
     pub increments: Increments<N>,
-    /// What sweeps remember beside them.
+    /// What sweeps remember next to them.
     pub earlier: Increments<N>,
     /// The curve in the middle of the last extrapolated step. During an attempt: the result of its whole step.
     pub middle: Curve<N>,
@@ -54,33 +54,33 @@ pub struct State<N> {
 }
 
 impl<N: Number> Curve<N> {
-    /// A curve of zeros, to be filled.
+    /// Creates a curve of zeros, to be filled.
     pub fn zeros(n: usize) -> Curve<N> {
         let ring = || Ring::zeros(n);
         Curve { x: ring(), y: ring(), k: ring(), r: ring() }
     }
 
-    /// Number of nodes.
+    /// Returns the number of nodes.
     pub fn len(&self) -> usize {
         self.x.len()
     }
 
-    /// Whether there are no nodes.
+    /// Returns whether there are no nodes.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The fields in the order in which the device stores them.
+    /// Returns the fields in the order in which the device stores them.
     pub fn fields(&self) -> [&Ring<N>; CURVE_FIELDS] {
         [&self.x, &self.y, &self.k, &self.r]
     }
 
-    /// The same, to be changed.
+    /// Returns the fields, mutable.
     pub fn fields_mut(&mut self) -> [&mut Ring<N>; CURVE_FIELDS] {
         [&mut self.x, &mut self.y, &mut self.k, &mut self.r]
     }
 
-    /// Takes over `other` in the lanes of `mask`.
+    /// Copies `other` in the lanes of `mask`.
     #[inline(always)]
     pub fn put(&mut self, mask: N::Mask, other: &Curve<N>) {
         for (own, other) in self.fields_mut().into_iter().zip(other.fields()) {
@@ -93,15 +93,15 @@ impl<N: Number> Curve<N> {
 }
 
 impl<T: Real> Curve<T> {
-    /// The nodes.
+    /// Returns the nodes.
     pub fn positions(&self) -> impl Iterator<Item = DVec2> {
         self.x.nodes().iter().zip(self.y.nodes()).map(|(x, y)| DVec2::new(x.to_f64(), y.to_f64()))
     }
 
-    /// The initial curve through the polygon `nodes` (n ≥ 6): `r_i = |R_i|` and `k_i = angle(R_{i-1}, R_{i+1}) / 2r_i`,
-    /// computed in f64 and rounded.
+    /// Creates the initial curve through the polygon `nodes` (n ≥ 6): `r_i = |R_i|` and
+    /// `k_i = angle(R_{i-1}, R_{i+1}) / 2r_i`, computed in f64 and rounded.
     ///
-    /// The angle is taken as the sum of the two vertex angles, so that a corner that turns by more than π over
+    /// The angle is the sum of the two vertex angles, so that a corner that turns by more than π over
     /// three segments keeps its sign.
     pub fn from_nodes(nodes: &[DVec2]) -> Curve<T> {
         let n = nodes.len();
@@ -121,20 +121,20 @@ impl<T: Real> Curve<T> {
 }
 
 impl<N: Number> Increments<N> {
-    /// No change.
+    /// Creates zero increments.
     pub fn zeros(n: usize) -> Increments<N> {
         Increments { k: Ring::zeros(n), x: Ring::zeros(n), y: Ring::zeros(n) }
     }
 }
 
 impl<N: Number> State<N> {
-    /// A state of zeros, to be filled.
+    /// Creates a state of zeros, to be filled.
     pub fn zeros(n: usize) -> State<N> {
         let (curve, increments) = (|| Curve::zeros(n), || Increments::zeros(n));
         State { curve: curve(), increments: increments(), earlier: increments(), middle: curve(), before: curve() }
     }
 
-    /// The fields in the order in which the device stores them.
+    /// Returns the fields in the order in which the device stores them.
     pub fn fields(&self) -> [&Ring<N>; STATE_FIELDS] {
         let [a, b, c, d] = self.curve.fields();
         let Increments { k, x, y } = &self.increments;
@@ -144,7 +144,7 @@ impl<N: Number> State<N> {
         [a, b, c, d, k, x, y, ek, ex, ey, e, f, g, h, l, m, n, o]
     }
 
-    /// The same, to be changed.
+    /// Returns the fields, mutable.
     pub fn fields_mut(&mut self) -> [&mut Ring<N>; STATE_FIELDS] {
         let [a, b, c, d] = self.curve.fields_mut();
         let Increments { k, x, y } = &mut self.increments;
@@ -156,19 +156,19 @@ impl<N: Number> State<N> {
 }
 
 impl<T: Real> State<T> {
-    /// The state before the first step.
+    /// Creates the state before the first step.
     pub fn from_nodes(nodes: &[DVec2]) -> State<T> {
         let curve = Curve::from_nodes(nodes);
         let increments = Increments::zeros(nodes.len());
         State { middle: curve.clone(), before: curve.clone(), earlier: increments.clone(), increments, curve }
     }
 
-    /// All fields one after another, `18n` numbers.
+    /// Returns all fields one after another, `18n` numbers.
     pub fn to_numbers(&self) -> Vec<T> {
         self.fields().into_iter().flat_map(|field| field.nodes().iter().copied()).collect()
     }
 
-    /// The inverse of [`State::to_numbers`].
+    /// Inverts [`State::to_numbers`].
     pub fn from_numbers(numbers: &[T]) -> State<T> {
         let n = numbers.len() / STATE_FIELDS;
         let field = |f: usize| Ring::from_nodes(numbers[f * n..(f + 1) * n].iter().copied());
@@ -184,14 +184,14 @@ impl<T: Real> State<T> {
         }
     }
 
-    /// The same state in another precision, rounded to the nearest numbers.
+    /// Converts the state to another precision, rounded to the nearest numbers.
     pub fn convert<U: Real>(&self) -> State<U> {
         let numbers: Vec<U> = self.to_numbers().into_iter().map(|v| U::of(v.to_f64())).collect();
         State::from_numbers(&numbers)
     }
 }
 
-/// How the old curve moves, and the reciprocals of its lengths, then of the new ones.
+/// The motion of the old curve, and the reciprocals of its lengths, then of the new ones.
 #[derive(Clone, Debug)]
 pub struct Motion<N> {
     /// `b(k)`.
@@ -208,7 +208,7 @@ pub struct Motion<N> {
     pub iq: Ring<N>,
 }
 
-/// What a step computes on the way from the old curve to the new one.
+/// Intermediate results of a step from the old curve to the new one.
 #[derive(Clone, Debug)]
 pub struct Workspace<N> {
     /// The cut of the ring.
@@ -221,22 +221,22 @@ pub struct Workspace<N> {
     pub curvature: Memory<N, 1>,
     /// The position system and its solver.
     pub position: Memory<N, 2>,
-    /// Fill the rows of the systems also where the solver does not need them.
+    /// Whether to fill the rows of the systems even if the solver does not need them.
     pub traced: bool,
 }
 
 impl<N: Number> Workspace<N> {
-    /// A workspace for rings cut by `blocks`, whatever the solver.
+    /// Creates a workspace for rings cut by `blocks`, whatever the solver.
     pub fn new(blocks: Blocks) -> Workspace<N> {
         Workspace::with(blocks, Memory::any(blocks.n), Memory::any(blocks.n))
     }
 
-    /// One with what the solver `S` needs.
+    /// Creates a workspace with what the solver `S` needs.
     pub fn for_solver<S: Solves>(blocks: Blocks) -> Workspace<N> {
         Workspace::with(blocks, S::memory(blocks.n), S::memory(blocks.n))
     }
 
-    /// Numbers that this has for each node.
+    /// Returns the numbers that it holds per node.
     pub const fn numbers<S: Solves>() -> usize {
         10 + S::FACTS.numbers_per_node
     }
@@ -256,7 +256,7 @@ impl<N: Number> Workspace<N> {
     }
 }
 
-/// Edge that ends at node i: `[Δx, Δy, |e|]`.
+/// Returns the edge that ends at node i: `[Δx, Δy, |e|]`.
 #[inline(always)]
 pub fn edge<N: Number>(curve: &Curve<N>, i: usize) -> [N; 3] {
     let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));

@@ -1,4 +1,4 @@
-//! How a member ends: the codes that the kernel and its twin leave in [`Counters`](super::member::Counters).
+//! How a member ends: the codes that the kernel and its twin write to [`Counters`](super::member::Counters).
 
 use serde::{Deserialize, Serialize};
 
@@ -12,12 +12,13 @@ pub enum Status {
     /// The final time came first, so far.
     #[default]
     Unfinished = 2,
-    /// Curvature times spacing too large, an edge vanished, the metric was lost, or the turning number; or no adaptive
-    /// step was short enough for the tolerance.
+    /// Curvature times spacing became too large, an edge vanished, the metric was lost, or the turning number changed;
+    /// or no adaptive step was short enough for the tolerance.
     Singular = 3,
     /// A value was not finite.
     Nonfinite = 4,
-    /// The sweep cap was reached, or the sweeps diverged; or adaptive steps stayed so short that it would never end.
+    /// The sweep cap was reached, or the sweeps diverged; or adaptive steps stayed so short that the run would never
+    /// end.
     Stalled = 5,
 }
 
@@ -26,12 +27,12 @@ impl Status {
     pub const ALL: [Status; 5] =
         [Status::Relaxed, Status::Unfinished, Status::Singular, Status::Nonfinite, Status::Stalled];
 
-    /// Whether the member ended before its time and without having relaxed.
+    /// Returns whether the member ended early without having relaxed.
     pub fn is_failure(self) -> bool {
         matches!(self, Status::Singular | Status::Nonfinite | Status::Stalled)
     }
 
-    /// The word used in `summary.csv`.
+    /// Returns the word used in `summary.csv`.
     pub fn name(self) -> &'static str {
         match self {
             Status::Relaxed => "relaxed",

@@ -8,18 +8,18 @@ use crate::{
     solver::{Order, Ring, Solver, Solves, by_solver, sweeps::Control},
 };
 
-/// What the members of a run have in common.
+/// The settings that the members of a run share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Method {
     /// Solver of the two systems.
     pub solver: Solver,
     /// Order of a Gauss–Seidel sweep.
     pub order: Order,
-    /// Sweeps per system after which a member is stalled.
+    /// Maximum sweeps per system; a member that needs more is stalled.
     pub max_sweeps: u32,
 }
 
-/// How the two solves of a step went.
+/// Result of the two solves of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Stepped<N: Number> {
     /// Sweeps on the curvature system.
@@ -32,10 +32,11 @@ pub struct Stepped<N: Number> {
     pub finite: N::Mask,
 }
 
-/// Share of the rounding error of an unknown below which an error of its increment is not worth a sweep.
+/// Fraction of the rounding error of an unknown below which an error of its increment is not worth a sweep.
 pub const NEGLIGIBLE: f64 = 0.1;
 
-/// Computes the curve a time `p.tau` after `old` into `work.new`; `increments` is where the solves start, and the result.
+/// Computes the curve a time `p.tau` after `old` into `work.new`; the solves start at `increments`, which returns the
+/// result.
 pub fn step<T: Real>(
     old: &Curve<T>,
     increments: &mut Increments<T>,
@@ -47,8 +48,8 @@ pub fn step<T: Real>(
     by_solver!(method.solver, S => step_by::<T, S>(old, increments, p, branches, true, method, work))
 }
 
-/// The same for members side by side that share `branches`, by the solver `S`. Lanes that are not `live` cost no sweeps and mean nothing
-/// afterwards.
+/// Like [`step`], for members side by side that share `branches`, by the solver `S`. Lanes that are not `live` cost no
+/// sweeps and mean nothing afterwards.
 #[inline(always)]
 pub fn step_by<N: Number, S: Solves>(
     old: &Curve<N>,
@@ -90,7 +91,7 @@ pub fn step_by<N: Number, S: Solves>(
     add(&old.y, &increments.y, &mut new.y);
     pull::pull(new, p, branches);
 
-    // What the second solve did counts only where the first one succeeded.
+    // The second solve counts only if the first one succeeded.
     Stepped {
         sweeps_k: for_k.sweeps,
         sweeps_x: N::select(for_k.converged, for_x.sweeps, N::of(0.0)),

@@ -1,8 +1,8 @@
-//! What multigrid needs to know of the two systems to discretise them on coarser rings. Twin of `shaders/terms.wgsl`.
+//! What multigrid needs from the two systems to discretise them on coarser rings. Twin of `shaders/terms.wgsl`.
 //!
 //! Both are `ρu + ∂⁴u + p ∂²u + w ∂u`: that of k lives on segments, q apart and r long, with ρ = 1/τ - kβ, p = 0 and
-//! w = -α; that of x on nodes, r apart and q long, with ρ = 1/τ, p = φ and w = -α + ³⁄₂ ∂_s k². Coarse systems are only
-//! corrected by, so α is taken as the mean over the cell.
+//! w = -α; that of x on nodes, r apart and q long, with ρ = 1/τ, p = φ and w = -α + ³⁄₂ ∂_s k². Coarse systems only
+//! provide corrections, so α is taken as the mean over the cell.
 
 use super::{curvature::Curvature, position::Position};
 use crate::{
