@@ -1,4 +1,4 @@
-//! The one table of tolerances: quantity, natural scale, factor. Measured maxima are in `docs/conformance.md`.
+//! The single table of tolerances: quantity, natural scale, factor. Measured maxima are in `docs/conformance.md`.
 
 use crate::{
     backend::gpu::shader::TRACE_FIELDS,
@@ -6,7 +6,7 @@ use crate::{
     solver::Row as Coefficients,
 };
 
-/// What a bound is measured in: the size of the terms whose rounding the quantity inherits.
+/// The unit of a bound: the size of the terms whose rounding the quantity inherits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NaturalScale {
     /// Largest of `|k|/r²` (the terms of a second difference) and `|b(k)|`.
@@ -21,7 +21,7 @@ pub enum NaturalScale {
     Weight,
     /// Largest `|k|`.
     Curvature,
-    /// Largest `|k|` times the root of the largest weight: a solve passes rounding on, the more the stiffer it is.
+    /// Largest `|k|` times the root of the largest weight: a solve amplifies rounding, the more the stiffer it is.
     SolvedCurvature,
     /// Radius of the circle of the same length.
     Position,
@@ -84,7 +84,7 @@ pub const FIELDS: [Bound; 4] = [
     bound("r", NaturalScale::Length, 16.0, 64.0),
 ];
 
-/// What the members report after a run: the fields of `Observed`, then the turning number and the travel.
+/// The members' reports after a run: the fields of `Observed`, then the turning number and the travel.
 pub const REPORT: [Bound; 10] = [
     bound("length", NaturalScale::Position, 16.0, 64.0),
     bound("area", NaturalScale::Area, 16.0, 64.0),
@@ -98,18 +98,19 @@ pub const REPORT: [Bound; 10] = [
     bound("travel", NaturalScale::Position, 16.0, 64.0),
 ];
 
-/// What a run keeps of how the excess falls: its values at the times of the grid, and the fitted rate.
+/// What a run records of the decay of its excess: the values at the times of the grid, and the fitted rate.
 ///
-/// An excess is off by its rounding, and inside an adaptive run by what a changed step length changes; its logarithm by
-/// that over the excess; the slope of a line by twice that over the time it spans.
+/// The error of an excess is its rounding and, inside an adaptive run, the effect of a changed step length. The error
+/// of its logarithm is that over the excess; the error of the slope of a line is twice that over the time it spans.
 pub const DECAY: [Bound; 2] =
     [bound("excess on the way", NaturalScale::One, 16.0, 64.0), bound("fitted rate", NaturalScale::One, 32.0, 128.0)];
 
-/// What adaptive runs leave besides their ends: the last step's start and middle, how long steps are, when events were.
+/// What adaptive runs leave in addition to their ends: the last step's start and middle, step lengths, and event times.
 ///
-/// All of it lies where a step happened to begin or end. The error estimate is off by a rounding of the solve, ε·√w with
-/// w the largest weight, so relative to the tolerance by ε·√w/tolerance, and a step length by half of that. What lies
-/// inside the run is off by as much of what it changes in a step, on top of what its own scale says.
+/// All of these depend on where a step happened to begin or end. The error of the error estimate is a rounding of the
+/// solve, ε·√w with w the largest weight, so relative to the tolerance ε·√w/tolerance; the relative error of a step
+/// length is half of that. A quantity inside the run is off by this fraction of its change over a step, in addition to
+/// its own scale.
 pub const PACE: [Bound; 6] = [
     bound("last step's start", NaturalScale::Position, 16.0, 64.0),
     bound("its middle", NaturalScale::Position, 16.0, 64.0),
@@ -120,14 +121,14 @@ pub const PACE: [Bound; 6] = [
 ];
 
 impl Bound {
-    /// The factor k for an adapter of this kind.
+    /// Returns the factor k for this kind of adapter.
     pub fn factor(&self, hardware: bool) -> f64 {
         if hardware { self.hardware } else { self.software }
     }
 }
 
 impl NaturalScale {
-    /// The scale of one member, from the curve before the step and what the step computed.
+    /// Returns the scale of one member, from the curve before the step and the results of the step.
     pub fn of(self, curve: &Curve<f64>, p: &Parameters<f64>, work: &Workspace<f64>) -> f64 {
         let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
         let k = || largest(&mut curve.k.nodes().iter().map(|k| k.abs()));

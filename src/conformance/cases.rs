@@ -1,4 +1,4 @@
-//! The ensemble that conformance is tested on: no two members alike, every flow, with and without redistribution.
+//! The ensemble used for conformance tests: no two members alike, every flow, with and without redistribution.
 
 use crate::{
     curve::polygon,
@@ -10,16 +10,16 @@ use crate::{
     scheme::{Parameters, State, run::Run},
 };
 
-/// Members of the comparison: a prime number, so that nothing divides it.
+/// Members of the comparison: a prime number, so that no size divides it.
 pub const MEMBERS: usize = 11;
 
-/// τ of member 0, the largest: at n = 100 the paper's 10⁻³, and with the same `τ/h⁴`, so the same number of sweeps,
+/// τ of member 0, the largest: the paper's 10⁻³ at n = 100, and the same `τ/h⁴`, so the same number of sweeps,
 /// at every n above 47.
 fn tau(n: usize) -> f64 {
     1e-3 * (100.0 / n as f64).powi(4).min(20.0)
 }
 
-/// `count` different members of `n` nodes, each with its own curve, flow, τ, ω and κ, to run `steps` steps.
+/// Creates `count` different members of `n` nodes, each with its own curve, flow, τ, ω and κ, to run `steps` steps.
 pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec<Run<f64>>> {
     let amplitude = if n < 20 { 0.02 } else { 0.05 };
     let spec = Spec { points: n, amplitude, seed: 20, ..Spec::default() };
@@ -37,17 +37,17 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
             let excess = polygon::excess(&nodes);
             let parameters = Parameters {
                 omega: 1.0 + j as f64,
-                // One member in five keeps its nodes.
+                // One member in five is not redistributed.
                 redistribution: if j % 5 == 3 { 0.0 } else { 1.0 },
                 // One member in three is pulled.
                 pull: if j % 3 == 1 { 50.0 } else { 0.0 },
                 tolerance,
-                // One member in seven chooses its own.
+                // One member in seven chooses its own factor.
                 sor: if j % 7 == 5 { 0.0 } else { 1.0 + 0.07 * (j % 10) as f64 },
                 polygon_ratio: polygon::regular_ratio(n),
                 relax_at: 0.9 * excess,
                 half_at: 0.95 * excess,
-                // However few its steps, a member leaves the fit with points.
+                // Even with few steps, a member leaves points for the fit.
                 fit_from: excess,
                 fit_to: 1e-3 * excess,
                 clock_end: f64::from(steps),
@@ -61,8 +61,8 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
         .collect()
 }
 
-/// The same members with adaptive steps of `tolerance` to the time of `steps` of their own fixed ones, for a run in
-/// `precision`.
+/// Creates the same members with adaptive steps of `tolerance`, to the time of `steps` of their own fixed steps, for a
+/// run in `precision`.
 pub fn adaptive_members(
     n: usize,
     count: usize,
@@ -82,12 +82,12 @@ pub fn adaptive_members(
         (p.time_unit, p.time_tick) = (ticks.unit, ticks.tick);
         (p.end_high, p.end_low) = ticks.split(end);
         (p.goal_high, p.goal_low) = (p.end_high, p.end_low);
-        // One member in four begins with a step that is far too long and refused.
+        // One member in four begins with a step that is far too long and is refused.
         progress.next = if j % 4 == 2 { end } else { 0.05 * p.tau };
         run.counters.goal = u32::MAX;
     }
     Ok(runs)
 }
 
-/// Tolerance of the sweeps in adaptive runs: an error estimate must not be made of what sweeps leave.
+/// Tolerance of the sweeps in adaptive runs: the error estimate must not consist of what sweeps leave.
 const SWEEPS: f64 = 1e-6;

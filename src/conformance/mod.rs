@@ -2,13 +2,12 @@
 //!
 //! *Theory.* The kernel and the CPU do the same operations in the same order, so they differ only where a compiler
 //! fuses or reassociates: by a few roundings of each quantity's natural scale. A bound is `k · ε · scale`; the
-//! factors stand in one table ([`bounds`]), with the reason for each scale.
+//! factors are in one table ([`bounds`]), with the reason for each scale.
 //!
-//! *Practice.* [`stages`] compares everything that one step computes, [`runs`] the curve after many
-//! steps, [`adaptive`] after adaptive ones. Both take
-//! an ensemble in which every member has its own curve, flow, τ and ω ([`members`]). `curvelax check` prints the
-//! table, `tests/conformance.rs` asserts it, with a negative control for each comparison. A run that begins on a GPU
-//! compares a few members first ([`self_test`](self_test::self_test)).
+//! *Practice.* [`stages`] compares everything that one step computes, [`runs`] the curve after many steps, [`adaptive`]
+//! after adaptive ones. They use an ensemble in which every member has its own curve, flow, τ and ω ([`members`]).
+//! `curvelax check` prints the table; `tests/conformance.rs` asserts it, with a negative control for each comparison. A
+//! run that begins on a GPU compares a few members first ([`self_test`](self_test::self_test)).
 
 pub mod bounds;
 pub mod cases;

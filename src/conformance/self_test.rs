@@ -1,6 +1,6 @@
-//! A self-test by known answers: before a run begins on a device, a few members take two steps there and on the CPU.
+//! A self-test by known answers: before a run begins on a device, a few members make two steps there and on the CPU.
 //!
-//! What is tested is what the run will use: its kernel, its number of nodes, its slots. The bounds are those of the other
+//! It tests what the run will use: its kernel, its number of nodes, its slots. The bounds are those of the other
 //! comparisons.
 
 use super::{
@@ -17,16 +17,16 @@ use crate::{
 
 /// One for each law of [`members`]; with and without redistribution and pull.
 const MEMBERS: usize = 4;
-/// Steps of fixed length, or the time of so many.
+/// Fixed steps; adaptive runs cover the same time.
 const STEPS: u32 = 2;
 /// Tolerance of adaptive steps.
 const ADAPTIVE: f64 = 1e-3;
 
-/// Makes two steps with members of `n` nodes, or adaptive ones over the time of two, and compares what they leave with what
-/// `method` leaves on the CPU. The slots, which must be free, are free again afterwards.
+/// Makes two steps with members of `n` nodes, or adaptive ones over the same time, and compares the results with those
+/// of `method` on the CPU. The slots must be free, and are free again afterwards.
 ///
 /// # Errors
-/// [`Error::Device`] with the quantity, its error and its bound; what `backend` itself reports.
+/// [`Error::Device`] with the quantity, its error and its bound; errors of `backend`.
 pub fn self_test<T: Real>(
     backend: &mut dyn Backend,
     device: &str,

@@ -1,4 +1,4 @@
-//! What members leave on a device.
+//! The results of members on a device.
 
 use super::setup::{MAX_SWEEPS, blocks};
 use crate::{
@@ -16,7 +16,7 @@ use crate::{
     solver::Solver,
 };
 
-/// What a member leaves on the GPU.
+/// The result of a member on the GPU.
 #[derive(Clone, Debug)]
 pub struct Left {
     /// Its last accepted state.
@@ -40,7 +40,7 @@ pub fn on_gpu<T: Real>(
     on_gpu_by::<T>(adapter, variant, n, launches, budget)
 }
 
-/// The same by a kernel of choice.
+/// Like [`on_gpu`], with a given kernel.
 pub fn on_gpu_by<T: Real>(
     adapter: &gpu::Gpu,
     variant: Variant,

@@ -1,4 +1,4 @@
-//! What whole runs leave.
+//! The results of whole runs.
 
 use super::{
     device::{Left, on_gpu},
@@ -27,10 +27,10 @@ use crate::{
 /// Tolerance of adaptive steps in the comparison.
 const ADAPTIVE: f64 = 1e-3;
 
-/// Fixed steps of a member in whose time it is compared with adaptive ones.
+/// Fixed steps of a member that take as long as its adaptive run in the comparison.
 pub const ADAPTIVE_STEPS: u32 = 40;
 
-/// The curve after `steps` steps, in dispatches of `budget`.
+/// Compares the curves after `steps` steps, in dispatches of `budget`.
 pub fn runs<T: Real>(
     adapter: &gpu::Gpu,
     solver: Solver,
@@ -43,12 +43,12 @@ pub fn runs<T: Real>(
     ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
 }
 
-/// The curve after adaptive steps to the same time, in dispatches of `budget`.
+/// Compares the curves after adaptive steps to the same time, in dispatches of `budget`.
 ///
-/// What rounding changes in a step length is what it changes in the error estimate, relative to the tolerance; what a
-/// changed length changes in the curve is the tolerance times that. So rounding changes the curve no more than with fixed
-/// steps of the longest length taken, five of them a step, and the bounds are the same. Those of what lies inside the run
-/// are in [`PACE`].
+/// Rounding changes a step length by its change of the error estimate, relative to the tolerance; a changed length
+/// changes the curve by the tolerance times that. So rounding changes the curve no more than with fixed steps of the
+/// longest length taken, five of them per step, and the bounds are the same. Bounds of quantities inside the run are in
+/// [`PACE`].
 pub fn adaptive<T: Real>(
     adapter: &gpu::Gpu,
     solver: Solver,
@@ -60,7 +60,7 @@ pub fn adaptive<T: Real>(
     ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
 }
 
-/// Both sides of `launches` at their ends.
+/// Compares both sides of `launches` at their ends.
 fn ends_agree<T: Real>(
     adapter: &gpu::Gpu,
     solver: Solver,
@@ -73,7 +73,8 @@ fn ends_agree<T: Real>(
     compare_ends::<T>(adapter.is_hardware(), &method(solver), n, &launches, &ours)
 }
 
-/// What a device left of `launches`, within the bounds of hardware or of software, against the twin by `method`.
+/// Compares a device's results of `launches` with those of the twin by `method`, within the bounds for hardware or
+/// software.
 pub(in crate::conformance) fn compare_ends<T: Real>(
     hardware: bool,
     method: &Method,
@@ -97,13 +98,13 @@ pub(in crate::conformance) fn compare_ends<T: Real>(
         at.parameters.tau = at.parameters.tau.max(twin.longest);
         let scales = Scales::of(&at)?;
         let grown = growth(twin.left.counters.steps);
-        // 2B - A takes the roundings of both half steps twice and those of the whole one once.
+        // 2B - A contains the roundings of both half steps twice and those of the whole step once.
         let roundings = grown * if adaptive { 5.0 } else { 1.0 };
         let limit = |bound: &Bound, scale: f64| bound.factor(hardware) * T::EPSILON * scale * roundings;
         let (of_curve, rest) = rows.split_at_mut(quantities.len());
         let (of_decay, inside) = rest.split_at_mut(DECAY.len());
         curves_agree(of_curve, member, &quantities, &scales, limit, OnGpu(left), OnCpu(&twin.left));
-        // What a changed step length changes inside the run: nothing with fixed steps.
+        // The effect of a changed step length inside the run; none with fixed steps.
         let estimate = T::EPSILON * grown * scales.stiffness() / launch.parameters.adaptive;
         let change = if adaptive { estimate * twin.steepest } else { 0.0 };
         let factors = DECAY.map(|bound| bound.factor(hardware));
@@ -123,7 +124,7 @@ struct Twin {
     left: Left,
     /// Its longest step.
     longest: f64,
-    /// The most that one step took off the excess.
+    /// The largest decrease of the excess in one step.
     steepest: f64,
 }
 
@@ -142,7 +143,8 @@ fn twin<T: Real>(launch: &Run<f64>, method: &Method, n: usize) -> Result<Twin> {
     Ok(Twin { left, longest, steepest })
 }
 
-/// That both sides ended alike, after as many steps and with their events in the same ones; else what differs.
+/// Checks that both sides ended alike, after equally many steps and with their events in the same ones; else returns
+/// the difference.
 fn same_events(ours: &Left, theirs: &Left) -> Result<(), String> {
     let end = |Left { counters, report, .. }: &Left| {
         let Counters { status, steps, rejected, half_step, relax_step, fit_points, noted, .. } = *counters;
@@ -159,7 +161,7 @@ fn same_events(ours: &Left, theirs: &Left) -> Result<(), String> {
     }
 }
 
-/// The last curve and its report, see [`FIELDS`] and [`REPORT`]; `limit` is the bound at a scale.
+/// Compares the last curve and its report, see [`FIELDS`] and [`REPORT`]; `limit` is the bound at a scale.
 fn curves_agree(
     rows: &mut [ConformanceRow],
     member: usize,
@@ -186,7 +188,7 @@ fn between(state: &State<f64>) -> &Curve<f64> {
     &state.middle
 }
 
-/// What a member keeps of its way down, see [`DECAY`]; `rounding` is that of an excess.
+/// Compares the recorded decay of a member, see [`DECAY`]; `rounding` is that of an excess.
 fn decays_agree(
     rows: &mut [ConformanceRow],
     member: usize,
@@ -211,8 +213,8 @@ fn decays_agree(
     );
 }
 
-/// What a member's run leaves besides its end, see [`PACE`]. `rounding` is what rounding does relative to a scale,
-/// `estimate` what it does to a step length, relative to it.
+/// Compares what a member's run leaves in addition to its end, see [`PACE`]. `rounding` is the effect of rounding
+/// relative to a scale, `estimate` its relative effect on a step length.
 fn insides_agree(
     rows: &mut [ConformanceRow],
     member: usize,
@@ -225,7 +227,7 @@ fn insides_agree(
     let (OnGpu(ours), OnCpu(theirs)) = (ours, theirs);
     let [start, middle, reports, last, next, events] = rows else { panic!("{} rows of PACE", rows.len()) };
     let (a, b) = (&ours.report, &theirs.report);
-    // Of a quantity that changes by `change` in a step.
+    // The bound of a quantity that changes by `change` in a step.
     let inside = |scale: f64, change: f64| rounding * scale + estimate * change;
     let largest = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let bounds = FIELDS.map(|bound| scales.get(bound.scale));
@@ -247,14 +249,14 @@ fn insides_agree(
         }
     }
     let (a, b) = (&a.progress, &b.progress);
-    // The last step reaches the final time, so its length is off by what the ones before it were off together.
+    // The last step reaches the final time, so its length has the total error of those before it.
     let longest = scales.parameters.tau;
     last.add(member, longest, factors[3] * estimate * longest, OnGpu(&[a.taken]), OnCpu(&[b.taken]));
     next.add(member, b.next, factors[4] * estimate * b.next, OnGpu(&[a.next]), OnCpu(&[b.next]));
     let half = |p: &Progress<f64>| p.half_high + (p.half_low + p.half_fraction * p.half_length);
     let relaxed = |p: &Progress<f64>| p.relax_high + (p.relax_low + p.relax_fraction * p.relax_length);
     if theirs.counters.half_step != NEVER && theirs.counters.relax_step != NEVER {
-        // The rounding of an excess over the rate at which it falls, and what the place of a parabola inside its step does.
+        // The rounding of an excess over its rate of decay, and the effect of the parabola's place inside its step.
         let p = &scales.parameters;
         let rate = (p.half_at - p.relax_at) / (relaxed(b) - half(b));
         let bound = factors[5] * (rounding / rate + estimate * b.half_length.max(b.relax_length));
@@ -262,14 +264,14 @@ fn insides_agree(
     }
 }
 
-/// What of a report is compared, in the order of [`REPORT`].
+/// The compared values of a report, in the order of [`REPORT`].
 fn reported(report: &Report<f64>) -> Vec<f64> {
     let mut numbers = report.now.to_numbers();
     numbers.extend([report.progress.turning, report.progress.travel]);
     numbers
 }
 
-/// How roundings add up over steps: like a random walk, since the flow itself damps what they leave.
+/// The growth of roundings over steps: like a random walk, since the flow itself damps them.
 fn growth(steps: u32) -> f64 {
     f64::from(steps).sqrt()
 }

@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use crate::{conformance::bounds::Bound, number::Real, solver::Solver};
 
-/// What the kernel computed.
+/// A result of the kernel.
 pub(super) struct OnGpu<V>(pub(super) V);
-/// What its twin computed. A type of its own, so that one side cannot be passed twice.
+/// A result of its twin. A separate type, so that one side cannot be passed twice.
 pub(super) struct OnCpu<V>(pub(super) V);
 
 /// One line of the table: the worst case of a quantity over all members and nodes.
@@ -20,13 +20,13 @@ pub struct ConformanceRow {
     pub precision: &'static str,
     /// Nodes per member.
     pub n: usize,
-    /// Steps after which it was compared; of adaptive ones the most that a member took.
+    /// Steps before the comparison; with adaptive steps, the maximum over the members.
     pub steps: u32,
-    /// The steps were adaptive.
+    /// Whether the steps were adaptive.
     pub adaptive: bool,
     /// Natural scale where the error is worst.
     pub scale: f64,
-    /// The difference that takes the largest share of its bound.
+    /// The difference with the largest fraction of its bound.
     pub error: f64,
     /// The bound there, `k · ε · scale`.
     pub bound: f64,
@@ -35,7 +35,7 @@ pub struct ConformanceRow {
 }
 
 impl ConformanceRow {
-    /// Whether the error is within its bound; NaN is not, and neither is a row that compared nothing.
+    /// Returns whether the error is within its bound; false for NaN, and for a row that compared nothing.
     pub fn passes(&self) -> bool {
         self.error <= self.bound && self.bound.is_finite()
     }
@@ -45,7 +45,7 @@ impl ConformanceRow {
         self.bound == f64::INFINITY
     }
 
-    /// The error as a share of its bound.
+    /// Returns the error as a fraction of its bound.
     pub fn share(&self) -> f64 {
         if self.error == 0.0 { 0.0 } else { self.error / self.bound }
     }
@@ -65,7 +65,7 @@ impl ConformanceRow {
         }
     }
 
-    /// Takes a member into account; the larger share of the bound wins, and NaN wins always.
+    /// Adds a member; the larger fraction of the bound wins, and NaN always wins.
     pub(super) fn add(
         &mut self,
         member: usize,

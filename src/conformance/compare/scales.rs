@@ -24,7 +24,7 @@ impl Scales {
         Ok(Scales { curve: run.state.curve, parameters: run.parameters, work })
     }
 
-    /// How much a solve passes rounding on: the root of the largest weight.
+    /// The amplification of rounding by a solve: the root of the largest weight.
     pub(super) fn stiffness(&self) -> f64 {
         (self.get(NaturalScale::SolvedCurvature) / self.get(NaturalScale::Curvature)).max(1.0)
     }

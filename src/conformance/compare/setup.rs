@@ -1,4 +1,4 @@
-//! What both sides of a comparison are given.
+//! The inputs of both sides of a comparison.
 
 use crate::{
     error::{Error, Result},
@@ -7,10 +7,10 @@ use crate::{
     solver::{Blocks, Order, Solver},
 };
 
-/// Sweeps at most in these comparisons.
+/// Maximum number of sweeps in these comparisons.
 pub const MAX_SWEEPS: u32 = 200_000;
 
-/// Moves one node of one member on the GPU side by `by`, relative to the radius: the comparison must then fail.
+/// Moves one node of one member on the GPU side by `by`, relative to the radius; the comparison must then fail.
 #[derive(Clone, Copy, Debug)]
 pub struct Tamper {
     /// The member.
@@ -40,7 +40,7 @@ pub(super) fn blocks(n: usize) -> Result<Blocks> {
     Blocks::new(n).ok_or_else(|| Error::Failed(format!("n = {n}: a ring has at least 6 nodes")))
 }
 
-/// A workspace that keeps the systems, whatever the solver.
+/// Creates a workspace that stores the systems, whatever the solver.
 pub(super) fn traced_workspace<T: Real>(n: usize) -> Result<Workspace<T>> {
     Ok(Workspace { traced: true, ..Workspace::new(blocks(n)?) })
 }

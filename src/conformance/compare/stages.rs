@@ -1,4 +1,4 @@
-//! Everything that one step computes, stage by stage.
+//! Comparison of everything that one step computes, stage by stage.
 
 use super::{
     row::{ConformanceRow, OnCpu, OnGpu},
@@ -20,7 +20,7 @@ use crate::{
     solver::{Ring, Solver},
 };
 
-/// Everything that one step computes, stage by stage.
+/// Compares everything that one step computes, stage by stage.
 pub fn stages<T: Real>(
     adapter: &gpu::Gpu,
     solver: Solver,
