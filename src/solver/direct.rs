@@ -5,7 +5,7 @@
 //! a 2×2 system for `s`. The systems of the scheme are perturbations of `1 + (positive) D⁴`, for which
 //! elimination without pivoting is stable. O(n), no branch on the values.
 //!
-//! *Practice.* Equations are asked for one after another and never stored: what limits a step is memory traffic.
+//! *Practice.* Equations are requested one after another and never stored, since memory traffic limits a step.
 
 use super::{
     ring::Ring,
@@ -23,19 +23,19 @@ struct Eliminated<N, const F: usize> {
     border: [N; 2],
 }
 
-/// Where an elimination keeps its triangular factor: `n-2` rows.
+/// Storage for the triangular factor of an elimination: `n-2` rows.
 #[derive(Clone, Debug)]
 pub struct Factor<N, const F: usize>(Vec<Eliminated<N, F>>);
 
 impl<N: Number, const F: usize> Factor<N, F> {
-    /// Room for systems of `n` ≥ 6 equations, or none for `n` = 0.
+    /// Allocates room for systems of `n` ≥ 6 equations, or none for `n` = 0.
     pub fn new(n: usize) -> Self {
         let zero = N::default();
         Factor(vec![Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] }; n.saturating_sub(2)])
     }
 }
 
-/// Writes the solution of `equations` to `unknown`, one ring of n ≥ 6 nodes per right-hand side; says whether it is
+/// Writes the solution of `equations` to `unknown`, one ring of n ≥ 6 nodes per right-hand side. Returns whether it is
 /// finite.
 #[inline(always)]
 pub fn solve<N: Number, const F: usize>(
@@ -81,7 +81,7 @@ fn eliminate<N: Number, const F: usize>(
             last[i - core] = own;
             continue;
         }
-        // What a row has outside the core stands in its border columns: of the last two unknowns.
+        // Entries of a row outside the core, those of the last two unknowns, go into its border columns.
         let mut border = [zero; 2];
         if i < 2 {
             border = if i == 0 { [own.a, own.b] } else { [zero, own.a] };
@@ -113,7 +113,7 @@ fn eliminate<N: Number, const F: usize>(
 #[inline(always)]
 fn substitute_back<N: Number, const F: usize>(rows: &mut [Eliminated<N, F>]) {
     let core = rows.len();
-    // The entries e of the last row but one, and d and e of the last one, are zero.
+    // The entry e of the last row but one, and d and e of the last one, are zero.
     let (mut below1, mut below2) = (rows[core - 1], rows[core - 1]);
     for row in rows[..core - 1].iter_mut().rev() {
         for f in 0..F {
@@ -126,7 +126,7 @@ fn substitute_back<N: Number, const F: usize>(rows: &mut [Eliminated<N, F>]) {
     }
 }
 
-/// The last two unknowns for each right-hand side, from the last two equations with `z = g - border·s` put in.
+/// The last two unknowns for each right-hand side, from the last two equations with `z = g - border·s` substituted.
 #[inline(always)]
 fn border_unknowns<N: Number, const F: usize>(
     p: &Equation<N, F>,

@@ -1,11 +1,12 @@
 //! Gauss–Seidel sweeps to a residual, the paper's solver.
 //!
-//! *Theory.* The unknown is the increment over a step, started from a prediction ([`Start`](crate::scheme::start::Start)).
-//! A sweep replaces `u_i` by `u_i + ω_SOR·residual_i`; ω_SOR = 1 is Gauss–Seidel. The slow modes of a fourth-order
-//! operator hardly show in the residual: their eigenvalue is only q/τ. So the residual is scaled by τ/q, which bounds the error of just these modes, and the sweeps stop when
-//! `max (τ/q)|residual| ≤ tolerance · max|u|`, or when that error is below the rounding of the unknown itself, or
-//! when the residual is all rounding (f32 reaches that at a tolerance of about 16·ε·τ/h⁴).
-//! Stopping on the update instead stops hundreds of times too early.
+//! *Theory.* The unknown is the increment over a step, started from a prediction
+//! ([`Start`](crate::scheme::start::Start)). A sweep replaces `u_i` by `u_i + ω_SOR·residual_i`; ω_SOR = 1 is
+//! Gauss–Seidel. The slow modes of a fourth-order operator hardly show in the residual: their eigenvalue is only q/τ.
+//! The residual is therefore scaled by τ/q, which bounds the error of just these modes, and the sweeps stop when `max
+//! (τ/q)|residual| ≤ tolerance · max|u|`, or when that error is below the rounding of the unknown itself, or when the
+//! residual is all rounding (f32 reaches that at a tolerance of about 16·ε·τ/h⁴). Stopping on the update would stop
+//! hundreds of times too early.
 //!
 //! *Practice.* Coloured order gives the kernel its parallelism and needs the same number of sweeps as the
 //! lexicographic order of the paper. The sweeps themselves are in [`sweeps`](super::sweeps). Twin of
@@ -18,11 +19,11 @@ use super::{
 };
 use crate::number::{Mask, Number};
 
-/// Sweeps between two looks at the residual; a look costs about as much as a sweep.
+/// Sweeps between two checks of the residual; a check costs about as much as a sweep.
 pub const SWEEPS_PER_CHECK: u32 = 8;
 
-/// Sweeps `unknown` (one ring per right-hand side) until its residual is small, in the lanes that are `live`. Lanes that are
-/// done stay as they are.
+/// Sweeps `unknown` (one ring per right-hand side) until its residual is small, in the lanes that are `live`. Finished
+/// lanes stay unchanged.
 #[inline(always)]
 pub fn solve<N: Number, const F: usize>(
     system: &System<N, F>,
@@ -61,7 +62,7 @@ fn over_relaxation<N: Number>(size: N) -> N {
     (N::of(2.0) * (g / (N::of(1.0) + g))).max(N::of(1.0))
 }
 
-/// The ⅝ in the over-relaxation of its own choice.
+/// The ⅝ in the automatic over-relaxation.
 pub const AUTO_SCALE: f64 = 0.625;
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
-//! Periodic pentadiagonal systems on a ring of nodes: the rows, Gauss–Seidel sweeps, alone or in V-cycles, and a direct solve.
+//! Periodic pentadiagonal systems on a ring of nodes: rows, Gauss–Seidel sweeps, alone or in V-cycles, and a direct
+//! solve.
 //!
-//! A solver is a type that implements [`Solves`]. Its [`Facts`] are all that the rest of the program knows of it.
+//! A solver is a type that implements [`Solves`]. The rest of the program knows only its [`Facts`].
 
 pub mod direct;
 pub mod gauss_seidel;
@@ -23,7 +24,7 @@ use gauss_seidel::SWEEPS_PER_CHECK;
 use multigrid::{Discretisation, KERNEL_LEVELS, Levels, SWEEPS_PER_CYCLE};
 use sweeps::{Control, Swept};
 
-/// Which solver takes the periodic pentadiagonal systems.
+/// The solver of the periodic pentadiagonal systems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Solver {
@@ -58,7 +59,7 @@ macro_rules! by_solver {
 pub(crate) use by_solver;
 
 impl Solver {
-    /// All of them.
+    /// All solvers.
     pub const ALL: [Solver; 3] = [Solver::GaussSeidel, Solver::Multigrid, Solver::Direct];
 
     /// Their names, in the same order.
@@ -72,17 +73,17 @@ impl Solver {
         names
     };
 
-    /// What the rest of the program knows of it.
+    /// Returns what the rest of the program knows about it.
     pub const fn facts(self) -> &'static Facts {
         by_solver!(self, S => &<S as Solves>::FACTS)
     }
 
-    /// As in flags and files.
+    /// Returns the name used in flags and files.
     pub const fn name(self) -> &'static str {
         self.facts().name
     }
 
-    /// Whether it sweeps until a tolerance is met.
+    /// Returns whether it sweeps until a tolerance is met.
     pub const fn sweeps(self) -> bool {
         self.facts().sweeps
     }
@@ -90,14 +91,14 @@ impl Solver {
 
 /// A solver as a type.
 pub trait Solves: 'static {
-    /// What the rest of the program knows of it.
+    /// What the rest of the program knows about it.
     const FACTS: Facts;
 
-    /// What it computes with, besides the unknowns, for systems of `n` equations.
+    /// Allocates its memory, apart from the unknowns, for systems of `n` equations.
     fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F>;
 
-    /// Solves `system` for `unknown`, one ring for each right-hand side, in the lanes that are `live`; sweeps start from what
-    /// is there. Other lanes cost no sweeps and mean nothing afterwards.
+    /// Solves `system` for `unknown`, one ring per right-hand side, in the lanes that are `live`; sweeps start from the
+    /// values of `unknown`. Other lanes cost no sweeps and mean nothing afterwards.
     fn solve<N: Number, const F: usize>(
         system: &impl Discretisation<N, F>,
         unknown: [&mut Ring<N>; F],
@@ -108,52 +109,52 @@ pub trait Solves: 'static {
     ) -> Swept<N>;
 }
 
-/// What a solver is called, needs and does.
+/// The name, needs and properties of a solver.
 #[derive(Debug)]
 pub struct Facts {
-    /// As in flags and files.
+    /// Name used in flags and files.
     pub name: &'static str,
-    /// As in messages.
+    /// Name used in messages.
     pub title: &'static str,
     /// Whether it sweeps until a tolerance is met.
     pub sweeps: bool,
-    /// Whether it needs the more sweeps the longer a step is.
+    /// Whether it needs more sweeps for longer steps.
     pub slows_with_step: bool,
-    /// Sweeps of a solve at most, whatever is asked for.
+    /// Maximum number of sweeps per solve, whatever is requested.
     pub max_sweeps: u32,
-    /// Keys of the spec that mean nothing to it.
+    /// Keys of the spec that have no meaning for it.
     pub refuses: &'static [&'static str],
-    /// Why they do not.
+    /// Why they have none.
     pub refuses_because: &'static str,
     /// Numbers per node of its [`Memory`], both systems of a step together.
     pub numbers_per_node: usize,
-    /// What the kernel needs to know.
+    /// What the kernel needs to know about it.
     pub kernel: KernelFacts,
 }
 
-/// What the kernel needs to know of a solver.
+/// What the kernel needs to know about a solver.
 #[derive(Debug)]
 pub struct KernelFacts {
     /// Its files.
     pub files: &'static [ShaderPart],
     /// Whether a member that is one subgroup may exchange by shuffles.
     pub shuffles: bool,
-    /// Rows of four numbers that a block has in workgroup memory, where threads exchange by barriers.
+    /// Rows of four numbers per block in workgroup memory, where threads exchange by barriers.
     pub rows_per_block: usize,
-    /// Numbers that a ring of n nodes has there besides.
+    /// Further numbers there for a ring of n nodes.
     pub numbers: fn(usize) -> usize,
-    /// Sweeps between two looks at the residual.
+    /// Sweeps between two checks of the residual.
     pub sweeps_per_look: u32,
-    /// Iterations of loops between two looks.
+    /// Loop iterations between two checks.
     pub iterations_per_look: u32,
-    /// And before the first.
+    /// Loop iterations before the first check.
     pub iterations_per_solve: u32,
 }
 
-/// What solvers compute with: each has room in what it needs, and leaves the rest empty.
+/// The memory of solvers: each allocates what it needs, and leaves the rest empty.
 #[derive(Clone, Debug)]
 pub struct Memory<N, const F: usize> {
-    /// The rows, as sweeps take them.
+    /// The rows used by sweeps.
     pub system: System<N, F>,
     /// Triangular factor.
     pub factor: direct::Factor<N, F>,
@@ -162,12 +163,12 @@ pub struct Memory<N, const F: usize> {
 }
 
 impl<N: Number, const F: usize> Memory<N, F> {
-    /// None.
+    /// Allocates nothing.
     pub fn none() -> Self {
         Self::with([0; 3])
     }
 
-    /// What any solver needs for systems of `n` equations.
+    /// Allocates what any solver needs for systems of `n` equations.
     pub fn any(n: usize) -> Self {
         Self::with([n; 3])
     }
@@ -228,7 +229,8 @@ impl Solves for Cycles {
         title: "sweeps inside multigrid",
         sweeps: true,
         slows_with_step: false,
-        // A V-cycle of two sweeps halves the error at least, so a solve takes some 50 cycles; one of 500 never ends.
+        // A V-cycle of two sweeps at least halves the error, so a solve takes some 50 cycles; one of 500 would never
+        // end.
         max_sweeps: 1000,
         refuses: &["order", "sor"],
         refuses_because: "multigrid sweeps by colours and without over-relaxation",
@@ -247,9 +249,9 @@ impl Solves for Cycles {
             rows_per_block: 3,
             numbers: |n| 13 * multigrid::coarse_nodes(n) + 4 * KERNEL_LEVELS,
             sweeps_per_look: SWEEPS_PER_CYCLE,
-            // Over 11 levels at most of 4 colours.
+            // At most 11 levels of 4 colours.
             iterations_per_look: 300,
-            // Down to the inverse of a matrix of 5 rows.
+            // Includes the inversion of a matrix of 5 rows.
             iterations_per_solve: 300,
         },
     };

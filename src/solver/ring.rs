@@ -5,8 +5,8 @@
 //! node by its place in its block: any two nodes of one colour are then at least three apart, also across block
 //! borders. Every n ≥ 6 is 4a + 3b with b ≤ 3; n = 5 is not.
 //!
-//! *Practice.* [`Blocks`] is the one place that knows the cut; the kernel gives each thread one block
-//! (`shaders/ring.wgsl`). Sums are taken block by block there, and so they are here, in the same order.
+//! *Practice.* Only [`Blocks`] knows the cut; the kernel gives each thread one block (`shaders/ring.wgsl`). Both sum
+//! block by block, in the same order.
 
 use std::ops::{Index, IndexMut, Range};
 
@@ -29,18 +29,18 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// Cuts a ring of `n` nodes, or `None` if it is too small.
+    /// Cuts a ring of `n` nodes; returns `None` if it is too small.
     pub fn new(n: usize) -> Option<Blocks> {
         let threes = (4 - n % 4) % 4;
         (n >= MIN_POINTS).then(|| Blocks { n, fours: (n - 3 * threes) / 4, threes })
     }
 
-    /// Number of blocks: threads of the kernel.
+    /// Returns the number of blocks, which is the number of threads of the kernel.
     pub fn count(self) -> usize {
         self.fours + self.threes
     }
 
-    /// First node and number of nodes of each block.
+    /// Iterates over the first node and the number of nodes of each block.
     #[inline(always)]
     pub fn iter(self) -> impl Iterator<Item = (usize, usize)> {
         let after_fours = 4 * self.fours;
@@ -48,7 +48,8 @@ impl Blocks {
         fours.chain((0..self.threes).map(move |block| (after_fours + 3 * block, 3)))
     }
 
-    /// The nodes of `colour` (0…3), in the order of the blocks: every fourth of one range, every third of another.
+    /// Returns the nodes of `colour` (0…3), in the order of the blocks: every fourth of one range, every third of
+    /// another.
     #[inline(always)]
     pub fn of_colour(self, colour: usize) -> [(Range<usize>, usize); 2] {
         let after_fours = 4 * self.fours;
@@ -57,24 +58,24 @@ impl Blocks {
     }
 }
 
-/// `M` sums over a ring, node after node, taken within blocks first.
+/// `M` sums over a ring, node after node, within blocks first.
 pub struct Sums<N, const M: usize> {
     totals: [N; M],
     parts: [N; M],
     fours: usize,
-    /// Where the present block ends.
+    /// Where the current block ends.
     end: usize,
 }
 
 impl<N: Number, const M: usize> Sums<N, M> {
-    /// Sums of nothing, over a ring that is cut by `blocks`.
+    /// Starts empty sums over a ring cut by `blocks`.
     #[inline(always)]
     pub fn new(blocks: Blocks) -> Self {
         let zero = [N::of(0.0); M];
         Sums { totals: zero, parts: zero, fours: 4 * blocks.fours, end: if blocks.fours > 0 { 4 } else { 3 } }
     }
 
-    /// Adds the terms of node `i`, the one after the last.
+    /// Adds the terms of node `i`, which follows the last one.
     #[inline(always)]
     pub fn add(&mut self, i: usize, terms: [N; M]) {
         for m in 0..M {
@@ -89,7 +90,7 @@ impl<N: Number, const M: usize> Sums<N, M> {
         }
     }
 
-    /// The sums up to the last node added: of whole blocks, and of what came after them.
+    /// Returns the sums up to the last node added: of whole blocks, and of the nodes after them.
     #[inline(always)]
     pub fn so_far(&self) -> [N; M] {
         let mut sums = self.totals;
@@ -99,7 +100,7 @@ impl<N: Number, const M: usize> Sums<N, M> {
         sums
     }
 
-    /// The sums after the last node.
+    /// Returns the sums after the last node.
     #[inline(always)]
     pub fn totals(self) -> [N; M] {
         self.totals
@@ -115,12 +116,12 @@ pub struct Ring<N> {
 const GHOSTS: usize = 2;
 
 impl<N: Number> Ring<N> {
-    /// A field of zeros on `n` nodes.
+    /// Creates a field of zeros on `n` nodes.
     pub fn zeros(n: usize) -> Ring<N> {
         Ring { padded: vec![N::default(); n + 2 * GHOSTS] }
     }
 
-    /// A field from its `n` values.
+    /// Creates a field from its `n` values.
     pub fn from_nodes(values: impl IntoIterator<Item = N>) -> Ring<N> {
         let mut padded = vec![N::default(); GHOSTS];
         padded.extend(values);
@@ -130,13 +131,13 @@ impl<N: Number> Ring<N> {
         ring
     }
 
-    /// Nodes.
+    /// Returns the number of nodes.
     #[inline(always)]
     pub fn len(&self) -> usize {
         self.padded.len() - 2 * GHOSTS
     }
 
-    /// Whether it has no nodes.
+    /// Returns whether it has no nodes.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -147,20 +148,20 @@ impl<N: Number> Ring<N> {
         close(&mut self.padded);
     }
 
-    /// The values with two ghosts at either end: node i at i + 2.
+    /// Returns the values with two ghosts at either end: node i at i + 2.
     #[inline(always)]
     pub(super) fn padded_mut(&mut self) -> &mut [N] {
         &mut self.padded
     }
 
-    /// Values at `i-2, i-1, i, i+1, i+2`, periodic.
+    /// Returns the values at `i-2, i-1, i, i+1, i+2`, periodic.
     #[inline(always)]
     pub fn window(&self, i: usize) -> [N; 5] {
         let w = &self.padded[i..i + 5];
         [w[0], w[1], w[2], w[3], w[4]]
     }
 
-    /// The nodes without ghosts.
+    /// Returns the nodes without ghosts.
     pub fn nodes(&self) -> &[N] {
         &self.padded[GHOSTS..GHOSTS + self.len()]
     }

@@ -1,5 +1,5 @@
-//! Coloured Gauss–Seidel sweeps, and when they have done enough: what [`gauss_seidel`](super::gauss_seidel) and
-//! [`multigrid`](super::multigrid) share. Twin of `shaders/sweeps.wgsl`: same order, same arithmetic.
+//! Coloured Gauss–Seidel sweeps and their stopping criterion, shared by [`gauss_seidel`](super::gauss_seidel) and
+//! [`multigrid`](super::multigrid). Twin of `shaders/sweeps.wgsl`: same order, same arithmetic.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use crate::number::{BIG, Mask, Number};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
-    /// Colour by colour: what the kernel does.
+    /// Colour by colour, as the kernel does.
     Coloured,
     /// Node by node, as the paper does (CPU only).
     Lexicographic,
@@ -24,30 +24,30 @@ pub enum Order {
 /// When to stop, and how to sweep.
 #[derive(Clone, Copy, Debug)]
 pub struct Control<N> {
-    /// Bound of the scaled residual relative to the largest increment.
+    /// Bound on the scaled residual relative to the largest increment.
     pub tolerance: N,
     /// Absolute error that is not worth a sweep: a fraction of the rounding error of the unknown.
     pub negligible: N,
-    /// ω_SOR; 0 to have it chosen by the size of the system.
+    /// ω_SOR; 0 to choose it by the size of the system.
     pub sor: N,
-    /// Sweeps after which the solve gives up.
+    /// Maximum sweeps before the solve gives up.
     pub max_sweeps: u32,
     /// Order of a sweep.
     pub order: Order,
 }
 
-/// What a solve did.
+/// Result of a solve.
 #[derive(Clone, Copy, Debug)]
 pub struct Swept<N: Number> {
     /// Sweeps made, per lane.
     pub sweeps: N,
-    /// Where the residual reached its bound; false after the cap, or where the sweeps diverged.
+    /// Whether the residual reached its bound; false after the cap, or if the sweeps diverged.
     pub converged: N::Mask,
-    /// Where the system itself was finite; no sweep is made of one that is not.
+    /// Whether the system itself was finite; a system that is not is not swept.
     pub finite: N::Mask,
 }
 
-/// When the sweeps on a system have done enough.
+/// The stopping criterion for the sweeps on a system.
 pub(super) struct Target<N: Number> {
     /// See [`system_size`].
     pub size: N,
@@ -57,7 +57,7 @@ pub(super) struct Target<N: Number> {
     pub finite: N::Mask,
 }
 
-/// Largest scaled row sum; more than [`BIG`] where an entry or a right-hand side is not finite.
+/// Largest scaled row sum; more than [`BIG`] if an entry or a right-hand side is not finite.
 ///
 /// Times ε it is the tolerance below which a scaled residual is rounding error: no sweep, and no direct solve, gets
 /// further.
@@ -83,8 +83,8 @@ impl<N: Number> Target<N> {
         Target { size, tolerance, negligible: control.negligible, finite: size.le(N::of(BIG)) }
     }
 
-    /// Of `[error, increment]`, an error that is bounded by the scaled residual and the largest increment: whether the
-    /// error is small enough for it, and whether more sweeps may make it so.
+    /// Judges `[error, increment]`, a bound of the error by the scaled residual and the largest increment: whether the
+    /// error is small enough, and whether more sweeps may make it so.
     #[inline(always)]
     pub fn judge(&self, [error, increment]: [N; 2]) -> (N::Mask, N::Mask) {
         let solved = self.finite.and(error.le((self.tolerance * increment).max(self.negligible)));
@@ -92,7 +92,8 @@ impl<N: Number> Target<N> {
     }
 }
 
-/// `[max weight·|residual|, max |u|]` over nodes and right-hand sides; not finite shows as more than [`BIG`].
+/// `[max weight·|residual|, max |u|]` over nodes and right-hand sides; a value that is not finite shows as more than
+/// [`BIG`].
 #[inline(always)]
 pub(super) fn norms<N: Number, const F: usize>(system: &System<N, F>, unknown: &[&mut Ring<N>; F]) -> [N; 2] {
     let mut norms = [N::of(0.0); 2];
@@ -105,7 +106,7 @@ pub(super) fn norms<N: Number, const F: usize>(system: &System<N, F>, unknown: &
     norms
 }
 
-/// A sweep, colour by colour.
+/// Sweeps once, colour by colour.
 #[inline(always)]
 pub(super) fn coloured_sweep<N: Number, const F: usize>(
     system: &System<N, F>,
@@ -123,7 +124,7 @@ pub(super) fn coloured_sweep<N: Number, const F: usize>(
     }
 }
 
-/// A sweep node by node.
+/// Sweeps once, node by node.
 #[inline(always)]
 pub(super) fn lexicographic_sweep<N: Number, const F: usize>(
     system: &System<N, F>,
@@ -140,7 +141,7 @@ pub(super) fn lexicographic_sweep<N: Number, const F: usize>(
     relaxation.close();
 }
 
-/// What a sweep reads and writes, as slices: their places then stay in registers.
+/// The data of a sweep as slices, whose addresses then stay in registers.
 struct Relaxation<'a, N: Number, const F: usize> {
     rows: &'a [Row<N>],
     rhs: [&'a [N]; F],
@@ -156,7 +157,7 @@ impl<'a, N: Number, const F: usize> Relaxation<'a, N, F> {
             rhs[f] = &system.rhs[f][..];
             padded[f] = Some(ring.padded_mut());
         }
-        // Lanes that are done move by 0: a masked store is slow on many processors.
+        // Finished lanes move by 0: a masked store is slow on many processors.
         Relaxation { rows: &system.rows, rhs, padded, sor: N::select(active, sor, N::of(0.0)) }
     }
 

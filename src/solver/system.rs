@@ -1,4 +1,4 @@
-//! A periodic pentadiagonal system with `F` right-hand sides: one equation a node, and the rows that sweeps take.
+//! A periodic pentadiagonal system with `F` right-hand sides: one equation per node, and the rows used by sweeps.
 
 use super::ring::Ring;
 use crate::number::Number;
@@ -18,14 +18,14 @@ pub struct Equation<N, const F: usize> {
     pub e: N,
     /// Right-hand sides.
     pub rhs: [N; F],
-    /// τ/q, with `q` the length that stands in the diagonal entry as `q/τ`.
+    /// τ/q, with `q` the length that appears in the diagonal entry as `q/τ`.
     pub time_over_length: N,
 }
 
-/// Something that has the equations of a system. A trait, not a closure: its methods are compiled into the vector code
-/// that asks.
+/// A source of the equations of a system. A trait, not a closure, so that its methods are compiled into the calling
+/// vector code.
 pub trait Equations<N, const F: usize> {
-    /// Equation `i`.
+    /// Returns equation `i`.
     fn equation(&self, i: usize) -> Equation<N, F>;
 }
 
@@ -40,12 +40,12 @@ pub struct Row<N> {
     pub d: N,
     /// Coefficient of `u_{i+2}`.
     pub e: N,
-    /// Factor from the residual of this row to a bound of the error in slow modes: `(τ/q)·c`.
+    /// Factor from the residual of this row to a bound on the error in slow modes: `(τ/q)·c`.
     pub weight: N,
 }
 
 impl<N: Number, const F: usize> Equation<N, F> {
-    /// The row and the right-hand sides, divided by the diagonal entry.
+    /// Returns the row and the right-hand sides, divided by the diagonal entry.
     #[inline(always)]
     fn normalise(self) -> (Row<N>, [N; F]) {
         let Equation { a, b, c, d, e, mut rhs, time_over_length } = self;
@@ -78,7 +78,7 @@ pub struct System<N, const F: usize> {
 }
 
 impl<N: Number, const F: usize> System<N, F> {
-    /// A system of `n` rows, to be filled.
+    /// Creates a system of `n` rows, to be filled.
     pub fn zeros(n: usize) -> Self {
         System { rows: vec![Row::default(); n], rhs: std::array::from_fn(|_| vec![N::default(); n]) }
     }
@@ -95,14 +95,14 @@ impl<N: Number, const F: usize> System<N, F> {
         }
     }
 
-    /// Residual of row `i` for right-hand side `f`.
+    /// Returns the residual of row `i` for right-hand side `f`.
     #[inline(always)]
     pub fn residual(&self, f: usize, i: usize, u: &Ring<N>) -> N {
         self.rows[i].residual(self.rhs[f][i], u.window(i))
     }
 }
 
-/// The equations as they are stored, with a diagonal entry of 1.
+/// The equations as stored, with a diagonal entry of 1.
 impl<N: Number, const F: usize> Equations<N, F> for System<N, F> {
     #[inline(always)]
     fn equation(&self, i: usize) -> Equation<N, F> {

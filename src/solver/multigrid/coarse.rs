@@ -1,4 +1,4 @@
-//! The coarse systems: the equation discretised anew on every coarse ring. Twin of `shaders/coarse.wgsl`.
+//! The coarse systems: the equation rediscretised on every coarse ring. Twin of `shaders/coarse.wgsl`.
 
 use super::{
     levels::{is_odd, sizes},
@@ -12,16 +12,16 @@ use crate::{
     },
 };
 
-/// The equations of a discretised `ρu + ∂⁴u + p ∂²u + w ∂u`, which can be discretised anew on coarser rings.
+/// The equations of a discretised `ρu + ∂⁴u + p ∂²u + w ∂u`, which can be rediscretised on coarser rings.
 pub trait Discretisation<N: Number, const F: usize>: Equations<N, F> {
     /// Writes ρ, p, w and the mesh into the finest level.
     fn discretised(&self, levels: &mut Levels<N, F>);
 }
 
-/// What a system discretises: `ρu + ∂⁴u + p ∂²u + w ∂u`, with the mesh on which it does.
+/// The terms of `ρu + ∂⁴u + p ∂²u + w ∂u` that a system discretises, and its mesh.
 #[derive(Clone, Debug)]
 pub struct Terms<N> {
-    /// Distance from each node to the next one.
+    /// Distance from each node to the next.
     pub spacing: Ring<N>,
     /// Length of the cell of each node, over which its equation is integrated.
     pub cell: Ring<N>,
@@ -36,9 +36,9 @@ pub struct Terms<N> {
 /// The rings below a ring of given size.
 #[derive(Clone, Debug)]
 pub struct Levels<N, const F: usize> {
-    /// The finest level: to be filled before a solve.
+    /// The finest level; must be filled before a solve.
     pub terms: Terms<N>,
-    /// 1/τ: to be set before a solve.
+    /// 1/τ; must be set before a solve.
     pub rate: N,
     pub(super) transfer: Transfer<N, F>,
     pub(super) coarse: Vec<Level<N, F>>,
@@ -46,14 +46,14 @@ pub struct Levels<N, const F: usize> {
     pub(super) inverse: Vec<N>,
 }
 
-/// A coarse level and its way to the next one.
+/// A coarse level and its transfer to the next one.
 #[derive(Clone, Debug)]
 pub(super) struct Level<N, const F: usize> {
     pub(super) terms: Terms<N>,
     /// 1/spacing and 1/cell.
     reciprocal: [Ring<N>; 2],
     pub(super) system: System<N, F>,
-    /// From a residual integrated over the cell, times τ, to a right-hand side.
+    /// Factor from a residual integrated over the cell, times τ, to a right-hand side.
     pub(super) share: Vec<N>,
     pub(super) unknown: [Ring<N>; F],
     pub(super) transfer: Transfer<N, F>,
@@ -70,7 +70,7 @@ impl<N: Number> Terms<N> {
         self.spacing.len()
     }
 
-    /// Periodic values at the ends; call after filling.
+    /// Sets the periodic values at the ends; call after filling.
     #[inline(always)]
     pub fn close(&mut self) {
         let Terms { spacing, cell, mass, second, first } = self;
@@ -107,7 +107,7 @@ fn average<N: Number>(field: &Ring<N>, i: usize) -> N {
 }
 
 impl<N: Number, const F: usize> Levels<N, F> {
-    /// Room for the levels below a ring of `n` nodes.
+    /// Allocates the levels below a ring of `n` nodes.
     pub fn new(n: usize) -> Self {
         let coarsest = sizes(n).last().unwrap_or(0);
         Levels {
@@ -145,7 +145,7 @@ impl<N: Number, const F: usize> Level<N, F> {
         }
     }
 
-    /// The rows of the level from its terms.
+    /// Computes the rows of the level from its terms.
     #[inline(always)]
     fn discretise(&mut self, rate: N) {
         let Terms { spacing, cell, mass, second, first } = &self.terms;
@@ -167,18 +167,19 @@ impl<N: Number, const F: usize> Level<N, F> {
 
 /// The coefficient `p` of ∂² for a level with cells of this length.
 ///
-/// A circle may be moved about, since ∂⁴ and p∂² cancel where p is the square of a wave number. On a few nodes their
-/// differences do not: that of p∂² is the larger one, and a coarse system with a long step would be singular.
+/// A circle may be translated, since ∂⁴ and p∂² cancel where p is the square of a wave number. On a few nodes their
+/// differences do not cancel: that of p∂² is larger, and a coarse system with a long step would be singular.
 #[inline(always)]
 fn balanced<N: Number>(p: N, cell: N) -> N {
     p / (N::of(1.0) + N::of(BALANCE) * (p.max(N::of(0.0)) * (cell * cell)))
 }
 
-/// By how much p is damped on coarse levels: with 1/12 the two terms of a circle cancel to order 4, with 1/9 nothing
+/// The damping of p on coarse levels: with 1/12 the two terms of a circle cancel to order 4; with 1/9 nothing
 /// negative is left of a circle on 3 nodes or more.
 pub const BALANCE: f64 = 1.0 / 9.0;
 
-/// A row of a coarse level, integrated over its cell and divided by its diagonal entry, and one over that entry.
+/// Returns a row of a coarse level, integrated over its cell and divided by its diagonal entry, and the reciprocal of
+/// the entry.
 #[inline(always)]
 pub(super) fn row<N: Number>(
     [idmm, idm, id, idp, _]: [N; 5],
@@ -198,13 +199,14 @@ pub(super) fn row<N: Number>(
     (Row { a: a * inverse, b: b * inverse, d: d * inverse, e: e * inverse, weight: N::of(0.0) }, inverse)
 }
 
-/// The inverse of the periodic pentadiagonal matrix of at most [`COARSEST`](super::COARSEST) `rows`, by Gauss and Jordan, row by row.
+/// Inverts the periodic pentadiagonal matrix of at most [`COARSEST`](super::COARSEST) `rows` by Gauss–Jordan
+/// elimination, row by row.
 #[inline(always)]
 fn invert_matrix<N: Number>(rows: &[Row<N>], inverse: &mut [N]) {
     let n = rows.len();
     inverse.fill(N::of(0.0));
     for (j, row) in rows.iter().enumerate() {
-        // On so few nodes neighbours on either side may be the same one.
+        // On so few nodes, neighbours on either side may coincide.
         for (o, entry) in [row.a, row.b, N::of(1.0), row.d, row.e].into_iter().enumerate() {
             inverse[n * j + (j + n + o - 2) % n] += entry;
         }

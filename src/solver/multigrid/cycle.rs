@@ -15,7 +15,7 @@ use crate::{
 pub const COARSE_SWEEPS: u32 = 4;
 
 impl<N: Number, const F: usize> Levels<N, F> {
-    /// Notes the residual of the finest level; returns `[max weight·|residual|, max |u|]`.
+    /// Stores the residual of the finest level; returns `[max weight·|residual|, max |u|]`.
     #[inline(always)]
     pub(super) fn residual(&mut self, system: &System<N, F>, unknown: &[&mut Ring<N>; F]) -> [N; 2] {
         let mut norms = [N::of(0.0); 2];
@@ -61,7 +61,7 @@ impl<N: Number, const F: usize> Levels<N, F> {
 }
 
 impl<N: Number, const F: usize> Level<N, F> {
-    /// Solves the coarsest system by the inverse of its matrix.
+    /// Solves the coarsest system with the inverse of its matrix.
     #[inline(always)]
     fn solve_coarsest(&mut self, inverse: &[N]) {
         let n = self.share.len();

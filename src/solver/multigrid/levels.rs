@@ -1,24 +1,24 @@
-//! The rings of multigrid: how many there are, and of which sizes. Twin of `shaders/levels.wgsl`, where their arrays are.
+//! The rings of multigrid: their number and sizes. Twin of `shaders/levels.wgsl`, where their arrays are.
 
 use crate::solver::ring::MIN_POINTS;
 
-/// Nodes of the coarsest ring at most; fewer than can be swept colour by colour.
+/// Maximum nodes of the coarsest ring; fewer than can be swept colour by colour.
 pub const COARSEST: usize = MIN_POINTS - 1;
 
-/// Levels in the kernel at most.
+/// Maximum number of levels in the kernel.
 pub const KERNEL_LEVELS: usize = 8;
 
-/// Sizes of the rings below one of `n` nodes, the finest first.
+/// Sizes of the rings below one of `n` nodes, finest first.
 pub(super) fn sizes(n: usize) -> impl Iterator<Item = usize> {
     std::iter::successors(Some(n / 2), |m| (*m > COARSEST).then_some(m / 2))
 }
 
-/// Nodes of all rings below one of `n` nodes.
+/// Returns the number of nodes of all rings below one of `n` nodes.
 pub fn coarse_nodes(n: usize) -> usize {
     sizes(n).sum()
 }
 
-/// Whether a ring of `n` nodes has two nodes between its last coarse node and its first one.
+/// Returns whether a ring of `n` nodes has two nodes between its last coarse node and its first one.
 #[inline(always)]
 pub(super) fn is_odd(n: usize) -> bool {
     n % 2 == 1

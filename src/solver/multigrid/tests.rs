@@ -5,10 +5,10 @@ use crate::solver::{Order, direct, system::Row};
 const SIZES: [usize; 21] = [6, 7, 8, 9, 10, 11, 12, 13, 23, 96, 99, 100, 101, 102, 103, 104, 127, 128, 255, 256, 512];
 /// Longest τ; a circle of this size relaxes in 1/12.
 const LONGEST: f64 = 1.0;
-/// τ/h⁴, where τ is not longer than that.
+/// τ/h⁴, unless τ would be longer than `LONGEST`.
 const STIFFNESSES: [f64; 6] = [0.06, 6.0, 60.0, 600.0, 6e4, 6e6];
 
-/// A mesh: how far its spacings jump from node to node, and the ratio between its widest and its narrowest part.
+/// A mesh: the jump of its spacings from node to node, and the ratio of its widest to its narrowest part.
 #[derive(Clone, Copy, Debug)]
 struct Mesh {
     jitter: f64,
@@ -18,7 +18,7 @@ struct Mesh {
 const MESHES: [Mesh; 3] =
     [Mesh { jitter: 0.0, ratio: 1.0 }, Mesh { jitter: 0.3, ratio: 1.0 }, Mesh { jitter: 0.05, ratio: 10.0 }];
 
-/// `u/τ + ∂⁴u + p ∂²u + w ∂u` on a ring of length 2π, with p and w like those of a curve near the unit circle.
+/// `u/τ + ∂⁴u + p ∂²u + w ∂u` on a ring of length 2π, with p and w similar to those of a curve near the unit circle.
 fn problem(n: usize, stiffness: f64, mesh: Mesh) -> (System<f64, 2>, Levels<f64, 2>) {
     let angle = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
     let noise = |i: usize| (12.9898 * i as f64 + 0.3).sin() * 43758.5453 % 1.0;
@@ -54,7 +54,7 @@ fn control(tolerance: f64, max_sweeps: u32) -> Control<f64> {
     Control { tolerance, negligible: 0.0, sor: 1.0, max_sweeps, order: Order::Coloured }
 }
 
-/// The solution after a solve from zero, and what the solve did.
+/// The solution after a solve from zero, and the result of the solve.
 fn solved(system: &System<f64, 2>, levels: &mut Levels<f64, 2>, control: Control<f64>) -> ([Ring<f64>; 2], Swept<f64>) {
     let n = system.rows.len();
     let mut unknown = [Ring::zeros(n), Ring::zeros(n)];
@@ -62,7 +62,7 @@ fn solved(system: &System<f64, 2>, levels: &mut Levels<f64, 2>, control: Control
     (unknown, swept)
 }
 
-/// Largest error against the direct solution, as a share of that.
+/// Largest error relative to the direct solution.
 fn error(system: &System<f64, 2>, unknown: &[Ring<f64>; 2]) -> f64 {
     let n = system.rows.len();
     let mut exact = [Ring::zeros(n), Ring::zeros(n)];

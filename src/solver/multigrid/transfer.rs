@@ -1,18 +1,18 @@
-//! From a ring to the next coarser one and back: residuals down, corrections up. Twin of `shaders/transfer.wgsl`.
+//! Transfer between a ring and the next coarser one: residuals down, corrections up. Twin of `shaders/transfer.wgsl`.
 
 use super::levels::is_odd;
 use crate::{number::Number, solver::ring::Ring};
 
-/// From a ring to the next coarser one and back.
+/// Transfer between a ring and the next coarser one.
 #[derive(Clone, Debug)]
 pub(super) struct Transfer<N, const F: usize> {
     /// Residuals integrated over cells.
     pub(super) residual: [Ring<N>; F],
-    /// Those of the nodes between coarse nodes j and j+1.
+    /// Residuals of the nodes between coarse nodes j and j+1.
     between: Ring<N>,
     /// Weights of coarse nodes j-1, j, j+1 and j+2 at the node between j and j+1.
     pub(super) weights: [Ring<N>; 4],
-    /// The same for the last node of an odd ring, which is the second one after the last coarse node.
+    /// Weights for the last node of an odd ring, the second after the last coarse node.
     pub(super) odd: [N; 4],
 }
 
@@ -26,7 +26,7 @@ impl<N: Number, const F: usize> Transfer<N, F> {
         }
     }
 
-    /// The weights for a ring with these spacings.
+    /// Computes the weights for a ring with these spacings.
     #[inline(always)]
     pub(super) fn weigh(&mut self, spacing: &Ring<N>, coarse: &Ring<N>) {
         let (n, m) = (spacing.len(), coarse.len());
@@ -44,7 +44,7 @@ impl<N: Number, const F: usize> Transfer<N, F> {
         }
     }
 
-    /// Residuals of the coarser ring, integrated over its cells.
+    /// Computes the residuals of the coarser ring, integrated over its cells.
     #[inline(always)]
     pub(super) fn restrict_residuals(&mut self, f: usize, coarse: &mut Ring<N>) {
         let (fine, m) = (&self.residual[f], coarse.len());
@@ -68,7 +68,7 @@ impl<N: Number, const F: usize> Transfer<N, F> {
         coarse.close();
     }
 
-    /// Puts the values of `coarse` at all nodes of the finer ring into `fine`, or adds this many times as much.
+    /// Puts the values of `coarse` at all nodes of the finer ring into `fine`, or adds them times `added`.
     #[inline(always)]
     pub(super) fn interpolate(&self, coarse: &Ring<N>, fine: &mut Ring<N>, added: Option<N>) {
         let m = coarse.len();
@@ -85,7 +85,7 @@ impl<N: Number, const F: usize> Transfer<N, F> {
     }
 }
 
-/// Replaces `old`, or adds this many times `value` to it.
+/// Replaces `old`, or adds `added` times `value` to it.
 #[inline(always)]
 fn put<N: Number>(old: &mut N, value: N, added: Option<N>) {
     *old = match added {
