@@ -31,7 +31,7 @@ pub enum Flow {
 const NAMES: [&str; 4] = ["surface-diffusion", "willmore", "elastic", "poly"];
 
 impl Flow {
-    /// Coefficients `c₁ … c_8` of `b(k)`.
+    /// Returns the coefficients `c₁ … c_8` of `b(k)`.
     pub fn coefficients(&self) -> [f64; MAX_DEGREE] {
         let mut c = [0.0; MAX_DEGREE];
         match self {
@@ -46,12 +46,12 @@ impl Flow {
         c
     }
 
-    /// Length penalty λ of the energy `∮(½k² + λ) ds` that the program reports; 0 unless the flow is elastic.
+    /// Returns the length penalty λ of the reported energy `∮(½k² + λ) ds`; 0 unless the flow is elastic.
     pub fn length_penalty(&self) -> f64 {
         if let Flow::Elastic(lambda) = self { *lambda } else { 0.0 }
     }
 
-    /// `b(k)`.
+    /// Evaluates `b(k)`.
     pub fn b(&self, k: f64) -> f64 {
         self.coefficients().iter().rev().fold(0.0, |sum, c| (sum + c) * k)
     }
@@ -67,20 +67,20 @@ impl Flow {
 }
 
 impl Flow {
-    /// Where a nearly round curve of area `area` grows so that its excess falls as a power of `growth + t`: that time.
-    /// For Willmore flow, whose circles have `R⁴ = R₀⁴ + 2t`.
+    /// Returns the time `growth` if a nearly round curve of area `area` grows so that its excess falls as a power of
+    /// `growth + t`. Applies to Willmore flow, whose circles have `R⁴ = R₀⁴ + 2t`.
     pub fn growth(&self, area: f64) -> Option<f64> {
         (*self == Flow::Willmore).then(|| 0.5 * (area / PI).powi(2))
     }
 
     /// Rate at which the excess of a nearly round curve of area `area` falls in mode `m`, by linear theory, in 1/time:
-    /// `24/R⁴` for m = 2 and surface diffusion; for Willmore flow the exponent of `1 + 2t/R₀⁴`. None where circles are
+    /// `24/R⁴` for m = 2 and surface diffusion; for Willmore flow the exponent of `1 + 2t/R₀⁴`. `None` if circles are
     /// not at rest and no such law is known.
     pub fn excess_rate(&self, m: u32, area: f64) -> Option<f64> {
         let radius = (area.abs() / PI).sqrt();
         match self {
             Flow::SurfaceDiffusion => Some(2.0 * self.linear_rate(m, radius)),
-            // The excess goes with the square of the mode's amplitude over the radius, both powers of R₀⁴ + 2t.
+            // The excess scales as the square of the mode's amplitude over the radius; both are powers of R₀⁴ + 2t.
             Flow::Willmore => Some(self.linear_rate(m, 1.0) + 0.5),
             Flow::Elastic(lambda) if *lambda > 0.0 => Some(2.0 * self.linear_rate(m, (2.0 * lambda).sqrt().recip())),
             _ => None,
@@ -141,7 +141,7 @@ impl FromStr for Flow {
     }
 }
 
-/// Comma-separated finite numbers.
+/// Parses comma-separated finite numbers.
 pub(crate) fn parse_numbers(list: &str) -> Result<Vec<f64>, String> {
     list.split(',')
         .map(|word| match word.trim().parse::<f64>() {

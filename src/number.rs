@@ -1,9 +1,9 @@
 //! The number that the scheme is generic over: `f64` is the reference, `f32` mirrors the kernel, lanes are several of
 //! either side by side.
 //!
-//! [`Number`] asks only for what SIMD lanes can give: arithmetic, and comparisons that return masks instead of steering
-//! branches. [`Real`] is a single number. Rust never contracts `a*b + c`, so every expression rounds as written, in
-//! every lane and on every machine.
+//! [`Number`] requires only what SIMD lanes can provide: arithmetic, and comparisons that return masks instead of
+//! steering branches. [`Real`] is a single number. Rust never contracts `a*b + c`, so every expression rounds as
+//! written, in every lane and on every machine.
 
 use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
@@ -12,14 +12,14 @@ mod lanes;
 
 pub(crate) use lanes::{Element, Instructions, WithLanes, with_lanes};
 
-/// Values above this bound count as not finite; far below the overflow of `f32`, so that squares survive.
+/// Values above this bound count as not finite; far below the overflow of `f32`, so that squares do not overflow.
 pub const BIG: f64 = 1e18;
 
 /// The outcome of a comparison: one truth value per lane.
 pub trait Mask: Copy {
-    /// Every lane holds `value`.
+    /// Returns a mask with `value` in every lane.
     fn all_of(value: bool) -> Self;
-    /// True in at least one lane.
+    /// Returns whether it holds in at least one lane.
     fn any(self) -> bool;
     /// Lane-wise and.
     fn and(self, other: Self) -> Self;
@@ -27,12 +27,12 @@ pub trait Mask: Copy {
     fn or(self, other: Self) -> Self;
     /// Lane-wise negation.
     fn not(self) -> Self;
-    /// The value of one lane.
+    /// Returns the value of one lane.
     fn lane(self, lane: usize) -> bool;
     /// Sets one lane.
     fn set_lane(&mut self, lane: usize, value: bool);
 
-    /// True in every lane.
+    /// Returns whether it holds in every lane.
     #[inline(always)]
     fn all(self) -> bool {
         !self.not().any()
@@ -88,16 +88,16 @@ pub trait Number:
     type Real: Real;
     /// Result of a comparison.
     type Mask: Mask;
-    /// How many numbers stand side by side.
+    /// How many numbers are side by side.
     const LANES: usize;
     /// Machine epsilon.
     const EPSILON: f64;
-    /// 1.5 times the number from which on there are no fractions.
+    /// 1.5 times the smallest number above which there are no fractions.
     const WHOLE: f64;
 
-    /// The number nearest to `value`, in every lane.
+    /// Returns the number nearest to `value`, in every lane.
     fn of(value: f64) -> Self;
-    /// The number in one lane.
+    /// Returns the number in one lane.
     fn lane(&self, lane: usize) -> Self::Real;
     /// Sets one lane.
     fn set_lane(&mut self, lane: usize, value: Self::Real);
@@ -105,19 +105,19 @@ pub trait Number:
     fn sqrt(self) -> Self;
     /// Absolute value.
     fn abs(self) -> Self;
-    /// The larger one; arguments must not be NaN.
+    /// The larger of two; arguments must not be NaN.
     fn max(self, other: Self) -> Self;
-    /// The smaller one; arguments must not be NaN.
+    /// The smaller of two; arguments must not be NaN.
     fn min(self, other: Self) -> Self;
     /// `2^self` for an integral `self` in [-126, 127].
     fn exp2_integral(self) -> Self;
-    /// `self <= other`; false where either is NaN.
+    /// `self <= other`; false if either is NaN.
     fn le(self, other: Self) -> Self::Mask;
     /// `yes` where the mask holds, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
-    /// Largest integer not above, for numbers below 2²¹ in size. No instruction of SSE2 rounds, and a call would cost more
-    /// than the exponential that asks.
+    /// Rounds down, for numbers below 2²¹ in size. SSE2 has no rounding instruction, and a call would cost more than
+    /// the exponential that needs it.
     #[inline(always)]
     fn small_floor(self) -> Self {
         let whole = Self::of(Self::WHOLE);
@@ -131,7 +131,7 @@ pub trait Number:
         Self::of(1.0) / self
     }
 
-    /// `|self|`, or 2·[`BIG`] where that is NaN or above [`BIG`]: safe to take maxima of.
+    /// `|self|`, or 2·[`BIG`] if that is NaN or above [`BIG`], so that maxima can be taken safely.
     #[inline(always)]
     fn bounded_abs(self) -> Self {
         let size = self.abs();
@@ -140,8 +140,8 @@ pub trait Number:
 
     /// `e^self` to 2 ulp for |self| ≤ 40, clamped beyond: reduction by ln 2, then a Horner polynomial.
     ///
-    /// Written out because WGSL has no `exp` for `f64`; `shaders/number.wgsl` has the same steps. Not called `exp`, since
-    /// that of `f64` itself would be called instead.
+    /// Written out because WGSL has no `exp` for `f64`; `shaders/number.wgsl` has the same steps. Not named `exp`,
+    /// since the inherent method of `f64` would be called instead.
     #[inline(always)]
     fn exponential(self) -> Self {
         let x = self.max(Self::of(-40.0)).min(Self::of(40.0));
@@ -154,7 +154,7 @@ pub trait Number:
         sum * n.exp2_integral()
     }
 
-    /// `2 sin(θ/2)` of the angle θ with `tan(θ/2) = self`.
+    /// `2 sin(θ/2)` for the angle θ with `tan(θ/2) = self`.
     #[inline(always)]
     fn twice_sin_atan(self) -> Self {
         let t = self.max(Self::of(-STEEPEST)).min(Self::of(STEEPEST));
@@ -162,7 +162,7 @@ pub trait Number:
     }
 }
 
-/// A tangent of half an angle that is as good as infinite, and whose square is finite in `f32`.
+/// Tangent of half an angle that is practically infinite, and whose square is finite in `f32`.
 const STEEPEST: f64 = 1e9;
 /// The leading nine bits of ln 2: `n · LN2_HIGH` is exact in `f32` and `f64` for |n| ≤ 64.
 const LN2_HIGH: f64 = 0.693359375;
@@ -192,11 +192,11 @@ pub trait Real:
 {
     /// Its name in WGSL.
     const NAME: &'static str;
-    /// Which of the two it is.
+    /// Which precision it is.
     const PRECISION: Precision;
     /// Exact conversion.
     fn to_f64(self) -> f64;
-    /// Largest integer not above.
+    /// Rounds down to an integer.
     fn floor(self) -> Self;
 }
 
@@ -211,7 +211,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Machine epsilon.
+    /// Returns the machine epsilon.
     pub fn epsilon(self) -> f64 {
         match self {
             Precision::F32 => f32::EPSILON.into(),
@@ -219,7 +219,7 @@ impl Precision {
         }
     }
 
-    /// Tolerance of the sweeps where none is asked for.
+    /// Returns the default tolerance of the sweeps.
     pub fn tolerance(self) -> f64 {
         match self {
             Precision::F32 => 1e-3,

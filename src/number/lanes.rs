@@ -1,8 +1,8 @@
-//! Numbers side by side in the registers of vector instructions: one lane a member.
+//! Numbers side by side in the registers of vector instructions: one lane per member.
 //!
 //! The instructions are [`pulp`]'s, each behind a token that proves that the processor has them. An expression such as
-//! `a + b` has nowhere to carry a token, so the type of the numbers stands for it: nobody else can name [`Lanes`], and
-//! [`with_lanes`] hands them on in exchange for a token.
+//! `a + b` cannot carry a token, so the type of the numbers stands for it: no other module can name [`Lanes`], and
+//! [`with_lanes`] provides them in exchange for a token.
 
 use std::{
     marker::PhantomData,
@@ -14,20 +14,20 @@ use pulp::Simd;
 
 use super::{Mask, Number, Real};
 
-/// Vector instructions whose token can be had anywhere.
+/// Vector instructions whose token is available anywhere.
 pub(crate) trait Instructions: Simd {
-    /// As wide as a register and aligned like that: loads of a number that lies across two lines of the cache take twice
-    /// the time, and padding would take twice the cache.
+    /// As wide as a register and aligned to it: loads that cross a cache line take twice the time, and padding would
+    /// take twice the cache.
     type Aligned: Copy + Send + Sync;
-    /// The token. Only here, see [`Here`].
+    /// Returns the token. For use in this file only, see [`Here`].
     fn token(here: Here) -> Self;
 }
 
-/// What nobody but this file can make: the operations of [`Lanes`] show it to take a token.
+/// Can be created in this file only: the operations of [`Lanes`] pass it to get a token.
 #[derive(Clone, Copy)]
 pub(crate) struct Here(());
 
-/// To be used in the operations of [`Lanes`] and [`LaneMask`] alone: the proof of [`Instructions::token`] rests on it.
+/// For use in the operations of [`Lanes`] and [`LaneMask`] only: the proof of [`Instructions::token`] rests on this.
 const HERE: Here = Here(());
 
 macro_rules! instructions {
@@ -44,14 +44,15 @@ macro_rules! instructions {
                 #[allow(unsafe_code)]
                 fn token(_: Here) -> Self {
                     debug_assert!(<$type>::is_available());
-                    // SAFETY: the function asks for nothing but that the processor has the instructions.
-                    // 1. Whoever calls it has a `Here`. Its field is private, and this file makes one, `HERE`, used in the
-                    //    operations of `Lanes<S, ..>` and `LaneMask<S, ..>` for `S::token` alone.
-                    // 2. These two types are private. Other code gets them as the type parameter of `WithLanes::call` only,
-                    //    or as its `Number::Mask`; and the one who calls that, `with_lanes`, was given a value of type `S`.
-                    // 3. A value of type `S` is a proof of the same thing: pulp makes one in `try_new`, which asks the
-                    //    processor, and in functions that are unsafe, which this crate denies but here.
-                    // 4. The answer holds for the whole process and until its end, so the value need not be kept: an
+                    // SAFETY: the function only requires that the processor has the instructions.
+                    // 1. Any caller has a `Here`. Its field is private, and this file creates a single one, `HERE`,
+                    //    used in the operations of `Lanes<S, ..>` and `LaneMask<S, ..>` for `S::token` only.
+                    // 2. These two types are private. Other code gets them only as the type parameter of
+                    //    `WithLanes::call`, or as its `Number::Mask`; and its caller, `with_lanes`, was given a value
+                    //    of type `S`.
+                    // 3. A value of type `S` proves the same: pulp creates one in `try_new`, which checks the
+                    //    processor, and in unsafe functions, which this crate denies everywhere else.
+                    // 4. This holds for the whole process until its end, so the value need not be stored: an
                     //    operation in another thread, or in a destructor, still comes after it.
                     unsafe { <$type>::new_unchecked() }
                 }
@@ -107,7 +108,8 @@ macro_rules! element {
             fn le(simd: S, a: S::$register, b: S::$register) -> S::$mask {
                 simd.$le(a, b)
             }
-            // The next three are pulp's for whole numbers: those for floating-point ones are not compiled into their caller.
+            // The next three use pulp's operations for integers: those for floating-point numbers are not inlined into
+            // their caller.
             #[inline(always)]
             fn neg(simd: S, a: S::$register) -> S::$register {
                 cast(simd.$bits_xor(cast(a), simd.$bits_splat((-0.0 as $real).to_bits())))
@@ -151,30 +153,30 @@ element!(f32, f32s, m32s, F32_LANES, splat_f32s, first_true_m32s,
     add_f32s sub_f32s mul_f32s div_f32s max_f32s min_f32s, sqrt_f32s,
     splat_u32s xor_u32s and_u32s select_u32s, less_than_or_equal_f32s, and_m32s or_m32s not_m32s);
 
-/// What is done with numbers of a type that can be had only where its instructions are.
+/// Work on numbers of a type that exists only where its instructions do.
 pub(crate) trait WithLanes<T: Real> {
-    /// What comes out.
+    /// The result.
     type Output;
-    /// Does it.
+    /// Runs the work.
     fn call<N: Number<Real = T>>(self) -> Self::Output;
 }
 
-/// Calls `work` with the numbers in `R` registers of the instructions `S`, which the token proves to be there.
+/// Calls `work` with the numbers in `R` registers of the instructions `S`, whose presence the token proves.
 pub(crate) fn with_lanes<S: Instructions, T: Element<S>, const R: usize, W: WithLanes<T>>(_: S, work: W) -> W::Output {
     work.call::<Lanes<S, T, R>>()
 }
 
-/// The numbers in `R` registers of the instructions `S`: where `R` is above 1, one is computed while the other waits.
+/// The numbers in `R` registers of the instructions `S`; if `R` is above 1, one is computed while another waits.
 #[derive(Clone, Copy)]
 #[repr(C)]
 struct Lanes<S: Instructions, T: Element<S>, const R: usize>([T::Register; R], [S::Aligned; 0], PhantomData<S>);
 
-/// One truth value a lane.
+/// One truth value per lane.
 #[derive(Clone, Copy)]
 struct LaneMask<S: Simd, T: Element<S>, const R: usize>([T::Truth; R], PhantomData<(S, T)>);
 
-/// `$result` of every register `$r`, in an array that starts as `$start`. A loop: a closure need not be compiled with the
-/// instructions of its caller.
+/// `$result` of every register `$r`, in an array that starts as `$start`. A loop, since a closure need not be compiled
+/// with the instructions of its caller.
 macro_rules! each {
     ($start:expr, $r:ident => $result:expr) => {{
         let mut all = $start;
@@ -186,7 +188,7 @@ macro_rules! each {
 }
 
 impl<S: Instructions, T: Element<S>, const R: usize> LaneMask<S, T, R> {
-    /// 1 where it holds, 0 elsewhere.
+    /// 1 where the mask holds, 0 elsewhere.
     #[inline(always)]
     fn to_numbers(self) -> Lanes<S, T, R> {
         Lanes::select(self, Lanes::of(1.0), Lanes::of(0.0))
@@ -333,7 +335,7 @@ impl<S: Instructions, T: Element<S>, const R: usize> Number for Lanes<S, T, R> {
 mod tests {
     use super::*;
 
-    /// Numbers at which operations differ, more than any registers hold.
+    /// Numbers at which operations differ; more than any register holds.
     const VALUES: [f64; 19] = [
         0.0,
         -0.0,
@@ -356,7 +358,7 @@ mod tests {
         65_536.5,
     ];
 
-    /// Every operation in every lane against that of one number.
+    /// Compares every operation in every lane with that of a single number.
     struct EveryOperation;
 
     impl<T: Real> WithLanes<T> for EveryOperation {
@@ -395,7 +397,7 @@ mod tests {
                     same("sqrt", a.sqrt(), x.sqrt());
                     same("of", N::of(0.1), T::of(0.1));
                     same("select", N::select(below, a, b), if x <= y { x } else { y });
-                    // Neither takes NaN, nor tells zeros apart.
+                    // Neither accepts NaN, nor distinguishes zeros.
                     if x <= y || y <= x {
                         assert!(a.max(b).lane(lane) == Number::max(x, y) && a.min(b).lane(lane) == Number::min(x, y));
                     }
@@ -444,7 +446,7 @@ mod tests {
         assert!(compared[0] >= 18 * VALUES.len(), "no vector instructions here: {compared:?}");
     }
 
-    /// The first step of the proof of `token`: the compiler sees to the others.
+    /// The first step of the proof of `token`; the compiler checks the others.
     #[test]
     fn the_one_unsafe_block_is_shown_where_it_is_called_from() {
         let (code, _) = include_str!("lanes.rs").split_once("#[cfg(test)]").unwrap();
