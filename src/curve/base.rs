@@ -1,4 +1,4 @@
-//! A shape that is ready to be evaluated: a closed formula or a polygon, as a map of `u ∈ [0, 1]`.
+//! A shape ready for evaluation: a closed formula or a polygon, as a map of `u ∈ [0, 1]`.
 
 use std::sync::Arc;
 
@@ -6,12 +6,12 @@ use glam::DVec2;
 
 use super::{Outline, polygon};
 
-/// Parameters at which a formula's area centroid is taken. A polygon misses second order: 1e-7 of the size here.
-/// The number is fixed, because the centroid is the centre of the perturbation and a member must be the same
+/// Parameters at which a formula's area centroid is computed. The polygon's error is of second order: 1e-7 of the size
+/// here. The number is fixed, because the centroid is the centre of the perturbation and a member must be the same
 /// curve whatever its number of nodes.
 const CENTROID_SAMPLES: usize = 1 << 14;
 
-/// A closed plane curve, counter-clockwise if it has a sense, at any parameter `u ∈ [0, 1]`.
+/// A closed plane curve, counter-clockwise if it has an orientation, at any parameter `u ∈ [0, 1]`.
 pub struct BaseCurve {
     kind: CurveKind,
     centroid: DVec2,
@@ -24,28 +24,28 @@ enum CurveKind {
 }
 
 impl BaseCurve {
-    /// The curve `u ↦ formula(u)`, of period 1.
+    /// Creates the curve `u ↦ formula(u)`, of period 1.
     pub fn from_formula(formula: impl Fn(f64) -> DVec2 + Send + Sync + 'static) -> BaseCurve {
         let samples: Vec<DVec2> = (0..CENTROID_SAMPLES).map(|j| formula(j as f64 / CENTROID_SAMPLES as f64)).collect();
         let centroid = polygon::area_centroid(&samples);
         BaseCurve { kind: CurveKind::Formula(Box::new(formula)), centroid, cusps: Vec::new() }
     }
 
-    /// The same curve with cusps at the parameters `cusps`, increasing multiples of 1/32 between 0 and 1.
+    /// Adds cusps at the parameters `cusps`, increasing multiples of 1/32 between 0 and 1.
     ///
-    /// Equal spacing makes a node of each: a cusp between two nodes would be cut off. `u = 0` is a node anyhow.
+    /// Equal spacing puts a node on each, since a cusp between two nodes would be cut off. `u = 0` is always a node.
     pub fn with_cusps(self, cusps: &[f64]) -> BaseCurve {
         BaseCurve { cusps: cusps.to_vec(), ..self }
     }
 
-    /// The closed polygon of a file; `u` is the share of its length from the first vertex on.
+    /// Creates the closed polygon of a file; `u` is the fraction of its length from the first vertex.
     pub fn from_outline(outline: impl Into<Arc<Outline>>) -> BaseCurve {
         let outline = outline.into();
         let centroid = polygon::area_centroid(outline.vertices());
         BaseCurve { kind: CurveKind::Polygon(outline), centroid, cusps: Vec::new() }
     }
 
-    /// The point at `u ∈ [0, 1]`.
+    /// Returns the point at `u ∈ [0, 1]`.
     pub fn point(&self, u: f64) -> DVec2 {
         match &self.kind {
             CurveKind::Formula(formula) => formula(u),
@@ -53,17 +53,17 @@ impl BaseCurve {
         }
     }
 
-    /// Centroid of the enclosed area: exact for a polygon, to 1e-7 of its size for a formula.
+    /// Returns the centroid of the enclosed area: exact for a polygon, to 1e-7 of its size for a formula.
     pub fn centroid(&self) -> DVec2 {
         self.centroid
     }
 
-    /// Parameters between 0 and 1 that equal spacing makes nodes of.
+    /// Returns the parameters between 0 and 1 on which equal spacing puts nodes.
     pub fn cusps(&self) -> &[f64] {
         &self.cusps
     }
 
-    /// The polygon, if the curve is one.
+    /// Returns the polygon, if the curve is one.
     pub fn outline(&self) -> Option<&Arc<Outline>> {
         match &self.kind {
             CurveKind::Formula(_) => None,
@@ -71,8 +71,8 @@ impl BaseCurve {
         }
     }
 
-    /// `(u, point)` once round, the first point again at `u = 1`; at least `pieces` pieces, and every vertex of a
-    /// polygon is among them, so that no corner is cut.
+    /// Returns `(u, point)` once round, with the first point again at `u = 1`. There are at least `pieces` pieces, and
+    /// every vertex of a polygon is included, so that no corner is cut.
     pub fn subdivision(&self, pieces: usize) -> Box<dyn Iterator<Item = (f64, DVec2)> + '_> {
         match &self.kind {
             CurveKind::Formula(formula) => {

@@ -1,25 +1,25 @@
-//! Does a closed polygon cross itself? A tree of boxes over its edges answers in about n log n.
+//! Tests whether a closed polygon crosses itself, by a tree of boxes over its edges, in about n log n.
 //!
-//! Neighbouring edges of a curve lie near each other, so runs of consecutive edges make a good hierarchy without
-//! any sorting: the leaves are the boxes round single edges, every other box holds two runs of half its length.
-//! A search for meeting edges descends into a pair of runs only where their boxes overlap. Unlike a uniform grid
-//! this adapts to outlines with a million points in one bay and ten on the open coast. Many long edges all over each
-//! other cost n², but there a meeting pair is found at once. The worst case, n², are long edges side by side aslant,
-//! such as a comb of needles: [`crossing_within`] gives up on it.
+//! Neighbouring edges of a curve are close to each other, so runs of consecutive edges form a good hierarchy without
+//! any sorting: the leaves are the boxes around single edges, every other box holds two runs of half its length.
+//! A search for meeting edges descends into a pair of runs only if their boxes overlap. Unlike a uniform grid,
+//! this adapts to outlines with a million points in one bay and ten on the open coast. Many long edges across each
+//! other cost n², but there a meeting pair is found at once. The worst case, n², is long slanted edges side by side,
+//! such as a comb of needles; [`crossing_within`] gives up on it.
 
 use glam::DVec2;
 
-/// A pair of edges `(i, j)`, i < j, that cross or touch, or `None` when the polygon is embedded.
+/// Returns a pair of edges `(i, j)`, i < j, that cross or touch, or `None` if the polygon is embedded.
 ///
 /// Edge i runs from vertex i to vertex i+1 (indices from 0, the last edge leads back to vertex 0). Neighbouring
-/// edges share a vertex by right and meet only when one folds back onto the other. Which pair is returned is
-/// fixed by the polygon but has no further meaning. The signs of areas are taken in f64 without error bounds, so
-/// a touch is exact only where its coordinates are.
+/// edges share a vertex and meet only if one folds back onto the other. Which pair is returned is
+/// fixed by the polygon but has no further meaning. The signs of areas are computed in f64 without error bounds, so
+/// a touch is exact only if its coordinates are.
 pub fn crossing(points: &[DVec2]) -> Option<(usize, usize)> {
     search(points, u64::MAX).0
 }
 
-/// As [`crossing`], or [`Undecided`] after comparing `comparisons` pairs of boxes, each some ten nanoseconds.
+/// Like [`crossing`], or returns [`Undecided`] after comparing `comparisons` pairs of boxes, some ten nanoseconds each.
 pub fn crossing_within(points: &[DVec2], comparisons: u64) -> Result<Option<(usize, usize)>, Undecided> {
     match search(points, comparisons) {
         (None, 0) => Err(Undecided),
@@ -27,11 +27,11 @@ pub fn crossing_within(points: &[DVec2], comparisons: u64) -> Result<Option<(usi
     }
 }
 
-/// Nobody knows whether the polygon crosses itself: its edges are too many and too much side by side.
+/// Unknown whether the polygon crosses itself: too many of its edges are side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Undecided;
 
-/// A meeting pair and the comparisons that are left; 0 says that the search was cut short.
+/// A meeting pair and the remaining comparisons; 0 means that the search was cut short.
 fn search(points: &[DVec2], comparisons: u64) -> (Option<(usize, usize)>, u64) {
     let mut left = comparisons;
     if points.len() < 3 {
@@ -41,10 +41,11 @@ fn search(points: &[DVec2], comparisons: u64) -> (Option<(usize, usize)>, u64) {
     (found, left)
 }
 
-/// How near two strands of the polygon come to each other that run in opposite directions, or `limit` if that is less.
+/// Returns the smallest distance between two strands of the polygon that run in opposite directions, or `limit` if that
+/// is less.
 ///
-/// A simple curve first touches itself where two strands of opposite directions meet, so until its nodes have gone half
-/// this far it stays simple, hairpins of less than three edges aside.
+/// A simple curve first touches itself where two strands of opposite directions meet. Until its nodes have moved half
+/// this far it therefore stays simple, except for hairpins of less than three edges.
 pub fn clearance(points: &[DVec2], limit: f64) -> f64 {
     let directions = BoxTree::over(points.len(), |i| {
         let (a, b) = edge(points, i);
@@ -73,7 +74,7 @@ impl Bounds {
         (self.low - other.high).max(other.low - self.high).max(DVec2::ZERO).length()
     }
 
-    /// No vector of one box and vector of the other has a smaller dot product, not even a rounded one: rounding keeps order.
+    /// A lower bound on the dot products of vectors from the two boxes, even rounded ones: rounding is monotonic.
     fn least_dot(self, other: Bounds) -> f64 {
         let least = |x: [f64; 2], y: [f64; 2]| (x[0] * y[0]).min(x[0] * y[1]).min((x[1] * y[0]).min(x[1] * y[1]));
         least([self.low.x, self.high.x], [other.low.x, other.high.x])
@@ -111,7 +112,7 @@ impl BoxTree {
         BoxTree { boxes, leaves }
     }
 
-    /// Searches the runs under `a` and `b`, two nodes of one level with `a <= b`, until no comparison is left.
+    /// Searches the runs under `a` and `b`, two nodes of one level with `a <= b`, until no comparisons are left.
     fn meeting_pair(&self, a: usize, b: usize, points: &[DVec2], left: &mut u64) -> Option<(usize, usize)> {
         *left = left.saturating_sub(1);
         if *left == 0 || !self.boxes[a].overlaps(self.boxes[b]) {
@@ -127,8 +128,8 @@ impl BoxTree {
     }
 
     /// Lowers `nearest` to the distance of the opposed edges under `a` and `b`, two nodes of one level with `a <= b`.
-    /// `directions` bounds the edges as vectors: runs of a smooth curve that lie near each other mostly turn too little for
-    /// an opposed pair.
+    /// `directions` bounds the edges as vectors: nearby runs of a smooth curve mostly turn too little to contain an
+    /// opposed pair.
     fn nearest_opposed(&self, a: usize, b: usize, points: &[DVec2], directions: &BoxTree, nearest: &mut f64) {
         // Empty boxes are infinitely far.
         if self.boxes[a].distance(self.boxes[b]) >= *nearest
@@ -166,7 +167,7 @@ fn edge(points: &[DVec2], i: usize) -> (DVec2, DVec2) {
     (points[i], points[(i + 1) % points.len()])
 }
 
-/// Whether edges i < j of the polygon meet elsewhere than in the vertex that neighbours share.
+/// Whether edges i < j of the polygon meet anywhere but in the vertex that neighbours share.
 fn edges_meet(points: &[DVec2], i: usize, j: usize) -> bool {
     let ((a, b), (c, d)) = (edge(points, i), edge(points, j));
     if j == i + 1 {
@@ -234,7 +235,7 @@ mod tests {
         (0..points.len()).any(|j| (0..j).any(|i| edges_meet(points, i, j)))
     }
 
-    /// A star-shaped polygon, embedded by construction, of which some vertices were then moved.
+    /// A star-shaped polygon, embedded by construction, with some vertices moved afterwards.
     fn random_polygon(seed: u64, member: u64) -> Vec<DVec2> {
         let stream = Stream::new(seed, member, 0);
         let n = 3 + (member % 61) as usize;
@@ -299,7 +300,7 @@ mod tests {
         assert_eq!(crossing(&polygon([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])), None);
     }
 
-    /// Needles side by side at 45 degrees: no box is apart from any other.
+    /// Needles side by side at 45 degrees: all boxes overlap.
     fn aslant_comb(needles: usize) -> Vec<DVec2> {
         let aslant = DVec2::from_angle(TAU / 8.0);
         let teeth = (0..2 * needles).map(|i| DVec2::new(i as f64 / needles as f64, (i % 2) as f64));
@@ -319,7 +320,7 @@ mod tests {
 
     #[test]
     fn only_runs_with_overlapping_boxes_are_searched() {
-        // 200 000 edges of a wavy circle are 2e10 pairs; by the tree, a few comparisons an edge.
+        // 200 000 edges of a wavy circle are 2e10 pairs; with the tree, a few comparisons per edge.
         let n = 200_000;
         let mut points: Vec<DVec2> = (0..n)
             .map(|i| {

@@ -1,9 +1,9 @@
 //! Plane-curve mathematics in f64: shapes, perturbations, sampling into nodes, and measures of polygons.
 //!
-//! A [`Shape`] is what a user writes; [`Shape::resolve`] makes it a [`BaseCurve`], a closed curve that can be
-//! evaluated at any parameter `u`. A [`RadialFactor`] moves the plane about the curve's centroid, which turns the
-//! one base curve into a different curve for each member of an ensemble. A [`Sampler`] finally places n nodes on
-//! it. Nothing here draws random numbers: the ensemble does, and hands amplitudes and phases down.
+//! A [`Shape`] is what a user writes. [`Shape::resolve`] turns it into a [`BaseCurve`], a closed curve that can be
+//! evaluated at any parameter `u`. A [`RadialFactor`] maps the plane about the curve's centroid, which turns the
+//! base curve into a different curve for each member of an ensemble. A [`Sampler`] finally places n nodes on
+//! it. Nothing here draws random numbers: the ensemble does, and passes amplitudes and phases.
 //!
 //! Nodes are numbered i = 1…n, counter-clockwise, as in the paper, and stored at index i-1.
 
@@ -22,6 +22,6 @@ pub use perturbation::{MIN_FACTOR, Modes, RadialFactor, RadialLaw, check_directi
 pub use sampling::{Sampler, Sampling, resample};
 pub use shape::{FlowerMode, Shape};
 
-/// Highest mode of a flower or a perturbation. A mode takes four nodes at the very least, and far fewer than 4000
-/// nodes are ever relaxed; the cap keeps the cost of a curve bounded before anything else is known about it.
+/// Highest mode of a flower or a perturbation. A mode needs at least four nodes, and runs use far fewer than 4000
+/// nodes; the cap bounds the cost of a curve before anything else is known about it.
 pub const MAX_MODE: u32 = 1000;

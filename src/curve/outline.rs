@@ -1,10 +1,11 @@
-//! Outlines from files: a table of points becomes a closed counter-clockwise polygon, or a refusal that says why.
+//! Outlines from files: turns a table of points into a closed counter-clockwise polygon, or an error that says why not.
 //!
-//! The format is CSV in UTF-8: a point a line, `x,y`, with a decimal point. Blank lines and lines that begin with `#` are skipped. A first line
-//! without any number is a header; it must name the columns `x` and `y`, and then further columns are ignored.
-//! The last point may repeat the first; other neighbours must differ, and points that are no neighbours may coincide,
-//! with the warning of a crossing, as may an edge that returns along another (a spike without width). Either orientation is accepted; a clockwise outline is turned round about
-//! its first point, which stays first.
+//! The format is CSV in UTF-8: one point per line, `x,y`, with a decimal point. Blank lines and lines that begin with
+//! `#` are skipped. A first line without any number is a header; it must name the columns `x` and `y`, and further
+//! columns are then ignored. The last point may repeat the first; other neighbours must differ. Points that are not
+//! neighbours may coincide, with the warning of a crossing, and so may an edge that returns along another (a spike
+//! without width). Either orientation is accepted; a clockwise outline is reversed about its first point, which stays
+//! first.
 
 use std::path::Path;
 
@@ -16,28 +17,28 @@ use crate::{
     input::{self, MAX_LINE, MAX_OUTLINE},
 };
 
-/// Largest number of points of an outline, and of nodes of a curve.
+/// Maximum number of points of an outline, and of nodes of a curve.
 pub const MAX_POINTS: usize = 1_000_000;
 
-/// Smallest extent: the same holds for their inverses.
+/// Minimum extent, so that inverse fourth powers of lengths stay finite.
 const MIN_EXTENT: f64 = 1e-30;
 
-/// Largest coordinate. Fourth powers of lengths, which times are measured in, stay finite.
+/// Maximum coordinate, so that fourth powers of lengths, in which times are measured, stay finite.
 const MAX_COORDINATE: f64 = 1e30;
 
-/// Distance, as a share of the outline's extent, at which neighbours are one point. Coordinates are rounded at
+/// Distance, relative to the outline's extent, at which neighbours are one point. Coordinates are rounded at
 /// 1e-16; an edge much shorter than this has no direction left.
 const COINCIDENT: f64 = 1e-12;
 
-/// Pairs of boxes compared before the search for a crossing is given up: a second. A million points of a
-/// coast take about 1e7.
+/// Pairs of boxes compared before the search for a crossing gives up: about a second. A coast of a million points takes
+/// about 1e7.
 const MAX_COMPARISONS: u64 = 50_000_000;
 
 /// A closed counter-clockwise polygon, traversed by arclength.
 #[derive(Clone, Debug)]
 pub struct Outline {
     vertices: Vec<DVec2>,
-    /// Length from vertex 0 to each vertex; one entry more than vertices, the last is the whole length.
+    /// Length from vertex 0 to each vertex, and finally the total length.
     reached: Vec<f64>,
     simple: bool,
     warnings: Vec<String>,
@@ -47,16 +48,15 @@ pub struct Outline {
 impl Outline {
     /// Reads an outline from a CSV file.
     ///
-    /// # Errors
-    /// [`Error::Request`] naming the path, the line, the value and the remedy: the file cannot be read, is empty,
-    /// or holds more than [`MAX_POINTS`] points or less than three distinct ones; a line is no pair of finite
-    /// numbers, or longer than 65 536 bytes; neighbouring points coincide; no net area is enclosed. An outline that crosses itself is
-    /// accepted with a warning.
+    /// # Errors [`Error::Request`] naming the path, the line, the value and the remedy: the file cannot be read, is
+    /// empty, or holds more than [`MAX_POINTS`] points or fewer than three distinct ones; a line is not a pair of
+    /// finite numbers, or longer than 65 536 bytes; neighbouring points coincide; no net area is enclosed. An outline
+    /// that crosses itself is accepted with a warning.
     pub fn read(path: &Path) -> Result<Outline> {
         Outline::read_from(Path::new(""), path)
     }
 
-    /// As [`Outline::read`], with `path` relative to the directory `base`; messages name `path` alone.
+    /// Like [`Outline::read`], with `path` relative to the directory `base`; messages name only `path`.
     ///
     /// # Errors
     /// As [`Outline::read`].
@@ -67,7 +67,7 @@ impl Outline {
         Outline::from_csv(path, &bytes)
     }
 
-    /// Reads an outline from what the file at `path` holds; the path is for the messages.
+    /// Reads an outline from the contents of the file at `path`, which is used in messages.
     ///
     /// # Errors
     /// As [`Outline::read`].
@@ -79,7 +79,8 @@ impl Outline {
         Ok(Outline { digest: crc32c::crc32c(bytes), ..source.outline(bytes)? })
     }
 
-    /// The outline through a list of points, in either sense, with or without the first one again at the end.
+    /// Creates the outline through a list of points, in either orientation, with or without the first one again at the
+    /// end.
     ///
     /// ```
     /// use curvelax::curve::Outline;
@@ -99,7 +100,7 @@ impl Outline {
         Source { path: Path::new("(points)") }.outline(lines.as_bytes())
     }
 
-    /// The polygon through points that are known to be fit: counter-clockwise, no two neighbours the same.
+    /// The polygon through valid points: counter-clockwise, no two neighbours equal.
     fn through(vertices: Vec<DVec2>, not_simple: Option<String>) -> Outline {
         let mut reached = vec![0.0];
         reached.extend(polygon::edges(&vertices).scan(0.0, |sum, edge| {
@@ -115,22 +116,22 @@ impl Outline {
         }
     }
 
-    /// Whether the polygon neither crosses nor touches itself; false also where that could not be told.
+    /// Returns whether the polygon neither crosses nor touches itself; false also if this is undecided.
     pub fn is_simple(&self) -> bool {
         self.simple
     }
 
-    /// The vertices, without a repeated closing point.
+    /// Returns the vertices, without a repeated closing point.
     pub fn vertices(&self) -> &[DVec2] {
         &self.vertices
     }
 
-    /// CRC-32C of the bytes that it was read from; 0 where there were none.
+    /// Returns the CRC-32C of the bytes it was read from; 0 if there were none.
     pub fn digest(&self) -> u32 {
         self.digest
     }
 
-    /// What the user should know about the outline, a sentence each.
+    /// Returns what the user should know about the outline, one sentence each.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -139,7 +140,7 @@ impl Outline {
         self.reached[self.vertices.len()]
     }
 
-    /// The point at the share `u ∈ [0, 1]` of the length, from the first vertex.
+    /// Returns the point at the fraction `u ∈ [0, 1]` of the length, from the first vertex.
     pub fn point(&self, u: f64) -> DVec2 {
         let target = u * self.length();
         let n = self.vertices.len();
@@ -148,7 +149,7 @@ impl Outline {
         self.vertices[edge].lerp(self.vertices[(edge + 1) % n], share)
     }
 
-    /// `(u, point)` once round: every vertex, and between vertices pieces no longer than `length / pieces`.
+    /// Returns `(u, point)` once round: every vertex, and between vertices pieces no longer than `length / pieces`.
     pub(super) fn subdivision(&self, pieces: usize) -> impl Iterator<Item = (f64, DVec2)> {
         let (n, length) = (self.vertices.len(), self.length());
         let edge = move |i: usize| {
@@ -164,14 +165,14 @@ impl Outline {
     }
 }
 
-/// The points of a file with the lines that they came from.
+/// The points of a file with their line numbers.
 #[derive(Default)]
 struct PointTable {
     points: Vec<DVec2>,
     lines: Vec<usize>,
 }
 
-/// The columns, from 0, that hold the coordinates; without a header they are the `only` ones.
+/// The columns, from 0, of the coordinates; without a header they are the `only` ones.
 #[derive(Clone, Copy)]
 struct Columns {
     x: usize,
@@ -179,7 +180,7 @@ struct Columns {
     only: bool,
 }
 
-/// Where the text came from, for the messages.
+/// The origin of the text, for messages.
 struct Source<'a> {
     path: &'a Path,
 }
@@ -269,7 +270,7 @@ impl Source<'_> {
         Ok(table)
     }
 
-    /// Refuses a line with one of `separators` in it.
+    /// Refuses a line that contains one of `separators`.
     fn refuse_separator(&self, line: usize, content: &str, separators: &[(char, &str)]) -> Result<()> {
         let Some((_, name)) = separators.iter().find(|(separator, _)| content.contains(*separator)) else {
             return Ok(());
@@ -278,7 +279,7 @@ impl Source<'_> {
         Err(self.refusal(Some(line), &problem, "separate them by a comma and write decimal points: 1.0,0.5"))
     }
 
-    /// The columns of x and y that a header names.
+    /// Returns the columns of x and y named by a header.
     fn header(&self, line: usize, fields: &[&str]) -> Result<Columns> {
         let column = |name: &str| fields.iter().position(|field| field.eq_ignore_ascii_case(name));
         let (Some(x), Some(y)) = (column("x"), column("y")) else {
@@ -342,7 +343,7 @@ impl Source<'_> {
     }
 }
 
-/// Fields between commas, trimmed, without quotes; a comma inside quotes does not separate.
+/// Splits a line into fields at commas, trimmed, without quotes; a comma inside quotes does not separate.
 fn fields(line: &str) -> impl Iterator<Item = &str> {
     let mut quoted = false;
     let separates = move |c: char| {
@@ -352,10 +353,10 @@ fn fields(line: &str) -> impl Iterator<Item = &str> {
     line.split(separates).map(|field| field.trim().trim_matches('"').trim())
 }
 
-/// Characters of foreign text in a message.
+/// Maximum characters of foreign text in a message.
 const SHOWN: usize = 40;
 
-/// What else separates columns, of which a space may also follow a comma.
+/// Other separators of columns; a space may also follow a comma.
 const SEPARATORS: [(char, &str); 3] = [(';', "semicolons"), ('\t', "tabs"), (' ', "spaces")];
 
 #[cfg(test)]
@@ -520,7 +521,7 @@ mod tests {
         assert!(outline.warnings()[0].starts_with("eight.csv: the outline crosses"), "{:?}", outline.warnings());
         let error = Outline::read_from(home.path(), Path::new("none.csv")).unwrap_err().to_string();
         assert!(error.starts_with("--shape file:none.csv: cannot read it"), "{error}");
-        // A whole path has no directory before it.
+        // An absolute path ignores the base directory.
         assert!(Outline::read_from(Path::new("/none"), &home.path().join("eight.csv")).is_ok());
     }
 

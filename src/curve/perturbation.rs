@@ -4,14 +4,14 @@
 //! p ↦ c + (p - c)·(1 + Σ_m a_m cos(mθ + φ_m)),   m = low…high,
 //! ```
 //!
-//! with θ the polar angle of `p - c`, `a_m ~ N(0, (σ m^-p)²)` and `φ_m` uniform. The factor depends on the angle
-//! alone. So while it is positive the map takes each ray onto itself, is one-to-one, and leaves an embedded curve
-//! embedded and an orientation as it was, whether or not the curve is star-shaped about c. Draws whose factor
-//! falls under [`MIN_FACTOR`] are therefore drawn again, which cuts the tails of the normal law off.
+//! with θ the polar angle of `p - c`, `a_m ~ N(0, (σ m^-p)²)` and `φ_m` uniform. The factor depends only on the angle.
+//! While it is positive, the map therefore takes each ray onto itself, is one-to-one, and preserves embedding and
+//! orientation, whether or not the curve is star-shaped about c. Draws whose factor falls below [`MIN_FACTOR`] are
+//! redrawn, which cuts off the tails of the normal law.
 //!
-//! With `z = (p - c)/|p - c|`, a point of the unit circle in the complex plane, the sum is the real part of
-//! `z^low·Σ_j d_j z^j`, `d_j = a_m e^{iφ_m}` at `m = low + j`: a complex polynomial, by Horner's rule, without an
-//! angle or a cosine for each point.
+//! With `z = (p - c)/|p - c|`, a point of the unit circle in the complex plane, the sum is the real part of `z^low·Σ_j
+//! d_j z^j`, `d_j = a_m e^{iφ_m}` at `m = low + j`: a complex polynomial, evaluated by Horner's rule, without an angle
+//! or a cosine per point.
 
 use std::{f64::consts::TAU, fmt, str::FromStr};
 
@@ -21,16 +21,16 @@ use serde::{Deserialize, Serialize};
 use super::MAX_MODE;
 use crate::error::Error;
 
-/// Smallest radial factor of a draw that is kept. Larger rejects curves that would relax well; smaller lets
-/// necks through that no number of nodes resolves.
+/// Minimum radial factor of an accepted draw. A larger bound would reject curves that relax well; a smaller one would
+/// admit necks that no number of nodes resolves.
 pub const MIN_FACTOR: f64 = 0.05;
 
-/// Largest standard deviation of the radial factor. [`MIN_FACTOR`] is then three deviations away at any one angle;
-/// much beyond, what is left after rejection is no longer the law that was asked for.
+/// Maximum standard deviation of the radial factor. [`MIN_FACTOR`] is then three deviations away at any one angle;
+/// far beyond, rejection distorts the requested law.
 const MAX_DEVIATION: f64 = 0.3;
 
-/// Angles for each period of the highest mode at which the factor is checked. Between them it can be lower by
-/// (π/64)²/2 = 0.12 % of Σ|a_m| at most, which is far less than [`MIN_FACTOR`] for every admitted law.
+/// Angles per period of the highest mode at which the factor is checked. Between them it can be lower by
+/// at most (π/64)²/2 = 0.12 % of Σ|a_m|, far less than [`MIN_FACTOR`] for every permitted law.
 const ANGLES_PER_PERIOD: u32 = 64;
 
 /// Modes `low..=high` of the perturbation.
@@ -84,7 +84,7 @@ impl TryFrom<String> for Modes {
     }
 }
 
-/// The law of the perturbation: σ, the modes and p, checked.
+/// The validated law of the perturbation: σ, the modes and p.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RadialLaw {
     amplitude: f64,
@@ -93,11 +93,11 @@ pub struct RadialLaw {
 }
 
 impl RadialLaw {
-    /// Checks σ = `amplitude` ∈ [0, 0.5], `modes`, p = `decay` ∈ [-4, 20], and what they come to together.
+    /// Validates σ = `amplitude` ∈ [0, 0.5], `modes`, p = `decay` ∈ [-4, 20], and their combination.
     ///
     /// # Errors
-    /// [`Error::Request`] with the key, its value and what is allowed; also when the standard deviation of the
-    /// radial factor, `sqrt(½ Σ σ² m^-2p)`, is more than 0.3.
+    /// [`Error::Request`] with the key, its value and the allowed range; also if the standard deviation of the
+    /// radial factor, `sqrt(½ Σ σ² m^-2p)`, exceeds 0.3.
     pub fn new(amplitude: f64, modes: Modes, decay: f64) -> Result<RadialLaw, Error> {
         if !(0.0..=0.5).contains(&amplitude) {
             return Err(Error::value("amplitude", amplitude, "out of range", "allowed are 0 to 0.5, 0 for none"));
@@ -116,75 +116,76 @@ impl RadialLaw {
         Ok(law)
     }
 
-    /// Whether the law leaves every curve as it is (σ = 0).
+    /// Returns whether the law leaves every curve unchanged (σ = 0).
     pub fn is_none(&self) -> bool {
         self.amplitude == 0.0
     }
 
-    /// σ.
+    /// Returns σ.
     pub fn amplitude(&self) -> f64 {
         self.amplitude
     }
 
-    /// The modes that are drawn.
+    /// Returns the modes that are drawn.
     pub fn modes(&self) -> Modes {
         self.modes
     }
 
-    /// Standard deviation `σ m^-p` of the amplitude of mode m.
+    /// Returns the standard deviation `σ m^-p` of the amplitude of mode m.
     pub fn deviation(&self, mode: u32) -> f64 {
         self.amplitude * f64::from(mode).powf(-self.decay)
     }
 
-    /// Standard deviation of the radial factor at any one angle, before draws are rejected: `sqrt(½ Σ (σ m^-p)²)`.
+    /// Returns the standard deviation of the radial factor at any one angle, before draws are rejected: `sqrt(½ Σ (σ
+    /// m^-p)²)`.
     pub fn radial_deviation(&self) -> f64 {
         let variance: f64 = (self.modes.low..=self.modes.high).map(|mode| self.deviation(mode).powi(2)).sum();
         (0.5 * variance).sqrt()
     }
 }
 
-/// `1 + Σ a_m cos(mθ + φ_m)`: one draw of the perturbation, or none at all.
+/// `1 + Σ a_m cos(mθ + φ_m)`: one draw of the perturbation, or none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RadialFactor {
     low: u32,
-    /// `a_m e^{iφ_m}`, m from `low` on.
+    /// `a_m e^{iφ_m}`, starting at m = `low`.
     coefficients: Vec<DVec2>,
 }
 
 impl RadialFactor {
-    /// The factor with amplitude and phase `(a_m, φ_m)` for each of `low`, `low + 1`, …
+    /// Creates the factor with amplitude and phase `(a_m, φ_m)` for each of `low`, `low + 1`, …
     pub fn new(low: u32, modes: impl IntoIterator<Item = (f64, f64)>) -> RadialFactor {
         let coefficients = modes.into_iter().map(|(a, phase)| a * DVec2::from_angle(phase)).collect();
         RadialFactor { low, coefficients }
     }
 
-    /// `Σ a_m cos(mθ + φ_m)` in the `direction` (cos θ, sin θ).
+    /// Returns `Σ a_m cos(mθ + φ_m)` in the `direction` (cos θ, sin θ).
     pub fn excursion(&self, direction: DVec2) -> f64 {
         let polynomial = |sum: DVec2, c: &DVec2| sum.rotate(direction) + *c;
         let sum = self.coefficients.iter().rev().fold(DVec2::ZERO, polynomial);
         power(direction, self.low).rotate(sum).x
     }
 
-    /// Where the map about `centre` takes `point`; without modes exactly `point`. The centre stays.
+    /// Maps `point` about `centre`; without modes returns exactly `point`. The centre stays fixed.
     pub fn apply(&self, centre: DVec2, point: DVec2) -> DVec2 {
         self.apply_towards((point - centre).normalize_or_zero(), centre, point)
     }
 
-    /// [`Self::apply`] with the direction from centre to point known beforehand.
+    /// [`Self::apply`] with a known direction from centre to point.
     pub(super) fn apply_towards(&self, direction: DVec2, centre: DVec2, point: DVec2) -> DVec2 {
         point + (point - centre) * self.excursion(direction)
     }
 
-    /// Whether the factor is at least [`MIN_FACTOR`] at each of `directions` (see [`check_directions`]).
+    /// Returns whether the factor is at least [`MIN_FACTOR`] at each of `directions` (see [`check_directions`]).
     pub fn is_embedding(&self, directions: &[DVec2]) -> bool {
         let deepest: f64 = self.coefficients.iter().map(|c| c.length()).sum();
-        // Most draws are so mild that no angle needs to be tried.
+        // Most draws are so mild that no angle needs checking.
         let embeds = |direction: &DVec2| 1.0 + self.excursion(*direction) >= MIN_FACTOR;
         1.0 - deepest >= MIN_FACTOR || directions.iter().all(embeds)
     }
 }
 
-/// The fixed directions at which a factor with modes up to `high` is checked: 64 to a period of the highest.
+/// Returns the fixed directions at which a factor with modes up to `high` is checked: 64 per period of the highest.
 pub fn check_directions(high: u32) -> Vec<DVec2> {
     let count = ANGLES_PER_PERIOD * high.max(8);
     (0..count).map(|j| DVec2::from_angle(TAU * f64::from(j) / f64::from(count))).collect()

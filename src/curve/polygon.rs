@@ -8,22 +8,22 @@ use std::f64::consts::PI;
 
 use glam::DVec2;
 
-/// Share of `L²` under which an area is rounding. The sums below leave about 1e-16·L²; a sliver of relative
+/// Fraction of `L²` below which an area is rounding. The sums below have errors of about 1e-16·L²; a sliver of relative
 /// width 1e-11 is still a curve.
 pub const NO_AREA: f64 = 1e-12;
 
-/// The n edge vectors; the last one leads back to the first vertex.
+/// Returns the n edge vectors; the last leads back to the first vertex.
 pub fn edges(points: &[DVec2]) -> impl Iterator<Item = DVec2> + '_ {
     let next = points.iter().cycle().skip(1);
     points.iter().zip(next).map(|(a, b)| *b - *a)
 }
 
-/// Length `L`.
+/// Returns the length `L`.
 pub fn length(points: &[DVec2]) -> f64 {
     edges(points).map(DVec2::length).sum()
 }
 
-/// Signed area `A = ½ Σ x_i × x_{i+1}`, positive counter-clockwise.
+/// Returns the signed area `A = ½ Σ x_i × x_{i+1}`, positive counter-clockwise.
 pub fn signed_area(points: &[DVec2]) -> f64 {
     0.5 * fan(points).map(|(a, b)| a.perp_dot(b)).sum::<f64>()
 }
@@ -33,10 +33,10 @@ fn fan(points: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
     points.windows(2).map(|pair| (pair[0] - points[0], pair[1] - points[0]))
 }
 
-/// Centroid of the enclosed area, each part counted as often as the polygon winds round it.
+/// Returns the centroid of the enclosed area, each part counted as often as the polygon winds round it.
 ///
-/// A figure-eight whose loops cancel has no area and so no such centroid, and where they nearly cancel it lies far
-/// away; then, whenever it is outside the box round the points, the centroid of the line itself.
+/// A figure-eight whose loops cancel has no area and thus no centroid; if they nearly cancel, the centroid is far
+/// away. If it is outside the bounding box of the points, the centroid of the line itself is returned.
 pub fn area_centroid(points: &[DVec2]) -> DVec2 {
     let length = length(points);
     let double_area = 2.0 * signed_area(points);
@@ -52,37 +52,37 @@ pub fn area_centroid(points: &[DVec2]) -> DVec2 {
     if length > 0.0 { points[0] + moment / length } else { points[0] }
 }
 
-/// Lower left and upper right corner of the box round the points.
+/// Returns the lower left and upper right corner of the bounding box of the points.
 pub fn bounds(points: &[DVec2]) -> (DVec2, DVec2) {
     points.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)))
 }
 
-/// Excess `L²/(4πA) - (n/π)·tan(π/n)`: 0 on the regular n-gon, the rounder of all n-gons, and > 0 on every other
-/// embedded counter-clockwise polygon. Without dimension.
+/// Returns the excess `L²/(4πA) - (n/π)·tan(π/n)`: 0 on the regular n-gon, the roundest of all n-gons, and > 0 on every
+/// other embedded counter-clockwise polygon. Dimensionless.
 ///
 /// The isoperimetric quotient alone would leave a relaxed polygon 1 + π²/(3n²) above a circle's 1 for ever.
 pub fn excess(points: &[DVec2]) -> f64 {
     excess_of(length(points), signed_area(points), points.len())
 }
 
-/// [`excess`] from a length, a signed area and the number of nodes n ≥ 3.
+/// Returns the [`excess`] from a length, a signed area and the number of nodes n ≥ 3.
 pub fn excess_of(length: f64, area: f64, n: usize) -> f64 {
     length * length / (4.0 * PI * area) - regular_ratio(n)
 }
 
-/// Isoperimetric ratio `L²/(4πA) = (n/π)·tan(π/n)` of the regular n-gon.
+/// Returns the isoperimetric ratio `L²/(4πA) = (n/π)·tan(π/n)` of the regular n-gon.
 pub fn regular_ratio(n: usize) -> f64 {
     let n = n as f64;
     n / PI * (PI / n).tan()
 }
 
-/// Turning number: how often the edge direction goes round, +1 for an embedded counter-clockwise polygon, 0 for a
-/// figure-eight.
+/// Returns the turning number, the number of revolutions of the edge direction: +1 for an embedded counter-clockwise
+/// polygon, 0 for a figure-eight.
 ///
 /// At each node the direction turns by less than π, so the hodograph (the closed polygon of the edge vectors) goes
-/// round the origin as often as the direction does. Its winding is the number of its edges that cross the positive
-/// x-axis upwards less those that cross it downwards: integers and signs, no angle. A node that turns by exactly π
-/// has no sense of turning and counts as none.
+/// round the origin as often as the direction does. Its winding number is the number of its edges that cross the
+/// positive x-axis upwards minus those that cross it downwards: integers and signs, no angle. A node that turns by
+/// exactly π has no sense of turning and is not counted.
 pub fn turning_number(points: &[DVec2]) -> i32 {
     let next = edges(points).chain(edges(points)).skip(1);
     let crossing = |(d, e): (DVec2, DVec2)| match (d.y <= 0.0, e.y <= 0.0) {
@@ -93,7 +93,7 @@ pub fn turning_number(points: &[DVec2]) -> i32 {
     edges(points).zip(next).map(crossing).sum()
 }
 
-/// Longest edge over shortest edge; infinite when an edge has no length.
+/// Returns the ratio of the longest to the shortest edge; infinite if an edge has no length.
 pub fn mesh_ratio(points: &[DVec2]) -> f64 {
     let (shortest, longest) = edges(points)
         .map(DVec2::length)
@@ -101,7 +101,7 @@ pub fn mesh_ratio(points: &[DVec2]) -> f64 {
     longest / shortest
 }
 
-/// Reverses the sense in which the polygon is traversed and keeps its first vertex first.
+/// Reverses the orientation of the polygon and keeps its first vertex first.
 pub fn turn_round(points: &mut [DVec2]) {
     if let [_, rest @ ..] = points {
         rest.reverse();

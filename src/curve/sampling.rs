@@ -1,14 +1,14 @@
 //! Sampling: n nodes on a curve, i = 1…n, equally spaced in the parameter or along the curve.
 //!
-//! What does not depend on the member is tabulated once: the base curve's nodes, or a fine subdivision of it with
-//! the direction of each sample from the centre. A member then costs one radial factor a sample.
+//! Whatever does not depend on the member is tabulated once: the base curve's nodes, or a fine subdivision of it with
+//! the direction of each sample from the centre. A member then costs one radial factor per sample.
 //!
-//! Equal spacing is found by inverting the cumulated chord length of the *perturbed* samples. Within a piece the
-//! parameter is interpolated linearly, and the curve itself is evaluated there: so nodes lie on the curve to the
+//! Equal spacing inverts the cumulative chord length of the *perturbed* samples. Within a piece the
+//! parameter is interpolated linearly, and the curve itself is evaluated there: nodes thus lie on the curve up to
 //! rounding, and only their spacing is approximate (to 5e-4 of itself on the smooth shapes that have a formula).
 //!
-//! Each cusp of a formula is made a node. Every arc between cusps has its share of the n nodes, rounded, equally
-//! spaced; so spacings differ by half a node an arc at most, and by nothing where the arcs are equal and their
+//! Each cusp of a formula becomes a node. Every arc between cusps gets its share of the n nodes, rounded, equally
+//! spaced. Spacings therefore differ by at most half a node per arc, and not at all if the arcs are equal and their
 //! number divides n.
 
 use std::{fmt, str::FromStr, sync::Arc};
@@ -19,18 +19,18 @@ use serde::{Deserialize, Serialize};
 use super::{BaseCurve, MAX_POINTS, Outline, RadialFactor};
 use crate::error::{Error, did_you_mean};
 
-/// Samples for each node, and the least number of them, that equal spacing is measured on. Half as many double the
-/// error of the spacing; the time to make a member is proportional to them.
+/// Samples per node, and their minimum number, for measuring equal spacing. Halving it doubles the
+/// error of the spacing; the time to create a member is proportional to it.
 const SAMPLES_PER_NODE: usize = 32;
 const MIN_SAMPLES: usize = 4096;
-/// Bytes of tabulated samples at most. More of them, those of 50 000 nodes, are made twice over for every member instead.
+/// Maximum bytes of tabulated samples. More samples, as for 50 000 nodes, are instead computed twice for every member.
 const LARGEST_TABLE: usize = 64 << 20;
 
 /// How nodes are placed on a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Sampling {
-    /// At u = i/n, the paper's. On a file's polygon `u` is the share of its length before perturbation.
+    /// At u = i/n, the paper's. On a file's polygon `u` is the fraction of its length before perturbation.
     Parameter,
     /// Equally spaced along the perturbed curve; node n at u = 0.
     Arclength,
@@ -41,7 +41,7 @@ pub enum Sampling {
 impl Sampling {
     const ALL: [Sampling; 3] = [Sampling::Parameter, Sampling::Arclength, Sampling::Points];
 
-    /// The word on the command line.
+    /// Returns the word used on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Sampling::Parameter => "parameter",
@@ -93,7 +93,7 @@ enum Plan {
     Fixed(Vec<DVec2>),
     /// A fine subdivision, mapped and measured for each member.
     Measured(Vec<CurvePoint>),
-    /// The same in so many pieces, too many for a table.
+    /// A subdivision into this many pieces, too many for a table.
     Passing(usize),
 }
 
@@ -106,10 +106,10 @@ struct CurvePoint {
 }
 
 impl Sampler {
-    /// Prepares `curve` for `nodes` nodes; with [`Sampling::Points`] the file's own number is taken instead.
+    /// Prepares `curve` for `nodes` nodes; with [`Sampling::Points`] the file's own number is used instead.
     ///
     /// # Errors
-    /// [`Error::Request`] when `nodes` is not in 3 to [`MAX_POINTS`], or `Points` is asked of a curve that is no
+    /// [`Error::Request`] if `nodes` is not in 3 to [`MAX_POINTS`], or `Points` is requested for a curve that is not a
     /// file.
     pub fn new(curve: BaseCurve, sampling: Sampling, nodes: usize) -> Result<Sampler, Error> {
         if !(3..=MAX_POINTS).contains(&nodes) {
@@ -139,17 +139,17 @@ impl Sampler {
         Ok(Sampler { curve, nodes, plan })
     }
 
-    /// Number of nodes n.
+    /// Returns the number of nodes n.
     pub fn nodes(&self) -> usize {
         self.nodes
     }
 
-    /// The polygon of its curve, if it is one.
+    /// Returns the polygon of its curve, if it is one.
     pub fn outline(&self) -> Option<&Arc<Outline>> {
         self.curve.outline()
     }
 
-    /// Bytes of what is tabulated for `nodes` nodes, the vertices of an outline aside.
+    /// Returns the bytes of the tables for `nodes` nodes, without the vertices of an outline.
     pub(crate) fn bytes(sampling: Sampling, nodes: usize) -> usize {
         match sampling {
             Sampling::Parameter | Sampling::Points => nodes * size_of::<DVec2>(),
@@ -159,7 +159,7 @@ impl Sampler {
         }
     }
 
-    /// The nodes i = 1…n, at index i-1, of the curve stretched by `factor` about its area centroid.
+    /// Returns the nodes i = 1…n, at index i-1, of the curve stretched by `factor` about its area centroid.
     pub fn sample(&self, factor: &RadialFactor) -> Vec<DVec2> {
         let centre = self.curve.centroid();
         match &self.plan {
@@ -175,7 +175,7 @@ impl Sampler {
         }
     }
 
-    /// Nodes by the samples that `walk` passes: the parameter of each, and the length up to it.
+    /// Places nodes by the samples that `walk` yields: the parameter of each, and the length up to it.
     fn equally_spaced<I>(&self, walk: impl Fn() -> I, factor: &RadialFactor) -> Vec<DVec2>
     where
         I: Iterator<Item = (f64, f64)>,
@@ -227,7 +227,7 @@ impl Sampler {
     }
 }
 
-/// The parameter of each sample, and the length up to it of the curve stretched by `factor`.
+/// The parameter of each sample, and the length up to it on the curve stretched by `factor`.
 fn measured(
     samples: impl Iterator<Item = CurvePoint>,
     factor: &RadialFactor,
@@ -241,7 +241,7 @@ fn measured(
     })
 }
 
-/// Pieces that a curve of `nodes` nodes is measured in, at least.
+/// Minimum number of pieces for measuring a curve of `nodes` nodes.
 fn pieces(nodes: usize) -> usize {
     MIN_SAMPLES.max(SAMPLES_PER_NODE * nodes)
 }
@@ -253,7 +253,7 @@ fn samples(curve: &BaseCurve, pieces: usize) -> impl Iterator<Item = CurvePoint>
     curve.subdivision(pieces).map(directed)
 }
 
-/// As many nodes as `nodes` has, equally spaced along that closed polygon; the last one stays where it is.
+/// Returns equally many nodes, equally spaced along the closed polygon `nodes`; the last one stays fixed.
 pub fn resample(nodes: &[DVec2]) -> Vec<DVec2> {
     let n = nodes.len();
     let closed: Vec<DVec2> = nodes[n - 1..].iter().chain(nodes).copied().collect();
@@ -341,7 +341,7 @@ mod tests {
     fn arclength_nodes_are_equally_spaced_along_the_perturbed_curve() {
         let factor = RadialFactor::new(2, [(0.1, 0.3), (-0.15, 2.0)]);
         for shape in ["ellipse:2,1", "nonconvex", "flower:3:0.3"] {
-            // So many that the chords' deficit, (κh)²/24, falls under the error of the interpolation.
+            // Enough nodes that the chords' deficit, (κh)²/24, is below the error of the interpolation.
             let nodes = sampler(shape, Sampling::Arclength, 16_001).sample(&factor);
             assert!(polygon::mesh_ratio(&nodes) < 1.0005, "{shape} {}", polygon::mesh_ratio(&nodes));
         }

@@ -1,7 +1,7 @@
-//! The shapes by name: how they are written, which numbers they take, and their parametrisations.
+//! The named shapes: their syntax, parameters and parametrisations.
 //!
 //! Every closed formula is a map of `u ∈ [0, 1]`, traversed counter-clockwise, with `u = 0` and `u = 1` the same
-//! point. Lengths are in the user's unit; so areas are its square and times its fourth power.
+//! point. Lengths are in the user's unit; areas are in its square and times in its fourth power.
 
 use std::{
     f64::consts::TAU,
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::{BaseCurve, MAX_MODE, Outline};
 use crate::error::{Error, did_you_mean};
 
-/// The curve that an ensemble is made of, before perturbation, named as on the command line.
+/// The curve from which an ensemble is made, before perturbation, named as on the command line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Shape {
@@ -37,14 +37,14 @@ pub enum Shape {
     /// `(cos³ 2πu, sin³ 2πu)`, of length 6 and area 3π/8, with cusps at u = 0, ¼, ½ and ¾.
     Astroid,
     /// Bernoulli's lemniscate `(cos, sin·cos)·A/(1 + sin²)` of 2πu, a figure-eight of length 5.2441151 A whose
-    /// curvature is 3/A at its two ends. It has no area and no sense, and its centre is its double point.
+    /// curvature is 3/A at its two ends. It has no area and no orientation, and its centre is its double point.
     Lemniscate {
         /// Half-width A.
         half_width: f64,
     },
     /// `r(θ) = 1 + Σ a_m cos(mθ + φ_m)` in polar coordinates, θ = 2πu.
     Flower(Vec<FlowerMode>),
-    /// A closed polygon read from a table of points; `u` is the share of its length, see [`Outline`].
+    /// A closed polygon read from a table of points; `u` is the fraction of its length, see [`Outline`].
     File(PathBuf),
 }
 
@@ -53,7 +53,7 @@ pub enum Shape {
 pub struct FlowerMode {
     /// Mode m, 1 to [`MAX_MODE`].
     pub mode: u32,
-    /// Amplitude a of either sign; all |a| of a flower add up to less than 1.
+    /// Amplitude a of either sign; the |a| of a flower sum to less than 1.
     pub amplitude: f64,
     /// Phase φ in radians.
     pub phase: f64,
@@ -62,11 +62,11 @@ pub struct FlowerMode {
 const NAMES: [&str; 7] = ["ellipse", "circle", "nonconvex", "astroid", "lemniscate", "flower", "file"];
 const FORMS: &str = "one of ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],..., file:PATH";
 
-/// Range of lengths. Within it the fourth powers that times are measured in, and their inverses, stay finite.
+/// Range of lengths in which fourth powers, the unit of times, and their inverses stay finite.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
 impl Shape {
-    /// Checks the numbers and makes the curve, reading its file if it has one.
+    /// Checks the numbers and creates the curve, reading its file if it has one.
     ///
     /// # Errors
     /// [`Error::Request`] for numbers out of range and for everything that [`Outline::read`] refuses.
@@ -74,7 +74,7 @@ impl Shape {
         self.resolve_from(Path::new(""))
     }
 
-    /// As [`Shape::resolve`], with the path of a file relative to the directory `base`.
+    /// Like [`Shape::resolve`], with the path of a file relative to the directory `base`.
     ///
     /// # Errors
     /// As [`Shape::resolve`].
@@ -91,8 +91,8 @@ impl Shape {
         })
     }
 
-    /// The lowest mode, 2 or more, by which the shape differs from a circle; it decays last. None of a circle, and of a
-    /// lemniscate, which never becomes one.
+    /// Returns the lowest mode, 2 or more, by which the shape differs from a circle; it decays last. `None` for a
+    /// circle, and for a lemniscate, which never becomes one.
     pub fn lowest_mode(&self) -> Option<u32> {
         match self {
             Shape::Ellipse { a, b } => (a != b).then_some(2),
@@ -105,7 +105,7 @@ impl Shape {
         }
     }
 
-    /// The highest mode that the shape is made of, for those that are made of modes.
+    /// Returns the highest mode of a shape made of modes.
     pub fn highest_mode(&self) -> Option<u32> {
         match self {
             Shape::Flower(modes) => modes.iter().map(|term| term.mode).max(),
@@ -113,7 +113,7 @@ impl Shape {
         }
     }
 
-    /// The ranges of the numbers: problem and remedy, without the key.
+    /// Checks the ranges of the numbers; an error gives problem and remedy, without the key.
     fn check(&self) -> Result<(), String> {
         match self {
             Shape::Ellipse { a, b } => check_size("half-axis", *a).and(check_size("half-axis", *b)),
@@ -254,7 +254,7 @@ impl FromStr for Shape {
     }
 }
 
-/// Exactly `N` comma-separated numbers; `usage` is the message when there are fewer or more.
+/// Parses exactly `N` comma-separated numbers; `usage` is the message if there are fewer or more.
 fn numbers<const N: usize>(arguments: Option<&str>, usage: &str) -> Result<[f64; N], String> {
     let words: Vec<&str> = arguments.unwrap_or_default().split(',').collect();
     let words: [&str; N] = words.try_into().map_err(|_| usage.to_owned())?;
@@ -269,7 +269,7 @@ fn flower_modes(list: &str) -> Result<Vec<FlowerMode>, String> {
     list.split(',').filter(|_| !list.is_empty()).map(flower_mode).collect()
 }
 
-/// `M:A` or `M:A:PHASE`.
+/// Parses `M:A` or `M:A:PHASE`.
 fn flower_mode(text: &str) -> Result<FlowerMode, String> {
     let wrong = || format!("`{text}` is not MODE:AMPLITUDE or MODE:AMPLITUDE:PHASE; write for example 3:0.2");
     let (mode, rest) = text.split_once(':').ok_or_else(wrong)?;
@@ -419,7 +419,7 @@ mod tests {
             let (square, across) = (p.length_squared(), p.x * p.x - p.y * p.y);
             assert!((square * square - a * a * across).abs() < 1e-14, "{p}");
         }
-        // Both ends bend by 3/A, one to either side; node n is the right one.
+        // Both ends have curvature 3/A, of opposite signs; node n is the right one.
         for (end, sense) in [(n, 1.0), (n / 2, -1.0)] {
             let [before, at, after] = [end - 1, end, end + 1].map(|i| curve[(i + n - 1) % n]);
             let curvature = (at - before).angle_to(after - at) / at.distance(after);
