@@ -1,4 +1,4 @@
-//! What a member leaves.
+//! The end of a member's trajectory: its results.
 
 use glam::DVec2;
 
@@ -15,18 +15,18 @@ use crate::{
 const MIN_POINTS: u32 = 8;
 
 impl Trajectory<'_> {
-    /// Keeps the nodes at both ends of the run.
+    /// Sets whether to store the nodes at both ends of the run.
     pub fn keep_portrait(&mut self, keep: bool) {
         self.portrait = keep;
     }
 
-    /// Whether [`Trajectory::end`] wants the last state.
+    /// Returns whether [`Trajectory::end`] needs the last state.
     pub fn keeps_portrait(&self) -> bool {
         self.portrait
     }
 
-    /// Slope of the line fitted to -ln excess, in 1/time, or against the logarithm of time where the excess falls as a
-    /// power of it; and the share of the variance that the line explains.
+    /// Slope of the line fitted to -ln excess, in 1/time, or against the logarithm of time if the excess falls as a
+    /// power of it; and the fraction of the variance that the line explains.
     fn rate(&self) -> Option<(f64, f64)> {
         let Decay { xx, xy, yy, .. } = self.report.decay;
         let clock = if self.launch.parameters.growth > 0.0 { 1.0 } else { self.time.unit(self.unit) };
@@ -41,7 +41,7 @@ impl Trajectory<'_> {
         [self.start.excess].into_iter().chain(noted.iter().copied()).chain(end).collect()
     }
 
-    /// What the member leaves; `last` is its last state, for the portrait.
+    /// Returns the member's results; `last` is its last state, for the portrait.
     pub fn end(mut self, last: Option<&State<f64>>) -> Ended {
         let frames = std::mem::take(&mut self.frames);
         let progress = &self.report.progress;

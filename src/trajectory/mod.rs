@@ -1,8 +1,8 @@
-//! One member's way through a run, seen from the host: where it starts, where it pauses next, what it leaves.
+//! One member's trajectory through a run, seen from the host: where it starts, where it pauses next, its results.
 //!
 //! A member is advanced in units of its own size: lengths are divided by a power of two near its radius and times by
-//! the fourth power of that, which rounds nothing, so that no threshold of the scheme and no range of a precision
-//! depends on the unit in which a user measures.
+//! the fourth power of that, without rounding, so that no threshold of the scheme and no range of a precision
+//! depends on the user's unit.
 
 mod end;
 mod outputs;
@@ -22,30 +22,31 @@ use crate::{
     },
 };
 
-/// Excess below which a curve is a regular polygon to rounding: such a member is relaxed at time 0.
+/// Excess below which a curve is a regular polygon up to rounding: such a member is relaxed at time 0.
 const ROUND: f64 = 1e-13;
 /// The first adaptive step in units of the fourth power of the shortest segment, the fastest time scale there is.
 const FIRST_STEP: f64 = 0.1;
-/// Adaptive steps to a tolerance of 1 after which a member is stalled; their number goes with its root. Curves that
-/// relax take some 3 to 30; one that creeps, because only tiny steps can be solved, would never end.
+/// Maximum number of adaptive steps to a tolerance of 1; it scales with the inverse root of the tolerance, and a member
+/// that exceeds it is stalled. Curves that relax take some 3 to 30; one that creeps, because only tiny steps can be
+/// solved, would never end.
 const MAX_STEPS: f64 = 1000.0;
-/// Steps in a time 1/ω besides: a curve at rest takes one or two, since lengths approach their mean explicitly.
+/// Further steps per time 1/ω: a curve at rest takes one or two, since lengths approach their mean explicitly.
 const MAX_STEPS_AT_REST: f64 = 4.0;
 
-/// What can be said of the relaxation of a member.
+/// What can be said about the relaxation of a member.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Course {
     /// Its excess is followed to the threshold.
     Followed,
-    /// It is at or under the threshold from the start, or a regular polygon.
+    /// It is at or below the threshold from the start, or a regular polygon.
     Round,
-    /// It is so nearly round that its threshold lies in the rounding of the precision.
+    /// It is so nearly round that its threshold is within the rounding of the precision.
     Unresolved,
-    /// It is no simple curve: whatever its excess, it does not relax to a circle.
+    /// It is not a simple curve: whatever its excess, it does not relax to a circle.
     Immersed,
 }
 
-/// How the time of a member passes.
+/// How a member's time advances.
 #[derive(Clone, Copy, Debug)]
 enum Time {
     Fixed(Clock),
@@ -53,7 +54,7 @@ enum Time {
 }
 
 impl Time {
-    /// The unit of the clock of [`decay`](crate::scheme::decay), for a member advanced in lengths of `unit`.
+    /// Unit of the clock of [`decay`](crate::scheme::decay), for a member advanced in lengths of `unit`.
     fn unit(self, unit: f64) -> f64 {
         match self {
             Time::Fixed(clock) => clock.tau,
@@ -70,14 +71,14 @@ pub struct Trajectory<'a> {
     t_end: f64,
     time: Time,
     launch: Run<f64>,
-    /// Output times, and how many of them are behind the member.
+    /// Output times, and how many of them the member has passed.
     outputs: &'a Outputs,
     served: usize,
     counters: Counters,
     report: Report<f64>,
     start: Observables,
     rows: Rows,
-    /// Times and the nodes that are drawn, in the user's frame.
+    /// Times and the drawn nodes, in the user's frame.
     frames: Vec<(f64, Vec<DVec2>)>,
     sweeps: [u64; 2],
     course: Course,
@@ -88,7 +89,7 @@ pub struct Trajectory<'a> {
 }
 
 impl Trajectory<'_> {
-    /// What the back end needs to start the member, or to go on with it. Its state is there from now on, and not here.
+    /// Returns what the back end needs to start or continue the member; its state is then held there only.
     pub fn launch(&mut self) -> Run<f64> {
         let (goal, parameters) = self.aim();
         let state = std::mem::replace(&mut self.launch.state, State::zeros(0));
@@ -99,7 +100,7 @@ impl Trajectory<'_> {
         run
     }
 
-    /// The member between two dispatches, with what the back end has of it.
+    /// Returns the member between two dispatches, with the back end's data.
     pub fn pause(&self, counters: Counters, report: Report<f64>, state: &State<f64>) -> Paused {
         Paused {
             counters,
@@ -114,10 +115,10 @@ impl Trajectory<'_> {
         }
     }
 
-    /// Puts a member that has just been made where it was [paused](Trajectory::pause).
+    /// Continues a newly created member where it was [paused](Trajectory::pause).
     ///
     /// # Errors
-    /// [`Error::Request`] where that was not this member.
+    /// [`Error::Request`] if a different member was paused.
     pub fn resume_from(&mut self, paused: Paused) -> Result<()> {
         let Paused { counters, report, state, sweeps, served, rows, frames, crossed, look_at } = paused;
         let (index, numbers) = (self.member.index, STATE_FIELDS * self.member.nodes.len());
@@ -140,7 +141,7 @@ impl Trajectory<'_> {
         Ok(())
     }
 
-    /// Takes what the back end reports.
+    /// Processes a report of the back end.
     pub fn observe(&mut self, counters: Counters, report: &Report<f64>) {
         self.sweeps[0] += u64::from(counters.sweeps_k);
         self.sweeps[1] += u64::from(counters.sweeps_x);
@@ -152,7 +153,7 @@ impl Trajectory<'_> {
         }
     }
 
-    /// Whether no step that the clock can count was as short as the curve needed at its start.
+    /// Whether even the shortest step that the clock can count was longer than the curve needed at its start.
     fn is_timed_too_coarsely(&self) -> bool {
         let Time::Adaptive(ticks) = self.time else { return false };
         let edge = self.start.length / self.unit / self.member.nodes.len() as f64;
@@ -161,13 +162,13 @@ impl Trajectory<'_> {
 
     fn take(&mut self, counters: Counters, report: &Report<f64>) {
         self.counters = counters;
-        // Until the first step is accepted the start is known better here, in f64.
+        // Until the first step is accepted, the host knows the start better, in f64.
         if counters.steps > 0 {
             self.report = *report;
         }
     }
 
-    /// Accepted steps after which the member has stalled.
+    /// Maximum number of accepted steps before the member is stalled.
     fn most_steps(&self) -> u32 {
         match self.time {
             Time::Fixed(_) => u32::MAX,
@@ -179,7 +180,7 @@ impl Trajectory<'_> {
         }
     }
 
-    /// Whether the member has ended.
+    /// Returns whether the member has ended.
     pub fn is_over(&self) -> bool {
         self.counters.status != 0 || self.is_at_end()
     }
@@ -192,7 +193,7 @@ impl Trajectory<'_> {
         }
     }
 
-    /// Time of the last accepted state.
+    /// Returns the time of the last accepted state.
     pub fn now(&self) -> f64 {
         let progress = &self.report.progress;
         match self.time {
@@ -202,12 +203,12 @@ impl Trajectory<'_> {
         }
     }
 
-    /// Share of its time that has passed.
+    /// Returns the fraction of its time that has passed.
     pub fn share(&self) -> f64 {
         self.now() / self.t_end
     }
 
-    /// Where to run to next, as a number of steps and the parameters on the way; none where the goal still stands.
+    /// Returns the next goal, as a number of steps, and the parameters until then; `None` if the goal is unchanged.
     pub fn next_aim(&self) -> Option<(u32, Parameters<f64>)> {
         self.needs_aim().then(|| self.aim())
     }

@@ -1,4 +1,4 @@
-//! What a member shows on its way: rows, snapshots and frames at output times, and the search for crossings.
+//! A member's output during the run: rows, snapshots and frames at output times, and the search for crossings.
 
 use glam::DVec2;
 
@@ -14,19 +14,19 @@ use crate::{
     solver::Ring,
 };
 
-/// Shares of a spacing that nodes go at most between two looks at a curve about to cross itself.
+/// Checks for crossings per spacing that nodes move, in a curve about to cross itself.
 const LOOKS_PER_SPACING: f64 = 16.0;
 
 impl Trajectory<'_> {
-    /// Whether [`Trajectory::serve`] needs the state: for a snapshot, or for a look at the curve.
+    /// Returns whether [`Trajectory::serve`] needs the state: for a snapshot, or to check for crossings.
     pub fn wants_state(&self) -> bool {
         let mut due = self.outputs.from(self.served).take_while(|output| self.place(output.t).is_some());
         self.is_look_due() || due.any(|output| output.snapshot || output.frame)
     }
 
-    /// Serves the output times that the last step has reached, and looks at the curve where that is due; `state` is
-    /// needed if [`Trajectory::wants_state`]. Returns whether all are served: no more are while `most` bytes of rows, or
-    /// more, are in memory.
+    /// Serves the output times that the last step has reached, and checks for crossings if due; `state` is
+    /// needed if [`Trajectory::wants_state`]. Returns whether all are served: it stops while `most` bytes of rows or
+    /// more are in memory.
     pub fn serve(&mut self, state: Option<&State<f64>>, most: usize) -> bool {
         if let (true, Some(state)) = (self.is_look_due(), state) {
             self.look(&state.curve);
@@ -43,12 +43,12 @@ impl Trajectory<'_> {
         true
     }
 
-    /// Its rows so far.
+    /// Returns the rows so far.
     pub fn rows(&mut self) -> &mut Rows {
         &mut self.rows
     }
 
-    /// How far in the last step the time `t` lies, in (0, 1]; none where the step has not reached it.
+    /// Where in the last step the time `t` is, in (0, 1]; `None` if the step has not reached it.
     fn place(&self, t: f64) -> Option<f64> {
         match self.time {
             Time::Fixed(clock) => {
@@ -98,8 +98,8 @@ impl Trajectory<'_> {
         }
     }
 
-    /// Values inside the last step, interpolated as accurately as the step itself: a fixed one, of first order, by a
-    /// straight line, an adaptive one by the parabola through its middle.
+    /// Values inside the last step, interpolated as accurately as the step itself: for a fixed one, of first order, by
+    /// a straight line, for an adaptive one by the parabola through its middle.
     fn between(&self, fraction: f64, before: &[f64], middle: &[f64], now: &[f64]) -> Vec<f64> {
         if fraction == 1.0 {
             return now.to_vec();
@@ -117,7 +117,7 @@ impl Trajectory<'_> {
             && self.report.now.k_min <= 0.0
     }
 
-    /// Looks whether the polygon crosses itself, and sets how far its nodes may go before the next look.
+    /// Checks whether the polygon crosses itself, and sets how far its nodes may move before the next check.
     ///
     /// A curve whose tangent turns once and always to one side is simple, so the back end pauses only members whose
     /// curvature changes sign.

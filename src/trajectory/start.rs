@@ -1,4 +1,4 @@
-//! A member at its start: its unit, its thresholds, its clock.
+//! The start of a member: its unit, its thresholds, its clock.
 
 use glam::DVec2;
 
@@ -14,22 +14,22 @@ use crate::{
     scheme::{Parameters, State, run::Run},
 };
 
-/// An excess is a difference of numbers near 1: below this many ε a threshold lies in its rounding.
+/// An excess is a difference of numbers near 1: a threshold below this multiple of ε is within its rounding.
 const RESOLUTION: f64 = 128.0;
 /// A threshold that no excess reaches.
 const NO_THRESHOLD: f64 = -1.0;
 /// The rate is fitted while the excess is between these fractions of its start. Adaptive steps follow the shape to the
 /// end of the fit, or to half the threshold.
 const FITTED: [f64; 2] = [1e-3, 1e-1];
-/// A curve that has shrunk to this fraction of its length is gone.
+/// A curve that has shrunk to this fraction of its length has vanished.
 const SHRUNK: f64 = 1e-3;
-/// Ticks of the clock in the first adaptive step at least.
+/// Minimum number of clock ticks in the first adaptive step.
 const FIRST_TICKS: f64 = 16.0;
 /// `--pull auto`: κ in units of the member's relaxation rate.
 const PULL_PER_RATE: f64 = 4.0;
 
 impl<'a> Trajectory<'a> {
-    /// A member at its start; serves the output times that are due there.
+    /// Creates a member at its start, and serves the output times that are due there.
     pub fn new(member: Member, spec: &Spec, precision: Precision, outputs: &'a Outputs) -> Trajectory<'a> {
         let unit = unit_of(&member.nodes);
         let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
@@ -81,7 +81,7 @@ impl<'a> Trajectory<'a> {
 }
 
 impl Course {
-    /// That of a curve with this excess and turning number, which is relaxed at an excess of `limit`.
+    /// The course of a curve with this excess and turning number, which is relaxed at an excess of `limit`.
     fn of(excess: f64, turning: f64, limit: f64, precision: Precision) -> Course {
         match limit {
             _ if excess <= ROUND => Course::Round,
@@ -98,7 +98,7 @@ fn resolution(precision: Precision) -> f64 {
     RESOLUTION * precision.epsilon()
 }
 
-/// Sets at which excess something happens on the way from `excess` to `limit`, and at which length the curve is gone.
+/// Sets the thresholds of the excess between `excess` and `limit`, and the length at which the curve has vanished.
 fn set_thresholds(launch: &mut Run<f64>, course: Course, excess: f64, limit: f64, precision: Precision) {
     let (resolution, parameters) = (resolution(precision), &mut launch.parameters);
     let reachable = course != Course::Immersed && excess > ROUND;
@@ -111,7 +111,7 @@ fn set_thresholds(launch: &mut Run<f64>, course: Course, excess: f64, limit: f64
     parameters.least_length = SHRUNK * launch.report.now.length;
 }
 
-/// How the time of the member passes; and how it ends at once, if no clock of the precision holds its time.
+/// How the member's time advances, and its status if it ends at once because no clock of the precision holds its time.
 fn begin_time(launch: &mut Run<f64>, spec: &Spec, unit: f64, precision: Precision) -> (Time, Option<Status>) {
     let tolerance = match spec.pace() {
         Pace::Fixed(tau) => return (Time::Fixed(Clock::new(tau, spec.t_end)), None),
@@ -134,12 +134,13 @@ fn begin_time(launch: &mut Run<f64>, spec: &Spec, unit: f64, precision: Precisio
     (Time::Adaptive(ticks), status)
 }
 
-/// The power of two next below the radius of the circle of the same length.
+/// The largest power of two not above the radius of the circle of the same length.
 fn unit_of(nodes: &[DVec2]) -> f64 {
     (polygon::length(nodes) / std::f64::consts::TAU).log2().floor().exp2()
 }
 
-/// Whether the law, a rate or the fixed step of a member is no number of a precision: too large, or a step too short.
+/// Whether the law, a rate or the fixed step of a member is outside the range of a precision: too large, or a step too
+/// short.
 fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
     let range = schedule::range(precision);
     let law = [p.c1, p.c2, p.c3, p.c4, p.c5, p.c6, p.c7, p.c8, p.length_penalty];
@@ -148,7 +149,7 @@ fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
     too_large || (p.tau != 0.0 && p.tau < *range.start())
 }
 
-/// The parameters of a member in units of `unit`, thresholds and times aside.
+/// The parameters of a member in units of `unit`, except thresholds and times.
 fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parameters<f64> {
     let time = unit.powi(4);
     let of_flow = Parameters::of_flow(&spec.flow, 1.0);
