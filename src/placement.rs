@@ -1,4 +1,4 @@
-//! Which back end a spec gets, and why: all that can be refused is refused here, before any work.
+//! Which back end a spec gets, and why. Everything that can be refused is refused here, before any work.
 
 use serde::{Deserialize, Serialize};
 
@@ -34,28 +34,28 @@ pub struct Platform {
     pub device_type: Option<String>,
     /// Number type of the arithmetic.
     pub precision: Precision,
-    /// Why this back end was taken.
+    /// Why this back end was chosen.
     pub reason: String,
     /// Threads of the CPU back end.
     pub threads: Option<usize>,
 }
 
 impl Platform {
-    /// Whether results are the same there to the last bit: those of the same program on the same adapter and driver, or on
-    /// any CPU, whatever its threads and vectors.
+    /// Returns whether results there are the same to the last bit: those of the same program on the same adapter and
+    /// driver, or on any CPU, whatever its threads and vectors.
     pub fn computes_like(&self, other: &Platform) -> bool {
         let place = |of: &Platform| (of.backend, of.adapter.clone(), of.driver.clone(), of.precision);
         place(self) == place(other)
     }
 
-    /// Back end, adapter and driver.
+    /// Returns back end, adapter and driver.
     pub fn name(&self) -> String {
         let backend = self.backend.to_string();
         let parts = [Some(backend.as_str()), self.adapter.as_deref(), self.driver.as_deref()];
         parts.into_iter().flatten().collect::<Vec<_>>().join(" ")
     }
 
-    /// Writes into a spec where it ran, which is elsewhere than was chosen if the GPU failed.
+    /// Writes to a spec where it ran, which differs from the choice if the GPU failed.
     pub fn settle_place(&self, spec: &mut Spec) {
         spec.backend = self.backend.into();
         spec.adapter = self.adapter.clone();
@@ -65,9 +65,9 @@ impl Platform {
 /// A back end that suits a spec, not yet opened.
 pub struct Choice {
     device: Device,
-    /// Its number, if it was asked for by that.
+    /// Its number, if it was requested by number.
     number: Option<String>,
-    /// Where the GPU cannot be opened the CPU is taken.
+    /// Whether to use the CPU if the GPU cannot be opened.
     or_cpu: bool,
     precision: Precision,
     reason: String,
@@ -76,20 +76,21 @@ pub struct Choice {
 /// Chooses the back end for members of `n` nodes.
 ///
 /// # Errors
-/// [`Error::Request`] when the adapter, the precision or n cannot be had.
+/// [`Error::Request`] if the adapter, the precision or n is not available.
 pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
     match spec.backend {
         BackendChoice::Cpu => cpu(spec, n, "asked for".into()),
         BackendChoice::Gpu => gpu(spec, n),
         BackendChoice::Auto if spec.adapter.is_some() => gpu(spec, n),
-        // Drivers are not loaded for nothing: that takes a tenth of a second, and Mesa's print what only matters to windows.
+        // Drivers are loaded only if needed: loading takes a tenth of a second, and Mesa's print messages that only
+        // matter to windows.
         BackendChoice::Auto if !may_have_hardware() => auto(spec, n, Vec::new()),
         BackendChoice::Auto => auto(spec, n, Gpu::list()),
     }
 }
 
-/// Chooses back ends for the cohorts of a study: all in one place, that of the first one, or with `--backend auto` on the
-/// CPU where that cannot do all of them.
+/// Chooses back ends for the cohorts of a study: all on one device, that of the first cohort, or with `--backend auto`
+/// on the CPU if that device cannot run all of them.
 ///
 /// # Errors
 /// As [`choose`].
@@ -117,7 +118,7 @@ pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
     }
 }
 
-/// Writes into a study what the choices for its cohorts settled, so that it can be repeated as it is.
+/// Writes the settings chosen for the cohorts to a study, so that it can be repeated exactly.
 pub fn settle(study: &mut Study, choices: &[Choice]) {
     let cohorts = study.cohorts();
     let each = |cells: &mut [Cell]| {
@@ -128,7 +129,7 @@ pub fn settle(study: &mut Study, choices: &[Choice]) {
     study.settle(each, |spec| choices.iter().take(1).for_each(|first| first.settle_place(spec)));
 }
 
-/// What `--backend auto` takes: the first hardware GPU that can do the run, else the CPU.
+/// The choice of `--backend auto`: the first hardware GPU that can do the run, else the CPU.
 fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
     if spec.order == Order::Lexicographic {
         return cpu(spec, n, "lexicographic sweeps run on the CPU".into());
@@ -168,7 +169,7 @@ fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
     }
 }
 
-/// The error of an adapter that is not there; `names` are those that are.
+/// Returns the error for a missing adapter; `names` are the existing ones.
 pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
     let there = if names.is_empty() {
         "this machine has none; use --backend cpu, or install a GPU driver (Debian's software GPU is \
@@ -188,7 +189,7 @@ fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<Choice> {
     Ok(Choice { device: Device::Gpu(Box::new(adapter)), number: None, or_cpu: false, precision, reason })
 }
 
-/// The precision of the run on an adapter, if members of `n` nodes fit it.
+/// The precision of the run on an adapter, if members of `n` nodes fit.
 fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> Result<Precision> {
     let precision = spec.precision.unwrap_or(capacity.best_precision());
     if precision == Precision::F64 && !capacity.f64 {
@@ -227,12 +228,12 @@ fn ring(n: usize) -> Result<Blocks> {
 }
 
 impl Choice {
-    /// The number type of the run.
+    /// Returns the number type of the run.
     pub fn precision(&self) -> Precision {
         self.precision
     }
 
-    /// One line: what was taken and why, and which solver.
+    /// Describes the choice in one line: what was chosen and why, and which solver.
     pub fn sentence(&self, spec: &Spec) -> String {
         let precision = match self.precision {
             Precision::F32 => "f32",
@@ -242,7 +243,7 @@ impl Choice {
         format!("back end: {}, {precision} ({}); {solver}", self.device, self.reason)
     }
 
-    /// The spec with everything that this choice settled written out, so that it can be repeated as it is.
+    /// Writes all settings of this choice to the spec, so that it can be repeated exactly.
     pub fn settle(&self, spec: &mut Spec) {
         self.settle_place(spec);
         if spec.solver().sweeps() {
@@ -251,16 +252,16 @@ impl Choice {
         spec.solver = spec.solver().into();
     }
 
-    /// Writes into a spec with cells what they all have in common: where they are computed.
+    /// Writes the common settings of all cells to a spec: where they are computed.
     pub fn settle_place(&self, spec: &mut Spec) {
         spec.backend = self.device.kind().into();
-        // Several of one name are told apart by their numbers only.
+        // Several adapters of one name are distinguished only by their numbers.
         let name = || self.device.gpu().map(|gpu| gpu.name().to_string());
         spec.adapter = self.number.clone().or_else(name);
         spec.precision = Some(self.precision);
     }
 
-    /// Where the members of `spec` are computed by this choice.
+    /// Returns where this choice computes the members of `spec`.
     pub fn platform(&self, spec: &Spec) -> Platform {
         let mut platform = Platform {
             backend: self.device.kind(),
@@ -282,8 +283,8 @@ impl Choice {
         platform
     }
 
-    /// The choice for a later part of a study whose first part runs `there`: a study does not move in its midst. Where the
-    /// GPU of the first part failed, it is the CPU; else a GPU that fails is an error.
+    /// Returns the choice for a later part of a study whose first part runs `there`, since a study does not change
+    /// device midway. If the GPU of the first part failed, this is the CPU; otherwise a GPU that fails is an error.
     pub fn after(self, there: &Platform) -> Choice {
         match (self.device.kind(), there.backend) {
             (DeviceKind::Gpu, DeviceKind::Cpu) => self.on_cpu(there.reason.clone()),
@@ -295,17 +296,17 @@ impl Choice {
         Choice { device: Device::Cpu, number: None, or_cpu: false, precision: self.precision, reason }
     }
 
-    /// The same, but the CPU where the GPU cannot be opened or computes wrongly.
+    /// Falls back to the CPU if the GPU cannot be opened or computes wrongly.
     pub fn or_cpu(self) -> Choice {
         Choice { or_cpu: true, ..self }
     }
 
-    /// What was chosen.
+    /// Returns the chosen device.
     pub fn device(&self) -> &Device {
         &self.device
     }
 
-    /// Opens it for a cohort of cells.
+    /// Opens the device for a cohort of cells.
     ///
     /// # Errors
     /// As [`open`](Choice::open).
@@ -315,11 +316,12 @@ impl Choice {
         self.open(&whole, whole.points)
     }
 
-    /// Opens it for the members of `spec`, of `n` nodes; a GPU has to pass a [self-test](crate::conformance::self_test()).
-    /// Where `--backend auto` chose a GPU that fails, it opens the CPU, and the platform's reason says why.
+    /// Opens the device for the members of `spec`, of `n` nodes; a GPU must pass a
+    /// [self-test](crate::conformance::self_test()). If `--backend auto` chose a GPU that fails, it opens the CPU, and
+    /// the platform's reason says why.
     ///
     /// # Errors
-    /// [`Error::Device`] when a GPU that was asked for cannot be opened or computes wrongly.
+    /// [`Error::Device`] if a requested GPU cannot be opened or computes wrongly.
     pub fn open(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         match self.precision {
             Precision::F32 => self.open_in::<f32>(spec, n),
@@ -344,17 +346,17 @@ impl Choice {
     }
 }
 
-/// Threads of the CPU back end: all cores unless the spec says how many.
+/// Threads of the CPU back end: all cores unless the spec gives a number.
 fn threads(spec: &Spec) -> usize {
     spec.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
 }
 
-/// The kernel for the members of `spec`, which has passed its self-test.
+/// Creates the kernel for the members of `spec`, which has passed its self-test.
 fn open_gpu<T: Vectorised>(gpu: &Gpu, blocks: Blocks, spec: &Spec, method: &Method) -> Result<Box<dyn Backend>> {
     let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
     let adaptive = spec.adaptive.is_some();
     let variant = Variant { adaptive, ..gpu.capacity().variant(blocks, spec.solver()) };
-    // The self-test has settings of its own: by the run's a solve may end before it is one, and then roundings decide.
+    // The self-test has its own cap: with the run's, a solve may end before it converges, and then roundings decide.
     let tested = Method { max_sweeps: MAX_SWEEPS, ..*method };
     let mut kernel = Kernel::<T>::new(gpu, blocks, members, tested.max_sweeps, variant)?;
     let device = format!("{} ({})", gpu.name(), gpu.driver());
@@ -366,7 +368,7 @@ fn open_gpu<T: Vectorised>(gpu: &Gpu, blocks: Blocks, spec: &Spec, method: &Meth
 mod tests {
     use super::*;
 
-    /// What every WebGPU device has at least.
+    /// The minimum of every WebGPU device.
     const LEAST: Capacity =
         Capacity { f64: false, threads: 256, workgroup_bytes: 16_384, subgroup: 32, least_subgroup: 0 };
 

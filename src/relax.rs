@@ -1,4 +1,4 @@
-//! The library's front door: a study in, what its members leave out.
+//! The library's entry point: runs a study and passes on what its members leave.
 
 use crate::{
     ensemble::{Sink, Study},
@@ -7,10 +7,12 @@ use crate::{
     simulate::simulate,
 };
 
-/// Relaxes the members of a study where its spec says, by default on the first hardware GPU that can do it and else on the
-/// CPU, and hands each to `sink` in member order. A `Vec` of [`Ended`](crate::ensemble::Ended) is a sink that collects them.
+/// Relaxes the members of a study on the device given by its spec, by default the first hardware GPU that can do it and
+/// else the CPU, and passes each to `sink` in member order. A `Vec` of [`Ended`](crate::ensemble::Ended) is a sink that
+/// collects them.
 ///
-/// Returns where that was. The first [`PORTRAITS`](crate::ensemble::study::PORTRAITS) members come with their nodes.
+/// Returns where they were computed. The first [`PORTRAITS`](crate::ensemble::study::PORTRAITS) members come with their
+/// nodes.
 ///
 /// ```
 /// use curvelax::{ensemble::{Spec, Study}, relax};
@@ -23,14 +25,14 @@ use crate::{
 /// ```
 ///
 /// # Errors
-/// [`Error::Request`](crate::Error::Request) where this machine cannot do what the spec asks for,
-/// [`Error::Device`](crate::Error::Device) where a GPU that it asks for fails, and those of the sink.
+/// [`Error::Request`](crate::Error::Request) if this machine cannot do what the spec asks for,
+/// [`Error::Device`](crate::Error::Device) if a requested GPU fails, and the errors of the sink.
 pub fn relax(study: &Study, sink: &mut dyn Sink) -> Result<Platform> {
     let mut there: Option<Platform> = None;
     let choices = choose_all(study)?;
     for (range, choice) in study.cohorts().into_iter().zip(choices) {
         let cohort = &study.cells()[range];
-        // A study does not move in its midst.
+        // A study does not change device midway.
         let choice = match &there {
             Some(platform) => choice.after(platform),
             None => choice,

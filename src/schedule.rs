@@ -1,4 +1,4 @@
-//! Time: the clock of a run with fixed τ, that of adaptive steps, and the output times.
+//! Time: the clock of a run with fixed τ, the clock of adaptive steps, and the output times.
 
 use std::ops::RangeInclusive;
 
@@ -10,7 +10,7 @@ use crate::{
 /// Relative distance from a step at which an output time counts as on it.
 const ON_A_STEP: f64 = 1e-9;
 
-/// Steps of length τ from 0 to the final time; the last one is shorter where τ does not divide it.
+/// Steps of length τ from 0 to the final time; the last is shorter if τ does not divide it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
     /// Length of every step but the last.
@@ -22,7 +22,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// The clock of a run; `t_end/tau` is at most 10⁹.
+    /// Creates the clock of a run; `t_end/tau` is at most 10⁹.
     pub fn new(tau: f64, t_end: f64) -> Clock {
         let ratio = t_end / tau;
         let whole = ratio.round();
@@ -30,35 +30,35 @@ impl Clock {
         Clock { tau, t_end, steps: steps.max(1.0) as u32 }
     }
 
-    /// Time after `step` steps.
+    /// Returns the time after `step` steps.
     pub fn time(&self, step: u32) -> f64 {
         if step >= self.steps { self.t_end } else { f64::from(step) * self.tau }
     }
 
-    /// Time at `fraction` of the step after `step` steps.
+    /// Returns the time at `fraction` of the step after `step` steps.
     pub fn inside(&self, step: u32, fraction: f64) -> f64 {
         let (before, after) = (self.time(step), self.time(step + 1));
         before + fraction.clamp(0.0, 1.0) * (after - before)
     }
 
-    /// Whether the last step is shorter than τ.
+    /// Returns whether the last step is shorter than τ.
     pub fn ends_short(&self) -> bool {
         self.t_end < f64::from(self.steps) * self.tau * (1.0 - ON_A_STEP)
     }
 
-    /// Length of the last step.
+    /// Returns the length of the last step.
     pub fn last(&self) -> f64 {
         self.t_end - f64::from(self.steps - 1) * self.tau
     }
 
-    /// Where the output time `t` lies: the step that reaches it, and how far in that step, in (0, 1].
+    /// Locates the output time `t`: the step that reaches it, and the fraction of that step, in (0, 1].
     pub fn locate(&self, t: f64) -> (u32, f64) {
         if t >= self.t_end * (1.0 - ON_A_STEP) {
             return (self.steps, 1.0);
         }
         let ratio = t / self.tau;
         let near = ratio.round();
-        // Where the last step is short, the step before it is the last that lies on a multiple of τ.
+        // If the last step is short, the one before it is the last to end on a multiple of τ.
         if (ratio - near).abs() <= ON_A_STEP * near.max(1.0) && near < f64::from(self.steps) {
             return (near as u32, 1.0);
         }
@@ -68,7 +68,7 @@ impl Clock {
     }
 }
 
-/// How adaptive time is split into parts that both fit the precision, see [`scheme::pace`](crate::scheme::pace).
+/// The split of adaptive time into two parts that both fit the precision, see [`scheme::pace`](crate::scheme::pace).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ticks {
     /// Unit of the high part, a power of two.
@@ -78,23 +78,23 @@ pub struct Ticks {
 }
 
 impl Ticks {
-    /// Parts for a run to `t_end`, one of the [`times`] of a precision, in its numbers: ticks of about 2ε² of the end,
-    /// but never below its least normal number.
+    /// Creates the parts for a run to `t_end`, one of the [`times`] of a precision, in its numbers: ticks of about 2ε²
+    /// of the end, but not below its smallest normal number.
     pub fn new(t_end: f64, precision: Precision) -> Ticks {
         let epsilon = precision.epsilon();
-        // The high part has to count to the end without rounding.
+        // The high part must count to the end without rounding.
         let unit = (2.0 * epsilon * t_end).log2().ceil().exp2().max(range(precision).start() / epsilon);
         Ticks { unit, tick: unit * epsilon }
     }
 
-    /// High and low part of `t`, rounded up to a whole tick.
+    /// Splits `t`, rounded up to a whole tick, into high and low part.
     pub fn split(&self, t: f64) -> (f64, f64) {
         let high = (t / self.unit).floor() * self.unit;
         (high, ((t - high) / self.tick).ceil() * self.tick)
     }
 }
 
-/// The positive numbers of a precision, from the least normal to the largest one.
+/// Returns the positive numbers of a precision, from the smallest normal to the largest one.
 pub fn range(precision: Precision) -> RangeInclusive<f64> {
     match precision {
         Precision::F32 => f32::MIN_POSITIVE.into()..=f32::MAX.into(),
@@ -102,7 +102,7 @@ pub fn range(precision: Precision) -> RangeInclusive<f64> {
     }
 }
 
-/// The times to which a precision counts in [`Ticks`]: their parts have all its digits.
+/// Returns the times to which a precision counts in [`Ticks`]: their parts have all its digits.
 pub fn times(precision: Precision) -> RangeInclusive<f64> {
     let (range, epsilon) = (range(precision), precision.epsilon());
     range.start() / epsilon..=range.end() * epsilon
@@ -113,21 +113,21 @@ pub fn times(precision: Precision) -> RangeInclusive<f64> {
 pub struct Output {
     /// The time.
     pub t: f64,
-    /// A row of `series.csv` is due.
+    /// Whether a row of `series.csv` is due.
     pub series: bool,
-    /// A snapshot is due.
+    /// Whether a snapshot is due.
     pub snapshot: bool,
-    /// A picture of the member on its way is due.
+    /// Whether a picture of the member during the run is due.
     pub frame: bool,
 }
 
-/// The times at which every member's excess is noted, both ends included.
+/// Returns the times at which every member's excess is recorded, both ends included.
 pub fn grid(t_end: f64) -> impl Iterator<Item = f64> {
     (0..=member::PARTS).map(move |part| decay::share::<f64>(part) * t_end)
 }
 
-/// The output times of a run, in order. Those that only the series has follow from their numbers: a million of them take
-/// no memory.
+/// The output times of a run, in order. Times for series rows only are computed from their numbers: a million of them
+/// take no memory.
 #[derive(Clone, Debug, Default)]
 pub struct Outputs {
     rows: SeriesTimes,
@@ -142,13 +142,13 @@ struct SeriesTimes {
     count: usize,
 }
 
-/// An output that is more than a row of the series.
+/// An output other than a mere row of the series.
 #[derive(Clone, Copy, Debug)]
 struct Other {
     output: Output,
-    /// Its place among all outputs.
+    /// Its index among all outputs.
     place: usize,
-    /// Outputs up to and with this one at which no row is due.
+    /// Outputs without a row, up to and including this one.
     without_row: usize,
 }
 
@@ -157,7 +157,7 @@ impl SeriesTimes {
         at_most(self.t_end, row as f64 * self.every)
     }
 
-    /// Rows before `t`.
+    /// The number of rows before `t`.
     fn before(&self, t: f64) -> usize {
         let (mut low, mut high) = (0, self.count);
         while low < high {
@@ -168,13 +168,13 @@ impl SeriesTimes {
     }
 }
 
-/// `t`, or the end where that is the same but for rounding.
+/// `t`, or the end if they differ only by rounding.
 fn at_most(t_end: f64, t: f64) -> f64 {
     if t >= t_end * (1.0 - ON_A_STEP) { t_end } else { t }
 }
 
 impl Outputs {
-    /// Those of a run to `t_end`: every `series` from 0 on, each of `snapshots` and of `frames`.
+    /// Creates the outputs of a run to `t_end`: every `series` from 0 on, each of `snapshots` and of `frames`.
     pub fn new(t_end: f64, series: Option<f64>, snapshots: &[f64], frames: &[f64]) -> Outputs {
         let count = series.map_or(0, |dt| (t_end / dt * (1.0 + ON_A_STEP)) as usize + 1);
         let rows = SeriesTimes { t_end, every: series.unwrap_or(0.0), count };
@@ -203,17 +203,17 @@ impl Outputs {
         Outputs { rows, others }
     }
 
-    /// How many there are.
+    /// Returns the number of outputs.
     pub fn len(&self) -> usize {
         self.rows.count + self.others.last().map_or(0, |last| last.without_row)
     }
 
-    /// Whether there is none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The one at `place`, from 0.
+    /// Returns the output at `place`, from 0.
     pub fn get(&self, place: usize) -> Option<Output> {
         let before = self.others.partition_point(|other| other.place < place);
         match self.others.get(before) {
@@ -225,7 +225,7 @@ impl Outputs {
         (row < self.rows.count).then(due)
     }
 
-    /// All of them, from the one at `place` on.
+    /// Iterates over the outputs, starting at `place`.
     pub fn from(&self, place: usize) -> impl Iterator<Item = Output> {
         (place..).map_while(|place| self.get(place))
     }
@@ -266,7 +266,7 @@ mod tests {
         assert!((clock.locate(0.25).1 - 0.5).abs() < 1e-12);
     }
 
-    /// The outputs of a run as they are listed when all of them are sorted.
+    /// The outputs of a run by sorting all of them.
     fn sorted(t_end: f64, series: Option<f64>, snapshots: &[f64], frames: &[f64]) -> Vec<(f64, [bool; 3])> {
         let rows = series.map_or(0, |dt| (t_end / dt * (1.0 + ON_A_STEP)) as u64 + 1);
         let rows = (0..rows).map(|row| (row as f64 * series.unwrap(), [true, false, false]));

@@ -1,7 +1,7 @@
-//! The loop: fill slots with members, advance them, collect what they report, refill.
+//! The main loop: fill slots with members, advance them, collect their reports, refill.
 //!
 //! Nothing here depends on where the members are advanced or on how many are resident: a member's steps are its
-//! own, its output times are reached by pausing it there, and rows leave in member order. So a run may be interrupted
+//! own, it is paused at its output times, and rows are written in member order. A run may therefore be interrupted
 //! between any two dispatches: the [`Standing`] then has all that [`resume`] needs to end it as it would have ended.
 
 use std::{
@@ -19,29 +19,29 @@ use crate::{
     trajectory::Trajectory,
 };
 
-/// A member is admitted when at most this many times the slots are waiting for the first one that has not ended.
+/// Members that may wait for the first unfinished one, in multiples of the slots; beyond, no member is admitted.
 const MEMBERS_AHEAD: usize = 8;
 
-/// Where a dispatch takes longer, the sink is told in between, and may stop the run.
+/// Interval at which the sink is notified, and may stop the run, during longer dispatches.
 const MAX_WAIT: Duration = Duration::from_millis(200);
 
-/// Members that end as they are made, between two words with the sink.
+/// Maximum members that end at creation between two calls of the sink.
 const MAX_AT_ONCE: usize = 1000;
 
-/// States that are read back at once when a run is kept, and the most bytes of them.
+/// Maximum states read back at once for a checkpoint, and their maximum bytes.
 const READ_BACK: usize = 512;
 const BYTES_READ_BACK: usize = 64 << 20;
 
-/// Bytes of rows in memory above which the sink is handed all of them, and of one member at most.
+/// Bytes of rows in memory above which all are passed to the sink; also the maximum of one member.
 pub const MAX_HELD: usize = 32 << 20;
 const MAX_OF_ONE: usize = 8 << 20;
-/// Before the run is kept the sink is handed all rows if they are more than this: what is kept stays small.
+/// Bytes of rows above which all are passed to the sink before a checkpoint, to keep it small.
 const MAX_KEPT: usize = 4 << 20;
 
-/// Runs the members of `cells`, which keep [cohort](crate::ensemble::Study::cohorts), on `backend`, and hands each to
-/// `sink` in member order.
+/// Runs the members of `cells`, which form a [cohort](crate::ensemble::Study::cohorts), on `backend`, and passes each
+/// to `sink` in member order.
 ///
-/// The first members come with their nodes before, on their way and after, `portraits` of them over all cells.
+/// The first members come with their nodes before, during and after the run, `portraits` of them over all cells.
 pub fn simulate(
     cells: &[Cell],
     precision: Precision,
@@ -52,10 +52,10 @@ pub fn simulate(
     resume(cells, precision, backend, portraits, Standing::default(), sink)
 }
 
-/// As [`simulate`], from where an earlier one of the same cells stood.
+/// Like [`simulate`], continuing from the progress of an earlier run of the same cells.
 ///
 /// # Errors
-/// Beside those of the back end and the sink, [`Error::Request`] where members in `standing` are not those of `cells`.
+/// Those of the back end and the sink, and [`Error::Request`] if members in `standing` are not those of `cells`.
 pub fn resume(
     cells: &[Cell],
     precision: Precision,
@@ -94,7 +94,7 @@ pub fn resume(
     let mut queue = Queue { total, ended: next + early.len() as u64, next, early, kept: false, told: Instant::now() };
     let done = run(&mut pool, &mut queue, backend, sink);
     if done.is_err() && !queue.kept {
-        // What has ended is not to be lost. Why the run ends is told already.
+        // Save the members that have ended; `done` already tells why the run ends.
         let _ = queue.checkpoint(None, sink);
     }
     done
@@ -103,14 +103,14 @@ pub fn resume(
 fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut dyn Sink) -> Result<()> {
     let cells = pool.cells.iter().enumerate();
     let members = cells.flat_map(|(cell, own)| own.members().map(move |member| (cell, member)));
-    // A state may hold as many rows as a run.
+    // A checkpoint may hold as many rows as a run.
     pool.relieve(queue, MAX_HELD, sink)?;
     let ended: BTreeSet<u64> = queue.early.keys().copied().collect();
     let left = (0..).zip(members).skip(queue.next as usize).filter(|(rank, _)| !ended.contains(rank));
     let mut waiting = left.peekable();
-    // Members that end early wait for those before them: this bounds how many.
+    // Members that end early wait for those before them; this bounds how many.
     let ahead = (MEMBERS_AHEAD * backend.slots()) as u64;
-    // Where there are two batches, one of them is on its way while the other one is looked after.
+    // With two batches, one is being advanced while the other is handled.
     let size = backend.slots() / backend.batches();
     let mut on_the_way = vec![false; backend.batches()];
     let mut told = false;
@@ -125,7 +125,7 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
             on_the_way[batch] = false;
             pool.collect(backend, slots.clone(), queue, sink)?;
         }
-        // Where members end at once, the sink is to be heard all the same.
+        // The sink must be heard even if members end at once.
         let mut over = 0;
         for slot in slots.clone() {
             while pool.resident[slot].is_none() && over < MAX_AT_ONCE {
@@ -142,7 +142,7 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
         }
         let wish = sink.wish();
         let goes_on = matches!(wish, Wish::Continue);
-        // To be kept, all have to be back.
+        // A checkpoint needs all batches back.
         if !goes_on && !on_the_way.contains(&true) {
             pool.relieve(queue, MAX_KEPT, sink)?;
             queue.checkpoint(Some(pool.pause(backend)?), sink)?;
@@ -161,7 +161,7 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
     Ok(())
 }
 
-/// As many states of `n` nodes as may be read back at once.
+/// Returns how many states of `n` nodes may be read back at once.
 pub fn states_at_once(n: usize) -> usize {
     (BYTES_READ_BACK / (STATE_FIELDS * size_of::<f64>() * n)).max(1)
 }
@@ -170,18 +170,18 @@ pub fn states_at_once(n: usize) -> usize {
 struct Pool<'a> {
     cells: &'a [Cell],
     precision: Precision,
-    /// Of each cell: for members without a portrait, and for those with one.
+    /// For each cell: for members without a portrait, and for those with one.
     outputs: [&'a [Outputs]; 2],
     resident: Vec<Option<(u64, Trajectory<'a>)>>,
     portraits: usize,
-    /// Members that go on where they were, by rank.
+    /// Members that continue from a checkpoint, by rank.
     paused: BTreeMap<u64, Paused>,
-    /// No more bytes of rows than these are in memory, also of members that ended early.
+    /// Bound on the bytes of rows in memory, including members that ended early.
     held: usize,
 }
 
 impl Pool<'_> {
-    /// Puts a member, the `rank`-th of this run, into a free slot; or ends it where there is nothing to do.
+    /// Puts a member, the `rank`-th of this run, into a free slot; or ends it if there is nothing to do.
     fn admit(
         &mut self,
         backend: &mut dyn Backend,
@@ -191,7 +191,7 @@ impl Pool<'_> {
     ) -> Result<Option<Ended>> {
         let own = &self.cells[cell];
         let each = (self.portraits / self.cells.len().max(1)).max(1);
-        // The same ones whatever shard they are in.
+        // The same members whatever their shard.
         let portrait = cell < self.portraits && own.place(index) < each as u64;
         let outputs = &self.outputs[usize::from(portrait)][cell];
         let mut trajectory = Trajectory::new(own.member(index)?, &own.spec, self.precision, outputs);
@@ -213,7 +213,7 @@ impl Pool<'_> {
         self.cells.first().map_or(1, |cell| cell.family.points())
     }
 
-    /// All members on their way; none of them is in a batch that is.
+    /// All unfinished members; none may be in a batch that is being advanced.
     fn pause(&self, backend: &mut dyn Backend) -> Result<BTreeMap<u64, Paused>> {
         let occupied = self.resident.iter().enumerate().filter_map(|(slot, own)| Some((slot, own.as_ref()?)));
         let occupied: Vec<_> = occupied.collect();
@@ -227,7 +227,7 @@ impl Pool<'_> {
         Ok(all)
     }
 
-    /// Looks at the members in `slots`: serves their output times, and aims them further or lets them leave.
+    /// Processes the members in `slots`: serves their output times, and sets their next goals or lets them leave.
     fn collect(
         &mut self,
         backend: &mut dyn Backend,
@@ -279,7 +279,7 @@ impl Pool<'_> {
             if self.held > MAX_HELD {
                 self.relieve(queue, MAX_HELD / 4 * 3, sink)?;
             }
-            // Many rows take long to write.
+            // Many rows take long to write, so the sink is notified in between.
             if queue.told.elapsed() >= MAX_WAIT {
                 queue.tell(self, sink)?;
             }
@@ -287,7 +287,7 @@ impl Pool<'_> {
         Ok(())
     }
 
-    /// Hands all rows in memory to the sink if they are more than `most` bytes.
+    /// Passes all rows in memory to the sink if they exceed `most` bytes.
     fn relieve(&mut self, queue: &mut Queue, most: usize, sink: &mut dyn Sink) -> Result<()> {
         let own = self.resident.iter_mut().flatten().map(|(_, trajectory)| trajectory.rows());
         let own = own.chain(self.paused.values_mut().map(|paused| &mut paused.rows));
@@ -311,20 +311,20 @@ impl Pool<'_> {
     }
 }
 
-/// Members that have ended, kept until those before them have.
+/// Members that have ended, held until those before them have.
 struct Queue {
     total: u64,
     ended: u64,
     next: u64,
     early: BTreeMap<u64, Ended>,
-    /// The sink knows where the run stands, to the last member.
+    /// Whether the sink has saved the progress of the run, to the last member.
     kept: bool,
-    /// When the sink was last told how far the run is.
+    /// When the sink was last notified of the progress.
     told: Instant,
 }
 
 impl Queue {
-    /// Tells how far the run is, and hears whether it is to end at once.
+    /// Reports the progress to the sink, which may end the run at once.
     fn tell(&mut self, pool: &Pool, sink: &mut dyn Sink) -> Result<()> {
         self.told = Instant::now();
         let work = self.ended as f64 + pool.share();
@@ -342,7 +342,7 @@ impl Queue {
         Ok(())
     }
 
-    /// Has the members kept that have ended, and those on their way where they are known.
+    /// Saves the members that have ended, and the unfinished ones if known.
     fn checkpoint(&mut self, resident: Option<BTreeMap<u64, Paused>>, sink: &mut dyn Sink) -> Result<()> {
         let standing = Standing { next: self.next, early: std::mem::take(&mut self.early), resident };
         let done = sink.checkpoint(&standing);
@@ -351,7 +351,7 @@ impl Queue {
         done
     }
 
-    /// Where the run is to stop: has kept what is known at once, since nobody may wait for those on their way.
+    /// If the run is to stop, saves at once what is known, since nobody may wait for members in progress.
     fn checkpoint_before_the_stop(&mut self, sink: &mut dyn Sink) -> Result<bool> {
         let stops = matches!(sink.wish(), Wish::Stop(_));
         if stops {
@@ -373,7 +373,7 @@ mod tests {
         },
     };
 
-    /// Takes members and never brings them back.
+    /// A back end that accepts members and never returns them.
     struct Never;
 
     impl Backend for Never {
@@ -408,7 +408,7 @@ mod tests {
         }
     }
 
-    /// Stops a run when it has been told of it so often.
+    /// Stops a run after this many notifications.
     struct Patience(u32);
 
     impl Sink for Patience {
