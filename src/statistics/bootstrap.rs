@@ -1,15 +1,15 @@
-//! How far the median could have been off: the bootstrap's percentile interval.
+//! The uncertainty of the median: the bootstrap's percentile interval.
 //!
 //! A resample is n members drawn with replacement, each with its time and its censoring. Only *how often* each is drawn
-//! matters, and these numbers are multinomial. So a resample is not drawn member by member and sorted. The sorted
-//! sample is halved again and again, and a binomial number tells how many draws go to the left half:
+//! matters, and these numbers are multinomial. So a resample is not drawn member by member and sorted. Instead, the
+//! sorted sample is halved recursively, and a binomial number gives the draws in the left half:
 //!
-//! - A range of events only, or of censorings only, needs no more than its number of draws, since the product of
-//!   Kaplan and Meier telescopes. It is halved further only if the median falls into it.
+//! - A range of events only, or of censorings only, needs just its number of draws, since the Kaplan–Meier product
+//!   telescopes. It is halved further only if the median falls into it.
 //! - A short range of both is drawn member by member.
-//! - What lies behind the median is never drawn.
+//! - Nothing beyond the median is drawn.
 //!
-//! The law is that of drawing with replacement, to a millionth of each probability. Where members are censored only at
+//! The law is that of drawing with replacement, to a millionth of each probability. If members are censored only at
 //! the end of the run, a resample takes about log₂ n binomials instead of n draws.
 
 use std::ops::Range;
@@ -21,12 +21,12 @@ use super::{
 };
 use crate::threads;
 
-/// How resampling is done.
+/// Settings for resampling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bootstrap {
-    /// Number of resamples: with 1000 the ends of a 95 % interval are off by about 4 % of its half-width.
+    /// Number of resamples; with 1000, the ends of a 95 % interval are off by about 4 % of its half-width.
     pub resamples: u32,
-    /// Probability that the interval is to hold, in (0, 1).
+    /// Coverage probability of the interval, in (0, 1).
     pub level: f64,
     /// Equal seeds give equal intervals, whatever the number of threads.
     pub seed: u64,
@@ -38,19 +38,19 @@ impl Default for Bootstrap {
     }
 }
 
-/// An interval of the median, in the unit of the times.
+/// An interval for the median, in the unit of the times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// Its lower end; `None` where even that many resamples have no median.
+    /// Its lower end; `None` if even that many resamples have no median.
     pub lower: Option<f64>,
-    /// Its upper end; `None` where it is open, because too many resamples have no median.
+    /// Its upper end; `None` if it is open, because too many resamples have no median.
     pub upper: Option<f64>,
     /// Resamples whose S stays above ½. They count as larger than all others.
     pub unreached: usize,
 }
 
 impl Bootstrap {
-    /// The percentile interval of the median of Kaplan and Meier.
+    /// Returns the percentile interval of the Kaplan–Meier median.
     ///
     /// Its ends are quantiles of the resamples' medians, of type 7. `None` for fewer than two members, without an
     /// event, without resamples, and for a level outside (0, 1).
@@ -58,12 +58,12 @@ impl Bootstrap {
         self.interval(&Ranges::new(sample), |place| sample.range(place..place + 1).next().map(|seen| seen.time))
     }
 
-    /// That of complete data, of which a resample's median is the value in the middle, the lower of two.
+    /// Returns the interval for complete data; the median of a resample is its middle value, the lower of two.
     pub fn median_of(&self, values: &Description) -> Option<Interval> {
         self.interval(&Ranges::complete(values.count()), |place| values.sorted().get(place).copied())
     }
 
-    /// The interval where `value` is what stands at a place.
+    /// The interval, where `value` gives the value at a place.
     fn interval(&self, ranges: &Ranges, value: impl Fn(usize) -> Option<f64> + Sync) -> Option<Interval> {
         let has_median = ranges.members > 1 && ranges.events(&(0..ranges.members)) > 0;
         if !has_median || self.resamples == 0 || !(self.level > 0.0 && self.level < 1.0) {
@@ -79,12 +79,12 @@ impl Bootstrap {
     }
 }
 
-/// Places of a sorted sample, with the number of events in any range at hand.
+/// Places of a sorted sample, with quick access to the number of events in any range.
 struct Ranges<'a> {
     members: usize,
-    /// What it is of where some members are censored, and the number of events before every [`BLOCK`]-th place.
+    /// The sample if some members are censored, and the number of events before every [`BLOCK`]-th place.
     censored: Option<(&'a Sample, Vec<usize>)>,
-    /// Members of both kinds that are drawn one by one.
+    /// Maximum length of a range of both kinds that is drawn member by member.
     short: usize,
 }
 
@@ -113,7 +113,7 @@ impl Ranges<'_> {
         before(range.end) - before(range.start)
     }
 
-    /// Where the median of one resample stands, if its S comes down to ½.
+    /// The place of the median of one resample, if its S comes down to ½.
     fn median(&self, draws: Draws) -> Option<usize> {
         let n = self.members;
         let curve = SurvivalPoint { survival: 1.0, at_risk: n as f64 };
@@ -126,7 +126,7 @@ fn events(sample: &Sample, range: Range<usize>) -> usize {
     sample.range(range).filter(|seen| seen.happened).count()
 }
 
-/// S and the members at risk, before the range that is looked at.
+/// S and the members at risk, before the current range.
 #[derive(Clone, Copy)]
 struct SurvivalPoint {
     survival: f64,
@@ -134,9 +134,9 @@ struct SurvivalPoint {
 }
 
 impl SurvivalPoint {
-    /// After `events` at times between which nothing is censored, among `leaving` members in all.
+    /// The point after `events` at times without censorings in between, among `leaving` members in all.
     ///
-    /// Without a branch, since in a resample nothing can be foretold; with none at risk S stays.
+    /// Branch-free, since a resample is unpredictable; with none at risk, S is unchanged.
     fn after(self, events: f64, leaving: f64) -> SurvivalPoint {
         let at_risk = self.at_risk.max(1.0);
         SurvivalPoint { survival: self.survival * ((at_risk - events) / at_risk), at_risk: self.at_risk - leaving }
@@ -147,7 +147,7 @@ impl SurvivalPoint {
     }
 }
 
-/// A resample up to the range that is looked at.
+/// A resample up to the current range.
 struct Resample<'a> {
     ranges: &'a Ranges<'a>,
     draws: Draws,
@@ -189,7 +189,8 @@ impl Resample<'_> {
             *curve = curve.after(f64::from(u8::from(seen.happened)) * leaving, leaving);
             Some(*curve)
         });
-        // The curve only falls: if it is not down at the end of the range it never was, and nothing is asked before.
+        // The curve only falls: if it is not down at the end of the range it never was, so nothing before needs
+        // checking.
         let after = curves.clone().last()?;
         if after.is_half_down() {
             return curves.position(SurvivalPoint::is_half_down).map(|i| range.start + i);
@@ -199,9 +200,9 @@ impl Resample<'_> {
     }
 }
 
-/// More would not stay in the nearest cache with their numbers; fewer would cost more binomials.
+/// More would not fit the nearest cache with their numbers; fewer would cost more binomials.
 const SHORT: usize = 4096;
-/// Members whose events are counted anew.
+/// Members between stored event counts.
 const BLOCK: usize = 64;
 
 #[cfg(test)]
@@ -214,7 +215,7 @@ mod tests {
 
     const RESAMPLES: u32 = 20_000;
 
-    /// Exponential times, censored with probability `censored` each, all at least `end` censored there.
+    /// Exponential times, each censored with probability `censored`, and at `end` if not below it.
     fn sample(members: u64, censored: f64, end: f64) -> Sample {
         let seen = |index| {
             let [u, v] = Stream::new(5, index, 0).uniforms(0);
@@ -224,7 +225,7 @@ mod tests {
         Sample::new((0..members).map(seen)).unwrap()
     }
 
-    /// Medians of resamples, in order, ranges up to `short` drawn one by one.
+    /// Medians of resamples, in order; ranges up to `short` are drawn member by member.
     fn medians(sample: &Sample, short: usize) -> Vec<f64> {
         let ranges = Ranges { short, ..Ranges::new(sample) };
         let times: Vec<f64> = sample.observations().map(|seen| seen.time).collect();
@@ -237,7 +238,7 @@ mod tests {
         medians
     }
 
-    /// Medians of resamples drawn member by member, sorted and estimated as any sample.
+    /// Medians of resamples drawn member by member, sorted and estimated like any sample.
     fn plain_medians(sample: &Sample) -> Vec<f64> {
         let (n, observations) = (sample.len(), sample.observations().collect::<Vec<_>>());
         let draw = |i: u64| {
@@ -248,13 +249,13 @@ mod tests {
         sorted((0..RESAMPLES.into()).map(draw))
     }
 
-    /// Largest difference of two empirical distributions of equal size.
+    /// Largest difference between two empirical distributions of equal size.
     fn distance(a: &[f64], b: &[f64]) -> f64 {
         let up_to = |all: &[f64], t: f64| all.partition_point(|median| *median <= t) as f64;
         a.iter().chain(b).map(|t| (up_to(a, *t) - up_to(b, *t)).abs()).fold(0.0, f64::max) / a.len() as f64
     }
 
-    /// Kolmogorov and Smirnov's distance that two samples of this size exceed once in 10⁵.
+    /// Kolmogorov–Smirnov distance that two samples of this size exceed once in 10⁵.
     fn chance() -> f64 {
         2.47 * (2.0 / f64::from(RESAMPLES)).sqrt()
     }
@@ -294,7 +295,7 @@ mod tests {
             let (ranges, curve) = (Ranges::new(&sample), SurvivalPoint { survival: 1.0, at_risk: n as f64 });
             let mut resample = Resample { ranges: &ranges, draws: Draws::new(1, 0), curve, counts: Vec::new() };
             assert!(resample.crossing(0..n, n).is_some());
-            // At most one for each level of the tree.
+            // At most one per level of the tree.
             assert!(resample.draws.blocks() <= 17, "{end}: {}", resample.draws.blocks());
         }
     }

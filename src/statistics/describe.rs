@@ -6,14 +6,14 @@ use super::{
 };
 use crate::error::{Error, Result};
 
-/// Finite numbers in order, and what is said of them, in their own unit.
+/// Finite numbers in order, with descriptive statistics in their own unit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Description {
     sorted: Vec<f64>,
 }
 
 impl Description {
-    /// Of any number of values, in any order; an error names the first that is not finite.
+    /// Describes any number of values, in any order; an error names the first that is not finite.
     pub fn new(values: impl IntoIterator<Item = f64>) -> Result<Description> {
         let mut sorted: Vec<f64> = values.into_iter().collect();
         if let Some(i) = sorted.iter().position(|value| !value.is_finite()) {
@@ -27,22 +27,22 @@ impl Description {
         Ok(Description { sorted })
     }
 
-    /// The values, smallest first.
+    /// Returns the values, smallest first.
     pub fn sorted(&self) -> &[f64] {
         &self.sorted
     }
 
-    /// How many there are.
+    /// Returns the number of values.
     pub fn count(&self) -> usize {
         self.sorted.len()
     }
 
-    /// Mean; `None` of no values, or beyond the range of f64.
+    /// Returns the mean; `None` without values, or beyond the range of f64.
     pub fn mean(&self) -> Option<f64> {
         mean(self.sorted.iter().copied())
     }
 
-    /// Standard deviation of the sample, with n - 1; `None` below two values, or beyond the range of f64.
+    /// Returns the standard deviation of the sample, with n - 1; `None` below two values, or beyond the range of f64.
     pub fn standard_deviation(&self) -> Option<f64> {
         let (mean, degrees) = (self.mean()?, self.count() - 1);
         if degrees == 0 {
@@ -52,12 +52,12 @@ impl Description {
         finite((squares.value() / degrees as f64).sqrt())
     }
 
-    /// Standard error of the mean, the standard deviation over √n; `None` likewise.
+    /// Returns the standard error of the mean, the standard deviation over √n; `None` likewise.
     pub fn standard_error(&self) -> Option<f64> {
         self.standard_deviation().map(|deviation| deviation / (self.count() as f64).sqrt())
     }
 
-    /// The value below which the share `p` ∈ [0, 1] lies; `None` of no values and for any other p.
+    /// Returns the value below which the fraction `p` ∈ [0, 1] lies; `None` without values and for any other p.
     ///
     /// Linear between the order statistics at (n - 1)p: type 7 of R. J. Hyndman and Y. Fan (*Am. Stat.* 50, 1996, 361),
     /// the default of numpy and R.
@@ -65,13 +65,13 @@ impl Description {
         quantile(&self.sorted, p)
     }
 
-    /// The middle value, or the mean of the two in the middle.
+    /// Returns the middle value, or the mean of the two in the middle.
     pub fn median(&self) -> Option<f64> {
         self.quantile(0.5)
     }
 }
 
-/// Type 7 of sorted values, of which the largest may be +∞: `None` where these would matter.
+/// Type 7 quantile of sorted values, the largest of which may be +∞; `None` if these would matter.
 pub(super) fn quantile(sorted: &[f64], p: f64) -> Option<f64> {
     if sorted.is_empty() || !(0.0..=1.0).contains(&p) {
         return None;
@@ -79,7 +79,7 @@ pub(super) fn quantile(sorted: &[f64], p: f64) -> Option<f64> {
     let place = (sorted.len() - 1) as f64 * p;
     let (low, share) = (place.floor() as usize, place.fract());
     let (a, b) = (sorted[low], if share > 0.0 { sorted[low + 1] } else { sorted[low] });
-    // In two products, since b - a may exceed the range; equal neighbours must give themselves.
+    // As two products, since b - a may overflow; equal neighbours must give exactly themselves.
     finite(if a == b { a } else { a * (1.0 - share) + b * share })
 }
 

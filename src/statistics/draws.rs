@@ -2,10 +2,10 @@
 
 use crate::random::Stream;
 
-/// The attempt in a stream's address that is kept for resampling: members count theirs from 0.
+/// The attempt number in a stream's address that is reserved for resampling; members count theirs from 0.
 const ATTEMPT: u32 = u32::MAX;
 
-/// Draws one after another; a pure function of the seed and the resample.
+/// Sequential draws; a pure function of the seed and the resample.
 #[derive(Clone, Debug)]
 pub struct Draws {
     stream: Stream,
@@ -13,7 +13,7 @@ pub struct Draws {
 }
 
 impl Draws {
-    /// The draws of one resample, from their first.
+    /// Starts the draws of one resample.
     pub fn new(seed: u64, resample: u64) -> Draws {
         Draws { stream: Stream::new(seed, resample, ATTEMPT), next: 0 }
     }
@@ -28,13 +28,13 @@ impl Draws {
         self.stream.uniforms(self.next)[0]
     }
 
-    /// How many blocks of random numbers were asked for.
+    /// Returns the number of blocks of random numbers used.
     #[cfg(test)]
     pub fn blocks(&self) -> u32 {
         self.next
     }
 
-    /// Throws `count` balls, each into any of the boxes alike, and adds them to the numbers there.
+    /// Throws `count` balls into equally likely boxes, and adds them to the numbers there.
     ///
     /// Boxes differ in probability by at most their number over 2³², relatively. There must be at least one.
     pub fn scatter(&mut self, count: usize, boxes: &mut [u32]) {
@@ -46,10 +46,10 @@ impl Draws {
         self.words().into_iter().take(count % 4).for_each(throw);
     }
 
-    /// How many of `count` independent draws succeed, each with probability `share` ∈ [0, 1].
+    /// Draws the number of successes among `count` independent draws, each with probability `share` ∈ [0, 1].
     ///
-    /// By inversion from the most probable number outwards: about √`count` terms and one uniform. Its probabilities
-    /// are those of the binomial law within 1e-8 of themselves for counts up to a million.
+    /// By inversion from the most probable number outwards: about √`count` terms and one uniform. The relative error of
+    /// its probabilities against the binomial law is within 1e-8 for counts up to a million.
     pub fn binomial(&mut self, count: usize, share: f64) -> usize {
         if count == 0 || share <= 0.0 {
             return 0;

@@ -1,6 +1,6 @@
-//! Sums that no order changes: fixed-point numbers of 256 bits.
+//! Sums that do not depend on the order of their terms: fixed-point numbers of 256 bits.
 //!
-//! Members may be added in any order and parts of an ensemble merged, and every bit of the sum is the same.
+//! Members may be added in any order and parts of an ensemble merged; the sum is the same to the last bit.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 const QUANTUM: i32 = -140;
 /// Terms are below 2 to this power, so that 2³² of them fit.
 const MOST: i32 = 83;
-/// Relative difference below which a variance is what rounding left of equal numbers.
+/// Relative difference below which a variance is the rounding left by equal numbers.
 const EQUAL: f64 = 4.0 * f64::EPSILON;
 
 /// A running sum.
@@ -16,12 +16,12 @@ const EQUAL: f64 = 4.0 * f64::EPSILON;
 pub struct ExactSum {
     low: u128,
     high: i128,
-    /// A term was out of range, so the sum is not known.
+    /// Whether a term was out of range, so that the sum is unknown.
     lost: bool,
 }
 
 impl ExactSum {
-    /// Adds a term; what of it is below 2⁻¹⁴⁰ is cut off.
+    /// Adds a term; its part below 2⁻¹⁴⁰ is cut off.
     pub fn add(&mut self, term: f64) {
         if term.is_nan() || term.abs() >= f64::from(MOST).exp2() {
             self.lost = true;
@@ -54,7 +54,7 @@ impl ExactSum {
         self.high = self.high.wrapping_add(high).wrapping_add(carry.into());
     }
 
-    /// The sum, rounded; `None` where a term was not finite or 2⁸³ and above.
+    /// Returns the sum, rounded; `None` if a term was not finite or was 2⁸³ or above.
     pub fn value(&self) -> Option<f64> {
         let negative = self.high < 0;
         let (low, high) = if negative { negated(self.low, self.high) } else { (self.low, self.high) };
@@ -84,24 +84,24 @@ impl Moments {
         self.squares.add(value * value);
     }
 
-    /// Adds the numbers of another.
+    /// Adds the numbers of another instance.
     pub fn merge(&mut self, other: &Moments) {
         self.count = self.count.saturating_add(other.count);
         self.sum.merge(&other.sum);
         self.squares.merge(&other.squares);
     }
 
-    /// How many there are.
+    /// Returns the count.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Their mean; `None` of none, or where one was out of range.
+    /// Returns the mean; `None` without numbers, or if one was out of range.
     pub fn mean(&self) -> Option<f64> {
         (self.count > 0).then_some(self.sum.value()? / self.count as f64)
     }
 
-    /// Their standard deviation, with n - 1; `None` likewise, and of one number.
+    /// Returns the standard deviation, with n - 1; `None` likewise, and for one number.
     pub fn deviation(&self) -> Option<f64> {
         let (mean, count) = (self.mean()?, self.count as f64);
         let (of_squares, squared) = (self.squares.value()? / count, mean * mean);

@@ -1,4 +1,4 @@
-//! One quantity against another: the straight line of least squares, and the power law as a line of logarithms.
+//! One quantity against another: the least-squares line, and the power law as a line of logarithms.
 
 use super::{
     finite,
@@ -6,14 +6,14 @@ use super::{
 };
 use crate::error::{Error, Result};
 
-/// y = intercept + slope·x, with the least sum of squared distances in y.
+/// y = intercept + slope·x, with the smallest sum of squared distances in y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
     /// Slope, in units of y over x.
     pub slope: f64,
     /// Value at x = 0.
     pub intercept: f64,
-    /// Share of the variance of y that the line explains; `None` where all y are equal and there is none.
+    /// Fraction of the variance of y that the line explains; `None` if all y are equal and there is none.
     pub r2: Option<f64>,
     /// Standard error of the slope, from the residuals with n - 2; `None` below three points.
     pub slope_error: Option<f64>,
@@ -22,16 +22,16 @@ pub struct Line {
 }
 
 impl Line {
-    /// Through points (x, y), in any order.
+    /// Fits a line through points (x, y), in any order.
     ///
-    /// An error names the first point that is not finite. `None` where no slope is defined: fewer than two different
+    /// An error names the first point that is not finite. `None` if no slope is defined: fewer than two different
     /// x, or sums beyond the range of f64.
     pub fn fit(points: &[(f64, f64)]) -> Result<Option<Line>> {
         require(points, |(x, y)| x.is_finite() && y.is_finite(), "a straight line", "finite")?;
         Ok(least_squares(points))
     }
 
-    /// The line's y at x.
+    /// Returns the line's y at x.
     pub fn at(&self, x: f64) -> f64 {
         self.intercept + self.slope * x
     }
@@ -46,16 +46,16 @@ pub struct PowerLaw {
     pub exponent: f64,
     /// Standard error of the exponent; `None` below three points.
     pub exponent_error: Option<f64>,
-    /// Share of the variance of ln y that the law explains; `None` where all y are equal.
+    /// Fraction of the variance of ln y that the law explains; `None` if all y are equal.
     pub r2: Option<f64>,
     /// Number of points.
     pub count: usize,
 }
 
 impl PowerLaw {
-    /// Through points (x, y), in any order.
+    /// Fits a power law through points (x, y), in any order.
     ///
-    /// An error names the first point that is not finite and positive. `None` where no exponent is defined: fewer than
+    /// An error names the first point that is not finite and positive. `None` if no exponent is defined: fewer than
     /// two different x, or a factor beyond the range of f64.
     pub fn fit(points: &[(f64, f64)]) -> Result<Option<PowerLaw>> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
@@ -68,7 +68,7 @@ impl PowerLaw {
         }))
     }
 
-    /// The law's y at x > 0.
+    /// Returns the law's y at x > 0.
     pub fn at(&self, x: f64) -> f64 {
         self.factor * x.powf(self.exponent)
     }

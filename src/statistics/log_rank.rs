@@ -8,19 +8,20 @@
 //! ```
 //!
 //! Since n_j(t) counts members, a sum of n_j n_l over times is a sum over *pairs* of members of the running sum at the
-//! earlier of their two times, which is known when that one leaves. So one pass makes V in members × groups instead of
-//! times × groups²; the diagonal follows because rows of V add up to 0, which costs no digits as a difference would.
+//! earlier of their two times, which is known when that member leaves. One pass thus computes V in members × groups
+//! instead of times × groups²; the diagonal follows because rows of V add up to 0, which costs no digits, unlike a
+//! difference.
 
 use std::{borrow::Borrow, cmp::Reverse, collections::BinaryHeap};
 
 use super::{finite, sample::Sample, special::chi_square_tail, sum::Sum};
 
-/// What the test found.
+/// Result of the test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogRank {
-    /// χ², chi-square distributed where the groups are alike, if there are enough events.
+    /// χ², chi-square distributed if the groups are alike and there are enough events.
     pub statistic: f64,
-    /// Groups with members at risk at the first event, less one.
+    /// Number of groups with members at risk at the first event, minus one.
     pub degrees_of_freedom: usize,
     /// Probability of a statistic at least as large if the groups are alike.
     pub p_value: f64,
@@ -28,24 +29,24 @@ pub struct LogRank {
     pub groups: Vec<GroupEvents>,
 }
 
-/// Events of a group.
+/// Event counts of a group.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroupEvents {
-    /// That happened.
+    /// Number that happened.
     pub observed: usize,
-    /// That would have if its members were like all others.
+    /// Number expected if its members were like all others.
     pub expected: f64,
 }
 
 /// Compares any number of groups.
 ///
-/// A group without members at risk at the first event says nothing and takes no degree of freedom. `None` where fewer
-/// than two groups say something, or all members at risk have their event at one time. Takes members × groups + groups³
+/// A group without members at risk at the first event is left out and adds no degree of freedom. `None` if fewer
+/// than two groups remain, or all members at risk have their event at one time. Takes members × groups + groups³
 /// operations and groups² numbers.
 pub fn log_rank(samples: &[impl Borrow<Sample>]) -> Option<LogRank> {
     let samples: &[&Sample] = &samples.iter().map(Borrow::borrow).collect::<Vec<_>>();
     let tally = LogRankSums::of(samples);
-    // All groups at risk at the first event are at risk together there, so V has the rank of their number, less one.
+    // All groups at risk at the first event are at risk together there, so V has the rank of their number, minus one.
     let compared: Vec<usize> = (0..samples.len()).filter(|j| tally.expected[*j].value() > 0.0).collect();
     let (_, free) = compared.split_last()?;
     if free.is_empty() {
@@ -77,7 +78,7 @@ impl LogRankSums {
         let mut at_risk: Vec<f64> = samples.iter().map(|sample| sample.len() as f64).collect();
         let (mut n, mut hazard, mut covariance) = (at_risk.iter().sum::<f64>(), Sum::default(), Sum::default());
         let mut groups: Vec<_> = samples.iter().map(|sample| sample.times()).collect();
-        // Times are not negative, so their bits are ordered as they are.
+        // Times are not negative, so their bits have the same order.
         let mut after = |j: usize| {
             let (time, events, censored) = groups[j].next()?;
             Some(Reverse((time.to_bits(), j, events, events + censored)))
@@ -119,7 +120,7 @@ impl LogRankSums {
     }
 }
 
-/// zᵀ V⁻¹ z by Cholesky's factors V = L Lᵀ, as |L⁻¹ z|²; `None` where V is not positive definite.
+/// zᵀ V⁻¹ z by Cholesky's factors V = L Lᵀ, as |L⁻¹ z|²; `None` if V is not positive definite.
 fn quadratic_form(mut v: Vec<Vec<f64>>, mut z: Vec<f64>) -> Option<f64> {
     for j in 0..z.len() {
         let (above, from_j) = v.split_at_mut(j);

@@ -1,31 +1,31 @@
-//! Statistics of relaxation times, some of which nobody has seen: pure functions from numbers to numbers.
+//! Statistics of relaxation times, some of them unobserved: pure functions from numbers to numbers.
 //!
 //! # Theory
 //!
-//! A member that has not relaxed at the end of its run still tells something: its time is *larger* than the run was
-//! long. Such a time is right-censored. To leave it out, or to take the end of the run for it, biases every mean and
+//! A member that has not relaxed at the end of its run still carries information: its time is *larger* than the run was
+//! long. Such a time is right-censored. Leaving it out, or replacing it by the end of the run, biases every mean and
 //! quantile downwards. The product-limit estimate of E. L. Kaplan and P. Meier (*J. Am. Stat. Assoc.* 53, 1958, 457)
-//! uses what it does tell,
+//! uses this information,
 //!
 //! ```text
 //! S(t) = Π_{t_i ≤ t} (1 - d_i/n_i),    var S(t) ≈ S(t)² Σ_{t_i ≤ t} d_i/(n_i (n_i - d_i))
 //! ```
 //!
 //! with d_i events at the time t_i among the n_i members still at risk, and M. Greenwood's variance (1926). Quantiles
-//! are read off S; the mean is the area under it, and where S does not come down to 0, only the area up to the largest
+//! are read off S; the mean is the area under it, and if S does not come down to 0, only the area up to the largest
 //! time: a lower bound. The log-rank test (N. Mantel, *Cancer Chemother. Rep.* 50, 1966, 163) compares the events of
 //! each group with those expected if all groups had one S. The interval of the median is B. Efron's bootstrap (*J. Am.
 //! Stat. Assoc.* 76, 1981, 312): members are drawn with replacement together with their censoring.
 //!
-//! All of it asks that censoring tells nothing about the time it hides. The end of the run is such a reason; a member
-//! that became singular is not, and what it is taken for is the caller's to decide and to report.
+//! All of this requires that censoring says nothing about the hidden time. This holds for the end of the run, but not
+//! for a member that became singular; the caller must decide, and report, how to treat such members.
 //!
 //! # Practice
 //!
 //! A [`Sample`] is checked and sorted once; [`KaplanMeier`], [`Bootstrap`] and [`log_rank`] read it and cannot fail. A
-//! [`Description`] is for complete data, [`Line`] and [`PowerLaw`] for one quantity against another. What cannot be
-//! known is `None`, never NaN and never infinite, and [`Caveat`] says in words why. Times may be in any one unit, in
-//! which means, deviations and quantiles are too; variances of S have none.
+//! [`Description`] is for complete data, [`Line`] and [`PowerLaw`] for one quantity against another. Unknown values are
+//! `None`, never NaN and never infinite, and [`Caveat`] says why. Times may be in any one unit; means, deviations and
+//! quantiles have the same unit, variances of S have none.
 
 //!
 //! # Example
@@ -64,7 +64,7 @@ pub use log_rank::{GroupEvents, LogRank, log_rank};
 pub use sample::{Observation, Observations, Sample};
 pub use survival::{Caveat, KaplanMeier, Mean, Step};
 
-/// A finite number, or none.
+/// The value if it is finite.
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }

@@ -1,4 +1,4 @@
-//! Right-censored times, checked and sorted, and the product that every estimate from them builds.
+//! Right-censored times, checked and sorted, and the product underlying every estimate from them.
 
 use std::ops::Range;
 
@@ -7,32 +7,32 @@ use crate::error::{Error, Result};
 /// One member's time, in any one unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// When it happened, or until when it had not.
+    /// When the event happened, or until when it had not.
     pub time: f64,
-    /// Whether it happened; if not, the observation is censored at `time`.
+    /// Whether the event happened; if not, the observation is censored at `time`.
     pub happened: bool,
 }
 
 impl Observation {
-    /// The event, if it came before the `end` of what was seen.
+    /// Creates the observation of an event, if it came before the `end` of observation.
     pub fn new(event: Option<f64>, end: f64) -> Observation {
         Observation { time: event.unwrap_or(end), happened: event.is_some() }
     }
 }
 
-/// Observations as they come in, 8 bytes each.
+/// Unsorted observations, 8 bytes each.
 ///
-/// A time that is not negative has a sign bit of 0. Its place takes the other bits, and theirs the censoring: so numbers
-/// are ordered as their times are, and at one time events come before censorings.
+/// A time that is not negative has a sign bit of 0. The other bits are shifted into its place, and the lowest bit is
+/// the censoring: numbers then have the order of their times, and events come before censorings at the same time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observations {
     keys: Vec<u64>,
 }
 
 impl Observations {
-    /// Adds one.
+    /// Adds an observation.
     ///
-    /// An error names its place where its time is negative or not finite.
+    /// An error names its place if its time is negative or not finite.
     pub fn push(&mut self, seen: Observation) -> Result<()> {
         let Observation { time, happened } = seen;
         if !(time.is_finite() && time >= 0.0) {
@@ -42,7 +42,7 @@ impl Observations {
                 self.keys.len()
             )));
         }
-        // -0 would sort behind all others and not tie with 0.
+        // -0 would sort after all others and not tie with 0.
         self.keys.push((time + 0.0).to_bits() << 1 | u64::from(!happened));
         Ok(())
     }
@@ -56,7 +56,7 @@ fn happened(key: u64) -> bool {
     key & 1 == 0
 }
 
-/// Observations in order of time; at one time events come before censorings, which were still at risk then.
+/// Observations in order of time; events come before censorings at the same time, which were still at risk then.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sample {
     sorted: Vec<u64>,
@@ -82,42 +82,42 @@ impl Sample {
         Ok(all.into())
     }
 
-    /// All observations, in order.
+    /// Returns all observations, in order.
     pub fn observations(&self) -> impl ExactSizeIterator<Item = Observation> + Clone + '_ {
         self.range(0..self.len())
     }
 
-    /// Those at some places, which must be there.
+    /// Returns those at a range of places, which must exist.
     pub(super) fn range(&self, places: Range<usize>) -> impl ExactSizeIterator<Item = Observation> + Clone + '_ {
         self.sorted[places].iter().map(|key| observation(*key))
     }
 
-    /// Number of members.
+    /// Returns the number of members.
     pub fn len(&self) -> usize {
         self.sorted.len()
     }
 
-    /// Whether there are no members.
+    /// Returns whether there are no members.
     pub fn is_empty(&self) -> bool {
         self.sorted.is_empty()
     }
 
-    /// Number of members to which it happened.
+    /// Returns the number of members with an event.
     pub fn events(&self) -> usize {
         self.events
     }
 
-    /// Number of members whose time is censored.
+    /// Returns the number of members whose time is censored.
     pub fn censored(&self) -> usize {
         self.len() - self.events
     }
 
-    /// The largest time, censored or not.
+    /// Returns the largest time, censored or not.
     pub fn last(&self) -> Option<f64> {
         self.sorted.last().map(|key| observation(*key).time)
     }
 
-    /// The different times in order, each with the numbers of its events and its censorings.
+    /// Iterates over the distinct times in order, each with the numbers of its events and its censorings.
     pub(super) fn times(&self) -> impl Iterator<Item = (f64, usize, usize)> + '_ {
         self.sorted.chunk_by(|a, b| a >> 1 == b >> 1).map(|tied| {
             let events = tied.partition_point(|key| happened(*key));
@@ -128,8 +128,8 @@ impl Sample {
 
 /// Π (1 - d/n) and Greenwood's sum, as members leave in order of time.
 ///
-/// Between two censorings the factors telescope, (n-d₁)/n · (n-d₁-d₂)/(n-d₁) · … = left/n: so products are taken at
-/// censorings only, and a complete sample has S = left/n to the last bit.
+/// Between two censorings the factors telescope, (n-d₁)/n · (n-d₁-d₂)/(n-d₁) · … = left/n. Products are therefore taken
+/// only at censorings, and a complete sample has S = left/n to the last bit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ProductLimit {
     at_risk: f64,
@@ -144,12 +144,12 @@ impl ProductLimit {
         ProductLimit { at_risk: members as f64, survival: 1.0, greenwood: 0.0, from: members as f64 }
     }
 
-    /// At most as many as are at risk.
+    /// Removes `count` members with events, at most those at risk.
     pub(super) fn events(&mut self, count: usize) {
         self.at_risk -= count as f64;
     }
 
-    /// At most as many as are at risk.
+    /// Removes `count` censored members, at most those at risk.
     pub(super) fn censored(&mut self, count: usize) {
         if count > 0 {
             (self.survival, self.greenwood) = (self.survival(), self.greenwood());
@@ -162,7 +162,7 @@ impl ProductLimit {
         if self.at_risk == self.from { self.survival } else { self.survival * (self.at_risk / self.from) }
     }
 
-    /// 0 where S is 0: the limit of S²·Σ.
+    /// Greenwood's variance; 0 if S is 0, the limit of S²·Σ.
     pub(super) fn variance(&self) -> f64 {
         let survival = self.survival();
         if survival == 0.0 { 0.0 } else { survival * survival * self.greenwood() }
@@ -175,10 +175,10 @@ impl ProductLimit {
     }
 }
 
-/// Whether a survival has come down to a level, equality included.
+/// Returns whether a survival has come down to a level, equality included.
 ///
-/// Levels such as 1 - 0.9 and products of fractions carry roundings, so equality is meant up to 1e-12; S takes no
-/// value that close to 0, since it is at least 1/n where it is not 0.
+/// Levels such as 1 - 0.9 and products of fractions carry rounding errors, so equality means within 1e-12; S takes no
+/// value that close to 0, since it is at least 1/n if it is not 0.
 pub(super) fn reaches(survival: f64, level: f64) -> bool {
     survival <= level + ROUNDING
 }

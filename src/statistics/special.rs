@@ -2,7 +2,7 @@
 //!
 //! Series and continued fraction as in Abramowitz and Stegun 6.5.29 and 6.5.31, the latter by Lentz's method.
 
-/// P(X > x) for X chi-square with `degrees_of_freedom` > 0; 1 at x ≤ 0, 0 where it falls below the smallest number.
+/// Returns P(X > x) for X chi-square with `degrees_of_freedom` > 0; 1 at x ≤ 0, 0 if it is below the smallest number.
 ///
 /// The relative error is below 1e-13 for up to 200 degrees of freedom, and grows in proportion beyond.
 pub fn chi_square_tail(x: f64, degrees_of_freedom: usize) -> f64 {
@@ -12,7 +12,7 @@ pub fn chi_square_tail(x: f64, degrees_of_freedom: usize) -> f64 {
 /// Q(a, x) = Γ(a, x)/Γ(a) for a > 0, x > 0.
 fn upper_gamma(a: f64, x: f64) -> f64 {
     let front = (a * x.ln() - x - libm::lgamma(a)).exp();
-    // Each converges fast on its side. On the left Q is not small, so that 1 - P loses nothing.
+    // Each converges fast on its side. On the left, Q is not small, so 1 - P loses no digits.
     if x < a + 1.0 { 1.0 - front * lower_series(a, x) } else { front * upper_fraction(a, x) }
 }
 
@@ -46,7 +46,7 @@ fn upper_fraction(a: f64, x: f64) -> f64 {
     fraction
 }
 
-/// Terms grow in number as √a near x = a; a million degrees of freedom need about 3000.
+/// The number of terms grows as √a near x = a; a million degrees of freedom need about 3000.
 const MAX_TERMS: u32 = 100_000;
 
 #[cfg(test)]

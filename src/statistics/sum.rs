@@ -1,6 +1,6 @@
 //! Sums whose error does not grow with the number of terms: A. Neumaier's compensation (1974).
 
-/// A running sum and what rounding took from it.
+/// A running sum and its rounding error.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sum {
     sum: f64,
@@ -16,7 +16,7 @@ impl Sum {
         self.sum = sum;
     }
 
-    /// The sum, good to about one rounding unless its terms cancel.
+    /// Returns the sum, accurate to about one rounding unless its terms cancel.
     pub fn value(self) -> f64 {
         self.sum + self.lost
     }
@@ -30,7 +30,7 @@ impl FromIterator<f64> for Sum {
     }
 }
 
-/// Mean of finite numbers, exact where all are equal; `None` of none or beyond the largest number.
+/// Returns the mean of finite numbers, exact if all are equal; `None` without numbers or beyond the largest number.
 pub fn mean(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
     let first = values.clone().next()?;
     let count = values.clone().count() as f64;

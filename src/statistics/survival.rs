@@ -1,4 +1,4 @@
-//! The product-limit estimate of Kaplan and Meier: the share of members to which it has not happened yet, with its
+//! The product-limit estimate of Kaplan and Meier: the fraction of members without an event so far, with its
 //! quantiles and its mean.
 
 use std::fmt;
@@ -12,20 +12,20 @@ use super::{
 /// A time at which S falls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// When.
+    /// The time.
     pub time: f64,
-    /// Members at risk just before, those censored at this very time included.
+    /// Members at risk just before, including those censored at this very time.
     pub at_risk: usize,
     /// Events at this time, at least 1.
     pub events: usize,
     /// S from this time on.
     pub survival: f64,
-    /// Greenwood's variance of S; 0 where S is 0, which is its limit.
+    /// Greenwood's variance of S; 0 if S is 0, the limit.
     pub variance: f64,
 }
 
 impl Step {
-    /// By how much S falls here, from what it is before.
+    /// The decrease of S here, from `survival` before.
     fn fall_from(&self, survival: f64) -> f64 {
         survival * (self.events as f64 / self.at_risk as f64)
     }
@@ -34,32 +34,32 @@ impl Step {
 /// The mean time, the area under S.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mean {
-    /// The mean: of t where S comes down to 0, else of min(t, `restricted_to`).
+    /// The mean: of t if S comes down to 0, else of min(t, `restricted_to`).
     pub value: f64,
     /// Standard deviation of a member's time, restricted likewise; without censoring that of the sample, with n - 1.
-    /// `None` where S falls to 0 by a single event.
+    /// `None` if S falls to 0 by a single event.
     pub standard_deviation: Option<f64>,
     /// Standard error of `value`; without censoring the standard deviation over √n. `None` likewise.
     pub standard_error: Option<f64>,
-    /// The largest time, where S is not 0 there. The mean is then a lower bound of the members' mean time.
+    /// The largest time, if S is not 0 there. The mean is then a lower bound of the members' mean time.
     pub restricted_to: Option<f64>,
 }
 
 /// An estimate of the survival function, a right-continuous step function from S = 1.
 ///
-/// Nothing is kept beside the sample: each number goes through it once or twice.
+/// Nothing is stored next to the sample: each number passes through it once or twice.
 #[derive(Clone, Copy, Debug)]
 pub struct KaplanMeier<'a> {
     sample: &'a Sample,
 }
 
 impl<'a> KaplanMeier<'a> {
-    /// From any sample, an empty one included.
+    /// Creates the estimate from any sample, even an empty one.
     pub fn new(sample: &'a Sample) -> KaplanMeier<'a> {
         KaplanMeier { sample }
     }
 
-    /// Where S falls, in order of time.
+    /// Iterates over the steps of S, in order of time.
     pub fn steps(&self) -> impl Iterator<Item = Step> + 'a {
         let mut limit = ProductLimit::new(self.sample.len());
         let mut left = self.sample.len();
@@ -73,31 +73,32 @@ impl<'a> KaplanMeier<'a> {
         })
     }
 
-    /// Number of members.
+    /// Returns the number of members.
     pub fn members(&self) -> usize {
         self.sample.len()
     }
 
-    /// Number of members to which it happened.
+    /// Returns the number of members with an event.
     pub fn events(&self) -> usize {
         self.sample.events()
     }
 
-    /// The largest time, censored or not, up to which S is known.
+    /// Returns the largest time, censored or not, up to which S is known.
     pub fn last(&self) -> Option<f64> {
         self.sample.last()
     }
 
-    /// S(t), the share of members to which it has not happened by the time t; beyond the largest time its last value.
+    /// Returns S(t), the fraction of members without an event by the time t; beyond the largest time its last value.
     pub fn survival(&self, t: f64) -> f64 {
         self.steps().take_while(|step| step.time <= t).last().map_or(1.0, |step| step.survival)
     }
 
-    /// The time by which it has happened to the share `p` ∈ [0, 1] of the members: the first with S(t) ≤ 1 - p.
+    /// Returns the time by which the fraction `p` ∈ [0, 1] of the members has had the event: the first with S(t) ≤ 1 -
+    /// p.
     ///
-    /// Where S is exactly 1 - p on an interval, that is the interval's start, as in lifelines and numpy's
-    /// `inverted_cdf` (R's `survfit` takes its middle); equality is meant up to 1e-12, so that rounding does not
-    /// decide. `None` where S does not come down that far, and for any other p.
+    /// If S is exactly 1 - p on an interval, this is the interval's start, as in lifelines and numpy's
+    /// `inverted_cdf` (R's `survfit` uses its middle); equality means within 1e-12, so that rounding does not
+    /// decide. `None` if S does not come down that far, and for any other p.
     pub fn quantile(&self, p: f64) -> Option<f64> {
         if !(0.0..=1.0).contains(&p) {
             return None;
@@ -105,20 +106,20 @@ impl<'a> KaplanMeier<'a> {
         self.steps().find(|step| reaches(step.survival, 1.0 - p)).map(|step| step.time)
     }
 
-    /// The time by which it has happened to half of the members.
+    /// Returns the time by which half of the members have had the event.
     pub fn median(&self) -> Option<f64> {
         self.quantile(0.5)
     }
 
-    /// The mean time, restricted to the largest time where S does not come down to 0.
+    /// Returns the mean time, restricted to the largest time if S does not come down to 0.
     ///
     /// With censoring the standard error is that of J. O. Irwin (1949), as in Kaplan and Meier and R's `survfit`:
     /// `var = Σ A_i² d_i/(n_i (n_i - d_i))`, A_i being the area under S from t_i on. `None` without an event, since
-    /// then nothing is known but that S was 1, or where the numbers are too large for f64.
+    /// all that is known then is that S was 1, or if the numbers are too large for f64.
     pub fn mean(&self) -> Option<Mean> {
         let (first, last) = (self.steps().next()?.time, self.last()?);
-        // Each event carries the fall of S, the end carries what is left; measured from the first event, so that equal
-        // times have exactly their own mean and no deviation.
+        // Each event contributes the fall of S, the end contributes the rest; measured from the first event, so that
+        // equal times have exactly their own mean and no deviation.
         let (mut mean, mut area) = (Sum::default(), Sum::default());
         let (mut survival, mut before) = (1.0, first);
         for step in self.steps() {
@@ -146,8 +147,8 @@ impl<'a> KaplanMeier<'a> {
         })
     }
 
-    /// Of the times about their `mean`, and of the `area` under S from the first event on. What is left of that comes down
-    /// to 0 without the rounding of all steps, since it is taken off as it was added up.
+    /// Variances of the times about their `mean`, and of the mean from the `area` under S from the first event on. The
+    /// remaining area comes down to 0 without the rounding of all steps, since it is subtracted as it was added up.
     fn variances(&self, mean: f64, mut area: Sum) -> [f64; 2] {
         let (mut of_times, mut of_area) = (Sum::default(), Sum::default());
         let (mut survival, mut before) = (1.0, None);
@@ -155,7 +156,7 @@ impl<'a> KaplanMeier<'a> {
             of_times.add(step.fall_from(survival) * (step.time - mean).powi(2));
             area.add(before.map_or(0.0, |before| -survival * (step.time - before)));
             let (n, left) = (step.at_risk as f64, (step.at_risk - step.events) as f64);
-            // The last event of all has no area behind it.
+            // The last event has no area behind it.
             if left > 0.0 {
                 of_area.add(area.value().powi(2) * (step.events as f64 / (n * left)));
             }
@@ -172,7 +173,7 @@ impl<'a> KaplanMeier<'a> {
         self.events() == 1 && self.steps().all(|step| step.survival == 0.0)
     }
 
-    /// What a reader must know before using the numbers, if there is anything.
+    /// Returns what a reader must know before using the numbers, if anything.
     pub fn caveat(&self) -> Option<Caveat> {
         let (members, censored) = (self.members(), self.sample.censored());
         let survival = self.steps().last().map_or(1.0, |step| step.survival);
@@ -186,7 +187,7 @@ impl<'a> KaplanMeier<'a> {
     }
 }
 
-/// Why numbers are missing, or not what they are called; a sentence by `Display`.
+/// Why numbers are missing, or differ from their names; `Display` gives a sentence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Caveat {
     /// The sample is empty.
@@ -346,7 +347,7 @@ mod tests {
             "1 of 2 members are censored, and S ends at 0.5 at the time 2: the mean is that of times cut off there, a \
              lower bound, and quantiles above 1 - S are not known"
         );
-        // The censored member counts by those that outlast it.
+        // The censored member counts through those that outlast it.
         let whole = curve("1+ 2 3");
         let mean = whole.mean().unwrap();
         assert_eq!((mean.value, mean.restricted_to, whole.caveat()), (2.5, None, None));
