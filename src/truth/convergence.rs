@@ -11,10 +11,10 @@ use crate::{
     simulate::simulate,
 };
 
-/// A problem solved.
+/// The solution of a problem.
 #[derive(Clone, Debug)]
 pub struct Solved {
-    /// What was measured, relative to what is exact; unknown where the run did not reach its final time.
+    /// Measured value relative to the exact one; unknown if the run did not reach its final time.
     pub ratio: Option<f64>,
     /// The member's row of a summary.
     pub outcome: Outcome,
@@ -23,14 +23,14 @@ pub struct Solved {
 }
 
 impl Solved {
-    /// Relative error against the exact solution: measured/exact - 1.
+    /// Returns the relative error against the exact solution: measured/exact - 1.
     pub fn error(&self) -> Option<f64> {
         self.ratio.map(|ratio| ratio - 1.0)
     }
 }
 
 impl Problem {
-    /// `method` with the problem's own keys: what `curvelax run` would be asked for, if the curve had a name.
+    /// Returns `method` with the problem's own keys: what to ask `curvelax run` for, if the curve had a name.
     pub fn spec(&self, method: &Spec, at: Resolution) -> Spec {
         Spec {
             curves: 1,
@@ -48,8 +48,8 @@ impl Problem {
     /// Solves the problem by the back end, precision and solver of `method`.
     ///
     /// # Errors
-    /// [`Error::Request`] when `method` cannot be had at this resolution, [`Error::Device`] when the GPU fails. A run
-    /// that ends early is no error but has no ratio.
+    /// [`Error::Request`] if `method` is not available at this resolution, [`Error::Device`] if the GPU fails. A run
+    /// that ends early is not an error but has no ratio.
     pub fn solve(&self, method: &Spec, at: Resolution) -> Result<Solved> {
         let spec = self.spec(method, at).validate()?;
         let choice = placement::choose(&spec, at.n)?;
@@ -76,19 +76,19 @@ impl Sink for Last {
     }
 }
 
-/// What a study refines.
+/// The quantity that a study refines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Varied {
     /// n, with τ in proportion to h²: the scheme is of order 2.
     Nodes,
     /// τ at a fixed n: order 1.
     Step,
-    /// The tolerance of adaptive steps at a fixed n: order 2 in its root, which their length goes with.
+    /// The tolerance of adaptive steps at a fixed n: order 2 in its root, which their length is proportional to.
     Tolerance,
 }
 
 impl Varied {
-    /// As in the table.
+    /// Returns the name used in the table.
     pub fn name(self) -> &'static str {
         match self {
             Varied::Nodes => "n",
@@ -97,7 +97,7 @@ impl Varied {
         }
     }
 
-    /// What is refined; it falls from row to row.
+    /// The refined quantity; it falls from row to row.
     fn fineness(self, at: Resolution) -> f64 {
         match self {
             Varied::Nodes => 1.0 / at.n as f64,
@@ -107,10 +107,10 @@ impl Varied {
     }
 }
 
-/// Resolutions, the coarsest first, each refined by the same factor.
+/// A series of resolutions, the coarsest first, each refined by the same factor.
 #[derive(Clone, Debug)]
 pub struct ConvergenceStudy {
-    /// What is refined.
+    /// The refined quantity.
     pub varied: Varied,
     /// The resolutions.
     pub at: Vec<Resolution>,
@@ -121,19 +121,19 @@ pub struct ConvergenceStudy {
 pub struct ConvergenceRow {
     /// Name of the problem.
     pub problem: String,
-    /// What is refined.
+    /// The refined quantity.
     pub varied: Varied,
     /// The resolution.
     pub at: Resolution,
     /// How the run ended.
     pub status: Status,
-    /// Relative error, measured/exact - 1; unknown where the run ended early.
+    /// Relative error, measured/exact - 1; unknown if the run ended early.
     pub error: Option<f64>,
     /// Observed order.
     pub order: Option<f64>,
 }
 
-/// The studies of `problem` by `solver`.
+/// Returns the studies of `problem` by `solver`.
 pub fn studies(problem: &Problem, solver: Solver) -> Vec<ConvergenceStudy> {
     let nodes: &[u32] = if solver.facts().slows_with_step { &SWEPT_NODES } else { &NODES };
     let by_nodes = |&n: &u32| problem.in_steps(n as usize, n * n / 25);
@@ -149,7 +149,7 @@ pub fn studies(problem: &Problem, solver: Solver) -> Vec<ConvergenceStudy> {
 
 /// n of a study in n, with n²/25 steps.
 const NODES: [u32; 3] = [50, 100, 200];
-/// The same with sweeps, whose number grows like n⁴·τ.
+/// The same for sweeps, whose number grows like n⁴·τ.
 const SWEPT_NODES: [u32; 3] = [25, 50, 100];
 /// n of the other studies.
 const FIXED_NODES: usize = 100;
@@ -159,7 +159,7 @@ const STEPS: [u32; 4] = [50, 100, 200, 400];
 /// Tolerances of a study in adaptive steps.
 const TOLERANCES: [f64; 4] = [6.4e-4, 1.6e-4, 4e-5, 1e-5];
 
-/// Change of the relative error, in ε, below which there is rounding only and no order to be seen.
+/// Change of the relative error, in ε, below which there is only rounding and no visible order.
 const ROUNDING: f64 = 1e3;
 
 impl ConvergenceStudy {
@@ -187,8 +187,8 @@ impl ConvergenceStudy {
 
     /// The order at the last of `errors`.
     ///
-    /// In n it is that of two errors. At a fixed n all errors share that of the spacing, which the differences of three
-    /// do not: their ratio is the order of the rest.
+    /// In n it is that of two errors. At a fixed n, all errors share the error of the spacing, but the differences of
+    /// three errors do not: their ratio gives the order of the rest.
     fn order(&self, errors: &[Option<f64>], rounding: f64) -> Option<f64> {
         let last = errors.len() - 1;
         let refined = self.varied.fineness(self.at[last.checked_sub(1)?]) / self.varied.fineness(self.at[last]);

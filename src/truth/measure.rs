@@ -1,4 +1,4 @@
-//! What is measured of a curve, from its nodes before and after a run, in f64.
+//! Measures of a curve, from its nodes before and after a run, in f64.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +20,7 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// The number; only the decay looks at the nodes `before`.
+    /// Returns the number; only the decay uses the nodes `before`.
     pub fn of(self, before: &[DVec2], after: &[DVec2]) -> f64 {
         match self {
             Measure::Radius => mean_radius(&about_centroid(after)),
@@ -40,9 +40,9 @@ fn mean_radius(nodes: &[DVec2]) -> f64 {
     nodes.iter().map(|node| node.length()).sum::<f64>() / nodes.len() as f64
 }
 
-/// Amplitude of mode m of the radius about the centroid as a function of the angle, a length.
+/// Returns the amplitude of mode m of the radius about the centroid as a function of the angle, a length.
 ///
-/// By the trapezium rule on the angles of the nodes, which is exact to rounding for modes that equally spaced nodes
+/// By the trapezium rule on the angles of the nodes, which is exact up to rounding for modes that equally spaced nodes
 /// resolve.
 pub fn mode_amplitude(nodes: &[DVec2], m: u32) -> f64 {
     let nodes = about_centroid(nodes);

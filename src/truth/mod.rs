@@ -15,9 +15,9 @@
 //!
 //! # Practice
 //!
-//! A [`Problem`] is a value: flow, curve, final time, what is measured, what it should be, and how far off it may be.
-//! [`problems`] is the one table of them, for the tests on every back end and for `curvelax convergence`.
-//! [`Problem::solve`] takes it at a [`Resolution`] through the same way as any run; a [`ConvergenceStudy`] refines one number.
+//! A [`Problem`] is a value: flow, curve, final time, the measured quantity, its exact value, and the error bound.
+//! [`problems`] is the single table of them, for the tests on every back end and for `curvelax convergence`.
+//! [`Problem::solve`] runs it at a [`Resolution`] like any other run; a [`ConvergenceStudy`] refines one number.
 
 mod convergence;
 mod measure;

@@ -1,5 +1,5 @@
-//! The one table of problems: each with its exact solution, what is measured, how far off it may be, and what a known
-//! mistake would give, which must be further off than that.
+//! The single table of problems: each with its exact solution, the measured quantity, its error bound, and the result
+//! of a known mistake, whose error must exceed the bound.
 
 use std::f64::consts::TAU;
 
@@ -23,11 +23,11 @@ pub struct Resolution {
     pub n: usize,
     /// Time step τ.
     pub tau: f64,
-    /// Local error tolerance of adaptive steps, which take the place of τ.
+    /// Local error tolerance of adaptive steps, which replace τ.
     pub tolerance: Option<f64>,
 }
 
-/// Time after which the lemniscate of half-width 1 has vanished under surface diffusion: `a(t) = (1 - 24t)^(1/4)`.
+/// Time at which the lemniscate of half-width 1 vanishes under surface diffusion: `a(t) = (1 - 24t)^(1/4)`.
 pub const LEMNISCATE_LIFE: f64 = 1.0 / 24.0;
 
 /// Length of the 2:1 ellipse at t = 0.1 under surface diffusion: an independent spectral solution, to all digits.
@@ -62,35 +62,35 @@ pub struct Problem {
     pub curve: StartCurve,
     /// Final time.
     pub t_end: f64,
-    /// What is measured there.
+    /// The quantity measured at the final time.
     pub measure: Measure,
-    /// What it is exactly.
+    /// Its exact value.
     pub exact: f64,
-    /// What a mistake would make of it: the negative control.
+    /// The value that a mistake would give: the negative control.
     pub mistaken: f64,
     /// The mistake.
     pub mistake: &'static str,
-    /// How far off, relative to `exact`, it may be.
+    /// Bound on the error relative to `exact`.
     pub bound: ErrorBound,
-    /// Nodes at which it is tested: enough to tell the mistake.
+    /// Nodes at which it is tested: enough to detect the mistake.
     pub n: usize,
-    /// Steps in which it is tested.
+    /// Steps with which it is tested.
     pub steps: u32,
 }
 
 /// Largest relative error, as a sum: `space·(100/n)² + time·(100/steps) + rounding`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorBound {
-    /// At n = 100 with a vanishing step.
+    /// Error at n = 100 with a vanishing step.
     pub space: f64,
-    /// Of 100 steps on a vanishing spacing.
+    /// Error of 100 steps with a vanishing spacing.
     pub time: f64,
-    /// Of f32, and of sweeps that end at its tolerance.
+    /// Error of f32, and of sweeps that end at its tolerance.
     pub single: f64,
 }
 
 impl ErrorBound {
-    /// The bound at n nodes after `steps` steps.
+    /// Returns the bound at n nodes after `steps` steps.
     fn at(&self, n: usize, steps: f64, precision: Precision) -> f64 {
         let rounding = if precision == Precision::F32 { self.single } else { 1e-9 };
         self.space * (100.0 / n as f64).powi(2) + self.time * 100.0 / steps + rounding
@@ -98,10 +98,10 @@ impl ErrorBound {
 }
 
 impl Problem {
-    /// The problem of this name.
+    /// Returns the problem of this name.
     ///
     /// # Errors
-    /// [`Error::Request`] with the nearest name where there is none.
+    /// [`Error::Request`] with the nearest name if there is none.
     pub fn named(name: &str) -> Result<Problem> {
         let mut all = problems();
         match all.iter().position(|problem| problem.name == name) {
@@ -115,35 +115,35 @@ impl Problem {
         }
     }
 
-    /// Where it is tested.
+    /// Returns the resolution at which it is tested.
     pub fn resolution(&self) -> Resolution {
         self.in_steps(self.n, self.steps)
     }
 
-    /// n nodes and `steps` equal steps.
+    /// Returns the resolution of n nodes and `steps` equal steps.
     pub fn in_steps(&self, n: usize, steps: u32) -> Resolution {
         Resolution { n, tau: self.t_end / f64::from(steps), tolerance: None }
     }
 
-    /// n nodes and adaptive steps.
+    /// Returns the resolution of n nodes and adaptive steps.
     pub fn to_tolerance(&self, n: usize, tolerance: f64) -> Resolution {
         Resolution { n, tau: self.t_end, tolerance: Some(tolerance) }
     }
 
-    /// How far off it may be at a resolution of fixed τ, relative to `exact`.
+    /// Returns the bound on the error relative to `exact` at a resolution of fixed τ.
     pub fn bound_at(&self, at: Resolution, precision: Precision) -> f64 {
         self.bound.at(at.n, self.t_end / at.tau, precision)
     }
 }
 
 impl StartCurve {
-    /// Relative amplitude of a small mode. The terms that the linear theory leaves out are of its square, rounding is of
-    /// its inverse.
+    /// Relative amplitude of a small mode. The terms neglected by linear theory are of its square, rounding is of its
+    /// inverse.
     fn amplitude(precision: Precision) -> f64 {
         if precision == Precision::F32 { 1e-2 } else { 1e-4 }
     }
 
-    /// The curve for a run in `precision`.
+    /// Returns the curve for a run in `precision`.
     pub fn resolve(self, precision: Precision) -> BaseCurve {
         match self {
             StartCurve::Circle { radius, turns } => {
@@ -163,7 +163,7 @@ impl StartCurve {
         }
     }
 
-    /// Nodes of a circle and its modes are equally spaced in the angle, those of the others along the curve.
+    /// Returns the spacing of the nodes: for a circle and its modes equal in the angle, for the others along the curve.
     pub fn sampling(self) -> Sampling {
         match self {
             StartCurve::Circle { .. } | StartCurve::Mode(_) => Sampling::Parameter,
@@ -172,7 +172,7 @@ impl StartCurve {
     }
 }
 
-/// All problems.
+/// Returns all problems.
 pub fn problems() -> Vec<Problem> {
     let mut all = circles();
     all.extend((2..=6).flat_map(modes));
@@ -180,7 +180,7 @@ pub fn problems() -> Vec<Problem> {
     all
 }
 
-/// Circles, once and twice round: the second turns by twice as much and must move as the first.
+/// Circles, once and twice round: the second has twice the turning number and must move like the first.
 fn circles() -> Vec<Problem> {
     let grown = 3.0_f64.powf(0.25);
     let circle = |name: &str, flow: Flow, turns: u32, space: f64| Problem {
@@ -225,7 +225,7 @@ fn modes(m: u32) -> Vec<Problem> {
             exact: exact(t_end),
             mistaken: mistaken(t_end),
             mistake,
-            // The step is implicit: it misses half a step's worth of the decay, and the fourth differences miss O(m²h²).
+            // The implicit step is off by half a step's decay, and the fourth differences by O(m²h²).
             bound: ErrorBound { space: 2.5e-3 + 8.7e-4 * m2, time: 6e-3, single: 4e-3 },
             n: if m < 4 { 66 } else { 198 },
             steps: 100,
@@ -260,7 +260,7 @@ fn modes(m: u32) -> Vec<Problem> {
     ]
 }
 
-/// Surface diffusion keeps the area.
+/// Surface diffusion conserves the area.
 fn ellipse_area() -> Problem {
     Problem {
         name: "ellipse-area".into(),
@@ -277,7 +277,7 @@ fn ellipse_area() -> Problem {
     }
 }
 
-/// The length of the same ellipse on its way.
+/// The length of the same ellipse during the run.
 fn ellipse_length() -> Problem {
     Problem {
         name: "ellipse-length".into(),

@@ -1,11 +1,11 @@
-//! A circle and a small mode on it, by the linear theory along R(t).
+//! A circle and a small mode on it, by linear theory along R(t).
 
 use crate::flow::Flow;
 
-/// Steps of the fourth-order quadrature below; its error is far under 1e-10 for decays of about 1.
+/// Steps of the fourth-order quadrature below; its error is far below 1e-10 for decays of about 1.
 const STEPS: u32 = 1000;
 
-/// What became of a circle and a small mode on it.
+/// A circle and a small mode on it at the final time.
 #[derive(Clone, Copy, Debug)]
 pub struct CircleMode {
     /// Radius at the final time.
@@ -14,8 +14,8 @@ pub struct CircleMode {
     pub decay: f64,
 }
 
-/// The circle of radius `radius` with a small mode `m` after the time `end`: `R' = -b(1/R)` and `∫ rate_m(R(t)) dt`,
-/// by Runge and Kutta's classical method.
+/// Returns the circle of radius `radius` with a small mode `m` after the time `end`: `R' = -b(1/R)` and
+/// `∫ rate_m(R(t)) dt`, by the classical Runge–Kutta method.
 pub fn circle_mode(flow: &Flow, radius: f64, m: u32, end: f64) -> CircleMode {
     let slope = |r: f64| -flow.b(1.0 / r);
     let h = end / f64::from(STEPS);
