@@ -1,10 +1,10 @@
-// The coarse systems of multigrid: rho u + u'''' + p u'' + w u' discretised anew on every coarse ring. Twin of
+// The coarse systems of multigrid: rho u + u'''' + p u'' + w u' rediscretised on every coarse ring. Twin of
 // src/solver/multigrid/coarse.rs.
 
-/// By how much p is damped on coarse levels.
+/// The damping of p on coarse levels.
 const BALANCE = 0.1111111111111111;
 
-/// Inverse of the coarsest matrix, row by row; every thread has its own.
+/// Inverse of the coarsest matrix, row by row; every thread has its own copy.
 var<private> inverse_matrix: array<real, 25>;
 
 /// The terms of coarse node j.
@@ -84,12 +84,12 @@ fn balanced(p_of: real, cell: real) -> real {
     return p_of / (real(1.0) + real(BALANCE) * (max(p_of, real(0.0)) * (cell * cell)));
 }
 
-/// The inverse of the coarsest matrix by Gauss and Jordan.
+/// Inverts the coarsest matrix by Gauss–Jordan elimination.
 fn invert_matrix(ring: Level) {
     let n = ring.nodes;
     for (var l = 0u; l < n * n; l++) { inverse_matrix[l] = real(0.0); }
     for (var j = 0u; j < n; j++) {
-        // On so few nodes neighbours on either side may be the same one.
+        // On so few nodes, neighbours on either side may coincide.
         let row = coarse_rows[ring.at + j];
         inverse_matrix[n * j + node_before(ring, j, 2u)] += row.x;
         inverse_matrix[n * j + node_before(ring, j, 1u)] += row.y;

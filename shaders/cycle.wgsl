@@ -3,7 +3,7 @@
 
 const COARSE_SWEEPS = 4u;
 
-/// Adds to `u` and `v` the correction for the residuals in the rings.
+/// Adds the correction for the residuals in the rings to `u` and `v`.
 fn correct() {
     var ring = finest();
     let depth = at_run_time(coarse_rings());
@@ -34,7 +34,7 @@ fn correct() {
     }
 }
 
-/// Solves the coarsest system by the inverse of its matrix.
+/// Solves the coarsest system with the inverse of its matrix.
 fn solve_coarsest(ring: Level) {
     for (var j = lane; j < ring.nodes; j += THREADS) {
         var sum = pair(0.0);

@@ -1,4 +1,4 @@
-// How the excess of a member falls: the line fitted to its logarithm, and its values at the times of a grid. Twin of
+// The decay of a member's excess: the line fitted to its logarithm, and its values at the times of a grid. Twin of
 // src/scheme/decay.rs.
 
 const PARTS = 32u;
@@ -6,7 +6,7 @@ const TIMES = 31u;
 const HALVINGS = 64u;
 const TERMS = 10u;
 
-/// Notes what a step of length h that is taken adds; its curves are in the report, it is not yet counted.
+/// Records what an accepted step of length h adds; its curves are in the report, it is not yet counted.
 fn follow(h: real) {
     var start = real(counters.steps);
     var end = min(start + real(1.0), p.clock_end);
@@ -24,7 +24,7 @@ fn follow(h: real) {
     note(start, end);
 }
 
-/// Takes the excess at the end of a step, or of half an adaptive one, into the fit while it is inside the window.
+/// Adds the excess at the end of a step, or of half an adaptive one, to the fit while it is inside the window.
 fn fit(start: real, end: real, before: real, after: real) {
     if counters.fit_over != 0u || (counters.fit_points == 0u && !(after <= p.fit_from)) { return; }
     if !(p.fit_to <= after) {
@@ -47,13 +47,13 @@ fn fit(start: real, end: real, before: real, after: real) {
     report.decay.yy += dy * (report.decay.y - report.decay.mean_y);
 }
 
-/// What the step adds to the abscissa.
+/// The change of the abscissa over the step.
 fn abscissa(start: real, end: real) -> real {
     if p.growth <= real(0.0) { return end - start; }
     return ln_ratio(p.growth + start, p.growth + end);
 }
 
-/// Notes the excess at the times of the grid that lie in the step.
+/// Records the excess at the grid times inside the step.
 fn note(start: real, end: real) {
     while counters.noted < TIMES {
         let share = real(counters.noted + 1u) / real(PARTS);

@@ -1,13 +1,13 @@
-// A direct solve inside the workgroup, in place of the sweeps. Its independent check is src/solver/direct.rs.
+// A direct solve inside the workgroup, instead of sweeps. Its independent check is src/solver/direct.rs.
 //
-// Every block keeps its last two unknowns `s` and eliminates the others: its first two nodes become
-// `m = c - P p - S s`, with `p` the last two unknowns of the block before. What remains is a ring of pairs,
-// `L p + D s + U s' = g`. Cyclic reduction solves it: in a round every second pair of the ring eliminates itself from its
-// neighbours, in ceil(log2(BLOCKS)) rounds one is left, and as many rounds back give the others. A ring of an odd number
-// keeps its first and its last pair, which go on as neighbours, so that it needs no border and no padding. No pivoting: the
-// systems are perturbations of 1 + (positive) D^4.
+// Every block keeps its last two unknowns `s` and eliminates the others: its first two nodes become `m = c - P p - S
+// s`, with `p` the last two unknowns of the block before. This leaves a ring of pairs, `L p + D s + U s' = g`. Cyclic
+// reduction solves it: in each round every second pair of the ring is eliminated from its neighbours, after
+// ceil(log2(BLOCKS)) rounds one is left, and as many rounds back give the others. A ring of an odd number keeps its
+// first and its last pair, which become neighbours, so that it needs no border and no padding. No pivoting: the systems
+// are perturbations of 1 + (positive) D^4.
 
-/// 2x2 matrices are kept as (m00, m01, m10, m11), pairs for x and y together as (x0, x1, y0, y1).
+/// 2x2 matrices are stored as (m00, m01, m10, m11), pairs for x and y together as (x0, x1, y0, y1).
 /// The rows of pairs that have left the ring, divided by their own matrix; in the end all pairs in `ring_rhs`.
 var<workgroup> ring_low: array<vec, BLOCKS>;
 var<workgroup> ring_high: array<vec, BLOCKS>;
@@ -31,8 +31,8 @@ fn invert(m: vec) -> vec {
     return vec(m.w, -m.y, -m.z, m.x) / (m.x * m.w - m.y * m.z);
 }
 
-/// Solves for `u` alone, or for `u` and `v`. Whether `u` alone is finite is judged with the positions: it spares a look at
-/// all blocks.
+/// Solves for `u` alone, or for `u` and `v`. Whether `u` alone is finite is judged with the positions, which saves a
+/// pass over all blocks.
 fn solve(both: bool, negligible: real) -> u32 {
     if !both { rhs_y = vec(0.0); }
     solve_rows();
@@ -68,7 +68,7 @@ fn eliminate_interior() -> Interior {
     return Interior(vec(rhs_x.x, 0.0, rhs_y.x, 0.0), vec(a.x, b.x, 0.0, 0.0), vec(d.x, e.x, -1.0, 0.0));
 }
 
-/// The rows of the block's pair, with its own interior and that of the next block put in.
+/// The rows of the block's pair, with its own interior and that of the next block substituted.
 fn pair_row(interior: Interior) -> PairRow {
     let a = row_of.a;
     let b = row_of.b;
@@ -101,8 +101,8 @@ fn pair_row(interior: Interior) -> PairRow {
     );
 }
 
-/// The pair of this block, once all are in `ring_rhs`. One barrier a round: a pair is written once as a row, when it leaves
-/// the ring, and once as a solution, and nobody reads it in a round in which it is written.
+/// The pair of this block, once all are in `ring_rhs`. One barrier per round: a pair is written once as a row, when it
+/// leaves the ring, and once as a solution, and nobody reads it in a round in which it is written.
 fn solve_ring(row: PairRow) -> vec {
     var low = row.low;
     var own = row.own;

@@ -1,9 +1,10 @@
-// What the entry point does: one workgroup takes one member through up to `dispatch.steps` steps towards its goal. Twin of
-// src/scheme/evolve.rs. A fixed step that fails is not accepted: the member ends in its last good state. An adaptive one
-// is tried again with a shorter step, until that is too short to mean anything.
+// The entry point's work: one workgroup advances one member by up to `dispatch.steps` steps towards its goal. Twin of
+// src/scheme/evolve.rs. A fixed step that fails is not accepted: the member ends in its last good state. An adaptive
+// step is retried with a shorter length until that is too short to mean anything.
 //
 // A dispatch also ends when its sweeps are used up. The attempt then pauses: the increments so far are stored, and the
-// next dispatch computes the same rows again and sweeps on, so that no bit depends on where a dispatch ended.
+// next dispatch recomputes the same rows and continues sweeping. Results do not depend on where a dispatch ends, to the
+// last bit.
 
 fn take_member(index: u32) {
     member = all_due[index];
@@ -40,9 +41,9 @@ fn take_member(index: u32) {
 const GO_ON = 0u;
 const STOP = 1u;
 
-/// One attempt at a step and its consequences; returns whether to go on, the same in every thread.
+/// Attempts a step and handles the result; returns whether to continue, the same in every thread.
 ///
-/// A step and an observation are each called in one place only: compilers put every call's whole body there.
+/// A step and an observation are each called in one place only: compilers inline the whole body of every call.
 fn advance() -> u32 {
     let by = stride();
     let h = by.length;
@@ -89,7 +90,7 @@ fn advance() -> u32 {
     } else {
         start_after_fixed();
     }
-    // The curve before a fixed step is kept where an output time may lie between the two.
+    // The curve before a fixed step is stored if an output time may lie between the two.
     if ADAPTIVE || counters.steps + 1u == counters.goal { store_curve(BEFORE); }
     x = here(new_x);
     y = here(new_y);
@@ -131,7 +132,7 @@ fn failure_of_step(solved: u32) -> u32 {
     return RUNNING;
 }
 
-/// Tries again with a step of length `next`, or gives the member up for `cause` where that is below `least` of `(L/n)⁴`.
+/// Retries with a step of length `next`, or ends the member for `cause` if that is below `least` of `(L/n)⁴`.
 fn refuse(next: real, least: real, cause: u32) -> u32 {
     counters.rejected += 1u;
     counters.refused = 1u;
@@ -140,13 +141,14 @@ fn refuse(next: real, least: real, cause: u32) -> u32 {
     return uniform_decision(select(STOP, GO_ON, counters.status == RUNNING));
 }
 
-/// Refuses a step of length h that failed outright; after that the increments may be anything.
+/// Refuses a step of length h that failed outright; its increments may then be anything.
 fn refuse_failure(h: real, cause: u32) -> u32 {
     start_nowhere();
     return refuse(real(MIN_GROWTH) * h, select(real(MIN_STEP), real(MIN_TO_SINGULAR), cause == SINGULAR), cause);
 }
 
-/// Notes the steps in which the excess falls to half its start and to the relaxation threshold, and where inside them.
+/// Records the steps in which the excess falls to half its start and to the relaxation threshold, and where inside
+/// them.
 fn record_events(h: real) {
     let length = select(real(0.0), h, ADAPTIVE);
     if counters.half_step == NEVER && report.now.excess <= p.half_at {
@@ -177,7 +179,7 @@ fn fraction_at(excess: real) -> real {
     return select(straight, crossing(before, report.middle.excess, after, excess), ADAPTIVE);
 }
 
-/// Counts the step that was taken; returns whether to go on.
+/// Counts an accepted step; returns whether to continue.
 fn accepted() -> u32 {
     report.progress.travel += others.z;
     counters.steps += 1u;

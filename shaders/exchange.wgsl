@@ -1,7 +1,7 @@
-// Exchange between the threads of a workgroup of any size, through workgroup memory and barriers. exchange_subgroup.wgsl
-// has the same functions with the same results for workgroups of one subgroup.
+// Exchange between the threads of a workgroup of any size, through workgroup memory and barriers.
+// exchange_subgroup.wgsl has the same functions with the same results for workgroups of one subgroup.
 
-/// Fields that neighbours need, one block an entry.
+/// Fields that neighbours need, one entry per block.
 var<workgroup> ring_a: array<vec, BLOCKS>;
 var<workgroup> ring_b: array<vec, BLOCKS>;
 /// A decision for the whole workgroup.
@@ -29,8 +29,8 @@ fn windows(a: vec, b: vec) -> Windows {
     return Windows(window(ring_a[before], a, ring_a[after]), window(ring_b[before], b, ring_b[after]));
 }
 
-/// Hands the fronts of the blocks to the blocks before them. One barrier, here and in the next two: each has an array of its
-/// own, so that whoever still reads one is separated from its next writer by the barrier of another.
+/// Passes the fronts of the blocks to the blocks before them. One barrier, here and in the next two: each has its own
+/// array, so that the barrier of another separates the last readers of an array from its next writer.
 fn pass_down(front: vec) -> vec {
     if owns > 0u { ring_a[lane] = front; }
     workgroupBarrier();
@@ -44,15 +44,15 @@ fn pass_down_early(front: vec) -> vec {
     return partials[after];
 }
 
-/// Hands the tails of the blocks to the blocks after them.
+/// Passes the tails of the blocks to the blocks after them.
 fn pass_up(tail: vec) -> vec {
     if owns > 0u { ring_b[lane] = tail; }
     workgroupBarrier();
     return ring_b[before];
 }
 
-/// Four maxima over the ring from the maxima over each block: first over every `groups`-th block, then over those, which
-/// reads 2 sqrt(BLOCKS) rows instead of BLOCKS.
+/// Four maxima over the ring from the maxima over each block: first over every `groups`-th block, then over the
+/// results, which reads 2 sqrt(BLOCKS) rows instead of BLOCKS.
 fn ring_maxima(part: vec) -> vec {
     workgroupBarrier();
     if owns > 0u { partials[lane] = part; }
@@ -70,7 +70,7 @@ fn ring_maxima(part: vec) -> vec {
     return largest;
 }
 
-/// Four sums in block order and twice four maxima over the ring.
+/// Four sums in block order and two sets of four maxima over the ring.
 fn ring_summary(sum: vec, extreme: vec, other: vec) -> Summary {
     workgroupBarrier();
     if owns > 0u {
@@ -88,7 +88,7 @@ fn ring_summary(sum: vec, extreme: vec, other: vec) -> Summary {
     return all;
 }
 
-/// The value that thread 0 holds, for every thread, in a way that control flow may depend on.
+/// The value in thread 0, for every thread, in a form on which control flow may depend.
 fn uniform_decision(value: u32) -> u32 {
     if lane == 0u { verdict = value; }
     return workgroupUniformLoad(&verdict);

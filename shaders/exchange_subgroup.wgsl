@@ -1,5 +1,5 @@
-// Exchange between the threads of a workgroup that is one subgroup: by shuffles, without barriers. exchange.wgsl has the
-// same functions with the same results for workgroups of any size.
+// Exchange between the threads of a workgroup that is one subgroup: by shuffles, without barriers. exchange.wgsl has
+// the same functions with the same results for workgroups of any size.
 
 @compute @workgroup_size(THREADS)
 fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(subgroup_invocation_id) thread: u32) {
@@ -26,7 +26,7 @@ fn pass_up(tail: vec) -> vec {
     return subgroupShuffle(tail, before);
 }
 
-/// Spare threads repeat the last block and change no maximum.
+/// Spare threads repeat the last block and do not change any maximum.
 fn ring_maxima(part: vec) -> vec {
     return subgroupMax(part);
 }

@@ -1,4 +1,4 @@
-// The adaptive step: one step of the paper's scheme against two half ones. Twin of src/scheme/extrapolation.rs.
+// The adaptive step: one step of the paper's scheme compared with two half steps. Twin of src/scheme/extrapolation.rs.
 
 /// Prepares part 0, 1 or 2 of an attempt of length h: the whole step, the first half, the second half.
 fn begin_part(part: u32, h: real) {
@@ -6,14 +6,14 @@ fn begin_part(part: u32, h: real) {
     load_curve(select(CURVE, BEFORE, part == 2u));
 }
 
-/// Keeps what a part computed: the whole step in MIDDLE, the first half in BEFORE, the second one in the registers.
+/// Stores the result of a part: the whole step in MIDDLE, the first half in BEFORE, the second half in registers.
 fn end_part(part: u32) {
     if part == 2u { return; }
     store_fields(select(BEFORE, MIDDLE, part == 0u), here(new_x), here(new_y), new_k, new_r);
     start_after_part(part);
 }
 
-/// How far apart the whole step and the two half steps are.
+/// The difference between the whole step and the two half steps.
 fn error_of_attempt() -> real {
     storageBarrier();
     let gap_k = bounded_abs(new_k - load_field(MIDDLE + 2u));
@@ -25,7 +25,7 @@ fn error_of_attempt() -> real {
     return max(bounded_abs(vec(m.x / scale)).x, m.y);
 }
 
-/// Puts the extrapolated curve into the registers of the new curve and the one in the middle of the step into MIDDLE.
+/// Puts the extrapolated curve into the registers of the new curve and the curve in the middle of the step into MIDDLE.
 fn extrapolate() {
     let gap_x = here(new_x) - load_field(MIDDLE);
     let gap_y = here(new_y) - load_field(MIDDLE + 1u);
@@ -45,14 +45,14 @@ fn extrapolate() {
     new_y = moved.b;
 }
 
-/// A quantity at the fraction `at` of a step in which it goes from `start` over `middle` to `end`: on the parabola.
+/// A quantity at the fraction `at` of a step, on the parabola through its values `start`, `middle` and `end`.
 fn inside(start: real, middle: real, end: real, at: real) -> real {
     let slope = real(4.0) * middle - real(3.0) * start - end;
     let bend = real(2.0) * (start - real(2.0) * middle + end);
     return start + at * (slope + at * bend);
 }
 
-/// Where in the step a quantity that goes from `start` over `middle` to `end` first falls to `at`, as a fraction.
+/// The fraction of a step at which a quantity that goes from `start` over `middle` to `end` first falls to `at`.
 fn crossing(start: real, middle: real, end: real, at: real) -> real {
     let above = start - at;
     let slope = real(4.0) * middle - real(3.0) * start - end;

@@ -2,13 +2,13 @@
 
 const SWEEPS_PER_CHECK = 8u;
 
-/// Sweeps `u` for rhs_x and, if `both`, `v` for rhs_y; returns how it ended.
+/// Sweeps `u` for rhs_x and, if `both`, `v` for rhs_y; returns how the solve ended.
 fn solve(both: bool, negligible: real) -> u32 {
     if both { return solve_two(negligible); }
     return solve_one(negligible);
 }
 
-/// Sweeps `u` for rhs_x; returns how it ended.
+/// Sweeps `u` for rhs_x; returns how the solve ended.
 fn solve_one(negligible: real) -> u32 {
     v = vec(0.0);
     start_sweeps();
@@ -28,7 +28,7 @@ fn solve_one(negligible: real) -> u32 {
     return paused_or(ended);
 }
 
-/// Sweeps `u` for rhs_x and `v` for rhs_y, with the barriers of one; returns how it ended.
+/// Sweeps `u` for rhs_x and `v` for rhs_y, with the barriers of one; returns how the solve ended.
 fn solve_two(negligible: real) -> u32 {
     start_sweeps();
     sweeps = counters.solve_sweeps;

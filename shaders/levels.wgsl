@@ -1,18 +1,19 @@
-// The rings of multigrid: their sizes, where they lie in the arrays, and which node is next to, above or below which.
+// The rings of multigrid: their sizes, their places in the arrays, and which nodes are adjacent, above or below.
 // Twin of src/solver/multigrid/levels.rs.
 //
 // Level l is a ring of NODES >> l nodes, down to COARSEST or fewer. The finest one stays in registers, block by block,
-// and its fields are shared in the rings for the way down. The coarser ones lie one behind the other in the arrays
-// below, and the nodes of each are dealt out to all threads. What belongs to the way between two levels lies with the
-// coarser one.
+// and its fields are shared in the rings for the way down. The coarser ones are stored consecutively in the arrays
+// below, and the nodes of each are distributed over all threads. Data for the transfer between two levels is stored
+// with the coarser one.
 
 const COARSEST = 5u;
-/// Levels at most: enough for any ring that fits.
+/// Maximum number of levels: enough for any ring that fits.
 const LEVELS = 8u;
 
 alias pair = vec2<real>;
 
-/// Entries a, b, d, e of the rows, and from a residual integrated over the cell, times tau, to a right-hand side.
+/// Entries a, b, d, e of the rows, and the factor from a residual integrated over the cell, times tau, to a right-hand
+/// side.
 var<workgroup> coarse_rows: array<vec, COARSE>;
 var<workgroup> coarse_share: array<real, COARSE>;
 /// Unknowns for the two right-hand sides. While the level is built: spacing and rho.
@@ -21,11 +22,11 @@ var<workgroup> coarse_value: array<pair, COARSE>;
 var<workgroup> coarse_held: array<pair, COARSE>;
 /// Weights of coarse nodes j-1 ... j+2 at the finer node between j and j+1.
 var<workgroup> coarse_weights: array<vec, COARSE>;
-/// The same for the last node of an odd ring, by level of that ring.
+/// The same for the last node of an odd ring, indexed by the level of that ring.
 var<workgroup> odd_weights: array<vec, LEVELS>;
 
-/// A level: how often the finest ring was halved, its nodes, and where it begins in the arrays, which do not hold the
-/// finest one.
+/// A level: how often the finest ring was halved, its nodes, and where it starts in the arrays, which exclude the
+/// finest level.
 struct Level { depth: u32, nodes: u32, at: u32 }
 
 fn is_odd(ring: Level) -> bool {
@@ -41,7 +42,7 @@ fn coarser(fine: Level) -> Level {
     return Level(fine.depth + 1u, fine.nodes / 2u, select(fine.at + fine.nodes, 0u, fine.depth == 0u));
 }
 
-/// The next finer level of one that is below the first coarse one.
+/// The next finer level of one below the first coarse level.
 fn finer(coarse: Level) -> Level {
     let depth = coarse.depth - 1u;
     let nodes = NODES >> depth;
@@ -55,8 +56,8 @@ fn coarse_rings() -> u32 {
     return depth;
 }
 
-/// `count`, in a way that compilers cannot know before: they would unroll the loops over levels, nodes and colours one
-/// inside the other, and take up to a minute.
+/// `count`, in a form that compilers cannot predict: they would unroll the nested loops over levels, nodes and colours,
+/// and take up to a minute.
 fn at_run_time(count: u32) -> u32 {
     return select(count, 0u, dispatch.max_sweeps == 0u);
 }
@@ -83,7 +84,7 @@ fn is_second_between(fine: Level, i: u32) -> bool {
     return is_odd(fine) && i == fine.nodes - 1u;
 }
 
-/// Coarse node t of the four around the second one.
+/// Coarse node t of the four around the second of those two.
 fn around_second(coarse: Level, t: u32) -> u32 {
     return node_after(coarse, coarse.nodes - 2u, t);
 }
@@ -93,12 +94,12 @@ fn is_coarse(fine: Level, i: u32) -> bool {
     return i % 2u == 0u && !is_second_between(fine, i);
 }
 
-/// The coarse node that node i is, or the one before it.
+/// The coarse node at node i, or the one before it.
 fn coarse_node(fine: Level, i: u32) -> u32 {
     return min(i / 2u, fine.nodes / 2u - 1u);
 }
 
-/// First node of a thread's block, and nodes in it.
+/// First node of a thread's block, and its number of nodes.
 struct Part { first: u32, nodes: u32 }
 
 /// The block of a coarse ring that this thread sweeps.
@@ -109,7 +110,7 @@ fn coarse_block(ring: Level) -> Part {
     return Part(start, select(select(0u, 3u, lane < fours + threes), 4u, lane < fours));
 }
 
-/// The colour that is swept in this phase: one after another, again and again.
+/// The colour swept in this phase: one after another, cyclically.
 fn colour_in(phase: u32) -> u32 {
     return phase % 4u;
 }

@@ -1,4 +1,4 @@
-// The structs shared with the host, one entry a resident member. Twin of src/scheme/member.rs.
+// The structs shared with the host, one entry per resident member. Twin of src/scheme/member.rs.
 
 /// Parameters of a member: the law, the step, sweeps, thresholds, adaptive steps and their times.
 struct Parameters {
@@ -41,7 +41,7 @@ struct Observed {
     metric_drift: real,
 }
 
-/// Where a member is in time, and when its events were.
+/// A member's time, and the times of its events.
 struct Progress {
     turning: real,
     travel: real,
@@ -70,7 +70,7 @@ struct Decay {
     yy: real,
 }
 
-/// What a member reports when a dispatch ends, but for what it notes on its way.
+/// A member's report at the end of a dispatch, except for the recorded excess.
 struct Report {
     before: Observed,
     middle: Observed,
@@ -79,7 +79,7 @@ struct Report {
     decay: Decay,
 }
 
-/// All of it.
+/// The complete report.
 struct Record {
     report: Report,
     excess_at: array<real, TIMES>,
@@ -111,23 +111,23 @@ const NONFINITE = 4u;
 const STALLED = 5u;
 const NEVER = 0xffffffffu;
 
-/// What one dispatch asks for.
+/// Parameters of one dispatch.
 struct Dispatch {
-    /// Steps at most.
+    /// Maximum number of steps.
     steps: u32,
-    /// Sweeps a system at most.
+    /// Maximum number of sweeps per system.
     max_sweeps: u32,
-    /// Sweeps after which the dispatch pauses, in the middle of a solve if need be.
+    /// Sweeps after which the dispatch pauses, if need be in the middle of a solve.
     sweeps: u32,
-    /// BLOCKS, as a number that compilers do not know: they would unroll every loop over the blocks.
+    /// BLOCKS, as a number unknown to compilers: they would unroll every loop over the blocks.
     blocks: u32,
     /// Groups in which maxima are taken: about the root of BLOCKS.
     groups: u32,
 }
 
 const STATE_FIELDS = 18u;
-/// Where in a state its curves begin, four fields each: x, y, k, r. The increments of k, x and y follow the first one, and
-/// then what sweeps remember beside them.
+/// Offsets of the curves in a state, four fields each: x, y, k, r. The increments of k, x and y follow the first one,
+/// and then what sweeps remember next to them.
 const CURVE = 0u;
 const INCREMENTS = 4u;
 const EARLIER = 7u;
@@ -143,7 +143,7 @@ const BEFORE = 14u;
 /// STATE_FIELDS fields of NODES numbers each.
 @group(0) @binding(4) var<storage, read_write> all_states: array<real>;
 
-/// The members that this dispatch advances, one a workgroup.
+/// The members that this dispatch advances, one per workgroup.
 @group(0) @binding(5) var<storage, read> all_due: array<u32>;
 
 /// Index of this workgroup's member, and its parameters.

@@ -1,10 +1,10 @@
 // Coloured sweeps inside V-cycles on the ring. Twin of src/solver/multigrid/mod.rs. The sweeps are in sweeps.wgsl, the
-// rings in levels.wgsl, the coarse systems in coarse.wgsl, the way between two rings in transfer.wgsl, and the cycle in
-// cycle.wgsl.
+// rings in levels.wgsl, the coarse systems in coarse.wgsl, the transfer between two rings in transfer.wgsl, and the
+// cycle in cycle.wgsl.
 
 const SWEEPS_PER_CYCLE = 2u;
 
-/// Sweeps `u` for rhs_x and, if `both`, `v` for rhs_y; returns how it ended.
+/// Sweeps `u` for rhs_x and, if `both`, `v` for rhs_y; returns how the solve ended.
 fn solve(both: bool, negligible: real) -> u32 {
     if both {
         position_terms(k_window);

@@ -1,11 +1,11 @@
-// Numbers: `real` is f32 or f64, chosen by the line that the host puts in front. Twin of src/number.rs.
+// Numbers: `real` is f32 or f64, chosen by the line that the host prepends. Twin of src/number.rs.
 
 alias vec = vec4<real>;
 
 /// Values above this bound count as not finite. `!(abs(x) <= BIG)` also holds for NaN; `x != x` never does.
 const BIG = 1e18;
 
-/// |v|, or 2 BIG where that is NaN or above BIG: safe to take maxima of.
+/// |v|, or 2 BIG if that is NaN or above BIG, so that maxima can be taken safely.
 fn bounded_abs(v: vec) -> vec {
     return select(vec(2.0 * BIG), abs(v), abs(v) <= vec(BIG));
 }

@@ -1,8 +1,8 @@
-// Sums and maxima of a curve, and what follows from them. Twin of src/scheme/observe.rs.
+// Sums and maxima of a curve, and what they determine. Twin of src/scheme/observe.rs.
 
-/// |k| r from which on a curve counts as not resolved.
+/// |k| r at which a curve counts as unresolved.
 const MAX_TURN = 2.0;
-/// Shortest over mean edge below which an edge counts as vanished.
+/// Ratio of the shortest edge to the mean below which an edge counts as vanished.
 const MIN_EDGE = 1e-5;
 /// Metric drift above which the scheme's lengths say nothing about the polygon.
 const MAX_DRIFT = 1.0;
@@ -14,7 +14,7 @@ const FOUR_PI = 12.566370614359172;
 var<private> sums: vec;
 /// Maxima of the new curve: |k| r, metric drift, longest edge, minus the shortest edge.
 var<private> extremes: vec;
-/// Largest curvature, minus the smallest, largest way that a node went.
+/// Largest curvature, minus the smallest, largest displacement of a node.
 var<private> others: vec;
 
 /// Whether the sums and the curvature are finite.
@@ -23,7 +23,7 @@ fn is_finite() -> bool {
     return sums.x <= big && abs(sums.y) <= big && extremes.x <= big;
 }
 
-/// Whether the curve has become singular: it is not resolved, an edge has vanished, its lengths say nothing, it has
+/// Whether the curve has become singular: it is unresolved, an edge has vanished, its lengths mean nothing, it has
 /// shrunk, or its turning number is no longer `turning`.
 fn is_singular(turning: real) -> bool {
     let mean_edge = sums.x / real(NODES);
@@ -34,20 +34,20 @@ fn is_singular(turning: real) -> bool {
     return !(resolved && apart && measured && extended && sums.w == turning);
 }
 
-/// `L²/(4π|A|)` above that of the regular polygon.
+/// `L²/(4π|A|)` minus that of the regular polygon.
 fn excess(length: real, area: real) -> real {
     return length * length / (real(FOUR_PI) * abs(area)) - p.polygon_ratio;
 }
 
-/// Largest gap between the angle by which the new curvature turns the tangent over a segment and the angle by which the
-/// new polygon turns there.
+/// The largest difference between the angle by which the new curvature turns the tangent over a segment and the angle
+/// by which the new polygon turns there.
 fn gap() -> real {
     let turned = turn(new_x, new_y);
     let apart = bounded_abs(new_k * turned.span - turned.angle);
     return ring_maxima(vec(block_max(apart), 0.0, 0.0, 0.0)).x;
 }
 
-/// +1 (-1) where the edge vector turns from e to f across the positive x axis, the short way round.
+/// +1 (-1) if the edge vector turns from e to f across the positive x axis, the short way round.
 fn winding(ex: vec, ey: vec, fx: vec, fy: vec) -> vec {
     let side = ex * fy - fx * ey;
     let e_below = select(vec(0.0), vec(1.0), ey <= vec(0.0));
@@ -57,7 +57,7 @@ fn winding(ex: vec, ey: vec, fx: vec, fy: vec) -> vec {
     return e_below * (vec(1.0) - f_below) * left - (vec(1.0) - e_below) * f_below * right;
 }
 
-/// Observes the curve whose windows of x and y and nodes of k and r are given; `moved` is how far its nodes went.
+/// Observes the curve given by the windows of x and y and the nodes of k and r; `moved` is how far its nodes moved.
 fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     let ex = here(wx) - minus1(wx);
     let ey = here(wy) - minus1(wy);
@@ -81,7 +81,7 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     others = all.others;
 }
 
-/// What the last `observe` says of its curve.
+/// Derives the observables from the last `observe`.
 fn observed() -> Observed {
     return Observed(
         sums.x, sums.y, excess(sums.x, sums.y), sums.z, -others.y, others.x, extremes.z / -extremes.w, extremes.y,

@@ -1,6 +1,6 @@
-// How the polygon turns, and the pull of k and r towards it. Twin of src/scheme/pull.rs.
+// The turn of the polygon, and the pull of k and r towards it. Twin of src/scheme/pull.rs.
 
-/// By how much the polygon turns at both ends of a segment together, over which length, and the segment's own.
+/// The turn of the polygon at both ends of a segment together, the length over which it turns, and the segment's own.
 struct Turn { angle: vec, span: vec, edge: vec }
 
 fn turn(wx: Window, wy: Window) -> Turn {

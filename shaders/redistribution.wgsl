@@ -5,13 +5,14 @@ var<private> rkb: vec;
 /// Tangential velocity at the nodes, and at the nodes before them.
 var<private> alpha: vec;
 var<private> alpha_before: vec;
-/// The curvatures on the window of the block: the old ones, exchanged together with lengths; for the positions the new ones.
+/// The curvatures on the window of the block: the old ones, exchanged together with lengths; for the positions the new
+/// ones.
 var<private> k_window: Window;
-/// The old x there.
+/// The old x on that window.
 var<private> x_window: Window;
 /// New lengths on the window of the block.
 var<private> r_new: Window;
-/// 1/r and 1/q there, of the old lengths, then of the new ones.
+/// 1/r and 1/q on that window, of the old lengths, then of the new ones.
 var<private> ir: Window;
 var<private> iq: Window;
 
@@ -60,10 +61,10 @@ fn tangential_velocity(mean_rkb: real, mean_length: real) {
     alpha = without_last_node(running);
 }
 
-/// 1/r and 1/q from one division: of r and q, which are of one size, 1/(r q).
+/// 1/r and 1/q from one division, 1/(r q), since both are of the same size.
 fn reciprocals(w: Window) {
     let low_q = (w.low + minus1(w)) * real(0.5);
-    // No row asks for the last q.
+    // No row needs the last q.
     let high_q = (w.high + plus3(w)) * real(0.5);
     let low = vec(1.0) / (w.low * low_q);
     let high = vec(1.0) / (w.high * high_q);

@@ -1,29 +1,29 @@
-// The ring of nodes, cut into blocks: which node or block is next to which, and what a thread knows of its neighbours.
+// The ring of nodes, cut into blocks: which nodes or blocks are adjacent, and what a thread knows of its neighbours.
 // Twin of src/solver/ring.rs. All arithmetic on indices of nodes and blocks is here and, for the coarse rings of
-// multigrid, in levels.wgsl. Addresses in storage buffers are made in member.wgsl and trace_on.wgsl.
+// multigrid, in levels.wgsl. Addresses in storage buffers are computed in member.wgsl and trace_on.wgsl.
 //
-// A thread owns one block of four or three consecutive nodes, kept in the components of a `vec`; a node's colour is
+// A thread owns one block of four or three consecutive nodes, stored in the components of a `vec`; a node's colour is
 // its place in the block. For a block of three the fourth component repeats the first node of the next block: it is
-// computed along and never written, summed or judged. The workgroup is filled up to whole subgroups with spare threads
-// that compute along with the last block and write nothing: lavapipe loses the registers of a subgroup that is only
-// partly filled when a loop with barriers ends.
+// computed too, but never written, summed or judged. The workgroup is filled up to whole subgroups with spare threads
+// that repeat the last block and write nothing: lavapipe loses the registers of a partly filled subgroup when a loop
+// with barriers ends.
 
 /// Nodes of a member.
 override NODES: u32;
 /// Blocks of four nodes; they come first.
 override FOURS: u32;
-/// Blocks.
+/// Number of blocks.
 override BLOCKS: u32;
-/// Threads: at least one a block, in whole subgroups.
+/// Threads: at least one per block, in whole subgroups.
 override THREADS: u32;
 /// Nodes of all coarser rings together, for multigrid.
 override COARSE: u32;
 
-/// This thread, its block, and the first node of that.
+/// This thread, its block, and the first node of the block.
 var<private> lane: u32;
 var<private> block: u32;
 var<private> first: u32;
-/// Nodes that it owns: 4, 3, or 0 for a spare thread.
+/// Number of nodes that it owns: 4, 3, or 0 for a spare thread.
 var<private> owns: u32;
 /// Whether its block and the one before have four nodes.
 var<private> is_four: bool;
@@ -63,12 +63,12 @@ fn colour_of(i: u32) -> u32 {
     return select((i - FOURS) % 3u, i % 4u, i < 4u * FOURS);
 }
 
-/// Of the groups in which maxima are taken, the one of the block.
+/// The group of the block, for taking maxima.
 fn group() -> u32 {
     return block % dispatch.groups;
 }
 
-// The direct solve halves the ring of blocks round by round: in a round every second of those that are left, `stride`
+// The direct solve halves the ring of blocks round by round: in each round every second remaining block, `stride`
 // apart, leaves.
 
 /// Whether the block leaves the ring in this round.
@@ -113,7 +113,7 @@ fn minus1(w: Window) -> vec { return vec(w.low.yzw, w.high.x); }
 fn here(w: Window) -> vec { return vec(w.low.zw, w.high.xy); }
 fn plus1(w: Window) -> vec { return vec(w.low.w, w.high.xyz); }
 fn plus2(w: Window) -> vec { return w.high; }
-/// The field at i+3, but for the last node: first+6 is outside the window, and first+5 stands in its place.
+/// The field at i+3, except for the last node: first+6 is outside the window, and first+5 replaces it.
 fn plus3(w: Window) -> vec { return vec(w.high.yzw, w.high.w); }
 
 /// The window of a block between the blocks before and after it.
@@ -124,7 +124,7 @@ fn window(of_before: vec, own: vec, of_after: vec) -> Window {
 }
 
 /// The window of a block between the tail of the block before and the front of the block after, two nodes each. The
-/// fourth component of a block of three has no second neighbour in it; the first one stands in its place.
+/// fourth component of a block of three has no second neighbour in it; the first one replaces it.
 fn narrow_window(tail: vec2<real>, own: vec, front: vec2<real>) -> Window {
     return Window(vec(tail, own.xy), select(vec(own.z, front, front.y), vec(own.zw, front), is_four));
 }

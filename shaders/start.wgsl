@@ -25,8 +25,8 @@ fn start_after_part(part: u32) {
     start_put(select(real(0.0), real(0.25), part == 0u), select(real(0.5), real(0.25), part == 0u), 1.0, 0.0);
 }
 
-/// Puts `a` times the increments plus `b` times those remembered into the increments, and `c`, `d` times into what is
-/// remembered, which is in EARLIER.
+/// Puts `a` times the increments plus `b` times the remembered ones into the increments, and `c`, `d` times into the
+/// remembered ones, which are in EARLIER.
 fn start_put(a: real, b: real, c: real, d: real) {
     if !SWEEPS { return; }
     let last_k = dk;

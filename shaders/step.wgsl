@@ -1,6 +1,6 @@
-// One step of the paper's scheme, from the curve in registers to the new one beside it. Twin of src/scheme/step.rs.
+// One step of the paper's scheme, from the curve in registers to the new one next to it. Twin of src/scheme/step.rs.
 
-/// Share of the rounding error of an unknown below which an error of its increment is not worth a sweep.
+/// Fraction of the rounding error of an unknown below which an error of its increment is not worth a sweep.
 const NEGLIGIBLE = 0.1;
 const HALF_OVER_PI = 0.15915494309189535;
 
@@ -10,13 +10,14 @@ var<private> new_r: vec;
 var<private> new_x: Window;
 var<private> new_y: Window;
 
-/// Computes the curve a time p.tau later; returns how its solves ended. An odd phase says that the curvature is solved.
+/// Computes the curve a time p.tau later; returns how its solves ended. An odd phase means that the curvature is
+/// solved.
 fn step() -> u32 {
     let length = redistribute();
     let radius = length * real(HALF_OVER_PI);
     let rounding = real(NEGLIGIBLE * EPSILON);
 
-    // The two solves share a call: compilers put the body of every call in its place.
+    // The two solves share a call, since compilers inline the body of every call.
     for (var part = uniform_decision(counters.phase & 1u); part < 2u; part++) {
         let positions = part == 1u;
         if positions { begin_positions(); } else { begin_curvature(); }

@@ -1,7 +1,7 @@
-// Sums and maxima over a block, and sums over the ring of blocks. In Rust `Sums` (src/solver/ring.rs) adds node after
+// Sums and maxima over a block, and sums over the ring of blocks. In Rust, `Sums` (src/solver/ring.rs) adds node after
 // node, in the same order.
 
-/// One row a block, for sums over the ring.
+/// One row per block, for sums over the ring.
 var<workgroup> partials: array<vec, BLOCKS>;
 
 /// `v` with the component that is not owned set to zero.
@@ -26,16 +26,16 @@ fn block_max_signed(v: vec) -> real {
     return max(max(v.x, v.y), select(v.z, max(v.z, v.w), owns == 4u));
 }
 
-/// What is summed over the ring: the blocks before this one, and all.
+/// Sums over the ring: of the blocks before this one, and of all.
 struct Sums { earlier: vec, all: vec }
 
-/// What is known of a curve after its new nodes are.
+/// Properties of a curve, known once its nodes are.
 struct Summary { sums: vec, extremes: vec, others: vec }
 
 /// Four sums over the ring from the sums over each block, added in block order.
 ///
-/// The bound of the loop is read from the dispatch: a constant one is unrolled, which takes lavapipe's compiler as long as
-/// everything else together, and runs no faster.
+/// The bound of the loop is read from the dispatch: a constant one is unrolled, which takes lavapipe's compiler as long
+/// as everything else together, and does not run faster.
 fn ring_sums(part: vec) -> Sums {
     workgroupBarrier();
     if owns > 0u { partials[lane] = part; }

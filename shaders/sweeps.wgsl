@@ -1,32 +1,32 @@
-// Coloured Gauss–Seidel sweeps, and when they have done enough: what gauss_seidel.wgsl and multigrid.wgsl share. Twin of
+// Coloured Gauss–Seidel sweeps and their stopping criterion, shared by gauss_seidel.wgsl and multigrid.wgsl. Twin of
 // src/solver/sweeps.rs.
 //
-// Rows, right-hand sides and unknowns stay in registers. Of a block of four, neighbours need the first two nodes (its front)
-// and the last two (its tail), and the first two need none of another block's first two: so colours 0 and 1 are one
-// phase, colours 2 and 3 another, and a sweep has two exchanges, with the results of four. Only a block of three
-// needs the front after it between its first and its second node: a third exchange where there is one.
+// Rows, right-hand sides and unknowns stay in registers. Neighbours of a block of four need its first two nodes (its
+// front) and its last two (its tail), and the first two need none of another block's first two. So colours 0 and 1 are
+// one phase, colours 2 and 3 another, and a sweep has two exchanges, with the results of four. Only a block of three
+// needs the front after it between its first and its second node, which costs a third exchange if there is one.
 
-/// Over-relaxation of the solve at hand.
+/// Over-relaxation of the current solve.
 var<private> sor: real;
-/// The tails of the block before, of u and v, and the fronts of the block after, at the present stage of a sweep.
+/// The tails of the block before, of u and v, and the fronts of the block after, at the current stage of a sweep.
 var<private> behind: vec;
 var<private> ahead: vec;
 
-/// Begins sweeps from `u` and `v`: what the blocks around have of them.
+/// Begins sweeps from `u` and `v`: exchanges them with the adjacent blocks.
 fn start_sweeps() {
     let start = windows(u, v);
     behind = tails_before(start.a, start.b);
     ahead = fronts_after(start.a, start.b);
 }
 
-/// A solve that neither ended nor reached the cap has run out of this dispatch's sweeps.
+/// A solve that neither ended nor reached the cap has used up this dispatch's sweeps.
 fn paused_or(ended: u32) -> u32 {
     if ended != UNSOLVED || sweeps >= dispatch.max_sweeps { return ended; }
     counters.solve_sweeps = sweeps;
     return PAUSED;
 }
 
-/// Largest scaled row sum; more than BIG where an entry or a right-hand side is not finite. Times EPSILON it is the
+/// Largest scaled row sum; more than BIG if an entry or a right-hand side is not finite. Times EPSILON it is the
 /// tolerance below which a scaled residual is rounding error.
 fn system_size(rhs: vec) -> real {
     let terms = vec(1.0) + abs(row_of.a) + abs(row_of.b) + abs(row_of.d) + abs(row_of.e);

@@ -2,7 +2,7 @@
 
 /// Row i: a u[i-2] + b u[i-1] + u[i] + d u[i+1] + e u[i+2] = rhs.
 var<private> row_of: Rows;
-/// Right-hand sides; the curvature system uses the first alone.
+/// Right-hand sides; the curvature system uses only the first.
 var<private> rhs_x: vec;
 var<private> rhs_y: vec;
 /// 1/diagonal.
@@ -31,6 +31,6 @@ const PAUSED = 99u;
 var<private> sweeps: u32;
 /// Sweeps left in this dispatch.
 var<private> budget: u32;
-/// The unknowns of the block: where sweeps start, then the result. The curvature system has `u` alone.
+/// The unknowns of the block: where sweeps start, then the result. The curvature system has only `u`.
 var<private> u: vec;
 var<private> v: vec;

@@ -1,3 +1,3 @@
-// The kernel of a run keeps no trace of its stages.
+// The kernel of a run does not trace its stages.
 
 fn trace(field: u32, value: vec) {}

@@ -1,4 +1,4 @@
-// From a ring of multigrid to the next coarser one and back: residuals down, corrections up. Twin of
+// Transfer between a ring of multigrid and the next coarser one: residuals down, corrections up. Twin of
 // src/solver/multigrid/transfer.rs.
 
 /// The weights between the finer ring and coarse nodes j and j+1.
