@@ -9,9 +9,9 @@
 //! orientation, whether or not the curve is star-shaped about c. Draws whose factor falls below [`MIN_FACTOR`] are
 //! redrawn, which cuts off the tails of the normal law.
 //!
-//! With `z = (p - c)/|p - c|`, a point of the unit circle in the complex plane, the sum is the real part of `z^low·Σ_j
-//! d_j z^j`, `d_j = a_m e^{iφ_m}` at `m = low + j`: a complex polynomial, evaluated by Horner's rule, without an angle
-//! or a cosine per point.
+//! With `z = (p - c)/|p - c|`, a point of the unit circle in the complex plane, the sum is the real part of
+//! `z^low·Σ_j d_j z^j`, `d_j = a_m e^{iφ_m}` at `m = low + j`: a complex polynomial, evaluated by Horner's rule, without
+//! an angle or a cosine per point.
 
 use std::{f64::consts::TAU, fmt, str::FromStr};
 
@@ -136,8 +136,8 @@ impl RadialLaw {
         self.amplitude * f64::from(mode).powf(-self.decay)
     }
 
-    /// Returns the standard deviation of the radial factor at any one angle, before draws are rejected: `sqrt(½ Σ (σ
-    /// m^-p)²)`.
+    /// Returns the standard deviation of the radial factor at any one angle, before draws are rejected:
+    /// `sqrt(½ Σ (σ m^-p)²)`.
     pub fn radial_deviation(&self) -> f64 {
         let variance: f64 = (self.modes.low..=self.modes.high).map(|mode| self.deviation(mode).powi(2)).sum();
         (0.5 * variance).sqrt()

@@ -308,7 +308,7 @@ fn count_sweeps<N: Number>(counters: &mut Counters, stepped: &Stepped<N>, lane: 
     counters.sweeps_x = counters.sweeps_x.saturating_add(stepped.sweeps_x.lane(lane).to_f64() as u32);
 }
 
-/// How the solves of a step failed.
+/// The failure of the solves of a step, if any.
 #[inline(always)]
 fn failure_of_solves<N: Number>(stepped: &Stepped<N>, lane: usize) -> Option<Status> {
     match (stepped.finite.lane(lane), stepped.solved.lane(lane)) {
@@ -318,7 +318,7 @@ fn failure_of_solves<N: Number>(stepped: &Stepped<N>, lane: usize) -> Option<Sta
     }
 }
 
-/// What is wrong with the curve after a step that was solved.
+/// The failure of a curve after a solved step, if any.
 fn failure_of_curve(finite: bool, singular: bool) -> Option<Status> {
     match (finite, singular) {
         (false, _) => Some(Status::Nonfinite),

@@ -87,11 +87,11 @@ numbers! {
         relax_at,
         /// Half the excess at the start.
         half_at,
-        /// Travel at which the member pauses for inspection, if its curvature changes sign.
+        /// Excess down to which adaptive steps follow the shape, not only the size, of the curve.
         follow_to,
         /// Length below which the curve has shrunk to a point.
         least_length,
-        /// Travel at which the member pauses to be looked at, if its curvature changes sign.
+        /// Travel at which the member pauses for inspection, if its curvature changes sign.
         look_at,
         /// Local error tolerance of adaptive steps; 0 for fixed ones.
         adaptive,
@@ -237,11 +237,10 @@ pub struct Counters {
     pub half_step: u32,
     /// Sweeps on curvature systems in this dispatch.
     pub sweeps_k: u32,
+    /// Sweeps on position systems in this dispatch.
+    pub sweeps_x: u32,
     /// Where the kernel paused inside an attempt: twice the number of finished steps of the paper, plus one after a
     /// curvature solve. The CPU never pauses.
-    pub sweeps_x: u32,
-    /// Where the kernel paused inside an attempt: twice the paper's steps that are done, one more after a curvature
-    /// solve. The CPU never pauses.
     pub phase: u32,
     /// Sweeps that the paused solve has made.
     pub solve_sweeps: u32,
@@ -319,7 +318,7 @@ impl<T: Real> Report<T> {
         Report { before, middle, now, progress, decay, excess_at }
     }
 
-    /// Number of numbers.
+    /// Length of the array of numbers.
     pub const LEN: usize =
         3 * Observed::<T>::FIELDS.len() + Progress::<T>::FIELDS.len() + Decay::<T>::FIELDS.len() + TIMES;
 

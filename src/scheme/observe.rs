@@ -42,7 +42,7 @@ pub struct Maxima<N> {
     pub longest: N,
     /// Minus the shortest edge.
     pub minus_shortest: N,
-    /// Minus the shortest edge length.
+    /// Largest curvature.
     pub k_max: N,
     /// Minus the smallest curvature.
     pub minus_k_min: N,

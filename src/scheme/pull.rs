@@ -1,11 +1,12 @@
 //! The metric pull: k and r relax towards the polygon's own curvatures and lengths. Twin of `shaders/pull.wgsl`.
 //!
 //! The scheme's three unknowns r, k and x drift apart, since each has its own equation, and nothing in the paper
-//! reconnects them. After a step of length τ the pull sets `k_i ← (k_i + κτ·k_i(x))/(1 + κτ)` and `r_i ← (r_i +
-//! κτ·|e_i|)/(1 + κτ)`, an implicit step of `k̇ = κ(k(x) - k)`, with `k_i(x)` the turn of the polygon between the
-//! neighbours of segment i over `|e_{i-1}|/2 + |e_i| + |e_{i+1}|/2`. A vertex of angle θ turns by 2 sin(θ/2): a regular
-//! polygon then has the curvature 1/R of its circumscribed circle, and the position equation leaves it at rest. With θ
-//! itself, k is larger by θ²/24 and circles grow for ever. κ = 0 is the paper's scheme.
+//! reconnects them. After a step of length τ the pull sets
+//! `k_i ← (k_i + κτ·k_i(x))/(1 + κτ)` and `r_i ← (r_i + κτ·|e_i|)/(1 + κτ)`, an implicit step of `k̇ = κ(k(x) - k)`,
+//! with `k_i(x)` the turn of the polygon between the neighbours of segment i over `|e_{i-1}|/2 + |e_i| + |e_{i+1}|/2`.
+//! A vertex of angle θ turns by 2 sin(θ/2): a regular polygon then has the curvature 1/R of its circumscribed circle,
+//! and the position equation leaves it at rest. With θ itself, k is larger by θ²/24 and circles grow for ever.
+//! κ = 0 is the paper's scheme.
 
 use super::{Branches, Curve, Parameters, state::edge};
 use crate::number::Number;

@@ -75,7 +75,7 @@ impl<N: Number> Curve<N> {
         [&self.x, &self.y, &self.k, &self.r]
     }
 
-    /// Returns the fields, mutable.
+    /// Returns the fields in the same order, mutably.
     pub fn fields_mut(&mut self) -> [&mut Ring<N>; CURVE_FIELDS] {
         [&mut self.x, &mut self.y, &mut self.k, &mut self.r]
     }
@@ -144,7 +144,7 @@ impl<N: Number> State<N> {
         [a, b, c, d, k, x, y, ek, ex, ey, e, f, g, h, l, m, n, o]
     }
 
-    /// Returns the fields, mutable.
+    /// Returns the fields in the same order, mutably.
     pub fn fields_mut(&mut self) -> [&mut Ring<N>; STATE_FIELDS] {
         let [a, b, c, d] = self.curve.fields_mut();
         let Increments { k, x, y } = &mut self.increments;

@@ -1,7 +1,7 @@
 //! Coloured sweeps inside a V-cycle on the ring: the number of sweeps hardly depends on τ/h⁴.
 //!
-//! *Theory.* Sweeps damp what oscillates from node to node and leave what is smooth, so the smooth part is solved for
-//! on a ring with half the nodes, in the same way, down to a ring of at most [`COARSEST`] nodes that is solved densely.
+//! *Theory.* Sweeps damp oscillations from node to node and leave the smooth part. This is solved for on a ring with
+//! half the nodes, in the same way, down to a ring of at most [`COARSEST`] nodes that is solved densely.
 //!
 //! - **Coarse nodes** are every second one: 0, 2, 4… An odd ring has two nodes between its last coarse node and its
 //!   first. A gap is then at most twice as wide as the others, however often the ring is halved.
