@@ -2,9 +2,9 @@
 //
 // Every block keeps its last two unknowns `s` and eliminates the others: its first two nodes become
 // `m = c - P p - S s`, with `p` the last two unknowns of the block before. This leaves a ring of pairs,
-// `L p + D s + U s' = g`. Cyclic reduction solves it: in each round every second pair of the ring is eliminated from its
-// neighbours, after ceil(log2(BLOCKS)) rounds one is left, and as many rounds back give the others. A ring of an odd
-// number keeps its first and its last pair, which become neighbours, so that it needs no border and no padding. No
+// `L p + D s + U s' = g`. Cyclic reduction solves it: in each round every second pair of the ring is eliminated from
+// its neighbours, after ceil(log2(BLOCKS)) rounds one is left, and as many rounds back give the others. A ring of an
+// odd number keeps its first and its last pair, which become neighbours, so that it needs no border and no padding. No
 // pivoting: the systems are perturbations of 1 + (positive) D^4.
 
 /// 2x2 matrices are stored as (m00, m01, m10, m11), pairs for x and y together as (x0, x1, y0, y1).

@@ -94,7 +94,7 @@ pub fn resume(
     let mut queue = Queue { total, ended: next + early.len() as u64, next, early, kept: false, told: Instant::now() };
     let done = run(&mut pool, &mut queue, backend, sink);
     if done.is_err() && !queue.kept {
-        // Save the members that have ended; `done` already tells why the run ends.
+        // Save the members that have ended; `done` already has the reason why the run ends.
         let _ = queue.checkpoint(None, sink);
     }
     done

@@ -10,8 +10,8 @@
 //! redrawn, which cuts off the tails of the normal law.
 //!
 //! With `z = (p - c)/|p - c|`, a point of the unit circle in the complex plane, the sum is the real part of
-//! `z^low·Σ_j d_j z^j`, `d_j = a_m e^{iφ_m}` at `m = low + j`: a complex polynomial, evaluated by Horner's rule, without
-//! an angle or a cosine per point.
+//! `z^low·Σ_j d_j z^j`, `d_j = a_m e^{iφ_m}` at `m = low + j`: a complex polynomial, evaluated by Horner's rule,
+//! without an angle or a cosine per point.
 
 use std::{f64::consts::TAU, fmt, str::FromStr};
 
