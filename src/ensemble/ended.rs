@@ -1,22 +1,22 @@
-//! What a member leaves as a whole.
+//! Everything a member leaves behind.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Mollified, Outcome, Portrait, Rows};
 
-/// Everything that one member left.
+/// Everything a member leaves behind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ended {
     /// Its row of the summary.
     pub outcome: Outcome,
     /// Its excess at the times of [`grid`](crate::schedule::grid) that it reached.
     pub excess: Vec<f64>,
-    /// Its rows of the series and its snapshots.
+    /// Its rows of the series, and its snapshots.
     pub rows: Rows,
-    /// Its nodes at both ends, where they were asked for.
+    /// Its nodes at both ends, if asked for.
     pub portrait: Option<Portrait>,
     /// What rounding off did to its corners before the run.
     pub mollified: Mollified,
-    /// Its threshold lies in the rounding of the precision, so no relaxation time can be told.
+    /// Its threshold is below the rounding of the precision, so its relaxation time is unknown.
     pub unresolved: bool,
 }

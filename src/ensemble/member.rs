@@ -1,9 +1,9 @@
-//! Members: member j of an ensemble is one base curve, randomly perturbed, sampled into n nodes.
+//! Members: member j of an ensemble is one base curve, randomly perturbed and sampled into n nodes.
 //!
-//! A member is a pure function of the spec and j. Its amplitudes and phases are draws addressed by (seed, j,
-//! attempt, mode), so neither the batch, the order, the thread nor the other members matter, and mode m is
-//! the same number whichever other modes are asked for. The number of nodes does not enter either: at n = 100 and
-//! n = 200 member j is the same curve.
+//! A member is a pure function of the spec and j. Its amplitudes and phases are draws addressed by (seed, j, attempt,
+//! mode). Batch, order, thread and the other members therefore do not matter, and mode m gets the same number whichever
+//! other modes are requested. The number of nodes does not matter either: member j is the same curve at n = 100 and n =
+//! 200.
 
 use std::{f64::consts::TAU, sync::Arc};
 
@@ -17,14 +17,14 @@ use crate::{
     solver::ring::MIN_POINTS,
 };
 
-/// Draws of one member before giving up. By Rice's formula the harshest law that is admitted, a
-/// thousand modes of one size, still keeps two draws in a hundred.
+/// Draws for one member before giving up. By Rice's formula the harshest law allowed, a thousand modes of one size,
+/// still yields two valid draws in a hundred.
 const MAX_ATTEMPTS: u32 = 1000;
 
 const NO_EXCESS: &str = "the loops of a lemniscate cancel: its area is next to nothing, and its excess, status and \
                          relaxation times, which divide by it, mean nothing";
 
-/// One curve at the start of its run.
+/// A curve at the start of its run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Member {
     /// Index of the member, from 0.
@@ -35,11 +35,11 @@ pub struct Member {
     pub nodes: Vec<DVec2>,
     /// Area centroid of the nodes in the user's frame, subtracted so that f32 keeps its digits.
     pub origin: DVec2,
-    /// What rounding off its corners did; only outlines sampled by arclength have any.
+    /// How its corners were rounded off; only outlines sampled by arclength can need it.
     pub mollified: Mollified,
 }
 
-/// The curve of a spec, prepared once, from which every member is made.
+/// The curve of a spec, prepared once; every member is made from it.
 pub struct Family {
     sampler: Arc<Sampler>,
     law: RadialLaw,
@@ -47,9 +47,9 @@ pub struct Family {
     /// Directions at which a draw is checked.
     directions: Arc<[DVec2]>,
     warnings: Vec<String>,
-    /// An outline spaced equally: its corners may be too sharp for n nodes.
+    /// The curve is an outline with equal spacing: its corners may be too sharp for n nodes.
     has_corners: bool,
-    /// The outline, if there is one, does not cross itself.
+    /// There is an outline, and it does not cross itself.
     simple: bool,
 }
 
@@ -57,12 +57,12 @@ impl Family {
     /// Loads the shape and checks the keys shape, sampling, points, amplitude, modes and decay.
     ///
     /// # Errors
-    /// [`Error::Request`] when one of them, or the file of the shape, is wrong.
+    /// [`Error::Request`] if one of them, or the file of the shape, is wrong.
     pub fn new(spec: &Spec) -> Result<Family> {
         Family::of(spec, spec.shape.resolve()?)
     }
 
-    /// As [`Family::new`] with `curve` in place of the shape: any curve that has no name on the command line.
+    /// Does the same as [`Family::new`], with `curve` in place of the shape: for curves that no `--shape` can name.
     ///
     /// ```
     /// use curvelax::{
@@ -79,7 +79,7 @@ impl Family {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Request`] when one of the keys sampling, points, amplitude, modes and decay is wrong.
+    /// [`Error::Request`] if one of the keys sampling, points, amplitude, modes and decay is wrong.
     pub fn of(spec: &Spec, curve: BaseCurve) -> Result<Family> {
         let law = RadialLaw::new(spec.amplitude, spec.modes, spec.decay)?;
         let outline = curve.outline();
@@ -98,8 +98,8 @@ impl Family {
         Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners, simple })
     }
 
-    /// As [`Family::new`] for a spec with the shape, sampling and points of that of `other`, which it shares what is
-    /// large with.
+    /// Does the same as [`Family::new`] for a spec with the same shape, sampling and points as `other`; the large
+    /// tables are shared.
     ///
     /// # Errors
     /// As [`Family::new`].
@@ -114,37 +114,37 @@ impl Family {
         Ok(Family { sampler, law, seed: spec.seed, directions, warnings, ..*other })
     }
 
-    /// The outline of its curve, if it has one.
+    /// The outline of the curve, if it has one.
     pub fn outline(&self) -> Option<&Arc<Outline>> {
         self.sampler.outline()
     }
 
-    /// Whether the tables of its curve are those of `other`.
+    /// Whether it shares the tables of its curve with `other`.
     #[cfg(test)]
     pub(crate) fn shares_with(&self, other: &Family) -> bool {
         Arc::ptr_eq(&self.sampler, &other.sampler)
     }
 
-    /// What the user should know about the curve, a sentence each.
+    /// What the user should know about the curve, one sentence each.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// Number of nodes n: with `--sampling points` the file's number of points, else the spec's.
+    /// Number of nodes n: with `--sampling points` the number of points in the file, otherwise that of the spec.
     pub fn points(&self) -> usize {
         self.sampler.nodes()
     }
 
-    /// Member `index`.
+    /// Makes member `index`.
     ///
     /// # Errors
-    /// [`Error::Request`] when no draw leaves the radius positive.
+    /// [`Error::Request`] if no draw leaves the radius positive.
     pub fn member(&self, index: u64) -> Result<Member> {
         let factor = self.radial_factor(index)?;
         let mut nodes = self.sampler.sample(&factor);
         let mollified = if self.has_corners { mollify(&mut nodes, self.simple) } else { Mollified::default() };
         let length = polygon::length(&nodes);
-        // Loops that cancel have an area of rounding only, whose sign must not decide the orientation.
+        // The area of loops that cancel is rounding only; its sign must not decide the orientation.
         if polygon::signed_area(&nodes) < -polygon::NO_AREA * length * length {
             polygon::turn_round(&mut nodes);
         }
@@ -153,7 +153,7 @@ impl Family {
         Ok(Member { index, cell: 0, nodes, origin, mollified })
     }
 
-    /// The first draw of member `index` that keeps the radius positive.
+    /// The first draw for member `index` that leaves the radius positive.
     fn radial_factor(&self, index: u64) -> Result<RadialFactor> {
         if self.law.is_none() {
             return Ok(RadialFactor::default());
@@ -165,7 +165,7 @@ impl Family {
         })
     }
 
-    /// Mode m takes draw 2m for its amplitude and draw 2m + 1 for its phase.
+    /// Mode m uses draw 2m for its amplitude and draw 2m + 1 for its phase.
     fn draw(&self, stream: Stream) -> RadialFactor {
         let modes = self.law.modes();
         let amplitude_and_phase = |m: u32| {
@@ -176,8 +176,8 @@ impl Family {
     }
 }
 
-/// 24/R⁴, the rate at which the excess of a nearly round curve decays under surface diffusion, with R the radius of the
-/// circle of the same area; of the same length where the curve is not simple and its area says nothing.
+/// 24/R⁴, the rate at which the excess of a nearly round curve decays under surface diffusion. R is the radius of the
+/// circle of equal area, or of equal length if the curve is not simple, when its area means nothing.
 pub fn relaxation_rate(nodes: &[DVec2]) -> f64 {
     let by_length = polygon::length(nodes) / TAU;
     let by_area = (polygon::signed_area(nodes).abs() / std::f64::consts::PI).sqrt();
@@ -185,10 +185,10 @@ pub fn relaxation_rate(nodes: &[DVec2]) -> f64 {
     24.0 / (if simple { by_area } else { by_length }).powi(4)
 }
 
-/// The largest κ that is admitted: n²/100 times the relaxation rate.
+/// The largest κ allowed: n²/100 times the relaxation rate.
 ///
-/// A pull that is strong compared with the relaxation undoes what the redistribution does, and the mesh falls apart: that
-/// of the nonconvex curve at 20, 60 and 200 times the rate for n = 32, 64 and 100 (docs/method.md).
+/// A pull that is strong compared with the relaxation undoes the redistribution, and the mesh falls apart. For the
+/// nonconvex curve this happens at 20, 60 and 200 times the rate for n = 32, 64 and 100 (docs/method.md).
 pub fn strongest_pull(nodes: &[DVec2]) -> f64 {
     (nodes.len() as f64 / 10.0).powi(2) * relaxation_rate(nodes)
 }
@@ -204,7 +204,7 @@ fn check_pull(pull: Pull, nodes: &[DVec2]) -> Result<()> {
     }
 }
 
-/// With the file's own points as nodes, `--points` must be its number or the default, which stands for not given.
+/// Checks `--points` against the file's own number of points; the default counts as not given.
 fn check_own_points(asked: usize, own: usize) -> Result<()> {
     if asked == own || asked == Spec::default().points {
         return Ok(());

@@ -1,5 +1,5 @@
-//! The ensemble: what was asked for ([`Spec`]), its members and their random numbers, and what a member's
-//! run leaves behind ([`Outcome`]).
+//! The ensemble: the request ([`Spec`]), its members with their random numbers, and the result of each member
+//! ([`Outcome`]).
 
 pub mod ended;
 pub mod member;

@@ -1,16 +1,16 @@
-//! Corners that n nodes cannot resolve are rounded off, as little as needed, before a run.
+//! Corners that n nodes cannot resolve are rounded off before a run, as little as needed.
 //!
-//! A raw outline can turn by up to π at a node. The scheme's first steps then merge the nodes there, whatever τ is.
-//! So an outline sampled along its length goes through rounds of `(I + κ D⁴) x_new = x_old`, with `D⁴` the periodic
-//! fourth difference of the node index (an implicit step of surface diffusion of duration `κ·spacing⁴`), each
-//! followed by spacing the nodes equally again, until no node turns by more than [`MAX_VERTEX_TURN`]. Without the
-//! new spacing nodes would crowd at a tip and a sharp one would take hundreds of rounds. The effect reaches a few
-//! spacings far, so it vanishes as n grows; the rounds and the change of area are reported.
+//! A raw outline can turn by up to π at a node. The scheme's first steps then merge the nodes there, whatever τ is. An
+//! outline sampled by arclength therefore goes through rounds of `(I + κ D⁴) x_new = x_old`, where `D⁴` is the periodic
+//! fourth difference in the node index (an implicit step of surface diffusion of duration `κ·spacing⁴`). After each
+//! round the nodes are spaced equally again. The rounds end when no node turns by more than [`MAX_VERTEX_TURN`].
+//! Without the new spacing, nodes would crowd at a tip, and a sharp one would need hundreds of rounds. The effect
+//! reaches a few spacings far, so it vanishes as n grows. The rounds and the change of area are reported.
 //!
-//! A part of the outline that is thinner than the spacing cannot be had with equal spacing, small turns and no
-//! crossing at once. Then rounds stop before the first crossing, and what is wrong is reported: no turn above the
-//! bound and no crossing is left where parts that are four spacings apart along the outline are one spacing apart in
-//! the plane (checked on random polygons in `tests/polygons.rs`).
+//! A part of the outline that is thinner than the spacing rules out equal spacing, small turns and no crossing at once.
+//! The rounds then stop before the first crossing, and the problem is reported. If parts of the outline at least four
+//! spacings apart along it are at least one spacing apart in the plane, no turn above the bound and no crossing remains
+//! (checked on random polygons in `tests/polygons.rs`).
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -22,12 +22,12 @@ use crate::{
 
 /// Largest turn at a node that is left alone, in rad; a larger one merges nodes in the first steps of a run.
 pub const MAX_VERTEX_TURN: f64 = 1.5;
-/// κ of one round; a larger one rounds off more than is needed.
+/// κ of one round; a larger one rounds off more than needed.
 const STRENGTH: f64 = 0.1;
-/// Rounds before giving up: a curve that still turns has no side that n nodes resolve, and is left to the statuses.
+/// Rounds before giving up. A curve that still turns has no side that n nodes resolve; its status will say so.
 const MAX_ROUNDS: u32 = 100;
 
-/// What rounding off did to a curve.
+/// How rounding off changed a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mollified {
     /// Rounds made; 0 if the curve was left alone.
@@ -41,7 +41,7 @@ pub struct Mollified {
 }
 
 impl Mollified {
-    /// Relative change of area above which the curve is another one.
+    /// Relative change of area above which the curve counts as a different one.
     pub const DISTORTED: f64 = 0.1;
 
     /// Whether the change of area is above [`Mollified::DISTORTED`].
@@ -50,8 +50,8 @@ impl Mollified {
     }
 }
 
-/// Rounds off the corners of `nodes` (n ≥ 6) where they are too sharp for it; `simple` says that the outline does
-/// not cross itself, so neither should they.
+/// Rounds off the corners of `nodes` (n ≥ 6) where they are too sharp for the scheme. `simple` says that the outline
+/// does not cross itself, so the nodes should not either.
 pub fn mollify(nodes: &mut Vec<DVec2>, simple: bool) -> Mollified {
     let area = polygon::signed_area(nodes);
     let crosses = |nodes: &[DVec2]| simple && crossing(nodes).is_some();
@@ -131,7 +131,7 @@ mod tests {
         assert!(coarse < 0.1 && fine < 0.25 * coarse, "{coarse} {fine}");
     }
 
-    /// A strip 1 long with square ends whose `n` nodes start a share of an edge after its corner.
+    /// A strip of length 1 with square ends; the first of its `n` nodes is a fraction of an edge after its corner.
     fn strip(width: f64, n: usize) -> Vec<DVec2> {
         let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, width), (0.0, width)].map(DVec2::from);
         let fine: Vec<DVec2> = (0..4)

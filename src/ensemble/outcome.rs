@@ -1,4 +1,4 @@
-//! What a member's run leaves behind: its status, its times, and its observables at the start and the end.
+//! The result of a member: its status, its times, and its observables at the start and the end.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -23,14 +23,14 @@ pub struct Observables {
     pub k_max: f64,
     /// Longest over shortest edge of the polygon.
     pub mesh_ratio: f64,
-    /// `max |r_i - |e_i|| / |e_i|`: how far the scheme's lengths have left the polygon's.
+    /// `max |r_i - |e_i|| / |e_i|`: how far the scheme's lengths have drifted from the polygon's.
     pub metric_drift: f64,
     /// Turning number of the polygon.
     pub turning: i32,
 }
 
 impl Observables {
-    /// In the user's unit, from what the scheme observed in lengths of `unit`.
+    /// Converts what the scheme observed in lengths of `unit` to the user's unit.
     pub fn new(observed: &Observed<f64>, turning: f64, unit: f64) -> Observables {
         Observables {
             length: observed.length * unit,
@@ -69,17 +69,17 @@ pub struct Outcome {
     pub t_relax: Option<f64>,
     /// First time the excess was at or under half its start.
     pub t_half: Option<f64>,
-    /// Slope of the line fitted to -ln excess against time, in 1/time; of one against `ln(1 + 2t/R₀⁴)` for Willmore flow.
+    /// Slope of a line fitted to -ln excess against time, in 1/time; for Willmore flow against `ln(1 + 2t/R₀⁴)`.
     pub rate: Option<f64>,
-    /// What linear theory gives for `rate`, where it does.
+    /// What linear theory predicts for `rate`, if it does.
     pub rate_theory: Option<f64>,
-    /// Share of the variance of ln excess that the line explains.
+    /// Fraction of the variance of ln excess explained by the line.
     pub rate_r2: Option<f64>,
     /// Observables of the initial curve, computed in f64 from the sampled nodes.
     pub start: Observables,
     /// Observables of the last accepted state.
     pub end: Observables,
-    /// Time at which the polygon was first seen to cross itself.
+    /// Time at which the polygon was first found to cross itself.
     pub self_crossing: Option<f64>,
 }
 
@@ -116,17 +116,17 @@ pub struct Snapshot {
 pub struct Portrait {
     /// At the start.
     pub before: Vec<DVec2>,
-    /// At some times on its way: every m-th node, m = [`Portrait::stride`].
+    /// At times during its run: every m-th node, m = [`Portrait::stride`].
     pub frames: Vec<(f64, Vec<DVec2>)>,
-    /// In the last accepted state.
+    /// At the last accepted state.
     pub after: Vec<DVec2>,
 }
 
 impl Portrait {
-    /// A picture has at most this many nodes of a curve: more do not show.
+    /// Maximum nodes of a curve in a picture: more would not show.
     pub const MAX_NODES: usize = 600;
 
-    /// Of `n` nodes every so-many-th is drawn.
+    /// The m for which every m-th of `n` nodes is drawn.
     pub fn stride(n: usize) -> usize {
         n.div_ceil(Self::MAX_NODES).max(1)
     }

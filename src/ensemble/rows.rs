@@ -1,10 +1,10 @@
-//! The rows of a member that has not left its run yet: in memory, and where its sink has put them.
+//! The rows of a member that is still running: in memory, and where its sink has put them.
 
 use serde::{Deserialize, Serialize};
 
 use super::{SeriesRow, Snapshot};
 
-/// Where rows lie that a sink took: what it answers to [`Sink::spill`](super::Sink::spill).
+/// Where a sink has stored rows: the answer of [`Sink::spill`](super::Sink::spill).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Extent {
     /// First byte.
@@ -18,7 +18,7 @@ pub struct Extent {
 /// The rows of one member, in time order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rows {
-    /// Where the sink has put the first of them; a sink that takes none has all of them below.
+    /// Where the sink has put the first of them; empty if the sink accepts none.
     pub spilled: Vec<Extent>,
     /// Rows of the series.
     pub series: Vec<SeriesRow>,
@@ -27,14 +27,14 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Bytes of those in memory.
+    /// Bytes of the rows in memory.
     pub fn bytes(&self) -> usize {
         let points = self.snapshots.first().map_or(0, |first| first.x.len());
         bytes_of(self.series.capacity(), self.snapshots.len(), points)
     }
 }
 
-/// Bytes of so many rows of the series and snapshots, each of four numbers a node, of `points` nodes.
+/// Bytes of `series` rows of the series and `snapshots` snapshots of `points` nodes, at four numbers a node.
 pub fn bytes_of(series: usize, snapshots: usize, points: usize) -> usize {
     series * size_of::<SeriesRow>() + snapshots * (size_of::<Snapshot>() + 4 * points * size_of::<f64>())
 }

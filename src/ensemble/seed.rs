@@ -1,13 +1,13 @@
-//! A seed in a spec file and in `run.json`: whole numbers of TOML end at 2⁶³, so larger seeds are written in quotes.
+//! A seed in a spec file and in `run.json`: integers in TOML end at 2⁶³, so larger seeds are written in quotes.
 
 use std::fmt;
 
 use serde::{Deserializer, Serializer, de};
 
-/// The largest number of TOML.
+/// The largest integer of TOML.
 const LARGEST_WHOLE: u64 = i64::MAX as u64;
 
-/// Writes `seed` as a number, or as its digits where that is none of TOML's.
+/// Writes `seed` as a number, or as its digits in quotes if TOML has no such number.
 pub fn serialize<S: Serializer>(seed: &u64, serializer: S) -> Result<S::Ok, S::Error> {
     if *seed <= LARGEST_WHOLE { serializer.serialize_u64(*seed) } else { serializer.collect_str(seed) }
 }

@@ -1,11 +1,11 @@
-//! A part of a study that is run by itself, on another machine or at another time.
+//! A part of a study that is run separately, on another machine or at another time.
 
 use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
-/// The members j of a study with j mod N = I, all cells of a sweep counted through: cells that take longer than others fall
-/// to all shards alike. Written `I/N`.
+/// The members j of a study with j mod N = I, counted through all cells of a sweep, so that slow cells are spread over
+/// all shards. Written `I/N`.
 ///
 /// ```
 /// use curvelax::ensemble::Shard;
@@ -23,10 +23,10 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Shard `index` of `count`.
+    /// Returns shard `index` of `count`.
     ///
     /// # Errors
-    /// What is wrong with the numbers.
+    /// A message about the wrong number.
     pub fn new(index: u64, count: u64) -> Result<Shard, String> {
         match (index, count) {
             (_, 0) => Err(format!("shard {index}/{count}: there are no shards; use I/N with N from 1")),
@@ -47,7 +47,7 @@ impl Shard {
         self.count
     }
 
-    /// Whether it has this member.
+    /// Whether `member` belongs to it.
     pub fn has(&self, member: u64) -> bool {
         member % self.count == self.index
     }

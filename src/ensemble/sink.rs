@@ -1,44 +1,44 @@
-//! Where a run sends what its members leave, and what it asks between two dispatches.
+//! Where a run sends the results of its members, and what it asks between two dispatches.
 
 use super::{Ended, Extent, Rows, SeriesRow, Snapshot, Standing};
 use crate::error::{Error, Result};
 
-/// What a sink wishes of a run between two dispatches.
+/// What a sink wants from a run between two dispatches.
 #[derive(Debug)]
 pub enum Wish {
-    /// To go on.
+    /// Continue.
     Continue,
-    /// To be told where the run stands, and to go on.
+    /// Report a checkpoint, then continue.
     Checkpoint,
-    /// To be told where the run stands, and to end with this error.
+    /// Report a checkpoint, then end with this error.
     Stop(Error),
 }
 
-/// Receives everything that the members leave.
+/// Receives all results of the members.
 pub trait Sink {
     /// A member has ended; called exactly once per member, in member order.
     fn member(&mut self, ended: &Ended) -> Result<()>;
-    /// Takes rows of a member that has not left, in time order, when more of them are in memory than should be. They come
-    /// back with the member as what this returns, also in a run that goes on from a standing; none where it has no place.
+    /// Stores rows of a member that is still running, in time order, when too many are in memory. The extent returned
+    /// comes back with the member, also after the run was resumed. `None` if the sink has no place for them.
     fn spill(&mut self, _series: &[SeriesRow], _snapshots: &[Snapshot]) -> Result<Option<Extent>> {
         Ok(None)
     }
-    /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done. Called after every dispatch, and
-    /// during long ones: an error stops the run.
+    /// Reports that `done` of `total` members have ended, and a fraction `share` ∈ [0, 1] of the work is done. Called
+    /// after every dispatch, and during long ones: an error stops the run.
     fn progress(&mut self, _done: u64, _total: u64, _share: f64) -> Result<()> {
         Ok(())
     }
-    /// What it wishes now; asked after every dispatch, and during long ones.
+    /// What the sink wants now; asked after every dispatch, and during long ones.
     fn wish(&mut self) -> Wish {
         Wish::Continue
     }
-    /// Where the run stands: as was wished for, or as it comes to a bad end.
+    /// Receives the progress of the run: on request, or when the run fails.
     fn checkpoint(&mut self, _standing: &Standing) -> Result<()> {
         Ok(())
     }
 }
 
-/// Collects what members leave, in member order.
+/// Collects the results in member order.
 impl Sink for Vec<Ended> {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         self.push(ended.clone());
@@ -47,7 +47,7 @@ impl Sink for Vec<Ended> {
 }
 
 impl Rows {
-    /// Hands those in memory to `sink`; whether it has taken them.
+    /// Hands the rows in memory to `sink`, and returns whether it stored them.
     pub fn spill(&mut self, sink: &mut dyn Sink) -> Result<bool> {
         if self.series.is_empty() && self.snapshots.is_empty() {
             return Ok(true);

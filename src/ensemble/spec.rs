@@ -1,7 +1,7 @@
 //! The spec: everything that determines a run, under the names that flags and TOML keys share.
 //!
-//! A spec is read once ([`Spec::from_toml`]), overlaid with the flags by `cli`, and checked once
-//! ([`Spec::validate`], in `validate.rs`); everything after that relies on it.
+//! A spec is read once ([`Spec::from_toml`]), overlaid with the flags by `cli`, and checked once ([`Spec::validate`],
+//! in `validate.rs`). Everything after that relies on it.
 
 use std::{fmt, marker::PhantomData, path::Path, str::FromStr};
 
@@ -31,7 +31,7 @@ pub use crate::{
 pub enum BackendChoice {
     /// A hardware GPU if there is one, else the CPU.
     Auto,
-    /// A GPU, a software one included.
+    /// A GPU, including software ones.
     Gpu,
     /// The CPU back end.
     Cpu,
@@ -46,18 +46,18 @@ impl From<DeviceKind> for BackendChoice {
     }
 }
 
-/// The solver asked for.
+/// The requested solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolverChoice {
-    /// Gauss–Seidel sweeps with a fixed τ, as in the paper; the direct solver with adaptive steps, whose sweeps would
-    /// grow in number as the steps grow in length.
+    /// Gauss–Seidel with a fixed τ, as in the paper; the direct solver with adaptive steps, because sweeps get more
+    /// numerous as steps grow.
     Auto,
     /// This one.
     Only(Solver),
 }
 
 impl SolverChoice {
-    /// As in flags and files: `auto`, then the solvers.
+    /// Names in flags and files: `auto`, then the solvers.
     pub const NAMES: [&str; 1 + Solver::NAMES.len()] = {
         let mut names = ["auto"; 1 + Solver::NAMES.len()];
         let mut i = 0;
@@ -107,7 +107,7 @@ pub enum Pace {
 /// κ of the metric pull.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pull {
-    /// κ itself, in 1/time; 0 is the paper.
+    /// κ itself, in 1/time; 0 is the paper's scheme.
     Rate(f64),
     /// κ from each member's own relaxation time.
     Auto,
@@ -140,7 +140,7 @@ pub enum Store {
 pub struct Spec {
     /// Number of members.
     pub curves: u64,
-    /// Nodes per member, `n`.
+    /// Nodes per member, n.
     pub points: usize,
     /// Seed of the ensemble.
     #[serde(with = "seed")]
@@ -173,9 +173,9 @@ pub struct Spec {
     pub pull: Pull,
     /// Solver of the pentadiagonal systems.
     pub solver: SolverChoice,
-    /// Order of the sweeps.
+    /// Order in which a sweep visits the nodes.
     pub order: Order,
-    /// Residual tolerance of the sweeps relative to the increment; by precision if absent.
+    /// Residual tolerance of the sweeps, relative to the increment; depends on the precision if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
     /// Over-relaxation; 1 is plain Gauss–Seidel.
@@ -184,10 +184,10 @@ pub struct Spec {
     pub max_sweeps: u32,
     /// Where to run.
     pub backend: BackendChoice,
-    /// Part of the name of the GPU adapter to take.
+    /// Part of the name of the GPU adapter to use.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adapter: Option<String>,
-    /// Number type; f64 where the device has it if absent.
+    /// Number type; if absent, f64 where the device has it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub precision: Option<Precision>,
     /// A member is relaxed when its excess is at most this fraction of its start; [`DEFAULT_RELAX_TO`] if neither it
@@ -210,13 +210,13 @@ pub struct Spec {
     /// Run only these members.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
     pub only: Option<Vec<u64>>,
-    /// Of these, run only this shard's.
+    /// Of these, run only the ones in this shard.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
     /// Threads of the CPU back end; all cores if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threads: Option<usize>,
-    /// Member j of every cell is drawn from the same random numbers.
+    /// Draw member j of every cell from the same random numbers.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub common_random_numbers: bool,
     /// Keys that vary from cell to cell.
@@ -273,16 +273,16 @@ impl Default for Spec {
 }
 
 impl Spec {
-    /// Reads a spec file; absent keys take their defaults.
+    /// Reads a spec file; absent keys have their defaults.
     ///
-    /// Not yet [validated](Spec::validate): flags may still replace what is wrong in it.
+    /// The result is not yet [validated](Spec::validate): flags may still replace wrong values.
     pub fn read(path: &Path) -> Result<Spec> {
         let text = input::text(path, input::MAX_SPEC)
             .map_err(|e| Error::Request(format!("cannot read the spec {}: {e}", path.display())))?;
         Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", path.display())))
     }
 
-    /// Parses the text of a spec file; absent keys take their defaults.
+    /// Parses the text of a spec file; absent keys have their defaults.
     ///
     /// ```
     /// use curvelax::{ensemble::Spec, flow::Flow};
@@ -293,34 +293,34 @@ impl Spec {
     /// ```
     ///
     /// # Errors
-    /// The message has toml's line and caret, and the nearest valid spelling.
+    /// The message has toml's line and caret, and suggests the nearest valid spelling.
     pub fn from_toml(text: &str) -> Result<Spec, String> {
         toml::from_str(text).map_err(|e| format!("{}{}", told(&e), suggestion(e.message())))
     }
 
-    /// The spec as a TOML file that [`Spec::from_toml`] reads back to the same spec.
+    /// Returns the spec as TOML that [`Spec::from_toml`] reads back to the same spec.
     pub fn to_toml(&self) -> Result<String> {
         toml::to_string(self).map_err(|e| Error::Failed(format!("cannot write the spec as TOML: {e}")))
     }
 
-    /// The names of all keys, in order.
+    /// Names of all keys, in order.
     pub fn keys() -> Vec<String> {
         let refused = toml::from_str::<Spec>("\"\" = 0").expect_err("the empty key is unknown");
         quoted(refused.message()).skip(1).map(str::to_owned).collect()
     }
 
-    /// The spec of cell `index` of its sweep, not yet validated.
+    /// Returns the spec of cell `index` of the sweep, not yet validated.
     ///
     /// # Errors
-    /// [`Error::Request`] for a value that the key cannot have.
+    /// [`Error::Request`] for a value that the key does not allow.
     pub fn of_cell(&self, index: u64) -> Result<Spec> {
         let failed = |e: &dyn fmt::Display| Error::Failed(format!("cannot write the spec as TOML: {e}"));
-        // The lists, which are long and cannot vary, go beside.
+        // Lists are long and cannot be swept: they are copied separately.
         let Spec { snapshots, only, sweep, .. } = self;
         let short = Spec { sweep: Sweep::default(), snapshots: Vec::new(), only: None, ..self.clone() };
         let mut table = toml::Table::try_from(short).map_err(|e| failed(&e))?;
         for (axis, value) in sweep.axes().iter().zip(sweep.values(index)) {
-            // What stands instead of each other.
+            // Keys that replace each other.
             match axis.key.as_str() {
                 "tau" => drop(table.remove("adaptive")),
                 "adaptive" => drop(table.remove("tau")),
@@ -329,7 +329,7 @@ impl Spec {
                 _ => {}
             }
             table.insert(axis.key.clone(), value.clone());
-            // Key by key, so that the message names the one that is wrong.
+            // One key at a time, so that the message names the wrong one.
             Spec::deserialize(table.clone()).map_err(|e| {
                 Error::Request(format!("--sweep {}={}: {}", axis.key, sweep::label(value), e.message().trim_end()))
             })?;
@@ -350,7 +350,7 @@ impl Spec {
         }
     }
 
-    /// How many members [`Spec::members`] has.
+    /// Number of [`Spec::members`].
     pub fn member_count(&self) -> u64 {
         match (&self.only, self.shard) {
             (Some(only), None) => only.len() as u64,
@@ -360,18 +360,17 @@ impl Spec {
         }
     }
 
-    /// The place of `member` among those that would run without shards.
+    /// The rank of `member` among those that would run without shards.
     pub fn place(&self, member: u64) -> u64 {
         self.only.as_ref().map_or(member, |only| only.partition_point(|own| *own < member) as u64)
     }
 
-    /// Members of all cells, whether they are to run or not.
+    /// Members of all cells, whether or not they run.
     pub fn all_members(&self) -> u64 {
         self.curves.saturating_mul(self.sweep.cells())
     }
 
-    /// The first key, but for those in `but`, that another spec has with another value: its name, the value here, and the one
-    /// there.
+    /// The first key, not among `but`, whose value differs in `other`: its name, the value here and the value there.
     pub fn difference(&self, other: &Spec, but: &[&str]) -> Option<(String, String, String)> {
         let [here, there] = [self, other].map(|spec| toml::Table::try_from(spec).unwrap_or_default());
         let shown = |value: Option<&toml::Value>| {
@@ -397,13 +396,13 @@ impl Spec {
         }
     }
 
-    /// The excess at which a member that starts with `excess` is relaxed.
+    /// The excess at which a member that starts with `excess` counts as relaxed.
     pub fn threshold(&self, excess: f64) -> f64 {
         self.relax_at.unwrap_or(self.relax_to.unwrap_or(DEFAULT_RELAX_TO) * excess)
     }
 
-    /// The rate at which the excess of a member of area `area` falls by linear theory, once only the mode that decays
-    /// last is left: the lowest one of the shape and of the perturbation. In 1/time, or an exponent, see
+    /// The rate at which, by linear theory, the excess of a member of area `area` falls once only the slowest mode is
+    /// left: the lowest one of the shape and the perturbation. It is in 1/time, or an exponent: see
     /// [`Flow::excess_rate`].
     pub fn rate_in_theory(&self, area: f64) -> Option<f64> {
         let drawn = (self.amplitude > 0.0).then(|| self.modes.low.max(2));
@@ -411,7 +410,7 @@ impl Spec {
         self.flow.excess_rate(mode, area)
     }
 
-    /// The cap of the sweeps of a solve in use.
+    /// The maximum sweeps per solve in use.
     pub fn most_sweeps(&self) -> u32 {
         self.max_sweeps.min(self.solver().facts().max_sweeps)
     }
@@ -422,10 +421,10 @@ impl Spec {
     }
 }
 
-/// Characters of a line that is still shown with its caret: the list of all keys has half as many.
+/// Lines longer than this are not shown with a caret; the list of all keys is half as long.
 const MAX_SHOWN: usize = 1000;
 
-/// What is wrong, with the line and a caret; of a line without end only where in it.
+/// What is wrong, with the line and a caret; for an overlong line, only where.
 fn told(error: &toml::de::Error) -> String {
     let whole = error.to_string();
     if whole.lines().all(|line| line.len() <= MAX_SHOWN) {
@@ -435,7 +434,7 @@ fn told(error: &toml::de::Error) -> String {
     format!("{}: {}", shortened(place, MAX_SHOWN), shortened(error.message().trim_end(), MAX_SHOWN))
 }
 
-/// The nearest of the names that serde lists after "unknown field `x`, expected one of `a`, `b`".
+/// Suggests the nearest of the names that serde lists after "unknown field `x`, expected one of `a`, `b`".
 fn suggestion(message: &str) -> String {
     let mut names = quoted(message);
     match names.next() {
@@ -517,7 +516,7 @@ impl<T: From<f64> + FromStr<Err = String>> de::Visitor<'_> for OrAuto<T> {
     }
 }
 
-/// A list as a TOML array, or as the comma-separated text that the flag takes.
+/// Reads a list: a TOML array, or the comma-separated text of a flag.
 fn list<'de, D, T>(deserializer: D) -> Result<Vec<T>, D::Error>
 where
     D: Deserializer<'de>,

@@ -1,4 +1,4 @@
-//! Where a run stands between two dispatches: enough to go on from there as if nothing had happened.
+//! The progress of a run between two dispatches: all that is needed to resume it exactly.
 
 use std::collections::BTreeMap;
 
@@ -8,27 +8,27 @@ use serde::{Deserialize, Serialize};
 use super::{Ended, Rows};
 use crate::scheme::member::{Counters, Report};
 
-/// The members of a run by rank, their place in the order in which they leave it, from 0.
+/// The members of a run by rank, from 0: the order in which they are handed to the sink.
 ///
-/// Those of lower rank than `next` have been handed to the sink; one that is nowhere here is at its start.
+/// Members of rank below `next` have been handed over. A member listed nowhere is at its start.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Standing {
     /// The first member that has not been handed to the sink.
     pub next: u64,
-    /// Members that ended, but before one of lower rank.
+    /// Members that ended before one of lower rank.
     pub early: BTreeMap<u64, Ended>,
-    /// Members on their way; none where they are not to be had, so that those kept last still hold.
+    /// Members in progress; `None` if they cannot be read back, so that those saved last remain valid.
     pub resident: Option<BTreeMap<u64, Paused>>,
 }
 
-/// A member on its way, as it was between two dispatches.
+/// A member in progress, as it was between two dispatches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Paused {
     /// Its counters in the back end.
     pub counters: Counters,
     /// Its report there.
     pub report: Report<f64>,
-    /// All fields of its [`State`](crate::scheme::State) there, one after another, `18n` numbers.
+    /// All fields of its [`State`](crate::scheme::State) there, one after another: `18n` numbers.
     pub state: Vec<f64>,
     /// Sweeps so far, on curvature and on position systems.
     pub sweeps: [u64; 2],
@@ -38,8 +38,8 @@ pub struct Paused {
     pub rows: Rows,
     /// Its portrait so far, with times.
     pub frames: Vec<(f64, Vec<DVec2>)>,
-    /// When it was first seen to cross itself.
+    /// When it was first found to cross itself.
     pub crossed: Option<f64>,
-    /// Travel at which it is looked at next.
+    /// Travel at which it is next checked for crossings.
     pub look_at: f64,
 }

@@ -1,4 +1,4 @@
-//! A study: the cells of a spec, each an ensemble of its own, whose members run side by side.
+//! A study: the cells of a spec, each an ensemble whose members run side by side.
 
 use std::{ops::Range, path::Path, sync::Arc};
 
@@ -12,17 +12,17 @@ use crate::{
     solver::{Order, Solver},
 };
 
-/// Members of a study that leave a [portrait](crate::ensemble::Portrait), the first ones of its cells.
+/// Members of a study that leave a [portrait](crate::ensemble::Portrait): the first ones of its cells.
 pub const PORTRAITS: usize = 12;
 
-/// What a spec asks for, checked: its cells, each with its curves. Whatever runs a spec takes this.
+/// A checked spec: its cells, each with its curves. Everything that runs a spec needs a `Study`.
 pub struct Study {
     spec: Spec,
     cells: Vec<Cell>,
 }
 
 impl Study {
-    /// Checks everything that can be wrong with `spec` on any machine, and makes the curves of its cells.
+    /// Checks everything about `spec` that does not depend on the machine, and makes the curves of its cells.
     ///
     /// ```
     /// use curvelax::ensemble::{Spec, Study};
@@ -33,13 +33,13 @@ impl Study {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Request`] for a value that is out of range, with the cell that has it, for curves of unequal numbers of
-    /// nodes that are to share an array, and for more curves than a memory holds.
+    /// [`Error::Request`] for a value out of range, naming its cell; for curves with different numbers of nodes that
+    /// would share an array; and for more curves than fit into memory.
     pub fn new(spec: Spec) -> Result<Study> {
         Study::new_from(spec, Path::new(""))
     }
 
-    /// As [`Study::new`], with paths in the spec relative to the directory `base`.
+    /// Does the same as [`Study::new`], with paths in the spec relative to the directory `base`.
     ///
     /// # Errors
     /// As [`Study::new`].
@@ -49,7 +49,7 @@ impl Study {
         Ok(Study { spec, cells }.with_spec_of_the_cell())
     }
 
-    /// The same, with members that are perturbations of `curve` in place of the shape of `spec`.
+    /// Does the same, with members that are perturbations of `curve` instead of the shape of `spec`.
     ///
     /// # Errors
     /// As [`Study::new`], and for a spec that sweeps.
@@ -64,12 +64,12 @@ impl Study {
         Ok(Study { cells: vec![Cell::only(own, family)], spec }.with_spec_of_the_cell())
     }
 
-    /// What was asked for.
+    /// The request.
     pub fn spec(&self) -> &Spec {
         &self.spec
     }
 
-    /// Its cells, one if nothing is swept.
+    /// Its cells; one if nothing is swept.
     pub fn cells(&self) -> &[Cell] {
         &self.cells
     }
@@ -79,22 +79,23 @@ impl Study {
         cohorts(&self.cells)
     }
 
-    /// Nodes of a member, which matters only where all have the same.
+    /// Nodes of a member; meaningful only if all have the same number.
     pub fn points(&self) -> usize {
         self.cells[0].spec.points
     }
 
-    /// Members of a cohort of so many cells that leave a portrait: [`PORTRAITS`] of the study, spread over all cells.
+    /// Members of a cohort of `cells` cells that leave a portrait: the [`PORTRAITS`] of the study, spread over all
+    /// cells.
     pub fn portraits(&self, cells: usize) -> usize {
         (PORTRAITS * cells).div_ceil(self.cells.len())
     }
 
-    /// Members to run, of all cells.
+    /// Members to run, over all cells.
     pub fn member_count(&self) -> u64 {
         self.spec.member_count()
     }
 
-    /// What the user should know before it runs, each sentence once.
+    /// What the user should know before the run, each sentence once.
     pub fn warnings(&self) -> Vec<String> {
         let mut all: Vec<String> = self.cells.iter().flat_map(Cell::warnings).collect();
         all.sort();
@@ -102,7 +103,7 @@ impl Study {
         all
     }
 
-    /// Writes out what is settled later: `each` in the spec of every cell, `all` what cells have in common.
+    /// Fills in what is decided later: `each` in the spec of every cell, `all` what the cells have in common.
     pub(crate) fn settle(&mut self, each: impl Fn(&mut [Cell]), all: impl Fn(&mut Spec)) {
         each(&mut self.cells);
         if self.spec.sweep.is_empty() {
@@ -112,12 +113,12 @@ impl Study {
         }
     }
 
-    /// Its cells alone.
+    /// Returns its cells.
     pub fn into_cells(self) -> Vec<Cell> {
         self.cells
     }
 
-    /// Its cells, to be changed.
+    /// Its cells, mutable.
     pub(crate) fn cells_mut(&mut self) -> &mut [Cell] {
         &mut self.cells
     }
@@ -129,7 +130,7 @@ impl Study {
         }
     }
 
-    /// A file's own points are known once it was read.
+    /// The number of points of a file is known only once it is read.
     fn spec_of_the_cell(&self) -> Spec {
         let Spec { only, shard, .. } = self.spec.clone();
         Spec { only, shard, ..self.cells[0].spec.clone() }
@@ -169,12 +170,12 @@ impl Cell {
         Cell { index: 0, spec, family, first: 0, common: false }
     }
 
-    /// The place of a member among those of the cell that would run without shards.
+    /// The rank of a member among those of the cell that would run without shards.
     pub fn place(&self, index: u64) -> u64 {
         self.spec.place(index - self.first)
     }
 
-    /// The members to run: the index of each in the study.
+    /// The members to run, as indices in the study.
     pub fn members(&self) -> impl Iterator<Item = u64> + '_ {
         self.spec.members().map(|member| self.first + member)
     }
@@ -188,7 +189,7 @@ impl Cell {
         Ok(Member { index, cell: self.index, ..self.family.member(drawn)? })
     }
 
-    /// What the user should know about it before it runs, a sentence each.
+    /// What the user should know about it before the run, one sentence each.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.family.warnings().to_vec();
         let Cohort { solver, adaptive, .. } = self.cohort();
@@ -198,7 +199,7 @@ impl Cell {
         warnings
     }
 
-    /// What it must have in common with others to run beside them.
+    /// What it must have in common with others to run side by side with them.
     pub fn cohort(&self) -> Cohort {
         let Spec { points, order, .. } = self.spec;
         let adaptive = matches!(self.spec.pace(), Pace::Adaptive(_));
@@ -206,11 +207,12 @@ impl Cell {
     }
 }
 
-/// The curves of all cells are made before the first of them runs, and may take this much memory: those of three cells of
-/// a million nodes.
+/// Memory for the curves of all cells, which are made before the first cell runs: enough for three cells of a million
+/// nodes.
 const MAX_BYTES: usize = 4_000_000_000;
 
-/// Cell `index` of `spec`, after the cells `before`, whose curves take `bytes`; paths are relative to `base`.
+/// Makes cell `index` of `spec`, after the cells `before`; `bytes` counts the memory of all curves. Paths are relative
+/// to `base`.
 fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize) -> Result<Cell> {
     let first = index * spec.curves;
     let only = spec.only.as_ref().map(|only| {
@@ -229,7 +231,7 @@ fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize
                 let problem = format!("the curves of the first {} take more than {gigabytes} GB", index + 1);
                 return Err(Error::value("sweep", cells, &problem, "use fewer --points, or fewer cells at once"));
             }
-            // The file is read once: what one cell was checked with is what another has.
+            // The file is read once, so that all cells have the outline that was checked.
             let outline =
                 before.iter().rfind(|cell| cell.spec.shape == own.shape).and_then(|cell| cell.family.outline());
             match outline {
@@ -238,13 +240,13 @@ fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize
             }
         }
     };
-    // A file's own points are a number that no check has seen.
+    // The number of points of a file has not been checked yet.
     let own = Spec { points: family.points(), ..own }.validate()?;
     let shard = spec.shard.map(|shard| shard.from(first));
     Ok(Cell { index, spec: Spec { only, shard, ..own }, family, first, common: spec.common_random_numbers })
 }
 
-/// All cells of `spec`, checked; one if nothing is swept.
+/// Makes and checks all cells of `spec`; one if nothing is swept.
 ///
 /// Paths in it are relative to the directory `base`.
 fn cells(spec: &Spec, base: &Path) -> Result<Vec<Cell>> {
@@ -320,7 +322,7 @@ mod tests {
 
     #[test]
     fn more_curves_than_a_memory_holds_are_refused_before_they_are_made() {
-        // Equal parameters take little time; their tables are a share of those of equal spacing.
+        // Parameter sampling is quick, and its tables are a fraction of those for equal spacing.
         let spec = swept(&["sampling=parameter,arclength"], Spec { points: 1_000_000, ..Spec::default() });
         let bytes = |held: usize| cell(&spec, Path::new(""), 0, &[], &mut { held });
         assert!(bytes(MAX_BYTES - 16_000_000).is_ok());

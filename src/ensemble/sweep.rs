@@ -1,6 +1,6 @@
 //! Sweeps: the keys of a spec that vary from cell to cell of a study, and their values.
 //!
-//! The cells are the cross product of all values; the key named last changes fastest.
+//! The cells are the cross product of all values; the last key changes fastest.
 
 use std::{fmt, str::FromStr};
 
@@ -30,35 +30,35 @@ const COMMON: [&str; 14] = [
     "stop-when-relaxed",
     "max-sweeps",
 ];
-/// More cells than this are a slip of the keyboard.
+/// More cells than this are a typing error.
 pub const MAX_CELLS: u64 = 10_000;
 
 /// The swept keys in order, each with its values.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sweep(Vec<SweepAxis>);
 
-/// One key and the values that it takes.
+/// One swept key with its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SweepAxis {
     /// A key of the spec.
     pub key: String,
-    /// Its values: numbers, words or truths.
+    /// Its values: numbers, words or booleans.
     pub values: Vec<Value>,
 }
 
 impl SweepAxis {
-    /// The values as they stand in tables.
+    /// The values as text for tables.
     pub fn labels(&self) -> Vec<String> {
         self.values.iter().map(label).collect()
     }
 
-    /// The values as numbers, if all are.
+    /// The values as numbers, if all of them are.
     pub fn numbers(&self) -> Option<Vec<f64>> {
         self.values.iter().map(|value| value.as_float().or_else(|| value.as_integer().map(|i| i as f64))).collect()
     }
 }
 
-/// A value as it stands in tables and messages.
+/// A value as text for tables and messages.
 pub(super) fn label(value: &Value) -> String {
     match value {
         Value::String(word) => word.clone(),
@@ -72,7 +72,7 @@ pub(super) fn label(value: &Value) -> String {
 impl FromStr for SweepAxis {
     type Err = String;
 
-    /// `key=v1,v2`; where a value has commas itself, semicolons stand between the values.
+    /// Parses `key=v1,v2`; if a value contains commas, semicolons separate the values.
     fn from_str(text: &str) -> Result<SweepAxis, String> {
         let (key, values) = text.split_once('=').ok_or_else(|| format!("`{text}` has no `=`; write key=v1,v2,..."))?;
         let separator = if values.contains(';') { ';' } else { ',' };
@@ -92,8 +92,8 @@ impl FromStr for SweepAxis {
     }
 }
 
-/// A whole number as a value of `key`. Those of TOML end at 2⁶³: a larger seed is its digits, and other keys that have so
-/// large ones are reals.
+/// An integer as a value of `key`. Integers in TOML end at 2⁶³: a larger seed becomes text, and other keys with values
+/// as large are reals.
 fn from_whole(key: &str, whole: u64) -> Value {
     match i64::try_from(whole) {
         Ok(whole) => Value::Integer(whole),
@@ -121,7 +121,7 @@ impl Sweep {
         &self.0
     }
 
-    /// Sets the values of a key: those of a flag stand instead of those of the file.
+    /// Sets the values of a key; flags thus replace what the file says.
     pub fn set(&mut self, axis: SweepAxis) {
         match self.0.iter_mut().find(|own| own.key == axis.key) {
             Some(own) => *own = axis,
@@ -129,12 +129,12 @@ impl Sweep {
         }
     }
 
-    /// How many cells there are: 1 without a sweep.
+    /// Number of cells: 1 without a sweep.
     pub fn cells(&self) -> u64 {
         self.0.iter().map(|axis| axis.values.len() as u64).fold(1, u64::saturating_mul)
     }
 
-    /// The value of every key in cell `index`, in the order of the keys.
+    /// The value of every key in cell `index`, in key order.
     pub fn values(&self, index: u64) -> Vec<&Value> {
         let mut rest = index;
         let mut values: Vec<&Value> = Vec::new();
@@ -147,22 +147,23 @@ impl Sweep {
         values
     }
 
-    /// What the values of cell `index` are called, as `key = value`.
+    /// Names the values of cell `index`, as `key = value`.
     pub fn name(&self, index: u64) -> String {
         let keys = self.0.iter().map(|axis| &axis.key);
         let parts = keys.zip(self.values(index)).map(|(key, value)| format!("{key} = {}", label(value)));
         parts.collect::<Vec<_>>().join(", ")
     }
 
-    /// The values of cell `index` as they stand in tables.
+    /// The values of cell `index` as text for tables.
     pub fn labels(&self, index: u64) -> Vec<String> {
         self.values(index).into_iter().map(label).collect()
     }
 
-    /// Checks keys, which must be among `keys`, and numbers of values; whether the values themselves can be had is checked cell by cell.
+    /// Checks that the keys are among `keys`, and the numbers of values. The values themselves are checked cell by
+    /// cell.
     ///
     /// # Errors
-    /// [`Error::Request`] for a key that is unknown, cannot vary, or has no values, and for too many cells.
+    /// [`Error::Request`] for a key that is unknown, cannot vary or has no values, and for too many cells.
     pub fn check(&self, keys: &[String]) -> Result<()> {
         for (i, SweepAxis { key, values }) in self.0.iter().enumerate() {
             if !keys.contains(key) {

@@ -1,7 +1,7 @@
 //! Range checks of a [`Spec`]: each number alone, then the combinations that make no sense.
 //!
-//! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that
-//! takes the file they come from; only the resolution of the highest mode is checked here.
+//! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that needs
+//! the file of the shape. Only the resolution of the highest mode is checked here.
 
 use super::spec::{BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Sor, Spec, Store};
 use crate::{
@@ -9,19 +9,19 @@ use crate::{
     solver::{Facts, ring::MIN_POINTS},
 };
 
-/// More members than this is a slip of the keyboard.
+/// More members than this are a typing error.
 const MAX_CURVES: u64 = 1_000_000_000;
 const MAX_POINTS: usize = 1_000_000;
-/// A member with more steps than this would not end in a year.
+/// A member with more steps than this would need more than a year.
 const MAX_STEPS: f64 = 1e9;
-/// Final times of which the smallest part in a table, and the sum over all members, are still numbers.
+/// Final times whose smallest part in a table, and whose sum over all members, can still be represented.
 const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
 /// The rows of a resident member stay in memory until it ends.
 const MAX_SERIES_ROWS: f64 = 1e6;
 const MAX_SNAPSHOTS: usize = 10_000;
-/// Likewise: four numbers a row.
+/// The same for snapshots, at four numbers a row.
 const MAX_SNAPSHOT_ROWS: usize = 100_000_000;
-/// The lengths approach their mean explicitly, by a factor 1 - ωτ a step.
+/// The lengths approach their mean explicitly, by a factor 1 - ωτ per step.
 const MAX_OMEGA_TAU: f64 = 1.0;
 /// Above this local error a step says nothing about the curve.
 const LOOSEST_ADAPTIVE: f64 = 1.0;
@@ -31,7 +31,7 @@ const MAX_SWEEPS: u32 = 100_000_000;
 const MAX_THREADS: usize = 1024;
 
 impl Spec {
-    /// Checks every range and combination and returns the spec with its lists sorted and free of repetitions.
+    /// Checks all ranges and combinations, and returns the spec with its lists sorted and without duplicates.
     pub fn validate(mut self) -> Result<Spec> {
         self.sweep.check(&Spec::keys())?;
         self.check_counts()?;
@@ -46,7 +46,7 @@ impl Spec {
         Ok(self)
     }
 
-    /// Writes out the choices that were left open, so that a printed spec says them.
+    /// Fills in the choices left open, so that a printed spec shows them.
     fn fill_defaults(&mut self) {
         if let Pace::Fixed(tau) = self.pace() {
             self.tau = Some(tau);
@@ -246,7 +246,7 @@ impl Spec {
         }
     }
 
-    /// Nothing may be asked for that the solver does not do: the direct one makes no sweeps, and multigrid makes its own.
+    /// Refuses options that the solver does not have: the direct one makes no sweeps, and multigrid has its own.
     fn check_sweeps(&self) -> Result<()> {
         let default = Spec::default();
         let asked = [
@@ -337,7 +337,7 @@ fn positive(key: &str, value: f64, what: &str, example: &str) -> Result<()> {
     Err(Error::value(key, number(value), &format!("not {what}"), &allowed))
 }
 
-/// `value` as a person would write it: 0.001, -1, 1e300.
+/// Formats `value` as a person would write it: 0.001, -1, 1e300.
 fn number(value: f64) -> String {
     let size = value.abs();
     if value.is_finite() && size != 0.0 && !(1e-5..1e15).contains(&size) {
@@ -351,7 +351,7 @@ fn number(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// TOML text whose validation must fail, and what the message must begin with.
+    /// TOML text that validation must refuse, and the beginning of the message.
     const REFUSED: &[(&str, &str)] = &[
         ("curves = 0", "--curves 0: "),
         ("curves = 1000000001", "--curves 1000000001: "),
