@@ -1,7 +1,7 @@
-//! `ensemble.csv`: the statistics of relaxation times and of rates of decay, one row a cell.
+//! `ensemble.csv`: the statistics of relaxation times and decay rates, one row per cell.
 //!
-//! A member whose time is not known is censored where it ended: one that is unfinished at the final time, and one that
-//! ended badly at its last good state. How many of these there are is in the row.
+//! A member whose time is unknown is censored where it ended: at the final time if it is unfinished, or at its last
+//! good state if it ended badly. The row counts these members.
 
 use std::mem;
 
@@ -15,7 +15,7 @@ use crate::{
     statistics::{Bootstrap, Description, Interval, KaplanMeier, LogRank, Mean, PowerLaw, Sample, log_rank},
 };
 
-/// Shares of the members whose times the table has, what its columns are called, and what they mean.
+/// Fractions of the members whose times are in the table, with the names and meanings of the columns.
 pub const QUANTILES: [(f64, &str, &str); 5] = [
     (0.05, "q05", "5 % quantile"),
     (0.25, "q25", "25 % quantile"),
@@ -24,7 +24,7 @@ pub const QUANTILES: [(f64, &str, &str); 5] = [
     (0.95, "q95", "95 % quantile"),
 ];
 
-/// The test that compares cells takes the cube of their number.
+/// The test that compares cells needs time cubic in their number.
 const MAX_COMPARED: usize = 500;
 
 /// Relaxation times of one cell.
@@ -33,30 +33,30 @@ pub struct CellStatistics {
     pub cell: u64,
     /// Its swept values, in the order of the keys.
     pub values: Vec<String>,
-    /// Members by status.
+    /// Members, by status.
     pub counts: [u64; Status::ALL.len()],
     /// The times, sorted.
     pub sample: Sample,
-    /// Mean time, restricted where the last member is censored.
+    /// Mean time, restricted if the last member is censored.
     pub mean: Option<Mean>,
-    /// Times of the [shares](QUANTILES) of the members.
+    /// Times by which each [fraction](QUANTILES) of the members has relaxed.
     pub quantiles: [Option<f64>; QUANTILES.len()],
     /// 95 % interval of the median.
     pub interval: Option<Interval>,
-    /// Rates of decay.
+    /// Decay rates.
     pub rates: Rates,
 }
 
-/// Fitted rates of decay of the members of one cell that have one: complete data.
+/// Fitted decay rates of the members of one cell that have one: complete data.
 pub struct Rates {
-    /// What the table says of them.
+    /// The numbers for the table.
     pub numbers: Numbers,
-    /// What is drawn: the rates, or what they are over those of theory.
+    /// Data for the chart: the rates, or their ratios to theory.
     pub drawn: Description,
 }
 
 impl Rates {
-    /// Of `rates`, of which what they are over theory is drawn if they are `relative`.
+    /// Summarises `rates`; the chart shows their ratios to theory if they are `relative`.
     fn new(bootstrap: &Bootstrap, rates: &[Rate], relative: bool) -> Result<Rates> {
         let theory = Description::new(rates.iter().filter_map(Rate::theory))?.median();
         let fitted = Description::new(rates.iter().map(|rate| rate.fitted))?;
@@ -77,12 +77,12 @@ impl Rates {
     }
 }
 
-/// The numbers of `ensemble.csv` on one quantity of a cell, in the order of its columns and named as these are.
+/// The numbers in `ensemble.csv` on one quantity of a cell, in the order and with the names of its columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Numbers {
-    /// Members of which the quantity is known.
+    /// Members with a known quantity.
     pub known: usize,
-    /// All others.
+    /// All other numbers.
     pub named: Vec<Statistic>,
 }
 
@@ -91,7 +91,7 @@ pub struct Numbers {
 pub struct Statistic {
     /// Its column, without the quantity.
     pub name: &'static str,
-    /// The number, where it is known.
+    /// The number, if known.
     pub value: Option<f64>,
     /// What it means.
     pub meaning: &'static str,
@@ -108,7 +108,7 @@ pub struct CellColumn {
 }
 
 impl Numbers {
-    /// The one of this name, where it is known.
+    /// Returns the number called `name`, if known.
     pub fn get(&self, name: &str) -> Option<f64> {
         self.named.iter().find(|statistic| statistic.name == name).and_then(|statistic| statistic.value)
     }
@@ -140,14 +140,14 @@ pub struct EnsembleStatistics {
     pub cells: Vec<CellStatistics>,
     /// Whether the cells could have one distribution; none for a single cell.
     pub log_rank: Option<LogRank>,
-    /// The medians as a power of the swept value, where one key is swept whose values are positive numbers.
+    /// The medians as a power of the swept value, if a single key with positive numeric values is swept.
     pub power_law: Option<PowerLaw>,
-    /// Rates are drawn over those of theory, which says something of every member that has one.
+    /// Rates are drawn relative to theory, if all members with a rate have a theoretical one.
     pub relative: bool,
 }
 
 impl CellStatistics {
-    /// Takes times and rates out of `tally`.
+    /// Moves times and rates out of `tally`.
     fn new(spec: &Spec, cell: u64, tally: &mut CellTally, relative: bool) -> Result<CellStatistics> {
         let sample = Sample::from(mem::take(&mut tally.times));
         let survival = KaplanMeier::new(&sample);
@@ -159,12 +159,12 @@ impl CellStatistics {
         Ok(CellStatistics { cell, values, counts, sample, mean, quantiles, interval, rates })
     }
 
-    /// Members that ended.
+    /// Number of members that ended.
     pub fn members(&self) -> u64 {
         self.counts.iter().sum()
     }
 
-    /// What the table says of the times.
+    /// The numbers on the times, for the table.
     pub fn times(&self) -> Numbers {
         let of = |number: fn(Mean) -> Option<f64>| self.mean.and_then(number);
         let (mean, sd) = (of(|mean| Some(mean.value)), of(|mean| mean.standard_deviation));
@@ -181,27 +181,27 @@ impl CellStatistics {
         Numbers { known: self.sample.events(), named: moments.into_iter().chain(places).collect() }
     }
 
-    /// The quantities of which the table tells, and what it says of them.
+    /// The quantities in the table, with their numbers.
     fn quantities(&self) -> [(&'static str, Numbers); 2] {
         [("t_relax", self.times()), ("rate", self.rates.numbers.clone())]
     }
 
-    /// The time by which half of the members have relaxed.
+    /// Time by which half of the members have relaxed.
     pub fn median(&self) -> Option<f64> {
         let [_, _, median, ..] = self.quantiles;
         median
     }
 
-    /// The interval of the median, where both its ends are known.
+    /// The interval of the median, if both its ends are known.
     pub fn bounds(&self) -> Option<(f64, f64)> {
         self.interval.and_then(|Interval { lower, upper, .. }| Some((lower?, upper?)))
     }
 }
 
 impl EnsembleStatistics {
-    /// From the times and rates of a run of `spec`, which are taken out of `tally`: it keeps what is counted.
+    /// Computes the statistics of a run of `spec`. Times and rates are moved out of `tally`, which keeps the counts.
     ///
-    /// Those of 10⁷ members are 240 MB, so they are sorted where they are.
+    /// Those of 10⁷ members are 240 MB, so they are sorted in place.
     pub fn new(spec: &Spec, tally: &mut Tally) -> Result<EnsembleStatistics> {
         let relative = tally.cells.iter().flat_map(|cell| &cell.rates).all(|rate| rate.theory().is_some());
         let mut none = CellTally::default();
@@ -219,7 +219,7 @@ impl EnsembleStatistics {
                 let medians = cells.iter().map(CellStatistics::median);
                 let points: Vec<(f64, f64)> =
                     values.into_iter().zip(medians).filter_map(|(x, y)| Some((x, y?))).collect();
-                // Values that are not positive have no power law, which is no fault.
+                // There is no power law of values that are not positive; this is not an error.
                 PowerLaw::fit(&points).ok().flatten()
             }),
             _ => None,

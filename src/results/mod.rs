@@ -1,4 +1,4 @@
-//! What the members of a study add up to: sums over members as they end, statistics by cell, and the record of the run.
+//! The results of a study: sums over members as they end, statistics by cell, and the record of the run.
 
 pub mod cells;
 pub mod provenance;

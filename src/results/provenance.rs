@@ -11,7 +11,7 @@ use crate::{
     placement::Platform,
 };
 
-/// What programs that read a run check first: it grows when an older reader would misunderstand the files.
+/// Programs that read a run check this first: it grows when an older reader would misunderstand the files.
 pub const FORMAT: u64 = 1;
 
 /// The content of `run.json`.
@@ -25,30 +25,30 @@ pub struct Provenance {
     pub seed: u64,
     /// Number type of the arithmetic.
     pub precision: Precision,
-    /// Residual tolerance of the sweeps, where there are any.
+    /// Residual tolerance of the sweeps, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// What was asked for, resolved.
+    /// The resolved spec.
     pub spec: Spec,
     /// Where it was computed.
     pub platform: Platform,
     /// Members that ended: the rows of `summary.csv`.
     pub members: u64,
-    /// The same by status.
+    /// Members that ended, by status.
     pub members_by_status: BTreeMap<String, u64>,
-    /// Steps of all members.
+    /// Total steps of all members.
     pub steps: u64,
-    /// Sweeps on curvature systems of all members.
+    /// Total sweeps on curvature systems.
     pub sweeps_k: u64,
-    /// Sweeps on position systems of all members.
+    /// Total sweeps on position systems.
     pub sweeps_x: u64,
     /// Members whose corners were rounded off before the run.
     pub mollified: MollifiedMembers,
-    /// Members whose threshold lies in the rounding of the precision.
+    /// Members whose threshold is below the rounding of the precision.
     pub below_rounding: u64,
     /// Rows of `mean_excess.csv`.
     pub excess_rows: u64,
-    /// What the user was told, a sentence each.
+    /// Warnings given to the user, one sentence each.
     pub warnings: Vec<String>,
     /// When it began, in UTC.
     pub started: String,
@@ -57,7 +57,7 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// Collects it at the end of a run.
+    /// Collects the record at the end of a run.
     pub fn new(
         spec: &Spec,
         platform: &Platform,
@@ -94,7 +94,7 @@ impl Provenance {
     }
 }
 
-/// `value` as JSON, in lines; `name` is what cannot be written if that fails.
+/// `value` as multi-line JSON; `name` is used in the error message.
 pub fn json(value: &impl Serialize, name: &str) -> Result<String> {
     let text = serde_json::to_string_pretty(value);
     text.map(|text| text + "\n").map_err(|e| Error::Failed(format!("cannot write {name}: {e}")))
@@ -105,11 +105,11 @@ pub fn by_status(tally: &Tally) -> BTreeMap<String, u64> {
     tally.counts().map(|(status, count)| (status.name().into(), count)).collect()
 }
 
-/// A time `since` 1970 in UTC to the second, for example `2026-11-05T09:08:07Z`.
+/// Formats a time `since` 1970 in UTC to the second, for example `2026-11-05T09:08:07Z`.
 pub fn rfc3339(since: Duration) -> String {
     let seconds = since.as_secs();
     let (day, second) = (seconds / 86_400, seconds % 86_400);
-    // Years begin in March here, so that the leap day is the last of its year (H. Hinnant, days_from_civil).
+    // Years begin in March here, so that a leap day is the last day of its year (H. Hinnant, days_from_civil).
     let shifted = day + 719_468;
     let (era, day_of_era) = (shifted / 146_097, shifted % 146_097);
     let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;

@@ -1,4 +1,4 @@
-//! Running totals over members: what the overview and `run.json` say, without keeping the members.
+//! Running totals over members, for the overview and `run.json`; the members themselves are not stored.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,63 +15,64 @@ use crate::{
 pub struct Tally {
     /// By cell.
     pub cells: Vec<CellTally>,
-    /// Steps of all members.
+    /// Total steps of all members.
     pub steps: u64,
-    /// Sweeps on curvature systems of all members.
+    /// Total sweeps on curvature systems.
     pub sweeps_k: u64,
-    /// Sweeps on position systems of all members.
+    /// Total sweeps on position systems.
     pub sweeps_x: u64,
     /// Members whose corners were rounded off before the run.
     pub mollified: MollifiedMembers,
-    /// Members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
+    /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
     drifted: (u64, f64),
-    /// Members whose relaxation cannot be told: their threshold lies in the rounding of the precision.
+    /// Members whose relaxation time is unknown because their threshold is below the rounding of the precision.
     pub below_rounding: u64,
-    /// Longest over shortest edge of each at its end, for a picture.
+    /// Longest over shortest edge of each member at its end, for a picture.
     pub mesh_ratios: Vec<f32>,
-    /// Metric drift of each at its end, likewise.
+    /// Metric drift of each member at its end, for a picture.
     pub metric_drifts: Vec<f32>,
 }
 
-/// Rate of decay of a member.
+/// Decay rate of a member.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate {
     /// As fitted, in length⁻⁴.
     pub fitted: f64,
-    /// NaN where theory says nothing.
+    /// NaN if theory predicts none.
     theory: f64,
 }
 
 impl Rate {
-    /// What linear theory gives, if a number.
+    /// The prediction of linear theory, if there is one.
     pub fn theory(&self) -> Option<f64> {
         Some(self.theory).filter(|theory| theory.is_finite())
     }
 
-    /// Over that of theory, if a number: areas at the ends of the range of floats, which a table may tell, have none.
+    /// Ratio to theory, if it is a number: areas at the ends of the range of floats, which a table may contain, have
+    /// none.
     pub fn ratio(&self) -> Option<f64> {
         self.theory().map(|theory| self.fitted / theory).filter(|ratio| ratio.is_finite())
     }
 }
 
-/// What the members of one cell came to.
+/// Totals over the members of one cell.
 #[derive(Clone, Debug, Default)]
 pub struct CellTally {
-    /// Members by status, in the order of [`Status::ALL`].
+    /// Members, by status in the order of [`Status::ALL`].
     pub counts: [u64; Status::ALL.len()],
-    /// When each relaxed, or until when it had not.
+    /// Times at which members relaxed, or up to which they had not.
     pub times: Observations,
-    /// Those that have not relaxed, by status.
+    /// Members that have not relaxed, by status.
     pub others: [u64; Status::ALL.len()],
-    /// Sum of the areas at the start.
+    /// Sum of the initial areas.
     pub area: f64,
-    /// Those that have a rate of decay.
+    /// Rates of the members that have one.
     pub rates: Vec<Rate>,
-    /// Excess at the times of [`grid`], of the members that reached them.
+    /// Excess at the times of [`grid`], over the members that reached them.
     pub excess: Vec<Moments>,
 }
 
-/// What a [`Tally`] knows of the members that ended beside what their rows in `summary.csv` say.
+/// The part of a [`Tally`] that cannot be recomputed from `summary.csv`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Aside {
     mollified: MollifiedMembers,
@@ -82,7 +83,7 @@ pub struct Aside {
 }
 
 impl Aside {
-    /// Adds what is known of other members.
+    /// Adds the data of other members.
     pub fn merge(&mut self, other: &Aside) {
         let Aside { mollified, drifted, below_rounding, excess } = other;
         self.mollified.merge(mollified);
@@ -103,7 +104,7 @@ pub struct MeanExcess {
     pub cell: u64,
     /// The time.
     pub t: f64,
-    /// How many reached it.
+    /// Number of members that reached it.
     pub members: u64,
     /// Their mean excess.
     pub mean: Option<f64>,
@@ -117,25 +118,25 @@ impl MeanExcess {
     }
 }
 
-/// Metric drift above which the scheme's lengths are so far from the polygon's that times mean little.
+/// Metric drift above which the scheme's lengths are too far from the polygon's for times to mean much.
 pub const DISTRUSTED_DRIFT: f64 = 0.1;
 
-/// What rounding off corners did to the members (`ensemble/mollifier.rs`).
+/// How corners of members were rounded off (`ensemble/mollifier.rs`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MollifiedMembers {
-    /// How many were not left alone.
+    /// Members that were changed.
     pub members: u64,
-    /// Most rounds that one took.
+    /// Maximum rounds for one member.
     pub most_rounds: u32,
     /// Largest relative change of area.
     pub largest_area_change: f64,
-    /// How many are not resolved: one of the next three.
+    /// Members that are not resolved, for one of the next three reasons.
     pub unresolved: u64,
-    /// How many cross themselves at the start, though the outline does not.
+    /// Members that cross themselves at the start, though their outline does not.
     pub crossed: u64,
-    /// How many start with a node that turns by more than 1.5 rad.
+    /// Members that start with a turn of more than 1.5 rad at a node.
     pub sharp: u64,
-    /// How many changed their area by more than a tenth.
+    /// Members whose area changed by more than a tenth.
     pub distorted: u64,
 }
 
@@ -152,7 +153,7 @@ impl MollifiedMembers {
         }
     }
 
-    /// Adds others.
+    /// Adds other members.
     fn merge(&mut self, other: &MollifiedMembers) {
         let MollifiedMembers { members, most_rounds, largest_area_change, unresolved, crossed, sharp, distorted } =
             other;
@@ -165,7 +166,7 @@ impl MollifiedMembers {
         self.distorted = self.distorted.saturating_add(*distorted);
     }
 
-    /// What the user should know, unless all is well.
+    /// What the user should know, if anything.
     fn warning(&self, all: u64) -> Option<String> {
         let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = self;
         (*unresolved > 0).then(|| {
@@ -187,10 +188,10 @@ impl MollifiedMembers {
 }
 
 impl Tally {
-    /// Adds one member.
+    /// Adds a member.
     ///
     /// # Errors
-    /// For a time that is none.
+    /// For an invalid time.
     pub fn add(&mut self, outcome: &Outcome) -> Result<()> {
         let cell = outcome.cell as usize;
         if self.cells.len() <= cell {
@@ -210,32 +211,32 @@ impl Tally {
         let drift = outcome.end.metric_drift;
         self.drifted.0 += u64::from(drift > DISTRUSTED_DRIFT);
         self.drifted.1 = self.drifted.1.max(drift);
-        // A table that was read may say anything.
+        // A table read from disk may contain anything.
         self.steps = self.steps.saturating_add(outcome.steps);
         self.sweeps_k = self.sweeps_k.saturating_add(outcome.sweeps_k);
         self.sweeps_x = self.sweeps_x.saturating_add(outcome.sweeps_x);
         Ok(())
     }
 
-    /// Members that ended with a metric drift above [`DISTRUSTED_DRIFT`].
+    /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`].
     pub fn distrusted(&self) -> u64 {
         self.drifted.0
     }
 
-    /// Adds the excess of a member of `cell` at the times of [`grid`] that it reached.
+    /// Adds the excess of a member of `cell`, at the times of [`grid`] that it reached.
     pub fn add_excess(&mut self, cell: u64, excess: &[f64]) {
         let Some(tally) = self.cells.get_mut(cell as usize) else { return };
         tally.excess.resize_with(tally.excess.len().max(excess.len()), Moments::default);
         tally.excess.iter_mut().zip(excess).for_each(|(moments, excess)| moments.add(*excess));
     }
 
-    /// Adds what is not in the summary's row.
+    /// Adds data that are not in a row of the summary.
     pub fn add_aside(&mut self, mollified: &Mollified, unresolved: bool) {
         self.mollified.add(mollified);
         self.below_rounding += u64::from(unresolved);
     }
 
-    /// What rows do not say.
+    /// Returns the data that are not in rows.
     pub fn aside(&self) -> Aside {
         let Tally { mollified, drifted, below_rounding, .. } = *self;
         Aside {
@@ -246,17 +247,17 @@ impl Tally {
         }
     }
 
-    /// Takes it back, after all rows.
+    /// Sets the data that are not in rows, after all rows were added.
     pub fn set_aside(&mut self, aside: Aside) {
         let Aside { mollified, drifted, below_rounding, excess } = aside;
         (self.mollified, self.drifted, self.below_rounding) = (mollified, drifted, below_rounding);
         self.cells.iter_mut().zip(excess).for_each(|(cell, excess)| cell.excess = excess);
     }
 
-    /// The rows of `mean_excess.csv`.
+    /// Returns the rows of `mean_excess.csv`.
     ///
     /// # Errors
-    /// [`Error::Request`](crate::Error::Request) where the values of a cell do not fit `spec`.
+    /// [`Error::Request`](crate::Error::Request) if the values of a cell do not fit `spec`.
     pub fn mean_excess(&self, spec: &Spec) -> Result<Vec<MeanExcess>> {
         let mut rows = Vec::new();
         for (cell, CellTally { excess, .. }) in (0..).zip(&self.cells) {
@@ -267,7 +268,7 @@ impl Tally {
         Ok(rows)
     }
 
-    /// What the user should know about the results, a sentence each.
+    /// What the user should know about the results, one sentence each.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings: Vec<String> = self.mollified.warning(self.members()).into_iter().collect();
         let members = format!("{} {}", self.members(), plural(self.members(), "member"));
@@ -296,12 +297,12 @@ impl Tally {
         warnings
     }
 
-    /// Members that ended neither relaxed nor unfinished.
+    /// Number of members that ended neither relaxed nor unfinished.
     pub fn failed(&self) -> u64 {
         self.counts().filter(|(status, _)| status.is_failure()).map(|(_, count)| count).sum()
     }
 
-    /// Members that ended.
+    /// Number of members that ended.
     pub fn members(&self) -> u64 {
         self.counts().map(|(_, count)| count).sum()
     }
