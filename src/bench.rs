@@ -1,9 +1,9 @@
-//! How fast a back end takes curves forward, in curve-steps per second.
+//! Measures how fast a back end advances curves, in curve-steps per second.
 //!
-//! A curve-step is one step of the paper's scheme for one curve; an adaptive attempt is three. A [`Bench`] holds the
-//! slots of a back end full of members of the default family and advances them through the same calls as a run:
-//! `load`, `aim`, `advance`, and a look at the counters. What a run does besides (making members, looking for
-//! crossings, outputs) is left out. Every number counts what was made, not what was asked for.
+//! A curve-step is one step of the paper's scheme for one curve; an adaptive attempt is three. A [`Bench`] fills the
+//! slots of a back end with members of the default family and advances them through the same calls as a run: `load`,
+//! `aim`, `advance`, and a look at the counters. Other work of a run (making members, checking for crossings, outputs)
+//! is left out. All numbers count steps made, not steps requested.
 
 use std::time::{Duration, Instant};
 
@@ -22,17 +22,17 @@ use crate::{
     trajectory::Trajectory,
 };
 
-/// Members that differ; further slots repeat them, so that filling a large device costs little.
+/// Number of different members; further slots repeat them, so that filling a large device costs little.
 const MEMBERS: usize = 256;
-/// Advances in a window at least, where a back end leaves the choice: a window that ends late says little.
+/// Minimum advances in a window, if the back end leaves the choice: a window that ends late says little.
 const ADVANCES_PER_WINDOW: u32 = 4;
-/// Fewest nodes of a perturbed ellipse: a mode takes four.
+/// Minimum nodes of a perturbed ellipse: a mode needs four.
 const FEWEST_POINTS: usize = 8;
 
-/// The spec of a case: the default ensemble with `points` nodes and only the modes that these resolve.
+/// Returns the spec of a case: the default ensemble with `points` nodes and only the modes that these resolve.
 ///
 /// # Errors
-/// [`Error::Request`] when a key is out of its range.
+/// [`Error::Request`] if a key is out of range.
 pub fn spec(points: usize, spec: Spec) -> Result<Spec> {
     if points < FEWEST_POINTS {
         let problem = "too few nodes for a perturbed ellipse";
@@ -42,19 +42,19 @@ pub fn spec(points: usize, spec: Spec) -> Result<Spec> {
     Spec { points, modes, ..spec }.validate()
 }
 
-/// A back end at work, its slots full.
+/// A running back end with full slots.
 pub struct Bench {
     backend: Box<dyn Backend>,
     platform: Platform,
     members: Vec<Run<f64>>,
-    /// What each slot has made since its member was loaded.
+    /// Curve-steps of each slot since its member was loaded.
     made: Vec<u64>,
-    /// Steps from one aim to the next; [`u32::MAX`] where the back end pauses sooner by itself.
+    /// Steps from one aim to the next; [`u32::MAX`] if the back end pauses earlier by itself.
     stride: u32,
     start_up: Duration,
 }
 
-/// What was made in a time.
+/// The work done in a time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BenchSample {
     /// Time taken.
@@ -63,7 +63,7 @@ pub struct BenchSample {
     pub steps: u64,
     /// Sweeps on curvature and position systems.
     pub sweeps: u64,
-    /// Some member stopped short of its goal.
+    /// Some member stopped before its goal.
     paused: bool,
 }
 
@@ -72,8 +72,8 @@ impl Bench {
     /// `window`.
     ///
     /// # Errors
-    /// [`Error::Request`] when the back end cannot do it, [`Error::Device`] when it fails, [`Error::Failed`] when a
-    /// member does.
+    /// [`Error::Request`] if the back end does not support the spec, [`Error::Device`] if it fails, [`Error::Failed`]
+    /// if a member does.
     pub fn open(spec: &Spec, window: Duration) -> Result<Bench> {
         let choice = placement::choose(spec, spec.points)?;
         let precision = choice.precision();
@@ -81,7 +81,7 @@ impl Bench {
         let count = usize::try_from(spec.curves).unwrap_or(usize::MAX);
         let member = |index: usize| {
             let mut run = Trajectory::new(family.member(index as u64)?, spec, precision, &Outputs::default()).launch();
-            // Nobody looks for crossings here, so nobody needs to be waited for.
+            // Nobody checks for crossings here, so members need not wait for that.
             run.parameters.look_at = BIG;
             Ok(run)
         };
@@ -105,12 +105,12 @@ impl Bench {
         &self.platform
     }
 
-    /// Members side by side.
+    /// Number of members running side by side.
     pub fn curves(&self) -> usize {
         self.made.len()
     }
 
-    /// Time from opening to the end of the first step, in which kernels are compiled.
+    /// Time from opening to the end of the first step, including the compilation of kernels.
     pub fn start_up(&self) -> Duration {
         self.start_up
     }
@@ -118,7 +118,7 @@ impl Bench {
     /// Advances for at least `window`.
     ///
     /// # Errors
-    /// As [`Bench::open`].
+    /// Those of [`Bench::open`].
     pub fn sample(&mut self, window: Duration) -> Result<BenchSample> {
         let mut total = BenchSample::default();
         while total.elapsed < window {
@@ -130,7 +130,7 @@ impl Bench {
         Ok(total)
     }
 
-    /// Doubles the stride until an advance takes its share of a window, or the back end pauses before.
+    /// Doubles the stride until an advance uses its share of a window, or the back end pauses earlier.
     fn find_stride(&mut self, window: Duration) -> Result<()> {
         while self.stride < u32::MAX {
             let BenchSample { elapsed, paused, .. } = self.advance()?;
@@ -142,7 +142,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Advances all members once, and aims or replaces those that got where they were to.
+    /// Advances all members once, and aims or replaces those that reached their goal.
     fn advance(&mut self) -> Result<BenchSample> {
         let started = Instant::now();
         self.backend.advance()?;
@@ -179,7 +179,7 @@ impl Bench {
     }
 }
 
-/// Curve-steps made since the start.
+/// Curve-steps since the start.
 fn made(run: &Run<f64>, counters: &Counters) -> u64 {
     let attempts = u64::from(counters.steps) + u64::from(counters.rejected);
     if run.parameters.adaptive > 0.0 { 3 * attempts } else { attempts }
@@ -204,7 +204,7 @@ mod tests {
         scheme::{Parameters, State},
     };
 
-    /// Makes at most five steps a call, with 9 sweeps each, and tells how many it made and loaded.
+    /// Makes at most five steps per call, with 9 sweeps each, and counts steps and loads.
     struct Fives {
         counters: [Counters; 2],
         steps: Rc<Cell<u64>>,
@@ -250,7 +250,7 @@ mod tests {
         }
     }
 
-    /// A bench over [`Fives`] whose members end after 12 steps, with the steps and the loads that it made.
+    /// A bench over [`Fives`] whose members end after 12 steps, with its counters of steps and loads.
     fn fives(stride: u32) -> (Bench, Rc<Cell<u64>>, Rc<Cell<u32>>) {
         let spec = spec(32, Spec { t_end: 0.012, curves: 2, ..Spec::default() }).unwrap();
         let member = Family::new(&spec).unwrap().member(0).unwrap();

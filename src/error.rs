@@ -1,4 +1,4 @@
-//! Errors: what, where, the numbers and the remedy, with the exit code each one leads to.
+//! Errors: what, where, the numbers and the remedy, each with its exit code.
 
 use std::path::{Path, PathBuf};
 
@@ -7,40 +7,40 @@ use std::path::{Path, PathBuf};
 /// The message is one line (a TOML error keeps its caret lines); `main` prints it after `error: `.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The request is wrong: nothing was started and nothing was written. Exit code 2.
+    /// The request is wrong; nothing was started or written. Exit code 2.
     #[error("{0}")]
     Request(String),
     /// A file or folder could not be read or written. Exit code 1.
     #[error("{action} {}: {source}", path.display())]
     Io {
-        /// What was attempted, for example `cannot write`.
+        /// The action attempted, for example `cannot write`.
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The device or its driver failed while running. Exit code 1.
+    /// The device or its driver failed during a run. Exit code 1.
     #[error("{0}")]
     Device(String),
     /// A comparison or run ended badly, as reported in its table. Exit code 1.
     #[error("{0}")]
     Failed(String),
-    /// The folder of a command was taken from it while it was writing there. Exit code 1.
+    /// The folder was removed or replaced while the command was writing there. Exit code 1.
     #[error("{0}")]
     Lost(String),
-    /// The run is done and its files are written, but members ended in a way that was to be an error. Exit code 3.
+    /// The run is complete and its files are written, but members ended in a way that counts as an error. Exit code 3.
     #[error("{0}")]
     Strict(String),
-    /// The run was stopped before its end, as was asked for. Exit code 75.
+    /// The run was stopped early, as requested. Exit code 75.
     #[error("{0}")]
     Stopped(String),
-    /// The same by Ctrl-C. Exit code 130.
+    /// The run was stopped early by Ctrl-C. Exit code 130.
     #[error("{0}")]
     Interrupted(String),
 }
 
-/// Result with the crate's [`Error`] unless another is named.
+/// Result with the crate's [`Error`] by default.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl Error {
@@ -49,13 +49,13 @@ impl Error {
         Error::Request(format!("--{key} {value}: {problem}; {allowed}"))
     }
 
-    /// Wraps an I/O error with what was attempted on which path.
+    /// Wraps an I/O error, adding the action and the path.
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Error {
         let path = path.to_path_buf();
         move |source| Error::Io { action, path, source }
     }
 
-    /// The process exit code that this error leads to.
+    /// The exit code of the process.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Request(_) => 2,
@@ -67,12 +67,12 @@ impl Error {
     }
 }
 
-/// Longer than any word that can be meant.
+/// Longer than any plausible word.
 const MAX_WORD: usize = 64;
 
-/// The candidate nearest to `word`, if one is near enough to be meant.
+/// The candidate nearest to `word`, if it is near enough.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // Likeness takes the product of the lengths.
+    // The cost is the product of the lengths.
     if word.len() > MAX_WORD {
         return None;
     }
@@ -84,8 +84,8 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate)
 }
 
-/// 1 for equal words. One slip, two letters swapped included, is near even in a word as short as `tau`, where the
-/// Jaro-Winkler likeness sees next to nothing in common.
+/// The similarity of two words, 1 if they are equal. One slip, including two swapped letters, is near even in a word as
+/// short as `tau`, where the Jaro-Winkler similarity is almost 0.
 fn likeness(a: &str, b: &str) -> f64 {
     let one_slip = a.len().min(b.len()) >= 3 && strsim::osa_distance(a, b) == 1;
     strsim::jaro_winkler(a, b).max(if one_slip { 0.9 } else { 0.0 })
@@ -96,7 +96,7 @@ pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str
     nearest(word, candidates).map_or(String::new(), |near| format!(" (did you mean `{near}`?)"))
 }
 
-/// `text` in about `most` characters and an ellipsis, its control characters escaped.
+/// Shortens `text` to about `most` characters and an ellipsis, and escapes its control characters.
 pub(crate) fn shortened(text: &str, most: usize) -> String {
     let (mut shown, mut length) = (String::new(), 0);
     for c in text.chars() {
@@ -113,7 +113,7 @@ pub(crate) fn shortened(text: &str, most: usize) -> String {
     shown
 }
 
-/// `text` in the same lines, its other control characters escaped: it may quote what a file holds, and a terminal obeys.
+/// Escapes control characters in `text` other than line breaks: it may quote a file, and a terminal would obey them.
 pub(crate) fn without_controls(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
@@ -126,7 +126,7 @@ pub(crate) fn without_controls(text: &str) -> String {
     shown
 }
 
-/// A message of several lines, such as a tree of causes or a text with a caret under it, as one.
+/// Joins a message of several lines, such as a tree of causes or a text with a caret under it, into one line.
 pub(crate) fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -147,7 +147,7 @@ mod tests {
     }
     #[test]
     fn no_likeness_is_sought_for_a_word_without_end() {
-        // Hours, where it is sought.
+        // A search would take hours.
         let endless = "tau".repeat(10_000_000);
         assert_eq!(nearest(&endless, [format!("x{endless}").as_str()]), None);
         assert_eq!(nearest(&format!("{}s", "x".repeat(63)), ["x".repeat(63).as_str()]), Some("x".repeat(63).as_str()));

@@ -1,9 +1,9 @@
-//! What a run will take, without making it: memory, dispatches, steps and time.
+//! Predicts the cost of a run without making it: memory, dispatches, steps and time.
 //!
-//! Work cannot be foretold from a spec: how many steps and sweeps a member takes depends on its curve. So a pilot runs a
-//! few members, spread evenly over all cells, on the back end of the run and through the same loop, for at most
-//! about two seconds: first as many as go abreast, then, where these are done early, as many more as there is time for.
-//! Between the two pilots lies the time of one more member, free of what is the same for any number of them.
+//! Work cannot be predicted from a spec: the steps and sweeps of a member depend on its curve. A pilot therefore runs a
+//! few members, spread evenly over all cells, on the back end of the run and through the same loop, for at most about
+//! two seconds. The first pilot has as many members as run side by side. If these end early, a second has as many more
+//! as there is time for. The difference between the two gives the time per additional member, free of fixed costs.
 
 use std::time::{Duration, Instant};
 
@@ -26,27 +26,27 @@ use crate::{
 
 /// Time for the pilots of all cohorts.
 const PILOT: Duration = Duration::from_secs(2);
-/// Cohorts that have a pilot, at most: each gets its share of the time, and less would show nothing.
+/// Maximum cohorts with a pilot: each gets its share of the time, and less would show nothing.
 const MAX_PILOTS: usize = 20;
-/// Share of the time left that a larger pilot is to take; it may take longer than foreseen.
+/// Fraction of the remaining time that a larger pilot may use; it may run longer than predicted.
 const FILLED: f64 = 0.6;
 
-/// The program with nothing to do, in bytes.
+/// Memory of the idle program, in bytes.
 const PROGRAM_BYTES: u64 = 10_000_000;
-/// Numbers that a resident member takes a node: its state on the back end, and its nodes at the start on the host.
+/// Numbers per node of a resident member: its state on the back end, and its initial nodes on the host.
 const POOL_NUMBERS: usize = STATE_FIELDS + 4;
-/// The same while the state of the run is kept: the member as it was paused, and its bytes.
+/// The same while a checkpoint is saved: the paused member, and its bytes.
 const KEPT_NUMBERS: usize = 2 * STATE_FIELDS;
-/// A run that is longer has its state kept before it ends, in seconds.
+/// A run longer than this, in seconds, saves a checkpoint before it ends.
 const FIRST_STATE: f64 = 5.0;
-/// Bytes of the page and its pictures a node, up to as many nodes as are drawn.
+/// Bytes per node of the page and its pictures, up to the maximum number of nodes drawn.
 const PAGE_BYTES: usize = 25_000;
-/// Copies of the nodes of the members that are drawn.
+/// Copies of the nodes of the members drawn.
 const PORTRAIT_COPIES: usize = 3;
-/// Bytes besides where rows go to disk before their members leave: as they are written and read again. Measured.
+/// Additional bytes if rows go to disk before their members end: rows are written and read again. Measured.
 const SPILL_BYTES: u64 = 6_000_000;
 
-/// What a run will take.
+/// The predicted cost of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Estimate {
     /// Members of the run.
@@ -55,38 +55,38 @@ pub struct Estimate {
     pub cells: usize,
     /// Where it would run.
     pub platform: Platform,
-    /// Members resident at once, the most of all cohorts.
+    /// Maximum members resident at once, over all cohorts.
     pub slots: usize,
     /// Peak resident size of the process.
     pub memory_bytes: u64,
-    /// Mean over the members; none where no member of the pilot has ended and nothing else tells.
+    /// Mean over the members; `None` if no member of the pilot has ended and there is no other clue.
     pub steps_per_member: Option<f64>,
-    /// Dispatches; none where the pilot was over before any work was done.
+    /// Dispatches; `None` if the pilot was over before any work was done.
     pub dispatches: Option<u64>,
-    /// Time in which back ends are opened and kernels compiled.
+    /// Time to open back ends and compile kernels.
     pub start_up_seconds: f64,
-    /// Time of the run besides; none as with the dispatches.
+    /// Time of the rest of the run; `None` as for the dispatches.
     pub seconds: Option<f64>,
-    /// What the estimate rests on.
+    /// The basis of the estimate.
     pub pilot: Pilot,
 }
 
 /// The pilots of all cohorts together.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Pilot {
-    /// Members that were started.
+    /// Members started.
     pub members: u64,
-    /// Those of them that ended.
+    /// Members that ended.
     pub ended: u64,
-    /// Those of them that relaxed.
+    /// Members that relaxed.
     pub relaxed: u64,
-    /// Those of them that have a rate.
+    /// Members that have a rate.
     pub rated: u64,
-    /// Time taken.
+    /// Time used.
     pub seconds: f64,
 }
 
-/// What cohorts of cells will take together, and how many members of theirs a pilot stands for.
+/// The cost of some cohorts, and for how many members a pilot stands.
 #[derive(Default)]
 struct CohortWork {
     members: f64,
@@ -96,10 +96,10 @@ struct CohortWork {
 }
 
 impl Estimate {
-    /// Estimates the run of a study, each cohort on its choice. It leaves the study with the members of its pilot.
+    /// Estimates the run of a study, each cohort on its choice. Afterwards the study has only the members of its pilot.
     ///
     /// # Errors
-    /// As the run itself.
+    /// Those of the run itself.
     pub fn new(study: &mut Study, choices: Vec<Choice>) -> Result<Estimate> {
         let cohorts = study.cohorts();
         let cells = study.cells_mut();
@@ -129,7 +129,7 @@ impl Estimate {
             total.steps = add(total.steps, work.steps);
         }
         let platform = opened.ok_or_else(|| Error::Failed("a study has no cell".into()))?;
-        // Cohorts without a pilot are like those that have one.
+        // Cohorts without a pilot are assumed to be like those with one.
         let scale = members as f64 / total.members.max(1.0);
         start_up *= every as f64;
         let seconds = total.seconds.map(|seconds| scale * seconds);
@@ -138,7 +138,7 @@ impl Estimate {
             cells: cells.len(),
             memory_bytes: memory(
                 members,
-                // Where none has ended yet, all may have one.
+                // If none has ended yet, all may have one.
                 if pilot.ended == 0 { 1.0 } else { pilot.rated as f64 / pilot.ended as f64 },
                 [slots, resident],
                 rows,
@@ -156,17 +156,17 @@ impl Estimate {
     }
 }
 
-/// One pilot.
+/// The result of one pilot.
 struct Seen {
     members: u64,
-    /// Members that have left it, and the steps that they made.
+    /// Members that have ended, and the steps that they made.
     left: u64,
     relaxed: u64,
     rated: u64,
     steps: u64,
     /// Bytes of their rows.
     rows: f64,
-    /// Share of its work that was done.
+    /// Fraction of the work that was done.
     share: f64,
     dispatches: u64,
     seconds: f64,
@@ -201,7 +201,7 @@ impl Sink for Seen {
         Ok(())
     }
 
-    /// Nobody wants the rows, but how much they are.
+    /// Only the size of the rows is needed.
     fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
         let length = rows::bytes_of(series.len(), snapshots.len(), snapshots.first().map_or(0, |first| first.x.len()));
         Ok(Some(Extent { length: length as u64, ..Extent::default() }))
@@ -217,8 +217,8 @@ impl Sink for Seen {
     }
 }
 
-/// Pilots of a cohort: what all of it will take, the members of the largest, and bytes of the rows of a member at its end
-/// and in that pilot.
+/// Runs pilots of a cohort. Returns the cost of all of it, the members of the largest pilot, and bytes of the rows of a
+/// member at its end and in that pilot.
 fn sample(
     cohort: &mut [Cell],
     precision: Precision,
@@ -243,7 +243,7 @@ fn sample(
         let left = until.saturating_duration_since(Instant::now()).as_secs_f64();
         let more = (count as f64 * FILLED * left / seen.seconds.max(1e-6)) as u64;
         pilots.push(seen);
-        // One that is not twice as large would show nothing new.
+        // A pilot less than twice as large would show nothing new.
         if stopped || count == all || more < 2 * count {
             break;
         }
@@ -270,7 +270,7 @@ fn sample(
     Ok((work, count, [rows, share * rows]))
 }
 
-/// Bytes of the rows of a member that comes to the end of its time, the most of all cells.
+/// Bytes of the rows of a member that reaches the final time, the maximum over all cells.
 fn all_rows(cohort: &[Cell]) -> f64 {
     let of_cell = |Cell { spec, family, .. }: &Cell| {
         let series = spec.series.map_or(0.0, |every| spec.t_end / every + 1.0);
@@ -279,7 +279,7 @@ fn all_rows(cohort: &[Cell]) -> f64 {
     cohort.iter().map(of_cell).fold(0.0, f64::max)
 }
 
-/// A cost of `all` members from that of the pilots, each of which is scaled to its end.
+/// The cost of `all` members from that of the pilots, each scaled to its end.
 fn extrapolated(pilots: &[Seen], all: u64, cost: impl Fn(&Seen) -> f64) -> Option<f64> {
     let whole = |seen: &Seen| (seen.share > 0.0).then(|| cost(seen) / seen.share.min(1.0));
     let known: Vec<(f64, f64)> = pilots.iter().filter_map(|seen| Some((seen.members as f64, whole(seen)?))).collect();
@@ -291,7 +291,7 @@ fn extrapolated(pilots: &[Seen], all: u64, cost: impl Fn(&Seen) -> f64) -> Optio
     Some(most + each * (all as f64 - members))
 }
 
-/// Steps of a member where these do not depend on its curve.
+/// Steps of a member, if these do not depend on its curve.
 fn certain_steps(cohort: &[Cell]) -> Option<f64> {
     let of_cell = |Cell { spec, .. }: &Cell| match spec.pace() {
         Pace::Fixed(tau) if !spec.stop_when_relaxed => Some(f64::from(Clock::new(tau, spec.t_end).steps)),
@@ -301,7 +301,7 @@ fn certain_steps(cohort: &[Cell]) -> Option<f64> {
     Some(steps / cohort.len() as f64)
 }
 
-/// Leaves `count` of the members of `cohort`, which has `all`, spread evenly; `own` are those that its cells were to run.
+/// Selects `count` of the `all` members of `cohort`, spread evenly; `own` are the members that its cells were to run.
 fn choose(cohort: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) {
     let place = |i: u64| ((2 * u128::from(i) + 1) * u128::from(all) / (2 * u128::from(count))) as u64;
     let mut places = (0..count).map(place).peekable();
@@ -320,14 +320,14 @@ fn choose(cohort: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) {
     }
 }
 
-/// Peak resident size of a run of `members` of `n` nodes, in bytes, from that of this process, which had `resident` of
-/// up to `slots` members in its pool. A member has `rows` bytes of rows at its end, and had in this process: above
-/// [`MAX_HELD`] for all of the pool they go to disk. Its state may be `kept` on the way.
+/// Peak resident size in bytes of a run of `members` of `n` nodes, from that of this process, which had `resident` of
+/// up to `slots` members in its pool. `rows` are the bytes of rows of a member at its end, and in this process: above
+/// [`MAX_HELD`] for the whole pool they go to disk. Checkpoints may be saved during the run (`kept`).
 ///
-/// The peak is at the end of the run, with a full pool and the tally, or after that, with the statistics and the charts
-/// and without the pool. The tally has of each member its time and two numbers of its mesh, of half the size, and of the
-/// share `rated` its rate with that of theory. Times are sorted where they are, and rates one number at a time; in their
-/// place comes the one that is drawn. A chart sorts the numbers that it shows.
+/// The peak is at the end of the run, with a full pool and the tally, or after it, with the statistics and the charts
+/// but no pool. For each member the tally has its time and two numbers of half size about its mesh; for a fraction
+/// `rated` also its rate and that of theory. Times are sorted in place, and rates one number at a time; the number that
+/// is drawn replaces them. A chart sorts the numbers that it shows.
 fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2], n: usize, kept: bool) -> u64 {
     let numbers = |count: usize| (count * size_of::<f64>()) as u64;
     let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
@@ -346,14 +346,14 @@ fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2
     let all_held = held(rows[0], full);
     let spilling = if all_held < MAX_HELD as u64 { 0 } else { SPILL_BYTES };
     let read_back = |members: usize| numbers(STATE_FIELDS * n * members.min(states_at_once(n)));
-    // Members that are drawn are read back at each of their pictures.
+    // Members that are drawn are read back for each of their pictures.
     let passing = if kept { numbers(KEPT_NUMBERS * n * full) + read_back(full) } else { read_back(drawn.min(full)) };
     let running = pool(full) + passing + portraits + all_held + spilling;
     let reporting = PORTRAIT_COPIES as u64 * portraits + page + statistics;
     program + tally + running.max(reporting)
 }
 
-/// The most that this process has had resident so far, in bytes, where the system tells.
+/// Maximum resident size of this process so far, in bytes, if the system reports it.
 pub fn peak_resident() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -409,10 +409,10 @@ mod tests {
     #[test]
     fn costs_are_extrapolated_from_the_two_largest_pilots() {
         let of = |pilots: &[Seen], all| extrapolated(pilots, all, |seen| seen.seconds);
-        // 0.3 s whatever the number, and 0.01 s each.
+        // A fixed cost of 0.3 s, and 0.01 s per member.
         let pilots = [seen(10, 1.0, 0.4), seen(110, 1.0, 1.4)];
         assert!((of(&pilots, 1010).unwrap() - 10.4).abs() < 1e-12);
-        // Half of it was seen.
+        // Half of the work was done.
         assert!((of(&[seen(10, 0.5, 1.0)], 30).unwrap() - 6.0).abs() < 1e-12);
         assert_eq!(of(&[seen(10, 1.0, 1.5)], 10), Some(1.5));
         assert_eq!(of(&[seen(10, 0.0, 2.0)], 10), None);
@@ -437,7 +437,7 @@ mod tests {
         assert_eq!((estimate.members, estimate.cells), (10_000_000, 1));
         assert!(estimate.memory_bytes > 300_000_000, "{estimate:?}");
         assert!(estimate.pilot.members < 5_000_000 && estimate.pilot.seconds < 60.0, "{estimate:?}");
-        // What the estimate names is not what it takes; other tests run beside this one.
+        // Memory predicted is not memory used; other tests run at the same time.
         if let (Some(before), Some(after)) = (before, peak_resident()) {
             assert!(after - before < estimate.memory_bytes / 4, "{before} to {after}");
         }

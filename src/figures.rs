@@ -1,14 +1,14 @@
-//! The paper's figures: what each one shows, as data, and the one run that makes it.
+//! The paper's figures: the data of each, and the run that makes it.
 //!
 //! *From the paper:* the curves and flows, n = 100, surface diffusion of the ellipse with τ = 10⁻³ on [0, 2], of the
 //! nonconvex curve with τ = 10⁻⁶ and ω = 1 to t = 0.170, the astroid under Willmore flow at t = 0, 0.0005, 0.005, and
-//! nodes at u = i/n. *Chosen here:* the times between the first and the last of a figure, and ω = 1 for the ellipse,
-//! which the paper does not print; τ and the sampling of the astroid, whose nodes at u = i/n crowd at the cusps so that
-//! the run fails at once.
+//! nodes at u = i/n. *Chosen here:* the times between the first and the last of a figure; ω = 1 for the ellipse, which
+//! the paper does not print; and τ and the sampling of the astroid, because nodes at u = i/n crowd at the cusps and the
+//! run fails at once.
 //!
-//! The systems are [solved directly](Solver::Direct), where the paper sweeps by Gauss–Seidel. Sweeps converge to the
-//! solution that a direct solver returns at once, so the figures are those of sweeps without end; `tests/figures.rs`
-//! bounds the distance to sweeps of the default tolerance.
+//! The systems are [solved directly](Solver::Direct); the paper uses Gauss–Seidel. Sweeps converge to the solution that
+//! a direct solver returns at once, so the figures are the limit of infinitely many sweeps. `tests/figures.rs` bounds
+//! the distance to sweeps of the default tolerance.
 
 use crate::{
     curve::Sampling,
@@ -23,25 +23,25 @@ use crate::{
     simulate::simulate,
 };
 
-/// Number of nodes of every figure, the paper's.
+/// Nodes of every figure, as in the paper.
 pub const POINTS: usize = 100;
-/// Speed ω of the redistribution where a figure has any, in 1/time.
+/// Speed ω of the redistribution, in the figures that have any, in 1/time.
 pub const OMEGA: f64 = 1.0;
 
 /// One figure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figure {
-    /// Its name on the command line and that of its files.
+    /// Its name on the command line and the name of its files.
     pub name: &'static str,
-    /// What it shows.
+    /// What the figure shows.
     pub title: &'static str,
-    /// What one should know before reading it.
+    /// A remark to read first.
     pub remark: &'static str,
-    /// Initial curve, as `--shape` takes it.
+    /// Initial curve, as in `--shape`.
     pub shape: &'static str,
     /// How nodes are placed on it.
     pub sampling: Sampling,
-    /// Law of motion, as `--flow` takes it.
+    /// Law of motion, as in `--flow`.
     pub flow: &'static str,
     /// Time step.
     pub tau: f64,
@@ -117,13 +117,13 @@ pub const FIGURES: [Figure; 4] = [
 ];
 
 impl Figure {
-    /// The figure called `name`.
+    /// Returns the figure called `name`.
     pub fn find(name: &str) -> Option<&'static Figure> {
         FIGURES.iter().find(|figure| figure.name == name)
     }
 
-    /// The run that makes it: one unperturbed member, the same bits on every machine with the same mathematical
-    /// library, so on the CPU, in f64 and solved directly.
+    /// The run that makes the figure: one unperturbed member on the CPU, in f64 and solved directly, so that all
+    /// machines with the same mathematical library give the same bits.
     pub fn spec(&self) -> Result<Spec> {
         let wrong = |message: String| Error::Request(format!("{}: {message}", self.name));
         Spec {
@@ -147,10 +147,10 @@ impl Figure {
         .validate()
     }
 
-    /// Runs `spec`, which is [the figure's own](Figure::spec) or a variation of it with the same snapshots.
+    /// Runs `spec`: [the figure's own](Figure::spec), or a variation of it with the same snapshots.
     ///
     /// # Errors
-    /// [`Error::Failed`] if the curve does not get to the last time.
+    /// [`Error::Failed`] if the curve does not reach the last time.
     pub fn simulate(&self, spec: &Spec, progress: Progress) -> Result<Ended> {
         let family = Family::new(spec)?;
         let choice = placement::choose(spec, family.points())?;
@@ -168,7 +168,7 @@ impl Figure {
         Ok(ended)
     }
 
-    /// The picture of what a run left.
+    /// Draws the result of a run.
     pub fn plot(&self, ended: &Ended) -> Plot {
         let curves: Vec<PlottedCurve> = ended.rows.snapshots.iter().map(PlottedCurve::from).collect();
         let panels = match self.layout {
@@ -181,7 +181,7 @@ impl Figure {
         Plot { title: self.title.into(), subtitle: self.parameters(), panels }
     }
 
-    /// The parameters in a line.
+    /// The parameters, in one line.
     pub fn parameters(&self) -> String {
         let Figure { tau, sampling, .. } = self;
         let nodes = match sampling {
@@ -194,7 +194,7 @@ impl Figure {
     }
 }
 
-/// `10⁻⁶` for `1e-6`; anything else as it is.
+/// `10⁻⁶` for `1e-6`; other text unchanged.
 fn superscript(number: &str) -> String {
     let raised =
         |digit: char| char::to_digit(digit, 10).map(|d| ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][d as usize]);
@@ -204,7 +204,7 @@ fn superscript(number: &str) -> String {
     }
 }
 
-/// Keeps the one member of a run.
+/// Stores the only member of a run.
 struct Only {
     ended: Option<Ended>,
     progress: Progress,

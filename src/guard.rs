@@ -1,4 +1,4 @@
-//! Panics of code that is not ours, as errors.
+//! Turns panics of other crates into errors.
 
 use std::{
     cell::Cell,
@@ -9,11 +9,11 @@ use std::{
 use crate::error::one_line;
 
 thread_local! {
-    /// Panics of this thread are caught and told as errors.
+    /// Panics of this thread are caught and reported as errors.
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `call` returns, or the message with which it panicked.
+/// Returns the result of `call`, or the message of its panic.
 pub fn guarded<R>(call: impl FnOnce() -> R) -> std::result::Result<R, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -1,6 +1,6 @@
-//! The one way in which files are opened for reading, whoever wrote them: only files, and up to a size that no honest one has.
+//! The only way in which files are opened for reading: regular files only, up to a size that no genuine one exceeds.
 //!
-//! A pipe may never end and a device never does, so neither is opened: the answer to a slip in a path comes at once.
+//! A pipe may never end and a device never does, so neither is opened: a wrong path gives an error at once.
 
 use std::{
     fs::{self, File, Metadata, OpenOptions},
@@ -8,40 +8,40 @@ use std::{
     path::Path,
 };
 
-/// Most bytes of a spec: half a million members by number.
+/// Maximum bytes of a spec: half a million members listed by number.
 pub(crate) const MAX_SPEC: u64 = 1 << 20;
-/// Most bytes of an outline: a million points with all their digits.
+/// Maximum bytes of an outline: a million points with all their digits.
 pub(crate) const MAX_OUTLINE: u64 = 1 << 26;
-/// Most bytes of a `run.json`: the longest spec, in lines.
+/// Maximum bytes of a `run.json`: the longest spec, line by line.
 pub(crate) const MAX_RUN: u64 = 1 << 22;
-/// Most bytes of the first members: ten times what twelve of them take.
+/// Maximum bytes of the first members: ten times the size of twelve.
 pub(crate) const MAX_PORTRAITS: u64 = 1 << 23;
-/// Most bytes of a line of a table: a thousand numbers.
+/// Maximum bytes of a line of a table: a thousand numbers.
 pub(crate) const MAX_LINE: usize = 1 << 16;
 
-/// Most bytes of a state or a `shard.state`: what a run writes at once is in memory once more, beside its members.
+/// Maximum bytes of a checkpoint or a `shard.state`: one that is written is in memory along with the members.
 pub(crate) const MAX_STATE: u64 = 1 << 34;
 
 /// Opens the file at `path` for reading.
 ///
 /// # Errors
-/// As [`File::open`], and for what is no file.
+/// Those of [`File::open`], and one if it is not a regular file.
 pub(crate) fn open(path: &Path) -> io::Result<File> {
     open_as(path, File::options().read(true))
 }
 
-/// Opens the file at `path` as `options` say.
+/// Opens the file at `path` with `options`.
 ///
 /// # Errors
-/// As [`open`].
+/// Those of [`open`].
 pub(crate) fn open_as(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
-    // Before it is opened, which some devices take for an order.
+    // Checked before opening, which some devices take as a command.
     match fs::metadata(path) {
         Err(e) if e.kind() == ErrorKind::NotFound => {}
         there => is_file(&there?)?,
     }
     let file = at_once(options).open(path)?;
-    // Another one may have come into its place.
+    // It may have been replaced in between.
     is_file(&file.metadata()?)?;
     Ok(file)
 }
@@ -54,7 +54,7 @@ fn is_file(of: &Metadata) -> io::Result<()> {
     }
 }
 
-/// To open a pipe is to wait for its writer, and some files of the system, such as `/proc/kmsg`, are read like one.
+/// Avoids waiting: opening a pipe waits for its writer, and some system files, such as `/proc/kmsg`, are read like one.
 #[cfg(unix)]
 fn at_once(options: &mut OpenOptions) -> &mut OpenOptions {
     use std::os::unix::fs::OpenOptionsExt;
@@ -67,10 +67,10 @@ fn at_once(options: &mut OpenOptions) -> &mut OpenOptions {
     options
 }
 
-/// The content of the file at `path`, if it is of `most` bytes or less.
+/// Returns the content of the file at `path`, if it has at most `most` bytes.
 ///
 /// # Errors
-/// As [`open`], and for a longer one.
+/// Those of [`open`], and one for a longer file.
 pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let too_long = |size: &str| Error::new(ErrorKind::FileTooLarge, format!("{size} bytes; at most {most} are read"));
@@ -78,7 +78,7 @@ pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     if size > most {
         return Err(too_long(&size.to_string()));
     }
-    // Files of the system have no size beforehand.
+    // System files do not know their size beforehand.
     let mut bytes = Vec::new();
     let read = file.take(most + 1).read_to_end(&mut bytes).map_err(|e| match e.kind() {
         ErrorKind::WouldBlock => {
@@ -92,10 +92,10 @@ pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     }
 }
 
-/// The same as text.
+/// Returns the content as text.
 ///
 /// # Errors
-/// As [`bytes`], and where it is not in UTF-8.
+/// Those of [`bytes`], and one if it is not UTF-8.
 pub(crate) fn text(path: &Path, most: u64) -> io::Result<String> {
     String::from_utf8(bytes(path, most)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
@@ -103,11 +103,11 @@ pub(crate) fn text(path: &Path, most: u64) -> io::Result<String> {
     })
 }
 
-/// A reader that ends with an error where a line has not ended after [`MAX_LINE`] bytes: nobody who reads line by line
-/// then holds more than that.
+/// A reader that fails if a line is longer than [`MAX_LINE`] bytes, so that nobody who reads line by line holds more
+/// than that.
 pub(crate) struct Lines<R> {
     inner: R,
-    /// Bytes since the last end of a line.
+    /// Bytes since the last line end.
     since: usize,
 }
 
@@ -176,7 +176,7 @@ mod tests {
             let longest = line(MAX_LINE);
             assert_eq!(read(&[&longest[..], &longest, b"\n\n", &longest].concat(), step), Ok(()), "{step}");
             let longer = [&longest[..], &line(MAX_LINE + 1)].concat();
-            // Of what one read brings only the beginning and the end are looked at: that much is held anyhow.
+            // Only the beginning and the end of each read are checked: so much is in memory anyway.
             assert_eq!(read(&longer, step).is_err(), step <= MAX_LINE + 1, "{step}");
             assert!(read(&vec![b'x'; 30 * MAX_LINE], step).is_err(), "{step}");
         }

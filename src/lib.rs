@@ -6,7 +6,7 @@
 //!
 //! by the semi-implicit Lagrangian scheme of K. Mikula and D. Ševčovič, *Numerical aspects of evolution of plane
 //! curves satisfying the fourth order geometric equation*. It runs on the CPU and, through WGSL and wgpu, on a GPU.
-//! `README.md` is about the program, `docs/method.md` about the scheme.
+//! `README.md` describes the program, `docs/method.md` the scheme.
 //!
 //! # Notation
 //!
@@ -19,7 +19,7 @@
 //! | T, N | unit tangent; unit inward normal, det(T, N) = 1; curves run counter-clockwise | |
 //! | β, α | normal velocity; tangential velocity, which moves nodes along the curve only | segment; node |
 //! | τ, ω | time step; speed of the redistribution of nodes, in 1/time | |
-//! | L, A | length and signed area of the polygon x | |
+//! | β, α | normal velocity; tangential velocity, which only moves nodes along the curve | segment; node |
 //! | excess | L²/(4πA) - (n/π)·tan(π/n), 0 on the regular polygon | |
 //!
 //! Lengths are in the user's unit and times in its fourth power.
@@ -28,7 +28,7 @@
 //!
 //! Each uses only those above it (`tests/modules_depend_downward.rs`).
 //!
-//! | module | holds |
+//! Each module uses only those above it (`tests/modules_depend_downward.rs`).
 //! |---|---|
 //! | [`error`] | what, where, numbers, remedy, exit code |
 //! | `wgsl` | the files of `shaders/`, compiled in |
@@ -37,31 +37,31 @@
 //! | [`number`] | the number that the scheme is generic over |
 //! | [`flow`] | the law b(k) |
 //! | [`curve`] | plane curves in f64: shapes, perturbation, sampling, measures |
-//! | [`solver`] | periodic pentadiagonal systems: rows, sweeps, direct solution |
+//! | [`number`] | the number type of the scheme |
 //! | [`statistics`] | censored times, their mean and median with intervals, tests between groups, fits |
 //! | [`scheme`] | the paper's step, one file a stage, with the stems of `shaders/` |
 //! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
 //! | [`ensemble`] | the spec, its members, what a member leaves |
 //! | `schedule`, `trajectory`, [`simulate`] | steps and output times; one member's way; the loop over all |
-//! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
-//! | [`placement`] | which back end a spec gets, and why |
-//! | [`relax`](fn@relax) | a study in, what its members leave out |
+//! | [`backend`] | slots in which members advance, on the CPU or a GPU |
+//! | [`ensemble`] | the spec, its members, the result of a member |
+//! | `schedule`, `trajectory`, [`simulate`] | steps and output times; one member's trajectory; the loop over all |
 //! | [`truth`] | problems with exact solutions, and the error and order against them |
 //! | [`results`] | what the members of a study add up to: sums, statistics by cell, the record of the run |
-//! | `draw` | SVG, axes and charts from plain numbers |
+//! | [`relax`](fn@relax) | from a study to the results of its members |
 //! | `files` | the folder of results: who may write there, and what each file holds |
-//! | `report` | a run's sink: tables, checkpoints, merge, `report.html` |
+//! | [`results`] | the results of a study: sums, statistics by cell, the record of the run |
 //! | `bench`, `estimate`, `figures` | how fast a back end is; what a run will take; the paper's figures |
 //! | `cli` | the commands |
 //!
-//! # Example
+//! | `bench`, `estimate`, `figures` | speed of a back end; cost of a run; the paper's figures |
 //!
 //! A [`Spec`](ensemble::Spec) says what to run, a [`Study`](ensemble::Study) is a spec that was checked, and
 //! [`relax`](fn@relax) hands what its members leave to a [`Sink`](ensemble::Sink), such as a `Vec`. One ellipse under
 //! surface diffusion keeps its area and loses length:
-//!
-//! ```
-//! use curvelax::{ensemble::{Spec, Study}, relax};
+//! A [`Spec`](ensemble::Spec) says what to run, a [`Study`](ensemble::Study) is a checked spec, and [`relax`](fn@relax)
+//! hands the results of its members to a [`Sink`](ensemble::Sink), such as a `Vec`. An ellipse under surface diffusion
+//! keeps its area and loses length:
 //!
 //! let study = Study::new(Spec { curves: 1, amplitude: 0.0, t_end: 0.2, ..Spec::default() })?;
 //! let mut members = Vec::new();
@@ -87,7 +87,7 @@ pub mod solver;
 pub mod statistics;
 pub mod truth;
 
-// Public for the program, and for the project's own tests, benchmarks and fuzzing only.
+// Public only for the program, and for the project's own tests, benchmarks and fuzzing.
 #[doc(hidden)]
 pub mod bench;
 #[doc(hidden)]

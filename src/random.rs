@@ -1,13 +1,12 @@
-//! Random numbers by counting: Philox4x32-10 (Salmon, Moraes, Dror, Shaw 2011), in f64 on the CPU.
+//! Counter-based random numbers: Philox4x32-10 (Salmon, Moraes, Dror, Shaw 2011), in f64 on the CPU.
 //!
-//! A counter-based generator has no state that draws advance. It is a keyed bijection of 128-bit blocks, ten
-//! rounds of multiplying and crossing over, and the n-th draw is the image of the number n. So a draw is a pure
-//! function of *where* it is used: here of the seed (the key), the member, the attempt and the draw within the
-//! attempt (the counter). Member j is the same in any batch, shard, order, thread count or back end, and a
-//! single member is repeated without making the ones before it.
+//! A counter-based generator has no state that changes with each draw. It is a keyed bijection of 128-bit blocks, ten
+//! rounds of multiplications and swaps; the n-th draw is the image of n. A draw is thus a pure function of *where* it
+//! is used: here the seed (the key), the member, the attempt and the draw within the attempt (the counter). Member j is
+//! the same in any batch, shard, order, thread count or back end, and can be repeated alone.
 //!
-//! The uniforms are the same bits everywhere. A normal number takes one logarithm and one cosine, so two
-//! machines agree on it as far as their mathematical libraries do (a few units in the last place).
+//! The uniforms have the same bits everywhere. A normal number needs one logarithm and one cosine, so two machines
+//! agree on it as far as their mathematical libraries do (a few units in the last place).
 
 use std::f64::consts::TAU;
 
@@ -15,7 +14,7 @@ const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const ROUNDS: usize = 10;
 
-/// Philox4x32-10: the random block that belongs to `counter` under `key`.
+/// Philox4x32-10: the random block of `counter` under `key`.
 pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     let ([mut c0, mut c1, mut c2, mut c3], [mut k0, mut k1]) = (counter, key);
     for _ in 0..ROUNDS {
@@ -33,9 +32,9 @@ fn wide_product(a: u32, b: u32) -> (u32, u32) {
     ((product >> 32) as u32, product as u32)
 }
 
-/// The draws of one attempt at one member.
+/// The draws of one attempt at a member.
 ///
-/// Draws are addressed, not consumed: `normal(3)` is the same whether or not `normal(2)` was asked for.
+/// Draws are addressed, not consumed: `normal(3)` is the same whether or not `normal(2)` was called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stream {
     key: [u32; 2],
@@ -54,13 +53,13 @@ impl Stream {
         philox([draw, self.attempt, self.index as u32, (self.index >> 32) as u32], self.key)
     }
 
-    /// Two independent uniforms in the open interval (0, 1), made of the words of the same draw.
+    /// Two independent uniforms in the open interval (0, 1), from the words of the same draw.
     pub fn uniforms(&self, draw: u32) -> [f64; 2] {
         let [a, b, c, d] = self.words(draw);
         [open_uniform(a, b), open_uniform(c, d)]
     }
 
-    /// A standard normal number, by Box and Muller's cosine.
+    /// A standard normal number, by the cosine form of Box and Muller.
     pub fn normal(&self, draw: u32) -> f64 {
         let [u, v] = self.uniforms(draw);
         (-2.0 * u.ln()).sqrt() * (TAU * v).cos()

@@ -1,6 +1,6 @@
-//! Numbers, counts and durations as people read them.
+//! Numbers, counts and durations as people write them.
 
-/// `value` with this many significant digits: plainly from 10⁻³ up to 10⁶, else with a power of ten.
+/// `value` with `digits` significant digits: plain from 10⁻³ to 10⁶, otherwise with a power of ten.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
@@ -32,12 +32,12 @@ pub fn count(number: u64, one: &str) -> String {
     format!("{} {}", grouped(number), plural(number, one))
 }
 
-/// The noun for `number` of what is called `one`.
+/// The plural of `one`, or `one` itself, as `number` requires.
 pub fn plural(number: u64, one: &str) -> String {
     format!("{one}{}", if number == 1 { "" } else { "s" })
 }
 
-/// `number` with its thousands apart from 10 000 on.
+/// `number` with thousands separated, from 10 000 on.
 pub fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
@@ -50,7 +50,7 @@ pub fn grouped(number: u64) -> String {
     text
 }
 
-/// Seconds in the unit that a person would take.
+/// Seconds in the unit that a person would use.
 pub fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {

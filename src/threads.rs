@@ -1,4 +1,4 @@
-//! Threads are started here, so that a system that has no more of them is an error by name.
+//! All threads are started here, so that a system without any left gives an error that says so.
 
 use std::{
     error::Error as _,
@@ -11,21 +11,21 @@ use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
 
 use crate::error::{Error, Result};
 
-/// What helps where the system starts no more threads.
+/// The remedy if the system starts no more threads.
 const REMEDY: &str = "raise the limit of this user or container (ulimit -u, pids.max), or end other processes";
 
 /// Starts a thread that does `work`; debuggers show its `name`.
 ///
 /// # Errors
-/// [`Error::Failed`] where the system starts no more threads.
+/// [`Error::Failed`] if the system starts no more threads.
 pub fn start(name: &str, work: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>> {
     Builder::new().name(name.into()).spawn(work).map_err(|e| no_more("a thread", "", &e))
 }
 
-/// A pool of `count` threads (0: all cores). A panic in one of them prints no second message.
+/// Starts a pool of `count` threads (0: all cores). A panic in one of them prints no second message.
 ///
 /// # Errors
-/// As [`start`].
+/// Those of [`start`].
 pub fn pool(count: usize) -> Result<ThreadPool> {
     let pool = ThreadPoolBuilder::new().num_threads(count).panic_handler(|_| {}).build();
     pool.map_err(|e| match count {
@@ -39,7 +39,7 @@ fn no_more(what: &str, fewer: &str, error: &dyn Display) -> Error {
     Error::Failed(format!("cannot start {what}: {error}; {fewer}{REMEDY}"))
 }
 
-/// `of` each number below `count`, in their order: on all cores, or on this thread alone where no others can be started.
+/// Returns `of` for each number below `count`, in order: on all cores, or on this thread if no others can be started.
 pub fn map<R: Send>(count: u32, of: impl Fn(u32) -> R + Sync) -> Vec<R> {
     if rayon::current_thread_index().is_some() || has_common_pool() {
         (0..count).into_par_iter().map(&of).collect()
@@ -48,12 +48,12 @@ pub fn map<R: Send>(count: u32, of: impl Fn(u32) -> R + Sync) -> Vec<R> {
     }
 }
 
-/// Whether rayon's common pool is there. A first use would panic where it cannot be started.
+/// Whether rayon's common pool exists. Its first use would panic if it could not be started.
 fn has_common_pool() -> bool {
     static IS_THERE: OnceLock<bool> = OnceLock::new();
     *IS_THERE.get_or_init(|| match ThreadPoolBuilder::new().build_global() {
         Ok(()) => true,
-        // Without a source the fault is that somebody built it before.
+        // An error without a source means that the pool was built earlier.
         Err(e) => e.source().is_none(),
     })
 }

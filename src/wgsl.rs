@@ -1,4 +1,4 @@
-//! Files of `shaders/`, compiled into the program.
+//! The files of `shaders/`, compiled into the program.
 
 /// A file: its name in `shaders/` and its text.
 pub type ShaderPart = (&'static str, &'static str);
