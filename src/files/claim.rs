@@ -1,7 +1,8 @@
-//! A folder that one command at a time writes into.
+//! A folder into which one command at a time writes.
 //!
-//! Two locks say so. That on the folder itself cannot be removed or exchanged under whoever holds it; that on the file
-//! `.curvelax.lock` is for file systems which lock files only, and there the file must stay what it is. Both end with their process.
+//! Two locks ensure this. The lock on the folder itself cannot be removed or replaced while it is held. The lock on the
+//! file `.curvelax.lock` is for file systems that lock files only; there the file must not be replaced. Both end with
+//! their process.
 
 use std::{
     fs::{File, TryLockError},
@@ -19,24 +20,24 @@ use crate::{
     input,
 };
 
-/// Locked while a run writes; what counts is the lock, which ends with its process, and not the file.
+/// Locked while a run writes. Only the lock counts, which ends with its process, not the file.
 pub const LOCK: &str = ".curvelax.lock";
 
-/// A folder that is held; let go when dropped.
+/// A folder that this process holds; released when dropped.
 #[derive(Debug)]
 pub struct Claim {
     /// Where it was found.
     path: PathBuf,
-    /// What was found there; nothing where the system opens no folders.
+    /// The folder that was opened there; nothing if the system opens no folders.
     folder: Option<Arc<File>>,
-    /// Whether that is locked.
+    /// Whether the folder itself is locked.
     whole: bool,
     place: Place,
     lock: File,
 }
 
 impl Claim {
-    /// Takes the folder at `path`; none if another process holds it.
+    /// Claims the folder at `path`; none if another process holds it.
     pub fn take(path: &Path) -> io::Result<Option<Claim>> {
         loop {
             let folder = if cfg!(unix) { Some(Arc::new(File::open(path)?)) } else { None };
@@ -52,7 +53,7 @@ impl Claim {
             let lock = lock(&place).map_err(|e| io::Error::new(e.kind(), format!("{LOCK}: {e}")))?;
             let Some(lock) = lock else { return Ok(None) };
             let claim = Claim { path: path.into(), folder, whole, place, lock };
-            // Whoever held it before may have removed the folder or the file after it was opened here.
+            // The previous holder may have removed the folder or the file after they were opened here.
             if claim.is_there()? && claim.has_its_file()? {
                 return Ok(Some(claim));
             }
@@ -64,7 +65,7 @@ impl Claim {
         &self.place
     }
 
-    /// Is called by its whole path from now on.
+    /// Uses the absolute path from now on.
     pub fn make_absolute(&mut self) -> Result<()> {
         self.path = std::path::absolute(&self.path).map_err(Error::io("cannot find", &self.path))?;
         self.place = match &self.folder {
@@ -74,10 +75,10 @@ impl Claim {
         Ok(())
     }
 
-    /// That it is still held, and still where it was found.
+    /// Checks that the folder is still held, and still where it was found.
     ///
     /// # Errors
-    /// [`Error::Lost`] where it is not.
+    /// [`Error::Lost`] if it is not.
     pub fn check(&self) -> Result<()> {
         let path = self.path.display();
         let cannot = Error::io("cannot find", &self.path);
@@ -105,7 +106,7 @@ impl Claim {
         lies_at(&self.lock, self.place.join(LOCK).at())
     }
 
-    /// Whether the folder is the one at its path, as far as can be told.
+    /// Whether the folder is still the one at its path, as far as this can be known.
     pub fn stays(&self) -> bool {
         self.is_there().unwrap_or(false)
     }
@@ -113,14 +114,14 @@ impl Claim {
 
 impl Drop for Claim {
     fn drop(&mut self) {
-        // Still locked: unlocked first, it could be another run's by the time it is removed.
+        // Removed while locked: after unlocking it could already be another run's.
         if self.has_its_file().unwrap_or(false) {
             let _ = remove(self.place.join(LOCK).at());
         }
     }
 }
 
-/// Locks the file in `folder`, made if need be; none if another process holds it.
+/// Locks the file in `folder`, creating it if needed; none if another process holds it.
 fn lock(folder: &Place) -> io::Result<Option<File>> {
     let path = folder.join(LOCK);
     if path.at().is_symlink() {
@@ -134,15 +135,15 @@ fn lock(folder: &Place) -> io::Result<Option<File>> {
     }
 }
 
-/// Whether another process holds the folder at `path`, or writes there now.
+/// Whether another process holds the folder at `path` or is writing there.
 pub fn is_held(path: &Path) -> bool {
     let locked =
         |file: io::Result<File>| file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)));
     locked(input::open(&path.join(LOCK))) || (cfg!(unix) && locked(File::open(path)))
 }
 
-/// Whether the file system says that it has no locks, which is no reason not to run: NFS without its lock daemon calls
-/// that `ENOLCK`.
+/// Whether the file system reports that it has no locks, which does not prevent a run: NFS without its lock daemon
+/// calls that `ENOLCK`.
 fn has_no_locks(error: &io::Error) -> bool {
     const ENOLCK: i32 = if cfg!(target_os = "linux") { 37 } else { 77 };
     error.kind() == io::ErrorKind::Unsupported || (cfg!(unix) && error.raw_os_error() == Some(ENOLCK))
@@ -189,7 +190,7 @@ mod tests {
         fs::remove_file(home.path().join(LOCK)).unwrap();
         claim.check().unwrap();
         assert!(Claim::take(home.path()).unwrap().is_none() && is_held(home.path()));
-        // As where only files have locks.
+        // As on file systems that lock files only.
         claim.whole = false;
         fs::write(home.path().join(LOCK), "").unwrap();
         let error = claim.check().unwrap_err().to_string();

@@ -1,4 +1,5 @@
-//! Columns of the tables: a name, what its fields hold, how they are written and read, and what they mean, in one line.
+//! Columns of the tables: a name, the type of the fields, how they are written and read, and what they mean, in one
+//! line.
 
 use serde::Serialize;
 
@@ -15,23 +16,23 @@ pub trait TableRow: Sized + 'static {
 pub struct Column<R> {
     /// The heading.
     pub name: &'static str,
-    /// What a field holds, as in the documents.
+    /// Type of the fields, as in the documents.
     pub holds: &'static str,
     /// What it means.
     pub meaning: &'static str,
     /// The field of a record.
     pub write: fn(&R) -> Field<'_>,
-    /// Takes the next field of a row over into a record.
+    /// Reads the next field of a row into a record.
     pub read: fn(&mut R, &mut Fields<'_>) -> Result<()>,
 }
 
-/// What is written into a field.
+/// The content of a field.
 #[derive(Serialize)]
 #[serde(untagged)]
 pub enum Field<'a> {
-    /// A whole number.
+    /// An integer ≥ 0.
     Whole(u64),
-    /// A whole number that may be negative.
+    /// An integer of either sign.
     Signed(i64),
     /// A float that reads back to the same bits, or nothing.
     Float(Option<f64>),
@@ -39,7 +40,8 @@ pub enum Field<'a> {
     Word(&'a str),
 }
 
-/// The columns of a [`TableRow`]: `heading: kind = path of the field, "meaning";` a line. The kinds are the modules below.
+/// The columns of a [`TableRow`], one per line: `heading: kind = path of the field, "meaning";`. The kinds are the
+/// modules below.
 macro_rules! columns {
     ($record:ty: $($name:ident: $kind:ident = $($field:ident).+, $meaning:literal;)+) => {
         impl $crate::files::column::TableRow for $record {
@@ -65,7 +67,7 @@ fn known(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// Kinds of columns: what a field holds, and how a value becomes one and is read again.
+/// Kinds of columns: the type of a field, and how a value is written and read.
 macro_rules! kinds {
     ($($(#[$doc:meta])* $kind:ident of $value:ty, $holds:literal: |$v:ident| $write:expr, |$fields:ident| $read:expr;)+) => {$(
         $(#[$doc])*
@@ -90,7 +92,7 @@ macro_rules! kinds {
 kinds! {
     /// A count or an index.
     whole of u64, "integer": |v| Field::Whole(*v), |fields| fields.whole();
-    /// A whole number of either sign.
+    /// An integer of either sign.
     signed of i32, "integer": |v| Field::Signed(i64::from(*v)), |fields| fields.whole();
     /// How a member ended.
     status of crate::ensemble::Status, "word": |v| Field::Word(v.name()), |fields| fields.status();

@@ -1,4 +1,4 @@
-//! What the file system is asked for: files that are no links, checksums, names that last.
+//! Operations on the file system: files that are not links, checksums, durable names.
 
 use std::{
     fs::{self, File},
@@ -12,11 +12,11 @@ use crate::{
     guard::guarded,
 };
 
-/// In every folder of a store.
+/// A file in every folder of a store.
 pub const IS_STORE: &str = "zarr.json";
 
-/// What lies in a folder, in no order. A listing panics where the system cannot close the folder, which changes nothing of
-/// what was read.
+/// The contents of a folder, in no order. A listing panics if the system cannot close the folder; the entries read are
+/// still valid.
 pub fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut listing = fs::read_dir(folder)?;
     let paths = listing.by_ref().map(|entry| Ok(entry?.path())).collect();
@@ -24,14 +24,14 @@ pub fn entries(folder: &Path) -> io::Result<Vec<PathBuf>> {
     paths
 }
 
-/// Makes the file anew: what lies there is removed and not written into, as it may be a link to elsewhere.
+/// Creates the file. An existing one is removed, not written into, as it may be a link to elsewhere.
 pub fn create(path: &Path) -> io::Result<File> {
     remove(path)?;
     File::create_new(path)
 }
 
-/// Removes the folder of a store and what is in it; it may be absent. What tells that it is a store goes last, so that what
-/// is left by one who is killed meanwhile still is one.
+/// Removes the folder of a store with its contents; it may be absent. The file that marks it as a store goes last, so
+/// that the remains after a kill are still recognised.
 pub fn remove_store(path: &Path) -> io::Result<()> {
     if path.is_symlink() {
         return fs::remove_file(path);
@@ -54,13 +54,13 @@ pub fn remove_store(path: &Path) -> io::Result<()> {
 /// Removes a file, which may be absent.
 pub fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
-        // Below a folder that is absent, too.
+        // Also if its folder is absent.
         Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
         _ => Ok(()),
     }
 }
 
-/// Whether a folder is there, and no link to one.
+/// Whether a folder exists at `path` and is not a link.
 pub fn is_real_folder(path: &Path) -> bool {
     path.symlink_metadata().is_ok_and(|of| of.is_dir())
 }
@@ -73,7 +73,7 @@ pub fn remove_any(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Bytes of what is left of `file`, and the CRC-32C of them after those of `crc`.
+/// Reads `file` to its end; returns the number of bytes and their CRC-32C, continued from `crc`.
 pub fn checksum(file: &mut impl Read, mut crc: u32) -> io::Result<(u64, u32)> {
     let mut length = 0;
     let mut buffer = vec![0; 1 << 16];
@@ -90,14 +90,14 @@ pub fn checksum(file: &mut impl Read, mut crc: u32) -> io::Result<(u64, u32)> {
     }
 }
 
-/// How many names the file has.
+/// Number of names (hard links) of the file.
 #[cfg(unix)]
 pub fn names_of(file: &File) -> io::Result<u64> {
     use std::os::unix::fs::MetadataExt;
     Ok(file.metadata()?.nlink())
 }
 
-/// Elsewhere that cannot be asked for in safe and stable Rust; a copy is never wrong.
+/// Not available elsewhere in safe and stable Rust; making a copy is always right.
 #[cfg(not(unix))]
 pub fn names_of(_: &File) -> io::Result<u64> {
     Ok(2)
@@ -114,12 +114,12 @@ pub fn sync_parent(place: &Place) -> Result<()> {
     sync_names(parent(place.at())).map_err(Error::io("cannot write to", parent(place.shown())))
 }
 
-/// Makes the names of what is in a folder durable.
+/// Makes the names of the entries of a folder durable.
 pub fn sync_folder(place: &Place) -> Result<()> {
     sync_names(place.at()).map_err(place.io("cannot write to"))
 }
 
-/// The same; only Unix lets a folder be synced.
+/// Does the same for a path; only Unix can sync a folder.
 pub fn sync_names(folder: &Path) -> io::Result<()> {
     match cfg!(unix) {
         true => File::open(folder).and_then(|folder| folder.sync_all()),
@@ -127,7 +127,7 @@ pub fn sync_names(folder: &Path) -> io::Result<()> {
     }
 }
 
-/// The folder in which `path` is a name.
+/// The folder that contains `path`.
 pub fn parent(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

@@ -13,7 +13,7 @@ use crate::{
 /// Characters of foreign text in a message.
 const SHOWN: usize = 200;
 
-/// The fields of a line, taken from left to right.
+/// The fields of a line, read from left to right.
 pub struct Fields<'a> {
     path: &'a Path,
     names: &'a [&'static str],
@@ -22,14 +22,14 @@ pub struct Fields<'a> {
 }
 
 impl<'a> Fields<'a> {
-    /// Those of `line` in the file at `path`, under these headings.
+    /// The fields of `line` in the file at `path`, under these headings.
     pub(super) fn new(path: &'a Path, names: &'a [&'static str], line: &'a StringRecord) -> Fields<'a> {
         Fields { path, names, line, taken: 0 }
     }
 }
 
 impl Fields<'_> {
-    /// The next one.
+    /// The next field, as a word.
     pub fn word(&mut self) -> &str {
         self.taken += 1;
         &self.line[self.taken - 1]
@@ -48,7 +48,7 @@ impl Fields<'_> {
         status.ok_or_else(|| self.unexpected(&Status::ALL.map(Status::name).join(", ")))
     }
 
-    /// A float; none if it is unknown.
+    /// A float; none if unknown.
     pub fn number(&mut self) -> Result<Option<f64>> {
         match self.word() {
             "" => Ok(None),
@@ -59,7 +59,7 @@ impl Fields<'_> {
         }
     }
 
-    /// A float; not a number if it is unknown.
+    /// A float; NaN if unknown.
     pub fn known(&mut self) -> Result<f64> {
         Ok(self.number()?.unwrap_or(f64::NAN))
     }
@@ -77,12 +77,12 @@ impl Fields<'_> {
         self.event()?.ok_or_else(|| self.unexpected("a time"))
     }
 
-    /// That the field taken last is not what was expected.
+    /// The error that the last field read is not what was expected.
     pub fn unexpected(&self, expected: &str) -> Error {
         self.refused(self.taken - 1, expected)
     }
 
-    /// That the field of the column `name` is not what was expected.
+    /// The error that the field of the column `name` is not what was expected.
     pub fn unexpected_in(&self, name: &str, expected: &str) -> Error {
         self.refused(self.names.iter().position(|own| *own == name).unwrap_or(0), expected)
     }

@@ -1,6 +1,6 @@
-//! A run's folder and the files in it: who may write there, how a file becomes durable, and what each one holds.
+//! A run's folder and its files: who may write there, how a file becomes durable, and what each one holds.
 //!
-//! Files grow under names ending in `.part` and get their own names together, when all of them are whole.
+//! Files grow under names ending in `.part` and get their final names together, when all of them are complete.
 
 pub mod claim;
 mod column;

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-/// One row a member.
+/// One row per member.
 pub const SUMMARY: &str = "summary.csv";
-/// Rates of decay, one row a member that has one.
+/// Decay rates, one row per member that has one.
 pub const RATES: &str = "rates.csv";
 /// Mean excess in time, by cell.
 pub const MEAN_EXCESS: &str = "mean_excess.csv";
@@ -20,13 +20,13 @@ pub const CONVERGENCE: &str = "convergence.csv";
 pub const ENSEMBLE: &str = "ensemble.csv";
 /// How the run was made.
 pub const RUN: &str = "run.json";
-/// The first members before, on their way and after.
+/// The first members at the start, during the run and at the end.
 pub const CURVES: &str = "plots/curves.svg";
 /// The nodes of the same members, from which pictures are drawn.
 pub const PORTRAITS: &str = "plots/portraits.json";
 /// Distribution of the relaxation times.
 pub const RELAXATION: &str = "plots/relaxation.svg";
-/// Fitted rates of decay.
+/// Fitted decay rates.
 pub const RATE: &str = "plots/rate.svg";
 /// Kaplan-Meier curves.
 pub const SURVIVAL: &str = "plots/survival.svg";
@@ -39,18 +39,18 @@ pub const MESH: &str = "plots/mesh.svg";
 /// Everything at a glance.
 pub const REPORT: &str = "report.html";
 
-/// What a merge has to know of a shard beside its tables, see [`shard`](crate::report::shard).
+/// What a merge needs from a shard besides its tables, see [`shard`](crate::report::shard).
 pub const SHARD: &str = "shard.state";
 
-/// What `curvelax figure` writes.
+/// The files of `curvelax figure`.
 pub const FIGURES: [&str; 8] =
     ["fig1a.svg", "fig1a.csv", "fig1b.svg", "fig1b.csv", "fig1c.svg", "fig1c.csv", "fig2.svg", "fig2.csv"];
 
-/// Rows that wait for their members to leave, see [`spill`](super::spill): never under this name, but while a run goes on as
-/// `.curvelax.rows.part`.
+/// Rows of members that are still running, see [`spill`](super::spill): never under this name, only as
+/// `.curvelax.rows.part` during a run.
 pub const ROWS: &str = "curvelax.rows";
 
-/// All that a run may write, the file that vouches for the others first.
+/// All files that a run may write; the one that vouches for the others comes first.
 pub const OWN: [&str; 19] = [
     RUN,
     SHARD,
@@ -73,26 +73,26 @@ pub const OWN: [&str; 19] = [
     ROWS,
 ];
 
-/// The tables of a run and its store, in the order in which they are named to people.
+/// The tables of a run and its store, in the order in which people see them.
 pub const TABLES: [&str; 7] = [SUMMARY, ENSEMBLE, RATES, MEAN_EXCESS, SERIES, SNAPSHOTS, STORE];
 
 /// The files that are drawn from the others.
 pub const PICTURES: [&str; 8] = [REPORT, RELAXATION, SURVIVAL, EXCESS, RATE, DEPENDENCE, MESH, CURVES];
 
-/// What helps against a file that was changed or cut off.
+/// The remedy for a file that was changed or truncated.
 pub const REMEDY: &str = "restore the file, or run again";
 
 /// The folder of the plots.
 pub const PLOTS: &str = "plots";
 
-/// From which an interrupted run goes on, see [`checkpoint`](crate::report::checkpoint).
+/// The checkpoint, see [`checkpoint`](crate::report::checkpoint).
 pub const STATE: &str = ".curvelax.state";
-/// The one before, for the case that the last one is damaged.
+/// The previous checkpoint, in case the last one is damaged.
 pub const STATE_OLD: &str = ".curvelax.state.old";
-/// The next one, while it is written.
+/// The next checkpoint, while it is being written.
 pub const STATE_PART: &str = ".curvelax.state.part";
 
-/// Says whether a folder can be written, and holds what is about to take the place of another file.
+/// Tests whether a folder can be written, and holds the replacement of another file.
 pub const PROBE: &str = ".curvelax.part";
 
 /// The temporary name of `name`.

@@ -1,4 +1,4 @@
-//! Whose a folder is: what a command may take, and what it must leave alone.
+//! Which command a folder belongs to: what a command may use, and what it must leave alone.
 
 use std::{
     collections::BTreeSet,
@@ -22,20 +22,20 @@ pub enum Owner {
     Convergence,
     /// `figure`.
     Figure,
-    /// `plot` with a folder of its own.
+    /// `plot` with a separate folder.
     Pictures,
     /// `plot` in the folder of the run that it draws.
     PicturesOfRun,
 }
 
-/// What is done about a folder that exists.
+/// How an existing folder is treated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
-    /// It is refused, unless nothing is in it but what a run leaves that is killed before it began.
+    /// Refused, unless it only has what a run killed before it began leaves.
     Refused,
-    /// It is taken unless a name in it is needed.
+    /// Accepted, unless a name in it is needed.
     Filled,
-    /// Files of an earlier run of the same command are replaced.
+    /// Accepted; files of an earlier run of the same command are replaced.
     Replaced,
 }
 
@@ -47,13 +47,13 @@ impl From<bool> for Existing {
 }
 
 impl Owner {
-    /// What only this command leaves.
+    /// Files that only this command writes.
     fn marks(self) -> &'static [&'static str] {
         match self {
             Owner::Run => &[RUN, SHARD, STATE, STATE_OLD],
             Owner::Convergence => &[CONVERGENCE],
             Owner::Figure => &FIGURES,
-            // Those of a run that lost the rest.
+            // They may be left over from a run whose other files are lost.
             Owner::Pictures | Owner::PicturesOfRun => &[],
         }
     }
@@ -67,7 +67,7 @@ impl Owner {
         }
     }
 
-    /// Refuses the folder at `place`, which is called `path`, if another command has written there.
+    /// Refuses the folder at `place`, called `path`, if another command has written there.
     ///
     /// # Errors
     /// [`Error::Request`] naming that command and its file.
@@ -85,11 +85,11 @@ impl Owner {
 }
 
 impl Existing {
-    /// Refuses the folder at `place`, which is called `path` and is to get the files `names`, as far as something in it
-    /// would be lost.
+    /// Refuses the folder at `place`, called `path`, in which files `names` will be written, if something in it would
+    /// be lost.
     ///
     /// # Errors
-    /// [`Error::Request`] that says what is there.
+    /// [`Error::Request`] naming what is there.
     pub fn check(self, place: &Path, path: &Path, names: &[String]) -> Result<()> {
         let refuse = |problem: &str, allowed: &str| Err(Error::value("out", path.display(), problem, allowed));
         if self == Existing::Replaced {
@@ -113,8 +113,8 @@ impl Existing {
     }
 }
 
-/// Whether `folder` holds what a run leaves that is killed before its first state, and nothing else. An empty one may be
-/// somebody's.
+/// Whether `folder` holds only what a run killed before its first checkpoint leaves. An empty one may belong to
+/// someone.
 fn is_only_begun(folder: &Path, names: &[String]) -> io::Result<bool> {
     let parts: BTreeSet<PathBuf> = names.iter().map(|name| part(Path::new(name))).collect();
     let is_left = |path: &Path| {

@@ -1,4 +1,4 @@
-//! A file that grows as `.NAME.part` and takes its final name only when it is complete and on disk.
+//! A file that grows as `.NAME.part` and gets its final name only when it is complete and on disk.
 
 use std::{
     cell::Cell,
@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 use super::{disk::sync_parent, place::Place};
 use crate::error::Result;
 
-/// What is said of a file that failed before.
+/// The message about a file that failed before.
 const TORN: &str = "an earlier write failed";
 
-/// A growing file as far as a state vouches for it.
+/// The length and checksum of a growing file, as recorded in a checkpoint.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Mark {
     /// Its final name.
@@ -26,55 +26,55 @@ pub struct Mark {
     pub crc: u32,
 }
 
-/// A file that is not complete yet; dropped so, it is removed unless [told](PartFile::keep) otherwise.
+/// An incomplete file; dropped in that condition it is removed, unless [kept](PartFile::keep).
 #[derive(Debug)]
 pub struct PartFile {
     file: File,
     part: Place,
     target: Place,
-    /// What was written.
+    /// The part written so far.
     mark: Mark,
     keep: Cell<bool>,
     broken: bool,
-    /// What was written may not be on disk, whatever the system says.
+    /// The data may not be on disk, whatever the system says.
     torn: Cell<bool>,
     finished: bool,
 }
 
 impl PartFile {
-    /// Goes on with `file`, which lies at `part` and holds what `mark` tells; it will be `target`.
+    /// Continues `file`, which is at `part` and matches `mark`; its final name is `target`.
     pub(super) fn new(file: File, part: Place, target: Place, mark: Mark) -> PartFile {
         let (keep, torn) = (Cell::new(mark.length > 0), Cell::new(false));
         PartFile { file, part, target, mark, keep, broken: false, torn, finished: false }
     }
 
-    /// Whether nothing was written yet.
+    /// Whether nothing has been written yet.
     pub fn is_empty(&self) -> bool {
         self.mark.length == 0
     }
 
-    /// Bytes that were written.
+    /// Bytes written.
     pub fn length(&self) -> u64 {
         self.mark.length
     }
 
-    /// Whether what is written is worth keeping if the run fails.
+    /// Sets whether to keep the file if the run fails.
     pub fn keep(&self, keep: bool) {
         self.keep.set(keep);
     }
 
-    /// What was written so far, once it is on disk.
+    /// Returns what has been written, once it is on disk.
     pub fn mark(&self) -> Result<Mark> {
         self.sync()?;
         Ok(self.mark.clone())
     }
 
-    /// Where it lies under its temporary name.
+    /// Its place under its temporary name.
     pub fn part(&self) -> &Place {
         &self.part
     }
 
-    /// The path of its final name, to be told.
+    /// The path of its final name, for messages.
     pub fn target(&self) -> &Path {
         self.target.shown()
     }
@@ -87,7 +87,7 @@ impl PartFile {
     /// Returns once its content is on disk.
     pub fn sync(&self) -> Result<()> {
         let synced = self.file.sync_all();
-        // What was not synced once may be lost although it is synced the next time.
+        // Data that failed to sync once may be lost even if a later sync succeeds.
         self.torn.set(self.torn.get() || synced.is_err());
         let whole = if self.torn.get() && synced.is_ok() { Err(io::Error::other(TORN)) } else { synced };
         whole.map_err(self.target.io("cannot write"))
@@ -103,7 +103,7 @@ impl PartFile {
 
 impl Write for PartFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // A writer with a buffer tries again when dropped, and would repeat what had got through.
+        // A buffered writer tries again when dropped, and would repeat data that was written.
         if self.broken {
             return Err(io::Error::other(TORN));
         }

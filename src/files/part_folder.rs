@@ -1,4 +1,4 @@
-//! A folder of files that grows as `.NAME.part` and takes its final name only when all of it is complete and on disk.
+//! A folder of files that grows as `.NAME.part` and gets its final name only when it is complete and on disk.
 
 use std::{
     fs::{self, File},
@@ -15,39 +15,38 @@ use crate::{
     input,
 };
 
-/// What the name of a file ends in that is to take the place of another.
+/// The suffix of a file that is to replace another.
 const SUCCESSOR: &str = "part";
 
-/// A folder that is not complete yet; dropped so, it is removed with all that is in it unless
-/// [told](PartFolder::keep) otherwise.
+/// An incomplete folder; dropped in that condition it is removed with its contents, unless [kept](PartFolder::keep).
 #[derive(Debug)]
 pub struct PartFolder {
     part: Place,
     target: Place,
     /// The folders in it.
     below: Vec<Place>,
-    /// It was begun by a run that was interrupted.
+    /// Whether an interrupted run began it.
     again: bool,
     keep: bool,
     finished: bool,
 }
 
 impl PartFolder {
-    /// Makes it, empty, at `part`; it will be `target`.
+    /// Creates it, empty, at `part`; its final name is `target`.
     pub(super) fn begin(part: Place, target: Place) -> Result<PartFolder> {
         fs::create_dir(part.at()).map_err(part.io("cannot make the folder"))?;
         Ok(PartFolder { part, target, below: Vec::new(), again: false, keep: false, finished: false })
     }
 
-    /// Goes on with the one at `part`, whose files may be written once more.
+    /// Continues the folder at `part`, whose files may be written again.
     pub(super) fn again(part: Place, target: Place) -> PartFolder {
         PartFolder { part, target, below: Vec::new(), again: true, keep: true, finished: false }
     }
 
-    /// Makes the folder `name` in it.
+    /// Creates the folder `name` in it.
     pub fn make(&mut self, name: &str) -> Result<()> {
         let path = self.part.join(name);
-        // A link to a folder is none: what is in it is not ours.
+        // A link to a folder does not count: its contents are not ours.
         if !(self.again && path.at().symlink_metadata().is_ok_and(|of| of.is_dir())) {
             fs::create_dir(path.at()).map_err(path.io("cannot make the folder"))?;
         }
@@ -55,15 +54,15 @@ impl PartFolder {
         Ok(())
     }
 
-    /// Writes the whole file `name` (with `/` between a folder in it and the file), whose content is on disk then.
+    /// Writes the whole file `name` (with `/` between a folder in it and the file), and returns once it is on disk.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let path = self.part.join(name);
         let path = path.at();
-        // What makes it a store stays there without a gap.
+        // The file that makes it a store is never absent.
         if self.again && input::bytes(path, bytes.len() as u64).is_ok_and(|old| old == bytes) {
             return Ok(());
         }
-        // What is there stays until it has a successor.
+        // An existing file stays until its replacement is complete.
         let replaced = self.again && path.symlink_metadata().is_ok();
         let place = if replaced { path.with_extension(SUCCESSOR) } else { path.to_path_buf() };
         let file = if replaced { create(&place) } else { File::create_new(&place) };
@@ -73,19 +72,19 @@ impl PartFolder {
             if replaced { fs::rename(&place, path) } else { Ok(()) }
         });
         written.map_err(|e| {
-            // Half a file would be taken for a whole one.
+            // Half a file would be mistaken for a whole one.
             let _ = fs::remove_file(&place);
             self.target.join(name).io("cannot write")(e)
         })
     }
 
-    /// Removes what a run that was killed left of files that were to take the place of others.
+    /// Removes unfinished replacements left by a killed run.
     pub(super) fn sweep(&self) -> Result<()> {
         sweep(self.part.at(), true)
             .map_err(|e| Error::Request(format!("{}: cannot go on with it ({e})", self.part.shown().display())))
     }
 
-    /// Whether what is written is worth keeping if the run fails.
+    /// Sets whether to keep the folder if the run fails.
     pub fn keep(&mut self, keep: bool) {
         self.keep = keep;
     }
@@ -95,17 +94,17 @@ impl PartFolder {
         &self.part
     }
 
-    /// The path of its final name, to be told.
+    /// The path of its final name, for messages.
     pub fn target(&self) -> &Path {
         self.target.shown()
     }
 
-    /// Returns once the names of all files in it are on disk, as their contents are.
+    /// Returns once the names of all files in it are on disk; their contents already are.
     pub fn sync(&self) -> Result<()> {
         self.below.iter().chain([&self.part]).try_for_each(sync_folder)
     }
 
-    /// Gives the folder its final name, in the place of what an earlier run left there.
+    /// Gives the folder its final name, replacing what an earlier run left there.
     pub(super) fn finish(mut self) -> Result<()> {
         remove_store(self.target.at()).map_err(self.target.io("cannot remove"))?;
         fs::rename(self.part.at(), self.target.at()).map_err(self.target.io("cannot write"))?;
@@ -122,7 +121,7 @@ impl Drop for PartFolder {
     }
 }
 
-/// Removes such files in `folder` and, where `below`, in the folders in it.
+/// Removes unfinished replacements in `folder` and, if `below`, in its subfolders.
 fn sweep(folder: &Path, below: bool) -> io::Result<()> {
     for path in entries(folder)? {
         if path.symlink_metadata()?.is_dir() {
@@ -179,7 +178,7 @@ mod tests {
         assert_eq!(names(&old), ["x", "zarr.json"]);
         assert_eq!(fs::read(old.join("x/c.0")).unwrap(), b"new");
 
-        // A run that writes none removes it.
+        // A run without a store removes it.
         let folder = OutputFolder::open(home.path(), true).unwrap();
         folder.publish(Vec::new(), None, folder.write(RUN, "newer").unwrap()).unwrap();
         drop(folder);
@@ -229,7 +228,7 @@ mod tests {
             assert!(error.to_string().contains(problem), "{error}");
             assert_eq!(fs::read_to_string(&mine).unwrap(), "mine");
         }
-        // An empty folder is nobody's loss.
+        // Nobody misses an empty folder.
         let home = tempfile::tempdir().unwrap();
         fs::create_dir(home.path().join(STORE)).unwrap();
         OutputFolder::open(home.path(), true).unwrap();

@@ -1,8 +1,8 @@
-//! A name in a folder: what the system is asked for, and what people are told.
+//! A name in a folder: the path for the system, and the path for people.
 //!
-//! A folder that was opened is reached through what was opened, not by its path: whatever is moved to that path meanwhile is
-//! not touched. Safe Rust has no `openat`, but Linux names what a process has opened: `/proc/self/fd/N/NAME`. Elsewhere it is
-//! the path.
+//! An open folder is accessed through its handle, not by its path: whatever is moved to that path meanwhile is not
+//! touched. Safe Rust has no `openat`, but Linux names open folders: `/proc/self/fd/N/NAME`. Other systems use the
+//! path.
 
 use std::{
     fs::{self, File},
@@ -18,17 +18,17 @@ use crate::error::Error;
 pub struct Place {
     at: PathBuf,
     shown: PathBuf,
-    /// Open as long as a name in it is in use: the number of a closed one would be that of another soon.
+    /// Open as long as a name in it is in use: the descriptor of a closed one would soon be reused.
     _folder: Option<Arc<File>>,
 }
 
 impl Place {
-    /// What has this path at the moment.
+    /// Whatever has this path at the moment.
     pub fn named(path: &Path) -> Place {
         Place { at: path.into(), shown: path.into(), _folder: None }
     }
 
-    /// The folder that was opened at `path`, wherever it is by now.
+    /// The folder that was opened at `path`, wherever it is now.
     pub fn opened(path: &Path, folder: Arc<File>) -> Place {
         match descriptor(&folder) {
             Some(at) => Place { at, shown: path.into(), _folder: Some(folder) },
@@ -36,7 +36,7 @@ impl Place {
         }
     }
 
-    /// What is called `name` in it.
+    /// The place `name` in it.
     pub fn join(&self, name: impl AsRef<Path>) -> Place {
         Place { at: self.at.join(&name), shown: self.shown.join(&name), _folder: self._folder.clone() }
     }
@@ -46,24 +46,24 @@ impl Place {
         &self.at
     }
 
-    /// The path to tell.
+    /// The path for messages.
     pub fn shown(&self) -> &Path {
         &self.shown
     }
 
-    /// As [`Error::io`].
+    /// Does the same as [`Error::io`].
     pub fn io(&self, action: &'static str) -> impl FnOnce(io::Error) -> Error + use<> {
         let path = self.shown.clone();
         move |source| Error::Io { action, path, source }
     }
 }
 
-/// The name of what was opened, where the system has one.
+/// The path of an open folder's handle, if the system has one.
 #[cfg(target_os = "linux")]
 fn descriptor(folder: &File) -> Option<PathBuf> {
     use std::os::fd::AsRawFd;
     let path = PathBuf::from(format!("/proc/self/fd/{}", folder.as_raw_fd()));
-    // Where /proc is not mounted there is none.
+    // There is none if /proc is not mounted.
     lies_at(folder, &path).is_ok_and(|same| same).then_some(path)
 }
 
@@ -72,7 +72,7 @@ fn descriptor(_: &File) -> Option<PathBuf> {
     None
 }
 
-/// Whether `file` is what has this path; false where nothing has.
+/// Whether `file` is the file at `path`; false if there is none.
 #[cfg(unix)]
 pub fn lies_at(file: &File, path: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
@@ -84,7 +84,7 @@ pub fn lies_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-/// Elsewhere a file has no number to ask for in safe and stable Rust; a file at its place has to do.
+/// Elsewhere, safe and stable Rust cannot identify a file; any file at this path must do.
 #[cfg(not(unix))]
 pub fn lies_at(_: &File, path: &Path) -> io::Result<bool> {
     path.try_exists()

@@ -1,7 +1,7 @@
-//! `plots/portraits.json`: the first members at the start, on their way and at the end.
+//! `plots/portraits.json`: the first members at the start, during the run and at the end.
 //!
-//! All pictures of them are drawn from what this file holds, so that they can be drawn again from it. A coordinate is a
-//! whole number below 4096 and two digits of base64; each member has a scale of its own, and depends on no other.
+//! All their pictures are drawn from this file, so that they can be redrawn from it. A coordinate is an integer below
+//! 4096, written as two digits of base64. Each member has its own scale and does not depend on the others.
 
 use std::path::Path;
 
@@ -31,13 +31,13 @@ pub struct Film {
     pub status: Status,
     /// Its relaxation time.
     pub t_relax: Option<f64>,
-    /// Number of its nodes, of which every m-th is kept.
+    /// Number of its nodes; every m-th is stored.
     pub points: usize,
     /// Place of the coordinates (0, 0), in the user's frame.
     corner: [f64; 2],
     /// Length of one unit of the coordinates.
     unit: f64,
-    /// Ascending, the first 0 and the last that of the last accepted state.
+    /// Ascending times, from 0 to the last accepted state.
     pub times: Vec<f64>,
     /// Coordinates x, y, x, y, … of the nodes at each time.
     nodes: Vec<String>,
@@ -50,7 +50,7 @@ struct Portraits {
 }
 
 impl Film {
-    /// Rounds what a member left. Times at which a node is not finite, or too large to be drawn, are left out.
+    /// Rounds the portrait of a member. Times at which a node is not finite, or too large to draw, are left out.
     pub fn new(outcome: &Outcome, portrait: &Portrait) -> Film {
         let Portrait { before, frames, after } = portrait;
         let stride = Portrait::stride(before.len());
@@ -77,7 +77,7 @@ impl Film {
         Film { member, status, t_relax, points: before.len(), corner: low.to_array(), unit, times, nodes }
     }
 
-    /// The nodes at each time, equally many at all.
+    /// The nodes at each time; their number is always the same.
     pub fn frames(&self) -> Vec<Vec<DVec2>> {
         let place = |digits: &[u8]| {
             let [x, y] =
@@ -87,7 +87,7 @@ impl Film {
         self.nodes.iter().map(|text| text.as_bytes().chunks_exact(4).map(place).collect()).collect()
     }
 
-    /// What is wrong with it, if it was not written by this program.
+    /// What is wrong with it, if this program did not write it.
     pub fn fault(&self) -> Option<&'static str> {
         let known = |text: &String| text.bytes().all(|digit| DIGITS.contains(&digit));
         let equal = |text: &String| text.len().is_multiple_of(4) && text.len() == self.nodes[0].len();
@@ -107,14 +107,14 @@ impl Film {
 pub fn to_json(films: &[Film]) -> Result<String> {
     let text = serde_json::to_string(&Portraits { members: films.into() });
     let text = text.map_err(|e| Error::Failed(format!("cannot write {}: {e}", names::PORTRAITS)))?;
-    // A line a member: long enough, and it can be looked at.
+    // One line per member: long, but readable.
     Ok(text.replace("{\"member\":", "\n{\"member\":") + "\n")
 }
 
 /// Reads the file at `path`.
 ///
 /// # Errors
-/// [`Error::Request`] that names the file, and the member where it has one.
+/// [`Error::Request`] naming the file, and the member if there is one.
 pub fn read(path: &Path) -> Result<Vec<Film>> {
     let text = input::text(path, input::MAX_PORTRAITS);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
@@ -153,7 +153,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::results::tally::tests::outcome;
 
-    /// A perturbed ellipse of n nodes that ends as a circle, or on its way there if it has not relaxed.
+    /// A perturbed ellipse of n nodes that ends as a circle, or part of the way there if it has not relaxed.
     pub fn film(member: u64, n: usize, status: Status, t_relax: Option<f64>) -> Film {
         let size = 1.0 + 0.1 * (member % 3) as f64;
         let nodes = |t: f64| -> Vec<DVec2> {

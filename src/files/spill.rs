@@ -1,7 +1,8 @@
-//! Rows of members that have not left the run yet, on disk: `.curvelax.rows.part`.
+//! Rows on disk of members that are still running: `.curvelax.rows.part`.
 //!
-//! A member may leave a million rows, and leaves them when those before it have left theirs. Meanwhile they wait here, not
-//! in memory. The file only grows, so that what any state refers to is still there, and it goes with the last state.
+//! A member may have a million rows, and writes them to the tables only after the members before it. Until then they
+//! wait here, not in memory. The file only grows, so that everything that any checkpoint refers to is still there; it
+//! is removed with the last checkpoint.
 
 use std::{
     fs::File,
@@ -19,7 +20,7 @@ use crate::{
     input,
 };
 
-/// Rows that were added together, as they are written.
+/// Rows added together, as they are written.
 pub type SpilledRows = (Vec<SeriesRow>, Vec<Snapshot>);
 
 /// The file.
@@ -34,7 +35,7 @@ impl Spill {
         Spill::of(folder.file(names::ROWS)?)
     }
 
-    /// Goes on with that of an interrupted run.
+    /// Continues the file of an interrupted run.
     pub fn resume(folder: &OutputFolder, mark: &Mark) -> Result<Spill> {
         Spill::of(folder.file_again(mark)?)
     }
@@ -53,10 +54,10 @@ impl Spill {
         Ok(extent)
     }
 
-    /// The rows at `extent`.
+    /// Reads the rows at `extent`.
     ///
     /// # Errors
-    /// [`Error::Failed`] where others lie there than were added.
+    /// [`Error::Failed`] if they are not the rows that were added.
     pub fn read(&mut self, extent: &Extent) -> Result<SpilledRows> {
         let place = self.file.part();
         let changed = || {
@@ -76,12 +77,12 @@ impl Spill {
         }
     }
 
-    /// How far it has grown, once that is on disk.
+    /// Returns its length and checksum, once it is on disk.
     pub fn mark(&self) -> Result<Mark> {
         self.file.mark()
     }
 
-    /// Whether it is needed if the run fails.
+    /// Sets whether to keep it if the run fails.
     pub fn keep(&self, keep: bool) {
         self.file.keep(keep);
     }

@@ -1,5 +1,5 @@
-//! Tables read back, row by row. Nothing is taken on trust: whatever this program would not have written is refused, with
-//! file, line and column, what was expected there and what was found.
+//! Reads tables row by row. Nothing is trusted: anything that this program would not have written is refused, with
+//! file, line and column, the expected and the actual content.
 
 use std::{
     fs::File,
@@ -34,7 +34,7 @@ impl<R: TableRow + Default> TableReader<R> {
     /// Opens the table at `place`, and reads its header.
     ///
     /// # Errors
-    /// [`Error::Request`] where there is none, or one with other columns, or one that is cut off.
+    /// [`Error::Request`] if it does not exist, has other columns, or is truncated.
     pub fn open(place: &Place) -> Result<TableReader<R>> {
         let path = place.shown().to_path_buf();
         let file = input::open(place.at()).and_then(|mut file| Ok((ends_with_a_line(&mut file)?, file)));
@@ -44,7 +44,7 @@ impl<R: TableRow + Default> TableReader<R> {
             let problem = "expected an end of line, found the end of the file: it was cut off";
             return Err(Error::Request(format!("{}: {problem}; {REMEDY}", path.display())));
         }
-        // Rows are checked here, where more can be said about them.
+        // Rows are checked here, where messages can say more.
         let reader =
             ReaderBuilder::new().has_headers(false).flexible(true).quoting(false).from_reader(Lines::new(file));
         let names = R::COLUMNS.iter().map(|column| column.name).collect();
@@ -59,10 +59,10 @@ impl<R: TableRow + Default> TableReader<R> {
         Ok(table)
     }
 
-    /// The next row, and its fields for what else may be wrong with them.
+    /// Returns the next row, and its fields for further checks.
     ///
     /// # Errors
-    /// [`Error::Request`] for a field that holds something else than its column.
+    /// [`Error::Request`] for a field that does not fit its column.
     pub fn read(&mut self) -> Result<Option<(R, Fields<'_>)>> {
         let Some(mut fields) = self.fields()? else { return Ok(None) };
         let mut record = R::default();
@@ -86,7 +86,7 @@ impl<R: TableRow + Default> TableReader<R> {
     }
 }
 
-/// Whether the file is complete as far as its last byte tells; it is then read from its start.
+/// Returns whether the file ends with a line break, and rewinds it.
 fn ends_with_a_line(file: &mut File) -> std::io::Result<bool> {
     let mut last = [0];
     if file.metadata()?.len() > 0 {

@@ -1,6 +1,6 @@
-//! The CSV files: one header, floats that read back exactly, unknown is empty, sorted by member.
+//! The CSV files: one header, floats that read back exactly, empty fields for unknown values, sorted by member.
 //!
-//! A float that is not finite is unknown. No clock times here: equal runs give equal bytes.
+//! A float that is not finite is unknown. There are no clock times: equal runs give equal bytes.
 
 use std::marker::PhantomData;
 
@@ -50,7 +50,7 @@ columns! { Outcome:
     self_crossing: event = self_crossing, "time at which the polygon was first seen to cross itself, which does not stop the member";
 }
 
-/// A row of `rates.csv`: the fitted rate of a member, beside that of linear theory.
+/// A row of `rates.csv`: the fitted rate of a member, and that of linear theory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RateRow {
     member: u64,
@@ -142,7 +142,7 @@ pub struct Table<R> {
     kind: PhantomData<fn(R)>,
 }
 
-/// `summary.csv`: one row a member.
+/// `summary.csv`: one row per member.
 pub type SummaryTable = Table<Outcome>;
 /// `rates.csv`: the fitted rate of each member that has one.
 pub type RateTable = Table<RateRow>;
@@ -152,7 +152,7 @@ pub type SeriesTable = Table<SeriesRow>;
 pub type SnapshotTable = Table<NodeRow>;
 
 impl<R: TableRow> Table<R> {
-    /// Begins a table with its header, or goes on with the rows that are in `file`.
+    /// Begins a table with its header, or continues after the rows in `file`.
     pub fn new(file: PartFile) -> Result<Self> {
         let begins = file.is_empty();
         let writer = WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
@@ -163,23 +163,23 @@ impl<R: TableRow> Table<R> {
         Ok(table)
     }
 
-    /// How far it has grown, once that is on disk.
+    /// Returns its length and checksum, once it is on disk.
     pub fn mark(&mut self) -> Result<Mark> {
         self.writer.flush().map_err(Error::io("cannot write", self.writer.get_ref().target()))?;
         self.writer.get_ref().mark()
     }
 
-    /// Whether its rows are worth keeping if the run fails.
+    /// Sets whether to keep its rows if the run fails.
     pub fn keep(&self, keep: bool) {
         self.writer.get_ref().keep(keep);
     }
 
-    /// The temporary name under which its rows lie.
+    /// The place of its rows, under a temporary name.
     pub fn part(&self) -> &Place {
         self.writer.get_ref().part()
     }
 
-    /// The whole table, on disk and ready for its final name.
+    /// Completes the table on disk, ready for its final name.
     pub fn ready(self) -> Result<PartFile> {
         let target = self.writer.get_ref().target().to_path_buf();
         let file = self.writer.into_inner().map_err(|e| Error::io("cannot write", &target)(e.into_error()))?;
@@ -197,7 +197,7 @@ impl<R: TableRow> Table<R> {
         self.writer.serialize(row).map_err(|e| Error::io("cannot write", self.writer.get_ref().target())(e.into()))
     }
 
-    /// The whole table in `file`, ready for its final name.
+    /// Writes a whole table into `file`, ready for its final name.
     pub fn of(file: PartFile, rows: &[R]) -> Result<PartFile> {
         let mut table = Table::new(file)?;
         rows.iter().try_for_each(|row| table.row(row))?;
@@ -206,7 +206,7 @@ impl<R: TableRow> Table<R> {
 }
 
 impl RateRow {
-    /// That of a member, if it has a rate.
+    /// The row of a member, if it has a rate.
     pub fn of(member: &Outcome) -> Option<RateRow> {
         let Outcome { member, cell, rate, rate_r2, rate_theory, .. } = *member;
         let rate_ratio = rate_theory.map(|theory| rate.unwrap_or_default() / theory);
@@ -215,7 +215,7 @@ impl RateRow {
 }
 
 impl SnapshotTable {
-    /// Writes one row a node, i = 1…n.
+    /// Writes one row per node, i = 1…n.
     pub fn snapshot(&mut self, snapshot: &Snapshot) -> Result<()> {
         let Snapshot { member, t, x, y, k, r } = snapshot;
         let nodes = x.iter().zip(y).zip(k).zip(r);
@@ -227,7 +227,7 @@ impl SnapshotTable {
 }
 
 impl ErrorRow {
-    /// That of a run: τ or the tolerance of adaptive steps is empty.
+    /// The row of a run; either τ or the tolerance of adaptive steps is empty.
     pub fn of(run: &ConvergenceRow) -> ErrorRow {
         let ConvergenceRow { problem, varied, at, error, order, .. } = run;
         ErrorRow {

@@ -12,7 +12,7 @@ use crate::{
 };
 
 impl OutputFolder {
-    /// Puts a state in the place of the last one, which is kept as the one before.
+    /// Saves a checkpoint; the last one becomes the previous one.
     pub fn keep_state(&self, bytes: &[u8]) -> Result<()> {
         self.check_claim()?;
         let [state, old, part] = [STATE, STATE_OLD, STATE_PART].map(|name| self.place(name));
@@ -33,13 +33,14 @@ impl OutputFolder {
         sync_folder(&self.place)
     }
 
-    /// Removes a last state that is damaged, lest it become the one before.
+    /// Removes a damaged last checkpoint, lest it become the previous one.
     pub fn forget_last_state(&self) -> Result<()> {
         let state = self.place(STATE);
         remove(state.at()).map_err(state.io("cannot remove"))
     }
 
-    /// Removes the states, the older one first: alone it would go on with files that have their final names.
+    /// Removes the checkpoints, the older one first: alone it would resume with files that already have their final
+    /// names.
     pub fn forget_states(&self) -> Result<()> {
         for name in [STATE_PART, STATE_OLD, STATE] {
             let place = self.place(name);
@@ -67,7 +68,7 @@ mod tests {
             folder.keep_state(bytes.as_bytes()).unwrap();
             assert_eq!(state_of(&folder), kept);
         }
-        // The last one is damaged: the one before stays until a new one is whole.
+        // The last one is damaged: the previous one stays until a new one is complete.
         folder.forget_last_state().unwrap();
         folder.keep_state(b"4").unwrap();
         assert_eq!(state_of(&folder), ["4", "2"]);

@@ -1,4 +1,4 @@
-//! What an earlier run left in a folder: names in the way, and files that are removed.
+//! What an earlier run left in a folder: names in the way, and files to remove.
 
 use std::{io, path::Path};
 
@@ -13,7 +13,7 @@ use crate::{
 };
 
 impl OutputFolder {
-    /// Refuses, before any work, names that this run could not give to its files at the end.
+    /// Refuses, before any work, a folder in which this run could not give its files their final names.
     pub(super) fn check_names(&mut self) -> Result<()> {
         let in_the_way = |place: &Place, what: &str| {
             let problem = format!("{} is {what}", place.shown().display());
@@ -33,7 +33,7 @@ impl OutputFolder {
                 // A link to a folder is removed like one to a file.
                 (false, true) if !path.is_symlink() => return in_the_way(&place, "a folder"),
                 (true, false) if path.symlink_metadata().is_ok() => return in_the_way(&place, "no folder"),
-                // All in it would be removed.
+                // Everything in it would be removed.
                 (true, true) if !is_own_store(path) => {
                     return in_the_way(&place, "not the folder of an earlier run");
                 }
@@ -44,19 +44,19 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// Removes what an interrupted run left, but for the files in `keep`.
+    /// Removes what an interrupted run left, except the files in `keep`.
     pub(super) fn remove_parts(&self, keep: &[&str]) -> io::Result<()> {
         let parts = self.names.iter().filter(|name| !keep.contains(&name.as_str()));
         parts.into_iter().try_for_each(|name| remove_any(self.part(name).at()))
     }
 
-    /// Removes what a run left beside the files of a complete one because it was killed before its first state.
+    /// Removes what a run killed before its first checkpoint left next to the files of a complete one.
     pub fn tidy(&self) -> Result<()> {
         self.forget_states()?;
         self.keep_only(&[])
     }
 
-    /// Removes everything that an interrupted run left but for what `names` name.
+    /// Removes everything that an interrupted run left, except `names`.
     pub fn keep_only(&self, names: &[&str]) -> Result<()> {
         self.remove_parts(names).map_err(Error::io("cannot remove what a run left in", &self.path))
     }

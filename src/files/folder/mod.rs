@@ -1,4 +1,4 @@
-//! The output folder. A file grows as `.NAME.part` and takes its final name only when it is complete and on disk.
+//! The output folder. A file grows as `.NAME.part` and gets its final name only when it is complete and on disk.
 
 mod checkpoints;
 mod leftovers;
@@ -21,40 +21,40 @@ use super::{
 };
 use crate::error::{Error, Result};
 
-/// The system knows no longer paths.
+/// The longest path of the system.
 const MAX_PATH: usize = if cfg!(target_os = "linux") { 4096 } else { 1024 };
-/// Bytes of the longest name in a folder: a chunk of a store, for more members than there are.
+/// Bytes of the longest name in a folder: a chunk of a store, for more members than any run has.
 const MAX_NAME: usize = 96;
 
-/// A folder that this run, and no other at the same time, may write into.
+/// A folder into which only this run may write.
 ///
-/// It is reached through what was opened: a folder that is moved away takes its files with it, and what comes into its place
-/// is not touched.
+/// It is accessed through its open handle: a folder that is moved away takes its files with it, and its replacement is
+/// not touched.
 ///
-/// Dropped while empty, the folders that were made for this run are removed again.
+/// If it is empty when dropped, the folders created for this run are removed again.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
-    /// The folders that were made for this run, outermost first.
+    /// The folders created for this run, outermost first.
     made: Vec<PathBuf>,
     new_plots: bool,
     /// None until it is held.
     claim: Option<Claim>,
-    /// What it is in it.
+    /// Where names in it are looked up.
     place: Place,
     /// The files that may be written.
     names: Vec<String>,
 }
 
 impl OutputFolder {
-    /// The folder of a run, as [`OutputFolder::open_for`] makes it.
+    /// Opens the folder of a run, as [`OutputFolder::open_for`].
     pub fn open(path: &Path, existing: impl Into<Existing>) -> Result<OutputFolder> {
         OutputFolder::open_for(path, existing, Owner::Run, OWN.map(String::from).into())
     }
 
-    /// Makes the folder and its parents, for `owner` to write the files `names` into. One that exists is refused but for
-    /// what `existing` allows; so is one that another command wrote, a place that cannot be written, and one where
-    /// another run is writing.
+    /// Creates the folder and its parents, for `owner` to write the files `names` into. An existing folder is refused
+    /// unless `existing` allows it. A folder that another command wrote, that cannot be written, or in which another
+    /// run is writing is refused too.
     pub fn open_for(
         path: &Path,
         existing: impl Into<Existing>,
@@ -86,12 +86,12 @@ impl OutputFolder {
         if !folder.claim().map_err(refuse)? {
             return Err(Error::value("out", path.display(), "a run is writing here", "use another folder"));
         }
-        // Another run may have come and gone in between.
+        // Another run may have started and ended in between.
         existing.check(folder.place.at(), path, &folder.names)?;
         owner.check(folder.place.at(), path)?;
         folder.check_names()?;
         folder.probe().map_err(refuse)?;
-        // What an interrupted run left; its lock is gone, so it is no longer writing.
+        // Leftovers of an interrupted run; its lock is gone, so it is no longer writing.
         if owner == Owner::Run {
             folder.forget_states()?;
         }
@@ -100,7 +100,7 @@ impl OutputFolder {
         Ok(folder)
     }
 
-    /// As `fs::create_dir_all`, remembering what was made.
+    /// Like `fs::create_dir_all`, but records what was created.
     fn make_all(&mut self, path: &Path) -> io::Result<()> {
         let missing: Vec<&Path> = path.ancestors().take_while(|folder| !folder.is_dir()).collect();
         for folder in missing.into_iter().rev().filter(|folder| !folder.as_os_str().is_empty()) {
@@ -118,7 +118,7 @@ impl OutputFolder {
         OutputFolder { path: path.into(), made: Vec::new(), new_plots: false, claim: None, place, names }
     }
 
-    /// Returns whether the folder is held by this run from now on.
+    /// Claims the folder; returns whether this run holds it.
     fn claim(&mut self) -> io::Result<bool> {
         self.claim = Claim::take(&self.path)?;
         if let Some(claim) = &self.claim {
@@ -127,8 +127,8 @@ impl OutputFolder {
         Ok(self.claim.is_some())
     }
 
-    /// Is called by its whole path from now on: the outlines of a run are named from the directory that it began in, which
-    /// may be another one.
+    /// Uses the absolute path from now on: outlines of a run are named relative to the directory in which it began,
+    /// which may be a different one.
     pub fn make_absolute(&mut self) -> Result<()> {
         self.path = std::path::absolute(&self.path).map_err(Error::io("cannot find", &self.path))?;
         if let Some(claim) = &mut self.claim {
@@ -138,15 +138,15 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// That the folder is still held by this run, and still where it was found.
+    /// Checks that this run still holds the folder, and that it is still where it was found.
     ///
     /// # Errors
-    /// [`Error::Lost`] where it is not.
+    /// [`Error::Lost`] if it is not.
     pub fn check_claim(&self) -> Result<()> {
         self.claim.as_ref().map_or(Ok(()), Claim::check)
     }
 
-    /// Why `error` came: because the folder was taken away, if it was.
+    /// Replaces `error` by its cause if the folder was taken away.
     pub fn explain(&self, error: Error) -> Error {
         match self.check_claim() {
             Err(lost @ Error::Lost(_)) => lost,
@@ -154,7 +154,7 @@ impl OutputFolder {
         }
     }
 
-    /// Whether files can be made here.
+    /// Checks that files can be created here.
     fn probe(&self) -> io::Result<()> {
         let probe = self.place.join(PROBE);
         create(probe.at()).and_then(|_| fs::remove_file(probe.at()))
@@ -165,7 +165,7 @@ impl OutputFolder {
         &self.path
     }
 
-    /// What is called `name` in it.
+    /// The place `name` in it.
     pub fn place(&self, name: &str) -> Place {
         self.place.join(name)
     }
@@ -178,21 +178,21 @@ impl OutputFolder {
 
 impl Drop for OutputFolder {
     fn drop(&mut self) {
-        // Removing a folder fails, as it should, where there is something inside.
+        // Removing a folder fails, as it should, if it is not empty.
         if self.new_plots {
             let _ = fs::remove_dir(self.place(PLOTS).at());
         }
-        // Others may be where it was.
+        // Another folder may be in its place.
         let stays = self.claim.as_ref().is_none_or(Claim::stays);
         self.claim = None;
-        // A folder that stays keeps those above it, also those that only its name goes through (`new/../out`).
+        // A folder that stays keeps its parents, including those that only its name goes through (`new/../out`).
         if stays {
             let _ = self.made.iter().rev().try_for_each(fs::remove_dir);
         }
     }
 }
 
-/// Refuses a path in which not every file would have one.
+/// Refuses a path too long for some of the files.
 fn check_length(path: &Path) -> Result<()> {
     let (length, most) = (path.as_os_str().len(), MAX_PATH - MAX_NAME);
     match length > most {

@@ -1,4 +1,4 @@
-//! Files that begin to grow in a folder, and their final names.
+//! Files that grow in a folder, and their final names.
 
 use std::{
     fs,
@@ -28,7 +28,7 @@ impl OutputFolder {
         Ok(PartFile::new(file, part, target, Mark { name: name.into(), length: 0, crc: 0 }))
     }
 
-    /// Makes the folder `name` in it. A link to another one is none.
+    /// Creates the folder `name` in it. A link to another folder does not count as one.
     fn make_below(&self, name: &Path) -> Result<()> {
         let below = self.place.join(name);
         let made = match fs::create_dir(below.at()) {
@@ -52,10 +52,11 @@ impl OutputFolder {
         Ok(file)
     }
 
-    /// Gives what is complete its final name, `run` last, and removes what an earlier run wrote and this one did not.
+    /// Gives complete files their final names, `run` last, and removes files of an earlier run that this one did not
+    /// write.
     ///
-    /// All of them are on disk by now, so that little is left that can fail. The earlier `run.json` goes first: no
-    /// moment has one that vouches for the files of two runs.
+    /// All are on disk by now, so that little can still fail. The earlier `run.json` is removed first: at no moment
+    /// does one vouch for the files of two runs.
     pub fn publish(&self, files: Vec<PartFile>, store: Option<PartFolder>, run: PartFile) -> Result<()> {
         self.check_claim()?;
         let mut written: Vec<String> = files.iter().map(|file| file.name().to_string()).collect();

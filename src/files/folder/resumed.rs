@@ -1,4 +1,4 @@
-//! The folder of an interrupted run: what a checkpoint vouches for is checked, cut off and continued.
+//! The folder of an interrupted run: files are checked against a checkpoint, truncated and continued.
 
 use std::{
     fs::{self, File},
@@ -21,17 +21,17 @@ use crate::{
 };
 
 impl OutputFolder {
-    /// The folder of an interrupted run, as it is.
+    /// Opens the folder of an interrupted run, as it is.
     ///
     /// # Errors
-    /// [`Error::Request`] where there is none, where it cannot be written, or where another run is writing.
+    /// [`Error::Request`] if there is none, if it cannot be written, or if another run is writing there.
     pub fn open_again(path: &Path) -> Result<OutputFolder> {
         let refuse = |problem: String| Error::Request(format!("{}: {problem}", path.display()));
         let cannot = |e: io::Error| refuse(format!("cannot be written ({e})"));
         if !path.is_dir() {
             return Err(refuse("no such folder; give that of a run".into()));
         }
-        // A folder that no run has begun in is left as it is.
+        // A folder in which no run has begun is left as it is.
         let mut begun = false;
         for name in [STATE, STATE_OLD, RUN] {
             begun |= path.join(name).try_exists().map_err(|e| refuse(format!("cannot find {name} in it ({e})")))?;
@@ -48,9 +48,10 @@ impl OutputFolder {
         Ok(folder)
     }
 
-    /// Whether the file is there, under its temporary or its final name, as far as `mark` goes; else what is wrong with it.
+    /// Checks that the file exists, under its temporary or its final name, and matches `mark`; otherwise returns the
+    /// fault.
     pub fn check(&self, mark: &Mark) -> std::result::Result<(), String> {
-        // A state that was not written by this program could name any file.
+        // A checkpoint not written by this program could name any file.
         if !self.names.contains(&mark.name) || is_store(Path::new(&mark.name)) {
             return Err(format!("it lists {:?}, which no run writes", mark.name));
         }
@@ -68,12 +69,12 @@ impl OutputFolder {
         }
     }
 
-    /// The same for the folder of a store.
+    /// Checks the folder of a store in the same way.
     pub fn check_store(&self, mark: &zarr::StoreMark) -> std::result::Result<(), String> {
         mark.check(&self.growing(STORE).map_err(|e| format!("cannot find {STORE} ({e})"))?)
     }
 
-    /// Goes on with a file of an interrupted run. What was written after `mark` is cut off.
+    /// Continues a file of an interrupted run; whatever was written after `mark` is cut off.
     pub fn file_again(&self, mark: &Mark) -> Result<PartFile> {
         let part = self.back(&mark.name)?;
         let cut = |path: &Path| {
@@ -89,7 +90,7 @@ impl OutputFolder {
         Ok(PartFile::new(file, part, self.place(&mark.name), mark.clone()))
     }
 
-    /// Puts a copy of the first `length` bytes of `file` in its place at `path`: under its other names it stays what it is.
+    /// Replaces the file at `path` by a copy of its first `length` bytes: under other names it stays unchanged.
     fn copy(&self, file: File, path: &Path, length: u64) -> io::Result<File> {
         let spare = self.place(PROBE);
         let mut copy = create(spare.at())?;
@@ -99,14 +100,14 @@ impl OutputFolder {
         Ok(copy)
     }
 
-    /// The same for the folder of a store.
+    /// Continues the folder of a store in the same way.
     pub fn store_again(&self, name: &str) -> Result<PartFolder> {
         let store = PartFolder::again(self.back(name)?, self.place(name));
         store.sweep()?;
         Ok(store)
     }
 
-    /// Where `name` lies of a run that was interrupted: if that was at its very end, under its final name.
+    /// Where `name` of an interrupted run is: under its final name if the interruption came at the very end.
     fn growing(&self, name: &str) -> io::Result<Place> {
         let part = self.part(name);
         match part.at().symlink_metadata() {
@@ -116,7 +117,7 @@ impl OutputFolder {
         }
     }
 
-    /// Gives `name` its temporary name back, which is returned.
+    /// Gives `name` its temporary name again, and returns that.
     fn back(&self, name: &str) -> Result<Place> {
         let part = self.part(name);
         let now = self.growing(name).map_err(part.io("cannot find"))?;

@@ -58,7 +58,7 @@ fn one_run_at_a_time_writes_into_a_folder() {
     drop((rows, first));
     assert_eq!(names(home.path()), [""; 0]);
 
-    // As a killed run leaves it.
+    // As left by a killed run.
     fs::create_dir(&out).unwrap();
     fs::write(out.join(LOCK), "").unwrap();
     drop(OutputFolder::open(&out, true).unwrap());

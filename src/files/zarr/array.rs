@@ -12,22 +12,22 @@ pub(super) struct Array {
     /// Chunks in each dimension.
     pub(super) grid: Vec<u64>,
     pub(super) chunk_bytes: usize,
-    /// What stands for an element that was not written.
+    /// The value of elements that were not written.
     pub(super) fill: Vec<u8>,
-    /// The chunk that is being filled, and the number of those before it.
+    /// The chunk that is being filled, and the number of chunks before it.
     pub(super) chunk: Vec<u8>,
     pub(super) written: u64,
-    /// CRC-32C of those.
+    /// CRC-32C of those before it.
     pub(super) crc: u32,
     /// Bytes of all elements.
     pub(super) bytes: u64,
-    /// Bytes between two elements that begin a chunk whatever is in the one before, and how many of them are to come.
+    /// Bytes between two elements that always begin a chunk, and how many of these bytes are still to come.
     pub(super) run_bytes: u64,
     pub(super) run_left: u64,
 }
 
 impl Array {
-    /// With extents by name of the dimension, chunks of at most `bytes`, and these attributes.
+    /// Makes an array from extents by name of the dimension, with chunks of at most `bytes`, and with attributes.
     pub(super) fn new(
         name: &'static str,
         kind: DataType,
@@ -40,7 +40,7 @@ impl Array {
         let names: Vec<&str> = dimensions.iter().map(|(name, _)| *name).collect();
         let chunk = chunk_shape(&shape, (bytes / size) as u64);
         let grid: Vec<u64> = shape.iter().zip(&chunk).map(|(extent, chunk)| extent.div_ceil(*chunk)).collect();
-        // Before the last dimension that is cut chunks have one element, after it they have all.
+        // Dimensions before the last one that is cut have chunks of one element, those after it are whole.
         let cut = grid.iter().rposition(|chunks| *chunks > 1).unwrap_or(0);
         let run_bytes = shape[cut..].iter().product::<u64>() * size as u64;
         Array {
@@ -51,7 +51,7 @@ impl Array {
                 "shape": shape,
                 "data_type": kind.name(),
                 "chunk_grid": { "name": "regular", "configuration": { "chunk_shape": chunk } },
-                // Files beside each other, instead of a folder for each index.
+                // Files side by side, instead of a folder per index.
                 "chunk_key_encoding": { "name": "default", "configuration": { "separator": "." } },
                 "fill_value": kind.fill_value(),
                 "codecs": [{ "name": "bytes", "configuration": { "endian": "little" } }],
@@ -85,7 +85,7 @@ impl Array {
         Ok(())
     }
 
-    /// Writes the chunk, which has its full length even where it reaches beyond the array.
+    /// Writes the chunk at its full length, even if it extends beyond the array.
     fn write(&mut self, folder: &PartFolder) -> Result<()> {
         let missing = self.chunk_bytes - self.chunk.len();
         self.chunk.extend(self.fill.iter().cycle().take(missing));

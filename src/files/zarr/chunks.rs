@@ -1,8 +1,8 @@
-//! How an array is cut into chunks of equal size, and what each is called.
+//! How an array is cut into chunks of equal size, and their names.
 
 use serde_json::Value;
 
-/// About so many bytes make a chunk: few files for many members, and little to read for one.
+/// Approximate bytes per chunk: few files for many members, and little to read for one.
 pub(super) const CHUNK_BYTES: usize = 4 << 20;
 
 /// Type of an element.
@@ -39,8 +39,8 @@ impl DataType {
     }
 }
 
-/// Extents of chunks of at most `room` elements: whole dimensions from the last on, then equal parts of one, then single
-/// elements.
+/// Extents of chunks of at most `room` elements: whole dimensions from the last one, then equal parts of one, then
+/// single elements.
 pub(super) fn chunk_shape(shape: &[u64], mut room: u64) -> Vec<u64> {
     let mut chunk: Vec<u64> = shape
         .iter()
@@ -48,7 +48,7 @@ pub(super) fn chunk_shape(shape: &[u64], mut room: u64) -> Vec<u64> {
         .map(|extent| {
             let parts = extent.div_ceil(room.max(1));
             let part = extent.div_ceil(parts);
-            // What is cut takes more than half of the room, and leaves 1 for the dimensions before it.
+            // Each part is more than half of the room, which leaves 1 for the dimensions before it.
             room /= part;
             part
         })
@@ -57,7 +57,7 @@ pub(super) fn chunk_shape(shape: &[u64], mut room: u64) -> Vec<u64> {
     chunk
 }
 
-/// The name of a chunk: `c`, and its place in the grid.
+/// The name of a chunk: `c` and its place in the grid.
 pub(super) fn key(number: u64, grid: &[u64]) -> String {
     let mut rest = number;
     let mut key = String::new();

@@ -8,10 +8,10 @@ use crate::{
     schedule::Outputs,
 };
 
-/// The array of how members ended.
+/// The array with the status of each member.
 pub(super) const STATUS: &str = "status";
 
-/// The arrays of nodes, with units and what they are.
+/// The arrays of nodes: name, unit and meaning.
 pub(super) const FIELDS: [(&str, &str, &str); 4] = [
     ("x", "length", "x coordinate of the node"),
     ("y", "length", "y coordinate of the node"),
@@ -19,7 +19,7 @@ pub(super) const FIELDS: [(&str, &str, &str); 4] = [
     ("r", "length", "length of the segment that ends at the node, as the scheme evolves it"),
 ];
 
-/// All of a store.
+/// All arrays of a store.
 pub(super) struct Arrays {
     pub(super) member: Array,
     pub(super) time: Array,
@@ -29,7 +29,7 @@ pub(super) struct Arrays {
     pub(super) status: Array,
 }
 
-/// Those of the members of `spec`, with chunks of at most `bytes`.
+/// The arrays for the members of `spec`, with chunks of at most `bytes`.
 pub(super) fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) -> Arrays {
     let members = ("member", spec.member_count());
     let (instants, nodes) = (("time", times.len() as u64), ("node", points as u64));
@@ -54,12 +54,12 @@ pub(super) fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) ->
     }
 }
 
-/// The times of the snapshots. Times that agree with the final one to rounding are that one, as in `snapshots.csv`.
+/// The times of the snapshots. Times equal to the final one up to rounding are replaced by it, as in `snapshots.csv`.
 pub(super) fn times(spec: &Spec) -> Vec<f64> {
     Outputs::new(spec.t_end, None, &spec.snapshots, &[]).from(0).map(|output| output.t).collect()
 }
 
-/// The index of the time nearest to `t`, which is among them but for rounding where final times differ from cell to cell.
+/// The index of the time nearest to `t`. They differ only by rounding, if final times vary from cell to cell.
 pub(super) fn nearest(times: &[f64], t: f64) -> usize {
     let after = times.partition_point(|own| *own < t).min(times.len() - 1);
     if after > 0 && t - times[after - 1] < times[after] - t { after - 1 } else { after }

@@ -1,4 +1,4 @@
-//! How far a store has grown, as a checkpoint says it.
+//! The extent of a growing store, as recorded in a checkpoint.
 
 use std::{fs, io::Read};
 
@@ -15,20 +15,20 @@ use crate::{
     input,
 };
 
-/// A growing store as far as a state vouches for it.
+/// The extent of a growing store, as recorded in a checkpoint.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoreMark {
-    /// Its arrays that grow.
+    /// Its growing arrays.
     pub(super) arrays: Vec<ArrayMark>,
 }
 
-/// The same of an array.
+/// The extent of an array.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct ArrayMark {
     pub(super) name: String,
     /// Chunks in each dimension.
     pub(super) grid: Vec<u64>,
-    /// Chunks that are written, and the CRC-32C of all of them.
+    /// Number of chunks written, and the CRC-32C of all of them.
     pub(super) written: u64,
     pub(super) crc: u32,
     /// The chunk that is being filled.
@@ -48,7 +48,7 @@ impl Array {
         }
     }
 
-    /// Goes on as marked, if the mark is of this array.
+    /// Continues from the mark, if it belongs to this array.
     pub(super) fn resume_from(&mut self, mark: &ArrayMark) -> bool {
         let ArrayMark { name, grid, written, crc, chunk, run_left } = mark;
         let fits = chunk.len() < self.chunk_bytes && *written <= grid.iter().product();
@@ -60,7 +60,7 @@ impl Array {
 }
 
 impl StoreMark {
-    /// That the chunks in `store` are those it vouches for; else what is wrong.
+    /// Checks that the chunks in `store` match; otherwise returns the fault.
     pub fn check(&self, store: &Place) -> std::result::Result<(), String> {
         let own = || FIELDS.iter().map(|(name, ..)| *name).chain([STATUS]);
         if !self.arrays.iter().map(|mark| mark.name.as_str()).eq(own()) {
@@ -95,7 +95,7 @@ impl ArrayMark {
         let mut found = 0;
         for number in 0..*written {
             let chunk = array.join(key(number, grid));
-            // Each chunk goes on where the one before it ended. None is longer.
+            // The checksum continues from chunk to chunk. None is longer.
             let sum = input::open(chunk.at()).and_then(|file| checksum(&mut file.take(CHUNK_BYTES as u64 + 1), found));
             found = sum.map_err(|e| format!("cannot read {} ({e})", chunk.shown().display()))?.1;
         }

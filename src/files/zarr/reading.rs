@@ -14,23 +14,23 @@ use crate::{
     input,
 };
 
-/// The members of a store that is complete, one after another. A chunk is opened when it is needed: any number of stores
-/// can be read side by side.
+/// The members of a complete store, one after another. Each chunk is opened when needed, so any number of stores can be
+/// read side by side.
 pub struct StoredMembers {
-    /// In the order of those that grow.
+    /// In the order of the growing arrays.
     pub(super) arrays: Vec<Elements>,
 }
 
-/// The elements of an array in their order.
+/// The elements of an array in order.
 pub(super) struct Elements {
-    /// As it was when it grew; its `chunk` is the one that is being read.
+    /// The array as it grew; its `chunk` is the one being read.
     array: Array,
     path: PathBuf,
     /// CRC-32C of all chunks.
     crc: u32,
-    /// Bytes of a member.
+    /// Bytes per member.
     pub(super) size: usize,
-    /// Bytes of the chunk that were taken.
+    /// Bytes of the chunk already read.
     taken: usize,
 }
 
@@ -38,7 +38,7 @@ impl StoredMembers {
     /// Opens the store at `path`, of the members of `spec`, of `points` nodes each.
     ///
     /// # Errors
-    /// [`Error::Request`] where `mark` is not that of such a store.
+    /// [`Error::Request`] if `mark` is not that of such a store.
     pub fn open(path: &Path, spec: &Spec, points: usize, mark: &StoreMark) -> Result<StoredMembers> {
         let arrays = arrays(spec, points, &times(spec), CHUNK_BYTES);
         let Arrays { fields, status, .. } = arrays;
@@ -61,10 +61,10 @@ impl StoredMembers {
         Ok(StoredMembers { arrays: own.into_iter().zip(&mark.arrays).map(elements).collect() })
     }
 
-    /// That what was read is what was written.
+    /// Checks that the data read are those that were written.
     ///
     /// # Errors
-    /// [`Error::Request`] naming the array that is not.
+    /// [`Error::Request`] naming the array that differs.
     pub fn check(&self) -> Result<()> {
         match self.arrays.iter().find(|own| own.array.crc != own.crc) {
             None => Ok(()),
@@ -81,7 +81,7 @@ impl Elements {
         ))
     }
 
-    /// The next ones, `most` bytes or fewer.
+    /// Returns the next elements, in at most `most` bytes.
     pub(super) fn next(&mut self, most: usize) -> Result<&[u8]> {
         if self.taken == self.array.chunk.len() {
             self.read()?;
@@ -91,7 +91,7 @@ impl Elements {
         Ok(&self.array.chunk[first..self.taken])
     }
 
-    /// Reads the next chunk, and leaves of it what is in the array.
+    /// Reads the next chunk, and removes the part beyond the array.
     fn read(&mut self) -> Result<()> {
         let Array { chunk_bytes, grid, written, run_left, run_bytes, .. } = &self.array;
         let path = self.path.join(key(*written, grid));

@@ -28,8 +28,7 @@ pub struct SnapshotStore {
 }
 
 impl SnapshotStore {
-    /// Makes the arrays for the members of `spec`, of `points` nodes each, and writes all that is known of them
-    /// beforehand.
+    /// Makes the arrays for the members of `spec`, of `points` nodes each, and writes all data known in advance.
     pub fn begin(folder: PartFolder, spec: &Spec, points: usize) -> Result<SnapshotStore> {
         SnapshotStore::of_chunks(folder, spec, points, times(spec), CHUNK_BYTES)
     }
@@ -50,7 +49,7 @@ impl SnapshotStore {
             "attributes": {
                 "title": "nodes of relaxing plane curves",
                 "curvelax": env!("CARGO_PKG_VERSION"),
-                // Where it ran and on how many threads makes no difference to the numbers.
+                // The number of threads does not change the results.
                 "spec": Spec { threads: None, ..spec.clone() }.to_toml()?,
             },
             "consolidated_metadata": { "kind": "inline", "must_understand": false, "metadata": consolidated },
@@ -72,14 +71,14 @@ impl SnapshotStore {
     /// Adds a snapshot of the next member; they come in time order.
     pub fn snapshot(&mut self, snapshot: &Snapshot) -> Result<()> {
         let place = nearest(&self.times, snapshot.t);
-        // Two times that are one but for rounding: the first of them stands.
+        // Of two times equal up to rounding, the first is used.
         if place < self.filled {
             return Ok(());
         }
         self.skip_to(place)?;
         let Snapshot { x, y, k, r, .. } = snapshot;
         for (array, values) in self.fields.iter_mut().zip([x, y, k, r]) {
-            // Unknown is NaN, as it is empty in tables.
+            // NaN for unknown, as empty fields in tables.
             let known = |value: f64| if value.is_finite() { value } else { f64::NAN };
             let value = |i: usize| values.get(i).map_or(f64::NAN, |value| known(*value));
             let bytes: Vec<u8> = (0..self.points).map(value).flat_map(f64::to_le_bytes).collect();
@@ -89,14 +88,14 @@ impl SnapshotStore {
         Ok(())
     }
 
-    /// Completes the next member, all of whose snapshots were added.
+    /// Completes the next member, after all its snapshots.
     pub fn member(&mut self, status: Status) -> Result<()> {
         self.skip_to(self.times.len())?;
         self.filled = 0;
         self.status.push(&self.folder, &[status as u8])
     }
 
-    /// Leaves the times up to the one at `place` unknown.
+    /// Leaves the times before the one at `place` unknown.
     fn skip_to(&mut self, place: usize) -> Result<()> {
         if self.filled < place {
             let unknown: Vec<u8> = DataType::Float64.fill().repeat(self.points);
@@ -108,7 +107,7 @@ impl SnapshotStore {
         Ok(())
     }
 
-    /// Adds the next member of another store, as it is there.
+    /// Adds the next member of another store unchanged.
     pub fn copy(&mut self, from: &mut StoredMembers) -> Result<()> {
         for (array, from) in self.fields.iter_mut().chain([&mut self.status]).zip(&mut from.arrays) {
             let mut left = from.size;
@@ -121,21 +120,21 @@ impl SnapshotStore {
         Ok(())
     }
 
-    /// How far it has grown, once that is on disk.
+    /// Returns its extent, once it is on disk.
     pub fn mark(&self) -> Result<StoreMark> {
         self.folder.sync()?;
         Ok(StoreMark { arrays: self.fields.iter().chain([&self.status]).map(Array::mark).collect() })
     }
 
-    /// Whether what is written is worth keeping if the run fails.
+    /// Sets whether to keep it if the run fails.
     pub fn keep(&mut self, keep: bool) {
         self.folder.keep(keep);
     }
 
-    /// Goes on with one that [was checked](StoreMark::check); what was written after `mark` is removed.
+    /// Continues a [checked](StoreMark::check) store; whatever was written after `mark` is removed.
     ///
     /// # Errors
-    /// [`Error::Request`] where the mark is of the arrays of another spec.
+    /// [`Error::Request`] if the mark is of the arrays of another spec.
     pub fn resume(folder: PartFolder, spec: &Spec, points: usize, mark: &StoreMark) -> Result<SnapshotStore> {
         mark.cut_off(folder.part())?;
         SnapshotStore::begin(folder, spec, points)?.from(mark)
@@ -155,7 +154,7 @@ impl SnapshotStore {
         }
     }
 
-    /// The whole store, on disk and ready for its final name.
+    /// Completes the store on disk, ready for its final name.
     pub fn ready(self) -> Result<PartFolder> {
         self.folder.sync()?;
         Ok(self.folder)
@@ -206,7 +205,7 @@ mod tests {
             let mut first = begin(out.store(names::STORE).unwrap());
             add(&mut first, &members[..kept]);
             let mark = first.mark().unwrap();
-            // Not in the state, so to be removed.
+            // Not in the checkpoint, so to be removed.
             add(&mut first, &members[kept..(kept + 3).min(members.len())]);
             let part = first.folder.part().clone();
             first.keep(true);

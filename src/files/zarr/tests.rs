@@ -36,7 +36,7 @@ impl Read {
     }
 }
 
-/// Reads an array by its metadata alone, element by element; bytes of short elements come first.
+/// Reads an array by its metadata alone, element by element; elements shorter than 8 bytes are extended.
 pub(super) fn read(store: &Path, name: &str) -> Read {
     let text = fs::read_to_string(store.join(name).join("zarr.json")).unwrap();
     let metadata: Value = serde_json::from_str(&text).unwrap();
@@ -71,7 +71,7 @@ pub(super) fn add(store: &mut SnapshotStore, status: Status, snapshots: &[Snapsh
     store.member(status).unwrap();
 }
 
-/// The store that members leave in chunks of at most `bytes`.
+/// The store of these members, in chunks of at most `bytes`.
 pub(super) fn stored(
     home: &Path,
     spec: &Spec,
@@ -92,7 +92,7 @@ pub(super) fn spec(curves: u64, snapshots: &[f64]) -> Spec {
     Spec { curves, snapshots: snapshots.into(), store: Store::Zarr, ..Spec::default() }
 }
 
-/// Seven members with five nodes that all differ, of which the fourth ends before the last of three times.
+/// Seven different members of five nodes; the fourth ends before the last of three times.
 pub(super) fn members() -> Vec<(Status, Vec<Snapshot>)> {
     let node = |member: u64, t: f64, field: f64| -> Vec<f64> {
         (1..=5).map(|i| 1000.0 * field + 100.0 * member as f64 + 10.0 * t + f64::from(i)).collect()
@@ -148,7 +148,7 @@ fn every_element_is_where_the_metadata_say_however_the_arrays_are_cut() {
         let chunks = fs::read_dir(store.join("x")).unwrap().count() - 1;
         assert_eq!(chunks, 7_usize.div_ceil(chunk[0]) * 3_usize.div_ceil(chunk[1]) * 5_usize.div_ceil(chunk[2]));
 
-        // Members in another order are seen, and so is a chunk with another one's bytes.
+        // Members in another order are detected, and so is a chunk with another one's bytes.
         let mut other = members.clone();
         other.swap(1, 2);
         assert_ne!(x.floats(), expected(&other, |snapshot| &snapshot.x));
