@@ -1,29 +1,30 @@
-//! Axes: from values to places, and ticks whose labels are round and do not touch.
+//! Axes: from values to positions, and ticks whose labels are round and do not touch.
 
 use super::width::{SIZE, width};
 use crate::text::power_of_ten;
 
-/// Values of a larger size, or of one below the inverse, are not drawn, but 0 is: their differences may over- or underflow.
+/// Values larger than this, or smaller than its inverse, are not drawn (0 is): their differences may over- or
+/// underflow.
 const LARGEST: f64 = 1e100;
 /// Free space beyond the values, as a share of their range.
 const PADDING: f64 = 0.04;
-/// Values whose range is a smaller part of their size are taken for equal: their labels would be.
+/// Values are treated as equal if their range, relative to their size, is smaller: their labels would be equal.
 const EQUAL: f64 = 1e-6;
-/// From the smallest to the largest of positive values, so that a linear axis would hide most of them.
+/// Ratio of the largest to the smallest of positive values above which a linear axis would hide most of them.
 const WIDE: f64 = 30.0;
-/// Pixels between labels side by side, and from label to label one above the other.
+/// Pixels between labels side by side, and between labels one above the other.
 const BETWEEN: f64 = 16.0;
 const LINE: f64 = 34.0;
-/// Least pixels of a decade that is divided by smaller ticks, and from tick to tick.
+/// Minimum pixels of a decade divided by smaller ticks, and between ticks.
 const DIVIDED: f64 = 30.0;
 const MIN_TICK: f64 = 4.0;
 
-/// How values are spread along an axis.
+/// How values are mapped to an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
     /// Equal distances are equal differences.
     Linear,
-    /// Equal distances are equal ratios; values that are not positive have no place.
+    /// Equal distances are equal ratios; only positive values can be shown.
     Log,
 }
 
@@ -36,7 +37,7 @@ impl Scale {
         }
     }
 
-    /// Whether `value` has a place on such an axis.
+    /// Whether `value` can be shown on such an axis.
     pub fn holds(self, value: f64) -> bool {
         match self {
             Scale::Linear => value == 0.0 || Scale::Log.holds(value.abs()),
@@ -44,7 +45,7 @@ impl Scale {
         }
     }
 
-    /// The number whose differences are distances.
+    /// The quantity that is proportional to distance.
     pub fn level(self, value: f64) -> f64 {
         match self {
             Scale::Linear => value,
@@ -61,7 +62,7 @@ impl Scale {
     }
 }
 
-/// Smallest and largest; none of nothing.
+/// The smallest and largest value; none if there are no values.
 pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values.into_iter().fold(None, |range, value| match range {
         None => Some((value, value)),
@@ -81,30 +82,30 @@ pub struct Axis {
     whole: bool,
 }
 
-/// Where an axis is marked.
+/// The marks on an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisTicks {
     /// Ascending values and their labels.
     pub labelled: Vec<(f64, String)>,
     /// Values between them.
     pub minor: Vec<f64>,
-    /// Labels count this power of ten.
+    /// Power of ten by which labels are multiplied.
     power: i32,
 }
 
 impl Axis {
-    /// From `low` to `high`, which are apart and [have places](Scale::holds). An empty `unit` is none.
+    /// An axis from `low` to `high`, which differ and [can be shown](Scale::holds). An empty `unit` means none.
     pub fn new(name: &str, unit: &str, scale: Scale, (low, high): (f64, f64)) -> Axis {
         debug_assert!(low.is_finite() && high.is_finite() && low < high, "{low} {high}");
         Axis { name: name.into(), unit: unit.into(), scale, low, high, whole: false }
     }
 
-    /// Counts from 0 to a little more than `most`.
+    /// An axis for counts from 0 to a little more than `most`.
     pub fn counts(name: &str, most: u64) -> Axis {
         Axis { whole: true, ..Axis::new(name, "", Scale::Linear, (0.0, 1.06 * most.max(1) as f64)) }
     }
 
-    /// The least that holds all of `values` that [can be held](Scale::holds), and a little more.
+    /// The smallest axis, with padding, for those of `values` that [can be shown](Scale::holds).
     pub fn over(name: &str, unit: &str, scale: Scale, values: impl IntoIterator<Item = f64>) -> Axis {
         let values = values.into_iter().filter(|value| scale.holds(*value));
         let (low, high) = range(values.map(|value| scale.level(value))).unwrap_or((0.0, 1.0));
@@ -122,34 +123,34 @@ impl Axis {
         Axis::new(name, unit, scale, (scale.value(low - room), scale.value(high + room)))
     }
 
-    /// The same from 0 on, if it is linear and no more than its padding is below 0.
+    /// The same axis from 0, if it is linear and only its padding is below 0.
     pub fn with_zero(self) -> Axis {
         let positive = self.low > -2.0 * PADDING * (self.high - self.low);
         if self.scale == Scale::Linear && positive { Axis { low: 0.0, ..self } } else { self }
     }
 
-    /// How values are spread.
+    /// The scale.
     pub fn scale(&self) -> Scale {
         self.scale
     }
 
-    /// The least and the largest value.
+    /// The smallest and the largest value.
     pub fn range(&self) -> (f64, f64) {
         (self.low, self.high)
     }
 
-    /// Whether `value` has a place between the ends.
+    /// Whether `value` is between the ends.
     pub fn holds(&self, value: f64) -> bool {
         self.scale.holds(value) && (self.low..=self.high).contains(&value)
     }
 
-    /// 0 at the low end, 1 at the high end.
+    /// The position from 0 at the low end to 1 at the high end.
     pub fn share(&self, value: f64) -> f64 {
         let [low, high, at] = [self.low, self.high, value].map(|value| self.scale.level(value));
         (at - low) / (high - low)
     }
 
-    /// Name and unit, with the power of ten that the labels count.
+    /// Name and unit, with the power of ten of the labels.
     pub fn title(&self, ticks: &AxisTicks) -> String {
         let power = if ticks.power == 0 { String::new() } else { power_of_ten(ticks.power) };
         match format!("{power} {}", self.unit).trim() {
@@ -158,17 +159,17 @@ impl Axis {
         }
     }
 
-    /// Ticks of a horizontal axis of this many pixels.
+    /// Ticks of a horizontal axis of `length` pixels.
     pub fn ticks_across(&self, length: f64) -> AxisTicks {
         self.ticks(length, &|label| width(label, SIZE) + BETWEEN)
     }
 
-    /// Ticks of a vertical axis of this many pixels.
+    /// Ticks of a vertical axis of `length` pixels.
     pub fn ticks_upwards(&self, length: f64) -> AxisTicks {
         self.ticks(length, &|_| LINE)
     }
 
-    /// The closest ticks whose labels, each taking as many pixels as `extent` says, do not touch.
+    /// The densest ticks whose labels, of the pixels that `extent` returns, do not touch.
     fn ticks(&self, length: f64, extent: &dyn Fn(&str) -> f64) -> AxisTicks {
         let fits = |ticks: &AxisTicks| {
             ticks.labelled.windows(2).all(|pair| {
@@ -182,7 +183,7 @@ impl Axis {
             let mut steps = std::iter::successors(Some(first), |step| Some(tick_step(1.01 * step)));
             let mut candidate = || self.linear(steps.next().unwrap_or(first));
             let mut ticks = candidate();
-            // A step above the range has at most one label.
+            // A step larger than the range gives at most one label.
             for _ in 0..12 {
                 if fits(&ticks) {
                     break;
@@ -204,7 +205,7 @@ impl Axis {
         }
     }
 
-    /// From dense to sparse; none of a linear axis.
+    /// Candidates from dense to sparse; none on a linear axis.
     fn log_candidates(&self, length: f64) -> Vec<AxisTicks> {
         if self.scale == Scale::Linear {
             return Vec::new();
@@ -222,7 +223,7 @@ impl Axis {
             _ => Vec::new(),
         };
         let minor: Vec<f64> = minor.iter().map(|(digit, power)| f64::from(*digit) * ten_to(*power)).collect();
-        // Either all labels are powers of ten, or all count one power of ten.
+        // Either all labels are powers of ten, or all are multiplied by one.
         let plain =
             (-3.0..=4.0).contains(&self.low.log10().ceil()) && (-3.0..=4.0).contains(&self.high.log10().floor());
         let powers = !plain && decades > 3.0;
@@ -243,7 +244,7 @@ impl Axis {
         dense.chain(sparse).map(candidate).collect()
     }
 
-    /// The power of ten that labels count: 0 where plain labels are short.
+    /// The power of ten of the labels: 0 if plain labels are short.
     fn power(&self) -> i32 {
         let size = self.low.abs().max(self.high.abs()).log10().floor() as i32;
         if (-3..5).contains(&size) { 0 } else { size.div_euclid(3) * 3 }
@@ -260,7 +261,7 @@ pub fn multiples(step: f64, low: f64, high: f64) -> impl Iterator<Item = (String
     })
 }
 
-/// The least of 1, 2 and 5 times a power of ten that is not under `least`.
+/// The smallest of 1, 2 and 5 times a power of ten that is at least `least`.
 pub fn tick_step(least: f64) -> f64 {
     let power = 10_f64.powi(least.log10().floor() as i32);
     [1.0, 2.0, 5.0].map(|digit| digit * power).into_iter().find(|step| *step >= least).unwrap_or(10.0 * power)

@@ -1,6 +1,7 @@
-//! What all charts are made of: a heading with sentences and a legend, panels with axes, colours for curves.
+//! The parts of all charts: a heading with sentences and a legend, panels with axes, colours of curves.
 //!
-//! A chart is laid out from top to bottom in this order. Widths of text are known only [roughly](super::width), from above.
+//! A chart is laid out from top to bottom in this order. Text widths are known only [roughly](super::width), from
+//! above.
 
 use glam::DVec2;
 
@@ -14,7 +15,7 @@ use crate::text::significant;
 
 /// Width of every chart, in pixels.
 pub const WIDTH: f64 = 680.0;
-/// Free space at the left and right of a chart.
+/// Margin at the left and right of a chart.
 pub const MARGIN: f64 = 20.0;
 /// Space below a panel for tick labels and the name of the axis.
 pub const FOOT: f64 = 52.0;
@@ -33,12 +34,12 @@ const MAX_CURVES: usize = 24;
 /// Width of the colour bar itself.
 const BAR: f64 = 14.0;
 
-/// Unknown and known bounds of an estimated number.
+/// An estimated number with its bounds, if known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EstimatedNumber {
     /// The number.
     pub value: f64,
-    /// Its confidence interval, 95 % by convention; none where it is unknown.
+    /// Its confidence interval, 95 % by convention; `None` if unknown.
     pub interval: Option<(f64, f64)>,
 }
 
@@ -53,30 +54,30 @@ impl EstimatedNumber {
     }
 }
 
-/// How a legend's entry is drawn.
+/// How an entry of a legend is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LegendMark {
     /// A line in the dash pattern of its class.
     Series,
     /// A dashed line.
     Dashed,
-    /// A thin line, and a thick one.
+    /// A thin line.
     Thin,
-    /// See [`LegendMark::Thin`].
+    /// A thick line.
     Thick,
     /// An area.
     Band,
     /// The [marker](draw_marker) of the series of this rank.
     Marker(usize),
-    /// A triangle that points up, and one that points right.
+    /// A triangle that points up.
     Up,
-    /// See [`LegendMark::Up`].
+    /// A triangle that points right.
     Right,
     /// The short stroke of a censored member.
     Stroke,
 }
 
-/// A legend's entry.
+/// An entry of a legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// Class of its colour.
@@ -121,7 +122,7 @@ impl Entry {
     }
 }
 
-/// Draws the marker of the series of this rank, a shape of its own for each of the [series](style::SERIES).
+/// Draws the marker of the series of this rank; each of the [series](style::SERIES) has its own shape.
 pub fn draw_marker(svg: &mut Svg, rank: usize, at: DVec2) {
     let [x, y] = at.to_array().map(coordinate);
     let square = format!("M{x} {y}m-3.6 -3.6h7.2v7.2h-7.2Z");
@@ -138,37 +139,37 @@ pub fn draw_marker(svg: &mut Svg, rank: usize, at: DVec2) {
     }
 }
 
-/// Data of a triangle about `at` that points up.
+/// Path data of a triangle about `at` that points up.
 pub fn triangle_up(at: DVec2) -> String {
     let [x, y] = (at - DVec2::new(0.0, 5.0)).to_array().map(coordinate);
     format!("M{x} {y}l5 9h-10Z")
 }
 
-/// Data of a triangle about `at` that points right.
+/// Path data of a triangle about `at` that points right.
 pub fn triangle_right(at: DVec2) -> String {
     let [x, y] = (at + DVec2::new(5.0, 0.0)).to_array().map(coordinate);
     format!("M{x} {y}l-9 5v-10Z")
 }
 
-/// Data of a short upright stroke about `at`.
+/// Path data of a short upright stroke about `at`.
 pub fn stroke(at: DVec2) -> String {
     let [x, y] = (at - DVec2::new(0.0, 4.0)).to_array().map(coordinate);
     format!("M{x} {y}v8")
 }
 
-/// What stands above the panels.
+/// The text above the panels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Heading<'a> {
     /// The title, also for screen readers.
     pub title: &'a str,
-    /// Sentences below it, each a paragraph; empty ones are left out.
+    /// Sentences below it, each a paragraph; empty ones are omitted.
     pub sentences: Vec<String>,
-    /// The legend; entries without a label are left out.
+    /// The legend; entries without a label are omitted.
     pub legend: Vec<Entry>,
 }
 
 impl Heading<'_> {
-    /// A picture that begins with this heading and has `body` pixels below it; where those begin.
+    /// Begins a picture with this heading and `body` pixels below it; returns where these begin.
     pub fn begin(&self, body: f64) -> (Svg, f64) {
         let room = WIDTH - 2.0 * MARGIN;
         let titles = wrapped(self.title, TITLE, room);
@@ -197,7 +198,7 @@ impl Heading<'_> {
         (svg, top)
     }
 
-    /// The legend, entry after entry, with the place of each in its row.
+    /// The rows of the legend, each entry with its position.
     fn rows(&self, room: f64) -> Vec<Vec<(f64, Entry)>> {
         let most = room - SAMPLE - 6.0;
         let fitted = |entry: &Entry| Entry { label: shortened(&entry.label, SIZE, most), ..entry.clone() };
@@ -221,7 +222,7 @@ impl Heading<'_> {
 /// Axes with room for data.
 #[derive(Clone, Debug)]
 pub struct Panel<'a> {
-    /// A line above it; empty is none.
+    /// A line above it, or empty.
     pub heading: &'a str,
     /// The upper left corner, in pixels.
     pub corner: DVec2,
@@ -231,12 +232,12 @@ pub struct Panel<'a> {
     pub x: &'a Axis,
     /// Vertical axis.
     pub y: &'a Axis,
-    /// Whether the horizontal axis has labels, or those of a panel below are its own.
+    /// Whether the horizontal axis has labels; otherwise those of a panel below apply.
     pub labels_x: bool,
 }
 
 impl Panel<'_> {
-    /// Space at the left of a panel of this height for what is written there.
+    /// Space needed at the left of a panel of this height.
     pub fn left(y: &Axis, height: f64) -> f64 {
         let labels = y.ticks_upwards(height).labelled.into_iter().map(|(_, label)| width(&label, SIZE));
         MARGIN + AXIS_SIZE + 16.0 + labels.fold(0.0, f64::max)
@@ -247,18 +248,18 @@ impl Panel<'_> {
         self.corner + self.size
     }
 
-    /// Where a value stands on the horizontal axis, in pixels.
+    /// The horizontal position of a value, in pixels.
     pub fn across(&self, x: f64) -> f64 {
         self.corner.x + self.size.x * self.x.share(x)
     }
 
-    /// Where a value stands on the vertical axis, in pixels, kept inside the panel.
+    /// The vertical position of a value, in pixels, restricted to the panel.
     pub fn height(&self, y: f64) -> f64 {
         // y grows downwards in SVG.
         self.end().y - self.size.y * self.y.share(y).clamp(0.0, 1.0)
     }
 
-    /// Where a point stands, anywhere.
+    /// The position of a point, inside the panel or not.
     pub fn place(&self, x: f64, y: f64) -> DVec2 {
         DVec2::new(self.across(x), self.end().y - self.size.y * self.y.share(y))
     }
@@ -323,7 +324,7 @@ impl Panel<'_> {
         svg.text_upwards("axis middle", at, &name);
     }
 
-    /// Writes a sentence in the middle, where there is nothing to draw.
+    /// Writes a sentence in the middle, if there is nothing to draw.
     pub fn say(&self, svg: &mut Svg, sentence: &str) {
         svg.rectangle("frame", self.corner, self.size, 0.0);
         let lines = wrapped(sentence, SIZE, self.size.x - 24.0);
@@ -334,7 +335,7 @@ impl Panel<'_> {
     }
 }
 
-/// One picture that says why there is nothing to draw.
+/// A picture that says why there is nothing to draw.
 pub fn nothing(title: &str, sentences: Vec<String>, reason: &str) -> String {
     let (mut svg, top) = Heading { title, sentences, legend: Vec::new() }.begin(180.0);
     let axis = Axis::new("", "", Scale::Linear, (0.0, 1.0));
@@ -350,18 +351,18 @@ pub fn nothing(title: &str, sentences: Vec<String>, reason: &str) -> String {
     svg.finish()
 }
 
-/// Colours of curves: a few are told apart, many are put in order.
+/// Colours of curves: a few are distinct, many form an ordered scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Colours {
     /// Which curves are drawn, and the class of each.
     pub shown: Vec<(usize, String)>,
-    /// The scale of the colours, where they are ordered.
+    /// The scale of the colours, if they are ordered.
     pub bar: Option<Axis>,
 }
 
 impl Colours {
-    /// Colours for one curve for each of `values`, which are those of `key`; where one is unknown, or there is none,
-    /// curves are ordered as they come, by their number from 0.
+    /// Colours for one curve per value of `key`. If a value is unknown, or there is none, curves are numbered from 0
+    /// and ordered by that.
     pub fn of(values: &[Option<f64>], key: &str) -> Colours {
         let count = values.len();
         if count <= style::SERIES {
@@ -388,18 +389,18 @@ impl Colours {
         Colours { shown: picked.map(class).collect(), bar: Some(axis) }
     }
 
-    /// The entries of curves that are told apart; `label` names them.
+    /// Legend entries of distinct curves, named by `label`.
     pub fn legend<'a>(&self, label: impl Fn(usize) -> &'a str) -> impl Iterator<Item = Entry> {
         let told_apart = self.shown.iter().filter(|_| self.bar.is_none());
         told_apart.map(move |(i, class)| Entry::new(class, LegendMark::Series, label(*i)))
     }
 
-    /// The marker of the curve drawn at this rank: colours that are ordered need no shapes.
+    /// The marker of the curve drawn at this rank: ordered colours need no shapes.
     pub fn rank(&self, rank: usize) -> usize {
         if self.bar.is_some() { 0 } else { rank }
     }
 
-    /// What to say if not all of `count` curves are drawn.
+    /// A sentence if not all of `count` curves are drawn.
     pub fn sentence(&self, count: usize) -> String {
         match self.shown.len() {
             shown if shown < count => format!("{shown} of {count} cells are drawn, spread over all."),
@@ -407,7 +408,7 @@ impl Colours {
         }
     }
 
-    /// Space for the colour bar beside a panel of this height.
+    /// Space for the colour bar next to a panel of this height.
     pub fn room(&self, height: f64) -> f64 {
         self.bar.as_ref().map_or(0.0, |bar| 2.0 * BAR + Panel::left(bar, height) - MARGIN)
     }
@@ -420,7 +421,7 @@ impl Colours {
         for i in 0..style::RAMP {
             let at = corner + DVec2::new(0.0, (style::RAMP - 1 - i) as f64 * step);
             svg.open(&format!("r{i}"));
-            // A little overlap, or seams show.
+            // A slight overlap avoids seams.
             svg.rectangle("solid", at, DVec2::new(BAR, step + if i > 0 { 0.5 } else { 0.0 }), 0.0);
             svg.close();
         }
@@ -439,7 +440,7 @@ impl Colours {
     }
 }
 
-/// A point of a line, if both values have places on axes of these scales.
+/// Whether a point can be shown on axes of these scales.
 pub fn drawable(x: (Scale, f64), y: (Scale, f64)) -> bool {
     x.0.holds(x.1) && y.0.holds(y.1)
 }

@@ -1,4 +1,4 @@
-//! Pictures from plain numbers: SVG, its style, axes and charts. Nothing here knows of a run or a file.
+//! Pictures from plain numbers: SVG, its style, axes and charts. Nothing here depends on a run or a file.
 
 pub mod axis;
 pub mod chart;

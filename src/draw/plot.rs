@@ -1,4 +1,4 @@
-//! Curves in axes of equal scale: panels side by side, which share one range and one scale.
+//! Curves on axes of equal scale, in panels side by side that share one range and one scale.
 
 use glam::DVec2;
 
@@ -9,12 +9,12 @@ use super::{
 };
 use crate::{curve::polygon, ensemble::Snapshot};
 
-/// Most width of all panels together and most height of one, in pixels.
+/// Maximum width of all panels together, and maximum height of one, in pixels.
 const MAX_WIDTH: f64 = 600.0;
 const MAX_HEIGHT: f64 = 440.0;
-/// Free space round the curves, as a share of the larger extent.
+/// Free space round the curves, as a fraction of the larger extent.
 const PADDING: f64 = 0.05;
-/// Pixels between panels, and round them for what stands there: title and legend, tick labels, names of the axes.
+/// Pixels between panels, and round them for labels: title and legend, tick labels, names of the axes.
 const GAP: f64 = 22.0;
 const HEAD: f64 = 56.0;
 const LEGEND: f64 = 26.0;
@@ -22,15 +22,15 @@ const HEADING: f64 = 22.0;
 const LEFT: f64 = 56.0;
 const RIGHT: f64 = 20.0;
 const FOOT: f64 = 48.0;
-/// Titles need this width, in pixels.
+/// Minimum width for titles, in pixels.
 const MIN_WIDTH: f64 = 560.0;
-/// Least pixels from tick to tick.
+/// Minimum pixels between ticks.
 const MIN_TICK: f64 = 45.0;
 /// Length of a tick, in pixels.
 const TICK: f64 = 5.0;
 /// Nodes closer than this on average, in pixels, get smaller dots.
 const DENSE: f64 = 6.0;
-/// Width of a legend's entry, in pixels.
+/// Width of an entry of the legend, in pixels.
 const ENTRY: f64 = 104.0;
 
 const LIGHT: &str = "\
@@ -52,7 +52,7 @@ const DARK: &str = "\
 .c4 path { stroke: #56b4e9 }
 ";
 
-/// Colours that the style sheet has.
+/// Number of colours in the style sheet.
 const COLOURS: usize = 5;
 
 /// A picture.
@@ -62,7 +62,7 @@ pub struct Plot {
     pub title: String,
     /// Second line.
     pub subtitle: String,
-    /// From left to right. Where one holds several curves a legend tells them apart.
+    /// Panels from left to right. If one has several curves, a legend distinguishes them.
     pub panels: Vec<PlotPanel>,
 }
 
@@ -140,14 +140,14 @@ struct Frame {
     high: DVec2,
     /// Pixels per unit of length, along both axes.
     scale: f64,
-    /// Pixels from border to border.
+    /// Width and height in pixels.
     size: DVec2,
-    /// From tick to tick.
+    /// Distance between ticks.
     step: f64,
 }
 
 impl Frame {
-    /// The least that holds all curves.
+    /// The smallest frame for all curves.
     fn new(panels: &[PlotPanel]) -> Frame {
         let nodes = || panels.iter().flat_map(|panel| &panel.curves).flat_map(|curve| curve.nodes.iter().copied());
         let low = nodes().reduce(DVec2::min).unwrap_or(DVec2::ZERO);
@@ -205,7 +205,7 @@ impl Frame {
     }
 }
 
-/// `value` as people write it: from 10⁻⁴ on plainly, below that with its power of ten.
+/// Formats `value` as people write it: plain from 10⁻⁴, with a power of ten below.
 pub fn short(value: f64) -> String {
     if value == 0.0 || value.abs() >= 1e-4 { value.to_string() } else { format!("{value:e}") }
 }

@@ -1,12 +1,12 @@
 //! The style sheets of the pictures: one look, on white paper and on dark screens.
 //!
-//! Colours are those of Okabe and Ito, which colour-blind readers tell apart, darkened or lightened until they stand out
-//! from the background. No rule needs more than what printers and converters of SVG know: classes, `currentColor` and
-//! one media query.
+//! The colours are those of Okabe and Ito, which colour-blind readers can distinguish, made darker or lighter until
+//! they stand out from the background. The rules use only features that printers and converters of SVG support:
+//! classes, `currentColor` and one media query.
 
-/// Colours and dash patterns of [`chart`] that tell curves apart: classes `s0`, `s1`, …
+/// Number of colours and dash patterns in [`chart`] that distinguish curves: classes `s0`, `s1`, …
 pub const SERIES: usize = 8;
-/// Colours of [`chart`] that put curves in order, from low to high: classes `r0`, `r1`, …
+/// Number of colours in [`chart`] that order curves, from low to high: classes `r0`, `r1`, …
 pub const RAMP: usize = 12;
 
 const LIGHT: &str = "
@@ -74,7 +74,7 @@ const CHART_DARK: &str = "\
 .r8 { color: #fdb22f } .r9 { color: #fdc627 } .r10 { color: #f9dd25 } .r11 { color: #f1f525 }
 ";
 
-/// What all pictures share, followed by the rules of one kind: always, and in dark mode.
+/// Rules of all pictures, followed by those of one kind: always, and in dark mode.
 pub fn sheet(light: &str, dark: &str) -> String {
     format!("{LIGHT}{light}@media screen and (prefers-color-scheme: dark) {{\n{DARK}{dark}}}\n")
 }
@@ -88,7 +88,7 @@ pub fn chart() -> String {
 mod tests {
     use super::*;
 
-    /// Contrast of two colours as `#rrggbb` by WCAG 2.
+    /// Contrast of two colours as `#rrggbb`, by WCAG 2.
     fn contrast(a: &str, b: &str) -> f64 {
         let luminance = |colour: &str| {
             let channel = |at: usize| {
@@ -101,7 +101,7 @@ mod tests {
         (a / b).max(b / a)
     }
 
-    /// Colours of the classes that are a letter and a number.
+    /// Colours of the classes named by a letter and a number.
     fn colours(sheet: &str) -> Vec<(&str, &str)> {
         let rules = sheet.split('.').filter_map(|rule| rule.split_once(" { color: "));
         let numbered = |class: &str| class.len() > 1 && class[1..].parse::<usize>().is_ok();

@@ -23,7 +23,7 @@ impl Svg {
         Svg { text }
     }
 
-    /// A rectangle with rounded corners.
+    /// Adds a rectangle with rounded corners.
     pub fn rectangle(&mut self, class: &str, corner: DVec2, size: DVec2, radius: f64) {
         let [x, y, width, height, rx] = [corner.x, corner.y, size.x, size.y, radius].map(coordinate);
         self.line(format_args!(
@@ -31,27 +31,27 @@ impl Svg {
         ));
     }
 
-    /// A path from its data.
+    /// Adds a path from its data.
     pub fn path(&mut self, class: &str, data: &str) {
         if !data.is_empty() {
             self.line(format_args!("<path class=\"{class}\" d=\"{data}\"/>"));
         }
     }
 
-    /// A line of text; `class` says how it is anchored.
+    /// Adds a line of text; `class` says how it is anchored.
     pub fn text(&mut self, class: &str, at: DVec2, content: &str) {
         let ([x, y], content) = ([at.x, at.y].map(coordinate), escape(content));
         self.line(format_args!("<text class=\"{class}\" x=\"{x}\" y=\"{y}\">{content}</text>"));
     }
 
-    /// A [line of text](Svg::text), or nothing.
+    /// Adds a [line of text](Svg::text), unless it is empty.
     pub fn text_unless_empty(&mut self, class: &str, at: DVec2, content: &str) {
         if !content.is_empty() {
             self.text(class, at, content);
         }
     }
 
-    /// A line of text that reads upwards, for the name of a vertical axis.
+    /// Adds a line of text that reads upwards, for the name of a vertical axis.
     pub fn text_upwards(&mut self, class: &str, at: DVec2, content: &str) {
         let ([x, y], content) = ([at.x, at.y].map(coordinate), escape(content));
         self.line(format_args!(
@@ -64,7 +64,7 @@ impl Svg {
         self.line(format_args!("<g class=\"{class}\">"));
     }
 
-    /// Ends the group begun last.
+    /// Ends the last group opened.
     pub fn close(&mut self) {
         self.text.push_str("</g>\n");
     }
@@ -81,7 +81,7 @@ impl Svg {
     }
 }
 
-/// Data of the closed path through `points`.
+/// Path data of the closed polygon through `points`.
 pub fn closed_path(points: &[DVec2]) -> String {
     let mut data = String::new();
     for (i, p) in points.iter().enumerate() {
@@ -93,19 +93,19 @@ pub fn closed_path(points: &[DVec2]) -> String {
     data
 }
 
-/// Data of a path that marks each of `points`: with round caps, a step of no length is a dot.
+/// Path data that mark each of `points`: with round caps, a step of length 0 is a dot.
 pub fn dots(points: &[DVec2]) -> String {
     points.iter().map(|p| format!("M{} {}h0", coordinate(p.x), coordinate(p.y))).collect()
 }
 
-/// `value` to a hundredth of a pixel, without zeros that say nothing.
+/// Formats `value` to a hundredth of a pixel, without trailing zeros.
 pub fn coordinate(value: f64) -> String {
     let text = format!("{value:.2}");
     let short = text.trim_end_matches('0').trim_end_matches('.');
     if short == "-0" { "0".into() } else { short.into() }
 }
 
-/// `text` for the content and the quoted attributes of XML and HTML; characters that XML forbids become U+FFFD.
+/// Escapes `text` for the content and the quoted attributes of XML and HTML; characters that XML forbids become U+FFFD.
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {

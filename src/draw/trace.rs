@@ -1,4 +1,4 @@
-//! Lines, steps and bands through any number of points, thinned to what shows and kept inside a frame.
+//! Lines, steps and bands through any number of points, thinned to visible detail and clipped to a frame.
 //!
 //! Points are in pixels, from left to right.
 
@@ -8,15 +8,15 @@ use glam::DVec2;
 
 use super::svg::coordinate;
 
-/// Points of all lines of a picture together: about 14 bytes each.
+/// Points of all lines of a picture together, at about 14 bytes each.
 const BUDGET: f64 = 4000.0;
 
-/// Most pixels that may be left out between two points of each of `lines` lines across `extent` pixels.
+/// Maximum pixels omitted between two points of each of `lines` lines across `extent` pixels.
 pub fn tolerance(lines: usize, extent: f64) -> f64 {
     (lines as f64 * extent / BUDGET).max(0.4)
 }
 
-/// The first and the last of `points`, and of those between as many as are `least` apart along x.
+/// The first and the last of `points`, and as many in between as are `least` apart along x.
 pub fn thinned(points: &[DVec2], least: f64) -> Vec<DVec2> {
     let mut kept: Vec<DVec2> = Vec::new();
     for (i, point) in points.iter().enumerate() {
@@ -28,7 +28,7 @@ pub fn thinned(points: &[DVec2], least: f64) -> Vec<DVec2> {
     kept
 }
 
-/// The corners of the steps whose heights change at `points`; changes under `least` wait for the next.
+/// The corners of a step line that changes at `points`; changes smaller than `least` wait for the next.
 pub fn steps(points: impl IntoIterator<Item = DVec2>, least: f64) -> Vec<DVec2> {
     let mut corners: Vec<DVec2> = Vec::new();
     let mut points = points.into_iter().peekable();
@@ -45,7 +45,7 @@ pub fn steps(points: impl IntoIterator<Item = DVec2>, least: f64) -> Vec<DVec2> 
     corners
 }
 
-/// Data of the open path through `points`.
+/// Path data of the open line through `points`.
 pub fn path(points: &[DVec2]) -> String {
     let mut data = String::new();
     let mut before = ["", ""].map(str::to_owned);
@@ -64,7 +64,7 @@ pub fn path(points: &[DVec2]) -> String {
     data
 }
 
-/// Data of the area between two lines.
+/// Path data of the area between two lines.
 pub fn band(high: &[DVec2], low: &[DVec2]) -> String {
     let outline: Vec<DVec2> = high.iter().chain(low.iter().rev()).copied().collect();
     if outline.len() < 3 { String::new() } else { path(&outline) + "Z" }
@@ -100,7 +100,7 @@ fn segment(a: DVec2, b: DVec2, low: DVec2, high: DVec2) -> Option<(DVec2, DVec2)
             }
         }
     }
-    // Ends inside stay as they are, so that parts join.
+    // Ends that are inside stay unchanged, so that parts join.
     let at = |s: f64| {
         if s == 0.0 {
             a

@@ -1,7 +1,7 @@
-//! How wide text is in a picture.
+//! The width of text in a picture.
 //!
-//! A picture is laid out before any font is known, so widths are those of DejaVu Sans, among the widest of the fonts that
-//! are taken for `sans-serif`: what fits there fits elsewhere.
+//! A picture is laid out before any font is known. Widths are therefore those of DejaVu Sans, among the widest fonts
+//! used for `sans-serif`: text that fits there fits elsewhere.
 
 /// Advance widths of U+0020 to U+007E in DejaVu Sans, in hundredths of the font size.
 const ADVANCE: [u8; 95] = [
@@ -13,7 +13,7 @@ const ADVANCE: [u8; 95] = [
 
 /// Size of most text, in pixels.
 pub const SIZE: f64 = 12.0;
-/// Size of a title, as a multiple of [`SIZE`] that counts its bold face, too.
+/// Size of a title, as a multiple of [`SIZE`] that includes its bold face.
 pub const TITLE: f64 = 15.0 * 1.13;
 
 /// Width of `text` in a font of `size` pixels.
@@ -29,7 +29,7 @@ pub fn width(text: &str, size: f64) -> f64 {
     size * text.chars().map(advance).sum::<f64>()
 }
 
-/// `text` in lines of at most `most` pixels, broken at spaces, and inside words only where one is too long.
+/// Breaks `text` into lines of at most `most` pixels, at spaces, and inside a word only if it is too long.
 pub fn wrapped(text: &str, size: f64, most: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut line = String::new();
@@ -51,7 +51,7 @@ pub fn wrapped(text: &str, size: f64, most: f64) -> Vec<String> {
     lines
 }
 
-/// `text`, or as much of its beginning as fits into `most` pixels with an ellipsis.
+/// Returns `text`, or as much of its beginning as fits into `most` pixels with an ellipsis.
 pub fn shortened(text: &str, size: f64, most: f64) -> String {
     if width(text, size) <= most {
         return text.into();

@@ -8,27 +8,27 @@ use crate::draw::{
     svg::{Svg, coordinate},
 };
 
-/// Fewest and most bins wanted; rounding changes their number by up to a half.
+/// Minimum and maximum number of bins wanted; rounding changes the number by up to a half.
 const FEWEST: f64 = 12.0;
 const MOST: f64 = 60.0;
-/// Widths are rounded to the next round number above this share of the width wanted, so about as often up as down.
+/// Widths are rounded to the next round number above this fraction of the width wanted, so about as often up as down.
 const ROUNDING: f64 = 0.64;
-/// Values whose range is a smaller part of their size go into one bin.
+/// Values whose range, relative to their size, is smaller go into one bin.
 const EQUAL: f64 = 1e-6;
-/// Bins are at least this many pixels high, so that a single member among a million shows.
+/// Minimum height of a bin in pixels, so that a single member among a million shows.
 const LEAST: f64 = 1.5;
 
-/// Members counted between bounds.
+/// Numbers of members between bounds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bins {
-    /// Ascending bounds, one more than bins.
+    /// Ascending bounds, one more than there are bins.
     pub bounds: Vec<f64>,
     /// Members in each bin.
     pub counts: Vec<u64>,
 }
 
 impl Bins {
-    /// Bins for ascending values that [have places](Scale::holds) on the scale; at least one value.
+    /// Bins for ascending values that [can be shown](Scale::holds) on the scale; at least one value.
     ///
     /// Their width follows Freedman and Diaconis, 2·IQR/∛n, rounded to 1, 2 or 5 times a power of ten.
     pub fn of(sorted: &[f64], scale: Scale) -> Bins {
@@ -63,10 +63,10 @@ impl Bins {
         self.counts.iter().copied().max().unwrap_or(0)
     }
 
-    /// An axis that holds all bins, and 0 where they come near it.
+    /// An axis for all bins, including 0 if they come near it.
     pub fn axis(&self, name: &str, unit: &str, scale: Scale) -> Axis {
         if let [low, high] = self.bounds[..] {
-            // One bar in the middle, not a wall.
+            // A bar in the middle, not a wall.
             let [low, high] = [low, high].map(|bound| scale.level(bound));
             let ends = [low - 8.0 * (high - low), high + 8.0 * (high - low)].map(|level| scale.value(level));
             return Axis::over(name, unit, scale, ends);
@@ -94,13 +94,13 @@ impl Bins {
     }
 }
 
-/// A dashed line up the whole panel.
+/// Draws a dashed line up the whole panel.
 pub fn guide(svg: &mut Svg, panel: &Panel, x: f64) {
     let at = coordinate(panel.across(x));
     svg.path("dashed", &format!("M{at} {}V{}", coordinate(panel.end().y), coordinate(panel.corner.y)));
 }
 
-/// The interval from `low` to `high` up the whole panel, as far as it is inside.
+/// Draws the interval from `low` to `high` over the height of the panel, as far as it is inside.
 pub fn interval(svg: &mut Svg, panel: &Panel, (low, high): (f64, f64)) {
     let [left, right] = [low, high].map(|x| panel.across(x).clamp(panel.corner.x, panel.end().x));
     if left < right {

@@ -1,4 +1,4 @@
-//! The mean excess in time, with its band and the slope that theory gives.
+//! The mean excess over time, with its band and the slope from theory.
 
 use glam::DVec2;
 
@@ -10,9 +10,9 @@ use crate::draw::{
 };
 
 const HEIGHT: f64 = 300.0;
-/// Smaller shares of the largest excess are rounding, and not drawn.
+/// Smaller fractions of the largest excess are rounding, and not drawn.
 const ROUNDING: f64 = 1e-18;
-/// Pieces of a line of theory, which is straight on some axes only.
+/// Segments of a theoretical line, which is straight on some axes only.
 const PIECES: i32 = 100;
 /// A band may extend the axis below its curve by this factor.
 const BELOW: f64 = 1e-2;
@@ -22,17 +22,18 @@ const BELOW: f64 = 1e-2;
 pub struct Decay<'a> {
     /// First line.
     pub title: &'a str,
-    /// A sentence below it, or nothing: over which members the mean is.
+    /// A sentence below it that says over which members the mean is, or nothing.
     pub note: &'a str,
-    /// What the bands are, such as `5 to 95 % of the members`.
+    /// Meaning of the bands, such as `5 to 95 % of the members`.
     pub band: &'a str,
-    /// Name of what tells the cells apart, for the colour bar that replaces the legend where there are many.
+    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
+    /// many.
     pub key: &'a str,
     /// The curves, in the order of the legend.
     pub curves: Vec<DecayCurve>,
-    /// What they are compared with.
+    /// Theoretical lines to compare with.
     pub theory: Vec<Theory>,
-    /// How time is spread: linear for exponential decay, logarithmic for an algebraic law.
+    /// Scale of time: linear for exponential decay, logarithmic for an algebraic law.
     pub time: Option<Scale>,
 }
 
@@ -47,11 +48,11 @@ pub struct DecayCurve {
     pub t: Vec<f64>,
     /// Mean excess at each time.
     pub mean: Vec<f64>,
-    /// Lower and upper bounds at each time, or nothing; what is not positive is drawn at the bottom.
+    /// Lower and upper bounds at each time, or nothing; values that are not positive are drawn at the bottom.
     pub band: Option<(Vec<f64>, Vec<f64>)>,
 }
 
-/// A line that theory gives.
+/// A theoretical line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Theory {
     /// Its entry in the legend, such as `exp(−24 t/R⁴)`.
@@ -60,7 +61,7 @@ pub struct Theory {
     pub law: DecayLaw,
 }
 
-/// How excess falls in time.
+/// The law by which excess decreases.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DecayLaw {
     /// start·exp(−rate·t).
@@ -90,7 +91,7 @@ impl DecayLaw {
         }
     }
 
-    /// Data of its line across a panel.
+    /// Path data of its line across a panel.
     fn line(self, panel: &Panel) -> String {
         let (scale, (first, last)) = (panel.x.scale(), panel.x.range());
         let [first, last] = [first, last].map(|t| scale.level(t));
@@ -101,13 +102,13 @@ impl DecayLaw {
     }
 }
 
-/// Data of the parts of a line inside a panel.
+/// Path data of the parts of a line inside a panel.
 fn clipped(points: &[DVec2], panel: &Panel) -> String {
     trace::clipped(points, panel.corner, panel.end()).iter().map(|part| trace::path(part)).collect()
 }
 
 impl DecayCurve {
-    /// The places of those of `values` that have one; what is below the axis is drawn at the bottom.
+    /// Positions of those of `values` that can be shown; values below the axis are drawn at the bottom.
     fn line(&self, values: &[f64], panel: &Panel, least: f64, floor: bool) -> Vec<DVec2> {
         let low = panel.y.range().0;
         let raised = |value: f64| if floor && value < low { low } else { value };
@@ -167,7 +168,7 @@ impl Decay<'_> {
         svg.finish()
     }
 
-    /// The vertical axis: all means that are more than rounding, and the bands as far as they are near.
+    /// The vertical axis: all means above rounding, and the bands where they are near.
     fn excess(&self, bands: bool) -> Axis {
         let means = || self.curves.iter().flat_map(|curve| curve.mean.iter().copied()).filter(|e| Scale::Log.holds(*e));
         let largest = means().fold(0.0, f64::max);

@@ -1,4 +1,4 @@
-//! What relaxation times depend on: their median and spread against a swept key, with the power law through them.
+//! Relaxation times against a swept key: their median and spread, with a power law through them.
 
 use glam::DVec2;
 
@@ -18,14 +18,14 @@ use crate::{
 };
 
 const HEIGHT: f64 = 300.0;
-/// Height of a named setting with one series, and what each further series adds.
+/// Height of a named setting with one series, and the height each further series adds.
 const ROW: f64 = 26.0;
 const FURTHER: f64 = 12.0;
 /// More named settings than this are not drawn.
 const MAX_ROWS: usize = 40;
-/// Most pixels for the name of a setting.
+/// Maximum pixels for the name of a setting.
 const MAX_NAME: f64 = 200.0;
-/// Most pixels between the series at one setting of a numeric key, and from the first to the last of them.
+/// Maximum pixels between the series at one setting of a numeric key, and from the first to the last of them.
 const ASIDE: f64 = 5.0;
 const SPREAD: f64 = 24.0;
 
@@ -38,20 +38,21 @@ pub struct Dependence<'a> {
     pub note: &'a str,
     /// The key.
     pub key: &'a str,
-    /// What tells the series apart, for the colour bar that replaces the legend where there are many.
+    /// Name of the quantity that distinguishes the series, for the colour bar that replaces the legend if there are
+    /// many.
     pub other_key: &'a str,
-    /// One series, or one for each setting of the other keys.
+    /// One series, or one per setting of the other keys.
     pub series: Vec<Series>,
-    /// How a numeric key is spread; by default as [`Scale::of`] says, or logarithmic where there is a power law.
+    /// Scale of a numeric key; by default that of [`Scale::of`], or logarithmic if there is a power law.
     pub across: Option<Scale>,
-    /// How t_relax is spread; the same by default.
+    /// Scale of t_relax; the same default.
     pub time: Option<Scale>,
 }
 
 /// t_relax at all settings of the key.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
-    /// Its entry in the legend, where there are several.
+    /// Its entry in the legend, if there are several.
     pub label: String,
     /// The value of the other key if it is a number, for the colour bar.
     pub value: Option<f64>,
@@ -66,9 +67,9 @@ pub struct Series {
 pub struct DependencePoint {
     /// The setting.
     pub at: Setting,
-    /// The median with its interval, in length⁴; none where too few members relaxed.
+    /// The median with its interval, in length⁴; none if too few members relaxed.
     pub median: Option<EstimatedNumber>,
-    /// The quantiles 25 and 75 %, in length⁴; the upper one is none where too few members relaxed.
+    /// The 25 and 75 % quantiles, in length⁴; the upper one is none if too few members relaxed.
     pub quartiles: (Option<f64>, Option<f64>),
 }
 
@@ -77,7 +78,7 @@ pub struct DependencePoint {
 pub enum Setting {
     /// Of a numeric key.
     Number(f64),
-    /// Of a named key. Where one is named, all are shown by name.
+    /// Of a named key. If one is named, all are shown by name.
     Name(String),
 }
 
@@ -86,7 +87,7 @@ pub enum Setting {
 pub struct PowerLawLine {
     /// p.
     pub exponent: EstimatedNumber,
-    /// t_relax where the key is 1, in length⁴.
+    /// t_relax for a key of 1, in length⁴.
     pub factor: f64,
 }
 
@@ -114,7 +115,7 @@ impl DependencePoint {
         }
     }
 
-    /// Draws it with its times where `place` puts them, and the marker of this rank.
+    /// Draws the point with its times at the positions that `place` returns, and the marker of this rank.
     fn draw(&self, svg: &mut Svg, time: &Axis, rank: usize, place: &dyn Fn(f64) -> DVec2) {
         let inside = |t: f64| t.clamp(time.range().0, time.range().1);
         let holds = |t: &f64| time.scale().holds(*t);
@@ -124,7 +125,7 @@ impl DependencePoint {
         };
         let (low, high) = (self.quartiles.0.filter(holds), self.quartiles.1.filter(holds));
         if let Some(low) = low {
-            // Open to the end of the axis where the upper quartile was not reached.
+            // Open to the end of the axis if the upper quartile was not reached.
             svg.path("thin", &line(low, high.unwrap_or(time.range().1)));
         }
         if let Some((low, high)) = self.median.and_then(|median| median.interval).filter(|(l, h)| holds(l) && holds(h))
@@ -138,19 +139,19 @@ impl DependencePoint {
 }
 
 impl Series {
-    /// The least and the largest of its settings that a power law holds for.
+    /// The smallest and the largest of its settings to which a power law applies.
     fn span(&self) -> Option<(f64, f64)> {
         let positive = self.levels.iter().filter_map(DependencePoint::number).filter(|x| Scale::Log.holds(*x));
         range(positive).filter(|(low, high)| low < high)
     }
 
-    /// Its law, if there is one and it can be drawn.
+    /// Its law, if it has one that can be drawn.
     fn law(&self) -> Option<PowerLawLine> {
         let known = |fit: &PowerLawLine| Scale::Log.holds(fit.factor) && Scale::Linear.holds(fit.exponent.value);
         self.fit.filter(known).filter(|_| self.span().is_some())
     }
 
-    /// Data of the line of its law.
+    /// Path data of the line of its law.
     fn line(&self, panel: &Panel) -> String {
         let (Some(PowerLawLine { exponent, factor }), Some((low, high))) = (self.law(), self.span()) else {
             return String::new();
@@ -195,7 +196,7 @@ impl Dependence<'_> {
         self.levels().any(|level| matches!(level.at, Setting::Name(_)))
     }
 
-    /// What to say of cells without a median.
+    /// A sentence about cells without a median.
     fn missing(&self) -> String {
         match self.levels().filter(|level| level.median.is_none()).count() {
             0 => String::new(),
@@ -205,7 +206,7 @@ impl Dependence<'_> {
         }
     }
 
-    /// How a quantity is spread: as wished where all values allow it.
+    /// The scale: `wish` if all values allow it.
     fn scale(&self, wish: Option<Scale>, values: &[f64]) -> Scale {
         let fitted = self.series.iter().any(|series| series.law().is_some());
         let default = if fitted { Scale::Log } else { Scale::of(values.iter().copied()) };
@@ -257,7 +258,7 @@ impl Dependence<'_> {
         svg.finish()
     }
 
-    /// Named settings below each other, with time across, so that names need not be turned.
+    /// Draws named settings one below the other, with time across, so that names are not rotated.
     fn draw_named(&self, colours: &Colours, mut sentences: Vec<String>) -> String {
         let mut names: Vec<String> = Vec::new();
         for level in self.levels() {

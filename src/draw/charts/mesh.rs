@@ -1,4 +1,4 @@
-//! Mesh quality over the members: how unequal the spacing of nodes is at the end, and how far lengths have drifted.
+//! Mesh quality of the members: how unequal the spacing of nodes is at the end, and how far lengths have drifted.
 
 use glam::DVec2;
 
@@ -23,11 +23,11 @@ pub struct MeshQuality<'a> {
     pub title: &'a str,
     /// A sentence below it, or nothing.
     pub note: &'a str,
-    /// Longest over shortest edge, one number a member: a picture shows less than seven digits.
+    /// Longest over shortest edge, one number per member: a picture shows less than seven digits.
     pub mesh_ratio: &'a [f32],
-    /// max |r_i − |e_i||/|e_i|, one number a member.
+    /// max |r_i − |e_i||/|e_i|, one number per member.
     pub metric_drift: &'a [f32],
-    /// Metric drift above which results are distrusted, and how many members have more; or nothing.
+    /// Metric drift above which results are distrusted, and the number of members above it; or nothing.
     pub distrusted: Option<(f64, u64)>,
 }
 
@@ -35,10 +35,10 @@ pub struct MeshQuality<'a> {
 struct MeshMeasure {
     name: &'static str,
     scale: Scale,
-    /// Where there are any.
+    /// Bins, if there are any values.
     bins: Option<Bins>,
     heading: String,
-    /// Values without a place on the axis.
+    /// Number of values that the axis cannot show.
     zeros: usize,
     unknown: usize,
 }
@@ -46,7 +46,7 @@ struct MeshMeasure {
 impl MeshMeasure {
     fn new(name: &'static str, values: &[f32]) -> MeshMeasure {
         let known = || values.iter().map(|value| f64::from(*value)).filter(|value| Scale::Linear.holds(*value));
-        // A drift of 0 is no reason to crowd all others at the left.
+        // A drift of 0 should not crowd all others at the left.
         let positive = || known().filter(|value| *value > 0.0);
         let scale = if known().any(|value| value < 0.0) { Scale::Linear } else { Scale::of(positive()) };
         let mut sorted: Vec<f64> = known().filter(|value| scale.holds(*value)).collect();
@@ -74,7 +74,7 @@ impl MeshMeasure {
         (zeros + &unknown).trim().into()
     }
 
-    /// Draws the panel from `corner` on, `width` wide with all that belongs to it.
+    /// Draws the panel from `corner`, `width` wide including its labels.
     fn draw(&self, svg: &mut Svg, corner: DVec2, width: f64, bound: Option<f64>) {
         let empty = Axis::new(self.name, "", Scale::Linear, (0.0, 1.0));
         let Some(bins) = &self.bins else {

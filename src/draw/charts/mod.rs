@@ -1,8 +1,8 @@
 //! The charts of a study, each from plain numbers to the text of an SVG file.
 //!
-//! Equal data give equal bytes. Values that are not finite are left out, and counted where they stand for members. Where
-//! there is nothing to draw, the picture says why. However many members there are, a picture stays below about 100 kB:
-//! members are counted in bins, and lines are thinned to what shows.
+//! Equal data give equal bytes. Values that are not finite are omitted, and counted if they stand for members. If there
+//! is nothing to draw, the picture says why. A picture stays below about 100 kB for any number of members: members are
+//! counted in bins, and lines are thinned to visible detail.
 
 mod bins;
 pub mod decay;
@@ -33,7 +33,7 @@ const TIME: &str = "length⁴";
 /// With more curves than this, bands would hide each other.
 const MAX_BANDS: usize = 4;
 
-/// The panel of a picture that has one, `height` high below `top`, with `room` for a colour bar at its right.
+/// The panel of a picture that has only one, `height` high below `top`, with `room` for a colour bar at its right.
 fn only_panel<'a>([x, y]: [&'a Axis; 2], top: f64, height: f64, room: f64) -> Panel<'a> {
     let left = Panel::left(y, height);
     let size = DVec2::new(WIDTH - left - MARGIN - room, height);

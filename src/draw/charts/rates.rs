@@ -1,4 +1,4 @@
-//! How fast the excess of the members falls: their fitted rates, as multiples of what linear theory gives where it does.
+//! How fast the excess of the members decreases: their fitted rates, relative to linear theory if it predicts any.
 
 use super::{
     bins::{Bins, guide},
@@ -21,11 +21,11 @@ pub struct FittedRates<'a> {
     pub title: &'a str,
     /// A sentence below it, or nothing.
     pub note: &'a str,
-    /// Rates over those of theory; or rates, in `unit`, where there is no theory.
+    /// Rates relative to theory; or rates in `unit`, if there is no theory.
     pub rates: Vec<f64>,
-    /// They are multiples of what theory gives.
+    /// Whether they are relative to theory.
     pub relative: bool,
-    /// Unit of rates that are not.
+    /// Unit of rates that are not relative.
     pub unit: &'a str,
     /// Members without a rate.
     pub without: u64,

@@ -1,4 +1,4 @@
-//! How relaxation times are distributed: their histogram, and below it the share that has relaxed.
+//! The distribution of relaxation times: a histogram, and below it the fraction that has relaxed.
 
 use std::iter;
 
@@ -28,11 +28,11 @@ pub struct RelaxationTimes<'a> {
     pub title: &'a str,
     /// A sentence below it, or nothing.
     pub note: &'a str,
-    /// t_relax of those that relaxed, in length⁴, in any order.
+    /// t_relax of the members that relaxed, in length⁴, in any order.
     pub times: Vec<f64>,
     /// The members without t_relax, counted by their status.
     pub others: &'a [(&'a str, u64)],
-    /// The median over all, with censored members counted as such, in length⁴.
+    /// The median over all members, including censored ones as such, in length⁴.
     pub median: Option<EstimatedNumber>,
 }
 
@@ -96,7 +96,7 @@ impl RelaxationTimes<'_> {
     }
 }
 
-/// The share of all members that has relaxed, against time: it ends below 1 where some never did.
+/// The fraction of all members that has relaxed, against time: it ends below 1 if some never did.
 fn steps(sorted: &[f64], members: u64, panel: &Panel) -> Vec<DVec2> {
     let share = |count: usize| count as f64 / members as f64;
     let places = sorted.iter().enumerate().map(|(i, t)| panel.place(*t, share(i + 1)));

@@ -1,4 +1,4 @@
-//! Survival curves: the share of members that has not relaxed yet, cell by cell (Kaplan and Meier).
+//! Survival curves: the fraction of members that has not relaxed yet, cell by cell (Kaplan and Meier).
 
 use std::iter;
 
@@ -12,11 +12,11 @@ use crate::draw::{
 };
 
 const HEIGHT: f64 = 300.0;
-/// Share of the members, and of a time, that is less than a tenth of a pixel.
+/// Fraction of the members, and of a time, that is less than a tenth of a pixel.
 const FINEST: f64 = 1.0 / 4096.0;
-/// Censoring strokes of all curves together.
+/// Maximum censoring strokes, over all curves.
 const MAX_STROKES: f64 = 1200.0;
-/// Least pixels between two of them on a curve.
+/// Minimum pixels between two of them on a curve.
 const STROKE_GAP: f64 = 3.0;
 
 /// Survival curves of the cells of a study.
@@ -26,11 +26,12 @@ pub struct Survival<'a> {
     pub title: &'a str,
     /// A sentence below it, or nothing.
     pub note: &'a str,
-    /// Name of what tells the cells apart, for the colour bar that replaces the legend where there are many.
+    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
+    /// many.
     pub key: &'a str,
     /// The curves, in the order of the legend.
     pub curves: Vec<SurvivalCurve>,
-    /// How time is spread; by default linearly, unless [`Scale::of`] says otherwise of the middles of the curves.
+    /// Scale of time; linear by default, unless [`Scale::of`] says otherwise for the middles of the curves.
     pub time: Option<Scale>,
 }
 
@@ -43,20 +44,20 @@ pub struct SurvivalCurve {
     pub value: Option<f64>,
     /// Times at which members relaxed, ascending, in length⁴.
     pub t: Vec<f64>,
-    /// Share that has not relaxed after each of those times, in [0, 1].
+    /// Fraction that has not relaxed after each of those times, in [0, 1].
     pub survival: Vec<f64>,
-    /// Lower and upper bounds of the shares, or nothing.
+    /// Lower and upper bounds of the fractions, or nothing.
     pub band: Option<(Vec<f64>, Vec<f64>)>,
     /// Times at which members were censored, ascending, in length⁴.
     pub censored: Vec<f64>,
 }
 
 impl SurvivalCurve {
-    /// Adds a step at a time behind all others, after which the share is `survival`, within `bounds`. Steps that come before
-    /// the curve has fallen by what shows are one, at the last of them.
+    /// Adds a step at a time after all others, to the fraction `survival`, within `bounds`. Steps before the curve has
+    /// fallen visibly are merged into one, at the last of them.
     pub fn add_step(&mut self, t: f64, survival: f64, bounds: (f64, f64)) {
         let (low, high) = self.band.get_or_insert_default();
-        // The share before the last step.
+        // The fraction before the last step.
         let before = match self.survival[..] {
             [.., before, _] => before,
             [_] => 1.0,
@@ -71,24 +72,24 @@ impl SurvivalCurve {
         }
     }
 
-    /// Adds a member that was censored at a time not before any other, unless its stroke would be over the last one.
+    /// Adds a member censored at a time not before any other, unless its stroke would cover the last one.
     pub fn add_censored(&mut self, t: f64) {
         if self.censored.last().is_none_or(|last| t - last > FINEST * t) {
             self.censored.push(t);
         }
     }
 
-    /// All times, in order of size within each kind.
+    /// All times, ascending within each kind.
     fn times(&self) -> impl Iterator<Item = f64> + '_ {
         self.t.iter().chain(&self.censored).copied()
     }
 
-    /// When the last member relaxed or was censored.
+    /// Time at which the last member relaxed or was censored.
     fn end(&self, scale: Scale) -> Option<f64> {
         self.times().filter(|t| scale.holds(*t)).reduce(f64::max)
     }
 
-    /// Corners of the steps of one of its lines, from all at the start to the end.
+    /// Corners of the steps of one of its lines, from the start to the end.
     fn line(&self, shares: &[f64], panel: &Panel, least: f64) -> Vec<DVec2> {
         let (time, share) = (panel.x.scale(), Scale::Linear);
         let Some(end) = self.end(time) else { return Vec::new() };
@@ -100,14 +101,14 @@ impl SurvivalCurve {
         trace::steps(iter::once(start).chain(places).chain([end]), least)
     }
 
-    /// Strokes where members were censored.
+    /// Path data of the strokes where members were censored.
     fn strokes(&self, panel: &Panel, least: f64) -> String {
         let mut data = String::new();
         let mut before = f64::NEG_INFINITY;
         for t in self.censored.iter().filter(|t| panel.x.scale().holds(**t)) {
             let x = panel.across(*t);
             if x - before >= least {
-                // The share after the last relaxation up to then.
+                // The fraction after the last relaxation up to then.
                 let relaxed = self.t.partition_point(|time| time <= t).min(self.survival.len());
                 let share = self.survival[..relaxed].last().copied().filter(|share| Scale::Linear.holds(*share));
                 data += &stroke(DVec2::new(x, panel.height(share.unwrap_or(1.0))));

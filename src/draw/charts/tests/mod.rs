@@ -1,4 +1,4 @@
-//! What holds for every chart, whatever its data.
+//! Properties of every chart, whatever its data.
 //!
 //! To look at the pictures: `CURVELAX_CHARTS=FOLDER cargo test charts`.
 
@@ -17,7 +17,7 @@ fn no_text_of_any_chart_is_cut_off_or_over_another() {
         }
         assert!(texts(svg).iter().any(|text| text.class == "head"), "{name}");
     }
-    // The check tells a difference.
+    // The check detects a difference.
     let (_, svg) = &pictures()[0];
     let labels: Vec<&str> = svg.lines().filter(|line| line.contains("x tick")).collect();
     let moved = svg.replace(labels[0], labels[1]);
@@ -122,7 +122,7 @@ fn medians_are_where_the_ticks_say() {
     let svg = picture("dependence");
     let (x, y) = (scale(svg, "x", true), scale(svg, "y", true));
     let series = amplitudes("all", 0.12, 8);
-    // The first of each kind is that of the legend.
+    // The first of each kind belongs to the legend.
     let dots = &paths(svg, "dots")[1..];
     assert_eq!(dots.len(), series.levels.len());
     for (dot, level) in dots.iter().zip(&series.levels) {

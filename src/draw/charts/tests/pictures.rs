@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use crate::draw::{axis::Scale, charts::*};
 
-/// Numbers in (0, 1), equal on every machine: halton of base 2 or 3.
+/// Numbers in (0, 1), equal on every machine: Halton numbers of base 2 or 3.
 fn spread(i: usize, base: usize) -> f64 {
     let (mut share, mut value, mut i) = (1.0, 0.0, i + 1);
     while i > 0 {
@@ -15,7 +15,7 @@ fn spread(i: usize, base: usize) -> f64 {
     value
 }
 
-/// About normal, with mean 0 and variance 1: quantile of the logistic distribution, scaled.
+/// Roughly normal, with mean 0 and variance 1: quantiles of the logistic distribution, scaled.
 fn normal(i: usize) -> f64 {
     let u = spread(i, 2);
     (u / (1.0 - u)).ln() / 1.814
@@ -25,7 +25,7 @@ fn times(count: usize, median: f64, width: f64) -> Vec<f64> {
     (0..count).map(|i| median * (width * normal(i)).exp()).collect()
 }
 
-/// Kaplan and Meier's curve of members of which those past `end` are censored, and some on the way.
+/// A Kaplan-Meier curve of members censored at `end`; some are censored earlier.
 pub fn survival(label: &str, value: Option<f64>, count: usize, median: f64, end: f64) -> SurvivalCurve {
     let mut all: Vec<(f64, bool)> =
         times(count, median, 0.5).into_iter().enumerate().map(|(i, t)| (t.min(end), t < end && i % 17 != 3)).collect();
@@ -61,7 +61,7 @@ fn level(at: Setting, median: f64) -> DependencePoint {
     DependencePoint { at, median: Some(median), quartiles: (Some(0.8 * median.value), Some(1.3 * median.value)) }
 }
 
-/// Medians scattered round factor·amplitude^(−0.31), at `count` amplitudes from 0.01 on.
+/// Medians scattered about factor·amplitude^(−0.31), at `count` amplitudes from 0.01.
 pub fn amplitudes(label: &str, factor: f64, count: usize) -> Series {
     let amplitude = |i: usize| 0.01 * 1.6_f64.powi(i as i32);
     let law = |x: f64| factor * x.powf(-0.31);

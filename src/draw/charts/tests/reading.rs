@@ -1,4 +1,4 @@
-//! What a picture says, read back from its text.
+//! The content of a picture, read back from its text.
 
 use crate::draw::width::{TITLE, width};
 
@@ -6,7 +6,7 @@ use crate::draw::width::{TITLE, width};
 pub struct Text<'a> {
     /// Its classes.
     pub class: &'a str,
-    /// What it says.
+    /// Its content.
     pub content: String,
     low: [f64; 2],
     high: [f64; 2],
@@ -71,7 +71,7 @@ pub fn complaint(svg: &str) -> Option<String> {
     None
 }
 
-/// The commands of the data of a path and their numbers.
+/// The commands in path data, with their numbers.
 pub fn commands(data: &str) -> Vec<(char, Vec<f64>)> {
     let starts: Vec<usize> = data.char_indices().filter(|(_, c)| c.is_alphabetic()).map(|(at, _)| at).collect();
     let ends = starts.iter().skip(1).copied().chain([data.len()]);
@@ -82,7 +82,7 @@ pub fn commands(data: &str) -> Vec<(char, Vec<f64>)> {
     starts.iter().zip(ends).map(command).collect()
 }
 
-/// From pixels to values, by the first and the last tick of an axis whose labels hold all of `kind`.
+/// The map from pixels to values, by the first and the last tick of an axis whose labels all contain `kind`.
 pub fn scale(svg: &str, kind: &str, log: bool) -> impl Fn(f64) -> f64 {
     let level = move |value: f64| if log { value.ln() } else { value };
     let digit = |c: char| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|raised| raised == c).map_or(c.to_string(), |d| d.to_string());
