@@ -1,8 +1,7 @@
-//! The state of a run on disk, from which `resume` goes on: the files `.curvelax.state` and, one older,
-//! `.curvelax.state.old`.
+//! The checkpoint from which `resume` continues: the file `.curvelax.state` and its predecessor `.curvelax.state.old`.
 //!
-//! Each is an [envelope](super::envelope) round what [`Head`] and [`Standing`] are. Tables are not in it, but how long they
-//! were and their checksums: a run that goes on cuts off what came later.
+//! Each is an [envelope](super::envelope) around [`Head`] and [`Standing`]. It holds the lengths and checksums of the
+//! tables, not the tables: a resumed run cuts off rows written later.
 
 use std::{
     collections::BTreeMap,
@@ -33,22 +32,22 @@ use crate::{
     results::tally::Aside,
 };
 
-/// What is in the file.
+/// The content of the file.
 type Body = (Head, u64, BTreeMap<u64, Ended>, BTreeMap<u64, Paused>);
 
-/// The fingerprint of the layout of all that `resume` reads.
+/// The fingerprint of the layout of all data that `resume` reads.
 pub static LAYOUT: LazyLock<u32> = LazyLock::new(fingerprint::<(Body, SpilledRows)>);
 
-/// What does not change while a run goes on.
+/// Facts that do not change during a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
     /// The resolved spec, in TOML.
     pub spec: String,
     /// Where it is computed.
     pub platform: Platform,
-    /// Where it was computed before, a sentence each.
+    /// Where it was computed before, one sentence each.
     pub moves: Vec<String>,
-    /// The folder that paths in the spec begin at; nothing where it has none.
+    /// The folder to which paths in the spec are relative; empty if it has none.
     pub base: String,
     /// The outlines in the spec, with the CRC-32C of each file.
     pub outlines: Vec<(PathBuf, u32)>,
@@ -56,39 +55,39 @@ pub struct Origin {
     pub started: Duration,
 }
 
-/// What a state says beside the members on their way.
+/// The part of a checkpoint that is not about members in progress.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Head {
-    /// How it all began.
+    /// The origin of the run.
     pub origin: Origin,
     /// Wall time of the run so far.
     pub wall: Duration,
-    /// Which of the [cohorts](crate::ensemble::Study::cohorts) the ranks are of.
+    /// Which of the [cohorts](crate::ensemble::Study::cohorts) is in progress; ranks refer to it.
     pub cohort: u64,
-    /// Tables, as far as they are told by this state.
+    /// Tables, with their extent at this checkpoint.
     pub tables: Vec<Mark>,
     /// The arrays of snapshots.
     pub store: Option<zarr::StoreMark>,
-    /// Rows of members that have not left yet, where they were too many for memory.
+    /// Rows of members that are still running, if these were too many for memory.
     pub rows: Option<Mark>,
-    /// Of the members that ended, what their rows do not say.
+    /// Data on the members that ended that are not in their rows.
     pub aside: Aside,
     /// The first members.
     pub films: Vec<Film>,
 }
 
-/// A state that was read back and found whole.
+/// A checkpoint that was read back and is valid.
 pub struct Saved {
-    /// Where the run stood.
+    /// Progress of the run.
     pub head: Head,
-    /// Its members.
+    /// Progress of its members.
     pub standing: Standing,
-    /// Why it is not the last state, if so.
+    /// Why it is not the last checkpoint, if so.
     pub note: Option<String>,
 }
 
 impl Origin {
-    /// That of a run of `cells` which begins now.
+    /// The origin of a run of `study` that begins now.
     ///
     /// # Errors
     /// [`Error::Request`] for outlines in a current folder without a name.
@@ -99,10 +98,10 @@ impl Origin {
         Ok(Origin { spec: study.spec().to_toml()?, platform, moves: Vec::new(), base, outlines, started })
     }
 
-    /// That the outlines of `study`, as they were read, are those of the beginning.
+    /// Checks that the outlines of `study`, as read, are those of the beginning.
     ///
     /// # Errors
-    /// [`Error::Request`] naming the first that is not.
+    /// [`Error::Request`] naming the first that differs.
     pub fn check_outlines(&self, study: &Study) -> Result<()> {
         let read = outlines(study);
         match self.outlines.iter().find(|(path, crc)| read.get(path) != Some(crc)) {
@@ -111,7 +110,7 @@ impl Origin {
         }
     }
 
-    /// The error of outlines that are not those of the beginning, or `error` where they are.
+    /// The error that outlines have changed, or else `error`.
     pub fn explain(&self, error: Error) -> Error {
         let read = |path| Outline::read_from(Path::new(&self.base), path).ok();
         let changed = self.outlines.iter().find(|(path, crc)| read(path).map(|outline| outline.digest()) != Some(*crc));
@@ -126,7 +125,7 @@ impl Origin {
     }
 }
 
-/// The outlines of a study with the CRC-32C of what was read of each.
+/// The outlines of a study, with the CRC-32C of each as read.
 fn outlines(study: &Study) -> BTreeMap<PathBuf, u32> {
     let outline = |cell: &Cell| match &cell.spec.shape {
         Shape::File(path) => Some((path.clone(), cell.family.outline()?.digest())),
@@ -135,7 +134,7 @@ fn outlines(study: &Study) -> BTreeMap<PathBuf, u32> {
     study.cells().iter().filter_map(outline).collect()
 }
 
-/// The current folder, by name.
+/// The path of the current folder.
 fn here() -> Result<String> {
     let refuse = |what: String| Error::Request(format!("the current folder, where the outline is named from, {what}"));
     let here = std::env::current_dir().map_err(|e| refuse(format!("cannot be found ({e})")))?;
@@ -143,28 +142,28 @@ fn here() -> Result<String> {
     name.ok_or_else(|| refuse(format!("has a name that is not UTF-8: {}; use another one", here.display())))
 }
 
-/// The bytes of a state; `resident` takes the place of that in `standing`.
+/// The bytes of a checkpoint; `resident` is used instead of that in `standing`.
 pub fn to_bytes(head: &Head, standing: &Standing, resident: &BTreeMap<u64, Paused>) -> Result<Vec<u8>> {
     let body = (head, standing.next, &standing.early, resident);
     sealed_body(*LAYOUT, &body).map_err(|e| Error::Failed(format!("cannot write {STATE}: {e}")))
 }
 
-/// Reads a state back.
+/// Reads a checkpoint from bytes.
 ///
 /// # Errors
-/// As [`opened`].
+/// Those of [`opened`].
 pub fn from_bytes(bytes: &[u8]) -> Result<(Head, Standing), Fault> {
     let (head, next, early, resident): Body = body(opened(*LAYOUT, bytes)?)?;
     Ok((head, Standing { next, early, resident: Some(resident) }))
 }
 
-/// Reads the state at `path`.
+/// Reads the checkpoint at `path`.
 pub fn read(path: &Path) -> Result<(Head, Standing), Fault> {
     from_bytes(&bytes(path)?)
 }
 
-/// Members on their way by the last state in `folder`, of those that have not ended in `standing`: where they are lost,
-/// they go on from there.
+/// Members in progress by the last checkpoint in `folder` that have not ended in `standing`. If the current ones are
+/// lost, these resume from there.
 pub fn on_their_way(folder: &OutputFolder, cohort: u64, standing: &Standing) -> BTreeMap<u64, Paused> {
     let read = |name| read(folder.place(name).at());
     match read(STATE).or_else(|_| read(STATE_OLD)) {
@@ -176,10 +175,11 @@ pub fn on_their_way(folder: &OutputFolder, cohort: u64, standing: &Standing) -> 
     }
 }
 
-/// The last state in the folder of an interrupted run that is whole and has its tables; none where nothing is left to do.
+/// Returns the last checkpoint in the folder of an interrupted run that is valid and matches its tables; none if
+/// nothing is left to do.
 ///
 /// # Errors
-/// [`Error::Request`] where there is no run, or none that can go on, with the reason.
+/// [`Error::Request`] if there is no run, or none that can be resumed, with the reason.
 pub fn find(folder: &OutputFolder) -> Result<Option<Saved>> {
     let path = folder.path();
     let refuse = |problem: String| Err(Error::Request(format!("{}: {problem}", path.display())));
@@ -210,7 +210,7 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Saved>> {
         }
     }
     match faults.is_empty() {
-        // What is left to do of a run that is complete is nothing.
+        // Nothing is left to do for a complete run.
         true if path.join(names::RUN).is_file() => super::reader::provenance(path).map(|_| None),
         true => refuse("no interrupted run: it had not started; curvelax run with --force starts it".into()),
         false => refuse(format!(

@@ -18,7 +18,7 @@ use crate::{
     results::{cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
 };
 
-/// What is said on stdout of a run that is done.
+/// Output on stdout for a completed run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// A table and some lines for people.
@@ -27,20 +27,20 @@ pub enum Form {
     Json,
 }
 
-/// How the overview names the pictures.
+/// Name of the pictures in the overview.
 const PLOTS: &str = "plots/*.svg";
 
-/// All members of a run, ended.
+/// A run whose members have all ended.
 pub struct Complete<'a> {
-    /// What was asked for, resolved.
+    /// The resolved spec.
     pub spec: &'a Spec,
     /// Where it was computed.
     pub platform: &'a Platform,
-    /// What came out.
+    /// The results.
     pub tally: Tally,
     /// The first members.
     pub films: &'a [Film],
-    /// What the user was told, a sentence each.
+    /// Warnings given to the user, one sentence each.
     pub warnings: &'a [String],
     /// When it began, since 1970.
     pub started: Duration,
@@ -49,11 +49,11 @@ pub struct Complete<'a> {
 }
 
 impl Complete<'_> {
-    /// Puts every file under its final name, once all are on disk, and returns the text for stdout. `files` and `store` have
-    /// the members; `shard` is [what a merge needs beside them](super::shard).
+    /// Gives all files their final names, once all are on disk, and returns the text for stdout. `files` and `store`
+    /// hold the results of the members; `shard` is [what a merge needs besides them](super::shard).
     ///
     /// # Errors
-    /// Where only the pictures cannot be written the tables are published all the same, with an error that says so.
+    /// If only the pictures cannot be written, the tables are published all the same, and the error says so.
     pub fn publish(
         self,
         folder: &OutputFolder,
@@ -65,7 +65,7 @@ impl Complete<'_> {
         let Complete { spec, platform, mut tally, films, warnings, started, wall } = self;
         let statistics = &EnsembleStatistics::new(spec, &mut tally)?;
         let tally = &tally;
-        // The rows of the members are first: where the disk fills up they are what is kept.
+        // Rows come first: they are saved even if the disk fills up.
         files.push(folder.write(names::ENSEMBLE, statistics.to_csv(spec)?)?);
         let excess = &tally.mean_excess(spec)?;
         files.push(Table::of(folder.file(names::MEAN_EXCESS)?, excess)?);
@@ -88,7 +88,7 @@ impl Complete<'_> {
             Ok(())
         })();
         if done.is_err() {
-            // All but what pictures are drawn from.
+            // Everything except the data from which pictures are drawn.
             drawn.truncate(1);
         }
         folder.publish(files.into_iter().chain(drawn).collect(), store, run)?;

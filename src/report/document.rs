@@ -1,5 +1,5 @@
-//! What a run says to programs (`--json`): the content of `run.json`, where its files are, and the statistics of its
-//! cells. Floats read back exactly; unknown is null.
+//! The results of a run for programs (`--json`): the content of `run.json`, the paths of its files, and the statistics
+//! of its cells. Floats read back exactly; unknown is null.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -23,9 +23,9 @@ pub struct Document<'a> {
     folder: &'a Path,
     files: &'a [&'static str],
     cells: Vec<CellDocument<'a>>,
-    /// Whether the cells could have one distribution; null where they were not compared.
+    /// Whether the cells could have one distribution; null if they were not compared.
     log_rank: Option<LogRankDocument>,
-    /// The medians as a power of the swept value; null where there is no such law.
+    /// The medians as a power of the swept value; null if there is no such law.
     power_law: Option<PowerLawDocument>,
 }
 
@@ -56,7 +56,7 @@ struct PowerLawDocument {
 }
 
 impl<'a> Document<'a> {
-    /// Collects it.
+    /// Collects the document.
     pub fn new(
         run: &'a Provenance,
         spec: &'a Spec,

@@ -1,8 +1,8 @@
-//! The envelope of what only this program reads: checkpoints, and what a merge has to know of a shard.
+//! The envelope of files that only this program reads: checkpoints, and the data that a merge needs from a shard.
 //!
-//! A file is 16 bytes of magic, the version of the format (4), the length of what follows without the checksum (8), the
-//! [fingerprint](super::fingerprint) of the body's layout (4), the version of the program and the body, as postcard writes
-//! them, and the CRC-32C of all of it (4), integers little-endian.
+//! A file is 16 bytes of magic, the version of the format (4), the length of the rest without the checksum (8), the
+//! [fingerprint](super::fingerprint) of the body's layout (4), the version of the program and the body, as written by
+//! postcard, and the CRC-32C of all of it (4). Integers are little-endian.
 
 use std::{
     fs::File,
@@ -15,20 +15,20 @@ use serde::{Deserialize, Serialize};
 use crate::{files::disk, input};
 
 const MAGIC: [u8; 16] = *b"curvelax state\r\n";
-/// Version of the format, that of the envelope and of numbers whose order no layout tells.
+/// Version of the format: of the envelope, and of numbers whose order no layout shows.
 const VERSION: u32 = 3;
-/// Bytes before what the length counts, and after it.
+/// Bytes before the counted part, and after it.
 const BEFORE: usize = MAGIC.len() + 4 + 8;
 const AFTER: usize = 4;
 
 const WRONG_CHECKSUM: &str = "its checksum is wrong";
 
-/// Why bytes are no state.
+/// Why bytes are not a valid file.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// They are no state of this program, or of another version of it: nothing else is to be tried.
+    /// They are not a file of this program, or one of another version: do not try others.
     Foreign(String),
-    /// They are one that was changed or cut off.
+    /// They were changed or truncated.
     Damaged(String),
 }
 
@@ -37,7 +37,7 @@ pub fn sealed_body(layout: u32, body: &impl Serialize) -> postcard::Result<Vec<u
     let body = (env!("CARGO_PKG_VERSION"), body);
     let size = postcard::experimental::serialized_size(&body)?;
     sealed(layout, |mut bytes| {
-        // A state may be large: no more room for it than it takes.
+        // A checkpoint may be large: reserve exactly as much as it needs.
         bytes.reserve_exact(size + AFTER);
         postcard::to_extend(&body, bytes)
     })
@@ -60,7 +60,7 @@ pub fn sealed<E>(layout: u32, write: impl FnOnce(Vec<u8>) -> Result<Vec<u8>, E>)
 /// The body of a [sealed](sealed_body) file.
 ///
 /// # Errors
-/// A [`Fault`] for anything but all the bytes that this version of the program wrote, with types of the same layout.
+/// A [`Fault`] unless the bytes are complete and written by this version of the program, with types of the same layout.
 pub fn opened(layout: u32, bytes: &[u8]) -> Result<&[u8], Fault> {
     let damaged = |what: &str| Err(Fault::Damaged(what.into()));
     let mut rest = bytes;
@@ -78,7 +78,7 @@ pub fn opened(layout: u32, bytes: &[u8]) -> Result<&[u8], Fault> {
     if crc32c::crc32c(all).to_le_bytes() != *crc {
         return damaged(WRONG_CHECKSUM);
     }
-    // Whole, so what follows is no accident.
+    // It is intact, so any difference is intended.
     if magic != MAGIC {
         return Err(Fault::Foreign("it is not a checkpoint of curvelax".into()));
     }
@@ -101,7 +101,7 @@ pub fn opened(layout: u32, bytes: &[u8]) -> Result<&[u8], Fault> {
     Ok(body)
 }
 
-/// Reads what [`opened`] gave.
+/// Reads the result of [`opened`].
 pub fn body<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Fault> {
     match postcard::take_from_bytes(bytes).map_err(unreadable)? {
         (body, []) => Ok(body),
@@ -113,7 +113,7 @@ fn unreadable(e: postcard::Error) -> Fault {
     Fault::Damaged(format!("it cannot be read ({e})"))
 }
 
-/// The length of the body, as the bytes before it tell.
+/// The length of the body, as given in the bytes before it.
 fn told(before: &[u8]) -> Option<u64> {
     before.get(BEFORE - 8..BEFORE)?.try_into().ok().map(u64::from_le_bytes)
 }
@@ -124,16 +124,16 @@ fn take<const N: usize>(bytes: &mut &[u8]) -> Option<[u8; N]> {
     Some(*first)
 }
 
-/// The bytes of the file at `path`, or the first of them if it is not sealed.
+/// The bytes of the file at `path`, or only the first if it is not sealed.
 pub fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
     let bytes = input::open(path).and_then(|mut file| {
         let length = file.metadata()?.len();
         let mut bytes = Vec::new();
-        // Whatever else it is, it is not read to its end if that is not where it says.
+        // A foreign file is not read to its end if the length does not match.
         (&file).take(BEFORE as u64).read_to_end(&mut bytes)?;
         let told = told(&bytes).and_then(|told| told.checked_add((BEFORE + AFTER) as u64));
         if told == Some(length) {
-            // Nor into memory, if it is not what was written.
+            // Nor into memory, if the checksum is wrong.
             check_whole(&mut file, length)?;
             file.rewind()?;
             bytes.clear();
@@ -144,7 +144,7 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
     bytes.map_err(|e| Fault::Damaged(e.to_string()))
 }
 
-/// That the last of the `length` bytes are the checksum of those before them, read piece by piece.
+/// Checks piece by piece that the last of the `length` bytes are the checksum of those before them.
 fn check_whole(file: &mut File, length: u64) -> io::Result<()> {
     if length > input::MAX_STATE {
         return Err(io::Error::other(format!("it has {length} bytes; at most {} are read", input::MAX_STATE)));
@@ -170,7 +170,7 @@ mod tests {
         body(opened(LAYOUT, bytes)?)
     }
 
-    /// The bytes with a right length and checksum again.
+    /// Corrects the length and checksum in `bytes`.
     fn sealed_again(mut bytes: Vec<u8>) -> Vec<u8> {
         bytes.truncate(bytes.len() - AFTER);
         let length = (bytes.len() - BEFORE) as u64;
@@ -192,7 +192,7 @@ mod tests {
         assert_eq!(with(MAGIC.len(), 2), older);
         let Fault::Foreign(message) = with(BEFORE + 5, b'9') else { panic!("another version of the program") };
         assert!(message.starts_with("it is of curvelax 9."), "{message}");
-        // Whole, but no state.
+        // Intact, but not a checkpoint.
         let cut = |length: usize| read(&sealed_again(sample()[..length].to_vec())).unwrap_err();
         let mut longer = sample();
         longer.push(0);

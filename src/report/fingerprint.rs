@@ -1,11 +1,11 @@
 //! The layout of a type as it is read from a checkpoint, and its fingerprint.
 //!
-//! Postcard writes values without names or types: a build whose structs differ would read other fields from the same bytes,
-//! mostly without noticing. The layout is what a type asks of a deserializer, in order: the names of structs, fields and
-//! variants, and the primitive types. It is recorded from the type alone, by handing it made-up values, so no list of
-//! fields has to be updated by hand.
+//! Postcard writes values without names or types: a build with different structs would read other fields from the same
+//! bytes, mostly without noticing. The layout is what a type requests from a deserializer, in order: the names of
+//! structs, fields and variants, and the primitive types. It is recorded from the type alone, by supplying made-up
+//! values, so that no list of fields needs manual updates.
 //!
-//! Not seen is what numbers in a list mean, and in which order they come: a change there changes the version of the
+//! The meaning and the order of numbers in a list are not covered: if these change, change the version of the
 //! [envelope](super::envelope).
 
 use std::collections::BTreeMap;
@@ -18,21 +18,21 @@ use serde::{
     },
 };
 
-/// A number that is another one where `T` has another layout.
+/// A number that differs if the layout of `T` differs.
 ///
 /// # Panics
-/// Where `T` has [none](layout); a test lays out all types that are written.
+/// If `T` has [no layout](layout); a test lays out all types that are written.
 pub fn fingerprint<T: for<'de> Deserialize<'de>>() -> u32 {
     crc32c::crc32c(layout::<T>().expect("a type that postcard can read").as_bytes())
 }
 
-/// What `T` asks for when it is read, in words.
+/// The requests of `T` when it is read, in words.
 ///
 /// # Errors
-/// For a type that refuses made-up values, that asks what comes next, or with variants that are out of reach.
+/// For a type that refuses made-up values, that asks for the type of the next value, or that has variants out of reach.
 pub fn layout<T: for<'de> Deserialize<'de>>() -> Result<String, Error> {
     let mut tracer = Tracer::default();
-    // A value has one variant of each enum, so others are made until all variants were seen.
+    // A value has one variant of each enum, so values are made until all variants were seen.
     loop {
         let seen = tracer.seen();
         T::deserialize(&mut tracer)?;
@@ -46,11 +46,11 @@ pub fn layout<T: for<'de> Deserialize<'de>>() -> Result<String, Error> {
     }
 }
 
-/// Hands out a value of any type, and records what it is asked for.
+/// Supplies values of any type, and records the requests.
 #[derive(Default)]
 struct Tracer {
     record: String,
-    /// Of each enum, how many variants were handed out, and how many there are.
+    /// For each enum, how many variants were supplied, and how many there are.
     enums: BTreeMap<&'static str, (usize, usize)>,
 }
 
@@ -60,12 +60,12 @@ impl Tracer {
         self.record.push(' ');
     }
 
-    /// Variants that were handed out.
+    /// Number of variants supplied.
     fn seen(&self) -> usize {
         self.enums.values().map(|(seen, _)| seen).sum()
     }
 
-    /// An enum with variants that were not.
+    /// An enum with variants that were not supplied.
     fn hidden(&self) -> Option<&'static str> {
         self.enums.iter().find(|(_, (seen, all))| seen < all).map(|(name, _)| *name)
     }
@@ -75,7 +75,7 @@ impl Tracer {
         self.list("{", fields.len(), fields, visitor)
     }
 
-    /// So many values, with these names if they have any.
+    /// A list of `left` values, with names if they have any.
     fn list<'de, V: Visitor<'de>>(
         &mut self,
         open: &str,
@@ -90,7 +90,7 @@ impl Tracer {
     }
 }
 
-/// Values that are left of a list.
+/// Remaining values of a list.
 struct Values<'a> {
     tracer: &'a mut Tracer,
     left: usize,
@@ -281,7 +281,7 @@ impl<'de> Deserializer<'de> for &mut Tracer {
 mod tests {
     use super::*;
 
-    /// A type called `Example` in a module of its own.
+    /// A type called `Example` in a separate module.
     macro_rules! example {
         ($module:ident: $($item:item)+) => {
             #[allow(dead_code)]

@@ -1,4 +1,4 @@
-//! `plots/curves.svg`: the first members before, on their way and after, all to one scale.
+//! `plots/curves.svg`: the first members at the start, during the run and at the end, all to one scale.
 
 use glam::DVec2;
 
@@ -8,11 +8,11 @@ use crate::{
     files::portraits::Film,
 };
 
-/// More members than this are not drawn.
+/// Maximum number of members drawn.
 pub const MAX_PANELS: usize = PORTRAITS;
 
 const COLUMNS: usize = 4;
-/// Width of a panel and the most of its height, in pixels, and the free space inside it.
+/// Width and maximum height of a panel in pixels, and the free space inside it.
 const SIDE: f64 = 200.0;
 const MIN_HEIGHT: f64 = 100.0;
 const PADDING: f64 = 14.0;
@@ -21,14 +21,14 @@ const GAP: f64 = 14.0;
 const MARGIN: f64 = 24.0;
 const HEAD: f64 = 48.0;
 const FOOT: f64 = 40.0;
-/// A picture this wide holds the head line.
+/// A picture this wide has room for the heading.
 const MIN_COLUMNS: usize = 2;
-/// States on the way: those in which about this share of the way to the end is left. The excess, which goes with the
+/// Intermediate states: those with about this fraction of the way to the end left. The excess, which goes with the
 /// square, has then fallen to a half and to a tenth.
 const LEFT: [f64; 2] = [0.71, 0.32];
-/// A state with more or less left than this looks like the start or the end.
+/// A state outside this range looks like the start or the end.
 const APART: std::ops::RangeInclusive<f64> = 0.12..=0.88;
-/// Nodes closer than this, in pixels, are a line already, and are not marked.
+/// Nodes closer than this, in pixels, look like a line and are not marked.
 const MIN_SPACING: f64 = 2.5;
 
 const STYLE: &str = "
@@ -93,7 +93,7 @@ pub fn draw(films: &[Film]) -> String {
 /// One member of the gallery.
 struct MemberPanel<'a> {
     film: &'a Film,
-    /// Its nodes at the start, on the way and at the end; none where nothing can be drawn.
+    /// Its nodes at the start, during the run and at the end; none if nothing can be drawn.
     states: Vec<Vec<DVec2>>,
 }
 
@@ -111,7 +111,7 @@ impl MemberPanel<'_> {
     }
 }
 
-/// The first of `frames`, those on the way that look different, and the last.
+/// The indices of the first of `frames`, of intermediate ones that look different, and of the last.
 fn shown(frames: &[Vec<DVec2>]) -> Vec<usize> {
     let (Some(start), Some(end)) = (frames.first(), frames.last()) else { return Vec::new() };
     let to_end = |nodes: &[DVec2]| nodes.iter().zip(end).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
@@ -165,7 +165,7 @@ fn draw_scale(svg: &mut Svg, left: DVec2, scale: f64) {
     svg.text("note", label, &format!("length {}", rounded(length)));
 }
 
-/// What all panels share.
+/// The layout common to all panels.
 struct PanelLayout {
     /// Pixels per unit of length.
     scale: f64,
@@ -173,7 +173,7 @@ struct PanelLayout {
     frame: DVec2,
 }
 
-/// The largest of `panels` fills its frame, which is as low as the tallest allows.
+/// Fits the largest of `panels` into its frame, which is no higher than the tallest panel needs.
 fn layout(panels: &[MemberPanel]) -> PanelLayout {
     let extent =
         panels.iter().filter_map(MemberPanel::bounds).map(|(low, high)| high - low).fold(DVec2::ZERO, DVec2::max);

@@ -15,21 +15,21 @@ use crate::{
     },
 };
 
-/// Those that a spec asks for.
+/// The growing files of a spec.
 pub struct Growing {
     summary: SummaryTable,
     rates: RateTable,
     series: Option<SeriesTable>,
     snapshots: Option<SnapshotTable>,
     store: Option<SnapshotStore>,
-    /// Rows of members that have not left; begun when the first of them come.
+    /// Rows of members that are still running; created when the first of them arrive.
     spill: Option<Spill>,
-    /// A member got into some of them only.
+    /// Some of them lack the last member.
     torn: bool,
 }
 
 impl Growing {
-    /// Their names for `spec`, the store aside.
+    /// Names of the files for `spec`, except the store.
     pub fn names(spec: &Spec) -> Vec<&'static str> {
         let snapshots = !spec.snapshots.is_empty() && spec.store == Store::Csv;
         let optional = [(names::SERIES, spec.series.is_some()), (names::SNAPSHOTS, snapshots)];
@@ -37,12 +37,12 @@ impl Growing {
         [names::SUMMARY, names::RATES].into_iter().chain(asked).collect()
     }
 
-    /// Whether `spec` asks for the store.
+    /// Whether `spec` requires the store.
     pub fn has_store(spec: &Spec) -> bool {
         !spec.snapshots.is_empty() && spec.store == Store::Zarr
     }
 
-    /// Begins them; `points` is the number of nodes of a member, which matters only where all have the same.
+    /// Begins the files; `points` is the number of nodes of a member, which matters only if all have the same.
     pub fn begin(folder: &OutputFolder, spec: &Spec, points: usize) -> Result<Growing> {
         let store = match Growing::has_store(spec) {
             true => Some(SnapshotStore::begin(folder.store(names::STORE)?, spec, points)?),
@@ -51,10 +51,10 @@ impl Growing {
         Growing::of(spec, store, |name| folder.file(name))
     }
 
-    /// Goes on with those of an interrupted run, as far as they were marked.
+    /// Continues the files of an interrupted run, up to their marks.
     ///
     /// # Errors
-    /// [`Error::Request`] where the marks are not of the files of `spec`.
+    /// [`Error::Request`] if the marks do not match the files of `spec`.
     pub fn resume(
         folder: &OutputFolder,
         spec: &Spec,
@@ -86,7 +86,7 @@ impl Growing {
         Ok(Growing { spill, ..growing })
     }
 
-    /// The tables in the files that `file` finds.
+    /// The tables in the files that `file` returns.
     fn of(spec: &Spec, store: Option<SnapshotStore>, file: impl Fn(&str) -> Result<PartFile>) -> Result<Growing> {
         let names = Growing::names(spec);
         let asked = |name: &str| names.contains(&name).then(|| file(name)).transpose();
@@ -101,9 +101,9 @@ impl Growing {
         })
     }
 
-    /// Writes what a member left.
+    /// Writes the results of a member.
     pub fn add(&mut self, ended: &Ended) -> Result<()> {
-        // Until all of it is written.
+        // Until everything is written.
         self.torn = true;
         let Ended { outcome, rows, .. } = ended;
         for extent in &rows.spilled {
@@ -134,7 +134,7 @@ impl Growing {
         Ok(())
     }
 
-    /// Takes rows of a member that has not left yet; [`Growing::add`] gets them back.
+    /// Stores rows of a member that is still running; [`Growing::add`] reads them back.
     pub fn spill(&mut self, folder: &OutputFolder, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Extent> {
         let spill = match self.spill.take() {
             Some(spill) => spill,
@@ -143,12 +143,12 @@ impl Growing {
         self.spill.insert(spill).add(series, snapshots)
     }
 
-    /// Where the rows of the members lie as yet.
+    /// Where the rows of the members are for now.
     pub fn rows(&self) -> &Place {
         self.summary.part()
     }
 
-    /// How far all have grown, once that is on disk.
+    /// Returns the extent of all files, once they are on disk.
     pub fn mark(&mut self) -> Result<(Vec<Mark>, Option<zarr::StoreMark>, Option<Mark>)> {
         if self.torn {
             return Err(Error::Failed("the rows of a member could not all be written".into()));
@@ -160,7 +160,7 @@ impl Growing {
         Ok((marks, store, self.spill.as_ref().map(Spill::mark).transpose()?))
     }
 
-    /// Whether they are worth keeping if the run fails.
+    /// Sets whether to keep them if the run fails.
     pub fn keep(&mut self, keep: bool) {
         self.summary.keep(keep);
         self.rates.keep(keep);
@@ -170,7 +170,8 @@ impl Growing {
         self.spill.iter().for_each(|spill| spill.keep(keep));
     }
 
-    /// All of them, on disk and ready for their final names; and what is to stay as long as the states of the run.
+    /// Completes all files on disk, ready for their final names; and returns the rows needed as long as there are
+    /// checkpoints.
     pub fn ready(self) -> Result<(Vec<PartFile>, Option<PartFolder>, Option<Spill>)> {
         let Growing { summary, rates, series, snapshots, store, spill, .. } = self;
         let mut files = vec![summary.ready()?, rates.ready()?];

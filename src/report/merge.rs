@@ -1,7 +1,7 @@
-//! Joins shards to the files that one run of all members would have written.
+//! Merges shards into the files that one run of all members would have written.
 //!
-//! Rows are copied as they are, in the order of the members, and nothing but a block of each shard is in memory; what is
-//! not in the rows is added up exactly. Statistics and pictures are then those of any run that is [`Complete`].
+//! Rows are copied unchanged, in the order of the members, with only one block of each shard in memory. Data that are
+//! not in the rows are added up exactly. Statistics and pictures are then those of any [`Complete`] run.
 
 use std::{
     cmp::Reverse,
@@ -35,34 +35,35 @@ use crate::{
     results::tally::Aside,
 };
 
-/// Bytes of all shards together that are read at once, and of one at least.
+/// Bytes read at once, from all shards together and at least from one.
 const BLOCKS: usize = 64 << 20;
 const MIN_BLOCK: usize = MAX_LINE;
 const MAX_BLOCK: usize = 1 << 20;
 
-/// Shards that are named one by one in a message.
+/// Maximum number of shards listed in a message.
 const NAMED: usize = 8;
 
-/// Keys that may differ from shard to shard: where and how it was computed, which the platform tells, and which shard.
+/// Keys that may differ between shards: where and how it was computed, which the platform records, and which shard it
+/// is.
 const OWN_KEYS: [&str; 4] = ["shard", "threads", "backend", "adapter"];
 
 /// Shards of one study.
 pub struct Shards {
-    /// Those that are done, by number.
+    /// Those that are complete, by number.
     parts: BTreeMap<u64, FinishedShard>,
-    /// What is known of the others.
+    /// Information on the others.
     unfinished: Vec<(Option<u64>, PathBuf, String)>,
-    /// The spec of the whole.
+    /// The spec of the whole study.
     spec: Spec,
     /// N.
     count: u64,
 }
 
 impl Shards {
-    /// Sorts what was found.
+    /// Sorts the shards that were found.
     ///
     /// # Errors
-    /// [`Error::Request`] where two shards are not of one study, or one is there twice.
+    /// [`Error::Request`] if two shards are not of the same study, or one is there twice.
     pub fn new(found: Vec<Found>) -> Result<Shards> {
         let of = |found: &Found| match found {
             Found::Done(part) => Some((part.path.clone(), part.spec.clone())),
@@ -105,7 +106,7 @@ impl Shards {
         Ok(shards)
     }
 
-    /// Digits are equal only where they were computed alike.
+    /// Digits agree only if shards were computed in the same way.
     fn check_places(&self) -> Result<()> {
         let mut parts = self.parts.values();
         let Some(first) = parts.next() else { return Ok(()) };
@@ -130,18 +131,18 @@ impl Shards {
         Ok(())
     }
 
-    /// How many shards the study has; those without a member do not count.
+    /// Number of shards of the study; those without members do not count.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// The shards that are not done, as ranges of their numbers: no more than there are folders and one, however many
-    /// shards the study has.
+    /// The shards that are not complete, as ranges of their numbers: at most one more than there are folders, however
+    /// many shards the study has.
     pub fn missing(&self) -> Vec<RangeInclusive<u64>> {
         self.all_but(self.parts.keys().copied())
     }
 
-    /// The shards with members but for `others`, which ascend.
+    /// The shards with members, except `others`, which ascend.
     fn all_but(&self, others: impl Iterator<Item = u64>) -> Vec<RangeInclusive<u64>> {
         match &self.spec.only {
             Some(only) => {
@@ -167,8 +168,8 @@ impl Shards {
         }
     }
 
-    /// A line for each shard that is not done: its number, and what there is instead; those of which nothing is known in
-    /// one line.
+    /// A line for each incomplete shard, with its number and what there is instead; a single line for all those of
+    /// which nothing is known.
     pub fn told(&self) -> Vec<String> {
         let line = |(index, path, why): &(Option<u64>, PathBuf, String)| match index {
             Some(index) if self.parts.contains_key(index) => None,
@@ -186,10 +187,10 @@ impl Shards {
         lines
     }
 
-    /// Joins them in `folder`, and returns the text for stdout.
+    /// Merges them in `folder`, and returns the text for stdout.
     ///
     /// # Errors
-    /// [`Error::Request`] where a shard is missing or is not what it was when it was done; nothing is left in `folder` then.
+    /// [`Error::Request`] if a shard is missing or has changed since it was completed; `folder` is then left empty.
     pub fn merge(self, folder: &OutputFolder, form: Form) -> Result<String> {
         self.check_complete()?;
         let Shards { parts, spec, .. } = self;
@@ -232,7 +233,7 @@ impl Shards {
     }
 
     /// # Errors
-    /// [`Error::Request`] naming the shards that are missing.
+    /// [`Error::Request`] naming the missing shards.
     pub fn check_complete(&self) -> Result<()> {
         let missing = self.missing();
         if missing.is_empty() {
@@ -271,7 +272,7 @@ fn unfinished(found: &Found) -> String {
     }
 }
 
-/// The first of them, and how many more.
+/// The first few lines, and the number of others.
 fn listed(lines: &[String], between: &str) -> String {
     let mut text = lines.iter().take(NAMED).cloned().collect::<Vec<_>>().join(between);
     if lines.len() > NAMED {
@@ -280,7 +281,7 @@ fn listed(lines: &[String], between: &str) -> String {
     text
 }
 
-/// Ascending ranges as Slurm writes them: `0,3,5-9`.
+/// Ascending ranges in Slurm's notation: `0,3,5-9`.
 pub fn listed_ranges(ranges: &[RangeInclusive<u64>]) -> String {
     let text = |range: &RangeInclusive<u64>| match (range.start(), range.end()) {
         (first, last) if first == last => first.to_string(),
@@ -294,16 +295,16 @@ fn total(ranges: &[RangeInclusive<u64>]) -> u64 {
     ranges.iter().map(|range| range.end() - range.start() + 1).sum()
 }
 
-/// The rows of a table of one shard, which is opened for every block anew: any number of shards can be joined.
+/// The rows of a table of one shard. It is reopened for every block, so that any number of shards can be merged.
 struct ShardRows {
     path: PathBuf,
     shard: Shard,
     mark: Mark,
-    /// Bytes that were read, and their CRC-32C.
+    /// Bytes read, and their CRC-32C.
     read: Mark,
     block: usize,
     buffer: Vec<u8>,
-    /// Where in it the next line begins, and its length.
+    /// Position and length of the next line.
     at: usize,
     line: usize,
 }
@@ -325,7 +326,7 @@ impl ShardRows {
         ))
     }
 
-    /// Goes to the next line; none at the end of the file, which is then known to be what the shard wrote.
+    /// Goes to the next line; none at the end of the file, when its checksum has been verified.
     fn next(&mut self) -> Result<Option<&[u8]>> {
         self.at += self.line;
         loop {
@@ -388,7 +389,7 @@ impl ShardRows {
     }
 }
 
-/// The table `name` of all parts, in the order of the members.
+/// Merges the table `name` of all parts, in the order of the members.
 fn join(parts: &[FinishedShard], name: &str, folder: &OutputFolder) -> Result<PartFile> {
     let file = folder.file(name)?;
     let target = file.target().to_path_buf();
@@ -399,10 +400,10 @@ fn join(parts: &[FinishedShard], name: &str, folder: &OutputFolder) -> Result<Pa
     Ok(file)
 }
 
-/// Writes the table `name` of all parts, in the order of the members, to `out`, which is called `target`.
+/// Writes the table `name` of all parts, in the order of the members, to `out`, which messages call `target`.
 ///
 /// # Errors
-/// [`Error::Request`] naming a file that is not what its shard wrote.
+/// [`Error::Request`] naming a file that differs from what its shard wrote.
 pub fn join_rows(parts: &[FinishedShard], name: &str, out: &mut impl Write, target: &Path) -> Result<()> {
     let cannot = |e| Error::io("cannot write", target)(e);
     let block = (BLOCKS / parts.len().max(1)).clamp(MIN_BLOCK, MAX_BLOCK);
@@ -434,7 +435,7 @@ pub fn join_rows(parts: &[FinishedShard], name: &str, out: &mut impl Write, targ
     Ok(())
 }
 
-/// The arrays of all parts, in the order of the members.
+/// Merges the arrays of all parts, in the order of the members.
 fn join_stores(parts: &[FinishedShard], spec: &Spec, folder: &OutputFolder) -> Result<PartFolder> {
     let points = parts[0].record.points;
     let mut stored = BTreeMap::new();

@@ -1,7 +1,7 @@
-//! What a run leaves for people and programs: tables, plots and provenance in a folder, and an overview.
+//! The output of a run for people and programs: tables, plots and provenance in a folder, and an overview.
 //!
-//! A [`RunReport`] is opened before the work starts, so that a folder that cannot be written costs nothing. It is the
-//! [`Sink`] of the simulation: rows stream to disk, and only a few numbers per member stay in memory.
+//! A [`RunReport`] is opened before the work starts, so that no work is lost to a folder that cannot be written. It is
+//! the [`Sink`] of the simulation: rows stream to disk, and only a few numbers per member stay in memory.
 
 pub mod checkpoint;
 pub mod complete;
@@ -41,52 +41,52 @@ use complete::Complete;
 use growing::Growing;
 use progress::Progress;
 
-/// A run that is asked to stop and does not come to a place where it can ends after this time all the same.
+/// A run that is asked to stop and does not reach a point where it can is ended after this time.
 const PATIENCE: Duration = Duration::from_millis(2500);
 
-/// States take at most this share of the time of a run.
+/// Checkpoints use at most one part in `SHARE_OF_STATES` of the time of a run.
 const SHARE_OF_STATES: u32 = 20;
 
-/// How a report goes about its work; nothing of it is in the results.
+/// How a report works; the results do not depend on it.
 pub struct Manner {
-    /// No progress on stderr.
+    /// Whether to suppress progress on stderr.
     pub quiet: bool,
-    /// Time between two states.
+    /// Time between two checkpoints.
     pub every: Duration,
-    /// Who may stop the run.
+    /// The means to stop the run.
     pub stop: Stop,
 }
 
-/// Everything that is written about one run.
-// The tables come before the folder: dropped first, they leave it empty for its own clean-up.
+/// Everything written about a run.
+// The tables come before the folder: dropped first, they leave it empty for its clean-up.
 pub struct RunReport {
     growing: Growing,
     folder: OutputFolder,
     origin: Origin,
-    /// Nodes of a member.
+    /// Nodes per member.
     points: usize,
     tally: Tally,
     /// The first members.
     films: Vec<Film>,
-    /// Members of the whole study, and those of earlier simulations.
+    /// Members of the whole study, and those of earlier cohorts.
     total: u64,
     before: u64,
-    /// Which simulation this is.
+    /// Index of the cohort.
     cohort: u64,
     progress: Progress,
     clock: Instant,
-    /// Wall time before it was interrupted.
+    /// Wall time before the interruption.
     earlier: Duration,
     every: Duration,
     stop: Stop,
-    /// When the last state was complete, and how long it took.
+    /// When the last checkpoint was complete, and how long it took.
     kept: (Instant, Duration),
-    /// There is something in the state.
+    /// Whether the checkpoint contains any work.
     has_begun: bool,
 }
 
 impl RunReport {
-    /// Opens the tables that a study asks for, and saves the first checkpoint, from which a run that is killed resumes.
+    /// Opens the tables of a study, and saves the first checkpoint, from which a killed run resumes.
     pub fn begin(folder: OutputFolder, study: &Study, origin: Origin, manner: Manner) -> Result<RunReport> {
         let growing = Growing::begin(&folder, study.spec(), study.points())?;
         let mut report = RunReport::new(folder, growing, study, origin, manner);
@@ -100,10 +100,10 @@ impl RunReport {
         }
     }
 
-    /// Goes on with the report of an interrupted run; returns where that stood.
+    /// Resumes the report of an interrupted run; returns the progress of the run.
     ///
     /// # Errors
-    /// [`Error::Request`] where its files are not those of the study.
+    /// [`Error::Request`] if its files are not those of the study.
     pub fn resume(folder: OutputFolder, study: &Study, kept: Saved, manner: Manner) -> Result<(RunReport, Standing)> {
         let Saved { head, standing, note } = kept;
         let Head { origin, wall, cohort, tables, store, rows, aside, films } = head;
@@ -141,14 +141,14 @@ impl RunReport {
         }
     }
 
-    /// The members that come now are simulated by themselves, as the `cohort`-th; those before have all ended.
+    /// Begins cohort number `cohort`; all members of earlier ones have ended.
     pub fn begin_cohort(&mut self, cohort: usize) {
         if self.cohort != cohort as u64 {
             (self.cohort, self.before) = (cohort as u64, self.tally.members());
         }
     }
 
-    /// Where everything is written.
+    /// The output folder.
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
@@ -158,12 +158,12 @@ impl RunReport {
         &self.origin.platform
     }
 
-    /// Where it was computed before, a sentence each.
+    /// Where it was computed before, one sentence each.
     pub fn moves(&self) -> &[String] {
         &self.origin.moves
     }
 
-    /// Which simulation of the study comes now, from 0.
+    /// Index of the current cohort.
     pub fn cohort(&self) -> usize {
         self.cohort as usize
     }
@@ -173,23 +173,23 @@ impl RunReport {
         self.tally.members()
     }
 
-    /// Why `error` came: because the folder was taken away, if it was.
+    /// Replaces `error` by its cause if the folder was taken away.
     pub fn explain(&self, error: Error) -> Error {
         self.folder.explain(error)
     }
 
-    /// Ends a run that failed: its state and its rows stay where they are; unless there is nothing in them, then none do.
-    /// Returns whether there is something to resume.
+    /// Ends a run that failed. Its checkpoint and its rows are kept, or removed if they contain no work. Returns
+    /// whether the run can be resumed.
     pub fn give_up(mut self) -> bool {
-        // In a folder that was taken away nothing is touched any more.
+        // A folder that was taken away is not touched any more.
         let wanted = self.has_begun || self.stop.asked().is_some() || self.folder.check_claim().is_err();
-        // A state that cannot be removed keeps its rows.
+        // A checkpoint that cannot be removed needs its rows.
         let stays = wanted || self.folder.forget_states().is_err();
         self.growing.keep(stays);
         stays
     }
 
-    /// How far it has come, once that is on disk.
+    /// Returns the head of a checkpoint, once everything is on disk.
     fn head(&mut self) -> Result<Head> {
         let (tables, store, rows) = self.growing.mark()?;
         Ok(Head {
@@ -223,21 +223,21 @@ impl RunReport {
         self.tally.warnings()
     }
 
-    /// How many members ended neither relaxed nor unfinished.
+    /// Number of members that ended neither relaxed nor unfinished.
     pub fn failed(&self) -> u64 {
         self.tally.failed()
     }
 
-    /// Puts every file under its final name, as [`Complete::publish`] does; `early` is what the user was told before.
+    /// Gives all files their final names with [`Complete::publish`]; `early` are the warnings given before.
     pub fn finish(mut self, spec: &Spec, early: &[String], form: Form) -> Result<String> {
-        // All rows are there: a run that is killed from now on draws its pictures again, and nothing else.
+        // All rows are written: a run killed from now on only needs to draw its pictures again.
         let next = self.tally.members() - self.before;
         self.checkpoint(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;
         let shard = match spec.shard {
             Some(_) => Some(shard::to_bytes(&Head { rows: None, ..self.head()? }, self.points, early)?),
             None => None,
         };
-        // In reverse order they are dropped: the folder last, after its files.
+        // Dropped in reverse order: the folder last, after its files.
         let RunReport { folder, tally, films, progress, origin, clock, earlier, growing, .. } = self;
         progress.finish();
         let wall = earlier.saturating_add(clock.elapsed());
@@ -248,7 +248,7 @@ impl RunReport {
         let published = complete.publish(&folder, files, store, shard.as_deref(), form);
         let done = published.and_then(|text| folder.forget_states().map(|()| text));
         if done.is_ok() {
-            // No state refers to it any more.
+            // No checkpoint refers to it any more.
             spill.iter().for_each(|spill| spill.keep(false));
         }
         done.map_err(|error| folder.explain(error))
@@ -258,7 +258,7 @@ impl RunReport {
 impl Sink for RunReport {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         let Ended { outcome, portrait, mollified, unresolved, excess, .. } = ended;
-        // First what may refuse it: rows that are written are rows that can be read again.
+        // The tally may refuse it, so it comes first: rows that are written can always be read back.
         self.tally.add(outcome)?;
         self.growing.add(ended)?;
         self.has_begun = true;
@@ -340,10 +340,10 @@ mod tests {
         RunReport::begin(OutputFolder::open(out, true).unwrap(), &study, origin, manner(stop)).unwrap()
     }
 
-    /// Nodes of the members here.
+    /// Nodes of the members in these tests.
     const POINTS: usize = 6;
 
-    /// What a member leaves.
+    /// The result of a member.
     fn ended(member: u64, portrait: Option<Portrait>) -> Ended {
         let of = |value| vec![value; POINTS];
         Ended {
@@ -360,7 +360,7 @@ mod tests {
         }
     }
 
-    /// A report into `out` that has received one member.
+    /// A report in `out` that has received one member.
     fn report(out: &Path, spec: &Spec, portrait: Option<Portrait>) -> RunReport {
         let mut report = begun(out, spec, &Stop::default());
         report.member(&ended(0, portrait)).unwrap();
@@ -411,7 +411,7 @@ mod tests {
         assert_eq!(error.exit_code(), 75, "the first cause counts");
         assert!(error.to_string().starts_with("stopped by --max-time after "), "{error}");
         assert!(error.to_string().contains("with 1 of 256 members in the table; curvelax resume "), "{error}");
-        // Where this thread had to wait for long, its patience may be over.
+        // If this thread had to wait long, its patience may be over.
         let goes_on = running.progress(1, 256, 0.1).is_ok();
         assert!((goes_on || before.elapsed() > PATIENCE) && !stop.is_kept());
         running.checkpoint(&Standing { next: 1, ..Standing::default() }).unwrap();
@@ -432,7 +432,7 @@ mod tests {
         assert!(matches!(running.wish(), Wish::Continue));
         running.every = Duration::ZERO;
         assert!(matches!(running.wish(), Wish::Checkpoint));
-        // A state that took long is not written again soon.
+        // A checkpoint that took long is not saved again soon.
         running.kept.1 = hour;
         assert!(matches!(running.wish(), Wish::Continue));
     }
@@ -459,7 +459,7 @@ mod tests {
             first.member(&ended(0, None)).unwrap();
             let early = BTreeMap::from([(2, ended(2, None))]);
             first.checkpoint(&Standing { next: 1, early, resident: Some(BTreeMap::new()) }).unwrap();
-            // Not in the state: to be cut off.
+            // Not in the checkpoint: to be cut off.
             first.member(&ended(1, None)).unwrap();
             assert!(first.give_up(), "there is something to go on with");
             let folder = OutputFolder::open_again(&broken).unwrap();
@@ -494,7 +494,7 @@ mod tests {
         assert_eq!(files(home.path()), [""; 0]);
         assert!(report(&out, &Spec::default(), None).give_up());
         assert_eq!(files(&out), [".curvelax.state", ".rates.csv.part", ".summary.csv.part"]);
-        // Nothing has ended, but it was asked to stop, which is no failure.
+        // Nothing has ended, but the run was asked to stop, which is not a failure.
         let stop = Stop::default();
         let running = begun(&home.path().join("stopped"), &Spec::default(), &stop);
         stop.ask(Cause::Terminate);

@@ -1,4 +1,4 @@
-//! The table that a run prints when it is done.
+//! The table that a run prints at its end.
 
 use std::{fmt, path::Path, time::Duration};
 
@@ -14,16 +14,16 @@ use crate::{
     text::{duration, plural},
 };
 
-/// Cells at most of which there is a line; the table has them all.
+/// Maximum number of cells listed; the table has them all.
 const MAX_CELLS: usize = 40;
 
-/// A finished run at a glance; its `Display` is the text for stdout.
+/// A completed run at a glance; its `Display` is the text for stdout.
 pub struct Overview<'a> {
-    /// What was asked for.
+    /// The resolved spec.
     pub spec: &'a Spec,
     /// Where it was computed.
     pub platform: &'a Platform,
-    /// What came out.
+    /// The results.
     pub tally: &'a Tally,
     /// Statistics of the relaxation times.
     pub statistics: &'a EnsembleStatistics,
@@ -59,7 +59,7 @@ impl fmt::Display for Overview<'_> {
 }
 
 impl Overview<'_> {
-    /// Members by status; the rarer endings only where there are any.
+    /// Members by status; rarer ones only if there are any.
     fn statuses(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let members = self.tally.members();
         writeln!(f, "{:<11}{:>10}{:>10}", "status", "members", "share")?;
@@ -72,7 +72,7 @@ impl Overview<'_> {
         writeln!(f, "{:<11}{members:>10}", "all")
     }
 
-    /// What was done to outlines whose corners the nodes do not resolve; empty where nothing was.
+    /// Changes to outlines whose corners the nodes do not resolve; empty if there were none.
     fn corners(&self) -> String {
         let MollifiedMembers { members, most_rounds, largest_area_change, .. } = self.tally.mollified;
         if members == 0 {
@@ -90,7 +90,7 @@ impl Overview<'_> {
         }
     }
 
-    /// The rates of a single ensemble; empty where no member has one.
+    /// The rates of a single ensemble; empty if no member has one.
     fn rate(&self) -> String {
         let [CellStatistics { rates: Rates { numbers, .. }, .. }] = &self.statistics.cells[..] else {
             return String::new();
@@ -102,7 +102,7 @@ impl Overview<'_> {
         format!("median {}{theory}, fitted to {} {members}", significant(median), numbers.known)
     }
 
-    /// One line a cell of a study, and how they compare.
+    /// One line per cell of a study, and how the cells compare.
     fn cells(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let EnsembleStatistics { cells, log_rank, power_law, .. } = self.statistics;
         if cells.len() < 2 {
@@ -159,7 +159,7 @@ impl Overview<'_> {
     }
 }
 
-/// What was run, in a line; what is swept is left out.
+/// Describes the run in one line, without the swept keys.
 pub fn describe(spec: &Spec) -> String {
     let pace = match spec.pace() {
         Pace::Fixed(tau) => ("tau", format!("tau = {tau:?}")),
@@ -178,14 +178,14 @@ pub fn describe(spec: &Spec) -> String {
     parts.collect::<Vec<_>>().join(", ")
 }
 
-/// Where it was run, in a line.
+/// The machine in one line.
 pub fn machine(platform: &Platform) -> String {
     let Platform { reason, threads, .. } = platform;
     let threads = threads.map_or(String::new(), |count| format!(", {count} {}", plural(count as u64, "thread")));
     format!("{}{threads} ({reason})", place(platform))
 }
 
-/// The same, as far as results depend on it.
+/// The machine, as far as results depend on it.
 pub fn place(platform: &Platform) -> String {
     let Platform { backend, adapter, precision, .. } = platform;
     let adapter = adapter.as_ref().map_or(String::new(), |name| format!(" {name}"));
@@ -193,7 +193,7 @@ pub fn place(platform: &Platform) -> String {
     format!("{backend}{adapter}, {precision}")
 }
 
-/// Median and mean of the times of a cell, and how far they are to be trusted.
+/// Median and mean of the times of a cell, and how reliable they are.
 fn times(cell: &CellStatistics) -> String {
     let (members, known) = (cell.members(), cell.sample.events() as u64);
     let Some(mean) = cell.mean else { return format!("none of {members} {} reached it", plural(members, "member")) };
@@ -217,7 +217,7 @@ fn times(cell: &CellStatistics) -> String {
     )
 }
 
-/// Four significant digits; whole numbers from 1000 on in full.
+/// Four significant digits; whole numbers from 1000 in full.
 fn significant(value: f64) -> String {
     let size = value.abs();
     match size {

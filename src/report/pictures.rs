@@ -1,4 +1,4 @@
-//! What people look at: the charts of a run and its page, from its statistics.
+//! What people look at: the charts of a run and its page, made from its statistics.
 
 use super::{
     gallery,
@@ -25,14 +25,14 @@ use crate::{
 
 /// Half the width of a 95 % band in standard errors.
 const BAND: f64 = 1.96;
-/// Digits of a number that is to be read.
+/// Digits of a number for reading.
 const DIGITS: usize = 4;
 
 /// A finished run.
 pub struct FinishedRun<'a> {
-    /// What was asked for, where and when it was computed.
+    /// The spec, with the place and time of the run.
     pub provenance: &'a Provenance,
-    /// What came out, but for what the statistics have taken.
+    /// The results, except those moved to the statistics.
     pub tally: &'a Tally,
     /// Statistics of times and rates.
     pub statistics: &'a EnsembleStatistics,
@@ -42,11 +42,11 @@ pub struct FinishedRun<'a> {
     pub films: &'a [Film],
 }
 
-/// A picture with its place in the folder of the run.
+/// A picture, and its place in the folder of the run.
 pub struct Chart {
     /// The file.
     pub name: &'static str,
-    /// The picture, with its words.
+    /// The picture, with its text.
     pub figure: PageFigure,
 }
 
@@ -65,10 +65,10 @@ impl FinishedRun<'_> {
         &self.provenance.spec
     }
 
-    /// The charts that this run has, in the order in which they are read.
+    /// The charts of this run, in reading order.
     ///
     /// # Errors
-    /// [`Error::Request`](crate::Error::Request) where a cell's values do not fit the spec.
+    /// [`Error::Request`](crate::Error::Request) if the values of a cell do not fit the spec.
     pub fn charts(&self) -> Result<Vec<Chart>> {
         let mut charts = vec![self.relaxation(), self.survival()];
         charts.extend(self.excess()?);
@@ -116,12 +116,12 @@ impl FinishedRun<'_> {
         chart(names::SURVIVAL, title, caption, survival.draw())
     }
 
-    /// The mean excess as long as all members of a cell run.
+    /// The mean excess, for as long as all members of a cell are running.
     fn excess(&self) -> Result<Option<Chart>> {
         let numbers = self.numbers();
         let curve = |(rank, cell): (usize, &CellTally)| {
             let all: u64 = cell.counts.iter().sum();
-            // The rows come cell by cell.
+            // Rows are sorted by cell.
             let first = self.excess.partition_point(|row| row.cell < rank as u64);
             let rows = self.excess[first..].iter().take_while(|row| row.cell == rank as u64 && row.members == all);
             let rows: Vec<(f64, f64, f64)> =
@@ -139,7 +139,7 @@ impl FinishedRun<'_> {
         if curves.iter().all(|curve| curve.t.len() < 2) {
             return Ok(None);
         }
-        // One line of theory is a help, many are not.
+        // One theoretical line helps, many do not.
         let theory = match (&self.tally.cells[..], &curves[..]) {
             ([cell], [curve]) => law(&self.spec().of_cell(0)?, cell, curve),
             _ => None,
@@ -166,7 +166,7 @@ impl FinishedRun<'_> {
         chart(names::RATE, title, caption, svg)
     }
 
-    /// t_relax against the key that changes fastest, a series for each combination of the others.
+    /// t_relax against the key that changes fastest, with a series for each combination of the others.
     fn dependence(&self) -> Option<Chart> {
         let (axis, others) = self.spec().sweep.axes().split_last()?;
         let numbers = axis.numbers();
@@ -220,7 +220,7 @@ impl FinishedRun<'_> {
 
     /// The text of `report.html`; `gallery` is the picture of the first members.
     fn page(&self, charts: &[Chart], gallery: Option<&str>) -> Result<String> {
-        // Equal results give equal bytes, on however many threads.
+        // Equal results give equal bytes, on any number of threads.
         let spec = Spec { threads: None, ..self.spec().clone() }.to_toml()?;
         let first = gallery.map(|svg| {
             let title = "The first members before, on their way and after";
@@ -268,7 +268,7 @@ impl FinishedRun<'_> {
         if let [axis] = self.spec().sweep.axes() { axis.numbers() } else { None }
     }
 
-    /// What a cell is called in a legend.
+    /// The name of a cell in a legend.
     fn label(&self, cell: u64) -> String {
         if self.spec().sweep.is_empty() { "all members".into() } else { self.spec().sweep.name(cell) }
     }
@@ -362,7 +362,7 @@ impl FinishedRun<'_> {
         };
         [
             ("curvelax", self.provenance.curvelax.clone()),
-            // No clock times, and nothing else that does not change a digit.
+            // No clock times, and nothing else that does not affect digits.
             ("ran on", place(&self.provenance.platform)),
             ("driver", self.provenance.platform.driver.clone().unwrap_or_default()),
             ("work", work),
@@ -379,13 +379,13 @@ fn chart(name: &'static str, title: &str, caption: &str, svg: String) -> Chart {
     Chart { name, figure: PageFigure { title: title.into(), caption: caption.into(), svg } }
 }
 
-/// Times of the members of a cell that relaxed, or of those that ended before.
+/// Times at which members of the cell relaxed, or at which they ended without relaxing.
 fn happened(cell: &CellStatistics, happened: bool) -> impl Iterator<Item = f64> + '_ {
     cell.sample.observations().filter(move |seen| seen.happened == happened).map(|seen| seen.time)
 }
 
-/// What linear theory says of the excess of a curve of the members' mean area, through the mean where it has fallen to a
-/// tenth.
+/// The law by which, in linear theory, the excess of a curve of the members' mean area decreases, through the point
+/// where the mean has fallen to a tenth.
 fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
     let members: u64 = cell.counts.iter().sum();
     let area = cell.area / members as f64;
@@ -393,7 +393,7 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
     let first = curve.mean.first()?;
     let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
     let (t, mean) = (curve.t[tenth], curve.mean[tenth]);
-    // 24, not 24.0.
+    // 24 instead of 24.0.
     let brief = |rate: f64| match rate.round() {
         whole if (rate - whole).abs() < 1e-6 * rate && rate < 1e4 => format!("{whole}"),
         _ => significant(rate, 3),
@@ -423,7 +423,7 @@ fn quartiles(cell: &CellStatistics) -> (Option<f64>, Option<f64>) {
     (lower, upper)
 }
 
-/// The number among `values` of a key whose values are numbers.
+/// The value among `values` of a key with numeric values.
 fn value_of(axis: &crate::ensemble::sweep::SweepAxis, values: &[String]) -> Option<f64> {
     axis.numbers().and_then(|_| values.first()?.parse().ok())
 }
@@ -446,7 +446,7 @@ mod tests {
         schedule::grid,
     };
 
-    /// Names and texts of the pictures of a run of `spec` that came to `tally`.
+    /// Names and texts of the pictures of a run of `spec` with this `tally`.
     fn pictures(spec: &Spec, mut tally: Tally, films: &[Film]) -> Vec<(&'static str, String)> {
         let provenance = &Provenance::new(spec, &platform(), &tally, &[], Duration::ZERO, Duration::from_secs(1));
         let statistics = &EnsembleStatistics::new(spec, &mut tally).unwrap();
@@ -454,7 +454,7 @@ mod tests {
         FinishedRun { provenance, tally: &tally, statistics, excess, films }.pictures().unwrap()
     }
 
-    /// 10⁵ members, no two alike, a third of them censored at times of their own.
+    /// 10⁵ members, all different, a third of them censored at various times.
     fn many(cells: u64) -> Tally {
         let mut tally = Tally::default();
         for member in 0..100_000_u64 {
@@ -494,10 +494,10 @@ mod tests {
         assert!(dots(&marks).len() > 800_000, "marks one by one would be seen");
     }
 
-    /// Words of the text that are no numbers where numbers should be.
+    /// Words that are not numbers where numbers should be.
     fn none_of(text: &str) -> Vec<&str> {
         let words = text.split(|c: char| !c.is_alphanumeric());
-        // Letters of a path may stand before it.
+        // Letters of a path may come before it.
         let is_none = |word: &&str| word.contains("NaN") || ["inf", "Infinity"].contains(word);
         words.filter(is_none).collect()
     }

@@ -1,5 +1,5 @@
-//! How far a command is, on stderr: a bar with an estimate on a terminal; else a run has a line every ten seconds, and work
-//! in few long steps one for each of them.
+//! The progress of a command, on stderr: a bar with an estimate on a terminal. Elsewhere a run prints a line every ten
+//! seconds, and a command of few long steps one per step.
 
 use std::{
     io::{self, IsTerminal, Write},
@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle, style::TemplateError};
 
 use crate::text::{duration, plural};
 
-/// Time between lines where there is no terminal.
+/// Time between lines without a terminal.
 const PERIOD: Duration = Duration::from_secs(10);
 /// Resolution of the bar.
 const TICKS: u64 = 10_000;
@@ -21,19 +21,19 @@ pub enum Progress {
     Quiet,
     /// On a terminal.
     Bar(ProgressBar),
-    /// In a file or a pipe, since the run began.
+    /// In a file or a pipe, with the start of the run.
     Lines(Instant, ProgressLines),
 }
 
-/// Lines at even times, none in a run that is over before the first.
+/// Lines at even times; none for a run that ends before the first.
 #[derive(Default)]
 pub struct ProgressLines {
-    /// Periods that have passed at the last line.
+    /// Periods that had passed at the last line.
     periods: u64,
 }
 
 impl Progress {
-    /// Chooses the way.
+    /// Chooses the variant.
     pub fn new(quiet: bool) -> Progress {
         if quiet {
             return Progress::Quiet;
@@ -44,7 +44,7 @@ impl Progress {
         let colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         let bar = ProgressBar::new(TICKS);
         bar.set_style(style(colour).unwrap_or_else(|_| ProgressStyle::default_bar()));
-        // A terminal that cannot go back in a line, such as TERM=dumb, has no bars.
+        // A terminal that cannot go back in a line, such as TERM=dumb, shows no bars.
         if bar.is_hidden() { Progress::Lines(Instant::now(), ProgressLines::default()) } else { Progress::Bar(bar) }
     }
 
@@ -64,8 +64,8 @@ impl Progress {
         }
     }
 
-    /// `done` of `total` steps have ended, and `what` comes now. Where there is no bar every step has its line: one may take
-    /// long, and then it is known which.
+    /// `done` of `total` steps have ended, and `what` is next. Without a bar every step has a line: a step may take
+    /// long, and the line shows which one is running.
     pub fn step(&self, done: usize, total: usize, what: &str) {
         match self {
             Progress::Quiet => {}
@@ -79,7 +79,7 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(self) {
         if let Progress::Bar(bar) = self {
             bar.finish_and_clear();
@@ -88,7 +88,7 @@ impl Progress {
 }
 
 impl ProgressLines {
-    /// The line that is due `elapsed` after the begin of the run, if one is.
+    /// The line due `elapsed` after the start of the run, if any.
     fn at(&mut self, elapsed: Duration, done: u64, total: u64, share: f64) -> Option<String> {
         let periods = elapsed.as_secs() / PERIOD.as_secs();
         let due = periods > self.periods;
@@ -134,7 +134,7 @@ mod tests {
         };
         let due: Vec<u64> = (0..60_000).step_by(70).filter(|elapsed| at(&mut lines, *elapsed)).collect();
         assert_eq!(due, [10_010, 20_020, 30_030, 40_040, 50_050]);
-        // Dispatches that take long leave lines out; none follow to make up for them.
+        // Long dispatches skip lines, which are not printed later.
         let due: Vec<u64> = [95_000, 99_999, 100_000].into_iter().filter(|elapsed| at(&mut lines, *elapsed)).collect();
         assert_eq!(due, [95_000, 100_000]);
     }

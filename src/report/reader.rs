@@ -1,6 +1,6 @@
-//! A finished run, read back from its folder: what `plot` draws again.
+//! A completed run, read back from its folder for `plot`.
 //!
-//! Tables are read row by row, and each row is checked against the spec and those before it.
+//! Tables are read row by row, and each row is checked against the spec and the rows before it.
 
 use std::path::Path;
 
@@ -25,15 +25,15 @@ use crate::{
 /// Characters of foreign text in a message.
 const SHOWN: usize = 200;
 
-/// A run as its folder tells it.
+/// A run as read from its folder.
 pub struct Finished {
     /// How it was made.
     pub provenance: Provenance,
-    /// What came out.
+    /// The results.
     pub tally: Tally,
     /// The mean excess in time.
     pub excess: Vec<MeanExcess>,
-    /// The first members; none where the run could not keep them.
+    /// The first members; none if the run could not save them.
     pub films: Vec<Film>,
 }
 
@@ -41,7 +41,7 @@ impl Finished {
     /// Reads the run in `folder`.
     ///
     /// # Errors
-    /// [`Error::Request`] for a folder without a finished run, and for files that are not those of one run.
+    /// [`Error::Request`] for a folder without a completed run, and for files of different runs.
     pub fn read(folder: &Path) -> Result<Finished> {
         let provenance = provenance(folder)?;
         let tally = tally(folder, &provenance)?;
@@ -52,7 +52,7 @@ impl Finished {
     }
 }
 
-/// What tells whether the rest can be understood, and nothing of the rest.
+/// The keys that decide whether the rest can be understood.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct RunHead {
@@ -63,7 +63,7 @@ struct RunHead {
 /// Reads `run.json`.
 ///
 /// # Errors
-/// As [`Finished::read`].
+/// Those of [`Finished::read`].
 pub fn provenance(folder: &Path) -> Result<Provenance> {
     let path = folder.join(names::RUN);
     let refuse = |problem: String| Err(Error::Request(format!("{}{problem}", path.display())));
@@ -97,7 +97,7 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
         }
         None => return refuse(format!(": expected a number under `format`, found none; {REMEDY}")),
     }
-    // From the text and not from the value, so that an error has its line.
+    // From the text, not from the value, so that an error names its line.
     let provenance: Provenance = match serde_json::from_str(&text) {
         Ok(provenance) => provenance,
         Err(e) => return refuse(no_json(e)),
@@ -111,7 +111,7 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
 /// Adds up the tables in `folder`, as the run did member by member.
 ///
 /// # Errors
-/// As [`Finished::read`].
+/// Those of [`Finished::read`].
 pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     let spec = &provenance.spec;
     let mut tally = Tally::default();
@@ -129,10 +129,10 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     Ok(tally)
 }
 
-/// Adds up the rows of a run that goes on, and `aside`.
+/// Adds up the rows of a resumed run, and `aside`.
 ///
 /// # Errors
-/// [`Error::Request`] for rows that are not those of a run of `spec`.
+/// [`Error::Request`] for rows that are not of a run of `spec`.
 pub fn rows(place: &Place, spec: &Spec, aside: Aside) -> Result<Tally> {
     let mut tally = Tally::default();
     for outcome in Summary::of(place, spec)? {
@@ -142,7 +142,7 @@ pub fn rows(place: &Place, spec: &Spec, aside: Aside) -> Result<Tally> {
     Ok(tally)
 }
 
-/// A count that `run.json` knows.
+/// Checks a count against `run.json`.
 fn expected(folder: &Path, name: &str, what: &str, expected: u64, found: u64) -> Result<()> {
     if expected == found {
         return Ok(());
@@ -151,7 +151,7 @@ fn expected(folder: &Path, name: &str, what: &str, expected: u64, found: u64) ->
     Err(Error::Request(format!("{}: expected {expected} {what} by {told}, found {found}; {REMEDY}", path.display())))
 }
 
-/// The rows of a `summary.csv`, in order; members ascend.
+/// The rows of a `summary.csv`, in order of ascending members.
 pub struct Summary {
     table: TableReader<Outcome>,
     last: Option<u64>,
@@ -164,7 +164,7 @@ impl Summary {
     /// Opens the table in `folder`, of a run of `spec`.
     ///
     /// # Errors
-    /// [`Error::Request`] where there is none, or one with other columns, or one that is cut off.
+    /// [`Error::Request`] if it does not exist, has other columns, or is truncated.
     pub fn open(folder: &Path, spec: &Spec) -> Result<Summary> {
         Summary::of(&Place::named(&folder.join(names::SUMMARY)), spec)
     }
@@ -188,7 +188,7 @@ impl Summary {
         if cell != own {
             return Err(fields.unexpected_in("cell", &format!("{own}, the cell of member {member}")));
         }
-        // What theory says is in no table, since the spec says it.
+        // The theoretical rate is in no table, since it follows from the spec.
         if self.spec_of.as_ref().is_none_or(|(of, _)| *of != cell) {
             self.spec_of = Some((cell, self.spec.of_cell(cell)?));
         }
@@ -208,7 +208,7 @@ impl Iterator for Summary {
 /// Reads `mean_excess.csv`.
 ///
 /// # Errors
-/// As [`Finished::read`].
+/// Those of [`Finished::read`].
 pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExcess>> {
     let mut table = TableReader::<MeanExcess>::open(&Place::named(&folder.join(names::MEAN_EXCESS)))?;
     let (mut rows, mut count, mut last): (Vec<MeanExcess>, u64, _) = (Vec::new(), 0, None);
@@ -219,7 +219,7 @@ pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExc
         }
         last = Some(at);
         count += 1;
-        // More than there should be are counted only.
+        // Surplus rows are only counted.
         rows.extend((count <= provenance.excess_rows).then_some(row));
     }
     expected(folder, names::MEAN_EXCESS, "rows", provenance.excess_rows, count)?;

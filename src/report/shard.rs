@@ -1,7 +1,7 @@
-//! `shard.state`: what a [merge](super::merge) has to know of a shard beside its tables.
+//! `shard.state`: the data that a [merge](super::merge) needs from a shard besides its tables.
 //!
-//! It is [sealed](super::envelope) as a checkpoint is, and has the length and the checksum of every table of the shard, so that
-//! one that was copied by half is known.
+//! It is [sealed](super::envelope) like a checkpoint, and has the length and the checksum of every table of the shard,
+//! so that an incomplete copy is detected.
 
 use std::{
     io,
@@ -30,25 +30,25 @@ use crate::{
 /// Characters of a fault in a message.
 const SHOWN: usize = 200;
 
-/// The fingerprint of the layout of what is in the file.
+/// The fingerprint of the layout of the file's content.
 pub static LAYOUT: LazyLock<u32> = LazyLock::new(fingerprint::<Record>);
 
-/// What is in the file.
+/// The content of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// As in the last state of the run: all members have ended.
+    /// As in the last checkpoint of the run: all members have ended.
     pub head: Head,
-    /// Nodes of a member, where all have the same.
+    /// Nodes per member, if all have the same number.
     pub points: usize,
-    /// What the user was told beside what follows from the results, a sentence each.
+    /// Warnings that do not follow from the results, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// A shard that is done.
+/// A complete shard.
 pub struct FinishedShard {
     /// Its folder.
     pub path: PathBuf,
-    /// Which one it is.
+    /// Which shard it is.
     pub shard: Shard,
     /// Its resolved spec.
     pub spec: Spec,
@@ -56,17 +56,17 @@ pub struct FinishedShard {
     pub record: Record,
 }
 
-/// What the folder of a shard has.
+/// The content of the folder of a shard.
 pub enum Found {
-    /// All of it.
+    /// Everything.
     Done(Box<FinishedShard>),
-    /// Not all, and why.
+    /// Not everything, and why.
     Unfinished {
         /// The folder.
         path: PathBuf,
-        /// The spec, if it tells one.
+        /// The spec, if it is known.
         spec: Option<Box<Spec>>,
-        /// What there is instead, and what to do.
+        /// What there is instead, and the remedy.
         why: String,
     },
 }
@@ -77,10 +77,10 @@ pub fn to_bytes(head: &Head, points: usize, warnings: &[String]) -> Result<Vec<u
     bytes.map_err(|e| Error::Failed(format!("cannot write {SHARD}: {e}")))
 }
 
-/// Reads it back.
+/// Reads the file from bytes.
 ///
 /// # Errors
-/// A [`Fault`] for anything but all the bytes that this version of the program wrote.
+/// A [`Fault`] unless the bytes are complete and written by this version of the program.
 pub fn from_bytes(bytes: &[u8]) -> Result<Record, Fault> {
     let record: Record = envelope::body(opened(*LAYOUT, bytes)?)?;
     match record.head.films.iter().find_map(|film| Some((film.member, film.fault()?))) {
@@ -89,10 +89,10 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Record, Fault> {
     }
 }
 
-/// Looks at the folder of a shard, and changes nothing there.
+/// Examines the folder of a shard without changing it.
 ///
 /// # Errors
-/// [`Error::Request`] where it is the folder of something else, or has what no shard of this program wrote.
+/// [`Error::Request`] if it is not the folder of a shard, or has something that no shard of this program wrote.
 pub fn look(path: &Path) -> Result<Found> {
     let unfinished = |spec: Option<Spec>, why: String| {
         Ok(Found::Unfinished { path: path.to_path_buf(), spec: spec.map(Box::new), why })
@@ -103,7 +103,7 @@ pub fn look(path: &Path) -> Result<Found> {
         Ok(of) if !of.is_dir() => return Err(refused(path, "not a folder; give that of a shard")),
         Ok(_) => {}
     }
-    // Before anything else: a run that ends meanwhile takes its states with it.
+    // Read first: a run that ends meanwhile removes its checkpoints.
     let states = [STATE, STATE_OLD].map(|name| checkpoint::read(&path.join(name)).ok());
     if let Some(why) = unfinished_run(path)? {
         let head = states.iter().flatten().next().map(|(head, _)| head);
@@ -118,7 +118,7 @@ pub fn look(path: &Path) -> Result<Found> {
     }
 }
 
-/// Why the run at `path` has not ended, if there is one.
+/// Why the run at `path` is incomplete, if there is one.
 fn unfinished_run(path: &Path) -> Result<Option<String>> {
     if claim::is_held(path) {
         return Ok(Some("a run is writing here".into()));
@@ -127,7 +127,7 @@ fn unfinished_run(path: &Path) -> Result<Option<String>> {
     Ok(interrupted.then(|| format!("interrupted; curvelax resume {} continues it", path.display())))
 }
 
-/// The shard at `path`, which is finished, with its tables as long as they were.
+/// The complete shard at `path`; its tables have their recorded lengths.
 fn part(path: &Path) -> Result<FinishedShard> {
     let faulty = |fault: &str| faulty(path, SHARD, fault);
     let read = envelope::bytes(&path.join(SHARD)).and_then(|bytes| from_bytes(&bytes));
@@ -145,7 +145,7 @@ fn part(path: &Path) -> Result<FinishedShard> {
     Ok(FinishedShard { path: path.to_path_buf(), shard, spec, record })
 }
 
-/// That the table in the folder at `path` is as long as the shard wrote it.
+/// Checks that the table in the folder at `path` has the length that the shard wrote.
 fn check_length(path: &Path, mark: &Mark) -> Result<()> {
     let fault = match path.join(&mark.name).metadata().map(|of| of.len()) {
         Ok(length) if length == mark.length => return Ok(()),

@@ -1,4 +1,4 @@
-//! A run is asked to stop, from another thread.
+//! Asks a run to stop, from another thread.
 
 use std::{
     sync::{
@@ -10,21 +10,21 @@ use std::{
 
 use crate::error::Error;
 
-/// Why a run is to stop before its end.
+/// Why a run is to stop early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// Ctrl-C.
     Interrupt,
-    /// SIGTERM: the machine, or a scheduler, takes its place back.
+    /// SIGTERM: the machine, or a scheduler, needs the resources.
     Terminate,
-    /// SIGHUP: its terminal is gone.
+    /// SIGHUP: its terminal is closed.
     Hangup,
     /// `--max-time`.
     MaxTime,
 }
 
 impl Cause {
-    /// The error that a run ends with; `so_far` says what is done.
+    /// The error with which the run ends; `so_far` says what has been done.
     pub fn error(self, so_far: &str) -> Error {
         let message = format!("stopped by {}{so_far}", self.name());
         match self {
@@ -43,7 +43,7 @@ impl Cause {
     }
 }
 
-/// Shared between a run and whoever may stop it.
+/// Shared between a run and those who may stop it.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<Inner>);
 
@@ -59,17 +59,17 @@ impl Stop {
         self.0.asked.get_or_init(|| (cause, Instant::now()));
     }
 
-    /// Why and when it was asked to.
+    /// Why and when it was asked.
     pub fn asked(&self) -> Option<(Cause, Instant)> {
         self.0.asked.get().copied()
     }
 
-    /// Whether nothing that was finished when the run was asked to stop would be lost if its process ended now.
+    /// Whether all results finished when the run was asked to stop are saved.
     pub fn is_kept(&self) -> bool {
         self.0.kept.load(Ordering::Acquire)
     }
 
-    /// Says that what is finished is kept.
+    /// Records that finished results are saved.
     pub(super) fn set_kept(&self) {
         if self.asked().is_some() {
             self.0.kept.store(true, Ordering::Release);

@@ -1,8 +1,8 @@
 //! `report.html`: a run at a glance, in one file that needs no network.
 //!
-//! The first screen says what was run, how many members relaxed, how long it took them and what went wrong; pictures,
+//! The first screen says what was run, how many members relaxed, how long they took and what went wrong. Pictures,
 //! tables, the spec and the provenance follow. All text is escaped, a content security policy forbids every request and
-//! every script but the one below the slider, and equal pages have equal bytes. However large the run, a page holds a few
+//! every script except that of the slider, and equal pages have equal bytes. For a run of any size, a page holds a few
 //! members, the pictures and the first rows of each table.
 
 mod player;
@@ -21,24 +21,24 @@ use scope::Sheets;
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
-/// Its digest, by which the content security policy names the one script that may run. A test computes it.
+/// Its digest, by which the content security policy allows this script only. A test computes it.
 const SCRIPT_DIGEST: &str = "sha256-775RypILJTOY0aphVAygxJe5VXjKB+pvwd32GxoMr5M=";
 
-/// Longer tables are cut, and say so.
+/// Longer tables are truncated, and say so.
 const MAX_ROWS: usize = 200;
 
-/// What a page shows.
+/// The content of a page.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Page<'a> {
     /// Heading, and title of the window.
     pub title: &'a str,
-    /// What was run, in a sentence or two.
+    /// A sentence or two on what was run.
     pub what: &'a str,
     /// Members by status, such as `("relaxed", 412)`.
     pub statuses: Vec<(&'a str, u64)>,
     /// The numbers to read first: how long relaxation took.
     pub headline: Vec<Headline>,
-    /// What the reader should know, a sentence each.
+    /// What the reader should know, one sentence each.
     pub warnings: &'a [String],
     /// A few members to watch; the first six are shown.
     pub members: Vec<MovingMember>,
@@ -52,25 +52,25 @@ pub struct Page<'a> {
     pub provenance: Vec<(String, String)>,
 }
 
-/// A number that stands out.
+/// A prominent number.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Headline {
-    /// What it is: `median t_relax`.
+    /// Its name: `median t_relax`.
     pub label: String,
-    /// The number, as people write it, with its unit.
+    /// The number as people write it, with its unit.
     pub value: String,
-    /// Its interval, or what else belongs to it; may be empty.
+    /// Its interval, or another note; may be empty.
     pub note: String,
 }
 
 /// A picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PageFigure {
-    /// Its title, which the picture itself shows: here for screen readers.
+    /// Its title for screen readers; the picture shows it, too.
     pub title: String,
     /// A sentence below it; may be empty.
     pub caption: String,
-    /// The text of an SVG file of this program: it is not escaped.
+    /// The text of an SVG file by this program: it is not escaped.
     pub svg: String,
 }
 
@@ -81,9 +81,9 @@ pub struct PageTable {
     pub caption: String,
     /// Names of the columns.
     pub header: Vec<String>,
-    /// Cells, as they are shown. Columns of numbers are aligned at the right.
+    /// Cells as shown. Columns of numbers are aligned at the right.
     pub rows: Vec<Vec<String>>,
-    /// Where all rows are, for a table that is cut; may be empty.
+    /// Where to find all rows of a truncated table; may be empty.
     pub source: String,
 }
 
@@ -144,7 +144,7 @@ impl Page<'_> {
         html + "</div>\n"
     }
 
-    /// The members with this status.
+    /// Number of members with this status.
     fn with(&self, status: &str) -> u64 {
         self.statuses.iter().filter(|(name, _)| *name == status).map(|(_, count)| count).sum()
     }
@@ -272,7 +272,7 @@ impl PageTable {
 fn head(title: &str, script: bool, sheets: &str) -> String {
     let script = if script { format!("'{SCRIPT_DIGEST}'") } else { "'none'".into() };
     let title = escape(title);
-    // The empty icon keeps browsers from asking a server for one.
+    // The empty icon keeps browsers from requesting one.
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
@@ -283,12 +283,12 @@ fn head(title: &str, script: bool, sheets: &str) -> String {
     )
 }
 
-/// The script and what it reads.
+/// The script and its data.
 fn script(data: &str) -> String {
     format!("<script type=\"application/json\" id=\"trajectories\">\n{data}\n</script>\n<script>{}</script>\n", code())
 }
 
-/// The script as browsers see it, who drop carriage returns before they take its digest.
+/// The script as browsers see it: they drop carriage returns before they compute its digest.
 fn code() -> String {
     SCRIPT.replace('\r', "")
 }
@@ -306,7 +306,7 @@ fn paragraph(class: &str, text: &str) -> String {
     }
 }
 
-/// A percentage, which is 0 only of none and 100 only of all.
+/// A percentage; 0 means none and 100 means all.
 fn share(part: u64, all: u64) -> String {
     let percent = 100.0 * part as f64 / all.max(1) as f64;
     match part {

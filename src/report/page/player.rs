@@ -1,7 +1,7 @@
-//! A few members that move: their nodes at some times, small enough to be part of a page.
+//! A few moving members: their nodes at some times, small enough to be part of a page.
 //!
-//! All members share one scale. A coordinate is a whole number below 4096 and two digits of base64; the script
-//! `page.js` reads them and moves the nodes on straight lines from time to time.
+//! All members share one scale. A coordinate is an integer below 4096, written as two digits of base64. The script
+//! `page.js` reads them and moves the nodes on straight lines from one time to the next.
 
 use std::{fmt::Write as _, io};
 
@@ -18,31 +18,31 @@ use crate::{
     text::significant,
 };
 
-/// More members than these are not shown.
+/// Maximum number of members shown.
 pub const MAX_MEMBERS: usize = 6;
-/// More times of one member, and nodes, than these do not fit into a small page, and show no more.
+/// Maximum times, and nodes, of a member: more would not fit into a small page, and show no more.
 const MAX_TIMES: usize = 61;
 const MAX_NODES: usize = 200;
-/// Places of the slider that stand for times.
+/// Maximum positions of the slider.
 const MAX_MARKS: usize = 121;
-/// Nodes are marked where there are no more than these.
+/// Maximum number of nodes that are marked.
 const MAX_DOTS: usize = 120;
 /// The largest coordinate, and the free space round a curve.
 const LARGEST: f64 = 4095.0;
 const PADDING: f64 = 200.0;
-/// Least height of a panel, as a share of its width.
+/// Minimum height of a panel, as a fraction of its width.
 const MIN_HEIGHT: f64 = 0.5;
 
-/// One member on its way.
+/// A member at several times.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MovingMember {
-    /// What it is, and how it ended: `member 3: relaxed at t = 0.41`.
+    /// What it is and how it ended: `member 3: relaxed at t = 0.41`.
     pub label: String,
-    /// How it ended, which its colour shows.
+    /// Its status, which sets its colour.
     pub status: &'static str,
     /// Ascending times, in length⁴.
     pub times: Vec<f64>,
-    /// Its nodes at each of them, equally many at all.
+    /// Its nodes at each time; their number is always the same.
     pub nodes: Vec<Vec<DVec2>>,
 }
 
@@ -80,27 +80,27 @@ struct PlayedMember {
     frames: Vec<Vec<u16>>,
 }
 
-/// What the script reads.
+/// The data of the script.
 #[derive(Serialize)]
 struct PlayerData {
     marks: Vec<f64>,
     members: Vec<MemberData>,
 }
 
-/// The same of a member; a frame is a string of digits.
+/// The data of a member; a frame is a string of digits.
 #[derive(Serialize)]
 struct MemberData {
     times: Vec<f64>,
     frames: Vec<String>,
 }
 
-/// JSON with a line for each member and each of its frames, so that no line of the page is endless. Numbers are as short as
-/// elsewhere on the page: `0`, and not `0.0`.
+/// JSON with a line for each member and each of its frames, so that no line of the page gets too long. Numbers are as
+/// short as elsewhere on the page: `0` instead of `0.0`.
 #[derive(Default)]
 struct LineBreaks {
-    /// Objects that are open.
+    /// Number of open objects.
     depth: usize,
-    /// A comma was written, and what follows it in the list is not known yet.
+    /// A comma was written, and the next item in the list is not known yet.
     after_comma: bool,
 }
 
@@ -150,7 +150,7 @@ impl Formatter for LineBreaks {
 }
 
 impl Player {
-    /// The first of `trajectories` that have a time to show; none if none has.
+    /// Uses the first of `trajectories` that have a time to show; none if none has.
     pub fn new(trajectories: &[MovingMember]) -> Option<Player> {
         let shown = trajectories.iter().map(|trajectory| (trajectory, trajectory.frames()));
         let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MAX_MEMBERS).collect();
@@ -172,7 +172,7 @@ impl Player {
         Some(Player { members: members.collect(), unit, height })
     }
 
-    /// Whether there is anything to move.
+    /// Whether anything moves.
     pub fn moves(&self) -> bool {
         self.members.iter().any(|member| member.times.len() > 1)
     }
@@ -208,7 +208,7 @@ impl Player {
         html
     }
 
-    /// What the script reads: numbers and digits of base64 only.
+    /// The data of the script: numbers and digits of base64 only.
     pub fn data(&self) -> String {
         let member = |PlayedMember { times, frames, .. }: &PlayedMember| MemberData {
             times: times.clone(),
@@ -221,7 +221,7 @@ impl Player {
         String::from_utf8(bytes).expect("JSON is UTF-8")
     }
 
-    /// Times at equal distances along the slider: where there are many, it moves slowly.
+    /// Times at equal distances along the slider; if there are many, it moves slowly.
     fn marks(&self) -> Vec<f64> {
         let mut all: Vec<f64> = self.members.iter().flat_map(|member| member.times.iter().copied()).collect();
         all.sort_by(f64::total_cmp);
@@ -229,7 +229,7 @@ impl Player {
         spread(all.len(), MAX_MARKS).map(|i| all[i]).collect()
     }
 
-    /// A round length and the coordinates that it takes.
+    /// A round length, and the same in coordinates.
     fn bar(&self) -> (f64, f64) {
         let length = tick_step(0.15 * LARGEST * self.unit);
         (length, length / self.unit)
@@ -241,7 +241,7 @@ impl Player {
     }
 }
 
-/// At most `most` indices below `count`, the first and the last among them.
+/// At most `most` indices below `count`, including the first and the last.
 pub fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
     let shown = count.min(most);
     (0..shown).map(move |i| if shown > 1 { i * (count - 1) / (shown - 1) } else { 0 })
@@ -261,7 +261,7 @@ fn dots(frame: &[u16]) -> String {
     frame.chunks_exact(2).map(|at| format!("M{} {}h0", at[0], at[1])).collect()
 }
 
-/// Two digits for each coordinate.
+/// Two digits per coordinate.
 fn digits(frame: &[u16]) -> String {
     frame.iter().flat_map(|v| [v >> 6, v & 63]).map(|digit| char::from(DIGITS[usize::from(digit)])).collect()
 }

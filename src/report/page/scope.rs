@@ -1,5 +1,5 @@
-//! Pictures inside a page: their style sheets hold for the whole page, so each is confined to the pictures that brought
-//! it, and equal ones are kept once.
+//! Pictures inside a page. Style sheets apply to the whole page, so each is restricted to the pictures it came with,
+//! and equal ones are stored once.
 
 use std::fmt::Write;
 
@@ -23,7 +23,7 @@ impl Sheets {
         svg
     }
 
-    /// All sheets, confined.
+    /// All style sheets, restricted.
     pub fn text(&self) -> String {
         self.sheets.iter().enumerate().map(|(i, sheet)| confined(sheet, &name(i))).collect()
     }
@@ -51,8 +51,8 @@ fn without(svg: &str, name: &str) -> (Option<String>, String) {
     (Some(content), svg[..start].to_owned() + rest)
 }
 
-/// `sheet` with each selector restricted to what is inside an element of this class. Rules may be inside media queries;
-/// there are no comments and no strings.
+/// `sheet` with each selector restricted to elements inside one of this class. Rules may be inside media queries; there
+/// are no comments or strings.
 fn confined(sheet: &str, class: &str) -> String {
     let mut text = String::new();
     let mut rest = sheet;

@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 use super::*;
 use crate::draw::charts::tests::pictures::pictures;
 
-/// A perturbed ellipse whose modes decay as theory says, recorded often at first and seldom later.
+/// A perturbed ellipse whose modes decay as in theory, recorded often at first and rarely later.
 fn member(j: usize) -> MovingMember {
     let nodes = |t: f64| -> Vec<DVec2> {
         let node = |i: usize| {
@@ -52,7 +52,7 @@ fn warnings() -> Vec<String> {
     ]
 }
 
-/// A page as a study makes it.
+/// A page like that of a study.
 fn page(warnings: &[String]) -> Page<'_> {
     let kinds = ["relaxation", "survival-8", "decay-3", "dependence", "mesh", "survival-20", "dependence-named-3"];
     let figure = |name: &&str| {
