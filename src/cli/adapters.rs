@@ -1,4 +1,4 @@
-//! `curvelax adapters`: what this machine offers, and which adapter `auto` takes and why.
+//! `curvelax adapters`: the devices of this machine, and which adapter `auto` uses and why.
 
 use serde::Serialize;
 
@@ -27,7 +27,7 @@ pub struct AdaptersArgs {
     json: bool,
 }
 
-/// What there is, and what is taken.
+/// The devices, and the choice of `auto`.
 #[derive(Serialize)]
 struct Listing {
     curvelax: &'static str,
@@ -43,7 +43,7 @@ struct Adapter {
     device_type: String,
     api: String,
     driver: String,
-    /// Most nodes of a member; null where there is no f64.
+    /// Maximum nodes of a member; null if there is no f64.
     max_points_f32: usize,
     max_points_f64: Option<usize>,
     workgroup_threads: usize,
@@ -52,7 +52,7 @@ struct Adapter {
     binding_bytes: u64,
 }
 
-/// What `--backend auto` takes for the default run.
+/// The choice of `--backend auto` for the default run.
 #[derive(Serialize)]
 struct Auto {
     backend: BackendChoice,

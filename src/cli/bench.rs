@@ -27,8 +27,6 @@ ensemble (perturbed 2:1 ellipses, surface diffusion, tau = 0.001) are advanced a
 other load on the machine affects all of them. Start-up is the time to open the back end and make the first step, in which
 kernels are compiled. The rates exclude it and a warm-up. The default takes less than a minute.";
 
-/// Names of the back ends that can be asked for.
-/// Names of the solvers that can be asked for.
 /// Members at once on hardware: enough to fill it.
 const CURVES: u64 = 8192;
 /// Members at once elsewhere: the CPU back end has fewer slots, and a software GPU as few cores.
@@ -83,7 +81,7 @@ pub struct BenchArgs {
     quiet: bool,
 }
 
-/// A line of the table. Unknown is none: a case that failed has its reason instead of numbers.
+/// A line of the table. Unknown values are none: a failed case has a reason instead of numbers.
 #[derive(Serialize)]
 struct BenchRow {
     backend: DeviceKind,
@@ -104,7 +102,7 @@ struct BenchRow {
     failed: Option<String>,
 }
 
-/// Rates over the windows, in their order.
+/// Rates over the windows, in order.
 #[derive(Serialize)]
 struct Spread {
     median: f64,
@@ -113,7 +111,7 @@ struct Spread {
     windows: Vec<f64>,
 }
 
-/// All rows, and what they have in common.
+/// All rows, with their common settings.
 #[derive(Serialize)]
 struct Benches<'a> {
     curvelax: &'static str,
@@ -163,13 +161,13 @@ pub fn bench(args: BenchArgs) -> Result<()> {
     }
 }
 
-/// The specs of all cases, checked: a wrong key ends the command before anything is started.
+/// The specs of all cases, checked: a wrong key ends the command before anything starts.
 fn cases(args: &BenchArgs) -> Result<Vec<Spec>> {
     fn or<T: Copy>(given: &[T], all: &[T]) -> Vec<T> {
         if given.is_empty() { all.to_vec() } else { given.to_vec() }
     }
     let base = Spec { adaptive: args.adaptive, threads: args.threads, ..Spec::default() };
-    // Fast ones first; where steps grow, without what slows with them.
+    // Fast ones first; with growing steps, without solvers that slow down with them.
     let suits = |solver: &Solver| args.adaptive.is_none() || !solver.facts().slows_with_step;
     let solvers = or(&args.solver, &Solver::ALL.into_iter().rev().filter(suits).collect::<Vec<_>>());
     let mut cases = Vec::new();
@@ -189,7 +187,7 @@ fn cases(args: &BenchArgs) -> Result<Vec<Spec>> {
     Ok(cases)
 }
 
-/// Where a case runs: the CPU, or the adapter of this name, and with how many members.
+/// Where a case runs: the CPU, or the adapter of this name; and with how many members.
 #[derive(Clone)]
 struct BenchPlace {
     backend: DeviceKind,
@@ -203,7 +201,7 @@ impl BenchPlace {
     }
 }
 
-/// The back ends asked for. An adapter that several interfaces list is measured once, through the first.
+/// The requested back ends. An adapter listed by several interfaces is measured once, through the first.
 fn places(args: &BenchArgs) -> Result<Vec<BenchPlace>> {
     let asked = |backend| args.backend.contains(&backend);
     let mut places = Vec::new();
@@ -224,7 +222,7 @@ fn places(args: &BenchArgs) -> Result<Vec<BenchPlace>> {
     for gpu in &chosen {
         if seen.insert(gpu.name()) {
             let enough = if gpu.is_hardware() { CURVES } else { CURVES_IN_SOFTWARE };
-            // Of two adapters of one name the name would be the first.
+            // If two adapters share a name, the name would mean the first.
             let adapter = args.adapter.clone().filter(|_| by_number).or_else(|| Some(gpu.name().to_string()));
             let curves = args.curves.unwrap_or(enough);
             places.push(BenchPlace { backend: DeviceKind::Gpu, adapter, curves });
@@ -236,7 +234,7 @@ fn places(args: &BenchArgs) -> Result<Vec<BenchPlace>> {
     Ok(places)
 }
 
-/// A case on its way to a row.
+/// A case being measured.
 struct Case {
     spec: Spec,
     bench: Result<Bench>,
@@ -248,7 +246,7 @@ impl Case {
         Case { spec, bench: Err(Error::Failed("not started".into())), samples: Vec::new() }
     }
 
-    /// Measures a window; a case that has failed stays failed.
+    /// Measures a window; a failed case stays failed.
     fn measure(&mut self, window: Duration) {
         if let Ok(bench) = &mut self.bench {
             match bench.sample(window) {
@@ -323,7 +321,7 @@ fn precision_name(precision: Precision) -> &'static str {
     }
 }
 
-/// Aligned; a case that failed has the reason in place of its numbers.
+/// An aligned table; a failed case has its reason instead of numbers.
 fn table(rows: &[BenchRow]) -> String {
     let place = |row: &BenchRow| match (&row.adapter, row.threads) {
         (Some(adapter), _) => adapter.clone(),

@@ -22,14 +22,14 @@ An error is the largest difference between GPU and CPU over all members and node
 error of the quantity's natural scale. The exit code is 1 if an error exceeds its bound. Most of the time is spent compiling
 kernels, unless the driver has them in its cache: minutes the first time, seconds afterwards.";
 
-/// Sizes of the rings that are compared: odd, a power of two, the default, a prime.
+/// Numbers of nodes to compare: odd, a power of two, the default, a prime.
 const SIZES: [usize; 4] = [7, 64, 100, 101];
 /// Steps after which whole runs are compared.
 const STEPS: [u32; 2] = [1, 100];
-/// What a kernel can do in a dispatch.
+/// The work of a kernel per dispatch.
 const BUDGET: Budget = Budget { steps: 16, sweeps: u32::MAX };
 
-/// What is compared by a kernel of its own.
+/// Comparisons with a separate kernel each.
 #[derive(Clone, Copy)]
 enum Compared {
     /// The stages of a step.
@@ -79,7 +79,7 @@ struct Comparison {
     rows: Vec<Verdict>,
 }
 
-/// A row, and whether it is good.
+/// A row, and whether it passed.
 #[derive(Serialize)]
 struct Verdict {
     #[serde(flatten)]
@@ -87,7 +87,7 @@ struct Verdict {
     passes: bool,
 }
 
-/// What programs get.
+/// The output for programs.
 #[derive(Serialize)]
 struct Checks {
     curvelax: &'static str,
@@ -148,8 +148,8 @@ fn compare(gpu: &Gpu, progress: Progress) -> Result<Vec<ConformanceRow>> {
     Ok(rows)
 }
 
-/// The worst row of every quantity over all sizes; of all solvers but the first what does not come before a solve. Every
-/// kernel is told before it is compiled.
+/// The worst row of every quantity over all sizes; for solvers after the first, without stages before a solve. Every
+/// kernel is announced before it is compiled.
 fn compare_in<T: Real>(gpu: &Gpu, tell: &mut impl FnMut(&str, Solver, usize, Compared)) -> Result<Vec<ConformanceRow>> {
     let mut all = Vec::new();
     for solver in Solver::ALL {

@@ -1,4 +1,4 @@
-//! `curvelax completions`: what a shell needs to complete commands and flags.
+//! `curvelax completions`: a script with which a shell completes commands and flags.
 
 use clap::CommandFactory;
 use clap_complete::{Shell, generate};

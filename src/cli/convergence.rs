@@ -1,4 +1,4 @@
-//! `curvelax convergence`: how far the scheme is from exact solutions, and at which order it comes nearer.
+//! `curvelax convergence`: the error of the scheme against exact solutions, and its order.
 
 use std::path::{Path, PathBuf};
 
@@ -73,7 +73,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     };
     let mut method = spec.validate()?;
     let choice = placement::choose(&method, method.points)?;
-    // Settled once: adapters are looked for only now, and every run is of the same precision.
+    // Chosen once: adapters are looked for only now, and all runs have the same precision.
     choice.settle(&mut method);
     let folder = args.out.map(|out| open(&out, args.force)).transpose()?;
     if !args.quiet {
@@ -106,7 +106,7 @@ fn open(out: &Path, force: bool) -> Result<OutputFolder> {
     OutputFolder::open_for(out, force, Owner::Convergence, vec![names::CONVERGENCE.into()])
 }
 
-/// Aligned, the problems apart; a run that ended early has its status in place of its error.
+/// An aligned table, grouped by problem; a run that ended early has its status instead of its error.
 fn table(rows: &[ConvergenceRow]) -> String {
     let width = rows.iter().map(|row| row.problem.len()).max().unwrap_or(0).max("problem".len());
     let line = |cells: [&str; 7]| {

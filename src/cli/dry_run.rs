@@ -1,4 +1,4 @@
-//! `curvelax run --dry-run`: what the run will take, as a table or as JSON; nothing is written.
+//! `curvelax run --dry-run`: the predicted cost of a run, as a table or as JSON; nothing is written.
 
 use crate::{
     ensemble::Spec,
@@ -32,7 +32,7 @@ pub fn table(estimate: &Estimate, spec: &Spec) -> String {
     rows.iter().map(|(label, text)| format!("{label:<11}{text}\n")).collect()
 }
 
-/// Bytes in the unit that a person would take.
+/// Formats bytes in the unit that a person would use.
 fn size(bytes: u64) -> String {
     let bytes = bytes as f64;
     match bytes {

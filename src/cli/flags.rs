@@ -1,7 +1,7 @@
-//! The flags that are the spec's keys: the same names, the same values; a flag wins over the file.
+//! The flags for the keys of the spec: the same names, the same values; a flag overrides the file.
 //!
-//! Values are only parsed here. Ranges are checked once, on the resolved spec, so that a number from the file
-//! and a number from a flag meet the same check.
+//! Values are only parsed here. Ranges are checked once, on the resolved spec, so that numbers from the file and from
+//! flags pass the same checks.
 
 use std::time::Duration;
 
@@ -203,21 +203,21 @@ pub struct SpecFlags {
     store: Option<Store>,
 }
 
-/// Says how many shards there are where not all are in the array.
+/// The number of shards, if not all are in the array.
 pub(super) const SHARDS: &str = "CURVELAX_SHARDS";
 
 const ENSEMBLE: &str = "Ensemble";
 const EVOLUTION: &str = "Evolution";
 pub(super) const METHOD: &str = "Method";
 pub(super) const MACHINE: &str = "Machine";
-/// Heading of the flags that say what is written and where.
+/// Heading of the flags for output.
 pub const OUTPUT: &str = "Output";
 
 impl SpecFlags {
-    /// Replaces in `spec` what was given as a flag.
+    /// Replaces in `spec` the values given as flags.
     pub fn overlay(mut self, spec: &mut Spec) {
         std::mem::take(&mut self.sweep).into_iter().for_each(|axis| spec.sweep.set(axis));
-        // A flag wins over the file: also over the key that it stands instead of.
+        // A flag overrides the file, including the key that it excludes.
         if self.tau.is_some() || self.adaptive.is_some() {
             (spec.tau, spec.adaptive) = (None, None);
         }
@@ -226,7 +226,7 @@ impl SpecFlags {
         }
         macro_rules! replace {
             ($($key:ident)*; $($optional:ident)*) => {{
-                // Names every field, so that a flag cannot be forgotten here.
+                // All fields are named, so that no flag is forgotten here.
                 let SpecFlags { sweep: _, $($key,)* $($optional,)* } = self;
                 $(if let Some(value) = $key { spec.$key = value; })*
                 $(if $optional.is_some() { spec.$optional = $optional; })*
@@ -249,7 +249,7 @@ pub(super) fn whole<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
     value.ok_or_else(|| format!("not a whole number from 0 to {}", u128::MAX >> (128 - 8 * size_of::<T>())))
 }
 
-/// `I/N`, or `slurm`.
+/// Parses `I/N`, or `slurm`.
 fn shard(text: &str) -> Result<Shard, String> {
     match text.trim() {
         "slurm" => slurm(|name| std::env::var(name).ok()),
@@ -257,8 +257,8 @@ fn shard(text: &str) -> Result<Shard, String> {
     }
 }
 
-/// The shard of this task of a Slurm job array. An array of some shards of N, submitted again, says N in
-/// `CURVELAX_SHARDS`, since the array's own count is then not N.
+/// The shard of this task of a Slurm job array. If an array of only some of the N shards is submitted again, its own
+/// count is not N, and `CURVELAX_SHARDS` gives N.
 fn slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
     let number = |name: &str| {
         let text = variable(name).ok_or_else(|| format!("no {name}: this is not a task of a Slurm job array"))?;
@@ -281,7 +281,7 @@ fn slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
     Shard::new(index, count)
 }
 
-/// A time in hours, minutes and seconds: `1h30m`, `5m`, `90s`, or seconds alone.
+/// Parses a time in hours, minutes and seconds: `1h30m`, `5m`, `90s`, or seconds alone.
 pub(super) fn duration(text: &str) -> Result<Duration, String> {
     let wrong = || "not a time; write 90, 90s, 5m or 1h30m".to_string();
     let number =
@@ -311,7 +311,7 @@ fn text_of<T: std::str::FromStr<Err = String>>(text: &str) -> Result<T, String> 
     text.parse()
 }
 
-/// One of `names`, with clap's listing and suggestions, read as the spec file is.
+/// Parses one of `names` as in the spec file, with clap's listing and suggestions.
 pub(super) fn word<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
 where
     T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
@@ -405,7 +405,7 @@ mod tests {
         let default: BTreeSet<&str> = default.lines().filter(|line| !line.starts_with("shape")).collect();
         let kept: Vec<&str> = given.lines().filter(|line| default.contains(line)).collect();
         assert_eq!(kept, [""; 0]);
-        // Either of the two that stand for one another.
+        // One key of each pair that excludes the other is left out.
         assert_eq!(given.lines().filter(|line| line.contains(" = ")).count(), Spec::keys().len() - 2);
         assert!(given.ends_with("[sweep]\nphase = [1, 2]\n"), "{given}");
     }

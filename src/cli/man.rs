@@ -18,7 +18,7 @@ Examples:
 #[command(after_help = EXAMPLES)]
 pub struct ManArgs {}
 
-/// Prints the page: what the program is, then each command with its flags.
+/// Prints the page: a description of the program, then each command with its flags.
 pub fn man(ManArgs {}: ManArgs) -> Result<()> {
     let mut program = Cli::command();
     program.build();
@@ -35,7 +35,7 @@ fn page(program: &Command) -> io::Result<String> {
     man.render_subcommands_section(&mut head)?;
     let mut page = String::from_utf8_lossy(&head).into_owned();
     for name in program.get_subcommands().map(Command::get_name) {
-        // It has no page of its own.
+        // It has no separate page.
         page = page.replace(&format!("curvelax\\-{name}(1)"), &format!("curvelax {name}"));
     }
     for command in program.get_subcommands().filter(|command| command.get_name() != "help") {
@@ -51,7 +51,7 @@ fn page(program: &Command) -> io::Result<String> {
     Ok(page)
 }
 
-/// `text` as roff sets it character by character.
+/// `text` as literal characters in roff.
 fn literal(text: &str) -> String {
     let lines = text.lines().map(|line| line.replace('\\', "\\e").replace('-', "\\-"));
     // A line that begins with a dot or a quote would be a request.

@@ -71,7 +71,7 @@ pub fn merge(args: MergeArgs) -> Result<()> {
     if args.json || !args.quiet { print(&text) } else { Ok(()) }
 }
 
-/// What is to be done, and how.
+/// Which shards are missing, and how to submit them.
 fn missing(shards: &Shards, script: &str) -> String {
     let (missing, count) = (shards.missing(), shards.count());
     if missing.is_empty() {
@@ -95,7 +95,7 @@ fn check_place(out: &Path, shards: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Where `path` is or would be, without links.
+/// The path at which `path` is or would be, with links resolved.
 fn place(path: &Path) -> io::Result<PathBuf> {
     match path.canonicalize() {
         Err(e) if e.kind() == io::ErrorKind::NotFound => {

@@ -1,7 +1,7 @@
-//! The command line: one file per command, and the flags that are the spec's keys.
+//! The command line: one file per command, and the flags for the keys of the spec.
 //!
-//! Results go to files, one table goes to stdout, everything else to stderr. A reader that closes stdout early
-//! ends the program quietly.
+//! Results go to files, one table goes to stdout, everything else to stderr. If the reader closes stdout early, the
+//! program ends quietly.
 
 mod adapters;
 mod bench;
@@ -65,7 +65,7 @@ enum Command {
     Man(man::ManArgs),
 }
 
-/// Parses the arguments of the process, does what they ask, and returns the exit code.
+/// Parses the arguments of the process, runs the command, and returns the exit code.
 pub fn main() -> ExitCode {
     let cli = parse(std::env::args_os()).unwrap_or_else(|error| error.exit());
     let done = match cli.command {
@@ -90,7 +90,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// As `Cli::try_parse_from`, with [an answer](unknown::explain) to flags that are not there.
+/// Does the same as `Cli::try_parse_from`, but [explains](unknown::explain) unknown flags.
 fn parse(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Result<Cli, clap::Error> {
     let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
     let program = Cli::command();
@@ -101,7 +101,7 @@ fn parse(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Result<Cli
     })
 }
 
-/// Writes `text` to stdout; that the reader has gone away is no error.
+/// Writes `text` to stdout; a closed stdout is not an error.
 pub(crate) fn print(text: &str) -> Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -115,7 +115,7 @@ fn print_json(value: &impl Serialize) -> Result<()> {
     print(&json(value, "JSON")?)
 }
 
-/// Writes a line to stderr, where nothing can be done if that fails.
+/// Writes a line to stderr; if that fails, nothing can be done.
 pub(crate) fn note(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{}", without_controls(line));
 }
@@ -136,7 +136,7 @@ mod tests {
         lines.filter(|line| line.starts_with("curvelax ")).collect()
     }
 
-    /// The words of a line as a shell passes them on, without what it takes for itself.
+    /// The words of a line as a shell passes them on, without redirections and the like.
     fn words(line: &str) -> impl Iterator<Item = &str> {
         line.split_whitespace().take_while(|word| !matches!(*word, ">" | "|" | "#"))
     }

@@ -41,7 +41,7 @@ pub struct PlotArgs {
 
 /// Runs the command.
 pub fn plot(args: PlotArgs) -> Result<()> {
-    // Before the folder is opened, which would make one that is not there.
+    // Before the folder is opened, which would create a missing one.
     reader::provenance(&args.run)?;
     let (out, force, owner) = match &args.out {
         Some(out) if !is_same(out, &args.run) => (out, args.force, Owner::Pictures),
@@ -65,7 +65,7 @@ pub fn plot(args: PlotArgs) -> Result<()> {
     print(&format!("results    {}: {}\n", out.display(), names.join(", ")))
 }
 
-/// Whether both paths lead to one folder.
+/// Whether both paths lead to the same folder.
 fn is_same(one: &Path, other: &Path) -> bool {
     matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }

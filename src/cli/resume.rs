@@ -1,4 +1,5 @@
-//! `curvelax resume`: an interrupted run goes on where it was, to the very files that it would have written.
+//! `curvelax resume`: an interrupted run continues where it stopped, and writes exactly the files it would have
+//! written.
 
 use std::path::{Path, PathBuf};
 
@@ -58,10 +59,10 @@ pub fn resume(args: ResumeArgs) -> Result<()> {
     resume_in(folder, saved, place, args.manner)
 }
 
-/// The run that was begun in the folder at `path`, if one was: its folder, and its state unless it is finished.
+/// The run that was begun in the folder at `path`, if any: its folder, and its checkpoint unless it is complete.
 ///
 /// # Errors
-/// As those of [`resume`].
+/// Those of [`resume`].
 pub fn begun(path: &Path) -> Result<Option<(OutputFolder, Option<Saved>)>> {
     let there = |name: &&str| path.join(name).exists();
     if ![names::STATE, names::STATE_OLD, names::RUN].iter().any(there) {
@@ -72,17 +73,17 @@ pub fn begun(path: &Path) -> Result<Option<(OutputFolder, Option<Saved>)>> {
     Ok(Some((folder, saved)))
 }
 
-/// Goes on with a run that was begun, if it is one of `spec`.
+/// Resumes a run that was begun, if it has the same spec.
 ///
 /// # Errors
-/// [`Error::Request`] for one of another spec, and as [`resume`].
+/// [`Error::Request`] for a run of another spec, and those of [`resume`].
 pub fn resume_like((folder, saved): (OutputFolder, Option<Saved>), spec: &Spec, flags: MannerFlags) -> Result<()> {
     let path = folder.path().display().to_string();
     let own = match &saved {
         Some(saved) => Spec::from_toml(&saved.head.origin.spec).map_err(|e| state_spec(&e))?,
         None => reader::provenance(folder.path())?.spec,
     };
-    // Where it goes on is checked by itself, and on how many threads makes no difference.
+    // Where it continues is checked separately, and the number of threads makes no difference.
     if let Some((key, here, there)) = spec.difference(&own, &["backend", "adapter", "threads"]) {
         return Err(Error::Request(format!(
             "--resume: the run in {path} has another spec: {key} is {there} there and {here} here; use another folder"
@@ -91,7 +92,7 @@ pub fn resume_like((folder, saved): (OutputFolder, Option<Saved>), spec: &Spec, 
     resume_in(folder, saved, ResumePlace { threads: spec.threads, ..ResumePlace::default() }, flags)
 }
 
-/// Where a run is to go on, if not where it was.
+/// Where a run is to continue, if not where it was.
 #[derive(Default)]
 struct ResumePlace {
     backend: Option<BackendChoice>,
@@ -106,7 +107,7 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: ResumePlace,
         flags.say(&format!("note: the run in {} is finished: nothing is left to do", path.display()));
         return Ok(());
     };
-    // Before a device is looked for, which takes its time.
+    // Before a device is looked for, which takes time.
     let manner = flags.manner()?;
     if let Some(fault) = &saved.note {
         note(&format!("warning: {}: {fault}", path.display()));
@@ -147,7 +148,7 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: ResumePlace,
     work.carry_out(report, standing, &flags)
 }
 
-/// The spec of the state, with what this command line asks for instead.
+/// The spec of the checkpoint, with the changes by this command line.
 fn spec(text: &str, ResumePlace { backend, adapter, threads }: ResumePlace) -> Result<Spec> {
     let mut spec = Spec::from_toml(text).map_err(|e| state_spec(&e))?;
     if backend.is_some() || adapter.is_some() {
@@ -164,9 +165,9 @@ fn state_spec(fault: &str) -> Error {
     Error::Request(format!("the spec in the state: {fault}"))
 }
 
-/// That paths in the spec can begin at `base`.
+/// Checks that paths in the spec can be relative to `base`.
 fn check_base(base: &Path) -> Result<()> {
-    // A name in it is found only where it is a folder that may be entered.
+    // Names in it are found only if it is a folder with search permission.
     base.join(".").metadata().map(drop).map_err(|e| {
         let base = base.display();
         Error::Request(format!("{base}: the run was begun in this folder, and its outline is named from there ({e})"))

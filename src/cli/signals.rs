@@ -1,7 +1,7 @@
-//! Ctrl-C, SIGTERM, SIGHUP and `--max-time` ask a run to stop; one that does not answer is ended.
+//! Ctrl-C, SIGTERM, SIGHUP and `--max-time` ask a run to stop; a run that does not respond is ended.
 //!
-//! Two threads do all of it. Both are started before the run, because a system may have no third one when it is needed: one
-//! receives the signals and says the last word, the other counts the time and ends the process.
+//! Two threads do all of it. Both are started before the run, because the system may have no thread left when one is
+//! needed. One receives the signals and prints the last message; the other keeps the time and ends the process.
 
 use std::{
     sync::mpsc::{Receiver, RecvTimeoutError, channel},
@@ -16,17 +16,17 @@ use crate::{
     threads,
 };
 
-/// A run that was asked to stop has so long to come to its end.
+/// Time for a run to end after it was asked to stop.
 const PATIENCE: Duration = Duration::from_secs(4);
-/// A run that is asked to stop twice has so long to keep what is finished.
+/// Time for a run to save finished work after it was asked to stop twice.
 const SHORT_PATIENCE: Duration = Duration::from_millis(1000);
-/// Whoever reads what is said has so long to take it.
+/// Time for the reader of stderr to accept the last message.
 const LAST_WORD: Duration = Duration::from_millis(100);
 
-/// Passes on to `stop` whatever asks this process to end, from now on; and the end of `most`.
+/// From now on, forwards requests to end this process to `stop`; also when the time `most` is over.
 ///
 /// # Errors
-/// [`Error::Failed`](crate::Error::Failed) where the system has no threads or no pipe for it.
+/// [`Error::Failed`](crate::Error::Failed) if the system has no threads or no pipe for it.
 pub fn watch(stop: &Stop, most: Option<Duration>) -> Result<()> {
     let (mut ears, closing) = system::ears()?;
     let (ask, asked) = channel();
@@ -35,11 +35,11 @@ pub fn watch(stop: &Stop, most: Option<Duration>) -> Result<()> {
     threads::start("signals", move || {
         ears.hear(|cause| {
             to_stop.ask(cause);
-            // The clock has gone where the process ends.
+            // The clock is gone if the process is ending.
             let _ = ask.send(());
         });
         if let Some(cause) = to_stop.asked().map(|(cause, _)| cause) {
-            // The clock does not wait for it: nobody may read what is said.
+            // The clock does not wait for the message, as nobody may read it.
             note(&format!("error: {}", last_word(cause)));
         }
     })?;
@@ -50,8 +50,8 @@ fn last_word(cause: Cause) -> crate::Error {
     cause.error(" at once; curvelax resume continues from the last checkpoint")
 }
 
-/// Waits until the run is `asked` to stop or `most` is over, and then for its end; whatever is running when its time is up,
-/// its state is on disk.
+/// Waits until the run is `asked` to stop or `most` is over, and then for its end. When time is up, whatever is still
+/// running is ended: a checkpoint is on disk.
 fn clock(stop: &Stop, asked: &Receiver<()>, most: Option<Duration>, ears: system::Closing) {
     match most.map_or_else(|| asked.recv().map_err(Into::into), |most| asked.recv_timeout(most)) {
         Ok(()) => {}
@@ -94,13 +94,13 @@ mod system {
     use super::*;
     use crate::Error;
 
-    /// What receives the signals.
+    /// Receives the signals.
     pub struct Ears(Signals);
-    /// Ends their receiving.
+    /// Ends the reception.
     pub type Closing = Handle;
 
     pub fn ears() -> Result<(Ears, Closing)> {
-        // So that a file that grows too large is an error as any other.
+        // So that a file that grows too large gives an ordinary error.
         let _ = flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
         let ignored = ignored();
         let heard = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
@@ -114,7 +114,7 @@ mod system {
     }
 
     impl Ears {
-        /// Passes on what asks for the end, until they are closed.
+        /// Forwards signals that ask for the end, until closed.
         pub fn hear(&mut self, mut ask: impl FnMut(Cause)) {
             for signal in self.0.forever() {
                 ask(match signal {
@@ -126,20 +126,21 @@ mod system {
         }
     }
 
-    /// Those that whoever started the process wants it to ignore, such as `nohup`: bit i - 1 for the signal i. Only Linux tells.
+    /// The signals that the parent process wants ignored, as with `nohup`: bit i - 1 for signal i. Available on Linux
+    /// only.
     fn ignored() -> u64 {
         let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
         let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
         mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
     }
 
-    /// Without what the C library does at the end, which drivers take ill while they are at work.
+    /// Exits without the C library's clean-up, which active drivers do not tolerate.
     pub fn exit(code: u8) {
         low_level::exit(code.into());
     }
 }
 
-/// The system ends the process; a run loses what is younger than its state.
+/// The system ends the process; a run loses the work since its last checkpoint.
 #[cfg(not(unix))]
 mod system {
     use std::sync::mpsc::Sender;

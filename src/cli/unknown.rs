@@ -1,4 +1,4 @@
-//! Flags that a command does not have: what may have been meant.
+//! Flags that a command does not have: suggestions of what was meant.
 
 use std::{ffi::OsString, iter};
 
@@ -10,16 +10,16 @@ use clap::{
 
 use crate::error::nearest;
 
-/// Flags of a command that are listed at most; the help has more.
+/// Maximum flags of a command that are listed; the help has more.
 const LISTED: usize = 16;
 
-/// Says in `error`, if it is of a flag that is not there, which commands have it, or which flag of its own command is like it:
-/// clap does not see a slip in a short word, and looks for words that are alike where a flag is of another command.
+/// If `error` is about an unknown flag, adds which commands have it, or which flag of this command is similar. clap
+/// misses slips in short words, and suggests similar words if the flag belongs to another command.
 pub fn explain(error: &mut clap::Error, program: &Command, arguments: &[OsString]) {
     let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return };
     let Some(word) = given.strip_prefix("--").filter(|_| error.kind() == ErrorKind::UnknownArgument) else { return };
     let word = word.to_string();
-    // The program itself has no flag with a value that could stand before the command.
+    // The program itself has no flag with a value that could come before the command.
     let called = arguments.iter().skip(1).find_map(|argument| program.find_subcommand(argument));
     let command = called.unwrap_or(program);
     let owners: Vec<&str> = program
@@ -28,7 +28,7 @@ pub fn explain(error: &mut clap::Error, program: &Command, arguments: &[OsString
         .map(Command::get_name)
         .collect();
     if !owners.is_empty() {
-        // A command that has it was named behind it.
+        // If the command has the flag, it was named after the flag.
         let called = called.filter(|command| !owners.contains(&command.get_name()));
         error.remove(ContextKind::SuggestedArg);
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(belongs(&word, &owners, called)));
@@ -44,7 +44,7 @@ fn flags(command: &Command) -> impl Iterator<Item = &str> {
     command.get_arguments().filter_map(clap::Arg::get_long)
 }
 
-/// Where a flag belongs, and what the command that was `called` does and takes.
+/// The commands to which a flag belongs, and the description and flags of the command that was `called`.
 fn belongs(word: &str, owners: &[&str], called: Option<&Command>) -> Vec<StyledStr> {
     let owners = quoted(owners.iter().map(|owner| (*owner).to_string()));
     let Some(command) = called else { return vec![format!("'--{word}' goes behind a command: {owners}").into()] };

@@ -1,4 +1,4 @@
-//! A study on its way, for `run` and `resume`: what was asked for, where it is computed, and how it is carried out.
+//! A study in progress, for `run` and `resume`: the request, where it is computed, and how it is carried out.
 
 use std::{path::Path, time::Duration};
 
@@ -38,22 +38,22 @@ pub struct MannerFlags {
 }
 
 impl MannerFlags {
-    /// Says a line on stderr, unless all should be quiet.
+    /// Prints a line on stderr, unless quiet.
     pub fn say(&self, line: &str) {
         if !self.quiet {
             note(line)
         }
     }
 
-    /// That what is asked for can be said of results in `out`.
+    /// Checks that the results in `out` can be printed as requested.
     ///
     /// # Errors
-    /// [`Error::Request`] for a name that JSON cannot hold.
+    /// [`Error::Request`] for a name that JSON cannot represent.
     pub fn check_name(&self, out: &Path) -> Result<()> {
         check_name(self.json, out)
     }
 
-    /// From now on the run can be stopped.
+    /// Makes the run stoppable from now on.
     pub fn manner(&self) -> Result<Manner> {
         let stop = Stop::default();
         signals::watch(&stop, self.max_time)?;
@@ -61,11 +61,11 @@ impl MannerFlags {
     }
 }
 
-/// A study, ready to run: where each cohort of its cells is computed.
+/// A study that is ready to run, with the back end of each cohort.
 pub struct Work {
-    /// Resolved, with everything that was settled by the choices.
+    /// The resolved study, with everything that the choices decided.
     pub study: Study,
-    /// Where its cohorts are computed.
+    /// The back ends of its cohorts.
     pub choices: Vec<Choice>,
     /// The back end of the first cohort, once it is open.
     opened: Option<Box<dyn Backend>>,
@@ -77,7 +77,7 @@ impl Work {
         Work::new_from(spec, Path::new(""))
     }
 
-    /// As [`Work::new`], with paths in the spec relative to the directory `base`.
+    /// Does the same as [`Work::new`], with paths in the spec relative to the directory `base`.
     pub fn new_from(spec: Spec, base: &Path) -> Result<Work> {
         let mut study = Study::new_from(spec, base)?;
         let choices = placement::choose_all(&study)?;
@@ -85,7 +85,8 @@ impl Work {
         Ok(Work { study, choices, opened: None })
     }
 
-    /// Opens the back end of the first cohort: where that is not the chosen one, the spec tells. Returns where it is.
+    /// Opens the back end of the first cohort, and returns where it is. If that differs from the choice, it is recorded
+    /// in the spec.
     pub fn open(&mut self, flags: &MannerFlags) -> Result<Platform> {
         let choice = &self.choices[0];
         let (backend, platform) = open(self.first_cohort(), choice, flags)?;
@@ -108,15 +109,15 @@ impl Work {
         before.map(|cell| cell.spec.member_count()).sum()
     }
 
-    /// Where all is computed.
+    /// Where everything is computed.
     pub fn platform(&self) -> Platform {
         self.choices[0].platform(&self.first_cohort()[0].spec)
     }
 
-    /// Runs what is left to do, and publishes all results.
+    /// Runs the remaining work, and publishes all results.
     ///
     /// # Errors
-    /// Beside those of the run, [`Error::Request`] where `standing` is not that of the report.
+    /// Those of the run, and [`Error::Request`] if `standing` does not match the report.
     pub fn carry_out(self, mut report: RunReport, standing: Standing, flags: &MannerFlags) -> Result<()> {
         let (told, rows) = (self.members_before(report.cohort()).saturating_add(standing.next), report.members());
         if told != rows {
@@ -157,7 +158,7 @@ impl Work {
     }
 }
 
-/// As [`MannerFlags::check_name`], where `json` is asked for.
+/// Does the same as [`MannerFlags::check_name`], if `json` is set.
 pub fn check_name(json: bool, out: &Path) -> Result<()> {
     match json && out.to_str().is_none() {
         true => Err(Error::value(
@@ -170,21 +171,21 @@ pub fn check_name(json: bool, out: &Path) -> Result<()> {
     }
 }
 
-/// Says how a run that failed goes on, unless the error does.
+/// Says how to resume a run that failed, unless the error does.
 fn kept(out: &Path, error: &Error) {
     if !matches!(error, Error::Stopped(_) | Error::Interrupted(_) | Error::Lost(_)) {
         note(&format!("note: the run was saved: curvelax resume {} continues it", out.display()));
     }
 }
 
-/// Opens the back end that was chosen for a cohort.
+/// Opens the back end chosen for a cohort.
 fn open(cohort: &[Cell], choice: &Choice, flags: &MannerFlags) -> Result<(Box<dyn Backend>, Platform)> {
     flags.say(&choice.sentence(&cohort[0].spec));
     choice.open_for(cohort)
 }
 
-/// Runs one cohort of cells after another, from where `standing` is in that of the report; `opened` is the back end of the
-/// first one, where it is open.
+/// Runs one cohort of cells after another, from `standing` in the report's current one; `opened` is the back end of the
+/// first, if it is open.
 fn advance(
     study: &Study,
     choices: Vec<Choice>,
@@ -198,7 +199,7 @@ fn advance(
         let cohort = &study.cells()[range];
         let mut backend = match opened.take() {
             Some(backend) => backend,
-            // A run that has begun does not move.
+            // A run that has begun stays on its device.
             None => open(cohort, &choice.after(report.platform()), flags)?.0,
         };
         report.begin_cohort(number);
