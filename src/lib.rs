@@ -17,51 +17,51 @@
 //! | k, r | signed curvature, > 0 on a circle; length, as the scheme evolves it | segment [x_{i-1}, x_i] |
 //! | q | (r_i + r_{i+1})/2 | node |
 //! | T, N | unit tangent; unit inward normal, det(T, N) = 1; curves run counter-clockwise | |
-//! | β, α | normal velocity; tangential velocity, which moves nodes along the curve only | segment; node |
-//! | τ, ω | time step; speed of the redistribution of nodes, in 1/time | |
 //! | β, α | normal velocity; tangential velocity, which only moves nodes along the curve | segment; node |
+//! | τ, ω | time step; speed of the redistribution of nodes, in 1/time | |
+//! | L, A | length and signed area of the polygon x | |
 //! | excess | L²/(4πA) - (n/π)·tan(π/n), 0 on the regular polygon | |
 //!
 //! Lengths are in the user's unit and times in its fourth power.
 //!
 //! # Modules
 //!
-//! Each uses only those above it (`tests/modules_depend_downward.rs`).
-//!
 //! Each module uses only those above it (`tests/modules_depend_downward.rs`).
+//!
+//! | module | holds |
 //! |---|---|
 //! | [`error`] | what, where, numbers, remedy, exit code |
 //! | `wgsl` | the files of `shaders/`, compiled in |
 //! | `guard`, `threads` | panics of other crates become errors; every thread is started here |
-//! | `input`, `text`, [`random`] | files opened for reading; numbers as people read them; random numbers addressed by key |
-//! | [`number`] | the number that the scheme is generic over |
+//! | `input`, `text`, [`random`] | files opened for reading; numbers as people write them; random numbers addressed by key |
+//! | [`number`] | the number type of the scheme |
 //! | [`flow`] | the law b(k) |
 //! | [`curve`] | plane curves in f64: shapes, perturbation, sampling, measures |
-//! | [`number`] | the number type of the scheme |
+//! | [`solver`] | periodic pentadiagonal systems: rows, sweeps, direct solution |
 //! | [`statistics`] | censored times, their mean and median with intervals, tests between groups, fits |
-//! | [`scheme`] | the paper's step, one file a stage, with the stems of `shaders/` |
-//! | [`backend`] | slots in which members are advanced, on the CPU or a GPU |
-//! | [`ensemble`] | the spec, its members, what a member leaves |
-//! | `schedule`, `trajectory`, [`simulate`] | steps and output times; one member's way; the loop over all |
+//! | [`scheme`] | the paper's step, one file per stage, named as in `shaders/` |
 //! | [`backend`] | slots in which members advance, on the CPU or a GPU |
 //! | [`ensemble`] | the spec, its members, the result of a member |
 //! | `schedule`, `trajectory`, [`simulate`] | steps and output times; one member's trajectory; the loop over all |
-//! | [`truth`] | problems with exact solutions, and the error and order against them |
-//! | [`results`] | what the members of a study add up to: sums, statistics by cell, the record of the run |
+//! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
+//! | [`placement`] | which back end a spec gets, and why |
 //! | [`relax`](fn@relax) | from a study to the results of its members |
-//! | `files` | the folder of results: who may write there, and what each file holds |
+//! | [`truth`] | problems with exact solutions, and the error and order against them |
 //! | [`results`] | the results of a study: sums, statistics by cell, the record of the run |
-//! | `bench`, `estimate`, `figures` | how fast a back end is; what a run will take; the paper's figures |
+//! | `draw` | SVG, axes and charts from plain numbers |
+//! | `files` | the folder of results: who may write there, and what each file holds |
+//! | `report` | a run's sink: tables, checkpoints, merge, `report.html` |
+//! | `bench`, `estimate`, `figures` | speed of a back end; cost of a run; the paper's figures |
 //! | `cli` | the commands |
 //!
-//! | `bench`, `estimate`, `figures` | speed of a back end; cost of a run; the paper's figures |
+//! # Example
 //!
-//! A [`Spec`](ensemble::Spec) says what to run, a [`Study`](ensemble::Study) is a spec that was checked, and
-//! [`relax`](fn@relax) hands what its members leave to a [`Sink`](ensemble::Sink), such as a `Vec`. One ellipse under
-//! surface diffusion keeps its area and loses length:
 //! A [`Spec`](ensemble::Spec) says what to run, a [`Study`](ensemble::Study) is a checked spec, and [`relax`](fn@relax)
 //! hands the results of its members to a [`Sink`](ensemble::Sink), such as a `Vec`. An ellipse under surface diffusion
 //! keeps its area and loses length:
+//!
+//! ```
+//! use curvelax::{ensemble::{Spec, Study}, relax};
 //!
 //! let study = Study::new(Spec { curves: 1, amplitude: 0.0, t_end: 0.2, ..Spec::default() })?;
 //! let mut members = Vec::new();

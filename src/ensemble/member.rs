@@ -2,7 +2,7 @@
 //!
 //! A member is a pure function of the spec and j. Its amplitudes and phases are draws addressed by (seed, j, attempt,
 //! mode). Batch, order, thread and the other members therefore do not matter, and mode m gets the same number whichever
-//! other modes are requested. The number of nodes does not matter either: member j is the same curve at n = 100 and n =
+//! other modes are requested. The number of nodes does not matter either: member j is the same curve at n = 100 and
 //! 200.
 
 use std::{f64::consts::TAU, sync::Arc};

@@ -49,7 +49,7 @@ impl Study {
         Ok(Study { spec, cells }.with_spec_of_the_cell())
     }
 
-    /// Does the same, with members that are perturbations of `curve` instead of the shape of `spec`.
+    /// Does the same as [`Study::new`], with members that are perturbations of `curve` instead of the shape of `spec`.
     ///
     /// # Errors
     /// As [`Study::new`], and for a spec that sweeps.
