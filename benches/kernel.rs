@@ -1,7 +1,8 @@
 //! The kernel on the first adapter of this machine: start-up, sweeps alone, whole steps.
 //!
-//! Sweeps are made on systems that never reach their tolerance, so that a dispatch is a known number of them; whole steps
-//! are those of the conformance ensemble. Means over dispatches in seconds of all cores; of sweeps the difference of a long dispatch and a short one.
+//! Sweeps run on systems that never reach their tolerance, so that a dispatch makes a known number of them. Whole steps
+//! are those of the conformance ensemble. Figures are means over dispatches, in seconds summed over all cores; for
+//! sweeps, the difference between a long dispatch and a short one.
 
 use curvelax::{
     backend::{
@@ -43,8 +44,8 @@ fn measure<T: Real>(gpu: &Gpu, n: usize) {
     println!("{} n = {n}: start {:.2} s, adaptive", T::NAME, self::start::<T>(gpu, n, adaptive).1);
 }
 
-/// Seconds of all cores that this process has used, which other processes do not change; on a hardware GPU it is the wall clock
-/// that counts.
+/// Processor seconds of this process over all cores, which other processes do not affect; on a hardware GPU, only
+/// the wall clock matters.
 fn now() -> f64 {
     let ticks = || {
         let text = std::fs::read_to_string("/proc/self/stat").ok()?;
@@ -67,7 +68,7 @@ fn start<T: Real>(gpu: &Gpu, n: usize, variant: Variant) -> (Kernel<T>, f64) {
     (kernel, now() - started)
 }
 
-/// Seconds of all cores that a dispatch takes, the mean of many.
+/// Mean processor seconds of a dispatch, over many.
 fn dispatch<T: Real>(kernel: &mut Kernel<T>) -> f64 {
     let (at, mut count) = (now(), 0);
     while count < 3 || now() - at < 0.6 {

@@ -1,7 +1,8 @@
-//! What a step costs beside the best loop for its two solves alone: `cargo bench --bench solve`.
+//! The cost of a step compared with the fastest loop for its two solves alone: `cargo bench --bench solve`.
 //!
-//! The loop is written for this purpose only: bands that lie ready, fused multiply-adds, the widest vectors, one thread. It
-//! solves what a step solves, a periodic pentadiagonal system for k and one for x and y, and does nothing else.
+//! The loop is written for this purpose only: bands ready in memory, fused multiply-adds, the widest vectors, one
+//! thread. It solves the same systems as a step, a periodic pentadiagonal one for k and one for x and y, and does
+//! nothing else.
 
 use bytemuck::cast;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -20,7 +21,7 @@ use pulp::{Arch, Simd, WithSimd};
 const POINTS: usize = 100;
 const WINDOW: Duration = Duration::from_millis(50);
 
-/// One number of every member abreast.
+/// One number per member, for members side by side.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Lanes<S: Simd>(S::f64s);
@@ -71,7 +72,7 @@ fn solve<S: Simd, const F: usize>(simd: S, given: &[Row<S, F>], rows: &mut [Row<
     for i in 0..core {
         let mut own = given[i];
         let [a, b, c, d, e] = own.bands;
-        // The ends of the ring stand in the border.
+        // The ends of the ring are in the border.
         match i {
             0 => own = Row { bands: [zero, zero, c, d, e], border: [a, b], ..own },
             1 => own = Row { bands: [zero, b, c, d, e], border: [zero, a], ..own },
@@ -139,7 +140,7 @@ fn solve<S: Simd, const F: usize>(simd: S, given: &[Row<S, F>], rows: &mut [Row<
 /// `c - a·b`, fused.
 #[inline(always)]
 fn minus<S: Simd>(simd: S, c: Lanes<S>, a: Lanes<S>, b: Lanes<S>) -> Lanes<S> {
-    // pulp's negation of floating-point numbers is not compiled into its caller.
+    // pulp's negation of floating-point numbers is not inlined into its caller.
     let opposite = cast(simd.xor_u64s(cast(a.0), simd.splat_u64s((-0.0_f64).to_bits())));
     Lanes(simd.mul_add_f64s(opposite, b.0, c.0))
 }

@@ -1,4 +1,4 @@
-//! The stages of a step, each on its own, in f64 and f32 on one core: `cargo bench --bench stages`.
+//! The stages of a step, each alone, in f64 and f32 on one core: `cargo bench --bench stages`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use curvelax::{
@@ -64,7 +64,7 @@ fn stages<T: Real>(c: &mut Criterion) {
     group.bench_function("direct, position", |b| {
         b.iter(|| direct::solve(position, [&mut increments.x, &mut increments.y], factor_of_both));
     });
-    // A cap that ends the solve at its first look at the residual: the cost of sweeps, not of their number.
+    // A cap that ends the solve at its first check of the residual: this measures the cost of sweeps, not their number.
     let control = Control {
         tolerance: T::of(0.0),
         negligible: T::of(0.0),

@@ -1,4 +1,4 @@
-//! One step of the scheme on the CPU, solver by solver, and the making of a member: `cargo bench`.
+//! One step of the scheme on the CPU with each solver, and making a member: `cargo bench`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use curvelax::{
