@@ -1,13 +1,13 @@
-//! A wrong request: exit code 2, a message that names the key and the value, nothing on stdout, nothing written.
+//! Wrong requests: exit code 2, a message that names the key and the value, nothing on stdout, nothing written.
 
 use std::{fs, path::Path, process::Output};
 
 use assert_cmd::Command;
 use tempfile::TempDir;
 
-/// Runs `curvelax run ARGUMENTS --out OUT` in an empty folder with the given files, and returns what it said.
+/// Runs `curvelax run ARGUMENTS --out OUT` in an empty folder with the given files, and returns its message.
 ///
-/// Asserts all that holds for every wrong request.
+/// Asserts everything that holds for all wrong requests.
 #[track_caller]
 fn refused(arguments: &[&str], files: &[(&str, &str)]) -> String {
     let home = TempDir::new().unwrap();
@@ -25,7 +25,7 @@ fn refused(arguments: &[&str], files: &[(&str, &str)]) -> String {
 }
 
 fn curvelax(folder: &Path, arguments: &[&str]) -> Output {
-    // Where this is not set, a layer of Mesa says so on stderr.
+    // Without this a layer of Mesa prints a message on stderr.
     let mut command = Command::cargo_bin("curvelax").unwrap();
     command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).args(arguments).output().unwrap()
 }
@@ -56,7 +56,7 @@ fn a_wrong_number_is_named_with_its_flag() {
     ] {
         for value in values {
             let message = refused(&[flag, value], &[]);
-            // The offending item of a list, and the step that does not fit a final time.
+            // The wrong item of a list, and the step that does not fit a final time.
             let (flag, value) = match (flag, *value) {
                 ("--t-end", "0.0001") => ("--tau", "0.001"),
                 ("--tau", "-1e-3") => ("--tau", "-0.001"),
@@ -188,10 +188,11 @@ fn a_spec_file_that_cannot_be_read_is_named() {
     assert_says(&refused(&["."], &[]), &["cannot read the spec .: "]);
 }
 
-/// `curvelax ARGUMENTS` refused in one line that begins with `start`, with a memory of 300 MB and a minute of the processor.
+/// Checks that `curvelax ARGUMENTS` is refused in one line that begins with `start`, with 300 MB of memory and a minute
+/// of processor time.
 ///
-/// A limit that is passed ends the program otherwise: allocations fail, a signal comes; ten minutes are for a pipe that is
-/// waited for.
+/// A program that exceeds a limit ends in another way: allocations fail, or a signal comes. The ten minutes are for a
+/// program that waits for a pipe.
 #[cfg(target_os = "linux")]
 #[track_caller]
 fn refused_at_once(folder: &Path, arguments: &[&str], start: &str) {
@@ -209,7 +210,7 @@ fn refused_at_once(folder: &Path, arguments: &[&str], start: &str) {
     assert!(output.stdout.is_empty() && !folder.join("new").exists(), "{arguments:?}");
 }
 
-/// A file of `size` zero bytes, none of which is on a disk.
+/// A file of `size` zero bytes that uses no disk space.
 #[cfg(target_os = "linux")]
 fn endless(path: &Path, size: u64) {
     fs::File::create(path).unwrap().set_len(size).unwrap();
@@ -469,7 +470,7 @@ fn a_reader_that_goes_away_ends_the_program_quietly() {
     }
 }
 
-/// What the reader of shapes and the perturbation refuse.
+/// The reader of shapes and the perturbation refuse these.
 #[test]
 fn a_wrong_shape_is_refused_by_name() {
     let files = [
@@ -516,7 +517,7 @@ fn a_wrong_shape_is_refused_by_name() {
     assert_says(&refused(&["--shape", "elipse:2,1"], &[]), &["did you mean `ellipse`?"]);
 }
 
-/// No adapter has this name, whatever the machine.
+/// No machine has an adapter of this name.
 #[test]
 fn an_adapter_that_is_not_there_is_refused_by_name() {
     let message = refused(&["--backend", "gpu", "--adapter", "abacus"], &[]);

@@ -1,4 +1,4 @@
-//! `curvelax bench`: rows for what was asked, numbers that agree with each other, and wrong requests refused.
+//! `curvelax bench`: the requested rows, consistent numbers, and wrong requests refused.
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -9,12 +9,12 @@ const QUICK: &str = "--seconds 0.06 --repeats 3 --quiet";
 fn bench(arguments: &str) -> Output {
     let home = tempfile::TempDir::new().unwrap();
     let mut command = Command::cargo_bin("curvelax").unwrap();
-    // Where this is not set, a layer of Mesa says so on stderr.
+    // Without this a layer of Mesa prints a message on stderr.
     command.current_dir(home.path()).env("XDG_RUNTIME_DIR", home.path()).arg("bench");
     command.args(arguments.split_whitespace()).output().unwrap()
 }
 
-/// The rows of `bench ARGUMENTS --json`, which must succeed without a word on stderr.
+/// The rows of `bench ARGUMENTS --json`, which must succeed with nothing on stderr.
 #[track_caller]
 fn rows(arguments: &str) -> Vec<Value> {
     let output = bench(&format!("{arguments} {QUICK} --json"));

@@ -1,6 +1,7 @@
-//! `report.html` in a real browser without a window, where there is one; elsewhere these tests are reported as ignored.
+//! `report.html` in a real headless browser, if there is one; otherwise these tests are reported as ignored.
 //!
-//! Chromium or Chrome: the program that `CURVELAX_BROWSER` names, or the first in the path. It has no network here.
+//! The browser is Chromium or Chrome: the program named by `CURVELAX_BROWSER`, or the first in the path. It has no
+//! network.
 
 mod common;
 
@@ -17,10 +18,11 @@ use libtest_mimic::{Arguments, Trial};
 
 const NAMES: [&str; 5] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
 
-/// Members that move for a while, one that never relaxes, a series and two cells: a page with all that a page can have.
+/// Members that move for a while, one that never relaxes, a series and two cells: a page with everything that a page
+/// can have.
 const RUN: &str = "--curves 4 --points 40 --adaptive=1e-3 --t-end 0.5 --series 0.05 --sweep omega=1,2";
 
-/// A name and what is done with the browser.
+/// A name and a test.
 type Test = (&'static str, fn(&Path));
 
 fn main() -> ExitCode {
@@ -62,7 +64,7 @@ fn browser() -> Option<PathBuf> {
 /// A page after its script has run.
 struct Shown {
     dom: String,
-    /// What was said on the console.
+    /// Messages on the console.
     console: Vec<String>,
 }
 
@@ -89,13 +91,13 @@ impl Shown {
         Shown { dom: String::from_utf8(output.stdout).unwrap(), console }
     }
 
-    /// The data of the paths of this class among the members.
+    /// The data of the members' paths with this class.
     fn paths(&self, class: &str) -> Vec<&str> {
         let begin = format!("<path class=\"{class}\" d=\"");
         self.dom.split(&begin).skip(1).map(|rest| rest.split('"').next().unwrap()).collect()
     }
 
-    /// Whether the slider can be used, which the script sees to at its end.
+    /// Whether the slider is enabled, which the script does last.
     fn has_slider(&self) -> bool {
         let controls = self.dom.split("id=\"controls\"").nth(1).map(|rest| rest.split('>').next().unwrap());
         controls.is_some_and(|attributes| !attributes.contains("hidden"))
@@ -106,7 +108,7 @@ fn page(done: &Done) -> PathBuf {
     done.path().join("report.html")
 }
 
-/// Whether a path is closed, through `nodes` points of two whole numbers.
+/// Whether a path is closed and has `nodes` points of two integers.
 fn is_polygon(path: &str, nodes: usize) -> bool {
     let inside = path.strip_prefix('M').and_then(|rest| rest.strip_suffix('Z'));
     let is_point = |point: &str| {
@@ -133,7 +135,7 @@ fn the_slider_moves_the_members(browser: &Path) {
         assert_ne!(a.paths("nodes"), b.paths("nodes"));
     }
     assert!(!is_polygon("M1 2L3 4Z", 3) && !is_polygon("M1 NaNL3 4Z", 2) && is_polygon("M1 2L3 4Z", 2));
-    // Charts and their words are there, whatever the script does.
+    // Charts and their text are there with or without the script.
     for words in ["Relaxation times", "Members not yet relaxed", "Mean excess", "Mesh quality at the end"] {
         assert!(start.dom.contains(words), "no {words:?}");
     }
@@ -159,7 +161,7 @@ fn a_broken_page_is_found_out(browser: &Path) {
     };
     let whole = spoiled(&unguarded, "</h1>", "</h1>");
     assert!(whole.console.is_empty() && whole.has_slider(), "{:?}", whole.console);
-    // The policy refuses a script that is not the one it names; without it, the script fails.
+    // The policy refuses any script but the one it names; without the policy, the script fails.
     for text in [&text, &unguarded] {
         let broken = spoiled(text, "\"use strict\";", "\"use strict\"; nobody();");
         assert!(!broken.console.is_empty() && !broken.has_slider(), "{:?}", broken.console);

@@ -1,4 +1,4 @@
-//! The habits of the program: JSON, exit codes, `--max-time`, the dry run, completions, the man page.
+//! The program's conventions: JSON, exit codes, `--max-time`, the dry run, completions, the man page.
 
 mod common;
 
@@ -15,11 +15,11 @@ use tempfile::TempDir;
 
 fn curvelax(folder: &Path, arguments: &str) -> Output {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    // Where this is not set, a layer of Mesa says so on stderr.
+    // Without this a layer of Mesa prints a message on stderr.
     command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).args(arguments.split_whitespace()).output().unwrap()
 }
 
-/// What the program prints, which must succeed without a word on stderr.
+/// The output of the program, which must succeed with nothing on stderr.
 #[track_caller]
 fn printed(folder: &Path, arguments: &str) -> String {
     let output = curvelax(folder, arguments);
@@ -33,7 +33,7 @@ fn json(folder: &Path, arguments: &str) -> Value {
     serde_json::from_str(&printed(folder, arguments)).expect("one JSON document")
 }
 
-/// Names of what lies in a folder.
+/// Names of the entries of a folder.
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> =
         fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
@@ -58,7 +58,7 @@ fn json_of_a_run_is_run_json_with_the_statistics_of_ensemble_csv() {
     assert_eq!((cells.len(), rows.len()), (2, 2));
     for (cell, row) in cells.iter().zip(&rows) {
         for name in ["known", "mean", "sd", "se", "q05", "median", "q95", "median_low", "median_high"] {
-            // What is unknown is empty there and null here.
+            // Unknown values are empty there and null here.
             assert_eq!(cell["t_relax"][name].as_f64(), row[&format!("t_relax_{name}")].parse().ok(), "{name}");
         }
         assert_eq!(cell["members_by_status"]["relaxed"].as_f64(), Some(number(row, "relaxed")));
@@ -99,7 +99,7 @@ fn strict_fails_where_members_end_badly_and_only_there() {
 #[test]
 fn a_run_out_of_time_keeps_its_state() {
     let home = TempDir::new().unwrap();
-    // Months of members.
+    // Months of work.
     let long = "run --backend cpu --points 34 --adaptive=1e-3 --curves 100000000 --stop-when-relaxed";
     let started = Instant::now();
     let mut output = curvelax(home.path(), &format!("{long} --max-time 2s --out out"));
@@ -116,7 +116,7 @@ fn a_run_out_of_time_keeps_its_state() {
         [".curvelax.state", ".curvelax.state.old", ".rates.csv.part", ".summary.csv.part"]
     );
     assert_eq!(output.stdout, b"");
-    // What was done is not done again, and seconds add up, however little is done in one.
+    // Finished work is not repeated, and seconds add up, however little is done in one.
     while rows() < kept + 100 {
         assert!(started.elapsed().as_secs() < 600, "{kept} members in ten minutes");
         let before = rows();
@@ -158,8 +158,8 @@ fn a_dry_run_writes_nothing_and_its_table_says_what_its_json_says() {
     assert_eq!(names(home.path()), [""; 0]);
 }
 
-/// The peak resident size of `curvelax ARGUMENTS --out OUT`, which prints its results into a pipe that is full: when its files
-/// are complete, it waits there until the size has been read.
+/// The peak resident size of `curvelax ARGUMENTS --out OUT`. Its stdout is a pipe that is full: once its files are
+/// complete, it waits there until the size has been read.
 #[cfg(target_os = "linux")]
 fn peak(folder: &Path, arguments: &str, out: &str) -> f64 {
     use std::io::Write;
@@ -189,14 +189,14 @@ fn peak(folder: &Path, arguments: &str, out: &str) -> f64 {
 fn the_memory_of_a_run_is_foretold_within_a_fifth() {
     let home = TempDir::new().unwrap();
     let mut foretold = Vec::new();
-    // Few members, and so many small ones that what is kept of each is most of it; those that have a rate take more.
+    // Few members, and so many small ones that the data stored for each dominate; members with a rate need more.
     let many = "--shape circle:1 --sampling parameter --points 8 --modes 2..=2 --solver direct --stop-when-relaxed \
                 --tau 0.02";
     let runs = [
         "--curves 300 --adaptive=1e-3 --stop-when-relaxed".to_string(),
         format!("--curves 250000 --t-end 0.02 {many}"),
         format!("--curves 350000 --t-end 0.9 --relax-to 1e-3 {many}"),
-        // More rows than memory is to hold, and members of very many nodes.
+        // More rows than may be in memory, and members of very many nodes.
         "--curves 12 --points 32 --adaptive=0.1 --t-end 1 --series 1e-5".to_string(),
         "--curves 12 --points 500 --adaptive=0.1 --t-end 0.01 --snapshots SNAPSHOTS --store zarr".to_string(),
         "--curves 1 --points 100000 --adaptive --t-end 1e-15".to_string(),
@@ -211,11 +211,11 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
         assert!((said / taken - 1.0).abs() < 0.2, "{spec}: {said} foretold, {taken} taken");
         foretold.push(said);
     }
-    // The one would not do for the other.
+    // One estimate would not do for the other.
     assert!(foretold[2] > 1.4 * foretold[1], "{foretold:?}");
 }
 
-/// Vulkan's loader says what it loads; and where `XDG_RUNTIME_DIR` is not set a layer of Mesa says so.
+/// Vulkan's loader lists what it loads; without `XDG_RUNTIME_DIR` a layer of Mesa prints a message, too.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_first_run_loads_no_driver_where_no_gpu_can_be() {
@@ -247,7 +247,7 @@ fn completions_are_scripts_and_know_the_commands_and_flags() {
     assert_eq!(curvelax(home.path(), "completions tcsh").status.code(), Some(2));
 }
 
-/// The commands that have a section of their own in a man page.
+/// The commands that have a separate section in a man page.
 fn sections(page: &str) -> Vec<&str> {
     page.lines().filter_map(|line| line.strip_prefix(".SH \"curvelax ")?.strip_suffix('"')).collect()
 }

@@ -1,7 +1,7 @@
 //! The kernel against its CPU twin on every adapter of this machine: each case is a value, each comparison has a
 //! negative control.
 //!
-//! No adapter is a failure, unless `ALLOW_NO_GPU=1`: then every case is reported as ignored.
+//! Having no adapter is a failure, unless `ALLOW_NO_GPU=1`: then every case is reported as ignored.
 
 use std::{
     io::{BufRead, BufReader, Write},
@@ -31,15 +31,15 @@ use curvelax::{
 use glam::DVec2;
 use libtest_mimic::{Arguments, Failed, Trial};
 
-/// The sizes: the two smallest, a power of two, divisible by 3, by 4, prime, every remainder by 4 (the number of blocks
-/// of three), and one beyond 64 threads.
+/// The sizes: the two smallest, a power of two, divisible by 3, by 4, a prime, every remainder modulo 4 (the number of
+/// blocks of three), and one beyond 64 threads.
 const SIZES: [usize; 8] = [6, 7, 64, 99, 100, 101, 102, 257];
 
 /// Sizes of the adaptive comparison.
 const ADAPTIVE_SIZES: [usize; 3] = [7, 64, 101];
 
 /// Sizes at which the exchange by shuffles is compared with that by barriers: every number of blocks of three, and the
-/// largest ring that eight threads hold.
+/// largest ring for eight threads.
 const ONE_SUBGROUP: [usize; 5] = [6, 7, 29, 30, 32];
 
 type Outcome = Result<(), Failed>;
@@ -71,7 +71,7 @@ fn main() {
     conclusion.exit();
 }
 
-/// Leaves the number of cases where a script can see it.
+/// Records the number of cases for scripts.
 fn record(cases: u64) {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/target/conformance-cases.txt");
     let file = std::fs::OpenOptions::new().create(true).append(true).open(path);
@@ -166,7 +166,7 @@ fn adaptive_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 
 fn a_moved_node_fails_adaptive<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let tamper = Tamper { member: 4, node: n / 2, by: 65536.0 * T::EPSILON };
-    // Either a row fails, or the member takes other steps.
+    // Either a row fails, or the member makes other steps.
     match adaptive::<T>(gpu, solver, n, dispatches_of(7), Some(tamper)) {
         Ok(rows) if rows.iter().all(ConformanceRow::passes) => Err("a moved node was not noticed".into()),
         Ok(rows) => match rows.iter().find(|row| !row.passes() && row.at.0 != tamper.member) {
@@ -180,7 +180,7 @@ fn a_moved_node_fails_adaptive<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> 
 
 fn adaptive_bits<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let mut launches = adaptive_members(n, 5, 20, 1e-3, T::PRECISION)?;
-    // Two members end when they are relaxed, which all are on the way.
+    // Two members end when they are relaxed; all relax during the run.
     for launch in &mut launches[1..3] {
         launch.counters.stop_when_relaxed = 1;
     }
@@ -204,7 +204,7 @@ fn adaptive_bits<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
             return Err(format!("member {j}: {:?}", left.counters).into());
         }
     }
-    // The negative control: another tolerance takes other steps.
+    // The negative control: another tolerance leads to other steps.
     let other = on_gpu::<T>(gpu, solver, n, &adaptive_members(n, 5, 20, 2e-3, T::PRECISION)?, dispatches_of(1000))?;
     if same(&other[0], &at_once[0], "").is_ok() {
         return Err("another tolerance changed nothing".into());
@@ -270,7 +270,7 @@ fn permutation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 }
 
 fn same(a: &Left, b: &Left, what: &str) -> Outcome {
-    // Not the goals, which a member that pauses sets, nor the sweeps of the last dispatch.
+    // Neither the goals, which a member sets when it pauses, nor the sweeps of the last dispatch.
     let counts = |c: Counters| (c.status, c.steps, c.rejected, c.refused, c.relax_step, c.half_step, c.phase);
     let bits = |left: &Left| {
         let numbers = [left.state.to_numbers(), left.report.to_numbers()].concat();
@@ -298,7 +298,7 @@ fn dispatches<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     Ok(())
 }
 
-/// What a run hands out.
+/// Outcomes of a run.
 #[derive(Default)]
 struct Outcomes(Vec<String>);
 
@@ -309,7 +309,7 @@ impl Sink for Outcomes {
     }
 }
 
-/// Members that end at their own times, looked at on the way, refilled into slots of two batches.
+/// Members that end at different times, observed during the run, refilled into slots of two batches.
 fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let spec = Spec {
         curves: 13,
@@ -339,14 +339,15 @@ fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
             return Err(format!("{batches:?} batches and slots give other results").into());
         }
     }
-    // The negative control: another step is noticed.
+    // The negative control: a different step is detected.
     if whole.len() != 13 || run([1, 13], &Spec { tau: Some(1.1e-3), ..spec.clone() })? == whole {
         return Err("another step changed nothing".into());
     }
     Ok(())
 }
 
-/// The kernel whose workgroup is one subgroup, bit for bit that of any size; where the adapter's subgroups hold the ring.
+/// A kernel whose workgroup is one subgroup gives the same bits as one of any size, if the adapter's subgroups hold the
+/// ring.
 fn exchanges<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let by_shuffles = gpu.capacity().variant(Blocks::new(n).ok_or("n")?, solver);
     if by_shuffles.subgroup != (gpu.capacity().least_subgroup >= 8) {
@@ -375,7 +376,7 @@ fn replace_nodes(run: &mut Run<f64>, change: impl FnOnce(&mut Vec<DVec2>)) {
     *run = Run { counters, ..Run::new(State::from_nodes(&nodes), run.parameters) };
 }
 
-/// One member of each bad end, at different places; the good ones must not notice.
+/// One member for each way to fail, at different places; the good ones must not be affected.
 fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let good = members(n, 8, 20, 1e-4)?;
     let alone = on_gpu::<T>(gpu, solver, n, &good, dispatches_of(5))?;
@@ -384,7 +385,7 @@ fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     replace_nodes(&mut mixed[3], |nodes| nodes[5].x = 1e30);
     // Two neighbouring nodes in one place.
     replace_nodes(&mut mixed[4], |nodes| nodes[8] = nodes[7]);
-    // A turning number that the curve does not have.
+    // A turning number that is not the curve's.
     mixed[6].report.progress.turning = 2.0;
     let together = on_gpu::<T>(gpu, solver, n, &mixed, dispatches_of(5))?;
     let expected = [
@@ -423,7 +424,7 @@ fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
         if key(ours) != key(theirs) {
             return Err(format!("member {j}: {:?} on the GPU, {:?} on the CPU", key(ours), key(theirs)).into());
         }
-        // Where inside the step: the rounding of an excess, over its change in the step.
+        // Position inside the step: the rounding of an excess, over its change in the step.
         let (a, b) = (ended[j].report.progress, twin.report.convert::<f64>().progress);
         for (a, b) in [(a.relax_fraction, b.relax_fraction), (a.half_fraction, b.half_fraction)] {
             let per_step = (launch.parameters.half_at - launch.parameters.relax_at) / f64::from(ours.steps);
@@ -443,7 +444,7 @@ fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let most = gpu.capacity().max_points::<T>(solver);
     let n = most.min(1024);
-    // Whatever the solver needs for a ring besides its rows may take twice as much again and more.
+    // The solver's other needs for a ring may be twice those of its rows, or more.
     let least = if (solver.facts().kernel.numbers)(512) > 0 { 256 } else { 512 };
     if n < least {
         return Err(format!("only {n} points fit").into());
@@ -465,7 +466,7 @@ fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     Ok(())
 }
 
-/// A dispatch that does as much as it may loses nothing: llvmpipe leaves all loops silently when they get too long.
+/// A dispatch at its maximum work loses nothing: llvmpipe silently leaves all loops when they get too long.
 fn adaptive_largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let n = gpu.capacity().max_points::<T>(solver).min(1024);
     let launches = adaptive_members(n, 2, 6, 1e-3, T::PRECISION)?;
@@ -480,7 +481,7 @@ fn adaptive_largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     Ok(())
 }
 
-/// Numbers of the tables that the program writes, with the statuses in front.
+/// Numbers of the tables that the program writes, with the statuses first.
 fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Result<(Vec<String>, Vec<f64>), Failed> {
     let folder = tempfile::tempdir()?;
     let solver = solver.name();
@@ -492,8 +493,8 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
     if !pace.contains(&"--t-end") {
         command.args(["run", "--curves", "7", "--t-end", "0.4", "--series", "0.07", "--snapshots", "0,0.1,0.2"]);
     }
-    // In f32 an error estimate may meet its tolerance on one side only, and the step in which a member relaxes then ends at
-    // another time: there members go on to one that is the same for all.
+    // In f32 an error estimate may meet its tolerance on one side only, and the step in which a member relaxes then
+    // ends at another time: members there continue to a time that is the same for all.
     let rounded = T::PRECISION == Precision::F32 && pace.iter().any(|flag| flag.starts_with("--adaptive"));
     command.args(pace).args(["--backend", backend, "--solver", solver]);
     if !rounded {
@@ -510,9 +511,9 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
         for record in reader.records() {
             for (column, field) in header.iter().zip(record?.iter()) {
                 match field.parse() {
-                    // Counts of sweeps may differ where a residual meets its bound.
+                    // Numbers of sweeps may differ where a residual is close to its bound.
                     Ok(_) if column.starts_with("sweeps") => {}
-                    // So may those of steps.
+                    // So may numbers of steps.
                     Ok(_) if rounded && ["steps", "rejected"].contains(&column) => {}
                     Ok(number) => numbers.push(number),
                     Err(_) => words.push(format!("{name} {column} {field}")),
@@ -523,12 +524,12 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
     Ok((words, numbers))
 }
 
-/// The program from outside: statuses equal, numbers within what their solves resolve.
+/// The program from outside: equal statuses, and numbers within the accuracy of the solves.
 fn programs_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
     tables_agree::<T>(solver, n, &["--tau", "0.003", "--relax-to", "0.3"]).map(drop)
 }
 
-/// Two unit discs joined by a thin bar: its long sides come to cross.
+/// Two unit discs joined by a thin bar, whose long sides eventually cross.
 fn dumbbell() -> String {
     let bar = 0.1_f64;
     let end = std::f64::consts::PI - bar.asin();
@@ -538,14 +539,14 @@ fn dumbbell() -> String {
     nodes.fold("x,y\n".to_string(), |text, p| text + &format!("{},{}\n", p.x, p.y))
 }
 
-/// Adaptive steps: output times and events inside them, refused ones, members that come to cross themselves.
+/// Adaptive steps: output times and events inside them, refused ones, members that begin to cross themselves.
 fn adaptive_programs_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
     tables_agree::<T>(solver, n, &["--adaptive", "--pull", "auto", "--relax-at", "0.05"])?;
-    // Longer ones would take too many sweeps.
+    // Longer ones would need too many sweeps.
     if solver.facts().slows_with_step {
         return Ok(());
     }
-    // An f32 member may make one step more on one side; the numbers then differ by what steps are allowed to be wrong.
+    // An f32 member may make one step more on one side; the numbers then differ by the error allowed per step.
     let adaptive = if T::PRECISION == Precision::F32 { "--adaptive=2e-4" } else { "--adaptive" };
     tables_agree::<T>(solver, n, &[adaptive, "--pull", "auto", "--shape", "nonconvex", "--amplitude", "0.1"])?;
     let times = ["run", "--curves", "7", "--t-end", "3", "--series", "0.3", "--snapshots", "1,2"];
@@ -557,7 +558,7 @@ fn adaptive_programs_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcom
     }
 }
 
-/// Compares the tables; returns what of them are no numbers.
+/// Compares the tables; returns the entries that are not numbers.
 fn tables_agree<T: Real>(solver: Solver, n: usize, pace: &[&str]) -> Result<Vec<String>, Failed> {
     let (gpu, cpu) = (tables::<T>("gpu", solver, n, pace)?, tables::<T>("cpu", solver, n, pace)?);
     if gpu.0 != cpu.0 || gpu.1.len() != cpu.1.len() || gpu.1.len() < 1000 {
@@ -569,7 +570,7 @@ fn tables_agree<T: Real>(solver: Solver, n: usize, pace: &[&str]) -> Result<Vec<
     if error > bound { Err(format!("the tables differ by {error:e}").into()) } else { Ok(cpu.0) }
 }
 
-/// `curvelax check` may take minutes, in which it is not silent. Its end is not waited for.
+/// `curvelax check` may need minutes, during which it shows progress. The test does not wait for its end.
 fn check_tells() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));

@@ -6,7 +6,7 @@ use assert_cmd::Command;
 use tempfile::TempDir;
 
 fn convergence(home: &TempDir, arguments: &str) -> Output {
-    // Where this is not set, a layer of Mesa says so on stderr.
+    // Without this a layer of Mesa prints a message on stderr.
     let mut command = Command::cargo_bin("curvelax").unwrap();
     command.current_dir(home.path()).env("XDG_RUNTIME_DIR", home.path()).arg("convergence");
     command.args(arguments.split_whitespace()).output().unwrap()
@@ -37,7 +37,7 @@ fn the_table_and_the_file_have_the_orders_of_the_scheme() {
         let expected = if &row[1] == "tau" { 1.0 } else { 2.0 };
         if !row[6].is_empty() {
             let order: f64 = row[6].parse().unwrap();
-            // Adaptive steps are too few here to show their order in full.
+            // There are too few adaptive steps here to show their full order.
             let margin = if &row[1] == "tolerance" { 1.0 } else { 0.1 };
             assert!((order - expected).abs() < margin, "{row:?}");
         }
@@ -107,7 +107,7 @@ fn a_wrong_request_is_refused_by_name() {
     assert_eq!(fs::read_dir(home.path()).unwrap().count(), 1);
 }
 
-/// --force replaces what this command wrote, and nothing of another one.
+/// --force replaces files of this command, but not of another one.
 #[test]
 fn a_folder_holds_the_files_of_one_command() {
     let home = TempDir::new().unwrap();

@@ -1,4 +1,4 @@
-//! The documents: flags and columns as the program has them, a README of at most a thousand words, and links that lead somewhere.
+//! The documents: flags and columns as in the program, a README of at most a thousand words, and links that work.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -19,7 +19,7 @@ use curvelax::{
     },
 };
 
-/// The pages with a generated part, and what stands around that.
+/// The pages with a generated part, and the marks around it.
 const FLAGS: &str = "docs/flags.md";
 const FILES: &str = "docs/files.md";
 const BEGIN: &str = "<!-- Generated from the program: UPDATE_DOCS=1 cargo test --test documents -->\n";
@@ -43,7 +43,7 @@ fn help(command: Option<&str>) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// One entry of a help text: a flag, an argument or a command, and what is said of it.
+/// An entry of a help text: a flag, an argument or a command, with its description.
 #[derive(Debug, PartialEq)]
 struct Entry<'a> {
     heading: &'a str,
@@ -67,18 +67,18 @@ fn entries(help: &str) -> Vec<Entry<'_>> {
     all
 }
 
-/// `text` without `[label: …]` at its end, and what stood there.
+/// `text` without `[label: …]` at its end, and the content of that.
 fn noted<'a>(text: &'a str, label: &str) -> (&'a str, Option<&'a str>) {
     let note = text.rsplit_once(&format!(" [{label}: ")).and_then(|(text, note)| Some((text, note.strip_suffix(']')?)));
     note.map_or((text, None), |(text, note)| (text, Some(note)))
 }
 
-/// As the cell of a table.
+/// Formats text as a cell of a table.
 fn cell(text: &str) -> String {
     ["\\", "|", "<", "*", "["].iter().fold(text.to_owned(), |text, c| text.replace(c, &format!("\\{c}")))
 }
 
-/// A row of the table: the flag, what it means with the values that it may have, its default.
+/// A row of the table: the flag, its meaning with its possible values, its default.
 fn row(entry: &Entry) -> String {
     let (text, values) = noted(entry.text, "possible values");
     let (text, default) = noted(text, "default");
@@ -113,7 +113,7 @@ fn flags() -> String {
     page
 }
 
-/// A table with a name, and of each column its heading, what it holds and what it means.
+/// A table with a name, and the heading, type and meaning of each column.
 fn table(name: &str, rows: &str, columns: impl Iterator<Item = [String; 3]>) -> String {
     let lines = columns.map(|[heading, holds, meaning]| format!("| `{heading}` | {holds} | {} |\n", cell(&meaning)));
     format!(
@@ -163,7 +163,7 @@ fn the_page_of_flags_is_that_of_the_program() {
     generated(FLAGS, &flags);
 }
 
-/// That the generated part of a page is `text`; or makes it so, where that is asked for.
+/// Checks that the generated part of a page is `text`, or rewrites it on request.
 fn generated(page: &str, text: &str) {
     let path = root().join(page);
     let old = read(&path);
@@ -217,7 +217,7 @@ fn documents() -> BTreeSet<PathBuf> {
     all
 }
 
-/// The text outside of code: no blocks, no spans, in which brackets mean something else.
+/// The text without code blocks and spans, in which brackets mean something else.
 fn prose(text: &str) -> String {
     let (mut prose, mut fenced, mut blank) = (String::new(), false, true);
     for line in text.lines() {
@@ -227,7 +227,7 @@ fn prose(text: &str) -> String {
             prose += line;
             prose.push('\n');
         }
-        // Code that is indented begins after an empty line, and its own lines are followed by more of it.
+        // Indented code begins after an empty line and continues while lines are indented.
         blank = line.is_empty() || blank && line.starts_with("    ");
     }
     prose.split('`').step_by(2).collect::<Vec<_>>().join("`")
@@ -238,7 +238,7 @@ fn links(prose: &str) -> Vec<&str> {
     prose.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(target, _)| target).collect()
 }
 
-/// What links may name after a `#`: headings as GitHub names them, and `<a id=…>`.
+/// Targets after a `#`: headings as GitHub names them, and `<a id=…>`.
 fn anchors(text: &str) -> BTreeSet<String> {
     let (mut all, mut seen) = (BTreeSet::new(), BTreeMap::<String, u32>::new());
     let mut fenced = false;
@@ -257,7 +257,7 @@ fn anchors(text: &str) -> BTreeSet<String> {
     all
 }
 
-/// Links of `text` that lead nowhere; `at` finds a file by its path from that of the text.
+/// Broken links of `text`; `at` finds a file by its path relative to that of the text.
 fn broken(text: &str, at: impl Fn(&str) -> Option<String>) -> Vec<String> {
     let outside = |target: &str| ["https://", "http://", "mailto:"].iter().any(|scheme| target.starts_with(scheme));
     let leads = |target: &str| {

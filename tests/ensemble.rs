@@ -124,7 +124,7 @@ fn too_few_sweeps_stall_every_member() {
     }
 }
 
-/// A step far too large for the shape ends members in different ways; those that survive do not notice.
+/// A step far too large for the shape ends members in different ways; the survivors are not affected.
 #[test]
 fn members_that_fail_leave_the_others_alone() {
     for (flags, failures) in [
@@ -147,7 +147,7 @@ fn members_that_fail_leave_the_others_alone() {
     }
 }
 
-/// Under too large a step k and r lose x, and the curve shrinks to a point that looks round.
+/// If the step is too large, k and r drift from x, and the curve shrinks to a point that looks round.
 #[test]
 fn a_curve_that_its_metric_has_left_is_never_called_relaxed() {
     let flags = "--shape nonconvex --sampling parameter --curves 48 --tau 1e-4 --t-end 0.2 --solver direct";
@@ -187,7 +187,7 @@ fn run_quiet_with_warning(home: &Path, flags: &str, out: &str) -> Row {
     reader.deserialize().next().unwrap().unwrap()
 }
 
-/// Runs `launches` on the CPU until they end; their counters, and the states they end in.
+/// Runs `launches` on the CPU until they end; returns their counters and final states.
 fn advance(launches: &[Run<f64>], method: Method) -> Vec<(Counters, State<f64>)> {
     let n = launches[0].state.curve.len();
     let mut backend = CpuBackend::<f64>::new(Blocks::new(n).unwrap(), method, 2).unwrap();
@@ -245,7 +245,7 @@ fn outline_run(text: &str, more: &str) -> Done {
 #[test]
 fn a_clockwise_file_is_the_same_curve() {
     let forwards = outline(DVec2::ZERO, |i| i);
-    // From the same first point the other way round, the nodes are the same nodes.
+    // From the same first point in the opposite direction, the nodes are the same.
     let backwards = outline(DVec2::ZERO, |i| 61 - i);
     for sampling in ["--sampling points", "--sampling points --no-redistribution"] {
         let [a, b] = [&forwards, &backwards].map(|text| outline_run(text, sampling));
@@ -253,7 +253,7 @@ fn a_clockwise_file_is_the_same_curve() {
         assert_eq!(a.text("snapshots.csv"), b.text("snapshots.csv"));
         assert!(number(&a.summary()[0], "area_start") > 0.0);
     }
-    // From another first point they are numbered from another one (and without redistribution no node is special).
+    // From another first point the nodes are numbered differently (and without redistribution no node is special).
     let turned = outline(DVec2::ZERO, |i| 61 + 60 - i);
     let [a, b] = [&forwards, &turned].map(|text| outline_run(text, "--sampling points --no-redistribution"));
     let [a, b] = [a, b].map(|done| done.rows("snapshots.csv").chunks(61).map(positions).collect::<Vec<_>>());
@@ -269,7 +269,7 @@ fn a_clockwise_file_is_the_same_curve() {
     }
 }
 
-/// At 10⁶ a coordinate is rounded to 10⁻¹⁰; nothing else is lost, as the state is centred.
+/// At 10⁶ a coordinate is rounded to 10⁻¹⁰; nothing else is lost, because the state is centred.
 #[test]
 fn a_file_far_away_relaxes_as_one_at_home() {
     let far = DVec2::new(1e6, -1e6);

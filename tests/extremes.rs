@@ -1,5 +1,5 @@
-//! Numbers at the ends of their ranges: seeds beyond the whole numbers of TOML, curves and times beyond those of a precision.
-//! Each is refused before the run, or ends its member by name; what is written reads back.
+//! Numbers at the ends of their ranges: seeds beyond the integers of TOML, curves and times beyond those of a
+//! precision. Each is refused before the run, or ends its member with a status; everything written reads back.
 
 mod common;
 
@@ -12,9 +12,9 @@ use std::{
 use common::program::{Row, number, run_with};
 use tempfile::TempDir;
 
-/// The first seed that is no number of TOML, and the last one of all.
+/// The first seed that is not a number in TOML, and the last of all.
 const SEEDS: [u64; 2] = [1 << 63, u64::MAX];
-/// A study that takes no time.
+/// A study that ends at once.
 const SMALL: &str = "--curves 4 --points 34 --tau 1e-3 --t-end 0.01 --solver direct --backend cpu --quiet";
 
 fn curvelax(home: &Path, arguments: &str) -> Output {
@@ -23,7 +23,7 @@ fn curvelax(home: &Path, arguments: &str) -> Output {
     command.output().unwrap()
 }
 
-/// What it said on stdout and on stderr, if it ended with this code.
+/// The output on stdout and on stderr, if it ended with this code.
 #[track_caller]
 fn said(output: &Output, code: i32) -> [String; 2] {
     let [out, err] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
@@ -60,7 +60,7 @@ fn every_seed_is_run_printed_swept_cut_into_shards_and_merged() {
         let run: serde_json::Value =
             serde_json::from_str(&fs::read_to_string(path.join("whole/run.json")).unwrap()).unwrap();
         assert_eq!(run["seed"], seed);
-        // Shards of two such seeds are not those of one study.
+        // Shards with two different seeds are not of one study.
         done(&format!("run {SMALL} --seed {} --shard 1/2 --out other", seed - 1));
         let [_, err] = said(&curvelax(path, "merge s0 other --out mixed"), 2);
         assert!(err.contains("seed is "), "{err}");
@@ -120,7 +120,7 @@ fn a_time_that_the_clock_cannot_count_stalls_the_member_within_its_steps() {
             }
         }
     }
-    // Controls: a time that it can count, and a curve that is singular by itself.
+    // Controls: a time that it can count, and a curve that is already singular.
     for (line, status) in [
         ("--shape circle:1e-15 --adaptive --t-end 1e-60 --stop-when-relaxed", "relaxed"),
         ("--omega 0 --t-end 1e4 --adaptive --pull auto --stop-when-relaxed", "relaxed"),

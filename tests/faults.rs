@@ -1,8 +1,8 @@
-//! Faults of devices and of members: an adapter that computes wrongly, a device that is lost, full or slow, a back end that
-//! fails at any call, a member whose numbers are poison. Each ends in an error by name or in the status of that member
-//! alone.
+//! Faults of devices and of members: an adapter that computes wrongly, a device that is lost, full or slow, a back end
+//! that fails at any call, a member with poisoned numbers. Each ends in a specific error, or in the status of that
+//! member alone.
 //!
-//! Cases that need an adapter are reported as ignored where there is none and `ALLOW_NO_GPU=1` says that this is allowed.
+//! Without an adapter and with `ALLOW_NO_GPU=1`, cases that need one are reported as ignored.
 
 mod common;
 
@@ -41,13 +41,13 @@ use common::All;
 
 type Outcome = Result<(), Failed>;
 
-/// Nodes of the members among which one is poison.
+/// Nodes of the members, one of which is poisoned.
 const POINTS: usize = 11;
-/// Its cohort: every lane of the widest vectors is met twice, and not all vectors are full.
+/// Members of a cohort: every lane of the widest vectors is used twice, and not all vectors are full.
 const COHORT: usize = 40;
-/// What is waited for so long hangs.
+/// A test that waits this long hangs.
 const HANGS: Duration = Duration::from_secs(600);
-/// More advances than members of a few steps can take.
+/// More advances than members of a few steps can need.
 const MANY_ADVANCES: usize = 10_000;
 
 fn main() {
@@ -98,7 +98,7 @@ fn on_the_cpu<T: Vectorised>(solver: Solver, adaptive: bool, trials: &mut Vec<Tr
     add("the self-test passes what computes rightly, and names what does not", the_self_test_finds_a_liar::<T>);
 }
 
-/// One kernel for both, since lavapipe takes a second or more to compile one.
+/// One kernel for both, since lavapipe needs a second or more to compile one.
 fn on_the_gpu<T: Real>(index: usize, solver: Solver, adaptive: bool, trials: &mut Vec<Trial>) {
     let name = format!("{} {} {}, adapter {index}", T::NAME, solver.name(), pace(adaptive));
     let case = move || -> Outcome {
@@ -128,7 +128,7 @@ fn require(holds: bool, otherwise: impl FnOnce() -> String) -> Outcome {
 
 // Poisoned members.
 
-/// What is wrong with a member, and what was done to it.
+/// A fault of a member, and the function that causes it.
 type Poison = (&'static str, fn(&mut Run<f64>));
 
 const POISONS: [Poison; 9] = [
@@ -160,7 +160,7 @@ fn renew(run: &mut Run<f64>, change: impl FnOnce(&mut [DVec2])) {
     run.report.progress.next = next;
 }
 
-/// Members no two of which are alike; lanes ask that all of them are redistributed, or none, and pulled, or none.
+/// Members that are all different; lanes require that either all or none are redistributed, and likewise pulled.
 fn launches<T: Real>(count: usize, adaptive: bool) -> curvelax::Result<Vec<Run<f64>>> {
     let few = 13;
     let some = match adaptive {
@@ -178,7 +178,7 @@ fn launches<T: Real>(count: usize, adaptive: bool) -> curvelax::Result<Vec<Run<f
     Ok((0..count).map(member).collect())
 }
 
-/// The bits that a member leaves, but for the sweeps of the last dispatch.
+/// The bits of a member's results, except the sweeps of the last dispatch.
 type Bits = ([u32; 8], Vec<u64>);
 
 /// Runs `launches` to their goals.
@@ -203,7 +203,7 @@ fn finished(backend: &mut dyn Backend, launches: &[Run<f64>]) -> Result<Vec<(Cou
     Ok(slots.into_iter().zip(states).map(left).collect())
 }
 
-/// Every poison for which `takes` holds, at every place among the others.
+/// Tries every poison for which `takes` holds, at every place among the others.
 fn poison<T: Real>(
     backend: &mut dyn Backend,
     adaptive: bool,
@@ -215,7 +215,7 @@ fn poison<T: Real>(
     if let Some(j) = alone.iter().position(|(counters, _)| counters.status != 0 || counters.steps < 2) {
         return Err(format!("{where_}: good member {j}: {:?}", alone[j].0).into());
     }
-    // The negative control: a member that is some roundings away is noticed.
+    // The negative control: a member that is a few roundings off is detected.
     let mut other = good.clone();
     other[7].state.curve.k[3] *= 1.0 + 64.0 * T::EPSILON;
     other[7].state.curve.k.close();
@@ -258,19 +258,19 @@ fn poison_on_the_cpu<T: Vectorised>(solver: Solver, adaptive: bool) -> Outcome {
 fn poison_on_the_gpu<T: Real>(kernel: Kernel<T>, gpu: &Gpu, solver: Solver, adaptive: bool) -> Outcome {
     let mut kernel = kernel.with_budget(Budget { steps: 1 << 10, sweeps: 1 << 20 });
     let where_ = format!("{} {} {} {}", T::NAME, solver.name(), pace(adaptive), gpu.name());
-    // The members of a dispatch share nothing but its end: not every poison at every place.
+    // The members of a dispatch share nothing but its end, so not every poison is tried at every place.
     poison::<T>(&mut kernel, adaptive, &where_, |place, kind| place % POISONS.len() == kind)
 }
 
 // The self-test.
 
-/// A back end that computes rightly and tells one thing wrongly.
+/// A back end that computes correctly and reports one thing wrongly.
 struct Liar<B> {
     inner: B,
     lie: Lie,
 }
 
-/// What is told wrongly: of which number, by how much relative to the radius.
+/// A wrong report: of which number, and by how much relative to the radius.
 #[derive(Clone, Copy, Debug)]
 enum Lie {
     None,
@@ -323,7 +323,7 @@ impl<B: Backend> Backend for Liar<B> {
         match self.lie {
             Lie::Node(by) => curve.x[5] += by,
             Lie::Curvature(by) => curve.k[2] += by,
-            // As a device does whose shaders do not run: what it was given, or zeros.
+            // Like a device whose shaders do not run: its input, or zeros.
             Lie::Nothing => state = State::zeros(curve.len()),
             Lie::None | Lie::Excess(_) | Lie::Steps => {}
         }
@@ -334,7 +334,7 @@ impl<B: Backend> Backend for Liar<B> {
 fn the_self_test_finds_a_liar<T: Vectorised>(solver: Solver, adaptive: bool) -> Outcome {
     let n = 64;
     let tested = |lie: Lie| -> Result<curvelax::Result<()>, Failed> {
-        // One member at a time: those of the self-test could not go abreast.
+        // One member at a time, as those of the self-test could not run side by side.
         let inner = CpuBackend::<T>::with_vectors(Blocks::new(n).ok_or("n")?, method(solver), 1, Vectors::None)?;
         let mut liar = Liar { inner, lie };
         let result = self_test::<T>(&mut liar, "toaster (bread 1.2)", false, &method(solver), n, adaptive);
@@ -384,7 +384,7 @@ fn the_self_test_passes<T: Real>(
 
 // The device.
 
-/// A kernel with `count` members that have a long way to go, in dispatches of `sweeps` where the adapter allows as many.
+/// A kernel with `count` long-running members, in dispatches of `sweeps` if the adapter allows as many.
 fn busy(gpu: &Gpu, count: usize, sweeps: u32) -> Result<Kernel<f32>, Failed> {
     let blocks = Blocks::new(64).ok_or("n")?;
     let variant = gpu.capacity().variant(blocks, Solver::GaussSeidel);
@@ -396,7 +396,7 @@ fn busy(gpu: &Gpu, count: usize, sweeps: u32) -> Result<Kernel<f32>, Failed> {
     Ok(kernel)
 }
 
-/// The error must be of the device and name the adapter, `what` and a remedy, in one line.
+/// The error must be about the device and name the adapter, `what` and a remedy, in one line.
 fn named<R>(result: curvelax::Result<R>, gpu: &Gpu, what: &str) -> Outcome {
     let Err(error) = result else { return Err(format!("{what}: not noticed").into()) };
     let message = error.to_string();
@@ -411,7 +411,7 @@ fn lost_between_dispatches(gpu: &Gpu) -> Outcome {
     kernel.advance()?;
     gpu.lose();
     named(kernel.advance(), gpu, "the device was lost")?;
-    // And whatever is asked of it then.
+    // The same holds for all later requests.
     named(kernel.advance(), gpu, "the device was lost")?;
     named(kernel.load(1, &members(64, 1, 9, 1e-4)?[0]), gpu, "the device was lost")?;
     named(kernel.state(0), gpu, "the device was lost")?;
@@ -422,7 +422,7 @@ fn lost_during_a_dispatch(gpu: &Gpu) -> Outcome {
     let mut kernel = busy(gpu, 3, 1 << 14)?;
     kernel.start(0)?;
     gpu.lose();
-    // What was on its way may still arrive.
+    // Results under way may still arrive.
     let finished = kernel.finish(0);
     if finished.is_err() {
         named(finished, gpu, "the device was lost")?;
@@ -431,7 +431,8 @@ fn lost_during_a_dispatch(gpu: &Gpu) -> Outcome {
     named(kernel.advance(), gpu, "the device was lost")
 }
 
-/// With the cap of the run the self-test compared solves that were none, and rounding decided how its members ended.
+/// With the cap of the run, the self-test compared solves that had not converged, and rounding decided how its members
+/// ended.
 fn a_cap_of_one_sweep(gpu: &Gpu) -> Outcome {
     let spec = Spec {
         backend: BackendChoice::Gpu,
@@ -480,7 +481,7 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     let family = Family::new(&spec)?;
     simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut all)?;
     require(all.0.len() == 3, || format!("{} members", all.0.len()))?;
-    // A later part of the same study goes the same way, and one of a study that is on a GPU stays there.
+    // A later part of the same study makes the same choice, and one of a study on a GPU stays there.
     let later = choice_like(&spec)?.or_cpu().after(&platform);
     require(later.device().gpu().is_none(), || "a later part goes back to the GPU".into())?;
     let (_, there) = choice_like(&spec)?.open(&spec, spec.points)?;
@@ -509,7 +510,7 @@ fn no_room(gpu: &Gpu) -> Outcome {
 
 fn slow_dispatch(gpu: &Gpu) -> Outcome {
     let slice = Duration::from_millis(1);
-    // Long enough to be watched, on whatever machine.
+    // Long enough to be observed on any machine.
     let (mut sweeps, mut slices) = (1 << 15, 0);
     let mut whole = Duration::ZERO;
     while slices < 2 {
@@ -527,7 +528,7 @@ fn slow_dispatch(gpu: &Gpu) -> Outcome {
         println!("a dispatch of {whole:.1?}, waited for in {slices} slices of 1 ms");
         require(kernel.is_back(0, slice), || "nothing is on its way, and it is waited for".into())?;
     }
-    // The same dispatch with less time than it takes; it may be faster this time.
+    // The same dispatch with less time than it needs; it may be faster this time.
     let mut limit = whole / 8;
     loop {
         let mut kernel = busy(gpu, 96, sweeps)?.with_limit(limit);
@@ -544,12 +545,12 @@ fn slow_dispatch(gpu: &Gpu) -> Outcome {
     }
 }
 
-// Whatever calls a run makes.
+// The calls of a run.
 
 /// A back end that fails at one of its calls.
 struct Failing {
     inner: Box<dyn Backend>,
-    /// Calls of `call` that succeed before.
+    /// Calls of `call` that succeed first.
     before: usize,
     call: &'static str,
     failed: bool,
@@ -659,7 +660,7 @@ fn any_call_fails() -> Outcome {
     Ok(())
 }
 
-/// The program where the loader of Vulkan finds no driver.
+/// The program where the Vulkan loader finds no driver.
 #[cfg(target_os = "linux")]
 fn no_adapter() -> Outcome {
     let folder = tempfile::tempdir()?;

@@ -1,4 +1,4 @@
-//! The paper's figures: the files, that they show what the data say, and that the pictures in the docs are these.
+//! The paper's figures: their files, that they show the data, and that the pictures in the docs are the same.
 
 mod common;
 
@@ -21,7 +21,7 @@ fn figure(folder: &Path, arguments: &str) -> Output {
     command.args(arguments.split_whitespace()).output().unwrap()
 }
 
-/// The files of these figures in `out` below the folder returned.
+/// Writes the files of these figures to `out` below the folder returned.
 #[track_caller]
 fn made(names: &str) -> TempDir {
     let home = TempDir::new().unwrap();
@@ -49,7 +49,7 @@ fn rows(csv: &str) -> Vec<Row> {
     reader.records().map(|record| row(record.unwrap())).collect()
 }
 
-/// Elements opened and closed in order, quotes in pairs, nothing unescaped: what a parser of XML checks first.
+/// Whether elements are opened and closed in order, quotes paired and text escaped: the first checks of any XML parser.
 fn is_well_formed(svg: &str) -> bool {
     let mut open = Vec::new();
     let mut rest = svg;
@@ -79,7 +79,7 @@ fn attribute<'a>(line: &'a str, name: &str) -> &'a str {
     line[start..].split('"').next().unwrap()
 }
 
-/// `(value, pixel)` of the ticks of an axis, in the order drawn; those of several panels follow each other.
+/// `(value, pixel)` of the ticks of an axis, in the order drawn, panel by panel.
 fn ticks(svg: &str, axis: &str) -> Vec<(f64, f64)> {
     let class = format!("<text class=\"{axis} tick ");
     let tick = |line: &str| {
@@ -89,7 +89,7 @@ fn ticks(svg: &str, axis: &str) -> Vec<(f64, f64)> {
     svg.lines().filter(|line| line.starts_with(&class)).map(tick).collect()
 }
 
-/// Pixels per unit, with its sign, and pixel of 0, from the first and the last tick of a panel.
+/// Pixels per unit (signed) and pixel of 0, from the first and the last tick of a panel.
 fn axis(ticks: &[(f64, f64)]) -> (f64, f64) {
     let ((a, at), (b, bt)) = (ticks[0], ticks[ticks.len() - 1]);
     let scale = (bt - at) / (b - a);
@@ -111,7 +111,7 @@ fn dots(svg: &str) -> Vec<Vec<DVec2>> {
         .collect()
 }
 
-/// Whether `svg` has axes of one scale, and `data` lie where they say, all in one panel.
+/// Whether `svg` has axes of equal scale, with `data` drawn at the right places, all in one panel.
 fn shows(svg: &str, data: &[Row]) -> bool {
     let ((x_scale, x_zero), (y_scale, y_zero)) = (axis(&ticks(svg, "x")), axis(&ticks(svg, "y")));
     // y grows downwards; a label's baseline is below its tick.
@@ -140,7 +140,7 @@ fn a_figure_shows_its_data_in_axes_of_one_scale() {
         assert!(is_well_formed(svg));
         assert!(shows(svg, &rows));
     }
-    // The checks tell a difference: other data, other scales, a broken file.
+    // The checks detect a difference: other data, other scales, a broken file.
     assert!(!shows(&a.1, &rows(&b.0)));
     assert!(!shows(&a.1.replace(">2.0</text>", ">2.1</text>"), &rows(&a.0)));
     assert!(!is_well_formed(&a.1.replacen("</g>", "", 1)) && !is_well_formed(&a.1.replace("Figure 1a.", "&")));
@@ -158,7 +158,7 @@ fn without_redistribution_nodes_gather_and_with_it_they_spread() {
     assert!(without > 3.5 && with < 1.3, "{without} {with}");
 }
 
-/// To the last time but one: at rest sweeps take long to agree on increments that are next to nothing.
+/// Runs to the last time but one: at rest, sweeps need long to agree on tiny increments.
 fn ended(figure: &Figure, solver: Solver) -> Ended {
     let times = &figure.times[..figure.times.len() - 1];
     let spec = Spec {
@@ -170,7 +170,7 @@ fn ended(figure: &Figure, solver: Solver) -> Ended {
     figure.simulate(&spec.validate().unwrap(), Progress::Quiet).unwrap()
 }
 
-/// Largest distance of a node from itself.
+/// Largest distance between nodes of the same index.
 fn distance(a: &Ended, b: &Ended) -> f64 {
     let pairs = a.rows.snapshots.iter().zip(&b.rows.snapshots);
     let differences = pairs.flat_map(|(a, b)| {

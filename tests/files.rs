@@ -68,7 +68,7 @@ fn rows_come_at_the_times_asked_for() {
             assert!(chunk.iter().zip(1..).all(|(row, i): (_, u32)| row["i"] == i.to_string()));
         }
         assert_eq!(snapshots.len(), 3 * 41);
-        // The first row of the series and the last snapshot are the ends that the summary tells of.
+        // The first row of the series and the last snapshot are the two ends in the summary.
         let ends = &summary[member];
         assert_eq!((&series[0]["length"], &series[0]["excess"]), (&ends["length_start"], &ends["excess_start"]));
         let last: Vec<DVec2> = positions(&snapshots[82..]);
@@ -124,7 +124,7 @@ fn interpolated_rows_are_as_near_to_small_steps_as_rows_on_steps() {
         assert_eq!(found.len(), 25);
         found.iter().zip(&exact).map(|(found, exact)| (found - exact).abs()).collect()
     };
-    // Every second time lies in the middle of a step of 0.005 and every time on a step of 0.0025.
+    // Every second time is in the middle of a step of 0.005, and every time at the end of a step of 0.0025.
     let (coarse, fine) = (error("0.005"), error("0.0025"));
     eprintln!("{coarse:?}\n{fine:?}");
     for i in 4..25 {
@@ -150,7 +150,7 @@ fn the_files_have_the_columns_of_the_manual() {
     }
 }
 
-/// Keeps all that the members leave.
+/// Stores the results of all members.
 #[derive(Default)]
 struct Recorder(Vec<Ended>);
 

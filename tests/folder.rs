@@ -1,4 +1,4 @@
-//! What the program leaves in the output folder when the disk or the folder does not let it finish.
+//! The output folder when the disk or the folder does not let the program finish.
 #![cfg(unix)]
 
 use std::{
@@ -23,8 +23,8 @@ fn limited(home: &Path, limit: &str, arguments: &str) -> Output {
     Command::new("sh").args(["-c", &script]).arg(program).current_dir(home).output().unwrap()
 }
 
-/// 400 members are more than the buffer of the table, so that a write fails during the run; 50 are less, and it fails
-/// at the end.
+/// 400 members exceed the buffer of the table, so that a write fails during the run; 50 do not, and it fails at the
+/// end.
 #[test]
 fn a_run_on_a_full_disk_goes_on_when_there_is_room() {
     for curves in [400, 50] {
@@ -61,7 +61,7 @@ fn a_disk_that_is_full_for_the_pictures_leaves_the_tables_and_they_can_be_drawn_
     assert!(message.ends_with("; the tables in out are complete, some pictures are missing\n"), "{message}");
     assert!(message.starts_with(NOTE), "{message}");
     assert_eq!(fs::read_to_string(out.join("summary.csv")).unwrap().lines().count(), 3);
-    // Of the run, and not of the one before.
+    // From this run, not the previous one.
     assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("\"members\": 2"));
     assert!(!out.join("report.html").exists() && !out.join("plots/curves.svg").exists());
     assert!(fs::read_dir(&out).unwrap().all(|entry| !entry.unwrap().file_name().to_string_lossy().contains("part")));

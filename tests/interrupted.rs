@@ -1,4 +1,4 @@
-//! `curvelax resume` as a user meets it: what it goes on with, what it refuses, and where it goes on.
+//! `curvelax resume` as a user meets it: what it resumes, what it refuses, and where it continues.
 
 use std::{
     fs,
@@ -9,10 +9,10 @@ use std::{
 
 use tempfile::TempDir;
 
-/// A billion steps, some hour, stopped after a second.
+/// A billion steps, about an hour, stopped after a second.
 const LONG: &str = "--curves 3 --points 34 --tau 1e-9 --t-end 1 --solver direct --series 0.1 --max-time 1s";
 
-/// What is waited for so long hangs.
+/// A test that waits this long hangs.
 const HANGS: Duration = Duration::from_secs(600);
 
 fn curvelax(home: &Path, arguments: &str) -> Output {
@@ -39,7 +39,7 @@ fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     all
 }
 
-/// `resume ARGUMENTS` is refused with these words, and leaves the folder as it is.
+/// Checks that `resume ARGUMENTS` is refused with these words, and leaves the folder unchanged.
 #[track_caller]
 fn refused(home: &Path, run: &str, arguments: &str, words: &[&str]) {
     let before = contents(&home.join(run));
@@ -77,7 +77,7 @@ fn an_outline_is_found_again_from_anywhere_and_has_to_be_the_same() {
     [&begun, &elsewhere].into_iter().for_each(|folder| fs::create_dir(folder).unwrap());
     let square = "x,y\n0,0\n1,0\n1,1\n0,1\n";
     fs::write(begun.join("square.csv"), square).unwrap();
-    // Another outline of this name lies where it is resumed.
+    // A different outline of this name is where it is resumed.
     fs::write(elsewhere.join("square.csv"), "x,y\n0,0\n2,0\n0,1\n").unwrap();
     let run = format!("run --backend cpu --shape file:square.csv {LONG}");
     said(&curvelax(&begun, &format!("{run} --out out")), 75);
@@ -124,7 +124,7 @@ mod unix {
         let _ = Command::new("kill").args([name, &child.id().to_string()]).stderr(Stdio::null()).status();
     }
 
-    /// Starts a run into `out` and waits until it has a state, or has ended.
+    /// Starts a run into `out` and waits until it has a checkpoint, or has ended.
     fn begun(command: &mut Command, out: &Path) -> Child {
         let (mut child, since) = (command.stderr(Stdio::piped()).spawn().unwrap(), Instant::now());
         while !out.join(".curvelax.state").exists() && child.try_wait().unwrap().is_none() {
@@ -134,14 +134,14 @@ mod unix {
         child
     }
 
-    /// Leaves a run in `home` that was asked to stop in the middle.
+    /// Leaves in `home` a run that was stopped in the middle.
     fn stopped(home: &Path) {
         let (out, since) = (home.join("out"), Instant::now());
         while since.elapsed() < HANGS {
             let child = begun(&mut program(home, &format!("run --backend cpu {SHORT} --out out --force")), &out);
             signal(&child, "-TERM");
             let output = child.wait_with_output().unwrap();
-            // Else it was over before.
+            // Otherwise it had ended before.
             if output.status.code() != Some(0) {
                 said(&output, 75);
                 return;
@@ -154,7 +154,7 @@ mod unix {
     fn a_run_goes_on_where_it_began_unless_it_is_told_to_go_elsewhere() {
         let home = TempDir::new().unwrap();
         stopped(home.path());
-        // As if it had begun on another machine: the platform is in the state, and the state has a checksum.
+        // As if it had begun on another machine: the platform is in the checkpoint, which has a checksum.
         let state = home.path().join("out/.curvelax.state");
         let (mut head, standing) = curvelax::report::checkpoint::from_bytes(&fs::read(&state).unwrap()).unwrap();
         head.origin.platform.driver = Some("another".into());
@@ -191,7 +191,7 @@ mod unix {
         signal(&child, "-TERM");
         let message = said(&child.wait_with_output().unwrap(), 75);
         assert!(message.contains("stopped by SIGTERM"), "{message}");
-        // Where these tests run under nohup it would be ignored here too.
+        // If these tests run under nohup, it would be ignored here too.
         let mut heard = Command::new("env");
         heard.arg("--default-signal=HUP").arg(assert_cmd::cargo::cargo_bin("curvelax"));
         heard.args(format!("run --backend cpu {long} --out heard").split_whitespace()).current_dir(home.path());

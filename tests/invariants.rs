@@ -1,7 +1,7 @@
-//! What must stay, fall, or not matter: conserved areas, falling energies, motions of the plane, scaling, solvers,
-//! precision, and the work that a run takes.
+//! Quantities that must stay, fall, or not matter: conserved areas, decreasing energies, rigid motions, scaling,
+//! solvers, precision, and the work of a run.
 //!
-//! Every test prints what it measured.
+//! Every test prints its measurements.
 
 mod common;
 
@@ -29,7 +29,7 @@ use glam::DVec2;
 
 use common::{DIRECT, SWEEPS, Stepper, distance, ellipse, nodes};
 
-/// Keeps the one member of a run.
+/// Stores the only member of a run.
 struct Last(Option<Ended>);
 
 impl Sink for Last {
@@ -39,7 +39,7 @@ impl Sink for Last {
     }
 }
 
-/// What became of `curve`, and its last nodes.
+/// The outcome of `curve`, and its last nodes.
 fn relaxed(spec: &Spec, curve: impl Fn(f64) -> DVec2 + Send + Sync + 'static) -> (Outcome, Vec<DVec2>) {
     let spec = spec.clone().validate().unwrap();
     let family = Family::of(&spec, BaseCurve::from_formula(curve)).unwrap();
@@ -78,8 +78,8 @@ fn method(precision: Precision, solver: Solver) -> Spec {
     }
 }
 
-/// Every precision and solver, with the distance that rounding may make between two results, and the distance where
-/// sweeps may also end elsewhere within their tolerance.
+/// Every precision and solver, with the distance that rounding may cause between two results, and the distance if
+/// sweeps may also end at different points within their tolerance.
 const METHODS: [(Precision, Solver, f64, f64); 4] = [
     (Precision::F64, Solver::Direct, 2e-13, 2e-13),
     (Precision::F64, Solver::GaussSeidel, 2e-13, 5e-7),
@@ -87,7 +87,7 @@ const METHODS: [(Precision, Solver, f64, f64); 4] = [
     (Precision::F32, Solver::GaussSeidel, 2e-6, 2e-5),
 ];
 
-/// The nodes are where they are expected, and not where they would be without the motion.
+/// Asserts that the nodes are where they are expected, and not where they would be without the motion.
 #[track_caller]
 fn assert_moved(what: &str, expected: &[DVec2], found: &[DVec2], unmoved: &[DVec2], bound: f64) {
     let apart = distance(expected, found);
@@ -117,8 +117,8 @@ fn motions_of_the_plane_move_the_result() {
     }
 }
 
-/// A mirrored curve, traversed the other way so that it stays counter-clockwise, with the same last node, which α does
-/// not move.
+/// A mirrored curve, traversed in the opposite direction so that it stays counter-clockwise, with the same last node,
+/// which α does not move.
 #[test]
 fn a_mirror_mirrors_the_result() {
     let mirror = |node: DVec2| DVec2::new(-node.x, node.y);
@@ -132,7 +132,7 @@ fn a_mirror_mirrors_the_result() {
     }
 }
 
-/// Lengths by c, so times by c⁴, ω by c⁻⁴ and λ by c⁻². Powers of two change no digit.
+/// Lengths scale by c, so times by c⁴, ω by c⁻⁴ and λ by c⁻². Powers of two change no digit.
 #[test]
 fn a_larger_curve_is_slower_by_the_fourth_power() {
     for (precision, solver, rounding, _) in METHODS {
@@ -154,7 +154,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
                 assert_eq!(large.t_half.map(|t| t / c.powi(4)), outcome.t_half);
             }
         }
-        // The negative control: times by c³ is another curve.
+        // The negative control: times scaled by c³ give a different curve.
         let (_, wrong) =
             relaxed(&Spec { tau: spec.tau.map(|tau| tau * 8.0), t_end: spec.t_end * 8.0, ..spec.clone() }, |u| {
                 2.0 * potato(u)
@@ -163,7 +163,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
     }
 }
 
-/// Adaptive steps and the pull choose their lengths and rates by the curve's own scale, and go through the same motions.
+/// Adaptive steps and the pull choose their lengths and rates by the curve's own scale, and undergo the same motions.
 #[test]
 fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
     for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-4)] {
@@ -182,7 +182,7 @@ fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
             assert!((a - b).abs() <= rounding, "{a} and {b}");
             assert_eq!(large.steps, outcome.steps);
         }
-        // The negative control: a pull that is not scaled is another one.
+        // The negative control: an unscaled pull makes a difference.
         let rate = Pull::Rate(40.0);
         let (_, pulled) = relaxed(&Spec { pull: rate, ..spec.clone() }, potato);
         let (t_end, omega, flow) = (16.0 * spec.t_end, spec.omega / 16.0, Flow::Elastic(0.1));
@@ -196,8 +196,8 @@ fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
     }
 }
 
-/// Which node is the first matters to α alone, which moves nodes along the curve: without it not at all, with it by the
-/// error of the scheme, which falls with h².
+/// The choice of the first node matters only through α, which moves nodes along the curve: without it not at all, with
+/// it by the error of the scheme, which falls as h².
 #[test]
 fn the_first_node_does_not_matter() {
     let shift = 17;
@@ -221,7 +221,7 @@ fn the_first_node_does_not_matter() {
     assert!(coarse < 1e-4 && fine < 0.3 * coarse, "{coarse:e} {fine:e}");
 }
 
-/// Steps and sweeps of a few runs, which are deterministic: a change of them is a change of the program.
+/// Steps and sweeps of a few runs, which are deterministic: if they change, the program has changed.
 #[test]
 fn the_work_of_a_run_is_what_it_was() {
     let spec = |flow, n, sor| Spec {
@@ -280,7 +280,7 @@ fn the_area_of_the_paper_s_ellipse_is_kept() {
     }
 }
 
-/// The energies that the flows are gradients of: length, `½∮k²` and `∮(½k² + λ)`.
+/// Each flow is the gradient flow of its energy: length, `½∮k²` and `∮(½k² + λ)`.
 #[test]
 fn every_gradient_flow_lowers_its_energy_at_every_step() {
     let potato = nodes(100, |u| potato(u / TAU));
@@ -304,8 +304,8 @@ fn every_gradient_flow_lowers_its_energy_at_every_step() {
     }
 }
 
-/// The negative control: what is no energy of a flow does not fall. Surface diffusion does not lower the area, Willmore
-/// flow lengthens.
+/// The negative control: other quantities do not fall. Surface diffusion does not lower the area, and Willmore flow
+/// lengthens curves.
 #[test]
 fn what_is_no_energy_of_a_flow_does_not_fall() {
     let p = Parameters::of_flow(&Flow::Willmore, 1e-3);
@@ -370,7 +370,7 @@ fn f32_errors(n: usize) -> [f64; 2] {
     errors
 }
 
-/// f32 is as good as its documents say at n nodes.
+/// Asserts that f32 is as good at n nodes as the documents say.
 fn assert_f32_follows(n: usize) {
     let [positions, t_relax] = f32_errors(n);
     assert!(positions <= 5e-4 && t_relax.abs() <= 1e-3, "n = {n}: {positions:e}, {t_relax:e}");

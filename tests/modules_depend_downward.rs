@@ -1,5 +1,5 @@
-//! Modules depend downward only: no folder or file of `src` uses one above it in [`LAYERS`], and no files use each other in
-//! a circle. Tests inside the files may use anything. Type names are unique across the crate.
+//! Modules depend downward only: no folder or file of `src` uses one above it in [`LAYERS`], and no files form a circle
+//! of uses. Tests inside the files may use anything. Type names are unique across the crate.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -12,7 +12,7 @@ use syn::{
     visit::{self, Visit},
 };
 
-/// The modules of the crate, each above all that it may use.
+/// The modules of the crate; each may use only those above it.
 const LAYERS: [&str; 30] = [
     "wgsl",
     "error",
@@ -48,7 +48,8 @@ const LAYERS: [&str; 30] = [
 
 type Module = Vec<String>;
 
-/// Paths that a file names outside its tests, from the root of the crate; re-exports apart, by the name that they get.
+/// Paths that a file names outside its tests, from the root of the crate; re-exports separately, by the name that they
+/// get.
 #[derive(Default)]
 struct Names {
     module: Module,
@@ -65,7 +66,8 @@ fn is_of_tests(attributes: &[Attribute]) -> bool {
 }
 
 impl Names {
-    /// From the root of the crate; none for a path into another crate, unless it is that of a module beside this file's.
+    /// The path from the root of the crate; none for a path into another crate, unless it is that of a sibling module
+    /// of this file's.
     fn absolute(&self, path: &[String]) -> Option<Module> {
         let mut base = self.module.clone();
         match path.first()?.as_str() {
@@ -159,7 +161,7 @@ fn sources() -> BTreeMap<Module, String> {
     all
 }
 
-/// Which file uses which others, re-exports followed.
+/// Which file uses which others, with re-exports resolved.
 fn arrows(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>> {
     let names: BTreeMap<&Module, Names> = sources
         .iter()
@@ -171,7 +173,7 @@ fn arrows(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Modul
         .collect();
     let leads_to = |path: &Module| {
         let mut path = path.clone();
-        // A chain of re-exports is short.
+        // Chains of re-exports are short.
         for _ in 0..8 {
             let known = (1..=path.len()).rev().find(|length| sources.contains_key(&path[..*length]))?;
             let module = path[..known].to_vec();
@@ -190,7 +192,7 @@ fn arrows(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Modul
     names.iter().map(uses).collect()
 }
 
-/// What breaks the rule, a line each.
+/// Violations of the rule, one per line.
 fn faults(sources: &BTreeMap<Module, String>) -> Vec<String> {
     let arrows = arrows(sources);
     let layer = |module: &Module| LAYERS.iter().position(|name| *name == module[0]);
@@ -204,7 +206,7 @@ fn faults(sources: &BTreeMap<Module, String>) -> Vec<String> {
         let upward = others.iter().filter(|to| layer(to).is_none_or(|other| other > own));
         faults.extend(upward.map(|to| format!("{shown} uses {}, which is above it", to.join("/"))));
     }
-    // Files are taken away that use none of the rest; what stays is in a circle or above one.
+    // Files that use none of the rest are removed; the remainder is in a circle or above one.
     let mut rest = arrows;
     loop {
         let done: Vec<Module> = rest
@@ -285,8 +287,7 @@ impl<'a> Visit<'a> for Types {
     }
 }
 
-/// Names of types with the files that define them, where these are several; one file may define a type once for each
-/// system.
+/// Type names defined in several files, with these files; one file may define a type once per operating system.
 fn shared_names(sources: &BTreeMap<Module, String>) -> Vec<String> {
     let mut files: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for (module, text) in sources {

@@ -1,4 +1,4 @@
-//! Pictures that are drawn again from the files of a run.
+//! Pictures drawn again from the files of a run.
 
 mod common;
 
@@ -12,7 +12,7 @@ use std::{
 use assert_cmd::Command;
 use common::program::{Done, run};
 
-/// A run with all that `plot` reads: two cells, a series, and members that stay unfinished.
+/// A run with everything that `plot` reads: two cells, a series, and members that stay unfinished.
 const RUN: &str = "--curves 3 --points 32 --adaptive=1e-3 --t-end 0.4 --series 0.1 --sweep omega=1,2";
 
 #[track_caller]
@@ -121,7 +121,7 @@ fn pictures_follow_the_tables() {
     assert!(before[mesh] != pictures(&done.path())[mesh]);
 }
 
-/// A run that `spoil` changes is refused, with the words `said`, and nothing is written.
+/// Checks that a run changed by `spoil` is refused with the words `said`, and nothing is written.
 #[track_caller]
 fn refused(done: &Done, spoil: impl FnOnce(&Path), said: &str) {
     let home = tempfile::tempdir().unwrap();
@@ -146,7 +146,7 @@ fn refused(done: &Done, spoil: impl FnOnce(&Path), said: &str) {
     }
 }
 
-/// Replaces the field in this row and column, counted from 0 with the header, of a table.
+/// Replaces a field of a table; row and column are counted from 0, the header being row 0.
 fn field(path: &Path, row: usize, column: usize, value: &str) {
     let text = fs::read_to_string(path).unwrap();
     let mut rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();

@@ -1,4 +1,4 @@
-//! Random simple polygons: what the generator promises, and what becomes of them as outlines.
+//! Random simple polygons: the guarantees of the generator, and their treatment as outlines.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! Rates of decay and the mean excess of a run, from outside: against the definition and against theory.
+//! Decay rates and the mean excess of a run, from outside: against the definition and against theory.
 
 mod common;
 
@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use common::program::{Done, Row, column, number, run};
 
-/// Share of all members whose rate is within 2 % of what theory gives, which `theory` says once more.
+/// Fraction of all members whose rate is within 2 % of the theoretical one, which `theory` recomputes.
 fn share_as_in_theory(done: &Done, theory: impl Fn(f64) -> f64) -> f64 {
     let (members, rates) = (done.summary(), done.rows("rates.csv"));
     for row in &rates {
@@ -36,7 +36,7 @@ fn small_modes_of_a_circle_decay_as_linear_theory_has_it() {
     assert!(share_as_in_theory(&elastic, |_| 18.0) >= 0.95);
     let cell = &two.rows("ensemble.csv")[0];
     assert!((number(cell, "rate_ratio") - 1.0).abs() < 0.02 && number(cell, "rate_known") >= 95.0, "{cell:?}");
-    // The control: steps that are too long show.
+    // The control: steps that are too long are detected.
     let long = run("--shape circle:1 --amplitude 0.02 --modes 2..=2 --solver direct --t-end 1 --curves 20");
     assert!(share_as_in_theory(&long, |area| 24.0 / fourth(area)) < 0.5, "τ = 10⁻³ decays some 5 % too fast");
 }

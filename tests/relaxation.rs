@@ -1,7 +1,7 @@
-//! What adaptive steps, the metric pull and thresholds must reach together: times to relax against the truth.
+//! What adaptive steps, the metric pull and thresholds must achieve together: times to relax against exact ones.
 //!
-//! Bounds are little above what was measured; each comparison has a control that fails it. On the CPU, directly
-//! solved, in f64, where nothing else is said.
+//! Bounds are slightly above the measured values; each comparison has a control that fails it. Runs are on the CPU,
+//! solved directly, in f64, unless noted.
 
 mod common;
 
@@ -35,7 +35,7 @@ use rayon::prelude::*;
 
 use common::{All, DIRECT, Stepper, dumbbell, file, polygons, wavy_circle};
 
-/// One unperturbed curve in adaptive steps, directly solved.
+/// An unperturbed curve with adaptive steps, solved directly.
 fn adaptive(shape: &str, points: usize) -> Spec {
     Spec {
         shape: shape.parse().unwrap(),
@@ -70,8 +70,7 @@ fn one(spec: &Spec) -> Outcome {
     run(spec).remove(0).outcome
 }
 
-/// A polygon of `corners` as a user's file.
-/// Runs a member to its end by hand, so that its last state can be looked at, also where the program refuses its n.
+/// Runs a member to its end by hand, so that its last state can be inspected, even where the program refuses its n.
 fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let n = member.nodes.len();
     let outputs = Outputs::new(spec.t_end, spec.series, &spec.snapshots, &[]);
@@ -91,7 +90,7 @@ fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     (trajectory.end(None), run.state.convert())
 }
 
-/// Scaled to area π.
+/// Scales to area π.
 fn of_area_pi(mut corners: Vec<DVec2>) -> Vec<DVec2> {
     let size = (polygon::signed_area(&corners).abs() / std::f64::consts::PI).sqrt();
     corners.iter_mut().for_each(|p| *p /= size);
@@ -144,7 +143,7 @@ fn tabulate(all: &[Relaxed]) {
     );
 }
 
-/// Within `bound` of `exact`, relatively.
+/// Whether `found` is within `bound` of `exact`, relatively.
 fn near(found: Option<f64>, exact: f64, bound: f64) -> bool {
     found.is_some_and(|found| (found / exact - 1.0).abs() <= bound)
 }
@@ -183,7 +182,7 @@ fn a_nonconvex_curve_relaxes_when_it_should_with_the_pull_and_not_without() {
     }
 }
 
-/// Times until the excess is 0.01 by an independent program with a fixed pull, at n = 128 and 256.
+/// Times until the excess is 0.01, by an independent program with a fixed pull, at n = 128 and 256.
 const ISLANDS: [(&str, [f64; 2]); 4] = [
     ("madagascar", [0.1837, 0.1836]),
     ("jamaica", [0.1966, 0.1965]),
@@ -222,7 +221,7 @@ fn islands_relax_at_every_n_when_an_independent_program_says_and_not_without_the
 
 #[test]
 fn rows_at_given_times_do_not_depend_on_where_steps_fell_and_change_no_step() {
-    // Largest gap to a tight tolerance, of the length and of the excess over its start.
+    // Largest difference from a tight tolerance, of the length and of the excess over its start.
     for (shape, t_end, bounds) in [("ellipse:2,1", 2.0, [5e-5, 6e-4]), ("nonconvex", 0.17, [8e-5, 1e-4])] {
         let spec = Spec { pull: Pull::Auto, t_end, ..adaptive(shape, 100) };
         let snapshots = vec![0.3 * t_end, 0.77 * t_end];
@@ -238,7 +237,7 @@ fn rows_at_given_times_do_not_depend_on_where_steps_fell_and_change_no_step() {
         for (a, b) in loose.rows.series.iter().zip(&tight.rows.series) {
             assert!(a.t == b.t && within(gap(&a.at, &b.at), 1.0), "{shape}, t = {}: {:?}", a.t, gap(&a.at, &b.at));
         }
-        // Where a row of another time, half a row off, would not pass.
+        // A row of a different time, half a row off, would fail.
         let off = gap(&loose.rows.series[20].at, &loose.rows.series[21].at);
         assert!(!within(off.map(|gap| 0.5 * gap), 1.0), "the control passes");
         // A run that ends at the time of a row, with a step that ends there.
@@ -267,7 +266,7 @@ fn a_million_tiny_steps_add_up_exactly_in_f32() {
     let (ticks, mut progress, p) = clock::<f32>(2.0, 0.0);
     let (mut exact, mut naive) = (0_u64, 0.0_f32);
     for j in 0..1_000_000_u32 {
-        // 16 to 115 ticks, and not a whole number of them.
+        // 16 to 115 ticks, and not an integer number.
         progress.next = (ticks.tick * (16.3 + f64::from(j % 100))) as f32;
         let stride = pace::stride(&progress, &p);
         assert!(!stride.last && stride.length > 0.0);
@@ -334,7 +333,7 @@ fn a_curve_whose_curvature_has_left_it_is_never_relaxed() {
         Spec { adaptive: None, sampling: Sampling::Parameter, stop_when_relaxed: true, ..adaptive("nonconvex", 100) };
     let spec = Spec { amplitude: 0.05, curves: 48, ..spec };
     let family = Family::new(&spec.clone().validate().unwrap()).unwrap();
-    // Two at a step that is short enough, all at those that are too long.
+    // Two at a step that is short enough, all at steps that are too long.
     let coarse = (11..=30).flat_map(|j| (0..spec.curves).map(move |member| (j, member)));
     let members: Vec<(i32, u64)> = [(3, 0), (3, 1)].into_iter().chain(coarse).collect();
     let relaxed = |&(j, member): &(i32, u64)| {
@@ -343,7 +342,7 @@ fn a_curve_whose_curvature_has_left_it_is_never_relaxed() {
         let (ended, state) = follow::<f64>(&spec, family.member(member).unwrap());
         let (outcome, gap) = (ended.outcome, observe::gap(&state.curve));
         let line = format!("tau = {tau:.2e}, member {member}: {outcome:?}, gap {gap:.2}");
-        // What shrinks away looks round, too.
+        // Curves that shrink away look round, too.
         let sound = gap <= observe::MAX_GAP && outcome.end.area > 0.7 * outcome.start.area;
         assert!(outcome.status != Status::Relaxed || sound, "{line}");
         outcome.status == Status::Relaxed
@@ -358,7 +357,7 @@ fn one_sweep_is_too_few_and_the_member_stalls_in_finite_time() {
     let spec = Spec { solver: Solver::GaussSeidel.into(), max_sweeps: 1, ..adaptive("ellipse:2,1", 50) };
     let outcome = one(&spec);
     assert_eq!((outcome.status, outcome.t_relax), (Status::Stalled, None));
-    // Steps of any length are solved once they are short enough; the member creeps on until it has made its share.
+    // Steps of any length can be solved once they are short enough; the member creeps on until it has made its share.
     assert!(outcome.steps == 31_631 && outcome.t_end < 0.1, "{outcome:?}");
     assert_eq!(one(&Spec { max_sweeps: 200_000, sor: Sor::Factor(1.7), ..spec }).status, Status::Relaxed);
 }
@@ -384,7 +383,7 @@ fn a_crossing_is_seen_when_dense_snapshots_see_it_and_nowhere_else() {
             assert_eq!(looked.outcome, outcome, "looking at curve {j} has changed it");
             let first = looked.rows.snapshots.iter().find(|snapshot| crosses(snapshot)).map(|snapshot| snapshot.t);
             println!("curve {j}, n = {n}: {:?}, snapshots {first:?}, {}", outcome.self_crossing, outcome.status.name());
-            // It is seen at the end of a step, or after a sixteenth of a spacing.
+            // It is detected at the end of a step, or after a sixteenth of a spacing.
             match (outcome.self_crossing, first) {
                 (Some(seen), Some(first)) => {
                     assert!(first <= seen && seen <= 1.12 * first, "curve {j}: {seen} {first}")
@@ -416,7 +415,7 @@ fn a_polygon_that_crosses_itself_has_done_so_from_the_start() {
     }
 }
 
-/// How random polygons are relaxed here.
+/// The spec for random polygons.
 fn for_polygons(omega: f64) -> Spec {
     Spec { pull: Pull::Auto, omega, relax_at: Some(0.01), stop_when_relaxed: true, ..adaptive("circle:1", 128) }
 }
@@ -487,7 +486,7 @@ fn single_precision_against_double() {
     }
 }
 
-/// A run without thresholds to steps of any error.
+/// A run without thresholds, for steps of any error.
 fn unbounded(nodes: &[DVec2], flow: &Flow) -> Run<f64> {
     let end = 100.0;
     let ticks = Ticks::new(end, Precision::F64);
@@ -526,7 +525,7 @@ fn extrapolated_steps_are_of_order_two_and_their_halves_alone_of_order_one() {
         ("the Willmore circle", Flow::Willmore, circle, 0.0, 1.0, radius),
         ("a small mode", Flow::SurfaceDiffusion, mode, 0.0, 1.0 / 72.0, |nodes| common::mode(nodes, 3)),
     ] {
-        // The fast first times of the spacing, which no step here resolves, are gone through beforehand.
+        // The fast initial times of the spacing, which no step here resolves, are passed first.
         let mut start = unbounded(&nodes, &flow);
         if settling > 0.0 {
             extrapolate(&mut start, settling, 4000);
@@ -552,7 +551,7 @@ fn extrapolated_steps_are_of_order_two_and_their_halves_alone_of_order_one() {
     }
 }
 
-/// The check itself: a round polygon under a curvature that is not its own, which no run was found to reach.
+/// Tests the check itself: a round polygon with a foreign curvature, which no run was found to reach.
 #[test]
 fn a_round_polygon_under_a_foreign_curvature_does_not_count_as_relaxed() {
     for (foreign, relaxes) in [(1.0, true), (8.0, false)] {

@@ -34,7 +34,7 @@ fn a_run_leaves_a_page_with_what_a_reader_asks_first() {
     }
 }
 
-/// Words that stand where a number should be.
+/// Words in place of numbers.
 fn none_of(text: &str) -> Vec<&str> {
     let words = text.split(|c: char| !c.is_alphanumeric());
     words.filter(|word| word.contains("NaN") || ["inf", "Infinity"].contains(word)).collect()
@@ -91,7 +91,7 @@ fn a_study_compares_its_cells() {
         let mut times: Vec<f64> = members.iter().filter_map(|member| member["t_relax"].parse().ok()).collect();
         times.sort_by(f64::total_cmp);
         assert_eq!(row["t_relax_known"], times.len().to_string());
-        // The fourth of seven, censored ones being the last.
+        // The fourth of seven, with censored ones last.
         let median = times.get(3).map_or(String::new(), f64::to_string);
         assert_eq!(row["t_relax_median"].parse::<f64>().ok(), median.parse().ok(), "cell {cell}");
     }
@@ -113,7 +113,7 @@ fn the_mean_excess_is_drawn_with_its_slope() {
 fn members_of_the_page_move() {
     let page = run(RUN).text("report.html");
     assert!(page.contains("type=\"range\"") && page.contains("member 0: relaxed at t = "), "no slider");
-    // A member that is round from the start has nothing to show but its circle, and says so without fail.
+    // A member that is round from the start only shows its circle, and the page says so.
     let round = run("--curves 1 --shape circle:1 --amplitude 0 --stop-when-relaxed").text("report.html");
     assert!(round.contains("member 0: relaxed at t = 0") && !round.contains("NaN"), "a member at rest");
 }

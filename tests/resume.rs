@@ -1,5 +1,5 @@
-//! A run that is interrupted over and over again ends as one that is not, bit for bit: on the CPU and on a GPU, between any
-//! two dispatches, with any number of slots, and also where the members on their way are lost.
+//! A run that is interrupted repeatedly ends like one that is not, bit for bit: on the CPU and on a GPU, between any
+//! two dispatches, with any number of slots, and also if the members in progress are lost.
 
 mod common;
 
@@ -23,16 +23,16 @@ use curvelax::{
 };
 use libtest_mimic::{Arguments, Failed, Trial};
 
-/// Takes members and stops the run again and again.
+/// Receives members and stops the run repeatedly.
 #[derive(Default)]
 struct Interrupting {
     ended: Vec<Ended>,
-    /// Wishes until the next stop.
+    /// Calls of `wish` until the next stop.
     patience: u32,
     standing: Standing,
-    /// What was kept last of members on their way.
+    /// The members in progress at the last checkpoint that had them.
     resident: BTreeMap<u64, Paused>,
-    /// Every so many stops the members on their way are lost.
+    /// Whether members in progress are lost at regular stops.
     lost: bool,
 }
 
@@ -62,10 +62,10 @@ impl Sink for Interrupting {
     }
 }
 
-/// The case whose curves cross themselves on their way.
+/// The case whose curves cross themselves during the run.
 const CROSSING: &str = "curves that cross themselves";
 
-/// How a back end for the members of a spec is opened.
+/// Opens a back end for the members of a spec.
 type Open<'a> = &'a dyn Fn(&Spec) -> Result<Box<dyn Backend>>;
 
 fn cells(name: &str, spec: &Spec) -> Result<[Cell; 1]> {
@@ -82,12 +82,12 @@ fn straight(name: &str, spec: &Spec, precision: Precision, open: Open) -> Result
     Ok(all.ended)
 }
 
-/// The same in pieces of `patience` dispatches; returns what the members left and the number of pieces.
+/// The same in pieces of `patience` dispatches; returns the results of the members and the number of pieces.
 fn in_pieces(name: &str, spec: &Spec, precision: Precision, open: Open, patience: u32) -> Result<(Vec<Ended>, u32)> {
     let cells = cells(name, spec)?;
     let mut sink = Interrupting::default();
     for piece in 1.. {
-        // More each time, so that the run comes to an end although it is lost what was on its way.
+        // More each time, so that the run ends although members in progress are lost.
         sink.patience = patience + piece / 4;
         sink.lost = piece % 5 == 0;
         let mut standing = std::mem::take(&mut sink.standing);
@@ -95,7 +95,7 @@ fn in_pieces(name: &str, spec: &Spec, precision: Precision, open: Open, patience
         if !sink.lost {
             standing.resident = Some(resident);
         }
-        // As it comes back from the disk.
+        // As read back from disk.
         let bytes = postcard::to_allocvec(&standing).expect("a state");
         let standing = postcard::from_bytes(&bytes).expect("the same");
         match resume(&cells, precision, open(spec)?.as_mut(), 2, standing, &mut sink) {
@@ -125,7 +125,7 @@ fn compare(name: &str, spec: &Spec, precision: Precision, open: Open, patience: 
     if name == CROSSING && !whole.iter().any(|ended| ended.outcome.self_crossing.is_some_and(|t| t > 0.0)) {
         return Err("no curve has crossed itself".into());
     }
-    // Negative control: a member of another seed has other bits.
+    // Negative control: a member with another seed has different bits.
     let other = straight(name, &Spec { seed: spec.seed + 1, ..spec.clone() }, precision, open)?;
     if format!("{:?}", other[3]) == format!("{:?}", whole[3]) {
         return Err("the comparison sees nothing".into());
@@ -133,7 +133,7 @@ fn compare(name: &str, spec: &Spec, precision: Precision, open: Open, patience: 
     Ok(())
 }
 
-/// Members of all fates, with output times, some of which lie between steps.
+/// Members with all kinds of ends, and output times, some of them inside steps.
 fn specs() -> Vec<(&'static str, Spec)> {
     let outputs = |more: Spec| Spec { curves: 13, series: Some(0.013), snapshots: vec![0.0, 0.02], points: 33, ..more };
     let fixed =
@@ -147,7 +147,7 @@ fn specs() -> Vec<(&'static str, Spec)> {
         specs.push(("fixed steps", fixed(solver)));
         specs.push(("adaptive steps", adaptive(solver)));
     }
-    // Of the long dumbbell.
+    // With a long dumbbell.
     specs.push((CROSSING, Spec { t_end: 1.5, points: 128, pull: Pull::Auto, ..adaptive(Solver::Direct) }));
     let short = Spec { t_end: 0.0502, stop_when_relaxed: true, relax_to: Some(0.7), ..fixed(Solver::Direct) };
     specs.push(("members that end early and steps that end short", short));
@@ -182,7 +182,7 @@ fn main() -> ExitCode {
                 let variant = gpu.capacity().variant(blocks, spec.solver());
                 let variant = Variant { adaptive: spec.adaptive.is_some(), ..variant };
                 let kernel = Kernel::<f64>::in_batches(&gpu, blocks, [2, 7], spec.max_sweeps, variant)?;
-                // So little that dispatches end inside solves; adaptive steps are long, and take thousands of sweeps.
+                // So few that dispatches end inside solves; adaptive steps are long, and need thousands of sweeps.
                 let sweeps = if spec.adaptive.is_some() { 600 } else { 50 };
                 Ok(Box::new(kernel.with_budget(Budget { steps: 9, sweeps })))
             };

@@ -1,5 +1,5 @@
-//! Rows that wait for their members to leave: on disk where they are many, and in the tables the same bytes as those of a
-//! run that was never interrupted.
+//! Rows that wait for their members to end: on disk if they are many, and in the tables with the same bytes as in a run
+//! that was never interrupted.
 
 use std::{collections::BTreeMap, fs, path::Path, time::Duration};
 
@@ -18,13 +18,13 @@ use curvelax::{
     simulate::resume,
 };
 
-/// A report whose run is stopped when its patience is at an end.
+/// A report whose run is stopped when its patience is over.
 struct Impatient<'a> {
     report: &'a mut RunReport,
     patience: u32,
-    /// It does not wait for the members on their way.
+    /// It does not wait for the members in progress.
     at_once: bool,
-    /// It waits for a state.
+    /// It waits for a checkpoint.
     waits: bool,
     spilled: u64,
 }
@@ -69,8 +69,8 @@ fn manner() -> Manner {
     Manner { quiet: true, every: Duration::from_secs(1000), stop: Stop::default() }
 }
 
-/// Runs `spec` into `out` in pieces of `patience` looks at the run and more; returns how many pieces there were, and how
-/// often rows were handed over.
+/// Runs `spec` into `out` in pieces of `patience` or more checks; returns the number of pieces, and how often rows were
+/// spilled.
 fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
     let mut study = Study::new(spec.clone())?;
     let choices = placement::choose_all(&study)?;
@@ -80,7 +80,7 @@ fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
     let mut report = RunReport::begin(OutputFolder::open(out, false)?, &study, origin, manner())?;
     let (mut standing, mut spilled) = (Standing::default(), 0);
     for piece in 1.. {
-        // More each time, so that the run comes to an end although some of its work is lost.
+        // More each time, so that the run ends although some of its work is lost.
         let patience = patience.saturating_add(piece / 4);
         let mut sink = Impatient { report: &mut report, patience, at_once: piece % 3 == 0, waits: false, spilled: 0 };
         let (mut backend, _) = choice.open_for(cells)?;
@@ -103,7 +103,7 @@ fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
     unreachable!("it ends")
 }
 
-/// All files below a folder, by name; `run.json` tells when it was.
+/// All files below a folder, by name; `run.json` has the time of the run.
 fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut all = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {

@@ -1,5 +1,5 @@
-//! Every shader, without any GPU: valid in both precisions, translated for every API, laid out as the host
-//! believes, and free of what WGSL does silently wrong.
+//! Every shader, without any GPU: valid in both precisions, translated for every API, laid out as the host expects, and
+//! free of constructs that WGSL silently gets wrong.
 
 use std::collections::BTreeMap;
 
@@ -71,7 +71,7 @@ fn every_shader_is_valid_in_both_precisions() {
         validated(&shader::source::<f32>(variant), variant, capabilities::<f32>()).unwrap();
         validated(&shader::source::<f64>(variant), variant, capabilities::<f64>()).unwrap();
     }
-    // Negative control: f64 is refused where it is not asked for.
+    // Negative control: f64 is refused unless requested.
     assert!(validated(&shader::source::<f64>(SWEEPS), SWEEPS, Capabilities::empty()).is_err());
 }
 
@@ -219,7 +219,7 @@ fn code() -> String {
     source.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
 }
 
-/// f64 transcendentals pass validation and return garbage, and a hardware's f32 ones are not Rust's.
+/// f64 transcendentals pass validation and return garbage, and f32 ones in hardware differ from Rust's.
 fn transcendental(module: &Module) -> Option<naga::MathFunction> {
     use naga::{Expression, MathFunction as M};
     let functions = module.functions.iter().map(|(_, f)| f).chain(module.entry_points.iter().map(|e| &e.function));
@@ -265,7 +265,7 @@ fn no_transcendental_function_is_used() {
     assert!(transcendental(&with).is_some());
 }
 
-/// A comparison of a value with itself: meant to detect NaN, and optimised away.
+/// A comparison of a value with itself, meant to detect NaN: it is optimised away.
 fn self_comparison(code: &str) -> Option<&str> {
     let spaced = code.replace("!=", " != ").replace("==", " == ");
     let words: Vec<&str> = spaced.split([' ', '\n', '(', ')', ';', '{', '}']).filter(|word| !word.is_empty()).collect();
@@ -335,7 +335,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
     for (name, value) in table {
         assert_eq!(constant(name), value, "{name}");
     }
-    // What a solve, or the loop over steps, says of itself inside the kernel; the host never sees it.
+    // The status of a solve, or of the loop over steps, inside the kernel; the host never sees it.
     let of_the_kernel = ["GO_ON", "STOP", "UNSOLVED", "SOLVED", "NOT_FINITE", "DIVERGED", "PAUSED"];
     let known = |name: &&str| table.iter().any(|(known, _)| known == name) || of_the_kernel.contains(name);
     let code = code();
@@ -359,7 +359,7 @@ fn noop_device() -> wgpu::Device {
     pollster::block_on(adapter.request_device(&asked)).unwrap().0
 }
 
-/// The error of building the pipeline and binding `buffers` storage buffers behind the uniform one.
+/// The error of building the pipeline and binding `buffers` storage buffers after the uniform one.
 fn pipeline_error<T: Real>(device: &wgpu::Device, n: usize, variant: Variant, buffers: u32) -> Option<String> {
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let pipeline = kernel::compile::<T>(device, Blocks::new(n).unwrap(), 32, variant);
@@ -384,7 +384,7 @@ fn pipelines_are_built_and_bound_without_any_gpu() {
             let buffers = 5 + u32::from(variant.traced);
             assert_eq!(pipeline_error::<f32>(&device, n, variant, buffers), None, "f32, n = {n}");
             assert_eq!(pipeline_error::<f64>(&device, n, variant, buffers), None, "f64, n = {n}");
-            // Negative control: a buffer too few is noticed.
+            // Negative control: a missing buffer is detected.
             assert!(pipeline_error::<f32>(&device, n, variant, buffers - 1).is_some());
         }
     }

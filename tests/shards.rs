@@ -1,4 +1,4 @@
-//! Shards and their merge, as a user meets them: the very files of one run, and what is refused.
+//! Shards and their merge, as a user meets them: exactly the files of one run, and what is refused.
 
 use std::{
     collections::BTreeMap,
@@ -14,10 +14,10 @@ use curvelax::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Cells that cost unequally, all files, members that end in several ways.
+/// Cells of unequal cost, all files, members that end in several ways.
 const STUDY: &str = "--backend cpu --curves 22 --points 34 --sweep shape=ellipse:2,1;lemniscate:1;circle:1 --adaptive=1e-3 \
                      --stop-when-relaxed --t-end 0.4 --series 0.05 --snapshots 0,0.1,0.4";
-/// A study that takes no time, with 12 members.
+/// A quick study with 12 members.
 const SMALL: &str = "--backend cpu --curves 12 --points 34 --tau 1e-3 --t-end 0.01 --solver direct";
 
 fn program(home: &Path, arguments: &str) -> Command {
@@ -33,7 +33,7 @@ fn curvelax(home: &Path, arguments: &str) -> Output {
     program(home, arguments).output().unwrap()
 }
 
-/// What it said on stderr, if it ended with this code.
+/// Its message on stderr, if it ended with this code.
 #[track_caller]
 fn said(output: &Output, code: i32) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -59,7 +59,7 @@ fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     all
 }
 
-/// `run.json` without what may differ: when it ran, how long it took, and on how many threads.
+/// `run.json` without what may differ: when it ran, how long it took, and the number of threads.
 fn lasting(run: &[u8]) -> Value {
     let mut run: Value = serde_json::from_slice(run).unwrap();
     for key in ["started", "wall_seconds"] {
@@ -81,10 +81,10 @@ fn differences(one: &Path, other: &Path) -> Vec<String> {
     differing
 }
 
-/// Runs `study` in `count` shards and joins them to `out`.
+/// Runs `study` in `count` shards and merges them to `out`.
 fn sharded(home: &Path, study: &str, count: u64, out: &str) {
     for index in 0..count {
-        // On other numbers of threads members are advanced in other batches.
+        // With other numbers of threads, members run in other batches.
         let threads = 1 + index % 3;
         done(home, &format!("run {study} --shard {index}/{count} --threads {threads} --out {out}-{count}/{index}"));
     }
@@ -105,7 +105,7 @@ fn merged_shards_are_the_files_of_one_run() {
             sharded(home.path(), &study, count, &out);
             assert_eq!(differences(&one, &home.path().join(&out)), [""; 0], "{count} shards, {store}");
         }
-        // A byte that differs is seen, in whatever file, and a number in run.json too.
+        // A different byte in any file is detected, and a number in run.json too.
         let merged = home.path().join(format!("{store}-merged-3"));
         for name in content(&merged).keys() {
             let path = merged.join(name);
@@ -145,12 +145,12 @@ fn merged_shards_of_a_gpu_are_the_files_of_one_run() {
         return;
     }
     let home = TempDir::new().unwrap();
-    // By its number, as one of several of one name is told apart.
+    // By number, which distinguishes adapters of the same name.
     let study = "--backend gpu --adapter 0 --precision f32 --curves 10 --points 34 --adaptive=1e-2 --stop-when-relaxed --series 0.1";
     done(home.path(), &format!("run {study} --out one"));
     sharded(home.path(), study, 3, "merged");
     assert_eq!(differences(&home.path().join("one"), &home.path().join("merged")), [""; 0]);
-    // The CPU computes other digits in this precision.
+    // The CPU computes different digits in this precision.
     let other = study.replace("gpu --adapter 0", "cpu");
     done(home.path(), &format!("run {other} --shard 1/3 --out other"));
     let words = ["not of one study", "one was computed on cpu and the other on gpu"];
@@ -184,7 +184,7 @@ fn some_members_are_sharded_by_their_numbers() {
     assert_eq!(differences(&home.path().join("one"), &home.path().join("merged")), [""; 0]);
 }
 
-/// A command that ends with 2 and these words in its last line, and makes no folder `no`.
+/// Checks that a command ends with 2 and these words in its last line, and creates no folder `no`.
 #[track_caller]
 fn refused(home: &Path, arguments: &str, words: &[&str]) {
     let message = said(&curvelax(home, arguments), 2);
@@ -269,7 +269,7 @@ fn shards_that_are_not_what_they_were_are_refused_by_name() {
     refused(path, MERGE, &["s/1/rates.csv: cannot be found"]);
     fs::rename(path.join("rates"), path.join("s/1/rates.csv")).unwrap();
 
-    // Whole, but of another program, or from elsewhere.
+    // Intact, but of another program, or from elsewhere.
     let record = shard::from_bytes(&state).unwrap();
     let older = envelope::sealed(*shard::LAYOUT, |bytes| postcard::to_extend(&("0.0.1", &record), bytes)).unwrap();
     spoil("s/2/shard.state", &older, &["it is of curvelax 0.0.1, and this is"]);
@@ -284,7 +284,7 @@ fn shards_that_are_not_what_they_were_are_refused_by_name() {
     refused(path, MERGE, &["s/2 and s/0 are not of one study: one was computed on cpu another and the other on cpu"]);
     fs::write(path.join("s/2/shard.state"), state).unwrap();
 
-    // One that runs now, and one that was interrupted.
+    // One that is running, and one that was interrupted.
     let lock = File::create(path.join("s/0/.curvelax.lock")).unwrap();
     lock.lock().unwrap();
     refused(path, MERGE, &["2 of 3 shards are done", "s/0: a run is writing here"]);
@@ -314,7 +314,7 @@ fn what_is_missing_is_printed_with_the_line_that_submits_it() {
     let folders = "shards 1,4-8,10-11 of 12: not among the folders";
     assert_eq!(printed(&format!("merge --missing {all}")), format!("{folders}\n{submit} array.sh\n"));
     assert_eq!(printed(&format!("merge --missing --script job {all}")), format!("{folders}\n{submit} job\n"));
-    // What was interrupted says which one it is.
+    // An interrupted shard says which one it is.
     let words = "s/5 is of another study than s/0: tau is 0.000000001, and 0.001 there";
     refused(home.path(), &format!("merge --missing {all} {five}"), &[words]);
     let lines = printed(&format!("merge --missing {five}"));
@@ -340,7 +340,7 @@ fn what_is_missing_of_a_billion_shards_is_told_as_ranges() {
     }
     let missing = |folder: &str| {
         let mut limited = Command::new("sh");
-        // Each shard by its number would take 8 GB.
+        // Listing each shard by number would take 8 GB.
         let line = "ulimit -v 1000000; exec \"$0\" merge --missing \"$1\"";
         let program = assert_cmd::cargo::cargo_bin("curvelax");
         let output = limited.current_dir(home.path()).args(["-c", line]).arg(program).arg(folder).output().unwrap();
@@ -396,11 +396,11 @@ fn a_task_of_a_job_array_knows_its_shard() {
 #[test]
 fn one_line_begins_a_run_goes_on_with_it_and_leaves_it() {
     let home = TempDir::new().unwrap();
-    // Four million steps, some 13 s.
+    // Four million steps, about 13 s.
     let long = SMALL.replace("1e-3", "2.5e-7").replace("0.01", "1");
     let line = format!("run {long} --only 1,3 --resume --out out");
     said(&curvelax(home.path(), &format!("{line} --max-time 1s")), 75);
-    // An orphan of this job still runs.
+    // An orphan of this job is still running.
     let lock = File::create(home.path().join("out/.curvelax.lock")).unwrap();
     lock.lock().unwrap();
     refused(home.path(), &line, &["out: a run is writing here"]);
@@ -413,7 +413,7 @@ fn one_line_begins_a_run_goes_on_with_it_and_leaves_it() {
     let message = said(&curvelax(home.path(), &format!("{line} --max-time 1s")), 75);
     assert!(message.contains("resuming: 0 of 2 members are in the table"), "{message}");
     let short = format!("run {SMALL} --resume --out short");
-    // A folder in which nothing was begun is no obstacle.
+    // A folder in which nothing was begun is not in the way.
     fs::create_dir(home.path().join("short")).unwrap();
     said(&curvelax(home.path(), &short), 0);
     let before = content(&home.path().join("short"));

@@ -1,7 +1,7 @@
-//! Statistics against independent packages, and what holds for all samples.
+//! Statistics against independent packages, and properties that hold for all samples.
 //!
-//! `tests/data/README.md` says where the numbers are from. Each comparison is made a second time with an input that is
-//! a little wrong, and must then fail.
+//! `tests/data/README.md` gives the origin of the numbers. Each comparison is repeated with a slightly wrong input, and
+//! must then fail.
 
 use std::{fs, path::PathBuf};
 
@@ -13,7 +13,7 @@ use toml::{Table, Value};
 
 const SETS: [&str; 5] = ["leukaemia", "ties", "heavy", "uncensored", "thousand"];
 const LEVELS: [f64; 7] = [0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95];
-/// Relative. The packages differ among themselves by 2e-14.
+/// Relative. The packages differ from each other by 2e-14.
 const BOUND: f64 = 1e-12;
 
 fn text(file: &str) -> String {
@@ -33,7 +33,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(number).collect()
 }
 
-/// A number of a table, if it has one of this name.
+/// The entry of a table called `name`, if it is a number.
 fn entry(table: &Value, name: &str) -> Option<f64> {
     table.get(name).map(number)
 }
@@ -59,7 +59,7 @@ fn groups(rows: &[Row]) -> Vec<Sample> {
     (0..count).map(|group| sample(rows, Some(group))).collect()
 }
 
-/// Largest relative difference; infinite where one side has a number and the other has none.
+/// Largest relative difference; infinite if only one side has a number.
 #[track_caller]
 fn worst(found: &[Option<f64>], expected: &[Option<f64>]) -> f64 {
     if found.len() != expected.len() {
@@ -74,7 +74,7 @@ fn worst(found: &[Option<f64>], expected: &[Option<f64>]) -> f64 {
     found.iter().zip(expected).map(apart).fold(0.0, f64::max)
 }
 
-/// A quantity, the differences that are found in it, and how an input must be wrong for it to tell.
+/// A quantity, its differences, and the input errors that it must detect.
 struct Comparison {
     quantity: &'static str,
     wrong: fn(Vec<Row>) -> Vec<Row>,
@@ -87,21 +87,21 @@ fn slower(mut rows: Vec<Row>) -> Vec<Row> {
     rows
 }
 
-/// The first event of all is taken for a censoring.
+/// The first event of all is mistaken for a censoring.
 fn overlooked(mut rows: Vec<Row>) -> Vec<Row> {
     let first = rows.iter_mut().filter(|row| row.0.happened).min_by(|a, b| a.0.time.total_cmp(&b.0.time)).unwrap();
     first.0.happened = false;
     rows
 }
 
-/// The member with the largest time is left out.
+/// The member with the largest time is omitted.
 fn lost(mut rows: Vec<Row>) -> Vec<Row> {
     let last = (0..rows.len()).max_by(|i, j| rows[*i].0.time.total_cmp(&rows[*j].0.time)).unwrap();
     rows.remove(last);
     rows
 }
 
-/// Over all samples of the set that have this entry in the reference.
+/// The largest result over all samples of the set that have this entry in the reference.
 fn over_samples(
     rows: &[Row],
     set: &Value,
@@ -192,7 +192,7 @@ fn apart_from_r(rows: &[Row], set: &str, table: &str) -> f64 {
         let [_, group, value, error, statistic]: [&str; 5] = line.split('\t').collect::<Vec<_>>().try_into().unwrap();
         let sample = sample(rows, group.parse().ok());
         let mean = KaplanMeier::new(&sample).mean();
-        // Without censoring R divides by n where n - 1 is usual.
+        // Without censoring, R divides by n instead of the usual n - 1.
         let n = sample.len() as f64;
         let share = if sample.censored() == 0 { ((n - 1.0) / n).sqrt() } else { 1.0 };
         let found = [mean.map(|mean| mean.value), mean.and_then(|mean| mean.standard_error).map(|error| error * share)];
@@ -264,10 +264,10 @@ fn fits_agree_with_scipy() {
     }
 }
 
-/// Whether an interval's ends are quantiles of `(time, share of medians at or below it)`, up to chance.
+/// Whether the ends of an interval are quantiles of `(time, share of medians at or below it)`, up to chance.
 fn is_within_chance(interval: Interval, bootstrap: Bootstrap, shares: &[(f64, f64)]) -> bool {
     let outside = 0.5 * (1.0 - bootstrap.level);
-    // Five standard errors of a share that n resamples give.
+    // Five standard errors of a share from n resamples.
     let chance = 5.0 * (outside * (1.0 - outside) / f64::from(bootstrap.resamples)).sqrt();
     let fits = |end: Option<f64>, p: f64| {
         let at = end.map_or(shares.len(), |end| shares.partition_point(|(time, _)| *time < end));
@@ -318,7 +318,7 @@ fn samples() -> impl Strategy<Value = Vec<Observation>> {
     prop::collection::vec(observation, 0..40)
 }
 
-/// S by its definition, for a moment t.
+/// S by its definition, for a time t.
 fn survival_by_definition(observations: &[Observation], t: f64) -> f64 {
     let mut times: Vec<f64> = observations.iter().filter(|o| o.happened && o.time <= t).map(|o| o.time).collect();
     times.sort_by(f64::total_cmp);

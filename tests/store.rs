@@ -1,4 +1,4 @@
-//! `snapshots.zarr` from outside: what lies in the folder, which bytes, and what becomes of it when a run fails.
+//! `snapshots.zarr` from outside: the files in the folder, their bytes, and the effects of a failed run.
 
 mod common;
 
@@ -53,11 +53,11 @@ fn the_store_holds_the_numbers_of_the_table_and_stands_instead_of_it() {
         assert_eq!(bits(&found), bits(&expected), "{name}");
         let lost = expected.iter().filter(|value| value.is_nan()).count();
         assert!(lost > 0 && lost < expected.len() / 2, "{lost} of {} are missing", expected.len());
-        // Two nodes exchanged are seen.
+        // Two exchanged nodes are detected.
         expected.swap(0, 1);
         assert_ne!(bits(&found), bits(&expected), "{name}");
     }
-    // The summaries tell the same of both, and the statuses in the store are theirs.
+    // Both summaries agree, and the statuses in the store match them.
     assert_eq!(table.text("summary.csv"), arrays.text("summary.csv"));
     let group: Value = serde_json::from_slice(&store["zarr.json"]).unwrap();
     let flags = &group["consolidated_metadata"]["metadata"]["status"]["attributes"];
@@ -133,7 +133,7 @@ fn a_full_disk_leaves_the_store_of_the_earlier_run_and_no_half_of_another() {
     assert!(more.iter().all(|name| state.iter().any(|part| name.starts_with(part))), "{more:?}");
     assert!(message.contains("note: the run was saved: curvelax resume out continues it\n"), "{message}");
 
-    // With room it goes on, to what it would have been.
+    // With room it resumes, to exactly the right end.
     let resumed = limited(home.path(), "unlimited", "resume out");
     assert_eq!(resumed.status.code(), Some(0), "{}", String::from_utf8_lossy(&resumed.stderr));
     let straight = format!("{} --seed 2", small.replace("--out out", "--out straight"));
@@ -142,7 +142,7 @@ fn a_full_disk_leaves_the_store_of_the_earlier_run_and_no_half_of_another() {
     assert!(ours.remove("run.json").is_some() && theirs.remove("run.json").is_some());
     assert!(ours == theirs, "{:?}", ours.keys());
 
-    // A later run of another kind leaves nothing of it.
+    // A later run of another kind removes all of it.
     let third = limited(home.path(), "unlimited", &format!("{} --force", small.replace("zarr", "csv")));
     assert_eq!(third.status.code(), Some(0), "{}", String::from_utf8_lossy(&third.stderr));
     let left: Vec<String> = files(&out).into_keys().collect();

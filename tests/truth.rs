@@ -1,7 +1,7 @@
 //! The scheme against exact solutions: every problem of the table on every back end, in both precisions, by both
-//! solvers. Each comparison has a negative control: what a known mistake would give fails the same bound.
+//! solvers. Each comparison has a negative control: the result of a known mistake fails the same bound.
 //!
-//! A bound that is missed means an error, not a bound too tight. Without an adapter the cases of the GPU fail, unless
+//! A missed bound means an error, not that the bound is too tight. Without an adapter, GPU cases fail, unless
 //! `ALLOW_NO_GPU=1`: then they are reported as ignored.
 
 mod common;
@@ -56,7 +56,7 @@ fn main() {
     libtest_mimic::run(&arguments, trials).exit();
 }
 
-/// Within its bound of what is exact, and not within it of what is mistaken.
+/// Whether a run is within its bound of the exact value, and not within it of the mistaken one.
 fn judge(problem: &Problem, method: &Spec) -> Outcome {
     let at = problem.resolution();
     let Solved { ratio, outcome, precision, .. } = problem.solve(method, at).map_err(|e| e.to_string())?;
@@ -70,8 +70,8 @@ fn judge(problem: &Problem, method: &Spec) -> Outcome {
     if error.abs() <= bound && mistaken.abs() > bound { Ok(()) } else { Err(line.into()) }
 }
 
-/// The lemniscate ends when its life is over, neither before nor after, and not as relaxed: as singular, or with sweeps as
-/// stalled, which diverge in the step across the end.
+/// The lemniscate ends exactly when its life is over, and not as relaxed: as singular, or with sweeps as stalled,
+/// because they diverge in the step across the end.
 fn extinction(method: &Spec) -> Outcome {
     let mut problem = Problem::named("lemniscate").map_err(|e| e.to_string())?;
     problem.t_end = 1.2 * LEMNISCATE_LIFE;
@@ -83,7 +83,7 @@ fn extinction(method: &Spec) -> Outcome {
     if outcome.status == expected && (life - 1.0).abs() < 0.01 { Ok(()) } else { Err(line.into()) }
 }
 
-/// Where errors are those of the scheme alone.
+/// The method for which errors are those of the scheme alone.
 fn reference() -> Spec {
     let (backend, precision) = (BackendChoice::Cpu, Some(Precision::F64));
     Spec { backend, precision, solver: Solver::Direct.into(), ..Spec::default() }
@@ -108,7 +108,7 @@ fn orders() -> Outcome {
             }
             let last = rows.last().and_then(|row| row.order);
             let found = last.ok_or_else(|| format!("{}: no order in {}", problem.name, study.varied.name()))?;
-            // The lemniscate is so near its end that 400 steps do not yet show the order in full.
+            // The lemniscate is so near its end that 400 steps do not yet show the full order.
             let (order, margin) = match (study.varied, problem.name.as_str()) {
                 (Varied::Nodes, _) => (2.0, 0.1),
                 (Varied::Tolerance, _) => (2.0, 0.2),
@@ -124,7 +124,7 @@ fn orders() -> Outcome {
     Ok(())
 }
 
-/// `R(1) = 3^(1/4)`: the errors that a program of its own gave.
+/// `R(1) = 3^(1/4)`: the errors of an independent program.
 fn willmore_circle() -> Outcome {
     let exact = 3.0_f64.powf(0.25);
     let errors = [10, 20, 40, 80, 160].map(|n| {
@@ -176,7 +176,7 @@ fn correct_step(Linear { state, work, p }: &mut Linear) {
     std::mem::swap(&mut state.curve, &mut work.new);
 }
 
-/// A step whose 𝓑_i has `φ(k_i) + φ(k_{i-1})`, as the paper prints it.
+/// A step whose 𝓑_i has `φ(k_i) + φ(k_{i-1})`, as printed in the paper.
 fn misprinted_step(Linear { state, work, p }: &mut Linear) {
     let State { curve, increments, .. } = state;
     let Workspace { blocks, motion, new, curvature, position, .. } = work;
@@ -194,7 +194,7 @@ fn misprinted_step(Linear { state, work, p }: &mut Linear) {
         let ([_, before, _, after, _], ir) = (new.k.window(i), motion.ir[i]);
         let change = 0.5 * (law.phi(before) - law.phi(after)) * ir;
         let row = &mut position.rows[i];
-        // The diagonal is q/τ minus the other entries, so it changes by as much the other way.
+        // The diagonal is q/τ minus the other entries, so it changes by the same amount in the opposite direction.
         let c = row.weight / (p.tau * motion.iq[i]);
         let rescale = c / (c - change);
         for (rhs, old) in position.rhs.iter_mut().zip([&curve.x, &curve.y]) {

@@ -1,5 +1,5 @@
-//! Every function of the shaders has a twin in Rust, or a reason why not: the tables of `shaders/README.md` against the
-//! code.
+//! Every function of the shaders has a twin in Rust, or a reason for having none: the tables of `shaders/README.md`
+//! against the code.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
@@ -8,7 +8,7 @@ use syn::{
     visit::{self, Visit},
 };
 
-/// What is compared, as text by path in the repository.
+/// The files under comparison: text by path in the repository.
 #[derive(Clone)]
 struct Sources(BTreeMap<String, String>);
 
@@ -55,7 +55,7 @@ fn rows(text: &str, head: &str) -> Vec<Vec<String>> {
     lines.map(cells).collect()
 }
 
-/// What stands between backticks.
+/// The words between backticks.
 fn names(cell: &str) -> Vec<&str> {
     cell.split('`').skip(1).step_by(2).collect()
 }
@@ -65,7 +65,7 @@ fn shader_functions(text: &str) -> Vec<&str> {
     text.lines().filter_map(|line| line.strip_prefix("fn ")?.split('(').next()).collect()
 }
 
-/// The functions of a Rust file in their order, each by its own name and with that of its type in front.
+/// The functions of a Rust file in order, each by its name alone and qualified by its type.
 fn rust_functions(text: &str) -> Vec<[String; 2]> {
     #[derive(Default)]
     struct Functions {
@@ -109,7 +109,7 @@ fn rust_functions(text: &str) -> Vec<[String; 2]> {
     functions.found
 }
 
-/// What is wrong, a line each, and how many twins there are.
+/// The faults, one per line, and the number of twins.
 fn compare(sources: &Sources) -> (Vec<String>, usize) {
     let readme = &sources.0[README];
     let (twins, exceptions) = (rows(readme, TWINS), rows(readme, EXCEPTIONS));
@@ -203,7 +203,7 @@ fn missing_twins_and_unnecessary_exceptions_are_found() {
     );
     let unlisted = faults(README, &|old| old.replace("| `pace.wgsl` |", "| |"));
     assert_eq!(unlisted, ["pace.wgsl is not in the table once"]);
-    // Tests and other files have no twins to offer.
+    // Tests and other files provide no twins.
     let hidden = "#[cfg(test)]\nmod more { fn next_length() {} }\n";
     assert_eq!(
         faults("src/scheme/pace.rs", &|old| old.replace("fn next_length", "fn length_of_next") + hidden),
@@ -211,8 +211,8 @@ fn missing_twins_and_unnecessary_exceptions_are_found() {
     );
 }
 
-/// The lines of a shader that compute with indices of nodes or blocks: by a remainder, which wraps them round the ring, or
-/// from how the ring is cut.
+/// The lines of a shader that compute with indices of nodes or blocks: by a remainder, which wraps them round the ring,
+/// or from how the ring is cut.
 fn index_arithmetic(text: &str) -> Vec<&str> {
     let computes = |line: &str| {
         let code = line.split("//").next().unwrap_or("").replace(", BLOCKS>", "");

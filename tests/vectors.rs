@@ -1,5 +1,5 @@
-//! Members abreast in vector instructions against one member at a time: the same bits, whatever goes beside a member, on
-//! however many threads. Each comparison has a negative control.
+//! Members side by side in vector instructions against one member at a time: the same bits, whatever runs next to a
+//! member, on any number of threads. Each comparison has a negative control.
 
 mod common;
 
@@ -22,7 +22,7 @@ use curvelax::{
 
 use common::All;
 
-/// A back end with fewer slots, so that members meet others.
+/// A back end with fewer slots, so that members share vectors with others.
 struct Fewer(Box<dyn Backend>, usize);
 
 impl Backend for Fewer {
@@ -58,13 +58,13 @@ impl Backend for Fewer {
     }
 }
 
-/// Members of all fates, with output times, some of which lie between steps.
+/// Members with all kinds of ends, and output times, some of them inside steps.
 fn spec(shape: &str, more: Spec) -> Spec {
     let shape = shape.parse().unwrap();
     Spec { shape, curves: 37, series: Some(0.013), snapshots: vec![0.0, 0.02], ..more }.validate().unwrap()
 }
 
-/// All members of `specs`, which have solver and n in common, side by side.
+/// All members of `specs`, with the same solver and n, side by side.
 fn run<T: Vectorised>(specs: &[Spec], vectors: Vectors, threads: usize, slots: usize) -> Vec<Ended> {
     let method = Method { solver: specs[0].solver(), order: Order::Coloured, max_sweeps: specs[0].max_sweeps };
     let blocks = Blocks::new(specs[0].points).unwrap();
@@ -98,7 +98,7 @@ fn same_bits<T: Vectorised>(name: &str, specs: &[Spec]) {
     }
     assert!(compared > 0);
     println!("{name}, {}: {compared} members, {wider} runs in vectors", T::NAME);
-    // Negative control: a member of another seed has other bits.
+    // Negative control: a member with another seed has different bits.
     let other: Vec<Spec> = specs.iter().map(|spec| Spec { seed: spec.seed + 1, ..spec.clone() }).collect();
     let other = run::<T>(&other, Vectors::widest(), 1, 1000);
     assert_ne!(format!("{:?}", alone[5]), format!("{:?}", other[5]));
@@ -129,7 +129,7 @@ fn adaptive_steps_give_the_same_bits_in_every_vector() {
 #[test]
 fn members_that_take_other_branches_are_not_disturbed() {
     for solver in Solver::ALL {
-        // Every branch by itself, and all mixtures.
+        // Every branch alone, and all mixtures.
         let specs = [(Some(1e-3), None), (None, Some(1e-2))].map(|(tau, adaptive)| {
             let (solver, amplitude) = (solver.into(), 0.1);
             let mut mixed = Spec { tau, adaptive, t_end: 0.03, points: 32, solver, amplitude, ..Spec::default() };

@@ -1,4 +1,4 @@
-//! What the integration tests share: a curve that is stepped by hand, and measures of it.
+//! Shared parts of the integration tests: a curve that is stepped by hand, and measures of it.
 #![allow(dead_code, missing_docs)] // every test file takes its own part of it
 
 pub mod polygons;
@@ -23,7 +23,7 @@ use glam::DVec2;
 pub const DIRECT: Method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
 pub const SWEEPS: Method = Method { solver: Solver::GaussSeidel, max_sweeps: 1_000_000, ..DIRECT };
 
-/// Everything that the members of a run leave.
+/// All results of the members of a run.
 #[derive(Default)]
 pub struct All(pub Vec<Ended>);
 
@@ -49,7 +49,7 @@ pub fn wavy_circle(n: usize, radius: f64, m: u32, amplitude: f64) -> Vec<DVec2> 
     nodes(n, |u| radius * (1.0 + amplitude * (f64::from(m) * u).cos()) * DVec2::from_angle(u))
 }
 
-/// A curve and what steps it.
+/// A curve with everything needed to step it.
 pub struct Stepper<T: Real> {
     pub state: State<T>,
     pub work: Workspace<T>,
@@ -67,7 +67,7 @@ impl<T: Real> Stepper<T> {
         }
     }
 
-    /// One step, which must succeed.
+    /// Makes one step, which must succeed.
     #[track_caller]
     pub fn step(&mut self) {
         let stepped = step::step(&self.state.curve, &mut self.state.increments, &self.p, &self.method, &mut self.work);
@@ -90,7 +90,7 @@ impl<T: Real> Stepper<T> {
     }
 }
 
-/// Largest distance between nodes of the same number.
+/// Largest distance between nodes of the same index.
 pub fn distance(a: &[DVec2], b: &[DVec2]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
@@ -113,7 +113,7 @@ pub fn mode(nodes: &[DVec2], m: u32) -> f64 {
     sum.length() / TAU
 }
 
-/// Slope of the line through the points by least squares.
+/// Slope of the least-squares line through the points.
 pub fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));

@@ -1,31 +1,32 @@
-//! Random simple polygons, as users may bring them: polygon `index` is always the same one.
+//! Random simple polygons, like those of users: polygon `index` is always the same one.
 //!
-//! Five families take turns. Each is simple by construction, except for coasts, whose every corner is tried before
-//! it is taken. All are then stretched to an aspect of 1 to 8, rotated, and run either way round from any corner.
+//! Five families alternate. Each is simple by construction, except for coasts, each corner of which is tested before it
+//! is accepted. All are then stretched to an aspect of 1 to 8, rotated, and traversed in either direction from any
+//! corner.
 
 use std::{collections::HashMap, f64::consts::TAU};
 
 use curvelax::{curve::crossing, random::Stream};
 use glam::DVec2;
 
-/// Fewest and most corners.
+/// Minimum and maximum number of corners.
 pub const CORNERS: std::ops::RangeInclusive<usize> = 5..=200;
-/// Longer over shorter side of the box round a polygon, before it is rotated.
+/// Maximum ratio of the sides of the box round a polygon, before it is rotated.
 pub const MAX_ASPECT: f64 = 8.0;
 const SEED: u64 = 20_261_121;
 
-/// How a polygon is made.
+/// Kinds of polygons.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Family {
     /// Random radii at increasing angles: spikes about a centre.
     Star,
-    /// A band of one width rolled up for half a turn to four turns, with gaps of another.
+    /// A band of one width rolled up for half a turn to four turns, with gaps of another width.
     Spiral,
     /// Teeth and tines, blunt or pointed, on a bar.
     Comb,
     /// Squares joined into a random tree, corners moved.
     Tree,
-    /// A pentagon whose edges are broken at random again and again.
+    /// A pentagon whose edges are broken at random repeatedly.
     Coast,
 }
 
@@ -47,7 +48,7 @@ pub fn random(index: u64) -> (Family, Vec<DVec2>) {
     (family, placed(corners, &mut draws))
 }
 
-/// Random numbers one after the other.
+/// A sequence of random numbers.
 struct Draws {
     stream: Stream,
     next: u32,
@@ -65,12 +66,12 @@ impl Draws {
         self.real(low.ln(), high.ln()).exp()
     }
 
-    /// A whole number from `low` to `high`, both included.
+    /// An integer from `low` to `high`, both included.
     fn count(&mut self, low: usize, high: usize) -> usize {
         self.real(low as f64, high as f64 + 1.0) as usize
     }
 
-    /// As [`Draws::size`], in whole numbers.
+    /// Like [`Draws::size`], in integers.
     fn scale(&mut self, low: usize, high: usize) -> usize {
         self.size(low as f64, high as f64 + 1.0) as usize
     }
@@ -95,7 +96,7 @@ fn placed(mut corners: Vec<DVec2>, draws: &mut Draws) -> Vec<DVec2> {
 fn star(draws: &mut Draws) -> Vec<DVec2> {
     let n = draws.scale(*CORNERS.start(), *CORNERS.end());
     let innermost = draws.real(0.1, 0.9);
-    // Neighbouring angles differ by less than π, so the centre is seen from every corner.
+    // Neighbouring angles differ by less than π, so the centre is visible from every corner.
     (0..n)
         .map(|i| {
             let angle = TAU * (i as f64 + draws.real(0.0, 0.8)) / n as f64;
@@ -105,7 +106,7 @@ fn star(draws: &mut Draws) -> Vec<DVec2> {
 }
 
 fn spiral(draws: &mut Draws) -> Vec<DVec2> {
-    // Corners lie on the same rays in every turn, and along a ray the radius grows: so chords do not meet.
+    // Corners lie on the same rays in every turn, and along a ray the radius grows, so chords do not meet.
     let rays_per_turn = draws.count(4, 24);
     let rays = draws.count(rays_per_turn / 2 + 1, (4 * rays_per_turn).min(98));
     let (start, half_width) = (draws.real(0.7, 3.0), draws.size(0.03, 0.45));
@@ -145,7 +146,7 @@ fn tree(draws: &mut Draws) -> Vec<DVec2> {
     for _ in 0..draws.scale(2, 300) {
         let (x, y) = cells[draws.count(0, cells.len() - 1)];
         let (dx, dy) = sides[draws.count(0, 3)];
-        // The new square may touch its parent and what its parent touches, and nothing beside or beyond.
+        // The new square may touch its parent and whatever its parent touches, but nothing next to it or beyond.
         let free = |(i, j)| !cells.contains(&(x + i * dx - j * dy, y + i * dy + j * dx));
         let apart = [(1, 0), (1, 1), (1, -1), (2, 0), (2, 1), (2, -1)].into_iter().all(free);
         if apart && cells.len() < 90 {

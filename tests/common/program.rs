@@ -1,4 +1,4 @@
-//! The program as a user runs it: one run in its own folder, and its tables.
+//! The program as a user runs it: one run in a separate folder, and its tables.
 
 use std::{collections::HashMap, fs};
 
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 /// The tables of a run.
 pub const FILES: [&str; 3] = ["summary.csv", "series.csv", "snapshots.csv"];
 
-/// A finished run in its own folder.
+/// A finished run in a separate folder.
 pub struct Done {
     pub home: TempDir,
 }
@@ -17,7 +17,7 @@ pub struct Done {
 /// A row by column name.
 pub type Row = HashMap<String, String>;
 
-/// `curvelax run ARGUMENTS --backend cpu`, which must succeed; `files` lie in the folder where it runs.
+/// Runs `curvelax run ARGUMENTS --backend cpu`, which must succeed; `files` are in the folder where it runs.
 #[track_caller]
 pub fn run_with(files: &[(&str, &str)], arguments: &str) -> Done {
     let home = TempDir::new().unwrap();
@@ -25,7 +25,7 @@ pub fn run_with(files: &[(&str, &str)], arguments: &str) -> Done {
         fs::write(home.path().join(name), text).unwrap();
     }
     let mut command = Command::cargo_bin("curvelax").unwrap();
-    // Where this is not set, a layer of Mesa says so on stderr.
+    // Without this a layer of Mesa prints a message on stderr.
     command.current_dir(home.path()).env("XDG_RUNTIME_DIR", home.path()).arg("run");
     command.args(arguments.split_whitespace()).args(["--backend", "cpu", "--quiet", "--out", "out"]);
     let output = command.output().unwrap();

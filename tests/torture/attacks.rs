@@ -1,4 +1,4 @@
-//! What others do to the folder of a run while it is there: it is taken away, copied with links, or somebody else's.
+//! Interference with the folder of a run: it is moved away, copied with links, or belongs to someone else.
 
 use std::{
     fs,
@@ -16,17 +16,17 @@ use crate::{
     study::{Attempt, Study},
 };
 
-/// Calls at which a run is held while its folder is taken away.
+/// Calls at which a run is paused while its folder is taken away.
 const HELD_AT: [&str; 6] = ["openat", "rename", "unlink", "fsync", "mkdir", "write"];
 
-/// A run that `strace` stopped at the n-th of some call.
+/// A run that `strace` paused at the n-th use of a call.
 struct Held {
     running: Running,
     program: u32,
 }
 
 impl Held {
-    /// None if the run came to its end before.
+    /// None if the run ended earlier.
     fn start(attempt: &Attempt, call: &str, n: usize) -> Option<Held> {
         let log = attempt.home.path().join("calls");
         let inject = format!("inject={call}:signal=STOP:when={n}");
@@ -52,7 +52,8 @@ fn signal(process: u32, name: &str) {
     assert!(status.success());
 }
 
-/// The folder of a run is moved or removed at the `stride`-th calls, and another run takes its path: that one is not touched.
+/// The folder of a run is moved or removed at every `stride`-th call, and another run uses its path: that run must not
+/// be touched.
 pub fn taken_away(study: &Study, other: &Study, stride: usize, seed: u64) -> Outcome {
     let mut random = Random::new(seed);
     let (mut cases, mut lost) = (0, 0);
@@ -93,7 +94,7 @@ pub fn taken_away(study: &Study, other: &Study, stride: usize, seed: u64) -> Out
     Found::new(cases, format!("{lost} lost theirs and said so, 0 differing bytes in the other one"))
 }
 
-/// What was moved away is resumed where it is.
+/// A folder that was moved away is resumed where it is.
 fn must_go_on(study: &Study, attempt: &Attempt, gone: &Path, told: &str) {
     let has = |name: &str| gone.join(name).exists();
     if has(".curvelax.state") || has(".curvelax.state.old") || has("run.json") {
@@ -104,7 +105,8 @@ fn must_go_on(study: &Study, attempt: &Attempt, gone: &Path, told: &str) {
     }
 }
 
-/// The lock of a run is removed after its n-th rename, and the run is resumed beside it: that is refused, and the run goes on.
+/// The lock of a run is removed after its n-th rename, and a second process tries to resume the run: that is refused,
+/// and the run continues.
 pub fn lock_removed(study: &Study) -> Outcome {
     let mut cases = 0;
     for n in 1.. {
@@ -162,7 +164,7 @@ fn link(from: &Path, to: &Path) {
     }
 }
 
-/// Everybody's `--force` on everybody's folder: only one's own is taken.
+/// Every command with `--force` on every command's folder: each accepts only its own.
 pub fn foreign_folders(study: &Study) -> Outcome {
     let home = TempDir::new().unwrap();
     let go = |arguments: &str| Running::start(&mut curvelax(home.path(), arguments)).end();
@@ -178,7 +180,7 @@ pub fn foreign_folders(study: &Study) -> Outcome {
         assert_eq!(go(&arguments).code, Some(0), "{arguments}");
     }
     copy(&Attempt::interrupted(study).out(), &home.path().join("interrupted"));
-    // The file of a lock that nobody holds may go.
+    // The file of an unused lock may be removed.
     let _ = fs::remove_file(home.path().join("interrupted/.curvelax.lock"));
     let folders = ["runs", "interrupted", "convergences", "figures"];
     let commands = [
@@ -212,7 +214,8 @@ pub fn foreign_folders(study: &Study) -> Outcome {
     Found::new(cases, "one's own replaced, others refused and not touched")
 }
 
-/// A folder in which no run was begun: files of the user are not replaced, and what a killed run left is no obstacle.
+/// A folder in which no run was begun: files of the user are not replaced, and leftovers of a killed run are not in the
+/// way.
 pub fn folders_without_a_run(study: &Study) -> Outcome {
     let mut cases = 0;
     for name in ["summary.csv", "report.html", "series.csv", "ensemble.csv", "plots/mesh.svg", "shard.state"] {
@@ -242,7 +245,7 @@ pub fn folders_without_a_run(study: &Study) -> Outcome {
     Found::new(cases, "refused, or done where nothing was lost")
 }
 
-/// An outline is read once by a run and once by what resumes it, whatever is swept, and one that changed is refused.
+/// An outline is read once by a run and once when it is resumed, whatever is swept, and a changed one is refused.
 pub fn outlines() -> Outcome {
     let home = TempDir::new().unwrap();
     let outline = home.path().join("q.csv");
@@ -270,7 +273,7 @@ pub fn outlines() -> Outcome {
     Found::new(cases, "read once; refused where it changed")
 }
 
-/// Paths around the longest that the system knows: done, or refused with nothing left over.
+/// Paths near the maximum length of the system: the run succeeds, or is refused with nothing left over.
 pub fn long_paths(study: &Study, lengths: &[usize]) -> Outcome {
     let (mut done, mut refused) = (0, 0);
     for length in lengths {

@@ -1,7 +1,7 @@
-//! Killed, or told of an error, at the n-th call of the system that touches a file, for every n.
+//! Kills or errors at the n-th system call that touches a file, for every n.
 //!
-//! `strace` injects both. It counts the calls of each thread by itself; the run has one thread that touches files for every
-//! call that is looked at, or the point that is counted in another one is met at its own number.
+//! `strace` injects both. It counts the calls of each thread separately. For every call under test, a single thread of
+//! the run touches files; if a call is counted in another thread, the fault comes at that thread's own count.
 
 use std::{collections::BTreeMap, fs};
 
@@ -14,7 +14,7 @@ use crate::{
     study::{Attempt, Study},
 };
 
-/// Calls that change what is on disk.
+/// Calls that change data on disk.
 pub const CHANGES: [&str; 20] = [
     "openat",
     "write",
@@ -42,17 +42,17 @@ pub const CHANGES: [&str; 20] = [
 pub const FAILURES: [&str; 9] =
     ["read", "pread64", "close", "flock", "fcntl", "lseek", "statx", "getdents64", "readlink"];
 
-/// What a disk says that is full, broken, or full for this user.
+/// Errors of a disk that is full, broken, or full for this user.
 const ERRORS: [&str; 3] = ["ENOSPC", "EIO", "EDQUOT"];
 
-/// Whether `strace` is there and may trace.
+/// Whether `strace` is installed and may trace.
 pub fn can_trace() -> bool {
     let mut command = std::process::Command::new("strace");
     command.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=none", "true"]);
     command.output().is_ok_and(|output| output.status.success())
 }
 
-/// What is tormented: a run from its beginning, one that is resumed, or one over the files of an earlier run.
+/// The target: a run from its beginning, a resumed one, or one over the files of an earlier run.
 #[derive(Clone, Copy)]
 pub enum From {
     Start,
@@ -60,7 +60,7 @@ pub enum From {
     Over(&'static Study),
 }
 
-/// How often each of `calls` is made by one thread at most.
+/// The maximum number of each of `calls` by one thread.
 fn counts(prepared: &Prepared, calls: &[&str]) -> BTreeMap<String, usize> {
     let list = TempDir::new().unwrap();
     let file = list.path().join("calls");
@@ -85,7 +85,7 @@ fn counts(prepared: &Prepared, calls: &[&str]) -> BTreeMap<String, usize> {
     most
 }
 
-/// Where an attempt begins.
+/// The starting point of an attempt.
 struct Prepared<'a> {
     study: &'a Study,
     from: From,
@@ -114,22 +114,22 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Goes on with `fault` at the calls `when`.
+    /// Continues with `fault` at the calls `when`.
     fn with_fault(&self, attempt: &Attempt, call: &str, fault: &str, when: &str) -> Ended {
-        // A call that is not traced is not tampered with.
+        // Only traced calls can be tampered with.
         let (trace, inject) = (format!("trace={call}"), format!("inject={call}:{fault}:when={when}"));
         self.go(attempt, &["strace", "-f", "-qq", "-o", "/dev/null", "-e", &trace, "-e", &inject])
     }
 }
 
-/// Kills at every `stride`-th of the calls that change what is on disk.
+/// Kills at every `stride`-th of the calls that change data on disk.
 pub fn kill_at_every_call(study: &Study, from: From, stride: usize, seed: u64) -> Outcome {
     let prepared = Prepared::new(study, from);
     let mut random = Random::new(seed);
     let (mut points, mut told) = (0, Vec::new());
     for (call, count) in counts(&prepared, &CHANGES) {
         let mut killed = 0;
-        // One more: the count may differ a little from run to run where it depends on the time.
+        // One more: the number may differ slightly from run to run if it depends on time.
         for n in (1 + random.below(stride)..=count + 1).step_by(stride) {
             let attempt = prepared.attempt();
             let ended = prepared.with_fault(&attempt, &call, "signal=KILL", &n.to_string());
@@ -149,7 +149,7 @@ pub fn kill_at_every_call(study: &Study, from: From, stride: usize, seed: u64) -
     Found::new(points, format!("0 differing bytes ({})", told.join(", ")))
 }
 
-/// Lets every `stride`-th call fail, once or from then on, with one error after the other or, where `all`, with each.
+/// Makes every `stride`-th call fail, once or from then on, with one error after the other or, if `all`, with each.
 pub fn fail_at_every_call(study: &Study, from: From, stride: usize, all: bool, seed: u64) -> Outcome {
     let prepared = Prepared::new(study, from);
     let mut random = Random::new(seed);
@@ -158,7 +158,7 @@ pub fn fail_at_every_call(study: &Study, from: From, stride: usize, all: bool, s
     let (mut points, mut turn) = (0, 0);
     for (call, count) in counts(&prepared, &calls) {
         for n in (1 + random.below(stride)..=count).step_by(stride) {
-            // A disk that is full stays so; a call that fails once is as bad.
+            // A full disk stays full; a call that fails once is just as bad.
             let faults = ERRORS.iter().flat_map(|error| [n.to_string(), format!("{n}+")].map(|when| (error, when)));
             let taken: Vec<_> = match all {
                 true => faults.collect(),
@@ -170,7 +170,7 @@ pub fn fail_at_every_call(study: &Study, from: From, stride: usize, all: bool, s
                 let ended = prepared.with_fault(&attempt, &call, &format!("error={error}"), &when);
                 let told = format!("{error} of {call} at {when}: {ended:?}");
                 eprintln!("{}: {told}", study.name);
-                // Nothing can be said where that fails, too.
+                // Nothing can be printed if that fails, too.
                 let speechless = call == "write" && ended.said.is_empty() && matches!(ended.code, Some(1 | 2));
                 let code = if speechless { 1 } else { must_be_a_decent_end(&ended, &told) };
                 *by_code.entry(code).or_default() += 1;
@@ -184,7 +184,7 @@ pub fn fail_at_every_call(study: &Study, from: From, stride: usize, all: bool, s
     Found::new(points, format!("0 panics, 0 differing bytes ({})", codes.join(", ")))
 }
 
-/// Done in spite of all, or one line that says where it failed; returns the exit code.
+/// The run succeeded in spite of all, or printed one line that says where it failed; returns the exit code.
 #[track_caller]
 pub fn must_be_a_decent_end(ended: &Ended, told: &str) -> i32 {
     let code = ended.code.unwrap_or_else(|| panic!("{told}"));
@@ -194,11 +194,11 @@ pub fn must_be_a_decent_end(ended: &Ended, told: &str) -> i32 {
         1 | 2 => {
             let errors = ended.errors();
             assert!(errors.len() == 1 && ended.said.lines().all(is_said), "{told}");
-            // The folder that the run makes its own in is `.`.
+            // The run creates its folder in `.`.
             let is_path = ["out", "to .: "].iter().any(|path| errors[0].contains(path));
             assert!(is_path, "no path: {told}");
         }
-        // Before the program: the libraries could not be loaded.
+        // Before the program started: the libraries could not be loaded.
         127 => assert!(ended.said.contains("error while loading shared libraries"), "{told}"),
         _ => panic!("{told}"),
     }

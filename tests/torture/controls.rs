@@ -8,7 +8,7 @@ use crate::{
     study::{Attempt, Study},
 };
 
-/// One changed byte in any file, a file too many, a file too few are all seen; other clock times are not.
+/// One changed byte in any file, an extra file and a missing file are all detected; other clock times are not.
 pub fn differences_are_seen(study: &Study) -> Outcome {
     let attempt = Attempt::new(study);
     assert_eq!(attempt.start().end().code, Some(0));

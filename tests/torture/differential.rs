@@ -1,8 +1,8 @@
-//! Random studies: every cell is the run that it would be alone, bit for bit, and threads, shards, the order of a merge,
-//! stops and kills change no byte.
+//! Random studies: every cell equals a run of it alone, bit for bit, and threads, shards, the order of a merge, stops
+//! and kills change no byte.
 //!
-//! The keys that a study sweeps are dealt from a shuffled pack of all that can be swept, two a study, so that few studies
-//! meet every key. A study whose values do not go together is refused by the program and drawn again.
+//! The swept keys are dealt from a shuffled pack of all keys that can be swept, two per study, so that few studies
+//! cover every key. If its values are not compatible, the program refuses a study, and it is drawn again.
 
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
@@ -20,7 +20,7 @@ use crate::{
     random::Random,
 };
 
-/// Every key that can be swept, with values for it. A value that has commas is why `;` stands between them.
+/// Every key that can be swept, with values for it. Values that contain commas are why `;` separates them.
 const KEYS: [(&str, &[&str]); 20] = [
     ("points", &["13", "16", "24", "37"]),
     ("seed", &["1", "2", "77"]),
@@ -46,14 +46,14 @@ const KEYS: [(&str, &[&str]); 20] = [
     ("relax-to", &["0.01", "0.5"]),
     ("relax-at", &["0.01", "0.1"]),
 ];
-/// Keys that stand instead of each other.
+/// Keys that exclude each other.
 const INSTEAD: [[&str; 2]; 2] = [["tau", "adaptive"], ["relax-to", "relax-at"]];
-/// Keys of sweeps, which a direct solver refuses.
+/// Keys for sweeps of the solver, which a direct solver refuses.
 const OF_SWEEPS: [&str; 3] = ["order", "tolerance", "sor"];
-/// Tables with a row for every member or cell.
+/// Tables with a row per member or cell.
 const TABLES: [&str; 6] =
     ["summary.csv", "series.csv", "snapshots.csv", "ensemble.csv", "rates.csv", "mean_excess.csv"];
-/// Draws of a study whose values do not go together.
+/// Draws of a study with incompatible values.
 const TRIES: usize = 20;
 /// An ellipse with a dent, as a file.
 const OUTLINE: [(f64, f64); 8] =
@@ -63,11 +63,11 @@ type Settings = BTreeMap<&'static str, String>;
 
 /// A random study.
 struct Drawn {
-    /// Values of keys that all cells have.
+    /// Values of keys for all cells.
     base: Settings,
     /// The swept keys with their values.
     axes: [(&'static str, Vec<&'static str>); 2],
-    /// Flags that say nothing about a member's way.
+    /// Flags that do not affect a member's trajectory.
     rest: String,
     members: usize,
     common: bool,
@@ -87,8 +87,8 @@ impl Drawn {
         let fixed =
             [("t-end", "0.4"), ("modes", "2..=3"), ("points", if on_the_gpu { "16" } else { "23" }), ("tau", "1e-3")];
         base.extend(fixed.map(|(key, value)| (key, value.to_string())));
-        // Lengths of steps and numbers of nodes are whole other ways through the program; the rest stays as it is half the
-        // time. On a GPU every number of nodes is a kernel to compile.
+        // Kinds of steps and numbers of nodes are entirely different paths through the program; other keys keep their
+        // values half the time. On a GPU every number of nodes requires compiling a kernel.
         for (key, values) in KEYS {
             let stays = OF_SWEEPS.contains(&key) || (on_the_gpu && ["points", "solver"].contains(&key));
             if !stays && random.below(2) == 0 {
@@ -101,8 +101,8 @@ impl Drawn {
         if keys.contains(&"order") {
             set(&mut base, "solver", "gauss-seidel");
         }
-        // A strong pull brings so few nodes into disorder where nothing redistributes them: such a member stalls after
-        // thousands of steps, and by sweeps it takes minutes.
+        // With a strong pull and no redistribution, so few nodes fall into disorder: the member stalls after thousands
+        // of steps, and with sweeps it needs minutes.
         let swept = |key: &str| keys.contains(&key);
         let has = |base: &Settings, key: &str, value: &str| base.get(key).is_some_and(|own| own == value);
         if (swept("pull") || has(&base, "pull", "auto"))
@@ -144,7 +144,7 @@ impl Drawn {
         format!("run {} {} {} --curves {}", flags(&self.base), axes.join(" "), self.rest, self.members)
     }
 
-    /// The run that cell `cell` would be by itself, and the number that its first member has there.
+    /// The run of cell `cell` alone, and the index that its first member has there.
     fn alone(&self, cell: usize) -> (String, usize) {
         let [(outer, outer_values), (inner, inner_values)] = &self.axes;
         let mut own = self.base.clone();
@@ -167,7 +167,7 @@ fn values(key: &str) -> &'static [&'static str] {
     KEYS.iter().find(|(name, _)| *name == key).unwrap().1
 }
 
-/// Sets a key, in the place of one that stands instead.
+/// Sets a key, replacing one that it excludes.
 fn set(settings: &mut Settings, key: &'static str, value: &str) {
     for [one, other] in INSTEAD {
         if key == one || key == other {
@@ -188,11 +188,11 @@ fn flags(settings: &Settings) -> String {
     settings.iter().map(flag).collect::<Vec<_>>().join(" ")
 }
 
-/// A study in its own folder, where all that is tried with it runs.
+/// A study in a separate folder, in which all experiments with it run.
 struct Trial {
     home: TempDir,
     drawn: Drawn,
-    /// All that was run, for who wants to see it fail again.
+    /// All commands so far, so that a failure can be repeated.
     story: Vec<String>,
 }
 
@@ -219,7 +219,8 @@ impl Trial {
         content(&self.home.path().join(folder))
     }
 
-    /// The folder must hold the files of the study. Threads stand in `run.json`: it is compared where they are the `same`.
+    /// The folder must hold the files of the study. `run.json` has the number of threads, so it is compared only if
+    /// that is the `same`.
     #[track_caller]
     fn must_be_the_study(&self, expected: &Content, folder: &str, same: bool) {
         let [mut expected, mut found] = [expected.clone(), self.content(folder)];
@@ -231,7 +232,7 @@ impl Trial {
         assert!(differences.is_empty(), "{folder}: {differences:#?} after {:#?}", self.story);
     }
 
-    /// Whether the study goes together: nothing was written where it does not.
+    /// Whether the values are compatible; if not, nothing was written.
     fn is_accepted(&mut self) -> bool {
         let ended = self.start(&format!("{} --out study", self.drawn.study())).end();
         let refused = ended.code == Some(2) && !self.home.path().join("study").exists();
@@ -239,7 +240,7 @@ impl Trial {
         !refused
     }
 
-    /// Every cell against its own run; returns the number of rows compared.
+    /// Every cell against a run of it alone; returns the number of rows compared.
     #[track_caller]
     fn cells(&mut self) -> usize {
         let mut compared = 0;
@@ -262,8 +263,8 @@ impl Trial {
         compared
     }
 
-    /// The rows of a cell whose first member is `first`, with members counted from there, and without what says which cell it
-    /// is; none where there is no such table.
+    /// The rows of a cell whose first member is `first`, with members counted from there, and without the columns that
+    /// identify the cell; none if there is no such table.
     fn rows(&self, path: &Path, cell: usize, first: usize) -> Vec<Vec<String>> {
         let Ok(mut table) = csv::Reader::from_path(path) else { return Vec::new() };
         let header = table.headers().unwrap().clone();
@@ -285,7 +286,7 @@ impl Trial {
         table.records().filter_map(|record| row(record.unwrap())).collect()
     }
 
-    /// The study in shards, on other numbers of threads, and joined in two orders.
+    /// The study in shards, with different numbers of threads, merged in two orders.
     #[track_caller]
     fn shards(&mut self, expected: &Content, random: &mut Random) {
         let members = self.drawn.cells() * self.drawn.members;
@@ -305,18 +306,18 @@ impl Trial {
         }
     }
 
-    /// The study stopped and killed, and gone on with until it ends.
+    /// The study stopped and killed, and resumed until it ends.
     #[track_caller]
     fn interruptions(&mut self, expected: &Content, took: Duration, random: &mut Random) -> usize {
         let study = self.drawn.study();
         let mut running = self.start(&format!("{study} --out stopped"));
         let mut interruptions = 0;
         for _ in 0..4 {
-            // Members are advanced from the moment on at which their table is there, and for a part of the time only.
+            // Members run only for a part of the time, from the moment when their table exists.
             let (table, moment) =
                 (self.home.path().join("stopped/.summary.csv.part"), took.mul_f64(0.5 * random.real()));
             running.wait_until(|running| table.exists() && running.age() >= moment);
-            // A stop leaves a state of that very moment, a kill what was there.
+            // A stop leaves a checkpoint of that moment, a kill the last one.
             let ended = match random.below(3) {
                 0 => running.kill(),
                 _ => {
@@ -346,11 +347,11 @@ impl Trial {
     }
 }
 
-/// Studies on a back end until `wanted` of them were compared.
+/// Runs studies on a back end until `wanted` of them were compared.
 pub fn studies(backend: &'static str, wanted: usize, seed: u64) -> Outcome {
     let mut random = Random::new(seed ^ u64::from(backend == "gpu") << 40);
     let mut pack = VecDeque::new();
-    // Where there is room for all keys, none is left out.
+    // If there is room for all keys, none is left out.
     let mut missing: BTreeSet<&str> = keys(backend).into_iter().collect();
     missing.retain(|_| 2 * wanted >= KEYS.len());
     let (mut studies, mut refused, mut cells, mut rows, mut interruptions) = (0, 0, 0, 0, 0);
@@ -363,7 +364,7 @@ pub fn studies(backend: &'static str, wanted: usize, seed: u64) -> Outcome {
             pack.push_back(keys[0]);
             continue;
         }
-        // Until the program takes it; some pairs never go together.
+        // Until the program accepts it; some pairs are never compatible.
         for _ in 0..TRIES {
             let mut trial = Trial::new(Drawn::new(&mut random, keys, backend));
             let since = Instant::now();

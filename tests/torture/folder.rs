@@ -1,11 +1,11 @@
-//! All that lies in a folder, byte for byte, and how two folders differ.
+//! The contents of a folder, byte for byte, and how two folders differ.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-/// Files by their path in the folder. Folders have a `/` at the end.
+/// Files by their path in the folder. Folders end in `/`.
 pub type Content = BTreeMap<String, Vec<u8>>;
 
-/// What is in `folder`, without the clock times of its `run.json`.
+/// The contents of `folder`, without the clock times of its `run.json`.
 pub fn content(folder: &Path) -> Content {
     let mut content = Content::new();
     collect(folder, "", &mut content);
@@ -28,7 +28,7 @@ fn collect(folder: &Path, prefix: &str, content: &mut Content) {
     }
 }
 
-/// Without the only two lines that may differ between equal runs.
+/// Removes the only two lines that may differ between equal runs.
 fn without_clock_times(json: &[u8]) -> Vec<u8> {
     let is_time = |line: &[u8]| {
         [b"  \"started\": ".as_slice(), b"  \"wall_seconds\": "].iter().any(|begin| line.starts_with(begin))
@@ -36,7 +36,7 @@ fn without_clock_times(json: &[u8]) -> Vec<u8> {
     json.split_inclusive(|byte| *byte == b'\n').filter(|line| !is_time(line)).flatten().copied().collect()
 }
 
-/// A line for every file that is missing, is left over or has another content.
+/// A line for every file that is missing, extra or different.
 pub fn differences(expected: &Content, found: &Content) -> Vec<String> {
     let missing = expected.keys().filter(|name| !found.contains_key(*name)).map(|name| format!("{name} is missing"));
     let left = found.keys().filter(|name| !expected.contains_key(*name)).map(|name| format!("{name} is left over"));

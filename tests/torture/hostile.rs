@@ -1,4 +1,4 @@
-//! What lies where a file of a run should: pipes, devices, folders, links, and files that hardly end.
+//! Other things in the place of a run's files: pipes, devices, folders, links, and huge files.
 
 use std::{
     ffi::OsStr,
@@ -17,14 +17,14 @@ use crate::{
     study::{Attempt, Study},
 };
 
-/// Address space that is enough for the small runs of these tests, and not for a file that is read whole.
+/// Address space that is enough for the small runs of these tests, but not for reading a whole huge file.
 const LITTLE: [&str; 3] = ["sh", "-c", "ulimit -v 1000000; exec \"$0\" \"$@\""];
 
-/// What is put in the place of a file.
+/// Replacements of a file.
 const THINGS: [&str; 5] = ["a pipe", "a device", "a folder", "2 GiB", "nothing to be opened"];
 
 fn put(thing: &str, path: &Path) {
-    // With what it says of itself as long as that was right.
+    // With its original header as long as that was valid.
     let old = fs::read(path).unwrap_or_default();
     let _ = fs::remove_file(path);
     match thing {
@@ -44,8 +44,8 @@ fn put(thing: &str, path: &Path) {
     }
 }
 
-/// Each of [`THINGS`] in the place of every file that is read again: what reads it says so at once, in little memory, or does
-/// without; what is put there is as it was.
+/// Each of [`THINGS`] in the place of every file that is read again: the reader reports it at once, with little memory,
+/// or does without the file; the replacement stays unchanged.
 pub fn in_the_place_of_files(csv: &Study, zarr: &Study) -> Outcome {
     let home = TempDir::new().unwrap();
     let go = |arguments: &str| Running::start(&mut through(home.path(), &LITTLE, arguments)).end();
@@ -102,11 +102,11 @@ pub fn in_the_place_of_files(csv: &Study, zarr: &Study) -> Outcome {
     Found::new(count, format!("{done} done without it, {} refused in 1 GB", count - done))
 }
 
-/// Folders where a run wants to have others, leftovers of a kill in a store, and names that are no text.
+/// Folders where a run needs others, leftovers of a kill in a store, and names that are not text.
 pub fn in_the_way(csv: &Study, zarr: &Study) -> Outcome {
     let mut cases = 0;
     let middle = Attempt::interrupted(csv);
-    // The file of a lock that nobody holds may go.
+    // The file of an unused lock may be removed.
     let _ = fs::remove_file(middle.out().join(".curvelax.lock"));
     for name in [".curvelax.state", ".curvelax.state.old", ".curvelax.state.part", ".curvelax.part"] {
         let attempt = middle.fork();

@@ -1,4 +1,4 @@
-//! Killed with no warning, at random times, again and again, also while resuming.
+//! Kills without warning, at random times, repeatedly, also while resuming.
 
 use std::{thread::sleep, time::Duration};
 
@@ -12,16 +12,16 @@ use crate::{
 /// When a run is killed.
 #[derive(Clone, Copy, Debug)]
 enum Moment {
-    /// So long after its start.
+    /// This long after its start.
     After(Duration),
-    /// So long after the first file of the last stage appears.
+    /// This long after the first file of the last stage appears.
     Publishing(Duration),
 }
 
-/// What appears when all members have ended: the tables that are made of all of them, and final names.
+/// Files that appear when all members have ended: tables over all of them, and final names.
 const LAST_STAGE: [&str; 4] = [".ensemble.csv.part", "ensemble.csv", "summary.csv", ".run.json.part"];
 
-/// A moment for a run that takes `whole`: its first milliseconds, its end, and anything between.
+/// A moment for a run that needs `whole`: its first milliseconds, its end, and anything between.
 fn moment(random: &mut Random, whole: Duration) -> Moment {
     let between = |random: &mut Random, most: Duration| most.mul_f64(random.real());
     match random.below(5) {
@@ -43,8 +43,8 @@ impl Moment {
     }
 }
 
-/// Kills `study` at least `kills` times: every run of it one to six times before it is let through. Over the files of an
-/// `earlier` run, these or those must be left whole.
+/// Kills `study` at least `kills` times: every run of it one to six times before it may finish. Over the files of an
+/// `earlier` run, either those or the new ones must be complete.
 pub fn at_random_times(study: &Study, earlier: Option<&Study>, kills: usize, seed: u64) -> Outcome {
     let whole = study.reference().took;
     let mut random = Random::new(seed);

@@ -1,7 +1,7 @@
-//! Whatever happens to a run, its files end as if nothing had, or it says what was wrong.
+//! Whatever happens to a run, its final files are as if nothing had happened, or it reports what was wrong.
 //!
-//! Within `cargo test` at a small scale; `tests/torture/run` takes the full one (TORTURE=full). Every test counts its cases,
-//! and a table of all stands at the end. Times are random, from TORTURE_SEED, which is printed.
+//! `cargo test` runs these tests at a small scale, `tests/torture/run` at full scale (TORTURE=full). Every test counts
+//! its cases, and a table of all is printed at the end. Times are random, from TORTURE_SEED, which is printed.
 #![cfg_attr(not(target_os = "linux"), allow(dead_code, unused_imports))]
 
 #[cfg(target_os = "linux")]
@@ -53,7 +53,7 @@ fn main() -> std::process::ExitCode {
     suite::main()
 }
 
-/// Processes, signals and disks are asked for here as Linux knows them.
+/// Processes, signals and disks are used here as on Linux.
 #[cfg(not(target_os = "linux"))]
 fn main() {
     println!("torture: only on Linux");

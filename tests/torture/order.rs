@@ -16,7 +16,7 @@ fn tables(files: &Content) -> Content {
     files.iter().filter(|(name, _)| name.ends_with(".csv")).map(|(name, text)| (name.clone(), text.clone())).collect()
 }
 
-/// One, two, three and more threads, from the start and from the middle on.
+/// One, two, three and more threads, from the start and from the middle.
 pub fn threads(study: &Study) -> Outcome {
     let expected = tables(&study.reference().files);
     let mut cases = 0;
@@ -31,7 +31,7 @@ pub fn threads(study: &Study) -> Outcome {
         let run = done(&attempt, &attempt.run().replace("--threads 1", ""));
         let found = differences(&expected, &tables(&run));
         assert!(found.is_empty(), "{threads} threads: {found:?}");
-        // The number of threads that it ended with is in its files.
+        // The number of threads at its end is in its files.
         let attempt = Attempt::interrupted(study);
         let found = differences(&run, &done(&attempt, "resume out --quiet"));
         assert!(found.is_empty(), "resumed with {threads} threads: {found:?}");
@@ -40,7 +40,7 @@ pub fn threads(study: &Study) -> Outcome {
     Found::new(cases, "0 differing bytes")
 }
 
-/// Members by themselves, in pairs and in another order of the request.
+/// Members alone, in pairs and requested in another order.
 pub fn subsets(study: &Study, subsets: &[&str]) -> Outcome {
     let expected = &study.reference().files;
     let text = |files: &Content, name: &str| {

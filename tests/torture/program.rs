@@ -1,4 +1,4 @@
-//! The program as a user starts it, waits for it, signals it and kills it.
+//! Starts the program like a user, waits for it, signals it and kills it.
 
 use std::{
     fs,
@@ -11,11 +11,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How often a process is looked at.
+/// Interval between checks of a process.
 const GLANCE: Duration = Duration::from_millis(1);
-/// No process of these tests runs as long, on whatever machine; one that does hangs.
+/// No process of these tests runs this long on any machine; one that does hangs.
 pub const HANGS: Duration = Duration::from_secs(1800);
-/// A tick of the processor time in `/proc`, on every machine that matters.
+/// A tick of the processor time in `/proc`, on every relevant machine.
 const TICK: Duration = Duration::from_millis(10);
 
 /// The built program.
@@ -32,13 +32,13 @@ pub fn curvelax(home: &Path, arguments: &str) -> Command {
 pub fn through(home: &Path, starter: &[&str], arguments: &str) -> Command {
     let mut words = hearing().iter().chain(starter).map(PathBuf::from).chain([binary()]);
     let mut command = Command::new(words.next().unwrap());
-    // Where this is not set, a layer of Mesa says so on stderr.
+    // Without this a layer of Mesa prints a message on stderr.
     command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(words).args(arguments.split_whitespace());
     command
 }
 
-/// Starts a program that hears signals: who runs these tests in the background of a shell lets them ignore Ctrl-C, which is
-/// inherited. Nothing where there is no such starter.
+/// A starter that makes a program receive signals: if these tests run in the background of a shell they ignore Ctrl-C,
+/// which is inherited. Empty if there is no such starter.
 fn hearing() -> &'static [&'static str] {
     const ENV: [&str; 2] = ["env", "--default-signal=INT,HUP,TERM"];
     static HAS_ENV: OnceLock<bool> = OnceLock::new();
@@ -55,7 +55,7 @@ fn succeeds(command: &mut Command) -> bool {
     status.is_ok_and(|status| status.success())
 }
 
-/// What `/proc/PROCESS/status` says under `name`, such as `VmRSS:`.
+/// The entry of `/proc/PROCESS/status` called `name`, such as `VmRSS:`.
 pub fn status(process: u32, name: &str) -> Option<String> {
     let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     Some(status.lines().find_map(|line| line.strip_prefix(name))?.trim().to_string())
@@ -64,12 +64,12 @@ pub fn status(process: u32, name: &str) -> Option<String> {
 /// A started program; killed when it is dropped.
 pub struct Running {
     child: Child,
-    /// Reads its stderr: a pipe, so that limits of files do not bind what is said.
+    /// Reads its stderr: a pipe, so that file limits do not apply to messages.
     said: Option<JoinHandle<Vec<u8>>>,
     since: Instant,
 }
 
-/// What a program left.
+/// The result of a program.
 #[derive(Debug)]
 pub struct Ended {
     pub code: Option<i32>,
@@ -79,7 +79,7 @@ pub struct Ended {
 }
 
 impl Running {
-    /// Starts `command`, whose stdout goes nowhere unless it was told otherwise.
+    /// Starts `command`; its stdout is discarded unless it was redirected.
     #[track_caller]
     pub fn start(command: &mut Command) -> Running {
         Running::start_with(command.stdout(Stdio::null()))
@@ -112,7 +112,7 @@ impl Running {
         self.child.try_wait().unwrap().is_some()
     }
 
-    /// Waits until it is over, or `enough` is true; returns whether it is still running.
+    /// Waits until it has ended, or `enough` is true; returns whether it is still running.
     pub fn wait_until(&mut self, mut enough: impl FnMut(&Running) -> bool) -> bool {
         while !self.is_over() {
             assert!(self.age() < HANGS, "hangs");
@@ -135,7 +135,7 @@ impl Running {
         caught.is_some_and(|mask| mask >> (number - 1) & 1 == 1)
     }
 
-    /// Whether SIGSTOP holds it.
+    /// Whether SIGSTOP has paused it.
     pub fn is_held(&self) -> bool {
         status(self.id(), "State:").is_some_and(|state| state.starts_with('T'))
     }
@@ -146,16 +146,16 @@ impl Running {
         files.filter_map(|file| fs::read_link(file.path()).ok()).any(|path| path.ends_with(name))
     }
 
-    /// The processor time that it has had so far.
+    /// The processor time it has used so far.
     pub fn worked(&self) -> Option<Duration> {
         let stat = fs::read_to_string(format!("/proc/{}/stat", self.id())).ok()?;
-        // After the name of the program, from the third field on; the 14th and the 15th.
+        // After the name of the program, from the third field; these are the 14th and the 15th.
         let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
         let ticks = |field: usize| fields.get(field - 3)?.parse::<u32>().ok();
         Some(TICK * (ticks(14)? + ticks(15)?))
     }
 
-    /// Does something to it until its end; returns also the processor time that it takes from now on.
+    /// Repeats `what` until it ends; also returns the processor time it uses from now on.
     #[track_caller]
     pub fn end_while(mut self, mut what: impl FnMut(&Running)) -> (Ended, Duration) {
         let before = self.worked().unwrap_or_default();
@@ -173,7 +173,7 @@ impl Running {
         self.end()
     }
 
-    /// Waits for its end. Whatever was done to it, it must not panic.
+    /// Waits for its end. It must not panic, whatever was done to it.
     #[track_caller]
     pub fn end(mut self) -> Ended {
         self.wait_until(|_| false);
@@ -187,10 +187,10 @@ impl Running {
     }
 }
 
-/// `kill -s NAME` of all at once.
+/// `kill -s NAME` for all at once.
 pub fn signal(name: &str, all: &[&Running]) {
     let ids = all.iter().map(|running| running.id().to_string());
-    // They may be over by now.
+    // They may have ended.
     let _ = Command::new("kill").args(["-s", name]).args(ids).stderr(Stdio::null()).status();
 }
 
@@ -207,7 +207,7 @@ impl Ended {
         self.said.lines().filter(|line| line.starts_with("error: ")).collect()
     }
 
-    /// Whether it was told that there is nothing to resume.
+    /// Whether the message is that there is nothing to resume.
     pub fn had_not_begun(&self) -> bool {
         let is_said = |words: &str| self.said.contains(words);
         self.code == Some(2) && is_said("--force") && (is_said("had not begun") || is_said("no run was begun here"))

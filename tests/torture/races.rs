@@ -6,13 +6,13 @@ use crate::{
     study::{Attempt, Study},
 };
 
-/// Begins when it is woken, so that two that are woken together begin together.
+/// Starts when it is woken, so that two programs can be started together.
 const HELD: [&str; 3] = ["sh", "-c", "kill -s STOP $$; exec \"$0\" \"$@\""];
 
-/// Open in a run that is at work, from its begin to its end.
+/// Open while a run is working, from its start to its end.
 const TABLE: &str = ".summary.csv.part";
 
-/// Who starts twice.
+/// Which command starts twice.
 #[derive(Clone, Copy, Debug)]
 pub enum Twins {
     Runs,
@@ -36,7 +36,7 @@ impl Twins {
     }
 }
 
-/// `races` double starts: exactly one proceeds, and the other does not touch it.
+/// `races` double starts: exactly one proceeds, and the other does not touch its files.
 pub fn double_starts(study: &Study, races: usize) -> Outcome {
     let middle = Attempt::interrupted(study);
     let mut second_won = 0;
@@ -60,8 +60,8 @@ pub fn double_starts(study: &Study, races: usize) -> Outcome {
     Found::new(races, format!("{races} proceeded, {races} refused, 0 differing bytes; {second_won} times the second"))
 }
 
-/// Lets both begin at once. The one that gets to work is held until the other one has ended: it must not be done before the
-/// other one looks, however little work there is.
+/// Starts both at once. The one that begins to work is paused until the other one has ended: it must not finish before
+/// the other one checks, however little work there is.
 fn together(mut both: [Running; 2]) -> [Ended; 2] {
     for one in &mut both {
         one.wait_until(Running::is_held);

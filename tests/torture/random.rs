@@ -1,4 +1,4 @@
-//! Random numbers one after the other.
+//! A sequence of random numbers.
 
 use curvelax::random::Stream;
 
@@ -18,7 +18,7 @@ impl Random {
         self.stream.uniforms(self.next)[0]
     }
 
-    /// A whole number below `limit`.
+    /// An integer below `limit`.
     pub fn below(&mut self, limit: usize) -> usize {
         (self.real() * limit as f64) as usize
     }

@@ -1,4 +1,4 @@
-//! Asked to stop: by a signal at a random time, by two of them, by the clock.
+//! Requests to stop: by a signal at a random time, by two of them, by the clock.
 
 use std::{
     thread::{available_parallelism, sleep},
@@ -12,11 +12,11 @@ use crate::{
     study::{Attempt, Study},
 };
 
-/// A run that was asked to stop stops after so much work on each core. What the clock says is printed: it is the machine's,
-/// which may be at other work.
+/// Maximum processor time per core in which a run stops when asked. The wall time is only printed, as the machine may
+/// be busy with other work.
 const SOON: Duration = Duration::from_secs(5);
 
-/// The most that runs took to stop.
+/// The maximum that runs needed to stop.
 #[derive(Default)]
 struct Longest {
     waited: Duration,
@@ -29,7 +29,7 @@ impl Longest {
         self.end_while(running, |_| ())
     }
 
-    /// The same while more is done to it.
+    /// The same while `what` is done to it.
     fn end_while(&mut self, running: Running, what: impl FnMut(&Running)) -> Ended {
         let asked = Instant::now();
         let (ended, worked) = running.end_while(what);
@@ -59,7 +59,7 @@ pub fn stop_at_random_times(studies: &[&Study], signals: &[(&str, i32, i32)], ca
         rank += 1;
         let attempt = Attempt::on_a_fast_disk(study);
         let mut running = attempt.start();
-        // Twice in a row: the second one stops a resumed run.
+        // Twice in a row: the second signal stops a resumed run.
         for _ in 0..2 {
             let time = study.reference().took.mul_f64(0.8 * random.real());
             running.wait_until(|running| running.age() >= time);
@@ -72,7 +72,7 @@ pub fn stop_at_random_times(studies: &[&Study], signals: &[(&str, i32, i32)], ca
                     assert!(attempt.has_state(), "{told}");
                     stopped += 1;
                 }
-                // It came before the program listened.
+                // It came before the program received signals.
                 (None, Some(found)) if found == number => assert!(!hears, "{told}"),
                 (Some(0), _) => {}
                 _ => return Err(told.into()),
@@ -86,7 +86,7 @@ pub fn stop_at_random_times(studies: &[&Study], signals: &[(&str, i32, i32)], ca
     Found::new(stopped, format!("0 differing bytes; {}", longest.within(SOON)))
 }
 
-/// Between one Ctrl-C and the next of somebody in a hurry.
+/// Time between two Ctrl-C of someone in a hurry.
 const PRESSED_AGAIN: Duration = Duration::from_millis(100);
 
 /// A second Ctrl-C does not wait for anything.
@@ -101,7 +101,7 @@ pub fn stop_twice(study: &Study, cases: usize, seed: u64) -> Outcome {
         running.signal("INT");
         sleep(Duration::from_millis(3).mul_f64(random.real()));
         let (first, mut pressed) = (Instant::now(), 0);
-        // Two that come before the first is looked at are one: who is not heard presses again.
+        // Two signals that come before the first is handled count as one: whoever is not heard presses again.
         let ended = longest.end_while(running, |running| {
             if first.elapsed() >= PRESSED_AGAIN * pressed {
                 running.signal("INT");
@@ -114,13 +114,13 @@ pub fn stop_twice(study: &Study, cases: usize, seed: u64) -> Outcome {
     Found::new(cases, format!("0 differing bytes; {}", longest.within(SOON / 5)))
 }
 
-/// The shortest limit of time.
+/// The shortest time limit.
 const SECOND: Duration = Duration::from_secs(1);
-/// How often a run may only take a second before it may take its time.
+/// How often a run is limited to a second before it may finish.
 const SECONDS: usize = 3;
 
-/// A run that may only take a second at a time. It is held until its second is over, wherever it is by then: a run that needs
-/// less than a second is stopped, too.
+/// A run limited to a second at a time. It is paused until its second is over, wherever it is by then, so that a run
+/// that needs less than a second is stopped, too.
 pub fn a_second_at_a_time(studies: &[&Study]) -> Outcome {
     let mut stops = 0;
     for study in studies {
@@ -146,7 +146,7 @@ pub fn a_second_at_a_time(studies: &[&Study]) -> Outcome {
 
 fn a_second(attempt: &Attempt, arguments: &str) -> Ended {
     let mut running = Running::start(&mut curvelax(attempt.home.path(), &format!("{arguments} --max-time 1s")));
-    // Its clock runs from when it listens to signals, and goes on while it is held.
+    // Its clock starts when it begins to receive signals, and runs on while it is paused.
     if running.wait_until(|running| running.hears(15) && attempt.has_state()) {
         running.signal("STOP");
         sleep(SECOND);

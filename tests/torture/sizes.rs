@@ -1,4 +1,5 @@
-//! Rings of three to a million nodes, ensembles of no member to ten million: done, or refused before any work.
+//! Rings of three to a million nodes, ensembles of zero to ten million members: they run, or are refused before any
+//! work.
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -14,7 +15,7 @@ fn run(arguments: &str) -> (TempDir, Ended) {
     (home, ended)
 }
 
-/// Three steps of a ring of n nodes, or a refusal by name.
+/// Three steps of a ring of n nodes, or a specific refusal.
 pub fn rings(sizes: &[usize]) -> Outcome {
     let few = "--curves 1 --quiet --solver direct --tau 1e-12 --t-end 3e-12";
     for size in [0, 1, 2, 3, 4, 5, 1_000_001] {
@@ -32,7 +33,7 @@ pub fn rings(sizes: &[usize]) -> Outcome {
     Found::new(7 + sizes.len(), format!("{} refused by name, {} done", 7, sizes.len()))
 }
 
-/// No member, one, and ten million of which a dry run says what they take.
+/// No members, one, and ten million in a dry run.
 pub fn members() -> Outcome {
     let (home, ended) = run("--curves 0 --quiet");
     assert!(ended.code == Some(2) && ended.said.contains("--curves 0"), "{ended:?}");

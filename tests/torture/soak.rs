@@ -1,7 +1,7 @@
-//! A long run takes no more than a short one: memory and open files, sampled while it runs.
+//! A long run needs no more than a short one: memory and open files, sampled while it runs.
 //!
-//! The run would last for months and is stopped when enough samples were taken, one each time its table has grown: what is
-//! compared is so far apart in its work, however fast that is done.
+//! The run would last for months and is stopped after enough samples, one each time its table has grown: samples are
+//! equally far apart in work, however fast it is done.
 
 use std::fs;
 
@@ -12,10 +12,10 @@ use crate::{
     program::{Running, curvelax, status},
 };
 
-/// Growth of the resident memory after the start-up that is still none: pages that the allocator had not touched.
+/// Permitted growth of the resident memory after the start-up: pages that the allocator had not touched.
 const SLACK_KIB: u64 = 2048;
 
-/// Takes `samples` of a run whose members make `steps` steps each.
+/// Collects `samples` of a run whose members make `steps` steps each.
 pub fn constant(samples: usize, steps: u64) -> Outcome {
     let home = TempDir::new().unwrap();
     let arguments = format!(
@@ -51,13 +51,13 @@ pub fn constant(samples: usize, steps: u64) -> Outcome {
     );
     eprintln!("{told}");
     assert!(most - least <= SLACK_KIB, "{told}");
-    // A state that is being written is open for a moment.
+    // A checkpoint that is being written is open for a moment.
     assert!(most_files - fewest_files <= 3, "{told}");
     Found::new(steady.len(), told)
 }
 
-/// Memory of its own in KiB, wherever that is kept, and the number of open files. Pages of the program itself come and go
-/// with what else the machine does.
+/// Private memory in KiB, wherever it is, and the number of open files. Pages of the program itself come and go with
+/// other work of the machine.
 fn sample(process: u32) -> Option<(u64, u64)> {
     let kib = |name| status(process, name)?.trim_end_matches(" kB").parse::<u64>().ok();
     let files = fs::read_dir(format!("/proc/{process}/fd")).ok()?.count();

@@ -1,4 +1,4 @@
-//! A disk that is full, and files that may not grow.
+//! A full disk, and files that may not grow.
 
 use std::{
     path::Path,
@@ -12,13 +12,13 @@ use crate::{
     study::{Attempt, Study},
 };
 
-/// A small disk in memory; gone when it is dropped.
+/// A small disk in memory; unmounted when dropped.
 pub struct Disk<'a> {
     at: &'a Path,
 }
 
 impl<'a> Disk<'a> {
-    /// Needs root, and a container that lets it mount.
+    /// Needs root, and a container that allows mounting.
     pub fn mount(at: &'a Path, options: &str) -> Option<Disk<'a>> {
         mount(&["-t", "tmpfs", "-o", options, "tmpfs", at.to_str()?]).then_some(Disk { at })
     }
@@ -43,7 +43,7 @@ pub fn can_mount() -> bool {
     Disk::mount(home.path(), "size=64k").is_some()
 }
 
-/// Disks from too small for anything to almost large enough.
+/// Disks from far too small to almost large enough.
 pub fn small_disks(study: &Study, sizes: &[usize]) -> Outcome {
     let mut failed = 0;
     for kib in sizes {
@@ -61,7 +61,7 @@ pub fn small_disks(study: &Study, sizes: &[usize]) -> Outcome {
     Found::new(sizes.len(), format!("0 differing bytes; {failed} too small"))
 }
 
-/// Files that may not grow beyond so many blocks, with the signal of the limit ignored, and not.
+/// Files limited to a number of blocks, with the signal of the limit ignored or not.
 pub fn limited_files(study: &Study, limits: &[usize]) -> Outcome {
     let mut failed = 0;
     for blocks in limits {

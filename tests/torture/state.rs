@@ -1,4 +1,4 @@
-//! A state that is not what was written: any bit, any length.
+//! Damaged checkpoints: any bit, any length.
 
 use std::{fs, path::Path, time::Instant};
 
@@ -12,7 +12,7 @@ use crate::{
 const NEWEST: &str = ".curvelax.state";
 const BEFORE: &str = ".curvelax.state.old";
 
-/// An interrupted run with its two states.
+/// An interrupted run with its two checkpoints.
 fn with_two_states(study: &Study) -> Attempt<'_> {
     let since = Instant::now();
     // A run may end before it is asked to stop.
@@ -30,7 +30,7 @@ fn with_two_states(study: &Study) -> Attempt<'_> {
     panic!("{}: no run has two states", study.name);
 }
 
-/// Flips every `stride`-th bit of the newest state, and cuts it off at every `cut`-th length.
+/// Flips every `stride`-th bit of the newest checkpoint, and truncates it at every `cut`-th length.
 pub fn damaged(study: &Study, stride: usize, cut: usize, seed: u64) -> Outcome {
     let mut random = Random::new(seed);
     let prepared = with_two_states(study);
@@ -59,7 +59,7 @@ pub fn damaged(study: &Study, stride: usize, cut: usize, seed: u64) -> Outcome {
     }
     alone.write(NEWEST, &whole);
     alone.must_end_well(Ended { code: Some(2), signal: None, said: "the state is whole again".into() });
-    // With the one before there is a way; some damages each in a folder of its own.
+    // With the previous one it can be resumed; some damages are tested in separate folders.
     let mut used = 0;
     let few = damages.len().min(if stride == 1 { 2000 } else { 40 });
     for _ in 0..few {
@@ -94,7 +94,7 @@ fn must_be_refused(ended: &Ended, what: &str) {
     assert!(ended.errors().len() == 1 && ended.said.contains(NEWEST), "{what}: {ended:?}");
 }
 
-/// A state beside tables that are not its own, and tables that were changed.
+/// A checkpoint next to foreign tables, and tables that were changed.
 pub fn foreign_tables(study: &Study, other: &Study) -> Outcome {
     let (one, two) = (Attempt::interrupted(study), Attempt::interrupted(other));
     let tables = |path: &Path| -> Vec<String> {

@@ -1,4 +1,4 @@
-//! The runs that are tormented, and what they leave when nobody does.
+//! The runs under test, and their results when nothing interferes.
 
 use std::{
     fs,
@@ -21,7 +21,7 @@ pub struct Study {
     reference: OnceLock<Reference>,
 }
 
-/// A run that nobody disturbed.
+/// An undisturbed run.
 pub struct Reference {
     home: TempDir,
     pub files: Content,
@@ -33,7 +33,7 @@ impl Study {
         Study { name, arguments, reference: OnceLock::new() }
     }
 
-    /// What an undisturbed run leaves, made once.
+    /// The result of an undisturbed run, made once.
     pub fn reference(&self) -> &Reference {
         self.reference.get_or_init(|| {
             let home = TempDir::new().unwrap();
@@ -49,10 +49,10 @@ impl Study {
     }
 }
 
-/// A folder in which a study is to reach its end, whatever is done to it on the way.
+/// A folder in which a study must reach its end, whatever is done to it before.
 pub struct Attempt<'a> {
     pub study: &'a Study,
-    /// What the folder held before, complete.
+    /// The previous, complete contents of the folder.
     earlier: Option<&'a Study>,
     pub home: TempDir,
 }
@@ -63,13 +63,14 @@ impl<'a> Attempt<'a> {
         Attempt { study, earlier: None, home: TempDir::new().unwrap() }
     }
 
-    /// In memory, where there is room: a disk that others use may take a second for a sync, which is no time of the program.
+    /// In memory if there is room: a shared disk may need a second for a sync, for which the program is not
+    /// responsible.
     pub fn on_a_fast_disk(study: &'a Study) -> Attempt<'a> {
         let home = TempDir::new_in("/dev/shm").or_else(|_| TempDir::new());
         Attempt { home: home.unwrap(), ..Attempt::new(study) }
     }
 
-    /// In the place of the files of an earlier run.
+    /// Replaces the files of an earlier run.
     pub fn over(study: &'a Study, earlier: &'a Study) -> Attempt<'a> {
         let attempt = Attempt { earlier: Some(earlier), ..Attempt::new(study) };
         copy(&earlier.reference().home.path().join("out"), &attempt.out());
@@ -87,7 +88,7 @@ impl<'a> Attempt<'a> {
         self.home.path().join("out")
     }
 
-    /// Whether a state can be resumed from.
+    /// Whether there is a checkpoint to resume from.
     pub fn has_state(&self) -> bool {
         self.out().join(".curvelax.state").exists() || self.out().join(".curvelax.state.old").exists()
     }
@@ -98,7 +99,7 @@ impl<'a> Attempt<'a> {
         format!("run {} --quiet --checkpoint-every 1s --out out{force}", self.study.arguments)
     }
 
-    /// Begins.
+    /// Starts the run.
     pub fn start(&self) -> Running {
         self.start_through(&[])
     }
@@ -116,7 +117,7 @@ impl<'a> Attempt<'a> {
         Running::start(&mut through(self.home.path(), starter, resume))
     }
 
-    /// Goes on as a user would who reads what was said: resumes what has begun, and else begins again.
+    /// Continues like a user who reads the messages: resumes a run that has begun, and otherwise starts again.
     pub fn resume_after(&self, last: &Ended) -> Running {
         if last.had_not_begun() {
             assert!(!self.has_state(), "there is a state, but {last:?}");
@@ -129,7 +130,7 @@ impl<'a> Attempt<'a> {
         }
     }
 
-    /// Lets the study reach its end after `last`; then all files must be there, and no others, as if nothing had been.
+    /// Lets the study reach its end after `last`; then exactly its files must be there, as if nothing had happened.
     #[track_caller]
     pub fn must_end_well(&self, mut last: Ended) {
         let begun = self.has_state();
@@ -150,7 +151,7 @@ impl<'a> Attempt<'a> {
         self.must_be_whole(true, story);
     }
 
-    /// The files of the study, or, if it may not have `begun`, those that were there before.
+    /// The files of the study; or, if it may not have `begun`, those that were there before.
     #[track_caller]
     pub fn must_be_whole(&self, begun: bool, story: &[String]) {
         let found = content(&self.out());
@@ -163,7 +164,7 @@ impl<'a> Attempt<'a> {
         );
     }
 
-    /// What lies in the folder.
+    /// The entries of the folder.
     pub fn names(&self) -> Vec<String> {
         match self.out().exists() {
             true => content(&self.out()).into_keys().collect(),
@@ -171,10 +172,10 @@ impl<'a> Attempt<'a> {
         }
     }
 
-    /// A run that was interrupted as soon as it could be, with what it says.
+    /// A run that was interrupted as early as possible, with its messages.
     pub fn interrupted(study: &'a Study) -> Attempt<'a> {
         let since = Instant::now();
-        // A run may end before anybody looks.
+        // A run may end before it is checked.
         while since.elapsed() < HANGS {
             let attempt = Attempt::new(study);
             let mut running = attempt.start();

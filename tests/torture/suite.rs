@@ -1,4 +1,4 @@
-//! The tests at their two scales, and the table of what they found.
+//! The tests at their two scales, and the table of their results.
 
 use std::{
     env,
@@ -17,7 +17,7 @@ use crate::{
     surroundings, threads,
 };
 
-/// Cases of a test, and what it saw.
+/// The cases of a test, and its observations.
 pub struct Found {
     cases: usize,
     result: String,
@@ -31,7 +31,7 @@ impl Found {
     }
 }
 
-// One thread each, so that two tests fill two cores.
+// One thread each, so that two tests use two cores.
 
 /// Adaptive steps with both tables, about two seconds.
 static ADAPTIVE: Study = Study::new(
@@ -43,7 +43,7 @@ static FIXED: Study = Study::new(
     "fixed, zarr",
     "--backend cpu --threads 1 --points 34 --curves 150 --tau 5e-5 --t-end 1 --series 0.2 --snapshots 0,0.5,1 --store zarr",
 );
-/// Two cohorts, one of adaptive and one of fixed steps would be two runs; two numbers of nodes are two cohorts.
+/// Two numbers of nodes give two cohorts; adaptive and fixed steps would be two runs.
 static COHORTS: Study = Study::new(
     "two cohorts",
     "--backend cpu --threads 1 --curves 500 --adaptive=2e-6 --stop-when-relaxed --series 0.2 --snapshots 0.1 \
@@ -58,7 +58,7 @@ static GPU_ZARR: Study = Study::new(
     "lavapipe, fixed, zarr, two cohorts",
     "--backend gpu --curves 60 --tau 1e-3 --t-end 0.5 --solver direct --snapshots 0,0.1 --series 0.1 --sweep points=34,52",
 );
-/// So short that it can be repeated for every call of the system.
+/// So short that it can be repeated for every system call.
 static SHORT: Study = Study::new(
     "short, csv",
     "--backend cpu --threads 1 --curves 5 --adaptive=1e-3 --stop-when-relaxed --series 0.2 --snapshots 0.1 \
@@ -68,7 +68,7 @@ static SHORT_ZARR: Study = Study::new(
     "short, zarr",
     "--backend cpu --threads 1 --curves 5 --points 34 --adaptive=1e-3 --stop-when-relaxed --snapshots 0,0.1 --store zarr",
 );
-/// Another seed, for what must not be mixed up.
+/// Another seed, for files that must not be mixed up.
 static OTHER: Study = Study::new(
     "short, another seed",
     "--backend cpu --threads 1 --curves 7 --seed 5 --adaptive=1e-3 --stop-when-relaxed --points 34 --series 0.1 --store zarr \
@@ -79,7 +79,7 @@ static TINY: Study = Study::new(
     "tiny",
     "--backend cpu --threads 1 --curves 2 --points 34 --tau 4e-6 --t-end 0.2 --solver direct --series 0.05",
 );
-/// Long enough for a second state in the middle.
+/// Long enough for a second checkpoint in the middle.
 static SECOND: Study = Study::new(
     "more than a second, zarr",
     "--backend cpu --threads 1 --points 34 --curves 110 --tau 5e-5 --t-end 1 --series 0.5 --snapshots 0,0.5 --store zarr",
@@ -89,7 +89,7 @@ const STOPS: [(&str, i32, i32); 3] = [("INT", 2, 130), ("TERM", 15, 75), ("HUP",
 
 type Rows = Arc<Mutex<Vec<(String, &'static str, Option<String>)>>>;
 
-/// The tests that were asked for.
+/// The tests requested.
 struct Suite {
     full: bool,
     rows: Rows,
@@ -106,7 +106,7 @@ impl Suite {
         self.test_if(None, name, bound, test);
     }
 
-    /// A test that is reported as ignored where something is missing.
+    /// A test that is reported as ignored if something is missing.
     fn test_if(
         &mut self,
         missing: Option<&str>,
@@ -158,7 +158,7 @@ pub fn main() -> ExitCode {
     conclusion.exit_code()
 }
 
-/// A GPU for `study`, or what is missing.
+/// What a GPU run is missing, if anything.
 fn no_gpu() -> Option<&'static str> {
     let mut command = Command::new(program::binary());
     let output = command.args(["adapters", "--json"]).stderr(Stdio::null()).output().unwrap();

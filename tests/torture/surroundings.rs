@@ -1,4 +1,4 @@
-//! Where a run finds itself: folders that cannot be written or vanish, nobody who listens, other languages and clocks.
+//! The environment of a run: folders that cannot be written or vanish, closed outputs, other languages and clocks.
 
 use std::{
     fs,
@@ -18,10 +18,10 @@ use crate::{
     study::{Attempt, Study},
 };
 
-/// The user who may do nothing, to whom root changes: no folder is closed to root.
+/// A user without rights, to whom root changes, since no folder is closed to root.
 const NOBODY: [&str; 4] = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"];
 
-/// A run as a user whom permissions bind.
+/// A run as a user who is bound by permissions.
 pub struct AsNobody {
     /// A copy that this user may start, wherever the program was built.
     program: PathBuf,
@@ -47,7 +47,7 @@ impl AsNobody {
         Running::start(self.command(&["sh", "-c", &script]).arg(&self.program))
     }
 
-    /// A command of this user.
+    /// A command run by this user.
     pub fn command(&self, words: &[&str]) -> Command {
         let starter: &[&str] = if self.is_root { &NOBODY } else { &["env"] };
         let mut command = Command::new(starter[0]);
@@ -65,7 +65,7 @@ fn set_mode(path: &Path, mode: u32) {
     fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
 }
 
-/// A folder that may only be read: a run is refused there, and a resumed one keeps its state.
+/// A read-only folder: a run is refused there, and a resumed one keeps its checkpoint.
 pub fn folders_that_cannot_be_written(study: &Study) -> Outcome {
     let nobody = AsNobody::new();
     let closed = nobody.home.path().join("closed");
@@ -93,7 +93,7 @@ pub fn folders_that_cannot_be_written(study: &Study) -> Outcome {
     Found::new(4, "refused by name, nothing lost")
 }
 
-/// A file system that is mounted to be read: not even root writes there.
+/// A file system mounted read-only: not even root writes there.
 pub fn read_only_disk(study: &Study) -> Outcome {
     let attempt = Attempt::new(study);
     let disk = Disk::mount(attempt.home.path(), "size=64m").ok_or("cannot mount")?;
@@ -112,14 +112,14 @@ pub fn read_only_disk(study: &Study) -> Outcome {
     Found::new(2, "refused by name, nothing lost")
 }
 
-/// A mask that takes all rights from new files.
+/// A mask that removes all rights from new files.
 pub fn no_rights_for_new_files(study: &Study) -> Outcome {
     let nobody = AsNobody::new();
     let out = nobody.home.path().join("out");
     let ended = nobody.go("777", &format!("run {} --quiet --out out", study.arguments));
     assert!(ended.code == Some(2) && ended.errors()[0].contains("out"), "{ended:?}");
     assert!(!out.exists(), "a folder was left");
-    // Files that their owner may only write serve a run, and say so when they are to be read again.
+    // Files that their owner may only write are enough for a run; reading them again gives an error that says so.
     let ended = nobody.go("477", &format!("run {} --quiet --out out", study.arguments));
     must_be_a_decent_end(&ended, &format!("{ended:?}"));
     let attempt = Attempt::new(study);
@@ -138,14 +138,14 @@ pub fn no_rights_for_new_files(study: &Study) -> Outcome {
 pub fn vanished_folder(study: &Study, cases: usize, seed: u64) -> Outcome {
     let mut random = crate::random::Random::new(seed);
     let (mut failed, mut all) = (0, 0);
-    // A run may be over before its folder vanishes.
+    // A run may end before its folder vanishes.
     while failed < cases {
         all += 1;
         let attempt = Attempt::new(study);
         let mut running = attempt.start();
         let time = study.reference().took.mul_f64(random.real());
         running.wait_until(|running| running.age() >= time && attempt.has_state());
-        // Until the run has seen it, it may make files anew.
+        // Until the run detects it, it may create files again.
         let mut tries = 0;
         while fs::remove_dir_all(attempt.out()).is_err() && tries < 1000 {
             tries += 1;
@@ -159,7 +159,7 @@ pub fn vanished_folder(study: &Study, cases: usize, seed: u64) -> Outcome {
     Found::new(all, format!("a named error in {failed}, 0 panics"))
 }
 
-/// Nobody reads what is printed: pipes without a reader, closed streams, a device that is full.
+/// Nobody reads the output: pipes without a reader, closed streams, a full device.
 pub fn nobody_listens(study: &Study) -> Outcome {
     let talkative = |attempt: &Attempt| attempt.run().replace("--quiet ", "");
     let shells = ["exec \"$0\" ARGUMENTS >&-", "exec \"$0\" ARGUMENTS 2>&-", "exec \"$0\" ARGUMENTS >&- 2>&- <&-"];
@@ -178,7 +178,7 @@ pub fn nobody_listens(study: &Study) -> Outcome {
             let mut command = curvelax(attempt.home.path(), &(talkative(&attempt) + json));
             let piped = |closed: bool| if closed { Stdio::piped() } else { Stdio::null() };
             let mut child = command.stdin(Stdio::null()).stdout(piped(stdout)).stderr(piped(stderr)).spawn().unwrap();
-            // The reading ends.
+            // The reader stops.
             drop((child.stdout.take(), child.stderr.take()));
             let status = child.wait().unwrap();
             assert_eq!(status.code(), Some(0), "closed: stdout {stdout}, stderr {stderr}: {status:?}");
@@ -194,7 +194,7 @@ pub fn nobody_listens(study: &Study) -> Outcome {
     Found::new(10, "0 differing bytes; a full stdout is named")
 }
 
-/// Other decimal signs, other letters, names that no system knows.
+/// Other decimal signs, other letters, unknown locales.
 pub fn locales(study: &Study) -> Outcome {
     let locales = ["C", "POSIX", "de_DE.UTF-8", "tr_TR.UTF-8", "C.UTF-8", "nonsense", "", "\u{fffd}"];
     for locale in locales {
@@ -207,7 +207,7 @@ pub fn locales(study: &Study) -> Outcome {
     Found::new(locales.len(), "0 differing bytes")
 }
 
-/// A file system that has no locks, whichever way it says so; an error of another kind is one.
+/// A file system without locks, however it reports that; an error of another kind is an error.
 pub fn no_locks(study: &Study) -> Outcome {
     let start = |attempt: &Attempt, error: &str| {
         let inject = format!("inject=flock:error={error}");

@@ -1,6 +1,7 @@
-//! A system that starts no more threads: what cannot do without them says so, and signals are received all the same.
+//! A system that starts no more threads: commands that need them say so, and signals are still received.
 //!
-//! `strace` lets the calls fail by which the main thread starts others: a limit of the user does not bind root.
+//! `strace` makes the calls fail with which the main thread starts others, because a limit of the user does not bind
+//! root.
 
 use std::{thread::sleep, time::Duration};
 
@@ -12,26 +13,26 @@ use crate::{
     surroundings::AsNobody,
 };
 
-/// Starts `arguments` where the main thread can start `room` threads and no more.
+/// Starts `arguments` where the main thread can start only `room` threads.
 fn start(attempt: &Attempt, room: usize, arguments: &str) -> Running {
     let inject = format!("inject=clone,clone3:error=EAGAIN:when={}+", room + 1);
     let starter = ["strace", "-f", "-qq", "-o", "/dev/null", "-e", "trace=clone,clone3", "-e", &inject];
     Running::start(&mut through(attempt.home.path(), &starter, arguments))
 }
 
-/// A command that is given less and less room.
+/// A command with less and less room.
 struct Case {
     name: &'static str,
     arguments: String,
-    /// Threads without which it cannot do its work.
+    /// Minimum number of threads for its work.
     least: usize,
-    /// Where it begins.
+    /// Its starting point.
     prepare: fn(&'static Study) -> Attempt<'static>,
-    /// Whether it is to leave the files of the study.
+    /// Whether it must leave the files of the study.
     writes: bool,
 }
 
-/// Every command with room for no thread, for one, and so on until it is done.
+/// Every command with room for no thread, for one, and so on until it succeeds.
 pub fn few(study: &'static Study) -> Outcome {
     const BENCH: &str =
         "bench --backend cpu --threads 1 --points 34 --solver direct --precision f64 --seconds 0.1 --quiet";
@@ -97,7 +98,7 @@ fn shards(study: &'static Study) -> Attempt<'static> {
     attempt
 }
 
-/// A software GPU starts threads of its own, some of which it can do without.
+/// A software GPU starts threads itself, some of which it can do without.
 pub fn few_on_the_gpu(study: &'static Study, most: usize) -> Outcome {
     let mut refused = 0;
     for room in 0..=most {
@@ -115,7 +116,7 @@ pub fn few_on_the_gpu(study: &'static Study, most: usize) -> Outcome {
     Found::new(most + 1, format!("{refused} refused by name, 0 panics, 0 differing bytes"))
 }
 
-/// One error with `remedy`; beside it a run may say that its state is kept.
+/// One error with `remedy`; a run may also say that its checkpoint is saved.
 #[track_caller]
 fn must_be_named(ended: &Ended, remedy: &str, told: &str) {
     let is_said = |line: &str| line.starts_with("error: ") || line.starts_with("note: the run was saved");
@@ -123,19 +124,19 @@ fn must_be_named(ended: &Ended, remedy: &str, told: &str) {
     assert!(ended.errors().len() == 1 && ended.errors()[0].contains(remedy), "{told}");
 }
 
-/// Runs that have what they need, and find no further thread when they are to stop: `strace` counts the calls of every thread
-/// by itself, so here the user's limit is lowered as soon as the run has begun.
+/// Runs that have all threads they need, but can start no more when they are to stop. `strace` counts the calls of
+/// every thread separately, so the user's limit is lowered instead, as soon as the run has begun.
 pub fn none_left_for_signals(study: &'static Study, stops: &[(&str, i32, i32)]) -> Outcome {
     let max_time = [("--max-time 1s", 0, 75)];
     for (cause, _, code) in stops.iter().chain(&max_time) {
-        // A run may be done before it can be stopped, where the tests get less of the processors than it does.
+        // A run may end before it can be stopped, if the tests get less processor time than it does.
         let stopped = (0..20).any(|_| stopped_without_threads(study, cause, *code));
         assert!(stopped, "{cause}: every run was done before it could be stopped");
     }
     Found::new(stops.len() + 1, "stopped, 0 differing bytes")
 }
 
-/// Whether the run was still there to be stopped; then it ends with `code`.
+/// Whether the run was still there to be stopped; if so, it ends with `code`.
 fn stopped_without_threads(study: &'static Study, cause: &str, code: i32) -> bool {
     let nobody = AsNobody::new();
     let more = if cause.starts_with("--") { cause } else { "" };
