@@ -33,7 +33,7 @@
 //! | [`error`] | what, where, numbers, remedy, exit code |
 //! | `wgsl` | the files of `shaders/`, compiled in |
 //! | `guard`, `threads` | panics of other crates become errors; every thread is started here |
-//! | `input`, `text`, [`random`] | files opened for reading; numbers as people write them; random numbers addressed by key |
+//! | `input`, `text`, [`random`] | files opened for reading; numbers as text; random numbers addressed by key |
 //! | [`number`] | the number type of the scheme |
 //! | [`flow`] | the law b(k) |
 //! | [`curve`] | plane curves in f64: shapes, perturbation, sampling, measures |

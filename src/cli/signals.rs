@@ -1,7 +1,7 @@
 //! Ctrl-C, SIGTERM, SIGHUP and `--max-time` ask a run to stop; a run that does not respond is ended.
 //!
 //! Two threads do all of it. Both are started before the run, because the system may have no thread left when one is
-//! needed. One receives the signals and prints the last message; the other keeps the time and ends the process.
+//! needed. One receives the signals and prints the last message; the other watches the time and ends the process.
 
 use std::{
     sync::mpsc::{Receiver, RecvTimeoutError, channel},

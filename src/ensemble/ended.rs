@@ -15,7 +15,7 @@ pub struct Ended {
     pub rows: Rows,
     /// Its nodes at both ends, if asked for.
     pub portrait: Option<Portrait>,
-    /// What rounding off did to its corners before the run.
+    /// How its corners were rounded off before the run.
     pub mollified: Mollified,
     /// Its threshold is below the rounding of the precision, so its relaxation time is unknown.
     pub unresolved: bool,

@@ -154,7 +154,7 @@ pub struct Cell {
 const LONG_SWEEPS: &str = "plain sweeps need more iterations the longer the step, and adaptive steps grow: a solve \
                            may need tens of thousands, where --solver multigrid needs a few hundred and direct none";
 
-/// What members must have in common to be advanced side by side.
+/// The properties that members must share to run side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cohort {
     points: usize,
@@ -199,7 +199,7 @@ impl Cell {
         warnings
     }
 
-    /// What it must have in common with others to run side by side with them.
+    /// The properties that other cells must share to run side by side with it.
     pub fn cohort(&self) -> Cohort {
         let Spec { points, order, .. } = self.spec;
         let adaptive = matches!(self.spec.pace(), Pace::Adaptive(_));

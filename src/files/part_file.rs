@@ -26,7 +26,7 @@ pub struct Mark {
     pub crc: u32,
 }
 
-/// An incomplete file; dropped in that condition it is removed, unless [kept](PartFile::keep).
+/// An incomplete file; it is removed when dropped, unless [kept](PartFile::keep).
 #[derive(Debug)]
 pub struct PartFile {
     file: File,

@@ -18,7 +18,7 @@ use crate::{
 /// The suffix of a file that is to replace another.
 const SUCCESSOR: &str = "part";
 
-/// An incomplete folder; dropped in that condition it is removed with its contents, unless [kept](PartFolder::keep).
+/// An incomplete folder; it is removed with its contents when dropped, unless [kept](PartFolder::keep).
 #[derive(Debug)]
 pub struct PartFolder {
     part: Place,

@@ -163,7 +163,7 @@ impl RunReport {
         &self.origin.moves
     }
 
-    /// Index of the current cohort.
+    /// Index of the current cohort, from 0.
     pub fn cohort(&self) -> usize {
         self.cohort as usize
     }

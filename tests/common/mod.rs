@@ -1,5 +1,5 @@
 //! Shared parts of the integration tests: a curve that is stepped by hand, and measures of it.
-#![allow(dead_code, missing_docs)] // every test file takes its own part of it
+#![allow(dead_code, missing_docs)] // every test file uses a different part of it
 
 pub mod polygons;
 pub mod program;

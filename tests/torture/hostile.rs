@@ -24,7 +24,7 @@ const LITTLE: [&str; 3] = ["sh", "-c", "ulimit -v 1000000; exec \"$0\" \"$@\""];
 const THINGS: [&str; 5] = ["a pipe", "a device", "a folder", "2 GiB", "nothing to be opened"];
 
 fn put(thing: &str, path: &Path) {
-    // With its original header as long as that was valid.
+    // The huge file begins like the original; the header of a checkpoint gets the matching length.
     let old = fs::read(path).unwrap_or_default();
     let _ = fs::remove_file(path);
     match thing {
