@@ -165,7 +165,7 @@ mod unix {
         let message = said(&curvelax(home.path(), "resume out --backend cpu"), 0);
         assert!(message.contains("resuming: 0 of 3 members"), "{message}");
         let run = fs::read_to_string(home.path().join("out/run.json")).unwrap();
-        assert!(run.contains("\"the run was on cpu another and went on on cpu\""), "{run}");
+        assert!(run.contains("\"the run began on cpu another and continued on cpu\""), "{run}");
         assert!(!home.path().join("out/.curvelax.state").exists());
     }
 

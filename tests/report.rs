@@ -51,7 +51,7 @@ fn runs_of_one_member_of_none_in_a_cell_and_of_none_that_relaxed_leave_no_number
         ("--curves 2 --points 40 --shape circle:1 --amplitude 0 --stop-when-relaxed", "All 2 members relaxed."),
         (
             "--curves 4 --points 32 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct --series 0.1",
-            " failed: see the statuses",
+            "failed (see `status`)",
         ),
     ] {
         let done = run(arguments);

@@ -324,7 +324,7 @@ fn what_is_missing_is_printed_with_the_line_that_submits_it() {
     }
     assert_eq!(
         printed(&format!("merge --missing {all} t/1 t/4 t/5 t/6 t/7 t/8 t/10 t/11")),
-        "all 12 shards are there\n"
+        "all 12 shards are present\n"
     );
 }
 
