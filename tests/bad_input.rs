@@ -417,7 +417,7 @@ fn a_folder_that_exists_or_cannot_be_made_is_refused() {
         ("old", false, "--out old: already exists; name a new folder, or add --force"),
         ("file", false, "--out file: exists but is not a directory"),
         ("file", true, "--out file: exists but is not a directory"),
-        ("file/below", false, "--out file/below: file is no folder"),
+        ("file/below", false, "--out file/below: file is not a directory"),
     ] {
         let force = if force { "--force" } else { "--quiet" };
         let output = curvelax(home.path(), &["run", "--curves", "2", "--backend", "cpu", "--out", out, force]);

@@ -2,8 +2,8 @@
 
     python examples/python/dask_study.py examples/specs/amplitude.toml --shards 8 --workers 2 --out amplitude
 
-The same line begins and goes on: what an earlier try left in amplitude.shards is not computed again. On a cluster with a
-file system that all share, put Client("tcp://SCHEDULER:8786") in the place of the LocalCluster.
+The same line starts and resumes: what an earlier attempt left in amplitude.shards is not computed again. On a cluster
+with a shared file system, use Client("tcp://SCHEDULER:8786") instead of the LocalCluster.
 """
 
 import argparse
@@ -23,8 +23,8 @@ from dask.distributed import Client, LocalCluster
 def run_shard(i, shards, run, home):
     """Runs shard i, from its start or from where an earlier try left it, and returns its folder."""
     out = f"{home}/{i}-of-{shards}"
-    # A worker that is killed leaves its curvelax behind, which goes on and keeps the folder locked. Linux ends it with the
-    # worker; until it has ended (elsewhere: when its shard is done) the retry waits, and goes on from what it has left.
+    # A killed worker leaves its curvelax behind, which continues and keeps the folder locked. Linux ends it with the
+    # worker. The retry waits until it has ended (elsewhere: until its shard is done) and resumes from its checkpoint.
     libc = ctypes.CDLL(None) if sys.platform == "linux" else None
 
     def end_with_worker():

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # One shard of the study for each task of the array. submit.sh submits it together with merge.sh.
 #
-# The same line is right for the first start, after a requeue and when the task is submitted again: --resume goes on with
-# what is there, and leaves a finished shard as it is.
+# The same line works for the first start, after a requeue and when the task is submitted again: --resume continues an
+# interrupted shard and leaves a finished one as it is.
 
 #SBATCH --job-name=curvelax
 #SBATCH --array=0-7

@@ -261,7 +261,7 @@ fn same_study(one: (&PathBuf, &Spec), own: (&PathBuf, &Spec)) -> Result<u64> {
     match (one.shard, own.shard) {
         (Some(shard), Some(own)) if shard.count() == own.count() => Ok(shard.index()),
         (Some(shard), Some(own)) => refuse(format!("it says shard {shard}, but {own} is there")),
-        _ => refuse("it is no shard".into()),
+        _ => refuse("it is not a shard".into()),
     }
 }
 

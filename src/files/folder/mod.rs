@@ -69,7 +69,7 @@ impl OutputFolder {
         let mut folder = OutputFolder::of(path, names);
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             if parent.exists() && !parent.is_dir() {
-                let problem = format!("{} is no folder", parent.display());
+                let problem = format!("{} is not a directory", parent.display());
                 return Err(Error::value("out", path.display(), &problem, "name a place inside a folder"));
             }
             folder.make_all(parent).map_err(refuse)?;
