@@ -415,9 +415,9 @@ fn a_folder_that_exists_or_cannot_be_made_is_refused() {
     fs::create_dir(home.path().join("old")).unwrap();
     for (out, force, reason) in [
         ("old", false, "--out old: already exists; name a new folder, or add --force"),
-        ("file", false, "--out file: exists but is not a directory"),
-        ("file", true, "--out file: exists but is not a directory"),
-        ("file/below", false, "--out file/below: file is not a directory"),
+        ("file", false, "--out file: exists but is not a folder"),
+        ("file", true, "--out file: exists but is not a folder"),
+        ("file/below", false, "--out file/below: file is not a folder"),
     ] {
         let force = if force { "--force" } else { "--quiet" };
         let output = curvelax(home.path(), &["run", "--curves", "2", "--backend", "cpu", "--out", out, force]);
@@ -432,7 +432,7 @@ fn a_folder_that_exists_or_cannot_be_made_is_refused() {
 fn a_folder_with_something_in_the_way_is_refused_with_force() {
     let home = TempDir::new().unwrap();
     for (folder, file, reason) in [
-        ("first", "plots", "--out first: first/plots is no folder; "),
+        ("first", "plots", "--out first: first/plots is not a folder; "),
         ("second", "summary.csv/mine", "--out second: second/summary.csv is a folder; "),
     ] {
         let file = home.path().join(folder).join(file);

@@ -220,7 +220,7 @@ fn a_wrong_request_writes_nothing() {
         ("--out new", &["<NAME>"]),
         ("fig1a", &["--out <DIR>"]),
         ("fig1a --out old", &["--out old: already exists; ", "--force"]),
-        ("fig1a --out file --force", &["--out file: exists but is not a directory"]),
+        ("fig1a --out file --force", &["--out file: exists but is not a folder"]),
         ("fig1a --tau 1 --out new", &["unexpected argument '--tau'"]),
     ] {
         let output = figure(home.path(), arguments);

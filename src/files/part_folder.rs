@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn what_no_run_has_left_is_not_removed() {
         for (file, problem) in [
-            ("snapshots.zarr", "is not a directory"),
+            ("snapshots.zarr", "is not a folder"),
             ("snapshots.zarr/mine", "is not the folder of an earlier run"),
             (".snapshots.zarr.part/mine", "is not the folder of an earlier run"),
         ] {

@@ -23,10 +23,7 @@ impl OutputFolder {
         let needed = self.names.iter().any(|name| Path::new(name).starts_with(PLOTS));
         let new_plots = needed && plots.at().symlink_metadata().is_err();
         if needed && !new_plots && !is_real_folder(plots.at()) {
-            return in_the_way(
-                &plots,
-                if plots.at().is_symlink() { "a link, not a directory" } else { "not a directory" },
-            );
+            return in_the_way(&plots, if plots.at().is_symlink() { "a link, not a folder" } else { "not a folder" });
         }
         let others = [STATE, STATE_OLD, STATE_PART, PROBE].map(|name| self.place(name));
         let own = self.names.iter().flat_map(|name| [self.place(name), self.part(name)]);
@@ -34,8 +31,8 @@ impl OutputFolder {
             let path = place.at();
             match (is_store(path), path.is_dir()) {
                 // A link to a folder is removed like one to a file.
-                (false, true) if !path.is_symlink() => return in_the_way(&place, "a directory"),
-                (true, false) if path.symlink_metadata().is_ok() => return in_the_way(&place, "not a directory"),
+                (false, true) if !path.is_symlink() => return in_the_way(&place, "a folder"),
+                (true, false) if path.symlink_metadata().is_ok() => return in_the_way(&place, "not a folder"),
                 // Everything in it would be removed.
                 (true, true) if !is_own_store(path) => {
                     return in_the_way(&place, "not the folder of an earlier run");

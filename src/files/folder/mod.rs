@@ -69,7 +69,7 @@ impl OutputFolder {
         let mut folder = OutputFolder::of(path, names);
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             if parent.exists() && !parent.is_dir() {
-                let problem = format!("{} is not a directory", parent.display());
+                let problem = format!("{} is not a folder", parent.display());
                 return Err(Error::value("out", path.display(), &problem, "name a place inside a folder"));
             }
             folder.make_all(parent).map_err(refuse)?;
@@ -78,7 +78,7 @@ impl OutputFolder {
             Ok(()) => folder.made.push(path.to_path_buf()),
             Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(refuse(e)),
             Err(_) if !path.is_dir() => {
-                return Err(Error::value("out", path.display(), "exists but is not a directory", "name another"));
+                return Err(Error::value("out", path.display(), "exists but is not a folder", "name another"));
             }
             // Before its lock is touched.
             Err(_) => existing.check(path, path, &folder.names)?,
