@@ -332,12 +332,13 @@ impl Choice {
     fn open_in<T: Vectorised>(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         let blocks = ring(n)?;
         let method = Method { solver: spec.solver(), order: spec.order, max_sweeps: spec.most_sweeps() };
-        let Device::Gpu(gpu) = &self.device else {
-            let backend = CpuBackend::<T>::for_members(blocks, method, threads(spec), spec.member_count())?;
-            return Ok((Box::new(backend), self.platform(spec)));
+        let opened = match &self.device {
+            Device::Cpu => CpuBackend::<T>::for_members(blocks, method, threads(spec), spec.member_count())
+                .map(|backend| Box::new(backend) as Box<dyn Backend>),
+            Device::Gpu(gpu) => open_gpu::<T>(gpu, blocks, spec, &method),
         };
-        match open_gpu::<T>(gpu, blocks, spec, &method) {
-            Ok(kernel) => Ok((kernel, self.platform(spec))),
+        match opened {
+            Ok(backend) => Ok((backend, self.platform(spec))),
             Err(Error::Device(fault)) if self.or_cpu => {
                 self.on_cpu(format!("the GPU failed: {fault}")).open_in::<T>(spec, n)
             }

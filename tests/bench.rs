@@ -1,8 +1,10 @@
 //! `curvelax bench`: the requested rows, consistent numbers, and wrong requests refused.
 
-use assert_cmd::Command;
-use serde_json::Value;
 use std::process::Output;
+
+use assert_cmd::Command;
+use curvelax::solver::Solver;
+use serde_json::Value;
 
 const QUICK: &str = "--seconds 0.06 --repeats 3 --quiet";
 
@@ -36,7 +38,7 @@ fn every_solver_and_precision_on_the_cpu_has_a_row_whose_numbers_agree() {
     let case = |row: &Value| format!("{} {} {} {}", row["backend"], row["solver"], row["precision"], row["points"]);
     let cases: Vec<String> = rows.iter().map(case).collect();
     let expected = ["24", "50"].iter().flat_map(|n| {
-        let solvers = ["direct", "multigrid", "gauss-seidel"].iter();
+        let solvers = Solver::NAMES.into_iter().rev();
         solvers.flat_map(move |s| ["f64", "f32"].map(|p| format!("\"cpu\" \"{s}\" \"{p}\" {n}")))
     });
     assert_eq!(cases, expected.collect::<Vec<_>>());

@@ -281,11 +281,13 @@ fn nan_is_never_looked_for_by_comparing_a_value_with_itself() {
     }
 }
 
-/// Value of `const NAME = …;` in the shaders.
+/// Value of `const NAME = …;` in the shaders, the same wherever it is.
 fn constant(name: &str) -> f64 {
     let start = format!("const {name} = ");
     let code = code();
-    let line = code.lines().find(|line| line.starts_with(&start)).unwrap_or_else(|| panic!("no constant {name}"));
+    let mut lines = code.lines().filter(|line| line.starts_with(&start));
+    let line = lines.next().unwrap_or_else(|| panic!("no constant {name}"));
+    assert!(lines.all(|other| other == line), "{name} has several values");
     let text = line[start.len()..].trim_end_matches(';').trim_end_matches('u');
     text.strip_prefix("0x")
         .map_or_else(|| text.parse().unwrap(), |hex| f64::from(u32::from_str_radix(hex, 16).unwrap()))

@@ -10,7 +10,7 @@ use crate::{
     bench::{self, Bench, BenchSample},
     ensemble::{
         Spec,
-        spec::{BackendChoice, Precision, Solver},
+        spec::{Precision, Solver},
     },
     error::{Error, Result},
     placement::no_adapter,
@@ -161,8 +161,8 @@ pub fn bench(args: BenchArgs) -> Result<()> {
     }
 }
 
-/// The specs of all cases, checked: a wrong key ends the command before anything starts.
-fn cases(args: &BenchArgs) -> Result<Vec<Spec>> {
+/// Where each case runs, and its spec, checked: a wrong key ends the command before anything starts.
+fn cases(args: &BenchArgs) -> Result<Vec<(DeviceKind, Spec)>> {
     fn or<T: Copy>(given: &[T], all: &[T]) -> Vec<T> {
         if given.is_empty() { all.to_vec() } else { given.to_vec() }
     }
@@ -176,10 +176,8 @@ fn cases(args: &BenchArgs) -> Result<Vec<Spec>> {
             for &solver in &solvers {
                 for precision in or(&args.precision, &[Precision::F64, Precision::F32]) {
                     let solver = solver.into();
-                    cases.push(bench::spec(
-                        points,
-                        Spec { solver, precision: Some(precision), ..place.clone().over(&base) },
-                    )?);
+                    let spec = Spec { solver, precision: Some(precision), ..place.clone().over(&base) };
+                    cases.push((place.backend, bench::spec(points, spec)?));
                 }
             }
         }
@@ -236,14 +234,15 @@ fn places(args: &BenchArgs) -> Result<Vec<BenchPlace>> {
 
 /// A case being measured.
 struct Case {
+    backend: DeviceKind,
     spec: Spec,
     bench: Result<Bench>,
     samples: Vec<BenchSample>,
 }
 
 impl Case {
-    fn new(spec: Spec) -> Case {
-        Case { spec, bench: Err(Error::Failed("not started".into())), samples: Vec::new() }
+    fn new((backend, spec): (DeviceKind, Spec)) -> Case {
+        Case { backend, spec, bench: Err(Error::Failed("not started".into())), samples: Vec::new() }
     }
 
     /// Measures a window; a failed case stays failed.
@@ -258,7 +257,7 @@ impl Case {
 
     fn name(&self) -> String {
         let Spec { adapter, points, .. } = &self.spec;
-        let place = adapter.as_deref().unwrap_or("cpu");
+        let place = adapter.clone().unwrap_or_else(|| self.backend.to_string());
         let (solver, precision) = (self.spec.solver().name(), precision_name(self.precision()));
         format!("{place}, {solver}, {precision}, n = {points}")
     }
@@ -281,7 +280,7 @@ impl Case {
             Ok(_) => None,
         };
         BenchRow {
-            backend: if self.spec.backend == BackendChoice::Cpu { DeviceKind::Cpu } else { DeviceKind::Gpu },
+            backend: self.backend,
             adapter: self.spec.adapter.clone(),
             driver: platform.and_then(|platform| platform.driver.clone()),
             device_type: platform.and_then(|platform| platform.device_type.clone()),

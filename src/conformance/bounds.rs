@@ -2,7 +2,7 @@
 
 use crate::{
     backend::gpu::shader::TRACE_FIELDS,
-    scheme::{Curve, Parameters, Workspace},
+    scheme::{Curve, Parameters, Workspace, member::Observed},
     solver::Row as Coefficients,
 };
 
@@ -85,7 +85,7 @@ pub const FIELDS: [Bound; 4] = [
 ];
 
 /// The members' reports after a run: the fields of `Observed`, then the turning number and the travel.
-pub const REPORT: [Bound; 10] = [
+pub const REPORT: [Bound; Observed::<f64>::FIELDS.len() + 2] = [
     bound("length", NaturalScale::Position, 16.0, 64.0),
     bound("area", NaturalScale::Area, 16.0, 64.0),
     bound("excess", NaturalScale::One, 16.0, 64.0),

@@ -10,6 +10,14 @@ use crate::{
     scheme::{Parameters, State, run::Run},
 };
 
+/// Laws of the members: every named flow, and a polynomial.
+pub const LAWS: usize = 4;
+
+/// One member in this many keeps its nodes.
+const UNDISTRIBUTED: usize = 5;
+// Otherwise one law would only be compared without redistribution.
+const _: () = assert!(!LAWS.is_multiple_of(UNDISTRIBUTED));
+
 /// Members of the comparison: a prime number, so that no size divides it.
 pub const MEMBERS: usize = 11;
 
@@ -24,7 +32,7 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
     let amplitude = if n < 20 { 0.02 } else { 0.05 };
     let spec = Spec { points: n, amplitude, seed: 20, ..Spec::default() };
     let family = Family::new(&spec)?;
-    let flows = [
+    let flows: [Flow; LAWS] = [
         Flow::SurfaceDiffusion,
         Flow::Willmore,
         Flow::Elastic(0.3),
@@ -33,12 +41,11 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
     (0..count)
         .map(|j| {
             let nodes = family.member(j as u64)?.nodes;
-            let flow = &flows[j % flows.len()];
+            let flow = &flows[j % LAWS];
             let excess = polygon::excess(&nodes);
             let parameters = Parameters {
                 omega: 1.0 + j as f64,
-                // One member in five is not redistributed.
-                redistribution: if j % 5 == 3 { 0.0 } else { 1.0 },
+                redistribution: if j % UNDISTRIBUTED == 3 { 0.0 } else { 1.0 },
                 // One member in three is pulled.
                 pull: if j % 3 == 1 { 50.0 } else { 0.0 },
                 tolerance,
@@ -51,7 +58,7 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
                 fit_from: excess,
                 fit_to: 1e-3 * excess,
                 clock_end: f64::from(steps),
-                growth: if *flow == Flow::Willmore { 50.0 } else { 0.0 },
+                growth: if flow.growth(1.0).is_some() { 50.0 } else { 0.0 },
                 ..Parameters::of_flow(flow, tau(n) * (1.0 - 0.05 * j as f64))
             };
             let mut run = Run::new(State::from_nodes(&nodes), parameters);

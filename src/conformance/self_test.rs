@@ -5,6 +5,7 @@
 
 use super::{
     adaptive_members,
+    cases::LAWS,
     compare::{ConformanceRow, Left, compare_ends},
     members,
 };
@@ -16,7 +17,7 @@ use crate::{
 };
 
 /// One for each law of [`members`]; with and without redistribution and pull.
-const MEMBERS: usize = 4;
+const MEMBERS: usize = LAWS;
 /// Fixed steps; adaptive runs cover the same time.
 const STEPS: u32 = 2;
 /// Tolerance of adaptive steps.

@@ -1,6 +1,9 @@
 //! The CSV files: one header, floats that read back exactly, empty fields for unknown values, sorted by member.
 //!
 //! A float that is not finite is unknown. There are no clock times: equal runs give equal bytes.
+//!
+//! A column is a line of `columns!`. [`Table::row`] writes its field and [`TableReader`](super::TableReader) reads it; how
+//! is in `column.rs`, by kind.
 
 use std::marker::PhantomData;
 
@@ -255,7 +258,6 @@ mod tests {
     fn outcome(start: Observables, end: Observables) -> Outcome {
         Outcome {
             member: 3,
-            cell: 0,
             status: Status::Relaxed,
             t_end: 0.5,
             steps: 500,
@@ -263,13 +265,11 @@ mod tests {
             sweeps_k: 1234,
             sweeps_x: 987,
             t_relax: Some(0.1 + 0.2),
-            t_half: None,
             rate: Some(6.5),
-            rate_r2: None,
-            rate_theory: None,
             start,
             end,
             self_crossing: Some(0.25),
+            ..Outcome::default()
         }
     }
 

@@ -236,6 +236,19 @@ mod tests {
     };
 
     #[test]
+    fn the_run_that_the_fuzzer_changes_is_one_of_this_version() {
+        let home = tempfile::tempdir().unwrap();
+        let base = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/base");
+        std::fs::create_dir(home.path().join("plots")).unwrap();
+        for name in [names::RUN, names::SUMMARY, names::MEAN_EXCESS, names::PORTRAITS] {
+            let own = Path::new(name).file_name().unwrap();
+            std::fs::copy(base.join(own), home.path().join(name)).unwrap();
+        }
+        let run = Finished::read(home.path()).unwrap();
+        assert!(run.tally.members() > 0 && !run.films.is_empty());
+    }
+
+    #[test]
     fn a_row_reads_back_to_the_outcome_that_was_written() {
         let home = tempfile::tempdir().unwrap();
         let mut written = outcome(3, Status::Stalled, Some(0.1 + 0.2));

@@ -317,28 +317,9 @@ impl Tally {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::ensemble::Observables;
 
     pub fn outcome(member: u64, status: Status, t_relax: Option<f64>) -> Outcome {
-        let (start, end) = (Observables::default(), Observables::default());
-        Outcome {
-            member,
-            cell: 0,
-            status,
-            t_end: 2.0,
-            steps: 10,
-            sweeps_k: 20,
-            sweeps_x: 5,
-            t_relax,
-            t_half: None,
-            rate: None,
-            rate_r2: None,
-            rate_theory: None,
-            start,
-            end,
-            rejected: 0,
-            self_crossing: None,
-        }
+        Outcome { member, status, t_end: 2.0, steps: 10, sweeps_k: 20, sweeps_x: 5, t_relax, ..Outcome::default() }
     }
 
     fn tally(times: &[f64], censored: u64) -> Tally {

@@ -1,4 +1,7 @@
 //! How a member ends: the codes that the kernel and its twin write to [`Counters`](super::member::Counters).
+//!
+//! A step decides on failure in `evolve.rs`. The host decides on members that end as they start, creep, or reach their
+//! final time, in `src/trajectory`.
 
 use serde::{Deserialize, Serialize};
 
