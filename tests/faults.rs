@@ -37,8 +37,6 @@ use curvelax::{
 use glam::DVec2;
 use libtest_mimic::{Arguments, Failed, Trial};
 
-use common::All;
-
 type Outcome = Result<(), Failed>;
 
 /// Nodes of the members, one of which is poisoned.
@@ -449,12 +447,12 @@ fn a_cap_of_one_sweep(gpu: &Gpu) -> Outcome {
     let choice = placement::choose(&spec, spec.points)?;
     let (mut backend, _) = choice.open(&spec, spec.points)?;
     // The run has the cap that it asked for.
-    let mut all = All::default();
+    let mut all = Vec::new();
     let cell = Cell::only(spec.clone(), Family::new(&spec)?);
     simulate(&[cell], choice.precision(), backend.as_mut(), 0, &mut all)?;
-    require(all.0.len() == 3, || format!("{} members", all.0.len()))?;
+    require(all.len() == 3, || format!("{} members", all.len()))?;
     let sweeps = |ended: &Ended| ended.outcome.sweeps_k <= 3 * (ended.outcome.steps + ended.outcome.rejected);
-    require(all.0.iter().all(sweeps), || format!("{:?}", all.0[0].outcome))
+    require(all.iter().all(sweeps), || format!("{:?}", all[0].outcome))
 }
 
 fn lost_before(gpu: &Gpu) -> Outcome {
@@ -477,10 +475,10 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     let mut settled = spec.clone();
     platform.settle_place(&mut settled);
     require((settled.backend, settled.adapter) == (BackendChoice::Cpu, None), || "the spec says another place".into())?;
-    let mut all = All::default();
+    let mut all = Vec::new();
     let family = Family::new(&spec)?;
     simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut all)?;
-    require(all.0.len() == 3, || format!("{} members", all.0.len()))?;
+    require(all.len() == 3, || format!("{} members", all.len()))?;
     // A later part of the same study makes the same choice, and one of a study on a GPU stays there.
     let later = choice_like(&spec)?.or_cpu().after(&platform);
     require(later.device().gpu().is_none(), || "a later part goes back to the GPU".into())?;
@@ -633,10 +631,10 @@ fn any_call_fails() -> Outcome {
     let run = |call, before| -> Result<(Vec<String>, curvelax::Result<()>), Failed> {
         let inner = CpuBackend::<f64>::with_vectors(blocks, method(Solver::Direct), 1, Vectors::None)?;
         let mut backend = Failing { inner: Box::new(inner), before, call, failed: false };
-        let mut all = All::default();
+        let mut all = Vec::new();
         let cells = [Cell::only(spec.clone(), Family::new(&spec)?)];
         let result = simulate(&cells, Precision::F64, &mut backend, 2, &mut all);
-        Ok((all.0.iter().map(|ended| format!("{ended:?}")).collect(), result))
+        Ok((all.iter().map(|ended| format!("{ended:?}")).collect(), result))
     };
     let (whole, result) = run("none", 0)?;
     result?;

@@ -5,8 +5,7 @@ mod common;
 use assert_cmd::Command;
 use curvelax::{
     backend::cpu::CpuBackend,
-    ensemble::{Cell, Ended, Family, Sink, Spec, spec::Precision},
-    error::Result,
+    ensemble::{Cell, Ended, Family, Spec, spec::Precision},
     simulate::simulate,
     solver::Blocks,
 };
@@ -150,17 +149,6 @@ fn the_files_have_the_columns_of_the_manual() {
     }
 }
 
-/// Stores the results of all members.
-#[derive(Default)]
-struct Recorder(Vec<Ended>);
-
-impl Sink for Recorder {
-    fn member(&mut self, ended: &Ended) -> Result<()> {
-        self.0.push(ended.clone());
-        Ok(())
-    }
-}
-
 #[test]
 fn every_number_in_the_files_is_the_one_that_was_computed() {
     let spec = Spec {
@@ -175,15 +163,15 @@ fn every_number_in_the_files_is_the_one_that_was_computed() {
     let spec = spec.validate().unwrap();
     let done = run_with(&[("spec.toml", &spec.to_toml().unwrap())], "spec.toml");
     let mut backend = CpuBackend::<f64>::new(Blocks::new(37).unwrap(), SWEEPS, 1).unwrap();
-    let mut recorder = Recorder::default();
+    let mut members: Vec<Ended> = Vec::new();
     let family = Family::new(&spec).unwrap();
-    simulate(&[Cell::only(spec.clone(), family)], Precision::F64, &mut backend, 0, &mut recorder).unwrap();
+    simulate(&[Cell::only(spec.clone(), family)], Precision::F64, &mut backend, 0, &mut members).unwrap();
 
     let read = |row: &Row, names: &[&str]| -> Vec<Option<u64>> {
         names.iter().map(|name| (!row[*name].is_empty()).then(|| number(row, name).to_bits())).collect()
     };
     let bits = |values: &[f64]| -> Vec<Option<u64>> { values.iter().map(|value| Some(value.to_bits())).collect() };
-    for (row, ended) in done.summary().iter().zip(&recorder.0) {
+    for (row, ended) in done.summary().iter().zip(&members) {
         let o = &ended.outcome;
         let (s, e) = (&o.start, &o.end);
         assert_eq!(read(row, &["t_relax", "t_half"]), [o.t_relax, o.t_half].map(|t| t.map(f64::to_bits)));
@@ -194,10 +182,10 @@ fn every_number_in_the_files_is_the_one_that_was_computed() {
         assert_eq!(read(row, &["metric_drift"]), bits(&[e.metric_drift]));
         assert_eq!([&row["steps"], &row["sweeps_k"]], [&o.steps.to_string(), &o.sweeps_k.to_string()]);
     }
-    assert!(recorder.0.iter().any(|ended| ended.outcome.t_relax.is_some()));
+    assert!(members.iter().any(|ended| ended.outcome.t_relax.is_some()));
 
     let series = done.rows("series.csv");
-    let computed: Vec<_> = recorder.0.iter().flat_map(|ended| &ended.rows.series).collect();
+    let computed: Vec<_> = members.iter().flat_map(|ended| &ended.rows.series).collect();
     assert_eq!(series.len(), computed.len());
     for (row, c) in series.iter().zip(computed) {
         let at = &c.at;
@@ -206,7 +194,7 @@ fn every_number_in_the_files_is_the_one_that_was_computed() {
         assert_eq!(number(row, "t").to_bits(), c.t.to_bits());
     }
     let snapshots = done.rows("snapshots.csv");
-    let computed: Vec<_> = recorder.0.iter().flat_map(|ended| &ended.rows.snapshots).collect();
+    let computed: Vec<_> = members.iter().flat_map(|ended| &ended.rows.snapshots).collect();
     assert_eq!(snapshots.len(), 37 * computed.len());
     for (i, row) in snapshots.iter().enumerate() {
         let (c, i) = (computed[i / 37], i % 37);

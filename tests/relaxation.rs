@@ -33,7 +33,7 @@ use curvelax::{
 use glam::DVec2;
 use rayon::prelude::*;
 
-use common::{All, DIRECT, Stepper, dumbbell, file, polygons, wavy_circle};
+use common::{DIRECT, Stepper, dumbbell, file, polygons, wavy_circle};
 
 /// An unperturbed curve with adaptive steps, solved directly.
 fn adaptive(shape: &str, points: usize) -> Spec {
@@ -61,9 +61,9 @@ fn run_of(spec: &Spec, curve: BaseCurve) -> Vec<Ended> {
     let choice = placement::choose(&spec, family.points()).unwrap();
     let precision = choice.precision();
     let (mut backend, _) = choice.open(&spec, family.points()).unwrap();
-    let mut all = All::default();
+    let mut all = Vec::new();
     simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), usize::MAX, &mut all).unwrap();
-    all.0
+    all
 }
 
 fn one(spec: &Spec) -> Outcome {

@@ -20,8 +20,6 @@ use curvelax::{
     solver::{Blocks, Order},
 };
 
-use common::All;
-
 /// A back end with fewer slots, so that members share vectors with others.
 struct Fewer(Box<dyn Backend>, usize);
 
@@ -69,10 +67,10 @@ fn run<T: Vectorised>(specs: &[Spec], vectors: Vectors, threads: usize, slots: u
     let method = Method { solver: specs[0].solver(), order: Order::Coloured, max_sweeps: specs[0].max_sweeps };
     let blocks = Blocks::new(specs[0].points).unwrap();
     let backend = CpuBackend::<T>::with_vectors(blocks, method, threads, vectors).unwrap();
-    let mut all = All::default();
+    let mut all = Vec::new();
     let cells: Vec<Cell> = specs.iter().flat_map(|spec| Study::new(spec.clone()).unwrap().into_cells()).collect();
     simulate(&cells, T::PRECISION, &mut Fewer(Box::new(backend), slots), 2, &mut all).unwrap();
-    all.0
+    all
 }
 
 fn same_bits<T: Vectorised>(name: &str, specs: &[Spec]) {

@@ -7,9 +7,7 @@ pub mod program;
 use std::f64::consts::TAU;
 
 use curvelax::{
-    Result,
     curve::{BaseCurve, Outline},
-    ensemble::{Ended, Sink},
     number::Real,
     scheme::{
         Parameters, State, Workspace,
@@ -22,17 +20,6 @@ use glam::DVec2;
 
 pub const DIRECT: Method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
 pub const SWEEPS: Method = Method { solver: Solver::GaussSeidel, max_sweeps: 1_000_000, ..DIRECT };
-
-/// All results of the members of a run.
-#[derive(Default)]
-pub struct All(pub Vec<Ended>);
-
-impl Sink for All {
-    fn member(&mut self, ended: &Ended) -> Result<()> {
-        self.0.push(ended.clone());
-        Ok(())
-    }
-}
 
 /// n nodes at `u = i/n`, i = 1…n.
 pub fn nodes(n: usize, curve: impl Fn(f64) -> DVec2) -> Vec<DVec2> {

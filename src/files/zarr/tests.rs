@@ -8,10 +8,9 @@ use super::SnapshotStore;
 use crate::{
     backend::{Backend, cpu::CpuBackend},
     ensemble::{
-        Cell, Ended, Family, Sink, Snapshot, Spec, Status,
+        Cell, Ended, Family, Snapshot, Spec, Status,
         spec::{Precision, Store},
     },
-    error::Result,
     files::{OutputFolder, names, tables::SnapshotTable},
     scheme::step::Method,
     simulate::simulate,
@@ -176,20 +175,6 @@ fn unknown_is_nan_and_padding_is_never_in_the_array() {
     assert!(last.chunks(8).skip(15).all(|element| element == f64::NAN.to_le_bytes()));
 }
 
-/// Keeps all that the members leave.
-#[derive(Default)]
-struct Recorder(Vec<Ended>);
-
-impl Sink for Recorder {
-    fn member(&mut self, ended: &Ended) -> Result<()> {
-        self.0.push(ended.clone());
-        Ok(())
-    }
-    fn progress(&mut self, _done: u64, _total: u64, _share: f64) -> Result<()> {
-        Ok(())
-    }
-}
-
 #[test]
 fn a_run_leaves_the_same_bits_as_in_its_table() {
     let spec = Spec {
@@ -205,10 +190,10 @@ fn a_run_leaves_the_same_bits_as_in_its_table() {
     let family = Family::new(&spec).unwrap();
     let direct = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
     let mut backend = CpuBackend::<f64>::new(Blocks::new(33).unwrap(), direct, 1).unwrap();
-    let mut recorder = Recorder::default();
+    let mut members: Vec<Ended> = Vec::new();
     let backend: &mut dyn Backend = &mut backend;
-    simulate(&[Cell::only(spec.clone(), family)], Precision::F64, backend, 0, &mut recorder).unwrap();
-    let members: Vec<_> = recorder.0.into_iter().map(|ended| (ended.outcome.status, ended.rows.snapshots)).collect();
+    simulate(&[Cell::only(spec.clone(), family)], Precision::F64, backend, 0, &mut members).unwrap();
+    let members: Vec<_> = members.into_iter().map(|ended| (ended.outcome.status, ended.rows.snapshots)).collect();
 
     let home = tempfile::tempdir().unwrap();
     let store = stored(home.path(), &spec, &members, 2 * 4 * 33 * 8);
