@@ -2,11 +2,12 @@
 //! seconds, and a command of few long steps one per step.
 
 use std::{
+    fmt,
     io::{self, IsTerminal, Write},
     time::{Duration, Instant},
 };
 
-use indicatif::{ProgressBar, ProgressStyle, style::TemplateError};
+use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle, style::TemplateError};
 
 use crate::text::{duration, plural};
 
@@ -99,8 +100,16 @@ impl ProgressLines {
 
 fn style(colour: bool) -> Result<ProgressStyle, TemplateError> {
     let bar = if colour { "{bar:32.cyan/dim}" } else { "{bar:32}" };
-    let style = ProgressStyle::with_template(&format!("{bar} {{percent:>3}} %  {{msg}}  {{eta}} left"))?;
-    Ok(style.progress_chars("━━─"))
+    let style = ProgressStyle::with_template(&format!("{bar} {{percent:>3}} %  {{msg}}{{left}}"))?;
+    Ok(style.progress_chars("━━─").with_key("left", left))
+}
+
+/// Writes the time left, once there is something to estimate it from.
+fn left(state: &ProgressState, text: &mut dyn fmt::Write) {
+    if state.pos() > 0 {
+        // The bar has no place for a failure.
+        let _ = write!(text, "  {:#} left", HumanDuration(state.eta()));
+    }
 }
 
 fn line(done: u64, total: u64, share: f64, elapsed: Duration) -> String {
