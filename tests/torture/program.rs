@@ -210,6 +210,6 @@ impl Ended {
     /// Whether the message is that there is nothing to resume.
     pub fn had_not_begun(&self) -> bool {
         let is_said = |words: &str| self.said.contains(words);
-        self.code == Some(2) && is_said("--force") && (is_said("had not begun") || is_said("no run was begun here"))
+        self.code == Some(2) && is_said("--force") && (is_said("had not started") || is_said("no run was started here"))
     }
 }

@@ -288,7 +288,8 @@ fn the_rest(suite: &mut Suite, seed: u64) {
     suite.test_if(strace.or(gpu), "few_threads_on_the_gpu", NAMED, move || threads::few_on_the_gpu(&GPU, most));
     let limit = (!threads::can_limit()).then_some("prlimit and setpriv");
     suite.test_if(limit, "no_threads_left_for_signals", "stopped, 0 differing bytes", || {
-        threads::none_left_for_signals(&SECOND, &STOPS)
+        // One that is not done before a stop is heard, however busy the machine is.
+        threads::none_left_for_signals(&ADAPTIVE, &STOPS)
     });
     suite.test("no_rights_for_new_files", "refused by name", || surroundings::no_rights_for_new_files(&SHORT));
     let cases = suite.of(3, 50);
