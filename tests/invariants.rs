@@ -11,7 +11,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, Shape, polygon},
     ensemble::{
         Cell, Ended, Family, Outcome, Sink, Spec, Status,
-        spec::{BackendChoice, Precision, Pull, Solver, SolverChoice, Sor},
+        spec::{BackendChoice, Omega, Precision, Pull, Solver, SolverChoice, Sor},
     },
     flow::Flow,
     number::Real,
@@ -142,7 +142,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
             let scaled = Spec {
                 tau: spec.tau.map(|tau| tau * c.powi(4)),
                 t_end: spec.t_end * c.powi(4),
-                omega: spec.omega / c.powi(4),
+                omega: Omega::Rate(1.0 / c.powi(4)),
                 flow: Flow::Elastic(0.4 / (c * c)),
                 ..spec.clone()
             };
@@ -168,13 +168,14 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
 fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
     for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-4)] {
         let fixed = method(precision, Solver::Direct);
-        let spec = Spec { tau: None, adaptive: Some(1e-3), pull: Pull::Auto, t_end: 0.1, relax_to: Some(0.5), ..fixed };
+        let (omega, pull) = (Omega::Auto, Pull::Auto);
+        let spec = Spec { tau: None, adaptive: Some(1e-3), omega, pull, t_end: 0.1, relax_to: Some(0.5), ..fixed };
         let (outcome, plain) = relaxed(&spec, potato);
         assert!(outcome.steps > 20 && outcome.t_relax.is_some());
         for c in [2.0_f64, 0.25, 3.0] {
             let flow = Flow::Elastic(0.4 / (c * c));
-            let (t_end, omega) = (spec.t_end * c.powi(4), spec.omega / c.powi(4));
-            let (large, nodes) = relaxed(&Spec { t_end, omega, flow, ..spec.clone() }, move |u| c * potato(u));
+            let t_end = spec.t_end * c.powi(4);
+            let (large, nodes) = relaxed(&Spec { t_end, flow, ..spec.clone() }, move |u| c * potato(u));
             let expected: Vec<DVec2> = plain.iter().map(|node| *node * c).collect();
             let rounding = if c == 3.0 { bound * c } else { 0.0 };
             assert_moved(&format!("{precision:?} adaptive, scaled by {c}"), &expected, &nodes, &plain, rounding);
@@ -182,11 +183,16 @@ fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
             assert!((a - b).abs() <= rounding, "{a} and {b}");
             assert_eq!(large.steps, outcome.steps);
         }
-        // The negative control: an unscaled pull makes a difference.
+        // The negative controls: an unscaled ω and an unscaled pull make a difference.
+        let fixed = Spec { omega: Omega::Rate(1.0), ..spec.clone() };
+        let (_, slow) = relaxed(&fixed, potato);
+        let flow = Flow::Elastic(0.1);
+        let (_, large) = relaxed(&Spec { t_end: 16.0 * spec.t_end, flow, ..fixed }, |u| 2.0 * potato(u));
+        assert!(distance(&slow, &large.iter().map(|node| *node / 2.0).collect::<Vec<_>>()) > 1e-6);
         let rate = Pull::Rate(40.0);
         let (_, pulled) = relaxed(&Spec { pull: rate, ..spec.clone() }, potato);
-        let (t_end, omega, flow) = (16.0 * spec.t_end, spec.omega / 16.0, Flow::Elastic(0.1));
-        let (_, large) = relaxed(&Spec { t_end, omega, flow, pull: rate, ..spec.clone() }, |u| 2.0 * potato(u));
+        let (t_end, flow) = (16.0 * spec.t_end, Flow::Elastic(0.1));
+        let (_, large) = relaxed(&Spec { t_end, flow, pull: rate, ..spec.clone() }, |u| 2.0 * potato(u));
         assert!(distance(&pulled, &large.iter().map(|node| *node / 2.0).collect::<Vec<_>>()) > 1e-6);
 
         let spin = DVec2::from_angle(0.7);

@@ -11,7 +11,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, crossing, polygon},
     ensemble::{
         Cell, Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
-        spec::{BackendChoice, Precision, Pull, Sor},
+        spec::{BackendChoice, Omega, Precision, Pull, Sor},
     },
     flow::Flow,
     number::Real,
@@ -198,7 +198,7 @@ fn islands_relax_at_every_n_when_an_independent_program_says_and_not_without_the
             let at = |n: usize, pull| {
                 let spec = Spec {
                     pull,
-                    omega,
+                    omega: Omega::Rate(omega),
                     relax_at: Some(0.01),
                     ..adaptive(&format!("file:examples/islands/{island}.csv"), n)
                 };
@@ -417,7 +417,13 @@ fn a_polygon_that_crosses_itself_has_done_so_from_the_start() {
 
 /// The spec for random polygons.
 fn for_polygons(omega: f64) -> Spec {
-    Spec { pull: Pull::Auto, omega, relax_at: Some(0.01), stop_when_relaxed: true, ..adaptive("circle:1", 128) }
+    Spec {
+        pull: Pull::Auto,
+        omega: Omega::Rate(omega),
+        relax_at: Some(0.01),
+        stop_when_relaxed: true,
+        ..adaptive("circle:1", 128)
+    }
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::{
     curve::{Modes, Sampling, Shape},
     ensemble::{
         Shard, Spec,
-        spec::{BackendChoice, Order, Precision, Pull, SolverChoice, Sor, Store},
+        spec::{BackendChoice, Omega, Order, Precision, Pull, SolverChoice, Sor, Store},
         sweep::SweepAxis,
     },
     flow::Flow,
@@ -112,12 +112,12 @@ pub struct SpecFlags {
     /// Final time [default: 2]
     #[arg(long, value_name = "T", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
     t_end: Option<f64>,
-    /// Rate ω, in 1/time, of the redistribution towards equal spacing [default: 1]
+    /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member [default: 1]
     #[arg(
-        long, value_name = "OMEGA", value_parser = real, allow_hyphen_values = true,
+        long, value_name = "OMEGA", value_parser = text_of::<Omega>, allow_hyphen_values = true,
         help_heading = EVOLUTION
     )]
-    omega: Option<f64>,
+    omega: Option<Omega>,
     /// Move nodes along the normal only [default: false]
     #[arg(
         long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",

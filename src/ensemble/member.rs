@@ -9,7 +9,12 @@ use std::{f64::consts::TAU, sync::Arc};
 
 use glam::DVec2;
 
-use super::{Mollified, Spec, mollifier::mollify, spec::Pull};
+use super::{
+    Mollified, Spec,
+    mollifier::mollify,
+    spec::{Omega, Pace, Pull},
+    validate::{MAX_OMEGA_TAU, overshooting},
+};
 use crate::random::Stream;
 use crate::{
     curve::{BaseCurve, Outline, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions, polygon},
@@ -93,7 +98,7 @@ impl Family {
             warnings.push(NO_EXCESS.into());
         }
         let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
-        check_pull(spec.pull, &sampler.sample(&RadialFactor::default()))?;
+        check_rates(spec, &sampler.sample(&RadialFactor::default()))?;
         let (sampler, directions) = (Arc::new(sampler), check_directions(spec.modes.high).into());
         Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners, simple })
     }
@@ -105,7 +110,7 @@ impl Family {
     /// As [`Family::new`].
     pub(crate) fn like(other: &Family, spec: &Spec) -> Result<Family> {
         let law = RadialLaw::new(spec.amplitude, spec.modes, spec.decay)?;
-        check_pull(spec.pull, &other.sampler.sample(&RadialFactor::default()))?;
+        check_rates(spec, &other.sampler.sample(&RadialFactor::default()))?;
         let directions = match other.law.modes().high == spec.modes.high {
             true => Arc::clone(&other.directions),
             false => check_directions(spec.modes.high).into(),
@@ -185,6 +190,11 @@ pub fn relaxation_rate(nodes: &[DVec2]) -> f64 {
     24.0 / (if simple { by_area } else { by_length }).powi(4)
 }
 
+/// ω of `--omega auto`: 1/6 of the relaxation rate, the paper's ω = 1 for a circle of the area of its 2:1 ellipse.
+pub fn own_omega(nodes: &[DVec2]) -> f64 {
+    relaxation_rate(nodes) / 6.0
+}
+
 /// The largest κ allowed: n²/100 times the relaxation rate.
 ///
 /// A pull that is strong compared with the relaxation undoes the redistribution, and the mesh falls apart. For the
@@ -193,9 +203,18 @@ pub fn strongest_pull(nodes: &[DVec2]) -> f64 {
     (nodes.len() as f64 / 10.0).powi(2) * relaxation_rate(nodes)
 }
 
-fn check_pull(pull: Pull, nodes: &[DVec2]) -> Result<()> {
+/// Checks the rates that depend on the curve: a strong pull, and its own ω with fixed steps.
+fn check_rates(spec: &Spec, nodes: &[DVec2]) -> Result<()> {
+    let omega = own_omega(nodes);
+    if let (Omega::Auto, Pace::Fixed(tau)) = (spec.omega, spec.pace())
+        && omega * tau > MAX_OMEGA_TAU
+        && !spec.no_redistribution
+    {
+        let allowed = format!("use --tau {:.3e} or less", MAX_OMEGA_TAU / omega);
+        return Err(Error::value("omega", "auto", &overshooting(omega, tau), &allowed));
+    }
     let most = strongest_pull(nodes);
-    match pull {
+    match spec.pull {
         Pull::Rate(rate) if rate > most => {
             let problem = format!("so strong that it destroys the mesh of {} nodes on this curve", nodes.len());
             Err(Error::value("pull", rate, &problem, &format!("use {most:.3} or less, or auto")))
@@ -394,6 +413,18 @@ mod tests {
     }
 
     #[test]
+    fn the_own_speed_of_the_redistribution_is_the_papers_for_its_ellipse_and_scales_with_the_curve() {
+        let omega = |shape: &str| {
+            let spec = Spec { shape: shape.parse().unwrap(), amplitude: 0.0, points: 400, ..Spec::default() };
+            own_omega(&Family::new(&spec).unwrap().member(0).unwrap().nodes)
+        };
+        assert!((omega("ellipse:2,1") - 1.0).abs() < 1e-3);
+        assert_eq!(omega("ellipse:64,32"), omega("ellipse:2,1") / 32_f64.powi(4));
+        // Of an immersed curve, by its length.
+        assert!(omega("lemniscate:1").is_finite());
+    }
+
+    #[test]
     fn every_wrong_key_is_refused_before_any_member_is_made() {
         let wrong = [
             (Spec { amplitude: 0.6, ..Spec::default() }, "--amplitude 0.6"),
@@ -401,6 +432,7 @@ mod tests {
             (Spec { decay: f64::NAN, ..Spec::default() }, "--decay NaN"),
             (Spec { points: 2, ..Spec::default() }, "--points 2"),
             (Spec { pull: Pull::Rate(700.0), ..Spec::default() }, "--pull 700"),
+            (Spec { omega: Omega::Auto, tau: Some(1.01), ..Spec::default() }, "--omega auto: omega tau = 1.01,"),
             (Spec { sampling: Sampling::Points, ..Spec::default() }, "--sampling points"),
             (Spec { shape: Shape::Circle { radius: 0.0 }, ..Spec::default() }, "--shape circle:0"),
             (Spec { shape: Shape::File("none.csv".into()), ..Spec::default() }, "--shape file:none.csv"),

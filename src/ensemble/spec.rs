@@ -104,6 +104,15 @@ pub enum Pace {
     Adaptive(f64),
 }
 
+/// ω of the redistribution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Omega {
+    /// ω itself, in 1/time.
+    Rate(f64),
+    /// From each member's own relaxation time.
+    Auto,
+}
+
 /// κ of the metric pull.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pull {
@@ -166,7 +175,7 @@ pub struct Spec {
     /// Final time.
     pub t_end: f64,
     /// ω, speed of the redistribution towards equal spacing, in 1/time.
-    pub omega: f64,
+    pub omega: Omega,
     /// No tangential redistribution (α = 0).
     pub no_redistribution: bool,
     /// κ of the metric pull.
@@ -246,7 +255,7 @@ impl Default for Spec {
             tau: None,
             adaptive: None,
             t_end: 2.0,
-            omega: 1.0,
+            omega: Omega::Rate(1.0),
             no_redistribution: false,
             pull: Pull::Rate(0.0),
             solver: SolverChoice::Auto,
@@ -487,6 +496,7 @@ macro_rules! number_or_auto {
     };
 }
 
+number_or_auto!(Omega, Rate);
 number_or_auto!(Pull, Rate);
 number_or_auto!(Sor, Factor);
 
@@ -569,7 +579,7 @@ mod tests {
             tau: Some(1e-300),
             relax_at: Some(0.01),
             pull: Pull::Rate(0.1),
-            omega: 0.1 + 0.2,
+            omega: Omega::Rate(0.1 + 0.2),
             flow: Flow::Polynomial(vec![0.5, 0.0, -0.25]),
             precision: Some(Precision::F32),
             tolerance: Some(3e-4),
@@ -580,8 +590,14 @@ mod tests {
             shard: Some(Shard::new(1, 3).unwrap()),
             ..Spec::default()
         };
-        let adaptive =
-            Spec { adaptive: Some(1e-3), pull: Pull::Auto, sor: Sor::Auto, relax_to: Some(0.1), ..Spec::default() };
+        let adaptive = Spec {
+            adaptive: Some(1e-3),
+            omega: Omega::Auto,
+            pull: Pull::Auto,
+            sor: Sor::Auto,
+            relax_to: Some(0.1),
+            ..Spec::default()
+        };
         for spec in [spec, adaptive, Spec::default()] {
             let text = spec.to_toml().unwrap();
             assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");

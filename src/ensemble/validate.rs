@@ -3,7 +3,9 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that needs
 //! the file of the shape. Only the resolution of the highest mode is checked here.
 
-use super::spec::{BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Order, Pace, Precision, Pull, Sor, Spec, Store};
+use super::spec::{
+    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Omega, Order, Pace, Precision, Pull, Sor, Spec, Store,
+};
 use crate::{
     error::{Error, Result},
     solver::{Facts, ring::MIN_POINTS},
@@ -22,7 +24,7 @@ const MAX_SNAPSHOTS: usize = 10_000;
 /// The same for snapshots, at four numbers a row.
 const MAX_SNAPSHOT_ROWS: usize = 100_000_000;
 /// The lengths approach their mean explicitly, by a factor 1 - ωτ per step.
-const MAX_OMEGA_TAU: f64 = 1.0;
+pub(super) const MAX_OMEGA_TAU: f64 = 1.0;
 /// Above this local error a step says nothing about the curve.
 const LOOSEST_ADAPTIVE: f64 = 1.0;
 /// A sweep residual above this no longer says that a system is solved.
@@ -138,6 +140,30 @@ impl Spec {
         Ok(())
     }
 
+    fn check_omega(&self) -> Result<()> {
+        let Omega::Rate(omega) = self.omega else { return Ok(()) };
+        if !(omega.is_finite() && omega >= 0.0) {
+            let allowed = "use 0, a positive number such as 1, or auto";
+            return Err(Error::value("omega", number(omega), "not a redistribution speed", allowed));
+        }
+        if self.no_redistribution {
+            return Ok(());
+        }
+        match self.pace() {
+            Pace::Fixed(tau) if omega * tau > MAX_OMEGA_TAU => {
+                let allowed = format!("it is a rate: use --omega {} or less", number(1.0 / tau));
+                Err(Error::value("omega", number(omega), &overshooting(omega, tau), &allowed))
+            }
+            Pace::Adaptive(_) if omega * self.t_end > MAX_STEPS => {
+                let problem =
+                    format!("adaptive steps are at most about 1/omega long, and --t-end is {}", number(self.t_end));
+                let allowed = format!("use --omega {} or less, or an earlier --t-end", number(MAX_STEPS / self.t_end));
+                Err(Error::value("omega", number(omega), &problem, &allowed))
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn check_pull(&self) -> Result<()> {
         let Pull::Rate(rate) = self.pull else { return Ok(()) };
         if !(rate.is_finite() && rate >= 0.0) {
@@ -148,28 +174,7 @@ impl Spec {
     }
 
     fn check_method(&self) -> Result<()> {
-        if !(self.omega.is_finite() && self.omega >= 0.0) {
-            let allowed = "use 0 or any positive number, for example 1";
-            return Err(Error::value("omega", number(self.omega), "not a redistribution speed", allowed));
-        }
-        if let Pace::Fixed(tau) = self.pace()
-            && self.omega * tau > MAX_OMEGA_TAU
-            && !self.no_redistribution
-        {
-            let turns = number(self.omega * tau);
-            let problem = format!("omega tau = {turns}, and the redistribution overshoots above 1");
-            let allowed = format!("it is a rate: use --omega {} or less", number(1.0 / tau));
-            return Err(Error::value("omega", number(self.omega), &problem, &allowed));
-        }
-        if let Pace::Adaptive(_) = self.pace()
-            && self.omega * self.t_end > MAX_STEPS
-            && !self.no_redistribution
-        {
-            let problem =
-                format!("adaptive steps are at most about 1/omega long, and --t-end is {}", number(self.t_end));
-            let allowed = format!("use --omega {} or less, or an earlier --t-end", number(MAX_STEPS / self.t_end));
-            return Err(Error::value("omega", number(self.omega), &problem, &allowed));
-        }
+        self.check_omega()?;
         self.check_pull()?;
         if let Some(tolerance) = self.tolerance
             && !(tolerance > 0.0 && tolerance <= LOOSEST_TOLERANCE)
@@ -327,6 +332,11 @@ fn tightest_adaptive(precision: Precision) -> f64 {
         Precision::F32 => 1e-5,
         Precision::F64 => 1e-8,
     }
+}
+
+/// The problem of a redistribution that is too fast for fixed steps.
+pub(super) fn overshooting(omega: f64, tau: f64) -> String {
+    format!("omega tau = {}, and the redistribution overshoots above {MAX_OMEGA_TAU}", number(omega * tau))
 }
 
 fn positive(key: &str, value: f64, what: &str, example: &str) -> Result<()> {

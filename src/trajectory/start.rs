@@ -7,8 +7,8 @@ use crate::{
     curve::polygon,
     ensemble::{
         Member, Observables, Rows, Spec, Status,
-        member::{relaxation_rate, strongest_pull},
-        spec::{Pace, Precision, Pull, Sor},
+        member::{own_omega, relaxation_rate, strongest_pull},
+        spec::{Omega, Pace, Precision, Pull, Sor},
     },
     schedule::{self, Clock, Outputs, Ticks},
     scheme::{Parameters, State, run::Run},
@@ -165,7 +165,10 @@ fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parame
         c7: law(7, of_flow.c7),
         c8: law(8, of_flow.c8),
         tau: if let Pace::Fixed(tau) = spec.pace() { tau / time } else { 0.0 },
-        omega: spec.omega * time,
+        omega: match spec.omega {
+            Omega::Rate(rate) => rate * time,
+            Omega::Auto => own_omega(nodes),
+        },
         redistribution: f64::from(u8::from(!spec.no_redistribution)),
         pull: match spec.pull {
             Pull::Rate(rate) => rate * time,
