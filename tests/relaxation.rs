@@ -148,6 +148,22 @@ fn near(found: Option<f64>, exact: f64, bound: f64) -> bool {
     found.is_some_and(|found| (found / exact - 1.0).abs() <= bound)
 }
 
+/// A curve at rest that is followed for 10⁵ relaxation times with hardly any redistribution loses its mesh in the end.
+#[test]
+fn a_member_that_relaxed_stays_relaxed_whatever_happens_to_it_at_rest() {
+    let omega = |rate| Omega::Rate(rate);
+    let spec = |omega, t_end| Spec { pull: Pull::Auto, omega, t_end, ..adaptive("ellipse:2,1", 100) };
+    let long = one(&spec(omega(1e-4), 20_000.0));
+    assert_eq!(long.status, Status::Relaxed);
+    assert!(long.t_end < 20_000.0, "it lost its mesh: {}", long.t_end);
+    let short = one(&spec(omega(1e-4), 5.0));
+    assert_eq!((short.status, short.t_end), (Status::Relaxed, 5.0));
+    assert!((long.t_relax.unwrap() / short.t_relax.unwrap() - 1.0).abs() < 1e-12);
+    // The negative control: one that fails before it relaxes is not.
+    let failed = one(&Spec { adaptive: None, tau: Some(0.5), solver: Solver::Direct.into(), ..spec(omega(1.0), 5.0) });
+    assert!(failed.t_relax.is_none() && failed.status.is_failure(), "{failed:?}");
+}
+
 #[test]
 fn an_ellipse_relaxes_when_it_should_in_eighty_steps_and_not_with_a_coarse_fixed_step() {
     for (sampling, n, bounds) in [

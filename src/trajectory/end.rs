@@ -56,7 +56,8 @@ impl Trajectory<'_> {
         let t_relax = if self.course == Course::Round { Some(0.0) } else { relaxed };
         let t_half = if self.start.excess <= ROUND { Some(0.0) } else { halved };
         let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.counters.status);
-        let status = failed.unwrap_or(if t_relax.is_some() { Status::Relaxed } else { Status::Unfinished });
+        // What happens to a curve at rest takes nothing from its time.
+        let status = if t_relax.is_some() { Status::Relaxed } else { failed.unwrap_or(Status::Unfinished) };
         let (rate, rate_r2) = self.rate().unzip();
         let (origin, unit) = (self.member.origin, self.unit);
         let portrait = self.portrait.then(|| {
