@@ -91,6 +91,45 @@ fn an_outline_is_found_again_from_anywhere_and_has_to_be_the_same() {
 }
 
 #[test]
+fn run_resume_compares_the_outline_and_the_back_end_that_it_is_asked_for() {
+    let home = TempDir::new().unwrap();
+    let [a, b] = ["a", "b"].map(|name| home.path().join(name));
+    [&a, &b].into_iter().for_each(|folder| fs::create_dir(folder).unwrap());
+    let square = "x,y\n0,0\n1,0\n1,1\n0,1\n";
+    fs::write(a.join("square.csv"), square).unwrap();
+    fs::write(b.join("square.csv"), square.replace("1,1", "1,1.5")).unwrap();
+    let line =
+        |folder: &str, more: &str| format!("run --shape file:square.csv {LONG} --resume --out {folder}out {more}");
+    said(&curvelax(&a, &line("", "--backend cpu")), 75);
+    let message = said(&curvelax(&b, &line("../a/", "--backend cpu")), 2);
+    assert!(message.contains("square.csv has changed or disappeared since the run began"), "{message}");
+    // The same outline is resumed from elsewhere.
+    fs::write(b.join("square.csv"), square).unwrap();
+    said(&curvelax(&b, &line("../a/", "--backend cpu")), 75);
+    said(&curvelax(&a, &line("", "")), 75);
+    // Whether or not there is a GPU.
+    let message = said(&curvelax(&a, &line("", "--backend gpu")), 2);
+    let told = ["the run in out is on the cpu; leave out --backend", "no GPU adapter"];
+    assert!(told.iter().any(|told| message.contains(told)), "{message}");
+}
+
+#[test]
+fn a_finished_run_answers_again_with_its_results_and_its_failures() {
+    let home = TempDir::new().unwrap();
+    let line = "run --backend cpu --curves 4 --points 60 --tau 0.02 --t-end 1 --shape astroid --out bad";
+    let first = curvelax(home.path(), &format!("{line} --strict --json"));
+    said(&first, 3);
+    let json = |output: &Output| serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap();
+    for again in ["resume bad --strict --json", &format!("{line} --resume --strict --json")] {
+        let output = curvelax(home.path(), again);
+        assert!(said(&output, 3).contains("--strict: 4 of 4 members ended neither relaxed nor unfinished"), "{again}");
+        assert_eq!(json(&output), json(&first), "{again}");
+    }
+    assert!(curvelax(home.path(), "resume bad --json").status.success());
+    assert_eq!(curvelax(home.path(), "resume bad").stdout, b"");
+}
+
+#[test]
 fn members_that_end_as_they_are_made_are_kept_too() {
     let home = TempDir::new().unwrap();
     let round = "run --backend cpu --shape circle:1 --amplitude 0 --stop-when-relaxed --curves 30000000 --max-time 1s";

@@ -254,12 +254,12 @@ fn shards_that_are_not_what_they_were_are_refused_by_name() {
     let mut other = summary.clone();
     other[summary.len() - 2] ^= 1;
     spoil("s/1/summary.csv", &summary[..summary.len() - 9], &["bytes, and the shard wrote", "copy the shard again"]);
-    spoil("s/1/summary.csv", &other, &["its checksum is another one", "copy it again"]);
+    spoil("s/1/summary.csv", &other, &["its checksum differs", "copy it again"]);
     let text = String::from_utf8(summary.clone()).unwrap();
     let (member, cut) = (text.replacen("\n4,", "\n5,", 1), text.replace('\n', "x"));
     spoil("s/1/summary.csv", member.as_bytes(), &["a row that is of no member of shard 1/3"]);
     spoil("s/1/summary.csv", cut.as_bytes(), &["its last line is cut off"]);
-    spoil("s/1/summary.csv", text.replacen("member", "mumber", 1).as_bytes(), &["its columns are others"]);
+    spoil("s/1/summary.csv", text.replacen("member", "mumber", 1).as_bytes(), &["its columns differ"]);
     let state = copies("s/2/shard.state");
     spoil("s/2/shard.state", &state[..state.len() / 2], &["bytes where"]);
     let mut bit = state.clone();

@@ -14,6 +14,7 @@ use std::{
 };
 
 use curvelax::{
+    backend::DeviceKind,
     ensemble::{Shard, Spec, spec::Precision},
     files::{names, part_file::Mark},
     placement::Platform,
@@ -102,7 +103,7 @@ impl Folder {
         let shard = Shard::new(index, 2).unwrap();
         let spec = Spec { curves: 8, shard: Some(shard), ..Spec::default() }.validate().unwrap();
         let platform = Platform {
-            backend: "cpu".into(),
+            backend: DeviceKind::Cpu,
             adapter: None,
             driver: None,
             device_type: None,

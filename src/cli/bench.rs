@@ -124,10 +124,10 @@ struct Benches<'a> {
 pub fn bench(args: BenchArgs) -> Result<()> {
     let (seconds, repeats) = (args.seconds.unwrap_or(2.0), args.repeats.unwrap_or(5));
     if !(seconds > 0.0 && seconds <= MAX_SECONDS) {
-        return Err(Error::value("seconds", seconds, "no time to measure in", &format!("use up to {MAX_SECONDS}")));
+        return Err(Error::value("seconds", seconds, "out of range", &format!("use up to {MAX_SECONDS}")));
     }
     if !(1..=MAX_REPEATS).contains(&repeats) {
-        return Err(Error::value("repeats", repeats, "no number of windows", &format!("use 1 to {MAX_REPEATS}")));
+        return Err(Error::value("repeats", repeats, "out of range", &format!("use 1 to {MAX_REPEATS}")));
     }
     let window = Duration::from_secs_f64(seconds / repeats as f64);
     let mut cases = cases(&args)?.into_iter().map(Case::new).collect::<Vec<_>>();

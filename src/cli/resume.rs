@@ -9,12 +9,12 @@ use super::{
     work::{MannerFlags, Work},
 };
 use crate::{
-    ensemble::{Spec, spec::BackendChoice},
+    ensemble::{Spec, Study, spec::BackendChoice},
     error::{Error, Result},
     files::{OutputFolder, names},
     report::{
         RunReport,
-        checkpoint::{self, Saved},
+        checkpoint::{self, Head, Saved},
         reader,
     },
 };
@@ -77,8 +77,13 @@ pub fn begun(path: &Path) -> Result<Option<(OutputFolder, Option<Saved>)>> {
 ///
 /// # Errors
 /// [`Error::Request`] for a run of another spec, and those of [`resume`].
-pub fn resume_like((folder, saved): (OutputFolder, Option<Saved>), spec: &Spec, flags: MannerFlags) -> Result<()> {
-    let path = folder.path().display().to_string();
+pub fn resume_like(
+    (folder, saved): (OutputFolder, Option<Saved>),
+    study: &Study,
+    asked: BackendChoice,
+    flags: MannerFlags,
+) -> Result<()> {
+    let (path, spec) = (folder.path().display().to_string(), study.spec());
     let own = match &saved {
         Some(saved) => Spec::from_toml(&saved.head.origin.spec).map_err(|e| state_spec(&e))?,
         None => reader::provenance(folder.path())?.spec,
@@ -88,6 +93,17 @@ pub fn resume_like((folder, saved): (OutputFolder, Option<Saved>), spec: &Spec, 
         return Err(Error::Request(format!(
             "--resume: the run in {path} has another spec: {key} is {there} there and {here} here; use another folder"
         )));
+    }
+    if let Some(Saved { head: Head { origin, .. }, .. }) = &saved {
+        // The outline of this name may be another one here.
+        origin.check_outlines(study)?;
+        let there = origin.platform.backend;
+        if asked != BackendChoice::Auto && asked != there.into() {
+            return Err(Error::Request(format!(
+                "--resume: the run in {path} is on the {there}; leave out --backend, or move it with curvelax resume \
+                 --backend"
+            )));
+        }
     }
     resume_in(folder, saved, ResumePlace { threads: spec.threads, ..ResumePlace::default() }, flags)
 }
@@ -105,7 +121,7 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: ResumePlace,
     let Some(mut saved) = saved else {
         folder.tidy()?;
         flags.say(&format!("note: the run in {} is finished: nothing is left to do", path.display()));
-        return Ok(());
+        return flags.finished(&path);
     };
     // Before a device is looked for, which takes time.
     let manner = flags.manner()?;

@@ -60,7 +60,9 @@ pub struct RunArgs {
 
 /// Runs the command.
 pub fn run(args: RunArgs) -> Result<()> {
-    let mut work = Work::new(resolve(args.spec, args.flags)?)?;
+    let spec = resolve(args.spec, args.flags)?;
+    let asked = spec.backend;
+    let mut work = Work::new(spec)?;
     if args.print_spec {
         return print(&work.study.spec().to_toml()?);
     }
@@ -78,7 +80,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     flags.check_name(&out)?;
     let begun = if args.resume { resume::begun(&out)? } else { None };
     if let Some(begun) = begun {
-        return resume::resume_like(begun, work.study.spec(), flags);
+        return resume::resume_like(begun, &work.study, asked, flags);
     }
     let manner = flags.manner()?;
     let existing = if args.resume { Existing::Filled } else { args.force.into() };

@@ -47,7 +47,7 @@ fn flags(command: &Command) -> impl Iterator<Item = &str> {
 /// The commands to which a flag belongs, and the description and flags of the command that was `called`.
 fn belongs(word: &str, owners: &[&str], called: Option<&Command>) -> Vec<StyledStr> {
     let owners = quoted(owners.iter().map(|owner| (*owner).to_string()));
-    let Some(command) = called else { return vec![format!("'--{word}' goes behind a command: {owners}").into()] };
+    let Some(command) = called else { return vec![format!("'--{word}' goes after a command: {owners}").into()] };
     let name = command.get_name();
     let own: Vec<String> = flags(command).map(|flag| format!("--{flag}")).collect();
     let takes = match own.len() {
@@ -122,7 +122,7 @@ mod tests {
     fn a_flag_before_the_command_is_sent_behind_it() {
         for arguments in [&["--json"][..], &["--curves=3"], &["--curves", "3", "run"]] {
             let error = said(arguments);
-            assert!(error.contains("goes behind a command: 'run'") && !error.contains("similar"), "{error}");
+            assert!(error.contains("goes after a command: 'run'") && !error.contains("similar"), "{error}");
         }
     }
 }

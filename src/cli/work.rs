@@ -9,7 +9,8 @@ use crate::{
     error::{Error, Result},
     files::names,
     placement::{self, Choice, Platform},
-    report::{Form, Manner, RunReport, Stop},
+    report::{Form, Manner, RunReport, Stop, complete::listed, document::Document, reader::Finished},
+    results::EnsembleStatistics,
     simulate::resume,
     text::plural,
 };
@@ -51,6 +52,39 @@ impl MannerFlags {
     /// [`Error::Request`] for a name that JSON cannot represent.
     pub fn check_name(&self, out: &Path) -> Result<()> {
         check_name(self.json, out)
+    }
+
+    /// Says about the finished run in `out` what is asked of one: its results as JSON, and whether members failed.
+    ///
+    /// # Errors
+    /// As [`MannerFlags::check_failed`], and those of reading the run.
+    pub fn finished(&self, out: &Path) -> Result<()> {
+        if !self.json && !self.strict {
+            return Ok(());
+        }
+        let Finished { provenance, mut tally, .. } = Finished::read(out)?;
+        let (failed, members) = (tally.failed(), tally.members());
+        if self.json {
+            let statistics = EnsembleStatistics::new(&provenance.spec, &mut tally)?;
+            let files = listed(|name| out.join(name).exists());
+            print(&Document::new(&provenance, &provenance.spec, &statistics, out, &files).to_json()?)?;
+        }
+        self.check_failed(failed, members, out)
+    }
+
+    /// Checks that no member failed, if that is asked for.
+    ///
+    /// # Errors
+    /// [`Error::Strict`] with how many did.
+    fn check_failed(&self, failed: u64, members: u64, out: &Path) -> Result<()> {
+        match failed {
+            1.. if self.strict => Err(Error::Strict(format!(
+                "--strict: {failed} of {members} {} ended neither relaxed nor unfinished; see `status` in {}",
+                plural(members, "member"),
+                out.join(names::SUMMARY).display()
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// Makes the run stoppable from now on.
@@ -146,15 +180,7 @@ impl Work {
         if flags.json || !flags.quiet {
             print(&text)?;
         }
-        match failed {
-            1.. if flags.strict => Err(Error::Strict(format!(
-                "--strict: {failed} of {} {} ended neither relaxed nor unfinished; see `status` in {}",
-                study.member_count(),
-                plural(study.member_count(), "member"),
-                out.join(names::SUMMARY).display()
-            ))),
-            _ => Ok(()),
-        }
+        flags.check_failed(failed, study.member_count(), &out)
     }
 }
 

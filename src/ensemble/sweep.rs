@@ -171,7 +171,7 @@ impl Sweep {
                 return Err(Error::Request(format!("--sweep {key}: no such key{hint}; see --print-spec for the keys")));
             }
             if COMMON.contains(&key.as_str()) {
-                let message = "all members of a run have it in common; run once for each value";
+                let message = "it is the same for the whole run; run once for each value";
                 return Err(Error::Request(format!("--sweep {key}: {message}")));
             }
             if values.is_empty() {
@@ -311,7 +311,7 @@ mod tests {
     fn wrong_sweeps_are_refused_with_their_key() {
         for (axes, part) in [
             (&["amplitud=1"][..], "--sweep amplitud: no such key (did you mean `amplitude`?)"),
-            (&["curves=1,2"], "--sweep curves: all members of a run have it in common"),
+            (&["curves=1,2"], "--sweep curves: it is the same for the whole run"),
             (&["amplitude="], "--sweep amplitude: no values"),
             (&["seed=1,2,3,4,5,6,7,8,9,10", "decay=1,2,3,4,5,6,7,8,9,10"], ""),
         ] {

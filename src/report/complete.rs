@@ -48,6 +48,13 @@ pub struct Complete<'a> {
     pub wall: Duration,
 }
 
+/// The names of a run's files as the overview lists them, of those that `is_there`.
+pub fn listed(is_there: impl Fn(&str) -> bool) -> Vec<&'static str> {
+    let tables = names::TABLES.into_iter().filter(|name| is_there(name));
+    let shard = Some(names::SHARD).filter(|name| is_there(name));
+    tables.chain([names::REPORT, PLOTS, names::RUN]).chain(shard).collect()
+}
+
 impl Complete<'_> {
     /// Gives all files their final names, once all are on disk, and returns the text for stdout. `files` and `store`
     /// hold the results of the members; `shard` is [what a merge needs besides them](super::shard).
@@ -74,8 +81,7 @@ impl Complete<'_> {
         }
         let mut written: Vec<String> = files.iter().map(|file| file.name().to_string()).collect();
         written.extend(store.iter().map(|_| names::STORE.to_string()));
-        let is_written = |name: &&str| written.iter().any(|own| own == name);
-        let mut names: Vec<&str> = names::TABLES.into_iter().filter(is_written).collect();
+        let names = listed(|name| written.iter().any(|own| own == name));
         let provenance = &Provenance::new(spec, platform, tally, warnings, started, wall);
         let run = folder.write(names::RUN, provenance.to_json()?)?;
         let study = FinishedRun { provenance, tally, statistics, excess, films };
@@ -96,8 +102,6 @@ impl Complete<'_> {
             let folder = folder.path().display();
             Error::Failed(format!("{error}; the tables in {folder} are complete, some pictures are missing"))
         })?;
-        names.extend([names::REPORT, PLOTS, names::RUN]);
-        names.extend(shard.map(|_| names::SHARD));
         let (folder, files) = (folder.path(), &names[..]);
         match form {
             Form::Overview => {

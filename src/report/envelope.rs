@@ -72,7 +72,7 @@ pub fn opened(layout: u32, bytes: &[u8]) -> Result<&[u8], Fault> {
     let (version, length) = (u32::from_le_bytes(version), u64::from_le_bytes(length));
     let whole = length.checked_add((BEFORE + AFTER) as u64);
     if whole != Some(bytes.len() as u64) {
-        return damaged(&format!("it has {} bytes where {length} and {} are told", bytes.len(), BEFORE + AFTER));
+        return damaged(&format!("it was cut off or changed: its header promises {length} bytes of content"));
     }
     let (all, crc) = bytes.split_at(bytes.len() - AFTER);
     if crc32c::crc32c(all).to_le_bytes() != *crc {

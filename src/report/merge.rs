@@ -345,7 +345,7 @@ impl ShardRows {
         self.line = 0;
         match () {
             _ if self.at < self.buffer.len() => Err(self.changed("its last line is cut off")),
-            _ if self.read.crc != self.mark.crc => Err(self.changed("its checksum is another one")),
+            _ if self.read.crc != self.mark.crc => Err(self.changed("its checksum differs")),
             _ => Ok(None),
         }
     }
@@ -417,7 +417,7 @@ pub fn join_rows(parts: &[FinishedShard], name: &str, out: &mut impl Write, targ
                 header = Some(own);
             }
             (Some(header), Some(own)) if *header == own => {}
-            _ => return Err(rows.changed("its columns are others")),
+            _ => return Err(rows.changed("its columns differ")),
         }
     }
     let mut next = BinaryHeap::new();

@@ -132,7 +132,7 @@ impl Overview<'_> {
             let error = exponent_error.map_or(String::new(), |error| format!(" +- {}", significant(error)));
             writeln!(
                 f,
-                "{:<11}median t_relax goes with {} to the power {}{error}",
+                "{:<11}median t_relax scales as {} to the power {}{error}",
                 "law",
                 axis.key,
                 significant(*exponent)

@@ -266,7 +266,10 @@ pub fn outlines() -> Outcome {
     for text in ["0,0\n3,0\n3,1\n0,1\n", "0,0\n", ""] {
         fs::write(&outline, text).unwrap();
         let ended = Running::start(&mut curvelax(home.path(), "resume out --quiet")).end();
-        assert!(ended.code == Some(2) && ended.said.contains("has changed or disappeared since the run began"), "{ended:?}");
+        assert!(
+            ended.code == Some(2) && ended.said.contains("has changed or disappeared since the run began"),
+            "{ended:?}"
+        );
         assert!(content(&home.path().join("out")) == before);
         cases += 1;
     }

@@ -41,7 +41,7 @@ impl OutputFolder {
         }
         let mut folder = OutputFolder::of(path, OWN.map(String::from).into());
         if !folder.claim().map_err(cannot)? {
-            return Err(refuse("a run is writing here; wait for its end".into()));
+            return Err(refuse("a run is writing here; wait until it ends".into()));
         }
         folder.check_names()?;
         folder.probe().map_err(cannot)?;

@@ -68,7 +68,7 @@ impl StoredMembers {
     pub fn check(&self) -> Result<()> {
         match self.arrays.iter().find(|own| own.array.crc != own.crc) {
             None => Ok(()),
-            Some(own) => Err(own.changed("their checksum is another one")),
+            Some(own) => Err(own.changed("their checksum differs")),
         }
     }
 }
@@ -158,6 +158,6 @@ mod tests {
         bytes[0] ^= 1;
         fs::write(&chunk, bytes).unwrap();
         let error = copy(&home.path().join("again")).unwrap_err().to_string();
-        assert!(error.contains("/k: their checksum is another one"), "{error}");
+        assert!(error.contains("/k: their checksum differs"), "{error}");
     }
 }
