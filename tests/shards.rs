@@ -261,7 +261,7 @@ fn shards_that_are_not_what_they_were_are_refused_by_name() {
     spoil("s/1/summary.csv", cut.as_bytes(), &["its last line is cut off"]);
     spoil("s/1/summary.csv", text.replacen("member", "mumber", 1).as_bytes(), &["its columns differ"]);
     let state = copies("s/2/shard.state");
-    spoil("s/2/shard.state", &state[..state.len() / 2], &["bytes where"]);
+    spoil("s/2/shard.state", &state[..state.len() / 2], &["it was cut off or changed"]);
     let mut bit = state.clone();
     bit[state.len() / 2] ^= 4;
     spoil("s/2/shard.state", &bit, &["its checksum is wrong"]);

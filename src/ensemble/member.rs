@@ -432,7 +432,7 @@ mod tests {
             (Spec { decay: f64::NAN, ..Spec::default() }, "--decay NaN"),
             (Spec { points: 2, ..Spec::default() }, "--points 2"),
             (Spec { pull: Pull::Rate(700.0), ..Spec::default() }, "--pull 700"),
-            (Spec { omega: Omega::Auto, tau: Some(1.01), ..Spec::default() }, "--omega auto: omega tau = 1.01,"),
+            (Spec { omega: Omega::Auto, tau: Some(1.01), ..Spec::default() }, "--omega auto: omega tau = 1.01158"),
             (Spec { sampling: Sampling::Points, ..Spec::default() }, "--sampling points"),
             (Spec { shape: Shape::Circle { radius: 0.0 }, ..Spec::default() }, "--shape circle:0"),
             (Spec { shape: Shape::File("none.csv".into()), ..Spec::default() }, "--shape file:none.csv"),

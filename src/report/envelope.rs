@@ -67,7 +67,7 @@ pub fn opened(layout: u32, bytes: &[u8]) -> Result<&[u8], Fault> {
     let (Some(magic), Some(version), Some(length)) =
         (take::<16>(&mut rest), take::<4>(&mut rest), take::<8>(&mut rest))
     else {
-        return damaged(&format!("it has {} bytes, fewer than any state", bytes.len()));
+        return damaged(&format!("it has {} bytes, fewer than any checkpoint", bytes.len()));
     };
     let (version, length) = (u32::from_le_bytes(version), u64::from_le_bytes(length));
     let whole = length.checked_add((BEFORE + AFTER) as u64);
