@@ -129,6 +129,7 @@ fn a_wrong_sweep_names_its_key_and_cell() {
         (&["amplitude="], ["--sweep amplitude: no values", "amplitude=v1,v2"]),
         (&["amplitude"], ["has no `=`", "key=v1,v2"]),
         (&["amplitude=0.1,word"], ["--sweep amplitude=word: ", "in the cell amplitude = word"]),
+        (&["omega=1", "decay=1,2", "omega=2"], ["--sweep omega: given twice; ", "--sweep omega=V1,V2"]),
         (&["omega=1,-1", "decay=1,2"], ["--omega -1: ", "in the cell omega = -1, decay = 1"]),
         (&[&many[0], &many[1]], ["(1000000 cells): too many", "at most 10000"]),
     ] {

@@ -15,6 +15,7 @@ use crate::{
         spec::{BackendChoice, Omega, Order, Precision, Pull, SolverChoice, Sor, Store},
         sweep::SweepAxis,
     },
+    error::{Error, Result},
     flow::Flow,
 };
 
@@ -214,6 +215,20 @@ pub(super) const MACHINE: &str = "Machine";
 pub const OUTPUT: &str = "Output";
 
 impl SpecFlags {
+    /// Checks that no key is swept by two flags.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a key that is swept twice: the values of one flag would be lost.
+    pub fn check_sweeps(&self) -> Result<()> {
+        let twice = |(i, axis): (usize, &SweepAxis)| self.sweep[..i].iter().any(|other| other.key == axis.key);
+        match self.sweep.iter().enumerate().find(|at| twice(*at)) {
+            None => Ok(()),
+            Some((_, SweepAxis { key, .. })) => {
+                Err(Error::Request(format!("--sweep {key}: given twice; give all values at once, --sweep {key}=V1,V2")))
+            }
+        }
+    }
+
     /// Replaces in `spec` the values given as flags.
     pub fn overlay(mut self, spec: &mut Spec) {
         std::mem::take(&mut self.sweep).into_iter().for_each(|axis| spec.sweep.set(axis));

@@ -72,8 +72,11 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
     }
     if !path.exists() {
         let begun = folder.join(format!(".{}.part", names::SUMMARY)).exists();
-        let problem =
-            if begun { "the run there did not finish; start it again" } else { "no run there; give its folder" };
+        let problem = if begun {
+            "the run there has not finished; curvelax resume continues it"
+        } else {
+            "no run there; give its folder"
+        };
         return Err(Error::Request(format!("{}: {problem} (no {})", folder.display(), names::RUN)));
     }
     let text = input::text(&path, input::MAX_RUN);
