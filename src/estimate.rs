@@ -96,7 +96,7 @@ struct CohortWork {
 }
 
 impl Estimate {
-    /// Estimates the run of a study, each cohort on its choice. Afterwards the study has only the members of its pilot.
+    /// Estimates the run of a study, each cohort on its choice. The study is as before afterwards.
     ///
     /// # Errors
     /// Those of the run itself.

@@ -95,20 +95,19 @@ pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
 /// # Errors
 /// As [`choose`].
 pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
-    let cells = study.cohorts().into_iter().map(|range| &study.cells()[range.start].spec);
-    let parts: Vec<(&Spec, usize)> = cells.map(|spec| (spec, spec.points)).collect();
-    let Some(((first, n), others)) = parts.split_first() else { return Ok(Vec::new()) };
-    let choice = choose(first, *n)?;
-    let there = |(spec, n): &(&Spec, usize)| {
+    let specs: Vec<&Spec> = study.cohorts().into_iter().map(|range| &study.cells()[range.start].spec).collect();
+    let Some((first, others)) = specs.split_first() else { return Ok(Vec::new()) };
+    let choice = choose(first, first.points)?;
+    let there = |spec: &&Spec| {
         let mut spec = (*spec).clone();
         choice.settle_place(&mut spec);
-        choose(&spec, *n)
+        choose(&spec, spec.points)
     };
     let rest: Result<Vec<Choice>> = others.iter().map(there).collect();
     match rest {
         Err(error) if choice.or_cpu => {
             let reason = format!("the GPU cannot do all cells: {error}");
-            parts.iter().map(|(spec, n)| cpu(spec, *n, reason.clone())).collect()
+            specs.iter().map(|spec| cpu(spec, spec.points, reason.clone())).collect()
         }
         rest => {
             let mut all = rest?;
@@ -120,13 +119,10 @@ pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
 
 /// Writes the settings chosen for the cohorts to a study, so that it can be repeated exactly.
 pub fn settle(study: &mut Study, choices: &[Choice]) {
-    let cohorts = study.cohorts();
-    let each = |cells: &mut [Cell]| {
-        for (range, choice) in cohorts.iter().zip(choices) {
-            cells[range.clone()].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
-        }
-    };
-    study.settle(each, |spec| choices.iter().take(1).for_each(|first| first.settle_place(spec)));
+    for (range, choice) in study.cohorts().into_iter().zip(choices) {
+        study.cells_mut()[range].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
+    }
+    study.settle_spec(|spec| choices.iter().take(1).for_each(|first| first.settle_place(spec)));
 }
 
 /// The choice of `--backend auto`: the first hardware GPU that can do the run, else the CPU.

@@ -288,8 +288,7 @@ fn slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
     if first != 0 || last.checked_add(1) != Some(count) {
         return Err(format!(
             "the array has {count} tasks from {first} to {last}, and shards count from 0 to N - 1: use --array=0-{}, \
-             or \
-             export {SHARDS}=N to run some of N",
+             or export {SHARDS}=N to run some of N",
             count.saturating_sub(1)
         ));
     }
@@ -340,7 +339,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::solver::Solver;
+    use crate::{backend::DeviceKind, solver::Solver};
     use clap::{Args, FromArgMatches};
 
     fn command() -> clap::Command {
@@ -463,6 +462,7 @@ mod tests {
         assert_eq!(words::<SolverChoice>(), SolverChoice::NAMES);
         assert_eq!(words::<Order>(), ORDERS);
         assert_eq!(words::<BackendChoice>(), BACKENDS);
+        assert_eq!(words::<DeviceKind>(), DeviceKind::NAMES);
         assert_eq!(words::<Precision>(), PRECISIONS);
         assert_eq!(words::<Store>(), STORES);
         for name in SAMPLINGS {

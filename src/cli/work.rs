@@ -126,8 +126,8 @@ impl Work {
         let (backend, platform) = open(self.first_cohort(), choice, flags)?;
         if choice.device().kind() != platform.backend {
             flags.say(&format!("note: on the CPU instead: {}", platform.reason));
-            let moved = |cells: &mut [Cell]| cells.iter_mut().for_each(|cell| platform.settle_place(&mut cell.spec));
-            self.study.settle(moved, |spec| platform.settle_place(spec));
+            self.study.cells_mut().iter_mut().for_each(|cell| platform.settle_place(&mut cell.spec));
+            self.study.settle_spec(|spec| platform.settle_place(spec));
         }
         self.opened = Some(backend);
         Ok(platform)

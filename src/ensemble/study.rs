@@ -46,7 +46,7 @@ impl Study {
     pub fn new_from(spec: Spec, base: &Path) -> Result<Study> {
         let spec = spec.validate()?;
         let cells = cells(&spec, base)?;
-        Ok(Study { spec, cells }.with_spec_of_the_cell())
+        Ok(Study::of_cells(spec, cells))
     }
 
     /// Does the same as [`Study::new`], with members that are perturbations of `curve` instead of the shape of `spec`.
@@ -61,7 +61,7 @@ impl Study {
         }
         let family = Family::of(&spec, curve)?;
         let own = Spec { points: family.points(), ..spec.clone() }.validate()?;
-        Ok(Study { cells: vec![Cell::only(own, family)], spec }.with_spec_of_the_cell())
+        Ok(Study::of_cells(spec, vec![Cell::only(own, family)]))
     }
 
     /// The request.
@@ -103,13 +103,14 @@ impl Study {
         all
     }
 
-    /// Fills in what is decided later: `each` in the spec of every cell, `all` what the cells have in common.
-    pub(crate) fn settle(&mut self, each: impl Fn(&mut [Cell]), all: impl Fn(&mut Spec)) {
-        each(&mut self.cells);
+    /// Brings the spec up to date with the cells: it is that of the only cell, such as the number of points of a file, or
+    /// gets by `common` what all cells have in common.
+    pub(crate) fn settle_spec(&mut self, common: impl Fn(&mut Spec)) {
         if self.spec.sweep.is_empty() {
-            self.spec = self.spec_of_the_cell();
+            let Spec { only, shard, .. } = self.spec.clone();
+            self.spec = Spec { only, shard, ..self.cells[0].spec.clone() };
         } else {
-            all(&mut self.spec);
+            common(&mut self.spec);
         }
     }
 
@@ -123,17 +124,10 @@ impl Study {
         &mut self.cells
     }
 
-    fn with_spec_of_the_cell(self) -> Study {
-        match self.spec.sweep.is_empty() {
-            true => Study { spec: self.spec_of_the_cell(), ..self },
-            false => self,
-        }
-    }
-
-    /// The number of points of a file is known only once it is read.
-    fn spec_of_the_cell(&self) -> Spec {
-        let Spec { only, shard, .. } = self.spec.clone();
-        Spec { only, shard, ..self.cells[0].spec.clone() }
+    fn of_cells(spec: Spec, cells: Vec<Cell>) -> Study {
+        let mut study = Study { spec, cells };
+        study.settle_spec(|_| ());
+        study
     }
 }
 
