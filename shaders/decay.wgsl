@@ -3,28 +3,39 @@
 
 const PARTS = 32u;
 const TIMES = 31u;
+const POINTS = 8u;
 const HALVINGS = 64u;
 const TERMS = 10u;
 
-/// Records what an accepted step of length h adds; its curves are in the report, it is not yet counted.
-fn follow(h: real) {
+/// Records what an accepted step adds; it is not yet counted.
+fn follow(taken: Taken) {
     var start = real(counters.steps);
     var end = min(start + real(1.0), p.clock_end);
     if ADAPTIVE {
         start = report.progress.time_high + report.progress.time_low;
-        end = start + h;
+        end = start + taken.h;
     }
-    if ADAPTIVE {
-        let half = start + real(0.5) * h;
-        fit(start, half, report.before.excess, report.middle.excess);
-        fit(half, end, report.middle.excess, report.now.excess);
-    } else {
-        fit(start, end, report.before.excess, report.now.excess);
+    if counters.fit_points > 0u || taken.after <= p.fit_from {
+        var time = start;
+        var excess = taken.before;
+        let points = select(1u, POINTS, ADAPTIVE);
+        for (var point = 1u; point <= points; point++) {
+            var next = end;
+            var below = taken.after;
+            if ADAPTIVE {
+                let share = real(point) / real(POINTS);
+                next = start + share * taken.h;
+                below = taken_inside(taken, share);
+            }
+            fit(time, next, excess, below);
+            time = next;
+            excess = below;
+        }
     }
-    note(start, end);
+    note(start, end, taken);
 }
 
-/// Adds the excess at the end of a step, or of half an adaptive one, to the fit while it is inside the window.
+/// Adds the excess at the end of a step, or of a part of an adaptive one, to the fit while it is inside the window.
 fn fit(start: real, end: real, before: real, after: real) {
     if counters.fit_over != 0u || (counters.fit_points == 0u && !(after <= p.fit_from)) { return; }
     if !(p.fit_to <= after) {
@@ -54,16 +65,13 @@ fn abscissa(start: real, end: real) -> real {
 }
 
 /// Records the excess at the grid times inside the step.
-fn note(start: real, end: real) {
+fn note(start: real, end: real, taken: Taken) {
     while counters.noted < TIMES {
         let share = real(counters.noted + 1u) / real(PARTS);
         let time = share * share * share * p.clock_end;
         if !(time <= end) { return; }
         let at = min(max((time - start) / (end - start), real(0.0)), real(1.0));
-        let before = report.before.excess;
-        let after = report.now.excess;
-        var excess = before + at * (after - before);
-        if ADAPTIVE { excess = inside(before, report.middle.excess, after, at); }
+        let excess = taken_inside(taken, at);
         if lane == 0u { all_reports[member].excess_at[counters.noted] = excess; }
         counters.noted += 1u;
     }

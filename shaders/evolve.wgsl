@@ -14,14 +14,14 @@ fn take_member(index: u32) {
     counters.sweeps_k = 0u;
     counters.sweeps_x = 0u;
     let due = select(0u, counters.goal - counters.steps, counters.status == RUNNING);
-    let steps = uniform_decision(min(dispatch.steps, due));
-    if steps > 0u {
+    if uniform_decision(due) > 0u {
         load_curve(CURVE);
         dk = load_field(INCREMENTS);
         dx = load_field(INCREMENTS + 1u);
         dy = load_field(INCREMENTS + 2u);
         budget = dispatch.sweeps;
-        for (var s = 0u; s < steps && budget > 0u; s++) {
+        steps_left = dispatch.steps;
+        while steps_left > 0u && budget > 0u {
             if advance() != GO_ON { break; }
         }
         storageBarrier();
@@ -38,6 +38,9 @@ fn take_member(index: u32) {
     }
 }
 
+/// Steps of the paper before the dispatch pauses.
+var<private> steps_left: u32;
+
 const GO_ON = 0u;
 const STOP = 1u;
 
@@ -47,29 +50,34 @@ const STOP = 1u;
 fn advance() -> u32 {
     let by = stride();
     let h = by.length;
-    let parts = select(1u, 3u, ADAPTIVE);
+    let count = uniform_decision(select(1u, parts(counters.order), ADAPTIVE));
+    if ADAPTIVE && counters.phase == 0u && counters.solve_sweeps == 0u {
+        begin_attempt();
+        begin_row(h);
+    }
     var solved = SOLVED;
-    for (var part = uniform_decision(counters.phase / 2u); part < parts && solved == SOLVED; part++) {
+    var part = uniform_decision(counters.phase / 2u);
+    for (; part < count && solved == SOLVED && steps_left > 0u; part++) {
         if ADAPTIVE { begin_part(part, h); }
         solved = step();
-        if ADAPTIVE && solved == SOLVED { end_part(part); }
+        if ADAPTIVE && solved == SOLVED { end_part(part, h); }
+        steps_left--;
     }
-    if solved == PAUSED { return STOP; }
+    if solved == PAUSED || (solved == SOLVED && part < count) { return STOP; }
     counters.phase = 0u;
     counters.solve_sweeps = 0u;
-    var error = real(0.0);
-    if ADAPTIVE && solved == SOLVED {
-        error = error_of_attempt();
-        if uniform_decision(select(1u, 0u, error <= p.adaptive)) == 1u {
-            let next = next_length(h, error, 1.0);
-            start_after_refused(next / (real(0.5) * h));
-            return refuse(next, real(MIN_STEP), SINGULAR);
+    counters.parts += count;
+    if ADAPTIVE && solved == SOLVED { finish_attempt(); }
+    var errors = vec2<real>(0.0, 0.0);
+    if solved == SOLVED {
+        let moved_x = here(new_x) - x;
+        let moved_y = here(new_y) - y;
+        observe(new_x, new_y, new_k, new_r, sqrt(moved_x * moved_x + moved_y * moved_y));
+        if ADAPTIVE {
+            errors = errors_of_attempt();
+            if uniform_decision(select(1u, 0u, errors.x <= allowed(h))) == 1u { return refuse_inaccurate(h, errors); }
         }
-        extrapolate();
-        load_curve(CURVE);
     }
-    var middle = report.now;
-    if solved == SOLVED { middle = observe_step(); }
     let failure = uniform_decision(failure_of_step(solved));
     if failure != RUNNING {
         if ADAPTIVE { return refuse_failure(h, failure); }
@@ -77,51 +85,29 @@ fn advance() -> u32 {
         return STOP;
     }
     report.before = report.now;
-    report.middle = middle;
     report.now = observed();
-    record_events(h);
-    follow(h);
+    var taken = Taken(0.0, report.before.excess, report.now.excess, Fall());
+    var declines = vec2<real>(0.0, 0.0);
     if ADAPTIVE {
-        let next = next_length(h, error, select(real(1.0), real(MAX_GROWTH), counters.refused == 0u));
-        report.progress.next = next;
-        start_after_taken(next / (real(0.5) * h));
-        pass_time(by);
-        counters.refused = 0u;
-    } else {
-        start_after_fixed();
+        declines = decline();
+        taken.h = h;
+        taken.fall = fall_of(h, declines);
     }
-    // The curve before a fixed step is stored if an output time may lie between the two.
-    if ADAPTIVE || counters.steps + 1u == counters.goal { store_curve(BEFORE); }
+    record_events(taken);
+    follow(taken);
+    if ADAPTIVE {
+        lengthen(by, errors, declines);
+        keep_attempt();
+    } else {
+        start_after_step();
+        // The curve before the step is stored if an output time may lie between the two.
+        if counters.steps + 1u == counters.goal { store_curve(BEFORE); }
+    }
     x = here(new_x);
     y = here(new_y);
     k = new_k;
     r = new_r;
-    if ADAPTIVE { store_curve(CURVE); }
     return accepted();
-}
-
-/// Observes the middle of an adaptive step, which it returns, and then the new curve; x and y hold the curve before it.
-fn observe_step() -> Observed {
-    var middle = report.now;
-    for (var curve = select(1u, 0u, ADAPTIVE); curve < 2u; curve++) {
-        var wx = new_x;
-        var wy = new_y;
-        var kh = new_k;
-        var rh = new_r;
-        if curve == 0u {
-            storageBarrier();
-            let middle = windows(load_field(MIDDLE), load_field(MIDDLE + 1u));
-            wx = middle.a;
-            wy = middle.b;
-            kh = load_field(MIDDLE + 2u);
-            rh = load_field(MIDDLE + 3u);
-        }
-        let moved_x = here(wx) - x;
-        let moved_y = here(wy) - y;
-        observe(wx, wy, kh, rh, sqrt(moved_x * moved_x + moved_y * moved_y));
-        if curve == 0u { middle = observed(); }
-    }
-    return middle;
 }
 
 fn failure_of_step(solved: u32) -> u32 {
@@ -135,28 +121,35 @@ fn failure_of_step(solved: u32) -> u32 {
 /// Retries with a step of length `next`, or ends the member for `cause` if that is below `least` of `(L/n)⁴`.
 fn refuse(next: real, least: real, cause: u32) -> u32 {
     counters.rejected += 1u;
-    counters.refused = 1u;
+    counters.refused += 1u;
     report.progress.next = next;
     if !(least_step(least) <= next) { counters.status = cause; }
     return uniform_decision(select(STOP, GO_ON, counters.status == RUNNING));
 }
 
-/// Refuses a step of length h that failed outright; its increments may then be anything.
+/// Refuses a step of length h that failed outright.
 fn refuse_failure(h: real, cause: u32) -> u32 {
-    start_nowhere();
-    return refuse(real(MIN_GROWTH) * h, select(real(MIN_STEP), real(MIN_TO_SINGULAR), cause == SINGULAR), cause);
+    let least = select(real(MIN_STEP), real(MIN_TO_SINGULAR), cause == SINGULAR);
+    return refuse(real(AFTER_FAILURE) * h, least, cause);
+}
+
+/// Refuses a step of length h whose error is too large.
+fn refuse_inaccurate(h: real, errors: vec2<real>) -> u32 {
+    let most = select(real(AFTER_REFUSALS), real(AFTER_REFUSAL), counters.refused == 0u);
+    let next = choose(h, counters.order, errors, most, allowed(h));
+    counters.order = next.order;
+    return refuse(next.length, real(MIN_STEP), SINGULAR);
 }
 
 /// Records the steps in which the excess falls to half its start and to the relaxation threshold, and where inside
 /// them.
-fn record_events(h: real) {
-    let length = select(real(0.0), h, ADAPTIVE);
+fn record_events(taken: Taken) {
     if counters.half_step == NEVER && report.now.excess <= p.half_at {
         counters.half_step = counters.steps;
         report.progress.half_high = report.progress.time_high;
         report.progress.half_low = report.progress.time_low;
-        report.progress.half_length = length;
-        report.progress.half_fraction = fraction_at(p.half_at);
+        report.progress.half_length = taken.h;
+        report.progress.half_fraction = taken_fraction_at(taken, p.half_at);
     }
     // A curve whose curvature is not that of its polygon does not count as relaxed.
     let due = counters.relax_step == NEVER && report.now.excess <= p.relax_at;
@@ -165,18 +158,21 @@ fn record_events(h: real) {
         counters.relax_step = counters.steps;
         report.progress.relax_high = report.progress.time_high;
         report.progress.relax_low = report.progress.time_low;
-        report.progress.relax_length = length;
-        report.progress.relax_fraction = fraction_at(p.relax_at);
+        report.progress.relax_length = taken.h;
+        report.progress.relax_fraction = taken_fraction_at(taken, p.relax_at);
     }
 }
 
-/// Where in the last step the excess fell to `excess`.
-fn fraction_at(excess: real) -> real {
-    let before = report.before.excess;
-    if before <= excess { return real(1.0); }
-    let after = report.now.excess;
-    let straight = (before - excess) / (before - after);
-    return select(straight, crossing(before, report.middle.excess, after, excess), ADAPTIVE);
+/// Advances the clock by an accepted adaptive step, and chooses the length and the order of the next one.
+fn lengthen(by: Stride, errors: vec2<real>, declines: vec2<real>) {
+    let most_growth = select(real(1.0), real(MAX_GROWTH), counters.refused == 0u);
+    let next = choose(by.length, counters.order, errors, most_growth, allowed(by.length));
+    report.progress.next = next.length;
+    counters.order = next.order;
+    report.progress.slope = declines.x;
+    report.progress.bend = declines.y;
+    pass_time(by);
+    counters.refused = 0u;
 }
 
 /// Counts an accepted step; returns whether to continue.

@@ -1,64 +1,128 @@
-// The adaptive step: one step of the paper's scheme compared with two half steps. Twin of src/scheme/extrapolation.rs.
+// The adaptive step: the paper's scheme with 1, 2, ... J parts, extrapolated to order J. Twin of
+// src/scheme/extrapolation.rs.
 
-/// Prepares part 0, 1 or 2 of an attempt of length h: the whole step, the first half, the second half.
+const LEAST_ORDER = 2u;
+const MOST_ORDER = 6u;
+const MOST_ORDER_F32 = 4u;
+const SHARED_PARTS = 3u;
+
+/// The steps of the paper that a step of order `order` makes.
+fn parts(order: u32) -> u32 { return order * (order + 1u) / 2u; }
+
+/// Highest order of a step in numbers of this precision.
+fn most_order() -> u32 { return select(MOST_ORDER, MOST_ORDER_F32, EPSILON > 1e-10); }
+
+/// The weight of `row` in the combination of the rows from `lowest` to `order`.
+fn weight(row: u32, lowest: u32, order: u32) -> real {
+    let own = real(row);
+    var weight = select(real(0.0), real(1.0), lowest <= row && row <= order);
+    for (var other = lowest; other <= order; other++) {
+        if other != row { weight = weight * (own / (own - real(other))); }
+    }
+    return weight;
+}
+
+/// How much of the change up to the end of a part goes into the curve at the end of the step, its first and second
+/// derivative, and the errors of order J-1 and J-2.
+struct Shares { value: real, slope: real, bend: real, gap: real, lower_gap: real }
+
+/// The shares of a part of `row`, `left` parts before its end.
+fn shares_of(row: u32, left: u32, order: u32) -> Shares {
+    let own = real(row);
+    let whole = weight(row, 1u, order);
+    let upper = weight(row, LEAST_ORDER, order);
+    let square = own * own * upper;
+    if left == 1u { return Shares(0.0, -(own * whole), -(square + square), 0.0, 0.0); }
+    if left == 2u { return Shares(0.0, 0.0, square, 0.0, 0.0); }
+    var lower = real(0.0);
+    if order > LEAST_ORDER { lower = weight(row, 1u, order - 1u) - weight(row, LEAST_ORDER, order - 1u); }
+    return Shares(whole, own * whole, square, whole - upper, lower);
+}
+
+/// Prepares the combinations of an attempt: nothing has changed yet.
+fn begin_attempt() {
+    for (var field = BEFORE; field < PART; field++) { store_field(field, vec(0.0)); }
+    for (var field = GAPS; field < STATE_FIELDS; field++) { store_field(field, vec(0.0)); }
+}
+
+/// The row to which a part belongs, and the parts of the row after it.
+struct Place { row: u32, left: u32 }
+
+fn place_of(part: u32) -> Place {
+    var row = 1u;
+    while parts(row) <= part { row++; }
+    return Place(row, parts(row) - 1u - part);
+}
+
+/// Prepares a part of an attempt of length h.
 fn begin_part(part: u32, h: real) {
-    p.tau = select(real(0.5) * h, h, part == 0u);
-    load_curve(select(CURVE, BEFORE, part == 2u));
+    let place = place_of(part);
+    p.tau = h / real(place.row);
+    load_curve(select(PART, CURVE, place.left + 1u == place.row));
 }
 
-/// Stores the result of a part: the whole step in MIDDLE, the first half in BEFORE, the second half in registers.
-fn end_part(part: u32) {
-    if part == 2u { return; }
-    store_fields(select(BEFORE, MIDDLE, part == 0u), here(new_x), here(new_y), new_k, new_r);
-    start_after_part(part);
+/// Stores the curve at the end of a part, adds it to the combinations, and prepares the solves of the next part.
+fn end_part(part: u32, h: real) {
+    store_fields(PART, here(new_x), here(new_y), new_k, new_r);
+    let place = place_of(part);
+    if place.left < SHARED_PARTS { add_part(place.left, shares_of(place.row, place.left, counters.order)); }
+    if place.left > 0u { start_after_step(); } else { begin_row(h / real(place.row + 1u)); }
 }
 
-/// The difference between the whole step and the two half steps.
-fn error_of_attempt() -> real {
-    storageBarrier();
-    let gap_k = bounded_abs(new_k - load_field(MIDDLE + 2u));
-    let gap_r = bounded_abs(new_r / load_field(MIDDLE + 3u) - vec(1.0));
-    let m = ring_maxima(vec(block_max(gap_k), block_max(gap_r), block_max_signed(new_k), block_max_signed(-new_k)));
-    let size = max(m.z, m.w);
-    let spread = min(m.z + m.w, size);
-    let scale = select(sqrt(size * spread), size, report.now.excess <= p.follow_to);
-    return max(bounded_abs(vec(m.x / scale)).x, m.y);
+/// Adds the curve at the end of a part, `left` parts before the end of its row.
+fn add_part(left: u32, shares: Shares) {
+    let change_x = here(new_x) - load_own(CURVE);
+    let change_y = here(new_y) - load_own(CURVE + 1u);
+    let change_k = new_k - load_own(CURVE + 2u);
+    let change_r = new_r - load_own(CURVE + 3u);
+    add_share(BEND_BEFORE, shares.bend, change_x, change_y, change_k, change_r);
+    if left < 2u { add_share(SLOPE_BEFORE, shares.slope, change_x, change_y, change_k, change_r); }
+    if left > 0u { return; }
+    add_share(BEFORE, shares.value, change_x, change_y, change_k, change_r);
+    store_field(GAPS, load_own(GAPS) + shares.gap * change_k);
+    store_field(GAPS + 1u, load_own(GAPS + 1u) + shares.gap * change_r);
+    store_field(GAPS + 2u, load_own(GAPS + 2u) + shares.lower_gap * change_k);
+    store_field(GAPS + 3u, load_own(GAPS + 3u) + shares.lower_gap * change_r);
 }
 
-/// Puts the extrapolated curve into the registers of the new curve and the curve in the middle of the step into MIDDLE.
-fn extrapolate() {
-    let gap_x = here(new_x) - load_field(MIDDLE);
-    let gap_y = here(new_y) - load_field(MIDDLE + 1u);
-    let gap_k = new_k - load_field(MIDDLE + 2u);
-    let whole_r = load_field(MIDDLE + 3u);
-    let gap_r = new_r - whole_r;
-    let middle_x = load_field(BEFORE) + real(0.5) * gap_x;
-    let middle_y = load_field(BEFORE + 1u) + real(0.5) * gap_y;
-    let middle_k = load_field(BEFORE + 2u) + real(0.5) * gap_k;
-    let middle_r = load_field(BEFORE + 3u) + real(0.5) * gap_r;
-    storageBarrier();
-    store_fields(MIDDLE, middle_x, middle_y, middle_k, middle_r);
-    new_k = new_k + gap_k;
-    new_r = new_r * new_r / whole_r;
-    let moved = windows(here(new_x) + gap_x, here(new_y) + gap_y);
+fn add_share(base: u32, share: real, change_x: vec, change_y: vec, change_k: vec, change_r: vec) {
+    store_field(base, load_own(base) + share * change_x);
+    store_field(base + 1u, load_own(base + 1u) + share * change_y);
+    store_field(base + 2u, load_own(base + 2u) + share * change_k);
+    store_field(base + 3u, load_own(base + 3u) + share * change_r);
+}
+
+/// Puts the curve at the end of the step into the registers of the new curve, and the one at its start into those of the
+/// old one.
+fn finish_attempt() {
+    load_curve(CURVE);
+    let moved = windows(x + load_own(BEFORE), y + load_own(BEFORE + 1u));
     new_x = moved.a;
     new_y = moved.b;
+    new_k = k + load_own(BEFORE + 2u);
+    new_r = r + load_own(BEFORE + 3u);
 }
 
-/// A quantity at the fraction `at` of a step, on the parabola through its values `start`, `middle` and `end`.
-fn inside(start: real, middle: real, end: real, at: real) -> real {
-    let slope = real(4.0) * middle - real(3.0) * start - end;
-    let bend = real(2.0) * (start - real(2.0) * middle + end);
-    return start + at * (slope + at * bend);
+/// The errors of order J-1 and J-2, of the new curve, which is observed.
+fn errors_of_attempt() -> vec2<real> {
+    let m = ring_maxima(vec(
+        block_max(bounded_abs(load_own(GAPS))), block_max(bounded_abs(load_own(GAPS + 1u) * (vec(1.0) / new_r))),
+        block_max(bounded_abs(load_own(GAPS + 2u))), block_max(bounded_abs(load_own(GAPS + 3u) * (vec(1.0) / new_r))),
+    ));
+    let size = max(others.x, others.y);
+    let spread = min(others.x + others.y, size);
+    let scale = select(sqrt(size * spread), size, report.now.excess <= p.follow_to);
+    let relative = bounded_abs(m / scale);
+    return vec2(max(relative.x, m.y), max(relative.z, m.w));
 }
 
-/// The fraction of a step at which a quantity that goes from `start` over `middle` to `end` first falls to `at`.
-fn crossing(start: real, middle: real, end: real, at: real) -> real {
-    let above = start - at;
-    let slope = real(4.0) * middle - real(3.0) * start - end;
-    let bend = real(2.0) * (start - real(2.0) * middle + end);
-    let discriminant = slope * slope - real(4.0) * bend * above;
-    let root = real(2.0) * above / (sqrt(max(discriminant, real(0.0))) - slope);
-    let straight = above / (start - end);
-    return select(straight, root, real(0.0) <= discriminant && real(0.0) <= root && root <= real(1.0));
+/// Makes what an accepted attempt has combined the state of the member.
+fn keep_attempt() {
+    for (var field = 0u; field < 8u; field++) {
+        let kept = load_own(SLOPE + field);
+        store_field(SLOPE + field, load_own(SLOPE_BEFORE + field));
+        store_field(SLOPE_BEFORE + field, kept);
+    }
+    store_curve(BEFORE);
+    store_fields(CURVE, here(new_x), here(new_y), new_k, new_r);
 }

@@ -48,7 +48,10 @@ struct Progress {
     time_high: real,
     time_low: real,
     taken: real,
+    taken_before: real,
     next: real,
+    slope: real,
+    bend: real,
     relax_high: real,
     relax_low: real,
     relax_length: real,
@@ -73,7 +76,6 @@ struct Decay {
 /// A member's report at the end of a dispatch, except for the recorded excess.
 struct Report {
     before: Observed,
-    middle: Observed,
     now: Observed,
     progress: Progress,
     decay: Decay,
@@ -91,6 +93,8 @@ struct Counters {
     steps: u32,
     rejected: u32,
     refused: u32,
+    order: u32,
+    parts: u32,
     goal: u32,
     stop_when_relaxed: u32,
     relax_step: u32,
@@ -113,7 +117,7 @@ const NEVER = 0xffffffffu;
 
 /// Parameters of one dispatch.
 struct Dispatch {
-    /// Maximum number of steps.
+    /// Steps of the paper after which the dispatch pauses, if need be in the middle of an adaptive step.
     steps: u32,
     /// Maximum number of sweeps per system.
     max_sweeps: u32,
@@ -125,16 +129,24 @@ struct Dispatch {
     groups: u32,
 }
 
-const STATE_FIELDS = 18u;
+const STATE_FIELDS = 38u;
 /// Offsets of the curves in a state, four fields each: x, y, k, r. The increments of k, x and y follow the first one,
 /// and then what sweeps remember next to them.
 const CURVE = 0u;
 const INCREMENTS = 4u;
 const EARLIER = 7u;
-/// The middle of the last adaptive step; during an attempt the result of its whole step.
-const MIDDLE = 10u;
-/// The curve before the last step; during an attempt the result of its first half step.
-const BEFORE = 14u;
+/// The first and second derivative of the curve at the end of the last adaptive step, in units of that step.
+const SLOPE = 10u;
+const BEND = 14u;
+/// The curve before the last step, and its derivatives. During an attempt: the change that it makes so far, and those
+/// at its end.
+const BEFORE = 18u;
+const SLOPE_BEFORE = 22u;
+const BEND_BEFORE = 26u;
+/// During an attempt: the curve at the end of the last part.
+const PART = 30u;
+/// During an attempt: its errors, of k and r, of its order and of the one below.
+const GAPS = 34u;
 
 @group(0) @binding(0) var<uniform> dispatch: Dispatch;
 @group(0) @binding(1) var<storage, read> all_parameters: array<Parameters>;
@@ -166,6 +178,14 @@ fn load_field(field: u32) -> vec {
     return vec(
         all_states[base + first], all_states[base + first + 1u],
         all_states[base + first + 2u], all_states[base + node(3u)],
+    );
+}
+
+/// Like `load_field`, for what no other thread needs: the last component of a block of three repeats its own third node.
+fn load_own(field: u32) -> vec {
+    let base = (member * STATE_FIELDS + field) * NODES + first;
+    return vec(
+        all_states[base], all_states[base + 1u], all_states[base + 2u], all_states[base + select(2u, 3u, owns == 4u)],
     );
 }
 

@@ -39,6 +39,39 @@ fn excess(length: real, area: real) -> real {
     return length * length / (real(FOUR_PI) * abs(area)) - p.polygon_ratio;
 }
 
+/// The first and the second derivative of ln excess along an adaptive step, by those of the nodes of the new curve.
+fn decline() -> vec2<real> {
+    let slope = windows(load_own(SLOPE_BEFORE), load_own(SLOPE_BEFORE + 1u));
+    let bend = windows(load_own(BEND_BEFORE), load_own(BEND_BEFORE + 1u));
+    let ex = here(new_x) - minus1(new_x);
+    let ey = here(new_y) - minus1(new_y);
+    let fx = here(slope.a) - minus1(slope.a);
+    let fy = here(slope.b) - minus1(slope.b);
+    let gx = here(bend.a) - minus1(bend.a);
+    let gy = here(bend.b) - minus1(bend.b);
+    let inverse = vec(1.0) / sqrt(ex * ex + ey * ey);
+    let stretch = (ex * fx + ey * fy) * inverse;
+    let bent = (fx * fx + fy * fy + (ex * gx + ey * gy) - stretch * stretch) * inverse;
+    let area = (minus1(slope.a) * here(new_y) - here(slope.a) * minus1(new_y))
+        + (minus1(new_x) * here(slope.b) - here(new_x) * minus1(slope.b));
+    let area_bend = (minus1(bend.a) * here(new_y) - here(bend.a) * minus1(new_y))
+        + (minus1(new_x) * here(bend.b) - here(new_x) * minus1(bend.b))
+        + real(2.0) * (minus1(slope.a) * here(slope.b) - here(slope.a) * minus1(slope.b));
+    let part = vec(block_sum(stretch), block_sum(bent), block_sum(area), block_sum(area_bend));
+    let all = ring_sums(part).all;
+    let length = sums.x;
+    let half = real(0.5);
+    let growth = all.x / length;
+    let widening = half * all.z / sums.y;
+    let slope_of_ratio = real(2.0) * growth - widening;
+    let bend_of_ratio = real(2.0) * (all.y / length - growth * growth)
+        - (half * all.w / sums.y - widening * widening);
+    let ratio = length * length / (real(FOUR_PI) * abs(sums.y));
+    let over = ratio / (ratio - p.polygon_ratio);
+    let falls = over * slope_of_ratio;
+    return vec2(falls, over * (bend_of_ratio + slope_of_ratio * slope_of_ratio) - falls * falls);
+}
+
 /// The largest difference between the angle by which the new curvature turns the tangent over a segment and the angle
 /// by which the new polygon turns there.
 fn gap() -> real {

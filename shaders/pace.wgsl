@@ -1,8 +1,14 @@
 // Adaptive time: the length of the next step, and a clock that loses nothing. Twin of src/scheme/pace.rs.
 
-const SAFETY = 0.95;
-const MAX_GROWTH = 4.0;
-const MIN_GROWTH = 0.25;
+const SAFETY = 0.9;
+const MAX_GROWTH = 8.0;
+const MIN_GROWTH = 0.1;
+const AFTER_FAILURE = 0.25;
+const AFTER_REFUSAL = 0.7;
+const AFTER_REFUSALS = 0.3;
+const ROUNDING = 8.0;
+const FALLS = 0.8;
+const RISES = 0.9;
 const MIN_STEP = 1e-12;
 const MIN_TO_SINGULAR = 1e-3;
 
@@ -24,6 +30,7 @@ fn stride() -> Stride {
 
 /// Advances the clock.
 fn pass_time(by: Stride) {
+    report.progress.taken_before = report.progress.taken;
     report.progress.taken = by.length;
     if by.last {
         report.progress.time_high = p.end_high;
@@ -42,10 +49,37 @@ fn is_at_goal() -> bool {
     return (p.goal_high - report.progress.time_high) + (p.goal_low - report.progress.time_low) <= real(0.0);
 }
 
-/// The length after a step of `length` with error `error`; the error scales with the square of the length.
-fn next_length(length: real, error: real, most_growth: real) -> real {
-    let growth = real(SAFETY) * sqrt(p.adaptive / max(error, real(1e-6) * p.adaptive));
-    return length * min(max(growth, real(MIN_GROWTH)), most_growth);
+/// The largest error of a step of length h: an error below the rounding of the solves says nothing.
+fn allowed(h: real) -> real {
+    let edge = report.now.length / real(NODES);
+    return max(real(4.0 * ROUNDING * EPSILON) * (sqrt(h) / (edge * edge)), p.adaptive);
+}
+
+/// The ratio of the next step to one of order `order` with error `error`, where `most` is allowed.
+fn growth(error: real, order: u32, most: real) -> real {
+    let ratio = most / max(error, real(1e-12) * most);
+    let root = exponential(vec(ln_ratio(1.0, ratio) / real(order))).x;
+    return min(max(real(SAFETY) * root, real(MIN_GROWTH)), real(MAX_GROWTH));
+}
+
+/// A length and an order.
+struct Choice { length: real, order: u32 }
+
+/// The work of a step of order `order` and of this ratio to the last one, for the same progress.
+fn work(order: u32, ratio: real) -> real { return real(parts(order)) / ratio; }
+
+/// The length and the order after a step of length `length` and order `order`, with the errors of that order
+/// and of the one below.
+fn choose(length: real, order: u32, errors: vec2<real>, most_growth: real, most: real) -> Choice {
+    let own = min(growth(errors.x, order, most), most_growth);
+    if order > LEAST_ORDER {
+        let lower = min(growth(errors.y, order - 1u, most), most_growth);
+        if work(order - 1u, lower) <= real(FALLS) * work(order, own) { return Choice(length * lower, order - 1u); }
+        if work(order - 1u, lower) <= work(order, own) / real(RISES) { return Choice(length * own, order); }
+    }
+    if order == most_order() || most_growth <= real(1.0) { return Choice(length * own, order); }
+    let longer = real(parts(order + 1u)) / real(parts(order));
+    return Choice(length * min(own * longer, most_growth), order + 1u);
 }
 
 /// The shortest step to try, `share` of `(L/n)⁴`.

@@ -8,11 +8,11 @@ use curvelax::{
     ensemble::Status,
     number::{BIG, Real},
     scheme::{
-        decay,
+        decay, dense, extrapolation,
         member::{self, Counters, Decay, NEVER, Observed, Parameters, Progress, Report},
         observe::{MAX_DRIFT, MAX_GAP, MAX_TURN, MIN_EDGE},
         pace,
-        state::{CURVE_FIELDS, STATE_FIELDS},
+        state::{CURVE_FIELDS, LASTING_FIELDS, NEEDED_FIELDS, STATE_FIELDS},
         step::NEGLIGIBLE,
     },
     solver::{
@@ -149,7 +149,6 @@ fn layouts_agree<T: Real>() {
     use std::mem::offset_of;
     let parts = [
         ("before", offset_of!(Report<T>, before)),
-        ("middle", offset_of!(Report<T>, middle)),
         ("now", offset_of!(Report<T>, now)),
         ("progress", offset_of!(Report<T>, progress)),
         ("decay", offset_of!(Report<T>, decay)),
@@ -169,8 +168,8 @@ fn the_structs_shared_with_the_host_have_its_layout() {
     layouts_agree::<f64>();
     use std::mem::offset_of;
     assert_eq!(size_of::<Counters>(), 4 * Counters::FIELDS.len());
-    assert_eq!(offset_of!(Counters, goal), 16);
-    assert_eq!(offset_of!(Counters, solve_sweeps), 4 * 11);
+    assert_eq!(offset_of!(Counters, goal), 24);
+    assert_eq!(offset_of!(Counters, solve_sweeps), 4 * 13);
     assert_eq!(offset_of!(Parameters<f64>, tau), 8 * 8);
     assert_eq!(size_of::<Report<f32>>(), 4 * Report::<f32>::LEN);
 }
@@ -313,8 +312,26 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("STATE_FIELDS", STATE_FIELDS as f64),
         ("INCREMENTS", CURVE_FIELDS as f64),
         ("EARLIER", (CURVE_FIELDS + 3) as f64),
-        ("MIDDLE", (CURVE_FIELDS + 6) as f64),
-        ("BEFORE", (2 * CURVE_FIELDS + 6) as f64),
+        ("SLOPE", (CURVE_FIELDS + 6) as f64),
+        ("BEND", (2 * CURVE_FIELDS + 6) as f64),
+        ("BEFORE", NEEDED_FIELDS as f64),
+        ("SLOPE_BEFORE", (NEEDED_FIELDS + CURVE_FIELDS) as f64),
+        ("BEND_BEFORE", (NEEDED_FIELDS + 2 * CURVE_FIELDS) as f64),
+        ("PART", LASTING_FIELDS as f64),
+        ("GAPS", (LASTING_FIELDS + CURVE_FIELDS) as f64),
+        ("LEAST_ORDER", f64::from(extrapolation::LEAST_ORDER)),
+        ("MOST_ORDER", f64::from(extrapolation::MOST_ORDER)),
+        ("MOST_ORDER_F32", f64::from(extrapolation::MOST_ORDER_F32)),
+        ("SHARED_PARTS", f64::from(extrapolation::SHARED_PARTS)),
+        ("AFTER_FAILURE", pace::AFTER_FAILURE),
+        ("AFTER_REFUSAL", pace::AFTER_REFUSAL),
+        ("AFTER_REFUSALS", pace::AFTER_REFUSALS),
+        ("ROUNDING", pace::ROUNDING),
+        ("FALLS", pace::FALLS),
+        ("RISES", pace::RISES),
+        ("POINTS", f64::from(decay::POINTS)),
+        ("RESOLVED", dense::RESOLVED),
+        ("BISECTIONS", f64::from(dense::BISECTIONS)),
         ("NEGLIGIBLE", NEGLIGIBLE),
         ("SWEEPS_PER_CHECK", f64::from(SWEEPS_PER_CHECK)),
         ("AUTO_SCALE", AUTO_SCALE),
@@ -338,7 +355,18 @@ fn the_constants_of_shaders_and_host_are_equal() {
         assert_eq!(constant(name), value, "{name}");
     }
     // The status of a solve, or of the loop over steps, inside the kernel; the host never sees it.
-    let of_the_kernel = ["GO_ON", "STOP", "UNSOLVED", "SOLVED", "NOT_FINITE", "DIVERGED", "PAUSED"];
+    let of_the_kernel = [
+        "GO_ON",
+        "STOP",
+        "UNSOLVED",
+        "SOLVED",
+        "NOT_FINITE",
+        "DIVERGED",
+        "PAUSED",
+        "STRAIGHT",
+        "EXPONENTIAL",
+        "SMOOTH",
+    ];
     let known = |name: &&str| table.iter().any(|(known, _)| known == name) || of_the_kernel.contains(name);
     let code = code();
     let names = code.lines().filter_map(|line| line.strip_prefix("const ")?.split([' ', ':']).next());

@@ -183,10 +183,10 @@ fn missing_twins_and_unnecessary_exceptions_are_found() {
     };
     assert_eq!(appended("shaders/pace.wgsl", "fn hurry() {}\n"), ["pace.wgsl: hurry has no twin"]);
     assert_eq!(
-        faults("src/scheme/pace.rs", &|old| old.replace("fn next_length", "fn length_of_next")),
-        ["pace.wgsl: next_length has no twin"]
+        faults("src/scheme/pace.rs", &|old| old.replace("fn growth", "fn stretch")),
+        ["pace.wgsl: growth has no twin"]
     );
-    assert_eq!(exception("next_length"), ["the exception of next_length is unnecessary"]);
+    assert_eq!(exception("growth"), ["the exception of growth is unnecessary"]);
     assert_eq!(exception("hurry"), ["the exception of hurry is unnecessary"]);
     assert_eq!(exception("pace.wgsl"), ["the exception of pace.wgsl is unnecessary"]);
     assert_eq!(
@@ -206,8 +206,8 @@ fn missing_twins_and_unnecessary_exceptions_are_found() {
     // Tests and other files provide no twins.
     let hidden = "#[cfg(test)]\nmod more { fn next_length() {} }\n";
     assert_eq!(
-        faults("src/scheme/pace.rs", &|old| old.replace("fn next_length", "fn length_of_next") + hidden),
-        ["pace.wgsl: next_length has no twin"]
+        faults("src/scheme/pace.rs", &|old| old.replace("fn growth", "fn stretch") + hidden),
+        ["pace.wgsl: growth has no twin"]
     );
 }
 

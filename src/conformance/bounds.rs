@@ -108,13 +108,13 @@ pub const DECAY: [Bound; 2] =
 /// What adaptive runs leave in addition to their ends: the last step's start and middle, step lengths, and event times.
 ///
 /// All of these depend on where a step happened to begin or end. The error of the error estimate is a rounding of the
-/// solve, ε·√w with w the largest weight, so relative to the tolerance ε·√w/tolerance; the relative error of a step
-/// length is half of that. A quantity inside the run is off by this fraction of its change over a step, in addition to
+/// solve, ε·√w with w the largest weight, as often as the combination of the rows amplifies it, so relative to the
+/// tolerance; the relative error of a step length is a fraction of that. A quantity inside the run is off by this fraction of its change over a step, in addition to
 /// its own scale.
 pub const PACE: [Bound; 6] = [
     bound("last step's start", NaturalScale::Position, 16.0, 64.0),
     bound("its middle", NaturalScale::Position, 16.0, 64.0),
-    bound("their reports", NaturalScale::One, 16.0, 64.0),
+    bound("report of its start", NaturalScale::One, 16.0, 64.0),
     bound("last step", NaturalScale::One, 4.0, 16.0),
     bound("next step", NaturalScale::One, 4.0, 16.0),
     bound("t_half, t_relax", NaturalScale::One, 1.0, 4.0),

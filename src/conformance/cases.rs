@@ -7,7 +7,11 @@ use crate::{
     flow::Flow,
     number::Precision,
     schedule::Ticks,
-    scheme::{Parameters, State, run::Run},
+    scheme::{
+        Parameters, State,
+        extrapolation::most_order,
+        run::{FIRST_ORDER, Run},
+    },
 };
 
 /// Laws of the members: every named flow, and a polynomial.
@@ -92,6 +96,7 @@ pub fn adaptive_members(
         // One member in four begins with a step that is far too long and is refused.
         progress.next = if j % 4 == 2 { end } else { 0.05 * p.tau };
         run.counters.goal = u32::MAX;
+        run.counters.order = FIRST_ORDER.min(most_order(precision.epsilon()));
     }
     Ok(runs)
 }

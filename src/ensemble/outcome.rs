@@ -81,6 +81,8 @@ pub struct Outcome {
     pub end: Observables,
     /// Time at which the polygon was first found to cross itself.
     pub self_crossing: Option<f64>,
+    /// Steps of the paper's scheme that were computed, also in refused adaptive steps.
+    pub solves: u64,
 }
 
 /// One row of `series.csv`.

@@ -51,6 +51,7 @@ columns! { Outcome:
     mesh_ratio: number = end.mesh_ratio, "longest over shortest edge of the last polygon";
     metric_drift: number = end.metric_drift, "max |r_i - |e_i||/|e_i| of the last state: how far the scheme's own lengths have left those of the polygon";
     self_crossing: event = self_crossing, "time at which the polygon was first seen to cross itself, which does not stop the member";
+    solves: whole = solves, "steps of the scheme that were computed, each a solve for k and one for x and y: 1 for a fixed step, 1 + 2 + … + J for an adaptive one of order J, also if it was refused";
 }
 
 /// A row of `rates.csv`: the fitted rate of a member, and that of linear theory.

@@ -142,7 +142,7 @@ impl Overview<'_> {
     }
 
     fn work(&self) -> String {
-        let Tally { steps, sweeps_k, sweeps_x, .. } = self.tally;
+        let Tally { steps, solves, sweeps_k, sweeps_x, .. } = self.tally;
         let members = self.tally.members().max(1);
         let each = |total: u64| match total % members {
             0 => (total / members).to_string(),
@@ -152,9 +152,14 @@ impl Overview<'_> {
             one if one == "1" => "1 step".into(),
             several => format!("{several} steps"),
         };
+        let solves_each = if solves == steps { String::new() } else { format!(" ({} solves)", each(*solves)) };
         match sweeps_k + sweeps_x {
-            0 => format!("{steps_each} per member, no sweeps"),
-            _ => format!("{steps_each} per member, sweeps {} for k and {} for x, y", each(*sweeps_k), each(*sweeps_x)),
+            0 => format!("{steps_each} per member{solves_each}, no sweeps"),
+            _ => format!(
+                "{steps_each} per member{solves_each}, sweeps {} for k and {} for x, y",
+                each(*sweeps_k),
+                each(*sweeps_x)
+            ),
         }
     }
 }

@@ -355,10 +355,11 @@ impl FinishedRun<'_> {
     }
 
     fn provenance(&self) -> Vec<(String, String)> {
-        let Tally { steps, sweeps_k, sweeps_x, .. } = self.tally;
+        let Tally { steps, solves, sweeps_k, sweeps_x, .. } = self.tally;
+        let steps = if solves == steps { format!("{steps} steps") } else { format!("{steps} steps, {solves} solves") };
         let work = match sweeps_k + sweeps_x {
-            0 => format!("{steps} steps"),
-            _ => format!("{steps} steps, {sweeps_k} sweeps for k and {sweeps_x} for x, y"),
+            0 => steps,
+            _ => format!("{steps}, {sweeps_k} sweeps for k and {sweeps_x} for x, y"),
         };
         [
             ("curvelax", self.provenance.curvelax.clone()),

@@ -38,6 +38,8 @@ pub struct Provenance {
     pub members_by_status: BTreeMap<String, u64>,
     /// Total steps of all members.
     pub steps: u64,
+    /// Total steps of the paper's scheme that were computed, also in refused adaptive steps.
+    pub solves: u64,
     /// Total sweeps on curvature systems.
     pub sweeps_k: u64,
     /// Total sweeps on position systems.
@@ -77,6 +79,7 @@ impl Provenance {
             members: tally.members(),
             members_by_status: by_status(tally),
             steps: tally.steps,
+            solves: tally.solves,
             sweeps_k: tally.sweeps_k,
             sweeps_x: tally.sweeps_x,
             mollified: tally.mollified,

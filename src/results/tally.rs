@@ -17,6 +17,8 @@ pub struct Tally {
     pub cells: Vec<CellTally>,
     /// Total steps of all members.
     pub steps: u64,
+    /// Total steps of the paper's scheme that were computed, also in refused adaptive steps.
+    pub solves: u64,
     /// Total sweeps on curvature systems.
     pub sweeps_k: u64,
     /// Total sweeps on position systems.
@@ -213,6 +215,7 @@ impl Tally {
         self.drifted.1 = self.drifted.1.max(drift);
         // A table read from disk may contain anything.
         self.steps = self.steps.saturating_add(outcome.steps);
+        self.solves = self.solves.saturating_add(outcome.solves);
         self.sweeps_k = self.sweeps_k.saturating_add(outcome.sweeps_k);
         self.sweeps_x = self.sweeps_x.saturating_add(outcome.sweeps_x);
         Ok(())

@@ -11,7 +11,7 @@ use crate::number::Real;
 /// The branches of one member, or of a group of members that share them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Branches {
-    /// The step is adaptive, extrapolated from three steps.
+    /// The step is adaptive, extrapolated from several steps of the paper.
     pub adaptive: bool,
     /// Nodes are redistributed along the curve.
     pub redistributed: bool,

@@ -5,14 +5,17 @@
 //! is accumulated from step to step, so that no difference of large numbers is taken.
 
 use super::{
-    Parameters, extrapolation,
+    Parameters,
+    dense::Taken,
     member::{PARTS, TIMES},
-    run::{Run, Taken},
+    run::Run,
 };
 use crate::number::Real;
 
 /// Maximum number of halvings that bring a ratio near 1.
 pub const HALVINGS: u32 = 64;
+/// Points that an adaptive step adds to the fit.
+pub const POINTS: u32 = 8;
 /// Terms of the series of the logarithm; the last is below 10⁻¹⁶.
 pub const TERMS: u32 = 10;
 
@@ -25,13 +28,17 @@ pub fn share<T: Real>(part: usize) -> T {
 /// Records what an accepted step adds.
 pub(super) fn follow<T: Real>(run: &mut Run<T>, taken: &Taken<T>) {
     let (from, to) = clock(run, taken);
-    let Taken { before, middle, after, .. } = *taken;
-    if run.parameters.adaptive.le(T::of(0.0)) {
-        fit(run, [from, to], [before, after]);
-    } else {
-        let half = from + T::of(0.5) * taken.h;
-        fit(run, [from, half], [before, middle]);
-        fit(run, [half, to], [middle, after]);
+    let fitted = run.counters.fit_points > 0 || taken.after.le(run.parameters.fit_from);
+    if fitted && run.parameters.adaptive.le(T::of(0.0)) {
+        fit(run, [from, to], [taken.before, taken.after]);
+    } else if fitted {
+        let (mut time, mut excess) = (from, taken.before);
+        for point in 1..=POINTS {
+            let share = T::of(f64::from(point)) / T::of(f64::from(POINTS));
+            let (next, below) = (from + share * taken.h, taken.inside(share));
+            fit(run, [time, next], [excess, below]);
+            (time, excess) = (next, below);
+        }
     }
     note(run, from, to, taken);
 }
@@ -47,7 +54,7 @@ fn clock<T: Real>(run: &Run<T>, taken: &Taken<T>) -> (T, T) {
     (from, from + taken.h)
 }
 
-/// Adds the excess at the end of a step, or of half an adaptive one, to the fit while it is inside the window: from the
+/// Adds the excess at the end of a step, or of a part of an adaptive one, to the fit while it is inside the window: from the
 /// first time in the window to the first time below it.
 fn fit<T: Real>(run: &mut Run<T>, [from, to]: [T; 2], [before, after]: [T; 2]) {
     let Run { report, counters, parameters: p, .. } = run;
@@ -92,12 +99,7 @@ fn note<T: Real>(run: &mut Run<T>, from: T, to: T, taken: &Taken<T>) {
             return;
         }
         let inside = ((time - from) / (to - from)).max(T::of(0.0)).min(T::of(1.0));
-        let Taken { before, middle, after, .. } = *taken;
-        report.excess_at[counters.noted as usize] = if p.adaptive.le(T::of(0.0)) {
-            before + inside * (after - before)
-        } else {
-            extrapolation::inside(before, middle, after, inside)
-        };
+        report.excess_at[counters.noted as usize] = taken.inside(inside);
         counters.noted += 1;
     }
 }

@@ -5,13 +5,15 @@
 //! depend on the others, to the last bit.
 
 use super::{
-    Branches, Parameters, State, Status, Workspace, decay, extrapolation,
+    Branches, Parameters, State, Status, Workspace, decay,
+    dense::{Fall, Taken},
+    extrapolation::{self, AllShares, SHARED_PARTS},
     member::{Counters, NEVER},
     observe::{self, Glance},
     pace::{self, Stride},
-    run::{Run, Taken},
-    start::Start,
-    state::{self, STATE_FIELDS},
+    run::Run,
+    start::{self, Start},
+    state::{self, LASTING_FIELDS, STATE_FIELDS},
     step::{self, Method, Stepped},
 };
 use crate::{
@@ -45,16 +47,17 @@ pub struct Team<N: Number> {
     /// Turning number at the start.
     turning: N,
     strides: Vec<Stride<N::Real>>,
+    shares: AllShares<N::Real>,
     work: Workspace<N>,
 }
 
 /// Result of an attempted step.
 struct Attempt<N: Number> {
     stepped: Stepped<N>,
-    /// Error of an adaptive step; 0 for a fixed one.
-    error: N,
-    /// Excess in the middle of an adaptive step.
-    middle: N,
+    /// Errors of an adaptive step, of its order and of the one below; 0 for a fixed one.
+    errors: [N; 2],
+    /// First and second derivative of ln excess at the end of an adaptive step.
+    decline: [N; 2],
     seen: Glance<N>,
     excess: N,
 }
@@ -97,7 +100,7 @@ pub fn evolve_abreast<N: Number, S: Solves>(group: Group<N::Real>, method: &Meth
         let all_leave = made == attempts || runs.iter().filter(|run| run.counters.is_running()).count() < enough;
         for lane in 0..runs.len() {
             if live.lane(lane) && (all_leave || !runs[lane].counters.is_running()) {
-                team.let_out(lane, runs[lane], adaptive);
+                team.let_out(lane, runs[lane]);
                 live.set_lane(lane, false);
             }
         }
@@ -131,6 +134,7 @@ impl<N: Number> Team<N> {
             excess: N::default(),
             turning: N::default(),
             strides: vec![stride; N::LANES],
+            shares: AllShares::new(),
             work,
         }
     }
@@ -139,7 +143,7 @@ impl<N: Number> Team<N> {
     #[inline(always)]
     fn take_in(&mut self, lane: usize, run: &Run<N::Real>) {
         let from = run.state.fields();
-        for (to, from) in self.state.fields_mut().into_iter().zip(from).take(state::NEEDED_FIELDS) {
+        for (to, from) in self.state.fields_mut().zip(from).take(state::NEEDED_FIELDS) {
             for i in 0..from.len() {
                 to[i].set_lane(lane, from[i]);
             }
@@ -152,19 +156,17 @@ impl<N: Number> Team<N> {
 
     /// Copies a member back from its lane, with its report.
     #[inline(always)]
-    fn let_out(&self, lane: usize, run: &mut Run<N::Real>, adaptive: bool) {
-        for (from, to) in self.state.fields().into_iter().zip(run.state.fields_mut()) {
+    fn let_out(&self, lane: usize, run: &mut Run<N::Real>) {
+        for (from, to) in self.state.fields().into_iter().zip(run.state.fields_mut()).take(LASTING_FIELDS) {
             for i in 0..from.len() {
                 to[i] = from[i].lane(lane);
             }
             to.close();
         }
-        run.report_on(self.work.blocks, adaptive);
+        run.report_on(self.work.blocks);
     }
 
-    /// Makes a fixed step, or the three steps of an adaptive one, in all lanes.
-    ///
-    /// The step is called in one place only, since its whole body is inlined there.
+    /// Makes a fixed step, or the parts of an adaptive one, in all lanes.
     #[inline(always)]
     fn attempt<S: Solves>(
         &mut self,
@@ -173,52 +175,102 @@ impl<N: Number> Team<N> {
         branches: Branches,
         method: &Method,
     ) -> Attempt<N> {
-        let adaptive = branches.adaptive;
-        let Team { state, parameters, excess, strides, work, .. } = self;
-        let mut h = parameters.tau;
+        let mut orders = N::of(1.0);
+        let mut most = 1;
+        let h = self.strides(runs, live, branches.adaptive, &mut orders, &mut most);
+        let stepped = self.make_parts::<S>(runs, live, branches, method, [h, orders], most);
+        let Team { state, parameters, work, .. } = self;
+        let (mut errors, mut decline) = ([N::of(0.0); 2], [N::of(0.0); 2]);
+        if branches.adaptive {
+            extrapolation::finish_attempt(state, &mut work.new);
+            let followed = self.excess.le(parameters.follow_to).not();
+            errors = extrapolation::errors_of_attempt(&state.gaps, &work.new, followed);
+        }
+        let seen = observe::glance(&state.curve, &work.new, work.blocks);
+        let sizes = [seen.length, seen.area];
+        if branches.adaptive {
+            let (slope, bend) = (&state.slope_before, &state.bend_before);
+            decline = observe::decline(&work.new, slope, bend, sizes, parameters, work.blocks);
+        }
+        let excess = observe::excess(seen.length, seen.area, parameters);
+        Attempt { stepped, errors, decline, seen, excess }
+    }
+
+    /// The lengths of the next steps, their orders and the highest one.
+    #[inline(always)]
+    fn strides(
+        &mut self,
+        runs: &[&mut Run<N::Real>],
+        live: N::Mask,
+        adaptive: bool,
+        orders: &mut N,
+        most: &mut u32,
+    ) -> N {
+        let mut h = self.parameters.tau;
         if adaptive {
             for (lane, run) in runs.iter().enumerate() {
-                strides[lane] = pace::stride(&run.report.progress, &run.parameters);
-                h.set_lane(lane, strides[lane].length);
-            }
-        }
-        let half = N::of(0.5);
-        let mut ok = live;
-        let none = N::of(0.0);
-        let mut all = Stepped { sweeps_k: none, sweeps_x: none, solved: live, finite: live };
-        for part in 0..if adaptive { 3 } else { 1 } {
-            parameters.tau = if part == 0 { h } else { half * h };
-            let from = if part == 2 { &state.before } else { &state.curve };
-            let stepped = step::step_by::<N, S>(from, &mut state.increments, parameters, branches, ok, method, work);
-            // An earlier failure determines the cause; its lane makes no more sweeps.
-            all.finite = all.finite.and(stepped.finite.or(ok.not()));
-            all.solved = all.solved.and(stepped.solved.or(ok.not()));
-            all.sweeps_k += N::select(ok, stepped.sweeps_k, none);
-            all.sweeps_x += N::select(ok, stepped.sweeps_x, none);
-            ok = all.finite.and(all.solved);
-            if !ok.any() {
-                break;
-            }
-            if adaptive && part < 2 {
-                let kept = if part == 0 { &mut state.middle } else { &mut state.before };
-                std::mem::swap(kept, &mut work.new);
-                if S::FACTS.sweeps {
-                    Start::after_part(part).put(&mut state.increments, &mut state.earlier);
+                self.strides[lane] = pace::stride(&run.report.progress, &run.parameters);
+                h.set_lane(lane, self.strides[lane].length);
+                orders.set_lane(lane, N::Real::of(f64::from(run.counters.order)));
+                if live.lane(lane) {
+                    *most = run.counters.order.max(*most);
                 }
             }
         }
-        parameters.tau = h;
-        let (mut error, mut middle) = (none, none);
-        if adaptive {
-            let followed = excess.le(parameters.follow_to).not();
-            error = extrapolation::error_of_attempt(&state.middle, &work.new, followed);
-            extrapolation::extrapolate(&mut state.middle, &state.before, &mut work.new);
-            let sums = observe::sums(&state.middle, parameters, work.blocks);
-            middle = observe::excess(sums.length, sums.area, parameters);
+        h
+    }
+
+    /// Makes the parts of steps of length h, row by row. Lanes of a lower order, and lanes that have failed, stand by.
+    ///
+    /// The step is called in one place only, since its whole body is inlined there.
+    #[inline(always)]
+    fn make_parts<S: Solves>(
+        &mut self,
+        runs: &[&mut Run<N::Real>],
+        live: N::Mask,
+        branches: Branches,
+        method: &Method,
+        [h, orders]: [N; 2],
+        most: u32,
+    ) -> Stepped<N> {
+        let Team { state, parameters, work, shares, .. } = self;
+        let none = N::of(0.0);
+        let mut all = Stepped { sweeps_k: none, sweeps_x: none, solved: live, finite: live };
+        let mut ok = live;
+        if branches.adaptive {
+            extrapolation::begin_attempt(state);
         }
-        let seen = observe::glance(&state.curve, &work.new, work.blocks);
-        let excess = observe::excess(seen.length, seen.area, parameters);
-        Attempt { stepped: all, error, middle, seen, excess }
+        for row in 1..=most {
+            let busy = ok.and(N::of(f64::from(row)).le(orders));
+            parameters.tau = if branches.adaptive { h / N::of(f64::from(row)) } else { h };
+            for part in 1..=row {
+                let busy = busy.and(ok);
+                if branches.adaptive && S::FACTS.sweeps {
+                    start_part(state, runs, parameters.tau, part);
+                }
+                let from = if part == 1 { &state.curve } else { &state.part };
+                let stepped =
+                    step::step_by::<N, S>(from, &mut state.increments, parameters, branches, busy, method, work);
+                // An earlier failure determines the cause; its lane makes no more sweeps.
+                all.finite = all.finite.and(stepped.finite.or(busy.not()));
+                all.solved = all.solved.and(stepped.solved.or(busy.not()));
+                all.sweeps_k += N::select(busy, stepped.sweeps_k, none);
+                all.sweeps_x += N::select(busy, stepped.sweeps_x, none);
+                ok = all.finite.and(all.solved);
+                if branches.adaptive && ok.any() {
+                    let left = row - part;
+                    if left < SHARED_PARTS {
+                        extrapolation::add_part(state, &work.new, left, &shares.in_lanes(runs, row, left), busy);
+                    }
+                    std::mem::swap(&mut state.part, &mut work.new);
+                }
+            }
+            if !ok.any() {
+                break;
+            }
+        }
+        parameters.tau = h;
+        all
     }
 
     /// Decides for every member whether to accept the step, and records its results.
@@ -232,49 +284,46 @@ impl<N: Number> Team<N> {
     ) {
         let n = self.work.blocks.n;
         let gap = self.gap_at_threshold(runs, live, attempt.excess);
-        let exact = attempt.error.le(self.parameters.adaptive);
         let (finite, singular) =
             (attempt.seen.is_finite(), attempt.seen.is_singular(self.turning, &self.parameters, n));
         let mut kept = N::Mask::all_of(false);
-        let mut start = Start::after_fixed();
         for (lane, run) in runs.iter_mut().enumerate() {
             if !live.lane(lane) {
                 continue;
             }
             count_sweeps(&mut run.counters, &attempt.stepped, lane);
-            let (stride, error) = (self.strides[lane], attempt.error.lane(lane));
+            let (stride, errors) = (self.strides[lane], attempt.errors.map(|error| error.lane(lane)));
+            run.counters.parts += if adaptive { extrapolation::parts(run.counters.order) } else { 1 };
             let of_solves = failure_of_solves(&attempt.stepped, lane);
             let failure = of_solves.or(failure_of_curve(finite.lane(lane), singular.lane(lane)));
-            if adaptive && of_solves.is_none() && !exact.lane(lane) {
+            let length = run.report.now.length;
+            let allowed = pace::allowed(stride.length, length, N::Real::of(n as f64), &run.parameters);
+            if adaptive && of_solves.is_none() && !errors[0].le(allowed) {
                 kept.set_lane(lane, true);
-                start.set_lane(lane, refuse_inaccurate(run, n, stride.length, error));
+                refuse_inaccurate(run, n, stride.length, errors, allowed);
             } else if let Some(cause) = failure {
                 kept.set_lane(lane, true);
                 if adaptive {
-                    start.set_lane(lane, refuse_failure(run, n, stride.length, cause));
+                    refuse_failure(run, n, stride.length, cause);
                 } else {
                     run.counters.status = cause as u32;
                 }
             } else {
-                let taken = Taken {
-                    h: if adaptive { stride.length } else { N::Real::of(0.0) },
-                    before: self.excess.lane(lane),
-                    middle: attempt.middle.lane(lane),
-                    after: attempt.excess.lane(lane),
-                    gap: gap.lane(lane),
-                };
+                let excess = [self.excess.lane(lane), attempt.excess.lane(lane)];
+                let decline = attempt.decline.map(|of| of.lane(lane));
+                let taken = taken(run, stride, excess, decline, gap.lane(lane), adaptive);
                 record_events(run, &taken);
                 decay::follow(run, &taken);
                 if adaptive {
-                    start.set_lane(lane, lengthen(run, stride, error));
+                    lengthen(run, stride, errors, decline, allowed);
                 }
                 accepted(run, taken.after, &attempt.seen, lane, adaptive);
             }
         }
-        if S::FACTS.sweeps {
-            start.put(&mut self.state.increments, &mut self.state.earlier);
+        if S::FACTS.sweeps && !adaptive {
+            Start::after_step().put(&mut self.state.increments, &mut self.state.earlier);
         }
-        self.accept(kept, attempt.excess);
+        self.accept(kept, attempt.excess, adaptive);
     }
 
     /// The gap between k and the polygon of the new curves, if one of them may have relaxed. It costs a fifth of a
@@ -291,15 +340,54 @@ impl<N: Number> Team<N> {
 
     /// Accepts the new curves, except in the lanes that keep theirs.
     #[inline(always)]
-    fn accept(&mut self, kept: N::Mask, excess: N) {
+    fn accept(&mut self, kept: N::Mask, excess: N, adaptive: bool) {
         let Team { state, work, .. } = self;
         if kept.any() {
             work.new.put(kept, &state.curve);
+            if adaptive {
+                state.slope_before.put(kept, &state.slope);
+                state.bend_before.put(kept, &state.bend);
+            }
         }
         self.excess = N::select(kept, self.excess, excess);
         std::mem::swap(&mut state.before, &mut state.curve);
         std::mem::swap(&mut state.curve, &mut work.new);
+        if adaptive {
+            std::mem::swap(&mut state.slope_before, &mut state.slope);
+            std::mem::swap(&mut state.bend_before, &mut state.bend);
+        }
     }
+}
+
+/// Where the solves of a part of length tau start.
+#[inline(always)]
+fn start_part<N: Number>(state: &mut State<N>, runs: &[&mut Run<N::Real>], tau: N, part: u32) {
+    if part > 1 {
+        return Start::after_step().put(&mut state.increments, &mut state.earlier);
+    }
+    let mut ratio = N::of(0.0);
+    for (lane, run) in runs.iter().enumerate() {
+        let taken = run.report.progress.taken;
+        let never = taken.le(N::Real::of(0.0));
+        ratio.set_lane(lane, if never { taken } else { tau.lane(lane) / taken });
+    }
+    start::begin_row(state, ratio);
+}
+
+/// An accepted step.
+fn taken<T: Real>(
+    run: &Run<T>,
+    stride: Stride<T>,
+    [before, after]: [T; 2],
+    decline: [T; 2],
+    gap: T,
+    adaptive: bool,
+) -> Taken<T> {
+    if !adaptive {
+        return Taken { h: T::of(0.0), before, after, fall: Fall::Straight, gap };
+    }
+    let h = stride.length;
+    Taken { h, before, after, fall: Fall::of(&run.report.progress, h, [before, after], decline), gap }
 }
 
 #[inline(always)]
@@ -330,7 +418,7 @@ fn failure_of_curve(finite: bool, singular: bool) -> Option<Status> {
 /// Retries with a step of length `next`, or ends the member for `cause` if that is below `least` of `(L/n)⁴`.
 fn refuse<T: Real>(run: &mut Run<T>, n: usize, next: T, least: f64, cause: Status) {
     run.counters.rejected += 1;
-    run.counters.refused = 1;
+    run.counters.refused += 1;
     run.report.progress.next = next;
     let least = pace::least_step(run.report.now.length, T::of(n as f64), least, &run.parameters);
     if !least.le(next) {
@@ -338,18 +426,18 @@ fn refuse<T: Real>(run: &mut Run<T>, n: usize, next: T, least: f64, cause: Statu
     }
 }
 
-/// Refuses a step of length h that failed outright; its increments may then be anything.
-fn refuse_failure<T: Real>(run: &mut Run<T>, n: usize, h: T, cause: Status) -> Start<T> {
+/// Refuses a step of length h that failed outright.
+fn refuse_failure<T: Real>(run: &mut Run<T>, n: usize, h: T, cause: Status) {
     let least = if cause == Status::Singular { pace::MIN_TO_SINGULAR } else { pace::MIN_STEP };
-    refuse(run, n, T::of(pace::MIN_GROWTH) * h, least, cause);
-    Start::nowhere()
+    refuse(run, n, T::of(pace::AFTER_FAILURE) * h, least, cause);
 }
 
 /// Refuses a step of length h whose error is too large.
-fn refuse_inaccurate<T: Real>(run: &mut Run<T>, n: usize, h: T, error: T) -> Start<T> {
-    let next = pace::next_length(h, error, 1.0, &run.parameters);
+fn refuse_inaccurate<T: Real>(run: &mut Run<T>, n: usize, h: T, errors: [T; 2], allowed: T) {
+    let most = T::of(if run.counters.refused == 0 { pace::AFTER_REFUSAL } else { pace::AFTER_REFUSALS });
+    let (next, order) = pace::choose(h, run.counters.order, errors, most, allowed);
+    run.counters.order = order;
     refuse(run, n, next, pace::MIN_STEP, Status::Singular);
-    Start::after_refused(next / (T::of(0.5) * h))
 }
 
 /// Records the steps in which the excess falls to half its start and to the relaxation threshold, and where inside
@@ -360,37 +448,25 @@ fn record_events<T: Real>(run: &mut Run<T>, taken: &Taken<T>) {
     if counters.half_step == NEVER && taken.after.le(p.half_at) {
         counters.half_step = counters.steps;
         (progress.half_high, progress.half_low) = (progress.time_high, progress.time_low);
-        (progress.half_length, progress.half_fraction) = (taken.h, fraction_at(taken, p.half_at, p));
+        (progress.half_length, progress.half_fraction) = (taken.h, taken.fraction_at(p.half_at));
     }
     let due = counters.relax_step == NEVER && taken.after.le(p.relax_at);
     if due && taken.gap.le(T::of(observe::MAX_GAP)) {
         counters.relax_step = counters.steps;
         (progress.relax_high, progress.relax_low) = (progress.time_high, progress.time_low);
-        (progress.relax_length, progress.relax_fraction) = (taken.h, fraction_at(taken, p.relax_at, p));
+        (progress.relax_length, progress.relax_fraction) = (taken.h, taken.fraction_at(p.relax_at));
     }
 }
 
-/// Where in the last step the excess fell to `excess`; at its end if it already had before.
-fn fraction_at<T: Real>(&Taken { before, middle, after, .. }: &Taken<T>, excess: T, p: &Parameters<T>) -> T {
-    if before.le(excess) {
-        T::of(1.0)
-    } else if p.adaptive.le(T::of(0.0)) {
-        (before - excess) / (before - after)
-    } else {
-        extrapolation::crossing(before, middle, after, excess)
-    }
-}
-
-/// Advances the clock by an accepted adaptive step, and chooses the length of the next one.
-fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, error: T) -> Start<T> {
+/// Advances the clock by an accepted adaptive step, and chooses the length and the order of the next one.
+fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, errors: [T; 2], [slope, bend]: [T; 2], allowed: T) {
     let Run { parameters, counters, report, .. } = run;
     let progress = &mut report.progress;
-    let most_growth = if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 };
-    progress.next = pace::next_length(stride.length, error, most_growth, parameters);
-    let start = Start::after_taken(progress.next / (T::of(0.5) * stride.length));
+    let most_growth = T::of(if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 });
+    (progress.next, counters.order) = pace::choose(stride.length, counters.order, errors, most_growth, allowed);
+    (progress.slope, progress.bend) = (slope, bend);
     pace::pass_time(progress, stride, parameters);
     counters.refused = 0;
-    start
 }
 
 /// Counts an accepted step, and decides whether the member continues.

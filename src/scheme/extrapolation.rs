@@ -1,99 +1,266 @@
-//! The adaptive step: one step of the paper's scheme compared with two half steps. Twin of
+//! The adaptive step: the paper's scheme with 1, 2, … J parts, extrapolated to order J. Twin of
 //! `shaders/extrapolation.wgsl`.
 //!
-//! With A the result of one step of length h and B that of two steps of h/2, the scheme of first order makes errors
-//! `c h²` and `c h²/2`. So `A - B` measures the error, `2B - A` is of second order, and so is, in the middle,
-//! `B₁ + (B - A)/2` with B₁ the first half step. Every part is the paper's step; lengths, which are positive, are
-//! extrapolated as `r_B²/r_A`.
+//! Row j is the result of j steps of the paper of length h/j. The scheme is of first order, and its error has an
+//! expansion in powers of the length of the parts, so the Aitken–Neville combination of the first J rows is of order
+//! J (E. Hairer and G. Wanner, *Solving Ordinary Differential Equations II*, section IV.9). With the harmonic sequence
+//! its weights are `w_j = Π_{i≠j} j/(j-i)`. The rows from 2 to J give order J-1, and the difference between the two
+//! measures the error. All of x, y, k and r are combined, each by itself.
+//!
+//! Backward differences at the ends of the rows are combined in the same way: the first and second derivatives at the
+//! end of the step, from which [`dense`](super::dense) takes what lies inside steps (E. Hairer and A. Ostermann, *Dense
+//! output for extrapolation methods*, 1990).
+//!
+//! Everything is accumulated as parts are made, as a change from the curve at the start, in what the state holds of the
+//! step before: nobody needs that any more.
 
-use super::Curve;
+use super::{Curve, State, run::Run, state::Gaps};
 use crate::number::{BIG, Number, Real};
 
-/// The difference between the whole step and the two half steps, in k and in ln r.
-///
-/// The difference in k is relative to the largest |k|. While the shape is followed, i.e. until the excess is
-/// negligible, it is relative to the geometric mean of the largest |k| and the spread of k: a curve close to a circle
-/// must not lose its modes in a tolerance measured by the circle.
+/// Lowest order of a step.
+pub const LEAST_ORDER: u32 = 2;
+/// Highest order of a step.
+pub const MOST_ORDER: u32 = 6;
+/// Highest order in f32: weights grow with the order, and with them the rounding of the parts.
+pub const MOST_ORDER_F32: u32 = 4;
+
+/// The last parts of a row, which go into the combinations.
+pub const SHARED_PARTS: u32 = 3;
+
+/// The steps of the paper that a step of order `order` makes.
+pub fn parts(order: u32) -> u32 {
+    order * (order + 1) / 2
+}
+
+/// Highest order of a step in numbers of this machine epsilon.
+pub fn most_order(epsilon: f64) -> u32 {
+    if epsilon > 1e-10 { MOST_ORDER_F32 } else { MOST_ORDER }
+}
+
+/// The weight of `row` in the combination of the rows from `first` to `order`.
+fn weight<T: Real>(row: u32, first: u32, order: u32) -> T {
+    let own = T::of(f64::from(row));
+    let mut weight = T::of(if first <= row && row <= order { 1.0 } else { 0.0 });
+    for other in first..=order {
+        if other != row {
+            weight = weight * (own / (own - T::of(f64::from(other))));
+        }
+    }
+    weight
+}
+
+/// How much larger the rounding of a step of order `order` is than that of one of the paper's: each part adds its own,
+/// and the weights of the rows multiply them.
+pub fn roundings(order: u32) -> f64 {
+    let of_row = |row| f64::from(row) * weight::<f64>(row, 1, order).powi(2);
+    (1..=order).map(of_row).sum::<f64>().sqrt()
+}
+
+/// How much of the change up to the end of a part goes into each combination.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Shares<N> {
+    /// Into the curve at the end of the step.
+    value: N,
+    /// Into its derivative, times the length of the step.
+    slope: N,
+    /// Into its second derivative, times the square of that.
+    bend: N,
+    /// Into the error of order J-1.
+    gap: N,
+    /// Into the error of order J-2.
+    lower_gap: N,
+}
+
+impl<T: Real> Shares<T> {
+    /// The shares of a part of `row`, `left` parts before its end, in a step of order `order`.
+    pub fn of(row: u32, left: u32, order: u32) -> Shares<T> {
+        let own = T::of(f64::from(row));
+        let zero = T::of(0.0);
+        let (whole, upper) = (weight::<T>(row, 1, order), weight::<T>(row, LEAST_ORDER, order));
+        let square = own * own * upper;
+        match left {
+            0 => {
+                let lower = if order > LEAST_ORDER {
+                    weight::<T>(row, 1, order - 1) - weight::<T>(row, LEAST_ORDER, order - 1)
+                } else {
+                    zero
+                };
+                Shares { value: whole, slope: own * whole, bend: square, gap: whole - upper, lower_gap: lower }
+            }
+            1 => Shares { slope: -(own * whole), bend: -(square + square), ..Shares::default() },
+            2 => Shares { bend: square, ..Shares::default() },
+            _ => Shares::default(),
+        }
+    }
+}
+
+impl<N: Number> Shares<N> {
+    /// Sets one lane.
+    #[inline(always)]
+    pub fn set_lane(&mut self, lane: usize, of: Shares<N::Real>) {
+        self.value.set_lane(lane, of.value);
+        self.slope.set_lane(lane, of.slope);
+        self.bend.set_lane(lane, of.bend);
+        self.gap.set_lane(lane, of.gap);
+        self.lower_gap.set_lane(lane, of.lower_gap);
+    }
+}
+
+/// The shares of all parts in steps of all orders.
+pub struct AllShares<T>(Vec<Shares<T>>);
+
+impl<T: Real> AllShares<T> {
+    /// Computes them.
+    pub fn new() -> AllShares<T> {
+        let rows = (0..=MOST_ORDER).flat_map(|order| (0..=MOST_ORDER).map(move |row| (order, row)));
+        let parts = rows.flat_map(|(order, row)| (0..SHARED_PARTS).map(move |left| (order, row, left)));
+        AllShares(parts.map(|(order, row, left)| Shares::of(row, left, order)).collect())
+    }
+
+    /// Returns those of a part in every lane, by its order.
+    #[inline(always)]
+    pub fn in_lanes<N: Number<Real = T>>(&self, runs: &[&mut Run<T>], row: u32, left: u32) -> Shares<N> {
+        let mut shares = Shares::default();
+        for (lane, run) in runs.iter().enumerate() {
+            let at = ((run.counters.order * (MOST_ORDER + 1)) + row) * SHARED_PARTS + left;
+            shares.set_lane(lane, self.0[at as usize]);
+        }
+        shares
+    }
+}
+
+/// Prepares the combinations of an attempt: nothing has changed yet.
 #[inline(always)]
-pub fn error_of_attempt<N: Number>(whole: &Curve<N>, halves: &Curve<N>, followed: N::Mask) -> N {
+pub fn begin_attempt<N: Number>(state: &mut State<N>) {
+    let State { before, slope_before, bend_before, gaps, .. } = state;
+    let curves = [before, slope_before, bend_before].into_iter().flat_map(Curve::fields_mut);
+    for field in curves.chain(gaps.fields_mut()) {
+        for i in 0..field.len() {
+            field[i] = N::of(0.0);
+        }
+    }
+}
+
+/// Adds the curve `new` at the end of a part, `left` parts before the end of its row, in the lanes of `busy`.
+#[inline(always)]
+pub fn add_part<N: Number>(state: &mut State<N>, new: &Curve<N>, left: u32, shares: &Shares<N>, busy: N::Mask) {
+    let State { curve, before, slope_before, bend_before, gaps, .. } = state;
+    let changes = new.fields().into_iter().zip(curve.fields());
+    let sums = before.fields_mut().into_iter().zip(slope_before.fields_mut()).zip(bend_before.fields_mut());
+    for ((new, old), ((value, slope), bend)) in changes.zip(sums) {
+        for i in 0..new.len() {
+            let change = N::select(busy, new[i] - old[i], N::of(0.0));
+            bend[i] += shares.bend * change;
+            if left < 2 {
+                slope[i] += shares.slope * change;
+            }
+            if left == 0 {
+                value[i] += shares.value * change;
+            }
+        }
+    }
+    if left > 0 {
+        return;
+    }
+    for i in 0..new.len() {
+        let change_k = N::select(busy, new.k[i] - curve.k[i], N::of(0.0));
+        let change_r = N::select(busy, new.r[i] - curve.r[i], N::of(0.0));
+        gaps.k[i] += shares.gap * change_k;
+        gaps.r[i] += shares.gap * change_r;
+        gaps.lower_k[i] += shares.lower_gap * change_k;
+        gaps.lower_r[i] += shares.lower_gap * change_r;
+    }
+}
+
+/// Puts the curve at the end of the step into `new`.
+#[inline(always)]
+pub fn finish_attempt<N: Number>(state: &mut State<N>, new: &mut Curve<N>) {
+    let State { curve, before, slope_before, bend_before, .. } = state;
+    let changes = before.fields().into_iter().zip(curve.fields());
+    for (new, (change, old)) in new.fields_mut().into_iter().zip(changes) {
+        for i in 0..old.len() {
+            new[i] = old[i] + change[i];
+        }
+        new.close();
+    }
+    slope_before.close();
+    bend_before.close();
+}
+
+/// The errors of order J-1 and J-2, in k and in ln r, of the step that ends in `new`.
+///
+/// The error in k is relative to the largest |k|. While the shape is followed, i.e. until the excess is negligible, it
+/// is relative to the geometric mean of the largest |k| and the spread of k: a curve close to a circle must not lose its
+/// modes in a tolerance measured by the circle.
+#[inline(always)]
+pub fn errors_of_attempt<N: Number>(gaps: &Gaps<N>, new: &Curve<N>, followed: N::Mask) -> [N; 2] {
     let low = N::of(-2.0 * BIG);
-    let (mut gap_k, mut gap_r, mut k_max, mut minus_k_min) = (N::of(0.0), N::of(0.0), low, low);
-    for i in 0..whole.len() {
-        gap_k = gap_k.max((halves.k[i] - whole.k[i]).bounded_abs());
-        gap_r = gap_r.max((halves.r[i] / whole.r[i] - N::of(1.0)).bounded_abs());
-        k_max = k_max.max(halves.k[i]);
-        minus_k_min = minus_k_min.max(-halves.k[i]);
+    let (mut gap_k, mut gap_r, mut lower_k, mut lower_r) = (N::of(0.0), N::of(0.0), N::of(0.0), N::of(0.0));
+    let (mut k_max, mut minus_k_min) = (low, low);
+    for i in 0..new.len() {
+        let ir = new.r[i].recip();
+        gap_k = gap_k.max(gaps.k[i].bounded_abs());
+        gap_r = gap_r.max((gaps.r[i] * ir).bounded_abs());
+        lower_k = lower_k.max(gaps.lower_k[i].bounded_abs());
+        lower_r = lower_r.max((gaps.lower_r[i] * ir).bounded_abs());
+        k_max = k_max.max(new.k[i]);
+        minus_k_min = minus_k_min.max(-new.k[i]);
     }
     let size = k_max.max(minus_k_min);
     let spread = (k_max + minus_k_min).min(size);
     let scale = N::select(followed, (size * spread).sqrt(), size);
-    (gap_k / scale).bounded_abs().max(gap_r)
-}
-
-/// Puts the extrapolated curve into `halves` and the curve in the middle of the step into `whole`.
-#[inline(always)]
-pub fn extrapolate<N: Number>(whole: &mut Curve<N>, first: &Curve<N>, halves: &mut Curve<N>) {
-    let half = N::of(0.5);
-    for i in 0..whole.len() {
-        between(&mut whole.x[i], first.x[i], &mut halves.x[i]);
-        between(&mut whole.y[i], first.y[i], &mut halves.y[i]);
-        between(&mut whole.k[i], first.k[i], &mut halves.k[i]);
-        let (a, b) = (whole.r[i], halves.r[i]);
-        whole.r[i] = first.r[i] + half * (b - a);
-        halves.r[i] = b * b / a;
-    }
-    for curve in [whole, halves] {
-        curve.x.close();
-        curve.y.close();
-        curve.k.close();
-        curve.r.close();
-    }
-}
-
-/// Replaces A by the value in the middle of the step, and B by the one at its end, from A, B₁ and B.
-#[inline(always)]
-fn between<N: Number>(a: &mut N, b1: N, b: &mut N) {
-    let gap = *b - *a;
-    *a = b1 + N::of(0.5) * gap;
-    *b += gap;
-}
-
-/// A quantity at the fraction `at` of a step, on the parabola through its values `start`, `middle` and `end`.
-pub fn inside<T: Real>(start: T, middle: T, end: T, at: T) -> T {
-    let (two, four) = (T::of(2.0), T::of(4.0));
-    let slope = four * middle - T::of(3.0) * start - end;
-    let bend = two * (start - two * middle + end);
-    start + at * (slope + at * bend)
-}
-
-/// The fraction of a step at which a quantity that goes from `start` over `middle` to `end` first falls to `target`;
-/// `start > target >= end`.
-pub fn crossing<T: Real>(start: T, middle: T, end: T, target: T) -> T {
-    let (zero, two, four) = (T::of(0.0), T::of(2.0), T::of(4.0));
-    // The parabola through the three: above + slope θ + bend θ².
-    let above = start - target;
-    let slope = four * middle - T::of(3.0) * start - end;
-    let bend = two * (start - two * middle + end);
-    let discriminant = slope * slope - four * bend * above;
-    let root = two * above / (discriminant.max(zero).sqrt() - slope);
-    let straight = above / (start - end);
-    let inside = zero.le(discriminant) && zero.le(root) && root.le(T::of(1.0));
-    if inside { root } else { straight }
+    [(gap_k / scale).bounded_abs().max(gap_r), (lower_k / scale).bounded_abs().max(lower_r)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// The end, the derivative and the second derivative of a step of length h for y' = -y², y(0) = 1, by the explicit
+    /// Euler method, and the two errors.
+    fn step(h: f64, order: u32) -> [f64; 5] {
+        let mut all = [1.0, 0.0, 0.0, 0.0, 0.0];
+        for row in 1..=order {
+            let mut y = 1.0;
+            for part in 1..=row {
+                y -= h / f64::from(row) * y * y;
+                let shares = Shares::<f64>::of(row, row - part, order);
+                let [value, slope, bend, gap, lower] =
+                    [shares.value, shares.slope, shares.bend, shares.gap, shares.lower_gap];
+                for (sum, share) in all.iter_mut().zip([value, slope, bend, gap, lower]) {
+                    *sum += share * (y - 1.0);
+                }
+            }
+        }
+        all
+    }
+
     #[test]
-    fn a_parabola_s_crossing_is_found_and_a_wild_one_falls_back_to_a_straight_line() {
-        let decay = |t: f64| (-0.5 * t).exp();
-        let at = crossing(1.0, decay(0.5), decay(1.0), decay(0.3));
-        assert!((at - 0.3).abs() < 2e-3, "{at}");
-        assert_eq!(crossing(1.0, 0.75, 0.5, 0.5), 1.0);
-        assert_eq!(crossing(2.0, 1.5, 1.0, 1.25), 0.75);
-        let wild = crossing(1.0, 9.0, 0.0, 0.5);
-        assert!((0.0..=1.0).contains(&wild), "{wild}");
-        assert_eq!(crossing(1.0, f64::NAN, 0.0, 0.5), 0.5);
+    fn combinations_have_their_orders() {
+        for order in LEAST_ORDER..=MOST_ORDER {
+            let errors = [0.1, 0.05].map(|h: f64| {
+                let [value, slope, bend, gap, lower] = step(h, order);
+                let y = 1.0 / (1.0 + h);
+                [value - y, slope + h * y * y, bend - 2.0 * h * h * y * y * y, gap, lower]
+            });
+            let observed = |of: usize| (errors[0][of] / errors[1][of]).abs().log2();
+            let expected = f64::from(order) + 1.0;
+            for (of, order) in [expected, expected, expected, expected - 1.0, expected - 2.0].into_iter().enumerate() {
+                // Order J-2 of the lowest step does not exist.
+                if expected > 3.0 || of < 4 {
+                    assert!((observed(of) - order).abs() < 0.35, "{expected}: {of}: {} of {order}", observed(of));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn weights_add_up_to_one() {
+        for order in LEAST_ORDER..=MOST_ORDER {
+            let sum = |first: u32| (1..=order).map(|row| weight::<f64>(row, first, order)).sum::<f64>();
+            assert!((sum(1) - 1.0).abs() < 1e-13 && (sum(2) - 1.0).abs() < 1e-13, "{order}");
+        }
+        assert_eq!(weight::<f64>(1, 1, 2), -1.0, "step doubling");
+        assert_eq!(weight::<f64>(2, 1, 2), 2.0, "step doubling");
     }
 }

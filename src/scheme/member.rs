@@ -93,7 +93,7 @@ numbers! {
         least_length,
         /// Travel at which the member pauses for inspection, if its curvature changes sign.
         look_at,
-        /// Local error tolerance of adaptive steps; 0 for fixed ones.
+        /// Largest error of an adaptive step; 0 for fixed ones.
         adaptive,
         /// Unit of the high part of an adaptive time, a power of two.
         time_unit,
@@ -153,8 +153,14 @@ numbers! {
         time_low,
         /// Length of the last adaptive step.
         taken,
+        /// Length of the one before; 0 if there was none.
+        taken_before,
         /// Length of the next one.
         next,
+        /// Derivative of ln excess at the end of the last step, times its length.
+        slope,
+        /// Second derivative, times the square of the length.
+        bend,
         /// Start of the step in which the member relaxed, if steps are adaptive; high part.
         relax_high,
         /// Low part.
@@ -200,8 +206,6 @@ numbers! {
 pub struct Report<N> {
     /// The curve before the last step.
     pub before: Observed<N>,
-    /// The curve in the middle of the last adaptive step.
-    pub middle: Observed<N>,
     /// The last accepted curve; only the excess is known before the first step.
     pub now: Observed<N>,
     /// Its time and events.
@@ -225,8 +229,12 @@ pub struct Counters {
     pub steps: u32,
     /// Refused adaptive steps since the start.
     pub rejected: u32,
-    /// 1: the last adaptive step was refused.
+    /// Adaptive steps refused since the last accepted one.
     pub refused: u32,
+    /// Order of the next adaptive step.
+    pub order: u32,
+    /// Steps of the paper made since the start, also in refused steps.
+    pub parts: u32,
     /// Steps at which to stop; a member that pauses earlier sets this to its steps.
     pub goal: u32,
     /// 1: end the member once it is relaxed.
@@ -239,8 +247,7 @@ pub struct Counters {
     pub sweeps_k: u32,
     /// Sweeps on position systems in this dispatch.
     pub sweeps_x: u32,
-    /// Where the kernel paused inside an attempt: twice the number of finished steps of the paper, plus one after a
-    /// curvature solve. The CPU never pauses.
+    /// Where the kernel paused inside an attempt: twice the number of finished parts, plus one after a curvature solve. The CPU never pauses.
     pub phase: u32,
     /// Sweeps that the paused solve has made.
     pub solve_sweeps: u32,
@@ -295,8 +302,8 @@ fn convert<T: Real, U: Real>(numbers: Vec<T>) -> Vec<U> {
 impl<T: Real> Report<T> {
     /// Returns all numbers in memory order.
     pub fn to_numbers(&self) -> Vec<T> {
-        let Report { before, middle, now, progress, decay, excess_at } = self;
-        let observed = [before, middle, now].into_iter().flat_map(Observed::to_numbers);
+        let Report { before, now, progress, decay, excess_at } = self;
+        let observed = [before, now].into_iter().flat_map(Observed::to_numbers);
         let rest = [progress.to_numbers(), decay.to_numbers(), excess_at.to_vec()].into_iter().flatten();
         observed.chain(rest).collect()
     }
@@ -310,17 +317,17 @@ impl<T: Real> Report<T> {
             first
         };
         let mut observed = || Observed::from_numbers(next(Observed::<T>::FIELDS.len()));
-        let (before, middle, now) = (observed(), observed(), observed());
+        let (before, now) = (observed(), observed());
         let progress = Progress::from_numbers(next(Progress::<T>::FIELDS.len()));
         let decay = Decay::from_numbers(next(Decay::<T>::FIELDS.len()));
         let mut excess_at = [T::of(0.0); TIMES];
         excess_at.copy_from_slice(next(TIMES));
-        Report { before, middle, now, progress, decay, excess_at }
+        Report { before, now, progress, decay, excess_at }
     }
 
     /// Length of the array of numbers.
     pub const LEN: usize =
-        3 * Observed::<T>::FIELDS.len() + Progress::<T>::FIELDS.len() + Decay::<T>::FIELDS.len() + TIMES;
+        2 * Observed::<T>::FIELDS.len() + Progress::<T>::FIELDS.len() + Decay::<T>::FIELDS.len() + TIMES;
 
     /// Converts the report to another precision, rounding.
     pub fn convert<U: Real>(&self) -> Report<U> {
@@ -335,11 +342,13 @@ impl Counters {
     }
 
     /// Field names in memory order.
-    pub const FIELDS: [&'static str; 15] = [
+    pub const FIELDS: [&'static str; 17] = [
         "status",
         "steps",
         "rejected",
         "refused",
+        "order",
+        "parts",
         "goal",
         "stop_when_relaxed",
         "relax_step",

@@ -12,8 +12,9 @@
 //! here is over i and i+1. Both systems are written for the increment δ over the step: the right-hand side is
 //! the residual of the old state in node differences, so no digits are lost to the size of x.
 //!
-//! With adaptive steps, [`extrapolation`] combines three of them, of τ, τ/2 and τ/2, into one of second order, and
-//! [`pace`] chooses the length and tracks the time. [`decay`] records how fast the excess falls.
+//! With adaptive steps, [`extrapolation`] combines rows of 1, 2, … J of them into one of order J, [`pace`] chooses the
+//! length and the order and tracks the time, and [`dense`] gives what lies inside a step. [`decay`] records how fast the
+//! excess falls.
 //!
 //! *Practice.* Node i = 1…n of the paper is index i-1 here. `k[i]` and `r[i]` live on the segment that ends at node i,
 //! `q[i]` between the middles of segments i and i+1. A [`Curve`] is x, y, k and r; a [`State`] is a curve with what the
@@ -23,6 +24,7 @@
 pub mod branches;
 pub mod curvature;
 pub mod decay;
+pub mod dense;
 pub mod evolve;
 pub mod extrapolation;
 pub mod flow;

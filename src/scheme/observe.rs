@@ -149,6 +149,43 @@ pub fn excess<N: Number>(length: N, area: N, p: &Parameters<N>) -> N {
     length * length / (N::of(4.0 * std::f64::consts::PI) * area.abs()) - p.polygon_ratio
 }
 
+/// The first and the second derivative of ln excess along a step, by those of the nodes of the curve at its end.
+///
+/// With length L, area A and Q = L²/(4π|A|), (ln Q)' is 2L'/L - A'/A.
+#[inline(always)]
+pub fn decline<N: Number>(
+    curve: &Curve<N>,
+    slope: &Curve<N>,
+    bend: &Curve<N>,
+    [length, area]: [N; 2],
+    p: &Parameters<N>,
+    blocks: Blocks,
+) -> [N; 2] {
+    let two = N::of(2.0);
+    let mut sums = solver::Sums::new(blocks);
+    for i in 0..curve.len() {
+        let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
+        let ([_, um, u, ..], [_, vm, v, ..]) = (slope.x.window(i), slope.y.window(i));
+        let ([_, sm, s, ..], [_, tm, t, ..]) = (bend.x.window(i), bend.y.window(i));
+        let ([ex, ey], [fx, fy], [gx, gy]) = ([x - xm, y - ym], [u - um, v - vm], [s - sm, t - tm]);
+        let inverse = (ex * ex + ey * ey).sqrt().recip();
+        let stretch = (ex * fx + ey * fy) * inverse;
+        let bent = (fx * fx + fy * fy + (ex * gx + ey * gy) - stretch * stretch) * inverse;
+        let area = (um * y - u * ym) + (xm * v - x * vm);
+        let area_bend = (sm * y - s * ym) + (xm * t - x * tm) + two * (um * v - u * vm);
+        sums.add(i, [stretch, bent, area, area_bend]);
+    }
+    let [stretch, bent, area_slope, area_bend] = sums.totals();
+    let half = N::of(0.5);
+    let (growth, widening) = (stretch / length, half * area_slope / area);
+    let slope = two * growth - widening;
+    let bend = two * (bent / length - growth * growth) - (half * area_bend / area - widening * widening);
+    let ratio = length * length / (N::of(4.0 * std::f64::consts::PI) * area.abs());
+    let over = ratio / (ratio - p.polygon_ratio);
+    let first = over * slope;
+    [first, over * (bend + slope * slope) - first * first]
+}
+
 /// The largest difference between the angle by which the curvature turns the tangent over a segment, from middle to
 /// middle of its neighbours, and the angle by which the polygon turns there.
 #[inline(always)]

@@ -5,15 +5,31 @@
 //! exact in every precision, however many and however small the steps are. Nothing here relies on the order in which
 //! a compiler adds.
 
-use super::{Parameters, member::Progress};
+use super::{
+    Parameters, decay,
+    extrapolation::{LEAST_ORDER, most_order, parts},
+    member::Progress,
+};
 use crate::number::Real;
 
 /// Fraction taken of the step length that is predicted to meet the tolerance.
-pub const SAFETY: f64 = 0.95;
+pub const SAFETY: f64 = 0.9;
 /// Maximum ratio of a step to the one before.
-pub const MAX_GROWTH: f64 = 4.0;
-/// Minimum ratio of a step to the one before; the ratio after a failure.
-pub const MIN_GROWTH: f64 = 0.25;
+pub const MAX_GROWTH: f64 = 8.0;
+/// Minimum ratio of a step to the one before.
+pub const MIN_GROWTH: f64 = 0.1;
+/// The ratio after a failure.
+pub const AFTER_FAILURE: f64 = 0.25;
+/// Maximum ratio to a step that was refused.
+pub const AFTER_REFUSAL: f64 = 0.7;
+/// The same if the one before it was refused, too: where a curve has just begun, errors do not fall as the order says.
+pub const AFTER_REFUSALS: f64 = 0.3;
+/// Rounding of a step of the lowest order, in units of ε and of the root of the largest weight of its systems.
+pub const ROUNDING: f64 = 8.0;
+/// The order falls where the lower one makes the same progress for this fraction of the work.
+pub const FALLS: f64 = 0.8;
+/// The order rises where the lower one makes the same progress for no less than this multiple of the work.
+pub const RISES: f64 = 0.9;
 /// A step below this multiple of `(L/n)⁴`, far below all time scales of a curve that n nodes resolve, ends the member.
 pub const MIN_STEP: f64 = 1e-12;
 /// Like [`MIN_STEP`], for a step that is accurate but ends in a singular curve: shorter ones only creep towards the
@@ -49,6 +65,7 @@ pub fn stride<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> Stride<T> {
 
 /// Advances the clock by `stride`.
 pub fn pass_time<T: Real>(progress: &mut Progress<T>, stride: Stride<T>, p: &Parameters<T>) {
+    progress.taken_before = progress.taken;
     progress.taken = stride.length;
     if stride.last {
         (progress.time_high, progress.time_low) = (p.end_high, p.end_low);
@@ -67,11 +84,47 @@ pub fn is_at_goal<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> bool {
     ((p.goal_high - progress.time_high) + (p.goal_low - progress.time_low)).le(T::of(0.0))
 }
 
-/// Returns the length after a step of `length` with error `error`; the error scales with the square of the length.
-pub fn next_length<T: Real>(length: T, error: T, most_growth: f64, p: &Parameters<T>) -> T {
+/// Returns the largest error of a step of length h of a curve of length `length` with n nodes: an error below the
+/// rounding of the solves says nothing. The largest weight of their systems is about 16h/(L/n)⁴.
+pub fn allowed<T: Real>(h: T, length: T, n: T, p: &Parameters<T>) -> T {
+    let edge = length / n;
+    (T::of(4.0 * ROUNDING * T::EPSILON) * (h.sqrt() / (edge * edge))).max(p.adaptive)
+}
+
+/// Returns the ratio of the next step to one of order `order` with error `error`, which scales with that power of the
+/// length, where `allowed` is allowed.
+pub fn growth<T: Real>(error: T, order: u32, allowed: T) -> T {
     // A zero error allows any growth.
-    let growth = T::of(SAFETY) * (p.adaptive / error.max(T::of(1e-6) * p.adaptive)).sqrt();
-    length * growth.max(T::of(MIN_GROWTH)).min(T::of(most_growth))
+    let ratio = allowed / error.max(T::of(1e-12) * allowed);
+    let root = (decay::ln_ratio(T::of(1.0), ratio) / T::of(f64::from(order))).exponential();
+    (T::of(SAFETY) * root).max(T::of(MIN_GROWTH)).min(T::of(MAX_GROWTH))
+}
+
+/// Returns the work of a step of order `order` and of this ratio to the last one, for the same progress.
+fn work<T: Real>(order: u32, ratio: T) -> T {
+    T::of(f64::from(parts(order))) / ratio
+}
+
+/// Returns the length and the order after a step of length `length` and order `order`, with the errors of that order and
+/// of the one below: of the two, and the one above, the order that makes the most progress for its work. The order only
+/// rises if the step may grow.
+pub fn choose<T: Real>(length: T, order: u32, errors: [T; 2], most_growth: T, allowed: T) -> (T, u32) {
+    let own = growth(errors[0], order, allowed).min(most_growth);
+    if order > LEAST_ORDER {
+        let lower = growth(errors[1], order - 1, allowed).min(most_growth);
+        if work(order - 1, lower).le(T::of(FALLS) * work(order, own)) {
+            return (length * lower, order - 1);
+        }
+        if work(order - 1, lower).le(work(order, own) / T::of(RISES)) {
+            return (length * own, order);
+        }
+    }
+    if order == most_order(T::EPSILON) || most_growth.le(T::of(1.0)) {
+        return (length * own, order);
+    }
+    // The next order is taken to need as much work for the same progress.
+    let longer = T::of(f64::from(parts(order + 1))) / T::of(f64::from(parts(order)));
+    (length * (own * longer).min(most_growth), order + 1)
 }
 
 /// Returns the shortest step to try, `share` of `(L/n)⁴`.

@@ -7,6 +7,8 @@ use super::{
 };
 use crate::{number::Real, solver::Blocks};
 
+/// Order of the first adaptive step.
+pub const FIRST_ORDER: u32 = 5;
 /// One member in progress: everything that a dispatch reads and writes.
 #[derive(Clone, Debug)]
 pub struct Run<T> {
@@ -26,15 +28,15 @@ impl<T: Real> Run<T> {
         let blocks = Blocks::new(state.curve.len()).expect("a ring of 6 nodes or more");
         let sums = observe::sums(&state.curve, &parameters, blocks);
         let now = observe::observed(&sums, &observe::maxima(&state.curve), &parameters);
-        let mut report = Report { before: now, middle: now, now, ..Report::default() };
+        let mut report = Report { before: now, now, ..Report::default() };
         report.progress.turning = sums.turning;
-        let counters = Counters { relax_step: NEVER, half_step: NEVER, ..Counters::default() };
+        let counters = Counters { relax_step: NEVER, half_step: NEVER, order: FIRST_ORDER, ..Counters::default() };
         Run { state, parameters, counters, report }
     }
 
     /// Reports on its curves; not compiled into the vector code, since it concerns a single member.
     #[inline(never)]
-    pub(super) fn report_on(&mut self, blocks: Blocks, adaptive: bool) {
+    pub(super) fn report_on(&mut self, blocks: Blocks) {
         let Run { state, parameters, report, counters } = self;
         // The start is known as it was passed in. Observing it here could change it, and the next step's events, by a
         // rounding, which must not depend on where a dispatch ended.
@@ -43,7 +45,6 @@ impl<T: Real> Run<T> {
         }
         report.before = observe::observe(&state.before, parameters, blocks);
         report.now = observe::observe(&state.curve, parameters, blocks);
-        report.middle = if adaptive { observe::observe(&state.middle, parameters, blocks) } else { report.before };
     }
 
     /// Converts the member to another precision, rounding.
@@ -55,13 +56,4 @@ impl<T: Real> Run<T> {
             report: self.report.convert(),
         }
     }
-}
-
-/// An accepted step: its length if adaptive, the excess along it, and the gap between k and the polygon.
-pub(super) struct Taken<T> {
-    pub(super) h: T,
-    pub(super) before: T,
-    pub(super) middle: T,
-    pub(super) after: T,
-    pub(super) gap: T,
 }

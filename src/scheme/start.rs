@@ -1,18 +1,11 @@
 //! Where sweeps start: increments predicted from those of the last two solves. Twin of `shaders/start.wgsl`.
 //!
 //! An increment over a time τ that ends at t is τ·v(t), and v is smooth. Two increments therefore predict the next one
-//! to second order, which saves most of the sweeps needed with the last one alone. In an adaptive attempt of length h,
-//! with the whole step W and the half steps H₁ and H₂:
-//!
-//! | start of | from | because |
-//! |---|---|---|
-//! | W, after an accepted step | H₁, H₂ | the line through v(t - h'/2) and v(t), extended to t + h |
-//! | W, after a refused step | its H₁, H₂ | the line through v(t + h'/2) and v(t + h') |
-//! | H₁ | (V + W)/4 | the mean of v(t) and v(t + h); V is h·v(t) |
-//! | H₂ | W/2 | both end at t + h |
+//! to second order, which saves most of the sweeps needed with the last one alone. The first part of a row of an
+//! adaptive step has no increment before it: it starts from the derivatives at the end of the step before.
 
-use super::Increments;
-use crate::number::Number;
+use super::{Curve, Increments, State};
+use crate::{number::Number, solver::Ring};
 
 /// The matrix that turns the increments and the remembered ones into the start of the next solve, and what to remember
 /// then.
@@ -26,31 +19,10 @@ impl<N: Number> Start<N> {
         Start([[N::of(0.0); 2]; 2])
     }
 
-    /// After a fixed step: extrapolates linearly.
+    /// After a step of the paper: extrapolates to the next one of the same length.
     #[inline(always)]
-    pub fn after_fixed() -> Self {
+    pub fn after_step() -> Self {
         Start([[N::of(2.0), N::of(-1.0)], [N::of(1.0), N::of(0.0)]])
-    }
-
-    /// After an accepted attempt, for a whole step `ratio` times as long as one of its halves; remembers V.
-    #[inline(always)]
-    pub fn after_taken(ratio: N) -> Self {
-        Start([[ratio * (N::of(1.0) + ratio), -(ratio * ratio)], [ratio, N::of(0.0)]])
-    }
-
-    /// After a refused attempt, for a whole step `ratio` times as long as one of its halves; remembers V.
-    #[inline(always)]
-    pub fn after_refused(ratio: N) -> Self {
-        let from_end = ratio - N::of(2.0);
-        Start([[ratio * (N::of(1.0) + from_end), -(ratio * from_end)], [-ratio, N::of(2.0) * ratio]])
-    }
-
-    /// After part 0 or 1 of an attempt, the whole step and the first half; remembers what that part computed.
-    #[inline(always)]
-    pub fn after_part(part: usize) -> Self {
-        let quarter = N::of(0.25);
-        let to_next = if part == 0 { [quarter, quarter] } else { [N::of(0.0), N::of(0.5)] };
-        Start([to_next, [N::of(1.0), N::of(0.0)]])
     }
 
     /// Sets one lane.
@@ -82,6 +54,25 @@ impl<N: Number> Start<N> {
     }
 }
 
+/// Puts the start of the first part of a row: `ratio` times as long as the step that left the slope and the bend.
+#[inline(always)]
+pub fn begin_row<N: Number>(state: &mut State<N>, ratio: N) {
+    let State { increments, earlier, slope, bend, .. } = state;
+    let square = ratio * ratio;
+    let put = |increment: &mut Ring<N>, earlier: &mut Ring<N>, slope: &Ring<N>, bend: &Ring<N>| {
+        for i in 0..slope.len() {
+            earlier[i] = ratio * slope[i];
+            increment[i] = earlier[i] + square * bend[i];
+        }
+        increment.close();
+        earlier.close();
+    };
+    let [Curve { x, y, k, .. }, Curve { x: bx, y: by, k: bk, .. }] = [slope, bend];
+    put(&mut increments.k, &mut earlier.k, k, bk);
+    put(&mut increments.x, &mut earlier.x, x, bx);
+    put(&mut increments.y, &mut earlier.y, y, by);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,23 +94,20 @@ mod tests {
     #[test]
     fn starts_are_exact_where_the_velocity_is_a_straight_line() {
         let v = |t: f64| 0.7 - 1.3 * t;
-        let (t, h, next) = (0.4, 0.25, 0.15);
-        let halves = [0.5 * h * v(t + h), 0.5 * h * v(t + 0.5 * h)];
-        let ratio = next / (0.5 * h);
-        for (name, start, begin) in
-            [("taken", Start::after_taken(ratio), t + h), ("refused", Start::after_refused(ratio), t)]
-        {
-            let [whole, present] = put(start, halves);
-            assert!((whole - next * v(begin + next)).abs() < 1e-15, "{name}: whole step");
-            assert!((present - next * v(begin)).abs() < 1e-15, "{name}: h·v(t)");
-            let [first, whole] = put(Start::after_part(0), [whole, present]);
-            assert!((first - 0.5 * next * v(begin + 0.5 * next)).abs() < 1e-15, "{name}: first half");
-            let [second, first_again] = put(Start::after_part(1), [first, whole]);
-            assert!((second - 0.5 * next * v(begin + next)).abs() < 1e-15, "{name}: second half");
-            assert_eq!(first_again, first, "{name}");
+        let (t, h) = (0.4, 0.25);
+        let [next, last] = put(Start::after_step(), [h * v(t), h * v(t - h)]);
+        assert!((next - h * v(t + h)).abs() < 1e-15 && last == h * v(t));
+
+        // A step of length 0.2 ended at t; a part of length h follows.
+        let (step, mut state) = (0.2, State::<f64>::zeros(6));
+        for i in 0..6 {
+            (state.slope.y[i], state.bend.y[i]) = (step * v(t), step * step * -1.3);
         }
-        let fixed = put(Start::after_fixed(), [h * v(t), h * v(t - h)]);
-        assert!((fixed[0] - h * v(t + h)).abs() < 1e-15 && fixed[1] == h * v(t));
+        begin_row(&mut state, h / step);
+        assert!((state.increments.y[2] - h * v(t + h)).abs() < 1e-15);
+        let [second, _] = put(Start::after_step(), [state.increments.y[2], state.earlier.y[2]]);
+        assert!((second - h * v(t + 2.0 * h)).abs() < 1e-15);
+        assert_eq!(state.increments.x[2], 0.0);
     }
 
     #[test]

@@ -10,9 +10,12 @@ use crate::{
 /// Fields of a curve.
 pub const CURVE_FIELDS: usize = 4;
 /// Fields of a state, in the order of [`State::fields`].
-pub const STATE_FIELDS: usize = 3 * CURVE_FIELDS + 6;
-/// Fields of a state that the next step reads, which come first: the curve, the increments and the earlier ones.
-pub const NEEDED_FIELDS: usize = CURVE_FIELDS + 6;
+pub const STATE_FIELDS: usize = 8 * CURVE_FIELDS + 6;
+/// Fields of a state that the next step reads, which come first: the curve, the increments and the earlier ones, and
+/// how the curve moves.
+pub const NEEDED_FIELDS: usize = 3 * CURVE_FIELDS + 6;
+/// Fields of a state that mean something between two attempts, which come first.
+pub const LASTING_FIELDS: usize = 6 * CURVE_FIELDS + 6;
 
 /// A polygon of `n` nodes with the scheme's own curvatures and lengths.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +41,19 @@ pub struct Increments<N> {
     pub y: Ring<N>,
 }
 
+/// The errors of an adaptive attempt so far, as changes of k and of r.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gaps<N> {
+    /// Of order J-1, in k.
+    pub k: Ring<N>,
+    /// Of order J-1, in r.
+    pub r: Ring<N>,
+    /// Of order J-2, in k.
+    pub lower_k: Ring<N>,
+    /// Of order J-2, in r.
+    pub lower_r: Ring<N>,
+}
+
 /// A curve in progress: the state of a member between two steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State<N> {
@@ -47,10 +63,20 @@ pub struct State<N> {
     pub increments: Increments<N>,
     /// What sweeps remember next to them.
     pub earlier: Increments<N>,
-    /// The curve in the middle of the last extrapolated step. During an attempt: the result of its whole step.
-    pub middle: Curve<N>,
-    /// The curve before the last step. During an attempt: the result of its first half step.
+    /// The derivative of the curve at the end of the last adaptive step, times the length of that step.
+    pub slope: Curve<N>,
+    /// The second derivative, times the square of the length.
+    pub bend: Curve<N>,
+    /// The curve before the last step. During an adaptive attempt: the change that it makes, so far.
     pub before: Curve<N>,
+    /// The derivative there, times the length of the step before. During an attempt: that at its end, so far.
+    pub slope_before: Curve<N>,
+    /// The second derivative there.
+    pub bend_before: Curve<N>,
+    /// During an adaptive attempt: the curve at the end of the last part.
+    pub part: Curve<N>,
+    /// During an adaptive attempt: its errors.
+    pub gaps: Gaps<N>,
 }
 
 impl<N: Number> Curve<N> {
@@ -78,6 +104,14 @@ impl<N: Number> Curve<N> {
     /// Returns the fields in the same order, mutably.
     pub fn fields_mut(&mut self) -> [&mut Ring<N>; CURVE_FIELDS] {
         [&mut self.x, &mut self.y, &mut self.k, &mut self.r]
+    }
+
+    /// Closes all rings.
+    #[inline(always)]
+    pub fn close(&mut self) {
+        for field in self.fields_mut() {
+            field.close();
+        }
     }
 
     /// Copies `other` in the lanes of `mask`.
@@ -127,43 +161,78 @@ impl<N: Number> Increments<N> {
     }
 }
 
+impl<N: Number> Gaps<N> {
+    /// Creates errors of zero.
+    pub fn zeros(n: usize) -> Gaps<N> {
+        let ring = || Ring::zeros(n);
+        Gaps { k: ring(), r: ring(), lower_k: ring(), lower_r: ring() }
+    }
+
+    /// Returns the fields in the order in which the device stores them.
+    pub fn fields(&self) -> [&Ring<N>; CURVE_FIELDS] {
+        [&self.k, &self.r, &self.lower_k, &self.lower_r]
+    }
+
+    /// Returns the fields in the same order, mutably.
+    pub fn fields_mut(&mut self) -> [&mut Ring<N>; CURVE_FIELDS] {
+        [&mut self.k, &mut self.r, &mut self.lower_k, &mut self.lower_r]
+    }
+}
+
 impl<N: Number> State<N> {
     /// Creates a state of zeros, to be filled.
     pub fn zeros(n: usize) -> State<N> {
-        let (curve, increments) = (|| Curve::zeros(n), || Increments::zeros(n));
-        State { curve: curve(), increments: increments(), earlier: increments(), middle: curve(), before: curve() }
+        State::starting(Curve::zeros(n))
+    }
+
+    /// Creates the state of `curve` before the first step.
+    fn starting(curve: Curve<N>) -> State<N> {
+        let n = curve.len();
+        let (zeros, increments) = (|| Curve::zeros(n), || Increments::zeros(n));
+        State {
+            before: curve.clone(),
+            curve,
+            increments: increments(),
+            earlier: increments(),
+            slope: zeros(),
+            bend: zeros(),
+            slope_before: zeros(),
+            bend_before: zeros(),
+            part: zeros(),
+            gaps: Gaps::zeros(n),
+        }
     }
 
     /// Returns the fields in the order in which the device stores them.
     pub fn fields(&self) -> [&Ring<N>; STATE_FIELDS] {
-        let [a, b, c, d] = self.curve.fields();
-        let Increments { k, x, y } = &self.increments;
-        let Increments { k: ek, x: ex, y: ey } = &self.earlier;
-        let [e, f, g, h] = self.middle.fields();
-        let [l, m, n, o] = self.before.fields();
-        [a, b, c, d, k, x, y, ek, ex, ey, e, f, g, h, l, m, n, o]
+        let State { curve, increments, earlier, slope, bend, before, slope_before, bend_before, part, gaps } = self;
+        let mut all = [&curve.x; STATE_FIELDS];
+        let Increments { k, x, y } = increments;
+        let Increments { k: ek, x: ex, y: ey } = earlier;
+        let first = curve.fields().into_iter().chain([k, x, y, ek, ex, ey]);
+        let others = [slope, bend, before, slope_before, bend_before, part].into_iter().flat_map(Curve::fields);
+        all.iter_mut().zip(first.chain(others).chain(gaps.fields())).for_each(|(to, field)| *to = field);
+        all
     }
 
     /// Returns the fields in the same order, mutably.
-    pub fn fields_mut(&mut self) -> [&mut Ring<N>; STATE_FIELDS] {
-        let [a, b, c, d] = self.curve.fields_mut();
-        let Increments { k, x, y } = &mut self.increments;
-        let Increments { k: ek, x: ex, y: ey } = &mut self.earlier;
-        let [e, f, g, h] = self.middle.fields_mut();
-        let [l, m, n, o] = self.before.fields_mut();
-        [a, b, c, d, k, x, y, ek, ex, ey, e, f, g, h, l, m, n, o]
+    pub fn fields_mut(&mut self) -> impl Iterator<Item = &mut Ring<N>> {
+        let State { curve, increments, earlier, slope, bend, before, slope_before, bend_before, part, gaps } = self;
+        let Increments { k, x, y } = increments;
+        let Increments { k: ek, x: ex, y: ey } = earlier;
+        let first = curve.fields_mut().into_iter().chain([k, x, y, ek, ex, ey]);
+        let others = [slope, bend, before, slope_before, bend_before, part].into_iter().flat_map(Curve::fields_mut);
+        first.chain(others).chain(gaps.fields_mut())
     }
 }
 
 impl<T: Real> State<T> {
     /// Creates the state before the first step.
     pub fn from_nodes(nodes: &[DVec2]) -> State<T> {
-        let curve = Curve::from_nodes(nodes);
-        let increments = Increments::zeros(nodes.len());
-        State { middle: curve.clone(), before: curve.clone(), earlier: increments.clone(), increments, curve }
+        State::starting(Curve::from_nodes(nodes))
     }
 
-    /// Returns all fields one after another, `18n` numbers.
+    /// Returns all fields one after another, `38n` numbers.
     pub fn to_numbers(&self) -> Vec<T> {
         self.fields().into_iter().flat_map(|field| field.nodes().iter().copied()).collect()
     }
@@ -171,17 +240,13 @@ impl<T: Real> State<T> {
     /// Inverts [`State::to_numbers`].
     pub fn from_numbers(numbers: &[T]) -> State<T> {
         let n = numbers.len() / STATE_FIELDS;
-        let field = |f: usize| Ring::from_nodes(numbers[f * n..(f + 1) * n].iter().copied());
-        let curve = |f: usize| Curve { x: field(f), y: field(f + 1), k: field(f + 2), r: field(f + 3) };
-        let increments = |f: usize| Increments { k: field(f), x: field(f + 1), y: field(f + 2) };
-        let (curve_at, middle_at, before_at) = (0, NEEDED_FIELDS, NEEDED_FIELDS + CURVE_FIELDS);
-        State {
-            curve: curve(curve_at),
-            increments: increments(CURVE_FIELDS),
-            earlier: increments(CURVE_FIELDS + 3),
-            middle: curve(middle_at),
-            before: curve(before_at),
+        let mut state = State::zeros(n);
+        if n > 0 {
+            for (field, numbers) in state.fields_mut().zip(numbers.chunks_exact(n)) {
+                *field = Ring::from_nodes(numbers.iter().copied());
+            }
         }
+        state
     }
 
     /// Converts the state to another precision, rounded to the nearest numbers.

@@ -24,8 +24,12 @@ use crate::{
 
 /// Excess below which a curve is a regular polygon up to rounding: such a member is relaxed at time 0.
 const ROUND: f64 = 1e-13;
-/// The first adaptive step in units of the fourth power of the shortest segment, the fastest time scale there is.
-const FIRST_STEP: f64 = 0.1;
+/// The fourth power of the shortest segment is the fastest time scale there is, and a clock must be able to count this
+/// multiple of it.
+const FASTEST: f64 = 0.1;
+/// The first adaptive step in the same unit. A smooth curve could take an even longer one; a rough one refuses it a few
+/// times.
+const FIRST_STEP: f64 = 100.0;
 /// Maximum number of adaptive steps to a tolerance of 1; it scales with the inverse root of the tolerance, and a member
 /// that exceeds it is stalled. Curves that relax take some 3 to 30; one that creeps, because only tiny steps can be
 /// solved, would never end.
@@ -157,7 +161,7 @@ impl Trajectory<'_> {
     fn is_timed_too_coarsely(&self) -> bool {
         let Time::Adaptive(ticks) = self.time else { return false };
         let edge = self.start.length / self.unit / self.member.nodes.len() as f64;
-        ticks.tick > FIRST_STEP * edge.powi(4)
+        ticks.tick > FASTEST * edge.powi(4)
     }
 
     fn take(&mut self, counters: Counters, report: &Report<f64>) {

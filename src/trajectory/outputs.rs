@@ -8,20 +8,25 @@ use crate::{
     ensemble::{Observables, Portrait, Rows, SeriesRow, Snapshot},
     schedule::Output,
     scheme::{
-        Curve, State, extrapolation,
-        member::{Observed, Report},
+        Curve, State, dense,
+        member::{Observed, Progress, Report},
+        observe,
     },
-    solver::Ring,
+    solver::{Blocks, Ring},
 };
 
 /// Checks for crossings per spacing that nodes move, in a curve about to cross itself.
 const LOOKS_PER_SPACING: f64 = 16.0;
+/// Halvings that find a crossing inside the part of a step that it is in.
+const LOOKS_PER_CROSSING: u32 = 10;
 
 impl Trajectory<'_> {
-    /// Returns whether [`Trajectory::serve`] needs the state: for a snapshot, or to check for crossings.
+    /// Returns whether [`Trajectory::serve`] needs the state: for a snapshot, for what lies inside an adaptive step, or to
+    /// check for crossings.
     pub fn wants_state(&self) -> bool {
         let mut due = self.outputs.from(self.served).take_while(|output| self.place(output.t).is_some());
-        self.is_look_due() || due.any(|output| output.snapshot || output.frame)
+        let adaptive = matches!(self.time, Time::Adaptive(_));
+        self.is_look_due() || due.any(|output| output.snapshot || output.frame || adaptive)
     }
 
     /// Serves the output times that the last step has reached, and checks for crossings if due; `state` is
@@ -29,7 +34,7 @@ impl Trajectory<'_> {
     /// more are in memory.
     pub fn serve(&mut self, state: Option<&State<f64>>, most: usize) -> bool {
         if let (true, Some(state)) = (self.is_look_due(), state) {
-            self.look(&state.curve);
+            self.look(state);
         }
         while let Some(output) = self.outputs.get(self.served)
             && let Some(fraction) = self.place(output.t)
@@ -66,27 +71,28 @@ impl Trajectory<'_> {
     }
 
     fn emit(&mut self, output: &Output, fraction: f64, state: Option<&State<f64>>) {
-        let (member, t) = (self.member.index, output.t);
+        let (member, t, unit) = (self.member.index, output.t, self.unit);
+        let curve = state.map(|state| self.curve_at(fraction, state));
         if output.series {
-            let Report { before, middle, now, progress, .. } = &self.report;
-            let at = self.between(fraction, &before.to_numbers(), &middle.to_numbers(), &now.to_numbers());
-            let at = Observables::new(&Observed::from_numbers(&at), progress.turning, self.unit);
+            let at = match (&curve, self.time) {
+                (Some(curve), Time::Adaptive(_)) => self.observe_inside(fraction, curve),
+                _ => self.report_at(fraction),
+            };
+            let at = Observables::new(&at, self.report.progress.turning, unit);
             self.rows.series.push(SeriesRow { member, t, at });
         }
-        if let (true, Some(state)) = (output.snapshot || output.frame, state) {
-            let State { before, middle, curve, .. } = state;
-            let field = |of: fn(&Curve<f64>) -> &Ring<f64>, unit: f64, origin: f64| {
-                let nodes = self.between(fraction, of(before).nodes(), of(middle).nodes(), of(curve).nodes());
-                nodes.into_iter().map(|v| v * unit + origin).collect()
+        if let (true, Some(curve)) = (output.snapshot || output.frame, curve) {
+            let origin = self.member.origin;
+            let field = |field: &Ring<f64>, unit: f64, origin: f64| {
+                field.nodes().iter().map(|v| v * unit + origin).collect::<Vec<f64>>()
             };
-            let (unit, origin) = (self.unit, self.member.origin);
             let snapshot = Snapshot {
                 member,
                 t,
-                x: field(|curve| &curve.x, unit, origin.x),
-                y: field(|curve| &curve.y, unit, origin.y),
-                k: field(|curve| &curve.k, 1.0 / unit, 0.0),
-                r: field(|curve| &curve.r, unit, 0.0),
+                x: field(&curve.x, unit, origin.x),
+                y: field(&curve.y, unit, origin.y),
+                k: field(&curve.k, 1.0 / unit, 0.0),
+                r: field(&curve.r, unit, 0.0),
             };
             if output.frame {
                 let nodes = snapshot.x.iter().zip(&snapshot.y).map(|(x, y)| DVec2::new(*x, *y));
@@ -98,17 +104,42 @@ impl Trajectory<'_> {
         }
     }
 
-    /// Values inside the last step, interpolated as accurately as the step itself: for a fixed one, of first order, by
-    /// a straight line, for an adaptive one by the parabola through its middle.
-    fn between(&self, fraction: f64, before: &[f64], middle: &[f64], now: &[f64]) -> Vec<f64> {
-        if fraction == 1.0 {
-            return now.to_vec();
-        }
-        let values = before.iter().zip(middle).zip(now);
+    /// The curve inside the last step, as accurate as the step itself: for a fixed one, of first order, on a straight
+    /// line.
+    fn curve_at(&self, fraction: f64, state: &State<f64>) -> Curve<f64> {
         match self.time {
-            Time::Fixed(_) => values.map(|((a, _), b)| a + fraction * (b - a)).collect(),
-            Time::Adaptive(_) => values.map(|((a, m), b)| extrapolation::inside(*a, *m, *b, fraction)).collect(),
+            Time::Fixed(_) => {
+                let mut curve = state.curve.clone();
+                for (end, start) in curve.fields_mut().into_iter().zip(state.before.fields()) {
+                    for i in 0..start.len() {
+                        end[i] = if fraction == 1.0 { end[i] } else { start[i] + fraction * (end[i] - start[i]) };
+                    }
+                    end.close();
+                }
+                curve
+            }
+            Time::Adaptive(_) => dense::inside(state, &self.report.progress, fraction),
         }
+    }
+
+    /// Observes a curve inside the last step.
+    fn observe_inside(&self, fraction: f64, curve: &Curve<f64>) -> Observed<f64> {
+        if fraction == 1.0 {
+            return self.report.now;
+        }
+        let blocks = Blocks::new(curve.len()).expect("a ring of 6 nodes or more");
+        observe::observe(curve, &self.launch.parameters, blocks)
+    }
+
+    /// The observables inside the last fixed step, on a straight line.
+    fn report_at(&self, fraction: f64) -> Observed<f64> {
+        let Report { before, now, .. } = &self.report;
+        if fraction == 1.0 {
+            return *now;
+        }
+        let (before, now) = (before.to_numbers(), now.to_numbers());
+        let between: Vec<f64> = before.iter().zip(&now).map(|(a, b)| a + fraction * (b - a)).collect();
+        Observed::from_numbers(&between)
     }
 
     fn is_look_due(&self) -> bool {
@@ -120,19 +151,50 @@ impl Trajectory<'_> {
     /// Checks whether the polygon crosses itself, and sets how far its nodes may move before the next check.
     ///
     /// A curve whose tangent turns once and always to one side is simple, so the back end pauses only members whose
-    /// curvature changes sign.
-    pub(super) fn look(&mut self, curve: &Curve<f64>) {
-        let progress = &self.report.progress;
-        let nodes: Vec<DVec2> = curve.positions().collect();
-        let changes_sign = self.report.now.k_min <= 0.0;
-        if progress.turning.abs() != 1.0 || (changes_sign && crossing(&nodes).is_some()) {
-            self.crossed = Some(self.now());
-            self.launch.parameters.look_at = crate::number::BIG;
-            return;
+    /// curvature changes sign. An adaptive step is long: it is gone through from where a crossing is possible, as far at
+    /// a time as none is.
+    pub(super) fn look(&mut self, state: &State<f64>) {
+        let Progress { turning, travel, taken, .. } = self.report.progress;
+        let moved = farthest(&state.before, &state.curve);
+        let adaptive = matches!(self.time, Time::Adaptive(_)) && taken > 0.0 && moved > 0.0;
+        let mut at =
+            if adaptive { (1.0 - (travel - self.launch.parameters.look_at) / moved).clamp(0.0, 1.0) } else { 1.0 };
+        let mut simple_at = 0.0;
+        loop {
+            let curve = self.curve_at(at, state);
+            let nodes: Vec<DVec2> = curve.positions().collect();
+            let changes_sign = curve.k.nodes().iter().any(|k| *k <= 0.0);
+            if turning.abs() != 1.0 || (changes_sign && crossing(&nodes).is_some()) {
+                let first =
+                    if adaptive && turning.abs() == 1.0 { self.first_crossing([simple_at, at], state) } else { at };
+                self.crossed = Some(self.now() - (1.0 - first) * taken * self.unit.powi(4));
+                self.launch.parameters.look_at = crate::number::BIG;
+                return;
+            }
+            let length = self.report.now.length;
+            let far = if changes_sign { 0.5 * clearance(&nodes, length) } else { 0.0 };
+            let far = far.max(length / (LOOKS_PER_SPACING * nodes.len() as f64));
+            if at >= 1.0 {
+                self.launch.parameters.look_at = travel + far;
+                return;
+            }
+            simple_at = at;
+            at = (at + far / moved).min(1.0);
         }
-        let length = self.report.now.length;
-        let far = if changes_sign { 0.5 * clearance(&nodes, length) } else { 0.0 };
-        let least = length / (LOOKS_PER_SPACING * nodes.len() as f64);
-        self.launch.parameters.look_at = progress.travel + far.max(least);
     }
+
+    /// Where inside the last step the polygon first crosses itself, between a simple curve and one that does.
+    fn first_crossing(&self, [mut simple, mut crossed]: [f64; 2], state: &State<f64>) -> f64 {
+        for _ in 0..LOOKS_PER_CROSSING {
+            let middle = 0.5 * (simple + crossed);
+            let nodes: Vec<DVec2> = self.curve_at(middle, state).positions().collect();
+            if crossing(&nodes).is_some() { crossed = middle } else { simple = middle }
+        }
+        crossed
+    }
+}
+
+/// The largest displacement of a node.
+fn farthest(from: &Curve<f64>, to: &Curve<f64>) -> f64 {
+    from.positions().zip(to.positions()).map(|(a, b)| a.distance(b)).fold(0.0, f64::max)
 }

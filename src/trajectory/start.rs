@@ -11,7 +11,11 @@ use crate::{
         spec::{Omega, Pace, Precision, Pull, Sor},
     },
     schedule::{self, Clock, Outputs, Ticks},
-    scheme::{Parameters, State, run::Run},
+    scheme::{
+        Parameters, State,
+        extrapolation::most_order,
+        run::{FIRST_ORDER, Run},
+    },
 };
 
 /// An excess is a difference of numbers near 1: a threshold below this multiple of ε is within its rounding.
@@ -23,6 +27,8 @@ const NO_THRESHOLD: f64 = -1.0;
 const FITTED: [f64; 2] = [1e-3, 1e-1];
 /// A curve that has shrunk to this fraction of its length has vanished.
 const SHRUNK: f64 = 1e-3;
+/// Largest error of an adaptive step in units of the tolerance: t_relax is then off by a tenth of it (docs/method.md).
+const ERROR_PER_TOLERANCE: f64 = 1.0 / 12.0;
 /// Minimum number of clock ticks in the first adaptive step.
 const FIRST_TICKS: f64 = 16.0;
 /// `--pull auto`: κ in units of the member's relaxation rate.
@@ -36,6 +42,7 @@ impl<'a> Trajectory<'a> {
         let parameters = parameters(spec, &nodes, unit, spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
         launch.counters.stop_when_relaxed = spec.stop_when_relaxed.into();
+        launch.counters.order = FIRST_ORDER.min(most_order(precision.epsilon()));
         let turning = launch.report.progress.turning;
         let start = Observables::new(&launch.report.now, turning, unit);
         let limit = spec.threshold(start.excess);
@@ -72,7 +79,7 @@ impl<'a> Trajectory<'a> {
         };
         trajectory.counters.status = status.map_or(0, |status| status as u32);
         let state = std::mem::replace(&mut trajectory.launch.state, State::zeros(0));
-        trajectory.look(&state.curve);
+        trajectory.look(&state);
         // At the start one row and one snapshot are due.
         trajectory.serve(Some(&state), usize::MAX);
         trajectory.launch.state = state;
@@ -126,7 +133,7 @@ fn begin_time(launch: &mut Run<f64>, spec: &Spec, unit: f64, precision: Precisio
     let end = end.clamp(*times.start(), *times.end());
     let ticks = Ticks::new(end, precision);
     let parameters = &mut launch.parameters;
-    parameters.adaptive = tolerance;
+    parameters.adaptive = ERROR_PER_TOLERANCE * tolerance;
     (parameters.time_unit, parameters.time_tick) = (ticks.unit, ticks.tick);
     (parameters.end_high, parameters.end_low) = ticks.split(end);
     let shortest = launch.state.curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);

@@ -12,7 +12,7 @@ const DISPATCH_TIME: Duration = Duration::from_millis(40);
 /// inside a solve, and the next one continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
-    /// Steps per member.
+    /// Steps of the paper per member.
     pub steps: u32,
     /// Sweeps per member, rounded up to the next check of the residual.
     pub sweeps: u32,
@@ -27,10 +27,10 @@ impl Budget {
         if gpu.is_hardware() {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
-        // A sweep is one iteration. A check of the residual walks over at most all blocks; a step does so ten times, an
-        // adaptive one, which is three of the paper's, forty times.
+        // A sweep is one iteration. A check of the residual walks over at most all blocks; a step does so ten times, and
+        // the end of an adaptive one, which may come after any of its parts, as often again.
         let walk = blocks.count() as u32 + 1;
-        let walks = if adaptive { 40 } else { 10 };
+        let walks = if adaptive { 20 } else { 10 };
         // The rings below the finest one are walked over in every cycle, and built twice in each of the paper's steps.
         let kernel = &solver.facts().kernel;
         let build = walks / 5 * kernel.iterations_per_solve;

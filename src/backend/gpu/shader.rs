@@ -46,7 +46,7 @@ impl Variant {
     }
 }
 
-const COMMON: [ShaderPart; 17] = parts![
+const COMMON: [ShaderPart; 18] = parts![
     "number.wgsl",
     "ring.wgsl",
     "sums.wgsl",
@@ -59,9 +59,10 @@ const COMMON: [ShaderPart; 17] = parts![
     "pull.wgsl",
     "observe.wgsl",
     "step.wgsl",
-    "pace.wgsl",
     "start.wgsl",
     "extrapolation.wgsl",
+    "pace.wgsl",
+    "dense.wgsl",
     "decay.wgsl",
     "evolve.wgsl",
 ];

@@ -15,8 +15,9 @@ use crate::{
     error::{Error, Result},
     number::Real,
     scheme::{
-        Curve, State,
+        Curve, dense,
         evolve::{Team, evolve},
+        extrapolation::{self, LEAST_ORDER},
         member::{Counters, Decay, NEVER, Progress, Report},
         run::Run,
         step::Method,
@@ -98,14 +99,14 @@ pub(in crate::conformance) fn compare_ends<T: Real>(
         at.parameters.tau = at.parameters.tau.max(twin.longest);
         let scales = Scales::of(&at)?;
         let grown = growth(twin.left.counters.steps);
-        // 2B - A contains the roundings of both half steps twice and those of the whole step once.
-        let roundings = grown * if adaptive { 5.0 } else { 1.0 };
+        let amplified = if adaptive { extrapolation::roundings(twin.order) } else { 1.0 };
+        let roundings = grown * amplified;
         let limit = |bound: &Bound, scale: f64| bound.factor(hardware) * T::EPSILON * scale * roundings;
         let (of_curve, rest) = rows.split_at_mut(quantities.len());
         let (of_decay, inside) = rest.split_at_mut(DECAY.len());
         curves_agree(of_curve, member, &quantities, &scales, limit, OnGpu(left), OnCpu(&twin.left));
         // The effect of a changed step length inside the run; none with fixed steps.
-        let estimate = T::EPSILON * grown * scales.stiffness() / launch.parameters.adaptive;
+        let estimate = T::EPSILON * roundings * scales.stiffness() / launch.parameters.adaptive;
         let change = if adaptive { estimate * twin.steepest } else { 0.0 };
         let factors = DECAY.map(|bound| bound.factor(hardware));
         let rounding = T::EPSILON * roundings + change;
@@ -126,21 +127,24 @@ struct Twin {
     longest: f64,
     /// The largest decrease of the excess in one step.
     steepest: f64,
+    /// The highest order of a step.
+    order: u32,
 }
 
 /// Runs the twin of `launch` to its goal.
 fn twin<T: Real>(launch: &Run<f64>, method: &Method, n: usize) -> Result<Twin> {
     let mut run: Run<T> = launch.convert();
-    let (mut longest, mut steepest) = (0.0_f64, 0.0_f64);
+    let (mut longest, mut steepest, mut order) = (0.0_f64, 0.0_f64, LEAST_ORDER);
     let mut work = Team::new(blocks(n)?);
     while run.counters.is_running() {
         let before = run.report.now.excess.to_f64();
+        order = order.max(run.counters.order);
         evolve(&mut run, method, &mut work, 1);
         steepest = steepest.max((run.report.now.excess.to_f64() - before).abs());
         longest = longest.max(run.report.progress.taken.to_f64());
     }
     let left = Left { state: run.state.convert(), counters: run.counters, report: run.report.convert() };
-    Ok(Twin { left, longest, steepest })
+    Ok(Twin { left, longest, steepest, order })
 }
 
 /// Checks that both sides ended alike, after equally many steps and with their events in the same ones; else returns
@@ -180,12 +184,8 @@ fn curves_agree(
     }
 }
 
-fn before(state: &State<f64>) -> &Curve<f64> {
-    &state.before
-}
-
-fn between(state: &State<f64>) -> &Curve<f64> {
-    &state.middle
+fn middle_of(left: &Left) -> Curve<f64> {
+    dense::inside(&left.state, &left.report.progress, 0.5)
 }
 
 /// Compares the recorded decay of a member, see [`DECAY`]; `rounding` is that of an excess.
@@ -231,22 +231,20 @@ fn insides_agree(
     let inside = |scale: f64, change: f64| rounding * scale + estimate * change;
     let largest = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let bounds = FIELDS.map(|bound| scales.get(bound.scale));
-    let curves = [(start, factors[0], before as fn(&State<f64>) -> &Curve<f64>), (middle, factors[1], between)];
-    for (row, factor, of) in curves {
-        let (a, b) = (of(&ours.state).fields(), of(&theirs.state).fields());
-        let fields = a.into_iter().zip(b).zip(theirs.state.curve.fields()).zip(bounds);
+    let starts = [&ours.state.before, &theirs.state.before].map(Curve::clone);
+    let middles = [ours, theirs].map(middle_of);
+    for (row, factor, [a, b]) in [(start, factors[0], starts), (middle, factors[1], middles)] {
+        let fields = a.fields().into_iter().zip(b.fields()).zip(theirs.state.curve.fields()).zip(bounds);
         for (((a, b), end), scale) in fields {
             let bound = factor * inside(scale, largest(end.nodes(), b.nodes()));
             row.add(member, scale, bound, OnGpu(a.nodes()), OnCpu(b.nodes()));
         }
     }
-    for (a, b) in [(&a.before, &b.before), (&a.middle, &b.middle)] {
-        let (a, b, end) = (a.to_numbers(), b.to_numbers(), theirs.report.now.to_numbers());
-        for (j, bound) in REPORT.iter().take(a.len()).enumerate() {
-            let scale = scales.get(bound.scale);
-            let bound = factors[2] * inside(scale, (b[j] - end[j]).abs());
-            reports.add(member, scale, bound, OnGpu(&a[j..=j]), OnCpu(&b[j..=j]));
-        }
+    let (before, end) = ([a, b].map(|report| report.before.to_numbers()), theirs.report.now.to_numbers());
+    for (j, bound) in REPORT.iter().take(end.len()).enumerate() {
+        let ([a, b], scale) = (&before, scales.get(bound.scale));
+        let bound = factors[2] * inside(scale, (b[j] - end[j]).abs());
+        reports.add(member, scale, bound, OnGpu(&a[j..=j]), OnCpu(&b[j..=j]));
     }
     let (a, b) = (&a.progress, &b.progress);
     // The last step reaches the final time, so its length has the total error of those before it.
@@ -256,7 +254,7 @@ fn insides_agree(
     let half = |p: &Progress<f64>| p.half_high + (p.half_low + p.half_fraction * p.half_length);
     let relaxed = |p: &Progress<f64>| p.relax_high + (p.relax_low + p.relax_fraction * p.relax_length);
     if theirs.counters.half_step != NEVER && theirs.counters.relax_step != NEVER {
-        // The rounding of an excess over its rate of decay, and the effect of the parabola's place inside its step.
+        // The rounding of an excess over its rate of decay, and the effect of the place inside its step.
         let p = &scales.parameters;
         let rate = (p.half_at - p.relax_at) / (relaxed(b) - half(b));
         let bound = factors[5] * (rounding / rate + estimate * b.half_length.max(b.relax_length));

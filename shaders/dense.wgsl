@@ -1,0 +1,92 @@
+// What lies inside an adaptive step: a polynomial through both of its ends. Twin of src/scheme/dense.rs.
+
+const RESOLVED = 128.0;
+const BISECTIONS = 54u;
+
+/// A value and its first and second derivative.
+struct Jet { value: real, slope: real, bend: real }
+
+/// The polynomial of degree 5 with given values and derivatives at both ends of a step, with time from 0 to 1.
+struct Arc { start: Jet, end: Jet }
+
+/// The cubic with a value at the start, and value and derivatives at the end.
+fn arc_first(start: real, end: Jet) -> Arc {
+    let cube = end.value - start - end.slope + real(0.5) * end.bend;
+    let slope = end.slope - end.bend + real(3.0) * cube;
+    return Arc(Jet(start, slope, end.bend - real(6.0) * cube), end);
+}
+
+/// The value at a fraction of the step.
+fn arc_at(arc: Arc, at: real) -> real {
+    let a = arc.start;
+    let b = arc.end;
+    let half = real(0.5);
+    let three = real(3.0);
+    let rise = b.value - a.value;
+    let third = real(10.0) * rise - real(6.0) * a.slope - real(4.0) * b.slope + half * (b.bend - three * a.bend);
+    let fourth = real(8.0) * a.slope + real(7.0) * b.slope - real(15.0) * rise + half * (three * a.bend) - b.bend;
+    let fifth = real(6.0) * rise - three * (a.slope + b.slope) + half * (b.bend - a.bend);
+    return a.value + at * (a.slope + at * (half * a.bend + at * (third + at * (fourth + at * fifth))));
+}
+
+/// The fraction of the step at which the value falls to `aim`, which lies between its ends.
+fn arc_crossing(arc: Arc, aim: real) -> real {
+    var low = real(0.0);
+    var high = real(1.0);
+    for (var i = 0u; i < BISECTIONS; i++) {
+        let middle = real(0.5) * (low + high);
+        if arc_at(arc, middle) <= aim { high = middle; } else { low = middle; }
+    }
+    return high;
+}
+
+/// Whether all derivatives are finite and of a size that the step can have.
+fn arc_is_tame(arc: Arc) -> bool {
+    let most = real(BIG);
+    let at_start = abs(arc.start.slope) <= most && abs(arc.start.bend) <= most;
+    return at_start && abs(arc.end.slope) <= most && abs(arc.end.bend) <= most;
+}
+
+const STRAIGHT = 0u;
+const EXPONENTIAL = 1u;
+const SMOOTH = 2u;
+
+/// The excess inside a step: on a straight line; its logarithm, relative to the start, on a straight line to `fallen`; or
+/// on `arc`.
+struct Fall { kind: u32, fallen: real, arc: Arc }
+
+/// The fall in an adaptive step of length h, with the derivatives of ln excess at its end.
+fn fall_of(h: real, decline: vec2<real>) -> Fall {
+    let before = report.before.excess;
+    let after = report.now.excess;
+    if before <= real(0.0) || after <= real(0.0) { return Fall(); }
+    let fallen = ln_ratio(before, after);
+    let end = Jet(fallen, decline.x, decline.y);
+    var arc = arc_first(0.0, end);
+    if !(report.progress.taken <= real(0.0)) {
+        let ratio = h / report.progress.taken;
+        arc = Arc(Jet(0.0, ratio * report.progress.slope, ratio * ratio * report.progress.bend), end);
+    }
+    let resolved = real(RESOLVED * EPSILON) <= after;
+    return Fall(select(EXPONENTIAL, SMOOTH, resolved && arc_is_tame(arc)), fallen, arc);
+}
+
+/// The last accepted step.
+struct Taken { h: real, before: real, after: real, fall: Fall }
+
+/// The excess at a fraction of the step.
+fn taken_inside(taken: Taken, at: real) -> real {
+    if taken.fall.kind == STRAIGHT { return taken.before + at * (taken.after - taken.before); }
+    var fallen = at * taken.fall.fallen;
+    if taken.fall.kind == SMOOTH { fallen = arc_at(taken.fall.arc, at); }
+    return taken.before * exponential(vec(fallen)).x;
+}
+
+/// The fraction of the step at which the excess falls to `excess`; its end if it already had before.
+fn taken_fraction_at(taken: Taken, excess: real) -> real {
+    if taken.before <= excess { return real(1.0); }
+    if taken.fall.kind == STRAIGHT { return (taken.before - excess) / (taken.before - taken.after); }
+    let aim = ln_ratio(taken.before, excess);
+    if taken.fall.kind == EXPONENTIAL { return aim / taken.fall.fallen; }
+    return arc_crossing(taken.fall.arc, aim);
+}

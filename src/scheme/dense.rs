@@ -1,0 +1,222 @@
+//! What lies inside an adaptive step: a polynomial through both of its ends. Twin of `shaders/dense.wgsl`.
+
+use super::{Curve, State, decay, member::Progress};
+use crate::number::{BIG, Real};
+
+/// Multiple of ε below which an excess, a difference of numbers near 1, is mostly rounding.
+pub const RESOLVED: f64 = 128.0;
+/// Number of halvings that find the place of an event: beyond the precision of every number.
+pub const BISECTIONS: u32 = 54;
+
+/// A value and its first and second derivative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jet<T> {
+    /// The value.
+    pub value: T,
+    /// The first derivative.
+    pub slope: T,
+    /// The second derivative.
+    pub bend: T,
+}
+
+/// The polynomial of degree 5 with given values and derivatives at both ends of a step, with time from 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arc<T> {
+    /// At the start.
+    pub start: Jet<T>,
+    /// At the end.
+    pub end: Jet<T>,
+}
+
+impl<T: Real> Jet<T> {
+    /// Returns the jet with these derivatives, taken by a unit of time that is 1/`ratio` of that of the new one.
+    fn scaled(value: T, slope: T, bend: T, ratio: T) -> Jet<T> {
+        Jet { value, slope: ratio * slope, bend: ratio * ratio * bend }
+    }
+}
+
+impl<T: Real> Arc<T> {
+    /// Returns the cubic with a value at the start, and value and derivatives at the end: for the first step of all.
+    pub fn first(start: T, end: Jet<T>) -> Arc<T> {
+        let (three, six, half) = (T::of(3.0), T::of(6.0), T::of(0.5));
+        let cube = end.value - start - end.slope + half * end.bend;
+        let slope = end.slope - end.bend + three * cube;
+        Arc { start: Jet { value: start, slope, bend: end.bend - six * cube }, end }
+    }
+
+    /// Returns the value at the fraction `at` of the step.
+    pub fn at(&self, at: T) -> T {
+        let (three, four, six) = (T::of(3.0), T::of(4.0), T::of(6.0));
+        let (seven, eight, ten, fifteen) = (T::of(7.0), T::of(8.0), T::of(10.0), T::of(15.0));
+        let half = T::of(0.5);
+        let Arc { start: a, end: b } = self;
+        let rise = b.value - a.value;
+        // Coefficients of the third, fourth and fifth power.
+        let third = ten * rise - six * a.slope - four * b.slope + half * (b.bend - three * a.bend);
+        let fourth = eight * a.slope + seven * b.slope - fifteen * rise + half * (three * a.bend) - b.bend;
+        let fifth = six * rise - three * (a.slope + b.slope) + half * (b.bend - a.bend);
+        a.value + at * (a.slope + at * (half * a.bend + at * (third + at * (fourth + at * fifth))))
+    }
+
+    /// Returns the fraction of the step at which the value falls to `target`, which lies between its ends.
+    pub fn crossing(&self, target: T) -> T {
+        let half = T::of(0.5);
+        let (mut low, mut high) = (T::of(0.0), T::of(1.0));
+        for _ in 0..BISECTIONS {
+            let middle = half * (low + high);
+            if self.at(middle).le(target) {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        high
+    }
+
+    /// Returns whether all derivatives are finite and of a size that the step can have.
+    pub fn is_tame(&self) -> bool {
+        let (Jet { slope: a, bend: b, .. }, Jet { slope: c, bend: d, .. }) = (self.start, self.end);
+        let most = T::of(BIG);
+        a.abs().le(most) && b.abs().le(most) && c.abs().le(most) && d.abs().le(most)
+    }
+}
+
+/// An accepted step.
+pub(super) struct Taken<T> {
+    /// Its length, if adaptive.
+    pub(super) h: T,
+    /// The excess before.
+    pub(super) before: T,
+    /// The excess after.
+    pub(super) after: T,
+    /// How the excess falls on the way.
+    pub(super) fall: Fall<T>,
+    /// The gap between k and the polygon.
+    pub(super) gap: T,
+}
+
+/// The excess inside a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Fall<T> {
+    /// On a straight line.
+    Straight,
+    /// Its logarithm, relative to the start, on a straight line to this value.
+    Exponential(T),
+    /// Its logarithm, relative to the start, on a polynomial.
+    Smooth(Arc<T>),
+}
+
+impl<T: Real> Fall<T> {
+    /// The fall in an adaptive step of length h from `before` to `after`, with the derivatives of ln excess at its end.
+    pub(super) fn of(progress: &Progress<T>, h: T, [before, after]: [T; 2], [slope, bend]: [T; 2]) -> Fall<T> {
+        let zero = T::of(0.0);
+        if before.le(zero) || after.le(zero) {
+            return Fall::Straight;
+        }
+        let fallen = decay::ln_ratio(before, after);
+        let end = Jet { value: fallen, slope, bend };
+        let arc = if progress.taken.le(zero) {
+            Arc::first(zero, end)
+        } else {
+            let ratio = h / progress.taken;
+            Arc { start: Jet::scaled(zero, progress.slope, progress.bend, ratio), end }
+        };
+        // An excess within its rounding has no derivatives.
+        let resolved = T::of(RESOLVED * T::EPSILON).le(after);
+        if resolved && arc.is_tame() { Fall::Smooth(arc) } else { Fall::Exponential(fallen) }
+    }
+}
+
+impl<T: Real> Taken<T> {
+    /// The excess at the fraction `at` of the step.
+    pub(super) fn inside(&self, at: T) -> T {
+        match self.fall {
+            Fall::Straight => self.before + at * (self.after - self.before),
+            Fall::Exponential(fallen) => self.before * (at * fallen).exponential(),
+            Fall::Smooth(arc) => self.before * arc.at(at).exponential(),
+        }
+    }
+
+    /// The fraction of the step at which the excess falls to `excess`; its end if it already had before.
+    pub(super) fn fraction_at(&self, excess: T) -> T {
+        if self.before.le(excess) {
+            return T::of(1.0);
+        }
+        match self.fall {
+            Fall::Straight => (self.before - excess) / (self.before - self.after),
+            Fall::Exponential(fallen) => decay::ln_ratio(self.before, excess) / fallen,
+            Fall::Smooth(arc) => arc.crossing(decay::ln_ratio(self.before, excess)),
+        }
+    }
+}
+
+/// Returns the curve at the fraction `at` of the last adaptive step, on the host.
+pub fn inside(state: &State<f64>, progress: &Progress<f64>, at: f64) -> Curve<f64> {
+    let mut curve = state.curve.clone();
+    if at == 1.0 {
+        return curve;
+    }
+    let State { slope, bend, before, slope_before, bend_before, .. } = state;
+    let ends = slope.fields().into_iter().zip(bend.fields());
+    let starts = before.fields().into_iter().zip(slope_before.fields()).zip(bend_before.fields());
+    // Derivatives are in units of their own steps.
+    let ratio = progress.taken / progress.taken_before;
+    for (field, ((slope, bend), ((start, slope_before), bend_before))) in
+        curve.fields_mut().into_iter().zip(ends.zip(starts))
+    {
+        for i in 0..field.len() {
+            let end = Jet { value: field[i], slope: slope[i], bend: bend[i] };
+            let arc = if progress.taken_before > 0.0 {
+                Arc { start: Jet::scaled(start[i], slope_before[i], bend_before[i], ratio), end }
+            } else {
+                Arc::first(start[i], end)
+            };
+            field[i] = arc.at(at);
+        }
+        field.close();
+    }
+    curve
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn jet([value, slope, bend]: [f64; 3]) -> Jet<f64> {
+        Jet { value, slope, bend }
+    }
+
+    #[test]
+    fn a_polynomial_of_degree_five_is_exact() {
+        let p = |t: f64| 1.0 + t * (-2.0 + t * (0.5 + t * (3.0 + t * (-1.5 + t * 0.7))));
+        let slope = |t: f64| -2.0 + t * (1.0 + t * (9.0 + t * (-6.0 + t * 3.5)));
+        let bend = |t: f64| 1.0 + t * (18.0 + t * (-18.0 + t * 14.0));
+        let [start, end] = [0.0, 1.0].map(|t| jet([p(t), slope(t), bend(t)]));
+        let arc = Arc { start, end };
+        for i in 0..=10 {
+            let t = 0.1 * f64::from(i);
+            assert!((arc.at(t) - p(t)).abs() < 1e-14, "{t}: {} {}", arc.at(t), p(t));
+        }
+    }
+
+    #[test]
+    fn without_derivatives_at_the_start_a_cubic_is_exact() {
+        let p = |t: f64| 1.0 + t * (-2.0 + t * (0.5 - t * 3.0));
+        let arc = Arc::first(1.0, jet([p(1.0), -10.0, -17.0]));
+        for i in 0..=10 {
+            let t = 0.1 * f64::from(i);
+            assert!((arc.at(t) - p(t)).abs() < 1e-14, "{t}");
+        }
+    }
+
+    #[test]
+    fn an_event_is_found_where_an_exponential_is() {
+        let at = |t: f64| [(-0.8 * t).exp(), -0.8 * (-0.8 * t).exp(), 0.64 * (-0.8 * t).exp()];
+        let arc = Arc { start: jet(at(0.0)), end: jet(at(1.0)) };
+        let found = arc.crossing(at(0.3)[0]);
+        assert!((found - 0.3).abs() < 1e-6, "{found}");
+        assert!((arc.crossing(at(1.0)[0]) - 1.0).abs() < 1e-12);
+        let wild = Arc { start: jet([1.0, f64::NAN, 0.0]), end: jet([0.0; 3]) };
+        assert!((0.0..=1.0).contains(&wild.crossing(0.5)) && !wild.is_tame());
+    }
+}
