@@ -135,7 +135,7 @@ impl Figure {
             flow: self.flow.parse().map_err(wrong)?,
             tau: Some(self.tau),
             t_end: self.times.iter().copied().fold(0.0, f64::max),
-            omega: OMEGA.into(),
+            omega: Some(OMEGA.into()),
             no_redistribution: !self.redistribution,
             solver: Solver::Direct.into(),
             backend: BackendChoice::Cpu,

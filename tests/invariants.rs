@@ -142,7 +142,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
             let scaled = Spec {
                 tau: spec.tau.map(|tau| tau * c.powi(4)),
                 t_end: spec.t_end * c.powi(4),
-                omega: Omega::Rate(1.0 / c.powi(4)),
+                omega: Some(Omega::Rate(1.0 / c.powi(4))),
                 flow: Flow::Elastic(0.4 / (c * c)),
                 ..spec.clone()
             };
@@ -168,7 +168,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
 fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
     for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-4)] {
         let fixed = method(precision, Solver::Direct);
-        let (omega, pull) = (Omega::Auto, Pull::Auto);
+        let (omega, pull) = (Some(Omega::Auto), Pull::Auto);
         let spec = Spec { tau: None, adaptive: Some(1e-3), omega, pull, t_end: 0.1, relax_to: Some(0.5), ..fixed };
         let (outcome, plain) = relaxed(&spec, potato);
         assert!(outcome.steps > 20 && outcome.t_relax.is_some());
@@ -184,7 +184,7 @@ fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
             assert_eq!(large.steps, outcome.steps);
         }
         // The negative controls: an unscaled ω and an unscaled pull make a difference.
-        let fixed = Spec { omega: Omega::Rate(1.0), ..spec.clone() };
+        let fixed = Spec { omega: Some(Omega::Rate(1.0)), ..spec.clone() };
         let (_, slow) = relaxed(&fixed, potato);
         let flow = Flow::Elastic(0.1);
         let (_, large) = relaxed(&Spec { t_end: 16.0 * spec.t_end, flow, ..fixed }, |u| 2.0 * potato(u));

@@ -152,7 +152,7 @@ fn near(found: Option<f64>, exact: f64, bound: f64) -> bool {
 /// A curve at rest that is followed for 10⁵ relaxation times with hardly any redistribution loses its mesh in the end.
 #[test]
 fn a_member_that_relaxed_stays_relaxed_whatever_happens_to_it_at_rest() {
-    let omega = |rate| Omega::Rate(rate);
+    let omega = |rate| Some(Omega::Rate(rate));
     let spec = |omega, t_end| Spec { pull: Pull::Auto, omega, t_end, ..adaptive("ellipse:2,1", 100) };
     let long = one(&spec(omega(1e-4), 20_000.0));
     assert_eq!(long.status, Status::Relaxed);
@@ -216,7 +216,7 @@ fn islands_relax_at_every_n_when_an_independent_program_says_and_not_without_the
             let at = |n: usize, pull| {
                 let spec = Spec {
                     pull,
-                    omega: Omega::Rate(omega),
+                    omega: Some(Omega::Rate(omega)),
                     relax_at: Some(0.01),
                     ..adaptive(&format!("file:examples/islands/{island}.csv"), n)
                 };
@@ -437,7 +437,7 @@ fn a_polygon_that_crosses_itself_has_done_so_from_the_start() {
 fn for_polygons(omega: f64) -> Spec {
     Spec {
         pull: Pull::Auto,
-        omega: Omega::Rate(omega),
+        omega: Some(Omega::Rate(omega)),
         relax_at: Some(0.01),
         stop_when_relaxed: true,
         ..adaptive("circle:1", 128)

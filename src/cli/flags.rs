@@ -113,7 +113,8 @@ pub struct SpecFlags {
     /// Final time [default: 2]
     #[arg(long, value_name = "T", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
     t_end: Option<f64>,
-    /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member [default: 1]
+    /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member
+    /// [default: 1 with --tau, auto with --adaptive]
     #[arg(
         long, value_name = "OMEGA", value_parser = text_of::<Omega>, allow_hyphen_values = true,
         help_heading = EVOLUTION
@@ -248,9 +249,9 @@ impl SpecFlags {
             }};
         }
         replace! {
-            curves points seed shape sampling amplitude modes decay flow t_end omega no_redistribution pull solver
+            curves points seed shape sampling amplitude modes decay flow t_end no_redistribution pull solver
             order sor max_sweeps backend stop_when_relaxed snapshots store common_random_numbers;
-            tau adaptive relax_to relax_at only shard tolerance adapter precision series threads
+            tau adaptive omega relax_to relax_at only shard tolerance adapter precision series threads
         }
     }
 }

@@ -206,7 +206,7 @@ pub fn strongest_pull(nodes: &[DVec2]) -> f64 {
 /// Checks the rates that depend on the curve: a strong pull, and its own ω with fixed steps.
 fn check_rates(spec: &Spec, nodes: &[DVec2]) -> Result<()> {
     let omega = own_omega(nodes);
-    if let (Omega::Auto, Pace::Fixed(tau)) = (spec.omega, spec.pace())
+    if let (Omega::Auto, Pace::Fixed(tau)) = (spec.omega(), spec.pace())
         && omega * tau > MAX_OMEGA_TAU
         && !spec.no_redistribution
     {
@@ -432,7 +432,10 @@ mod tests {
             (Spec { decay: f64::NAN, ..Spec::default() }, "--decay NaN"),
             (Spec { points: 2, ..Spec::default() }, "--points 2"),
             (Spec { pull: Pull::Rate(700.0), ..Spec::default() }, "--pull 700"),
-            (Spec { omega: Omega::Auto, tau: Some(1.01), ..Spec::default() }, "--omega auto: omega tau = 1.01158"),
+            (
+                Spec { omega: Some(Omega::Auto), tau: Some(1.01), ..Spec::default() },
+                "--omega auto: omega tau = 1.01158",
+            ),
             (Spec { sampling: Sampling::Points, ..Spec::default() }, "--sampling points"),
             (Spec { shape: Shape::Circle { radius: 0.0 }, ..Spec::default() }, "--shape circle:0"),
             (Spec { shape: Shape::File("none.csv".into()), ..Spec::default() }, "--shape file:none.csv"),

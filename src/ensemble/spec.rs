@@ -174,8 +174,9 @@ pub struct Spec {
     pub adaptive: Option<f64>,
     /// Final time.
     pub t_end: f64,
-    /// ω, speed of the redistribution towards equal spacing, in 1/time.
-    pub omega: Omega,
+    /// ω, speed of the redistribution towards equal spacing, in 1/time; if absent, that of the [pace](Spec::omega).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub omega: Option<Omega>,
     /// No tangential redistribution (α = 0).
     pub no_redistribution: bool,
     /// κ of the metric pull.
@@ -235,6 +236,8 @@ pub struct Spec {
 
 /// The paper's time step.
 pub const DEFAULT_TAU: f64 = 1e-3;
+/// The paper's ω.
+pub const DEFAULT_OMEGA: f64 = 1.0;
 /// Tolerance of `--adaptive` without a value.
 pub const DEFAULT_ADAPTIVE: f64 = 1e-3;
 /// Fraction of the initial excess at which a member is relaxed.
@@ -255,7 +258,7 @@ impl Default for Spec {
             tau: None,
             adaptive: None,
             t_end: 2.0,
-            omega: Omega::Rate(1.0),
+            omega: None,
             no_redistribution: false,
             pull: Pull::Rate(0.0),
             solver: SolverChoice::Auto,
@@ -394,6 +397,14 @@ impl Spec {
     /// How time is cut into steps.
     pub fn pace(&self) -> Pace {
         self.adaptive.map_or(Pace::Fixed(self.tau.unwrap_or(DEFAULT_TAU)), Pace::Adaptive)
+    }
+
+    /// ω in use: if none is given, the paper's with a fixed τ, and each member's own with adaptive steps.
+    pub fn omega(&self) -> Omega {
+        self.omega.unwrap_or(match self.pace() {
+            Pace::Fixed(_) => Omega::Rate(DEFAULT_OMEGA),
+            Pace::Adaptive(_) => Omega::Auto,
+        })
     }
 
     /// The solver in use.
@@ -579,7 +590,7 @@ mod tests {
             tau: Some(1e-300),
             relax_at: Some(0.01),
             pull: Pull::Rate(0.1),
-            omega: Omega::Rate(0.1 + 0.2),
+            omega: Some(Omega::Rate(0.1 + 0.2)),
             flow: Flow::Polynomial(vec![0.5, 0.0, -0.25]),
             precision: Some(Precision::F32),
             tolerance: Some(3e-4),
@@ -592,7 +603,7 @@ mod tests {
         };
         let adaptive = Spec {
             adaptive: Some(1e-3),
-            omega: Omega::Auto,
+            omega: Some(Omega::Auto),
             pull: Pull::Auto,
             sor: Sor::Auto,
             relax_to: Some(0.1),
@@ -605,11 +616,26 @@ mod tests {
     }
 
     #[test]
+    fn the_redistribution_is_the_papers_with_a_fixed_step_and_each_members_own_with_adaptive_steps() {
+        let omega = |text: &str| Spec::from_toml(text).unwrap().validate().unwrap().omega;
+        assert_eq!(omega(""), Some(Omega::Rate(1.0)));
+        assert_eq!(omega("adaptive = 0.01"), Some(Omega::Auto));
+        assert_eq!(omega("adaptive = 0.01\nomega = 1"), Some(Omega::Rate(1.0)));
+        // Cells of a sweep choose for themselves.
+        let swept = Spec::from_toml("[sweep]\nadaptive = [0.01]").unwrap().validate().unwrap();
+        assert_eq!(swept.omega, None);
+        assert_eq!(swept.of_cell(0).unwrap().validate().unwrap().omega, Some(Omega::Auto));
+        let given = Spec::from_toml("omega = 2\n[sweep]\nadaptive = [0.01]").unwrap().validate().unwrap();
+        assert_eq!(given.of_cell(0).unwrap().validate().unwrap().omega, Some(Omega::Rate(2.0)));
+    }
+
+    #[test]
     fn the_keys_are_those_of_the_default_spec_and_the_optional_ones() {
         let keys = Spec::keys();
         let written: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
         assert!(written.keys().all(|key| keys.contains(key)));
-        let optional = ["tau", "adaptive", "relax-to", "relax-at", "tolerance", "adapter", "precision", "series"];
+        let optional =
+            ["tau", "adaptive", "omega", "relax-to", "relax-at", "tolerance", "adapter", "precision", "series"];
         let optional = [&optional[..], &["only", "shard", "threads", "common-random-numbers", "sweep"]].concat();
         for key in &optional {
             assert!(keys.iter().any(|known| known == key), "{key}");

@@ -297,7 +297,7 @@ mod tests {
     fn a_cell_keeps_the_lists_of_its_base() {
         let base = Spec { snapshots: vec![0.0, 0.5], only: Some(vec![3, 4]), ..Spec::default() };
         let spec = of_cell(&sweep(&["omega=2"]), &base, 0).unwrap();
-        assert_eq!(spec, Spec { omega: 2.0.into(), ..base });
+        assert_eq!(spec, Spec { omega: Some(2.0.into()), ..base });
     }
 
     #[test]

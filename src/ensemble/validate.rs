@@ -53,6 +53,10 @@ impl Spec {
         if let Pace::Fixed(tau) = self.pace() {
             self.tau = Some(tau);
         }
+        // Whether steps adapt may differ between cells, and with it the default.
+        if !self.sweep.axes().iter().any(|axis| ["tau", "adaptive"].contains(&axis.key.as_str())) {
+            self.omega = Some(self.omega());
+        }
         if self.relax_at.is_none() {
             self.relax_to.get_or_insert(DEFAULT_RELAX_TO);
         }
@@ -141,7 +145,7 @@ impl Spec {
     }
 
     fn check_omega(&self) -> Result<()> {
-        let Omega::Rate(omega) = self.omega else { return Ok(()) };
+        let Omega::Rate(omega) = self.omega() else { return Ok(()) };
         if !(omega.is_finite() && omega >= 0.0) {
             let allowed = "use 0, a positive number such as 1, or auto";
             return Err(Error::value("omega", number(omega), "not a redistribution speed", allowed));

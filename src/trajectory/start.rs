@@ -172,7 +172,7 @@ fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parame
         c7: law(7, of_flow.c7),
         c8: law(8, of_flow.c8),
         tau: if let Pace::Fixed(tau) = spec.pace() { tau / time } else { 0.0 },
-        omega: match spec.omega {
+        omega: match spec.omega() {
             Omega::Rate(rate) => rate * time,
             Omega::Auto => own_omega(nodes),
         },
