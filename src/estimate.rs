@@ -13,7 +13,7 @@ use crate::{
     backend::Backend,
     ensemble::{
         Cell, Ended, Extent, Portrait, SeriesRow, Sink, Snapshot, Study, rows,
-        spec::{Pace, Precision},
+        spec::{Pace, Precision, Tau},
     },
     error::{Error, Result},
     placement::{Choice, Platform},
@@ -294,7 +294,7 @@ fn extrapolated(pilots: &[Seen], all: u64, cost: impl Fn(&Seen) -> f64) -> Optio
 /// Steps of a member, if these do not depend on its curve.
 fn certain_steps(cohort: &[Cell]) -> Option<f64> {
     let of_cell = |Cell { spec, .. }: &Cell| match spec.pace() {
-        Pace::Fixed(tau) if !spec.stop_when_relaxed => Some(f64::from(Clock::new(tau, spec.t_end).steps)),
+        Pace::Fixed(Tau::Step(tau)) if !spec.stop_when_relaxed => Some(f64::from(Clock::new(tau, spec.t_end).steps)),
         _ => None,
     };
     let steps = cohort.iter().map(of_cell).sum::<Option<f64>>()?;
@@ -420,7 +420,7 @@ mod tests {
 
     #[test]
     fn steps_of_fixed_length_are_certain_unless_members_stop() {
-        let fixed = Spec { tau: Some(0.01), t_end: 0.055, ..Spec::default() };
+        let fixed = Spec { tau: Some(0.01.into()), t_end: 0.055, ..Spec::default() };
         assert_eq!(certain_steps(study(fixed.clone()).cells()), Some(6.0));
         assert_eq!(certain_steps(study(Spec { stop_when_relaxed: true, ..fixed }).cells()), None);
         assert_eq!(certain_steps(study(Spec { adaptive: Some(1e-3), ..Spec::default() }).cells()), None);

@@ -133,7 +133,7 @@ impl Figure {
             sampling: self.sampling,
             amplitude: 0.0,
             flow: self.flow.parse().map_err(wrong)?,
-            tau: Some(self.tau),
+            tau: Some(self.tau.into()),
             t_end: self.times.iter().copied().fold(0.0, f64::max),
             omega: Some(OMEGA.into()),
             no_redistribution: !self.redistribution,
@@ -248,7 +248,7 @@ mod tests {
     fn a_curve_that_fails_makes_no_figure() {
         let figure = Figure::find("fig1a").unwrap();
         // Steps so long that the first merges nodes.
-        let spec = Spec { shape: "nonconvex".parse().unwrap(), tau: Some(0.05), ..figure.spec().unwrap() };
+        let spec = Spec { shape: "nonconvex".parse().unwrap(), tau: Some(0.05.into()), ..figure.spec().unwrap() };
         let error = figure.simulate(&spec, Progress::Quiet).unwrap_err();
         assert_eq!(error.exit_code(), 1);
         assert!(error.to_string().starts_with("fig1a: the curve is "), "{error}");

@@ -18,6 +18,16 @@ pub fn significant(value: f64, digits: usize) -> String {
     text.replace('-', "\u{2212}")
 }
 
+/// Formats `value` as a person would type it, to read back exactly: 0.001, -1, 1e300.
+pub fn number(value: f64) -> String {
+    let size = value.abs();
+    if value.is_finite() && size != 0.0 && !(1e-5..1e15).contains(&size) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
+}
+
 /// `10⁻⁶`.
 pub fn power_of_ten(power: i32) -> String {
     let raised = |c: char| match c.to_digit(10) {

@@ -315,7 +315,7 @@ fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
         curves: 13,
         points: n,
         t_end: 0.1,
-        tau: Some(1e-3),
+        tau: Some(1e-3.into()),
         relax_to: Some(0.5),
         stop_when_relaxed: true,
         series: Some(0.03),
@@ -340,7 +340,7 @@ fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
         }
     }
     // The negative control: a different step is detected.
-    if whole.len() != 13 || run([1, 13], &Spec { tau: Some(1.1e-3), ..spec.clone() })? == whole {
+    if whole.len() != 13 || run([1, 13], &Spec { tau: Some(1.1e-3.into()), ..spec.clone() })? == whole {
         return Err("another step changed nothing".into());
     }
     Ok(())

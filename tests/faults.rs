@@ -618,7 +618,7 @@ fn any_call_fails() -> Outcome {
     let spec = Spec {
         curves: 41,
         points: 32,
-        tau: Some(1e-2),
+        tau: Some(1e-2.into()),
         t_end: 0.2,
         relax_to: Some(0.5),
         stop_when_relaxed: true,

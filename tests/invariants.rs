@@ -11,7 +11,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, Shape, polygon},
     ensemble::{
         Cell, Ended, Family, Outcome, Sink, Spec, Status,
-        spec::{BackendChoice, Omega, Precision, Pull, Solver, SolverChoice, Sor},
+        spec::{BackendChoice, Omega, Precision, Pull, Solver, SolverChoice, Sor, Tau},
     },
     flow::Flow,
     number::Real,
@@ -61,6 +61,12 @@ fn potato(u: f64) -> DVec2 {
     DVec2::from_angle(theta) * (1.0 + wave(2.0, 0.2, 0.0) + wave(3.0, 0.1, 0.5) + wave(5.0, 0.05, 1.0))
 }
 
+/// The fixed step of `spec`, `factor` times as long.
+fn times(spec: &Spec, factor: f64) -> Option<Tau> {
+    let Some(Tau::Step(tau)) = spec.tau else { panic!("no fixed step: {spec:?}") };
+    Some(Tau::Step(factor * tau))
+}
+
 /// 100 steps, in which the curve loses its shorter waves.
 fn method(precision: Precision, solver: Solver) -> Spec {
     Spec {
@@ -69,7 +75,7 @@ fn method(precision: Precision, solver: Solver) -> Spec {
         sampling: Sampling::Parameter,
         amplitude: 0.0,
         flow: Flow::Elastic(0.4),
-        tau: Some(1e-4),
+        tau: Some(1e-4.into()),
         t_end: 1e-2,
         backend: BackendChoice::Cpu,
         precision: Some(precision),
@@ -140,7 +146,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
         let (outcome, plain) = relaxed(&spec, potato);
         for (c, bound) in [(2.0_f64, 0.0), (0.25, 0.0), (3.0, rounding)] {
             let scaled = Spec {
-                tau: spec.tau.map(|tau| tau * c.powi(4)),
+                tau: times(&spec, c.powi(4)),
                 t_end: spec.t_end * c.powi(4),
                 omega: Some(Omega::Rate(1.0 / c.powi(4))),
                 flow: Flow::Elastic(0.4 / (c * c)),
@@ -156,9 +162,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
         }
         // The negative control: times scaled by c³ give a different curve.
         let (_, wrong) =
-            relaxed(&Spec { tau: spec.tau.map(|tau| tau * 8.0), t_end: spec.t_end * 8.0, ..spec.clone() }, |u| {
-                2.0 * potato(u)
-            });
+            relaxed(&Spec { tau: times(&spec, 8.0), t_end: spec.t_end * 8.0, ..spec.clone() }, |u| 2.0 * potato(u));
         assert!(distance(&plain, &wrong.iter().map(|node| *node / 2.0).collect::<Vec<_>>()) > 1e-3);
     }
 }
@@ -216,7 +220,8 @@ fn the_first_node_does_not_matter() {
         assert_moved(&format!("{precision:?} {solver:?}, first node, α = 0"), &expected, &nodes, &plain, tolerance);
     }
     let difference = |n: usize| {
-        let spec = Spec { points: n, tau: Some(0.36 / (n * n) as f64), ..method(Precision::F64, Solver::Direct) };
+        let spec =
+            Spec { points: n, tau: Some((0.36 / (n * n) as f64).into()), ..method(Precision::F64, Solver::Direct) };
         let (plain, _) = relaxed(&spec, potato);
         let (other, _) = relaxed(&spec, |u| potato((u + 0.25).fract()));
         let relative = |a: f64, b: f64| (a / b - 1.0).abs();
@@ -234,7 +239,7 @@ fn the_work_of_a_run_is_what_it_was() {
         points: n,
         flow,
         sor: Sor::Factor(sor),
-        tau: Some(1e-3),
+        tau: Some(1e-3.into()),
         t_end: 0.1,
         ..method(Precision::F64, Solver::GaussSeidel)
     };

@@ -11,7 +11,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, crossing, polygon},
     ensemble::{
         Cell, Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
-        spec::{BackendChoice, Omega, Precision, Pull, Sor},
+        spec::{BackendChoice, Omega, Precision, Pull, Sor, Tau},
     },
     flow::Flow,
     number::Real,
@@ -161,7 +161,8 @@ fn a_member_that_relaxed_stays_relaxed_whatever_happens_to_it_at_rest() {
     assert_eq!((short.status, short.t_end), (Status::Relaxed, 5.0));
     assert!((long.t_relax.unwrap() / short.t_relax.unwrap() - 1.0).abs() < 1e-12);
     // The negative control: one that fails before it relaxes is not.
-    let failed = one(&Spec { adaptive: None, tau: Some(0.5), solver: Solver::Direct.into(), ..spec(omega(1.0), 5.0) });
+    let failed =
+        one(&Spec { adaptive: None, tau: Some(0.5.into()), solver: Solver::Direct.into(), ..spec(omega(1.0), 5.0) });
     assert!(failed.t_relax.is_none() && failed.status.is_failure(), "{failed:?}");
 }
 
@@ -175,7 +176,7 @@ fn an_ellipse_relaxes_when_it_should_in_fifteen_steps_and_not_with_a_coarse_fixe
     ] {
         for (relax_at, exact, bound) in [(0.1, 0.117_081_9, bounds[0]), (0.01, 0.526_859_4, bounds[1])] {
             let spec = Spec { sampling, relax_at: Some(relax_at), ..adaptive("ellipse:2,1", n) };
-            let (fine, coarse) = (one(&spec), one(&Spec { adaptive: None, tau: Some(1e-2), ..spec }));
+            let (fine, coarse) = (one(&spec), one(&Spec { adaptive: None, tau: Some(1e-2.into()), ..spec }));
             let error = |outcome: &Outcome| outcome.t_relax.map(|t| t / exact - 1.0);
             println!(
                 "{sampling:?}, n = {n}, to {relax_at}: {:?} in {} steps; fixed {:?}",
@@ -356,7 +357,7 @@ fn a_curve_whose_curvature_has_left_it_is_never_relaxed() {
     let members: Vec<(i32, u64)> = [(3, 0), (3, 1)].into_iter().chain(coarse).collect();
     let relaxed = |&(j, member): &(i32, u64)| {
         let tau = 1e-6 * 1000_f64.powf(f64::from(j) / 30.0);
-        let spec = Spec { tau: Some(tau), t_end: 1e5 * tau, ..spec.clone() }.validate().unwrap();
+        let spec = Spec { tau: Some(tau.into()), t_end: 1e5 * tau, ..spec.clone() }.validate().unwrap();
         let (ended, state) = follow::<f64>(&spec, family.member(member).unwrap());
         let (outcome, gap) = (ended.outcome, observe::gap(&state.curve));
         let line = format!("tau = {tau:.2e}, member {member}: {outcome:?}, gap {gap:.2}");
@@ -489,7 +490,7 @@ fn single_precision_against_double() {
             for n in [50, 100, 200, 256, 320, 400, 512] {
                 let spec = Spec {
                     flow: flow.clone(),
-                    tau: pace,
+                    tau: pace.map(Tau::Step),
                     stop_when_relaxed: true,
                     t_end: 20.0,
                     ..adaptive("ellipse:2,1", n)

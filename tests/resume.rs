@@ -136,8 +136,9 @@ fn compare(name: &str, spec: &Spec, precision: Precision, open: Open, patience: 
 /// Members with all kinds of ends, and output times, some of them inside steps.
 fn specs() -> Vec<(&'static str, Spec)> {
     let outputs = |more: Spec| Spec { curves: 13, series: Some(0.013), snapshots: vec![0.0, 0.02], points: 33, ..more };
-    let fixed =
-        |solver: Solver| outputs(Spec { tau: Some(1e-3), t_end: 0.15, solver: solver.into(), ..Spec::default() });
+    let fixed = |solver: Solver| {
+        outputs(Spec { tau: Some(1e-3.into()), t_end: 0.15, solver: solver.into(), ..Spec::default() })
+    };
     let adaptive = |solver: Solver| {
         let shape = "nonconvex".parse().expect("a shape");
         outputs(Spec { adaptive: Some(1e-3), tau: None, t_end: 0.4, shape, solver: solver.into(), ..Spec::default() })

@@ -106,7 +106,8 @@ fn same_bits<T: Vectorised>(name: &str, specs: &[Spec]) {
 fn fixed_steps_give_the_same_bits_in_every_vector() {
     for solver in Solver::ALL {
         for n in [32, 37] {
-            let fixed = Spec { tau: Some(1e-3), t_end: 0.3, points: n, solver: solver.into(), ..Spec::default() };
+            let fixed =
+                Spec { tau: Some(1e-3.into()), t_end: 0.3, points: n, solver: solver.into(), ..Spec::default() };
             let specs = [spec("ellipse:2,1", Spec { stop_when_relaxed: true, relax_to: Some(0.5), ..fixed })];
             same_bits::<f64>(&format!("{solver:?}, n = {n}"), &specs);
             same_bits::<f32>(&format!("{solver:?}, n = {n}"), &specs);
@@ -128,7 +129,7 @@ fn adaptive_steps_give_the_same_bits_in_every_vector() {
 fn members_that_take_other_branches_are_not_disturbed() {
     for solver in Solver::ALL {
         // Every branch alone, and all mixtures.
-        let specs = [(Some(1e-3), None), (None, Some(1e-2))].map(|(tau, adaptive)| {
+        let specs = [(Some(1e-3.into()), None), (None, Some(1e-2))].map(|(tau, adaptive)| {
             let (solver, amplitude) = (solver.into(), 0.1);
             let mut mixed = Spec { tau, adaptive, t_end: 0.03, points: 32, solver, amplitude, ..Spec::default() };
             let axes = ["no-redistribution=true,false", "pull=0,3", "flow=surface-diffusion;willmore;poly:0.2"];
@@ -143,7 +144,7 @@ fn members_that_take_other_branches_are_not_disturbed() {
 #[test]
 fn members_that_fail_leave_the_lanes_to_others() {
     let base = Spec { t_end: 0.5, points: 40, solver: Solver::Direct.into(), amplitude: 0.3, ..Spec::default() };
-    let fixed = [spec("lemniscate:1", Spec { tau: Some(1e-3), ..base.clone() })];
+    let fixed = [spec("lemniscate:1", Spec { tau: Some(1e-3.into()), ..base.clone() })];
     let adaptive = [spec("lemniscate:1", Spec { adaptive: Some(1e-3), ..base })];
     for specs in [&fixed, &adaptive] {
         let all = run::<f64>(specs, Vectors::widest(), 2, 1000);

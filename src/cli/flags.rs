@@ -12,7 +12,7 @@ use crate::{
     curve::{Modes, Sampling, Shape},
     ensemble::{
         Shard, Spec,
-        spec::{BackendChoice, Omega, Order, Precision, Pull, SolverChoice, Sor, Store},
+        spec::{BackendChoice, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau},
         sweep::SweepAxis,
     },
     error::{Error, Result},
@@ -98,11 +98,11 @@ pub struct SpecFlags {
         help_heading = EVOLUTION
     )]
     flow: Option<Flow>,
-    /// Fixed time step τ [default: 0.001]
+    /// Fixed time step τ. auto is R^4/4000 for each member [default: 0.001]
     #[arg(
-        long, value_name = "TAU", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION
+        long, value_name = "TAU", value_parser = text_of::<Tau>, allow_hyphen_values = true, help_heading = EVOLUTION
     )]
-    tau: Option<f64>,
+    tau: Option<Tau>,
     /// Adapt the steps to this local error instead of using --tau. Without TOL it is 0.001; write --adaptive=TOL before
     /// SPEC.toml [default: off]
     #[arg(
@@ -436,7 +436,7 @@ mod tests {
         let spec = overlaid(&["--adaptive", "--relax-at", "0.01"], file());
         assert_eq!((spec.tau, spec.adaptive, spec.relax_to, spec.relax_at), (None, Some(1e-3), None, Some(0.01)));
         let spec = overlaid(&["--tau", "1e-5", "--relax-to", "0.2"], spec);
-        assert_eq!((spec.tau, spec.adaptive, spec.relax_to, spec.relax_at), (Some(1e-5), None, Some(0.2), None));
+        assert_eq!((spec.tau, spec.adaptive, spec.relax_to, spec.relax_at), (Some(1e-5.into()), None, Some(0.2), None));
         assert_eq!(overlaid(&[], file()), file());
     }
 

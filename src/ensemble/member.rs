@@ -12,7 +12,7 @@ use glam::DVec2;
 use super::{
     Mollified, Spec,
     mollifier::mollify,
-    spec::{Omega, Pace, Pull},
+    spec::{DEFAULT_OMEGA, DEFAULT_TAU, Omega, Pace, Pull, Tau},
     validate::{MAX_OMEGA_TAU, overshooting},
 };
 use crate::random::Stream;
@@ -195,6 +195,11 @@ pub fn own_omega(nodes: &[DVec2]) -> f64 {
     relaxation_rate(nodes) / 6.0
 }
 
+/// τ of `--tau auto`: 1/1000 of 1/ω, the paper's τ = 0.001 for a circle of the area of its 2:1 ellipse.
+pub fn own_tau(nodes: &[DVec2]) -> f64 {
+    DEFAULT_TAU / (own_omega(nodes) / DEFAULT_OMEGA)
+}
+
 /// The largest κ allowed: n²/100 times the relaxation rate.
 ///
 /// A pull that is strong compared with the relaxation undoes the redistribution, and the mesh falls apart. For the
@@ -203,16 +208,28 @@ pub fn strongest_pull(nodes: &[DVec2]) -> f64 {
     (nodes.len() as f64 / 10.0).powi(2) * relaxation_rate(nodes)
 }
 
-/// Checks the rates that depend on the curve: a strong pull, and its own ω with fixed steps.
-fn check_rates(spec: &Spec, nodes: &[DVec2]) -> Result<()> {
-    let omega = own_omega(nodes);
-    if let (Omega::Auto, Pace::Fixed(tau)) = (spec.omega(), spec.pace())
-        && omega * tau > MAX_OMEGA_TAU
-        && !spec.no_redistribution
-    {
-        let allowed = format!("use --tau {:.3e} or less", MAX_OMEGA_TAU / omega);
-        return Err(Error::value("omega", "auto", &overshooting(omega, tau), &allowed));
+/// Checks ω against a fixed τ, if one of them is that of the curve: `own_omega` or `own_tau`.
+fn check_redistribution(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()> {
+    let Pace::Fixed(step) = spec.pace() else { return Ok(()) };
+    let (tau, omega) = match (step, spec.omega()) {
+        (Tau::Step(tau), Omega::Auto) => (tau, own_omega),
+        (Tau::Auto, Omega::Rate(omega)) => (own_tau, omega),
+        // Both are numbers, which were checked, or both are in proportion.
+        _ => return Ok(()),
+    };
+    if spec.no_redistribution || omega * tau <= MAX_OMEGA_TAU {
+        return Ok(());
     }
+    let allowed = match step {
+        Tau::Step(_) => format!("use --tau {:.3e} or less", MAX_OMEGA_TAU / omega),
+        Tau::Auto => format!("use --omega {:.3e} or less, or auto", MAX_OMEGA_TAU / tau),
+    };
+    Err(Error::value("omega", spec.omega(), &overshooting(omega, tau), &allowed))
+}
+
+/// Checks the rates that depend on the curve: a strong pull, and the redistribution.
+fn check_rates(spec: &Spec, nodes: &[DVec2]) -> Result<()> {
+    check_redistribution(spec, own_omega(nodes), own_tau(nodes))?;
     let most = strongest_pull(nodes);
     match spec.pull {
         Pull::Rate(rate) if rate > most => {
@@ -413,13 +430,19 @@ mod tests {
     }
 
     #[test]
-    fn the_own_speed_of_the_redistribution_is_the_papers_for_its_ellipse_and_scales_with_the_curve() {
+    fn the_own_speed_and_step_of_a_curve_are_the_papers_for_its_ellipse_and_scale_with_the_curve() {
         let omega = |shape: &str| {
             let spec = Spec { shape: shape.parse().unwrap(), amplitude: 0.0, points: 400, ..Spec::default() };
             own_omega(&Family::new(&spec).unwrap().member(0).unwrap().nodes)
         };
         assert!((omega("ellipse:2,1") - 1.0).abs() < 1e-3);
         assert_eq!(omega("ellipse:64,32"), omega("ellipse:2,1") / 32_f64.powi(4));
+        let tau = |shape: &str| {
+            let spec = Spec { shape: shape.parse().unwrap(), amplitude: 0.0, points: 400, ..Spec::default() };
+            own_tau(&Family::new(&spec).unwrap().member(0).unwrap().nodes)
+        };
+        assert!((tau("ellipse:2,1") / 1e-3 - 1.0).abs() < 1e-3);
+        assert_eq!(tau("ellipse:64,32"), tau("ellipse:2,1") * 32_f64.powi(4));
         // Of an immersed curve, by its length.
         assert!(omega("lemniscate:1").is_finite());
     }
@@ -433,8 +456,12 @@ mod tests {
             (Spec { points: 2, ..Spec::default() }, "--points 2"),
             (Spec { pull: Pull::Rate(700.0), ..Spec::default() }, "--pull 700"),
             (
-                Spec { omega: Some(Omega::Auto), tau: Some(1.01), ..Spec::default() },
+                Spec { omega: Some(Omega::Auto), tau: Some(1.01.into()), ..Spec::default() },
                 "--omega auto: omega tau = 1.01158",
+            ),
+            (
+                Spec { omega: Some(2000.0.into()), tau: Some(Tau::Auto), ..Spec::default() },
+                "--omega 2000: omega tau = 1.99",
             ),
             (Spec { sampling: Sampling::Points, ..Spec::default() }, "--sampling points"),
             (Spec { shape: Shape::Circle { radius: 0.0 }, ..Spec::default() }, "--shape circle:0"),

@@ -17,7 +17,7 @@ use crate::{
     curve::{Modes, Sampling, Shape},
     error::{Error, Result, did_you_mean, shortened},
     flow::Flow,
-    input,
+    input, text,
 };
 
 pub use crate::{
@@ -95,11 +95,20 @@ impl<'de> Deserialize<'de> for SolverChoice {
     }
 }
 
+/// The fixed time step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tau {
+    /// τ itself.
+    Step(f64),
+    /// From each member's own relaxation time.
+    Auto,
+}
+
 /// How time is cut into steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
-    /// Steps of this length.
-    Fixed(f64),
+    /// Steps of one length.
+    Fixed(Tau),
     /// Extrapolated steps with this local error tolerance.
     Adaptive(f64),
 }
@@ -168,7 +177,7 @@ pub struct Spec {
     pub flow: Flow,
     /// Fixed time step; [`DEFAULT_TAU`] if neither it nor `adaptive` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub tau: Option<f64>,
+    pub tau: Option<Tau>,
     /// Local error tolerance of adaptive steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<f64>,
@@ -396,7 +405,7 @@ impl Spec {
 
     /// How time is cut into steps.
     pub fn pace(&self) -> Pace {
-        self.adaptive.map_or(Pace::Fixed(self.tau.unwrap_or(DEFAULT_TAU)), Pace::Adaptive)
+        self.adaptive.map_or(Pace::Fixed(self.tau.unwrap_or(DEFAULT_TAU.into())), Pace::Adaptive)
     }
 
     /// ω in use: if none is given, the paper's with a fixed τ, and each member's own with adaptive steps.
@@ -484,6 +493,15 @@ macro_rules! number_or_auto {
             }
         }
 
+        impl fmt::Display for $kind {
+            fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                match self {
+                    $kind::$number(number) => write!(f, "{}", text::number(*number)),
+                    $kind::Auto => write!(f, "auto"),
+                }
+            }
+        }
+
         impl From<f64> for $kind {
             fn from(number: f64) -> $kind {
                 $kind::$number(number)
@@ -507,6 +525,7 @@ macro_rules! number_or_auto {
     };
 }
 
+number_or_auto!(Tau, Step);
 number_or_auto!(Omega, Rate);
 number_or_auto!(Pull, Rate);
 number_or_auto!(Sor, Factor);
@@ -587,7 +606,7 @@ mod tests {
     fn a_spec_reads_back_from_its_toml() {
         let spec = Spec {
             seed: u64::MAX,
-            tau: Some(1e-300),
+            tau: Some(1e-300.into()),
             relax_at: Some(0.01),
             pull: Pull::Rate(0.1),
             omega: Some(Omega::Rate(0.1 + 0.2)),
@@ -609,7 +628,8 @@ mod tests {
             relax_to: Some(0.1),
             ..Spec::default()
         };
-        for spec in [spec, adaptive, Spec::default()] {
+        let own = Spec { tau: Some(Tau::Auto), ..Spec::default() };
+        for spec in [spec, adaptive, own, Spec::default()] {
             let text = spec.to_toml().unwrap();
             assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");
         }

@@ -304,7 +304,7 @@ mod tests {
     fn what_stands_instead_of_a_swept_key_makes_room() {
         let base = Spec { adaptive: Some(1e-3), relax_at: Some(0.01), ..Spec::default() };
         let spec = of_cell(&sweep(&["tau=0.01", "relax-to=0.1"]), &base, 0).unwrap();
-        assert_eq!((spec.tau, spec.adaptive, spec.relax_to, spec.relax_at), (Some(0.01), None, Some(0.1), None));
+        assert_eq!((spec.tau, spec.adaptive, spec.relax_to, spec.relax_at), (Some(0.01.into()), None, Some(0.1), None));
     }
 
     #[test]

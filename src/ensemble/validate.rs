@@ -4,11 +4,12 @@
 //! the file of the shape. Only the resolution of the highest mode is checked here.
 
 use super::spec::{
-    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Omega, Order, Pace, Precision, Pull, Sor, Spec, Store,
+    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Omega, Order, Pace, Precision, Pull, Sor, Spec, Store, Tau,
 };
 use crate::{
     error::{Error, Result},
     solver::{Facts, ring::MIN_POINTS},
+    text::number,
 };
 
 /// More members than this are a typing error.
@@ -110,7 +111,8 @@ impl Spec {
         Ok(())
     }
 
-    fn check_fixed(&self, tau: f64) -> Result<()> {
+    fn check_fixed(&self, tau: Tau) -> Result<()> {
+        let Tau::Step(tau) = tau else { return Ok(()) };
         positive("tau", tau, "a time step", "0.001")?;
         let t_end = number(self.t_end);
         if tau > self.t_end {
@@ -130,7 +132,7 @@ impl Spec {
     fn check_adaptive(&self, tolerance: f64) -> Result<()> {
         if let Some(tau) = self.tau {
             let problem = format!("steps are either fixed or adaptive, and --adaptive {} is given", number(tolerance));
-            return Err(Error::value("tau", number(tau), &problem, "leave out one of the two"));
+            return Err(Error::value("tau", tau, &problem, "leave out one of the two"));
         }
         if !(tolerance > 0.0 && tolerance <= LOOSEST_ADAPTIVE) {
             let allowed = format!("use a number above 0, up to {LOOSEST_ADAPTIVE}, for example {DEFAULT_ADAPTIVE}");
@@ -154,7 +156,7 @@ impl Spec {
             return Ok(());
         }
         match self.pace() {
-            Pace::Fixed(tau) if omega * tau > MAX_OMEGA_TAU => {
+            Pace::Fixed(Tau::Step(tau)) if omega * tau > MAX_OMEGA_TAU => {
                 let allowed = format!("it is a rate: use --omega {} or less", number(1.0 / tau));
                 Err(Error::value("omega", number(omega), &overshooting(omega, tau), &allowed))
             }
@@ -349,16 +351,6 @@ fn positive(key: &str, value: f64, what: &str, example: &str) -> Result<()> {
     }
     let allowed = format!("use a finite number above 0, for example {example}");
     Err(Error::value(key, number(value), &format!("not {what}"), &allowed))
-}
-
-/// Formats `value` as a person would write it: 0.001, -1, 1e300.
-fn number(value: f64) -> String {
-    let size = value.abs();
-    if value.is_finite() && size != 0.0 && !(1e-5..1e15).contains(&size) {
-        format!("{value:e}")
-    } else {
-        value.to_string()
-    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,10 @@
 use std::{fmt, path::Path, time::Duration};
 
 use crate::{
-    ensemble::{Spec, spec::Pace},
+    ensemble::{
+        Spec,
+        spec::{Pace, Tau},
+    },
     files::names::ENSEMBLE,
     placement::Platform,
     results::{
@@ -167,7 +170,8 @@ impl Overview<'_> {
 /// Describes the run in one line, without the swept keys.
 pub fn describe(spec: &Spec) -> String {
     let pace = match spec.pace() {
-        Pace::Fixed(tau) => ("tau", format!("tau = {tau:?}")),
+        Pace::Fixed(Tau::Step(tau)) => ("tau", format!("tau = {tau:?}")),
+        Pace::Fixed(Tau::Auto) => ("tau", "tau = auto".into()),
         Pace::Adaptive(tolerance) => ("adaptive", format!("adaptive {tolerance:?}")),
     };
     let parts = [

@@ -157,7 +157,7 @@ pub(crate) mod tests {
 
     #[test]
     fn the_spec_in_run_json_repeats_the_run() {
-        let spec = Spec { seed: u64::MAX, tau: Some(1.0 / 3.0), only: Some(vec![2]), ..Spec::default() };
+        let spec = Spec { seed: u64::MAX, tau: Some((1.0 / 3.0).into()), only: Some(vec![2]), ..Spec::default() };
         let (platform, tally) = (platform(), Tally::default());
         let run = Provenance::new(&spec, &platform, &tally, &[], Duration::ZERO, Duration::from_millis(1500));
         let json: serde_json::Value = serde_json::from_str(&run.to_json().unwrap()).unwrap();

@@ -7,8 +7,8 @@ use crate::{
     curve::polygon,
     ensemble::{
         Member, Observables, Rows, Spec, Status,
-        member::{own_omega, relaxation_rate, strongest_pull},
-        spec::{Omega, Pace, Precision, Pull, Sor},
+        member::{own_omega, own_tau, relaxation_rate, strongest_pull},
+        spec::{Omega, Pace, Precision, Pull, Sor, Tau},
     },
     schedule::{self, Clock, Outputs, Ticks},
     scheme::{
@@ -121,7 +121,13 @@ fn set_thresholds(launch: &mut Run<f64>, course: Course, excess: f64, limit: f64
 /// How the member's time advances, and its status if it ends at once because no clock of the precision holds its time.
 fn begin_time(launch: &mut Run<f64>, spec: &Spec, unit: f64, precision: Precision) -> (Time, Option<Status>) {
     let tolerance = match spec.pace() {
-        Pace::Fixed(tau) => return (Time::Fixed(Clock::new(tau, spec.t_end)), None),
+        Pace::Fixed(tau) => {
+            let tau = match tau {
+                Tau::Step(tau) => tau,
+                Tau::Auto => launch.parameters.tau * unit.powi(4),
+            };
+            return (Time::Fixed(Clock::new(tau, spec.t_end)), None);
+        }
         Pace::Adaptive(tolerance) => tolerance,
     };
     let (times, end) = (schedule::times(precision), spec.t_end / unit.powi(4));
@@ -171,7 +177,11 @@ fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parame
         c6: law(6, of_flow.c6),
         c7: law(7, of_flow.c7),
         c8: law(8, of_flow.c8),
-        tau: if let Pace::Fixed(tau) = spec.pace() { tau / time } else { 0.0 },
+        tau: match spec.pace() {
+            Pace::Fixed(Tau::Step(tau)) => tau / time,
+            Pace::Fixed(Tau::Auto) => own_tau(nodes),
+            Pace::Adaptive(_) => 0.0,
+        },
         omega: match spec.omega() {
             Omega::Rate(rate) => rate * time,
             Omega::Auto => own_omega(nodes),

@@ -38,7 +38,7 @@ impl Problem {
             sampling: self.curve.sampling(),
             amplitude: 0.0,
             flow: self.flow.clone(),
-            tau: at.tolerance.is_none().then_some(at.tau),
+            tau: at.tolerance.is_none().then_some(at.tau.into()),
             adaptive: at.tolerance,
             t_end: self.t_end,
             ..method.clone()
