@@ -9,7 +9,13 @@ use curvelax::{
 };
 
 fn main() -> curvelax::Result<()> {
-    let spec = Spec { curves: 32, flow: Flow::Willmore, t_end: 8.0, stop_when_relaxed: true, ..Spec::default() };
+    let spec = Spec {
+        curves: 32,
+        flow: Flow::Willmore,
+        t_end: Some(8.0.into()),
+        stop_when_relaxed: Some(true),
+        ..Spec::default()
+    };
     let mut members = Vec::new();
     let platform = relax(&Study::new(spec)?, &mut members)?;
 

@@ -29,7 +29,7 @@ fn main() -> curvelax::Result<()> {
             adaptive: Some(1e-3),
             pull: Pull::Auto,
             relax_at: Some(0.01),
-            stop_when_relaxed: true,
+            stop_when_relaxed: Some(true),
             ..Spec::default()
         };
         let mut members = Vec::new();

@@ -252,7 +252,7 @@ mod tests {
 
     /// A bench over [`Fives`] whose members end after 12 steps, with its counters of steps and loads.
     fn fives(stride: u32) -> (Bench, Rc<Cell<u64>>, Rc<Cell<u32>>) {
-        let spec = spec(32, Spec { t_end: 0.012, curves: 2, ..Spec::default() }).unwrap();
+        let spec = spec(32, Spec { t_end: Some(0.012.into()), curves: 2, ..Spec::default() }).unwrap();
         let member = Family::new(&spec).unwrap().member(0).unwrap();
         let run = Trajectory::new(member, &spec, Precision::F64, &Outputs::default()).launch();
         let (steps, loads) = (Rc::default(), Rc::default());

@@ -273,7 +273,7 @@ fn sample(
 /// Bytes of the rows of a member that reaches the final time, the maximum over all cells.
 fn all_rows(cohort: &[Cell]) -> f64 {
     let of_cell = |Cell { spec, family, .. }: &Cell| {
-        let series = spec.series.map_or(0.0, |every| spec.t_end / every + 1.0);
+        let series = spec.series.map_or(0.0, |every| spec.final_time() / every + 1.0);
         rows::bytes_of(series as usize, spec.snapshots.len(), family.points()) as f64
     };
     cohort.iter().map(of_cell).fold(0.0, f64::max)
@@ -294,7 +294,9 @@ fn extrapolated(pilots: &[Seen], all: u64, cost: impl Fn(&Seen) -> f64) -> Optio
 /// Steps of a member, if these do not depend on its curve.
 fn certain_steps(cohort: &[Cell]) -> Option<f64> {
     let of_cell = |Cell { spec, .. }: &Cell| match spec.pace() {
-        Pace::Fixed(Tau::Step(tau)) if !spec.stop_when_relaxed => Some(f64::from(Clock::new(tau, spec.t_end).steps)),
+        Pace::Fixed(Tau::Step(tau)) if !spec.stops_when_relaxed() => {
+            Some(f64::from(Clock::new(tau, spec.final_time()).steps))
+        }
         _ => None,
     };
     let steps = cohort.iter().map(of_cell).sum::<Option<f64>>()?;
@@ -420,16 +422,16 @@ mod tests {
 
     #[test]
     fn steps_of_fixed_length_are_certain_unless_members_stop() {
-        let fixed = Spec { tau: Some(0.01.into()), t_end: 0.055, ..Spec::default() };
+        let fixed = Spec { tau: Some(0.01.into()), t_end: Some(0.055.into()), ..Spec::default() };
         assert_eq!(certain_steps(study(fixed.clone()).cells()), Some(6.0));
-        assert_eq!(certain_steps(study(Spec { stop_when_relaxed: true, ..fixed }).cells()), None);
+        assert_eq!(certain_steps(study(Spec { stop_when_relaxed: Some(true), ..fixed }).cells()), None);
         assert_eq!(certain_steps(study(Spec { adaptive: Some(1e-3), ..Spec::default() }).cells()), None);
     }
 
     #[test]
     fn ten_million_members_are_estimated_without_room_for_them() {
         let before = peak_resident();
-        let spec = Spec { curves: 10_000_000, adaptive: Some(1e-3), stop_when_relaxed: true, ..Spec::default() };
+        let spec = Spec { curves: 10_000_000, adaptive: Some(1e-3), stop_when_relaxed: Some(true), ..Spec::default() };
         let mut study = study(Spec { backend: BackendChoice::Cpu, points: 32, ..spec });
         let choices = choose_all(&study).unwrap();
         settle(&mut study, &choices);

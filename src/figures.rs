@@ -134,7 +134,7 @@ impl Figure {
             amplitude: 0.0,
             flow: self.flow.parse().map_err(wrong)?,
             tau: Some(self.tau.into()),
-            t_end: self.times.iter().copied().fold(0.0, f64::max),
+            t_end: Some(self.times.iter().copied().fold(0.0, f64::max).into()),
             omega: Some(OMEGA.into()),
             no_redistribution: !self.redistribution,
             solver: Solver::Direct.into(),

@@ -17,7 +17,7 @@ use crate::{
 /// ```
 /// use curvelax::{ensemble::{Spec, Study}, relax};
 ///
-/// let study = Study::new(Spec { curves: 3, t_end: 0.05, ..Spec::default() })?;
+/// let study = Study::new(Spec { curves: 3, t_end: Some(0.05.into()), ..Spec::default() })?;
 /// let mut members = Vec::new();
 /// relax(&study, &mut members)?;
 /// assert!(members.iter().all(|member| member.outcome.end.length < member.outcome.start.length));

@@ -68,8 +68,8 @@ pub fn resume(
         let of_cell = |Cell { spec, .. }: &Cell| {
             // The pictures show the start and the end anyway.
             let inside = if framed { member::TIMES } else { 0 };
-            let frames: Vec<f64> = grid(spec.t_end).skip(1).take(inside).collect();
-            Outputs::new(spec.t_end, spec.series, &spec.snapshots, &frames)
+            let frames: Vec<f64> = grid(spec.final_time()).skip(1).take(inside).collect();
+            Outputs::new(spec.final_time(), spec.series, &spec.snapshots, &frames)
         };
         cells.iter().map(of_cell).collect()
     };

@@ -117,6 +117,7 @@ fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
         add("relaxed members stop, at the step and in the place the CPU finds".into(), relaxation::<T>, 64);
         add("the largest n that fits the adapter runs".into(), largest::<T>, 0);
         add("the program writes the same tables on both back ends".into(), programs_agree::<T>, 61);
+        add("a curve of any size relaxes at the same time on both back ends".into(), sizes_agree::<T>, 64);
         add("the program refuses a ring that the adapter cannot hold".into(), program_refuses::<T>, 0);
         add("the paper's ellipse at t = 2 is that of the CPU in f64".into(), paper::<T>, 100);
     }
@@ -314,10 +315,10 @@ fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let spec = Spec {
         curves: 13,
         points: n,
-        t_end: 0.1,
+        t_end: Some(0.1.into()),
         tau: Some(1e-3.into()),
         relax_to: Some(0.5),
-        stop_when_relaxed: true,
+        stop_when_relaxed: Some(true),
         series: Some(0.03),
         snapshots: vec![0.0505],
         solver: solver.into(),
@@ -527,6 +528,41 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
 /// The program from outside: equal statuses, and numbers within the accuracy of the solves.
 fn programs_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
     tables_agree::<T>(solver, n, &["--tau", "0.003", "--relax-to", "0.3"]).map(drop)
+}
+
+/// Times to relax of a tiny and a huge curve, with times and rates by their size.
+fn sizes_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
+    let bound = if T::PRECISION == Precision::F32 { 2e-3 } else { 1e-6 };
+    let paces = [&["--tau", "auto"][..], &["--adaptive", "--pull", "auto"]];
+    // Longer steps would need too many sweeps.
+    for pace in &paces[..if solver.facts().slows_with_step { 1 } else { 2 }] {
+        let [gpu, cpu] = ["gpu", "cpu"].map(|backend| times_of_sizes::<T>(backend, solver, n, pace));
+        for (on_gpu, on_cpu) in gpu?.into_iter().zip(cpu?) {
+            let (a, b): (f64, f64) = (on_gpu.parse()?, on_cpu.parse()?);
+            let gap = (a / b - 1.0).abs();
+            if gap.is_nan() || gap > bound {
+                return Err(format!("{pace:?}: t_relax {a:e} on the GPU, {b:e} on the CPU").into());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// t_relax of ellipses of three sizes, 40 orders of magnitude apart in time.
+fn times_of_sizes<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Result<Vec<String>, Failed> {
+    let folder = tempfile::tempdir()?;
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
+    command.current_dir(&folder).env("XDG_RUNTIME_DIR", folder.path());
+    command.args(["run", "--curves", "2", "--sweep", "shape=ellipse:2e-6,1e-6;ellipse:2,1;ellipse:2e4,1e4"]);
+    command.args(pace).args(["--t-end", "auto", "--relax-to", "0.3", "--backend", backend, "--solver", solver.name()]);
+    let output = command.args(["--precision", T::NAME, "--points", &n.to_string(), "--out", "out"]).output()?;
+    if !output.status.success() {
+        return Err(String::from_utf8(output.stderr)?.into());
+    }
+    let mut reader = csv::Reader::from_path(folder.path().join("out/summary.csv"))?;
+    let column = reader.headers()?.iter().position(|name| name == "t_relax").ok_or("no t_relax")?;
+    let times: Vec<String> = reader.records().map(|row| Ok(row?[column].to_owned())).collect::<Result<_, Failed>>()?;
+    if times.len() == 6 { Ok(times) } else { Err(format!("{times:?}").into()) }
 }
 
 /// Two unit discs joined by a thin bar, whose long sides eventually cross.

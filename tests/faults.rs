@@ -440,7 +440,7 @@ fn a_cap_of_one_sweep(gpu: &Gpu) -> Outcome {
         adaptive: Some(0.005),
         solver: Solver::GaussSeidel.into(),
         max_sweeps: 1,
-        t_end: 1e-9,
+        t_end: Some(1e-9.into()),
         ..Spec::default()
     };
     let spec = spec.validate()?;
@@ -457,7 +457,8 @@ fn a_cap_of_one_sweep(gpu: &Gpu) -> Outcome {
 
 fn lost_before(gpu: &Gpu) -> Outcome {
     let adapter = Some(gpu.name().to_string());
-    let spec = Spec { backend: BackendChoice::Gpu, adapter, curves: 3, t_end: 0.01, ..Spec::default() }.validate()?;
+    let spec = Spec { backend: BackendChoice::Gpu, adapter, curves: 3, t_end: Some(0.01.into()), ..Spec::default() }
+        .validate()?;
     let choice = || -> Result<placement::Choice, Failed> {
         let choice = placement::choose(&spec, spec.points)?;
         let gpu = choice.device().gpu().ok_or("no GPU")?;
@@ -619,9 +620,9 @@ fn any_call_fails() -> Outcome {
         curves: 41,
         points: 32,
         tau: Some(1e-2.into()),
-        t_end: 0.2,
+        t_end: Some(0.2.into()),
         relax_to: Some(0.5),
-        stop_when_relaxed: true,
+        stop_when_relaxed: Some(true),
         series: Some(0.05),
         solver: Solver::Direct.into(),
         ..Spec::default()

@@ -163,7 +163,7 @@ fn ended(figure: &Figure, solver: Solver) -> Ended {
     let times = &figure.times[..figure.times.len() - 1];
     let spec = Spec {
         solver: solver.into(),
-        t_end: times[times.len() - 1],
+        t_end: Some(times[times.len() - 1].into()),
         snapshots: times.into(),
         ..figure.spec().unwrap()
     };

@@ -154,7 +154,7 @@ fn every_number_in_the_files_is_the_one_that_was_computed() {
     let spec = Spec {
         curves: 7,
         points: 37,
-        t_end: 0.15,
+        t_end: Some(0.15.into()),
         relax_to: Some(0.6),
         series: Some(0.01),
         snapshots: vec![0.0, 0.0123],

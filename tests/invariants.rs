@@ -76,7 +76,7 @@ fn method(precision: Precision, solver: Solver) -> Spec {
         amplitude: 0.0,
         flow: Flow::Elastic(0.4),
         tau: Some(1e-4.into()),
-        t_end: 1e-2,
+        t_end: Some(1e-2.into()),
         backend: BackendChoice::Cpu,
         precision: Some(precision),
         solver: solver.into(),
@@ -147,7 +147,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
         for (c, bound) in [(2.0_f64, 0.0), (0.25, 0.0), (3.0, rounding)] {
             let scaled = Spec {
                 tau: times(&spec, c.powi(4)),
-                t_end: spec.t_end * c.powi(4),
+                t_end: Some((spec.final_time() * c.powi(4)).into()),
                 omega: Some(Omega::Rate(1.0 / c.powi(4))),
                 flow: Flow::Elastic(0.4 / (c * c)),
                 ..spec.clone()
@@ -161,8 +161,10 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
             }
         }
         // The negative control: times scaled by c³ give a different curve.
-        let (_, wrong) =
-            relaxed(&Spec { tau: times(&spec, 8.0), t_end: spec.t_end * 8.0, ..spec.clone() }, |u| 2.0 * potato(u));
+        let (_, wrong) = relaxed(
+            &Spec { tau: times(&spec, 8.0), t_end: Some((spec.final_time() * 8.0).into()), ..spec.clone() },
+            |u| 2.0 * potato(u),
+        );
         assert!(distance(&plain, &wrong.iter().map(|node| *node / 2.0).collect::<Vec<_>>()) > 1e-3);
     }
 }
@@ -173,12 +175,20 @@ fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
     for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-4)] {
         let fixed = method(precision, Solver::Direct);
         let (omega, pull) = (Some(Omega::Auto), Pull::Auto);
-        let spec = Spec { tau: None, adaptive: Some(1e-3), omega, pull, t_end: 0.1, relax_to: Some(0.5), ..fixed };
+        let spec = Spec {
+            tau: None,
+            adaptive: Some(1e-3),
+            omega,
+            pull,
+            t_end: Some(0.1.into()),
+            relax_to: Some(0.5),
+            ..fixed
+        };
         let (outcome, plain) = relaxed(&spec, potato);
         assert!(outcome.steps > 20 && outcome.t_relax.is_some());
         for c in [2.0_f64, 0.25, 3.0] {
             let flow = Flow::Elastic(0.4 / (c * c));
-            let t_end = spec.t_end * c.powi(4);
+            let t_end = Some((spec.final_time() * c.powi(4)).into());
             let (large, nodes) = relaxed(&Spec { t_end, flow, ..spec.clone() }, move |u| c * potato(u));
             let expected: Vec<DVec2> = plain.iter().map(|node| *node * c).collect();
             let rounding = if c == 3.0 { bound * c } else { 0.0 };
@@ -191,11 +201,12 @@ fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
         let fixed = Spec { omega: Some(Omega::Rate(1.0)), ..spec.clone() };
         let (_, slow) = relaxed(&fixed, potato);
         let flow = Flow::Elastic(0.1);
-        let (_, large) = relaxed(&Spec { t_end: 16.0 * spec.t_end, flow, ..fixed }, |u| 2.0 * potato(u));
+        let (_, large) =
+            relaxed(&Spec { t_end: Some((16.0 * spec.final_time()).into()), flow, ..fixed }, |u| 2.0 * potato(u));
         assert!(distance(&slow, &large.iter().map(|node| *node / 2.0).collect::<Vec<_>>()) > 1e-6);
         let rate = Pull::Rate(40.0);
         let (_, pulled) = relaxed(&Spec { pull: rate, ..spec.clone() }, potato);
-        let (t_end, flow) = (16.0 * spec.t_end, Flow::Elastic(0.1));
+        let (t_end, flow) = (Some((16.0 * spec.final_time()).into()), Flow::Elastic(0.1));
         let (_, large) = relaxed(&Spec { t_end, flow, pull: rate, ..spec.clone() }, |u| 2.0 * potato(u));
         assert!(distance(&pulled, &large.iter().map(|node| *node / 2.0).collect::<Vec<_>>()) > 1e-6);
 
@@ -240,17 +251,19 @@ fn the_work_of_a_run_is_what_it_was() {
         flow,
         sor: Sor::Factor(sor),
         tau: Some(1e-3.into()),
-        t_end: 0.1,
+        t_end: Some(0.1.into()),
         ..method(Precision::F64, Solver::GaussSeidel)
     };
     let direct = Spec { solver: Solver::Direct.into(), ..spec(Flow::Willmore, 61, 1.0) };
     let adaptive =
         Spec { tau: None, adaptive: Some(1e-3), solver: SolverChoice::Auto, ..spec(Flow::Willmore, 61, 1.0) };
+    let adaptive = Spec { omega: Some(Omega::Rate(1.0)), ..adaptive };
     let swept = Spec { solver: Solver::GaussSeidel.into(), ..adaptive.clone() };
     let automatic = Spec { sor: Sor::Auto, ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
     let cycles = Spec { solver: Solver::Multigrid.into(), ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
     let adaptive_cycles = Spec { solver: Solver::Multigrid.into(), ..adaptive.clone() };
-    let stops = Spec { stop_when_relaxed: true, t_end: 2.0, ..spec(Flow::SurfaceDiffusion, 50, 1.7) };
+    let stops =
+        Spec { stop_when_relaxed: Some(true), t_end: Some(2.0.into()), ..spec(Flow::SurfaceDiffusion, 50, 1.7) };
     for (name, spec, expected) in [
         ("surface diffusion", spec(Flow::SurfaceDiffusion, 100, 1.0), [100, 281616, 259784]),
         ("Willmore flow, over-relaxed", spec(Flow::Willmore, 61, 1.7), [100, 11672, 10592]),

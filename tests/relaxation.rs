@@ -74,7 +74,7 @@ fn one(spec: &Spec) -> Outcome {
 /// Runs a member to its end by hand, so that its last state can be inspected, even where the program refuses its n.
 fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let n = member.nodes.len();
-    let outputs = Outputs::new(spec.t_end, spec.series, &spec.snapshots, &[]);
+    let outputs = Outputs::new(spec.final_time(), spec.series, &spec.snapshots, &[]);
     let mut trajectory = Trajectory::new(member, spec, T::PRECISION, &outputs);
     let mut run = trajectory.launch().convert::<T>();
     let mut work = evolve::Team::new(Blocks::new(n).unwrap());
@@ -111,7 +111,7 @@ fn relax_polygon(index: u64, spec: &Spec) -> Relaxed {
     let (family, corners) = polygons::random(index);
     let corners = of_area_pi(corners);
     let radius = polygon::length(&corners) / TAU;
-    let spec = Spec { t_end: 10.0 * radius.powi(4), ..spec.clone() }.validate().unwrap();
+    let spec = Spec { t_end: Some((10.0 * radius.powi(4)).into()), ..spec.clone() }.validate().unwrap();
     let member = Family::of(&spec, file(&corners)).unwrap().member(0).unwrap();
     let start = Instant::now();
     let (ended, state) = follow::<f64>(&spec, member);
@@ -153,7 +153,8 @@ fn near(found: Option<f64>, exact: f64, bound: f64) -> bool {
 #[test]
 fn a_member_that_relaxed_stays_relaxed_whatever_happens_to_it_at_rest() {
     let omega = |rate| Some(Omega::Rate(rate));
-    let spec = |omega, t_end| Spec { pull: Pull::Auto, omega, t_end, ..adaptive("ellipse:2,1", 100) };
+    let spec =
+        |omega, t_end: f64| Spec { pull: Pull::Auto, omega, t_end: Some(t_end.into()), ..adaptive("ellipse:2,1", 100) };
     let long = one(&spec(omega(1e-4), 20_000.0));
     assert_eq!(long.status, Status::Relaxed);
     assert!(long.t_end < 20_000.0, "it lost its mesh: {}", long.t_end);
@@ -193,7 +194,7 @@ fn an_ellipse_relaxes_when_it_should_in_fifteen_steps_and_not_with_a_coarse_fixe
 #[test]
 fn a_nonconvex_curve_relaxes_when_it_should_with_the_pull_and_not_without() {
     for (n, bound) in [(100, 0.02), (200, 0.01)] {
-        let spec = Spec { pull: Pull::Auto, t_end: 0.17, ..adaptive("nonconvex", n) };
+        let spec = Spec { pull: Pull::Auto, t_end: Some(0.17.into()), ..adaptive("nonconvex", n) };
         let (pulled, plain) = (one(&spec), one(&Spec { pull: Pull::Rate(0.0), ..spec }));
         println!("n = {n}: {:?} in {} steps, without the pull {:?}", pulled.t_relax, pulled.steps, plain.t_relax);
         assert!(near(pulled.t_relax, 0.0855, bound) && pulled.steps <= 50, "{pulled:?}");
@@ -221,7 +222,7 @@ fn islands_relax_at_every_n_when_an_independent_program_says_and_not_without_the
                     relax_at: Some(0.01),
                     ..adaptive(&format!("file:examples/islands/{island}.csv"), n)
                 };
-                let outcome = one(&Spec { t_end: 0.5, stop_when_relaxed: true, ..spec });
+                let outcome = one(&Spec { t_end: Some(0.5.into()), stop_when_relaxed: Some(true), ..spec });
                 assert_eq!(outcome.status, Status::Relaxed, "{island}, n = {n}: {outcome:?}");
                 outcome.t_relax.unwrap()
             };
@@ -242,7 +243,7 @@ fn islands_relax_at_every_n_when_an_independent_program_says_and_not_without_the
 fn rows_at_given_times_do_not_depend_on_where_steps_fell_and_change_no_step() {
     // Largest difference from a tight tolerance, of the length and of the excess over its start.
     for (shape, t_end, bounds) in [("ellipse:2,1", 2.0, [5e-5, 6e-4]), ("nonconvex", 0.17, [8e-5, 1e-4])] {
-        let spec = Spec { pull: Pull::Auto, t_end, ..adaptive(shape, 100) };
+        let spec = Spec { pull: Pull::Auto, t_end: Some(t_end.into()), ..adaptive(shape, 100) };
         let snapshots = vec![0.3 * t_end, 0.77 * t_end];
         let rows = Spec { series: Some(t_end / 97.0), snapshots, ..spec.clone() };
         let (loose, tight) = (run(&rows).remove(0), run(&Spec { adaptive: Some(1e-5), ..rows }).remove(0));
@@ -261,7 +262,7 @@ fn rows_at_given_times_do_not_depend_on_where_steps_fell_and_change_no_step() {
         assert!(!within(off.map(|gap| 0.5 * gap), 1.0), "the control passes");
         // A run that ends at the time of a row, with a step that ends there.
         for j in [5, 20, 45, 60, 80, 90] {
-            let there = one(&Spec { t_end: loose.rows.series[j].t, ..spec.clone() });
+            let there = one(&Spec { t_end: Some(loose.rows.series[j].t.into()), ..spec.clone() });
             let gap = gap(&loose.rows.series[j].at, &there.end);
             println!("{shape}, t = {:.4}: interpolated to {gap:.1?}", loose.rows.series[j].t);
             assert!(within(gap, 0.25), "{shape}, row {j}: {gap:?}");
@@ -312,7 +313,7 @@ fn a_step_below_a_tick_moves_the_clock_by_one() {
 /// A step is at most about 1/ω long, since lengths approach their mean explicitly.
 #[test]
 fn a_circle_stays_at_rest_through_a_long_run_in_either_precision() {
-    let spec = Spec { pull: Pull::Auto, t_end: 1e4, ..adaptive("ellipse:2,1", 100) };
+    let spec = Spec { pull: Pull::Auto, t_end: Some(1e4.into()), ..adaptive("ellipse:2,1", 100) };
     for precision in [Precision::F64, Precision::F32] {
         let outcome = one(&Spec { precision: Some(precision), ..spec.clone() });
         let Outcome { status, steps, end, start, .. } = &outcome;
@@ -338,7 +339,8 @@ fn a_lemniscate_is_singular_when_its_life_is_over_with_both_solvers() {
         let shape = format!("lemniscate:{size}");
         let max_sweeps = if solver == sweeps { 20_000 } else { Spec::default().max_sweeps };
         let precision = Some(precision);
-        let outcome = one(&Spec { solver, precision, t_end: 1.2 * life, max_sweeps, ..adaptive(&shape, 66) });
+        let outcome =
+            one(&Spec { solver, precision, t_end: Some((1.2 * life).into()), max_sweeps, ..adaptive(&shape, 66) });
         println!("{solver:?}, {precision:?}: {} after {:.4} of its life", outcome.status.name(), outcome.t_end / life);
         assert_eq!((outcome.status, outcome.t_relax), (Status::Singular, None));
         assert!(near(Some(outcome.t_end), life, 0.01) && !near(Some(outcome.t_end), 1.2 * life, 0.01));
@@ -348,8 +350,12 @@ fn a_lemniscate_is_singular_when_its_life_is_over_with_both_solvers() {
 
 #[test]
 fn a_curve_whose_curvature_has_left_it_is_never_relaxed() {
-    let spec =
-        Spec { adaptive: None, sampling: Sampling::Parameter, stop_when_relaxed: true, ..adaptive("nonconvex", 100) };
+    let spec = Spec {
+        adaptive: None,
+        sampling: Sampling::Parameter,
+        stop_when_relaxed: Some(true),
+        ..adaptive("nonconvex", 100)
+    };
     let spec = Spec { amplitude: 0.05, curves: 48, ..spec };
     let family = Family::new(&spec.clone().validate().unwrap()).unwrap();
     // Two at a step that is short enough, all at steps that are too long.
@@ -357,7 +363,7 @@ fn a_curve_whose_curvature_has_left_it_is_never_relaxed() {
     let members: Vec<(i32, u64)> = [(3, 0), (3, 1)].into_iter().chain(coarse).collect();
     let relaxed = |&(j, member): &(i32, u64)| {
         let tau = 1e-6 * 1000_f64.powf(f64::from(j) / 30.0);
-        let spec = Spec { tau: Some(tau.into()), t_end: 1e5 * tau, ..spec.clone() }.validate().unwrap();
+        let spec = Spec { tau: Some(tau.into()), t_end: Some((1e5 * tau).into()), ..spec.clone() }.validate().unwrap();
         let (ended, state) = follow::<f64>(&spec, family.member(member).unwrap());
         let (outcome, gap) = (ended.outcome, observe::gap(&state.curve));
         let line = format!("tau = {tau:.2e}, member {member}: {outcome:?}, gap {gap:.2}");
@@ -394,7 +400,7 @@ fn a_crossing_is_seen_when_dense_snapshots_see_it_and_nowhere_else() {
     for (j, corners) in bells.iter().chain(&random).enumerate() {
         for (tolerance, n) in [(1e-3, 128), (1e-4, 128), (1e-3, 200)] {
             let spec = Spec { pull: Pull::Auto, adaptive: Some(tolerance), ..adaptive("circle:1", n) };
-            let spec = Spec { t_end: 20.0, stop_when_relaxed: true, ..spec };
+            let spec = Spec { t_end: Some(20.0.into()), stop_when_relaxed: Some(true), ..spec };
             let outcome = run_of(&spec, file(corners)).remove(0).outcome;
             let until = outcome.self_crossing.unwrap_or(outcome.t_end);
             let snapshots: Vec<f64> = (1..=400).map(|i| until * f64::from(i) / 400.0).collect();
@@ -440,7 +446,7 @@ fn for_polygons(omega: f64) -> Spec {
         pull: Pull::Auto,
         omega: Some(Omega::Rate(omega)),
         relax_at: Some(0.01),
-        stop_when_relaxed: true,
+        stop_when_relaxed: Some(true),
         ..adaptive("circle:1", 128)
     }
 }
@@ -491,8 +497,8 @@ fn single_precision_against_double() {
                 let spec = Spec {
                     flow: flow.clone(),
                     tau: pace.map(Tau::Step),
-                    stop_when_relaxed: true,
-                    t_end: 20.0,
+                    stop_when_relaxed: Some(true),
+                    t_end: Some(20.0.into()),
                     ..adaptive("ellipse:2,1", n)
                 };
                 let pull = if pace.is_none() { Pull::Auto } else { Pull::Rate(0.0) };

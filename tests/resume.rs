@@ -15,7 +15,7 @@ use curvelax::{
     },
     ensemble::{
         Cell, Ended, Family, Paused, Sink, Spec, Standing, Wish,
-        spec::{Precision, Pull, Solver},
+        spec::{FinalTime, Precision, Pull, Solver, Tau},
     },
     scheme::step::Method,
     simulate::resume,
@@ -137,20 +137,34 @@ fn compare(name: &str, spec: &Spec, precision: Precision, open: Open, patience: 
 fn specs() -> Vec<(&'static str, Spec)> {
     let outputs = |more: Spec| Spec { curves: 13, series: Some(0.013), snapshots: vec![0.0, 0.02], points: 33, ..more };
     let fixed = |solver: Solver| {
-        outputs(Spec { tau: Some(1e-3.into()), t_end: 0.15, solver: solver.into(), ..Spec::default() })
+        outputs(Spec { tau: Some(1e-3.into()), t_end: Some(0.15.into()), solver: solver.into(), ..Spec::default() })
     };
     let adaptive = |solver: Solver| {
         let shape = "nonconvex".parse().expect("a shape");
-        outputs(Spec { adaptive: Some(1e-3), tau: None, t_end: 0.4, shape, solver: solver.into(), ..Spec::default() })
+        outputs(Spec {
+            adaptive: Some(1e-3),
+            tau: None,
+            t_end: Some(0.4.into()),
+            shape,
+            solver: solver.into(),
+            ..Spec::default()
+        })
     };
     let mut specs = Vec::new();
     for solver in Solver::ALL {
         specs.push(("fixed steps", fixed(solver)));
         specs.push(("adaptive steps", adaptive(solver)));
     }
+    let by_size = Spec { tau: Some(Tau::Auto), t_end: Some(FinalTime::Auto), ..fixed(Solver::Direct) };
+    specs.push(("times by the size of the curves", by_size));
     // With a long dumbbell.
-    specs.push((CROSSING, Spec { t_end: 1.5, points: 128, pull: Pull::Auto, ..adaptive(Solver::Direct) }));
-    let short = Spec { t_end: 0.0502, stop_when_relaxed: true, relax_to: Some(0.7), ..fixed(Solver::Direct) };
+    specs.push((CROSSING, Spec { t_end: Some(1.5.into()), points: 128, pull: Pull::Auto, ..adaptive(Solver::Direct) }));
+    let short = Spec {
+        t_end: Some(0.0502.into()),
+        stop_when_relaxed: Some(true),
+        relax_to: Some(0.7),
+        ..fixed(Solver::Direct)
+    };
     specs.push(("members that end early and steps that end short", short));
     specs.into_iter().map(|(name, spec)| (name, spec.validate().expect("a right spec"))).collect()
 }

@@ -118,7 +118,7 @@ fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 fn same_in_pieces(spec: Spec, table: &str) {
-    let spec = Spec { curves: 11, adaptive: Some(0.1), t_end: 1.0, backend: BackendChoice::Cpu, ..spec };
+    let spec = Spec { curves: 11, adaptive: Some(0.1), t_end: Some(1.0.into()), backend: BackendChoice::Cpu, ..spec };
     let home = tempfile::tempdir().unwrap();
     let [whole, pieces] = ["whole", "pieces"].map(|name| home.path().join(name));
     let (_, straight) = run(&spec, &whole, u32::MAX / 2).unwrap();

@@ -106,9 +106,14 @@ fn same_bits<T: Vectorised>(name: &str, specs: &[Spec]) {
 fn fixed_steps_give_the_same_bits_in_every_vector() {
     for solver in Solver::ALL {
         for n in [32, 37] {
-            let fixed =
-                Spec { tau: Some(1e-3.into()), t_end: 0.3, points: n, solver: solver.into(), ..Spec::default() };
-            let specs = [spec("ellipse:2,1", Spec { stop_when_relaxed: true, relax_to: Some(0.5), ..fixed })];
+            let fixed = Spec {
+                tau: Some(1e-3.into()),
+                t_end: Some(0.3.into()),
+                points: n,
+                solver: solver.into(),
+                ..Spec::default()
+            };
+            let specs = [spec("ellipse:2,1", Spec { stop_when_relaxed: Some(true), relax_to: Some(0.5), ..fixed })];
             same_bits::<f64>(&format!("{solver:?}, n = {n}"), &specs);
             same_bits::<f32>(&format!("{solver:?}, n = {n}"), &specs);
         }
@@ -118,8 +123,14 @@ fn fixed_steps_give_the_same_bits_in_every_vector() {
 #[test]
 fn adaptive_steps_give_the_same_bits_in_every_vector() {
     for solver in Solver::ALL {
-        let adaptive = Spec { adaptive: Some(1e-2), t_end: 0.4, points: 33, solver: solver.into(), ..Spec::default() };
-        let specs = [spec("flower:3:0.3", Spec { stop_when_relaxed: true, ..adaptive })];
+        let adaptive = Spec {
+            adaptive: Some(1e-2),
+            t_end: Some(0.4.into()),
+            points: 33,
+            solver: solver.into(),
+            ..Spec::default()
+        };
+        let specs = [spec("flower:3:0.3", Spec { stop_when_relaxed: Some(true), ..adaptive })];
         same_bits::<f64>(&format!("{solver:?}, adaptive"), &specs);
         same_bits::<f32>(&format!("{solver:?}, adaptive"), &specs);
     }
@@ -131,7 +142,8 @@ fn members_that_take_other_branches_are_not_disturbed() {
         // Every branch alone, and all mixtures.
         let specs = [(Some(1e-3.into()), None), (None, Some(1e-2))].map(|(tau, adaptive)| {
             let (solver, amplitude) = (solver.into(), 0.1);
-            let mut mixed = Spec { tau, adaptive, t_end: 0.03, points: 32, solver, amplitude, ..Spec::default() };
+            let mut mixed =
+                Spec { tau, adaptive, t_end: Some(0.03.into()), points: 32, solver, amplitude, ..Spec::default() };
             let axes = ["no-redistribution=true,false", "pull=0,3", "flow=surface-diffusion;willmore;poly:0.2"];
             axes.into_iter().for_each(|axis| mixed.sweep.set(axis.parse().unwrap()));
             Spec { curves: 3, ..spec("ellipse:2,1", mixed) }
@@ -143,7 +155,8 @@ fn members_that_take_other_branches_are_not_disturbed() {
 
 #[test]
 fn members_that_fail_leave_the_lanes_to_others() {
-    let base = Spec { t_end: 0.5, points: 40, solver: Solver::Direct.into(), amplitude: 0.3, ..Spec::default() };
+    let base =
+        Spec { t_end: Some(0.5.into()), points: 40, solver: Solver::Direct.into(), amplitude: 0.3, ..Spec::default() };
     let fixed = [spec("lemniscate:1", Spec { tau: Some(1e-3.into()), ..base.clone() })];
     let adaptive = [spec("lemniscate:1", Spec { adaptive: Some(1e-3), ..base })];
     for specs in [&fixed, &adaptive] {

@@ -12,7 +12,7 @@ use crate::{
     curve::{Modes, Sampling, Shape},
     ensemble::{
         Shard, Spec,
-        spec::{BackendChoice, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau},
+        spec::{BackendChoice, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau},
         sweep::SweepAxis,
     },
     error::{Error, Result},
@@ -110,11 +110,12 @@ pub struct SpecFlags {
         default_missing_value = "0.001", help_heading = EVOLUTION
     )]
     adaptive: Option<f64>,
-    /// Final time [default: 2]
-    #[arg(long, value_name = "T", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
-    t_end: Option<f64>,
+    /// Final time. auto ends a member when it is relaxed, or at six times what theory expects of its cell's curve.
+    /// T1,T2,... is a time for each cell of a sweep [default: 2]
+    #[arg(long, value_name = "T", value_parser = text_of::<FinalTime>, allow_hyphen_values = true, help_heading = EVOLUTION)]
+    t_end: Option<FinalTime>,
     /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member
-    /// [default: 1 with --tau, auto with --adaptive]
+    /// [default: 1 with --tau, auto with --adaptive and --tau auto]
     #[arg(
         long, value_name = "OMEGA", value_parser = text_of::<Omega>, allow_hyphen_values = true,
         help_heading = EVOLUTION
@@ -138,7 +139,7 @@ pub struct SpecFlags {
         long, value_name = "EXCESS", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION
     )]
     relax_at: Option<f64>,
-    /// End a member as soon as it is relaxed [default: false]
+    /// End a member as soon as it is relaxed [default: false, true with --t-end auto]
     #[arg(
         long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
         hide_possible_values = true, help_heading = EVOLUTION
@@ -249,9 +250,9 @@ impl SpecFlags {
             }};
         }
         replace! {
-            curves points seed shape sampling amplitude modes decay flow t_end no_redistribution pull solver
-            order sor max_sweeps backend stop_when_relaxed snapshots store common_random_numbers;
-            tau adaptive omega relax_to relax_at only shard tolerance adapter precision series threads
+            curves points seed shape sampling amplitude modes decay flow no_redistribution pull solver
+            order sor max_sweeps backend snapshots store common_random_numbers;
+            tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
         }
     }
 }
@@ -362,7 +363,8 @@ mod tests {
 
     #[test]
     fn the_help_states_the_defaults_of_the_spec() {
-        let defaults: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
+        let filled = Spec::default().validate().unwrap();
+        let defaults: toml::Table = toml::from_str(&filled.to_toml().unwrap()).unwrap();
         for argument in command().get_arguments() {
             let help = argument.get_help().unwrap().to_string();
             let stated = help.rsplit_once("[default: ").expect("a default").1.trim_end_matches(']');
@@ -373,6 +375,7 @@ mod tests {
                 toml::Value::Array(list) if list.is_empty() => "off".into(),
                 other => other.to_string(),
             };
+            let stated = stated.split_once(" with --").map_or(stated, |(stated, _)| stated);
             assert_eq!(stated, expected, "{argument}");
         }
     }
@@ -447,10 +450,10 @@ mod tests {
 
     #[test]
     fn a_switch_can_undo_the_file() {
-        let mut spec = Spec { stop_when_relaxed: true, ..Spec::default() };
+        let mut spec = Spec { stop_when_relaxed: Some(true), ..Spec::default() };
         let matches = command().no_binary_name(true).try_get_matches_from(["--stop-when-relaxed=false"]).unwrap();
         SpecFlags::from_arg_matches(&matches).unwrap().overlay(&mut spec);
-        assert!(!spec.stop_when_relaxed);
+        assert_eq!(spec.stop_when_relaxed, Some(false));
     }
 
     #[test]

@@ -67,6 +67,7 @@ pub fn run(args: RunArgs) -> Result<()> {
         return print(&work.study.spec().to_toml()?);
     }
     let flags = args.manner;
+    work.study.note().into_iter().for_each(|note| flags.say(&format!("note: {note}")));
     if args.dry_run {
         work.study.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
         let estimate = Estimate::new(&mut work.study, work.choices)?;

@@ -14,7 +14,10 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{BaseCurve, MAX_MODE, Outline};
-use crate::error::{Error, did_you_mean};
+use crate::{
+    error::{Error, did_you_mean},
+    text::number,
+};
 
 /// The curve from which an ensemble is made, before perturbation, named as on the command line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -190,11 +193,11 @@ fn check_flower(modes: &[FlowerMode]) -> Result<(), String> {
 impl fmt::Display for Shape {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Shape::Ellipse { a, b } => write!(f, "ellipse:{a},{b}"),
-            Shape::Circle { radius } => write!(f, "circle:{radius}"),
+            Shape::Ellipse { a, b } => write!(f, "ellipse:{},{}", number(*a), number(*b)),
+            Shape::Circle { radius } => write!(f, "circle:{}", number(*radius)),
             Shape::Nonconvex => write!(f, "nonconvex"),
             Shape::Astroid => write!(f, "astroid"),
-            Shape::Lemniscate { half_width } => write!(f, "lemniscate:{half_width}"),
+            Shape::Lemniscate { half_width } => write!(f, "lemniscate:{}", number(*half_width)),
             Shape::Flower(modes) => {
                 let terms: Vec<String> = modes.iter().map(FlowerMode::to_string).collect();
                 write!(f, "flower:{}", terms.join(","))

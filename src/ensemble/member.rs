@@ -9,12 +9,7 @@ use std::{f64::consts::TAU, sync::Arc};
 
 use glam::DVec2;
 
-use super::{
-    Mollified, Spec,
-    mollifier::mollify,
-    spec::{DEFAULT_OMEGA, DEFAULT_TAU, Omega, Pace, Pull, Tau},
-    validate::{MAX_OMEGA_TAU, overshooting},
-};
+use super::{Mollified, Spec, horizon::CurveScale, mollifier::mollify};
 use crate::random::Stream;
 use crate::{
     curve::{BaseCurve, Outline, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions, polygon},
@@ -56,6 +51,8 @@ pub struct Family {
     has_corners: bool,
     /// There is an outline, and it does not cross itself.
     simple: bool,
+    /// The size of the curve without perturbation.
+    scale: Arc<CurveScale>,
 }
 
 impl Family {
@@ -98,9 +95,13 @@ impl Family {
             warnings.push(NO_EXCESS.into());
         }
         let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
-        check_rates(spec, &sampler.sample(&RadialFactor::default()))?;
+        let mut nodes = sampler.sample(&RadialFactor::default());
+        if has_corners {
+            mollify(&mut nodes, simple);
+        }
+        let scale = Arc::new(CurveScale::of(&nodes));
         let (sampler, directions) = (Arc::new(sampler), check_directions(spec.modes.high).into());
-        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners, simple })
+        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners, simple, scale })
     }
 
     /// Does the same as [`Family::new`] for a spec with the same shape, sampling and points as `other`; the large
@@ -110,18 +111,23 @@ impl Family {
     /// As [`Family::new`].
     pub(crate) fn like(other: &Family, spec: &Spec) -> Result<Family> {
         let law = RadialLaw::new(spec.amplitude, spec.modes, spec.decay)?;
-        check_rates(spec, &other.sampler.sample(&RadialFactor::default()))?;
         let directions = match other.law.modes().high == spec.modes.high {
             true => Arc::clone(&other.directions),
             false => check_directions(spec.modes.high).into(),
         };
-        let (sampler, warnings) = (Arc::clone(&other.sampler), other.warnings.clone());
-        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, ..*other })
+        let (sampler, scale) = (Arc::clone(&other.sampler), Arc::clone(&other.scale));
+        let warnings = other.warnings.clone();
+        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, scale, ..*other })
     }
 
     /// The outline of the curve, if it has one.
     pub fn outline(&self) -> Option<&Arc<Outline>> {
         self.sampler.outline()
+    }
+
+    /// The size of the curve without perturbation.
+    pub(super) fn scale(&self) -> &CurveScale {
+        &self.scale
     }
 
     /// Whether it shares the tables of its curve with `other`.
@@ -178,65 +184,6 @@ impl Family {
             (self.law.deviation(m) * stream.normal(2 * m), TAU * turn)
         };
         RadialFactor::new(modes.low, (modes.low..=modes.high).map(amplitude_and_phase))
-    }
-}
-
-/// 24/R⁴, the rate at which the excess of a nearly round curve decays under surface diffusion. R is the radius of the
-/// circle of equal area, or of equal length if the curve is not simple, when its area means nothing.
-pub fn relaxation_rate(nodes: &[DVec2]) -> f64 {
-    let by_length = polygon::length(nodes) / TAU;
-    let by_area = (polygon::signed_area(nodes).abs() / std::f64::consts::PI).sqrt();
-    let simple = polygon::turning_number(nodes).abs() == 1;
-    24.0 / (if simple { by_area } else { by_length }).powi(4)
-}
-
-/// ω of `--omega auto`: 1/6 of the relaxation rate, the paper's ω = 1 for a circle of the area of its 2:1 ellipse.
-pub fn own_omega(nodes: &[DVec2]) -> f64 {
-    relaxation_rate(nodes) / 6.0
-}
-
-/// τ of `--tau auto`: 1/1000 of 1/ω, the paper's τ = 0.001 for a circle of the area of its 2:1 ellipse.
-pub fn own_tau(nodes: &[DVec2]) -> f64 {
-    DEFAULT_TAU / (own_omega(nodes) / DEFAULT_OMEGA)
-}
-
-/// The largest κ allowed: n²/100 times the relaxation rate.
-///
-/// A pull that is strong compared with the relaxation undoes the redistribution, and the mesh falls apart. For the
-/// nonconvex curve this happens at 20, 60 and 200 times the rate for n = 32, 64 and 100 (docs/method.md).
-pub fn strongest_pull(nodes: &[DVec2]) -> f64 {
-    (nodes.len() as f64 / 10.0).powi(2) * relaxation_rate(nodes)
-}
-
-/// Checks ω against a fixed τ, if one of them is that of the curve: `own_omega` or `own_tau`.
-fn check_redistribution(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()> {
-    let Pace::Fixed(step) = spec.pace() else { return Ok(()) };
-    let (tau, omega) = match (step, spec.omega()) {
-        (Tau::Step(tau), Omega::Auto) => (tau, own_omega),
-        (Tau::Auto, Omega::Rate(omega)) => (own_tau, omega),
-        // Both are numbers, which were checked, or both are in proportion.
-        _ => return Ok(()),
-    };
-    if spec.no_redistribution || omega * tau <= MAX_OMEGA_TAU {
-        return Ok(());
-    }
-    let allowed = match step {
-        Tau::Step(_) => format!("use --tau {:.3e} or less", MAX_OMEGA_TAU / omega),
-        Tau::Auto => format!("use --omega {:.3e} or less, or auto", MAX_OMEGA_TAU / tau),
-    };
-    Err(Error::value("omega", spec.omega(), &overshooting(omega, tau), &allowed))
-}
-
-/// Checks the rates that depend on the curve: a strong pull, and the redistribution.
-fn check_rates(spec: &Spec, nodes: &[DVec2]) -> Result<()> {
-    check_redistribution(spec, own_omega(nodes), own_tau(nodes))?;
-    let most = strongest_pull(nodes);
-    match spec.pull {
-        Pull::Rate(rate) if rate > most => {
-            let problem = format!("so strong that it destroys the mesh of {} nodes on this curve", nodes.len());
-            Err(Error::value("pull", rate, &problem, &format!("use {most:.3} or less, or auto")))
-        }
-        _ => Ok(()),
     }
 }
 
@@ -430,39 +377,12 @@ mod tests {
     }
 
     #[test]
-    fn the_own_speed_and_step_of_a_curve_are_the_papers_for_its_ellipse_and_scale_with_the_curve() {
-        let omega = |shape: &str| {
-            let spec = Spec { shape: shape.parse().unwrap(), amplitude: 0.0, points: 400, ..Spec::default() };
-            own_omega(&Family::new(&spec).unwrap().member(0).unwrap().nodes)
-        };
-        assert!((omega("ellipse:2,1") - 1.0).abs() < 1e-3);
-        assert_eq!(omega("ellipse:64,32"), omega("ellipse:2,1") / 32_f64.powi(4));
-        let tau = |shape: &str| {
-            let spec = Spec { shape: shape.parse().unwrap(), amplitude: 0.0, points: 400, ..Spec::default() };
-            own_tau(&Family::new(&spec).unwrap().member(0).unwrap().nodes)
-        };
-        assert!((tau("ellipse:2,1") / 1e-3 - 1.0).abs() < 1e-3);
-        assert_eq!(tau("ellipse:64,32"), tau("ellipse:2,1") * 32_f64.powi(4));
-        // Of an immersed curve, by its length.
-        assert!(omega("lemniscate:1").is_finite());
-    }
-
-    #[test]
     fn every_wrong_key_is_refused_before_any_member_is_made() {
         let wrong = [
             (Spec { amplitude: 0.6, ..Spec::default() }, "--amplitude 0.6"),
             (Spec { modes: Modes { low: 0, high: 3 }, ..Spec::default() }, "--modes `0..=3`"),
             (Spec { decay: f64::NAN, ..Spec::default() }, "--decay NaN"),
             (Spec { points: 2, ..Spec::default() }, "--points 2"),
-            (Spec { pull: Pull::Rate(700.0), ..Spec::default() }, "--pull 700"),
-            (
-                Spec { omega: Some(Omega::Auto), tau: Some(1.01.into()), ..Spec::default() },
-                "--omega auto: omega tau = 1.01158",
-            ),
-            (
-                Spec { omega: Some(2000.0.into()), tau: Some(Tau::Auto), ..Spec::default() },
-                "--omega 2000: omega tau = 1.99",
-            ),
             (Spec { sampling: Sampling::Points, ..Spec::default() }, "--sampling points"),
             (Spec { shape: Shape::Circle { radius: 0.0 }, ..Spec::default() }, "--shape circle:0"),
             (Spec { shape: Shape::File("none.csv".into()), ..Spec::default() }, "--shape file:none.csv"),

@@ -2,9 +2,11 @@
 //! ([`Outcome`]).
 
 pub mod ended;
+mod horizon;
 pub mod member;
 pub mod mollifier;
 pub mod outcome;
+pub mod rates;
 pub mod rows;
 mod seed;
 pub mod shard;
@@ -13,6 +15,7 @@ pub mod spec;
 pub mod standing;
 pub mod study;
 pub mod sweep;
+mod times;
 mod validate;
 
 pub use ended::Ended;

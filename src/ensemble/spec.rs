@@ -122,6 +122,17 @@ pub enum Omega {
     Auto,
 }
 
+/// When a member ends at the latest.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FinalTime {
+    /// At this time.
+    At(f64),
+    /// When it is relaxed, or at the time that its cell's curve gives as a cap.
+    Auto,
+    /// For each cell of a sweep at its own time.
+    OfCells(Vec<f64>),
+}
+
 /// κ of the metric pull.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pull {
@@ -181,8 +192,9 @@ pub struct Spec {
     /// Local error tolerance of adaptive steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<f64>,
-    /// Final time.
-    pub t_end: f64,
+    /// Final time; [`DEFAULT_T_END`] if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub t_end: Option<FinalTime>,
     /// ω, speed of the redistribution towards equal spacing, in 1/time; if absent, that of the [pace](Spec::omega).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub omega: Option<Omega>,
@@ -216,8 +228,9 @@ pub struct Spec {
     /// A member is relaxed when its excess is at most this.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relax_at: Option<f64>,
-    /// End a member when it is relaxed.
-    pub stop_when_relaxed: bool,
+    /// End a member when it is relaxed; if absent, only with a [final time](FinalTime::Auto) that means just that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_when_relaxed: Option<bool>,
     /// Interval between rows of `series.csv`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub series: Option<f64>,
@@ -245,6 +258,10 @@ pub struct Spec {
 
 /// The paper's time step.
 pub const DEFAULT_TAU: f64 = 1e-3;
+/// Keys that are times or rates.
+const TIMED: [&str; 4] = ["tau", "t-end", "omega", "pull"];
+/// The final time of the paper's first example.
+pub const DEFAULT_T_END: f64 = 2.0;
 /// The paper's ω.
 pub const DEFAULT_OMEGA: f64 = 1.0;
 /// Tolerance of `--adaptive` without a value.
@@ -266,7 +283,7 @@ impl Default for Spec {
             flow: Flow::SurfaceDiffusion,
             tau: None,
             adaptive: None,
-            t_end: 2.0,
+            t_end: None,
             omega: None,
             no_redistribution: false,
             pull: Pull::Rate(0.0),
@@ -280,7 +297,7 @@ impl Default for Spec {
             precision: None,
             relax_to: None,
             relax_at: None,
-            stop_when_relaxed: false,
+            stop_when_relaxed: None,
             series: None,
             snapshots: Vec::new(),
             store: Store::Csv,
@@ -355,7 +372,11 @@ impl Spec {
                 Error::Request(format!("--sweep {}={}: {}", axis.key, sweep::label(value), e.message().trim_end()))
             })?;
         }
-        let spec = Spec::deserialize(table).map_err(|e| failed(&e))?;
+        let mut spec = Spec::deserialize(table).map_err(|e| failed(&e))?;
+        if let Some(FinalTime::OfCells(times)) = &spec.t_end {
+            let own = usize::try_from(index).ok().and_then(|index| times.get(index));
+            spec.t_end = Some(FinalTime::At(*own.ok_or_else(|| final_times(times.len(), sweep.cells()))?));
+        }
         Ok(Spec { snapshots: snapshots.clone(), only: only.clone(), ..spec })
     }
 
@@ -408,11 +429,37 @@ impl Spec {
         self.adaptive.map_or(Pace::Fixed(self.tau.unwrap_or(DEFAULT_TAU.into())), Pace::Adaptive)
     }
 
-    /// ω in use: if none is given, the paper's with a fixed τ, and each member's own with adaptive steps.
+    /// The final time, the latest one of all cells; infinite while it is still [`FinalTime::Auto`], which a
+    /// [study](crate::ensemble::Study) replaces by numbers.
+    pub fn final_time(&self) -> f64 {
+        match &self.t_end {
+            None => DEFAULT_T_END,
+            Some(FinalTime::At(t)) => *t,
+            Some(FinalTime::Auto) => f64::INFINITY,
+            Some(FinalTime::OfCells(times)) => times.iter().copied().fold(0.0, f64::max),
+        }
+    }
+
+    /// Whether it gives no number as a time or a rate: all of them may then be chosen by the size of the curve.
+    pub(super) fn gives_no_times(&self) -> bool {
+        let Spec { tau, t_end, omega, pull, series, snapshots, .. } = self;
+        let times = matches!(tau, Some(Tau::Step(_))) || !matches!(t_end, None | Some(FinalTime::Auto));
+        let rates = matches!(omega, Some(Omega::Rate(_))) || matches!(pull, Pull::Rate(rate) if *rate != 0.0);
+        let swept = |key| self.sweep.axes().iter().any(|axis| axis.key == key);
+        let outputs = series.is_some() || !snapshots.is_empty();
+        !(times || rates || outputs || TIMED.into_iter().any(swept))
+    }
+
+    /// Whether a member ends when it is relaxed.
+    pub fn stops_when_relaxed(&self) -> bool {
+        self.stop_when_relaxed.unwrap_or(self.t_end == Some(FinalTime::Auto))
+    }
+
+    /// ω in use: if none is given, the paper's where τ is a number, and otherwise each member's own.
     pub fn omega(&self) -> Omega {
         self.omega.unwrap_or(match self.pace() {
-            Pace::Fixed(_) => Omega::Rate(DEFAULT_OMEGA),
-            Pace::Adaptive(_) => Omega::Auto,
+            Pace::Fixed(Tau::Step(_)) => Omega::Rate(DEFAULT_OMEGA),
+            Pace::Fixed(Tau::Auto) | Pace::Adaptive(_) => Omega::Auto,
         })
     }
 
@@ -439,6 +486,15 @@ impl Spec {
         self.flow.excess_rate(mode, area)
     }
 
+    /// The mean excess that the perturbation of a circle has in each mode from 2 on: ½ (m²-1) a_m².
+    pub(super) fn perturbed_excess(&self) -> impl Iterator<Item = f64> {
+        let (high, own) = (self.modes.high, self.clone());
+        (2..=if self.amplitude == 0.0 { 1 } else { high }).map(move |m| {
+            let (deviation, m) = (own.amplitude * f64::from(m).powf(-own.decay), f64::from(m));
+            if m < f64::from(own.modes.low) { 0.0 } else { 0.5 * (m * m - 1.0) * deviation * deviation }
+        })
+    }
+
     /// The maximum sweeps per solve in use.
     pub fn most_sweeps(&self) -> u32 {
         self.max_sweeps.min(self.solver().facts().max_sweeps)
@@ -448,6 +504,13 @@ impl Spec {
     pub fn tolerance_at(&self, precision: Precision) -> f64 {
         self.tolerance.unwrap_or(precision.tolerance())
     }
+}
+
+/// The error for a list of final times that does not fit the sweep.
+pub(super) fn final_times(times: usize, cells: u64) -> Error {
+    let problem =
+        format!("a list has one time for each cell, and there {} {cells}", if cells == 1 { "is" } else { "are" });
+    Error::value("t-end", format!("({times} times)"), &problem, "give one time, auto, or one for each cell")
 }
 
 /// Lines longer than this are not shown with a caret; the list of all keys is half as long.
@@ -502,6 +565,12 @@ macro_rules! number_or_auto {
             }
         }
 
+        impl FromNumbers for $kind {
+            fn from_numbers(_: Vec<f64>) -> Option<$kind> {
+                None
+            }
+        }
+
         impl From<f64> for $kind {
             fn from(number: f64) -> $kind {
                 $kind::$number(number)
@@ -530,9 +599,74 @@ number_or_auto!(Omega, Rate);
 number_or_auto!(Pull, Rate);
 number_or_auto!(Sor, Factor);
 
+impl fmt::Display for FinalTime {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            FinalTime::At(t) => write!(f, "{}", text::number(*t)),
+            FinalTime::Auto => write!(f, "auto"),
+            FinalTime::OfCells(times) => {
+                let (low, high) =
+                    times.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), t| (low.min(*t), high.max(*t)));
+                write!(f, "{} to {}", text::number(low), text::number(high))
+            }
+        }
+    }
+}
+
+impl FromStr for FinalTime {
+    type Err = String;
+
+    /// Parses a time, `auto`, or a list of times with commas between them.
+    fn from_str(text: &str) -> Result<FinalTime, String> {
+        let number = |word: &str| {
+            let number = word.trim().parse::<f64>();
+            number.map_err(|_| format!("`{}` is neither a number nor `auto`", word.trim()))
+        };
+        match text.trim() {
+            "auto" => Ok(FinalTime::Auto),
+            list if list.contains(',') => list.split(',').map(number).collect::<Result<_, _>>().map(FinalTime::OfCells),
+            word => number(word).map(FinalTime::At),
+        }
+    }
+}
+
+impl From<f64> for FinalTime {
+    fn from(t: f64) -> FinalTime {
+        FinalTime::At(t)
+    }
+}
+
+impl Serialize for FinalTime {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            FinalTime::At(t) => serializer.serialize_f64(*t),
+            FinalTime::Auto => serializer.serialize_str("auto"),
+            FinalTime::OfCells(times) => times.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for FinalTime {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<FinalTime, D::Error> {
+        deserializer.deserialize_any(OrAuto(PhantomData))
+    }
+}
+
+/// Kinds that may also be read from a list of numbers.
+trait FromNumbers: Sized {
+    /// The kind with these numbers, if it can have several.
+    fn from_numbers(numbers: Vec<f64>) -> Option<Self>;
+}
+
+impl FromNumbers for FinalTime {
+    fn from_numbers(numbers: Vec<f64>) -> Option<FinalTime> {
+        Some(FinalTime::OfCells(numbers))
+    }
+}
+
 struct OrAuto<T>(PhantomData<T>);
 
-impl<T: From<f64> + FromStr<Err = String>> de::Visitor<'_> for OrAuto<T> {
+impl<'de, T: From<f64> + FromStr<Err = String> + FromNumbers> de::Visitor<'de> for OrAuto<T> {
     type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
@@ -553,6 +687,14 @@ impl<T: From<f64> + FromStr<Err = String>> de::Visitor<'_> for OrAuto<T> {
 
     fn visit_str<E: de::Error>(self, text: &str) -> Result<T, E> {
         text.parse().map_err(E::custom)
+    }
+
+    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<T, A::Error> {
+        let mut numbers = Vec::new();
+        while let Some(number) = items.next_element()? {
+            numbers.push(number);
+        }
+        T::from_numbers(numbers).ok_or_else(|| de::Error::invalid_type(de::Unexpected::Seq, &"a number or \"auto\""))
     }
 }
 
@@ -628,7 +770,7 @@ mod tests {
             relax_to: Some(0.1),
             ..Spec::default()
         };
-        let own = Spec { tau: Some(Tau::Auto), ..Spec::default() };
+        let own = Spec { tau: Some(Tau::Auto), t_end: Some(FinalTime::Auto), ..Spec::default() };
         for spec in [spec, adaptive, own, Spec::default()] {
             let text = spec.to_toml().unwrap();
             assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");
@@ -636,10 +778,12 @@ mod tests {
     }
 
     #[test]
-    fn the_redistribution_is_the_papers_with_a_fixed_step_and_each_members_own_with_adaptive_steps() {
+    fn the_redistribution_is_the_papers_where_tau_is_a_number_and_otherwise_each_members_own() {
         let omega = |text: &str| Spec::from_toml(text).unwrap().validate().unwrap().omega;
         assert_eq!(omega(""), Some(Omega::Rate(1.0)));
         assert_eq!(omega("adaptive = 0.01"), Some(Omega::Auto));
+        assert_eq!(omega("tau = 'auto'"), Some(Omega::Auto));
+        assert_eq!(omega("tau = 0.01"), Some(Omega::Rate(1.0)));
         assert_eq!(omega("adaptive = 0.01\nomega = 1"), Some(Omega::Rate(1.0)));
         // Cells of a sweep choose for themselves.
         let swept = Spec::from_toml("[sweep]\nadaptive = [0.01]").unwrap().validate().unwrap();
@@ -654,8 +798,19 @@ mod tests {
         let keys = Spec::keys();
         let written: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
         assert!(written.keys().all(|key| keys.contains(key)));
-        let optional =
-            ["tau", "adaptive", "omega", "relax-to", "relax-at", "tolerance", "adapter", "precision", "series"];
+        let optional = [
+            "tau",
+            "adaptive",
+            "t-end",
+            "omega",
+            "stop-when-relaxed",
+            "relax-to",
+            "relax-at",
+            "tolerance",
+            "adapter",
+            "precision",
+            "series",
+        ];
         let optional = [&optional[..], &["only", "shard", "threads", "common-random-numbers", "sweep"]].concat();
         for key in &optional {
             assert!(keys.iter().any(|known| known == key), "{key}");

@@ -4,7 +4,8 @@ use std::{ops::Range, path::Path, sync::Arc};
 
 use super::{
     Family, Member, Spec,
-    spec::{Pace, Store},
+    spec::{FinalTime, Pace, Store, Tau},
+    times,
 };
 use crate::{
     curve::{BaseCurve, Sampler},
@@ -19,6 +20,8 @@ pub const PORTRAITS: usize = 12;
 pub struct Study {
     spec: Spec,
     cells: Vec<Cell>,
+    /// Flags by which times follow the size of the curves, although the request does not have them.
+    by_size: Vec<&'static str>,
 }
 
 impl Study {
@@ -44,9 +47,19 @@ impl Study {
     /// # Errors
     /// As [`Study::new`].
     pub fn new_from(spec: Spec, base: &Path) -> Result<Study> {
+        let (free, given) = (spec.gives_no_times(), spec.clone());
         let spec = spec.validate()?;
         let cells = cells(&spec, base)?;
-        Ok(Study::of_cells(spec, cells))
+        if !free || !cells.iter().any(|cell| times::is_far(cell.family.scale())) {
+            return Study::of_cells(spec, cells);
+        }
+        let tau = if spec.adaptive.is_some() { None } else { Some(Tau::Auto) };
+        let own = Spec { tau, t_end: Some(FinalTime::Auto), omega: None, ..spec }.validate()?;
+        drop(cells);
+        let cells = self::cells(&own, base)?;
+        let chosen = [("--tau auto", own.tau != given.tau), ("--t-end auto", given.t_end.is_none())];
+        let by_size = chosen.into_iter().filter_map(|(flag, is_new)| is_new.then_some(flag)).collect();
+        Ok(Study { by_size, ..Study::of_cells(own, cells)? })
     }
 
     /// Does the same as [`Study::new`], with members that are perturbations of `curve` instead of the shape of `spec`.
@@ -61,7 +74,7 @@ impl Study {
         }
         let family = Family::of(&spec, curve)?;
         let own = Spec { points: family.points(), ..spec.clone() }.validate()?;
-        Ok(Study::of_cells(spec, vec![Cell::only(own, family)]))
+        Study::of_cells(spec, vec![Cell::only(own, family)])
     }
 
     /// The request.
@@ -103,6 +116,12 @@ impl Study {
         all
     }
 
+    /// What was chosen because the request says nothing about it, if anything.
+    pub fn note(&self) -> Option<String> {
+        let problem = "the default times are for curves of about unit size, and one here is far smaller or larger";
+        (!self.by_size.is_empty()).then(|| format!("{problem}: used {}", self.by_size.join(" ")))
+    }
+
     /// Brings the spec up to date with the cells: it is that of the only cell, such as the number of points of a file, or
     /// gets by `common` what all cells have in common.
     pub(crate) fn settle_spec(&mut self, common: impl Fn(&mut Spec)) {
@@ -124,10 +143,19 @@ impl Study {
         &mut self.cells
     }
 
-    fn of_cells(spec: Spec, cells: Vec<Cell>) -> Study {
-        let mut study = Study { spec, cells };
+    /// # Errors
+    /// [`Error::Request`] for times and rates that do not suit the curve of a cell.
+    fn of_cells(mut spec: Spec, mut cells: Vec<Cell>) -> Result<Study> {
+        for cell in &mut cells {
+            let own = cell.settled();
+            cell.spec = own.map_err(|error| of_cell(error, &spec, cell.index))?;
+        }
+        if spec.t_end == Some(FinalTime::Auto) && !spec.sweep.is_empty() {
+            spec.t_end = Some(FinalTime::OfCells(cells.iter().map(|cell| cell.spec.final_time()).collect()));
+        }
+        let mut study = Study { spec, cells, by_size: Vec::new() };
         study.settle_spec(|_| ());
-        study
+        Ok(study)
     }
 }
 
@@ -159,9 +187,18 @@ pub struct Cohort {
 
 impl Cell {
     /// The only cell of a spec without a sweep.
-    ///
     pub fn only(spec: Spec, family: Family) -> Cell {
+        let spec = times::settled(spec, family.scale());
         Cell { index: 0, spec, family, first: 0, common: false }
+    }
+
+    /// Its spec with a number as the final time, checked against the curve.
+    fn settled(&self) -> Result<Spec> {
+        let scale = self.family.scale();
+        let Spec { only, shard, .. } = self.spec.clone();
+        let spec = times::settled(Spec { only: None, shard: None, ..self.spec.clone() }, scale).validate()?;
+        times::check(&spec, scale, self.family.points())?;
+        Ok(Spec { only, shard, ..spec })
     }
 
     /// The rank of a member among those of the cell that would run without shards.
@@ -190,6 +227,7 @@ impl Cell {
         if adaptive && solver.facts().slows_with_step {
             warnings.push(LONG_SWEEPS.into());
         }
+        warnings.extend(times::warnings(&self.spec, self.family.scale()));
         warnings
     }
 
@@ -247,13 +285,8 @@ fn cells(spec: &Spec, base: &Path) -> Result<Vec<Cell>> {
     let mut cells: Vec<Cell> = Vec::new();
     let mut bytes = 0;
     for index in 0..spec.sweep.cells() {
-        let cell = cell(spec, base, index, &cells, &mut bytes).map_err(|error| match error {
-            Error::Request(message) if !spec.sweep.is_empty() => {
-                Error::Request(format!("{message} (in the cell {})", spec.sweep.name(index)))
-            }
-            error => error,
-        })?;
-        cells.push(cell);
+        let cell = cell(spec, base, index, &cells, &mut bytes);
+        cells.push(cell.map_err(|error| of_cell(error, spec, index))?);
     }
     let unequal = cells.windows(2).find(|pair| pair[0].spec.points != pair[1].spec.points);
     if let (Store::Zarr, Some([one, other])) = (spec.store, unequal) {
@@ -262,6 +295,16 @@ fn cells(spec: &Spec, base: &Path) -> Result<Vec<Cell>> {
         return Err(Error::value("store", "zarr", &problem, "use --store csv, or one number of --points"));
     }
     Ok(cells)
+}
+
+/// Adds the cell of a sweep to an error about its request.
+fn of_cell(error: Error, spec: &Spec, index: u64) -> Error {
+    match error {
+        Error::Request(message) if !spec.sweep.is_empty() => {
+            Error::Request(format!("{message} (in the cell {})", spec.sweep.name(index)))
+        }
+        error => error,
+    }
 }
 
 fn cohorts(cells: &[Cell]) -> Vec<Range<usize>> {

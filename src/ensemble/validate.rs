@@ -4,7 +4,8 @@
 //! the file of the shape. Only the resolution of the highest mode is checked here.
 
 use super::spec::{
-    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, Omega, Order, Pace, Precision, Pull, Sor, Spec, Store, Tau,
+    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, Precision, Pull,
+    Sor, Spec, Store, Tau, final_times,
 };
 use crate::{
     error::{Error, Result},
@@ -16,7 +17,7 @@ use crate::{
 const MAX_CURVES: u64 = 1_000_000_000;
 const MAX_POINTS: usize = 1_000_000;
 /// A member with more steps than this would need more than a year.
-const MAX_STEPS: f64 = 1e9;
+pub(super) const MAX_STEPS: f64 = 1e9;
 /// Final times whose smallest part in a table, and whose sum over all members, can still be represented.
 const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
 /// The rows of a resident member stay in memory until it ends.
@@ -58,6 +59,10 @@ impl Spec {
         if !self.sweep.axes().iter().any(|axis| ["tau", "adaptive"].contains(&axis.key.as_str())) {
             self.omega = Some(self.omega());
         }
+        self.t_end.get_or_insert(DEFAULT_T_END.into());
+        if self.stops_when_relaxed() {
+            self.stop_when_relaxed = Some(true);
+        }
         if self.relax_at.is_none() {
             self.relax_to.get_or_insert(DEFAULT_RELAX_TO);
         }
@@ -92,18 +97,15 @@ impl Spec {
     }
 
     fn check_times(&self) -> Result<()> {
-        positive("t-end", self.t_end, "a final time", "2")?;
-        if !TIMES.contains(&self.t_end) {
-            let allowed = format!("use a time from {:e} to {:e}", TIMES.start(), TIMES.end());
-            return Err(Error::value("t-end", number(self.t_end), "parts or sums of it are not finite", &allowed));
-        }
+        self.check_final_times()?;
         match self.pace() {
             Pace::Fixed(tau) => self.check_fixed(tau)?,
             Pace::Adaptive(tolerance) => self.check_adaptive(tolerance)?,
         }
         let Some(series) = self.series else { return Ok(()) };
         positive("series", series, "an interval of time", "0.01")?;
-        let rows = self.t_end / series;
+        let Some(t_end) = self.known_end() else { return Ok(()) };
+        let rows = t_end / series;
         if rows > MAX_SERIES_ROWS {
             let allowed = format!("at most {MAX_SERIES_ROWS:e} rows: use a longer interval");
             return Err(Error::value("series", number(series), &format!("about {rows:.1e} rows per member"), &allowed));
@@ -111,16 +113,50 @@ impl Spec {
         Ok(())
     }
 
+    /// The final time of the spec of a cell, if it is a number.
+    fn known_end(&self) -> Option<f64> {
+        match self.t_end {
+            None | Some(FinalTime::At(_)) => Some(self.final_time()),
+            Some(FinalTime::Auto | FinalTime::OfCells(_)) => None,
+        }
+    }
+
+    fn check_final_times(&self) -> Result<()> {
+        let swept = self.sweep.axes().iter().find(|axis| axis.key == "t-end");
+        let times = match &self.t_end {
+            Some(FinalTime::OfCells(times)) if times.len() as u64 != self.sweep.cells() || swept.is_some() => {
+                return Err(final_times(times.len(), self.sweep.cells()));
+            }
+            Some(FinalTime::OfCells(times)) => times.clone(),
+            _ => self.known_end().into_iter().collect(),
+        };
+        for t in times {
+            positive("t-end", t, "a final time", "2")?;
+            if !TIMES.contains(&t) {
+                let allowed = format!("use a time from {:e} to {:e}", TIMES.start(), TIMES.end());
+                return Err(Error::value("t-end", number(t), "parts or sums of it are not finite", &allowed));
+            }
+        }
+        match swept.is_some_and(|axis| axis.values.iter().any(|value| value.as_str() == Some("auto"))) {
+            true => {
+                let message = "auto is a time for each cell already; give numbers, or --t-end auto without the sweep";
+                Err(Error::Request(format!("--sweep t-end=auto: {message}")))
+            }
+            false => Ok(()),
+        }
+    }
+
     fn check_fixed(&self, tau: Tau) -> Result<()> {
         let Tau::Step(tau) = tau else { return Ok(()) };
         positive("tau", tau, "a time step", "0.001")?;
-        let t_end = number(self.t_end);
-        if tau > self.t_end {
+        let Some(end) = self.known_end() else { return Ok(()) };
+        let t_end = number(end);
+        if tau > end {
             let problem = format!("the step is longer than the whole run of {t_end}");
-            let allowed = format!("use a step of at most {t_end}, or a later --t-end");
+            let allowed = format!("use a step of at most {t_end} or auto, or a later --t-end");
             return Err(Error::value("tau", number(tau), &problem, &allowed));
         }
-        let steps = self.t_end / tau;
+        let steps = end / tau;
         if steps > MAX_STEPS {
             let problem = format!("about {steps:.1e} steps of {} to --t-end {t_end}", number(tau));
             let allowed = format!("at most {MAX_STEPS:e} steps: use a larger --tau or an earlier --t-end");
@@ -160,13 +196,16 @@ impl Spec {
                 let allowed = format!("it is a rate: use --omega {} or less", number(1.0 / tau));
                 Err(Error::value("omega", number(omega), &overshooting(omega, tau), &allowed))
             }
-            Pace::Adaptive(_) if omega * self.t_end > MAX_STEPS => {
-                let problem =
-                    format!("adaptive steps are at most about 1/omega long, and --t-end is {}", number(self.t_end));
-                let allowed = format!("use --omega {} or less, or an earlier --t-end", number(MAX_STEPS / self.t_end));
-                Err(Error::value("omega", number(omega), &problem, &allowed))
-            }
-            _ => Ok(()),
+            Pace::Adaptive(_) => match self.known_end() {
+                Some(t_end) if omega * t_end > MAX_STEPS => {
+                    let problem =
+                        format!("adaptive steps are at most about 1/omega long, and --t-end is {}", number(t_end));
+                    let allowed = format!("use --omega {} or less, or an earlier --t-end", number(MAX_STEPS / t_end));
+                    Err(Error::value("omega", number(omega), &problem, &allowed))
+                }
+                _ => Ok(()),
+            },
+            Pace::Fixed(_) => Ok(()),
         }
     }
 
@@ -280,8 +319,9 @@ impl Spec {
     }
 
     fn tidy_snapshots(&mut self) -> Result<()> {
-        if let Some(&t) = self.snapshots.iter().find(|t| !(**t >= 0.0 && **t <= self.t_end)) {
-            let allowed = format!("use times from 0 to --t-end {}", number(self.t_end));
+        let t_end = self.known_end().unwrap_or(*TIMES.end());
+        if let Some(&t) = self.snapshots.iter().find(|t| !(**t >= 0.0 && **t <= t_end)) {
+            let allowed = format!("use times from 0 to --t-end {}", number(t_end));
             return Err(Error::value("snapshots", number(t), "not a time of the run", &allowed));
         }
         self.snapshots.iter_mut().for_each(|t| *t += 0.0); // -0 becomes 0

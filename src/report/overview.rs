@@ -179,7 +179,7 @@ pub fn describe(spec: &Spec) -> String {
         ("flow", spec.flow.to_string()),
         ("points", format!("n = {}", spec.points)),
         pace,
-        ("t-end", format!("t-end = {}", spec.t_end)),
+        ("t-end", format!("t-end = {}", spec.t_end.clone().unwrap_or(spec.final_time().into()))),
         ("seed", format!("seed {}", spec.seed)),
     ];
     let swept = |key: &str| spec.sweep.axes().iter().any(|axis| axis.key == key);

@@ -264,7 +264,7 @@ impl Tally {
     pub fn mean_excess(&self, spec: &Spec) -> Result<Vec<MeanExcess>> {
         let mut rows = Vec::new();
         for (cell, CellTally { excess, .. }) in (0..).zip(&self.cells) {
-            let t_end = spec.of_cell(cell)?.t_end;
+            let t_end = spec.of_cell(cell)?.final_time();
             let row = |(t, of): (f64, &Moments)| MeanExcess::new(cell, t, of);
             rows.extend(grid(t_end).zip(excess).map(row));
         }

@@ -7,7 +7,7 @@ use crate::{
     curve::polygon,
     ensemble::{
         Member, Observables, Rows, Spec, Status,
-        member::{own_omega, own_tau, relaxation_rate, strongest_pull},
+        rates::{own_omega, own_tau, radius, relaxation_rate, strongest_pull},
         spec::{Omega, Pace, Precision, Pull, Sor, Tau},
     },
     schedule::{self, Clock, Outputs, Ticks},
@@ -41,7 +41,7 @@ impl<'a> Trajectory<'a> {
         let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
         let parameters = parameters(spec, &nodes, unit, spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
-        launch.counters.stop_when_relaxed = spec.stop_when_relaxed.into();
+        launch.counters.stop_when_relaxed = spec.stops_when_relaxed().into();
         launch.counters.order = FIRST_ORDER.min(most_order(precision.epsilon()));
         let turning = launch.report.progress.turning;
         let start = Observables::new(&launch.report.now, turning, unit);
@@ -50,18 +50,18 @@ impl<'a> Trajectory<'a> {
         set_thresholds(&mut launch, course, start.excess, limit, precision);
         let (time, out_of_range) = begin_time(&mut launch, spec, unit, precision);
         let clock = time.unit(unit);
-        launch.parameters.clock_end = spec.t_end / clock;
+        launch.parameters.clock_end = spec.final_time() / clock;
         launch.parameters.growth =
             spec.flow.growth(start.area).map_or(0.0, |growth| (growth / clock).min(*schedule::range(precision).end()));
         let status = match course {
-            Course::Round if spec.stop_when_relaxed => Some(Status::Relaxed),
+            Course::Round if spec.stops_when_relaxed() => Some(Status::Relaxed),
             _ if beyond(&parameters, precision) => Some(Status::Nonfinite),
             _ => out_of_range,
         };
         let mut trajectory = Trajectory {
             member,
             unit,
-            t_end: spec.t_end,
+            t_end: spec.final_time(),
             time,
             outputs,
             served: 0,
@@ -126,11 +126,11 @@ fn begin_time(launch: &mut Run<f64>, spec: &Spec, unit: f64, precision: Precisio
                 Tau::Step(tau) => tau,
                 Tau::Auto => launch.parameters.tau * unit.powi(4),
             };
-            return (Time::Fixed(Clock::new(tau, spec.t_end)), None);
+            return (Time::Fixed(Clock::new(tau, spec.final_time())), None);
         }
         Pace::Adaptive(tolerance) => tolerance,
     };
-    let (times, end) = (schedule::times(precision), spec.t_end / unit.powi(4));
+    let (times, end) = (schedule::times(precision), spec.final_time() / unit.powi(4));
     let status = match end {
         end if end < *times.start() => Some(Status::Nonfinite),
         end if end > *times.end() => Some(Status::Stalled),
@@ -165,6 +165,7 @@ fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
 /// The parameters of a member in units of `unit`, except thresholds and times.
 fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parameters<f64> {
     let time = unit.powi(4);
+    let rate = relaxation_rate(radius(nodes));
     let of_flow = Parameters::of_flow(&spec.flow, 1.0);
     // b(k) has the dimension of 1/length³.
     let law = |j: i32, c: f64| c * unit.powi(3 - j);
@@ -179,17 +180,17 @@ fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parame
         c8: law(8, of_flow.c8),
         tau: match spec.pace() {
             Pace::Fixed(Tau::Step(tau)) => tau / time,
-            Pace::Fixed(Tau::Auto) => own_tau(nodes),
+            Pace::Fixed(Tau::Auto) => own_tau(rate),
             Pace::Adaptive(_) => 0.0,
         },
         omega: match spec.omega() {
             Omega::Rate(rate) => rate * time,
-            Omega::Auto => own_omega(nodes),
+            Omega::Auto => own_omega(rate),
         },
         redistribution: f64::from(u8::from(!spec.no_redistribution)),
         pull: match spec.pull {
             Pull::Rate(rate) => rate * time,
-            Pull::Auto => (PULL_PER_RATE * relaxation_rate(nodes)).min(strongest_pull(nodes)),
+            Pull::Auto => (PULL_PER_RATE * rate).min(strongest_pull(rate, nodes.len())),
         },
         tolerance,
         sor: match spec.sor {

@@ -40,7 +40,7 @@ impl Problem {
             flow: self.flow.clone(),
             tau: at.tolerance.is_none().then_some(at.tau.into()),
             adaptive: at.tolerance,
-            t_end: self.t_end,
+            t_end: Some(self.t_end.into()),
             ..method.clone()
         }
     }

@@ -56,7 +56,7 @@ pub(super) fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) ->
 
 /// The times of the snapshots. Times equal to the final one up to rounding are replaced by it, as in `snapshots.csv`.
 pub(super) fn times(spec: &Spec) -> Vec<f64> {
-    Outputs::new(spec.t_end, None, &spec.snapshots, &[]).from(0).map(|output| output.t).collect()
+    Outputs::new(spec.final_time(), None, &spec.snapshots, &[]).from(0).map(|output| output.t).collect()
 }
 
 /// The index of the time nearest to `t`. They differ only by rounding, if final times vary from cell to cell.

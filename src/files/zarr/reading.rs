@@ -125,7 +125,8 @@ mod tests {
 
     #[test]
     fn a_store_is_copied_member_by_member_and_a_changed_chunk_is_found() {
-        let (home, spec) = (tempfile::tempdir().unwrap(), Spec { t_end: 2.0, ..spec(7, &[0.0, 1.0, 2.0]) });
+        let (home, spec) =
+            (tempfile::tempdir().unwrap(), Spec { t_end: Some(2.0.into()), ..spec(7, &[0.0, 1.0, 2.0]) });
         let (from, to) = (home.path().join("from"), home.path().join("to"));
         let open = |path: &Path| {
             let out = OutputFolder::open(path, false).unwrap();

@@ -179,9 +179,9 @@ fn unknown_is_nan_and_padding_is_never_in_the_array() {
 fn a_run_leaves_the_same_bits_as_in_its_table() {
     let spec = Spec {
         points: 33,
-        t_end: 0.3,
+        t_end: Some(0.3.into()),
         relax_to: Some(0.2),
-        stop_when_relaxed: true,
+        stop_when_relaxed: Some(true),
         only: Some(vec![1, 2, 5, 7, 8]),
         solver: Solver::Direct.into(),
         ..spec(11, &[0.0, 0.0123, 0.1, 0.3])

@@ -1,0 +1,214 @@
+//! A curve scaled by s gives the same results with times scaled by s⁴, whatever s: in metres as in nanometres.
+
+mod common;
+
+use std::{fs, path::Path};
+
+use glam::DVec2;
+
+use common::program::{Done, Row, number, run_with};
+
+/// A power of two loses no bits.
+const EXACT: [f64; 5] = [1.0, 9.313225746154785e-10, 0.125, 1024.0, 1073741824.0];
+const OTHERS: [f64; 5] = [1e-9, 1e-6, 0.1, 3.0, 1e9];
+/// Steps that need no number from the user.
+const PACES: [&str; 2] = ["--adaptive --pull auto --t-end auto", "--tau auto --solver direct --t-end auto"];
+/// Columns with the power of the length that they are measured in.
+const COLUMNS: [(&str, i32); 19] = [
+    ("t_end", 4),
+    ("steps", 0),
+    ("rejected", 0),
+    ("t_relax", 4),
+    ("t_half", 4),
+    ("rate", -4),
+    ("rate_r2", 0),
+    ("length_start", 1),
+    ("length_end", 1),
+    ("area_start", 2),
+    ("area_end", 2),
+    ("excess_start", 0),
+    ("excess_end", 0),
+    ("energy_start", -1),
+    ("energy_end", -1),
+    ("k_min", -1),
+    ("k_max", -1),
+    ("mesh_ratio", 0),
+    ("metric_drift", 0),
+];
+/// Columns that must agree to rounding if the scale is not a power of two.
+const SOLID: [&str; 7] = ["t_relax", "t_half", "length_start", "length_end", "area_start", "area_end", "excess_start"];
+
+/// A table of points `s` times as large.
+fn outline(points: &[DVec2], s: f64) -> String {
+    points.iter().fold("x,y\n".to_string(), |text, p| text + &format!("{},{}\n", s * p.x, s * p.y))
+}
+
+fn nonconvex() -> Vec<DVec2> {
+    common::nodes(300, |u| {
+        let (sine, cosine) = u.sin_cos();
+        let bays = sine * (0.2 + sine * (3.0 * u).sin().powi(2));
+        DVec2::new(cosine, 0.5 * sine + cosine.sin() + bays)
+    })
+}
+
+fn island() -> Vec<DVec2> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/islands/jamaica.csv");
+    let text = fs::read_to_string(path).unwrap();
+    let point = |line: &str| {
+        let (x, y) = line.split_once(',')?;
+        Some(DVec2::new(x.trim().parse().ok()?, y.trim().parse().ok()?))
+    };
+    text.lines().filter_map(point).collect()
+}
+
+/// A run whose cells are the curve `name` at the scales `scales`.
+fn scaled(name: &str, scales: &[f64], flags: &str) -> Done {
+    let (mut files, mut shapes) = (Vec::new(), Vec::new());
+    for (i, s) in scales.iter().enumerate() {
+        shapes.push(match name {
+            "ellipse" => format!("ellipse:{},{}", 2.0 * s, s),
+            "circle" => format!("circle:{s}"),
+            _ => format!("file:{i}.csv"),
+        });
+        let points = match name {
+            "nonconvex" => nonconvex(),
+            _ => island(),
+        };
+        files.push((format!("{i}.csv"), outline(&points, *s)));
+    }
+    let files: Vec<(&str, &str)> = files.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
+    let sweep = format!("--sweep shape={} --common-random-numbers", shapes.join(";"));
+    run_with(&files, &format!("--curves 3 --points 64 --amplitude 0.1 --relax-to 0.1 {flags} {sweep}"))
+}
+
+/// The rows of every cell of a run.
+fn cells(done: &Done, count: usize) -> Vec<Vec<Row>> {
+    let rows = done.summary();
+    (0..count).map(|cell| rows.iter().filter(|row| row["cell"] == cell.to_string()).cloned().collect()).collect()
+}
+
+/// What a row says once lengths are divided by s, and how far it may be off: nothing if s is a power of two.
+fn assert_scaled(what: &str, one: &Row, large: &Row, s: f64, bound: f64) {
+    assert_eq!(one["status"], large["status"], "{what}, scaled by {s}");
+    for (column, power) in COLUMNS {
+        if bound > 0.0 && !SOLID.contains(&column) {
+            continue;
+        }
+        if one[column].is_empty() || large[column].is_empty() {
+            assert_eq!(one[column], large[column], "{what}, scaled by {s}: {column}");
+            continue;
+        }
+        let (expected, found) = (number(one, column), number(large, column) / s.powi(power));
+        let gap = (found - expected).abs();
+        assert!(gap <= bound * expected.abs(), "{what}, scaled by {s}: {column} {found:e}, not {expected:e}");
+    }
+}
+
+#[test]
+fn a_curve_of_any_size_relaxes_as_one_of_unit_size() {
+    for name in ["ellipse", "circle", "nonconvex", "island"] {
+        for pace in PACES {
+            for (precision, bound) in [("f64", 1e-10), ("f32", 1e-2)] {
+                let what = format!("{name} {pace} {precision}");
+                let scales = [&EXACT[..], &OTHERS].concat();
+                let all = cells(&scaled(name, &scales, &format!("{pace} --precision {precision}")), scales.len());
+                assert!(all[0].iter().all(|row| row["status"] == "relaxed"), "{what}: {:?}", all[0]);
+                for (s, rows) in scales.iter().zip(&all) {
+                    let bound = if EXACT.contains(s) { 0.0 } else { bound };
+                    for (one, large) in all[0].iter().zip(rows) {
+                        assert_scaled(&what, one, large, *s, bound);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The negative control: a rate of its own makes the same curve another problem at another size.
+#[test]
+fn a_number_for_a_rate_is_for_one_size_only() {
+    let flags = format!("{} --omega 1", PACES[0]);
+    let [one, small] = &cells(&scaled("ellipse", &[1.0, 0.125], &flags), 2)[..] else { panic!("two cells") };
+    let times = |rows: &[Row], s: f64| rows.iter().map(|row| number(row, "t_relax") / s.powi(4)).collect::<Vec<_>>();
+    assert_ne!(times(one, 1.0), times(small, 0.125));
+}
+
+#[test]
+fn a_run_of_a_tiny_or_huge_curve_draws_its_pictures_and_repeats_from_its_spec() {
+    for s in [1e-9, 1e9] {
+        let shape = format!("--shape ellipse:{},{}", 2.0 * s, s);
+        let done = run_with(&[], &format!("--curves 5 --points 40 --adaptive --pull auto --t-end auto {shape}"));
+        for plot in ["curves", "excess", "relaxation"] {
+            let svg = done.text(&format!("plots/{plot}.svg"));
+            assert!(!["NaN", "inf", "0.00000000"].iter().any(|word| svg.contains(word)), "{plot} at {s}");
+        }
+        // Its spec has numbers in place of auto, and makes the same tables.
+        let run: serde_json::Value = serde_json::from_str(&done.text("run.json")).unwrap();
+        let t_end = run["spec"]["t-end"].as_f64().unwrap();
+        assert_eq!(run["spec"]["stop-when-relaxed"], true);
+        let flags = format!("--adaptive --pull auto --omega auto --stop-when-relaxed --t-end {t_end:e}");
+        let again = run_with(&[], &format!("--curves 5 --points 40 {flags} {shape}"));
+        for table in ["summary.csv", "ensemble.csv", "mean_excess.csv"] {
+            assert_eq!(done.text(table), again.text(table), "{table} at {s}");
+        }
+    }
+}
+
+#[test]
+fn a_member_that_does_not_relax_ends_at_the_cap() {
+    // b = -2/9 k³ leaves the lemniscate where it is, for (L/2π)⁴; b = -2 k³ makes mode 2 of a circle grow.
+    for (flags, cap) in [
+        ("--shape lemniscate:1 --amplitude 0 --flow poly:0,0,-0.2222222222222222 --sampling parameter", 0.485),
+        ("--shape flower:2:0.02 --amplitude 0 --flow poly:0,0,-2", 6.0 * 100_f64.ln() / 24.0),
+    ] {
+        let rows =
+            run_with(&[], &format!("--curves 1 --points 64 --adaptive --pull auto --t-end auto {flags}")).summary();
+        assert_eq!(rows[0]["status"], "unfinished", "{flags}");
+        // Up to its rounding, and to the nodes.
+        let t_end = number(&rows[0], "t_end");
+        assert!((0.98..1.03).contains(&(t_end / cap)), "{flags}: {t_end} instead of {cap}");
+    }
+}
+
+#[test]
+fn shards_with_times_by_size_merge_to_the_whole_run() {
+    let home = tempfile::tempdir().unwrap();
+    let program = |arguments: &str| {
+        let mut command = assert_cmd::Command::cargo_bin("curvelax").unwrap();
+        command.current_dir(&home).env("XDG_RUNTIME_DIR", home.path());
+        let output = command.args(arguments.split_whitespace()).arg("--quiet").output().unwrap();
+        assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    let study = "--backend cpu --threads 1 --curves 5 --points 34 --tau auto --solver direct --t-end auto --sweep \
+                 shape=ellipse:2,1;circle:0.001;lemniscate:1";
+    program(&format!("run {study} --out whole"));
+    for shard in 0..3 {
+        program(&format!("run {study} --shard {shard}/3 --out {shard}"));
+    }
+    program("merge 0 1 2 --out merged");
+    let text = |folder: &str, name: &str| fs::read_to_string(home.path().join(folder).join(name)).unwrap();
+    for name in ["summary.csv", "ensemble.csv", "mean_excess.csv", "plots/excess.svg"] {
+        assert_eq!(text("whole", name), text("merged", name), "{name}");
+    }
+    // Each cell has its own times.
+    let excess = text("whole", "mean_excess.csv");
+    let last = |cell: &str| excess.lines().rfind(|line| line.starts_with(cell)).unwrap().to_owned();
+    assert_ne!(last("0,").split(',').nth(1), last("1,").split(',').nth(1));
+}
+
+/// Every default that is meant for unit size gives way where no number says otherwise.
+#[test]
+fn a_small_curve_relaxes_with_the_defaults() {
+    for shape in ["circle:0.1", "ellipse:0.2,0.1", "ellipse:2e-6,1e-6", "ellipse:200,100"] {
+        for flags in ["--solver direct", "--adaptive", "--adaptive --pull auto"] {
+            let rows = run_noted(&format!("--curves 4 --shape {shape} {flags}"));
+            assert!(rows.iter().all(|row| row["status"] == "relaxed"), "{shape} {flags}: {rows:?}");
+        }
+    }
+}
+
+/// A run whose note about its times is not an error.
+fn run_noted(arguments: &str) -> Vec<Row> {
+    let done = run_with(&[], arguments);
+    done.summary()
+}
