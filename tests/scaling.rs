@@ -212,3 +212,52 @@ fn run_noted(arguments: &str) -> Vec<Row> {
     let done = run_with(&[], arguments);
     done.summary()
 }
+
+/// The radius of a circle under Willmore flow, R⁴ = R₀⁴ + 2Bt, and the rate of a small mode, 2·12·B/R⁴, in micrometres and
+/// hours; a tenth of the mobility takes ten times as long.
+#[test]
+fn times_are_in_the_unit_of_the_mobility() {
+    let circle = |mobility: &str, t_end: &str| {
+        let flags = "--curves 1 --amplitude 0 --shape circle:5 --flow willmore --adaptive=1e-4 --pull auto";
+        let done =
+            run_with(&[], &format!("{flags} --units um,h --mobility {mobility} --t-end {t_end} --series {t_end}"));
+        let rows = done.rows("series.csv");
+        (number(&rows[0], "area"), number(&rows[1], "area"), done)
+    };
+    let grown = |mobility: f64, t: f64| ((625.0 + 2.0 * mobility * t) / 625.0_f64).sqrt();
+    let (before, after, _) = circle("0.5", "400");
+    assert!((after / before / grown(0.5, 400.0) - 1.0).abs() < 1e-3, "{}", after / before);
+    // The negative control: without the mobility the circle would grow more.
+    assert!((after / before / grown(1.0, 400.0) - 1.0).abs() > 0.05);
+    let (_, slow, _) = circle("0.05", "4000");
+    assert!((slow / after - 1.0).abs() < 1e-9, "{slow} {after}");
+
+    let mode = "--curves 2 --shape flower:2:0.01 --amplitude 0 --points 200 --pull auto --relax-to 1e-4";
+    for pace in ["--adaptive=1e-5 --t-end auto", "--tau auto --solver direct --t-end auto"] {
+        let done = run_with(&[], &format!("{mode} {pace} --mobility 2e-3 --units µm,s"));
+        let row = &done.summary()[0];
+        let exact = 24.0 * 2e-3;
+        assert!((number(row, "rate") / exact - 1.0).abs() < 0.01, "{pace}: {}", row["rate"]);
+        assert!((number(row, "t_relax") * exact / 1e4_f64.ln() - 1.0).abs() < 0.01, "{pace}: {}", row["t_relax"]);
+        // The axes, the page and run.json say so.
+        assert!(done.text("plots/excess.svg").contains("s)") && !done.text("plots/excess.svg").contains("length⁴"));
+        assert!(!done.text("report.html").contains("length⁴"));
+        let run: serde_json::Value = serde_json::from_str(&done.text("run.json")).unwrap();
+        assert_eq!((&run["spec"]["units"], &run["spec"]["mobility"]), (&"µm,s".into(), &2e-3.into()));
+    }
+}
+
+#[test]
+fn rates_and_times_given_as_numbers_are_in_the_unit_of_the_mobility_too() {
+    let rows = |flags: &str| run_with(&[], &format!("--curves 2 --points 48 {flags}")).summary();
+    let plain = "--omega 2 --pull 30 --t-end 1 --series 0.25";
+    let slow = "--mobility 0.25 --omega 0.5 --pull 7.5 --t-end 4 --series 1";
+    for (pace, long) in [("--adaptive", "--adaptive"), ("--tau 1e-3 --solver direct", "--tau 4e-3 --solver direct")] {
+        let (one, other) = (rows(&format!("{pace} {plain}")), rows(&format!("{long} {slow}")));
+        for (a, b) in one.iter().zip(&other) {
+            assert_eq!(number(a, "t_relax") * 4.0, number(b, "t_relax"), "{pace}");
+            assert_eq!(number(a, "rate"), number(b, "rate") * 4.0, "{pace}");
+            assert_eq!((&a["steps"], &a["length_end"]), (&b["steps"], &b["length_end"]), "{pace}");
+        }
+    }
+}

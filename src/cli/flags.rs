@@ -12,7 +12,7 @@ use crate::{
     curve::{Modes, Sampling, Shape},
     ensemble::{
         Shard, Spec,
-        spec::{BackendChoice, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau},
+        spec::{BackendChoice, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau, Units},
         sweep::SweepAxis,
     },
     error::{Error, Result},
@@ -98,6 +98,13 @@ pub struct SpecFlags {
         help_heading = EVOLUTION
     )]
     flow: Option<Flow>,
+    /// Mobility B in length^4/time, for surface diffusion D_s gamma Omega^2 nu/(k_B T): times are then in the unit of time
+    /// that it has, in all flags and all results [default: 1]
+    #[arg(long, value_name = "B", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
+    mobility: Option<f64>,
+    /// Names of the units of length and time, such as um,h, for the report and the axes [default: none]
+    #[arg(long, value_name = "LENGTH,TIME", value_parser = text_of::<Units>, help_heading = EVOLUTION)]
+    units: Option<Units>,
     /// Fixed time step τ. auto is R^4/4000 for each member [default: 0.001]
     #[arg(
         long, value_name = "TAU", value_parser = text_of::<Tau>, allow_hyphen_values = true, help_heading = EVOLUTION
@@ -252,7 +259,7 @@ impl SpecFlags {
         replace! {
             curves points seed shape sampling amplitude modes decay flow no_redistribution pull solver
             order sor max_sweeps backend snapshots store common_random_numbers;
-            tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
+            mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
         }
     }
 }
@@ -409,7 +416,7 @@ mod tests {
     #[test]
     fn every_flag_replaces_its_key() {
         let spec = parse(
-            "--curves 3 --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --flow willmore \
+            "--curves 3 --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --flow willmore --mobility 2 --units um,h \
              --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --pull 3 --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \

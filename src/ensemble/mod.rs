@@ -16,6 +16,7 @@ pub mod standing;
 pub mod study;
 pub mod sweep;
 mod times;
+mod units;
 mod validate;
 
 pub use ended::Ended;

@@ -20,6 +20,7 @@ use crate::{
     input, text,
 };
 
+pub use super::units::Units;
 pub use crate::{
     number::Precision,
     solver::{Order, Solver},
@@ -186,6 +187,12 @@ pub struct Spec {
     pub decay: f64,
     /// The law of motion.
     pub flow: Flow,
+    /// B of the flow in the user's units of length and time, in length⁴/time; 1 if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mobility: Option<f64>,
+    /// The user's units of length and time, for the report and the axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
     /// Fixed time step; [`DEFAULT_TAU`] if neither it nor `adaptive` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tau: Option<Tau>,
@@ -281,6 +288,8 @@ impl Default for Spec {
             modes: Modes { low: 2, high: 8 },
             decay: 1.0,
             flow: Flow::SurfaceDiffusion,
+            mobility: None,
+            units: None,
             tau: None,
             adaptive: None,
             t_end: None,
@@ -429,6 +438,16 @@ impl Spec {
         self.adaptive.map_or(Pace::Fixed(self.tau.unwrap_or(DEFAULT_TAU.into())), Pace::Adaptive)
     }
 
+    /// B in use: the motion takes a time of 1/B where that of unit mobility takes 1.
+    pub fn mobility(&self) -> f64 {
+        self.mobility.unwrap_or(1.0)
+    }
+
+    /// Returns the time `growth` of [`Flow::growth`] for a member of area `area`.
+    pub fn growth(&self, area: f64) -> Option<f64> {
+        self.flow.growth(area).map(|growth| growth / self.mobility())
+    }
+
     /// The final time, the latest one of all cells; infinite while it is still [`FinalTime::Auto`], which a
     /// [study](crate::ensemble::Study) replaces by numbers.
     pub fn final_time(&self) -> f64 {
@@ -483,7 +502,8 @@ impl Spec {
     pub fn rate_in_theory(&self, area: f64) -> Option<f64> {
         let drawn = (self.amplitude > 0.0).then(|| self.modes.low.max(2));
         let mode = self.shape.lowest_mode().into_iter().chain(drawn).min()?;
-        self.flow.excess_rate(mode, area)
+        let rate = self.flow.excess_rate(mode, area)?;
+        Some(if self.flow.growth(area).is_some() { rate } else { self.mobility() * rate })
     }
 
     /// The mean excess that the perturbation of a circle has in each mode from 2 on: ½ (m²-1) a_m².
@@ -799,6 +819,8 @@ mod tests {
         let written: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
         assert!(written.keys().all(|key| keys.contains(key)));
         let optional = [
+            "mobility",
+            "units",
             "tau",
             "adaptive",
             "t-end",

@@ -50,7 +50,7 @@ impl Study {
         let (free, given) = (spec.gives_no_times(), spec.clone());
         let spec = spec.validate()?;
         let cells = cells(&spec, base)?;
-        if !free || !cells.iter().any(|cell| times::is_far(cell.family.scale())) {
+        if !free || !cells.iter().any(|cell| times::is_far(&cell.spec, cell.family.scale())) {
             return Study::of_cells(spec, cells);
         }
         let tau = if spec.adaptive.is_some() { None } else { Some(Tau::Auto) };

@@ -14,7 +14,7 @@ use toml::Value;
 use crate::error::{Error, Result, did_you_mean};
 
 /// Keys that all members of a run have in common.
-const COMMON: [&str; 14] = [
+const COMMON: [&str; 15] = [
     "curves",
     "backend",
     "adapter",
@@ -29,6 +29,7 @@ const COMMON: [&str; 14] = [
     "common-random-numbers",
     "stop-when-relaxed",
     "max-sweeps",
+    "units",
 ];
 /// More cells than this are a typing error.
 pub const MAX_CELLS: u64 = 10_000;

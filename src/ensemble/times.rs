@@ -44,7 +44,8 @@ pub fn settled(spec: Spec, scale: &CurveScale) -> Spec {
 
 /// What the user should know about times and rates that are far from what the curve of a cell needs, one sentence each.
 pub fn warnings(spec: &Spec, scale: &CurveScale) -> Vec<String> {
-    let (omega, tau) = (own_omega(scale.rate()), own_tau(scale.rate()));
+    let rate = rate(spec, scale);
+    let (omega, tau) = (own_omega(rate), own_tau(rate));
     [far_omega(spec, omega), far_tau(spec, tau), far_end(spec, scale)].into_iter().flatten().collect()
 }
 
@@ -78,7 +79,7 @@ fn far_tau(spec: &Spec, own: f64) -> Option<String> {
 fn far_end(spec: &Spec, scale: &CurveScale) -> Option<String> {
     let (t_end, expected) = (spec.final_time(), expected(spec, scale));
     // A curve that starts nearly round is expected to rest.
-    let slowest = expected.max(scale.first_radius(&spec.flow).powi(4) / 4.0);
+    let slowest = expected.max(scale.first_radius(&spec.flow).powi(4) / (4.0 * spec.mobility()));
     let what = match () {
         () if t_end < expected / FAR_END => "is far too early for a member to relax",
         () if t_end > slowest * FAR_END && !spec.stops_when_relaxed() => "is long after a member has relaxed",
@@ -87,9 +88,14 @@ fn far_end(spec: &Spec, scale: &CurveScale) -> Option<String> {
     Some(format!("--t-end {} {what}: by theory it relaxes at about {}", number(t_end), short(expected)))
 }
 
+/// The relaxation rate of the curve in the user's unit of time.
+fn rate(spec: &Spec, scale: &CurveScale) -> f64 {
+    spec.mobility() * scale.rate()
+}
+
 /// Whether the default τ, ω and final time are far from what a curve of this size needs.
-pub fn is_far(scale: &CurveScale) -> bool {
-    let size = scale.radius.powi(4) / PAPERS_SIZE;
+pub fn is_far(spec: &Spec, scale: &CurveScale) -> bool {
+    let size = scale.radius.powi(4) / (spec.mobility() * PAPERS_SIZE);
     !(1.0 / SUITED..=SUITED).contains(&size)
 }
 
@@ -106,9 +112,9 @@ fn expected(spec: &Spec, scale: &CurveScale) -> f64 {
     let own = |factor: f64| spec.perturbed_excess().map(|part| factor * part).collect::<Vec<_>>();
     let start = scale.excess + own(1.0).iter().sum::<f64>();
     let threshold = spec.threshold(start);
-    let fourth = scale.first_radius(&spec.flow).powi(4);
+    let fourth = scale.first_radius(&spec.flow).powi(4) / spec.mobility();
     match scale.relaxes_after(&spec.flow, &own(PERTURBED), threshold) {
-        Some(t) if t > 0.0 => t,
+        Some(t) if t > 0.0 => t / spec.mobility(),
         // It is round already.
         Some(_) => fourth / 24.0,
         None if scale.simple => fourth / 24.0 * (start / threshold).ln().max(1.0),
@@ -128,7 +134,7 @@ fn rounded_up(t: f64) -> f64 {
 /// [`Error::Request`] for a redistribution that overshoots or needs too many steps, for too many steps, and for a pull
 /// that is too strong.
 pub fn check(spec: &Spec, scale: &CurveScale, n: usize) -> Result<()> {
-    let rate = scale.rate();
+    let rate = rate(spec, scale);
     check_redistribution(spec, own_omega(rate), own_tau(rate))?;
     check_steps(spec, own_omega(rate), own_tau(rate))?;
     let most = strongest_pull(rate, n);

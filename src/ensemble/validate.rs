@@ -20,6 +20,8 @@ const MAX_POINTS: usize = 1_000_000;
 pub(super) const MAX_STEPS: f64 = 1e9;
 /// Final times whose smallest part in a table, and whose sum over all members, can still be represented.
 const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
+/// Mobilities with which times, fourth powers of lengths over them, stay finite.
+const MOBILITIES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 /// The rows of a resident member stay in memory until it ends.
 const MAX_SERIES_ROWS: f64 = 1e6;
 const MAX_SNAPSHOTS: usize = 10_000;
@@ -39,6 +41,7 @@ impl Spec {
     pub fn validate(mut self) -> Result<Spec> {
         self.sweep.check(&Spec::keys())?;
         self.check_counts()?;
+        self.check_mobility()?;
         self.check_times()?;
         self.check_method()?;
         self.check_relaxation()?;
@@ -94,6 +97,18 @@ impl Spec {
             return Err(Error::value("threads", threads, problem, &format!("use 1 to {MAX_THREADS}")));
         }
         Ok(())
+    }
+
+    fn check_mobility(&self) -> Result<()> {
+        let Some(mobility) = self.mobility else { return Ok(()) };
+        positive("mobility", mobility, "a mobility in length^4/time", "1")?;
+        match MOBILITIES.contains(&mobility) {
+            true => Ok(()),
+            false => {
+                let allowed = format!("use a number from {:e} to {:e}", MOBILITIES.start(), MOBILITIES.end());
+                Err(Error::value("mobility", number(mobility), "times in this unit are not finite", &allowed))
+            }
+        }
     }
 
     fn check_times(&self) -> Result<()> {
@@ -472,6 +487,11 @@ mod tests {
         ("adaptive = 9e-6\nprecision = 'f32'", "--adaptive 9e-6: the rounding of the precision is larger; use 1e-5"),
         ("adaptive = 0.001\ntau = 0.001", "--tau 0.001: steps are either fixed or adaptive"),
         ("adaptive = 0.001\nomega = 1e9", "--omega 1000000000: adaptive steps are at most about 1/omega long"),
+        ("mobility = 0", "--mobility 0: not a mobility in length^4/time; use a finite number above 0, for example 1"),
+        ("mobility = -1", "--mobility -1: "),
+        ("mobility = nan", "--mobility NaN: "),
+        ("mobility = inf", "--mobility inf: "),
+        ("mobility = 1e101", "--mobility 1e101: times in this unit are not finite; use a number from 1e-100 to 1e100"),
         ("pull = -1", "--pull -1: not a rate"),
         ("pull = nan", "--pull NaN: "),
         ("pull = inf", "--pull inf: "),
@@ -557,6 +577,7 @@ mod tests {
             "relax-at",
             "adaptive",
             "pull",
+            "mobility",
         ];
         for key in numbers.into_iter().chain(["series", "snapshots", "only", "threads"]) {
             assert!(REFUSED.iter().any(|(_, start)| start.starts_with(&format!("--{key} "))), "{key}");

@@ -5,7 +5,7 @@ use std::{fmt, path::Path, time::Duration};
 use crate::{
     ensemble::{
         Spec,
-        spec::{Pace, Tau},
+        spec::{Pace, Tau, Units},
     },
     files::names::ENSEMBLE,
     placement::Platform,
@@ -14,7 +14,7 @@ use crate::{
         tally::{MollifiedMembers, Tally},
     },
     statistics::{LogRank, PowerLaw},
-    text::{duration, plural},
+    text::{duration, number, plural},
 };
 
 /// Maximum number of cells listed; the table has them all.
@@ -177,14 +177,24 @@ pub fn describe(spec: &Spec) -> String {
     let parts = [
         ("shape", String::from(spec.shape.clone())),
         ("flow", spec.flow.to_string()),
+        ("mobility", mobility(spec)),
         ("points", format!("n = {}", spec.points)),
         pace,
         ("t-end", format!("t-end = {}", spec.t_end.clone().unwrap_or(spec.final_time().into()))),
         ("seed", format!("seed {}", spec.seed)),
     ];
     let swept = |key: &str| spec.sweep.axes().iter().any(|axis| axis.key == key);
-    let parts = parts.into_iter().filter(|(key, _)| !swept(key)).map(|(_, part)| part);
+    let parts = parts.into_iter().filter(|(key, part)| !swept(key) && !part.is_empty()).map(|(_, part)| part);
     parts.collect::<Vec<_>>().join(", ")
+}
+
+/// The mobility with its unit; nothing if there is neither.
+fn mobility(spec: &Spec) -> String {
+    match (&spec.units, spec.mobility) {
+        (None, None) => String::new(),
+        (None, Some(mobility)) => format!("B = {}", number(mobility)),
+        (Some(Units { length, time }), _) => format!("B = {} {length}^4/{time}", number(spec.mobility())),
+    }
 }
 
 /// The machine in one line.

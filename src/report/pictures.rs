@@ -58,7 +58,12 @@ impl FinishedRun<'_> {
         let page = self.page(&charts, gallery.as_deref())?;
         let charts = charts.into_iter().map(|chart| (chart.name, chart.figure.svg));
         let gallery = gallery.map(|svg| (names::CURVES, svg));
-        Ok(charts.chain(gallery).chain([(names::REPORT, page)]).collect())
+        let all = charts.chain(gallery).chain([(names::REPORT, page)]);
+        let named = |(name, text): (&'static str, String)| match &self.spec().units {
+            Some(units) => (name, units.name(&text)),
+            None => (name, text),
+        };
+        Ok(all.map(named).collect())
     }
 
     fn spec(&self) -> &Spec {
@@ -399,7 +404,7 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
         whole if (rate - whole).abs() < 1e-6 * rate && rate < 1e4 => format!("{whole}"),
         _ => significant(rate, 3),
     };
-    Some(match (spec.flow.growth(area), &spec.flow) {
+    Some(match (spec.growth(area), &spec.flow) {
         (Some(time), _) => Theory {
             label: format!("(1 + 2t/R⁴)^−{}", brief(rate)),
             law: DecayLaw::Algebraic { start: mean * (1.0 + t / time).powf(rate), time, power: rate },

@@ -29,7 +29,7 @@ impl Trajectory<'_> {
     /// power of it; and the fraction of the variance that the line explains.
     fn rate(&self) -> Option<(f64, f64)> {
         let Decay { xx, xy, yy, .. } = self.report.decay;
-        let clock = if self.launch.parameters.growth > 0.0 { 1.0 } else { self.time.unit(self.unit) };
+        let clock = if self.launch.parameters.growth > 0.0 { 1.0 } else { self.time.unit(self.time_unit) };
         let (rate, r2) = (-xy / xx / clock, xy * xy / (xx * yy));
         (self.counters.fit_points >= MIN_POINTS && rate.is_finite() && r2.is_finite()).then_some((rate, r2))
     }
@@ -48,7 +48,7 @@ impl Trajectory<'_> {
         let inside = |step: u32, [high, low, length, fraction]: [f64; 4]| match (self.time, step) {
             (_, NEVER) => None,
             (Time::Fixed(clock), step) => Some(clock.inside(step, fraction)),
-            (Time::Adaptive(_), _) => Some((high + (low + fraction * length)) * self.unit.powi(4)),
+            (Time::Adaptive(_), _) => Some((high + (low + fraction * length)) * self.time_unit),
         };
         let p = progress;
         let relaxed = inside(self.counters.relax_step, [p.relax_high, p.relax_low, p.relax_length, p.relax_fraction]);

@@ -2,7 +2,8 @@
 //!
 //! A member is advanced in units of its own size: lengths are divided by a power of two near its radius and times by
 //! the fourth power of that, without rounding, so that no threshold of the scheme and no range of a precision
-//! depends on the user's unit.
+//! depends on the user's unit. Times are also multiplied by the mobility, here and nowhere else: outside they are the
+//! user's, inside those of unit mobility.
 
 mod end;
 mod outputs;
@@ -58,11 +59,11 @@ enum Time {
 }
 
 impl Time {
-    /// Unit of the clock of [`decay`](crate::scheme::decay), for a member advanced in lengths of `unit`.
+    /// Unit of the clock of [`decay`](crate::scheme::decay), for a member advanced in times of `unit`.
     fn unit(self, unit: f64) -> f64 {
         match self {
             Time::Fixed(clock) => clock.tau,
-            Time::Adaptive(_) => unit.powi(4),
+            Time::Adaptive(_) => unit,
         }
     }
 }
@@ -72,6 +73,8 @@ pub struct Trajectory<'a> {
     member: Member,
     /// A power of two near the member's radius: the unit of length in which it is advanced.
     unit: f64,
+    /// The fourth power of that over the mobility: the unit of time.
+    time_unit: f64,
     t_end: f64,
     time: Time,
     launch: Run<f64>,
@@ -203,7 +206,7 @@ impl Trajectory<'_> {
         match self.time {
             _ if self.is_at_end() => self.t_end,
             Time::Fixed(clock) => clock.time(self.counters.steps),
-            Time::Adaptive(_) => (progress.time_high + progress.time_low) * self.unit.powi(4),
+            Time::Adaptive(_) => (progress.time_high + progress.time_low) * self.time_unit,
         }
     }
 
@@ -231,12 +234,12 @@ impl Trajectory<'_> {
                 let ends_short = clock.ends_short() && goal == clock.steps;
                 let before_last = ends_short && steps + 1 < clock.steps;
                 let tau = if ends_short && !before_last { clock.last() } else { clock.tau };
-                parameters.tau = tau / self.unit.powi(4);
+                parameters.tau = tau / self.time_unit;
                 if before_last { clock.steps - 1 } else { goal }
             }
             Time::Adaptive(ticks) => {
                 let end = (parameters.end_high, parameters.end_low);
-                let split = |t: f64| if t >= self.t_end { end } else { ticks.split(t / self.unit.powi(4)) };
+                let split = |t: f64| if t >= self.t_end { end } else { ticks.split(t / self.time_unit) };
                 (parameters.goal_high, parameters.goal_low) = output.map_or(end, split);
                 self.most_steps()
             }

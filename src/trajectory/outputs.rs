@@ -62,7 +62,7 @@ impl Trajectory<'_> {
             }
             Time::Adaptive(ticks) => {
                 let progress = &self.report.progress;
-                let (high, low) = ticks.split(t / self.unit.powi(4));
+                let (high, low) = ticks.split(t / self.time_unit);
                 let past = (progress.time_high - high) + (progress.time_low - low);
                 let step = progress.taken.max(f64::MIN_POSITIVE);
                 (past >= 0.0 || self.is_at_end()).then(|| (1.0 - past / step).clamp(0.0, 1.0))

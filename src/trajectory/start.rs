@@ -39,7 +39,8 @@ impl<'a> Trajectory<'a> {
     pub fn new(member: Member, spec: &Spec, precision: Precision, outputs: &'a Outputs) -> Trajectory<'a> {
         let unit = unit_of(&member.nodes);
         let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
-        let parameters = parameters(spec, &nodes, unit, spec.tolerance_at(precision));
+        let time_unit = unit.powi(4) / spec.mobility();
+        let parameters = parameters(spec, &nodes, [unit, time_unit], spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
         launch.counters.stop_when_relaxed = spec.stops_when_relaxed().into();
         launch.counters.order = FIRST_ORDER.min(most_order(precision.epsilon()));
@@ -48,11 +49,11 @@ impl<'a> Trajectory<'a> {
         let limit = spec.threshold(start.excess);
         let course = Course::of(start.excess, turning, limit, precision);
         set_thresholds(&mut launch, course, start.excess, limit, precision);
-        let (time, out_of_range) = begin_time(&mut launch, spec, unit, precision);
-        let clock = time.unit(unit);
+        let (time, out_of_range) = begin_time(&mut launch, spec, time_unit, precision);
+        let clock = time.unit(time_unit);
         launch.parameters.clock_end = spec.final_time() / clock;
         launch.parameters.growth =
-            spec.flow.growth(start.area).map_or(0.0, |growth| (growth / clock).min(*schedule::range(precision).end()));
+            spec.growth(start.area).map_or(0.0, |growth| (growth / clock).min(*schedule::range(precision).end()));
         let status = match course {
             Course::Round if spec.stops_when_relaxed() => Some(Status::Relaxed),
             _ if beyond(&parameters, precision) => Some(Status::Nonfinite),
@@ -61,6 +62,7 @@ impl<'a> Trajectory<'a> {
         let mut trajectory = Trajectory {
             member,
             unit,
+            time_unit,
             t_end: spec.final_time(),
             time,
             outputs,
@@ -119,18 +121,18 @@ fn set_thresholds(launch: &mut Run<f64>, course: Course, excess: f64, limit: f64
 }
 
 /// How the member's time advances, and its status if it ends at once because no clock of the precision holds its time.
-fn begin_time(launch: &mut Run<f64>, spec: &Spec, unit: f64, precision: Precision) -> (Time, Option<Status>) {
+fn begin_time(launch: &mut Run<f64>, spec: &Spec, time_unit: f64, precision: Precision) -> (Time, Option<Status>) {
     let tolerance = match spec.pace() {
         Pace::Fixed(tau) => {
             let tau = match tau {
                 Tau::Step(tau) => tau,
-                Tau::Auto => launch.parameters.tau * unit.powi(4),
+                Tau::Auto => launch.parameters.tau * time_unit,
             };
             return (Time::Fixed(Clock::new(tau, spec.final_time())), None);
         }
         Pace::Adaptive(tolerance) => tolerance,
     };
-    let (times, end) = (schedule::times(precision), spec.final_time() / unit.powi(4));
+    let (times, end) = (schedule::times(precision), spec.final_time() / time_unit);
     let status = match end {
         end if end < *times.start() => Some(Status::Nonfinite),
         end if end > *times.end() => Some(Status::Stalled),
@@ -162,9 +164,8 @@ fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
     too_large || (p.tau != 0.0 && p.tau < *range.start())
 }
 
-/// The parameters of a member in units of `unit`, except thresholds and times.
-fn parameters(spec: &Spec, nodes: &[DVec2], unit: f64, tolerance: f64) -> Parameters<f64> {
-    let time = unit.powi(4);
+/// The parameters of a member in the units `unit` of length and `time` of time, except thresholds and times.
+fn parameters(spec: &Spec, nodes: &[DVec2], [unit, time]: [f64; 2], tolerance: f64) -> Parameters<f64> {
     let rate = relaxation_rate(radius(nodes));
     let of_flow = Parameters::of_flow(&spec.flow, 1.0);
     // b(k) has the dimension of 1/length³.

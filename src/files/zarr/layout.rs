@@ -40,14 +40,15 @@ pub(super) fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) ->
         "flag_values": Status::ALL.map(|status| status as u32),
         "flag_meanings": Status::ALL.map(Status::name).join(" "),
     });
-    let time = json!({ "long_name": "time", "units": "length^4" });
+    let unit = |own: &str| spec.units.as_ref().map_or(own.to_owned(), |units| units.attribute(own));
+    let time = json!({ "long_name": "time", "units": unit("length^4") });
     Arrays {
         member: vector("member", DataType::Int64, members, of_member("index of the member")),
         time: vector("time", DataType::Float64, instants, time),
         node: vector("node", DataType::Int64, nodes, json!({ "long_name": "number of the node along the curve" })),
         cell: vector("cell", DataType::Int64, members, of_member("index of the cell of the sweep")),
         fields: FIELDS.map(|(name, units, what)| {
-            let attributes = json!({ "long_name": what, "units": units, "coordinates": "cell status" });
+            let attributes = json!({ "long_name": what, "units": unit(units), "coordinates": "cell status" });
             Array::new(name, DataType::Float64, &[members, instants, nodes], attributes, bytes)
         }),
         status: vector(STATUS, DataType::Int8, members, flags),
