@@ -167,7 +167,7 @@ impl Trajectory<'_> {
             if turning.abs() != 1.0 || (changes_sign && crossing(&nodes).is_some()) {
                 let first =
                     if adaptive && turning.abs() == 1.0 { self.first_crossing([simple_at, at], state) } else { at };
-                self.crossed = Some(self.now() - (1.0 - first) * taken * self.unit.powi(4));
+                self.crossed = Some(self.now() - (1.0 - first) * taken * self.time_unit);
                 self.launch.parameters.look_at = crate::number::BIG;
                 return;
             }
