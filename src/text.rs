@@ -28,6 +28,15 @@ pub fn number(value: f64) -> String {
     }
 }
 
+/// A probability with its sign: `p = 0.35`, `p = 2.1e-19`. It is never 0.
+pub fn p_value(p: f64) -> String {
+    match p {
+        ..1e-300 => "p < 1e-300".into(),
+        ..1e-3 => format!("p = {p:.1e}"),
+        _ => format!("p = {}", significant(p, 2)),
+    }
+}
+
 /// `10⁻⁶`.
 pub fn power_of_ten(power: i32) -> String {
     let raised = |c: char| match c.to_digit(10) {
@@ -85,6 +94,14 @@ mod tests {
     fn numbers_have_the_digits_asked_for() {
         let shown = [0.0, 0.41234, -2.0, 9.9996, 1234.5, 1e-7, 2e6].map(|value| significant(value, 3));
         assert_eq!(shown, ["0", "0.412", "\u{2212}2.00", "10.0", "1234", "1.00·10⁻⁷", "2.00·10⁶"]);
+    }
+
+    #[test]
+    fn a_probability_is_never_shown_as_zero() {
+        let shown = [1.0, 0.354, 0.00123, 2.13e-19, 1.1e-300, 1e-301, f64::MIN_POSITIVE, 0.0].map(p_value);
+        let expected = ["1.0", "0.35", "0.0012", "2.1e-19", "1.1e-300"].map(|p| format!("p = {p}"));
+        assert_eq!(shown[..5], expected);
+        assert!(shown[5..].iter().all(|text| text == "p < 1e-300"), "{shown:?}");
     }
 
     #[test]

@@ -23,8 +23,10 @@ pub struct Document<'a> {
     folder: &'a Path,
     files: &'a [&'static str],
     cells: Vec<CellDocument<'a>>,
-    /// Whether the cells could have one distribution; null if they were not compared.
+    /// Whether the cells could have one distribution; null if the test does not hold.
     log_rank: Option<LogRankDocument>,
+    /// Why the cells of a study are not compared; null if they are.
+    not_compared: Option<String>,
     /// The medians as a power of the swept value; null if there is no such law.
     power_law: Option<PowerLawDocument>,
 }
@@ -64,8 +66,9 @@ impl<'a> Document<'a> {
         folder: &'a Path,
         files: &'a [&'static str],
     ) -> Document<'a> {
-        let EnsembleStatistics { cells, log_rank, power_law, .. } = statistics;
-        let log_rank = log_rank.as_ref().map(|test| LogRankDocument {
+        let EnsembleStatistics { cells, comparison, power_law, .. } = statistics;
+        let not_compared = comparison.refusal().map(String::from);
+        let log_rank = comparison.log_rank().map(|test| LogRankDocument {
             chi2: test.statistic,
             degrees_of_freedom: test.degrees_of_freedom,
             p: test.p_value,
@@ -77,7 +80,7 @@ impl<'a> Document<'a> {
             r2: law.r2,
         });
         let cells = cells.iter().map(|cell| CellDocument::new(spec, cell)).collect();
-        Document { run, folder, files, cells, log_rank, power_law }
+        Document { run, folder, files, cells, log_rank, not_compared, power_law }
     }
 
     /// Its text.
@@ -146,7 +149,8 @@ mod tests {
             assert_eq!(read("se"), statistics.mean.and_then(|mean| mean.standard_error));
             assert_eq!(read("q95"), None, "a quantile beyond the last event is unknown: {text}");
         }
-        assert_eq!(json["log_rank"]["degrees_of_freedom"], 1);
+        assert_eq!(json["log_rank"], serde_json::Value::Null);
+        assert!(json["not_compared"].as_str().is_some_and(|why| why.contains("expected relaxations")), "{text}");
         assert_eq!(json["power_law"]["exponent"].as_f64(), statistics.power_law.map(|law| law.exponent));
     }
 }

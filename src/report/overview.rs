@@ -14,7 +14,7 @@ use crate::{
         tally::{MollifiedMembers, Tally},
     },
     statistics::{LogRank, PowerLaw},
-    text::{duration, number, plural},
+    text::{duration, number, p_value, plural},
 };
 
 /// Maximum number of cells listed; the table has them all.
@@ -107,7 +107,7 @@ impl Overview<'_> {
 
     /// One line per cell of a study, and how the cells compare.
     fn cells(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let EnsembleStatistics { cells, log_rank, power_law, .. } = self.statistics;
+        let EnsembleStatistics { cells, comparison, power_law, .. } = self.statistics;
         if cells.len() < 2 {
             return Ok(());
         }
@@ -119,17 +119,16 @@ impl Overview<'_> {
             1 => writeln!(f, "{:<11}1 more cell is in {ENSEMBLE}", "...")?,
             more => writeln!(f, "{:<11}{more} more cells are in {ENSEMBLE}", "...")?,
         }
-        if let Some(LogRank { statistic, degrees_of_freedom, p_value, .. }) = log_rank {
-            let p = match *p_value {
-                0.0 => "< 1e-300".into(),
-                p => format!("= {}", significant(p)),
-            };
-            let chi = significant(*statistic);
+        if let Some(LogRank { statistic, degrees_of_freedom, p_value: p, .. }) = comparison.log_rank() {
+            let (p, chi) = (p_value(*p), significant(*statistic));
             writeln!(
                 f,
-                "{:<11}log-rank test that all cells have one distribution: p {p}, chi2 = {chi} ({degrees_of_freedom})",
+                "{:<11}log-rank test that all cells have one distribution: {p}, chi2 = {chi} ({degrees_of_freedom})",
                 "cells"
             )?;
+        }
+        if let Some(why) = comparison.refusal() {
+            writeln!(f, "{:<11}not compared: {why}", "cells")?;
         }
         if let (Some(PowerLaw { exponent, exponent_error, .. }), [axis]) = (power_law, self.spec.sweep.axes()) {
             let error = exponent_error.map_or(String::new(), |error| format!(" +- {}", significant(error)));

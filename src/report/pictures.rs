@@ -16,11 +16,12 @@ use crate::{
     flow::Flow,
     results::{
         cells::{CellStatistics, EnsembleStatistics, QUANTILES},
+        comparison::Comparison,
         provenance::Provenance,
         tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
     },
     statistics::{KaplanMeier, Step},
-    text::{count, significant},
+    text::{count, p_value, significant},
 };
 
 /// Half the width of a 95 % band in standard errors.
@@ -283,7 +284,7 @@ impl FinishedRun<'_> {
     }
 
     fn headline(&self) -> Vec<Headline> {
-        let EnsembleStatistics { cells, log_rank, power_law, .. } = self.statistics;
+        let EnsembleStatistics { cells, comparison, power_law, .. } = self.statistics;
         let mut headline = Vec::new();
         let mut add = |label: &str, value: Option<f64>, note: String| {
             let value = value.map_or("not reached".into(), |value| significant(value, DIGITS));
@@ -321,11 +322,7 @@ impl FinishedRun<'_> {
                     let label = format!("power of {}", self.keys());
                     headline.push(Headline { label, value: significant(law.exponent, 3), note: error });
                 }
-                if let Some(test) = log_rank {
-                    let label = "one distribution?".to_string();
-                    let value = format!("p = {}", significant(test.p_value, 2));
-                    headline.push(Headline { label, value, note: "log-rank test over all cells".into() });
-                }
+                headline.extend(compared(comparison));
             }
         }
         headline
@@ -418,6 +415,16 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
             Theory { label, law: DecayLaw::Exponential { start: mean * (rate * t).exp(), rate } }
         }
     })
+}
+
+/// Whether the cells differ, in the headline.
+fn compared(comparison: &Comparison) -> Option<Headline> {
+    let of = |value: String, note: String| Some(Headline { label: "one distribution?".into(), value, note });
+    match comparison {
+        Comparison::Single => None,
+        Comparison::LogRank(test) => of(p_value(test.p_value), "log-rank test over all cells".into()),
+        Comparison::Refused(why) => of("not tested".into(), why.clone()),
+    }
 }
 
 fn median(cell: &CellStatistics) -> Option<EstimatedNumber> {

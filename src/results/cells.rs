@@ -8,11 +8,14 @@ use std::mem;
 use csv::WriterBuilder;
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-use super::tally::{CellTally, Rate, Tally};
+use super::{
+    comparison::Comparison,
+    tally::{CellTally, Rate, Tally},
+};
 use crate::{
     ensemble::{Spec, Status},
     error::{Error, Result},
-    statistics::{Bootstrap, Description, Interval, KaplanMeier, LogRank, Mean, PowerLaw, Sample, log_rank},
+    statistics::{Bootstrap, Description, Interval, KaplanMeier, Mean, PowerLaw, Sample},
 };
 
 /// Fractions of the members whose times are in the table, with the names and meanings of the columns.
@@ -23,9 +26,6 @@ pub const QUANTILES: [(f64, &str, &str); 5] = [
     (0.75, "q75", "75 % quantile"),
     (0.95, "q95", "95 % quantile"),
 ];
-
-/// The test that compares cells needs time cubic in their number.
-const MAX_COMPARED: usize = 500;
 
 /// Relaxation times of one cell.
 pub struct CellStatistics {
@@ -138,8 +138,8 @@ fn places(quantiles: [Option<f64>; QUANTILES.len()], interval: Option<Interval>)
 pub struct EnsembleStatistics {
     /// Each cell.
     pub cells: Vec<CellStatistics>,
-    /// Whether the cells could have one distribution; none for a single cell.
-    pub log_rank: Option<LogRank>,
+    /// How the cells compare.
+    pub comparison: Comparison,
     /// The medians as a power of the swept value, if a single key with positive numeric values is swept.
     pub power_law: Option<PowerLaw>,
     /// Rates are drawn relative to theory, if all members with a rate have a theoretical one.
@@ -211,9 +211,8 @@ impl EnsembleStatistics {
                 CellStatistics::new(spec, cell, of_cell, relative)
             })
             .collect::<Result<Vec<_>>>()?;
-        let compared = (2..=MAX_COMPARED).contains(&cells.len());
-        let samples = || cells.iter().map(|cell| &cell.sample).collect::<Vec<_>>();
-        let log_rank = if compared { log_rank(&samples()) } else { None };
+        let samples: Vec<&Sample> = cells.iter().map(|cell| &cell.sample).collect();
+        let comparison = Comparison::independent(spec, &samples)?;
         let power_law = match spec.sweep.axes() {
             [axis] => axis.numbers().and_then(|values| {
                 let medians = cells.iter().map(CellStatistics::median);
@@ -224,7 +223,7 @@ impl EnsembleStatistics {
             }),
             _ => None,
         };
-        Ok(EnsembleStatistics { cells, log_rank, power_law, relative })
+        Ok(EnsembleStatistics { cells, comparison, power_law, relative })
     }
 
     /// The columns of `ensemble.csv`.
@@ -301,7 +300,7 @@ mod tests {
         assert!(lines[1].starts_with("0,\"ellipse:2,1\",2,2,0,0,0,0,2,1.0,0.7071"), "{}", lines[1]);
         assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
         assert!(lines[2].contains(",2.0,1.0,1.0,1.0,,,"), "the mean is restricted, the tail unknown: {}", lines[2]);
-        assert_eq!(statistics.log_rank.unwrap().degrees_of_freedom, 1);
+        assert!(statistics.comparison.refusal().is_some(), "{:?}", statistics.comparison);
         assert_eq!(statistics.power_law, None);
     }
 

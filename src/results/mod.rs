@@ -1,7 +1,9 @@
 //! The results of a study: sums over members as they end, statistics by cell, and the record of the run.
 
 pub mod cells;
+pub mod comparison;
 pub mod provenance;
 pub mod tally;
 
 pub use cells::EnsembleStatistics;
+pub use comparison::Comparison;

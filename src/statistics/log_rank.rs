@@ -23,7 +23,7 @@ pub struct LogRank {
     pub statistic: f64,
     /// Number of groups with members at risk at the first event, minus one.
     pub degrees_of_freedom: usize,
-    /// Probability of a statistic at least as large if the groups are alike.
+    /// Probability of a statistic at least as large if the groups are alike; never 0, but the smallest normal number.
     pub p_value: f64,
     /// The groups, in the order given.
     pub groups: Vec<GroupEvents>,

@@ -1,12 +1,24 @@
-//! The tail of the chi-square distribution, by the incomplete gamma function.
+//! Tails of the chi-square and the normal distribution.
 //!
-//! Series and continued fraction as in Abramowitz and Stegun 6.5.29 and 6.5.31, the latter by Lentz's method.
+//! The former is an incomplete gamma function: series and continued fraction as in Abramowitz and Stegun 6.5.29 and
+//! 6.5.31, the latter by Lentz's method.
+//!
+//! A probability that is too small for a normal f64 is returned as [`LEAST`], so that none is ever 0: an event that was
+//! seen is not impossible.
 
-/// Returns P(X > x) for X chi-square with `degrees_of_freedom` > 0; 1 at x ≤ 0, 0 if it is below the smallest number.
+/// The smallest probability that is returned.
+pub const LEAST: f64 = f64::MIN_POSITIVE;
+
+/// Returns P(X > x) for X chi-square with `degrees_of_freedom` > 0; 1 at x ≤ 0, and at least [`LEAST`].
 ///
 /// The relative error is below 1e-13 for up to 200 degrees of freedom, and grows in proportion beyond.
 pub fn chi_square_tail(x: f64, degrees_of_freedom: usize) -> f64 {
-    if x <= 0.0 { 1.0 } else { upper_gamma(degrees_of_freedom as f64 / 2.0, x / 2.0) }
+    if x <= 0.0 { 1.0 } else { upper_gamma(degrees_of_freedom as f64 / 2.0, x / 2.0).max(LEAST) }
+}
+
+/// Returns P(|Z| > |z|) for Z standard normal, at least [`LEAST`].
+pub fn normal_tails(z: f64) -> f64 {
+    libm::erfc(z.abs() / std::f64::consts::SQRT_2).max(LEAST)
 }
 
 /// Q(a, x) = Γ(a, x)/Γ(a) for a > 0, x > 0.
@@ -93,8 +105,17 @@ mod tests {
         for degrees in [1, 2, 3, 7, 50, 1001, 100_000] {
             for x in [-1.0, 0.0, 1e-300, 1e-3, 1.0, 999.0, 1001.0, 1e5, 1.01e5, 1e9, f64::MAX] {
                 let tail = chi_square_tail(x, degrees);
-                assert!((0.0..=1.0).contains(&tail), "{x} {degrees}: {tail}");
+                assert!((LEAST..=1.0).contains(&tail), "{x} {degrees}: {tail}");
             }
         }
+    }
+
+    #[test]
+    fn both_tails_of_the_normal_distribution_are_that_of_chi_square_with_one_degree() {
+        for z in [0.0, 0.3, -1.0, 1.959963984540054, 5.0, -12.0, 30.0] {
+            let (found, expected) = (normal_tails(z), chi_square_tail(z * z, 1));
+            assert!((found / expected - 1.0).abs() < 1e-12, "{z}: {found:e}, not {expected:e}");
+        }
+        assert_eq!(normal_tails(-50.0), LEAST);
     }
 }
