@@ -93,6 +93,33 @@ fn sharded(home: &Path, study: &str, count: u64, out: &str) {
 }
 
 #[test]
+fn cells_with_common_random_numbers_are_paired_alike_in_one_run_in_shards_and_when_drawn_again() {
+    let home = TempDir::new().unwrap();
+    let study = "--backend cpu --curves 23 --points 34 --sweep adaptive=1e-3,1e-4 --common-random-numbers --t-end 0.88 \
+                 --precision f64";
+    let one = curvelax(home.path(), &format!("run {study} --out one --json"));
+    let document: Value = serde_json::from_slice(&one.stdout).unwrap();
+    assert_eq!(said(&one, 0).matches("warning").count(), 0);
+    let paired = &document["paired"][0];
+    assert_eq!((document["log_rank"].clone(), paired["cell"].as_u64()), (Value::Null, Some(1)));
+    // The coarser tolerance errs to one side, and some members have not relaxed.
+    let left_out: u64 =
+        ["later", "earlier", "unknown"].iter().map(|kind| paired["left_out"][kind].as_u64().unwrap()).sum();
+    assert_eq!(paired["pairs"].as_u64().unwrap() + left_out, 23, "{paired}");
+    assert!(left_out > 0 && paired["p"].as_f64().unwrap() < 1e-3, "{paired}");
+    assert!(paired["p"].as_f64().unwrap() > 0.0, "{paired}");
+    for count in [2, 5] {
+        let out = format!("merged-{count}");
+        sharded(home.path(), study, count, &out);
+        assert_eq!(differences(&home.path().join("one"), &home.path().join(&out)), [""; 0], "{count} shards");
+    }
+    let page = fs::read(home.path().join("one/report.html")).unwrap();
+    assert!(String::from_utf8_lossy(&page).contains("t_relax less that of the same member of cell 0"));
+    done(home.path(), "plot one --out again");
+    assert!(fs::read(home.path().join("again/report.html")).unwrap() == page, "redrawn pairs differ");
+}
+
+#[test]
 fn merged_shards_are_the_files_of_one_run() {
     let home = TempDir::new().unwrap();
     for store in ["csv", "zarr"] {

@@ -8,6 +8,7 @@ use toml::Value;
 
 use crate::results::{
     cells::{CellStatistics, EnsembleStatistics, Numbers},
+    comparison::{CellDifference, LeftOut},
     provenance::{Provenance, json},
 };
 use crate::{
@@ -25,6 +26,8 @@ pub struct Document<'a> {
     cells: Vec<CellDocument<'a>>,
     /// Whether the cells could have one distribution; null if the test does not hold.
     log_rank: Option<LogRankDocument>,
+    /// The differences from the first cell; null unless cells share their random numbers.
+    paired: Option<Vec<PairedDocument>>,
     /// Why the cells of a study are not compared; null if they are.
     not_compared: Option<String>,
     /// The medians as a power of the swept value; null if there is no such law.
@@ -50,6 +53,42 @@ struct LogRankDocument {
 }
 
 #[derive(Serialize)]
+struct PairedDocument {
+    cell: u64,
+    against: u64,
+    pairs: usize,
+    equal: usize,
+    median: Option<f64>,
+    median_low: Option<f64>,
+    median_high: Option<f64>,
+    /// W⁺ of the signed-rank test; null without a test.
+    w: Option<f64>,
+    p: Option<f64>,
+    exact: Option<bool>,
+    left_out: BTreeMap<&'static str, usize>,
+}
+
+impl PairedDocument {
+    fn new(of: &CellDifference) -> PairedDocument {
+        let CellDifference { cell, pairs, equal, median, interval, test, left_out } = *of;
+        let LeftOut { later, earlier, unknown } = left_out;
+        PairedDocument {
+            cell,
+            against: 0,
+            pairs,
+            equal,
+            median,
+            median_low: interval.map(|(low, _)| low),
+            median_high: interval.map(|(_, high)| high),
+            w: test.map(|test| test.statistic),
+            p: test.map(|test| test.p_value),
+            exact: test.map(|test| test.exact),
+            left_out: [("later", later), ("earlier", earlier), ("unknown", unknown)].into(),
+        }
+    }
+}
+
+#[derive(Serialize)]
 struct PowerLawDocument {
     factor: f64,
     exponent: f64,
@@ -67,6 +106,7 @@ impl<'a> Document<'a> {
         files: &'a [&'static str],
     ) -> Document<'a> {
         let EnsembleStatistics { cells, comparison, power_law, .. } = statistics;
+        let paired = comparison.paired_cells().map(|cells| cells.iter().map(PairedDocument::new).collect());
         let not_compared = comparison.refusal().map(String::from);
         let log_rank = comparison.log_rank().map(|test| LogRankDocument {
             chi2: test.statistic,
@@ -80,7 +120,7 @@ impl<'a> Document<'a> {
             r2: law.r2,
         });
         let cells = cells.iter().map(|cell| CellDocument::new(spec, cell)).collect();
-        Document { run, folder, files, cells, log_rank, not_compared, power_law }
+        Document { run, folder, files, cells, log_rank, paired, not_compared, power_law }
     }
 
     /// Its text.

@@ -11,6 +11,7 @@ use crate::{
     placement::Platform,
     results::{
         cells::{CellStatistics, EnsembleStatistics, Rates},
+        comparison::{CellDifference, LeftOut},
         tally::{MollifiedMembers, Tally},
     },
     statistics::{LogRank, PowerLaw},
@@ -130,6 +131,16 @@ impl Overview<'_> {
         if let Some(why) = comparison.refusal() {
             writeln!(f, "{:<11}not compared: {why}", "cells")?;
         }
+        for (i, difference) in comparison.paired_cells().unwrap_or_default().iter().take(MAX_CELLS).enumerate() {
+            if i == 0 {
+                writeln!(
+                    f,
+                    "{:<11}t_relax less that of the same member of cell 0 (Wilcoxon's signed ranks):",
+                    "pairs"
+                )?;
+            }
+            writeln!(f, "{:<11}{}", difference.cell, paired(difference))?;
+        }
         if let (Some(PowerLaw { exponent, exponent_error, .. }), [axis]) = (power_law, self.spec.sweep.axes()) {
             let error = exponent_error.map_or(String::new(), |error| format!(" +- {}", significant(error)));
             writeln!(
@@ -183,7 +194,12 @@ pub fn describe(spec: &Spec) -> String {
         ("seed", format!("seed {}", spec.seed)),
     ];
     let swept = |key: &str| spec.sweep.axes().iter().any(|axis| axis.key == key);
-    let parts = parts.into_iter().filter(|(key, part)| !swept(key) && !part.is_empty()).map(|(_, part)| part);
+    // A swept tolerance replaces a fixed step, and the reverse.
+    let has_one_value = |key: &str| match key {
+        "tau" | "adaptive" => !swept("tau") && !swept("adaptive"),
+        _ => !swept(key),
+    };
+    let parts = parts.into_iter().filter(|(key, part)| has_one_value(key) && !part.is_empty()).map(|(_, part)| part);
     parts.collect::<Vec<_>>().join(", ")
 }
 
@@ -235,6 +251,34 @@ fn times(cell: &CellStatistics) -> String {
     )
 }
 
+/// The differences of a cell from the first.
+fn paired(of: &CellDifference) -> String {
+    let CellDifference { pairs, equal, median, interval, test, left_out, .. } = of;
+    let which = plural(*pairs as u64, "pair");
+    let difference = match (median, interval, test) {
+        (None, ..) => "in no pair both relaxed".into(),
+        (Some(0.0), _, None) => format!("equal in {pairs} {which}"),
+        (Some(median), _, None) => format!("{} in {pairs} {which}, not tested", significant(*median)),
+        (Some(median), interval, Some(test)) => {
+            let bounds = interval.map_or(String::new(), |(low, high)| {
+                format!(" (95 % interval {} to {})", significant(low), significant(high))
+            });
+            let equal = if *equal > 0 { format!(", {equal} of them equal") } else { String::new() };
+            format!("median {}{bounds}, {} over {pairs} {which}{equal}", significant(*median), p_value(test.p_value))
+        }
+    };
+    let LeftOut { later, earlier, unknown } = left_out;
+    match left_out.count() {
+        0 => difference,
+        count => {
+            let parts = [(later, "later"), (earlier, "earlier"), (unknown, "of unknown order")];
+            let parts = parts.into_iter().filter(|(count, _)| **count > 0);
+            let parts: Vec<String> = parts.map(|(count, what)| format!("{count} {what}")).collect();
+            format!("{difference}; {count} left out, since a member did not relax ({})", parts.join(", "))
+        }
+    }
+}
+
 /// Four significant digits; whole numbers from 1000 in full.
 fn significant(value: f64) -> String {
     let size = value.abs();
@@ -255,6 +299,7 @@ mod tests {
         ensemble::Status,
         files::names,
         results::{provenance::tests::platform, tally::tests::outcome},
+        statistics::SignedRank,
     };
 
     fn overview(tally: &Tally) -> String {
@@ -307,6 +352,29 @@ results    out: summary.csv, run.json
         let one_thread = Platform { threads: Some(1), ..platform() };
         assert!(machine(&one_thread).contains(", 1 thread ("), "{}", machine(&one_thread));
         assert!(machine(&platform()).contains(", 2 threads ("), "{}", machine(&platform()));
+    }
+
+    #[test]
+    fn differences_of_pairs_look_like_this() {
+        let test = SignedRank { ranked: 510, statistic: 1e5, p_value: 1e-85, exact: false };
+        let some = CellDifference {
+            cell: 1,
+            pairs: 512,
+            equal: 2,
+            median: Some(-1.25e-3),
+            interval: Some((-1.5e-3, -1e-3)),
+            test: Some(test),
+            left_out: LeftOut { later: 0, earlier: 2, unknown: 1 },
+        };
+        let median =
+            "median -0.001250 (95 % interval -0.001500 to -0.001000), p = 1.0e-85 over 512 pairs, 2 of them equal";
+        let left_out = "; 3 left out, since a member did not relax (2 earlier, 1 of unknown order)";
+        assert_eq!(paired(&some), format!("{median}{left_out}"));
+        let equal = CellDifference { median: Some(0.0), test: None, left_out: LeftOut::default(), ..some.clone() };
+        assert_eq!(paired(&equal), "equal in 512 pairs");
+        let copies = CellDifference { pairs: 1, median: Some(0.5), ..equal.clone() };
+        assert_eq!(paired(&copies), "0.5000 in 1 pair, not tested");
+        assert_eq!(paired(&CellDifference { median: None, ..equal }), "in no pair both relaxed");
     }
 
     #[test]

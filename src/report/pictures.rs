@@ -16,7 +16,7 @@ use crate::{
     flow::Flow,
     results::{
         cells::{CellStatistics, EnsembleStatistics, QUANTILES},
-        comparison::Comparison,
+        comparison::{CellDifference, Comparison},
         provenance::Provenance,
         tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
     },
@@ -241,7 +241,7 @@ impl FinishedRun<'_> {
             warnings: &self.provenance.warnings,
             members: self.trajectories(),
             plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
-            tables: vec![self.table()],
+            tables: [self.table()].into_iter().chain(self.pairs()).collect(),
             spec: &spec,
             provenance: self.provenance(),
         };
@@ -356,6 +356,31 @@ impl FinishedRun<'_> {
         }
     }
 
+    /// The differences from the first cell, if cells share their random numbers.
+    fn pairs(&self) -> Option<PageTable> {
+        let cells = self.statistics.comparison.paired_cells()?;
+        let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
+        let row = |of: &CellDifference| {
+            let [low, high] = of.interval.map_or([None, None], |(low, high)| [Some(low), Some(high)]);
+            let name = self.spec().sweep.name(of.cell);
+            let p = of.test.map_or(String::new(), |test| p_value(test.p_value));
+            let counts = [of.pairs, of.equal].map(|count| count.to_string());
+            let left_out = [of.left_out.later, of.left_out.earlier, of.left_out.unknown].map(|count| count.to_string());
+            let start = [of.cell.to_string(), name].into_iter().chain(counts);
+            start.chain([of.median, low, high].map(shown)).chain([p]).chain(left_out).collect()
+        };
+        let header = ["cell", "values", "pairs", "equal", "median", "95 % from", "to", "signed ranks"];
+        let left_out = ["left out: later", "earlier", "unknown"];
+        Some(PageTable {
+            caption: "t_relax less that of the same member of cell 0: pairs that both relaxed (Wilcoxon's signed-rank \
+                      test), and pairs left out because a member did not"
+                .into(),
+            header: header.into_iter().chain(left_out).map(String::from).collect(),
+            rows: cells.iter().map(row).collect(),
+            source: String::new(),
+        })
+    }
+
     fn provenance(&self) -> Vec<(String, String)> {
         let Tally { steps, solves, sweeps_k, sweeps_x, .. } = self.tally;
         let steps = if solves == steps { format!("{steps} steps") } else { format!("{steps} steps, {solves} solves") };
@@ -423,7 +448,19 @@ fn compared(comparison: &Comparison) -> Option<Headline> {
     match comparison {
         Comparison::Single => None,
         Comparison::LogRank(test) => of(p_value(test.p_value), "log-rank test over all cells".into()),
+        Comparison::Paired(cells) => of(differing(cells), "signed ranks of each cell against the first".into()),
         Comparison::Refused(why) => of("not tested".into(), why.clone()),
+    }
+}
+
+/// How many cells differ from the first with a probability of 5 % that any of them does by chance (Bonferroni).
+fn differing(cells: &[CellDifference]) -> String {
+    let most = 0.05 / cells.len() as f64;
+    let differ = cells.iter().filter(|cell| cell.test.is_some_and(|test| test.p_value < most)).count();
+    match cells {
+        [CellDifference { test: Some(test), .. }] => p_value(test.p_value),
+        [_] => "not tested".into(),
+        _ => format!("{differ} of {} differ", cells.len()),
     }
 }
 

@@ -204,6 +204,8 @@ impl EnsembleStatistics {
     /// Those of 10⁷ members are 240 MB, so they are sorted in place.
     pub fn new(spec: &Spec, tally: &mut Tally) -> Result<EnsembleStatistics> {
         let relative = tally.cells.iter().flat_map(|cell| &cell.rates).all(|rate| rate.theory().is_some());
+        // Sorting takes the times out of the order of the members.
+        let paired = if spec.common_random_numbers { Some(Comparison::paired(spec, tally)?) } else { None };
         let mut none = CellTally::default();
         let cells = (0..spec.sweep.cells())
             .map(|cell| {
@@ -212,7 +214,10 @@ impl EnsembleStatistics {
             })
             .collect::<Result<Vec<_>>>()?;
         let samples: Vec<&Sample> = cells.iter().map(|cell| &cell.sample).collect();
-        let comparison = Comparison::independent(spec, &samples)?;
+        let comparison = match paired {
+            Some(paired) => paired,
+            None => Comparison::independent(spec, &samples)?,
+        };
         let power_law = match spec.sweep.axes() {
             [axis] => axis.numbers().and_then(|values| {
                 let medians = cells.iter().map(CellStatistics::median);

@@ -16,6 +16,7 @@
 //! time: a lower bound. The log-rank test (N. Mantel, *Cancer Chemother. Rep.* 50, 1966, 163) compares the events of
 //! each group with those expected if all groups had one S. The interval of the median is B. Efron's bootstrap (*J. Am.
 //! Stat. Assoc.* 76, 1981, 312): members are drawn with replacement together with their censoring.
+//! [`PairedDifferences`] of two groups whose members share their random numbers are tested by F. Wilcoxon's signed ranks.
 //!
 //! All of this requires that censoring says nothing about the hidden time. This holds for the end of the run, but not
 //! for a member that became singular; the caller must decide, and report, how to treat such members.
@@ -51,6 +52,7 @@ mod draws;
 mod exact;
 mod fit;
 mod log_rank;
+mod paired;
 mod sample;
 mod special;
 mod sum;
@@ -61,6 +63,7 @@ pub use describe::Description;
 pub use exact::{ExactSum, Moments};
 pub use fit::{Line, PowerLaw};
 pub use log_rank::{GroupEvents, LogRank, log_rank};
+pub use paired::{PairedDifferences, SignedRank};
 pub use sample::{Observation, Observations, Sample};
 pub use survival::{Caveat, KaplanMeier, Mean, Step};
 

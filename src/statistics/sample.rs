@@ -46,6 +46,21 @@ impl Observations {
         self.keys.push((time + 0.0).to_bits() << 1 | u64::from(!happened));
         Ok(())
     }
+
+    /// Returns the number of observations.
+    pub fn len(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Returns whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.keys.is_empty()
+    }
+
+    /// Iterates over them in the order in which they were added.
+    pub fn iter(&self) -> impl Iterator<Item = Observation> + '_ {
+        self.keys.iter().map(|key| observation(*key))
+    }
 }
 
 fn observation(key: u64) -> Observation {
