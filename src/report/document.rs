@@ -10,6 +10,7 @@ use crate::results::{
     cells::{CellStatistics, EnsembleStatistics, Numbers},
     comparison::{CellDifference, LeftOut},
     provenance::{Provenance, json},
+    scaling::Scaling,
 };
 use crate::{
     ensemble::{Spec, Status},
@@ -30,7 +31,7 @@ pub struct Document<'a> {
     paired: Option<Vec<PairedDocument>>,
     /// Why the cells of a study are not compared; null if they are.
     not_compared: Option<String>,
-    /// The medians as a power of the swept value; null if there is no such law.
+    /// The medians as a power of the swept value; null if no single scale is swept.
     power_law: Option<PowerLawDocument>,
 }
 
@@ -90,10 +91,43 @@ impl PairedDocument {
 
 #[derive(Serialize)]
 struct PowerLawDocument {
-    factor: f64,
-    exponent: f64,
+    /// The scale.
+    of: String,
+    /// Null if fewer than two cells can be fitted.
+    factor: Option<f64>,
+    exponent: Option<f64>,
     exponent_se: Option<f64>,
     r2: Option<f64>,
+    /// How well it fits; null below three cells, and if they have no uncertainties.
+    chi2: Option<f64>,
+    degrees_of_freedom: Option<usize>,
+    p: Option<f64>,
+    left_out: Vec<LeftOutDocument>,
+}
+
+/// A cell that is not in the fit.
+#[derive(Serialize)]
+struct LeftOutDocument {
+    cell: u64,
+    reason: &'static str,
+}
+
+impl PowerLawDocument {
+    fn new(scaling: &Scaling) -> PowerLawDocument {
+        let law = scaling.law.as_ref();
+        let goodness = law.and_then(|law| law.goodness);
+        PowerLawDocument {
+            of: scaling.scale.clone(),
+            factor: law.map(|law| law.factor),
+            exponent: law.map(|law| law.exponent),
+            exponent_se: law.and_then(|law| law.exponent_error),
+            r2: law.and_then(|law| law.r2),
+            chi2: goodness.map(|goodness| goodness.statistic),
+            degrees_of_freedom: goodness.map(|goodness| goodness.degrees_of_freedom),
+            p: goodness.map(|goodness| goodness.p_value),
+            left_out: scaling.left_out.iter().map(|(cell, reason)| LeftOutDocument { cell: *cell, reason }).collect(),
+        }
+    }
 }
 
 impl<'a> Document<'a> {
@@ -105,7 +139,7 @@ impl<'a> Document<'a> {
         folder: &'a Path,
         files: &'a [&'static str],
     ) -> Document<'a> {
-        let EnsembleStatistics { cells, comparison, power_law, .. } = statistics;
+        let EnsembleStatistics { cells, comparison, scaling, .. } = statistics;
         let paired = comparison.paired_cells().map(|cells| cells.iter().map(PairedDocument::new).collect());
         let not_compared = comparison.refusal().map(String::from);
         let log_rank = comparison.log_rank().map(|test| LogRankDocument {
@@ -113,12 +147,7 @@ impl<'a> Document<'a> {
             degrees_of_freedom: test.degrees_of_freedom,
             p: test.p_value,
         });
-        let power_law = power_law.as_ref().map(|law| PowerLawDocument {
-            factor: law.factor,
-            exponent: law.exponent,
-            exponent_se: law.exponent_error,
-            r2: law.r2,
-        });
+        let power_law = scaling.as_ref().map(PowerLawDocument::new);
         let cells = cells.iter().map(|cell| CellDocument::new(spec, cell)).collect();
         Document { run, folder, files, cells, log_rank, paired, not_compared, power_law }
     }
@@ -191,6 +220,11 @@ mod tests {
         }
         assert_eq!(json["log_rank"], serde_json::Value::Null);
         assert!(json["not_compared"].as_str().is_some_and(|why| why.contains("expected relaxations")), "{text}");
-        assert_eq!(json["power_law"]["exponent"].as_f64(), statistics.power_law.map(|law| law.exponent));
+        // Too few members relaxed for the upper ends of the intervals.
+        let law = &json["power_law"];
+        assert_eq!((&law["of"], &law["exponent"]), (&"amplitude".into(), &serde_json::Value::Null));
+        let open = statistics.cells.iter().filter(|cell| cell.bounds().is_none()).count();
+        assert!(open > 0 && law["left_out"].as_array().unwrap().len() == open, "{text}");
+        assert_eq!(law["left_out"][0]["reason"], "its median has no closed 95 % interval");
     }
 }

@@ -12,9 +12,10 @@ use crate::{
     results::{
         cells::{CellStatistics, EnsembleStatistics, Rates},
         comparison::{CellDifference, LeftOut},
+        scaling::Scaling,
         tally::{MollifiedMembers, Tally},
     },
-    statistics::{LogRank, PowerLaw},
+    statistics::{GoodnessOfFit, LogRank, PowerLaw},
     text::{duration, number, p_value, plural},
 };
 
@@ -108,7 +109,7 @@ impl Overview<'_> {
 
     /// One line per cell of a study, and how the cells compare.
     fn cells(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let EnsembleStatistics { cells, comparison, power_law, .. } = self.statistics;
+        let EnsembleStatistics { cells, comparison, scaling, .. } = self.statistics;
         if cells.len() < 2 {
             return Ok(());
         }
@@ -141,15 +142,8 @@ impl Overview<'_> {
             }
             writeln!(f, "{:<11}{}", difference.cell, paired(difference))?;
         }
-        if let (Some(PowerLaw { exponent, exponent_error, .. }), [axis]) = (power_law, self.spec.sweep.axes()) {
-            let error = exponent_error.map_or(String::new(), |error| format!(" +- {}", significant(error)));
-            writeln!(
-                f,
-                "{:<11}median t_relax scales as {} to the power {}{error}",
-                "law",
-                axis.key,
-                significant(*exponent)
-            )?;
+        for text in scaling.iter().flat_map(law) {
+            writeln!(f, "{:<11}{text}", "law")?;
         }
         writeln!(f)
     }
@@ -249,6 +243,32 @@ fn times(cell: &CellStatistics) -> String {
         significant(mean.value),
         plural(known, "member")
     )
+}
+
+/// The power law of the medians, how well it fits, and the cells that are not in the fit.
+fn law(of: &Scaling) -> Vec<String> {
+    let scale = &of.scale;
+    let fitted = of.law.map(|PowerLaw { exponent, exponent_error, count, goodness, .. }| {
+        let error = exponent_error.map_or(String::new(), |error| format!(", standard error {}", significant(error)));
+        let exponent = format!("{}{error}", significant(exponent));
+        let fit = goodness.map(|GoodnessOfFit { statistic, degrees_of_freedom, p_value: p }| {
+            format!("chi2 = {} ({degrees_of_freedom}), {}", significant(statistic), p_value(p))
+        });
+        match fit {
+            Some(fit) if of.is_rejected() => {
+                format!("median t_relax is no power of {scale}: {fit}; the nearest power is {exponent}")
+            }
+            Some(fit) => format!("median t_relax scales as {scale} to the power {exponent}; {fit}"),
+            None => {
+                let why =
+                    if count < 3 { "two cells do not test it" } else { "without sampling errors it is not tested" };
+                format!("median t_relax scales as {scale} to the power {exponent}; {why}")
+            }
+        }
+    });
+    let fitted = fitted.unwrap_or_else(|| format!("no power of {scale} is fitted: too few cells have a median"));
+    let left_out = (!of.left_out.is_empty()).then(|| format!("not in the fit: {}", of.told()));
+    [fitted].into_iter().chain(left_out).collect()
 }
 
 /// The differences of a cell from the first.
@@ -375,6 +395,36 @@ results    out: summary.csv, run.json
         let copies = CellDifference { pairs: 1, median: Some(0.5), ..equal.clone() };
         assert_eq!(paired(&copies), "0.5000 in 1 pair, not tested");
         assert_eq!(paired(&CellDifference { median: None, ..equal }), "in no pair both relaxed");
+    }
+
+    #[test]
+    fn a_law_is_printed_with_its_test_and_the_cells_that_are_not_in_it() {
+        let goodness = |p_value| GoodnessOfFit { statistic: 12.5, degrees_of_freedom: 3, p_value };
+        let of = |p_value: Option<f64>, count| Scaling {
+            scale: "amplitude".into(),
+            law: Some(PowerLaw {
+                factor: 1.0,
+                exponent: -0.25,
+                exponent_error: Some(0.01),
+                r2: None,
+                count,
+                goodness: p_value.map(goodness),
+            }),
+            left_out: Vec::new(),
+        };
+        let holds = "median t_relax scales as amplitude to the power -0.2500, standard error 0.01000";
+        assert_eq!(law(&of(Some(0.25), 5)), [format!("{holds}; chi2 = 12.50 (3), p = 0.25")]);
+        let rejected = "median t_relax is no power of amplitude: chi2 = 12.50 (3), p = 1.0e-7; the nearest power is -0.2500, \
+                        standard error 0.01000";
+        assert_eq!(law(&of(Some(1e-7), 5)), [rejected]);
+        assert_eq!(law(&of(None, 2)), [format!("{holds}; two cells do not test it")]);
+        assert_eq!(law(&of(None, 4)), [format!("{holds}; without sampling errors it is not tested")]);
+        let none = Scaling { law: None, left_out: vec![(3, "its median is 0")], ..of(None, 0) };
+        let lines = [
+            "no power of amplitude is fitted: too few cells have a median",
+            "not in the fit: cell 3 (its median is 0)",
+        ];
+        assert_eq!(law(&none), lines);
     }
 
     #[test]

@@ -18,6 +18,7 @@ use crate::{
         cells::{CellStatistics, EnsembleStatistics, QUANTILES},
         comparison::{CellDifference, Comparison},
         provenance::Provenance,
+        scaling::Scaling,
         tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
     },
     statistics::{KaplanMeier, Step},
@@ -193,10 +194,11 @@ impl FinishedRun<'_> {
                 let place = |level: &DependencePoint| if let Setting::Number(x) = level.at { x } else { 0.0 };
                 levels.sort_by(|a, b| place(a).total_cmp(&place(b)));
             }
-            let fit = self.statistics.power_law.as_ref().filter(|_| others.is_empty()).map(|law| {
+            let scaling = self.statistics.scaling.as_ref();
+            let fit = scaling.and_then(|scaling| Some((scaling, scaling.law?))).map(|(scaling, law)| {
                 let around = |error: f64| (law.exponent - BAND * error, law.exponent + BAND * error);
                 let exponent = EstimatedNumber { value: law.exponent, interval: law.exponent_error.map(around) };
-                PowerLawLine { exponent, factor: law.factor }
+                PowerLawLine { exponent, factor: law.factor, rejected: scaling.is_rejected() }
             });
             let label = named.collect::<Vec<_>>().join(", ");
             let value = if let [other] = others { value_of(other, values) } else { None };
@@ -204,7 +206,9 @@ impl FinishedRun<'_> {
         });
         let title = format!("Relaxation time against {}", axis.key);
         let other_key = others.iter().map(|other| other.key.as_str()).collect::<Vec<_>>().join(", ");
-        let (note, series) = (self.what(), series.collect());
+        let left_out = self.statistics.scaling.as_ref().map(Scaling::told).filter(|told| !told.is_empty());
+        let left_out = left_out.map_or(String::new(), |told| format!(". Not in the fit: {told}"));
+        let (note, series) = (format!("{}{left_out}", self.what()), series.collect());
         let (key, across, time) = (&axis.key[..], None, None);
         let svg = Dependence { title: &title, note: &note, key, other_key: &other_key, series, across, time }.draw();
         let caption = "Median with its 95 % bootstrap interval (thick) and the middle half of the members (thin).";
@@ -284,7 +288,7 @@ impl FinishedRun<'_> {
     }
 
     fn headline(&self) -> Vec<Headline> {
-        let EnsembleStatistics { cells, comparison, power_law, .. } = self.statistics;
+        let EnsembleStatistics { cells, comparison, scaling, .. } = self.statistics;
         let mut headline = Vec::new();
         let mut add = |label: &str, value: Option<f64>, note: String| {
             let value = value.map_or("not reached".into(), |value| significant(value, DIGITS));
@@ -316,12 +320,7 @@ impl FinishedRun<'_> {
                 };
                 let note = format!("over {} cells", cells.len());
                 headline.push(Headline { label: "median t_relax".into(), value: shown, note });
-                if let Some(law) = power_law {
-                    let error =
-                        law.exponent_error.map_or(String::new(), |e| format!("standard error {}", significant(e, 2)));
-                    let label = format!("power of {}", self.keys());
-                    headline.push(Headline { label, value: significant(law.exponent, 3), note: error });
-                }
+                headline.extend(scaling.as_ref().and_then(power));
                 headline.extend(compared(comparison));
             }
         }
@@ -440,6 +439,18 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
             Theory { label, law: DecayLaw::Exponential { start: mean * (rate * t).exp(), rate } }
         }
     })
+}
+
+/// The power law of the medians, in the headline.
+fn power(of: &Scaling) -> Option<Headline> {
+    let law = of.law?;
+    let error = law.exponent_error.map(|e| format!("standard error {}", significant(e, 2)));
+    let fit = law.goodness.map(|goodness| match of.is_rejected() {
+        true => format!("but χ² rejects a power law, {}", p_value(goodness.p_value)),
+        false => format!("χ² allows it, {}", p_value(goodness.p_value)),
+    });
+    let note = error.into_iter().chain(fit).collect::<Vec<_>>().join("; ");
+    Some(Headline { label: format!("power of {}", of.scale), value: significant(law.exponent, 3), note })
 }
 
 /// Whether the cells differ, in the headline.

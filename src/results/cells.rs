@@ -10,12 +10,13 @@ use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::{
     comparison::Comparison,
+    scaling::Scaling,
     tally::{CellTally, Rate, Tally},
 };
 use crate::{
     ensemble::{Spec, Status},
     error::{Error, Result},
-    statistics::{Bootstrap, Description, Interval, KaplanMeier, Mean, PowerLaw, Sample},
+    statistics::{Bootstrap, Description, Interval, KaplanMeier, Mean, Sample},
 };
 
 /// Fractions of the members whose times are in the table, with the names and meanings of the columns.
@@ -140,8 +141,8 @@ pub struct EnsembleStatistics {
     pub cells: Vec<CellStatistics>,
     /// How the cells compare.
     pub comparison: Comparison,
-    /// The medians as a power of the swept value, if a single key with positive numeric values is swept.
-    pub power_law: Option<PowerLaw>,
+    /// The medians as a power of the swept value, if a single scale is swept.
+    pub scaling: Option<Scaling>,
     /// Rates are drawn relative to theory, if all members with a rate have a theoretical one.
     pub relative: bool,
 }
@@ -192,6 +193,12 @@ impl CellStatistics {
         median
     }
 
+    /// Whether all its members relaxed at one time, as copies of one curve do.
+    pub fn has_copies(&self) -> bool {
+        let mut seen = self.sample.observations();
+        seen.next().is_some_and(|first| first.happened && seen.all(|other| other == first))
+    }
+
     /// The interval of the median, if both its ends are known.
     pub fn bounds(&self) -> Option<(f64, f64)> {
         self.interval.and_then(|Interval { lower, upper, .. }| Some((lower?, upper?)))
@@ -218,17 +225,8 @@ impl EnsembleStatistics {
             Some(paired) => paired,
             None => Comparison::independent(spec, &samples)?,
         };
-        let power_law = match spec.sweep.axes() {
-            [axis] => axis.numbers().and_then(|values| {
-                let medians = cells.iter().map(CellStatistics::median);
-                let points: Vec<(f64, f64)> =
-                    values.into_iter().zip(medians).filter_map(|(x, y)| Some((x, y?))).collect();
-                // There is no power law of values that are not positive; this is not an error.
-                PowerLaw::fit(&points).ok().flatten()
-            }),
-            _ => None,
-        };
-        Ok(EnsembleStatistics { cells, comparison, power_law, relative })
+        let scaling = Scaling::of(&spec.sweep, &cells);
+        Ok(EnsembleStatistics { cells, comparison, scaling, relative })
     }
 
     /// The columns of `ensemble.csv`.
@@ -306,16 +304,7 @@ mod tests {
         assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
         assert!(lines[2].contains(",2.0,1.0,1.0,1.0,,,"), "the mean is restricted, the tail unknown: {}", lines[2]);
         assert!(statistics.comparison.refusal().is_some(), "{:?}", statistics.comparison);
-        assert_eq!(statistics.power_law, None);
-    }
-
-    #[test]
-    fn medians_follow_a_power_of_the_swept_number() {
-        let members: Vec<(u64, Option<f64>)> =
-            (0..6).map(|member| (member / 2, Some(3.0 * [1.0, 4.0, 16.0][member as usize / 2]))).collect();
-        let law = statistics("amplitude=0.1,0.2,0.4", &members).1.power_law.unwrap();
-        assert!((law.exponent - 2.0).abs() < 1e-12 && (law.factor - 300.0).abs() < 1e-9, "{law:?}");
-        assert_eq!(statistics("omega=0,1,2", &members).1.power_law, None);
+        assert_eq!(statistics.scaling, None);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 pub mod cells;
 pub mod comparison;
 pub mod provenance;
+pub mod scaling;
 pub mod tally;
 
 pub use cells::EnsembleStatistics;

@@ -61,7 +61,7 @@ mod survival;
 pub use bootstrap::{Bootstrap, Interval};
 pub use describe::Description;
 pub use exact::{ExactSum, Moments};
-pub use fit::{Line, PowerLaw};
+pub use fit::{GoodnessOfFit, Line, PowerLaw};
 pub use log_rank::{GroupEvents, LogRank, log_rank};
 pub use paired::{PairedDifferences, SignedRank};
 pub use sample::{Observation, Observations, Sample};

@@ -89,6 +89,8 @@ pub struct PowerLawLine {
     pub exponent: EstimatedNumber,
     /// t_relax for a key of 1, in length⁴.
     pub factor: f64,
+    /// Whether the medians are too far from any power law.
+    pub rejected: bool,
 }
 
 impl DependencePoint {
@@ -153,7 +155,7 @@ impl Series {
 
     /// Path data of the line of its law.
     fn line(&self, panel: &Panel) -> String {
-        let (Some(PowerLawLine { exponent, factor }), Some((low, high))) = (self.law(), self.span()) else {
+        let (Some(PowerLawLine { exponent, factor, .. }), Some((low, high))) = (self.law(), self.span()) else {
             return String::new();
         };
         let at = |share: f64| low * (high / low).powf(share);
@@ -338,7 +340,8 @@ impl Dependence<'_> {
         let beyond = any(&|level| level.median.is_none(), pointer, "median not reached");
         let fit = self.series.iter().find_map(Series::law).map(|fit| {
             let exponent = if several { String::new() } else { format!(", p = {}", fit.exponent.shown()) };
-            Entry::new(neutral, LegendMark::Dashed, &format!("fit: t_relax ∝ {}ᵖ{exponent}", self.key))
+            let verdict = if fit.rejected { "; χ² rejects a power law" } else { "" };
+            Entry::new(neutral, LegendMark::Dashed, &format!("fit: t_relax ∝ {}ᵖ{exponent}{verdict}", self.key))
         });
         series.chain(median).chain(interval).chain(quartiles).chain(beyond).chain(fit).collect()
     }

@@ -67,7 +67,7 @@ pub fn amplitudes(label: &str, factor: f64, count: usize) -> Series {
     let law = |x: f64| factor * x.powf(-0.31);
     let levels = (0..count).map(|i| level(Setting::Number(amplitude(i)), law(amplitude(i)) * (1.0 + 0.05 * normal(i))));
     let exponent = EstimatedNumber { value: -0.312, interval: Some((-0.33, -0.294)) };
-    let fit = Some(PowerLawLine { exponent, factor });
+    let fit = Some(PowerLawLine { exponent, factor, rejected: false });
     Series { label: label.into(), value: Some(factor), levels: levels.collect(), fit }
 }
 
@@ -217,7 +217,11 @@ pub fn draw_all() -> Vec<(String, String)> {
     let median = Some(EstimatedNumber { value: 0.4, interval: Some((f64::NAN, f64::INFINITY)) });
     let (at, fit) = (
         Setting::Number(0.0),
-        Some(PowerLawLine { exponent: EstimatedNumber { value: f64::NAN, interval: None }, factor: 0.0 }),
+        Some(PowerLawLine {
+            exponent: EstimatedNumber { value: f64::NAN, interval: None },
+            factor: 0.0,
+            rejected: true,
+        }),
     );
     let levels = vec![DependencePoint { at, median, quartiles: (Some(f64::NAN), None) }, level];
     add("dependence-unknown", depend(vec![Series { levels, fit, ..Series::default() }], "amplitude"));
