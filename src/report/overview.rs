@@ -228,11 +228,11 @@ fn times(cell: &CellStatistics) -> String {
     let median = match (cell.median(), cell.bounds()) {
         (None, _) => "not reached by half of the members".to_string(),
         (Some(median), Some((lower, upper))) => {
-            format!("{} ({} to {})", significant(median), significant(lower), significant(upper))
+            format!("{} (95 % interval {} to {})", significant(median), significant(lower), significant(upper))
         }
         (Some(median), _) => significant(median),
     };
-    let error = mean.standard_error.map_or(String::new(), |error| format!(" +- {}", significant(error)));
+    let error = mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
     let least = if mean.restricted_to.is_some() { "at least " } else { "" };
     let censored = match members - known {
         0 => String::new(),
@@ -346,7 +346,7 @@ stalled             1    25.0 %
 all                 4
 
 ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
-t_relax    median 0.5000, mean at least 1.200 +- 0.4016 over 2 members that reached it; 2 censored
+t_relax    median 0.5000, mean at least 1.200 (standard error 0.4016) over 2 members that reached it; 2 censored
 work       10 steps per member, sweeps 20 for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s

@@ -154,7 +154,9 @@ impl CellStatistics {
         let survival = KaplanMeier::new(&sample);
         let bootstrap = Bootstrap { seed: spec.seed.wrapping_add(cell), ..Bootstrap::default() };
         let (mean, interval) = (survival.mean(), bootstrap.median(&sample));
-        let quantiles = QUANTILES.map(|(share, ..)| survival.quantile(share));
+        // The usual median, also of an even number.
+        let quantile = |share| if share == 0.5 { survival.median() } else { survival.quantile(share) };
+        let quantiles = QUANTILES.map(|(share, ..)| quantile(share));
         let (values, counts) = (spec.sweep.labels(cell), tally.counts);
         let rates = Rates::new(&bootstrap, &mem::take(&mut tally.rates), relative)?;
         Ok(CellStatistics { cell, values, counts, sample, mean, quantiles, interval, rates })

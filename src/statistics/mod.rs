@@ -12,7 +12,7 @@
 //! ```
 //!
 //! with d_i events at the time t_i among the n_i members still at risk, and M. Greenwood's variance (1926). Quantiles
-//! are read off S; the mean is the area under it, and if S does not come down to 0, only the area up to the largest
+//! are read off S, and the median is the middle of the times at which S is ½; the mean is the area under it, and if S does not come down to 0, only the area up to the largest
 //! time: a lower bound. The log-rank test (N. Mantel, *Cancer Chemother. Rep.* 50, 1966, 163) compares the events of
 //! each group with those expected if all groups had one S. The interval of the median is B. Efron's bootstrap (*J. Am.
 //! Stat. Assoc.* 76, 1981, 312): members are drawn with replacement together with their censoring.

@@ -198,7 +198,7 @@ pub(super) fn reaches(survival: f64, level: f64) -> bool {
     survival <= level + ROUNDING
 }
 
-const ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-12;
 
 #[cfg(test)]
 mod tests {

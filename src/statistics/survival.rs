@@ -5,7 +5,7 @@ use std::fmt;
 
 use super::{
     finite,
-    sample::{ProductLimit, Sample, reaches},
+    sample::{ProductLimit, ROUNDING, Sample, reaches},
     sum::Sum,
 };
 
@@ -107,8 +107,16 @@ impl<'a> KaplanMeier<'a> {
     }
 
     /// Returns the time by which half of the members have had the event.
+    ///
+    /// If S is exactly ½ between two events, this is the middle between them, as in R's `survfit`. Without censoring it
+    /// is therefore the usual median, the mean of the two middle times of an even number. If no later event is known,
+    /// it is the time of the last one.
     pub fn median(&self) -> Option<f64> {
-        self.quantile(0.5)
+        let mut steps = self.steps().skip_while(|step| !reaches(step.survival, 0.5));
+        let first = steps.next()?;
+        let is_half = first.survival >= 0.5 - ROUNDING;
+        let next = steps.next().filter(|_| is_half);
+        Some(next.map_or(first.time, |next| 0.5 * first.time + 0.5 * next.time))
     }
 
     /// Returns the mean time, restricted to the largest time if S does not come down to 0.
@@ -264,14 +272,24 @@ mod tests {
 
     #[test]
     fn where_the_curve_is_exactly_at_the_level_the_quantile_is_the_first_time() {
-        assert_eq!(curve("1 2 3 4").median(), Some(2.0));
-        assert_eq!(curve("1 2 3 4 5").median(), Some(3.0));
+        assert_eq!(curve("1 2 3 4").quantile(0.5), Some(2.0));
+        assert_eq!(curve("1 2 3 4 5").quantile(0.5), Some(3.0));
         // 1 - 0.9 is less than 1/10, 1 - 0.3 is less than 7/10, and a product with censoring is rounded.
         let ten = curve("1 2 3 4 5 6 7 8 9 10");
         assert_eq!([0.1, 0.3, 0.7, 0.9, 1.0].map(|p| ten.quantile(p)), [1.0, 3.0, 7.0, 9.0, 10.0].map(Some));
         // 4/5 · 3/4 is 3/5, then one is censored: 3/5 · 1/2 is 3/10.
         let censored = curve("1 2 2.5+ 3 4+");
         assert_eq!([0.4, 0.7, 0.70001].map(|p| censored.quantile(p)), [Some(2.0), Some(3.0), None]);
+    }
+
+    #[test]
+    fn the_median_of_an_even_number_is_the_mean_of_the_two_in_the_middle() {
+        let medians = ["1 2 4 8", "1 2 3 4 5", "1 5", "7", "2 2 2 9"].map(|times| curve(times).median());
+        assert_eq!(medians, [3.0, 3.0, 3.0, 7.0, 2.0].map(Some));
+        // S is 2/3, then two are censored: 2/3 · 3/4 is ½.
+        assert_eq!(curve("1 2 3 3+ 3+ 4 5 6 7").median(), Some(4.5));
+        // Nothing is known behind the second event.
+        assert_eq!(["1 2 3+ 4+", "1 2+ 3+ 4+"].map(|times| curve(times).median()), [Some(2.0), None]);
     }
 
     #[test]
