@@ -107,7 +107,7 @@ def draw(table, snapshots, path):
     bars = [median - quartiles[0.25], quartiles[0.75] - median]
     middle.errorbar(median.index, median, bars, fmt="o", ms=5, color="black", capsize=3, label="median, quartiles")
     line = np.array([amplitudes[0] / 1.3, amplitudes[-1] * 1.3])
-    middle.plot(line, a + b * np.log(line), color="crimson", label=f"fit: slope {b:.4f} ± {error:.4f}")
+    middle.plot(line, a + b * np.log(line), color="crimson", label=f"fit: slope {b:.4f}, standard error {error:.4f}")
     theory = median.iloc[0] + np.log(line / amplitudes[0]) / RATE
     middle.plot(line, theory, "k:", label=f"theory: slope 1/12 = {1 / RATE:.4f}")
     middle.set(xscale="log", xlabel="amplitude σ", ylabel="t_relax / R⁴", title="Relaxation time grows as ln σ / 12")
@@ -143,7 +143,7 @@ def main():
     snapshots = xr.open_zarr(arguments.out / "snapshots.zarr", chunks=None)
     picture = arguments.out / "study.png"
     slope, error = draw(table, snapshots, picture)
-    print(f"slope of median t_relax against ln σ: {slope:.4f} ± {error:.4f}, theory 1/12 = {1 / RATE:.4f}")
+    print(f"slope of median t_relax against ln σ: {slope:.4f} (standard error {error:.4f}), theory 1/12 = {1 / RATE:.4f}")
     print(f"figure: {picture}")
 
 

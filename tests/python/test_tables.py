@@ -2,12 +2,14 @@
 
 import math
 import unittest
+from pathlib import Path
 
 import pandas as pd
 import polars as pl
 
 from common import Runs, columns
 
+ROOT = Path(__file__).resolve().parents[2]
 TABLES = ["summary.csv", "ensemble.csv", "rates.csv", "mean_excess.csv", "series.csv", "snapshots.csv"]
 INTEGERS = {
     "summary.csv": ["member", "cell", "steps", "rejected", "sweeps_k", "sweeps_x", "turning"],
@@ -84,6 +86,25 @@ class Tables(unittest.TestCase):
                 self.assertTrue(is_kind[kind], f"{table}: {series.name} is {series.dtype}")
                 values = [math.nan if value is None else value for value in series.to_list()]
                 self.assertTrue(same(values, expected[series.name]), f"{table}: {series.name}")
+
+    def test_the_lines_in_the_documents_give_empty_columns_their_type(self):
+        text = (ROOT / "docs" / "files.md").read_text()
+        lines = text.split("```python\n")[1].split("```")[0]
+        some = 0
+        for table in TABLES:
+            path = self.runs.csv / table
+            self.assertIn('"ellipses/summary.csv"', lines)
+            names = {}
+            exec(lines.replace('"ellipses/summary.csv"', repr(str(path))), names)
+            read, plain = names["table"], pl.read_csv(path, infer_schema_length=None)
+            for series in read:
+                kind = self.kinds(table, series.name)
+                right = {"integer": series.dtype.is_integer(), "float": series.dtype.is_float(),
+                         "text": series.dtype == pl.String}
+                self.assertTrue(right[kind], f"{table}: {series.name} is {series.dtype}")
+                some += series.dtype != plain[series.name].dtype
+        # The control: without these lines polars takes some columns for text.
+        self.assertGreater(some, 0)
 
     def test_the_comparison_sees_one_bit_one_type_and_one_gap(self):
         values = [0.1, math.nan, 3.0]
