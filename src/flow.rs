@@ -74,15 +74,14 @@ impl Flow {
     }
 
     /// Rate at which the excess of a nearly round curve of area `area` falls in mode `m`, by linear theory, in 1/time:
-    /// `24/R⁴` for m = 2 and surface diffusion; for Willmore flow the exponent of `1 + 2t/R₀⁴`. `None` if circles are
-    /// not at rest and no such law is known.
+    /// `24/R⁴` for m = 2 and surface diffusion; for Willmore flow the exponent of `1 + 2t/R₀⁴`. `None` if the
+    /// radius of a circle changes in another way: see `ensemble/theory.rs` for elastic flow.
     pub fn excess_rate(&self, m: u32, area: f64) -> Option<f64> {
         let radius = (area.abs() / PI).sqrt();
         match self {
             Flow::SurfaceDiffusion => Some(2.0 * self.linear_rate(m, radius)),
             // The excess scales as the square of the mode's amplitude over the radius; both are powers of R₀⁴ + 2t.
             Flow::Willmore => Some(self.linear_rate(m, 1.0) + 0.5),
-            Flow::Elastic(lambda) if *lambda > 0.0 => Some(2.0 * self.linear_rate(m, (2.0 * lambda).sqrt().recip())),
             _ => None,
         }
         .filter(|rate| rate.is_finite())

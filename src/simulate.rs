@@ -12,10 +12,13 @@ use std::{
 
 use crate::{
     backend::Backend,
-    ensemble::{Cell, Ended, Paused, Rows, Sink, Standing, Wish, spec::Precision},
+    ensemble::{Cell, Ended, Paused, Rows, Sink, Standing, Wish, spec::Precision, theory},
     error::{Error, Result},
     schedule::{Outputs, grid},
-    scheme::{member, state::STATE_FIELDS},
+    scheme::{
+        member,
+        state::{STATE_FIELDS, State},
+    },
     trajectory::Trajectory,
 };
 
@@ -197,7 +200,7 @@ impl Pool<'_> {
         let mut trajectory = Trajectory::new(own.member(index)?, &own.spec, self.precision, outputs);
         trajectory.keep_portrait(portrait);
         if trajectory.is_over() {
-            return Ok(Some(trajectory.end(None)));
+            return Ok(Some(self.end(trajectory, None)));
         }
         if let Some(paused) = self.paused.remove(&rank) {
             trajectory.resume_from(paused)?;
@@ -206,6 +209,16 @@ impl Pool<'_> {
         backend.load(slot, &trajectory.launch())?;
         self.resident[slot] = Some((rank, trajectory));
         Ok(None)
+    }
+
+    /// Ends a member. What theory predicts may depend on when it relaxed.
+    fn end(&self, trajectory: Trajectory, last: Option<&State<f64>>) -> Ended {
+        let mut ended = trajectory.end(last);
+        let own = |cell: &&Cell| cell.index == ended.outcome.cell;
+        let first = self.cells.first().map_or(0, |cell| cell.index);
+        let cell = self.cells.get((ended.outcome.cell - first) as usize).filter(own);
+        ended.outcome.rate_theory = cell.and_then(|cell| theory::rate_of(&cell.spec, &ended.outcome));
+        ended
     }
 
     /// Nodes of a member.
@@ -274,7 +287,7 @@ impl Pool<'_> {
                 }
             } else if let Some((rank, trajectory)) = self.resident[slot].take() {
                 backend.clear(slot);
-                queue.leave(rank, trajectory.end(state.as_ref()), sink)?;
+                queue.leave(rank, self.end(trajectory, state.as_ref()), sink)?;
             }
             if self.held > MAX_HELD {
                 self.relieve(queue, MAX_HELD / 4 * 3, sink)?;

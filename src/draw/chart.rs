@@ -44,11 +44,11 @@ pub struct EstimatedNumber {
 }
 
 impl EstimatedNumber {
-    /// `0.412 (0.401 to 0.420)`.
+    /// `0.412 (95 %: 0.401 to 0.420)`.
     pub fn shown(&self) -> String {
         let value = significant(self.value, 3);
         match self.interval {
-            Some((low, high)) => format!("{value} ({} to {})", significant(low, 3), significant(high, 3)),
+            Some((low, high)) => format!("{value} (95 %: {} to {})", significant(low, 3), significant(high, 3)),
             None => value,
         }
     }

@@ -15,6 +15,7 @@ pub mod spec;
 pub mod standing;
 pub mod study;
 pub mod sweep;
+pub mod theory;
 mod times;
 mod units;
 mod validate;

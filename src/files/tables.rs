@@ -70,7 +70,7 @@ columns! { RateRow:
     cell: whole = cell, "index of its cell";
     rate: optional = rate, "as in `summary.csv`";
     rate_r2: optional = rate_r2, "as in `summary.csv`";
-    rate_theory: optional = rate_theory, "rate of the slowest mode by linear theory, 24/R⁴ for mode 2 and surface diffusion; empty where there is none";
+    rate_theory: optional = rate_theory, "rate of the slowest mode by linear theory, 24/R⁴ for mode 2 and surface diffusion, for elastic flow at the radius while the rate is fitted; empty where there is none";
     rate_ratio: optional = rate_ratio, "rate / rate_theory";
 }
 

@@ -1,5 +1,7 @@
 //! What people look at: the charts of a run and its page, made from its statistics.
 
+use std::cmp::Reverse;
+
 use super::{
     gallery,
     overview::{describe, place},
@@ -7,16 +9,16 @@ use super::{
 };
 use crate::{
     draw::charts::{
-        Decay, DecayCurve, DecayLaw, Dependence, DependencePoint, EstimatedNumber, FittedRates, MeshQuality,
-        PowerLawLine, RelaxationTimes, Series, Setting, Survival, SurvivalCurve, Theory,
+        CellValues, Decay, DecayCurve, DecayLaw, Dependence, DependencePoint, EstimatedNumber, FittedRates,
+        MeshQuality, PowerLawLine, RelaxationTimes, Series, Setting, Survival, SurvivalCurve, Theory,
     },
-    ensemble::{Spec, Status},
+    ensemble::{Spec, Status, sweep::SweepAxis, theory},
     error::Result,
     files::{names, portraits::Film},
     flow::Flow,
     results::{
         cells::{CellStatistics, EnsembleStatistics, QUANTILES},
-        comparison::{CellDifference, Comparison},
+        comparison::{CellComparison, CellDifference},
         provenance::Provenance,
         scaling::Scaling,
         tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
@@ -87,7 +89,13 @@ impl FinishedRun<'_> {
 
     fn relaxation(&self) -> Chart {
         let cells = &self.statistics.cells;
-        let times: Vec<f64> = cells.iter().flat_map(|cell| happened(cell, true)).collect();
+        let numbers = self.numbers();
+        let times = cells.iter().enumerate().map(|(rank, cell)| CellValues {
+            label: self.label(cell.cell),
+            value: numbers.as_ref().map(|numbers| numbers[rank]),
+            numbers: happened(cell, true).collect(),
+            members: cell.sample.len() as u64,
+        });
         let others = Status::ALL.iter().enumerate().map(|(rank, status)| {
             let without = self.tally.cells.iter().map(|cell| cell.others[rank]).sum();
             (status.name(), without)
@@ -95,8 +103,9 @@ impl FinishedRun<'_> {
         let others: Vec<(&str, u64)> = others.filter(|(_, without)| *without > 0).collect();
         let median = if let [cell] = &cells[..] { median(cell) } else { None };
         let title = "Relaxation times";
-        let svg = RelaxationTimes { title, note: &self.what(), times, others: &others, median }.draw();
-        let caption = "How many members relaxed when, and which share of all had relaxed by then.";
+        let (note, key, cells) = (&self.what(), &self.colour_key(), times.collect());
+        let svg = RelaxationTimes { title, note, key, cells, others: &others, median }.draw();
+        let caption = "How many members relaxed when, and which share of all had relaxed by then, cell by cell.";
         chart(names::RELAXATION, title, caption, svg)
     }
 
@@ -116,7 +125,7 @@ impl FinishedRun<'_> {
             happened(cell, false).for_each(|t| curve.add_censored(t));
             curve
         });
-        let (title, key) = ("Members not yet relaxed", self.keys());
+        let (title, key) = ("Members not yet relaxed", self.colour_key());
         let survival = Survival { title, note: &self.what(), key: &key, curves: curves.collect(), time: None };
         let caption =
             "Kaplan-Meier estimate with Greenwood's 95 % band; a stroke marks a member that ended before it relaxed.";
@@ -152,7 +161,7 @@ impl FinishedRun<'_> {
             _ => None,
         };
         let theory = theory.into_iter().collect();
-        let (title, key) = ("Mean excess", self.keys());
+        let (title, key) = ("Mean excess", self.colour_key());
         let note = format!("{}; over all members, as long as all of them run", self.what());
         let band = "one standard deviation of the members";
         let svg = Decay { title, note: &note, band, key: &key, curves, theory, time: None }.draw();
@@ -163,11 +172,19 @@ impl FinishedRun<'_> {
 
     fn rates(&self) -> Chart {
         let EnsembleStatistics { cells, relative, .. } = self.statistics;
-        let rates: Vec<f64> = cells.iter().flat_map(|cell| cell.rates.drawn.sorted()).copied().collect();
+        let numbers = self.numbers();
+        let rates = cells.iter().enumerate().map(|(rank, cell)| CellValues {
+            label: self.label(cell.cell),
+            value: numbers.as_ref().map(|numbers| numbers[rank]),
+            numbers: cell.rates.drawn.sorted().into(),
+            members: cell.members(),
+        });
+        let rates: Vec<CellValues> = rates.collect();
         let title = "Rates of decay";
-        let without = self.tally.members() - rates.len() as u64;
+        let without = self.tally.members() - rates.iter().map(|cell| cell.numbers.len() as u64).sum::<u64>();
         let (relative, unit) = (*relative, "length⁻⁴");
-        let svg = FittedRates { title, note: &self.what(), rates, relative, unit, without }.draw();
+        let (note, key, cells) = (&self.what(), &self.colour_key(), rates);
+        let svg = FittedRates { title, note, key, cells, relative, unit, without }.draw();
         let caption = "Slope of the line through ln excess, while that falls from a tenth to a thousandth of its start, over the \
                        rate that linear theory gives the slowest mode.";
         chart(names::RATE, title, caption, svg)
@@ -273,9 +290,23 @@ impl FinishedRun<'_> {
         [describe(self.spec())].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
     }
 
-    /// The values of the only swept key, cell by cell, if they are numbers.
+    /// The swept key with numeric values that colours show if there are many cells: the one with most values. Cells
+    /// that differ in other keys share a colour.
+    fn colour_axis(&self) -> Option<(usize, &SweepAxis)> {
+        let axes = self.spec().sweep.axes().iter().enumerate();
+        axes.filter(|(_, axis)| axis.numbers().is_some()).max_by_key(|(i, axis)| (axis.values.len(), Reverse(*i)))
+    }
+
+    /// Its name.
+    fn colour_key(&self) -> String {
+        self.colour_axis().map_or(self.keys(), |(_, axis)| axis.key.clone())
+    }
+
+    /// Its values, cell by cell.
     fn numbers(&self) -> Option<Vec<f64>> {
-        if let [axis] = self.spec().sweep.axes() { axis.numbers() } else { None }
+        let (place, _) = self.colour_axis()?;
+        let cells = self.statistics.cells.iter();
+        cells.map(|cell| cell.values.get(place)?.parse().ok()).collect()
     }
 
     /// The name of a cell in a legend.
@@ -416,10 +447,10 @@ fn happened(cell: &CellStatistics, happened: bool) -> impl Iterator<Item = f64> 
 fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
     let members: u64 = cell.counts.iter().sum();
     let area = cell.area / members as f64;
-    let rate = spec.rate_in_theory(area)?;
     let first = curve.mean.first()?;
     let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
     let (t, mean) = (curve.t[tenth], curve.mean[tenth]);
+    let rate = spec.rate_in_theory(area).or_else(|| theory::rate_at(spec, area, t))?;
     // 24 instead of 24.0.
     let brief = |rate: f64| match rate.round() {
         whole if (rate - whole).abs() < 1e-6 * rate && rate < 1e4 => format!("{whole}"),
@@ -434,7 +465,8 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
             let fourth_power = (area / std::f64::consts::PI).powi(2);
             let label = match flow {
                 Flow::SurfaceDiffusion => format!("exp(−{} t/R⁴)", brief(rate * fourth_power)),
-                _ => format!("exp(−{} t)", brief(rate)),
+                // The radius still changes, and the rate with it.
+                _ => format!("exp(−{} t), for the radius at t = {}", brief(rate), significant(t, 2)),
             };
             Theory { label, law: DecayLaw::Exponential { start: mean * (rate * t).exp(), rate } }
         }
@@ -454,13 +486,13 @@ fn power(of: &Scaling) -> Option<Headline> {
 }
 
 /// Whether the cells differ, in the headline.
-fn compared(comparison: &Comparison) -> Option<Headline> {
+fn compared(comparison: &CellComparison) -> Option<Headline> {
     let of = |value: String, note: String| Some(Headline { label: "one distribution?".into(), value, note });
     match comparison {
-        Comparison::Single => None,
-        Comparison::LogRank(test) => of(p_value(test.p_value), "log-rank test over all cells".into()),
-        Comparison::Paired(cells) => of(differing(cells), "signed ranks of each cell against the first".into()),
-        Comparison::Refused(why) => of("not tested".into(), why.clone()),
+        CellComparison::Single => None,
+        CellComparison::LogRank(test) => of(p_value(test.p_value), "log-rank test over all cells".into()),
+        CellComparison::Paired(cells) => of(differing(cells), "signed ranks of each cell against the first".into()),
+        CellComparison::Refused(why) => of("not tested".into(), why.clone()),
     }
 }
 
@@ -485,7 +517,7 @@ fn quartiles(cell: &CellStatistics) -> (Option<f64>, Option<f64>) {
 }
 
 /// The value among `values` of a key with numeric values.
-fn value_of(axis: &crate::ensemble::sweep::SweepAxis, values: &[String]) -> Option<f64> {
+fn value_of(axis: &SweepAxis, values: &[String]) -> Option<f64> {
     axis.numbers().and_then(|_| values.first()?.parse().ok())
 }
 

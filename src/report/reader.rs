@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::{
-    ensemble::{Outcome, Spec},
+    ensemble::{Outcome, Spec, theory},
     error::{Error, Result, shortened},
     files::{
         TableReader,
@@ -22,6 +22,8 @@ use crate::{
     },
 };
 
+/// Relative distance behind the end at which a time is still rounding, in f32.
+const LATE: f64 = 1e-6;
 /// Characters of foreign text in a message.
 const SHOWN: usize = 200;
 
@@ -178,7 +180,7 @@ impl Summary {
 
     fn read(&mut self) -> Result<Option<Outcome>> {
         let Some((mut outcome, fields)) = self.table.read()? else { return Ok(None) };
-        let Outcome { member, cell, start, .. } = outcome;
+        let Outcome { member, cell, .. } = outcome;
         if let Some(last) = self.last.filter(|last| member <= *last) {
             return Err(fields.unexpected_in("member", &format!("a member after {last}: members ascend, each once")));
         }
@@ -191,11 +193,15 @@ impl Summary {
         if cell != own {
             return Err(fields.unexpected_in("cell", &format!("{own}, the cell of member {member}")));
         }
-        // The theoretical rate is in no table, since it follows from the spec.
         if self.spec_of.as_ref().is_none_or(|(of, _)| *of != cell) {
             self.spec_of = Some((cell, self.spec.of_cell(cell)?));
         }
-        outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| spec.rate_in_theory(start.area));
+        let t_end = self.spec_of.as_ref().map_or(f64::INFINITY, |(_, spec)| spec.t_end);
+        if outcome.t_relax.is_some_and(|t| t > t_end * (1.0 + LATE)) {
+            return Err(fields.unexpected_in("t_relax", &format!("a time up to {t_end}, the end of the run")));
+        }
+        // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
+        outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| theory::rate_of(spec, &outcome));
         Ok(Some(outcome))
     }
 }

@@ -9,7 +9,7 @@ use csv::WriterBuilder;
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::{
-    comparison::Comparison,
+    comparison::CellComparison,
     scaling::Scaling,
     tally::{CellTally, Rate, Tally},
 };
@@ -140,7 +140,7 @@ pub struct EnsembleStatistics {
     /// Each cell.
     pub cells: Vec<CellStatistics>,
     /// How the cells compare.
-    pub comparison: Comparison,
+    pub comparison: CellComparison,
     /// The medians as a power of the swept value, if a single scale is swept.
     pub scaling: Option<Scaling>,
     /// Rates are drawn relative to theory, if all members with a rate have a theoretical one.
@@ -214,7 +214,7 @@ impl EnsembleStatistics {
     pub fn new(spec: &Spec, tally: &mut Tally) -> Result<EnsembleStatistics> {
         let relative = tally.cells.iter().flat_map(|cell| &cell.rates).all(|rate| rate.theory().is_some());
         // Sorting takes the times out of the order of the members.
-        let paired = if spec.common_random_numbers { Some(Comparison::paired(spec, tally)?) } else { None };
+        let paired = if spec.common_random_numbers { Some(CellComparison::paired(spec, tally)?) } else { None };
         let mut none = CellTally::default();
         let cells = (0..spec.sweep.cells())
             .map(|cell| {
@@ -225,7 +225,7 @@ impl EnsembleStatistics {
         let samples: Vec<&Sample> = cells.iter().map(|cell| &cell.sample).collect();
         let comparison = match paired {
             Some(paired) => paired,
-            None => Comparison::independent(spec, &samples)?,
+            None => CellComparison::independent(spec, &samples)?,
         };
         let scaling = Scaling::of(&spec.sweep, &cells);
         Ok(EnsembleStatistics { cells, comparison, scaling, relative })

@@ -23,7 +23,7 @@ const MAX_COMPARED: usize = 500;
 
 /// How the cells compare.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Comparison {
+pub enum CellComparison {
     /// There is only one.
     Single,
     /// Independent groups, by the log-rank test that all have one distribution.
@@ -128,21 +128,21 @@ fn ranks(spec: &Spec, cell: u64) -> Box<dyn Iterator<Item = u64> + '_> {
     Box::new(all.filter(move |member| shard.is_none_or(|shard| shard.has(*member))).map(move |member| member - start))
 }
 
-impl Comparison {
+impl CellComparison {
     /// Compares the cells of a study of `spec` whose members share their random numbers. Times are still in `tally`, in
     /// the order of the members.
     ///
     /// # Errors
     /// If a time is not finite.
-    pub fn paired(spec: &Spec, tally: &Tally) -> Result<Comparison> {
+    pub fn paired(spec: &Spec, tally: &Tally) -> Result<CellComparison> {
         let count = spec.sweep.cells();
         if count < 2 {
-            return Ok(Comparison::Single);
+            return Ok(CellComparison::Single);
         }
         let none = CellTally::default();
         let times = |cell: u64| &tally.cells.get(cell as usize).unwrap_or(&none).times;
         if let Some(cell) = (0..count).find(|cell| ranks(spec, *cell).count() != times(*cell).len()) {
-            return Ok(Comparison::Refused(format!(
+            return Ok(CellComparison::Refused(format!(
                 "cell {cell} has {} members of {}; pairs are made of all members",
                 times(cell).len(),
                 ranks(spec, cell).count()
@@ -152,19 +152,19 @@ impl Comparison {
         (1..count)
             .map(|cell| CellDifference::new(cell, ranked(0), ranked(cell)))
             .collect::<Result<_>>()
-            .map(Comparison::Paired)
+            .map(CellComparison::Paired)
     }
 
     /// Compares the times of cells of a study of `spec`, in order.
     ///
     /// # Errors
     /// [`Error::Request`](crate::Error::Request) if the values of a cell do not fit the spec.
-    pub fn independent(spec: &Spec, samples: &[&Sample]) -> Result<Comparison> {
+    pub fn independent(spec: &Spec, samples: &[&Sample]) -> Result<CellComparison> {
         let count = samples.len();
         if count < 2 {
-            return Ok(Comparison::Single);
+            return Ok(CellComparison::Single);
         }
-        let refused = |why: String| Ok(Comparison::Refused(why));
+        let refused = |why: String| Ok(CellComparison::Refused(why));
         if count > MAX_COMPARED {
             return refused(format!("{count} cells; the log-rank test compares at most {MAX_COMPARED}"));
         }
@@ -180,7 +180,7 @@ impl Comparison {
         };
         let fewest = test.groups.iter().enumerate().min_by(|a, b| a.1.expected.total_cmp(&b.1.expected));
         match fewest.filter(|(_, group)| group.expected < LEAST_EXPECTED) {
-            None => Ok(Comparison::LogRank(test)),
+            None => Ok(CellComparison::LogRank(test)),
             Some((cell, group)) => refused(format!(
                 "cell {cell} has {:.1} expected relaxations; the log-rank test needs {LEAST_EXPECTED} in each cell: \
                  use more --curves",
@@ -191,17 +191,17 @@ impl Comparison {
 
     /// The log-rank test, if it holds.
     pub fn log_rank(&self) -> Option<&LogRank> {
-        if let Comparison::LogRank(test) = self { Some(test) } else { None }
+        if let CellComparison::LogRank(test) = self { Some(test) } else { None }
     }
 
     /// The differences from the first cell, if the cells are paired.
     pub fn paired_cells(&self) -> Option<&[CellDifference]> {
-        if let Comparison::Paired(cells) = self { Some(cells) } else { None }
+        if let CellComparison::Paired(cells) = self { Some(cells) } else { None }
     }
 
     /// Why no test holds, if none does.
     pub fn refusal(&self) -> Option<&str> {
-        if let Comparison::Refused(why) = self { Some(why) } else { None }
+        if let CellComparison::Refused(why) = self { Some(why) } else { None }
     }
 }
 
@@ -231,9 +231,9 @@ mod tests {
         (0..cells).map(|cell| Sample::new((0..curves).map(|member| time(cell, member))).unwrap()).collect()
     }
 
-    fn compared(cells: usize, curves: u64, factor: f64) -> Comparison {
+    fn compared(cells: usize, curves: u64, factor: f64) -> CellComparison {
         let samples = samples(cells, curves, factor);
-        Comparison::independent(&swept(cells, curves), &samples.iter().collect::<Vec<_>>()).unwrap()
+        CellComparison::independent(&swept(cells, curves), &samples.iter().collect::<Vec<_>>()).unwrap()
     }
 
     #[test]
@@ -254,11 +254,11 @@ mod tests {
         assert!(p(1.0) > 0.01 && p(1.3) < 1e-12, "seed 3: {} {}", p(1.0), p(1.3));
         let few = compared(3, 5, 1.3);
         assert!(few.refusal().is_some_and(|why| why.contains(" expected relaxations; ")), "{few:?}");
-        assert_eq!(compared(1, 200, 1.0), Comparison::Single);
+        assert_eq!(compared(1, 200, 1.0), CellComparison::Single);
     }
 
     /// Cells with common random numbers: times by cell and rank, negative for members that end unfinished there.
-    fn paired(cells: &[&[f64]], only: Option<Vec<u64>>) -> Comparison {
+    fn paired(cells: &[&[f64]], only: Option<Vec<u64>>) -> CellComparison {
         let mut spec = swept(cells.len(), cells[0].len() as u64);
         (spec.common_random_numbers, spec.only) = (true, only);
         let mut tally = Tally::default();
@@ -271,7 +271,7 @@ mod tests {
             };
             tally.add(&Outcome { cell, ..outcome }).unwrap();
         }
-        Comparison::paired(&spec, &tally).unwrap()
+        CellComparison::paired(&spec, &tally).unwrap()
     }
 
     #[test]
@@ -308,7 +308,7 @@ mod tests {
         spec.common_random_numbers = true;
         let mut tally = Tally::default();
         tally.add(&outcome(0, Status::Relaxed, Some(1.0))).unwrap();
-        let refused = Comparison::paired(&spec, &tally).unwrap();
+        let refused = CellComparison::paired(&spec, &tally).unwrap();
         assert_eq!(refused.refusal(), Some("cell 0 has 1 members of 3; pairs are made of all members"));
     }
 
@@ -316,7 +316,7 @@ mod tests {
     fn copies_of_one_curve_are_not_compared() {
         let samples = samples(2, 200, 1.3);
         let mut spec = swept(2, 200);
-        let compared = |spec: &Spec| Comparison::independent(spec, &samples.iter().collect::<Vec<_>>()).unwrap();
+        let compared = |spec: &Spec| CellComparison::independent(spec, &samples.iter().collect::<Vec<_>>()).unwrap();
         assert!(compared(&spec).log_rank().is_some());
         spec.amplitude = 0.0;
         let refused = compared(&spec);
@@ -332,10 +332,10 @@ mod tests {
     #[test]
     fn cells_without_relaxations_and_too_many_cells_are_not_compared() {
         let none = Sample::new([Observation { time: 1.0, happened: false }; 50]).unwrap();
-        let refused = Comparison::independent(&swept(2, 50), &[&none, &none]).unwrap();
+        let refused = CellComparison::independent(&swept(2, 50), &[&none, &none]).unwrap();
         assert!(refused.refusal().unwrap().starts_with("fewer than two cells still have members"), "{refused:?}");
         let many = vec![&none; 501];
-        let refused = Comparison::independent(&swept(501, 50), &many).unwrap();
+        let refused = CellComparison::independent(&swept(501, 50), &many).unwrap();
         assert_eq!(refused.refusal(), Some("501 cells; the log-rank test compares at most 500"));
     }
 }

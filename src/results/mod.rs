@@ -7,4 +7,4 @@ pub mod scaling;
 pub mod tally;
 
 pub use cells::EnsembleStatistics;
-pub use comparison::Comparison;
+pub use comparison::CellComparison;

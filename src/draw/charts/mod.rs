@@ -4,7 +4,7 @@
 //! is nothing to draw, the picture says why. A picture stays below about 100 kB for any number of members: members are
 //! counted in bins, and lines are thinned to visible detail.
 
-mod bins;
+pub mod bins;
 pub mod decay;
 pub mod dependence;
 pub mod mesh;
@@ -12,6 +12,7 @@ pub mod rates;
 pub mod relaxation;
 pub mod survival;
 
+pub use bins::CellValues;
 pub use decay::{Decay, DecayCurve, DecayLaw, Theory};
 pub use dependence::{Dependence, DependencePoint, PowerLawLine, Series, Setting};
 pub use mesh::MeshQuality;

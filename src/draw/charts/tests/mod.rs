@@ -94,7 +94,7 @@ fn where_there_is_nothing_to_draw_the_picture_says_why() {
         ("decay-none", "There is no positive mean excess to draw."),
         ("decay-zero", "There is no positive mean excess to draw."),
         ("decay-one", "The mean excess is known at one time only"),
-        ("dependence", "fit: t_relax ∝ amplitudeᵖ, p = \u{2212}0.312 (\u{2212}0.330 to \u{2212}0.294)"),
+        ("dependence", "fit: t_relax ∝ amplitudeᵖ, p = \u{2212}0.312 (95 %: \u{2212}0.330 to \u{2212}0.294)"),
         ("dependence-partial", "1 cell without a median"),
         ("dependence-none", "There are no cells to compare."),
         ("dependence-unreached", "In no cell did enough members relax for a median."),
@@ -163,6 +163,32 @@ fn the_histogram_and_the_share_count_every_member() {
     let steps = &paths(svg, "series")[0];
     let relaxed = share(steps[steps.len() - 1][1]);
     assert!((relaxed - 412.0 / 512.0).abs() < 1e-3, "{relaxed}");
+}
+
+#[test]
+fn cells_have_a_curve_each_and_many_are_coloured_by_their_value() {
+    for name in ["relaxation", "rates"] {
+        for (cells, panels) in [(2, 1), (8, 1), (20, 1)] {
+            let svg = picture(&format!("{name}-cells-{cells}"));
+            let panels = if name == "relaxation" { 2 * panels } else { panels };
+            // Entries of the legend are lines, too.
+            let entries = if cells <= 8 { cells } else { 0 };
+            assert_eq!(paths(svg, "series").len(), entries + panels * cells, "{name} {cells}");
+            assert_eq!(svg.contains("amplitude = 1"), cells <= 8, "{name} {cells}");
+            assert_eq!(svg.contains("<g class=\"r0\">"), cells > 8, "{name} {cells}");
+        }
+        let many = picture(&format!("{name}-cells-300"));
+        assert!(many.contains("24 of 300 cells are drawn"), "{many}");
+    }
+    // The share of each cell is that of its own members.
+    let svg = picture("relaxation-cells-2");
+    let below = svg.rfind("<text class=\"y tick end\"").unwrap();
+    let below = svg[..below].rfind(">0.0</text>").map(|at| svg[..at].rfind('\n').unwrap() + 1).unwrap();
+    let share = scale(&svg[below..], "y", false);
+    let lines = paths(svg, "series");
+    for line in &lines[lines.len() - 2..] {
+        assert!((share(line[line.len() - 1][1]) - 512.0 / 519.0).abs() < 2e-3, "{line:?}");
+    }
 }
 
 #[test]

@@ -88,7 +88,9 @@ pub fn draw_all() -> Vec<(String, String)> {
 
     let relaxation = |times: &[f64], others: &[(&str, u64)], median: Option<f64>| {
         let median = median.map(|value| EstimatedNumber { value, interval: Some((0.97 * value, 1.04 * value)) });
-        RelaxationTimes { title: "Relaxation times", note: NOTE, times: times.to_vec(), others, median }.draw()
+        let members = times.len() as u64 + others.iter().map(|(_, count)| count).sum::<u64>();
+        let cells = vec![CellValues { numbers: times.to_vec(), members, ..CellValues::default() }];
+        RelaxationTimes { title: "Relaxation times", note: NOTE, key: "", cells, others, median }.draw()
     };
     add("relaxation", relaxation(&times(412, 0.4, 0.2), &some, Some(0.42)));
     add("relaxation-wide", relaxation(&times(5000, 1e-6, 1.5), &[], Some(1e-6)));
@@ -101,8 +103,8 @@ pub fn draw_all() -> Vec<(String, String)> {
     add("relaxation-million", relaxation(&times(1_000_000, 0.4, 0.3), &some, Some(0.4)));
 
     let rates = |rates: &[f64], relative: bool, without: u64| {
-        let rates = rates.to_vec();
-        FittedRates { title: "Rates of decay", note: NOTE, rates, relative, unit: "length⁻⁴", without }.draw()
+        let cells = vec![CellValues { numbers: rates.to_vec(), members: rates.len() as u64, ..CellValues::default() }];
+        FittedRates { title: "Rates of decay", note: NOTE, key: "", cells, relative, unit: "length⁻⁴", without }.draw()
     };
     add("rates", rates(&times(412, 1.0, 0.01), true, 3));
     add("rates-absolute", rates(&times(412, 24.0, 0.5), false, 0));
@@ -111,6 +113,26 @@ pub fn draw_all() -> Vec<(String, String)> {
     add("rates-one", rates(&[1.0], true, 0));
     add("rates-unknown", rates(&unknown, true, 0));
     add("rates-million", rates(&times(1_000_000, 1.0, 0.3), true, 1));
+
+    let by_cell = |count: usize, members: usize| -> Vec<CellValues> {
+        let cell = |i: usize| CellValues {
+            label: format!("amplitude = {i}"),
+            value: Some(i as f64),
+            numbers: times(members, 1.0 + 0.1 * i as f64, 0.1),
+            members: members as u64 + 7,
+        };
+        (0..count).map(cell).collect()
+    };
+    for (count, members) in [(2, 512), (8, 256), (20, 100), (300, 1000)] {
+        let (note, key, cells) = (NOTE, "amplitude", by_cell(count, members));
+        let others = [("unfinished", 7 * count as u64)];
+        let title = "Relaxation times";
+        let svg = RelaxationTimes { title, note, key, cells: cells.clone(), others: &others, median: None }.draw();
+        add(&format!("relaxation-cells-{count}"), svg);
+        let (title, unit) = ("Rates of decay", "length⁻⁴");
+        let svg = FittedRates { title, note, key, cells, relative: true, unit, without: 7 * count as u64 }.draw();
+        add(&format!("rates-cells-{count}"), svg);
+    }
 
     let survive = |curves: Vec<SurvivalCurve>, time: Option<Scale>| {
         Survival { title: "Share that has not relaxed", note: NOTE, key: "amplitude", curves, time }.draw()
