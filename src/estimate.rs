@@ -1,4 +1,4 @@
-//! Predicts the cost of a run without making it: memory, dispatches, steps and time.
+//! Predicts the cost of a run without making it: memory, disk space, dispatches, steps and time.
 //!
 //! Work cannot be predicted from a spec: the steps and sweeps of a member depend on its curve. A pilot therefore runs a
 //! few members, spread evenly over all cells, on the back end of the run and through the same loop, for at most about
@@ -13,7 +13,7 @@ use crate::{
     backend::Backend,
     ensemble::{
         Cell, Ended, Extent, Portrait, SeriesRow, Sink, Snapshot, Study, rows,
-        spec::{Pace, Precision, Tau},
+        spec::{Pace, Precision, Store, Tau},
     },
     error::{Error, Result},
     placement::{Choice, Platform},
@@ -46,6 +46,19 @@ const PORTRAIT_COPIES: usize = 3;
 /// Additional bytes if rows go to disk before their members end: rows are written and read again. Measured.
 const SPILL_BYTES: u64 = 6_000_000;
 
+/// Bytes of a row of a table, measured: floats have 17 digits. A row of the snapshots is a node.
+const SUMMARY_ROW: f64 = 337.0;
+const RATES_ROW: f64 = 80.0;
+const SERIES_ROW: f64 = 166.0;
+const NODE_ROW: f64 = 88.0;
+/// Bytes of the tables of a cell: its statistics and its mean excess.
+const CELL_BYTES: f64 = 2500.0;
+/// Bytes of plots and page, measured: without the members that are drawn, and for each of their nodes.
+const PLOTS_BYTES: f64 = 100_000.0;
+const DRAWN_NODE_BYTES: f64 = 355.0;
+/// Bytes of the files that describe a store and of its last, partly filled chunks.
+const STORE_BYTES: f64 = 50_000.0;
+
 /// The predicted cost of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Estimate {
@@ -59,6 +72,8 @@ pub struct Estimate {
     pub slots: usize,
     /// Peak resident size of the process.
     pub memory_bytes: u64,
+    /// Size of the output folder at the end.
+    pub disk_bytes: u64,
     /// Mean over the members; `None` if no member of the pilot has ended and there is no other clue.
     pub steps_per_member: Option<f64>,
     /// Dispatches; `None` if the pilot was over before any work was done.
@@ -93,6 +108,9 @@ struct CohortWork {
     seconds: Option<f64>,
     dispatches: Option<f64>,
     steps: Option<f64>,
+    /// Rows of the series and snapshots.
+    series: f64,
+    snapshots: f64,
 }
 
 impl Estimate {
@@ -124,6 +142,8 @@ impl Estimate {
             resident = resident.max(most.min(backend.slots() as u64) as usize);
             let add = |sum: Option<f64>, part: Option<f64>| Some(sum? + part?);
             total.members += work.members;
+            total.series += work.series;
+            total.snapshots += work.snapshots;
             total.seconds = add(total.seconds, work.seconds);
             total.dispatches = add(total.dispatches, work.dispatches);
             total.steps = add(total.steps, work.steps);
@@ -133,13 +153,15 @@ impl Estimate {
         let scale = members as f64 / total.members.max(1.0);
         start_up *= every as f64;
         let seconds = total.seconds.map(|seconds| scale * seconds);
+        // If none has ended yet, all may have one.
+        let rated = if pilot.ended == 0 { 1.0 } else { pilot.rated as f64 / pilot.ended as f64 };
         Ok(Estimate {
             members,
             cells: cells.len(),
+            disk_bytes: disk(cells, members, rated, scale * total.series, scale * total.snapshots),
             memory_bytes: memory(
                 members,
-                // If none has ended yet, all may have one.
-                if pilot.ended == 0 { 1.0 } else { pilot.rated as f64 / pilot.ended as f64 },
+                rated,
                 [slots, resident],
                 rows,
                 cells[0].spec.points,
@@ -166,6 +188,9 @@ struct Seen {
     steps: u64,
     /// Bytes of their rows.
     rows: f64,
+    /// Rows of their series, and snapshots.
+    series: usize,
+    snapshots: usize,
     /// Fraction of the work that was done.
     share: f64,
     dispatches: u64,
@@ -182,6 +207,8 @@ impl Seen {
             rated: 0,
             steps: 0,
             rows: 0.0,
+            series: 0,
+            snapshots: 0,
             share: 0.0,
             dispatches: 0,
             seconds: 0.0,
@@ -196,6 +223,8 @@ impl Sink for Seen {
         self.relaxed += u64::from(ended.outcome.t_relax.is_some());
         self.rated += u64::from(ended.outcome.rate.is_some());
         self.steps += ended.outcome.steps;
+        self.series += ended.rows.series.len();
+        self.snapshots += ended.rows.snapshots.len();
         let spilled: u64 = ended.rows.spilled.iter().map(|extent| extent.length).sum();
         self.rows += ended.rows.bytes() as f64 + spilled as f64;
         Ok(())
@@ -203,6 +232,8 @@ impl Sink for Seen {
 
     /// Only the size of the rows is needed.
     fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
+        self.series += series.len();
+        self.snapshots += snapshots.len();
         let length = rows::bytes_of(series.len(), snapshots.len(), snapshots.first().map_or(0, |first| first.x.len()));
         Ok(Some(Extent { length: length as u64, ..Extent::default() }))
     }
@@ -258,11 +289,16 @@ fn sample(
         pilot.seconds += seen.seconds;
     }
     let steps = pilots.iter().rfind(|seen| seen.left > 0).map(|seen| seen.steps as f64 / seen.left as f64);
+    let ended = pilots.iter().rfind(|seen| seen.left > 0);
+    let each = |count: fn(&Seen) -> usize| ended.map(|seen| count(seen) as f64 / seen.left as f64);
+    let [most_series, most_snapshots] = most_rows(cohort);
     let work = CohortWork {
         members: all as f64,
         seconds: extrapolated(&pilots, all, |seen| seen.seconds),
         dispatches: extrapolated(&pilots, all, |seen| seen.dispatches as f64),
         steps: steps.or_else(|| certain_steps(cohort)).map(|each| each * all as f64),
+        series: each(|seen| seen.series).unwrap_or(most_series) * all as f64,
+        snapshots: each(|seen| seen.snapshots).unwrap_or(most_snapshots) * all as f64,
     };
     let rows = pilots.iter().rfind(|seen| seen.left > 0).map(|seen| seen.rows / seen.left as f64);
     let rows = rows.unwrap_or_else(|| all_rows(cohort));
@@ -277,6 +313,28 @@ fn all_rows(cohort: &[Cell]) -> f64 {
         rows::bytes_of(series as usize, spec.snapshots.len(), family.points()) as f64
     };
     cohort.iter().map(of_cell).fold(0.0, f64::max)
+}
+
+/// Rows of the series and snapshots of a member that reaches the final time, the maximum over all cells.
+fn most_rows(cohort: &[Cell]) -> [f64; 2] {
+    let series = cohort.iter().map(|Cell { spec, .. }| spec.series.map_or(0.0, |every| spec.t_end / every + 1.0));
+    let snapshots = cohort.iter().map(|Cell { spec, .. }| spec.snapshots.len() as f64);
+    [series.fold(0.0, f64::max), snapshots.fold(0.0, f64::max)]
+}
+
+/// Bytes of the output folder at the end, with so many rows of the series and snapshots in all.
+fn disk(cells: &[Cell], members: u64, rated: f64, series: f64, snapshots: f64) -> u64 {
+    let Some(Cell { spec, family, .. }) = cells.first() else { return 0 };
+    let nodes = snapshots * family.points() as f64;
+    let nodes = match spec.store {
+        Store::Zarr if nodes == 0.0 => 0.0,
+        Store::Csv => nodes * NODE_ROW,
+        // x, y, k and r.
+        Store::Zarr => STORE_BYTES + nodes * 4.0 * size_of::<f64>() as f64,
+    };
+    let drawn = members.min(MAX_PANELS as u64) as f64 * family.points().min(Portrait::MAX_NODES) as f64;
+    let tables = members as f64 * (SUMMARY_ROW + rated * RATES_ROW) + series * SERIES_ROW + nodes;
+    (tables + cells.len() as f64 * CELL_BYTES + PLOTS_BYTES + drawn * DRAWN_NODE_BYTES) as u64
 }
 
 /// The cost of `all` members from that of the pilots, each scaled to its end.

@@ -148,14 +148,52 @@ fn a_dry_run_writes_nothing_and_its_table_says_what_its_json_says() {
         (&46.into(), &2.into(), &"cpu".into())
     );
     assert_eq!(said["steps_per_member"], 200.0);
-    for key in ["dispatches", "seconds", "memory_bytes", "slots"] {
+    for key in ["dispatches", "seconds", "memory_bytes", "disk_bytes", "slots"] {
         assert!(said[key].as_f64().is_some_and(|value| value > 0.0), "{key}: {said}");
     }
     let table = printed(home.path(), &format!("{study} --out out"));
-    for line in ["members    46 in 2 cells\n", "steps      about 200 per member\n", "time       about "] {
+    for line in
+        ["members    46 in 2 cells\n", "steps      about 200 per member\n", "disk       about ", "time       about "]
+    {
         assert!(table.contains(line), "{table}");
     }
     assert_eq!(names(home.path()), [""; 0]);
+}
+
+/// Bytes of all files below a folder.
+fn bytes(folder: &Path) -> f64 {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.map(|path| if path.is_dir() { bytes(&path) } else { fs::metadata(&path).unwrap().len() as f64 }).sum()
+}
+
+#[test]
+fn the_disk_space_of_a_run_is_foretold_within_a_quarter() {
+    let home = TempDir::new().unwrap();
+    let mut foretold = Vec::new();
+    for (i, flags) in [
+        "--curves 700 --points 34",
+        "--curves 60 --points 100 --series 0.01",
+        "--curves 60 --points 101 --snapshots 0,0.1,0.2,0.3,0.4,0.5",
+        "--curves 120 --points 100 --snapshots 0,0.1,0.2,0.3,0.4,0.5 --store zarr",
+        "--curves 3 --points 64 --sweep amplitude=0.01,0.02,0.03,0.04,0.05",
+        "--curves 400 --points 34 --stop-when-relaxed --series 0.02 --precision f32",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let study = format!("run --backend cpu --adaptive=1e-3 {flags}");
+        let said = json(home.path(), &format!("{study} --dry-run --json"))["disk_bytes"].as_f64().unwrap();
+        let out = format!("out-{i}");
+        printed(home.path(), &format!("{study} --quiet --out {out}"));
+        let measured = bytes(&home.path().join(&out));
+        eprintln!("{flags}: {said}, measured {measured}");
+        assert!((0.8..=1.25).contains(&(said / measured)), "{flags}: {said}, measured {measured}");
+        foretold.push(said / measured);
+        foretold.push(said);
+    }
+    // The sizes differ by more than the bound, so that one number for all would not do.
+    let sizes = || foretold.chunks(2).map(|pair| pair[1]);
+    assert!(sizes().fold(0.0, f64::max) > 4.0 * sizes().fold(f64::INFINITY, f64::min));
 }
 
 /// The peak resident size of `curvelax ARGUMENTS --out OUT`. Its stdout is a pipe that is full: once its files are

@@ -17,6 +17,7 @@ pub fn table(estimate: &Estimate, spec: &Spec) -> String {
         ("back end", format!("{}; solver {}", machine(&estimate.platform), spec.solver().name())),
         ("resident", format!("{} {which} at once", (*slots as u64).min(*members))),
         ("memory", format!("about {}", size(estimate.memory_bytes))),
+        ("disk", format!("about {}", size(estimate.disk_bytes))),
         (
             "steps",
             estimate.steps_per_member.map_or(unknown("a member ended"), |steps| format!("about {steps:.0} per member")),
@@ -64,6 +65,7 @@ mod tests {
             platform,
             slots: 128,
             memory_bytes: 17_400_000,
+            disk_bytes: 1_340_000_000,
             steps_per_member: Some(1999.6),
             dispatches: Some(740),
             start_up_seconds: 0.014,
@@ -75,6 +77,7 @@ members    3000 in 1 cell
 back end   cpu, f64, 2 threads (asked for); solver gauss-seidel
 resident   128 members at once
 memory     about 17 MB
+disk       about 1.3 GB
 steps      about 2000 per member
 dispatches about 740
 start-up   0.01 s
