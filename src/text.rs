@@ -1,4 +1,6 @@
-//! Numbers, counts and durations as people write them.
+//! Numbers, counts and durations as people write them, and paths as shells read them.
+
+use std::path::Path;
 
 /// `value` with `digits` significant digits: plain from 10⁻³ to 10⁶, otherwise with a power of ten.
 pub fn significant(value: f64, digits: usize) -> String {
@@ -69,6 +71,18 @@ pub fn grouped(number: u64) -> String {
     text
 }
 
+/// `path` as a word of a command line: in quotes if it needs them.
+pub fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/._-+:@%=,".contains(c);
+    match !text.is_empty() && text.chars().all(plain) && !text.starts_with('-') {
+        true => text,
+        // A path that begins with a dash would be read as a flag.
+        false if text.starts_with('-') => format!("'./{}'", text.replace('\'', "'\\''")),
+        false => format!("'{}'", text.replace('\'', "'\\''")),
+    }
+}
+
 /// Seconds in the unit that a person would use.
 pub fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
@@ -94,6 +108,21 @@ mod tests {
     fn numbers_have_the_digits_asked_for() {
         let shown = [0.0, 0.41234, -2.0, 9.9996, 1234.5, 1e-7, 2e6].map(|value| significant(value, 3));
         assert_eq!(shown, ["0", "0.412", "\u{2212}2.00", "10.0", "1234", "1.00·10⁻⁷", "2.00·10⁶"]);
+    }
+
+    #[test]
+    fn a_path_in_a_command_is_quoted_if_it_must_be() {
+        for (path, word) in [
+            ("out/run-1.b", "out/run-1.b"),
+            ("/data/größe", "/data/größe"),
+            ("my run", "'my run'"),
+            ("it's", "'it'\\''s'"),
+            ("a;b", "'a;b'"),
+            ("-x y", "'./-x y'"),
+            ("", "''"),
+        ] {
+            assert_eq!(quoted(Path::new(path)), word);
+        }
     }
 
     #[test]

@@ -172,10 +172,26 @@ fn a_summary_that_is_not_whole_is_refused_with_its_place() {
     let summary = |out: &Path| out.join("summary.csv");
     let last = done.text("summary.csv").lines().last().unwrap().len() + 1;
     let rest = "restore the file, or run again";
-    refused(&done, |out| shortened(&summary(out), 30), "out/summary.csv: expected an end of line, found the end");
+    refused(
+        &done,
+        |out| shortened(&summary(out), 30),
+        "out/summary.csv, line 7: expected an end of line, found the end",
+    );
     refused(&done, |out| shortened(&summary(out), 1), "it was cut off");
     refused(&done, |out| shortened(&summary(out), last), "out/summary.csv: expected 6 rows by run.json, found 5");
     refused(&done, |out| fs::write(summary(out), "").unwrap(), "it was cut off");
+    let other = |column: &str, value: &str| {
+        let mut rows: Vec<Vec<String>> =
+            done.text("summary.csv").lines().map(|row| row.split(',').map(String::from).collect()).collect();
+        let at = rows[0].iter().position(|name| name == column).unwrap();
+        rows[3][at] = value.into();
+        rows.iter().map(|row| row.join(",") + "\n").collect::<String>()
+    };
+    let late = "out/summary.csv, line 4, column t_relax: expected a time up to 0.4, the end of the run, found `7.5`";
+    refused(&done, |out| fs::write(summary(out), other("t_relax", "7.5")).unwrap(), late);
+    let bytes = [other("status", "@").replace('@', "rel\u{fffd}").as_bytes(), b""].concat();
+    let broken: Vec<u8> = bytes.iter().copied().filter(|byte| *byte != 0xbf).collect();
+    refused(&done, |out| fs::write(summary(out), broken).unwrap(), "out/summary.csv, line 4: not UTF-8: save it as");
     refused(&done, |out| fs::remove_file(summary(out)).unwrap(), "cannot read out/summary.csv: ");
     refused(
         &done,

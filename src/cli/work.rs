@@ -12,7 +12,7 @@ use crate::{
     report::{Form, Manner, RunReport, Stop, complete::listed, document::Document, reader::Finished},
     results::EnsembleStatistics,
     simulate::resume,
-    text::plural,
+    text::{plural, quoted},
 };
 
 /// How a run goes about its work: nothing of it changes a result.
@@ -200,7 +200,7 @@ pub fn check_name(json: bool, out: &Path) -> Result<()> {
 /// Says how to resume a run that failed, unless the error does.
 fn kept(out: &Path, error: &Error) {
     if !matches!(error, Error::Stopped(_) | Error::Interrupted(_) | Error::Lost(_)) {
-        note(&format!("note: the run was saved: curvelax resume {} continues it", out.display()));
+        note(&format!("note: the run was saved: curvelax resume {} continues it", quoted(out)));
     }
 }
 

@@ -172,12 +172,14 @@ struct PointTable {
     lines: Vec<usize>,
 }
 
-/// The columns, from 0, of the coordinates; without a header they are the `only` ones.
+/// The columns, from 0, of the coordinates.
 #[derive(Clone, Copy)]
 struct Columns {
     x: usize,
     y: usize,
-    only: bool,
+    /// Columns named by the header; without one there are two.
+    count: usize,
+    has_header: bool,
 }
 
 /// The origin of the text, for messages.
@@ -254,10 +256,12 @@ impl Source<'_> {
                 columns = Some(self.header(line, &fields)?);
                 continue;
             }
-            let Columns { x, y, only } = *columns.get_or_insert(Columns { x: 0, y: 1, only: true });
-            let (Some(x), Some(y), false) = (fields.get(x), fields.get(y), only && fields.len() > 2) else {
+            let Columns { x, y, count, has_header } =
+                *columns.get_or_insert(Columns { x: 0, y: 1, count: 2, has_header: false });
+            let (Some(x), Some(y), false) = (fields.get(x), fields.get(y), fields.len() > count) else {
                 self.refuse_separator(line, content, &SEPARATORS[..2])?;
-                let problem = format!("the number of columns is {} where x,y is expected", fields.len());
+                let expected = if has_header { format!("the header names {count}") } else { "x,y is expected".into() };
+                let problem = format!("the number of columns is {} where {expected}", fields.len());
                 let remedy = "separate by commas, and name further columns in a header";
                 return Err(self.refusal(Some(line), &problem, remedy));
             };
@@ -290,7 +294,7 @@ impl Source<'_> {
                 "begin with the header x,y or with a point such as 1.0,0.5",
             ));
         };
-        Ok(Columns { x, y, only: false })
+        Ok(Columns { x, y, count: fields.len(), has_header: true })
     }
 
     fn coordinate(&self, line: usize, field: &str) -> Result<f64> {
@@ -422,6 +426,7 @@ mod tests {
         assert_refused("0,0\n1\n1,1\n", &["line 2:", "columns is 1 "]);
         assert_refused("0,0,7\n1,0,7\n1,1,7\n", &["line 1:", "columns is 3 ", "header"]);
         assert_refused("x,y\n0,0\n1\n", &["line 3:", "columns is 1 "]);
+        assert_refused("x,y\n0,0\n1,0,9\n1,1\n", &["line 3:", "columns is 3 where the header names 2;"]);
         assert_refused("lon,lat\n0,0\n1,0\n1,1\n", &["line 1:", "`lon,lat` names no columns x and y"]);
         assert_refused("x,y\nx,y\n0,0\n", &["line 2:", "`x` is not a number"]);
     }

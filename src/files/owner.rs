@@ -11,7 +11,10 @@ use super::{
     disk::{entries, is_own_store},
     names::{CONVERGENCE, FIGURES, PLOTS, PROBE, RUN, SHARD, STATE, STATE_OLD, STATE_PART, is_store, part},
 };
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    text::quoted,
+};
 
 /// Who writes into a folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,7 +99,7 @@ impl Existing {
             return Ok(());
         }
         if [STATE, STATE_OLD].iter().any(|state| is_there(&place.join(state))) {
-            let resume = format!("curvelax resume {} continues it, --force starts over", path.display());
+            let resume = format!("curvelax resume {} continues it, --force starts over", quoted(path));
             return refuse("a run was interrupted here", &resume);
         }
         match self {

@@ -37,12 +37,12 @@ impl<R: TableRow + Default> TableReader<R> {
     /// [`Error::Request`] if it does not exist, has other columns, or is truncated.
     pub fn open(place: &Place) -> Result<TableReader<R>> {
         let path = place.shown().to_path_buf();
-        let file = input::open(place.at()).and_then(|mut file| Ok((ends_with_a_line(&mut file)?, file)));
-        let (whole, file) =
+        let file = input::open(place.at()).and_then(|mut file| Ok((line_cut_off(&mut file)?, file)));
+        let (cut_off, file) =
             file.map_err(|e| Error::Request(format!("cannot read {}: {e}; {REMEDY}", path.display())))?;
-        if !whole {
+        if let Some(line) = cut_off {
             let problem = "expected an end of line, found the end of the file: it was cut off";
-            return Err(Error::Request(format!("{}: {problem}; {REMEDY}", path.display())));
+            return Err(Error::Request(format!("{}, line {line}: {problem}; {REMEDY}", path.display())));
         }
         // Rows are checked here, where messages can say more.
         let reader =
@@ -75,8 +75,15 @@ impl<R: TableRow + Default> TableReader<R> {
     /// The fields of the next line, as many as there are columns.
     fn fields(&mut self) -> Result<Option<Fields<'_>>> {
         let TableReader { path, names, reader, line, .. } = self;
-        let some =
-            reader.read_record(line).map_err(|e| Error::Request(format!("{}: {e}; {REMEDY}", path.display())))?;
+        let some = reader.read_record(line).map_err(|e| {
+            let problem = match e.kind() {
+                csv::ErrorKind::Utf8 { .. } => "not UTF-8: save it as UTF-8".into(),
+                _ => e.to_string(),
+            };
+            // The reader may fail at a line that it has not begun.
+            let number = e.position().unwrap_or(reader.position()).line();
+            Error::Request(format!("{}, line {number}: {problem}; {REMEDY}", path.display()))
+        })?;
         let (expected, found) = (names.len(), line.len());
         if some && found != expected {
             let problem = format!("line {}: expected {expected} fields, found {found}", number_of(line));
@@ -86,13 +93,24 @@ impl<R: TableRow + Default> TableReader<R> {
     }
 }
 
-/// Returns whether the file ends with a line break, and rewinds it.
-fn ends_with_a_line(file: &mut File) -> std::io::Result<bool> {
+/// Returns the number of the last line if no line break ends it, and rewinds the file.
+fn line_cut_off(file: &mut File) -> std::io::Result<Option<u64>> {
     let mut last = [0];
     if file.metadata()?.len() > 0 {
         file.seek(SeekFrom::End(-1))?;
         file.read_exact(&mut last)?;
         file.rewind()?;
     }
-    Ok(last == *b"\n")
+    if last == *b"\n" {
+        return Ok(None);
+    }
+    let (mut line, mut block) = (1, vec![0; 1 << 16]);
+    loop {
+        match file.read(&mut block)? {
+            0 => break,
+            count => line += block[..count].iter().filter(|byte| **byte == b'\n').count() as u64,
+        }
+    }
+    file.rewind()?;
+    Ok(Some(line))
 }

@@ -34,7 +34,7 @@ use crate::{
     files::{OutputFolder, portraits::Film},
     placement::Platform,
     results::tally::Tally,
-    text::{duration, plural},
+    text::{duration, plural, quoted},
 };
 use checkpoint::{Head, Origin, Saved};
 use complete::Complete;
@@ -214,7 +214,7 @@ impl RunReport {
             " after {} with {rows} of {} {all} in the table; curvelax resume {} continues",
             duration(self.wall().as_secs_f64()),
             self.total,
-            self.folder.path().display(),
+            quoted(self.folder.path()),
         )
     }
 

@@ -25,6 +25,7 @@ use crate::files::{
 use crate::{
     ensemble::{Shard, Spec},
     error::{Error, Result, one_line, shortened},
+    text::quoted,
 };
 
 /// Characters of a fault in a message.
@@ -124,7 +125,7 @@ fn unfinished_run(path: &Path) -> Result<Option<String>> {
         return Ok(Some("a run is writing here".into()));
     }
     let interrupted = there(path, STATE)? || there(path, STATE_OLD)?;
-    Ok(interrupted.then(|| format!("interrupted; curvelax resume {} continues it", path.display())))
+    Ok(interrupted.then(|| format!("interrupted; curvelax resume {} continues it", quoted(path))))
 }
 
 /// The complete shard at `path`; its tables have their recorded lengths.
