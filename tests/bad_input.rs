@@ -332,8 +332,8 @@ fn files_of_a_run_without_end_are_refused_at_once() {
             [b"{\"spec\":\"".as_slice(), &b"a".repeat(4_000_000), b"\"}"].concat(),
             ": not written by curvelax",
         ),
-        ("summary.csv", table("\n"), ": a line of more than 65536 bytes; restore the file"),
-        ("mean_excess.csv", table("\n"), ": a line of more than 65536 bytes; restore the file"),
+        ("summary.csv", table("\n"), ", line 1: a line of more than 65536 bytes; restore the file"),
+        ("mean_excess.csv", table("\n"), ", line 1: a line of more than 65536 bytes; restore the file"),
         (
             "plots/portraits.json",
             [br#"{"members":[{"nodes":["#.as_slice(), &br#""","#.repeat(2_700_000)].concat(),

@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::{
     comparison::CellComparison,
-    scaling::Scaling,
+    scaling::{CellMedian, Scaling},
     tally::{CellTally, Rate, Tally},
 };
 use crate::{
@@ -227,7 +227,13 @@ impl EnsembleStatistics {
             Some(paired) => paired,
             None => CellComparison::independent(spec, &samples)?,
         };
-        let scaling = Scaling::of(&spec.sweep, &cells);
+        let medians = cells.iter().map(|cell| CellMedian {
+            cell: cell.cell,
+            value: cell.median(),
+            bounds: cell.bounds(),
+            has_copies: cell.has_copies(),
+        });
+        let scaling = Scaling::of(&spec.sweep, &medians.collect::<Vec<_>>());
         Ok(EnsembleStatistics { cells, comparison, scaling, relative })
     }
 

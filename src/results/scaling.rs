@@ -8,7 +8,6 @@
 //! A scale is a quantity that is doubled: the amplitude, the size of a shape, the coefficients of a flow. Numerical
 //! settings such as n or the tolerance are none. There the median tends to a limit, not to 0 or infinity.
 
-use super::cells::CellStatistics;
 use crate::{
     ensemble::sweep::{Sweep, SweepAxis},
     statistics::PowerLaw,
@@ -20,6 +19,19 @@ pub const REJECTED: f64 = 0.05;
 const BAND: f64 = 1.96;
 /// Arguments of shapes and flows are proportional up to this relative difference.
 const ROUNDING: f64 = 1e-9;
+
+/// The median of the times of one cell, with its uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CellMedian {
+    /// Index of the cell.
+    pub cell: u64,
+    /// The median; `None` if fewer than half of the members relaxed.
+    pub value: Option<f64>,
+    /// Its 95 % interval, if both ends are known.
+    pub bounds: Option<(f64, f64)>,
+    /// Whether all members are copies, so that there is no sampling error.
+    pub has_copies: bool,
+}
 
 /// The fitted law of a study that sweeps a scale.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +46,7 @@ pub struct Scaling {
 
 impl Scaling {
     /// Fits the medians of `cells`; `None` unless a single scale is swept.
-    pub fn of(sweep: &Sweep, cells: &[CellStatistics]) -> Option<Scaling> {
+    pub fn of(sweep: &Sweep, cells: &[CellMedian]) -> Option<Scaling> {
         let [axis] = sweep.axes() else { return None };
         let (scale, values) = scale(axis)?;
         let points: Vec<_> = cells.iter().zip(values).map(|(cell, value)| (cell.cell, point(cell, value))).collect();
@@ -73,18 +85,18 @@ impl Scaling {
 }
 
 /// Value, median and error of ln median of a cell, or why it has none.
-fn point(cell: &CellStatistics, value: f64) -> Result<(f64, f64, f64), &'static str> {
+fn point(cell: &CellMedian, value: f64) -> Result<(f64, f64, f64), &'static str> {
     if value <= 0.0 {
         return Err("its value is not positive");
     }
-    let median = cell.median().ok_or("fewer than half of its members relaxed")?;
+    let median = cell.value.ok_or("fewer than half of its members relaxed")?;
     if median <= 0.0 {
         return Err("its median is 0");
     }
-    if cell.has_copies() {
+    if cell.has_copies {
         return Ok((value, median, 0.0));
     }
-    match cell.bounds().ok_or("its median has no closed 95 % interval")? {
+    match cell.bounds.ok_or("its median has no closed 95 % interval")? {
         (low, high) if low > 0.0 => Ok((value, median, (high / low).ln() / (2.0 * BAND))),
         _ => Err("the interval of its median begins at 0"),
     }
