@@ -317,7 +317,8 @@ fn all_rows(cohort: &[Cell]) -> f64 {
 
 /// Rows of the series and snapshots of a member that reaches the final time, the maximum over all cells.
 fn most_rows(cohort: &[Cell]) -> [f64; 2] {
-    let series = cohort.iter().map(|Cell { spec, .. }| spec.series.map_or(0.0, |every| spec.t_end / every + 1.0));
+    let series =
+        cohort.iter().map(|Cell { spec, .. }| spec.series.map_or(0.0, |every| spec.final_time() / every + 1.0));
     let snapshots = cohort.iter().map(|Cell { spec, .. }| spec.snapshots.len() as f64);
     [series.fold(0.0, f64::max), snapshots.fold(0.0, f64::max)]
 }

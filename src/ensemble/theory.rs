@@ -28,7 +28,10 @@ pub fn rate_of(spec: &Spec, outcome: &Outcome) -> Option<f64> {
     match spec.flow {
         Flow::Elastic(penalty) if penalty > 0.0 => {
             let decay = Decline::new(spec, outcome.start.area)?;
-            outcome.rate.and_then(|_| decay.rate_in_window(decay.known_point(spec, outcome)))
+            // Theory knows no mobility: its time is that of length⁴.
+            let (t, level) = decay.known_point(spec, outcome);
+            let rate = outcome.rate.and_then(|_| decay.rate_in_window((spec.mobility() * t, level)));
+            rate.map(|rate| spec.mobility() * rate)
         }
         Flow::Elastic(_) => None,
         _ => spec.rate_in_theory(outcome.start.area),
@@ -38,7 +41,7 @@ pub fn rate_of(spec: &Spec, outcome: &Outcome) -> Option<f64> {
 /// The rate at the time `t` of a member of `area` at the start, in an elastic flow.
 pub fn rate_at(spec: &Spec, area: f64, t: f64) -> Option<f64> {
     let decline = Decline::new(spec, area)?;
-    decline.radius_squared(t).map(|u| decline.rate(u))
+    decline.radius_squared(spec.mobility() * t).map(|u| spec.mobility() * decline.rate(u))
 }
 
 /// A circle of elastic flow with a small mode.

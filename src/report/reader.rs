@@ -196,7 +196,7 @@ impl Summary {
         if self.spec_of.as_ref().is_none_or(|(of, _)| *of != cell) {
             self.spec_of = Some((cell, self.spec.of_cell(cell)?));
         }
-        let t_end = self.spec_of.as_ref().map_or(f64::INFINITY, |(_, spec)| spec.t_end);
+        let t_end = self.spec_of.as_ref().map_or(f64::INFINITY, |(_, spec)| spec.final_time());
         if outcome.t_relax.is_some_and(|t| t > t_end * (1.0 + LATE)) {
             return Err(fields.unexpected_in("t_relax", &format!("a time up to {t_end}, the end of the run")));
         }
