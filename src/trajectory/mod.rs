@@ -30,7 +30,7 @@ const ROUND: f64 = 1e-13;
 const FASTEST: f64 = 0.1;
 /// The first adaptive step in the same unit. A smooth curve could take an even longer one; a rough one refuses it a few
 /// times.
-const FIRST_STEP: f64 = 100.0;
+const FIRST_STEP: f64 = 30.0;
 /// Maximum number of adaptive steps to a tolerance of 1; it scales with the inverse root of the tolerance, and a member
 /// that exceeds it is stalled. Curves that relax take some 3 to 30; one that creeps, because only tiny steps can be
 /// solved, would never end.
