@@ -4,8 +4,6 @@
 const PARTS = 32u;
 const TIMES = 31u;
 const POINTS = 8u;
-const HALVINGS = 64u;
-const TERMS = 10u;
 
 /// Records what an accepted step adds; it is not yet counted.
 fn follow(taken: Taken) {
@@ -75,28 +73,4 @@ fn note(start: real, end: real, taken: Taken) {
         if lane == 0u { all_reports[member].excess_at[counters.noted] = excess; }
         counters.noted += 1u;
     }
-}
-
-/// ln(b/a) of positive numbers; WGSL has no logarithm in f64.
-fn ln_ratio(a: real, b: real) -> real {
-    var q = b / a;
-    var whole = real(0.0);
-    for (var halving = 0u; halving < HALVINGS; halving++) {
-        if !(real(0.7071067811865476) <= q) {
-            q = real(2.0) * q;
-            whole = whole - real(0.6931471805599453);
-        } else if !(q <= real(1.4142135623730951)) {
-            q = real(0.5) * q;
-            whole = whole + real(0.6931471805599453);
-        } else {
-            break;
-        }
-    }
-    let z = (q - real(1.0)) / (q + real(1.0));
-    let square = z * z;
-    var sum = real(0.0);
-    for (var left = TERMS; left > 0u; left--) {
-        sum = sum * square + real(1.0) / real(2u * left - 1u);
-    }
-    return whole + real(2.0) * (z * sum);
 }

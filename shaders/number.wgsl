@@ -10,6 +10,10 @@ fn bounded_abs(v: vec) -> vec {
     return select(vec(2.0 * BIG), abs(v), abs(v) <= vec(BIG));
 }
 
+/// Halvings and terms of the logarithm.
+const LN_HALVINGS = 64u;
+const LN_TERMS = 10u;
+
 /// e^x for |x| <= 40, clamped beyond: reduction by ln 2, then a Horner polynomial. WGSL's own exp is garbage in f64.
 fn exponential(v: vec) -> vec {
     let x = min(max(v, vec(-40.0)), vec(40.0));
@@ -36,4 +40,28 @@ fn exponential(v: vec) -> vec {
 fn twice_sin_atan(v: vec) -> vec {
     let t = min(max(v, vec(-1e9)), vec(1e9));
     return real(2.0) * (t / sqrt(vec(1.0) + t * t));
+}
+
+/// ln(b/a) of positive numbers; WGSL has no logarithm in f64.
+fn ln_ratio(a: real, b: real) -> real {
+    var q = b / a;
+    var whole = real(0.0);
+    for (var halving = 0u; halving < LN_HALVINGS; halving++) {
+        if !(real(0.7071067811865476) <= q) {
+            q = real(2.0) * q;
+            whole = whole - real(0.6931471805599453);
+        } else if !(q <= real(1.4142135623730951)) {
+            q = real(0.5) * q;
+            whole = whole + real(0.6931471805599453);
+        } else {
+            break;
+        }
+    }
+    let z = (q - real(1.0)) / (q + real(1.0));
+    let square = z * z;
+    var sum = real(0.0);
+    for (var left = LN_TERMS; left > 0u; left--) {
+        sum = sum * square + real(1.0) / real(2u * left - 1u);
+    }
+    return whole + real(2.0) * (z * sum);
 }

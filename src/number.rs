@@ -296,9 +296,57 @@ macro_rules! real {
 real!(f64, F64, "f64", 52, 1023, 6_755_399_441_055_744.0);
 real!(f32, F32, "f32", 23, 127, 12_582_912.0);
 
+/// Maximum number of halvings that bring a ratio near 1.
+pub const LN_HALVINGS: u32 = 64;
+/// Terms of the series of the logarithm; the last is below 10⁻¹⁶.
+pub const LN_TERMS: u32 = 10;
+
+/// `ln(b/a)` of positive numbers, by halvings and `2·artanh((q-1)/(q+1))` of the rest; WGSL has no logarithm in f64.
+pub fn ln_ratio<T: Real>(a: T, b: T) -> T {
+    let (one, half, two) = (T::of(1.0), T::of(0.5), T::of(2.0));
+    let ln_2 = T::of(std::f64::consts::LN_2);
+    let (mut q, mut whole) = (b / a, T::of(0.0));
+    let (low, high) = (T::of(std::f64::consts::FRAC_1_SQRT_2), T::of(std::f64::consts::SQRT_2));
+    for _ in 0..LN_HALVINGS {
+        if !low.le(q) {
+            q = two * q;
+            whole = whole - ln_2;
+        } else if !q.le(high) {
+            q = half * q;
+            whole += ln_2;
+        } else {
+            break;
+        }
+    }
+    let z = (q - one) / (q + one);
+    let square = z * z;
+    let mut sum = T::of(0.0);
+    for term in (0..LN_TERMS).rev() {
+        sum = sum * square + one / T::of(f64::from(2 * term + 1));
+    }
+    whole + two * (z * sum)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn worst_ln<T: Real>() -> f64 {
+        let mut worst = 0.0_f64;
+        for j in -400..=400 {
+            let (a, b) = (T::of(0.3), T::of((f64::from(j) * 0.03 + 0.01).exp()));
+            let exact = (b.to_f64() / a.to_f64()).ln();
+            worst = worst.max((ln_ratio(a, b).to_f64() - exact).abs() / (T::EPSILON * exact.abs().max(1.0)));
+        }
+        worst
+    }
+
+    #[test]
+    fn the_logarithm_is_accurate_in_both_precisions() {
+        assert!(worst_ln::<f64>() < 3.0, "{}", worst_ln::<f64>());
+        assert!(worst_ln::<f32>() < 3.0, "{}", worst_ln::<f32>());
+        assert_eq!(ln_ratio(2.0, 2.0), 0.0);
+    }
 
     fn worst_exp<T: Real>() -> f64 {
         let mut worst = 0.0_f64;

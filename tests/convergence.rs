@@ -34,7 +34,7 @@ fn the_table_and_the_file_have_the_orders_of_the_scheme() {
     let rows = rows(&home);
     assert_eq!(rows.len(), 2 * (3 + 4 + 4));
     for row in &rows {
-        let expected = if &row[1] == "tau" { 1.0 } else { 2.0 };
+        let expected = if &row[1] == "n" { 2.0 } else { 1.0 };
         if !row[6].is_empty() {
             let order: f64 = row[6].parse().unwrap();
             // There are too few adaptive steps here to show their full order.

@@ -246,7 +246,7 @@ fn a_mean_excess_that_is_not_that_of_the_run_is_refused() {
     let table = |out: &Path| out.join("mean_excess.csv");
     let last = done.text("mean_excess.csv").lines().last().unwrap().len() + 1;
     refused(&done, |out| shortened(&table(out), last), "out/mean_excess.csv: expected 66 rows by run.json, found 65");
-    refused(&done, |out| shortened(&table(out), 5), "out/mean_excess.csv: expected an end of line");
+    refused(&done, |out| shortened(&table(out), 5), "out/mean_excess.csv, line 67: expected an end of line");
     refused(&done, |out| field(&table(out), 7, 3, "x"), "out/mean_excess.csv, line 8, column mean: expected a number");
     refused(&done, |out| field(&table(out), 7, 1, "0"), "column t: expected a time after ");
     refused(&done, |out| fs::remove_file(table(out)).unwrap(), "cannot read out/mean_excess.csv: ");

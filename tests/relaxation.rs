@@ -168,7 +168,7 @@ fn a_member_that_relaxed_stays_relaxed_whatever_happens_to_it_at_rest() {
 }
 
 #[test]
-fn an_ellipse_relaxes_when_it_should_in_fifteen_steps_and_not_with_a_coarse_fixed_step() {
+fn an_ellipse_relaxes_when_it_should_in_twenty_steps_and_not_with_a_coarse_fixed_step() {
     for (sampling, n, bounds) in [
         (Sampling::Parameter, 100, [0.005, 0.005]),
         // The error of the spacing alone is 0.0057 to 0.01.
@@ -185,7 +185,7 @@ fn an_ellipse_relaxes_when_it_should_in_fifteen_steps_and_not_with_a_coarse_fixe
                 fine.steps,
                 error(&coarse)
             );
-            assert!(near(fine.t_relax, exact, bound) && fine.steps <= 15, "{fine:?}");
+            assert!(near(fine.t_relax, exact, bound) && fine.steps <= 20, "{fine:?}");
             assert!(!near(coarse.t_relax, exact, 10.0 * bound), "the control passes: {coarse:?}");
         }
     }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use curvelax::{
     backend::gpu::{Variant, kernel, shader},
     ensemble::Status,
-    number::{BIG, Real},
+    number::{BIG, LN_HALVINGS, LN_TERMS, Real},
     scheme::{
         decay, dense, extrapolation,
         member::{self, Counters, Decay, NEVER, Observed, Parameters, Progress, Report},
@@ -307,8 +307,8 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("MIN_TO_SINGULAR", pace::MIN_TO_SINGULAR),
         ("PARTS", member::PARTS as f64),
         ("TIMES", member::TIMES as f64),
-        ("HALVINGS", f64::from(decay::HALVINGS)),
-        ("TERMS", f64::from(decay::TERMS)),
+        ("LN_HALVINGS", f64::from(LN_HALVINGS)),
+        ("LN_TERMS", f64::from(LN_TERMS)),
         ("STATE_FIELDS", STATE_FIELDS as f64),
         ("INCREMENTS", CURVE_FIELDS as f64),
         ("EARLIER", (CURVE_FIELDS + 3) as f64),

@@ -112,7 +112,7 @@ fn orders() -> Outcome {
             let (order, margin) = match (study.varied, problem.name.as_str()) {
                 (Varied::Nodes, _) => (2.0, 0.1),
                 // Errors of steps of several orders, some of which cancel.
-                (Varied::Tolerance, _) => (1.15, 0.35),
+                (Varied::Tolerance, _) => (1.1, 0.5),
                 (_, "lemniscate") => (1.0, 0.2),
                 _ => (1.0, 0.1),
             };

@@ -322,7 +322,17 @@ pub(crate) mod tests {
     use super::*;
 
     pub fn outcome(member: u64, status: Status, t_relax: Option<f64>) -> Outcome {
-        Outcome { member, status, t_end: 2.0, steps: 10, sweeps_k: 20, sweeps_x: 5, t_relax, ..Outcome::default() }
+        Outcome {
+            member,
+            status,
+            t_end: 2.0,
+            steps: 10,
+            solves: 10,
+            sweeps_k: 20,
+            sweeps_x: 5,
+            t_relax,
+            ..Outcome::default()
+        }
     }
 
     fn tally(times: &[f64], censored: u64) -> Tally {

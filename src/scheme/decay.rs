@@ -10,14 +10,10 @@ use super::{
     member::{PARTS, TIMES},
     run::Run,
 };
-use crate::number::Real;
+use crate::number::{Real, ln_ratio};
 
-/// Maximum number of halvings that bring a ratio near 1.
-pub const HALVINGS: u32 = 64;
 /// Points that an adaptive step adds to the fit.
 pub const POINTS: u32 = 8;
-/// Terms of the series of the logarithm; the last is below 10⁻¹⁶.
-pub const TERMS: u32 = 10;
 
 /// The `part`-th time of the grid, as a fraction of the run: dense at the start, where curves change most.
 pub fn share<T: Real>(part: usize) -> T {
@@ -104,52 +100,9 @@ fn note<T: Real>(run: &mut Run<T>, from: T, to: T, taken: &Taken<T>) {
     }
 }
 
-/// `ln(b/a)` of positive numbers, by halvings and `2·artanh((q-1)/(q+1))` of the rest; WGSL has no logarithm in f64.
-pub fn ln_ratio<T: Real>(a: T, b: T) -> T {
-    let (one, half, two) = (T::of(1.0), T::of(0.5), T::of(2.0));
-    let ln_2 = T::of(std::f64::consts::LN_2);
-    let (mut q, mut whole) = (b / a, T::of(0.0));
-    let (low, high) = (T::of(std::f64::consts::FRAC_1_SQRT_2), T::of(std::f64::consts::SQRT_2));
-    for _ in 0..HALVINGS {
-        if !low.le(q) {
-            q = two * q;
-            whole = whole - ln_2;
-        } else if !q.le(high) {
-            q = half * q;
-            whole += ln_2;
-        } else {
-            break;
-        }
-    }
-    let z = (q - one) / (q + one);
-    let square = z * z;
-    let mut sum = T::of(0.0);
-    for term in (0..TERMS).rev() {
-        sum = sum * square + one / T::of(f64::from(2 * term + 1));
-    }
-    whole + two * (z * sum)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn worst_ln<T: Real>() -> f64 {
-        let mut worst = 0.0_f64;
-        for j in -400..=400 {
-            let (a, b) = (T::of(0.3), T::of((f64::from(j) * 0.03 + 0.01).exp()));
-            let exact = (b.to_f64() / a.to_f64()).ln();
-            worst = worst.max((ln_ratio(a, b).to_f64() - exact).abs() / (T::EPSILON * exact.abs().max(1.0)));
-        }
-        worst
-    }
-
-    #[test]
-    fn the_logarithm_is_accurate_in_both_precisions() {
-        assert!(worst_ln::<f64>() < 3.0, "{}", worst_ln::<f64>());
-        assert!(worst_ln::<f32>() < 3.0, "{}", worst_ln::<f32>());
-        assert_eq!(ln_ratio(2.0, 2.0), 0.0);
-    }
 
     #[test]
     fn times_are_dense_at_the_start_and_end_at_the_end() {

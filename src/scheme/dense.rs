@@ -1,7 +1,7 @@
 //! What lies inside an adaptive step: a polynomial through both of its ends. Twin of `shaders/dense.wgsl`.
 
-use super::{Curve, State, decay, member::Progress};
-use crate::number::{BIG, Real};
+use super::{Curve, State, member::Progress};
+use crate::number::{BIG, Real, ln_ratio};
 
 /// Multiple of ε below which an excess, a difference of numbers near 1, is mostly rounding.
 pub const RESOLVED: f64 = 128.0;
@@ -113,7 +113,7 @@ impl<T: Real> Fall<T> {
         if before.le(zero) || after.le(zero) {
             return Fall::Straight;
         }
-        let fallen = decay::ln_ratio(before, after);
+        let fallen = ln_ratio(before, after);
         let end = Jet { value: fallen, slope, bend };
         let arc = if progress.taken.le(zero) {
             Arc::first(zero, end)
@@ -144,8 +144,8 @@ impl<T: Real> Taken<T> {
         }
         match self.fall {
             Fall::Straight => (self.before - excess) / (self.before - self.after),
-            Fall::Exponential(fallen) => decay::ln_ratio(self.before, excess) / fallen,
-            Fall::Smooth(arc) => arc.crossing(decay::ln_ratio(self.before, excess)),
+            Fall::Exponential(fallen) => ln_ratio(self.before, excess) / fallen,
+            Fall::Smooth(arc) => arc.crossing(ln_ratio(self.before, excess)),
         }
     }
 }
@@ -214,7 +214,8 @@ mod tests {
         let at = |t: f64| [(-0.8 * t).exp(), -0.8 * (-0.8 * t).exp(), 0.64 * (-0.8 * t).exp()];
         let arc = Arc { start: jet(at(0.0)), end: jet(at(1.0)) };
         let found = arc.crossing(at(0.3)[0]);
-        assert!((found - 0.3).abs() < 1e-6, "{found}");
+        // A parabola or a cubic would be off by 10⁻³ or more.
+        assert!((found - 0.3).abs() < 1e-5, "{found}");
         assert!((arc.crossing(at(1.0)[0]) - 1.0).abs() < 1e-12);
         let wild = Arc { start: jet([1.0, f64::NAN, 0.0]), end: jet([0.0; 3]) };
         assert!((0.0..=1.0).contains(&wild.crossing(0.5)) && !wild.is_tame());

@@ -13,7 +13,7 @@ use super::{
     pace::{self, Stride},
     run::Run,
     start::{self, Start},
-    state::{self, LASTING_FIELDS, STATE_FIELDS},
+    state::{self, CURVE_FIELDS, INCREMENT_FIELDS, LASTING_FIELDS, STATE_FIELDS},
     step::{self, Method, Stepped},
 };
 use crate::{
@@ -100,7 +100,7 @@ pub fn evolve_abreast<N: Number, S: Solves>(group: Group<N::Real>, method: &Meth
         let all_leave = made == attempts || runs.iter().filter(|run| run.counters.is_running()).count() < enough;
         for lane in 0..runs.len() {
             if live.lane(lane) && (all_leave || !runs[lane].counters.is_running()) {
-                team.let_out(lane, runs[lane]);
+                team.let_out(lane, runs[lane], adaptive);
                 live.set_lane(lane, false);
             }
         }
@@ -156,8 +156,13 @@ impl<N: Number> Team<N> {
 
     /// Copies a member back from its lane, with its report.
     #[inline(always)]
-    fn let_out(&self, lane: usize, run: &mut Run<N::Real>) {
-        for (from, to) in self.state.fields().into_iter().zip(run.state.fields_mut()).take(LASTING_FIELDS) {
+    fn let_out(&self, lane: usize, run: &mut Run<N::Real>, adaptive: bool) {
+        let fields = self.state.fields().into_iter().zip(run.state.fields_mut()).take(LASTING_FIELDS);
+        for (field, (from, to)) in fields.enumerate() {
+            // An adaptive step begins without increments; those of its last row depend on the orders of other lanes.
+            if adaptive && (CURVE_FIELDS..CURVE_FIELDS + INCREMENT_FIELDS).contains(&field) {
+                continue;
+            }
             for i in 0..from.len() {
                 to[i] = from[i].lane(lane);
             }

@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn combinations_have_their_orders() {
         for order in LEAST_ORDER..=MOST_ORDER {
-            let errors = [0.1, 0.05].map(|h: f64| {
+            let errors = [0.04, 0.02].map(|h: f64| {
                 let [value, slope, bend, gap, lower] = step(h, order);
                 let y = 1.0 / (1.0 + h);
                 [value - y, slope + h * y * y, bend - 2.0 * h * h * y * y * y, gap, lower]

@@ -6,11 +6,11 @@
 //! a compiler adds.
 
 use super::{
-    Parameters, decay,
+    Parameters,
     extrapolation::{LEAST_ORDER, most_order, parts},
     member::Progress,
 };
-use crate::number::Real;
+use crate::number::{Real, ln_ratio};
 
 /// Fraction taken of the step length that is predicted to meet the tolerance.
 pub const SAFETY: f64 = 0.9;
@@ -96,7 +96,7 @@ pub fn allowed<T: Real>(h: T, length: T, n: T, p: &Parameters<T>) -> T {
 pub fn growth<T: Real>(error: T, order: u32, allowed: T) -> T {
     // A zero error allows any growth.
     let ratio = allowed / error.max(T::of(1e-12) * allowed);
-    let root = (decay::ln_ratio(T::of(1.0), ratio) / T::of(f64::from(order))).exponential();
+    let root = (ln_ratio(T::of(1.0), ratio) / T::of(f64::from(order))).exponential();
     (T::of(SAFETY) * root).max(T::of(MIN_GROWTH)).min(T::of(MAX_GROWTH))
 }
 

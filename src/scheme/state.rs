@@ -9,13 +9,15 @@ use crate::{
 
 /// Fields of a curve.
 pub const CURVE_FIELDS: usize = 4;
+/// Fields of the increments of a state, and of the earlier ones.
+pub const INCREMENT_FIELDS: usize = 6;
 /// Fields of a state, in the order of [`State::fields`].
-pub const STATE_FIELDS: usize = 8 * CURVE_FIELDS + 6;
+pub const STATE_FIELDS: usize = 8 * CURVE_FIELDS + INCREMENT_FIELDS;
 /// Fields of a state that the next step reads, which come first: the curve, the increments and the earlier ones, and
 /// how the curve moves.
-pub const NEEDED_FIELDS: usize = 3 * CURVE_FIELDS + 6;
+pub const NEEDED_FIELDS: usize = 3 * CURVE_FIELDS + INCREMENT_FIELDS;
 /// Fields of a state that mean something between two attempts, which come first.
-pub const LASTING_FIELDS: usize = 6 * CURVE_FIELDS + 6;
+pub const LASTING_FIELDS: usize = 6 * CURVE_FIELDS + INCREMENT_FIELDS;
 
 /// A polygon of `n` nodes with the scheme's own curvatures and lengths.
 #[derive(Clone, Debug, PartialEq)]
@@ -251,8 +253,11 @@ impl<T: Real> State<T> {
 
     /// Converts the state to another precision, rounded to the nearest numbers.
     pub fn convert<U: Real>(&self) -> State<U> {
-        let numbers: Vec<U> = self.to_numbers().into_iter().map(|v| U::of(v.to_f64())).collect();
-        State::from_numbers(&numbers)
+        let mut state = State::zeros(self.curve.len());
+        for (to, from) in state.fields_mut().zip(self.fields()) {
+            *to = Ring::from_nodes(from.nodes().iter().map(|v| U::of(v.to_f64())));
+        }
+        state
     }
 }
 
