@@ -134,7 +134,7 @@ impl<N: Number> Team<N> {
             excess: N::default(),
             turning: N::default(),
             strides: vec![stride; N::LANES],
-            shares: AllShares::new(),
+            shares: AllShares::computed(),
             work,
         }
     }

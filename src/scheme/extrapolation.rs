@@ -111,7 +111,7 @@ pub struct AllShares<T>(Vec<Shares<T>>);
 
 impl<T: Real> AllShares<T> {
     /// Computes them.
-    pub fn new() -> AllShares<T> {
+    pub fn computed() -> AllShares<T> {
         let rows = (0..=MOST_ORDER).flat_map(|order| (0..=MOST_ORDER).map(move |row| (order, row)));
         let parts = rows.flat_map(|(order, row)| (0..SHARED_PARTS).map(move |left| (order, row, left)));
         AllShares(parts.map(|(order, row, left)| Shares::of(row, left, order)).collect())

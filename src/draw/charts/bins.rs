@@ -254,7 +254,10 @@ mod tests {
             }
         }
         let alone = cell((0..100).map(|i| f64::from(i).sqrt()).collect());
-        assert_eq!(Bins::shared(&[alone.clone()], Scale::Linear), [Bins::of(&alone.numbers, Scale::Linear)]);
+        assert_eq!(
+            Bins::shared(std::slice::from_ref(&alone), Scale::Linear),
+            [Bins::of(&alone.numbers, Scale::Linear)]
+        );
     }
 
     #[test]
