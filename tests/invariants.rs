@@ -265,6 +265,7 @@ fn the_work_of_a_run_is_what_it_was() {
     let adaptive_cycles = Spec { solver: Solver::Multigrid.into(), ..adaptive.clone() };
     let stops =
         Spec { stop_when_relaxed: Some(true), t_end: Some(2.0.into()), ..spec(Flow::SurfaceDiffusion, 50, 1.7) };
+    let mut changed = Vec::new();
     for (name, spec, expected) in [
         ("surface diffusion", spec(Flow::SurfaceDiffusion, 100, 1.0), [100, 281616, 259784]),
         ("Willmore flow, over-relaxed", spec(Flow::Willmore, 61, 1.7), [100, 11672, 10592]),
@@ -277,15 +278,16 @@ fn the_work_of_a_run_is_what_it_was() {
         ("direct", direct, [100, 0, 0]),
         ("over-relaxed as it chooses", automatic, [100, 53704, 49456]),
         ("multigrid", cycles, [100, 714, 628]),
-        ("multigrid, adaptive", adaptive_cycles, [71, 1930, 1566]),
-        ("adaptive", adaptive, [71, 0, 0]),
+        ("multigrid, adaptive", adaptive_cycles, [21, 3496, 3094]),
+        ("adaptive", adaptive, [21, 0, 0]),
         ("adaptive, by sweeps", swept, [71, 71984, 80032]),
     ] {
         let (outcome, _) = relaxed(&spec, potato);
         let work = [outcome.steps, outcome.sweeps_k, outcome.sweeps_x];
         eprintln!("{name}: {work:?}");
-        assert_eq!(work, expected, "{name}");
+        changed.extend((work != expected).then_some((name, work)));
     }
+    assert_eq!(changed, []);
 }
 
 /// Surface diffusion conserves the area.
