@@ -28,9 +28,9 @@ const ROUND: f64 = 1e-13;
 /// The fourth power of the shortest segment is the fastest time scale there is, and a clock must be able to count this
 /// multiple of it.
 const FASTEST: f64 = 0.1;
-/// The first adaptive step in the same unit. A smooth curve could take an even longer one; a rough one refuses it a few
-/// times.
-const FIRST_STEP: f64 = 30.0;
+/// The first adaptive step in the same unit. A smooth curve could take a longer one. A rough curve would refuse it, and
+/// what comes of a step that is far too long depends on roundings.
+const FIRST_STEP: f64 = 3.0;
 /// Maximum number of adaptive steps to a tolerance of 1; it scales with the inverse root of the tolerance, and a member
 /// that exceeds it is stalled. Curves that relax take some 3 to 30; one that creeps, because only tiny steps can be
 /// solved, would never end.
