@@ -1,6 +1,6 @@
 // What lies inside an adaptive step: a polynomial through both of its ends. Twin of src/scheme/dense.rs.
 
-const RESOLVED = 128.0;
+const RESOLVED = 131072.0;
 const BISECTIONS = 54u;
 
 /// A value and its first and second derivative.

@@ -278,9 +278,9 @@ fn the_work_of_a_run_is_what_it_was() {
         ("direct", direct, [100, 0, 0]),
         ("over-relaxed as it chooses", automatic, [100, 53704, 49456]),
         ("multigrid", cycles, [100, 714, 628]),
-        ("multigrid, adaptive", adaptive_cycles, [21, 3496, 3094]),
-        ("adaptive", adaptive, [21, 0, 0]),
-        ("adaptive, by sweeps", swept, [22, 213576, 213088]),
+        ("multigrid, adaptive", adaptive_cycles, [14, 2690, 2372]),
+        ("adaptive", adaptive, [14, 0, 0]),
+        ("adaptive, by sweeps", swept, [14, 242160, 239456]),
     ] {
         let (outcome, _) = relaxed(&spec, potato);
         let work = [outcome.steps, outcome.sweeps_k, outcome.sweeps_x];

@@ -3,8 +3,9 @@
 use super::{Curve, State, member::Progress};
 use crate::number::{BIG, Real, ln_ratio};
 
-/// Multiple of ε below which an excess, a difference of numbers near 1, is mostly rounding.
-pub const RESOLVED: f64 = 128.0;
+/// Multiple of ε below which the derivatives of ln excess are mostly rounding: their weights amplify it a thousand times,
+/// and the excess is a small difference of numbers near 1. In f32 this is most of a run.
+pub const RESOLVED: f64 = 131_072.0;
 /// Number of halvings that find the place of an event: beyond the precision of every number.
 pub const BISECTIONS: u32 = 54;
 
@@ -121,7 +122,6 @@ impl<T: Real> Fall<T> {
             let ratio = h / progress.taken;
             Arc { start: Jet::scaled(zero, progress.slope, progress.bend, ratio), end }
         };
-        // An excess within its rounding has no derivatives.
         let resolved = T::of(RESOLVED * T::EPSILON).le(after);
         if resolved && arc.is_tame() { Fall::Smooth(arc) } else { Fall::Exponential(fallen) }
     }
