@@ -95,7 +95,7 @@ fn sharded(home: &Path, study: &str, count: u64, out: &str) {
 #[test]
 fn cells_with_common_random_numbers_are_paired_alike_in_one_run_in_shards_and_when_drawn_again() {
     let home = TempDir::new().unwrap();
-    let study = "--backend cpu --curves 23 --points 34 --sweep adaptive=1e-3,1e-4 --common-random-numbers --t-end 0.88 \
+    let study = "--backend cpu --curves 23 --points 34 --sweep adaptive=3e-2,1e-4 --common-random-numbers --t-end 0.88 \
                  --precision f64";
     let one = curvelax(home.path(), &format!("run {study} --out one --json"));
     let document: Value = serde_json::from_slice(&one.stdout).unwrap();
