@@ -12,7 +12,7 @@ from common import Runs, columns
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = ["summary.csv", "ensemble.csv", "rates.csv", "mean_excess.csv", "series.csv", "snapshots.csv"]
 INTEGERS = {
-    "summary.csv": ["member", "cell", "steps", "rejected", "sweeps_k", "sweeps_x", "turning"],
+    "summary.csv": ["member", "cell", "steps", "rejected", "sweeps_k", "sweeps_x", "turning", "solves"],
     "ensemble.csv": ["cell", "members", "relaxed", "unfinished", "singular", "nonfinite", "stalled", "t_relax_known",
                      "rate_known"],
     "rates.csv": ["member", "cell"],
