@@ -49,6 +49,7 @@ const SPILL_BYTES: u64 = 6_000_000;
 /// Bytes of a row of a table, measured: floats have 17 digits. A row of the snapshots is a node.
 const SUMMARY_ROW: f64 = 337.0;
 const RATES_ROW: f64 = 80.0;
+const LEVEL_ROW: f64 = 55.0;
 const SERIES_ROW: f64 = 166.0;
 const NODE_ROW: f64 = 88.0;
 /// Bytes of the tables of a cell: its statistics and its mean excess.
@@ -70,6 +71,8 @@ pub struct Estimate {
     pub platform: Platform,
     /// Maximum members resident at once, over all cohorts.
     pub slots: usize,
+    /// Members that run at other resolutions besides, for the error of discretisation.
+    pub level_members: u64,
     /// Peak resident size of the process.
     pub memory_bytes: u64,
     /// Size of the output folder at the end.
@@ -114,51 +117,58 @@ struct CohortWork {
 }
 
 impl Estimate {
-    /// Estimates the run of a study, each cohort on its choice. The study is as before afterwards.
+    /// Estimates the run of a study, each stage on its choice.
     ///
     /// # Errors
     /// Those of the run itself.
-    pub fn new(study: &mut Study, choices: Vec<Choice>) -> Result<Estimate> {
-        let cohorts = study.cohorts();
-        let cells = study.cells_mut();
-        let members = cells.iter().map(|cell| cell.spec.member_count()).sum::<u64>();
+    pub fn new(study: &Study, choices: Vec<Choice>) -> Result<Estimate> {
+        let (stages, cells) = (study.stages(), study.cells());
+        let members = study.member_count();
         let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
-        let (mut slots, mut resident) = (0, 0);
+        // Own members come first, so that those of the levels do not count in it.
+        let (mut slots, mut resident, mut peak) = (0, 0, None);
         let mut rows = [0.0_f64; 2];
-        let (every, count) = (cohorts.len().div_ceil(MAX_PILOTS), cohorts.len());
+        let (every, count) = (stages.len().div_ceil(MAX_PILOTS), stages.len());
         let budget = PILOT / count.div_ceil(every).max(1) as u32;
-        let mut total =
-            CohortWork { seconds: Some(0.0), dispatches: Some(0.0), steps: Some(0.0), ..CohortWork::default() };
-        for (range, choice) in cohorts.into_iter().zip(choices).step_by(every) {
-            let cohort = &mut cells[range];
+        let (mut own, mut levels) = (CohortWork::none(), CohortWork::none());
+        // Backwards, so that the last stage, which has the study's own members, always has a pilot.
+        for (stage, choice) in stages.iter().zip(choices).rev().step_by(every) {
+            let mut cells = study.cells_of(stage)?.into_owned();
             let precision = choice.precision();
             let started = Instant::now();
-            let (mut backend, platform) = choice.open_for(cohort)?;
+            let (mut backend, platform) = choice.open_for(&cells)?;
             start_up += started.elapsed().as_secs_f64();
-            opened.get_or_insert(platform);
+            let mut seen = Pilot::default();
+            let (work, most, of_member) = sample(&mut cells, precision, backend.as_mut(), budget, &mut seen)?;
+            if stage.level.is_some() {
+                levels.add(&work);
+                continue;
+            }
+            opened = Some(platform);
             slots = slots.max(backend.slots());
-            let (work, most, of_member) = sample(cohort, precision, backend.as_mut(), budget, &mut pilot)?;
+            pilot.add(&seen);
             rows = [0, 1].map(|i| rows[i].max(of_member[i]));
             resident = resident.max(most.min(backend.slots() as u64) as usize);
-            let add = |sum: Option<f64>, part: Option<f64>| Some(sum? + part?);
-            total.members += work.members;
-            total.series += work.series;
-            total.snapshots += work.snapshots;
-            total.seconds = add(total.seconds, work.seconds);
-            total.dispatches = add(total.dispatches, work.dispatches);
-            total.steps = add(total.steps, work.steps);
+            own.add(&work);
+            peak = peak_resident();
         }
         let platform = opened.ok_or_else(|| Error::Failed("a study has no cell".into()))?;
-        // Cohorts without a pilot are assumed to be like those with one.
-        let scale = members as f64 / total.members.max(1.0);
+        // Stages without a pilot are assumed to be like those with one.
+        let level_members = study.work() - members;
+        let [scale, scale_levels] = [(members, &own), (level_members, &levels)].map(|(all, work)| match work.members {
+            0.0 => 0.0,
+            seen => all as f64 / seen,
+        });
         start_up *= every as f64;
-        let seconds = total.seconds.map(|seconds| scale * seconds);
+        let sum = |of: fn(&CohortWork) -> Option<f64>| Some(scale * of(&own)? + scale_levels * of(&levels)?);
+        let seconds = sum(|work| work.seconds);
         // If none has ended yet, all may have one.
         let rated = if pilot.ended == 0 { 1.0 } else { pilot.rated as f64 / pilot.ended as f64 };
+        let level_rows = level_members as f64 * LEVEL_ROW;
         Ok(Estimate {
             members,
             cells: cells.len(),
-            disk_bytes: disk(cells, members, rated, scale * total.series, scale * total.snapshots),
+            disk_bytes: disk(cells, members, rated, scale * own.series, scale * own.snapshots) + level_rows as u64,
             memory_bytes: memory(
                 members,
                 rated,
@@ -166,15 +176,44 @@ impl Estimate {
                 rows,
                 cells[0].spec.points,
                 seconds.is_none_or(|seconds| seconds > FIRST_STATE),
-            ),
+                peak,
+            ) + level_members * size_of::<(u64, f64)>() as u64,
             platform,
             slots,
-            steps_per_member: total.steps.map(|steps| steps / total.members.max(1.0)),
-            dispatches: total.dispatches.map(|dispatches| (scale * dispatches).ceil() as u64),
+            level_members,
+            steps_per_member: own.steps.map(|steps| steps / own.members.max(1.0)),
+            dispatches: sum(|work| work.dispatches).map(|dispatches| dispatches.ceil() as u64),
             start_up_seconds: start_up,
             seconds,
             pilot,
         })
+    }
+}
+
+impl Pilot {
+    fn add(&mut self, other: &Pilot) {
+        let Pilot { members, ended, relaxed, rated, seconds } = other;
+        self.members += members;
+        self.ended += ended;
+        self.relaxed += relaxed;
+        self.rated += rated;
+        self.seconds += seconds;
+    }
+}
+
+impl CohortWork {
+    fn none() -> CohortWork {
+        CohortWork { seconds: Some(0.0), dispatches: Some(0.0), steps: Some(0.0), ..CohortWork::default() }
+    }
+
+    fn add(&mut self, other: &CohortWork) {
+        let add = |sum: Option<f64>, part: Option<f64>| Some(sum? + part?);
+        self.members += other.members;
+        self.series += other.series;
+        self.snapshots += other.snapshots;
+        self.seconds = add(self.seconds, other.seconds);
+        self.dispatches = add(self.dispatches, other.dispatches);
+        self.steps = add(self.steps, other.steps);
     }
 }
 
@@ -381,7 +420,7 @@ fn choose(cohort: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) {
     }
 }
 
-/// Peak resident size in bytes of a run of `members` of `n` nodes, from that of this process, which had `resident` of
+/// Peak resident size in bytes of a run of `members` of `n` nodes, from the `peak` of this process, which had `resident` of
 /// up to `slots` members in its pool. `rows` are the bytes of rows of a member at its end, and in this process: above
 /// [`MAX_HELD`] for the whole pool they go to disk. Checkpoints may be saved during the run (`kept`).
 ///
@@ -389,7 +428,15 @@ fn choose(cohort: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) {
 /// but no pool. For each member the tally has its time and two numbers of half size about its mesh; for a fraction
 /// `rated` also its rate and that of theory. Times are sorted in place, and rates one number at a time; the number that
 /// is drawn replaces them. A chart sorts the numbers that it shows.
-fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2], n: usize, kept: bool) -> u64 {
+fn memory(
+    members: u64,
+    rated: f64,
+    [slots, resident]: [usize; 2],
+    rows: [f64; 2],
+    n: usize,
+    kept: bool,
+    peak: Option<u64>,
+) -> u64 {
     let numbers = |count: usize| (count * size_of::<f64>()) as u64;
     let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
     let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MAX_PANELS);
@@ -402,7 +449,7 @@ fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2
     let statistics = fitted.max(charted);
     let held = |each: f64, members: usize| (each * members as f64).min(MAX_HELD as f64) as u64;
     let in_pilot = pool(resident) + held(rows[1], resident);
-    let program = peak_resident().map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(in_pilot));
+    let program = peak.map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(in_pilot));
     let full = usize::try_from(members).unwrap_or(usize::MAX).min(slots);
     let all_held = held(rows[0], full);
     let spilling = if all_held < MAX_HELD as u64 { 0 } else { SPILL_BYTES };
@@ -494,7 +541,7 @@ mod tests {
         let mut study = study(Spec { backend: BackendChoice::Cpu, points: 32, ..spec });
         let choices = choose_all(&study).unwrap();
         settle(&mut study, &choices);
-        let estimate = Estimate::new(&mut study, choices).unwrap();
+        let estimate = Estimate::new(&study, choices).unwrap();
         assert_eq!((estimate.members, estimate.cells), (10_000_000, 1));
         assert!(estimate.memory_bytes > 300_000_000, "{estimate:?}");
         assert!(estimate.pilot.members < 5_000_000 && estimate.pilot.seconds < 60.0, "{estimate:?}");

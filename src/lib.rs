@@ -48,6 +48,7 @@
 //! | [`relax`](fn@relax) | from a study to the results of its members |
 //! | [`truth`] | problems with exact solutions, and the error and order against them |
 //! | [`results`] | the results of a study: sums, statistics by cell, the record of the run |
+//! | `accuracy` | nodes, tolerance and members for `--accuracy` |
 //! | `draw` | SVG, axes and charts from plain numbers |
 //! | `files` | the folder of results: who may write there, and what each file holds |
 //! | `report` | a run's sink: tables, checkpoints, merge, `report.html` |
@@ -103,6 +104,7 @@ pub mod schedule;
 #[doc(hidden)]
 pub mod trajectory;
 
+mod accuracy;
 mod draw;
 mod estimate;
 mod guard;

@@ -89,40 +89,47 @@ pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
     }
 }
 
-/// Chooses back ends for the cohorts of a study: all on one device, that of the first cohort, or with `--backend auto`
-/// on the CPU if that device cannot run all of them.
+/// Chooses back ends for the stages of a study: all on one device, that of its first own members, or with
+/// `--backend auto` on the CPU if that device cannot run all of them. A pilot is on the CPU: a few members do not fill a
+/// GPU.
 ///
 /// # Errors
 /// As [`choose`].
 pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
-    let specs: Vec<&Spec> = study.cohorts().into_iter().map(|range| &study.cells()[range.start].spec).collect();
-    let Some((first, others)) = specs.split_first() else { return Ok(Vec::new()) };
-    let choice = choose(first, first.points)?;
-    let there = |spec: &&Spec| {
-        let mut spec = (*spec).clone();
+    let (stages, own) = (study.stages(), study.own_stage());
+    let specs: Vec<Spec> = stages.iter().map(|stage| study.spec_of(stage)).collect::<Result<_>>()?;
+    let choice = choose(&specs[own], specs[own].points)?;
+    let there = |(_, spec): (usize, &Spec)| {
+        if study.has_pilot() && spec.backend == BackendChoice::Cpu {
+            return cpu(spec, spec.points, "a pilot does not fill a GPU".into());
+        }
+        let mut spec = spec.clone();
         choice.settle_place(&mut spec);
         choose(&spec, spec.points)
     };
-    let rest: Result<Vec<Choice>> = others.iter().map(there).collect();
-    match rest {
+    let others: Result<Vec<Choice>> = specs.iter().enumerate().filter(|(i, _)| *i != own).map(there).collect();
+    match others {
         Err(error) if choice.or_cpu => {
             let reason = format!("the GPU cannot do all cells: {error}");
             specs.iter().map(|spec| cpu(spec, spec.points, reason.clone())).collect()
         }
-        rest => {
-            let mut all = rest?;
-            all.insert(0, choice);
+        others => {
+            let mut all = others?;
+            all.insert(own, choice);
             Ok(all)
         }
     }
 }
 
-/// Writes the settings chosen for the cohorts to a study, so that it can be repeated exactly.
+/// Writes the settings chosen for the stages to a study, so that it can be repeated exactly.
 pub fn settle(study: &mut Study, choices: &[Choice]) {
-    for (range, choice) in study.cohorts().into_iter().zip(choices) {
-        study.cells_mut()[range].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
+    let stages = study.stages();
+    let own = || stages.iter().zip(choices).filter(|(stage, _)| stage.level.is_none());
+    for (stage, choice) in own() {
+        study.cells_mut()[stage.range.clone()].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));
     }
-    study.settle_spec(|spec| choices.iter().take(1).for_each(|first| first.settle_place(spec)));
+    let first = own().next();
+    study.settle_spec(|spec| first.iter().for_each(|(_, first)| first.settle_place(spec)));
 }
 
 /// The choice of `--backend auto`: the first hardware GPU that can do the run, else the CPU.
@@ -143,7 +150,7 @@ fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
 
 fn cpu(spec: &Spec, n: usize, reason: String) -> Result<Choice> {
     let precision = spec.precision.unwrap_or(Precision::F64);
-    check_precision(n, precision)?;
+    check_precision(spec, n, precision)?;
     Ok(Choice { device: Device::Cpu, number: None, or_cpu: false, precision, reason })
 }
 
@@ -192,7 +199,7 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
         let problem = format!("adapter {name} has no f64");
         return Err(Error::value("precision", "f64", &problem, "use --precision f32, or --backend cpu"));
     }
-    check_precision(n, precision)?;
+    check_precision(spec, n, precision)?;
     let (fits, most) = match precision {
         Precision::F32 => (
             capacity.check_size::<f32>(ring(n)?, spec.solver()),
@@ -210,7 +217,11 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
 }
 
 /// f32 has a resolution limit: rounding grows like (1/h)⁴, and beyond the verified n results would only look right.
-fn check_precision(n: usize, precision: Precision) -> Result<()> {
+fn check_precision(spec: &Spec, n: usize, precision: Precision) -> Result<()> {
+    if precision == Precision::F32 && spec.refine {
+        let problem = "rounding in f32 is larger than the errors that it is to tell";
+        return Err(Error::value("refine", true, problem, "use --precision f64, or --backend cpu"));
+    }
     if precision == Precision::F32 && n > MAX_POINTS_F32 {
         let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");
         return Err(Error::value("points", n, &problem, "use fewer points, or --precision f64"));

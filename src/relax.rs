@@ -1,7 +1,7 @@
 //! The library's entry point: runs a study and passes on what its members leave.
 
 use crate::{
-    ensemble::{Sink, Study},
+    ensemble::{Judged, LevelTimes, Sink, Study},
     error::Result,
     placement::{Platform, choose_all},
     simulate::simulate,
@@ -28,18 +28,25 @@ use crate::{
 /// [`Error::Request`](crate::Error::Request) if this machine cannot do what the spec asks for,
 /// [`Error::Device`](crate::Error::Device) if a requested GPU fails, and the errors of the sink.
 pub fn relax(study: &Study, sink: &mut dyn Sink) -> Result<Platform> {
-    let mut there: Option<Platform> = None;
-    let choices = choose_all(study)?;
-    for (range, choice) in study.cohorts().into_iter().zip(choices) {
-        let cohort = &study.cells()[range];
-        // A study does not change device midway.
-        let choice = match &there {
-            Some(platform) => choice.after(platform),
-            None => choice,
+    let (stages, mut choices) = (study.stages(), choose_all(study)?);
+    let own = study.own_stage();
+    // Where it is computed depends on whether this device can be opened.
+    let first = choices.remove(own);
+    let (first, platform) = first.open_for(&study.cells()[stages[own].range.clone()])?;
+    let (mut first, mut levels) = (Some(first), LevelTimes::default());
+    for (i, stage) in stages.iter().enumerate() {
+        let cells = study.cells_of(stage)?;
+        let (mut backend, precision) = match first.take_if(|_| i == own) {
+            Some(first) => (first, platform.precision),
+            None => {
+                // A study does not change device midway.
+                let choice = choices.remove(0).after(&platform);
+                (choice.open_for(&cells)?.0, choice.precision())
+            }
         };
-        let (mut backend, platform) = choice.open_for(cohort)?;
-        simulate(cohort, choice.precision(), backend.as_mut(), study.portraits(cohort.len()), sink)?;
-        there.get_or_insert(platform);
+        let portraits = if stage.level.is_some() { 0 } else { study.portraits(cells.len()) };
+        let mut sink = Judged { level: stage.level, cells: &cells, levels: &mut levels, sink };
+        simulate(&cells, precision, backend.as_mut(), portraits, &mut sink)?;
     }
-    there.ok_or_else(|| crate::Error::Failed("a study has no cell".into()))
+    Ok(platform)
 }

@@ -41,7 +41,7 @@ const MAX_OF_ONE: usize = 8 << 20;
 /// Bytes of rows above which all are passed to the sink before a checkpoint, to keep it small.
 const MAX_KEPT: usize = 4 << 20;
 
-/// Runs the members of `cells`, which form a [cohort](crate::ensemble::Study::cohorts), on `backend`, and passes each
+/// Runs the members of `cells`, which form a [cohort](crate::ensemble::study::Cohort), on `backend`, and passes each
 /// to `sink` in member order.
 ///
 /// The first members come with their nodes before, during and after the run, `portraits` of them over all cells.
@@ -214,10 +214,9 @@ impl Pool<'_> {
     /// Ends a member. What theory predicts may depend on when it relaxed.
     fn end(&self, trajectory: Trajectory, last: Option<&State<f64>>) -> Ended {
         let mut ended = trajectory.end(last);
-        let own = |cell: &&Cell| cell.index == ended.outcome.cell;
-        let first = self.cells.first().map_or(0, |cell| cell.index);
-        let cell = self.cells.get((ended.outcome.cell - first) as usize).filter(own);
-        ended.outcome.rate_theory = cell.and_then(|cell| theory::rate_of(&cell.spec, &ended.outcome));
+        // Not all cells have a level.
+        let at = self.cells.binary_search_by_key(&ended.outcome.cell, |cell| cell.index);
+        ended.outcome.rate_theory = at.ok().and_then(|at| theory::rate_of(&self.cells[at].spec, &ended.outcome));
         ended
     }
 

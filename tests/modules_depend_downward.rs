@@ -13,7 +13,7 @@ use syn::{
 };
 
 /// The modules of the crate; each may use only those above it.
-const LAYERS: [&str; 30] = [
+const LAYERS: [&str; 31] = [
     "wgsl",
     "error",
     "guard",
@@ -37,6 +37,7 @@ const LAYERS: [&str; 30] = [
     "relax",
     "truth",
     "results",
+    "accuracy",
     "draw",
     "files",
     "report",

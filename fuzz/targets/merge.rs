@@ -119,11 +119,11 @@ impl Folder {
             outlines: Vec::new(),
             started: Duration::ZERO,
         };
-        let tables = [names::SUMMARY, names::RATES].map(|name| Mark { name: name.into(), length: 0, crc: 0 }).into();
+        let tables = [names::SUMMARY, names::LEVELS, names::RATES].map(|name| Mark { name: name.into(), length: 0, crc: 0 }).into();
         let (wall, aside) = (Duration::ZERO, Aside::default());
-        let head = Head { origin, wall, cohort: 0, tables, store: None, rows: None, aside, films: Vec::new() };
+        let head = Head { origin, wall, stage: 0, tables, store: None, rows: None, aside, films: Vec::new() };
         let files =
-            [names::SHARD, names::SUMMARY, names::RATES].map(|name| (name, File::create(path.join(name)).unwrap()));
+            [names::SHARD, names::SUMMARY, names::LEVELS, names::RATES].map(|name| (name, File::create(path.join(name)).unwrap()));
         let record = Record { head, points: 100, warnings: Vec::new() };
         let mut folder = Folder { path, record, shard, spec, files };
         let state = to_bytes(&folder.record.head, 100, &[]).unwrap();

@@ -19,9 +19,10 @@ use curvelax::{
 use libfuzzer_sys::fuzz_target;
 
 /// The letter of each file, its place and what it holds unless the input says something else.
-const FILES: [(u8, &str, &[u8]); 4] = [
+const FILES: [(u8, &str, &[u8]); 5] = [
     (b'r', names::RUN, include_bytes!("../base/run.json")),
     (b's', names::SUMMARY, include_bytes!("../base/summary.csv")),
+    (b'l', names::LEVELS, include_bytes!("../base/levels.csv")),
     (b'm', names::MEAN_EXCESS, include_bytes!("../base/mean_excess.csv")),
     (b'p', names::PORTRAITS, include_bytes!("../base/portraits.json")),
 ];

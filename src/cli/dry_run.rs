@@ -9,11 +9,12 @@ use crate::{
 
 /// The table.
 pub fn table(estimate: &Estimate, spec: &Spec) -> String {
-    let Estimate { members, cells, slots, pilot, .. } = estimate;
+    let Estimate { members, cells, slots, level_members, pilot, .. } = estimate;
     let unknown = |what: &str| format!("not known: the pilot was over before {what}");
     let which = plural(*members, "member");
     let rows = [
         ("members", format!("{members} in {cells} {}", plural(*cells as u64, "cell"))),
+        ("levels", levels(*level_members)),
         ("back end", format!("{}; solver {}", machine(&estimate.platform), spec.solver().name())),
         ("resident", format!("{} {which} at once", (*slots as u64).min(*members))),
         ("memory", format!("about {}", size(estimate.memory_bytes))),
@@ -31,6 +32,14 @@ pub fn table(estimate: &Estimate, spec: &Spec) -> String {
         ("pilot", format!("{} of {} started members ended in {}", pilot.ended, pilot.members, duration(pilot.seconds))),
     ];
     rows.iter().map(|(label, text)| format!("{label:<11}{text}\n")).collect()
+}
+
+/// The members that run besides, for the error of discretisation.
+fn levels(members: u64) -> String {
+    match members {
+        0 => "none: the error of discretisation will not be known".into(),
+        _ => format!("{members} {} besides at other resolutions", plural(members, "member")),
+    }
 }
 
 /// Formats bytes in the unit that a person would use.
@@ -64,6 +73,7 @@ mod tests {
             cells: 1,
             platform,
             slots: 128,
+            level_members: 32,
             memory_bytes: 17_400_000,
             disk_bytes: 1_340_000_000,
             steps_per_member: Some(1999.6),
@@ -74,6 +84,7 @@ mod tests {
         };
         let expected = "\
 members    3000 in 1 cell
+levels     32 members besides at other resolutions
 back end   cpu, f64, 2 threads (asked for); solver gauss-seidel
 resident   128 members at once
 memory     about 17 MB

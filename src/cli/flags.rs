@@ -12,7 +12,10 @@ use crate::{
     curve::{Modes, Sampling, Shape},
     ensemble::{
         Shard, Spec,
-        spec::{BackendChoice, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau, Units},
+        spec::{
+            BackendChoice, DEFAULT_ADAPTIVE, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau,
+            Units,
+        },
         sweep::SweepAxis,
     },
     error::{Error, Result},
@@ -153,6 +156,23 @@ pub struct SpecFlags {
     )]
     stop_when_relaxed: Option<bool>,
 
+    /// What we recommend for numbers to publish: --adaptive --pull auto --omega auto --t-end auto --stop-when-relaxed
+    /// --refine. Each can still be set on its own [default: off]
+    #[arg(long, help_heading = EVOLUTION)]
+    accurate: bool,
+    /// Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n → ∞:
+    /// columns t_limit, t_error and order of summary.csv [default: false]
+    #[arg(
+        long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        hide_possible_values = true, help_heading = EVOLUTION
+    )]
+    refine: Option<bool>,
+    /// Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for sampling and
+    /// discretisation together, is within X times the median. --curves, --points and --adaptive are what it begins with.
+    /// Needs --refine [default: off]
+    #[arg(long, value_name = "X", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
+    accuracy: Option<f64>,
+
     /// Rate κ, in 1/time, at which the scheme's k and r are pulled to the polygon's. auto is 4 x 24/R^4 for each member;
     /// 0 is the paper's scheme [default: 0]
     #[arg(
@@ -238,6 +258,18 @@ impl SpecFlags {
         }
     }
 
+    /// Sets what `--accurate` stands for, except what is given on its own.
+    fn recommend(&mut self, spec: &mut Spec) {
+        if self.tau.is_none() && self.adaptive.is_none() && spec.adaptive.is_none() {
+            (self.adaptive, spec.tau) = (Some(DEFAULT_ADAPTIVE), None);
+        }
+        self.pull.get_or_insert(Pull::Auto);
+        self.omega.get_or_insert(Omega::Auto);
+        self.t_end.get_or_insert(FinalTime::Auto);
+        self.stop_when_relaxed.get_or_insert(true);
+        self.refine.get_or_insert(true);
+    }
+
     /// Replaces in `spec` the values given as flags.
     pub fn overlay(mut self, spec: &mut Spec) {
         std::mem::take(&mut self.sweep).into_iter().for_each(|axis| spec.sweep.set(axis));
@@ -248,18 +280,21 @@ impl SpecFlags {
         if self.relax_to.is_some() || self.relax_at.is_some() {
             (spec.relax_to, spec.relax_at) = (None, None);
         }
+        if self.accurate {
+            self.recommend(spec);
+        }
         macro_rules! replace {
             ($($key:ident)*; $($optional:ident)*) => {{
                 // All fields are named, so that no flag is forgotten here.
-                let SpecFlags { sweep: _, $($key,)* $($optional,)* } = self;
+                let SpecFlags { sweep: _, accurate: _, $($key,)* $($optional,)* } = self;
                 $(if let Some(value) = $key { spec.$key = value; })*
                 $(if $optional.is_some() { spec.$optional = $optional; })*
             }};
         }
         replace! {
             curves points seed shape sampling amplitude modes decay flow no_redistribution pull solver
-            order sor max_sweeps backend snapshots store common_random_numbers;
-            mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
+            order sor max_sweeps backend snapshots store common_random_numbers refine;
+            accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
         }
     }
 }
@@ -365,7 +400,8 @@ mod tests {
     #[test]
     fn the_flags_are_the_keys_of_the_spec() {
         let flags: BTreeSet<String> = command().get_arguments().map(|a| a.get_long().unwrap().to_owned()).collect();
-        assert_eq!(flags, Spec::keys().into_iter().collect());
+        // One flag stands for several keys.
+        assert_eq!(flags, Spec::keys().into_iter().chain(["accurate".into()]).collect());
     }
 
     #[test]
@@ -420,7 +456,7 @@ mod tests {
              --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --pull 3 --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \
-             --series 0.1 --snapshots 0,1 --store zarr --only 1,2 --shard 0/2 --threads 2 --common-random-numbers \
+             --refine --accuracy 0.01 --series 0.1 --snapshots 0,1 --store zarr --only 1,2 --shard 0/2 --threads 2 --common-random-numbers \
              --sweep phase=1,2"
                 .split_whitespace()
                 .collect::<Vec<_>>()

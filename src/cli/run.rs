@@ -7,6 +7,7 @@ use super::{
     work::{MannerFlags, Work},
 };
 use crate::{
+    accuracy,
     ensemble::{Spec, Standing},
     error::{Error, Result},
     estimate::Estimate,
@@ -19,8 +20,11 @@ Examples:
   curvelax run --out ellipses
       256 perturbed 2:1 ellipses under surface diffusion, with the paper's n, τ and ω
   curvelax run --flow willmore --curves 10000 --stop-when-relaxed --out willmore
-  curvelax run --adaptive --pull auto --relax-at 0.01 --shape file:island.csv --out island
-      accurate relaxation times of an outline, with adaptive steps
+  curvelax run --accurate --out accurate
+      the same ellipses, each time with its limit for n → ∞ and its error
+  curvelax run --accurate --relax-at 0.01 --shape file:island.csv --out island
+  curvelax run --accurate --accuracy 1e-3 --out thousandth
+      as many members as the median needs
   curvelax run --curves 8 --tau 1e-4 --print-spec > spec.toml
   curvelax run spec.toml --seed 2 --out second
   curvelax run spec.toml --shard 3/8 --resume --out shards/3
@@ -62,6 +66,7 @@ pub struct RunArgs {
 pub fn run(args: RunArgs) -> Result<()> {
     let spec = resolve(args.spec, args.flags)?;
     let asked = spec.backend;
+    let spec = accuracy::plan(spec, |round| args.manner.say(&round.to_string()))?;
     let mut work = Work::new(spec)?;
     if args.print_spec {
         return print(&work.study.spec().to_toml()?);
@@ -70,7 +75,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     work.study.note().into_iter().for_each(|note| flags.say(&format!("note: {note}")));
     if args.dry_run {
         work.study.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
-        let estimate = Estimate::new(&mut work.study, work.choices)?;
+        let estimate = Estimate::new(&work.study, work.choices)?;
         return match (flags.json, flags.quiet) {
             (true, _) => print_json(&estimate),
             (false, false) => print(&dry_run::table(&estimate, &work.study.cells()[0].spec)),

@@ -5,7 +5,7 @@ use std::{path::Path, time::Duration};
 use super::{flags, note, print, signals};
 use crate::{
     backend::Backend,
-    ensemble::{Cell, Spec, Standing, Study},
+    ensemble::{Cell, Judged, Spec, Standing, Study},
     error::{Error, Result},
     files::names,
     placement::{self, Choice, Platform},
@@ -95,13 +95,13 @@ impl MannerFlags {
     }
 }
 
-/// A study that is ready to run, with the back end of each cohort.
+/// A study that is ready to run, with the back end of each stage.
 pub struct Work {
     /// The resolved study, with everything that the choices decided.
     pub study: Study,
-    /// The back ends of its cohorts.
+    /// The back ends of its stages.
     pub choices: Vec<Choice>,
-    /// The back end of the first cohort, once it is open.
+    /// The back end of the first cells of the study itself, once it is open.
     opened: Option<Box<dyn Backend>>,
 }
 
@@ -119,11 +119,11 @@ impl Work {
         Ok(Work { study, choices, opened: None })
     }
 
-    /// Opens the back end of the first cohort, and returns where it is. If that differs from the choice, it is recorded
+    /// Opens the back end of the first cells of the study itself, and returns where it is. If that differs from the choice, it is recorded
     /// in the spec.
     pub fn open(&mut self, flags: &MannerFlags) -> Result<Platform> {
-        let choice = &self.choices[0];
-        let (backend, platform) = open(self.first_cohort(), choice, flags)?;
+        let (cells, choice) = self.first();
+        let (backend, platform) = open(cells, choice, flags)?;
         if choice.device().kind() != platform.backend {
             flags.say(&format!("note: on the CPU instead: {}", platform.reason));
             self.study.cells_mut().iter_mut().for_each(|cell| platform.settle_place(&mut cell.spec));
@@ -133,19 +133,16 @@ impl Work {
         Ok(platform)
     }
 
-    fn first_cohort(&self) -> &[Cell] {
-        &self.study.cells()[self.study.cohorts()[0].clone()]
+    /// The first cells of the study itself, and their back end.
+    fn first(&self) -> (&[Cell], &Choice) {
+        let own = self.study.own_stage();
+        (&self.study.cells()[self.study.stages()[own].range.clone()], &self.choices[own])
     }
 
-    /// Members of the cohorts before `cohort`.
-    fn members_before(&self, cohort: usize) -> u64 {
-        let before = self.study.cohorts().into_iter().take(cohort).flat_map(|range| &self.study.cells()[range]);
-        before.map(|cell| cell.spec.member_count()).sum()
-    }
-
-    /// Where everything is computed.
+    /// Where everything is computed, except perhaps the pilot.
     pub fn platform(&self) -> Platform {
-        self.choices[0].platform(&self.first_cohort()[0].spec)
+        let (cells, choice) = self.first();
+        choice.platform(&cells[0].spec)
     }
 
     /// Runs the remaining work, and publishes all results.
@@ -153,7 +150,8 @@ impl Work {
     /// # Errors
     /// Those of the run, and [`Error::Request`] if `standing` does not match the report.
     pub fn carry_out(self, mut report: RunReport, standing: Standing, flags: &MannerFlags) -> Result<()> {
-        let (told, rows) = (self.members_before(report.cohort()).saturating_add(standing.next), report.members());
+        let before: u64 = self.study.stages().iter().take(report.stage()).map(|stage| stage.members).sum();
+        let (told, rows) = (before.saturating_add(standing.next), report.rows());
         if told != rows {
             let path = report.folder().display();
             return Err(Error::Request(format!(
@@ -210,8 +208,8 @@ fn open(cohort: &[Cell], choice: &Choice, flags: &MannerFlags) -> Result<(Box<dy
     choice.open_for(cohort)
 }
 
-/// Runs one cohort of cells after another, from `standing` in the report's current one; `opened` is the back end of the
-/// first, if it is open.
+/// Runs one stage after another, from `standing` in the report's current one; `opened` is the back end of the first own
+/// cells, if it is open.
 fn advance(
     study: &Study,
     choices: Vec<Choice>,
@@ -220,23 +218,23 @@ fn advance(
     report: &mut RunReport,
     flags: &MannerFlags,
 ) -> Result<()> {
-    let precision = report.platform().precision;
-    for (number, (range, choice)) in study.cohorts().into_iter().zip(choices).enumerate().skip(report.cohort()) {
-        let cohort = &study.cells()[range];
-        let mut backend = match opened.take() {
+    let (own, mut levels) = (study.own_stage(), report.take_levels());
+    for (i, (stage, choice)) in study.stages().iter().zip(choices).enumerate().skip(report.stage()) {
+        let cells = study.cells_of(stage)?;
+        // A run that has begun stays on its device.
+        let choice = choice.after(report.platform());
+        let precision = choice.precision();
+        let mut backend = match opened.take_if(|_| i == own) {
             Some(backend) => backend,
-            // A run that has begun stays on its device.
-            None => open(cohort, &choice.after(report.platform()), flags)?.0,
+            // Of levels nothing is said: they are where the study is, or a pilot.
+            None if stage.level.is_some() => choice.open_for(&cells)?.0,
+            None => open(&cells, &choice, flags)?.0,
         };
-        report.begin_cohort(number);
-        resume(
-            cohort,
-            precision,
-            backend.as_mut(),
-            study.portraits(cohort.len()),
-            std::mem::take(&mut standing),
-            report,
-        )?;
+        report.begin_stage(i);
+        let portraits = if stage.level.is_some() { 0 } else { study.portraits(cells.len()) };
+        let standing = std::mem::take(&mut standing);
+        let mut sink = Judged { level: stage.level, cells: &cells, levels: &mut levels, sink: report };
+        resume(&cells, precision, backend.as_mut(), portraits, standing, &mut sink)?;
     }
     Ok(())
 }

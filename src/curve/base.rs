@@ -12,14 +12,16 @@ use super::{Outline, polygon};
 const CENTROID_SAMPLES: usize = 1 << 14;
 
 /// A closed plane curve, counter-clockwise if it has an orientation, at any parameter `u ∈ [0, 1]`.
+#[derive(Clone)]
 pub struct BaseCurve {
     kind: CurveKind,
     centroid: DVec2,
     cusps: Vec<f64>,
 }
 
+#[derive(Clone)]
 enum CurveKind {
-    Formula(Box<dyn Fn(f64) -> DVec2 + Send + Sync>),
+    Formula(Arc<dyn Fn(f64) -> DVec2 + Send + Sync>),
     Polygon(Arc<Outline>),
 }
 
@@ -28,7 +30,7 @@ impl BaseCurve {
     pub fn from_formula(formula: impl Fn(f64) -> DVec2 + Send + Sync + 'static) -> BaseCurve {
         let samples: Vec<DVec2> = (0..CENTROID_SAMPLES).map(|j| formula(j as f64 / CENTROID_SAMPLES as f64)).collect();
         let centroid = polygon::area_centroid(&samples);
-        BaseCurve { kind: CurveKind::Formula(Box::new(formula)), centroid, cusps: Vec::new() }
+        BaseCurve { kind: CurveKind::Formula(Arc::new(formula)), centroid, cusps: Vec::new() }
     }
 
     /// Adds cusps at the parameters `cusps`, increasing multiples of 1/32 between 0 and 1.

@@ -144,6 +144,11 @@ impl Sampler {
         self.nodes
     }
 
+    /// Returns its curve.
+    pub fn curve(&self) -> &BaseCurve {
+        &self.curve
+    }
+
     /// Returns the polygon of its curve, if it is one.
     pub fn outline(&self) -> Option<&Arc<Outline>> {
         self.curve.outline()

@@ -40,6 +40,7 @@ pub struct Member {
 }
 
 /// The curve of a spec, prepared once; every member is made from it.
+#[derive(Clone)]
 pub struct Family {
     sampler: Arc<Sampler>,
     law: RadialLaw,
@@ -118,6 +119,14 @@ impl Family {
         let (sampler, scale) = (Arc::clone(&other.sampler), Arc::clone(&other.scale));
         let warnings = other.warnings.clone();
         Ok(Family { sampler, law, seed: spec.seed, directions, warnings, scale, ..*other })
+    }
+
+    /// Does the same as [`Family::new`] for a spec with the same shape as `other`, and another number of points.
+    ///
+    /// # Errors
+    /// As [`Family::new`].
+    pub(crate) fn resampled(other: &Family, spec: &Spec) -> Result<Family> {
+        Family::of(spec, other.sampler.curve().clone())
     }
 
     /// The outline of the curve, if it has one.

@@ -3,6 +3,8 @@
 
 pub mod ended;
 mod horizon;
+pub mod judged;
+pub mod levels;
 pub mod member;
 pub mod mollifier;
 pub mod outcome;
@@ -21,6 +23,8 @@ mod units;
 mod validate;
 
 pub use ended::Ended;
+pub use judged::Judged;
+pub use levels::{LevelRow, LevelTimes, RefinementLevel};
 pub use member::{Family, Member};
 pub use mollifier::Mollified;
 pub use outcome::{Observables, Outcome, Portrait, SeriesRow, Snapshot, Status};

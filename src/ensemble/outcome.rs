@@ -4,7 +4,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 pub use crate::scheme::Status;
-use crate::scheme::member::Observed;
+use crate::{scheme::member::Observed, statistics::Limit};
 
 /// Scalar observables of one curve at one time (f64 whatever the precision of the run).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -83,6 +83,15 @@ pub struct Outcome {
     pub self_crossing: Option<f64>,
     /// Steps of the paper's scheme that were computed, also in refused adaptive steps.
     pub solves: u64,
+    /// Relaxation time in the limit of many nodes and short steps, with `--refine`.
+    pub t_limit: Option<f64>,
+    /// Half-width of its 95 % interval.
+    pub t_error: Option<f64>,
+    /// Observed order of the relaxation time in 1/n.
+    pub order: Option<f64>,
+    /// What the [levels](super::LevelTimes) tell of the relaxation time, if the member ran at them.
+    #[serde(skip)]
+    pub judged: Option<Limit>,
 }
 
 /// One row of `series.csv`.

@@ -1,6 +1,6 @@
 //! Where a run sends the results of its members, and what it asks between two dispatches.
 
-use super::{Ended, Extent, Rows, SeriesRow, Snapshot, Standing};
+use super::{Ended, Extent, LevelRow, Rows, SeriesRow, Snapshot, Standing};
 use crate::error::{Error, Result};
 
 /// What a sink wants from a run between two dispatches.
@@ -18,6 +18,10 @@ pub enum Wish {
 pub trait Sink {
     /// A member has ended; called exactly once per member, in member order.
     fn member(&mut self, ended: &Ended) -> Result<()>;
+    /// A member has ended at a [level](super::RefinementLevel): before the members themselves, level by level in member order.
+    fn level(&mut self, _row: &LevelRow) -> Result<()> {
+        Ok(())
+    }
     /// Stores rows of a member that is still running, in time order, when too many are in memory. The extent returned
     /// comes back with the member, also after the run was resumed. `None` if the sink has no place for them.
     fn spill(&mut self, _series: &[SeriesRow], _snapshots: &[Snapshot]) -> Result<Option<Extent>> {

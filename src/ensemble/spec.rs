@@ -238,6 +238,12 @@ pub struct Spec {
     /// End a member when it is relaxed; if absent, only with a [final time](FinalTime::Auto) that means just that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stop_when_relaxed: Option<bool>,
+    /// Run every member at coarser resolutions, too, and extrapolate its relaxation time.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub refine: bool,
+    /// Total relative uncertainty of the median relaxation time to reach, by the choice of n, tolerance and members.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<f64>,
     /// Interval between rows of `series.csv`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub series: Option<f64>,
@@ -307,6 +313,8 @@ impl Default for Spec {
             relax_to: None,
             relax_at: None,
             stop_when_relaxed: None,
+            refine: false,
+            accuracy: None,
             series: None,
             snapshots: Vec::new(),
             store: Store::Csv,
@@ -414,6 +422,14 @@ impl Spec {
     /// The rank of `member` among those that would run without shards.
     pub fn place(&self, member: u64) -> u64 {
         self.only.as_ref().map_or(member, |only| only.partition_point(|own| *own < member) as u64)
+    }
+
+    /// The first `count` members that would run without shards.
+    pub(super) fn first_members(&self, count: u64) -> Vec<u64> {
+        match &self.only {
+            Some(only) => only.iter().copied().take(usize::try_from(count).unwrap_or(usize::MAX)).collect(),
+            None => (0..count.min(self.all_members())).collect(),
+        }
     }
 
     /// Members of all cells, whether or not they run.
@@ -832,6 +848,8 @@ mod tests {
             "adapter",
             "precision",
             "series",
+            "refine",
+            "accuracy",
         ];
         let optional = [&optional[..], &["only", "shard", "threads", "common-random-numbers", "sweep"]].concat();
         for key in &optional {

@@ -1,14 +1,14 @@
 //! A study: the cells of a spec, each an ensemble whose members run side by side.
 
-use std::{ops::Range, path::Path, sync::Arc};
+use std::{borrow::Cow, ops::Range, path::Path, sync::Arc};
 
 use super::{
-    Family, Member, Spec,
+    Family, Member, RefinementLevel, Spec,
     spec::{FinalTime, Pace, Store, Tau},
     times,
 };
 use crate::{
-    curve::{BaseCurve, Sampler},
+    curve::{BaseCurve, Sampler, Sampling},
     error::{Error, Result},
     solver::{Order, Solver},
 };
@@ -87,9 +87,62 @@ impl Study {
         &self.cells
     }
 
-    /// Ranges of cells whose members run side by side, in order.
-    pub fn cohorts(&self) -> Vec<Range<usize>> {
-        cohorts(&self.cells)
+    /// Its stages, in the order in which they run: the levels, and then its own members.
+    pub fn stages(&self) -> Vec<Stage> {
+        let mut stages = Vec::new();
+        for level in RefinementLevel::ALL {
+            let specs: Vec<_> = self.cells.iter().map(|cell| cell.at(level).ok()).collect();
+            stages.extend(stages_of(Some(level), &specs));
+        }
+        let own: Vec<_> = self.cells.iter().map(|cell| Some(cell.spec.clone())).collect();
+        stages.extend(stages_of(None, &own));
+        stages
+    }
+
+    /// The cells of a stage.
+    ///
+    /// # Errors
+    /// As [`Study::new`].
+    pub fn cells_of(&self, stage: &Stage) -> Result<Cow<'_, [Cell]>> {
+        let own = &self.cells[stage.range.clone()];
+        let Some(level) = stage.level else { return Ok(Cow::Borrowed(own)) };
+        let mut cells: Vec<Cell> = Vec::new();
+        for cell in own {
+            let Ok(spec) = cell.at(level) else { continue };
+            let other = cells.iter().rfind(|other| same_curve(&other.spec, &spec));
+            let family = match other {
+                Some(other) => Family::like(&other.family, &spec)?,
+                None => Family::resampled(&cell.family, &spec)?,
+            };
+            cells.push(Cell { spec, family, ..*cell });
+        }
+        Ok(Cow::Owned(cells))
+    }
+
+    /// The first stage of its own members.
+    pub fn own_stage(&self) -> usize {
+        self.stages().iter().take_while(|stage| stage.level.is_some()).count()
+    }
+
+    /// Whether the levels are those of a few members.
+    pub fn has_pilot(&self) -> bool {
+        !self.spec.refine
+    }
+
+    /// The spec of the first cell of a stage.
+    ///
+    /// # Errors
+    /// Does not fail for a stage of this study.
+    pub fn spec_of(&self, stage: &Stage) -> Result<Spec> {
+        let cells = &self.cells[stage.range.clone()];
+        let spec = |cell: &Cell| stage.level.map_or_else(|| Ok(cell.spec.clone()), |level| cell.at(level));
+        let none = || Error::Failed("a stage has no cell".into());
+        cells.iter().map(spec).find(Result::is_ok).ok_or_else(none)?
+    }
+
+    /// Members of all stages.
+    pub fn work(&self) -> u64 {
+        self.stages().iter().map(|stage| stage.members).sum()
     }
 
     /// Nodes of a member; meaningful only if all have the same number.
@@ -149,6 +202,7 @@ impl Study {
         for cell in &mut cells {
             let own = cell.settled();
             cell.spec = own.map_err(|error| of_cell(error, &spec, cell.index))?;
+            cell.check_refinement().map_err(|error| of_cell(error, &spec, cell.index))?;
         }
         if spec.t_end == Some(FinalTime::Auto) && !spec.sweep.is_empty() {
             spec.t_end = Some(FinalTime::OfCells(cells.iter().map(|cell| cell.spec.final_time()).collect()));
@@ -159,7 +213,41 @@ impl Study {
     }
 }
 
+/// A part of a study whose members run side by side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stage {
+    /// The level of its members, if they are not the study's own.
+    pub level: Option<RefinementLevel>,
+    /// Its cells in the study.
+    pub range: Range<usize>,
+    /// Its members.
+    pub members: u64,
+}
+
+/// The stages of cells with these specs, where they have one.
+fn stages_of(level: Option<RefinementLevel>, specs: &[Option<Spec>]) -> Vec<Stage> {
+    let mut stages: Vec<(Cohort, Stage)> = Vec::new();
+    for (i, spec) in specs.iter().enumerate() {
+        let Some(spec) = spec else { continue };
+        let (cohort, members) = (Cohort::of(spec), spec.member_count());
+        match stages.last_mut() {
+            Some((own, stage)) if *own == cohort => {
+                stage.range.end = i + 1;
+                stage.members += members;
+            }
+            _ => stages.push((cohort, Stage { level, range: i..i + 1, members })),
+        }
+    }
+    stages.into_iter().map(|(_, stage)| stage).filter(|stage| stage.level.is_none() || stage.members > 0).collect()
+}
+
+/// Whether two specs have one curve with the same nodes.
+fn same_curve(one: &Spec, other: &Spec) -> bool {
+    (one.points, one.sampling) == (other.points, other.sampling) && one.shape == other.shape
+}
+
 /// One ensemble of a study.
+#[derive(Clone)]
 pub struct Cell {
     /// Index of the cell, from 0.
     pub index: u64,
@@ -231,11 +319,49 @@ impl Cell {
         warnings
     }
 
+    /// Checks that its members have limits, if these are asked for.
+    fn check_refinement(&self) -> Result<()> {
+        if !self.spec.refine {
+            return Ok(());
+        }
+        let fault = RefinementLevel::ALL.into_iter().find_map(|level| Some((level, self.at(level).err()?)));
+        match fault {
+            None => Ok(()),
+            Some((level, fault)) => {
+                let n = level.points(self.spec.points);
+                let problem = format!("members must also run with {n} nodes, which cannot be: {fault}");
+                Err(Error::value("refine", true, &problem, "use more --points"))
+            }
+        }
+    }
+
+    /// Its spec at a level.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if its curve has no such level.
+    fn at(&self, level: RefinementLevel) -> Result<Spec> {
+        if self.spec.sampling == Sampling::Points {
+            let (problem, remedy) = ("a file's own points have no coarser resolution", "use --sampling arclength");
+            return Err(Error::value("sampling", "points", problem, remedy));
+        }
+        // Of a member that cannot be halved no level is of use.
+        let half = RefinementLevel::Half.spec(&self.spec)?;
+        times::check(&half, self.family.scale(), half.points)?;
+        let spec = level.spec(&self.spec)?;
+        times::check(&spec, self.family.scale(), spec.points)?;
+        Ok(spec)
+    }
+
     /// The properties that other cells must share to run side by side with it.
     pub fn cohort(&self) -> Cohort {
-        let Spec { points, order, .. } = self.spec;
-        let adaptive = matches!(self.spec.pace(), Pace::Adaptive(_));
-        Cohort { points, solver: self.spec.solver(), order, adaptive }
+        Cohort::of(&self.spec)
+    }
+}
+
+impl Cohort {
+    fn of(spec: &Spec) -> Cohort {
+        let Spec { points, order, .. } = *spec;
+        Cohort { points, solver: spec.solver(), order, adaptive: matches!(spec.pace(), Pace::Adaptive(_)) }
     }
 }
 
@@ -253,8 +379,7 @@ fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize
         only[below(first)..below(first + spec.curves)].iter().map(|member| member - first).collect()
     });
     let own = Spec { only: None, shard: None, ..spec.of_cell(index)? }.validate()?;
-    let curve = |other: &Spec| (own.points, own.sampling) == (other.points, other.sampling) && own.shape == other.shape;
-    let family = match before.iter().rfind(|cell| curve(&cell.spec)) {
+    let family = match before.iter().rfind(|cell| same_curve(&cell.spec, &own)) {
         Some(other) => Family::like(&other.family, &own)?,
         None => {
             *bytes += Sampler::bytes(own.sampling, own.points);
@@ -305,17 +430,6 @@ fn of_cell(error: Error, spec: &Spec, index: u64) -> Error {
         }
         error => error,
     }
-}
-
-fn cohorts(cells: &[Cell]) -> Vec<Range<usize>> {
-    let mut cohorts: Vec<Range<usize>> = Vec::new();
-    for (i, cell) in cells.iter().enumerate() {
-        match cohorts.last_mut() {
-            Some(range) if cells[range.start].cohort() == cell.cohort() => range.end = i + 1,
-            _ => cohorts.push(i..i + 1),
-        }
-    }
-    cohorts
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use toml::Value;
 use crate::error::{Error, Result, did_you_mean};
 
 /// Keys that all members of a run have in common.
-const COMMON: [&str; 15] = [
+const COMMON: [&str; 17] = [
     "curves",
     "backend",
     "adapter",
@@ -28,6 +28,8 @@ const COMMON: [&str; 15] = [
     "sweep",
     "common-random-numbers",
     "stop-when-relaxed",
+    "refine",
+    "accuracy",
     "max-sweeps",
     "units",
 ];

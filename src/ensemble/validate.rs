@@ -22,6 +22,8 @@ pub(super) const MAX_STEPS: f64 = 1e9;
 const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
 /// Mobilities with which times, fourth powers of lengths over them, stay finite.
 const MOBILITIES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+/// Uncertainties of a median that members by the million, at a thousand nodes, can reach.
+const ACCURACIES: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
 /// The rows of a resident member stay in memory until it ends.
 const MAX_SERIES_ROWS: f64 = 1e6;
 const MAX_SNAPSHOTS: usize = 10_000;
@@ -41,6 +43,7 @@ impl Spec {
     pub fn validate(mut self) -> Result<Spec> {
         self.sweep.check(&Spec::keys())?;
         self.check_counts()?;
+        self.check_accuracy()?;
         self.check_mobility()?;
         self.check_times()?;
         self.check_method()?;
@@ -97,6 +100,25 @@ impl Spec {
             return Err(Error::value("threads", threads, problem, &format!("use 1 to {MAX_THREADS}")));
         }
         Ok(())
+    }
+
+    fn check_accuracy(&self) -> Result<()> {
+        match self.accuracy {
+            Some(goal) if !self.refine => {
+                let problem = "the error of discretisation is known only with --refine";
+                Err(Error::value("accuracy", number(goal), problem, "add --accurate, or --refine"))
+            }
+            Some(goal) if self.only.is_some() => {
+                let problem = "the members are chosen by it, and --only chooses them, too";
+                Err(Error::value("accuracy", number(goal), problem, "leave out one of the two"))
+            }
+            Some(goal) if !ACCURACIES.contains(&goal) => {
+                let (low, high) = (number(*ACCURACIES.start()), number(*ACCURACIES.end()));
+                let problem = "not a relative uncertainty that can be reached";
+                Err(Error::value("accuracy", number(goal), problem, &format!("use a number from {low} to {high}")))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn check_mobility(&self) -> Result<()> {
@@ -388,7 +410,7 @@ impl Spec {
 }
 
 /// The smallest tolerance of adaptive steps whose errors are not all rounding.
-fn tightest_adaptive(precision: Precision) -> f64 {
+pub(super) fn tightest_adaptive(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 1e-5,
         Precision::F64 => 1e-8,

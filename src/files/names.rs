@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 pub const SUMMARY: &str = "summary.csv";
 /// Decay rates, one row per member that has one.
 pub const RATES: &str = "rates.csv";
+/// Relaxation times at other resolutions, one row per member and level.
+pub const LEVELS: &str = "levels.csv";
 /// Mean excess in time, by cell.
 pub const MEAN_EXCESS: &str = "mean_excess.csv";
 /// Observables over time.
@@ -51,10 +53,11 @@ pub const FIGURES: [&str; 8] =
 pub const ROWS: &str = "curvelax.rows";
 
 /// All files that a run may write; the one that vouches for the others comes first.
-pub const OWN: [&str; 19] = [
+pub const OWN: [&str; 20] = [
     RUN,
     SHARD,
     SUMMARY,
+    LEVELS,
     ENSEMBLE,
     MEAN_EXCESS,
     RATES,
@@ -74,7 +77,7 @@ pub const OWN: [&str; 19] = [
 ];
 
 /// The tables of a run and its store, in the order in which people see them.
-pub const TABLES: [&str; 7] = [SUMMARY, ENSEMBLE, RATES, MEAN_EXCESS, SERIES, SNAPSHOTS, STORE];
+pub const TABLES: [&str; 8] = [SUMMARY, ENSEMBLE, RATES, LEVELS, MEAN_EXCESS, SERIES, SNAPSHOTS, STORE];
 
 /// The files that are drawn from the others.
 pub const PICTURES: [&str; 8] = [REPORT, RELAXATION, SURVIVAL, EXCESS, RATE, DEPENDENCE, MESH, CURVES];

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::results::tally::MeanExcess;
 use crate::{
-    ensemble::{Outcome, SeriesRow, Snapshot},
+    ensemble::{LevelRow, Outcome, SeriesRow, Snapshot},
     error::{Error, Result},
     truth::ConvergenceRow,
 };
@@ -52,6 +52,20 @@ columns! { Outcome:
     metric_drift: number = end.metric_drift, "max |r_i - |e_i||/|e_i| of the last state: how far the scheme's own lengths have left those of the polygon";
     self_crossing: event = self_crossing, "time at which the polygon was first seen to cross itself, which does not stop the member";
     solves: whole = solves, "steps of the scheme that were computed, each a solve for k and one for x and y: 1 for a fixed step, 1 + 2 + … + J for an adaptive one of order J, also if it was refused";
+    t_limit: event = t_limit, "with `--refine`: t_relax in the limit of many nodes and short steps";
+    t_error: optional = t_error, "half-width of the 95 % interval of t_limit";
+    order: optional = order, "observed order of t_relax in 1/n, 2 for a smooth curve; empty where differences do not fall";
+}
+
+columns! { LevelRow:
+    member: whole = member, "index of the member";
+    level: whole = level, "1: n/2 nodes; 2: n/√2; 3: n";
+    cell: whole = cell, "index of its cell";
+    points: whole = points, "nodes";
+    adaptive: optional = adaptive, "tolerance of the steps: a tenth of that of the run, 1e-4 beside fixed steps";
+    status: status = status, "how the member ended";
+    t_relax: event = t_relax, "as in `summary.csv`";
+    solves: whole = solves, "as in `summary.csv`";
 }
 
 /// A row of `rates.csv`: the fitted rate of a member, and that of linear theory.
@@ -148,6 +162,8 @@ pub struct Table<R> {
 
 /// `summary.csv`: one row per member.
 pub type SummaryTable = Table<Outcome>;
+/// `levels.csv`: one row per member and level.
+pub type LevelTable = Table<LevelRow>;
 /// `rates.csv`: the fitted rate of each member that has one.
 pub type RateTable = Table<RateRow>;
 /// `series.csv`: the observables of each member over time.
@@ -271,6 +287,8 @@ mod tests {
             end,
             self_crossing: Some(0.25),
             solves: 600,
+            t_limit: Some(0.5),
+            t_error: Some(0.125),
             ..Outcome::default()
         }
     }
@@ -313,8 +331,8 @@ mod tests {
             text,
             "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
              length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
-             mesh_ratio,metric_drift,self_crossing,solves\n\
-             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600\n"
+             mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order\n\
+             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,\n"
         );
     }
 

@@ -62,8 +62,8 @@ pub struct Head {
     pub origin: Origin,
     /// Wall time of the run so far.
     pub wall: Duration,
-    /// Which of the [cohorts](crate::ensemble::Study::cohorts) is in progress; ranks refer to it.
-    pub cohort: u64,
+    /// Which of the [stages](crate::ensemble::Study::stages) is in progress; ranks refer to it.
+    pub stage: u64,
     /// Tables, with their extent at this checkpoint.
     pub tables: Vec<Mark>,
     /// The arrays of snapshots.
@@ -164,10 +164,10 @@ pub fn read(path: &Path) -> Result<(Head, Standing), Fault> {
 
 /// Members in progress by the last checkpoint in `folder` that have not ended in `standing`. If the current ones are
 /// lost, these resume from there.
-pub fn on_their_way(folder: &OutputFolder, cohort: u64, standing: &Standing) -> BTreeMap<u64, Paused> {
+pub fn on_their_way(folder: &OutputFolder, stage: u64, standing: &Standing) -> BTreeMap<u64, Paused> {
     let read = |name| read(folder.place(name).at());
     match read(STATE).or_else(|_| read(STATE_OLD)) {
-        Ok((head, Standing { resident: Some(mut resident), .. })) if head.cohort == cohort => {
+        Ok((head, Standing { resident: Some(mut resident), .. })) if head.stage == stage => {
             resident.retain(|rank, _| *rank >= standing.next && !standing.early.contains_key(rank));
             resident
         }
@@ -262,7 +262,7 @@ mod tests {
         let head = Head {
             origin,
             wall: Duration::from_millis(1500),
-            cohort: 0,
+            stage: 0,
             tables: vec![Mark { name: "summary.csv".into(), length: 300, crc: 5 }],
             store: None,
             rows: Some(Mark { name: "curvelax.rows".into(), length: 1 << 41, crc: 6 }),
@@ -369,8 +369,8 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let folder = OutputFolder::open(home.path(), true).unwrap();
         folder.keep_state(&bytes()).unwrap();
-        let ranks = |cohort: u64, standing: &Standing| -> Vec<u64> {
-            on_their_way(&folder, cohort, standing).into_keys().collect()
+        let ranks = |stage: u64, standing: &Standing| -> Vec<u64> {
+            on_their_way(&folder, stage, standing).into_keys().collect()
         };
         let none = Standing::default();
         assert_eq!(ranks(0, &none), [1, 3]);
@@ -379,6 +379,6 @@ mod tests {
             ranks(0, &Standing { early: BTreeMap::from([(3, state().1.early[&2].clone())]), ..none.clone() }),
             [1]
         );
-        assert_eq!(ranks(1, &none), [0; 0], "of another cohort");
+        assert_eq!(ranks(1, &none), [0; 0], "of another stage");
     }
 }

@@ -44,6 +44,8 @@ struct CellDocument<'a> {
     members_by_status: BTreeMap<&'static str, u64>,
     t_relax: Numbers,
     rate: Numbers,
+    discretisation: Numbers,
+    t_limit: Numbers,
 }
 
 #[derive(Serialize)]
@@ -168,6 +170,8 @@ impl<'a> CellDocument<'a> {
             members_by_status: Status::ALL.iter().map(|status| status.name()).zip(counts).collect(),
             t_relax: statistics.times(),
             rate: statistics.rates.numbers.clone(),
+            discretisation: statistics.errors(),
+            t_limit: statistics.limit(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The files that grow as members end: tables, and the store of snapshots.
 
 use crate::{
-    ensemble::{Ended, Extent, SeriesRow, Snapshot, Spec, spec::Store},
+    ensemble::{Ended, Extent, LevelRow, SeriesRow, Snapshot, Spec, spec::Store},
     error::{Error, Result},
     files::{
         folder::OutputFolder,
@@ -10,7 +10,7 @@ use crate::{
         part_folder::PartFolder,
         place::Place,
         spill::Spill,
-        tables::{RateRow, RateTable, SeriesTable, SnapshotTable, SummaryTable, Table},
+        tables::{LevelTable, RateRow, RateTable, SeriesTable, SnapshotTable, SummaryTable, Table},
         zarr::{self, SnapshotStore},
     },
 };
@@ -18,6 +18,7 @@ use crate::{
 /// The growing files of a spec.
 pub struct Growing {
     summary: SummaryTable,
+    levels: LevelTable,
     rates: RateTable,
     series: Option<SeriesTable>,
     snapshots: Option<SnapshotTable>,
@@ -34,7 +35,7 @@ impl Growing {
         let snapshots = !spec.snapshots.is_empty() && spec.store == Store::Csv;
         let optional = [(names::SERIES, spec.series.is_some()), (names::SNAPSHOTS, snapshots)];
         let asked = optional.into_iter().filter(|(_, asked)| *asked).map(|(name, _)| name);
-        [names::SUMMARY, names::RATES].into_iter().chain(asked).collect()
+        [names::SUMMARY, names::LEVELS, names::RATES].into_iter().chain(asked).collect()
     }
 
     /// Whether `spec` requires the store.
@@ -92,6 +93,7 @@ impl Growing {
         let asked = |name: &str| names.contains(&name).then(|| file(name)).transpose();
         Ok(Growing {
             summary: Table::new(file(names::SUMMARY)?)?,
+            levels: Table::new(file(names::LEVELS)?)?,
             rates: Table::new(file(names::RATES)?)?,
             series: asked(names::SERIES)?.map(Table::new).transpose()?,
             snapshots: asked(names::SNAPSHOTS)?.map(Table::new).transpose()?,
@@ -99,6 +101,11 @@ impl Growing {
             spill: None,
             torn: false,
         })
+    }
+
+    /// Writes the row of a member at a level.
+    pub fn add_level(&mut self, row: &LevelRow) -> Result<()> {
+        self.levels.row(row)
     }
 
     /// Writes the results of a member.
@@ -148,12 +155,17 @@ impl Growing {
         self.summary.part()
     }
 
+    /// Where the rows of the levels are for now.
+    pub fn levels(&self) -> &Place {
+        self.levels.part()
+    }
+
     /// Returns the extent of all files, once they are on disk.
     pub fn mark(&mut self) -> Result<(Vec<Mark>, Option<zarr::StoreMark>, Option<Mark>)> {
         if self.torn {
             return Err(Error::Failed("the rows of a member could not all be written".into()));
         }
-        let mut marks = vec![self.summary.mark()?, self.rates.mark()?];
+        let mut marks = vec![self.summary.mark()?, self.levels.mark()?, self.rates.mark()?];
         marks.extend(self.series.as_mut().map(SeriesTable::mark).transpose()?);
         marks.extend(self.snapshots.as_mut().map(SnapshotTable::mark).transpose()?);
         let store = self.store.as_ref().map(SnapshotStore::mark).transpose()?;
@@ -163,6 +175,7 @@ impl Growing {
     /// Sets whether to keep them if the run fails.
     pub fn keep(&mut self, keep: bool) {
         self.summary.keep(keep);
+        self.levels.keep(keep);
         self.rates.keep(keep);
         self.series.iter().for_each(|table| table.keep(keep));
         self.snapshots.iter().for_each(|table| table.keep(keep));
@@ -173,8 +186,8 @@ impl Growing {
     /// Completes all files on disk, ready for their final names; and returns the rows needed as long as there are
     /// checkpoints.
     pub fn ready(self) -> Result<(Vec<PartFile>, Option<PartFolder>, Option<Spill>)> {
-        let Growing { summary, rates, series, snapshots, store, spill, .. } = self;
-        let mut files = vec![summary.ready()?, rates.ready()?];
+        let Growing { summary, levels, rates, series, snapshots, store, spill, .. } = self;
+        let mut files = vec![summary.ready()?, levels.ready()?, rates.ready()?];
         files.extend(series.map(SeriesTable::ready).transpose()?);
         files.extend(snapshots.map(SnapshotTable::ready).transpose()?);
         Ok((files, store.map(SnapshotStore::ready).transpose()?, spill))

@@ -213,7 +213,10 @@ impl Shards {
         films.sort_by_key(|film| film.member);
         let mut seen = BTreeSet::new();
         warnings.retain(|warning| seen.insert(warning.clone()));
-        let tally = reader::rows(files[0].part(), spec, aside)?;
+        let own = |name: &str| files.iter().find(|file| file.name() == name).map(PartFile::part);
+        let none = || Error::Failed("a table of the shards was not merged".into());
+        let levels = reader::levels(own(names::LEVELS).ok_or_else(none)?, spec)?;
+        let tally = reader::rows(own(names::SUMMARY).ok_or_else(none)?, spec, &levels, aside)?;
         if tally.members() != spec.member_count() {
             let (found, all) = (tally.members(), spec.member_count());
             return Err(Error::Request(format!("the shards have {found} members, and their spec has {all}")));
@@ -368,18 +371,21 @@ impl ShardRows {
         Ok(())
     }
 
-    /// The member of the next line.
-    fn member(&mut self) -> Result<Option<u64>> {
-        let shard = self.shard;
-        let member = match self.next()? {
+    /// What the next line is sorted by: its member, after the level in a table that has levels.
+    fn key(&mut self) -> Result<Option<(u64, u64)>> {
+        let (shard, has_levels) = (self.shard, self.mark.name == names::LEVELS);
+        let key = match self.next()? {
             None => return Ok(None),
             Some(line) => {
-                let digits = line.split(|byte| *byte == b',').next().unwrap_or_default();
-                std::str::from_utf8(digits).ok().and_then(|text| text.parse().ok())
+                let mut fields = line.split(|byte| *byte == b',');
+                let mut number = || std::str::from_utf8(fields.next()?).ok()?.parse::<u64>().ok();
+                let member = number();
+                let level = if has_levels { number() } else { Some(0) };
+                level.zip(member)
             }
         };
-        match member.filter(|member| shard.has(*member)) {
-            Some(member) => Ok(Some(member)),
+        match key.filter(|(_, member)| shard.has(*member)) {
+            Some(key) => Ok(Some(key)),
             None => Err(self.changed(&format!("a row that is of no member of shard {shard}"))),
         }
     }
@@ -422,13 +428,15 @@ pub fn join_rows(parts: &[FinishedShard], name: &str, out: &mut impl Write, targ
     }
     let mut next = BinaryHeap::new();
     for (i, rows) in all.iter_mut().enumerate() {
-        next.extend(rows.member()?.map(|member| Reverse((member, i))));
+        next.extend(rows.key()?.map(|key| Reverse((key, i))));
     }
-    while let Some(Reverse((member, i))) = next.pop() {
+    while let Some(Reverse((key, i))) = next.pop() {
         let rows = &mut all[i];
         out.write_all(rows.line()).map_err(cannot)?;
-        match rows.member()? {
-            Some(after) if after < member => return Err(rows.changed(&format!("member {after} after {member}"))),
+        match rows.key()? {
+            Some(after) if after < key => {
+                return Err(rows.changed(&format!("member {} after {}", after.1, key.1)));
+            }
             after => next.extend(after.map(|after| Reverse((after, i)))),
         }
     }

@@ -29,7 +29,7 @@ pub use complete::Form;
 pub use stop::{Cause, Stop};
 
 use crate::{
-    ensemble::{Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish},
+    ensemble::{Ended, Extent, LevelRow, LevelTimes, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish},
     error::{Error, Result},
     files::{OutputFolder, portraits::Film},
     placement::Platform,
@@ -68,11 +68,14 @@ pub struct RunReport {
     tally: Tally,
     /// The first members.
     films: Vec<Film>,
-    /// Members of the whole study, and those of earlier cohorts.
-    total: u64,
-    before: u64,
-    /// Index of the cohort.
-    cohort: u64,
+    /// Relaxation times at the levels, by the rows of an earlier session.
+    levels: LevelTimes,
+    /// Members of the study.
+    members: u64,
+    /// Members of each stage.
+    stages: Vec<u64>,
+    /// Index of the stage.
+    stage: u64,
     progress: Progress,
     clock: Instant,
     /// Wall time before the interruption.
@@ -106,16 +109,16 @@ impl RunReport {
     /// [`Error::Request`] if its files are not those of the study.
     pub fn resume(folder: OutputFolder, study: &Study, kept: Saved, manner: Manner) -> Result<(RunReport, Standing)> {
         let Saved { head, standing, note } = kept;
-        let Head { origin, wall, cohort, tables, store, rows, aside, films } = head;
+        let Head { origin, wall, stage, tables, store, rows, aside, films } = head;
         let growing = Growing::resume(&folder, study.spec(), study.points(), &tables, store.as_ref(), rows.as_ref())?;
         if note.is_some() {
             folder.forget_last_state()?;
         }
-        let tally = reader::rows(growing.rows(), study.spec(), aside)?;
+        let levels = reader::levels(growing.levels(), study.spec())?;
+        let tally = reader::rows(growing.rows(), study.spec(), &levels, aside)?;
         let mut report = RunReport::new(folder, growing, study, origin, manner);
-        (report.tally, report.films, report.earlier, report.cohort) = (tally, films, wall, cohort);
-        report.before = report.tally.members().saturating_sub(standing.next);
-        report.has_begun = true;
+        (report.films, report.earlier, report.stage) = (films, wall, stage);
+        (report.tally, report.levels, report.has_begun) = (tally, levels, true);
         Ok((report, standing))
     }
 
@@ -128,9 +131,10 @@ impl RunReport {
             points: study.points(),
             tally: Tally::default(),
             films: Vec::new(),
-            total: study.member_count(),
-            before: 0,
-            cohort: 0,
+            levels: LevelTimes::default(),
+            members: study.member_count(),
+            stages: study.stages().iter().map(|stage| stage.members).collect(),
+            stage: 0,
             progress: Progress::new(quiet),
             clock: Instant::now(),
             earlier: Duration::ZERO,
@@ -141,11 +145,19 @@ impl RunReport {
         }
     }
 
-    /// Begins cohort number `cohort`; all members of earlier ones have ended.
-    pub fn begin_cohort(&mut self, cohort: usize) {
-        if self.cohort != cohort as u64 {
-            (self.cohort, self.before) = (cohort as u64, self.tally.members());
-        }
+    /// Begins stage number `stage`; all members of earlier ones have ended.
+    pub fn begin_stage(&mut self, stage: usize) {
+        self.stage = stage as u64;
+    }
+
+    /// Members of the stages before the current one.
+    fn before(&self) -> u64 {
+        self.stages.iter().take(self.stage as usize).sum()
+    }
+
+    /// Moves out the times of the levels that an earlier session left.
+    pub fn take_levels(&mut self) -> LevelTimes {
+        std::mem::take(&mut self.levels)
     }
 
     /// The output folder.
@@ -163,9 +175,14 @@ impl RunReport {
         &self.origin.moves
     }
 
-    /// Index of the current cohort, from 0.
-    pub fn cohort(&self) -> usize {
-        self.cohort as usize
+    /// Index of the current stage, from 0.
+    pub fn stage(&self) -> usize {
+        self.stage as usize
+    }
+
+    /// Rows that are written, of members and of levels.
+    pub fn rows(&self) -> u64 {
+        self.tally.members() + self.tally.levels
     }
 
     /// Members whose rows are written.
@@ -195,7 +212,7 @@ impl RunReport {
         Ok(Head {
             origin: self.origin.clone(),
             wall: self.wall(),
-            cohort: self.cohort,
+            stage: self.stage,
             tables,
             store,
             rows,
@@ -209,11 +226,11 @@ impl RunReport {
     }
 
     fn so_far(&self) -> String {
-        let (rows, all) = (self.tally.members(), plural(self.total, "member"));
+        let (rows, all) = (self.tally.members(), plural(self.members, "member"));
         format!(
             " after {} with {rows} of {} {all} in the table; curvelax resume {} continues",
             duration(self.wall().as_secs_f64()),
-            self.total,
+            self.members,
             quoted(self.folder.path()),
         )
     }
@@ -231,7 +248,7 @@ impl RunReport {
     /// Gives all files their final names with [`Complete::publish`]; `early` are the warnings given before.
     pub fn finish(mut self, spec: &Spec, early: &[String], form: Form) -> Result<String> {
         // All rows are written: a run killed from now on only needs to draw its pictures again.
-        let next = self.tally.members() - self.before;
+        let next = self.rows() - self.before();
         self.checkpoint(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;
         let shard = match spec.shard {
             Some(_) => Some(shard::to_bytes(&Head { rows: None, ..self.head()? }, self.points, early)?),
@@ -256,6 +273,13 @@ impl RunReport {
 }
 
 impl Sink for RunReport {
+    fn level(&mut self, row: &LevelRow) -> Result<()> {
+        self.growing.add_level(row)?;
+        self.tally.levels += 1;
+        self.has_begun = true;
+        Ok(())
+    }
+
     fn member(&mut self, ended: &Ended) -> Result<()> {
         let Ended { outcome, portrait, mollified, unresolved, excess, .. } = ended;
         // The tally may refuse it, so it comes first: rows that are written can always be read back.
@@ -273,8 +297,9 @@ impl Sink for RunReport {
     }
 
     fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
-        let share = (self.before as f64 + share * total as f64) / self.total.max(1) as f64;
-        self.progress.show(self.before + done, self.total, share);
+        let (before, all) = (self.before(), self.stages.iter().sum::<u64>());
+        let share = (before as f64 + share * total as f64) / all.max(1) as f64;
+        self.progress.show(before + done, all, share);
         match self.stop.asked() {
             Some((cause, when)) if when.elapsed() > PATIENCE => Err(cause.error(&self.so_far())),
             _ => Ok(()),
@@ -297,7 +322,7 @@ impl Sink for RunReport {
         let resident = match &standing.resident {
             Some(resident) => resident,
             None => {
-                known = checkpoint::on_their_way(&self.folder, self.cohort, standing);
+                known = checkpoint::on_their_way(&self.folder, self.stage, standing);
                 &known
             }
         };
@@ -376,7 +401,7 @@ mod tests {
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
         let overview = report(&out, &all, Some(portrait)).finish(&all, &[], Form::Overview).unwrap();
-        let always = ["ensemble.csv", "mean_excess.csv", "plots", "rates.csv", "report.html", "run.json"];
+        let always = ["ensemble.csv", "levels.csv", "mean_excess.csv", "plots", "rates.csv", "report.html", "run.json"];
         assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());
         let plots = ["excess.svg", "mesh.svg", "portraits.json", "rate.svg", "relaxation.svg", "survival.svg"];
         assert_eq!(files(&out.join("plots")), [&["curves.svg"], &plots[..]].concat());
@@ -385,7 +410,7 @@ mod tests {
         }
         assert!(
             overview.contains(
-                "ensemble.csv, rates.csv, mean_excess.csv, series.csv, snapshots.csv, report.html, plots/*.svg"
+                "ensemble.csv, rates.csv, levels.csv, mean_excess.csv, series.csv, snapshots.csv, report.html, plots/*.svg"
             ),
             "{overview}"
         );
@@ -493,7 +518,7 @@ mod tests {
         assert!(!begun(&out, &Spec::default(), &Stop::default()).give_up());
         assert_eq!(files(home.path()), [""; 0]);
         assert!(report(&out, &Spec::default(), None).give_up());
-        assert_eq!(files(&out), [".curvelax.state", ".rates.csv.part", ".summary.csv.part"]);
+        assert_eq!(files(&out), [".curvelax.state", ".levels.csv.part", ".rates.csv.part", ".summary.csv.part"]);
         // Nothing has ended, but the run was asked to stop, which is not a failure.
         let stop = Stop::default();
         let running = begun(&home.path().join("stopped"), &Spec::default(), &stop);

@@ -12,6 +12,7 @@ use crate::{
     results::{
         cells::{CellStatistics, EnsembleStatistics, Rates},
         comparison::{CellDifference, LeftOut},
+        discretisation::{CellLimits, DiscretisationError},
         scaling::Scaling,
         tally::{MollifiedMembers, Tally},
     },
@@ -49,6 +50,8 @@ impl fmt::Display for Overview<'_> {
             ("ensemble", describe(self.spec)),
             ("corners", self.corners()),
             ("t_relax", self.relaxation()),
+            ("t_limit", self.limit()),
+            ("error", self.error()),
             ("rate", self.rate()),
             ("work", self.work()),
             ("ran on", machine(self.platform)),
@@ -95,6 +98,22 @@ impl Overview<'_> {
         }
     }
 
+    /// The limit of the times of a single ensemble; empty without `--refine`.
+    fn limit(&self) -> String {
+        match &self.statistics.cells[..] {
+            [CellStatistics { limits: Some(limits), .. }] => limit(limits),
+            _ => String::new(),
+        }
+    }
+
+    /// The uncertainty of the median of a single ensemble, by its sources.
+    fn error(&self) -> String {
+        match &self.statistics.cells[..] {
+            [cell] => errors(cell, self.spec),
+            _ => String::new(),
+        }
+    }
+
     /// The rates of a single ensemble; empty if no member has one.
     fn rate(&self) -> String {
         let [CellStatistics { rates: Rates { numbers, .. }, .. }] = &self.statistics.cells[..] else {
@@ -115,6 +134,13 @@ impl Overview<'_> {
         }
         for cell in cells.iter().take(MAX_CELLS) {
             writeln!(f, "{:<11}{}: t_relax {}", cell.cell, self.spec.sweep.name(cell.cell), times(cell))?;
+            if let Some(limits) = &cell.limits {
+                writeln!(f, "{:<11}t_limit {}", "", limit(limits))?;
+            }
+            let errors = errors(cell, self.spec);
+            if !errors.is_empty() {
+                writeln!(f, "{:<11}{errors}", "")?;
+            }
         }
         match cells.len().saturating_sub(MAX_CELLS) {
             0 => {}
@@ -245,6 +271,51 @@ fn times(cell: &CellStatistics) -> String {
     )
 }
 
+/// Median and mean of the limits of a cell.
+fn limit(of: &CellLimits) -> String {
+    let interval = of.interval.map_or(String::new(), |(low, high)| {
+        let (low, high) = (significant(low), significant(high));
+        format!(" (95 % interval {low} to {high}, for sampling and discretisation)")
+    });
+    let median = of.median.map_or("not reached by half of the members".into(), significant);
+    let mean = of.mean.map_or(String::new(), |mean| {
+        let least = if mean.restricted_to.is_some() { "at least " } else { "" };
+        let error =
+            mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
+        format!(", mean {least}{}{error}", significant(mean.value))
+    });
+    format!("median {median}{interval}{mean}, for n → ∞ and short steps")
+}
+
+/// What sampling and discretisation do to the median of a cell, and what to do about the larger one.
+fn errors(cell: &CellStatistics, spec: &Spec) -> String {
+    if cell.sample.events() == 0 {
+        return String::new();
+    }
+    let sampling = cell
+        .bounds()
+        .map_or(String::new(), |(low, high)| format!("sampling {} to {}, ", significant(low), significant(high)));
+    let Some(DiscretisationError { members, mean, error, not_asymptotic }) = cell.discretisation else {
+        return format!("{sampling}discretisation not known: no member relaxed with n and with n/2 nodes");
+    };
+    let known = plural(members as u64, "member");
+    let percent = |value: f64| significant(100.0 * value);
+    let about = format!("{sampling}discretisation about {} % (by {members} {known})", percent(mean));
+    let half = cell.bounds().zip(cell.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
+    let larger = half.is_none_or(|half| mean.abs() > half);
+    let advice = match () {
+        () if not_asymptotic > 0 => format!(
+            "; {not_asymptotic} of them do not converge yet, so that it may be off by {} %: use more --points",
+            percent(error)
+        ),
+        () if spec.refine => ": t_limit is free of it".into(),
+        () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => ", the larger of the two: use --refine".into(),
+        () if larger => ", the larger of the two: use --accurate".into(),
+        () => String::new(),
+    };
+    format!("{about}{advice}")
+}
+
 /// The power law of the medians, how well it fits, and the cells that are not in the fit.
 fn law(of: &Scaling) -> Vec<String> {
     let scale = &of.scale;
@@ -347,6 +418,7 @@ all                 4
 
 ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
 t_relax    median 0.5000, mean at least 1.200 (standard error 0.4016) over 2 members that reached it; 2 censored
+error      discretisation not known: no member relaxed with n and with n/2 nodes
 work       10 steps per member, sweeps 20 for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s

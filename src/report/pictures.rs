@@ -19,6 +19,7 @@ use crate::{
     results::{
         cells::{CellStatistics, EnsembleStatistics, QUANTILES},
         comparison::{CellComparison, CellDifference},
+        discretisation::DiscretisationError,
         provenance::Provenance,
         scaling::Scaling,
         tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
@@ -103,7 +104,7 @@ impl FinishedRun<'_> {
         let others: Vec<(&str, u64)> = others.filter(|(_, without)| *without > 0).collect();
         let median = if let [cell] = &cells[..] { median(cell) } else { None };
         let title = "Relaxation times";
-        let (note, key, cells) = (&self.what(), &self.colour_key(), times.collect());
+        let (note, key, cells) = (&self.what_and_error(), &self.colour_key(), times.collect());
         let svg = RelaxationTimes { title, note, key, cells, others: &others, median }.draw();
         let caption = "How many members relaxed when, and which share of all had relaxed by then, cell by cell.";
         chart(names::RELAXATION, title, caption, svg)
@@ -126,7 +127,8 @@ impl FinishedRun<'_> {
             curve
         });
         let (title, key) = ("Members not yet relaxed", self.colour_key());
-        let survival = Survival { title, note: &self.what(), key: &key, curves: curves.collect(), time: None };
+        let survival =
+            Survival { title, note: &self.what_and_error(), key: &key, curves: curves.collect(), time: None };
         let caption =
             "Kaplan-Meier estimate with Greenwood's 95 % band; a stroke marks a member that ended before it relaxed.";
         chart(names::SURVIVAL, title, caption, survival.draw())
@@ -203,7 +205,7 @@ impl FinishedRun<'_> {
                     Some(numbers) => Setting::Number(numbers[rank]),
                     None => Setting::Name(cell.values[others.len()].clone()),
                 },
-                median: median(cell),
+                median: limit(cell).or_else(|| median(cell)),
                 quartiles: quartiles(cell),
             };
             let mut levels: Vec<DependencePoint> = cells.iter().enumerate().map(level).collect();
@@ -225,7 +227,9 @@ impl FinishedRun<'_> {
         let other_key = others.iter().map(|other| other.key.as_str()).collect::<Vec<_>>().join(", ");
         let left_out = self.statistics.scaling.as_ref().map(Scaling::told).filter(|told| !told.is_empty());
         let left_out = left_out.map_or(String::new(), |told| format!(". Not in the fit: {told}"));
-        let (note, series) = (format!("{}{left_out}", self.what()), series.collect());
+        let has_limits = cells.iter().any(|cell| limit(cell).is_some());
+        let of_limits = if has_limits { ". Medians of t_limit" } else { "" };
+        let (note, series) = (format!("{}{of_limits}{left_out}", self.what_and_error()), series.collect());
         let (key, across, time) = (&axis.key[..], None, None);
         let svg = Dependence { title: &title, note: &note, key, other_key: &other_key, series, across, time }.draw();
         let caption = "Median with its 95 % bootstrap interval (thick) and the middle half of the members (thin).";
@@ -292,6 +296,21 @@ impl FinishedRun<'_> {
 
     /// The swept key with numeric values that colours show if there are many cells: the one with most values. Cells
     /// that differ in other keys share a colour.
+    /// The same, with the error of discretisation of the times in the picture.
+    fn what_and_error(&self) -> String {
+        let errors = self.statistics.cells.iter().filter_map(|cell| cell.discretisation.as_ref());
+        let percent: Vec<f64> = errors.map(|error| 100.0 * error.mean).collect();
+        let [low, high] = [f64::min, f64::max].map(|of| percent.iter().copied().reduce(of).unwrap_or_default());
+        let [low, high] = [low, high].map(|value| significant(value, 2));
+        let range = match percent[..] {
+            [] => return self.what(),
+            [_] => low,
+            _ if low == high => low,
+            _ => format!("{low} to {high}"),
+        };
+        format!("{}; discretisation about {range} %", self.what())
+    }
+
     fn colour_axis(&self) -> Option<(usize, &SweepAxis)> {
         let axes = self.spec().sweep.axes().iter().enumerate();
         axes.filter(|(_, axis)| axis.numbers().is_some()).max_by_key(|(i, axis)| (axis.values.len(), Reverse(*i)))
@@ -337,6 +356,14 @@ impl FinishedRun<'_> {
                     None => error.map_or(String::new(), |error| format!("standard error {}", significant(error, 2))),
                 };
                 add("mean t_relax", mean.map(|mean| mean.value), note);
+                if let Some(limits) = &cell.limits {
+                    add("median t_limit", limits.median, limits.interval.map_or(String::new(), bounds));
+                }
+                if let Some(DiscretisationError { members, mean, error, .. }) = cell.discretisation {
+                    let [mean, error] = [mean, error].map(|value| significant(100.0 * value, 2));
+                    let note = format!("of t_relax, ± {error} %, by {}", count(members as u64, "member"));
+                    headline.push(Headline { label: "discretisation".into(), value: format!("{mean} %"), note });
+                }
                 if let [Some(low), .., Some(high)] = cell.quantiles {
                     let range = format!("{} to {}", significant(low, 3), significant(high, 3));
                     headline.push(Headline { label: "nine in ten".into(), value: range, note: "5 to 95 %".into() });
@@ -362,7 +389,7 @@ impl FinishedRun<'_> {
         let keys = self.spec().sweep.axes().iter().map(|axis| axis.key.clone());
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
         let numbers = ["mean", "standard error"].into_iter().chain(QUANTILES.map(|(_, name, _)| name));
-        let numbers = numbers.chain(["median rate", "over theory"]);
+        let numbers = numbers.chain(["median rate", "over theory", "discretisation %", "median t_limit", "t_error"]);
         let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
         let row = |cell: &CellStatistics| {
             let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
@@ -376,7 +403,12 @@ impl FinishedRun<'_> {
             let counts = cell.counts.iter().map(u64::to_string);
             let start = [cell.cell.to_string()].into_iter().chain(cell.values.iter().cloned());
             let rates = ["median", "ratio"].map(|name| shown(cell.rates.numbers.get(name)));
-            start.chain(counts).chain(moments).chain(quantiles).chain(rates).collect()
+            let percent = cell.discretisation.as_ref().map(|error| 100.0 * error.mean);
+            let limits = cell.limits.as_ref();
+            let limits = [limits.and_then(|limits| limits.median), limits.and_then(|limits| limits.error)];
+            let errors =
+                [percent, limits[0], limits[1]].map(|value| value.map_or(String::new(), |v| significant(v, DIGITS)));
+            start.chain(counts).chain(moments).chain(quantiles).chain(rates).chain(errors).collect()
         };
         PageTable {
             caption: "Members by status, statistics of t_relax (Kaplan-Meier), and rates of decay".into(),
@@ -509,6 +541,12 @@ fn differing(cells: &[CellDifference]) -> String {
 
 fn median(cell: &CellStatistics) -> Option<EstimatedNumber> {
     cell.median().map(|value| EstimatedNumber { value, interval: cell.bounds() })
+}
+
+/// The median of the limits with its interval for sampling and discretisation, if members have limits.
+fn limit(cell: &CellStatistics) -> Option<EstimatedNumber> {
+    let limits = cell.limits.as_ref()?;
+    limits.median.map(|value| EstimatedNumber { value, interval: limits.interval })
 }
 
 fn quartiles(cell: &CellStatistics) -> (Option<f64>, Option<f64>) {

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::{
-    ensemble::{Outcome, Spec, theory},
+    ensemble::{LevelRow, LevelTimes, Outcome, Spec, theory},
     error::{Error, Result, shortened},
     files::{
         TableReader,
@@ -121,7 +121,10 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     let spec = &provenance.spec;
     let mut tally = Tally::default();
     (tally.mollified, tally.below_rounding) = (provenance.mollified, provenance.below_rounding);
-    for outcome in Summary::open(folder, spec)? {
+    let levels = levels(&Place::named(&folder.join(names::LEVELS)), spec)?;
+    expected(folder, names::LEVELS, "rows", provenance.levels, levels.rows())?;
+    tally.levels = levels.rows();
+    for outcome in Summary::open(folder, spec, &levels)? {
         tally.add(&outcome?)?;
     }
     let summary = |what: &str, told: u64, found: u64| expected(folder, names::SUMMARY, what, told, found);
@@ -134,13 +137,31 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     Ok(tally)
 }
 
-/// Adds up the rows of a resumed run, and `aside`.
+/// Reads the times at the levels of a run of `spec`.
+///
+/// # Errors
+/// [`Error::Request`] for rows that are not of such a run.
+pub fn levels(place: &Place, spec: &Spec) -> Result<LevelTimes> {
+    let (mut table, mut levels) = (TableReader::<LevelRow>::open(place)?, LevelTimes::default());
+    while let Some((row, fields)) = table.read()? {
+        let LevelRow { member, cell, .. } = row;
+        if member >= spec.all_members() || cell != member / spec.curves {
+            let problem = format!("the cell of a member below {}", spec.all_members());
+            return Err(fields.unexpected_in("cell", &problem));
+        }
+        levels.add(&row).map_err(|expected| fields.unexpected_in("level", &expected))?;
+    }
+    Ok(levels)
+}
+
+/// Adds up the rows of a resumed run with those of its levels, and `aside`.
 ///
 /// # Errors
 /// [`Error::Request`] for rows that are not of a run of `spec`.
-pub fn rows(place: &Place, spec: &Spec, aside: Aside) -> Result<Tally> {
+pub fn rows(place: &Place, spec: &Spec, levels: &LevelTimes, aside: Aside) -> Result<Tally> {
     let mut tally = Tally::default();
-    for outcome in Summary::of(place, spec)? {
+    tally.levels = levels.rows();
+    for outcome in Summary::of(place, spec, levels)? {
         tally.add(&outcome?)?;
     }
     tally.set_aside(aside);
@@ -157,7 +178,8 @@ fn expected(folder: &Path, name: &str, what: &str, expected: u64, found: u64) ->
 }
 
 /// The rows of a `summary.csv`, in order of ascending members.
-pub struct Summary {
+pub struct Summary<'a> {
+    levels: &'a LevelTimes,
     table: TableReader<Outcome>,
     last: Option<u64>,
     spec: Spec,
@@ -165,17 +187,17 @@ pub struct Summary {
     spec_of: Option<(u64, Spec)>,
 }
 
-impl Summary {
+impl<'a> Summary<'a> {
     /// Opens the table in `folder`, of a run of `spec`.
     ///
     /// # Errors
     /// [`Error::Request`] if it does not exist, has other columns, or is truncated.
-    pub fn open(folder: &Path, spec: &Spec) -> Result<Summary> {
-        Summary::of(&Place::named(&folder.join(names::SUMMARY)), spec)
+    pub fn open(folder: &Path, spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
+        Summary::of(&Place::named(&folder.join(names::SUMMARY)), spec, levels)
     }
 
-    fn of(place: &Place, spec: &Spec) -> Result<Summary> {
-        Ok(Summary { table: TableReader::open(place)?, last: None, spec: spec.clone(), spec_of: None })
+    fn of(place: &Place, spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
+        Ok(Summary { levels, table: TableReader::open(place)?, last: None, spec: spec.clone(), spec_of: None })
     }
 
     fn read(&mut self) -> Result<Option<Outcome>> {
@@ -202,11 +224,14 @@ impl Summary {
         }
         // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
         outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| theory::rate_of(spec, &outcome));
+        if let Some((_, spec)) = &self.spec_of {
+            self.levels.judge(spec, &mut outcome);
+        }
         Ok(Some(outcome))
     }
 }
 
-impl Iterator for Summary {
+impl Iterator for Summary<'_> {
     type Item = Result<Outcome>;
 
     fn next(&mut self) -> Option<Result<Outcome>> {
@@ -249,7 +274,7 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let base = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/base");
         std::fs::create_dir(home.path().join("plots")).unwrap();
-        for name in [names::RUN, names::SUMMARY, names::MEAN_EXCESS, names::PORTRAITS] {
+        for name in [names::RUN, names::SUMMARY, names::LEVELS, names::MEAN_EXCESS, names::PORTRAITS] {
             let own = Path::new(name).file_name().unwrap();
             std::fs::copy(base.join(own), home.path().join(name)).unwrap();
         }
@@ -282,7 +307,8 @@ mod tests {
         let mut spec = Spec { curves: 2, ..Spec::default() };
         spec.sweep.set("omega=1,2".parse().unwrap());
         written.rate_theory = spec.rate_in_theory(-6.5);
-        let read: Vec<Outcome> = Summary::open(home.path(), &spec).unwrap().map(Result::unwrap).collect();
+        let read: Vec<Outcome> =
+            Summary::open(home.path(), &spec, &LevelTimes::default()).unwrap().map(Result::unwrap).collect();
         assert_eq!(read, [written.clone()]);
         assert_eq!(read[0].end.excess.to_bits(), written.end.excess.to_bits());
     }

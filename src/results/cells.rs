@@ -10,6 +10,7 @@ use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::{
     comparison::CellComparison,
+    discretisation::{CellLimits, DiscretisationError},
     scaling::{CellMedian, Scaling},
     tally::{CellTally, Rate, Tally},
 };
@@ -46,6 +47,10 @@ pub struct CellStatistics {
     pub interval: Option<Interval>,
     /// Decay rates.
     pub rates: Rates,
+    /// The error of discretisation, if it is known of some members.
+    pub discretisation: Option<DiscretisationError>,
+    /// The limits, if members have them.
+    pub limits: Option<CellLimits>,
 }
 
 /// Fitted decay rates of the members of one cell that have one: complete data.
@@ -159,7 +164,10 @@ impl CellStatistics {
         let quantiles = QUANTILES.map(|(share, ..)| quantile(share));
         let (values, counts) = (spec.sweep.labels(cell), tally.counts);
         let rates = Rates::new(&bootstrap, &mem::take(&mut tally.rates), relative)?;
-        Ok(CellStatistics { cell, values, counts, sample, mean, quantiles, interval, rates })
+        let judged = mem::take(&mut tally.judged);
+        let discretisation = DiscretisationError::of(&judged)?;
+        let limits = CellLimits::of(&Sample::from(mem::take(&mut tally.limits)), &judged, &bootstrap)?;
+        Ok(CellStatistics { cell, values, counts, sample, mean, quantiles, interval, rates, discretisation, limits })
     }
 
     /// Number of members that ended.
@@ -184,9 +192,39 @@ impl CellStatistics {
         Numbers { known: self.sample.events(), named: moments.into_iter().chain(places).collect() }
     }
 
+    /// The numbers on the error of discretisation, for the table.
+    pub fn errors(&self) -> Numbers {
+        let of = |number: fn(&DiscretisationError) -> f64| self.discretisation.as_ref().map(number);
+        let mean = "relative error of t_relax that n and the steps leave, negative if it is too early: mean of these";
+        let named = vec![
+            Statistic { name: "mean", value: of(|of| of.mean), meaning: mean },
+            Statistic { name: "error", value: of(|of| of.error), meaning: "half-width of its 95 % interval" },
+        ];
+        Numbers { known: self.discretisation.as_ref().map_or(0, |of| of.members), named }
+    }
+
+    /// The numbers on the limits, for the table.
+    pub fn limit(&self) -> Numbers {
+        let limits = self.limits.as_ref();
+        let of = |number: fn(Mean) -> Option<f64>| limits.and_then(|limits| limits.mean).and_then(number);
+        let interval = limits.and_then(|limits| limits.interval);
+        let of_sampling = "end of the 95 % interval of the median, for sampling and discretisation together";
+        let named = vec![
+            Statistic { name: "mean", value: of(|mean| Some(mean.value)), meaning: "mean, by Kaplan–Meier" },
+            Statistic { name: "sd", value: of(|mean| mean.standard_deviation), meaning: "standard deviation" },
+            Statistic { name: "se", value: of(|mean| mean.standard_error), meaning: "standard error of the mean" },
+            Statistic { name: "median", value: limits.and_then(|limits| limits.median), meaning: "median" },
+            Statistic { name: "median_low", value: interval.map(|(low, _)| low), meaning: of_sampling },
+            Statistic { name: "median_high", value: interval.map(|(_, high)| high), meaning: of_sampling },
+            Statistic { name: "error", value: limits.and_then(|limits| limits.error), meaning: "mean of t_error" },
+        ];
+        Numbers { known: limits.map_or(0, |limits| limits.known), named }
+    }
+
     /// The quantities in the table, with their numbers.
-    fn quantities(&self) -> [(&'static str, Numbers); 2] {
-        [("t_relax", self.times()), ("rate", self.rates.numbers.clone())]
+    fn quantities(&self) -> [(&'static str, Numbers); 4] {
+        let (times, rates) = (self.times(), self.rates.numbers.clone());
+        [("t_relax", times), ("rate", rates), ("discretisation", self.errors()), ("t_limit", self.limit())]
     }
 
     /// Time by which half of the members have relaxed.
@@ -306,7 +344,9 @@ mod tests {
             "cell,shape,members,relaxed,unfinished,singular,nonfinite,stalled,t_relax_known,t_relax_mean,t_relax_sd,\
              t_relax_se,t_relax_restricted_to,t_relax_q05,t_relax_q25,t_relax_median,t_relax_q75,t_relax_q95,\
              t_relax_median_low,t_relax_median_high,rate_known,rate_mean,rate_sd,rate_se,rate_q05,rate_q25,\
-             rate_median,rate_q75,rate_q95,rate_median_low,rate_median_high,rate_theory,rate_ratio"
+             rate_median,rate_q75,rate_q95,rate_median_low,rate_median_high,rate_theory,rate_ratio,discretisation_known,\
+             discretisation_mean,discretisation_error,t_limit_known,t_limit_mean,t_limit_sd,t_limit_se,t_limit_median,\
+             t_limit_median_low,t_limit_median_high,t_limit_error"
         );
         assert!(lines[1].starts_with("0,\"ellipse:2,1\",2,2,0,0,0,0,2,1.0,0.7071"), "{}", lines[1]);
         assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
@@ -320,9 +360,9 @@ mod tests {
         let (spec, statistics) = statistics("omega=1,2,3", &[(0, None), (0, None), (2, Some(0.0))]);
         let text = statistics.to_csv(&spec).unwrap();
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
-        let lines: Vec<&str> = text.lines().skip(1).collect();
-        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0{}0{}", ",".repeat(12), ",".repeat(12)));
-        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0{}0{}", ",".repeat(12), ",".repeat(12)));
+        let (lines, gap): (Vec<&str>, _) = (text.lines().skip(1).collect(), ",".repeat(12));
+        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0{gap}0{gap},0,,,0{}", ",".repeat(7)));
+        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0{gap}0{gap},0,,,0{}", ",".repeat(7)));
         assert!(lines[2].starts_with("2,3,1,1,0,0,0,0,1,0.0,,,,0.0,"), "{}", lines[2]);
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod cells;
 pub mod comparison;
+pub mod discretisation;
 pub mod provenance;
 pub mod scaling;
 pub mod tally;

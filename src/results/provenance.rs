@@ -48,6 +48,8 @@ pub struct Provenance {
     pub mollified: MollifiedMembers,
     /// Members whose threshold is below the rounding of the precision.
     pub below_rounding: u64,
+    /// Rows of `levels.csv`.
+    pub levels: u64,
     /// Rows of `mean_excess.csv`.
     pub excess_rows: u64,
     /// Warnings given to the user, one sentence each.
@@ -84,6 +86,7 @@ impl Provenance {
             sweeps_x: tally.sweeps_x,
             mollified: tally.mollified,
             below_rounding: tally.below_rounding,
+            levels: tally.levels,
             excess_rows: tally.cells.iter().map(|cell| cell.excess.len() as u64).sum(),
             warnings: warnings.into(),
             started: rfc3339(started),

@@ -7,7 +7,7 @@ use crate::{
     ensemble::{Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
     error::Result,
     schedule::grid,
-    statistics::{Moments, Observation, Observations},
+    statistics::{Limit, Moments, Observation, Observations},
 };
 
 /// Counts and sums over the members that ended.
@@ -23,6 +23,8 @@ pub struct Tally {
     pub sweeps_k: u64,
     /// Total sweeps on position systems.
     pub sweeps_x: u64,
+    /// Rows of the levels.
+    pub levels: u64,
     /// Members whose corners were rounded off before the run.
     pub mollified: MollifiedMembers,
     /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
@@ -72,6 +74,10 @@ pub struct CellTally {
     pub rates: Vec<Rate>,
     /// Excess at the times of [`grid`], over the members that reached them.
     pub excess: Vec<Moments>,
+    /// Limits of the times, of the members that have one; censored like the times for the others.
+    pub limits: Observations,
+    /// What the levels tell of the members that ran at them.
+    pub judged: Vec<Limit>,
 }
 
 /// The part of a [`Tally`] that cannot be recomputed from `summary.csv`.
@@ -199,8 +205,12 @@ impl Tally {
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
-        let CellTally { counts, times, others, area, rates, .. } = &mut self.cells[cell];
+        let CellTally { counts, times, others, area, rates, limits, judged, .. } = &mut self.cells[cell];
         times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
+        if outcome.t_limit.is_some() || outcome.t_relax.is_none() {
+            limits.push(Observation::new(outcome.t_limit, outcome.t_end))?;
+        }
+        judged.extend(outcome.judged);
         *area += outcome.start.area.abs();
         rates.extend(outcome.rate.map(|fitted| Rate { fitted, theory: outcome.rate_theory.unwrap_or(f64::NAN) }));
         self.mesh_ratios.push(outcome.end.mesh_ratio as f32);

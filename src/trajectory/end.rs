@@ -84,6 +84,7 @@ impl Trajectory<'_> {
             end: Observables::new(&self.report.now, progress.turning, unit),
             self_crossing: self.crossed,
             solves: self.counters.parts.into(),
+            ..Outcome::default()
         };
         Ended {
             excess: self.excess(),

@@ -51,8 +51,8 @@ const INSTEAD: [[&str; 2]; 2] = [["tau", "adaptive"], ["relax-to", "relax-at"]];
 /// Keys for sweeps of the solver, which a direct solver refuses.
 const OF_SWEEPS: [&str; 3] = ["order", "tolerance", "sor"];
 /// Tables with a row per member or cell.
-const TABLES: [&str; 6] =
-    ["summary.csv", "series.csv", "snapshots.csv", "ensemble.csv", "rates.csv", "mean_excess.csv"];
+const TABLES: [&str; 7] =
+    ["summary.csv", "levels.csv", "series.csv", "snapshots.csv", "ensemble.csv", "rates.csv", "mean_excess.csv"];
 /// Draws of a study with incompatible values.
 const TRIES: usize = 20;
 /// An ellipse with a dent, as a file.
@@ -126,6 +126,7 @@ impl Drawn {
         sometimes(" --snapshots 0,0.02,0.15", 2);
         sometimes(" --store zarr", 4);
         sometimes(" --max-sweeps 40", 6);
+        sometimes(" --refine", 6);
         let common = random.below(3) == 0;
         if common {
             rest.push_str(" --common-random-numbers");

@@ -43,11 +43,11 @@ static FIXED: Study = Study::new(
     "fixed, zarr",
     "--backend cpu --threads 1 --points 34 --curves 150 --tau 5e-5 --t-end 1 --series 0.2 --snapshots 0,0.5,1 --store zarr",
 );
-/// Two numbers of nodes give two cohorts; adaptive and fixed steps would be two runs.
+/// Two numbers of nodes give two cohorts, and each three levels; adaptive and fixed steps would be two runs.
 static COHORTS: Study = Study::new(
     "two cohorts",
-    "--backend cpu --threads 1 --curves 500 --adaptive=2e-6 --stop-when-relaxed --series 0.2 --snapshots 0.1 \
-     --sweep points=34,52",
+    "--backend cpu --threads 1 --curves 250 --adaptive=2e-6 --stop-when-relaxed --series 0.2 --snapshots 0.1 \
+     --modes 2..=4 --sweep points=34,52 --refine",
 );
 /// On the software GPU.
 static GPU: Study = Study::new(

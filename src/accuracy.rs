@@ -1,0 +1,167 @@
+//! `--accuracy`: the number of nodes, the tolerance and the number of members that reach a given uncertainty, found in
+//! rounds.
+//!
+//! A round runs the whole study, without its shards, in memory and on the CPU, so that the choice is the same on every
+//! machine. Its uncertainty has two parts: sampling falls like 1/√members, discretisation with n. The last choice is
+//! extrapolated from a round of at least an eighth as many members.
+
+use std::fmt;
+
+use crate::{
+    ensemble::{Ended, Sink, Spec, Study, spec::BackendChoice},
+    error::{Error, Result},
+    relax::relax,
+    results::{EnsembleStatistics, cells::CellStatistics, tally::Tally},
+    text::{plural, significant},
+};
+
+/// Share of the goal for discretisation, and that for sampling which is aimed at: the rest is for what a round of fewer
+/// members does not know.
+const DISCRETISATION: f64 = 0.2;
+const SAMPLING: f64 = 0.7;
+/// Members above which a goal is refused, and nodes.
+const MAX_MEMBERS: f64 = 1e6;
+const MAX_NODES: usize = 1600;
+/// Largest ratio of members to those of the round that they are extrapolated from, and of rounds to each other.
+const FARTHEST: f64 = 8.0;
+/// Largest share of members that may not converge yet.
+const UNRULY: f64 = 0.02;
+/// The error of a limit goes with this power of n.
+const ORDER: f64 = 4.0;
+/// Largest growth of n between rounds.
+const MAX_FINER: f64 = 2.0;
+/// More rounds mean that the uncertainty does not fall.
+const MAX_ROUNDS: usize = 12;
+
+/// A round: what was run, and the cell that is farthest from the goal.
+pub struct Round {
+    /// Its number, from 1.
+    number: usize,
+    /// Members of each cell.
+    members: u64,
+    /// Nodes.
+    points: usize,
+    /// Tolerance of the steps.
+    tolerance: Option<f64>,
+    /// Median limit.
+    median: f64,
+    /// Half-width of its 95 % interval relative to it, from sampling alone.
+    sampling: f64,
+    /// Half-width for discretisation.
+    discretisation: f64,
+    /// Share of the members whose times do not yet converge.
+    unruly: f64,
+}
+
+impl fmt::Display for Round {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Round { number, members, points, tolerance, median, sampling, discretisation, .. } = self;
+        let [median, sampling, discretisation] =
+            [*median, *sampling, *discretisation].map(|value| significant(value, 3));
+        let tolerance = tolerance.map_or(String::new(), |tolerance| format!(", tolerance {tolerance:e}"));
+        write!(
+            f,
+            "round {number}: {members} {} of n = {points}{tolerance}: median {median}, relative \
+             uncertainty {sampling} by sampling and {discretisation} by discretisation",
+            plural(*members, "member")
+        )
+    }
+}
+
+/// Collects the statistics of a round.
+#[derive(Default)]
+struct RoundSums(Tally);
+
+impl Sink for RoundSums {
+    fn member(&mut self, ended: &Ended) -> Result<()> {
+        self.0.add(&ended.outcome)
+    }
+}
+
+/// Returns `spec` with the nodes, tolerance and members that reach its goal, if it has one; `tell` hears of every round.
+/// The numbers of `spec` are those of the first round, and the least that are chosen.
+///
+/// # Errors
+/// [`Error::Request`] for a goal that needs more members or nodes than this program would run, or that cannot be judged,
+/// with what was reached.
+pub fn plan(spec: Spec, mut tell: impl FnMut(&Round)) -> Result<Spec> {
+    let Some(goal) = spec.accuracy else { return Ok(spec) };
+    let mut spec = spec.validate()?;
+    let refuse = |problem: &str, remedy: &str| Err(Error::value("accuracy", significant(goal, 3), problem, remedy));
+    for number in 1..=MAX_ROUNDS {
+        let round = Round { number, ..round(&spec)? };
+        tell(&round);
+        let reached = significant(round.sampling + round.discretisation, 2);
+        if round.discretisation > DISCRETISATION * goal || round.unruly > UNRULY {
+            if spec.points >= MAX_NODES {
+                let problem = format!("at n = {} the uncertainty of discretisation is still {reached}", spec.points);
+                return refuse(&problem, "use a larger number");
+            }
+            spec = finer(spec, &round, goal)?;
+            continue;
+        }
+        // At least one member more than none.
+        let needed = (round.members as f64 * (round.sampling / (SAMPLING * goal)).powi(2)).ceil();
+        if needed > MAX_MEMBERS {
+            let problem = format!(
+                "it needs about {needed:.1e} members in each cell, and more than {MAX_MEMBERS:.0e} is too many"
+            );
+            return refuse(&problem, &format!("{reached} was reached with {}; use a larger number", round.members));
+        }
+        let farthest = FARTHEST * round.members as f64;
+        spec.curves = (needed.min(farthest) as u64).max(spec.curves);
+        if needed <= farthest {
+            return Ok(spec);
+        }
+    }
+    refuse(&format!("not reached in {MAX_ROUNDS} rounds"), "use a larger number, or more --points")
+}
+
+/// The spec with more nodes and shorter steps, so that discretisation comes down to its share of the goal.
+fn finer(spec: Spec, round: &Round, goal: f64) -> Result<Spec> {
+    let wanted = round.discretisation / (0.5 * DISCRETISATION * goal);
+    let factor = wanted.powf(1.0 / ORDER).clamp(std::f64::consts::SQRT_2, MAX_FINER);
+    let points = ((spec.points as f64 * factor).ceil() as usize).min(MAX_NODES);
+    let adaptive = spec.adaptive.map(|tolerance| (0.1 * tolerance).max(1e-6).min(tolerance));
+    Spec { points, adaptive, ..spec }.validate()
+}
+
+/// Runs the study, and returns the cell that is farthest from its limit.
+fn round(spec: &Spec) -> Result<Round> {
+    let here = Spec { backend: BackendChoice::Cpu, adapter: None, shard: None, accuracy: None, ..spec.clone() };
+    let here = Spec { series: None, snapshots: Vec::new(), store: Spec::default().store, ..here };
+    let mut sums = RoundSums::default();
+    let study = Study::new(here)?;
+    relax(&study, &mut sums)?;
+    let statistics = EnsembleStatistics::new(study.spec(), &mut sums.0)?;
+    let rounds = statistics.cells.iter().map(|cell| of_cell(spec, cell)).collect::<Result<Vec<_>>>()?;
+    let width = |round: &Round| round.sampling + round.discretisation;
+    let worst = rounds.into_iter().max_by(|one, other| width(one).total_cmp(&width(other)));
+    worst.ok_or_else(|| Error::Failed("a study has no cell".into()))
+}
+
+fn of_cell(spec: &Spec, cell: &CellStatistics) -> Result<Round> {
+    let limits = cell.limits.as_ref();
+    let found = limits.and_then(|of| Some((of.median?, of.uncertainty()?, of.error?)));
+    let Some((median, total, error)) = found else {
+        let problem = "too few members relaxed for a median with an interval";
+        return Err(Error::value(
+            "accuracy",
+            spec.accuracy.unwrap_or_default(),
+            problem,
+            "use more --curves or --t-end",
+        ));
+    };
+    let discretisation = error / median;
+    let unruly = cell.discretisation.as_ref().map_or(0.0, |of| of.not_asymptotic as f64 / of.members.max(1) as f64);
+    Ok(Round {
+        number: 0,
+        members: spec.curves,
+        points: spec.points,
+        tolerance: spec.adaptive,
+        median,
+        sampling: (total - discretisation).max(0.0),
+        discretisation,
+        unruly,
+    })
+}

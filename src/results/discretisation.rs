@@ -1,0 +1,81 @@
+//! The error that n and the steps leave in the relaxation times of a cell, and what the times tend to.
+
+use crate::{
+    error::Result,
+    statistics::{Bootstrap, Description, Interval, KaplanMeier, Limit, Mean, Sample},
+};
+
+/// Standard errors in half a 95 % interval.
+const HALF_INTERVAL: f64 = 1.96;
+
+/// What the levels tell of the relaxation times of a cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiscretisationError {
+    /// Members that it is known of: all, or the pilot.
+    pub members: usize,
+    /// Mean relative error of their times, with its sign: negative if they are too early.
+    pub mean: f64,
+    /// Half-width of its 95 % interval for a member of the cell.
+    pub error: f64,
+    /// Members whose times do not yet converge in n.
+    pub not_asymptotic: usize,
+}
+
+impl DiscretisationError {
+    /// Summarises members that ran at the levels; none if there are none.
+    pub fn of(judged: &[Limit]) -> Result<Option<DiscretisationError>> {
+        let relative = Description::new(judged.iter().map(|limit| limit.relative))?;
+        let bars = Description::new(judged.iter().map(Limit::relative_error))?;
+        let sampling = HALF_INTERVAL * relative.standard_error().unwrap_or(0.0);
+        Ok(relative.mean().zip(bars.mean()).map(|(mean, bar)| DiscretisationError {
+            members: judged.len(),
+            mean,
+            error: sampling + bar,
+            not_asymptotic: judged.iter().filter(|limit| !limit.asymptotic).count(),
+        }))
+    }
+}
+
+/// The limits of the relaxation times of a cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CellLimits {
+    /// Members that have one.
+    pub known: usize,
+    /// Their mean, as that of the times.
+    pub mean: Option<Mean>,
+    /// Their median.
+    pub median: Option<f64>,
+    /// Its 95 % interval, for sampling and discretisation together.
+    pub interval: Option<(f64, f64)>,
+    /// Mean of the half-widths of the members' own intervals.
+    pub error: Option<f64>,
+}
+
+impl CellLimits {
+    /// Summarises the limits; none if no member has one.
+    pub fn of(sample: &Sample, judged: &[Limit], bootstrap: &Bootstrap) -> Result<Option<CellLimits>> {
+        if sample.events() == 0 {
+            return Ok(None);
+        }
+        let survival = KaplanMeier::new(sample);
+        let error = Description::new(judged.iter().map(|limit| limit.error))?.mean();
+        // Errors of discretisation have one sign for all members: they do not average out.
+        let wider = |Interval { lower, upper, .. }| Some((lower? - error?, upper? + error?));
+        // One member has an interval, too: that of its own error.
+        let alone = || (sample.len() == 1).then(|| sample.last()).flatten();
+        let alone = || alone().zip(error).map(|(t, error)| (t - error, t + error));
+        Ok(Some(CellLimits {
+            known: sample.events(),
+            mean: survival.mean(),
+            median: survival.median(),
+            interval: bootstrap.median(sample).and_then(wider).or_else(alone),
+            error,
+        }))
+    }
+
+    /// Half-width of the interval of the median, relative to it.
+    pub fn uncertainty(&self) -> Option<f64> {
+        let (median, (lower, upper)) = (self.median?, self.interval?);
+        Some((upper - median).max(median - lower) / median)
+    }
+}

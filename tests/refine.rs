@@ -1,0 +1,180 @@
+//! `--refine`, the pilot of every run and `--accuracy`, against runs that are much finer.
+
+use std::{fs, path::Path, process::Command};
+
+use curvelax::{
+    Error,
+    ensemble::{
+        Ended, Spec, Study,
+        spec::{BackendChoice, FinalTime, Pull},
+    },
+    relax,
+};
+use tempfile::TempDir;
+
+/// The curves of the tests, and the fraction of `t_error` with which they no longer hold: the bars are not idle.
+const PROBLEMS: [&str; 4] = [
+    "shape = 'ellipse:2,1'",
+    "shape = 'circle:1'\namplitude = 0.1\nmodes = '2..=6'",
+    "shape = 'ellipse:2,1'\nflow = 'willmore'",
+    "shape = 'nonconvex'\namplitude = 0.02\nmodes = '2..=3'",
+];
+
+fn spec(text: &str, curves: u64, points: usize, adaptive: f64) -> Spec {
+    Spec {
+        curves,
+        points,
+        adaptive: Some(adaptive),
+        t_end: Some(FinalTime::Auto),
+        pull: Pull::Auto,
+        backend: BackendChoice::Cpu,
+        ..Spec::from_toml(text).unwrap()
+    }
+}
+
+fn run(spec: Spec) -> Vec<Ended> {
+    let mut members = Vec::new();
+    relax(&Study::new(spec).unwrap(), &mut members).unwrap();
+    members
+}
+
+/// The limits of the members, from resolutions far beyond those of the levels.
+fn truth(text: &str, curves: u64) -> Vec<f64> {
+    let [coarse, fine] = [240, 320].map(|points| run(spec(text, curves, points, 1e-6)));
+    let pairs = coarse.iter().zip(&fine).map(|(a, b)| [a, b].map(|member| member.outcome.t_relax.unwrap()));
+    pairs.map(|[a, b]| b + (b - a) / ((320.0_f64 / 240.0).powi(2) - 1.0)).collect()
+}
+
+#[test]
+fn bars_hold_the_limit_and_are_not_idle() {
+    for text in PROBLEMS {
+        let members = run(Spec { refine: true, ..spec(text, 40, 100, 1e-3) });
+        let truth = truth(text, 40);
+        let held = |share: f64, of: fn(&Ended) -> f64| {
+            let within = |(member, truth): &(&Ended, &f64)| {
+                (of(member) - **truth).abs() <= share * member.outcome.t_error.unwrap()
+            };
+            members.iter().zip(&truth).filter(within).count()
+        };
+        let limit: fn(&Ended) -> f64 = |member| member.outcome.t_limit.unwrap();
+        let own: fn(&Ended) -> f64 = |member| member.outcome.t_relax.unwrap();
+        assert!(held(1.0, limit) >= 38, "{text}: {} of 40", held(1.0, limit));
+        // The controls: bars of a thirtieth do not hold, and times without a limit are outside.
+        assert!(held(1.0 / 30.0, limit) < 38, "{text}: {} of 40 within a thirtieth", held(1.0 / 30.0, limit));
+        let judged = |member: &Ended| member.outcome.judged.unwrap().asymptotic;
+        let smooth = members.iter().all(judged);
+        assert!(!smooth || held(1.0, own) < 20, "{text}: {} of 40 without a limit", held(1.0, own));
+    }
+}
+
+#[test]
+fn a_pilot_tells_the_error_of_fixed_and_adaptive_steps() {
+    let truth = truth(PROBLEMS[0], 8);
+    for (tau, adaptive) in [(Some(1e-3.into()), None), (None, Some(1e-3))] {
+        let spec = Spec { tau, adaptive, pull: Pull::Rate(0.0), ..spec(PROBLEMS[0], 128, 100, 1e-3) };
+        let members = run(Spec { t_end: None, stop_when_relaxed: Some(true), ..spec });
+        let judged: Vec<f64> = members.iter().filter_map(|of| Some(of.outcome.judged?.relative)).collect();
+        let exact = |(member, truth): (&Ended, &f64)| member.outcome.t_relax.unwrap() / truth - 1.0;
+        let exact: Vec<f64> = members.iter().zip(&truth).map(exact).collect();
+        assert_eq!(judged.len(), 8);
+        assert!(members.iter().all(|member| member.outcome.t_limit.is_none()));
+        let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+        let (told, true_error) = (mean(&judged), mean(&exact));
+        // Without the pull errors are up to 1 %.
+        assert!((told - true_error).abs() < 0.03 * true_error.abs(), "{told} for {true_error}");
+        assert!(true_error.abs() > 1e-3, "{true_error}");
+    }
+}
+
+fn curvelax(home: &Path, arguments: &str) -> (Option<i32>, String) {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
+    let output = command.args(arguments.split_whitespace()).current_dir(home).output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// The named column of the first row of a table.
+fn field(path: &Path, column: &str) -> String {
+    let mut table = csv::Reader::from_path(path).unwrap();
+    let at = table.headers().unwrap().iter().position(|name| name == column).unwrap();
+    table.records().next().unwrap().unwrap()[at].to_string()
+}
+
+#[test]
+fn accurate_is_short_for_what_it_says() {
+    let home = TempDir::new().unwrap();
+    let all = "--adaptive --pull auto --omega auto --t-end auto --stop-when-relaxed --refine";
+    for (flags, out) in [("--accurate", "one"), (all, "other")] {
+        let (code, said) = curvelax(home.path(), &format!("run {flags} --curves 5 --backend cpu --quiet --out {out}"));
+        assert_eq!(code, Some(0), "{said}");
+    }
+    for table in ["summary.csv", "levels.csv", "ensemble.csv"] {
+        let [one, other] = ["one", "other"].map(|out| fs::read(home.path().join(out).join(table)).unwrap());
+        assert_eq!(one, other, "{table}");
+    }
+    let (_, changed) = curvelax(home.path(), "run --accurate --pull 0 --curves 5 --backend cpu --quiet --out third");
+    assert_eq!(changed, "");
+    let [one, third] = ["one", "third"].map(|out| field(&home.path().join(out).join("summary.csv"), "t_limit"));
+    assert_ne!(one, third);
+}
+
+#[test]
+fn a_goal_is_reached_by_the_same_choice_whatever_the_shard() {
+    let home = TempDir::new().unwrap();
+    let flags = "run --accurate --accuracy 0.01 --curves 32 --backend cpu";
+    let (code, rounds) = curvelax(home.path(), &format!("{flags} --out whole"));
+    assert_eq!(code, Some(0), "{rounds}");
+    assert!(rounds.contains("round 1: 32 members of n = 100"), "{rounds}");
+    let ensemble = home.path().join("whole/ensemble.csv");
+    let [median, low, high] = ["median", "median_low", "median_high"]
+        .map(|name| field(&ensemble, &format!("t_limit_{name}")).parse::<f64>().unwrap());
+    assert!((high - median).max(median - low) <= 0.01 * median, "{low} {median} {high}");
+    // Half as large a goal needs more members: the first is not met by chance.
+    let members: u64 = field(&ensemble, "members").parse().unwrap();
+    assert!(members > 32, "{members}");
+    for index in 0..2 {
+        let (code, said) = curvelax(home.path(), &format!("{flags} --shard {index}/2 --quiet --out shard-{index}"));
+        assert_eq!(code, Some(0), "{said}");
+    }
+    assert_eq!(curvelax(home.path(), "merge shard-0 shard-1 --quiet --out merged").0, Some(0));
+    for table in ["summary.csv", "levels.csv", "ensemble.csv"] {
+        let [one, other] = ["whole", "merged"].map(|out| fs::read(home.path().join(out).join(table)).unwrap());
+        assert_eq!(one, other, "{table}");
+    }
+    // The same line again finds the run finished, and not of another spec.
+    let (code, said) = curvelax(home.path(), &format!("{flags} --resume --out whole"));
+    assert!(code == Some(0) && said.contains("nothing is left to do"), "{said}");
+}
+
+#[test]
+fn what_cannot_be_refined_is_refused_with_the_reason() {
+    let refused = |spec: Spec| match Study::new(spec) {
+        Err(Error::Request(message)) => message,
+        _ => panic!("it is accepted"),
+    };
+    let base = Spec { refine: true, adaptive: Some(1e-3), backend: BackendChoice::Cpu, ..Spec::default() };
+    for (wrong, part) in [
+        (Spec { points: 10, modes: "2..=2".to_string().try_into().unwrap(), ..base.clone() }, "with 5 nodes"),
+        (Spec { points: 40, ..base.clone() }, "20 nodes resolve no mode above 5"),
+        (Spec { accuracy: Some(0.0), ..base.clone() }, "--accuracy 0"),
+        (Spec { accuracy: Some(-1.0), ..base.clone() }, "--accuracy -1"),
+        (Spec { accuracy: Some(1e-300), ..base.clone() }, "use a number from"),
+        (Spec { accuracy: Some(f64::NAN), ..base.clone() }, "--accuracy NaN"),
+        (Spec { accuracy: Some(1e-3), refine: false, ..base.clone() }, "add --accurate"),
+    ] {
+        let message = refused(wrong);
+        assert!(message.contains(part), "{message}");
+    }
+    assert!(Study::new(base).is_ok());
+}
+
+#[test]
+fn a_run_whose_error_cannot_be_told_says_why() {
+    let home = TempDir::new().unwrap();
+    let flags = "run --points 16 --modes 2..=4 --curves 2 --tau 0.01 --backend cpu --out out";
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
+    let output = command.args(flags.split_whitespace()).current_dir(home.path()).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("discretisation not known: no member relaxed with n and with n/2 nodes"), "{told}");
+    assert_eq!(fs::read_to_string(home.path().join("out/levels.csv")).unwrap().lines().count(), 1);
+    assert_eq!(field(&home.path().join("out/ensemble.csv"), "discretisation_known"), "0");
+}
