@@ -99,7 +99,7 @@ fn advance() -> u32 {
         lengthen(by, errors, declines);
         keep_attempt();
     } else {
-        start_after_step();
+        after_step();
         // The curve before the step is stored if an output time may lie between the two.
         if counters.steps + 1u == counters.goal { store_curve(BEFORE); }
     }

@@ -66,7 +66,7 @@ fn end_part(part: u32, h: real) {
     store_fields(PART, here(new_x), here(new_y), new_k, new_r);
     let place = place_of(part);
     if place.left < SHARED_PARTS { add_part(place.left, shares_of(place.row, place.left, counters.order)); }
-    if place.left > 0u { start_after_step(); } else { begin_row(h / real(place.row + 1u)); }
+    if place.left > 0u { after_step(); } else { begin_row(h / real(place.row + 1u)); }
 }
 
 /// Adds the curve at the end of a part, `left` parts before the end of its row.

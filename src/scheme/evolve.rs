@@ -12,7 +12,7 @@ use super::{
     observe::{self, Glance},
     pace::{self, Stride},
     run::Run,
-    start::{self, Start},
+    start,
     state::{self, CURVE_FIELDS, INCREMENT_FIELDS, LASTING_FIELDS, STATE_FIELDS},
     step::{self, Method, Stepped},
 };
@@ -326,7 +326,7 @@ impl<N: Number> Team<N> {
             }
         }
         if S::FACTS.sweeps && !adaptive {
-            Start::after_step().put(&mut self.state.increments, &mut self.state.earlier);
+            start::after_step(&mut self.state.increments, &mut self.state.earlier);
         }
         self.accept(kept, attempt.excess, adaptive);
     }
@@ -368,7 +368,7 @@ impl<N: Number> Team<N> {
 #[inline(always)]
 fn start_part<N: Number>(state: &mut State<N>, runs: &[&mut Run<N::Real>], tau: N, part: u32) {
     if part > 1 {
-        return Start::after_step().put(&mut state.increments, &mut state.earlier);
+        return start::after_step(&mut state.increments, &mut state.earlier);
     }
     let mut ratio = N::of(0.0);
     for (lane, run) in runs.iter().enumerate() {

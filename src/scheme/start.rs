@@ -7,50 +7,19 @@
 use super::{Curve, Increments, State};
 use crate::{number::Number, solver::Ring};
 
-/// The matrix that turns the increments and the remembered ones into the start of the next solve, and what to remember
-/// then.
-#[derive(Clone, Copy, Debug)]
-pub struct Start<N>([[N; 2]; 2]);
-
-impl<N: Number> Start<N> {
-    /// Starts from zero, whatever the increments are.
-    #[inline(always)]
-    pub fn nowhere() -> Self {
-        Start([[N::of(0.0); 2]; 2])
-    }
-
-    /// After a step of the paper: extrapolates to the next one of the same length.
-    #[inline(always)]
-    pub fn after_step() -> Self {
-        Start([[N::of(2.0), N::of(-1.0)], [N::of(1.0), N::of(0.0)]])
-    }
-
-    /// Sets one lane.
-    #[inline(always)]
-    pub fn set_lane(&mut self, lane: usize, of: Start<N::Real>) {
-        for row in 0..2 {
-            for column in 0..2 {
-                self.0[row][column].set_lane(lane, of.0[row][column]);
-            }
+/// After a step of the paper: extrapolates its increments to the next one of the same length, and remembers them in
+/// `earlier`.
+#[inline(always)]
+pub fn after_step<N: Number>(increments: &mut Increments<N>, earlier: &mut Increments<N>) {
+    let Increments { k, x, y } = earlier;
+    for (own, earlier) in [(&mut increments.k, k), (&mut increments.x, x), (&mut increments.y, y)] {
+        for i in 0..own.len() {
+            let last = own[i];
+            own[i] = N::of(2.0) * last - earlier[i];
+            earlier[i] = last;
         }
-    }
-
-    /// Puts the start into `increments` and what to remember into `earlier`.
-    #[inline(always)]
-    pub fn put(&self, increments: &mut Increments<N>, earlier: &mut Increments<N>) {
-        let Start([[a, b], [c, d]]) = *self;
-        let zero = N::of(0.0);
-        let vanishes = (c.abs() + d.abs()).le(zero);
-        let Increments { k, x, y } = earlier;
-        for (own, earlier) in [(&mut increments.k, k), (&mut increments.x, x), (&mut increments.y, y)] {
-            for i in 0..own.len() {
-                let (last, before) = (own[i], earlier[i]);
-                own[i] = N::select(vanishes, zero, a * last + b * before);
-                earlier[i] = N::select(vanishes, zero, c * last + d * before);
-            }
-            own.close();
-            earlier.close();
-        }
+        own.close();
+        earlier.close();
     }
 }
 
@@ -77,8 +46,8 @@ pub fn begin_row<N: Number>(state: &mut State<N>, ratio: N) {
 mod tests {
     use super::*;
 
-    /// `[increments, earlier]` of one node after `start`.
-    fn put(start: Start<f64>, [last, before]: [f64; 2]) -> [f64; 2] {
+    /// `[increments, earlier]` of one node after a step of the paper.
+    fn next([last, before]: [f64; 2]) -> [f64; 2] {
         let filled = |value: f64| {
             let mut all = Increments::zeros(6);
             for ring in [&mut all.k, &mut all.x, &mut all.y] {
@@ -87,7 +56,7 @@ mod tests {
             all
         };
         let (mut increments, mut earlier) = (filled(last), filled(before));
-        start.put(&mut increments, &mut earlier);
+        after_step(&mut increments, &mut earlier);
         [increments.y[3], earlier.x[2]]
     }
 
@@ -95,8 +64,8 @@ mod tests {
     fn starts_are_exact_where_the_velocity_is_a_straight_line() {
         let v = |t: f64| 0.7 - 1.3 * t;
         let (t, h) = (0.4, 0.25);
-        let [next, last] = put(Start::after_step(), [h * v(t), h * v(t - h)]);
-        assert!((next - h * v(t + h)).abs() < 1e-15 && last == h * v(t));
+        let [start, last] = next([h * v(t), h * v(t - h)]);
+        assert!((start - h * v(t + h)).abs() < 1e-15 && last == h * v(t));
 
         // A step of length 0.2 ended at t; a part of length h follows.
         let (step, mut state) = (0.2, State::<f64>::zeros(6));
@@ -105,13 +74,8 @@ mod tests {
         }
         begin_row(&mut state, h / step);
         assert!((state.increments.y[2] - h * v(t + h)).abs() < 1e-15);
-        let [second, _] = put(Start::after_step(), [state.increments.y[2], state.earlier.y[2]]);
+        let [second, _] = next([state.increments.y[2], state.earlier.y[2]]);
         assert!((second - h * v(t + 2.0 * h)).abs() < 1e-15);
         assert_eq!(state.increments.x[2], 0.0);
-    }
-
-    #[test]
-    fn nothing_of_what_is_not_finite_is_left() {
-        assert_eq!(put(Start::nowhere(), [f64::NAN, f64::INFINITY]), [0.0; 2]);
     }
 }

@@ -61,7 +61,7 @@ pub struct Gaps<N> {
 pub struct State<N> {
     /// The last accepted curve.
     pub curve: Curve<N>,
-    /// Increments of the last solve, where sweeps start; see [`Start`](super::start::Start).
+    /// Increments of the last solve, where sweeps start; see [`start`](super::start).
     pub increments: Increments<N>,
     /// What sweeps remember next to them.
     pub earlier: Increments<N>,

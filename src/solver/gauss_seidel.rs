@@ -1,12 +1,11 @@
 //! Gauss–Seidel sweeps to a residual, the paper's solver.
 //!
-//! *Theory.* The unknown is the increment over a step, started from a prediction
-//! ([`Start`](crate::scheme::start::Start)). A sweep replaces `u_i` by `u_i + ω_SOR·residual_i`; ω_SOR = 1 is
-//! Gauss–Seidel. The slow modes of a fourth-order operator hardly show in the residual: their eigenvalue is only q/τ.
-//! The residual is therefore scaled by τ/q, which bounds the error of just these modes, and the sweeps stop when
-//! `max (τ/q)|residual| ≤ tolerance · max|u|`, or when that error is below the rounding of the unknown itself, or when
-//! the residual is all rounding (f32 reaches that at a tolerance of about 16·ε·τ/h⁴). Stopping on the update would stop
-//! hundreds of times too early.
+//! *Theory.* The unknown is the increment over a step, started from a prediction ([`start`](crate::scheme::start)). A
+//! sweep replaces `u_i` by `u_i + ω_SOR·residual_i`; ω_SOR = 1 is Gauss–Seidel. The slow modes of a fourth-order
+//! operator hardly show in the residual: their eigenvalue is only q/τ. The residual is therefore scaled by τ/q, which
+//! bounds the error of just these modes, and the sweeps stop when `max (τ/q)|residual| ≤ tolerance · max|u|`, or when
+//! that error is below the rounding of the unknown itself, or when the residual is all rounding (f32 reaches that at a
+//! tolerance of about 16·ε·τ/h⁴). Stopping on the update would stop hundreds of times too early.
 //!
 //! *Practice.* Coloured order gives the kernel its parallelism and needs the same number of sweeps as the
 //! lexicographic order of the paper. The sweeps themselves are in [`sweeps`](super::sweeps). Twin of
