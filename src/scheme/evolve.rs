@@ -180,9 +180,7 @@ impl<N: Number> Team<N> {
         branches: Branches,
         method: &Method,
     ) -> Attempt<N> {
-        let mut orders = N::of(1.0);
-        let mut most = 1;
-        let h = self.strides(runs, live, branches.adaptive, &mut orders, &mut most);
+        let (h, orders, most) = self.strides(runs, live, branches.adaptive);
         let stepped = self.make_parts::<S>(runs, live, branches, method, [h, orders], most);
         let Team { state, parameters, work, .. } = self;
         let (mut errors, mut decline) = ([N::of(0.0); 2], [N::of(0.0); 2]);
@@ -203,26 +201,19 @@ impl<N: Number> Team<N> {
 
     /// The lengths of the next steps, their orders and the highest one.
     #[inline(always)]
-    fn strides(
-        &mut self,
-        runs: &[&mut Run<N::Real>],
-        live: N::Mask,
-        adaptive: bool,
-        orders: &mut N,
-        most: &mut u32,
-    ) -> N {
-        let mut h = self.parameters.tau;
+    fn strides(&mut self, runs: &[&mut Run<N::Real>], live: N::Mask, adaptive: bool) -> (N, N, u32) {
+        let (mut h, mut orders, mut most) = (self.parameters.tau, N::of(1.0), 1);
         if adaptive {
             for (lane, run) in runs.iter().enumerate() {
                 self.strides[lane] = pace::stride(&run.report.progress, &run.parameters);
                 h.set_lane(lane, self.strides[lane].length);
                 orders.set_lane(lane, N::Real::of(f64::from(run.counters.order)));
                 if live.lane(lane) {
-                    *most = run.counters.order.max(*most);
+                    most = run.counters.order.max(most);
                 }
             }
         }
-        h
+        (h, orders, most)
     }
 
     /// Makes the parts of steps of length h, row by row. Lanes of a lower order, and lanes that have failed, stand by.
