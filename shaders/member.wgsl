@@ -173,21 +173,19 @@ var<private> dk: vec;
 var<private> dx: vec;
 var<private> dy: vec;
 
-fn load_field(field: u32) -> vec {
+/// A field in this thread's block: its first three nodes, and the one at `last`.
+fn load_nodes(field: u32, last: u32) -> vec {
     let base = (member * STATE_FIELDS + field) * NODES;
     return vec(
         all_states[base + first], all_states[base + first + 1u],
-        all_states[base + first + 2u], all_states[base + node(3u)],
+        all_states[base + first + 2u], all_states[base + last],
     );
 }
 
+fn load_field(field: u32) -> vec { return load_nodes(field, node(3u)); }
+
 /// Like `load_field`, for what no other thread needs: the last component of a block of three repeats its own third node.
-fn load_own(field: u32) -> vec {
-    let base = (member * STATE_FIELDS + field) * NODES + first;
-    return vec(
-        all_states[base], all_states[base + 1u], all_states[base + 2u], all_states[base + select(2u, 3u, owns == 4u)],
-    );
-}
+fn load_own(field: u32) -> vec { return load_nodes(field, first + select(2u, 3u, owns == 4u)); }
 
 /// Makes the curve at `base` the start of a step. Others have written what a block of three reads beyond its own.
 fn load_curve(base: u32) {
