@@ -66,7 +66,7 @@ fn advance() -> u32 {
     if solved == PAUSED || (solved == SOLVED && part < count) { return STOP; }
     counters.phase = 0u;
     counters.solve_sweeps = 0u;
-    counters.parts += count;
+    counters.solves += count;
     if ADAPTIVE && solved == SOLVED { finish_attempt(); }
     var errors = vec2<real>(0.0, 0.0);
     if solved == SOLVED {

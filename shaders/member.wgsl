@@ -94,7 +94,7 @@ struct Counters {
     rejected: u32,
     refused: u32,
     order: u32,
-    parts: u32,
+    solves: u32,
     goal: u32,
     stop_when_relaxed: u32,
     relax_step: u32,

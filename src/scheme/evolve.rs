@@ -289,7 +289,7 @@ impl<N: Number> Team<N> {
             }
             count_sweeps(&mut run.counters, &attempt.stepped, lane);
             let (stride, errors) = (self.strides[lane], attempt.errors.map(|error| error.lane(lane)));
-            run.counters.parts += if adaptive { extrapolation::parts(run.counters.order) } else { 1 };
+            run.counters.solves += if adaptive { extrapolation::parts(run.counters.order) } else { 1 };
             let of_solves = failure_of_solves(&attempt.stepped, lane);
             let failure = of_solves.or(failure_of_curve(finite.lane(lane), singular.lane(lane)));
             let length = run.report.now.length;

@@ -234,7 +234,7 @@ pub struct Counters {
     /// Order of the next adaptive step.
     pub order: u32,
     /// Steps of the paper made since the start, also in refused steps.
-    pub parts: u32,
+    pub solves: u32,
     /// Steps at which to stop; a member that pauses earlier sets this to its steps.
     pub goal: u32,
     /// 1: end the member once it is relaxed.
@@ -348,7 +348,7 @@ impl Counters {
         "rejected",
         "refused",
         "order",
-        "parts",
+        "solves",
         "goal",
         "stop_when_relaxed",
         "relax_step",

@@ -83,7 +83,7 @@ impl Trajectory<'_> {
             start: self.start,
             end: Observables::new(&self.report.now, progress.turning, unit),
             self_crossing: self.crossed,
-            solves: self.counters.parts.into(),
+            solves: self.counters.solves.into(),
             ..Outcome::default()
         };
         Ended {
