@@ -105,9 +105,10 @@ fn finish_attempt() {
 
 /// The errors of order J-1 and J-2, of the new curve, which is observed.
 fn errors_of_attempt() -> vec2<real> {
+    let ir = vec(1.0) / new_r;
     let m = ring_maxima(vec(
-        block_max(bounded_abs(load_own(GAPS))), block_max(bounded_abs(load_own(GAPS + 1u) * (vec(1.0) / new_r))),
-        block_max(bounded_abs(load_own(GAPS + 2u))), block_max(bounded_abs(load_own(GAPS + 3u) * (vec(1.0) / new_r))),
+        block_max(bounded_abs(load_own(GAPS))), block_max(bounded_abs(load_own(GAPS + 1u) * ir)),
+        block_max(bounded_abs(load_own(GAPS + 2u))), block_max(bounded_abs(load_own(GAPS + 3u) * ir)),
     ));
     let size = max(others.x, others.y);
     let spread = min(others.x + others.y, size);

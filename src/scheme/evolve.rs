@@ -293,8 +293,12 @@ impl<N: Number> Team<N> {
             let of_solves = failure_of_solves(&attempt.stepped, lane);
             let failure = of_solves.or(failure_of_curve(finite.lane(lane), singular.lane(lane)));
             let length = run.report.now.length;
-            let allowed = pace::allowed(stride.length, length, N::Real::of(n as f64), &run.parameters);
-            if adaptive && of_solves.is_none() && !errors[0].le(allowed) {
+            let allowed =
+                adaptive.then(|| pace::allowed(stride.length, length, N::Real::of(n as f64), &run.parameters));
+            if let Some(allowed) = allowed
+                && of_solves.is_none()
+                && !errors[0].le(allowed)
+            {
                 kept.set_lane(lane, true);
                 refuse_inaccurate(run, n, stride.length, errors, allowed);
             } else if let Some(cause) = failure {
@@ -310,7 +314,7 @@ impl<N: Number> Team<N> {
                 let taken = taken(run, stride, excess, decline, gap.lane(lane), adaptive);
                 record_events(run, &taken);
                 decay::follow(run, &taken);
-                if adaptive {
+                if let Some(allowed) = allowed {
                     lengthen(run, stride, errors, decline, allowed);
                 }
                 accepted(run, taken.after, &attempt.seen, lane, adaptive);
