@@ -41,7 +41,7 @@ impl Trajectory<'_> {
         [self.start.excess].into_iter().chain(noted.iter().copied()).chain(end).collect()
     }
 
-    /// Returns the member's results; `last` is its last state, for the portrait.
+    /// Returns the member's results, without what theory predicts of them; `last` is its last state, for the portrait.
     pub fn end(mut self, last: Option<&State<f64>>) -> Ended {
         let frames = std::mem::take(&mut self.frames);
         let progress = &self.report.progress;
@@ -79,7 +79,7 @@ impl Trajectory<'_> {
             t_half,
             rate,
             rate_r2,
-            rate_theory: self.rate_theory,
+            rate_theory: None,
             start: self.start,
             end: Observables::new(&self.report.now, progress.turning, unit),
             self_crossing: self.crossed,

@@ -89,7 +89,6 @@ pub struct Trajectory<'a> {
     frames: Vec<(f64, Vec<DVec2>)>,
     sweeps: [u64; 2],
     course: Course,
-    rate_theory: Option<f64>,
     /// When the polygon was first seen to cross itself.
     crossed: Option<f64>,
     portrait: bool,

@@ -75,7 +75,6 @@ impl<'a> Trajectory<'a> {
             frames: Vec::new(),
             sweeps: [0; 2],
             course,
-            rate_theory: spec.rate_in_theory(start.area),
             crossed: None,
             portrait: false,
         };
