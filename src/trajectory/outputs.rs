@@ -25,8 +25,12 @@ impl Trajectory<'_> {
     /// check for crossings.
     pub fn wants_state(&self) -> bool {
         let mut due = self.outputs.from(self.served).take_while(|output| self.place(output.t).is_some());
-        let adaptive = matches!(self.time, Time::Adaptive(_));
-        self.is_look_due() || due.any(|output| output.snapshot || output.frame || adaptive)
+        self.is_look_due() || due.any(|output| self.needs_curve(&output))
+    }
+
+    /// Whether an output is made from a curve: all but the rows of fixed steps, for which two reports do.
+    fn needs_curve(&self, output: &Output) -> bool {
+        output.snapshot || output.frame || matches!(self.time, Time::Adaptive(_))
     }
 
     /// Serves the output times that the last step has reached, and checks for crossings if due; `state` is
@@ -72,7 +76,7 @@ impl Trajectory<'_> {
 
     fn emit(&mut self, output: &Output, fraction: f64, state: Option<&State<f64>>) {
         let (member, t, unit) = (self.member.index, output.t, self.unit);
-        let curve = state.map(|state| self.curve_at(fraction, state));
+        let curve = state.filter(|_| self.needs_curve(output)).map(|state| self.curve_at(fraction, state));
         if output.series {
             let at = match (&curve, self.time) {
                 (Some(curve), Time::Adaptive(_)) => self.observe_inside(fraction, curve),
@@ -112,7 +116,7 @@ impl Trajectory<'_> {
                 let mut curve = state.curve.clone();
                 for (end, start) in curve.fields_mut().into_iter().zip(state.before.fields()) {
                     for i in 0..start.len() {
-                        end[i] = if fraction == 1.0 { end[i] } else { start[i] + fraction * (end[i] - start[i]) };
+                        end[i] = between(start[i], end[i], fraction);
                     }
                     end.close();
                 }
@@ -134,12 +138,9 @@ impl Trajectory<'_> {
     /// The observables inside the last fixed step, on a straight line.
     fn report_at(&self, fraction: f64) -> Observed<f64> {
         let Report { before, now, .. } = &self.report;
-        if fraction == 1.0 {
-            return *now;
-        }
-        let (before, now) = (before.to_numbers(), now.to_numbers());
-        let between: Vec<f64> = before.iter().zip(&now).map(|(a, b)| a + fraction * (b - a)).collect();
-        Observed::from_numbers(&between)
+        let ends = before.to_numbers().into_iter().zip(now.to_numbers());
+        let numbers: Vec<f64> = ends.map(|(start, end)| between(start, end, fraction)).collect();
+        Observed::from_numbers(&numbers)
     }
 
     fn is_look_due(&self) -> bool {
@@ -192,6 +193,11 @@ impl Trajectory<'_> {
         }
         crossed
     }
+}
+
+/// A number inside a step, on a straight line; at its end exactly the last one.
+fn between(start: f64, end: f64, fraction: f64) -> f64 {
+    if fraction == 1.0 { end } else { start + fraction * (end - start) }
 }
 
 /// The largest displacement of a node.
