@@ -180,6 +180,21 @@ impl Sampler {
         }
     }
 
+    /// Returns the signed area of the curve stretched by `factor`, from the samples by which its length is measured: that
+    /// of an outline does not depend on the number of nodes.
+    pub fn area(&self, factor: &RadialFactor) -> f64 {
+        let centre = self.curve.centroid();
+        match &self.plan {
+            Plan::Fixed(points) => enclosed(points.iter().map(|p| factor.apply(centre, *p))),
+            Plan::Measured(samples) => {
+                enclosed(mapped(samples.iter().copied(), factor, centre).map(|(_, point)| point))
+            }
+            Plan::Passing(pieces) => {
+                enclosed(mapped(samples(&self.curve, *pieces), factor, centre).map(|(_, point)| point))
+            }
+        }
+    }
+
     /// Places nodes by the samples that `walk` yields: the parameter of each, and the length up to it.
     fn equally_spaced<I>(&self, walk: impl Fn() -> I, factor: &RadialFactor) -> Vec<DVec2>
     where
@@ -238,12 +253,31 @@ fn measured(
     factor: &RadialFactor,
     centre: DVec2,
 ) -> impl Iterator<Item = (f64, f64)> {
-    let points = samples.map(move |s| (s.u, factor.apply_towards(s.direction, centre, s.point)));
     let (mut previous, mut sum) = (None, 0.0);
-    points.map(move |(u, point)| {
+    mapped(samples, factor, centre).map(move |(u, point)| {
         sum += previous.replace(point).map_or(0.0, |p: DVec2| p.distance(point));
         (u, sum)
     })
+}
+
+/// The parameter of each sample, and its place on the curve stretched by `factor`.
+fn mapped(
+    samples: impl Iterator<Item = CurvePoint>,
+    factor: &RadialFactor,
+    centre: DVec2,
+) -> impl Iterator<Item = (f64, DVec2)> {
+    samples.map(move |s| (s.u, factor.apply_towards(s.direction, centre, s.point)))
+}
+
+/// The signed area of a polygon that is not stored.
+fn enclosed(points: impl Iterator<Item = DVec2>) -> f64 {
+    let (mut first, mut previous, mut double) = (None, DVec2::ZERO, 0.0);
+    for point in points {
+        let arm = point - *first.get_or_insert(point);
+        double += previous.perp_dot(arm);
+        previous = arm;
+    }
+    0.5 * double
 }
 
 /// Minimum number of pieces for measuring a curve of `nodes` nodes.
@@ -290,6 +324,8 @@ fn cumulated_length(points: &[DVec2]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
     use crate::curve::{Shape, polygon};
 
@@ -352,6 +388,24 @@ mod tests {
         }
         let circle = sampler("circle:1", Sampling::Arclength, 101).sample(&RadialFactor::default());
         assert!(polygon::mesh_ratio(&circle) < 1.0 + 1e-9);
+    }
+
+    #[test]
+    fn the_area_is_that_of_the_perturbed_curve_and_not_of_its_nodes() {
+        let none = RadialFactor::default();
+        for nodes in [16, 1000] {
+            let own = sampler(island(), Sampling::Arclength, nodes);
+            let outline = polygon::signed_area(own.outline().unwrap().vertices());
+            assert!((own.area(&none) / outline - 1.0).abs() < 1e-13, "{nodes}");
+            // ∫ (1 + a cos 3θ)² / 2 dθ = π (1 + a²/2).
+            let circle = sampler("circle:1", Sampling::Arclength, nodes);
+            let stretched = circle.area(&RadialFactor::new(3, [(0.2, 0.5)]));
+            assert!((stretched / (PI * 1.02) - 1.0).abs() < 1e-5, "{nodes}: {stretched}");
+        }
+        let passing = Sampler { plan: Plan::Passing(pieces(16)), ..sampler(island(), Sampling::Arclength, 16) };
+        assert_eq!(passing.area(&none), sampler(island(), Sampling::Arclength, 16).area(&none));
+        let points = sampler(island(), Sampling::Points, 16);
+        assert!((points.area(&none) / passing.area(&none) - 1.0).abs() < 1e-13);
     }
 
     #[test]

@@ -98,7 +98,7 @@ impl Family {
         let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
         let mut nodes = sampler.sample(&RadialFactor::default());
         if has_corners {
-            mollify(&mut nodes, simple);
+            mollify(&mut nodes, || sampler.area(&RadialFactor::default()), simple);
         }
         let scale = Arc::new(CurveScale::of(&nodes));
         let (sampler, directions) = (Arc::new(sampler), check_directions(spec.modes.high).into());
@@ -162,7 +162,10 @@ impl Family {
     pub fn member(&self, index: u64) -> Result<Member> {
         let factor = self.radial_factor(index)?;
         let mut nodes = self.sampler.sample(&factor);
-        let mollified = if self.has_corners { mollify(&mut nodes, self.simple) } else { Mollified::default() };
+        let mollified = match self.has_corners {
+            true => mollify(&mut nodes, || self.sampler.area(&factor), self.simple),
+            false => Mollified::default(),
+        };
         let length = polygon::length(&nodes);
         // The area of loops that cancel is rounding only; its sign must not decide the orientation.
         if polygon::signed_area(&nodes) < -polygon::NO_AREA * length * length {
