@@ -4,7 +4,7 @@ mod common;
 
 use std::fs;
 
-use common::program::{Done, run};
+use common::program::{Done, run, run_with};
 
 const RUN: &str = "--curves 7 --points 40 --adaptive=1e-3 --t-end 1";
 
@@ -107,6 +107,16 @@ fn the_mean_excess_is_drawn_with_its_slope() {
     let study = run(&format!("{RUN} --sweep amplitude=0.02,0.1"));
     let svg = study.text("plots/excess.svg");
     assert!(svg.contains("amplitude = 0.1") && !svg.contains("exp("), "{svg}");
+}
+
+#[test]
+fn the_page_tells_what_was_rounded_off() {
+    let wedge = [("wedge.csv", "0,0\n3,-1\n3,1\n")];
+    let rounded = run_with(&wedge, "--curves 2 --shape file:wedge.csv --tau 1e-7 --t-end 2e-7 --solver direct");
+    let page = rounded.text("report.html");
+    assert!(page.contains("Corners were rounded off in 2 members, in at most ") && page.contains(" % and put back."));
+    let untouched = run("--curves 2 --tau 1e-7 --t-end 2e-7 --solver direct").text("report.html");
+    assert!(!untouched.contains("Corners were"));
 }
 
 #[test]

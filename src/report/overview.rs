@@ -14,7 +14,7 @@ use crate::{
         comparison::{CellDifference, LeftOut},
         discretisation::{CellLimits, DiscretisationError},
         scaling::Scaling,
-        tally::{MollifiedMembers, Tally},
+        tally::Tally,
     },
     statistics::{GoodnessOfFit, LogRank, PowerLaw},
     text::{duration, number, p_value, plural},
@@ -48,7 +48,7 @@ impl fmt::Display for Overview<'_> {
         self.cells(f)?;
         for (label, text) in [
             ("ensemble", describe(self.spec)),
-            ("corners", self.corners()),
+            ("corners", self.tally.mollified.told().unwrap_or_default()),
             ("t_relax", self.relaxation()),
             ("t_limit", self.limit()),
             ("error", self.error()),
@@ -78,17 +78,6 @@ impl Overview<'_> {
             }
         }
         writeln!(f, "{:<11}{members:>10}", "all")
-    }
-
-    /// Changes to outlines whose corners the nodes do not resolve; empty if there were none.
-    fn corners(&self) -> String {
-        let MollifiedMembers { members, most_rounds, largest_area_change, .. } = self.tally.mollified;
-        if members == 0 {
-            return String::new();
-        }
-        let change = significant(100.0 * largest_area_change);
-        let (which, rounds) = (plural(members, "member"), plural(most_rounds.into(), "round"));
-        format!("rounded off in {members} {which}, at most {most_rounds} {rounds}, area changed by at most {change} %")
     }
 
     fn relaxation(&self) -> String {

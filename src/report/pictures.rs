@@ -258,9 +258,10 @@ impl FinishedRun<'_> {
             let caption = "Grey: the start. Light: on the way. Colour: the last state, by status.";
             chart(names::CURVES, title, caption, svg.into()).figure
         });
+        let corners = self.tally.mollified.told().map_or(String::new(), |told| format!(" Corners were {told}."));
         let page = Page {
             title: "curvelax run",
-            what: &format!("{}, {}.", count(self.tally.members(), "member"), self.what()),
+            what: &format!("{}, {}.{corners}", count(self.tally.members(), "member"), self.what()),
             statuses: self.tally.counts().map(|(status, count)| (status.name(), count)).collect(),
             headline: self.headline(),
             warnings: &self.provenance.warnings,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::text::plural;
+use crate::text::{plural, significant};
 use crate::{
     ensemble::{Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
     error::Result,
@@ -136,7 +136,7 @@ pub struct MollifiedMembers {
     pub members: u64,
     /// Maximum rounds for one member.
     pub most_rounds: u32,
-    /// Largest relative change of area.
+    /// Largest relative change of area, before it was put back.
     pub largest_area_change: f64,
     /// Members that are not resolved, for one of the next three reasons.
     pub unresolved: u64,
@@ -172,6 +172,21 @@ impl MollifiedMembers {
         self.crossed = self.crossed.saturating_add(*crossed);
         self.sharp = self.sharp.saturating_add(*sharp);
         self.distorted = self.distorted.saturating_add(*distorted);
+    }
+
+    /// What was done to their outlines, after "were"; `None` if nothing was.
+    pub fn told(&self) -> Option<String> {
+        let MollifiedMembers { members, most_rounds, largest_area_change, crossed, distorted, .. } = *self;
+        // Of those two kinds some are left with another area.
+        let put_back = if crossed + distorted == 0 { " and put back" } else { "" };
+        (members > 0).then(|| {
+            format!(
+                "rounded off in {members} {}, in at most {most_rounds} {}, which changed the area by at most {} %{put_back}",
+                plural(members, "member"),
+                plural(most_rounds.into(), "round"),
+                significant(100.0 * largest_area_change, 2)
+            )
+        })
     }
 
     /// What the user should know, if anything.
@@ -364,10 +379,14 @@ pub(crate) mod tests {
     fn outlines_that_the_nodes_do_not_resolve_are_warned_of() {
         let mut tally = tally(&[1.0, 2.0, 3.0, 4.0], 0);
         let well = Mollified { rounds: 7, area_change: -0.05, ..Mollified::default() };
+        assert_eq!(tally.mollified.told(), None);
         tally.add_aside(&well, false);
         assert_eq!((tally.warnings(), tally.mollified.members), (vec![], 1));
+        let told = "rounded off in 1 member, in at most 7 rounds, which changed the area by at most 5.0 %";
+        assert_eq!(tally.mollified.told(), Some(format!("{told} and put back")));
         tally.add_aside(&Mollified { crossed: true, sharp: true, ..well }, false);
         tally.add_aside(&Mollified { area_change: -0.2, ..well }, false);
+        assert!(tally.mollified.told().is_some_and(|told| told.ends_with("by at most 20 %")));
         let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = tally.mollified;
         assert_eq!((unresolved, crossed, sharp, distorted), (2, 1, 1, 1));
         let warnings = tally.warnings();
