@@ -134,10 +134,17 @@ fn a_wrong_sweep_names_its_key_and_cell() {
         (&["amplitude"], ["has no `=`", "key=v1,v2"]),
         (&["amplitude=0.1,word"], ["--sweep amplitude=word: ", "in the cell amplitude = word"]),
         (&["omega=1", "decay=1,2", "omega=2"], ["--sweep omega: given twice; ", "--sweep omega=V1,V2"]),
+        (&["decay=1,2", "--decay=3"], ["--sweep decay: --decay is given, too", "leave one of them out"]),
+        (
+            &["relax-to=0.1,0.2", "--relax-to=0.1"],
+            ["--sweep relax-to: --relax-to is given, too", "leave one of them out"],
+        ),
         (&["omega=1,-1", "decay=1,2"], ["--omega -1: ", "in the cell omega = -1, decay = 1"]),
         (&[&many[0], &many[1]], ["(1000000 cells): too many", "at most 10000"]),
     ] {
-        let arguments: Vec<&str> = sweeps.iter().flat_map(|sweep| ["--sweep", sweep]).collect();
+        let (flags, axes): (Vec<&str>, Vec<&str>) = sweeps.iter().partition(|text| text.starts_with("--"));
+        let swept = axes.iter().flat_map(|sweep| ["--sweep", sweep]);
+        let arguments: Vec<&str> = swept.chain(flags).collect();
         assert_says(&refused(&arguments, &[]), &parts);
     }
     let message = refused(&["spec.toml"], &[("spec.toml", "[sweep]\namplitude = 1\n")]);

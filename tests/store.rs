@@ -107,7 +107,7 @@ fn members_of_a_sweep_and_members_alone_keep_their_index() {
 #[cfg(unix)]
 fn limited(home: &Path, limit: &str, arguments: &str) -> std::process::Output {
     let program = assert_cmd::cargo::cargo_bin("curvelax");
-    let script = format!("ulimit -f {limit}; exec \"$0\" {arguments} --quiet");
+    let script = format!("ulimit -f {limit}; exec \"$0\" {arguments}");
     std::process::Command::new("sh").args(["-c", &script]).arg(program).current_dir(home).output().unwrap()
 }
 

@@ -243,19 +243,49 @@ pub(super) const MACHINE: &str = "Machine";
 /// Heading of the flags for output.
 pub const OUTPUT: &str = "Output";
 
+/// Gives the fields of [`SpecFlags`] but the sweep to a macro: those of a key that always has a value, then the others.
+/// They are matched against the whole type there, so that none is forgotten here.
+macro_rules! every_flag {
+    ($to:ident) => {
+        $to! {
+            curves points seed shape sampling amplitude modes decay flow no_redistribution pull solver
+            order sor max_sweeps backend snapshots store common_random_numbers refine;
+            accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
+        }
+    };
+}
+
 impl SpecFlags {
-    /// Checks that no key is swept by two flags.
+    /// Checks that no key is given by two flags. A sweep may replace a single value of the spec file.
     ///
     /// # Errors
-    /// [`Error::Request`] for a key that is swept twice: the values of one flag would be lost.
+    /// [`Error::Request`] for a key that is swept twice, or swept and given: the values of one flag would be lost.
     pub fn check_sweeps(&self) -> Result<()> {
         let twice = |(i, axis): (usize, &SweepAxis)| self.sweep[..i].iter().any(|other| other.key == axis.key);
-        match self.sweep.iter().enumerate().find(|at| twice(*at)) {
-            None => Ok(()),
-            Some((_, SweepAxis { key, .. })) => {
-                Err(Error::Request(format!("--sweep {key}: given twice; give all values at once, --sweep {key}=V1,V2")))
-            }
+        if let Some((_, SweepAxis { key, .. })) = self.sweep.iter().enumerate().find(|at| twice(*at)) {
+            return Err(Error::Request(format!(
+                "--sweep {key}: given twice; give all values at once, --sweep {key}=V1,V2"
+            )));
         }
+        let given = self.given();
+        match self.sweep.iter().find(|axis| given.contains(&axis.key)) {
+            None => Ok(()),
+            Some(SweepAxis { key, .. }) => Err(Error::Request(format!(
+                "--sweep {key}: --{key} is given, too, and its value would be lost; leave one of them out"
+            ))),
+        }
+    }
+
+    /// The keys given as flags, without those that are swept.
+    fn given(&self) -> Vec<String> {
+        macro_rules! given {
+            ($($key:ident)*; $($optional:ident)*) => {{
+                let SpecFlags { sweep: _, accurate: _, $($key,)* $($optional,)* } = self;
+                let all = [$((stringify!($key), $key.is_some()),)* $((stringify!($optional), $optional.is_some()),)*];
+                all.into_iter().filter(|(_, given)| *given).map(|(key, _)| key.replace('_', "-")).collect()
+            }};
+        }
+        every_flag!(given)
     }
 
     /// Sets what `--accurate` stands for, except what is given on its own.
@@ -285,17 +315,12 @@ impl SpecFlags {
         }
         macro_rules! replace {
             ($($key:ident)*; $($optional:ident)*) => {{
-                // All fields are named, so that no flag is forgotten here.
                 let SpecFlags { sweep: _, accurate: _, $($key,)* $($optional,)* } = self;
                 $(if let Some(value) = $key { spec.$key = value; })*
                 $(if $optional.is_some() { spec.$optional = $optional; })*
             }};
         }
-        replace! {
-            curves points seed shape sampling amplitude modes decay flow no_redistribution pull solver
-            order sor max_sweeps backend snapshots store common_random_numbers refine;
-            accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
-        }
+        every_flag!(replace)
     }
 }
 

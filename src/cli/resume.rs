@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use super::{
     flags::{self, BACKENDS, MACHINE},
-    note,
     work::{MannerFlags, Work},
 };
 use crate::{
@@ -126,7 +125,7 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: ResumePlace,
     // Before a device is looked for, which takes time.
     let manner = flags.manner()?;
     if let Some(fault) = &saved.note {
-        note(&format!("warning: {}: {fault}", path.display()));
+        flags.say(&format!("warning: {}: {fault}", path.display()));
     }
     let origin = &mut saved.head.origin;
     let base = PathBuf::from(&origin.base);

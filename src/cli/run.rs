@@ -54,7 +54,7 @@ pub struct RunArgs {
     resume: bool,
     #[command(flatten)]
     manner: MannerFlags,
-    /// Predict memory, steps and time of the run from a pilot of about two seconds, and stop
+    /// Predict memory, disk space, steps and time of the run from a pilot of about two seconds, and stop
     #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
     dry_run: bool,
     /// Print the resolved spec and stop

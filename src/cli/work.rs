@@ -167,13 +167,13 @@ impl Work {
         if let Err(error) = done {
             let error = report.explain(error);
             if report.give_up() {
-                kept(&out, &error);
+                kept(&out, &error, flags);
             }
             return Err(error);
         }
         let (late, failed) = (report.warnings(), report.failed());
         let form = if flags.json { Form::Json } else { Form::Overview };
-        let text = report.finish(study.spec(), &early, form).inspect_err(|error| kept(&out, error))?;
+        let text = report.finish(study.spec(), &early, form).inspect_err(|error| kept(&out, error, flags))?;
         late.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
         if flags.json || !flags.quiet {
             print(&text)?;
@@ -196,9 +196,9 @@ pub fn check_name(json: bool, out: &Path) -> Result<()> {
 }
 
 /// Says how to resume a run that failed, unless the error does.
-fn kept(out: &Path, error: &Error) {
+fn kept(out: &Path, error: &Error, flags: &MannerFlags) {
     if !matches!(error, Error::Stopped(_) | Error::Interrupted(_) | Error::Lost(_)) {
-        note(&format!("note: the run was saved: curvelax resume {} continues it", quoted(out)));
+        flags.say(&format!("note: the run was saved: curvelax resume {} continues it", quoted(out)));
     }
 }
 
