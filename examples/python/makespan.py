@@ -1,9 +1,10 @@
-"""How long a study takes in N shards on nodes that differ and fail, simulated from the steps of a small run.
+"""How long a study takes in N shards on nodes that differ and fail, simulated from the work of a small run.
 
-    curvelax run --curves 300 --sweep adaptive=1e-3,1e-4,1e-5,3e-6 --solver direct --stop-when-relaxed --backend cpu --out pilot
+    curvelax run --curves 300 --sweep points=50,100,200,400 --adaptive --solver direct --stop-when-relaxed --backend cpu --out pilot
     python examples/python/makespan.py pilot/summary.csv
 
-A member costs --member-ms, and --step-us for each of its steps. A slot takes one shard after another, in their order, and
+A member costs --member-ms, and --node-ns for each of its nodes in each of its solves (`summary.csv`; the nodes of a cell
+are in run.json beside it). A slot takes one shard after another, in their order, and
 --start seconds to begin each. The slots of a node have one speed, fail together, and are back after --requeue seconds, as
 are the shards that they had, at the end of the queue. What is lost then is the work since the last checkpoint, or all.
 `modulo` deals members out as curvelax does, j mod N; `blocks` gives shard i the i-th part of them, in a row. Times are
@@ -13,17 +14,30 @@ medians over --rounds draws of speeds, failures and costs; efficiency is the sha
 import argparse
 import csv
 import heapq
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 
 
-def cells(path, member_ms, step_us):
+def points(spec, cell):
+    """The nodes of a cell; the last key of a sweep varies fastest."""
+    for key, values in reversed(spec.get("sweep", {}).items()):
+        cell, at = divmod(cell, len(values))
+        if key == "points":
+            return values[at]
+    return spec["points"]
+
+
+def cells(path, member_ms, node_ns):
     """Mean and variance of the hours that a member of each cell takes."""
+    spec = json.loads(Path(path).with_name("run.json").read_text())["spec"]
     with open(path, newline="") as file:
-        rows = [(int(row["cell"]), int(row["steps"])) for row in csv.DictReader(file)]
-    cell, steps = np.array(rows).T
-    hours = (member_ms / 1e3 + step_us / 1e6 * steps) / 3600
+        rows = [(int(row["cell"]), int(row["solves"])) for row in csv.DictReader(file)]
+    cell, solves = np.array(rows).T
+    nodes = np.array([points(spec, c) for c in range(cell.max() + 1)])
+    hours = (member_ms / 1e3 + node_ns / 1e9 * solves * nodes[cell]) / 3600
     each = [hours[cell == c] for c in np.unique(cell)]
     return np.array([h.mean() for h in each]), np.array([h.var() for h in each])
 
@@ -91,14 +105,14 @@ def main():
     parser.add_argument("summary", metavar="SUMMARY.csv")
     numbers = {
         "members": 1e9, "nodes": 8, "threads": 16, "uneven": 0.2, "hours-to-failure": 6.0, "requeue": 300.0,
-        "checkpoint": 5.0, "start": 10.0, "member-ms": 0.25, "step-us": 4.2, "rounds": 15, "seed": 1,
+        "checkpoint": 5.0, "start": 10.0, "member-ms": 0.15, "node-ns": 21.0, "rounds": 15, "seed": 1,
     }
     for name, value in numbers.items():
         parser.add_argument(f"--{name}", type=type(value), default=value, help=f"[default: {value:g}]")
     parser.add_argument("--shards", type=int, nargs="+", default=[128, 250, 500, 1000, 2000, 4000, 8000])
     options = parser.parse_args()
 
-    mean, variance = cells(options.summary, options.member_ms, options.step_us)
+    mean, variance = cells(options.summary, options.member_ms, options.node_ns)
     whole = options.members * mean.mean()
     print(f"{options.members:g} members in {len(mean)} cells of {', '.join(f'{3.6e6 * h:.2g}' for h in mean)} ms a member:")
     print(f"{span(whole)} of one slot, {span(whole / options.nodes / options.threads)} of all.\n")

@@ -93,11 +93,19 @@ class Queue(unittest.TestCase):
     def test_costs_are_read_by_cell(self):
         with tempfile.TemporaryDirectory() as home:
             table = Path(home) / "summary.csv"
-            table.write_text("member,cell,steps\n0,0,10\n1,0,30\n2,1,100\n")
-            mean, variance = makespan.cells(table, 0.5, 25.0)
+            table.write_text("member,cell,solves\n0,0,10\n1,0,30\n2,1,20\n")
+            (Path(home) / "run.json").write_text('{"spec": {"points": 10, "sweep": {"points": [10, 50]}}}')
+            mean, variance = makespan.cells(table, 0.5, 2500.0)
         self.assertTrue(np.allclose(mean * 3.6e6, [1.0, 3.0]))
         self.assertTrue(np.allclose(np.sqrt(variance) * 3.6e6, [0.25, 0.0]))
         self.assertTrue(math.isclose(3.6e6 * mean.mean(), 2.0))
+
+    def test_the_nodes_of_a_cell_are_those_of_the_sweep(self):
+        spec = {"points": 100, "sweep": {"points": [50, 200], "amplitude": [0.01, 0.02, 0.04]}}
+        self.assertEqual([makespan.points(spec, cell) for cell in range(6)], [50, 50, 50, 200, 200, 200])
+        spec["sweep"] = {"amplitude": [0.01, 0.02], "points": [50, 200]}
+        self.assertEqual([makespan.points(spec, cell) for cell in range(4)], [50, 200, 50, 200])
+        self.assertEqual([makespan.points({"points": 100}, 0), makespan.points({"points": 100, "sweep": {}}, 3)], [100, 100])
 
 
 if __name__ == "__main__":
