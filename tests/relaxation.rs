@@ -202,7 +202,8 @@ fn a_nonconvex_curve_relaxes_when_it_should_with_the_pull_and_not_without() {
     }
 }
 
-/// Times until the excess is 0.01, by an independent program with a fixed pull, at n = 128 and 256.
+/// Times until the excess is 0.01, by an independent program with a fixed pull, at n = 128 and 256: of outlines that had
+/// lost area when their corners were rounded off.
 const ISLANDS: [(&str, [f64; 2]); 4] = [
     ("madagascar", [0.1837, 0.1836]),
     ("jamaica", [0.1966, 0.1965]),
@@ -222,18 +223,21 @@ fn islands_relax_at_every_n_when_an_independent_program_says_and_not_without_the
                     relax_at: Some(0.01),
                     ..adaptive(&format!("file:examples/islands/{island}.csv"), n)
                 };
-                let outcome = one(&Spec { t_end: Some(0.5.into()), stop_when_relaxed: Some(true), ..spec });
-                assert_eq!(outcome.status, Status::Relaxed, "{island}, n = {n}: {outcome:?}");
-                outcome.t_relax.unwrap()
+                let run = run(&Spec { t_end: Some(0.5.into()), stop_when_relaxed: Some(true), ..spec }).remove(0);
+                assert_eq!(run.outcome.status, Status::Relaxed, "{island}, n = {n}: {:?}", run.outcome);
+                let time = run.outcome.t_relax.unwrap();
+                // Times go as the fourth power of the size.
+                [time, time * (1.0 + run.mollified.area_change).powi(2)]
             };
             let times = [64, 100, 128, 200, 256].map(|n| at(n, Pull::Auto));
             println!("{island}, omega = {omega}: {times:.4?}");
-            let [.., coarse, _, fine] = times;
-            assert!(near(Some(coarse), fine, 0.02), "{island}: {coarse} and {fine}");
-            for (found, expected) in [coarse, fine].into_iter().zip(table) {
+            let [.., [coarse, smaller_coarse], _, [fine, smaller_fine]] = times;
+            assert!(near(Some(coarse), fine, 0.015), "{island}: {coarse} and {fine}");
+            for (found, expected) in [smaller_coarse, smaller_fine].into_iter().zip(table) {
                 assert!(near(Some(found), expected, 0.02), "{island}: {found} instead of {expected}");
             }
-            worst_without = worst_without.max((at(128, Pull::Rate(0.0)) / table[0] - 1.0).abs());
+            let [_, without] = at(128, Pull::Rate(0.0));
+            worst_without = worst_without.max((without / table[0] - 1.0).abs());
         }
     }
     assert!(worst_without > 0.04, "the control passes: {worst_without}");
