@@ -4,7 +4,7 @@ use std::{path::Path, time::Duration};
 
 use super::{flags, note, print, signals};
 use crate::{
-    backend::Backend,
+    backend::{Backend, DeviceKind},
     ensemble::{Cell, Judged, Spec, Standing, Study},
     error::{Error, Result},
     files::names,
@@ -101,8 +101,8 @@ pub struct Work {
     pub study: Study,
     /// The back ends of its stages.
     pub choices: Vec<Choice>,
-    /// The back end of the first cells of the study itself, once it is open.
-    opened: Option<Box<dyn Backend>>,
+    /// The back end of the first cells of the study itself, once it is known to open; none if it opens again at no cost.
+    opened: Option<Option<Box<dyn Backend>>>,
 }
 
 impl Work {
@@ -129,7 +129,8 @@ impl Work {
             self.study.cells_mut().iter_mut().for_each(|cell| platform.settle_place(&mut cell.spec));
             self.study.settle_spec(|spec| platform.settle_place(spec));
         }
-        self.opened = Some(backend);
+        // One on the CPU is opened when its turn comes: it would only hold memory while the levels run.
+        self.opened = Some((platform.backend == DeviceKind::Gpu).then_some(backend));
         Ok(platform)
     }
 
@@ -208,12 +209,11 @@ fn open(cohort: &[Cell], choice: &Choice, flags: &MannerFlags) -> Result<(Box<dy
     choice.open_for(cohort)
 }
 
-/// Runs one stage after another, from `standing` in the report's current one; `opened` is the back end of the first own
-/// cells, if it is open.
+/// Runs one stage after another, from `standing` in the report's current one; `opened` is as in [`Work`].
 fn advance(
     study: &Study,
     choices: Vec<Choice>,
-    mut opened: Option<Box<dyn Backend>>,
+    mut opened: Option<Option<Box<dyn Backend>>>,
     mut standing: Standing,
     report: &mut RunReport,
     flags: &MannerFlags,
@@ -225,10 +225,10 @@ fn advance(
         let choice = choice.after(report.platform());
         let precision = choice.precision();
         let mut backend = match opened.take_if(|_| i == own) {
-            Some(backend) => backend,
+            Some(Some(backend)) => backend,
             // Of levels nothing is said: they are where the study is, or a pilot.
-            None if stage.level.is_some() => choice.open_for(&cells)?.0,
-            None => open(&cells, &choice, flags)?.0,
+            None if stage.level.is_none() => open(&cells, &choice, flags)?.0,
+            _ => choice.open_for(&cells)?.0,
         };
         report.begin_stage(i);
         let portraits = if stage.level.is_some() { 0 } else { study.portraits(cells.len()) };

@@ -17,7 +17,7 @@ use crate::{
         tally::Tally,
     },
     statistics::{GoodnessOfFit, LogRank, PowerLaw},
-    text::{duration, number, p_value, plural},
+    text::{self, duration, number, p_value, plural},
 };
 
 /// Maximum number of cells listed; the table has them all.
@@ -273,7 +273,7 @@ fn limit(of: &CellLimits) -> String {
             mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
         format!(", mean {least}{}{error}", significant(mean.value))
     });
-    format!("median {median}{interval}{mean}, for n → ∞ and short steps")
+    format!("median {median}{interval}{mean}")
 }
 
 /// What sampling and discretisation do to the median of a cell, and what to do about the larger one.
@@ -288,15 +288,15 @@ fn errors(cell: &CellStatistics, spec: &Spec) -> String {
         return format!("{sampling}discretisation not known: no member relaxed with n and with n/2 nodes");
     };
     let known = plural(members as u64, "member");
-    let percent = |value: f64| significant(100.0 * value);
-    let about = format!("{sampling}discretisation about {} % (by {members} {known})", percent(mean));
+    let percent = |value: f64| text::significant(100.0 * value, 2);
+    let about =
+        format!("{sampling}discretisation about {} % (± {} %, by {members} {known})", percent(mean), percent(error));
     let half = cell.bounds().zip(cell.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
     let larger = half.is_none_or(|half| mean.abs() > half);
     let advice = match () {
-        () if not_asymptotic > 0 => format!(
-            "; {not_asymptotic} of them do not converge yet, so that it may be off by {} %: use more --points",
-            percent(error)
-        ),
+        () if not_asymptotic > 0 => {
+            format!("; times of {not_asymptotic} of them do not converge yet in n: use more --points")
+        }
         () if spec.refine => ": t_limit is free of it".into(),
         () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => ", the larger of the two: use --refine".into(),
         () if larger => ", the larger of the two: use --accurate".into(),

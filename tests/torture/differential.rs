@@ -142,7 +142,10 @@ impl Drawn {
     fn study(&self) -> String {
         let axis = |(key, values): &(&str, Vec<&str>)| format!("--sweep {key}={};", values.join(";"));
         let axes: Vec<String> = self.axes.iter().map(axis).collect();
-        format!("run {} {} {} --curves {}", flags(&self.base), axes.join(" "), self.rest, self.members)
+        // A key is swept or given.
+        let mut base = self.base.clone();
+        base.retain(|key, _| self.axes.iter().all(|(swept, _)| swept != key));
+        format!("run {} {} {} --curves {}", flags(&base), axes.join(" "), self.rest, self.members)
     }
 
     /// The run of cell `cell` alone, and the index that its first member has there.
