@@ -8,7 +8,7 @@ use std::{
 
 use assert_cmd::Command;
 use curvelax::{
-    ensemble::{Outcome, SeriesRow, Spec},
+    ensemble::{LevelRow, Outcome, SeriesRow, Spec},
     files::{
         TableRow, names,
         tables::{ErrorRow, NodeRow, RateRow},
@@ -137,6 +137,7 @@ fn columns() -> String {
         table_of::<Outcome>(names::SUMMARY, "member"),
         table(names::ENSEMBLE, "cell; here with `--sweep amplitude=0.05,0.1`", of_cells),
         table_of::<RateRow>(names::RATES, "member with a rate"),
+        table_of::<LevelRow>(names::LEVELS, "member and level ([limit](method.md#limit))"),
         table_of::<MeanExcess>(names::MEAN_EXCESS, "cell and time"),
         table_of::<SeriesRow>(names::SERIES, "member and time, with `--series`"),
         table_of::<NodeRow>(names::SNAPSHOTS, "member, time and node, with `--snapshots`"),

@@ -157,7 +157,7 @@ impl Overview<'_> {
             }
             writeln!(f, "{:<11}{}", difference.cell, paired(difference))?;
         }
-        for text in scaling.iter().flat_map(law) {
+        for text in scaling.iter().flat_map(|of| law(of, self.statistics.time())) {
             writeln!(f, "{:<11}{text}", "law")?;
         }
         writeln!(f)
@@ -306,7 +306,7 @@ fn errors(cell: &CellStatistics, spec: &Spec) -> String {
 }
 
 /// The power law of the medians, how well it fits, and the cells that are not in the fit.
-fn law(of: &Scaling) -> Vec<String> {
+fn law(of: &Scaling, time: &str) -> Vec<String> {
     let scale = &of.scale;
     let fitted = of.law.map(|PowerLaw { exponent, exponent_error, count, goodness, .. }| {
         let error = exponent_error.map_or(String::new(), |error| format!(", standard error {}", significant(error)));
@@ -316,13 +316,13 @@ fn law(of: &Scaling) -> Vec<String> {
         });
         match fit {
             Some(fit) if of.is_rejected() => {
-                format!("median t_relax is no power of {scale}: {fit}; the nearest power is {exponent}")
+                format!("median {time} is no power of {scale}: {fit}; the nearest power is {exponent}")
             }
-            Some(fit) => format!("median t_relax scales as {scale} to the power {exponent}; {fit}"),
+            Some(fit) => format!("median {time} scales as {scale} to the power {exponent}; {fit}"),
             None => {
                 let why =
                     if count < 3 { "two cells do not test it" } else { "without sampling errors it is not tested" };
-                format!("median t_relax scales as {scale} to the power {exponent}; {why}")
+                format!("median {time} scales as {scale} to the power {exponent}; {why}")
             }
         }
     });
@@ -376,10 +376,10 @@ fn significant(value: f64) -> String {
 mod tests {
     use super::*;
     use crate::{
-        ensemble::Status,
+        ensemble::{Outcome, Status},
         files::names,
         results::{provenance::tests::platform, tally::tests::outcome},
-        statistics::SignedRank,
+        statistics::{Limit, SignedRank},
     };
 
     fn overview(tally: &Tally) -> String {
@@ -414,6 +414,32 @@ wall time  12.3 s
 results    out: summary.csv, run.json
 ";
         assert_eq!(overview(&tally), expected);
+    }
+
+    #[test]
+    fn errors_look_like_this() {
+        let mut tally = Tally::default();
+        for (member, t) in (0..40_u32).map(|member| (u64::from(member), 0.5 + 0.01 * f64::from(member))) {
+            let judged =
+                Limit { t: 1.02 * t, error: 1e-4 * t, order: Some(2.0), asymptotic: member > 0, relative: -0.02 };
+            let judged = (member < 4).then_some(judged);
+            tally.add(&Outcome { judged, ..outcome(member, Status::Relaxed, Some(t)) }).unwrap();
+        }
+        let told = |tally: &Tally| {
+            let text = overview(tally);
+            text.lines().find(|line| line.starts_with("error")).unwrap().to_string()
+        };
+        let about = "discretisation about -2 % (± 0.0098 %, by 4 members)";
+        let some = told(&tally);
+        assert!(
+            some.ends_with(&format!("{about}; times of 1 of them do not converge yet in n: use more --points")),
+            "{some}"
+        );
+        tally.cells[0].judged.iter_mut().for_each(|limit| limit.asymptotic = true);
+        // Sampling is the larger one here.
+        assert!(told(&tally).ends_with(about), "{}", told(&tally));
+        tally.cells[0].judged.iter_mut().for_each(|limit| limit.relative = -0.2);
+        assert!(told(&tally).ends_with(", the larger of the two: use --accurate"), "{}", told(&tally));
     }
 
     #[test]
@@ -474,18 +500,18 @@ results    out: summary.csv, run.json
             left_out: Vec::new(),
         };
         let holds = "median t_relax scales as amplitude to the power -0.2500, standard error 0.01000";
-        assert_eq!(law(&of(Some(0.25), 5)), [format!("{holds}; chi2 = 12.50 (3), p = 0.25")]);
+        assert_eq!(law(&of(Some(0.25), 5), "t_relax"), [format!("{holds}; chi2 = 12.50 (3), p = 0.25")]);
         let rejected = "median t_relax is no power of amplitude: chi2 = 12.50 (3), p = 1.0e-7; the nearest power is -0.2500, \
                         standard error 0.01000";
-        assert_eq!(law(&of(Some(1e-7), 5)), [rejected]);
-        assert_eq!(law(&of(None, 2)), [format!("{holds}; two cells do not test it")]);
-        assert_eq!(law(&of(None, 4)), [format!("{holds}; without sampling errors it is not tested")]);
+        assert_eq!(law(&of(Some(1e-7), 5), "t_relax"), [rejected]);
+        assert_eq!(law(&of(None, 2), "t_relax"), [format!("{holds}; two cells do not test it")]);
+        assert_eq!(law(&of(None, 4), "t_relax"), [format!("{holds}; without sampling errors it is not tested")]);
         let none = Scaling { law: None, left_out: vec![(3, "its median is 0")], ..of(None, 0) };
         let lines = [
             "no power of amplitude is fitted: too few cells have a median",
             "not in the fit: cell 3 (its median is 0)",
         ];
-        assert_eq!(law(&none), lines);
+        assert_eq!(law(&none, "t_relax"), lines);
     }
 
     #[test]

@@ -196,7 +196,10 @@ impl FinishedRun<'_> {
     fn dependence(&self) -> Option<Chart> {
         let (axis, others) = self.spec().sweep.axes().split_last()?;
         let numbers = axis.numbers();
-        let cells = &self.statistics.cells;
+        let EnsembleStatistics { cells, of_limits, .. } = self.statistics;
+        let of_cell = |cell: &CellStatistics| {
+            cell.judged_median(*of_limits).map(|(value, interval)| EstimatedNumber { value, interval })
+        };
         let series = cells.chunks(axis.values.len().max(1)).map(|cells| {
             let values = &cells[0].values[..others.len()];
             let named = others.iter().zip(values).map(|(other, value)| format!("{} = {value}", other.key));
@@ -205,7 +208,7 @@ impl FinishedRun<'_> {
                     Some(numbers) => Setting::Number(numbers[rank]),
                     None => Setting::Name(cell.values[others.len()].clone()),
                 },
-                median: limit(cell).or_else(|| median(cell)),
+                median: of_cell(cell),
                 quartiles: quartiles(cell),
             };
             let mut levels: Vec<DependencePoint> = cells.iter().enumerate().map(level).collect();
@@ -227,11 +230,11 @@ impl FinishedRun<'_> {
         let other_key = others.iter().map(|other| other.key.as_str()).collect::<Vec<_>>().join(", ");
         let left_out = self.statistics.scaling.as_ref().map(Scaling::told).filter(|told| !told.is_empty());
         let left_out = left_out.map_or(String::new(), |told| format!(". Not in the fit: {told}"));
-        let has_limits = cells.iter().any(|cell| limit(cell).is_some());
-        let of_limits = if has_limits { ". Medians of t_limit" } else { "" };
-        let (note, series) = (format!("{}{of_limits}{left_out}", self.what_and_error()), series.collect());
+        let (note, series) = (format!("{}{left_out}", self.what_and_error()), series.collect());
         let (key, across, time) = (&axis.key[..], None, None);
-        let svg = Dependence { title: &title, note: &note, key, other_key: &other_key, series, across, time }.draw();
+        let quantity = self.statistics.time();
+        let svg = Dependence { title: &title, note: &note, quantity, key, other_key: &other_key, series, across, time };
+        let svg = svg.draw();
         let caption = "Median with its 95 % bootstrap interval (thick) and the middle half of the members (thin).";
         Some(chart(names::DEPENDENCE, &title, caption, svg))
     }
@@ -371,14 +374,16 @@ impl FinishedRun<'_> {
                 }
             }
             _ => {
-                let medians: Vec<f64> = cells.iter().filter_map(CellStatistics::median).collect();
+                let of_limits = self.statistics.of_limits;
+                let medians = cells.iter().filter_map(|cell| cell.judged_median(of_limits));
+                let medians: Vec<f64> = medians.map(|(median, _)| median).collect();
                 let range = [f64::min, f64::max].map(|of| medians.iter().copied().reduce(of));
                 let shown = match range {
                     [Some(low), Some(high)] => format!("{} to {}", significant(low, 3), significant(high, 3)),
                     _ => "not reached".into(),
                 };
                 let note = format!("over {} cells", cells.len());
-                headline.push(Headline { label: "median t_relax".into(), value: shown, note });
+                headline.push(Headline { label: format!("median {}", self.statistics.time()), value: shown, note });
                 headline.extend(scaling.as_ref().and_then(power));
                 headline.extend(compared(comparison));
             }
@@ -542,12 +547,6 @@ fn differing(cells: &[CellDifference]) -> String {
 
 fn median(cell: &CellStatistics) -> Option<EstimatedNumber> {
     cell.median().map(|value| EstimatedNumber { value, interval: cell.bounds() })
-}
-
-/// The median of the limits with its interval for sampling and discretisation, if members have limits.
-fn limit(cell: &CellStatistics) -> Option<EstimatedNumber> {
-    let limits = cell.limits.as_ref()?;
-    limits.median.map(|value| EstimatedNumber { value, interval: limits.interval })
 }
 
 fn quartiles(cell: &CellStatistics) -> (Option<f64>, Option<f64>) {

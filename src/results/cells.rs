@@ -148,6 +148,8 @@ pub struct EnsembleStatistics {
     pub comparison: CellComparison,
     /// The medians as a power of the swept value, if a single scale is swept.
     pub scaling: Option<Scaling>,
+    /// Medians are compared in the limit, if all cells that have a median have that of limits.
+    pub of_limits: bool,
     /// Rates are drawn relative to theory, if all members with a rate have a theoretical one.
     pub relative: bool,
 }
@@ -208,14 +210,15 @@ impl CellStatistics {
         let limits = self.limits.as_ref();
         let of = |number: fn(Mean) -> Option<f64>| limits.and_then(|limits| limits.mean).and_then(number);
         let interval = limits.and_then(|limits| limits.interval);
-        let of_sampling = "end of the 95 % interval of the median, for sampling and discretisation together";
+        let low = "lower end of the 95 % interval of the median, for sampling and discretisation together";
+        let high = "upper end of the 95 % interval of the median, for sampling and discretisation together";
         let named = vec![
             Statistic { name: "mean", value: of(|mean| Some(mean.value)), meaning: "mean, by Kaplan–Meier" },
             Statistic { name: "sd", value: of(|mean| mean.standard_deviation), meaning: "standard deviation" },
             Statistic { name: "se", value: of(|mean| mean.standard_error), meaning: "standard error of the mean" },
             Statistic { name: "median", value: limits.and_then(|limits| limits.median), meaning: "median" },
-            Statistic { name: "median_low", value: interval.map(|(low, _)| low), meaning: of_sampling },
-            Statistic { name: "median_high", value: interval.map(|(_, high)| high), meaning: of_sampling },
+            Statistic { name: "median_low", value: interval.map(|(low, _)| low), meaning: low },
+            Statistic { name: "median_high", value: interval.map(|(_, high)| high), meaning: high },
             Statistic { name: "error", value: limits.and_then(|limits| limits.error), meaning: "mean of t_error" },
         ];
         Numbers { known: limits.map_or(0, |limits| limits.known), named }
@@ -231,6 +234,14 @@ impl CellStatistics {
     pub fn median(&self) -> Option<f64> {
         let [_, _, median, ..] = self.quantiles;
         median
+    }
+
+    /// The median with its interval, that of the limits if they are asked for.
+    pub fn judged_median(&self, of_limits: bool) -> Option<(f64, Option<(f64, f64)>)> {
+        match &self.limits {
+            Some(limits) if of_limits => limits.median.map(|median| (median, limits.interval)),
+            _ => self.median().map(|median| (median, self.bounds())),
+        }
     }
 
     /// Whether all its members relaxed at one time, as copies of one curve do.
@@ -265,14 +276,18 @@ impl EnsembleStatistics {
             Some(paired) => paired,
             None => CellComparison::independent(spec, &samples)?,
         };
-        let medians = cells.iter().map(|cell| CellMedian {
-            cell: cell.cell,
-            value: cell.median(),
-            bounds: cell.bounds(),
-            has_copies: cell.has_copies(),
+        let of_limits = spec.refine && cells.iter().all(|cell| cell.median().is_none() || cell.limits.is_some());
+        let medians = cells.iter().map(|cell| {
+            let (value, bounds) = cell.judged_median(of_limits).unzip();
+            CellMedian { cell: cell.cell, value, bounds: bounds.flatten(), has_copies: cell.has_copies() }
         });
         let scaling = Scaling::of(&spec.sweep, &medians.collect::<Vec<_>>());
-        Ok(EnsembleStatistics { cells, comparison, scaling, relative })
+        Ok(EnsembleStatistics { cells, comparison, scaling, relative, of_limits })
+    }
+
+    /// The time whose medians are compared.
+    pub fn time(&self) -> &'static str {
+        if self.of_limits { "t_limit" } else { "t_relax" }
     }
 
     /// The columns of `ensemble.csv`.

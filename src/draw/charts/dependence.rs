@@ -36,6 +36,8 @@ pub struct Dependence<'a> {
     pub title: &'a str,
     /// A sentence below it, or nothing.
     pub note: &'a str,
+    /// The time that is drawn, t_relax or its limit.
+    pub quantity: &'a str,
     /// The key.
     pub key: &'a str,
     /// Name of the quantity that distinguishes the series, for the colour bar that replaces the legend if there are
@@ -217,7 +219,7 @@ impl Dependence<'_> {
 
     fn time_axis(&self) -> Axis {
         let times: Vec<f64> = self.levels().flat_map(DependencePoint::times).collect();
-        let axis = Axis::over("t_relax", TIME, self.scale(self.time, &times), times.iter().copied());
+        let axis = Axis::over(self.quantity, TIME, self.scale(self.time, &times), times.iter().copied());
         match range(times) {
             Some((low, high)) if low >= 0.0 && low < 0.5 * high => axis.with_zero(),
             _ => axis,
@@ -341,7 +343,11 @@ impl Dependence<'_> {
         let fit = self.series.iter().find_map(Series::law).map(|fit| {
             let exponent = if several { String::new() } else { format!(", p = {}", fit.exponent.shown()) };
             let verdict = if fit.rejected { "; χ² rejects a power law" } else { "" };
-            Entry::new(neutral, LegendMark::Dashed, &format!("fit: t_relax ∝ {}ᵖ{exponent}{verdict}", self.key))
+            Entry::new(
+                neutral,
+                LegendMark::Dashed,
+                &format!("fit: {} ∝ {}ᵖ{exponent}{verdict}", self.quantity, self.key),
+            )
         });
         series.chain(median).chain(interval).chain(quartiles).chain(beyond).chain(fit).collect()
     }

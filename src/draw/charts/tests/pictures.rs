@@ -203,7 +203,17 @@ pub fn draw_all() -> Vec<(String, String)> {
 
     let depend = |series: Vec<Series>, key: &str| {
         let title = "Relaxation time against amplitude";
-        Dependence { title, note: NOTE, key, other_key: "aspect", series, across: None, time: None }.draw()
+        Dependence {
+            title,
+            note: NOTE,
+            quantity: "t_relax",
+            key,
+            other_key: "aspect",
+            series,
+            across: None,
+            time: None,
+        }
+        .draw()
     };
     add("dependence", depend(vec![amplitudes("all", 0.12, 8)], "amplitude"));
     let mut partial = amplitudes("all", 0.12, 8);
@@ -211,7 +221,13 @@ pub fn draw_all() -> Vec<(String, String)> {
     partial.levels[0].median = None;
     partial.levels[0].quartiles.1 = None;
     partial.levels[1].quartiles.1 = None;
-    let linear = Dependence { title: "Linear axes", key: "amplitude", series: vec![partial], ..Dependence::default() };
+    let linear = Dependence {
+        title: "Linear axes",
+        quantity: "t_relax",
+        key: "amplitude",
+        series: vec![partial],
+        ..Dependence::default()
+    };
     add("dependence-partial", linear.draw());
     let series = |count: usize| -> Vec<Series> {
         (0..count).map(|i| amplitudes(&format!("aspect = {}", i + 1), 0.1 * 1.3_f64.powi(i as i32), 6)).collect()
