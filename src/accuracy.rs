@@ -12,7 +12,7 @@ use crate::{
     error::{Error, Result},
     relax::relax,
     results::{EnsembleStatistics, cells::CellStatistics, tally::Tally},
-    text::{plural, significant},
+    text::{number, plural, rounded},
 };
 
 /// Share of the goal for discretisation, and that for sampling which is aimed at: the rest is for what a round of fewer
@@ -56,8 +56,7 @@ pub struct Round {
 impl fmt::Display for Round {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Round { number, members, points, tolerance, median, sampling, discretisation, .. } = self;
-        let [median, sampling, discretisation] =
-            [*median, *sampling, *discretisation].map(|value| significant(value, 3));
+        let [median, sampling, discretisation] = [*median, *sampling, *discretisation].map(|value| rounded(value, 3));
         let tolerance = tolerance.map_or(String::new(), |tolerance| format!(", tolerance {tolerance:e}"));
         write!(
             f,
@@ -87,11 +86,11 @@ impl Sink for RoundSums {
 pub fn plan(spec: Spec, mut tell: impl FnMut(&Round)) -> Result<Spec> {
     let Some(goal) = spec.accuracy else { return Ok(spec) };
     let mut spec = spec.validate()?;
-    let refuse = |problem: &str, remedy: &str| Err(Error::value("accuracy", significant(goal, 3), problem, remedy));
+    let refuse = |problem: &str, remedy: &str| Err(Error::value("accuracy", number(goal), problem, remedy));
     for number in 1..=MAX_ROUNDS {
         let round = Round { number, ..round(&spec)? };
         tell(&round);
-        let reached = significant(round.sampling + round.discretisation, 2);
+        let reached = rounded(round.sampling + round.discretisation, 2);
         if round.discretisation > DISCRETISATION * goal || round.unruly > UNRULY {
             if spec.points >= MAX_NODES {
                 let problem = format!("at n = {} the uncertainty of discretisation is still {reached}", spec.points);

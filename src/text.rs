@@ -30,6 +30,12 @@ pub fn number(value: f64) -> String {
     }
 }
 
+/// `value` rounded to `digits` significant digits, as a person would type it.
+pub fn rounded(value: f64, digits: usize) -> String {
+    let scientific = format!("{value:.*e}", digits.max(1) - 1);
+    scientific.parse().map_or_else(|_| value.to_string(), number)
+}
+
 /// A probability with its sign: `p = 0.35`, `p = 2.1e-19`. It is never 0.
 pub fn p_value(p: f64) -> String {
     match p {

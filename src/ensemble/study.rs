@@ -109,8 +109,8 @@ impl Study {
         let mut cells: Vec<Cell> = Vec::new();
         for cell in own {
             let Ok(spec) = cell.at(level) else { continue };
-            let other = cells.iter().rfind(|other| same_curve(&other.spec, &spec));
-            let family = match other {
+            let others = || [cell].into_iter().chain(cells.iter().rev());
+            let family = match others().find(|other| same_curve(&other.spec, &spec)) {
                 Some(other) => Family::like(&other.family, &spec)?,
                 None => Family::resampled(&cell.family, &spec)?,
             };

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    text::number,
+    text::{number, rounded},
 };
 
 /// The cap of `--t-end auto` over the time that theory expects: it covers members that differ from the curve of the
@@ -49,9 +49,9 @@ pub fn warnings(spec: &Spec, scale: &CurveScale) -> Vec<String> {
     [far_omega(spec, omega), far_tau(spec, tau), far_end(spec, scale)].into_iter().flatten().collect()
 }
 
-/// A number to three digits, as a person would type it.
+/// To three digits.
 fn short(value: f64) -> String {
-    format!("{value:.2e}").parse().map_or_else(|_| value.to_string(), number)
+    rounded(value, 3)
 }
 
 fn far_omega(spec: &Spec, own: f64) -> Option<String> {

@@ -17,7 +17,7 @@ use crate::{
         tally::Tally,
     },
     statistics::{GoodnessOfFit, LogRank, PowerLaw},
-    text::{self, duration, number, p_value, plural},
+    text::{duration, number, p_value, plural, rounded},
 };
 
 /// Maximum number of cells listed; the table has them all.
@@ -288,7 +288,7 @@ fn errors(cell: &CellStatistics, spec: &Spec) -> String {
         return format!("{sampling}discretisation not known: no member relaxed with n and with n/2 nodes");
     };
     let known = plural(members as u64, "member");
-    let percent = |value: f64| text::significant(100.0 * value, 2);
+    let percent = |value: f64| rounded(100.0 * value, 2);
     let about =
         format!("{sampling}discretisation about {} % (± {} %, by {members} {known})", percent(mean), percent(error));
     let half = cell.bounds().zip(cell.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
