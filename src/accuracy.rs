@@ -25,7 +25,7 @@ const MAX_NODES: usize = 1600;
 /// Largest ratio of members to those of the round that they are extrapolated from, and of rounds to each other.
 const FARTHEST: f64 = 8.0;
 /// Largest share of members that may not converge yet.
-const UNRULY: f64 = 0.02;
+const UNRULY: f64 = 0.05;
 /// The error of a limit goes with this power of n.
 const ORDER: f64 = 4.0;
 /// Largest growth of n between rounds.

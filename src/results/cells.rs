@@ -219,7 +219,7 @@ impl CellStatistics {
             Statistic { name: "median", value: limits.and_then(|limits| limits.median), meaning: "median" },
             Statistic { name: "median_low", value: interval.map(|(low, _)| low), meaning: low },
             Statistic { name: "median_high", value: interval.map(|(_, high)| high), meaning: high },
-            Statistic { name: "error", value: limits.and_then(|limits| limits.error), meaning: "mean of t_error" },
+            Statistic { name: "error", value: limits.and_then(|limits| limits.error), meaning: "median of t_error" },
         ];
         Numbers { known: limits.map_or(0, |limits| limits.known), named }
     }

@@ -27,7 +27,8 @@ impl DiscretisationError {
         let relative = Description::new(judged.iter().map(|limit| limit.relative))?;
         let bars = Description::new(judged.iter().map(Limit::relative_error))?;
         let sampling = HALF_INTERVAL * relative.standard_error().unwrap_or(0.0);
-        Ok(relative.mean().zip(bars.mean()).map(|(mean, bar)| DiscretisationError {
+        // The few that do not converge yet are counted, and not typical.
+        Ok(relative.mean().zip(bars.median()).map(|(mean, bar)| DiscretisationError {
             members: judged.len(),
             mean,
             error: sampling + bar,
@@ -47,7 +48,7 @@ pub struct CellLimits {
     pub median: Option<f64>,
     /// Its 95 % interval, for sampling and discretisation together.
     pub interval: Option<(f64, f64)>,
-    /// Mean of the half-widths of the members' own intervals.
+    /// Median of the half-widths of the members' own intervals.
     pub error: Option<f64>,
 }
 
@@ -58,7 +59,7 @@ impl CellLimits {
             return Ok(None);
         }
         let survival = KaplanMeier::new(sample);
-        let error = Description::new(judged.iter().map(|limit| limit.error))?.mean();
+        let error = Description::new(judged.iter().map(|limit| limit.error))?.median();
         // Errors of discretisation have one sign for all members: they do not average out.
         let wider = |Interval { lower, upper, .. }| Some((lower? - error?, upper? + error?));
         // One member has an interval, too: that of its own error.
