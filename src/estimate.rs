@@ -125,14 +125,15 @@ impl Estimate {
         let (stages, cells) = (study.stages(), study.cells());
         let members = study.member_count();
         let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
-        // Own members come first, so that those of the levels do not count in it.
-        let (mut slots, mut resident, mut peak) = (0, 0, None);
+        let (mut slots, mut resident) = (0, 0);
         let mut rows = [0.0_f64; 2];
         let (every, count) = (stages.len().div_ceil(MAX_PILOTS), stages.len());
         let budget = PILOT / count.div_ceil(every).max(1) as u32;
         let (mut own, mut levels) = (CohortWork::none(), CohortWork::none());
-        // Backwards, so that the last stage, which has the study's own members, always has a pilot.
-        for (stage, choice) in stages.iter().zip(choices).rev().step_by(every) {
+        // Counted backwards, so that the last stage, which has the study's own members, always has a pilot.
+        let mut sampled: Vec<_> = stages.iter().zip(choices).rev().step_by(every).collect();
+        sampled.reverse();
+        for (stage, choice) in sampled {
             let mut cells = study.cells_of(stage)?.into_owned();
             let precision = choice.precision();
             let started = Instant::now();
@@ -150,7 +151,6 @@ impl Estimate {
             rows = [0, 1].map(|i| rows[i].max(of_member[i]));
             resident = resident.max(most.min(backend.slots() as u64) as usize);
             own.add(&work);
-            peak = peak_resident();
         }
         let platform = opened.ok_or_else(|| Error::Failed("a study has no cell".into()))?;
         // Stages without a pilot are assumed to be like those with one.
@@ -176,7 +176,6 @@ impl Estimate {
                 rows,
                 cells[0].spec.points,
                 seconds.is_none_or(|seconds| seconds > FIRST_STATE),
-                peak,
             ) + level_members * size_of::<(u64, f64)>() as u64,
             platform,
             slots,
@@ -420,7 +419,7 @@ fn choose(cohort: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) {
     }
 }
 
-/// Peak resident size in bytes of a run of `members` of `n` nodes, from the `peak` of this process, which had `resident` of
+/// Peak resident size in bytes of a run of `members` of `n` nodes, from that of this process, which had `resident` of
 /// up to `slots` members in its pool. `rows` are the bytes of rows of a member at its end, and in this process: above
 /// [`MAX_HELD`] for the whole pool they go to disk. Checkpoints may be saved during the run (`kept`).
 ///
@@ -428,15 +427,7 @@ fn choose(cohort: &mut [Cell], own: &[Option<Vec<u64>>], all: u64, count: u64) {
 /// but no pool. For each member the tally has its time and two numbers of half size about its mesh; for a fraction
 /// `rated` also its rate and that of theory. Times are sorted in place, and rates one number at a time; the number that
 /// is drawn replaces them. A chart sorts the numbers that it shows.
-fn memory(
-    members: u64,
-    rated: f64,
-    [slots, resident]: [usize; 2],
-    rows: [f64; 2],
-    n: usize,
-    kept: bool,
-    peak: Option<u64>,
-) -> u64 {
+fn memory(members: u64, rated: f64, [slots, resident]: [usize; 2], rows: [f64; 2], n: usize, kept: bool) -> u64 {
     let numbers = |count: usize| (count * size_of::<f64>()) as u64;
     let pool = |slots: usize| numbers(POOL_NUMBERS * n * slots);
     let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MAX_PANELS);
@@ -449,7 +440,7 @@ fn memory(
     let statistics = fitted.max(charted);
     let held = |each: f64, members: usize| (each * members as f64).min(MAX_HELD as f64) as u64;
     let in_pilot = pool(resident) + held(rows[1], resident);
-    let program = peak.map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(in_pilot));
+    let program = peak_resident().map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(in_pilot));
     let full = usize::try_from(members).unwrap_or(usize::MAX).min(slots);
     let all_held = held(rows[0], full);
     let spilling = if all_held < MAX_HELD as u64 { 0 } else { SPILL_BYTES };
