@@ -128,7 +128,9 @@ impl Estimate {
         let (mut slots, mut resident) = (0, 0);
         let mut rows = [0.0_f64; 2];
         let (every, count) = (stages.len().div_ceil(MAX_PILOTS), stages.len());
-        let budget = PILOT / count.div_ceil(every).max(1) as u32;
+        // Half of the time is for the study's own members.
+        let of_levels = stages.iter().rev().step_by(every).filter(|stage| stage.level.is_some()).count();
+        let shares = [count.div_ceil(every) - of_levels, of_levels].map(|stages| PILOT / 2 / stages.max(1) as u32);
         let (mut own, mut levels) = (CohortWork::none(), CohortWork::none());
         // Counted backwards, so that the last stage, which has the study's own members, always has a pilot.
         let mut sampled: Vec<_> = stages.iter().zip(choices).rev().step_by(every).collect();
@@ -140,6 +142,7 @@ impl Estimate {
             let (mut backend, platform) = choice.open_for(&cells)?;
             start_up += started.elapsed().as_secs_f64();
             let mut seen = Pilot::default();
+            let budget = shares[usize::from(stage.level.is_some())];
             let (work, most, of_member) = sample(&mut cells, precision, backend.as_mut(), budget, &mut seen)?;
             if stage.level.is_some() {
                 levels.add(&work);
@@ -160,7 +163,11 @@ impl Estimate {
             seen => all as f64 / seen,
         });
         start_up *= every as f64;
-        let sum = |of: fn(&CohortWork) -> Option<f64>| Some(scale * of(&own)? + scale_levels * of(&levels)?);
+        // A member of a level of which nothing is known costs what an own one does.
+        let sum = |of: fn(&CohortWork) -> Option<f64>| {
+            let all = scale * of(&own)?;
+            Some(all + of(&levels).map_or(all * level_members as f64 / members as f64, |work| scale_levels * work))
+        };
         let seconds = sum(|work| work.seconds);
         // If none has ended yet, all may have one.
         let rated = if pilot.ended == 0 { 1.0 } else { pilot.rated as f64 / pilot.ended as f64 };
