@@ -8,7 +8,7 @@
 use std::fmt;
 
 use crate::{
-    ensemble::{Ended, Sink, Spec, Study, spec::BackendChoice},
+    ensemble::{Ended, LevelTimes, Sink, Spec, Study, spec::BackendChoice},
     error::{Error, Result},
     relax::relax,
     results::{EnsembleStatistics, cells::CellStatistics, tally::Tally},
@@ -30,6 +30,10 @@ const UNRULY: f64 = 0.05;
 const ORDER: f64 = 4.0;
 /// Largest growth of n between rounds.
 const MAX_FINER: f64 = 2.0;
+/// Fewest members of a round, unless all are the same.
+const MIN_MEMBERS: u64 = 16;
+/// Uncertainties below this are rounding.
+const ROUNDING: f64 = 1e-12;
 /// More rounds mean that the uncertainty does not fall.
 const MAX_ROUNDS: usize = 12;
 
@@ -53,11 +57,19 @@ pub struct Round {
     unruly: f64,
 }
 
+impl Round {
+    /// Whether its median is that of the same members with fewer nodes, as far as their errors allow.
+    fn agrees_with(&self, coarse: &Round, goal: f64) -> bool {
+        let apart = (self.median / coarse.median - 1.0).abs();
+        apart <= (self.discretisation + coarse.discretisation).max(0.5 * DISCRETISATION * goal)
+    }
+}
+
 impl fmt::Display for Round {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Round { number, members, points, tolerance, median, sampling, discretisation, .. } = self;
         let [median, sampling, discretisation] = [*median, *sampling, *discretisation].map(|value| rounded(value, 3));
-        let tolerance = tolerance.map_or(String::new(), |tolerance| format!(", tolerance {tolerance:e}"));
+        let tolerance = tolerance.map_or(String::new(), |tolerance| format!(", tolerance {}", rounded(tolerance, 2)));
         write!(
             f,
             "round {number}: {members} {} of n = {points}{tolerance}: median {median}, relative \
@@ -67,51 +79,79 @@ impl fmt::Display for Round {
     }
 }
 
-/// Collects the statistics of a round.
-#[derive(Default)]
-struct RoundSums(Tally);
+/// Collects the statistics of a round, unless it is asked to stop.
+struct RoundSums<'a> {
+    tally: Tally,
+    stopped: &'a dyn Fn() -> Option<Error>,
+}
 
-impl Sink for RoundSums {
+impl Sink for RoundSums<'_> {
     fn member(&mut self, ended: &Ended) -> Result<()> {
-        self.0.add(&ended.outcome)
+        self.tally.add(&ended.outcome)
+    }
+
+    fn progress(&mut self, _: u64, _: u64, _: f64) -> Result<()> {
+        (self.stopped)().map_or(Ok(()), Err)
     }
 }
 
-/// Returns `spec` with the nodes, tolerance and members that reach its goal, if it has one; `tell` hears of every round.
-/// The numbers of `spec` are those of the first round, and the least that are chosen.
+/// Returns `spec` with the nodes, tolerance and members that reach its goal, if it has one; `tell` hears of every round,
+/// and an error of `stopped` ends them. The numbers of `spec` are those of the first round, and the least that are
+/// chosen.
 ///
 /// # Errors
 /// [`Error::Request`] for a goal that needs more members or nodes than this program would run, or that cannot be judged,
-/// with what was reached.
-pub fn plan(spec: Spec, mut tell: impl FnMut(&Round)) -> Result<Spec> {
+/// with what was reached; and that of `stopped`.
+pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Option<Error>) -> Result<Spec> {
     let Some(goal) = spec.accuracy else { return Ok(spec) };
     let mut spec = spec.validate()?;
+    if spec.amplitude > 0.0 {
+        spec.curves = spec.curves.max(MIN_MEMBERS);
+    }
     let refuse = |problem: &str, remedy: &str| Err(Error::value("accuracy", number(goal), problem, remedy));
-    for number in 1..=MAX_ROUNDS {
-        let round = Round { number, ..round(&spec)? };
+    // The round with fewer nodes, whose error is to be confirmed by one with more.
+    let mut before: Option<(Spec, Round)> = None;
+    for count in 1..=MAX_ROUNDS {
+        let round = Round { number: count, ..round(&spec, &stopped)? };
         tell(&round);
-        let reached = rounded(round.sampling + round.discretisation, 2);
+        let reached = rounded(round.discretisation, 2);
         if round.discretisation > DISCRETISATION * goal || round.unruly > UNRULY {
             if spec.points >= MAX_NODES {
                 let problem = format!("at n = {} the uncertainty of discretisation is still {reached}", spec.points);
                 return refuse(&problem, "use a larger number");
             }
-            spec = finer(spec, &round, goal)?;
+            (spec, before) = (finer(spec, &round, goal)?, None);
             continue;
         }
-        // At least one member more than none.
-        let needed = (round.members as f64 * (round.sampling / (SAMPLING * goal)).powi(2)).ceil();
+        let confirmed = before.take().filter(|(_, coarse)| round.agrees_with(coarse, goal));
+        let Some((chosen, coarse)) = confirmed else {
+            let points = (spec.points as f64 * std::f64::consts::SQRT_2).round() as usize;
+            let next = Spec { points, ..spec.clone() }.validate()?;
+            before = Some((std::mem::replace(&mut spec, next), round));
+            continue;
+        };
+        let needed = (coarse.members as f64 * (coarse.sampling / (SAMPLING * goal)).powi(2)).ceil();
         if needed > MAX_MEMBERS {
             let problem = format!(
                 "it needs about {needed:.1e} members in each cell, and more than {MAX_MEMBERS:.0e} is too many"
             );
-            return refuse(&problem, &format!("{reached} was reached with {}; use a larger number", round.members));
+            let reached = rounded(coarse.sampling + coarse.discretisation, 2);
+            return refuse(&problem, &format!("{reached} was reached with {}; use a larger number", coarse.members));
         }
-        let farthest = FARTHEST * round.members as f64;
-        spec.curves = (needed.min(farthest) as u64).max(spec.curves);
+        let farthest = FARTHEST * coarse.members as f64;
+        spec = Spec { curves: (needed.min(farthest) as u64).max(chosen.curves), ..chosen };
         if needed <= farthest {
             return Ok(spec);
         }
+        // More of the same members: n is known to do.
+        let round = Round { number: count, ..self::round(&spec, &stopped)? };
+        tell(&round);
+        let needed = (round.members as f64 * (round.sampling / (SAMPLING * goal)).powi(2)).ceil();
+        if needed > MAX_MEMBERS.min(FARTHEST * round.members as f64) {
+            let problem = format!("it needs about {needed:.1e} members in each cell");
+            return refuse(&problem, &format!("begin with --curves {} or more", round.members));
+        }
+        return Ok(Spec { curves: (needed as u64).max(spec.curves), ..spec });
     }
     refuse(&format!("not reached in {MAX_ROUNDS} rounds"), "use a larger number, or more --points")
 }
@@ -126,13 +166,13 @@ fn finer(spec: Spec, round: &Round, goal: f64) -> Result<Spec> {
 }
 
 /// Runs the study, and returns the cell that is farthest from its limit.
-fn round(spec: &Spec) -> Result<Round> {
+fn round(spec: &Spec, stopped: &dyn Fn() -> Option<Error>) -> Result<Round> {
     let here = Spec { backend: BackendChoice::Cpu, adapter: None, shard: None, accuracy: None, ..spec.clone() };
     let here = Spec { series: None, snapshots: Vec::new(), store: Spec::default().store, ..here };
-    let mut sums = RoundSums::default();
     let study = Study::new(here)?;
+    let mut sums = RoundSums { tally: Tally::of(study.spec(), &LevelTimes::default()), stopped };
     relax(&study, &mut sums)?;
-    let statistics = EnsembleStatistics::new(study.spec(), &mut sums.0)?;
+    let statistics = EnsembleStatistics::new(study.spec(), &mut sums.tally)?;
     let rounds = statistics.cells.iter().map(|cell| of_cell(spec, cell)).collect::<Result<Vec<_>>>()?;
     let width = |round: &Round| round.sampling + round.discretisation;
     let worst = rounds.into_iter().max_by(|one, other| width(one).total_cmp(&width(other)));
@@ -159,7 +199,7 @@ fn of_cell(spec: &Spec, cell: &CellStatistics) -> Result<Round> {
         points: spec.points,
         tolerance: spec.adaptive,
         median,
-        sampling: (total - discretisation).max(0.0),
+        sampling: Some(total - discretisation).filter(|sampling| *sampling > ROUNDING).unwrap_or(0.0),
         discretisation,
         unruly,
     })

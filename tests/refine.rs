@@ -153,8 +153,11 @@ fn what_cannot_be_refined_is_refused_with_the_reason() {
     };
     let base = Spec { refine: true, adaptive: Some(1e-3), backend: BackendChoice::Cpu, ..Spec::default() };
     for (wrong, part) in [
-        (Spec { points: 10, modes: "2..=2".to_string().try_into().unwrap(), ..base.clone() }, "with 5 nodes"),
-        (Spec { points: 40, ..base.clone() }, "20 nodes resolve no mode above 5"),
+        (
+            Spec { points: 10, modes: "2..=2".to_string().try_into().unwrap(), ..base.clone() },
+            "n/2 = 5 nodes are too few",
+        ),
+        (Spec { points: 40, ..base.clone() }, "use 64 or more"),
         (Spec { accuracy: Some(0.0), ..base.clone() }, "--accuracy 0"),
         (Spec { accuracy: Some(-1.0), ..base.clone() }, "--accuracy -1"),
         (Spec { accuracy: Some(1e-300), ..base.clone() }, "use a number from"),
@@ -174,7 +177,7 @@ fn a_run_whose_error_cannot_be_told_says_why() {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
     let output = command.args(flags.split_whitespace()).current_dir(home.path()).output().unwrap();
     let told = String::from_utf8_lossy(&output.stdout);
-    assert!(told.contains("discretisation not known: no member relaxed with n and with n/2 nodes"), "{told}");
+    assert!(told.contains("discretisation not known: no member has times at n, n/√2 and n/2 nodes"), "{told}");
     assert_eq!(fs::read_to_string(home.path().join("out/levels.csv")).unwrap().lines().count(), 1);
     assert_eq!(field(&home.path().join("out/ensemble.csv"), "discretisation_known"), "0");
 }

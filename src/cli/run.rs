@@ -66,7 +66,14 @@ pub struct RunArgs {
 pub fn run(args: RunArgs) -> Result<()> {
     let spec = resolve(args.spec, args.flags)?;
     let asked = spec.backend;
-    let spec = accuracy::plan(spec, |round| args.manner.say(&round.to_string()))?;
+    let runs = !(args.print_spec || args.dry_run);
+    // Rounds take time, too.
+    let manner = if spec.accuracy.is_some() && runs { Some(args.manner.manner()?) } else { None };
+    let stopped = || {
+        let (cause, _) = manner.as_ref()?.stop.asked()?;
+        Some(cause.error(" in the rounds of --accuracy, before the run began: nothing is saved"))
+    };
+    let spec = accuracy::plan(spec, |round| args.manner.say(&round.to_string()), stopped)?;
     let mut work = Work::new(spec)?;
     if args.print_spec {
         return print(&work.study.spec().to_toml()?);
@@ -88,7 +95,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     if let Some(begun) = begun {
         return resume::resume_like(begun, &work.study, asked, flags);
     }
-    let manner = flags.manner()?;
+    let manner = manner.map_or_else(|| flags.manner(), Ok)?;
     let existing = if args.resume { Existing::Filled } else { args.force.into() };
     let folder = OutputFolder::open(&out, existing)?;
     let platform = work.open(&flags)?;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Outcome, Spec, Status,
-    spec::{BackendChoice, Order, Pace, Precision, SolverChoice, Sor, Store},
+    spec::{BackendChoice, FinalTime, Order, Pace, Precision, SolverChoice, Sor, Store},
     validate::tightest_adaptive,
 };
 use crate::{
@@ -23,6 +23,9 @@ const PILOT: u64 = 16;
 const PILOT_SHARE: u64 = 16;
 /// How much more exact the steps of a level are.
 const FINER: f64 = 10.0;
+/// How much later a level ends, and the latest time at all.
+const LONGER: f64 = 2.0;
+const LATEST: f64 = 1e300;
 /// Tolerance of the steps of a level beside fixed ones.
 const EXACT: f64 = 1e-4;
 
@@ -64,6 +67,8 @@ impl RefinementLevel {
             points: self.points(of.points),
             adaptive: Some(tolerance(of)),
             tau: None,
+            // A member that relaxes just in time needs longer where nodes are few.
+            t_end: Some(FinalTime::At((LONGER * of.final_time()).min(LATEST))),
             stop_when_relaxed: Some(true),
             series: None,
             snapshots: Vec::new(),

@@ -264,6 +264,9 @@ pub struct Cell {
 const LONG_SWEEPS: &str = "plain sweeps need more iterations the longer the step, and adaptive steps grow: a solve \
                            may need tens of thousands, where --solver multigrid needs a few hundred and direct none";
 
+/// How many times more nodes are looked for where so few cannot be refined.
+const MOST_MORE: usize = 8;
+
 /// The properties that members must share to run side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cohort {
@@ -324,15 +327,23 @@ impl Cell {
         if !self.spec.refine {
             return Ok(());
         }
-        let fault = RefinementLevel::ALL.into_iter().find_map(|level| Some((level, self.at(level).err()?)));
-        match fault {
-            None => Ok(()),
-            Some((level, fault)) => {
-                let n = level.points(self.spec.points);
-                let problem = format!("members must also run with {n} nodes, which cannot be: {fault}");
-                Err(Error::value("refine", true, &problem, "use more --points"))
+        let runs =
+            |spec: &Spec| RefinementLevel::ALL.into_iter().try_for_each(|level| self.resampled(spec, level).map(drop));
+        let Err(fault) = runs(&self.spec) else { return Ok(()) };
+        let n = self.spec.points;
+        let more = (n + 1..=MOST_MORE * n).find(|points| runs(&Spec { points: *points, ..self.spec.clone() }).is_ok());
+        let coarser = format!("n/2 = {} nodes are too few ({fault})", RefinementLevel::Half.points(n));
+        Err(match more {
+            Some(points) => Error::value(
+                "points",
+                n,
+                &format!("--refine also runs members with fewer, and {coarser}"),
+                &format!("use {points} or more"),
+            ),
+            None => {
+                Error::Request(format!("--refine: members must also run with fewer nodes, which cannot be: {fault}"))
             }
-        }
+        })
     }
 
     /// Its spec at a level.
@@ -340,14 +351,19 @@ impl Cell {
     /// # Errors
     /// [`Error::Request`] if its curve has no such level.
     fn at(&self, level: RefinementLevel) -> Result<Spec> {
-        if self.spec.sampling == Sampling::Points {
+        self.resampled(&self.spec, level)
+    }
+
+    /// That of `own`, its spec with any number of points, at a level.
+    fn resampled(&self, own: &Spec, level: RefinementLevel) -> Result<Spec> {
+        if own.sampling == Sampling::Points {
             let (problem, remedy) = ("a file's own points have no coarser resolution", "use --sampling arclength");
             return Err(Error::value("sampling", "points", problem, remedy));
         }
         // Of a member that cannot be halved no level is of use.
-        let half = RefinementLevel::Half.spec(&self.spec)?;
+        let half = RefinementLevel::Half.spec(own)?;
         times::check(&half, self.family.scale(), half.points)?;
-        let spec = level.spec(&self.spec)?;
+        let spec = level.spec(own)?;
         times::check(&spec, self.family.scale(), spec.points)?;
         Ok(spec)
     }

@@ -124,6 +124,11 @@ impl Sweep {
         &self.0
     }
 
+    /// Whether `key` is swept.
+    pub fn has(&self, key: &str) -> bool {
+        self.0.iter().any(|axis| axis.key == key)
+    }
+
     /// Sets the values of a key; flags thus replace what the file says.
     pub fn set(&mut self, axis: SweepAxis) {
         match self.0.iter_mut().find(|own| own.key == axis.key) {

@@ -22,6 +22,8 @@ pub(super) const MAX_STEPS: f64 = 1e9;
 const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
 /// Mobilities with which times, fourth powers of lengths over them, stay finite.
 const MOBILITIES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+/// Keys that are chosen for an uncertainty.
+const CHOSEN: [&str; 3] = ["points", "tau", "adaptive"];
 /// Uncertainties of a median that members by the million, at a thousand nodes, can reach.
 const ACCURACIES: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
 /// The rows of a resident member stay in memory until it ends.
@@ -107,6 +109,10 @@ impl Spec {
             Some(goal) if !self.refine => {
                 let problem = "the error of discretisation is known only with --refine";
                 Err(Error::value("accuracy", number(goal), problem, "add --accurate, or --refine"))
+            }
+            Some(goal) if CHOSEN.into_iter().any(|key| self.sweep.has(key)) => {
+                let problem = "it chooses n and the steps, and a sweep of points, tau or adaptive does, too";
+                Err(Error::value("accuracy", number(goal), problem, "leave out one of the two"))
             }
             Some(goal) if self.only.is_some() => {
                 let problem = "the members are chosen by it, and --only chooses them, too";

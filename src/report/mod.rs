@@ -129,7 +129,7 @@ impl RunReport {
             folder,
             origin,
             points: study.points(),
-            tally: Tally::default(),
+            tally: Tally::of(study.spec(), &LevelTimes::default()),
             films: Vec::new(),
             levels: LevelTimes::default(),
             members: study.member_count(),

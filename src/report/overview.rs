@@ -285,9 +285,15 @@ fn errors(cell: &CellStatistics, spec: &Spec) -> String {
         .bounds()
         .map_or(String::new(), |(low, high)| format!("sampling {} to {}, ", significant(low), significant(high)));
     let Some(DiscretisationError { members, mean, error, not_asymptotic }) = cell.discretisation else {
-        return format!("{sampling}discretisation not known: no member relaxed with n and with n/2 nodes");
+        return format!("{sampling}discretisation not known: no member has times at n, n/√2 and n/2 nodes");
     };
     let known = plural(members as u64, "member");
+    if 2 * not_asymptotic > members {
+        return format!(
+            "{sampling}discretisation not known: times of {not_asymptotic} of {members} {known} do not converge yet in n; \
+             use more --points"
+        );
+    }
     let percent = |value: f64| rounded(100.0 * value, 2);
     let about =
         format!("{sampling}discretisation about {} % (± {} %, by {members} {known})", percent(mean), percent(error));
@@ -407,7 +413,7 @@ all                 4
 
 ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
 t_relax    median 0.5000, mean at least 1.200 (standard error 0.4016) over 2 members that reached it; 2 censored
-error      discretisation not known: no member relaxed with n and with n/2 nodes
+error      discretisation not known: no member has times at n, n/√2 and n/2 nodes
 work       10 steps per member, sweeps 20 for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s

@@ -119,11 +119,10 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
 /// Those of [`Finished::read`].
 pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     let spec = &provenance.spec;
-    let mut tally = Tally::default();
-    (tally.mollified, tally.below_rounding) = (provenance.mollified, provenance.below_rounding);
     let levels = levels(&Place::named(&folder.join(names::LEVELS)), spec)?;
     expected(folder, names::LEVELS, "rows", provenance.levels, levels.rows())?;
-    tally.levels = levels.rows();
+    let mut tally = Tally::of(spec, &levels);
+    (tally.mollified, tally.below_rounding) = (provenance.mollified, provenance.below_rounding);
     for outcome in Summary::open(folder, spec, &levels)? {
         tally.add(&outcome?)?;
     }
@@ -159,8 +158,7 @@ pub fn levels(place: &Place, spec: &Spec) -> Result<LevelTimes> {
 /// # Errors
 /// [`Error::Request`] for rows that are not of a run of `spec`.
 pub fn rows(place: &Place, spec: &Spec, levels: &LevelTimes, aside: Aside) -> Result<Tally> {
-    let mut tally = Tally::default();
-    tally.levels = levels.rows();
+    let mut tally = Tally::of(spec, levels);
     for outcome in Summary::of(place, spec, levels)? {
         tally.add(&outcome?)?;
     }
@@ -224,8 +222,13 @@ impl<'a> Summary<'a> {
         }
         // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
         outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| theory::rate_of(spec, &outcome));
+        let told = (outcome.t_limit, outcome.t_error);
         if let Some((_, spec)) = &self.spec_of {
             self.levels.judge(spec, &mut outcome);
+        }
+        if (outcome.t_limit, outcome.t_error) != told {
+            let (limit, file) = (outcome.t_limit.map_or("nothing".into(), |t| t.to_string()), names::LEVELS);
+            return Err(fields.unexpected_in("t_limit", &format!("{limit}, as {file} has it")));
         }
         Ok(Some(outcome))
     }

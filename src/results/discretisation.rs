@@ -54,17 +54,19 @@ pub struct CellLimits {
 
 impl CellLimits {
     /// Summarises the limits; none if no member has one.
-    pub fn of(sample: &Sample, judged: &[Limit], bootstrap: &Bootstrap) -> Result<Option<CellLimits>> {
+    ///
+    /// `copies` says that all members are one curve.
+    pub fn of(sample: &Sample, judged: &[Limit], bootstrap: &Bootstrap, copies: bool) -> Result<Option<CellLimits>> {
         if sample.events() == 0 {
             return Ok(None);
         }
         let survival = KaplanMeier::new(sample);
         let error = Description::new(judged.iter().map(|limit| limit.error))?.median();
         // Errors of discretisation have one sign for all members: they do not average out.
-        let wider = |Interval { lower, upper, .. }| Some((lower? - error?, upper? + error?));
-        // One member has an interval, too: that of its own error.
-        let alone = || (sample.len() == 1).then(|| sample.last()).flatten();
-        let alone = || alone().zip(error).map(|(t, error)| (t - error, t + error));
+        let wider = |Interval { lower, upper, .. }| Some(((lower? - error?).max(0.0), upper? + error?));
+        // Copies of one curve have an interval, too: that of their own error.
+        let alone = || if copies && sample.len() == 1 { sample.last() } else { None };
+        let alone = || alone().zip(error).map(|(t, error)| ((t - error).max(0.0), t + error));
         Ok(Some(CellLimits {
             known: sample.events(),
             mean: survival.mean(),

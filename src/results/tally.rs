@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::text::{plural, significant};
 use crate::{
-    ensemble::{Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
+    ensemble::{LevelTimes, Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
     error::Result,
     schedule::grid,
     statistics::{Limit, Moments, Observation, Observations},
@@ -23,6 +23,8 @@ pub struct Tally {
     pub sweeps_k: u64,
     /// Total sweeps on position systems.
     pub sweeps_x: u64,
+    /// Whether members are to have limits.
+    pub refined: bool,
     /// Rows of the levels.
     pub levels: u64,
     /// Members whose corners were rounded off before the run.
@@ -211,19 +213,26 @@ impl MollifiedMembers {
 }
 
 impl Tally {
+    /// That of a run of `spec` before its members, after these times at its levels.
+    pub fn of(spec: &Spec, levels: &LevelTimes) -> Tally {
+        Tally { refined: spec.refine, levels: levels.rows(), ..Tally::default() }
+    }
+
     /// Adds a member.
     ///
     /// # Errors
     /// For an invalid time.
     pub fn add(&mut self, outcome: &Outcome) -> Result<()> {
-        let cell = outcome.cell as usize;
+        let (cell, refined) = (outcome.cell as usize, self.refined);
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
         let CellTally { counts, times, others, area, rates, limits, judged, .. } = &mut self.cells[cell];
         times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
-        if outcome.t_limit.is_some() || outcome.t_relax.is_none() {
-            limits.push(Observation::new(outcome.t_limit, outcome.t_end))?;
+        if refined {
+            // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
+            let end = outcome.t_limit.map_or(outcome.t_relax.unwrap_or(outcome.t_end), |_| outcome.t_end);
+            limits.push(Observation::new(outcome.t_limit, end))?;
         }
         judged.extend(outcome.judged);
         *area += outcome.start.area.abs();
@@ -312,6 +321,16 @@ impl Tally {
                 "{} of {members} started so nearly round that rounding hides the threshold: t_relax cannot be \
                  determined; use --precision f64 or a larger --relax-to",
                 self.below_rounding
+            ));
+        }
+        let judged = || self.cells.iter().flat_map(|cell| &cell.judged);
+        let early = judged().filter(|limit| !limit.asymptotic).count();
+        if self.refined && early > 0 {
+            warnings.push(format!(
+                "t_limit of {early} of {} {} is the time at n nodes: their times do not converge yet in n; use more \
+                 --points",
+                judged().count(),
+                plural(judged().count() as u64, "member")
             ));
         }
         let (drifted, worst) = self.drifted;

@@ -14,11 +14,11 @@ const OF_STEPS: f64 = 0.15;
 /// Share of the tolerance of the steps, relative to the time.
 const OF_TOLERANCE: f64 = 0.3;
 /// Observed orders between which differences fall as they should.
-const ORDERS: std::ops::RangeInclusive<f64> = 1.9..=2.25;
+const ORDERS: std::ops::RangeInclusive<f64> = 1.97..=2.2;
 /// Relative differences between the coarsest and the finest resolution: below the first they are as small as the errors
 /// of the steps, and have no order; above the second, three terms are too few.
 const SMALL: f64 = 5e-5;
-const LARGE: f64 = 0.06;
+const LARGE: f64 = 0.05;
 /// The error where differences do not fall as they should, in multiples of the largest of them.
 const NOT_ASYMPTOTIC: f64 = 4.0;
 /// Orders that are looked for.
