@@ -144,7 +144,7 @@ pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Opti
             return Ok(spec);
         }
         // More of the same members: n is known to do.
-        let round = Round { number: count, ..self::round(&spec, &stopped)? };
+        let round = Round { number: count + 1, ..self::round(&spec, &stopped)? };
         tell(&round);
         let needed = (round.members as f64 * (round.sampling / (SAMPLING * goal)).powi(2)).ceil();
         if needed > MAX_MEMBERS.min(FARTHEST * round.members as f64) {

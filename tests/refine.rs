@@ -123,6 +123,7 @@ fn a_goal_is_reached_by_the_same_choice_whatever_the_shard() {
     let flags = "run --accurate --accuracy 0.01 --curves 32 --backend cpu";
     let (code, rounds) = curvelax(home.path(), &format!("{flags} --out whole"));
     assert_eq!(code, Some(0), "{rounds}");
+    assert!(rounds.contains("round 2: 32 members of n = 141"), "the error is confirmed with more nodes: {rounds}");
     assert!(rounds.contains("round 1: 32 members of n = 100"), "{rounds}");
     let ensemble = home.path().join("whole/ensemble.csv");
     let [median, low, high] = ["median", "median_low", "median_high"]
@@ -180,4 +181,32 @@ fn a_run_whose_error_cannot_be_told_says_why() {
     assert!(told.contains("discretisation not known: no member has times at n, n/√2 and n/2 nodes"), "{told}");
     assert_eq!(fs::read_to_string(home.path().join("out/levels.csv")).unwrap().lines().count(), 1);
     assert_eq!(field(&home.path().join("out/ensemble.csv"), "discretisation_known"), "0");
+}
+
+#[test]
+fn rounds_can_be_stopped_and_members_that_relax_late_have_limits() {
+    let home = TempDir::new().unwrap();
+    let long = "run --accurate --accuracy 1e-3 --shape nonconvex --curves 400 --backend cpu --max-time 1s --out long";
+    let (code, said) = curvelax(home.path(), long);
+    assert_eq!(code, Some(75), "{said}");
+    assert!(said.contains("in the rounds of --accuracy") && !home.path().join("long").exists(), "{said}");
+    // Coarse levels relax later than the end of the run.
+    let median = |t_end: &str, out: &str| -> f64 {
+        let flags = format!("run --accurate --curves 32 --backend cpu --quiet --t-end {t_end} --out {out}");
+        assert_eq!(curvelax(home.path(), &flags).0, Some(0));
+        field(&home.path().join(out).join("ensemble.csv"), "t_limit_median").parse().unwrap()
+    };
+    assert_eq!(median("0.82", "cut"), median("auto", "whole"));
+}
+
+#[test]
+fn tables_that_disagree_are_refused() {
+    let home = TempDir::new().unwrap();
+    assert_eq!(curvelax(home.path(), "run --accurate --curves 4 --backend cpu --quiet --out out").0, Some(0));
+    assert_eq!(curvelax(home.path(), "plot out").0, Some(0));
+    let levels = home.path().join("out/levels.csv");
+    let text = fs::read_to_string(&levels).unwrap();
+    fs::write(&levels, text.replacen(",0.8", ",0.9", 1)).unwrap();
+    let (code, said) = curvelax(home.path(), "plot out");
+    assert!(code == Some(2) && said.contains("column t_limit: expected") && said.contains("levels.csv"), "{said}");
 }

@@ -52,6 +52,7 @@ impl fmt::Display for Overview<'_> {
             ("t_relax", self.relaxation()),
             ("t_limit", self.limit()),
             ("error", self.error()),
+            ("accuracy", self.accuracy()),
             ("rate", self.rate()),
             ("work", self.work()),
             ("ran on", machine(self.platform)),
@@ -101,6 +102,16 @@ impl Overview<'_> {
             [cell] => errors(cell, self.spec),
             _ => String::new(),
         }
+    }
+
+    /// What `--accuracy` asked for, and what was reached in the cell that is farthest from it.
+    fn accuracy(&self) -> String {
+        let Some(goal) = self.spec.accuracy else { return String::new() };
+        let cells = self.statistics.cells.iter().map(|cell| cell.limits.as_ref().and_then(CellLimits::uncertainty));
+        let worst = cells.map(|reached| reached.unwrap_or(f64::INFINITY)).fold(0.0, f64::max);
+        let reached = if worst.is_finite() { rounded(worst, 2) } else { "no interval".into() };
+        let missed = if worst > goal { ": missed, use more --curves to begin with" } else { "" };
+        format!("{} asked for, {reached} reached{missed}", number(goal))
     }
 
     /// The rates of a single ensemble; empty if no member has one.

@@ -3,7 +3,7 @@
 //! Where n is large enough, t(n) = t + c n⁻² + d n⁻⁴ + …, and three resolutions give t. How far that is from what the two
 //! finest give with c alone bounds its error, and the steps in time leave a part that goes with their tolerance. The
 //! constants below were fitted to ensembles of 32 curves and flows at n = 64 to 200 with limits known from n = 400 and
-//! 600 (`docs/method.md#limit`): in 97 of 100 of them at least 95 % of the intervals hold the limit.
+//! 600 (`docs/method.md#limit`): in 97 of 100 of those where most members converge at least 95 % of the intervals hold the limit.
 
 use serde::{Deserialize, Serialize};
 
