@@ -1,9 +1,10 @@
 //! All threads are started here, so that a system without any left gives an error that says so.
 
 use std::{
+    collections::BTreeMap,
     error::Error as _,
     fmt::Display,
-    sync::OnceLock,
+    sync::{Arc, Mutex, OnceLock, PoisonError},
     thread::{Builder, JoinHandle},
 };
 
@@ -22,17 +23,25 @@ pub fn start(name: &str, work: impl FnOnce() + Send + 'static) -> Result<JoinHan
     Builder::new().name(name.into()).spawn(work).map_err(|e| no_more("a thread", "", &e))
 }
 
-/// Starts a pool of `count` threads (0: all cores). A panic in one of them prints no second message.
+/// Returns the pool of `count` threads (0: all cores), which is started once: a run opens a back end for each of its
+/// stages, and the system may have no threads left by then. A panic in one of them prints no second message.
 ///
 /// # Errors
 /// Those of [`start`].
-pub fn pool(count: usize) -> Result<ThreadPool> {
+pub fn pool(count: usize) -> Result<Arc<ThreadPool>> {
+    static POOLS: Mutex<BTreeMap<usize, Arc<ThreadPool>>> = Mutex::new(BTreeMap::new());
+    let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(pool) = pools.get(&count) {
+        return Ok(Arc::clone(pool));
+    }
     let pool = ThreadPoolBuilder::new().num_threads(count).panic_handler(|_| {}).build();
-    pool.map_err(|e| match count {
+    let pool = Arc::new(pool.map_err(|e| match count {
         0 => no_more("a thread on each core", "try --threads 1, or ", &e),
         1 => no_more("1 thread", "", &e),
         _ => no_more(&format!("{count} threads"), "try --threads 1, or ", &e),
-    })
+    })?);
+    pools.insert(count, Arc::clone(&pool));
+    Ok(pool)
 }
 
 fn no_more(what: &str, fewer: &str, error: &dyn Display) -> Error {

@@ -57,7 +57,7 @@ pub struct CpuBackend<T> {
     slots: usize,
     method: Method,
     crew: Arc<dyn Crew<T>>,
-    pool: rayon::ThreadPool,
+    pool: Arc<rayon::ThreadPool>,
     /// Steps of the next batch; results do not depend on it, to the last bit.
     steps: u32,
 }
