@@ -26,6 +26,8 @@ use crate::{
 
 /// Time for the pilots of all cohorts.
 const PILOT: Duration = Duration::from_secs(2);
+/// The same for the levels.
+const LEVEL_PILOT: Duration = Duration::from_millis(500);
 /// Maximum cohorts with a pilot: each gets its share of the time, and less would show nothing.
 const MAX_PILOTS: usize = 20;
 /// Fraction of the remaining time that a larger pilot may use; it may run longer than predicted.
@@ -128,9 +130,9 @@ impl Estimate {
         let (mut slots, mut resident) = (0, 0);
         let mut rows = [0.0_f64; 2];
         let (every, count) = (stages.len().div_ceil(MAX_PILOTS), stages.len());
-        // Half of the time is for the study's own members.
         let of_levels = stages.iter().rev().step_by(every).filter(|stage| stage.level.is_some()).count();
-        let shares = [count.div_ceil(every) - of_levels, of_levels].map(|stages| PILOT / 2 / stages.max(1) as u32);
+        let of_members = count.div_ceil(every) - of_levels;
+        let shares = [(PILOT, of_members), (LEVEL_PILOT, of_levels)].map(|(time, stages)| time / stages.max(1) as u32);
         let (mut own, mut levels) = (CohortWork::none(), CohortWork::none());
         // Counted backwards, so that the last stage, which has the study's own members, always has a pilot.
         let mut sampled: Vec<_> = stages.iter().zip(choices).rev().step_by(every).collect();

@@ -21,6 +21,8 @@ use crate::{
 /// Members of a cell in the pilot, and the share of a small cell that is.
 const PILOT: u64 = 16;
 const PILOT_SHARE: u64 = 16;
+/// Nodes above which a single member takes so long that there is a pilot only if it is asked for, by `--refine`.
+const MAX_PILOT_POINTS: usize = 10_000;
 /// How much more exact the steps of a level are.
 const FINER: f64 = 10.0;
 /// How much later a level ends, and the latest time at all.
@@ -105,7 +107,7 @@ fn tolerance(spec: &Spec) -> f64 {
 /// Members of the pilot of a cell.
 fn pilot(spec: &Spec) -> u64 {
     let all = spec.only.as_ref().map_or(spec.curves, |only| only.len() as u64);
-    all.div_ceil(PILOT_SHARE).min(PILOT)
+    if spec.points > MAX_PILOT_POINTS { 0 } else { all.div_ceil(PILOT_SHARE).min(PILOT) }
 }
 
 /// A row of `levels.csv`: a member at a level.
