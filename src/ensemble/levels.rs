@@ -63,7 +63,7 @@ impl RefinementLevel {
     /// The spec of the cell at this level: the same members, or those of the pilot, to their relaxation.
     ///
     /// # Errors
-    /// [`Error::Request`] if members of so few nodes cannot run.
+    /// [`Error::Request`](crate::Error::Request) if members of so few nodes cannot run.
     pub fn spec(self, of: &Spec) -> Result<Spec> {
         let mut spec = Spec {
             points: self.points(of.points),
