@@ -93,7 +93,7 @@ struct Folder {
     record: Record,
     shard: Shard,
     spec: Spec,
-    files: [(&'static str, File); 3],
+    files: [(&'static str, File); 4],
 }
 
 impl Folder {
