@@ -77,7 +77,7 @@ fn checksum(data: &[u8]) -> u32 {
 /// A run's folder, of which only the files are written anew that change.
 struct Folder {
     path: PathBuf,
-    files: [(File, Vec<u8>); 4],
+    files: [(File, Vec<u8>); 5],
 }
 
 impl Folder {
@@ -91,7 +91,7 @@ impl Folder {
         Folder { path, files }
     }
 
-    fn hold(&mut self, content: [&[u8]; 4]) {
+    fn hold(&mut self, content: [&[u8]; 5]) {
         for ((file, held), new) in self.files.iter_mut().zip(content) {
             if held != new {
                 file.rewind().unwrap();
