@@ -58,6 +58,11 @@ pub struct Round {
 }
 
 impl Round {
+    /// Members for which sampling has its share of the goal.
+    fn needed(&self, goal: f64) -> f64 {
+        (self.members as f64 * (self.sampling / (SAMPLING * goal)).powi(2)).ceil()
+    }
+
     /// Whether its median is that of the same members with fewer nodes, as far as their errors allow.
     fn agrees_with(&self, coarse: &Round, goal: f64) -> bool {
         let apart = (self.median / coarse.median - 1.0).abs();
@@ -130,7 +135,7 @@ pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Opti
             before = Some((std::mem::replace(&mut spec, next), round));
             continue;
         };
-        let needed = (coarse.members as f64 * (coarse.sampling / (SAMPLING * goal)).powi(2)).ceil();
+        let needed = coarse.needed(goal);
         if needed > MAX_MEMBERS {
             let problem = format!(
                 "it needs about {needed:.1e} members in each cell, and more than {MAX_MEMBERS:.0e} is too many"
@@ -146,7 +151,7 @@ pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Opti
         // More of the same members: n is known to do.
         let round = Round { number: count + 1, ..self::round(&spec, &stopped)? };
         tell(&round);
-        let needed = (round.members as f64 * (round.sampling / (SAMPLING * goal)).powi(2)).ceil();
+        let needed = round.needed(goal);
         if needed > MAX_MEMBERS.min(FARTHEST * round.members as f64) {
             let problem = format!("it needs about {needed:.1e} members in each cell");
             return refuse(&problem, &format!("begin with --curves {} or more", round.members));

@@ -12,6 +12,7 @@ use crate::{
     ensemble::{
         Cell, Spec, Study,
         spec::{BackendChoice, Precision},
+        study::Stage,
     },
     error::{Error, Result},
     scheme::step::Method,
@@ -99,15 +100,16 @@ pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
     let (stages, own) = (study.stages(), study.own_stage());
     let specs: Vec<Spec> = stages.iter().map(|stage| study.spec_of(stage)).collect::<Result<_>>()?;
     let choice = choose(&specs[own], specs[own].points)?;
-    let there = |(_, spec): (usize, &Spec)| {
-        if study.has_pilot() && spec.backend == BackendChoice::Cpu {
+    let there = |(stage, spec): (&Stage, &Spec)| {
+        if stage.level.is_some() && study.has_pilot() {
             return cpu(spec, spec.points, "a pilot does not fill a GPU".into());
         }
         let mut spec = spec.clone();
         choice.settle_place(&mut spec);
         choose(&spec, spec.points)
     };
-    let others: Result<Vec<Choice>> = specs.iter().enumerate().filter(|(i, _)| *i != own).map(there).collect();
+    let others: Result<Vec<Choice>> =
+        stages.iter().zip(&specs).enumerate().filter(|(i, _)| *i != own).map(|(_, of)| there(of)).collect();
     match others {
         Err(error) if choice.or_cpu => {
             let reason = format!("the GPU cannot do all cells: {error}");
@@ -123,7 +125,7 @@ pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
 
 /// Writes the settings chosen for the stages to a study, so that it can be repeated exactly.
 pub fn settle(study: &mut Study, choices: &[Choice]) {
-    let stages = study.stages();
+    let stages = study.stages().to_vec();
     let own = || stages.iter().zip(choices).filter(|(stage, _)| stage.level.is_none());
     for (stage, choice) in own() {
         study.cells_mut()[stage.range.clone()].iter_mut().for_each(|cell| choice.settle(&mut cell.spec));

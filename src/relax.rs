@@ -44,9 +44,8 @@ pub fn relax(study: &Study, sink: &mut dyn Sink) -> Result<Platform> {
                 (choice.open_for(&cells)?.0, choice.precision())
             }
         };
-        let portraits = if stage.level.is_some() { 0 } else { study.portraits(cells.len()) };
         let mut sink = Judged { level: stage.level, cells: &cells, levels: &mut levels, sink };
-        simulate(&cells, precision, backend.as_mut(), portraits, &mut sink)?;
+        simulate(&cells, precision, backend.as_mut(), study.portraits(stage), &mut sink)?;
     }
     Ok(platform)
 }

@@ -231,10 +231,9 @@ fn advance(
             _ => choice.open_for(&cells)?.0,
         };
         report.begin_stage(i);
-        let portraits = if stage.level.is_some() { 0 } else { study.portraits(cells.len()) };
         let standing = std::mem::take(&mut standing);
         let mut sink = Judged { level: stage.level, cells: &cells, levels: &mut levels, sink: report };
-        resume(&cells, precision, backend.as_mut(), portraits, standing, &mut sink)?;
+        resume(&cells, precision, backend.as_mut(), study.portraits(stage), standing, &mut sink)?;
     }
     Ok(())
 }

@@ -480,7 +480,7 @@ impl Spec {
         let Spec { tau, t_end, omega, pull, series, snapshots, .. } = self;
         let times = matches!(tau, Some(Tau::Step(_))) || !matches!(t_end, None | Some(FinalTime::Auto));
         let rates = matches!(omega, Some(Omega::Rate(_))) || matches!(pull, Pull::Rate(rate) if *rate != 0.0);
-        let swept = |key| self.sweep.axes().iter().any(|axis| axis.key == key);
+        let swept = |key| self.sweep.has(key);
         let outputs = series.is_some() || !snapshots.is_empty();
         !(times || rates || outputs || TIMED.into_iter().any(swept))
     }

@@ -20,6 +20,7 @@ pub const PORTRAITS: usize = 12;
 pub struct Study {
     spec: Spec,
     cells: Vec<Cell>,
+    stages: Vec<Stage>,
     /// Flags by which times follow the size of the curves, although the request does not have them.
     by_size: Vec<&'static str>,
 }
@@ -88,15 +89,8 @@ impl Study {
     }
 
     /// Its stages, in the order in which they run: the levels, and then its own members.
-    pub fn stages(&self) -> Vec<Stage> {
-        let mut stages = Vec::new();
-        for level in RefinementLevel::ALL {
-            let specs: Vec<_> = self.cells.iter().map(|cell| cell.at(level).ok()).collect();
-            stages.extend(stages_of(Some(level), &specs));
-        }
-        let own: Vec<_> = self.cells.iter().map(|cell| Some(cell.spec.clone())).collect();
-        stages.extend(stages_of(None, &own));
-        stages
+    pub fn stages(&self) -> &[Stage] {
+        &self.stages
     }
 
     /// The cells of a stage.
@@ -121,7 +115,7 @@ impl Study {
 
     /// The first stage of its own members.
     pub fn own_stage(&self) -> usize {
-        self.stages().iter().take_while(|stage| stage.level.is_some()).count()
+        self.stages.iter().take_while(|stage| stage.level.is_some()).count()
     }
 
     /// Whether the levels are those of a few members.
@@ -142,7 +136,7 @@ impl Study {
 
     /// Members of all stages.
     pub fn work(&self) -> u64 {
-        self.stages().iter().map(|stage| stage.members).sum()
+        self.stages.iter().map(|stage| stage.members).sum()
     }
 
     /// Nodes of a member; meaningful only if all have the same number.
@@ -150,10 +144,12 @@ impl Study {
         self.cells[0].spec.points
     }
 
-    /// Members of a cohort of `cells` cells that leave a portrait: the [`PORTRAITS`] of the study, spread over all
-    /// cells.
-    pub fn portraits(&self, cells: usize) -> usize {
-        (PORTRAITS * cells).div_ceil(self.cells.len())
+    /// Members of a stage that leave a portrait: the [`PORTRAITS`] of the study, spread over all cells; none of a level.
+    pub fn portraits(&self, stage: &Stage) -> usize {
+        match stage.level {
+            Some(_) => 0,
+            None => (PORTRAITS * stage.range.len()).div_ceil(self.cells.len()),
+        }
     }
 
     /// Members to run, over all cells.
@@ -207,7 +203,8 @@ impl Study {
         if spec.t_end == Some(FinalTime::Auto) && !spec.sweep.is_empty() {
             spec.t_end = Some(FinalTime::OfCells(cells.iter().map(|cell| cell.spec.final_time()).collect()));
         }
-        let mut study = Study { spec, cells, by_size: Vec::new() };
+        let stages = stages(&cells);
+        let mut study = Study { spec, cells, stages, by_size: Vec::new() };
         study.settle_spec(|_| ());
         Ok(study)
     }
@@ -222,6 +219,18 @@ pub struct Stage {
     pub range: Range<usize>,
     /// Its members.
     pub members: u64,
+}
+
+/// All stages of a study of these cells. Where its members are computed changes none of them.
+fn stages(cells: &[Cell]) -> Vec<Stage> {
+    let mut stages = Vec::new();
+    for level in RefinementLevel::ALL {
+        let specs: Vec<_> = cells.iter().map(|cell| cell.at(level).ok()).collect();
+        stages.extend(stages_of(Some(level), &specs));
+    }
+    let own: Vec<_> = cells.iter().map(|cell| Some(cell.spec.clone())).collect();
+    stages.extend(stages_of(None, &own));
+    stages
 }
 
 /// The stages of cells with these specs, where they have one.

@@ -64,7 +64,7 @@ impl Spec {
             self.tau = Some(tau);
         }
         // Whether steps adapt may differ between cells, and with it the default.
-        if !self.sweep.axes().iter().any(|axis| ["tau", "adaptive"].contains(&axis.key.as_str())) {
+        if !["tau", "adaptive"].into_iter().any(|key| self.sweep.has(key)) {
             self.omega = Some(self.omega());
         }
         self.t_end.get_or_insert(DEFAULT_T_END.into());

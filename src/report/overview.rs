@@ -213,7 +213,7 @@ pub fn describe(spec: &Spec) -> String {
         ("t-end", format!("t-end = {}", spec.t_end.clone().unwrap_or(spec.final_time().into()))),
         ("seed", format!("seed {}", spec.seed)),
     ];
-    let swept = |key: &str| spec.sweep.axes().iter().any(|axis| axis.key == key);
+    let swept = |key: &str| spec.sweep.has(key);
     // A swept tolerance replaces a fixed step, and the reverse.
     let has_one_value = |key: &str| match key {
         "tau" | "adaptive" => !swept("tau") && !swept("adaptive"),

@@ -24,12 +24,10 @@ use crate::{
         scaling::Scaling,
         tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
     },
-    statistics::{KaplanMeier, Step},
+    statistics::{HALF_INTERVAL, KaplanMeier, Step},
     text::{count, p_value, significant},
 };
 
-/// Half the width of a 95 % band in standard errors.
-const BAND: f64 = 1.96;
 /// Digits of a number for reading.
 const DIGITS: usize = 4;
 
@@ -120,7 +118,7 @@ impl FinishedRun<'_> {
                 ..SurvivalCurve::default()
             };
             for Step { time, survival, variance, .. } in KaplanMeier::new(&cell.sample).steps() {
-                let bound = |sign: f64| (survival + sign * BAND * variance.sqrt()).clamp(0.0, 1.0);
+                let bound = |sign: f64| (survival + sign * HALF_INTERVAL * variance.sqrt()).clamp(0.0, 1.0);
                 curve.add_step(time, survival, (bound(-1.0), bound(1.0)));
             }
             happened(cell, false).for_each(|t| curve.add_censored(t));
@@ -218,7 +216,7 @@ impl FinishedRun<'_> {
             }
             let scaling = self.statistics.scaling.as_ref();
             let fit = scaling.and_then(|scaling| Some((scaling, scaling.law?))).map(|(scaling, law)| {
-                let around = |error: f64| (law.exponent - BAND * error, law.exponent + BAND * error);
+                let around = |error: f64| (law.exponent - HALF_INTERVAL * error, law.exponent + HALF_INTERVAL * error);
                 let exponent = EstimatedNumber { value: law.exponent, interval: law.exponent_error.map(around) };
                 PowerLawLine { exponent, factor: law.factor, rejected: scaling.is_rejected() }
             });

@@ -2,11 +2,8 @@
 
 use crate::{
     error::Result,
-    statistics::{Bootstrap, Description, Interval, KaplanMeier, Limit, Mean, Sample},
+    statistics::{Bootstrap, Description, HALF_INTERVAL, Interval, KaplanMeier, Limit, Mean, Sample},
 };
-
-/// Standard errors in half a 95 % interval.
-const HALF_INTERVAL: f64 = 1.96;
 
 /// What the levels tell of the relaxation times of a cell.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,13 +10,11 @@
 
 use crate::{
     ensemble::sweep::{Sweep, SweepAxis},
-    statistics::PowerLaw,
+    statistics::{HALF_INTERVAL, PowerLaw},
 };
 
 /// Probability of χ² below which a power law is rejected.
 pub const REJECTED: f64 = 0.05;
-/// Half the width of a 95 % interval in standard errors.
-const BAND: f64 = 1.96;
 /// Arguments of shapes and flows are proportional up to this relative difference.
 const ROUNDING: f64 = 1e-9;
 
@@ -97,7 +95,7 @@ fn point(cell: &CellMedian, value: f64) -> Result<(f64, f64, f64), &'static str>
         return Ok((value, median, 0.0));
     }
     match cell.bounds.ok_or("its median has no closed 95 % interval")? {
-        (low, high) if low > 0.0 => Ok((value, median, (high / low).ln() / (2.0 * BAND))),
+        (low, high) if low > 0.0 => Ok((value, median, (high / low).ln() / (2.0 * HALF_INTERVAL))),
         _ => Err("the interval of its median begins at 0"),
     }
 }

@@ -69,6 +69,9 @@ pub use paired::{PairedDifferences, SignedRank};
 pub use sample::{Observation, Observations, Sample};
 pub use survival::{Caveat, KaplanMeier, Mean, Step};
 
+/// Standard errors in half a 95 % interval of a normal estimate.
+pub const HALF_INTERVAL: f64 = 1.96;
+
 /// The value if it is finite.
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
