@@ -32,7 +32,7 @@ impl<T: Real> Start<T> {
         let run = Trajectory::new(member, &spec, Precision::F64, &Outputs::default()).launch().convert::<T>();
         let State { mut curve, mut increments, .. } = run.state;
         let (parameters, mut work) = (run.parameters, Workspace::new(Blocks::new(points).expect("n is at least 6")));
-        let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
+        let method = Method::coloured(Solver::Direct, 1);
         for _ in 0..10 {
             step::step(&curve, &mut increments, &parameters, &method, &mut work);
             std::mem::swap(&mut curve, &mut work.new);

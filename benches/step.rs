@@ -9,7 +9,7 @@ use curvelax::{
         Parameters, State, Workspace,
         step::{self, Method},
     },
-    solver::{Blocks, Order, Solver},
+    solver::{Blocks, Solver},
 };
 use glam::DVec2;
 
@@ -27,7 +27,7 @@ fn ellipse<T: Real>(n: usize) -> (State<T>, Parameters<T>, Workspace<T>) {
 }
 
 fn method(solver: Solver) -> Method {
-    Method { solver, order: Order::Coloured, max_sweeps: 200_000 }
+    Method::coloured(solver, 200_000)
 }
 
 fn step_in<T: Real>(c: &mut Criterion) {

@@ -2,15 +2,10 @@
 // src/scheme/extrapolation.rs.
 
 const LEAST_ORDER = 2u;
-const MOST_ORDER = 6u;
-const MOST_ORDER_F32 = 4u;
 const SHARED_PARTS = 3u;
 
 /// The steps of the paper that a step of order `order` makes.
 fn parts(order: u32) -> u32 { return order * (order + 1u) / 2u; }
-
-/// Highest order of a step in numbers of this precision.
-fn most_order() -> u32 { return select(MOST_ORDER, MOST_ORDER_F32, EPSILON > 1e-10); }
 
 /// The weight of `row` in the combination of the rows from `lowest` to `order`.
 fn weight(row: u32, lowest: u32, order: u32) -> real {

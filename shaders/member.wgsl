@@ -121,6 +121,8 @@ struct Dispatch {
     steps: u32,
     /// Maximum number of sweeps per system.
     max_sweeps: u32,
+    /// Highest order of an adaptive step.
+    most_order: u32,
     /// Sweeps after which the dispatch pauses, if need be in the middle of a solve.
     sweeps: u32,
     /// BLOCKS, as a number unknown to compilers: they would unroll every loop over the blocks.

@@ -77,7 +77,7 @@ fn choose(length: real, order: u32, errors: vec2<real>, most_growth: real, most:
         if work(order - 1u, lower) <= real(FALLS) * work(order, own) { return Choice(length * lower, order - 1u); }
         if work(order - 1u, lower) <= work(order, own) / real(RISES) { return Choice(length * own, order); }
     }
-    if order == most_order() || most_growth <= real(1.0) { return Choice(length * own, order); }
+    if order == dispatch.most_order || most_growth <= real(1.0) { return Choice(length * own, order); }
     let longer = real(parts(order + 1u)) / real(parts(order));
     return Choice(length * min(own * longer, most_growth), order + 1u);
 }

@@ -211,6 +211,14 @@ pub enum Precision {
 }
 
 impl Precision {
+    /// Returns its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Precision::F32 => "f32",
+            Precision::F64 => "f64",
+        }
+    }
+
     /// Returns the machine epsilon.
     pub fn epsilon(self) -> f64 {
         match self {

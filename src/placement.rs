@@ -15,7 +15,7 @@ use crate::{
         study::Stage,
     },
     error::{Error, Result},
-    scheme::step::Method,
+    scheme::{extrapolation::MOST_ORDER, step::Method},
     solver::{Blocks, Order},
 };
 
@@ -244,12 +244,12 @@ impl Choice {
 
     /// Describes the choice in one line: what was chosen and why, and which solver.
     pub fn sentence(&self, spec: &Spec) -> String {
-        let precision = match self.precision {
-            Precision::F32 => "f32",
-            Precision::F64 => "f64",
-        };
-        let solver = spec.solver().facts().title;
-        format!("back end: {}, {precision} ({}); {solver}", self.device, self.reason)
+        format!("{}; {}", self.place(), spec.solver().facts().title)
+    }
+
+    /// The same without the solver.
+    pub fn place(&self) -> String {
+        format!("back end: {}, {} ({})", self.device, self.precision.name(), self.reason)
     }
 
     /// Writes all settings of this choice to the spec, so that it can be repeated exactly.
@@ -340,7 +340,12 @@ impl Choice {
 
     fn open_in<T: Vectorised>(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
         let blocks = ring(n)?;
-        let method = Method { solver: spec.solver(), order: spec.order, max_sweeps: spec.most_sweeps() };
+        let method = Method {
+            solver: spec.solver(),
+            order: spec.order,
+            max_sweeps: spec.most_sweeps(),
+            most_order: spec.most_order.unwrap_or(MOST_ORDER),
+        };
         let opened = match &self.device {
             Device::Cpu => CpuBackend::<T>::for_members(blocks, method, threads(spec), spec.member_count())
                 .map(|backend| Box::new(backend) as Box<dyn Backend>),
@@ -371,7 +376,7 @@ fn open_gpu<T: Vectorised>(gpu: &Gpu, blocks: Blocks, spec: &Spec, method: &Meth
     let mut kernel = Kernel::<T>::new(gpu, blocks, members, tested.max_sweeps, variant)?;
     let device = format!("{} ({})", gpu.name(), gpu.driver());
     self_test::<T>(&mut kernel, &device, gpu.is_hardware(), &tested, blocks.n, adaptive)?;
-    Ok(Box::new(kernel.with_max_sweeps(method.max_sweeps)))
+    Ok(Box::new(kernel.with_caps(method.max_sweeps, method.most_order)))
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ use curvelax::{
         step::Method,
     },
     simulate::simulate,
-    solver::{Blocks, Order, Solver},
+    solver::{Blocks, Solver},
 };
 use glam::DVec2;
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -415,7 +415,7 @@ fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     }
     let ended = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(7))?;
     let blocks = Blocks::new(n).ok_or("n")?;
-    let method = Method { solver, order: Order::Coloured, max_sweeps: 200_000 };
+    let method = Method::coloured(solver, 200_000);
     let mut relaxed = 0;
     for (j, launch) in launches.iter().enumerate() {
         let mut twin: Run<T> = launch.convert();
@@ -664,7 +664,7 @@ fn paper<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     replace_nodes(&mut launch, |nodes| *nodes = (1..=n).map(node).collect());
     launch.parameters.tau = 1e-3;
     let mut exact = launch.clone();
-    let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
+    let method = Method::coloured(Solver::Direct, 1);
     evolve(&mut exact, &method, &mut Team::new(Blocks::new(n).ok_or("n")?), 2000);
     let Left { state, counters, .. } = on_gpu::<T>(gpu, solver, n, &[launch], dispatches_of(50))?.remove(0);
     if (counters.steps, exact.counters.steps) != (2000, 2000) {

@@ -135,3 +135,42 @@ fn a_folder_holds_the_files_of_one_command() {
     assert_eq!(names(), ["convergence.csv", "mine.txt"]);
     assert_ne!(fs::read_to_string(out.join("convergence.csv")).unwrap(), "old");
 }
+
+/// A number in a field of a row of `work_precision.csv`.
+fn number(row: &csv::StringRecord, field: usize) -> f64 {
+    row[field].parse().unwrap_or_else(|e| panic!("{row:?}: field {field}: {e}"))
+}
+
+#[test]
+fn higher_orders_take_fewer_solves_for_an_error_and_fixed_steps_are_of_first_order() {
+    let home = TempDir::new().unwrap();
+    let output = convergence(&home, "--work-precision --solver direct --backend cpu --out out");
+    let (printed, said) = (text(output.stdout), text(output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("32 perturbed 2:1 ellipses"), "{said}");
+
+    let out = home.path().join("out");
+    let mut reader = csv::Reader::from_path(out.join("work_precision.csv")).unwrap();
+    let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 4 + 5 * 5);
+    assert_eq!(printed.lines().filter(|line| line.starts_with("direct ")).count(), rows.len(), "{printed}");
+    let of_order = |order: &str| rows.iter().filter(|row| &row[3] == order).collect::<Vec<_>>();
+    for pair in of_order("1").windows(2) {
+        let [tau, error, solves] = [1, 4, 5].map(|field| number(pair[0], field) / number(pair[1], field));
+        let order = error.ln() / tau.ln();
+        assert!((order - 1.0).abs() < 0.15 && (solves * tau - 1.0).abs() < 0.05, "{pair:?}");
+    }
+    // A tighter tolerance costs solves and takes away error. Between two orders only the cost is comparable.
+    for order in ["2", "3", "4", "5", "6"] {
+        let rows = of_order(order);
+        assert!(rows.windows(2).all(|pair| number(pair[0], 5) < number(pair[1], 5)), "{rows:?}");
+        assert!(number(rows[4], 4) < 1e-2 * number(rows[0], 4), "{rows:?}");
+    }
+    let finest = ["2", "3", "4", "5", "6"].map(|order| number(of_order(order)[4], 5));
+    assert!(finest.windows(2).all(|pair| pair[1] < 0.9 * pair[0]), "{finest:?}");
+    assert!(rows.iter().all(|row| number(row, 7) > 0.0 && number(row, 6) == 0.0), "{rows:?}");
+
+    let picture = fs::read_to_string(out.join("work_precision.svg")).unwrap();
+    assert!(picture.contains("order up to 6") && picture.contains("time per member (ms)"));
+    assert_eq!(convergence(&home, "--work-precision --problem lemniscate").status.code(), Some(2));
+}

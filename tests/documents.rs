@@ -11,7 +11,7 @@ use curvelax::{
     ensemble::{LevelRow, Outcome, SeriesRow, Spec},
     files::{
         TableRow, names,
-        tables::{ErrorRow, NodeRow, RateRow},
+        tables::{CostRow, ErrorRow, NodeRow, RateRow},
     },
     results::{
         cells::EnsembleStatistics,
@@ -142,6 +142,7 @@ fn columns() -> String {
         table_of::<SeriesRow>(names::SERIES, "member and time, with `--series`"),
         table_of::<NodeRow>(names::SNAPSHOTS, "member, time and node, with `--snapshots`"),
         table_of::<ErrorRow>(names::CONVERGENCE, "run of a problem, from `curvelax convergence --out`"),
+        table_of::<CostRow>(names::WORK, "method, from `curvelax convergence --work-precision --out`"),
     ]
     .concat()
 }

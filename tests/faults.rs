@@ -32,7 +32,7 @@ use curvelax::{
         step::Method,
     },
     simulate::simulate,
-    solver::{Blocks, Order, Solver},
+    solver::{Blocks, Solver},
 };
 use glam::DVec2;
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -117,7 +117,7 @@ fn pace(adaptive: bool) -> &'static str {
 }
 
 fn method(solver: Solver) -> Method {
-    Method { solver, order: Order::Coloured, max_sweeps: 2000 }
+    Method::coloured(solver, 2000)
 }
 
 fn require(holds: bool, otherwise: impl FnOnce() -> String) -> Outcome {

@@ -6,7 +6,7 @@ use curvelax::{
         Parameters, State, Workspace,
         step::{self, Method},
     },
-    solver::{Blocks, Order, Solver},
+    solver::{Blocks, Solver},
 };
 use glam::DVec2;
 
@@ -33,7 +33,7 @@ fn worst_deviation(name: &str, flow: Flow, tau: f64, redistribution: bool) -> f6
     let nodes: Vec<DVec2> = states[0].1.iter().map(|row| DVec2::new(row[2], row[3])).collect();
     let mut state = State::<f64>::from_nodes(&nodes);
     let mut work = Workspace::new(Blocks::new(nodes.len()).unwrap());
-    let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
+    let method = Method::coloured(Solver::Direct, 1);
     let mut p = Parameters::of_flow(&flow, tau);
     p.redistribution = f64::from(u8::from(redistribution));
     let (mut steps, mut worst) = (0, 0.0_f64);

@@ -27,7 +27,7 @@ use curvelax::{
         step::Method,
     },
     simulate::simulate,
-    solver::{Blocks, Order, Solver},
+    solver::{Blocks, Solver},
     trajectory::Trajectory,
     truth::LEMNISCATE_LIFE,
 };
@@ -78,7 +78,7 @@ fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let mut trajectory = Trajectory::new(member, spec, T::PRECISION, &outputs);
     let mut run = trajectory.launch().convert::<T>();
     let mut work = evolve::Team::new(Blocks::new(n).unwrap());
-    let method = Method { solver: spec.solver(), order: Order::Coloured, max_sweeps: spec.max_sweeps };
+    let method = Method::coloured(spec.solver(), spec.max_sweeps);
     while !trajectory.is_over() {
         evolve::evolve(&mut run, &method, &mut work, 64);
         trajectory.observe(run.counters, &run.report.convert());
@@ -604,7 +604,7 @@ fn a_round_polygon_under_a_foreign_curvature_does_not_count_as_relaxed() {
         let p = Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-12);
         let mut run = Run::new(state, Parameters { polygon_ratio: 1.0, relax_at: 0.1, ..p });
         run.counters.goal = 1;
-        let method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
+        let method = Method::coloured(Solver::Direct, 1);
         evolve::evolve(&mut run, &method, &mut evolve::Team::new(Blocks::new(50).unwrap()), 1);
         assert_eq!((run.counters.status, run.counters.steps), (0, 1));
         assert_eq!(run.counters.relax_step == 0, relaxes, "curvature {foreign} times the polygon's");

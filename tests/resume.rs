@@ -19,7 +19,7 @@ use curvelax::{
     },
     scheme::step::Method,
     simulate::resume,
-    solver::{Blocks, Order},
+    solver::Blocks,
 };
 use libtest_mimic::{Arguments, Failed, Trial};
 
@@ -170,7 +170,7 @@ fn specs() -> Vec<(&'static str, Spec)> {
 }
 
 fn on_the_cpu<T: Vectorised>(spec: &Spec) -> Result<Box<dyn Backend>> {
-    let method = Method { solver: spec.solver(), order: Order::Coloured, max_sweeps: spec.max_sweeps };
+    let method = Method::coloured(spec.solver(), spec.max_sweeps);
     let blocks = Blocks::new(spec.points).expect("a ring");
     Ok(Box::new(CpuBackend::<T>::new(blocks, method, 2)?))
 }

@@ -320,8 +320,6 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("PART", LASTING_FIELDS as f64),
         ("GAPS", (LASTING_FIELDS + CURVE_FIELDS) as f64),
         ("LEAST_ORDER", f64::from(extrapolation::LEAST_ORDER)),
-        ("MOST_ORDER", f64::from(extrapolation::MOST_ORDER)),
-        ("MOST_ORDER_F32", f64::from(extrapolation::MOST_ORDER_F32)),
         ("SHARED_PARTS", f64::from(extrapolation::SHARED_PARTS)),
         ("AFTER_FAILURE", pace::AFTER_FAILURE),
         ("AFTER_REFUSAL", pace::AFTER_REFUSAL),

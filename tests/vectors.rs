@@ -17,7 +17,7 @@ use curvelax::{
         step::Method,
     },
     simulate::simulate,
-    solver::{Blocks, Order},
+    solver::Blocks,
 };
 
 /// A back end with fewer slots, so that members share vectors with others.
@@ -64,7 +64,7 @@ fn spec(shape: &str, more: Spec) -> Spec {
 
 /// All members of `specs`, with the same solver and n, side by side.
 fn run<T: Vectorised>(specs: &[Spec], vectors: Vectors, threads: usize, slots: usize) -> Vec<Ended> {
-    let method = Method { solver: specs[0].solver(), order: Order::Coloured, max_sweeps: specs[0].max_sweeps };
+    let method = Method::coloured(specs[0].solver(), specs[0].max_sweeps);
     let blocks = Blocks::new(specs[0].points).unwrap();
     let backend = CpuBackend::<T>::with_vectors(blocks, method, threads, vectors).unwrap();
     let mut all = Vec::new();

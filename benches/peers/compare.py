@@ -5,6 +5,7 @@ in each round every peer and curvelax gets its turn.
 """
 
 import argparse
+import csv
 import json
 import multiprocessing
 import os
@@ -24,6 +25,8 @@ POINTS, TAU, STEPS = 100, 1e-3, 100
 BOUND = 1e-9
 LAWS = {"surface-diffusion": (0.0, 0.0), "willmore": (0.0, -0.5), "elastic:0.5": (0.5, -0.5)}
 TIMED = "surface-diffusion"
+# Error of a relaxation time whose cost is compared.
+TARGET = 1e-4
 ONE_THREAD = {
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
@@ -113,6 +116,34 @@ def curvelax_rate(program, seconds, cores):
     return json.loads(done.stdout)["rows"][0]["steps_per_second"]["median"]
 
 
+def costs(program, cores):
+    """Solves of fixed steps, and solves and seconds of the cheapest adaptive ones, for an error of TARGET in t_relax."""
+    with tempfile.TemporaryDirectory() as home:
+        out = Path(home) / "out"
+        command = f"convergence --work-precision --backend cpu --solver direct --precision f64 --quiet --out {out}"
+        # It takes as many threads as there are processors.
+        subprocess.run(["taskset", "-c", f"0-{cores - 1}", program, *command.split()], check=True)
+        rows = list(csv.DictReader((out / "work_precision.csv").open()))
+    rows = [{key: float(value) for key, value in row.items() if key != "solver" and value} for row in rows]
+    fixed = sorted((row["error"], row["solves"]) for row in rows if "tau" in row)
+    errors, solves = np.log([*zip(*fixed)])
+    if not errors[0] <= np.log(TARGET) <= errors[-1]:
+        sys.exit(f"FAILED: no fixed steps are on both sides of an error of {TARGET:g}")
+    best = min((row["seconds"], row["solves"]) for row in rows if "tolerance" in row and row["error"] <= TARGET)
+    return float(np.exp(np.interp(np.log(TARGET), errors, solves))), best[1], best[0]
+
+
+def cost_table(rates, costs):
+    fixed, adaptive, seconds = costs
+    each = {name: (fixed, fixed / statistics.median(all)) for name, all in rates.items()}
+    each = {"curvelax, adaptive": (adaptive, seconds)} | {f"{name}, fixed": cost for name, cost in each.items()}
+    lines = [f"{f'error {TARGET:g}':<20}{'solves':>10}{'ms a member':>14}{'adaptive is':>16}"]
+    for name, (solves, time) in each.items():
+        faster = f"{f'{time / seconds:.3g} x faster':>16}" if time != seconds else ""
+        lines.append(f"{name:<20}{solves:>10.0f}{1e3 * time:>14.3g}{faster}")
+    return "\n".join(lines)
+
+
 def table(rates, errors):
     ours = rates["curvelax"]
     lines = [f"{'':<16}{'curve-steps/s':>15}{'min..max':>22}{'us/curve-step':>15}{'curvelax is':>14}{'differs by':>13}"]
@@ -165,6 +196,8 @@ def main():
         group.send(None)
     print(f"n = {POINTS}, tau = {TAU}, direct solves, f64, cores: {args.cores}, medians of {args.repeats} rounds\n")
     print(table(rates, errors))
+    print("\na relaxation time with this relative error of the steps; fixed steps cost the same solves everywhere\n")
+    print(cost_table(rates, costs(args.curvelax, args.cores)))
 
 
 if __name__ == "__main__":

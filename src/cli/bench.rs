@@ -258,7 +258,7 @@ impl Case {
     fn name(&self) -> String {
         let Spec { adapter, points, .. } = &self.spec;
         let place = adapter.clone().unwrap_or_else(|| self.backend.to_string());
-        let (solver, precision) = (self.spec.solver().name(), precision_name(self.precision()));
+        let (solver, precision) = (self.spec.solver().name(), self.precision().name());
         format!("{place}, {solver}, {precision}, n = {points}")
     }
 
@@ -313,13 +313,6 @@ impl Spread {
     }
 }
 
-fn precision_name(precision: Precision) -> &'static str {
-    match precision {
-        Precision::F32 => "f32",
-        Precision::F64 => "f64",
-    }
-}
-
 /// An aligned table; a failed case has its reason instead of numbers.
 fn table(rows: &[BenchRow]) -> String {
     let place = |row: &BenchRow| match (&row.adapter, row.threads) {
@@ -343,7 +336,7 @@ fn table(rows: &[BenchRow]) -> String {
         "start-up"
     );
     for row in rows {
-        let (solver, precision, n) = (row.solver.name(), precision_name(row.precision), row.points);
+        let (solver, precision, n) = (row.solver.name(), row.precision.name(), row.points);
         text += &format!("{:<width$}  {solver:<13}{precision:<5}{n:>6}", place(row));
         text += &match (&row.failed, &row.steps_per_second) {
             (None, Some(Spread { median, min, max, .. })) => {

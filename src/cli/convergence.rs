@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{flags, note, print};
 use crate::{
+    draw::charts::{WorkCurve, WorkDiagram, WorkPanels},
     ensemble::{
         Spec,
         spec::{BackendChoice, Precision, Solver, SolverChoice},
@@ -11,10 +12,11 @@ use crate::{
     error::{Error, Result},
     files::{
         OutputFolder, Owner, names,
-        tables::{ErrorRow, Table},
+        tables::{CostRow, ErrorRow, Table},
     },
     placement,
-    truth::{ConvergenceRow, Problem, problems, studies},
+    text::significant,
+    truth::{ConvergenceRow, Problem, WorkPrecision, WorkRow, problems, studies},
 };
 
 const EXAMPLES: &str = "\
@@ -22,11 +24,17 @@ Examples:
   curvelax convergence
   curvelax convergence --problem willmore-circle --problem lemniscate --out convergence
   curvelax convergence --backend gpu --precision f32
+  curvelax convergence --work-precision --out work
 
 An error is measured/exact - 1. In n, with tau proportional to 1/n^2, the order should be 2. In tau, at a fixed n, it
 should be 1. In the length of adaptive steps, proportional to the root of their tolerance, it should be 2. The last two are
 orders of the differences of three errors, which cancels the error of the spacing. No order is printed where the error changes
-by rounding only.";
+by rounding only.
+
+--work-precision runs members of the default ensemble with fixed steps and with adaptive steps of every order, at
+several lengths and tolerances, until they are relaxed. Its error is the median of |t_relax/reference - 1|, where the
+reference has the same nodes and a tolerance of 1e-8: the error of the steps alone. It takes some seconds with --solver
+direct, and minutes with plain sweeps.";
 
 /// Solve problems with exact solutions; print errors and observed orders as a table.
 #[derive(clap::Args)]
@@ -35,7 +43,10 @@ pub struct ConvergenceArgs {
     /// Solve only this problem; may be repeated [default: all]
     #[arg(long, value_name = "NAME")]
     problem: Vec<String>,
-    /// Solver of the pentadiagonal systems; sweeps take longer [default: direct]
+    /// Instead, measure what an error of the relaxation time costs, in solves and in seconds
+    #[arg(long, conflicts_with = "problem")]
+    work_precision: bool,
+    /// Solver of the pentadiagonal systems; sweeps take longer [default: direct; with --work-precision all]
     #[arg(long, value_name = "SOLVER", value_parser = flags::word::<SolverChoice>(&SolverChoice::NAMES), help_heading = flags::METHOD)]
     solver: Option<SolverChoice>,
     /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]
@@ -47,10 +58,10 @@ pub struct ConvergenceArgs {
     /// Number type [default: f64 where the device has it]
     #[arg(long, value_name = "TYPE", value_parser = flags::word::<Precision>(flags::PRECISIONS), help_heading = flags::MACHINE)]
     precision: Option<Precision>,
-    /// Folder for convergence.csv, which must not exist yet [default: no file]
+    /// Folder for convergence.csv, or work_precision.csv and .svg, which must not exist yet [default: no file]
     #[arg(long, value_name = "DIR", help_heading = flags::OUTPUT)]
     out: Option<PathBuf>,
-    /// Write into an existing DIR, replacing its convergence.csv
+    /// Write into an existing DIR, replacing these files in it
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
     /// Print no notes and no table: only errors
@@ -64,8 +75,9 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
         true => problems(),
         false => args.problem.iter().map(|name| Problem::named(name)).collect::<Result<_>>()?,
     };
+    let solver = args.solver;
     let spec = Spec {
-        solver: args.solver.unwrap_or(Solver::Direct.into()),
+        solver: solver.unwrap_or(Solver::Direct.into()),
         backend: args.backend.unwrap_or(BackendChoice::Auto),
         adapter: args.adapter,
         precision: args.precision,
@@ -75,9 +87,14 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     let choice = placement::choose(&method, method.points)?;
     // Chosen once: adapters are looked for only now, and all runs have the same precision.
     choice.settle(&mut method);
-    let folder = args.out.map(|out| open(&out, args.force)).transpose()?;
+    let names = if args.work_precision { vec![names::WORK, names::WORK_PICTURE] } else { vec![names::CONVERGENCE] };
+    let folder = args.out.map(|out| open(&out, args.force, names)).transpose()?;
     if !args.quiet {
-        note(&choice.sentence(&method));
+        note(&if args.work_precision { choice.place() } else { choice.sentence(&method) });
+    }
+    if args.work_precision {
+        let solvers = solver.map_or(Solver::ALL.to_vec(), |_| vec![method.solver()]);
+        return work_precision(&method, &solvers, folder, args.quiet);
     }
     let mut rows = Vec::new();
     for problem in &chosen {
@@ -102,8 +119,78 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     }
 }
 
-fn open(out: &Path, force: bool) -> Result<OutputFolder> {
-    OutputFolder::open_for(out, force, Owner::Convergence, vec![names::CONVERGENCE.into()])
+fn open(out: &Path, force: bool, names: Vec<&str>) -> Result<OutputFolder> {
+    OutputFolder::open_for(out, force, Owner::Convergence, names.into_iter().map(str::to_owned).collect())
+}
+
+/// Measures what errors cost, with all `solvers`; prints the rows as they come.
+fn work_precision(method: &Spec, solvers: &[Solver], folder: Option<OutputFolder>, quiet: bool) -> Result<()> {
+    let measured = WorkPrecision::new(method)?;
+    if !quiet {
+        note(&measured.sentence());
+        print(&work_line(["solver", "order", "tau", "tolerance", "error", "solves", "sweeps", "ms"]))?;
+    }
+    let mut rows = Vec::new();
+    for solver in solvers {
+        for way in measured.ways(*solver) {
+            let of_way = measured.rows(*solver, &way)?;
+            if !quiet {
+                print(&format!("\n{}", of_way.iter().map(work_row).collect::<String>()))?;
+            }
+            rows.push(of_way);
+        }
+    }
+    if let Some(folder) = folder {
+        let costs: Vec<CostRow> = rows.iter().flatten().map(CostRow::of).collect();
+        let table = Table::of(folder.file(names::WORK)?, &costs)?;
+        let picture = folder.write(names::WORK_PICTURE, work_diagram(&measured, solvers, &rows))?;
+        folder.publish_all(vec![table, picture])?;
+    }
+    match rows.iter().flatten().filter(|row| row.error.is_none()).count() {
+        0 => Ok(()),
+        early => Err(Error::Failed(format!("in {early} of {} rows not all members relaxed", rows.concat().len()))),
+    }
+}
+
+fn work_line([solver, order, tau, tolerance, error, solves, sweeps, ms]: [&str; 8]) -> String {
+    format!("{solver:<13}{order:>5}{tau:>10}{tolerance:>11}{error:>11}{solves:>9}{sweeps:>10}{ms:>10}\n")
+}
+
+fn work_row(row: &WorkRow) -> String {
+    let short = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.1e}"));
+    let (tau, tolerance) = row.stepping.settings();
+    work_line([
+        row.solver.name(),
+        &row.stepping.order().to_string(),
+        &short(tau),
+        &short(tolerance),
+        &short(row.error),
+        &format!("{:.0}", row.solves),
+        &format!("{:.0}", row.sweeps),
+        &significant(1e3 * row.seconds, 3),
+    ])
+}
+
+/// Errors against solves and seconds, a row of panels for each solver.
+fn work_diagram(measured: &WorkPrecision, solvers: &[Solver], rows: &[Vec<WorkRow>]) -> String {
+    let curve = |way: &Vec<WorkRow>| WorkCurve {
+        label: match way.first().map_or(1, |row| row.stepping.order()) {
+            1 => "fixed steps".into(),
+            order => format!("order up to {order}"),
+        },
+        points: way.iter().filter_map(|row| Some((row.error?, [row.solves, 1e3 * row.seconds]))).collect(),
+    };
+    let panels = |solver: &Solver| WorkPanels {
+        label: solver.name().into(),
+        curves: rows.iter().filter(|way| way.iter().all(|row| row.solver == *solver)).map(curve).collect(),
+    };
+    WorkDiagram {
+        title: "What an error of the relaxation time costs",
+        note: &measured.sentence(),
+        costs: [("solves per member", ""), ("time per member", "ms")],
+        rows: solvers.iter().map(panels).collect(),
+    }
+    .draw()
 }
 
 /// An aligned table, grouped by problem; a run that ended early has its status instead of its error.

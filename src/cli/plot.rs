@@ -18,8 +18,8 @@ Examples:
   curvelax plot ellipses
   curvelax plot ellipses --out pictures
 
-Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, mean_excess.csv and plots/portraits.json in DIR. The
-same version of the program writes the same bytes as the run.";
+Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, levels.csv, mean_excess.csv and plots/portraits.json
+in DIR. The same version of the program writes the same bytes as the run.";
 
 /// Redraw the plots and the report of a finished run.
 #[derive(clap::Args)]

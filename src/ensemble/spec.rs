@@ -199,6 +199,10 @@ pub struct Spec {
     /// Local error tolerance of adaptive steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<f64>,
+    /// Highest order of adaptive steps; if absent, that of the precision. Not a key: only the cost of orders is
+    /// [measured](crate::work_precision) with it.
+    #[serde(skip)]
+    pub most_order: Option<u32>,
     /// Final time; [`DEFAULT_T_END`] if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub t_end: Option<FinalTime>,
@@ -298,6 +302,7 @@ impl Default for Spec {
             units: None,
             tau: None,
             adaptive: None,
+            most_order: None,
             t_end: None,
             omega: None,
             no_redistribution: false,

@@ -18,6 +18,10 @@ pub const SNAPSHOTS: &str = "snapshots.csv";
 pub const STORE: &str = "snapshots.zarr";
 /// Errors and orders against exact solutions.
 pub const CONVERGENCE: &str = "convergence.csv";
+/// Errors of relaxation times and what they cost.
+pub const WORK: &str = "work_precision.csv";
+/// The same as a picture.
+pub const WORK_PICTURE: &str = "work_precision.svg";
 /// Statistics by cell.
 pub const ENSEMBLE: &str = "ensemble.csv";
 /// How the run was made.

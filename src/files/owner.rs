@@ -9,7 +9,10 @@ use std::{
 use super::{
     claim::LOCK,
     disk::{entries, is_own_store},
-    names::{CONVERGENCE, FIGURES, PLOTS, PROBE, RUN, SHARD, STATE, STATE_OLD, STATE_PART, is_store, part},
+    names::{
+        CONVERGENCE, FIGURES, PLOTS, PROBE, RUN, SHARD, STATE, STATE_OLD, STATE_PART, WORK, WORK_PICTURE, is_store,
+        part,
+    },
 };
 use crate::{
     error::{Error, Result},
@@ -54,7 +57,7 @@ impl Owner {
     fn marks(self) -> &'static [&'static str] {
         match self {
             Owner::Run => &[RUN, SHARD, STATE, STATE_OLD],
-            Owner::Convergence => &[CONVERGENCE],
+            Owner::Convergence => &[CONVERGENCE, WORK, WORK_PICTURE],
             Owner::Figure => &FIGURES,
             // They may be left over from a run whose other files are lost.
             Owner::Pictures | Owner::PicturesOfRun => &[],

@@ -18,7 +18,7 @@ use crate::results::tally::MeanExcess;
 use crate::{
     ensemble::{LevelRow, Outcome, SeriesRow, Snapshot},
     error::{Error, Result},
-    truth::ConvergenceRow,
+    truth::{ConvergenceRow, WorkRow},
 };
 
 /// Bytes gathered before they are written.
@@ -153,6 +153,30 @@ columns! { ErrorRow:
     order: optional = order, "observed order against the row before";
 }
 
+/// A row of `work_precision.csv`: the error of relaxation times by one method, and what it costs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CostRow {
+    solver: String,
+    tau: Option<f64>,
+    tolerance: Option<f64>,
+    most_order: u64,
+    error: Option<f64>,
+    solves: f64,
+    sweeps: f64,
+    seconds: f64,
+}
+
+columns! { CostRow:
+    solver: word = solver, "solver of the systems";
+    tau: optional = tau, "time step; empty where steps adapt";
+    tolerance: optional = tolerance, "local error tolerance of adaptive steps";
+    most_order: whole = most_order, "highest order of the steps; 1 for fixed ones";
+    error: optional = error, "median of |t_relax / reference - 1|; empty unless all members relaxed";
+    solves: number = solves, "steps of the paper per member, mean";
+    sweeps: number = sweeps, "sweeps per member, mean";
+    seconds: number = seconds, "seconds per member with all threads at work, median of several runs";
+}
+
 /// A table that grows row by row.
 pub struct Table<R> {
     // Flushes when dropped.
@@ -258,6 +282,23 @@ impl ErrorRow {
             tolerance: at.tolerance,
             error: *error,
             order: *order,
+        }
+    }
+}
+
+impl CostRow {
+    /// The row of a method; either τ or the tolerance of adaptive steps is empty.
+    pub fn of(row: &WorkRow) -> CostRow {
+        let (tau, tolerance) = row.stepping.settings();
+        CostRow {
+            solver: row.solver.name().to_string(),
+            tau,
+            tolerance,
+            most_order: row.stepping.order().into(),
+            error: row.error,
+            solves: row.solves,
+            sweeps: row.sweeps,
+            seconds: row.seconds,
         }
     }
 }

@@ -361,10 +361,15 @@ impl FinishedRun<'_> {
                 if let Some(limits) = &cell.limits {
                     add("median t_limit", limits.median, limits.interval.map_or(String::new(), bounds));
                 }
-                if let Some(DiscretisationError { members, mean, error, .. }) = cell.discretisation {
+                if let Some(discretisation) = cell.discretisation {
+                    let DiscretisationError { members, mean, error, .. } = discretisation;
                     let [mean, error] = [mean, error].map(|value| significant(100.0 * value, 2));
-                    let note = format!("of t_relax, ± {error} %, by {}", count(members as u64, "member"));
-                    headline.push(Headline { label: "discretisation".into(), value: format!("{mean} %"), note });
+                    let known = count(members as u64, "member");
+                    let (value, note) = match discretisation.converges() {
+                        true => (format!("{mean} %"), format!("of t_relax, ± {error} %, by {known}")),
+                        false => ("not known".into(), format!("most times of {known} do not converge yet in n")),
+                    };
+                    headline.push(Headline { label: "discretisation".into(), value, note });
                 }
                 if let [Some(low), .., Some(high)] = cell.quantiles {
                     let range = format!("{} to {}", significant(low, 3), significant(high, 3));

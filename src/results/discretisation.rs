@@ -32,6 +32,11 @@ impl DiscretisationError {
             not_asymptotic: judged.iter().filter(|limit| !limit.asymptotic).count(),
         }))
     }
+
+    /// Whether most of its members converge in n, so that the mean means something.
+    pub fn converges(&self) -> bool {
+        2 * self.not_asymptotic <= self.members
+    }
 }
 
 /// The limits of the relaxation times of a cell.

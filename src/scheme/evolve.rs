@@ -10,7 +10,7 @@ use super::{
     extrapolation::{self, AllShares, SHARED_PARTS},
     member::{Counters, NEVER},
     observe::{self, Glance},
-    pace::{self, Stride},
+    pace::{self, Allowed, Stride},
     run::Run,
     start,
     state::{self, CURVE_FIELDS, INCREMENT_FIELDS, LASTING_FIELDS, STATE_FIELDS},
@@ -96,7 +96,7 @@ pub fn evolve_abreast<N: Number, S: Solves>(group: Group<N::Real>, method: &Meth
     let enough = running.div_ceil(2);
     for made in 1..=attempts {
         let attempt = team.attempt::<S>(runs, live, branches, method);
-        team.conclude::<S>(runs, live, adaptive, &attempt);
+        team.conclude::<S>(runs, live, adaptive, method.most_order, &attempt);
         let all_leave = made == attempts || runs.iter().filter(|run| run.counters.is_running()).count() < enough;
         for lane in 0..runs.len() {
             if live.lane(lane) && (all_leave || !runs[lane].counters.is_running()) {
@@ -276,6 +276,7 @@ impl<N: Number> Team<N> {
         runs: &mut [&mut Run<N::Real>],
         live: N::Mask,
         adaptive: bool,
+        most_order: u32,
         attempt: &Attempt<N>,
     ) {
         let n = self.work.blocks.n;
@@ -293,11 +294,13 @@ impl<N: Number> Team<N> {
             let of_solves = failure_of_solves(&attempt.stepped, lane);
             let failure = of_solves.or(failure_of_curve(finite.lane(lane), singular.lane(lane)));
             let length = run.report.now.length;
-            let allowed =
-                adaptive.then(|| pace::allowed(stride.length, length, N::Real::of(n as f64), &run.parameters));
+            let allowed = adaptive.then(|| Allowed {
+                error: pace::allowed(stride.length, length, N::Real::of(n as f64), &run.parameters),
+                order: most_order.min(extrapolation::most_order(N::Real::EPSILON)),
+            });
             if let Some(allowed) = allowed
                 && of_solves.is_none()
-                && !errors[0].le(allowed)
+                && !errors[0].le(allowed.error)
             {
                 kept.set_lane(lane, true);
                 refuse_inaccurate(run, n, stride.length, errors, allowed);
@@ -433,7 +436,7 @@ fn refuse_failure<T: Real>(run: &mut Run<T>, n: usize, h: T, cause: Status) {
 }
 
 /// Refuses a step of length h whose error is too large.
-fn refuse_inaccurate<T: Real>(run: &mut Run<T>, n: usize, h: T, errors: [T; 2], allowed: T) {
+fn refuse_inaccurate<T: Real>(run: &mut Run<T>, n: usize, h: T, errors: [T; 2], allowed: Allowed<T>) {
     let most = T::of(if run.counters.refused == 0 { pace::AFTER_REFUSAL } else { pace::AFTER_REFUSALS });
     let (next, order) = pace::choose(h, run.counters.order, errors, most, allowed);
     run.counters.order = order;
@@ -459,7 +462,7 @@ fn record_events<T: Real>(run: &mut Run<T>, taken: &Taken<T>) {
 }
 
 /// Advances the clock by an accepted adaptive step, and chooses the length and the order of the next one.
-fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, errors: [T; 2], [slope, bend]: [T; 2], allowed: T) {
+fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, errors: [T; 2], [slope, bend]: [T; 2], allowed: Allowed<T>) {
     let Run { parameters, counters, report, .. } = run;
     let progress = &mut report.progress;
     let most_growth = T::of(if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 });

@@ -7,7 +7,7 @@
 
 use super::{
     Parameters,
-    extrapolation::{LEAST_ORDER, most_order, parts},
+    extrapolation::{LEAST_ORDER, parts},
     member::Progress,
 };
 use crate::number::{Real, ln_ratio};
@@ -47,6 +47,15 @@ pub struct Stride<T> {
     pub low: T,
     /// Whether it reaches the final time.
     pub last: bool,
+}
+
+/// What a step may have.
+#[derive(Clone, Copy, Debug)]
+pub struct Allowed<T> {
+    /// Largest error.
+    pub error: T,
+    /// Highest order.
+    pub order: u32,
 }
 
 /// Returns the next step: the requested length, half of the remaining time, or all of it.
@@ -108,10 +117,10 @@ fn work<T: Real>(order: u32, ratio: T) -> T {
 /// Returns the length and the order after a step of length `length` and order `order`, with the errors of that order and
 /// of the one below: of the two, and the one above, the order that makes the most progress for its work. The order only
 /// rises if the step may grow.
-pub fn choose<T: Real>(length: T, order: u32, errors: [T; 2], most_growth: T, allowed: T) -> (T, u32) {
-    let own = growth(errors[0], order, allowed).min(most_growth);
+pub fn choose<T: Real>(length: T, order: u32, errors: [T; 2], most_growth: T, allowed: Allowed<T>) -> (T, u32) {
+    let own = growth(errors[0], order, allowed.error).min(most_growth);
     if order > LEAST_ORDER {
-        let lower = growth(errors[1], order - 1, allowed).min(most_growth);
+        let lower = growth(errors[1], order - 1, allowed.error).min(most_growth);
         if work(order - 1, lower).le(T::of(FALLS) * work(order, own)) {
             return (length * lower, order - 1);
         }
@@ -119,7 +128,7 @@ pub fn choose<T: Real>(length: T, order: u32, errors: [T; 2], most_growth: T, al
             return (length * own, order);
         }
     }
-    if order == most_order(T::EPSILON) || most_growth.le(T::of(1.0)) {
+    if order == allowed.order || most_growth.le(T::of(1.0)) {
         return (length * own, order);
     }
     // The next order is taken to need as much work for the same progress.

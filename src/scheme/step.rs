@@ -1,7 +1,8 @@
 //! One step of the paper's scheme, from an old curve to the new one in the workspace. Twin of `shaders/step.wgsl`.
 
 use super::{
-    Branches, Curve, Increments, Parameters, Workspace, curvature::Curvature, position::Position, pull, redistribution,
+    Branches, Curve, Increments, Parameters, Workspace, curvature::Curvature, extrapolation::MOST_ORDER,
+    position::Position, pull, redistribution,
 };
 use crate::{
     number::{Mask, Number, Real},
@@ -17,6 +18,15 @@ pub struct Method {
     pub order: Order,
     /// Maximum sweeps per system; a member that needs more is stalled.
     pub max_sweeps: u32,
+    /// Highest order of an adaptive step; never above that of the [precision](super::extrapolation::most_order).
+    pub most_order: u32,
+}
+
+impl Method {
+    /// The method whose sweeps visit the nodes by colours, as the kernel's do, with steps of any order.
+    pub fn coloured(solver: Solver, max_sweeps: u32) -> Method {
+        Method { solver, order: Order::Coloured, max_sweeps, most_order: MOST_ORDER }
+    }
 }
 
 /// Result of the two solves of a step.

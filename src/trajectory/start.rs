@@ -43,7 +43,8 @@ impl<'a> Trajectory<'a> {
         let parameters = parameters(spec, &nodes, [unit, time_unit], spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
         launch.counters.stop_when_relaxed = spec.stops_when_relaxed().into();
-        launch.counters.order = FIRST_ORDER.min(most_order(precision.epsilon()));
+        launch.counters.order =
+            FIRST_ORDER.min(most_order(precision.epsilon())).min(spec.most_order.unwrap_or(FIRST_ORDER));
         let turning = launch.report.progress.turning;
         let start = Observables::new(&launch.report.now, turning, unit);
         let limit = spec.threshold(start.excess);

@@ -18,13 +18,16 @@
 //! A [`Problem`] is a value: flow, curve, final time, the measured quantity, its exact value, and the error bound.
 //! [`problems`] is the single table of them, for the tests on every back end and for `curvelax convergence`.
 //! [`Problem::solve`] runs it at a [`Resolution`] like any other run; a [`ConvergenceStudy`] refines one number.
+//! [`WorkPrecision`] measures what an error of the relaxation time costs.
 
 mod convergence;
 mod measure;
 mod problems;
 mod theory;
+mod work_precision;
 
 pub use convergence::{ConvergenceRow, ConvergenceStudy, Solved, Varied, studies};
 pub use measure::{Measure, mode_amplitude};
 pub use problems::{ErrorBound, LEMNISCATE_LIFE, Problem, Resolution, StartCurve, problems};
 pub use theory::{CircleMode, circle_mode};
+pub use work_precision::{Stepping, WorkPrecision, WorkRow};

@@ -11,6 +11,7 @@ use curvelax::{
     number::Real,
     scheme::{
         Parameters, State, Workspace,
+        extrapolation::MOST_ORDER,
         observe::{self, CurveSums},
         step::{self, Method},
     },
@@ -18,7 +19,8 @@ use curvelax::{
 };
 use glam::DVec2;
 
-pub const DIRECT: Method = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
+pub const DIRECT: Method =
+    Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1, most_order: MOST_ORDER };
 pub const SWEEPS: Method = Method { solver: Solver::GaussSeidel, max_sweeps: 1_000_000, ..DIRECT };
 
 /// n nodes at `u = i/n`, i = 1…n.

@@ -27,7 +27,7 @@ use crate::{
 };
 
 /// Field names of the parameters of one dispatch, in memory order.
-pub const DISPATCH_FIELDS: [&str; 5] = ["steps", "max_sweeps", "sweeps", "blocks", "groups"];
+pub const DISPATCH_FIELDS: [&str; 6] = ["steps", "max_sweeps", "most_order", "sweeps", "blocks", "groups"];
 
 /// Parameters of one dispatch.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -35,9 +35,19 @@ pub const DISPATCH_FIELDS: [&str; 5] = ["steps", "max_sweeps", "sweeps", "blocks
 struct Dispatch {
     steps: u32,
     max_sweeps: u32,
+    most_order: u32,
     sweeps: u32,
     blocks: u32,
     groups: u32,
+}
+
+/// What members may do.
+#[derive(Clone, Copy)]
+pub(super) struct Caps {
+    /// Maximum sweeps per system.
+    pub max_sweeps: u32,
+    /// Highest order of an adaptive step.
+    pub most_order: u32,
 }
 
 /// Slots side by side in one dispatch.
@@ -140,13 +150,13 @@ impl<T: Real> Batch<T> {
     }
 
     /// Dispatches the members that are due, if any.
-    pub fn start(&mut self, device: &OpenGpu, pipeline: &wgpu::ComputePipeline, budget: Budget, max_sweeps: u32) {
+    pub fn start(&mut self, device: &OpenGpu, pipeline: &wgpu::ComputePipeline, budget: Budget, caps: Caps) {
         self.due.clear();
         self.due.extend((0..).zip(&self.counters).filter(|(_, counters)| counters.is_running()).map(|(slot, _)| slot));
         if self.due.is_empty() {
             return;
         }
-        self.upload(&device.queue, budget, max_sweeps);
+        self.upload(&device.queue, budget, caps);
         let mut encoder = device.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
         pass.set_pipeline(pipeline);
@@ -196,9 +206,10 @@ impl<T: Real> Batch<T> {
         }
     }
 
-    fn upload(&mut self, queue: &wgpu::Queue, Budget { steps, sweeps }: Budget, max_sweeps: u32) {
+    fn upload(&mut self, queue: &wgpu::Queue, Budget { steps, sweeps }: Budget, caps: Caps) {
         let blocks = self.blocks.count() as u32;
-        let asked = Dispatch { steps, max_sweeps, sweeps, blocks, groups: blocks.isqrt() };
+        let Caps { max_sweeps, most_order } = caps;
+        let asked = Dispatch { steps, max_sweeps, most_order, sweeps, blocks, groups: blocks.isqrt() };
         queue.write_buffer(&self.buffers.dispatch, 0, bytemuck::bytes_of(&asked));
         queue.write_buffer(&self.buffers.due, 0, bytemuck::cast_slice(&self.due));
         // From the first changed slot to the last: needless uploads in between only write back what came from the

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::{
     adapter::{Gpu, OpenGpu},
-    batch::{Batch, Reading, staging},
+    batch::{Batch, Caps, Reading, staging},
     clock::Moment,
     shader::{TRACE_FIELDS, Variant},
 };
@@ -16,7 +16,7 @@ use crate::{
     error::{Error, Result},
     number::Real,
     scheme::{
-        Parameters, State,
+        Parameters, State, extrapolation,
         member::{Counters, Report},
         run::Run,
         state::STATE_FIELDS,
@@ -41,7 +41,7 @@ pub struct Kernel<T> {
     pipeline: wgpu::ComputePipeline,
     batches: Vec<Batch<T>>,
     slots_per_batch: usize,
-    max_sweeps: u32,
+    caps: Caps,
     solver: Solver,
     budget: Budget,
     most: Budget,
@@ -104,7 +104,7 @@ impl<T: Real> Kernel<T> {
             pipeline,
             batches,
             slots_per_batch: slots,
-            max_sweeps,
+            caps: Caps { max_sweeps, most_order: extrapolation::most_order(T::EPSILON) },
             solver: variant.solver,
             budget: Budget::first(variant.solver, most),
             most,
@@ -122,9 +122,9 @@ impl<T: Real> Kernel<T> {
         self
     }
 
-    /// Changes the cap on the sweeps of a solve.
-    pub fn with_max_sweeps(mut self, max_sweeps: u32) -> Self {
-        self.max_sweeps = max_sweeps;
+    /// Changes the caps on the sweeps of a solve and on the order of a step.
+    pub fn with_caps(mut self, max_sweeps: u32, most_order: u32) -> Self {
+        self.caps = Caps { max_sweeps, most_order: most_order.min(extrapolation::most_order(T::EPSILON)) };
         self
     }
 
@@ -206,7 +206,7 @@ impl<T: Real> Backend for Kernel<T> {
     }
 
     fn start(&mut self, batch: usize) -> Result<()> {
-        self.batches[batch].start(&self.gpu, &self.pipeline, self.budget, self.max_sweeps);
+        self.batches[batch].start(&self.gpu, &self.pipeline, self.budget, self.caps);
         self.gpu.check()
     }
 

@@ -4,7 +4,7 @@ use crate::{
     error::{Error, Result},
     number::Real,
     scheme::{Workspace, run::Run, step::Method},
-    solver::{Blocks, Order, Solver},
+    solver::{Blocks, Solver},
 };
 
 /// Maximum number of sweeps in these comparisons.
@@ -33,7 +33,7 @@ pub(super) fn tampered(mut launches: Vec<Run<f64>>, tamper: Option<Tamper>) -> V
 }
 
 pub(super) fn method(solver: Solver) -> Method {
-    Method { solver, order: Order::Coloured, max_sweeps: MAX_SWEEPS }
+    Method::coloured(solver, MAX_SWEEPS)
 }
 
 pub(super) fn blocks(n: usize) -> Result<Blocks> {

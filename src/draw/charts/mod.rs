@@ -1,4 +1,4 @@
-//! The charts of a study, each from plain numbers to the text of an SVG file.
+//! The charts of studies and of measurements, each from plain numbers to the text of an SVG file.
 //!
 //! Equal data give equal bytes. Values that are not finite are omitted, and counted if they stand for members. If there
 //! is nothing to draw, the picture says why. A picture stays below about 100 kB for any number of members: members are
@@ -11,6 +11,7 @@ pub mod mesh;
 pub mod rates;
 pub mod relaxation;
 pub mod survival;
+pub mod work;
 
 pub use bins::CellValues;
 pub use decay::{Decay, DecayCurve, DecayLaw, Theory};
@@ -19,6 +20,7 @@ pub use mesh::MeshQuality;
 pub use rates::FittedRates;
 pub use relaxation::RelaxationTimes;
 pub use survival::{Survival, SurvivalCurve};
+pub use work::{WorkCurve, WorkDiagram, WorkPanels};
 
 pub use super::chart::EstimatedNumber;
 

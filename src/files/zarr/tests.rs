@@ -14,7 +14,7 @@ use crate::{
     files::{OutputFolder, names, tables::SnapshotTable},
     scheme::step::Method,
     simulate::simulate,
-    solver::{Blocks, Order, Solver},
+    solver::{Blocks, Solver},
 };
 
 /// An array as it was read, in C order.
@@ -188,7 +188,7 @@ fn a_run_leaves_the_same_bits_as_in_its_table() {
     };
     let spec = spec.validate().unwrap();
     let family = Family::new(&spec).unwrap();
-    let direct = Method { solver: Solver::Direct, order: Order::Coloured, max_sweeps: 1 };
+    let direct = Method::coloured(Solver::Direct, 1);
     let mut backend = CpuBackend::<f64>::new(Blocks::new(33).unwrap(), direct, 1).unwrap();
     let mut members: Vec<Ended> = Vec::new();
     let backend: &mut dyn Backend = &mut backend;

@@ -280,6 +280,20 @@ pub fn draw_all() -> Vec<(String, String)> {
     add("mesh-equal", mesh(&[1.0; 100], &[1e-3; 100]));
     add("mesh-unknown", mesh(&unknown, &unknown));
 
+    let work = |rows: Vec<WorkPanels>| {
+        let title = "What an error of the relaxation time costs";
+        WorkDiagram { title, note: NOTE, costs: [("solves per member", ""), ("time per member", "ms")], rows }.draw()
+    };
+    let way = |order: i32| {
+        let point = |i: i32| (10_f64.powi(-i * order), [10.0 * 4_f64.powi(i), 0.1 * 4_f64.powi(i)]);
+        WorkCurve { label: format!("order up to {order}"), points: (1..5).map(point).collect() }
+    };
+    let panels = |label: &str| WorkPanels { label: label.into(), curves: (1..7).map(way).collect() };
+    add("work", work(vec![panels("direct"), panels("multigrid"), panels("gauss-seidel")]));
+    add("work-none", work(vec![]));
+    let unknown_cost = WorkCurve { label: "one".into(), points: vec![(0.0, [1.0, 2.0]), (1e-3, [f64::NAN, 2.0])] };
+    add("work-unknown", work(vec![WorkPanels { label: "direct".into(), curves: vec![unknown_cost] }]));
+
     let hostile =
         "<script>alert(\"a & b\")</script> and a title that is so long that it has to be broken into lines \0";
     let curves = vec![SurvivalCurve { label: hostile.into(), ..cells(1, 20).remove(0) }; 2];
