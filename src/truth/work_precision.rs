@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// How much is run.
-struct Extent {
+struct Effort {
     members: u64,
     /// Runs of which the seconds are the median.
     repeats: usize,
@@ -26,12 +26,12 @@ struct Extent {
     tolerances: &'static [f64],
 }
 
-const FULL: Extent = Extent { members: 32, repeats: 5, tolerances: &[1e-1, 1e-2, DEFAULT_ADAPTIVE, 1e-4, 1e-5] };
+const FULL: Effort = Effort { members: 32, repeats: 5, tolerances: &[1e-1, 1e-2, DEFAULT_ADAPTIVE, 1e-4, 1e-5] };
 /// Where longer steps take more sweeps, a member takes a good part of a second.
-const SWEPT: Extent = Extent { members: 8, repeats: 3, tolerances: &[1e-2, DEFAULT_ADAPTIVE, 1e-4] };
+const SWEPT: Effort = Effort { members: 8, repeats: 3, tolerances: &[1e-2, DEFAULT_ADAPTIVE, 1e-4] };
 
-impl Extent {
-    fn of(solver: Solver) -> &'static Extent {
+impl Effort {
+    fn of(solver: Solver) -> &'static Effort {
         if solver.facts().slows_with_step { &SWEPT } else { &FULL }
     }
 }
@@ -103,13 +103,13 @@ fn median(values: Vec<f64>) -> Result<f64> {
 
 /// Relaxation times and work of a run.
 #[derive(Default)]
-struct Times {
+struct RunTimes {
     t_relax: Vec<Option<f64>>,
     solves: u64,
     sweeps: u64,
 }
 
-impl Sink for Times {
+impl Sink for RunTimes {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         let outcome = &ended.outcome;
         self.t_relax.push(outcome.t_relax);
@@ -135,7 +135,7 @@ impl WorkPrecision {
         };
         let mut all = WorkPrecision { method: exact, precision: Precision::F64, reference: Vec::new() };
         let finest = Stepping::Adaptive { tolerance: FINEST, most_order: MOST_ORDER };
-        let Times { t_relax: reference, .. } = all.run(Solver::Direct, &[finest], 1)?.remove(0).0;
+        let RunTimes { t_relax: reference, .. } = all.run(Solver::Direct, &[finest], 1)?.remove(0).0;
         if reference.iter().any(Option::is_none) {
             return Err(Error::Failed("a member of the reference did not relax".into()));
         }
@@ -162,7 +162,7 @@ impl WorkPrecision {
         let orders = LEAST_ORDER..=most_order(self.precision.epsilon());
         let step = |tolerance: &f64, most_order| Stepping::Adaptive { tolerance: *tolerance, most_order };
         let adaptive =
-            |most_order| Extent::of(solver).tolerances.iter().map(|tolerance| step(tolerance, most_order)).collect();
+            |most_order| Effort::of(solver).tolerances.iter().map(|tolerance| step(tolerance, most_order)).collect();
         std::iter::once(fixed).chain(orders.map(adaptive)).collect()
     }
 
@@ -171,8 +171,8 @@ impl WorkPrecision {
     /// # Errors
     /// Those of the back end.
     pub fn rows(&self, solver: Solver, way: &[Stepping]) -> Result<Vec<WorkRow>> {
-        let runs = self.run(solver, way, Extent::of(solver).repeats)?;
-        let row = |(stepping, (times, seconds)): (&Stepping, (Times, f64))| {
+        let runs = self.run(solver, way, Effort::of(solver).repeats)?;
+        let row = |(stepping, (times, seconds)): (&Stepping, (RunTimes, f64))| {
             let pairs = times.t_relax.iter().zip(&self.reference);
             let errors: Option<Vec<f64>> = pairs.map(|(t, exact)| Some(((*t)? / (*exact)? - 1.0).abs())).collect();
             let mean = |of: u64| of as f64 / times.t_relax.len() as f64;
@@ -190,8 +190,8 @@ impl WorkPrecision {
 
     /// Runs all members once for each of `way`, and returns their times with the median of the seconds of `repeats`
     /// runs. The runs take turns, so that a disturbance of the machine meets all of them.
-    fn run(&self, solver: Solver, way: &[Stepping], repeats: usize) -> Result<Vec<(Times, f64)>> {
-        let mut runs: Vec<(Times, Vec<f64>)> = way.iter().map(|_| Default::default()).collect();
+    fn run(&self, solver: Solver, way: &[Stepping], repeats: usize) -> Result<Vec<(RunTimes, f64)>> {
+        let mut runs: Vec<(RunTimes, Vec<f64>)> = way.iter().map(|_| Default::default()).collect();
         let specs: Vec<Spec> = way.iter().map(|stepping| self.spec(solver, *stepping)).collect();
         let Some(first) = specs.first() else { return Ok(Vec::new()) };
         let choice = placement::choose(first, first.points)?;
@@ -199,7 +199,7 @@ impl WorkPrecision {
         let family = Family::new(first)?;
         for _ in 0..repeats {
             for (spec, (times, seconds)) in specs.iter().zip(&mut runs) {
-                *times = Times::default();
+                *times = RunTimes::default();
                 let cell = Cell::only(spec.clone().validate()?, family.clone());
                 let started = Instant::now();
                 simulate(&[cell], choice.precision(), backend.as_mut(), 0, times)?;
@@ -212,7 +212,7 @@ impl WorkPrecision {
     /// The spec of a run: what `--accurate` recommends, with other steps.
     fn spec(&self, solver: Solver, stepping: Stepping) -> Spec {
         let spec = Spec {
-            curves: Extent::of(solver).members,
+            curves: Effort::of(solver).members,
             solver: solver.into(),
             tolerance: None,
             omega: Some(Omega::Auto),
