@@ -135,28 +135,31 @@ pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Opti
             before = Some((std::mem::replace(&mut spec, next), round));
             continue;
         };
-        let needed = coarse.needed(goal);
-        if needed > MAX_MEMBERS {
-            let problem = format!(
-                "it needs about {needed:.1e} members in each cell, and more than {MAX_MEMBERS:.0e} is too many"
-            );
-            let reached = rounded(coarse.sampling + coarse.discretisation, 2);
-            return refuse(&problem, &format!("{reached} was reached with {}; use a larger number", coarse.members));
+        // n is known to do; a second round has more of the same members.
+        let (mut judged, mut spec) = (coarse, chosen);
+        for number in [count + 1, count + 2] {
+            let (needed, farthest) = (judged.needed(goal), FARTHEST * judged.members as f64);
+            if needed > MAX_MEMBERS {
+                let problem = format!(
+                    "it needs about {needed:.1e} members in each cell, and more than {MAX_MEMBERS:.0e} is too many"
+                );
+                let reached = rounded(judged.sampling + judged.discretisation, 2);
+                return refuse(
+                    &problem,
+                    &format!("{reached} was reached with {}; use a larger number", judged.members),
+                );
+            }
+            spec.curves = spec.curves.max(needed.min(farthest) as u64);
+            if needed <= farthest {
+                return Ok(spec);
+            }
+            if number == count + 1 {
+                judged = Round { number, ..self::round(&spec, &stopped)? };
+                tell(&judged);
+            }
         }
-        let farthest = FARTHEST * coarse.members as f64;
-        spec = Spec { curves: (needed.min(farthest) as u64).max(chosen.curves), ..chosen };
-        if needed <= farthest {
-            return Ok(spec);
-        }
-        // More of the same members: n is known to do.
-        let round = Round { number: count + 1, ..self::round(&spec, &stopped)? };
-        tell(&round);
-        let needed = round.needed(goal);
-        if needed > MAX_MEMBERS.min(FARTHEST * round.members as f64) {
-            let problem = format!("it needs about {needed:.1e} members in each cell");
-            return refuse(&problem, &format!("begin with --curves {} or more", round.members));
-        }
-        return Ok(Spec { curves: (needed as u64).max(spec.curves), ..spec });
+        let problem = format!("it needs about {:.1e} members in each cell", judged.needed(goal));
+        return refuse(&problem, &format!("begin with --curves {} or more", judged.members));
     }
     refuse(&format!("not reached in {MAX_ROUNDS} rounds"), "use a larger number, or more --points")
 }
@@ -187,14 +190,17 @@ fn round(spec: &Spec, stopped: &dyn Fn() -> Option<Error>) -> Result<Round> {
 fn of_cell(spec: &Spec, cell: &CellStatistics) -> Result<Round> {
     let limits = cell.limits.as_ref();
     let found = limits.and_then(|of| Some((of.median?, of.uncertainty()?, of.error?)));
+    let refuse = |problem: &str, remedy: &str| {
+        Err(Error::value("accuracy", number(spec.accuracy.unwrap_or_default()), problem, remedy))
+    };
+    if cell.median() == Some(0.0) {
+        return refuse(
+            "at least half of the members are relaxed at the start",
+            "use a larger --amplitude, or another --shape",
+        );
+    }
     let Some((median, total, error)) = found else {
-        let problem = "too few members relaxed for a median with an interval";
-        return Err(Error::value(
-            "accuracy",
-            spec.accuracy.unwrap_or_default(),
-            problem,
-            "use more --curves or --t-end",
-        ));
+        return refuse("too few members relaxed for a median with an interval", "use more --curves or --t-end");
     };
     let discretisation = error / median;
     let unruly = cell.discretisation.as_ref().map_or(0.0, |of| of.not_asymptotic as f64 / of.members.max(1) as f64);

@@ -295,10 +295,10 @@ fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     let sampling = cell
         .bounds()
         .map_or(String::new(), |(low, high)| format!("sampling {} to {}, ", significant(low), significant(high)));
-    let Some(discretisation) = cell.discretisation else {
+    let Some(discretisation) = &cell.discretisation else {
         return format!("{sampling}discretisation not known: no member has times at n, n/√2 and n/2 nodes");
     };
-    let DiscretisationError { members, mean, error, not_asymptotic } = discretisation;
+    let DiscretisationError { members, mean, error, not_asymptotic } = *discretisation;
     let known = plural(members as u64, "member");
     if !discretisation.converges() {
         return format!(

@@ -361,10 +361,10 @@ impl FinishedRun<'_> {
                 if let Some(limits) = &cell.limits {
                     add("median t_limit", limits.median, limits.interval.map_or(String::new(), bounds));
                 }
-                if let Some(discretisation) = cell.discretisation {
+                if let Some(discretisation) = &cell.discretisation {
                     let DiscretisationError { members, mean, error, .. } = discretisation;
                     let [mean, error] = [mean, error].map(|value| significant(100.0 * value, 2));
-                    let known = count(members as u64, "member");
+                    let known = count(*members as u64, "member");
                     let (value, note) = match discretisation.converges() {
                         true => (format!("{mean} %"), format!("of t_relax, ± {error} %, by {known}")),
                         false => ("not known".into(), format!("most times of {known} do not converge yet in n")),
