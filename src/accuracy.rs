@@ -135,33 +135,40 @@ pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Opti
             before = Some((std::mem::replace(&mut spec, next), round));
             continue;
         };
-        // n is known to do; a second round has more of the same members.
-        let (mut judged, mut spec) = (coarse, chosen);
-        for number in [count + 1, count + 2] {
-            let (needed, farthest) = (judged.needed(goal), FARTHEST * judged.members as f64);
-            if needed > MAX_MEMBERS {
-                let problem = format!(
-                    "it needs about {needed:.1e} members in each cell, and more than {MAX_MEMBERS:.0e} is too many"
-                );
-                let reached = rounded(judged.sampling + judged.discretisation, 2);
-                return refuse(
-                    &problem,
-                    &format!("{reached} was reached with {}; use a larger number", judged.members),
-                );
-            }
-            spec.curves = spec.curves.max(needed.min(farthest) as u64);
-            if needed <= farthest {
-                return Ok(spec);
-            }
-            if number == count + 1 {
-                judged = Round { number, ..self::round(&spec, &stopped)? };
-                tell(&judged);
-            }
-        }
-        let problem = format!("it needs about {:.1e} members in each cell", judged.needed(goal));
-        return refuse(&problem, &format!("begin with --curves {} or more", judged.members));
+        return members(chosen, coarse, goal, |number, spec| {
+            let round = Round { number: count + number, ..self::round(spec, &stopped)? };
+            tell(&round);
+            Ok(round)
+        });
     }
     refuse(&format!("not reached in {MAX_ROUNDS} rounds"), "use a larger number, or more --points")
+}
+
+/// The spec with as many members as `goal` needs, where `judged` says how far its first ones reach. The need is estimated,
+/// so it is not believed far beyond the members that are judged: `judge` judges more of the same.
+fn members(
+    mut spec: Spec,
+    mut judged: Round,
+    goal: f64,
+    mut judge: impl FnMut(usize, &Spec) -> Result<Round>,
+) -> Result<Spec> {
+    for further in 1.. {
+        let (needed, farthest) = (judged.needed(goal), FARTHEST * judged.members as f64);
+        if needed > MAX_MEMBERS {
+            let problem = format!(
+                "it needs about {needed:.1e} members in each cell, and more than {MAX_MEMBERS:.0e} is too many"
+            );
+            let reached = rounded(judged.sampling + judged.discretisation, 2);
+            let remedy = format!("{reached} was reached with {}; use a larger number", judged.members);
+            return Err(Error::value("accuracy", number(goal), &problem, &remedy));
+        }
+        spec.curves = spec.curves.max(needed.min(farthest) as u64);
+        if needed <= farthest {
+            break;
+        }
+        judged = judge(further, &spec)?;
+    }
+    Ok(spec)
 }
 
 /// The spec with more nodes and shorter steps, so that discretisation comes down to its share of the goal.

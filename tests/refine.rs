@@ -172,6 +172,20 @@ fn what_cannot_be_refined_is_refused_with_the_reason() {
 }
 
 #[test]
+fn a_goal_beyond_reach_is_refused_with_what_was_reached() {
+    let home = TempDir::new().unwrap();
+    let flags = "run --accurate --backend cpu --curves 32 --out out";
+    for (more, parts) in [
+        ("--accuracy 1e-5", ["members in each cell, and more than 1e6 is too many", "was reached with 32"]),
+        ("--accuracy 0.01 --shape circle:1 --amplitude 0", ["relaxed at the start", "use a larger --amplitude"]),
+    ] {
+        let (code, said) = curvelax(home.path(), &format!("{flags} {more}"));
+        assert_eq!(code, Some(2), "{said}");
+        assert!(parts.iter().all(|part| said.contains(part)) && !home.path().join("out").exists(), "{said}");
+    }
+}
+
+#[test]
 fn a_run_whose_error_cannot_be_told_says_why() {
     let home = TempDir::new().unwrap();
     let flags = "run --points 16 --modes 2..=4 --curves 2 --tau 0.01 --backend cpu --out out";
