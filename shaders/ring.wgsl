@@ -18,6 +18,8 @@ override BLOCKS: u32;
 override THREADS: u32;
 /// Nodes of all coarser rings together, for multigrid.
 override COARSE: u32;
+/// Number of odd rings that have a coarser one, at least 1.
+override ODD_RINGS: u32;
 
 /// This thread, its block, and the first node of the block.
 var<private> lane: u32;
