@@ -31,6 +31,16 @@ fn windows(a: vec, b: vec) -> Windows {
     return Windows(window(ring_a[before], a, ring_a[after]), window(ring_b[before], b, ring_b[after]));
 }
 
+/// The windows of three fields.
+fn three_windows(a: vec, b: vec, c: vec) -> ThreeWindows {
+    if owns > 0u { partials[lane] = c; }
+    share(a, b);
+    return ThreeWindows(
+        window(ring_a[before], a, ring_a[after]), window(ring_b[before], b, ring_b[after]),
+        window(partials[before], c, partials[after]),
+    );
+}
+
 /// Passes the fronts of the blocks to the blocks before them. One barrier, here and in the next two: each has its own
 /// array, so that the barrier of another separates the last readers of an array from its next writer.
 fn pass_down(front: vec) -> vec {

@@ -17,6 +17,14 @@ fn windows(a: vec, b: vec) -> Windows {
     );
 }
 
+fn three_windows(a: vec, b: vec, c: vec) -> ThreeWindows {
+    return ThreeWindows(
+        window(subgroupShuffle(a, before), a, subgroupShuffle(a, after)),
+        window(subgroupShuffle(b, before), b, subgroupShuffle(b, after)),
+        window(subgroupShuffle(c, before), c, subgroupShuffle(c, after)),
+    );
+}
+
 fn pass_down(front: vec) -> vec {
     return subgroupShuffle(front, after);
 }

@@ -15,6 +15,7 @@ fn solve(both: bool, negligible: real, made: u32, most: u32) -> Solve {
         v = vec(0.0);
     }
     sor = real(1.0);
+    settle();
     let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
     let tolerance = max(all_parameters[member].tolerance, real(EPSILON) * size);
     build();

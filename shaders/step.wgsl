@@ -63,7 +63,10 @@ fn end_curvature(made: u32) {
 
 fn begin_positions() {
     new_k = k + dk;
-    let exchanged = windows(new_k, y);
+    // Lengths are exchanged again, so that their windows take no registers in the first solve.
+    let exchanged = three_windows(new_k, y, here(r_new));
+    r_new = exchanged.c;
+    reciprocals(r_new);
     k_window = exchanged.a;
     position_equation(k_window, exchanged.b);
     trace_system(10u);
