@@ -4,8 +4,8 @@
 /// The damping of p on coarse levels.
 const BALANCE = 0.1111111111111111;
 
-/// Inverse of the coarsest matrix, row by row; every thread has its own copy.
-var<private> inverse_matrix: array<real, 25>;
+/// Inverse of the coarsest matrix, row by row.
+var<workgroup> inverse_matrix: array<real, 25>;
 
 /// The terms of coarse node j.
 fn coarsen(fine: Level, coarse: Level, j: u32) {
@@ -28,12 +28,15 @@ fn average(before: pair, own: pair, next: pair) -> pair {
     return real(0.25) * (before + next) + real(0.5) * own;
 }
 
-/// Builds all coarse systems from the terms of the finest one.
+/// Builds all coarse systems from the terms of the finest one. The barriers of the way down separate the inverse from
+/// its readers.
 fn build() {
     var fine = finest();
     var coarse = coarser(fine);
+    settle();
     share(term_second, term_first);
     for (var j = lane; j < coarse.nodes; j += THREADS) { coarse_held[coarse.at + j] = average_held(fine, j); }
+    settle();
     share(term_spacing, term_mass);
     let depth = at_run_time(coarse_rings());
     while fine.depth < depth {
@@ -47,7 +50,7 @@ fn build() {
         coarse = coarser(fine);
     }
     workgroupBarrier();
-    invert_matrix(fine);
+    if lane == 0u { invert_matrix(fine); }
 }
 
 /// Row j of a coarse level, integrated over its cell and divided by its diagonal entry.
@@ -76,7 +79,7 @@ fn discretise(ring: Level, j: u32) {
     let row_c = cell * own.y - (row_a + row_b + row_d + row_e);
     let over_c = real(1.0) / row_c;
     coarse_rows[ring.at + j] = vec(row_a, row_b, row_d, row_e) * over_c;
-    coarse_share[ring.at + j] = over_c * (real(1.0) / p.tau);
+    coarse_share[ring.at + j] = over_c * (real(1.0) / tau);
 }
 
 /// The coefficient p of the second derivative for a level with cells of this length.
@@ -84,7 +87,8 @@ fn balanced(p_of: real, cell: real) -> real {
     return p_of / (real(1.0) + real(BALANCE) * (max(p_of, real(0.0)) * (cell * cell)));
 }
 
-/// Inverts the coarsest matrix by Gauss–Jordan elimination.
+/// Inverts the coarsest matrix by Gauss–Jordan elimination, in one thread: its indices are unknown to compilers, so that
+/// a copy in every thread would take registers or device memory.
 fn invert_matrix(ring: Level) {
     let n = ring.nodes;
     for (var l = 0u; l < n * n; l++) { inverse_matrix[l] = real(0.0); }

@@ -16,11 +16,11 @@ fn curvature_equation() {
     let high = iqh * iqh * (irh + irp);
     let row_b = real(0.5) * alpha_before - (middle + low + row_a);
     let row_d = -(real(0.5) * alpha) - (middle + high + row_e);
-    let rate = real(1.0) / p.tau;
+    let rate = real(1.0) / tau;
     let row_c = (here(r_new) * rate - rkb) - (row_a + row_b + row_d + row_e);
     let bk = b(k);
     let forcing = (b(plus1(wk)) - bk) * iqh - (bk - b(minus1(wk))) * iqm;
     let stiff = row_a * (minus2(wk) - k) + row_b * (minus1(wk) - k) + row_d * (plus1(wk) - k) + row_e * (plus2(wk) - k);
-    normalise(row_a, row_b, row_c, row_d, row_e, p.tau * irh);
+    normalise(row_a, row_b, row_c, row_d, row_e, tau * irh);
     rhs_x = (forcing + rkb * k - stiff) * inverse;
 }

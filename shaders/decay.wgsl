@@ -7,6 +7,9 @@ const POINTS = 8u;
 
 /// Records what an accepted step adds; it is not yet counted.
 fn follow(taken: Taken) {
+    let p = &all_parameters[member];
+    let report = &all_reports[member].report;
+    let counters = &all_counters[member];
     var start = real(counters.steps);
     var end = min(start + real(1.0), p.clock_end);
     if ADAPTIVE {
@@ -35,6 +38,9 @@ fn follow(taken: Taken) {
 
 /// Adds the excess at the end of a step, or of a part of an adaptive one, to the fit while it is inside the window.
 fn fit(start: real, end: real, before: real, after: real) {
+    let p = &all_parameters[member];
+    let report = &all_reports[member].report;
+    let counters = &all_counters[member];
     if counters.fit_over != 0u || (counters.fit_points == 0u && !(after <= p.fit_from)) { return; }
     if !(p.fit_to <= after) {
         counters.fit_over = 1u;
@@ -58,19 +64,22 @@ fn fit(start: real, end: real, before: real, after: real) {
 
 /// The change of the abscissa over the step.
 fn abscissa(start: real, end: real) -> real {
+    let p = &all_parameters[member];
     if p.growth <= real(0.0) { return end - start; }
     return ln_ratio(p.growth + start, p.growth + end);
 }
 
 /// Records the excess at the grid times inside the step.
 fn note(start: real, end: real, taken: Taken) {
+    let p = &all_parameters[member];
+    let counters = &all_counters[member];
     while counters.noted < TIMES {
         let share = real(counters.noted + 1u) / real(PARTS);
         let time = share * share * share * p.clock_end;
         if !(time <= end) { return; }
         let at = min(max((time - start) / (end - start), real(0.0)), real(1.0));
         let excess = taken_inside(taken, at);
-        if lane == 0u { all_reports[member].excess_at[counters.noted] = excess; }
+        all_reports[member].excess_at[counters.noted] = excess;
         counters.noted += 1u;
     }
 }

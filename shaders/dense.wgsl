@@ -57,6 +57,7 @@ struct Fall { kind: u32, fallen: real, arc: Arc }
 
 /// The fall in an adaptive step of length h, with the derivatives of ln excess at its end.
 fn fall_of(h: real, decline: vec2<real>) -> Fall {
+    let report = &all_reports[member].report;
     let before = report.before.excess;
     let after = report.now.excess;
     if before <= real(0.0) || after <= real(0.0) { return Fall(); }

@@ -33,17 +33,16 @@ fn invert(m: vec) -> vec {
 
 /// Solves for `u` alone, or for `u` and `v`. Whether `u` alone is finite is judged with the positions, which saves a
 /// pass over all blocks.
-fn solve(both: bool, negligible: real) -> u32 {
+fn solve(both: bool, negligible: real, made: u32, most: u32) -> Solve {
     if !both { rhs_y = vec(0.0); }
     solve_rows();
-    if !both { return SOLVED; }
+    if !both { return Solve(SOLVED, 0u); }
     let size = max(block_max(bounded_abs(dk)), max(block_max(bounded_abs(u)), block_max(bounded_abs(v))));
     let largest = ring_maxima(vec(size, 0.0, 0.0, 0.0));
-    return uniform_decision(select(NOT_FINITE, SOLVED, largest.x <= real(BIG)));
+    return Solve(uniform_decision(select(NOT_FINITE, SOLVED, largest.x <= real(BIG))), 0u);
 }
 
 fn solve_rows() {
-    sweeps = 0u;
     let interior = eliminate_interior();
     let own = solve_ring(pair_row(interior));
     let m = interior.c - apply(interior.p, ring_rhs[before]) - apply(interior.s, own);

@@ -6,144 +6,212 @@
 // next dispatch recomputes the same rows and continues sweeping. Results do not depend on where a dispatch ends, to the
 // last bit.
 
+/// The attempt that thread 0 plans: whether one is due, the order of an adaptive step, the systems that are solved, the
+/// sweeps made for the next one, the length of the step and that of the last one.
+struct Plan { is_due: u32, order: u32, phase: u32, solve_sweeps: u32, length: real, taken: real }
+
+var<workgroup> plan: Plan;
+
 fn take_member(index: u32) {
     member = all_due[index];
-    p = all_parameters[member];
-    counters = all_counters[member];
-    report = all_reports[member].report;
+    tau = all_parameters[member].tau;
+    // Not through `member`: a compiler must see that this is the same in every thread.
+    let moves = all_parameters[all_due[index]].redistribution > real(0.5);
+    if lane == 0u { begin_dispatch(); }
+    var next = workgroupUniformLoad(&plan);
+    if next.is_due == 0u { return; }
+    load_curve(CURVE);
+    dk = load_field(INCREMENTS);
+    dx = load_field(INCREMENTS + 1u);
+    dy = load_field(INCREMENTS + 2u);
+    var course = Course(SOLVED, next.phase, next.solve_sweeps, dispatch.steps, dispatch.sweeps);
+    while next.is_due != 0u && course.steps > 0u && course.sweeps > 0u {
+        course = advance(next, course, moves);
+        next = workgroupUniformLoad(&plan);
+    }
+    storageBarrier();
+    if !ADAPTIVE { store_curve(CURVE); }
+    store_field(INCREMENTS, dk);
+    store_field(INCREMENTS + 1u, dx);
+    store_field(INCREMENTS + 2u, dy);
+}
+
+/// Plans the first attempt, perhaps one that was paused. In thread 0, like all functions below that read or change
+/// counters and report.
+fn begin_dispatch() {
+    let counters = &all_counters[member];
     counters.sweeps_k = 0u;
     counters.sweeps_x = 0u;
-    let due = select(0u, counters.goal - counters.steps, counters.status == RUNNING);
-    if uniform_decision(due) > 0u {
-        load_curve(CURVE);
-        dk = load_field(INCREMENTS);
-        dx = load_field(INCREMENTS + 1u);
-        dy = load_field(INCREMENTS + 2u);
-        budget = dispatch.sweeps;
-        steps_left = dispatch.steps;
-        while steps_left > 0u && budget > 0u {
-            if advance() != GO_ON { break; }
-        }
-        storageBarrier();
-        if !ADAPTIVE { store_curve(CURVE); }
-        store_field(INCREMENTS, dk);
-        store_field(INCREMENTS + 1u, dx);
-        store_field(INCREMENTS + 2u, dy);
-    }
-    // Every thread has read what thread 0 now overwrites.
-    storageBarrier();
-    if lane == 0u {
-        all_counters[member] = counters;
-        all_reports[member].report = report;
+    make_plan();
+    plan.phase = counters.phase;
+    plan.solve_sweeps = counters.solve_sweeps;
+    // `pause` sets them again.
+    counters.phase = 0u;
+    counters.solve_sweeps = 0u;
+}
+
+/// Plans the next attempt.
+fn make_plan() {
+    let counters = &all_counters[member];
+    plan.is_due = select(0u, 1u, counters.status == RUNNING && counters.steps < counters.goal);
+    if ADAPTIVE {
+        plan.order = counters.order;
+        plan.length = stride().length;
+        plan.taken = all_reports[member].report.progress.taken;
     }
 }
 
-/// Steps of the paper before the dispatch pauses.
-var<private> steps_left: u32;
+/// What became of an attempt; of an accepted one also whether it reaches the goal, and whether the member is relaxed if
+/// its curvature is that of its polygon.
+const REFUSED = 0u;
+const ACCEPTED = 1u;
+const AT_GOAL = 2u;
+const MAY_RELAX = 4u;
 
-const GO_ON = 0u;
-const STOP = 1u;
-
-/// Attempts a step and handles the result; returns whether to continue, the same in every thread.
+/// Attempts the planned step and handles the result.
 ///
 /// A step and an observation are each called in one place only: compilers inline the whole body of every call.
-fn advance() -> u32 {
-    let by = stride();
-    let h = by.length;
-    let count = uniform_decision(select(1u, parts(counters.order), ADAPTIVE));
-    if ADAPTIVE && counters.phase == 0u && counters.solve_sweeps == 0u {
+fn advance(planned: Plan, begun: Course, moves: bool) -> Course {
+    var course = begun;
+    let count = select(1u, parts(planned.order), ADAPTIVE);
+    if ADAPTIVE && course.phase == 0u && course.solve_sweeps == 0u {
         begin_attempt();
-        begin_row(h);
+        begin_row(planned.length, planned.taken);
     }
-    var solved = SOLVED;
-    var part = uniform_decision(counters.phase / 2u);
-    for (; part < count && solved == SOLVED && steps_left > 0u; part++) {
-        if ADAPTIVE { begin_part(part, h); }
-        solved = step();
-        if ADAPTIVE && solved == SOLVED { end_part(part, h); }
-        steps_left--;
+    course.ended = SOLVED;
+    for (var part = course.phase / 2u; part < count && course.ended == SOLVED && course.steps > 0u; part++) {
+        if ADAPTIVE { begin_part(part, planned.length); }
+        course = step(course, moves);
+        if ADAPTIVE && course.ended == SOLVED { end_part(part, planned); }
+        course.steps -= 1u;
     }
-    if solved == PAUSED || (solved == SOLVED && part < count) { return STOP; }
-    counters.phase = 0u;
-    counters.solve_sweeps = 0u;
-    counters.solves += count;
-    if ADAPTIVE && solved == SOLVED { finish_attempt(); }
-    var errors = vec2<real>(0.0, 0.0);
-    if solved == SOLVED {
+    let solved = course.ended == SOLVED;
+    if course.ended == PAUSED || (solved && course.phase < 2u * count) {
+        if lane == 0u { pause(course); }
+        return course;
+    }
+    course.phase = 0u;
+    course.solve_sweeps = 0u;
+    if ADAPTIVE && solved { finish_attempt(); }
+    var gaps = vec(0.0);
+    if solved {
         let moved_x = here(new_x) - x;
         let moved_y = here(new_y) - y;
         observe(new_x, new_y, new_k, new_r, sqrt(moved_x * moved_x + moved_y * moved_y));
-        if ADAPTIVE {
-            errors = errors_of_attempt();
-            if uniform_decision(select(1u, 0u, errors.x <= allowed(h))) == 1u { return refuse_inaccurate(h, errors); }
-        }
+        if ADAPTIVE { gaps = gaps_of_attempt(); }
     }
-    let failure = uniform_decision(failure_of_step(solved));
-    if failure != RUNNING {
-        if ADAPTIVE { return refuse_failure(h, failure); }
-        counters.status = failure;
-        return STOP;
+    var errors = vec2<real>(0.0, 0.0);
+    var found = REFUSED;
+    if lane == 0u {
+        if ADAPTIVE && solved { errors = errors_of_attempt(gaps); }
+        found = judge_attempt(course.ended, count, planned.length, errors);
+        if found == REFUSED { make_plan(); }
     }
-    report.before = report.now;
-    report.now = observed();
-    var taken = Taken(0.0, report.before.excess, report.now.excess, Fall());
+    let judged = uniform_decision(found);
+    if judged == REFUSED { return course; }
     var declines = vec2<real>(0.0, 0.0);
-    if ADAPTIVE {
-        declines = decline();
-        taken.h = h;
-        taken.fall = fall_of(h, declines);
+    if ADAPTIVE { declines = decline(); }
+    var apart = real(0.0);
+    if (judged & MAY_RELAX) != 0u { apart = gap(); }
+    if lane == 0u {
+        conclude(planned.length, errors, declines, apart);
+        make_plan();
     }
-    record_events(taken);
-    follow(taken);
     if ADAPTIVE {
-        lengthen(by, errors, declines);
         keep_attempt();
     } else {
         after_step();
         // The curve before the step is stored if an output time may lie between the two.
-        if counters.steps + 1u == counters.goal { store_curve(BEFORE); }
+        if (judged & AT_GOAL) != 0u { store_curve(BEFORE); }
     }
     x = here(new_x);
     y = here(new_y);
     k = new_k;
     r = new_r;
-    return accepted();
+    return course;
+}
+
+/// Stores where the attempt pauses, and ends the dispatch.
+fn pause(course: Course) {
+    all_counters[member].phase = course.phase;
+    all_counters[member].solve_sweeps = course.solve_sweeps;
+    plan.is_due = 0u;
+}
+
+/// Whether an attempt of `count` steps of the paper is accepted; reports the new curve if it is.
+fn judge_attempt(ended: u32, count: u32, h: real, errors: vec2<real>) -> u32 {
+    let p = &all_parameters[member];
+    let report = &all_reports[member].report;
+    let counters = &all_counters[member];
+    counters.solves += count;
+    if ADAPTIVE && ended == SOLVED && !(errors.x <= allowed(h)) {
+        refuse_inaccurate(h, errors);
+        return REFUSED;
+    }
+    let failure = failure_of_step(ended);
+    if failure != RUNNING {
+        if ADAPTIVE { refuse_failure(h, failure); } else { counters.status = failure; }
+        return REFUSED;
+    }
+    report.before = report.now;
+    report.now = observed();
+    let at_goal = select(0u, AT_GOAL, counters.steps + 1u == counters.goal);
+    let relaxes = counters.relax_step == NEVER && report.now.excess <= p.relax_at;
+    return ACCEPTED | at_goal | select(0u, MAY_RELAX, relaxes);
+}
+
+/// Records an accepted step of length h, of which `apart` is the gap between curvature and polygon.
+fn conclude(h: real, errors: vec2<real>, declines: vec2<real>, apart: real) {
+    let report = &all_reports[member].report;
+    var taken = Taken(0.0, report.before.excess, report.now.excess, Fall());
+    if ADAPTIVE {
+        taken.h = h;
+        taken.fall = fall_of(h, declines);
+    }
+    record_events(taken, apart);
+    follow(taken);
+    if ADAPTIVE { lengthen(stride(), errors, declines); }
+    accepted();
 }
 
 fn failure_of_step(solved: u32) -> u32 {
     if solved == NOT_FINITE { return NONFINITE; }
     if solved != SOLVED { return STALLED; }
     if !is_finite() { return NONFINITE; }
-    if is_singular(report.progress.turning) { return SINGULAR; }
+    if is_singular(all_reports[member].report.progress.turning) { return SINGULAR; }
     return RUNNING;
 }
 
 /// Retries with a step of length `next`, or ends the member for `cause` if that is below `least` of `(L/n)⁴`.
-fn refuse(next: real, least: real, cause: u32) -> u32 {
+fn refuse(next: real, least: real, cause: u32) {
+    let counters = &all_counters[member];
     counters.rejected += 1u;
     counters.refused += 1u;
-    report.progress.next = next;
+    all_reports[member].report.progress.next = next;
     if !(least_step(least) <= next) { counters.status = cause; }
-    return uniform_decision(select(STOP, GO_ON, counters.status == RUNNING));
 }
 
 /// Refuses a step of length h that failed outright.
-fn refuse_failure(h: real, cause: u32) -> u32 {
+fn refuse_failure(h: real, cause: u32) {
     let least = select(real(MIN_STEP), real(MIN_TO_SINGULAR), cause == SINGULAR);
-    return refuse(real(AFTER_FAILURE) * h, least, cause);
+    refuse(real(AFTER_FAILURE) * h, least, cause);
 }
 
 /// Refuses a step of length h whose error is too large.
-fn refuse_inaccurate(h: real, errors: vec2<real>) -> u32 {
+fn refuse_inaccurate(h: real, errors: vec2<real>) {
+    let counters = &all_counters[member];
     let most = select(real(AFTER_REFUSALS), real(AFTER_REFUSAL), counters.refused == 0u);
     let next = choose(h, counters.order, errors, most, allowed(h));
     counters.order = next.order;
-    return refuse(next.length, real(MIN_STEP), SINGULAR);
+    refuse(next.length, real(MIN_STEP), SINGULAR);
 }
 
 /// Records the steps in which the excess falls to half its start and to the relaxation threshold, and where inside
 /// them.
-fn record_events(taken: Taken) {
+fn record_events(taken: Taken, apart: real) {
+    let p = &all_parameters[member];
+    let report = &all_reports[member].report;
+    let counters = &all_counters[member];
     if counters.half_step == NEVER && report.now.excess <= p.half_at {
         counters.half_step = counters.steps;
         report.progress.half_high = report.progress.time_high;
@@ -153,8 +221,7 @@ fn record_events(taken: Taken) {
     }
     // A curve whose curvature is not that of its polygon does not count as relaxed.
     let due = counters.relax_step == NEVER && report.now.excess <= p.relax_at;
-    if uniform_decision(select(0u, 1u, due)) == 0u { return; }
-    if gap() <= real(MAX_GAP) {
+    if due && apart <= real(MAX_GAP) {
         counters.relax_step = counters.steps;
         report.progress.relax_high = report.progress.time_high;
         report.progress.relax_low = report.progress.time_low;
@@ -165,6 +232,8 @@ fn record_events(taken: Taken) {
 
 /// Advances the clock by an accepted adaptive step, and chooses the length and the order of the next one.
 fn lengthen(by: Stride, errors: vec2<real>, declines: vec2<real>) {
+    let report = &all_reports[member].report;
+    let counters = &all_counters[member];
     let most_growth = select(real(1.0), real(MAX_GROWTH), counters.refused == 0u);
     let next = choose(by.length, counters.order, errors, most_growth, allowed(by.length));
     report.progress.next = next.length;
@@ -175,13 +244,14 @@ fn lengthen(by: Stride, errors: vec2<real>, declines: vec2<real>) {
     counters.refused = 0u;
 }
 
-/// Counts an accepted step; returns whether to continue.
-fn accepted() -> u32 {
+/// Counts an accepted step.
+fn accepted() {
+    let p = &all_parameters[member];
+    let report = &all_reports[member].report;
+    let counters = &all_counters[member];
     report.progress.travel += others.z;
     counters.steps += 1u;
     if counters.relax_step != NEVER && counters.stop_when_relaxed != 0u { counters.status = RELAXED; }
     if p.look_at <= report.progress.travel && report.now.k_min <= real(0.0) { counters.goal = counters.steps; }
     if ADAPTIVE && is_at_goal() { counters.goal = counters.steps; }
-    let on = counters.status == RUNNING && counters.steps < counters.goal;
-    return uniform_decision(select(STOP, GO_ON, on));
 }

@@ -4,8 +4,6 @@
 /// Fields that neighbours need, one entry per block.
 var<workgroup> ring_a: array<vec, BLOCKS>;
 var<workgroup> ring_b: array<vec, BLOCKS>;
-/// A decision for the whole workgroup.
-var<workgroup> verdict: u32;
 
 @compute @workgroup_size(THREADS)
 fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
@@ -13,9 +11,13 @@ fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     take_member(group.x);
 }
 
-/// Writes two fields for all to read. Two barriers: earlier readers are done, and all have written.
-fn share(a: vec, b: vec) {
+/// Separates the last readers of the arrays from their next writer, where no other barrier does.
+fn settle() {
     workgroupBarrier();
+}
+
+/// Writes two fields for all to read.
+fn share(a: vec, b: vec) {
     if owns > 0u {
         ring_a[lane] = a;
         ring_b[lane] = b;
@@ -27,6 +29,16 @@ fn share(a: vec, b: vec) {
 fn windows(a: vec, b: vec) -> Windows {
     share(a, b);
     return Windows(window(ring_a[before], a, ring_a[after]), window(ring_b[before], b, ring_b[after]));
+}
+
+/// The windows of three fields.
+fn three_windows(a: vec, b: vec, c: vec) -> ThreeWindows {
+    if owns > 0u { partials[lane] = c; }
+    share(a, b);
+    return ThreeWindows(
+        window(ring_a[before], a, ring_a[after]), window(ring_b[before], b, ring_b[after]),
+        window(partials[before], c, partials[after]),
+    );
 }
 
 /// Passes the fronts of the blocks to the blocks before them. One barrier, here and in the next two: each has its own
@@ -54,7 +66,6 @@ fn pass_up(tail: vec) -> vec {
 /// Four maxima over the ring from the maxima over each block: first over every `groups`-th block, then over the
 /// results, which reads 2 sqrt(BLOCKS) rows instead of BLOCKS.
 fn ring_maxima(part: vec) -> vec {
-    workgroupBarrier();
     if owns > 0u { partials[lane] = part; }
     workgroupBarrier();
     var some = part;
@@ -70,26 +81,29 @@ fn ring_maxima(part: vec) -> vec {
     return largest;
 }
 
-/// Four sums in block order and two sets of four maxima over the ring.
+/// Four sums in block order and two sets of four maxima over the ring, these by groups like in `ring_maxima`.
 fn ring_summary(sum: vec, extreme: vec, other: vec) -> Summary {
-    workgroupBarrier();
     if owns > 0u {
         partials[lane] = sum;
         ring_a[lane] = extreme;
         ring_b[lane] = other;
     }
     workgroupBarrier();
-    var all = Summary(vec(0.0), ring_a[0], ring_b[0]);
-    for (var t = 0u; t < dispatch.blocks; t++) {
-        all.sums = all.sums + partials[t];
+    var all = Summary(vec(0.0), extreme, other);
+    for (var t = 0u; t < dispatch.blocks; t++) { all.sums = all.sums + partials[t]; }
+    for (var t = group(); t < dispatch.blocks; t += dispatch.groups) {
+        all.extremes = max(all.extremes, ring_a[t]);
+        all.others = max(all.others, ring_b[t]);
+    }
+    settle();
+    if owns > 0u {
+        ring_a[lane] = all.extremes;
+        ring_b[lane] = all.others;
+    }
+    workgroupBarrier();
+    for (var t = 0u; t < dispatch.groups; t++) {
         all.extremes = max(all.extremes, ring_a[t]);
         all.others = max(all.others, ring_b[t]);
     }
     return all;
-}
-
-/// The value in thread 0, for every thread, in a form on which control flow may depend.
-fn uniform_decision(value: u32) -> u32 {
-    if lane == 0u { verdict = value; }
-    return workgroupUniformLoad(&verdict);
 }

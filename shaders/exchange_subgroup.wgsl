@@ -7,10 +7,21 @@ fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(subgroup_invocation_
     take_member(group.x);
 }
 
+/// Shuffles have no readers to wait for.
+fn settle() {}
+
 fn windows(a: vec, b: vec) -> Windows {
     return Windows(
         window(subgroupShuffle(a, before), a, subgroupShuffle(a, after)),
         window(subgroupShuffle(b, before), b, subgroupShuffle(b, after)),
+    );
+}
+
+fn three_windows(a: vec, b: vec, c: vec) -> ThreeWindows {
+    return ThreeWindows(
+        window(subgroupShuffle(a, before), a, subgroupShuffle(a, after)),
+        window(subgroupShuffle(b, before), b, subgroupShuffle(b, after)),
+        window(subgroupShuffle(c, before), c, subgroupShuffle(c, after)),
     );
 }
 
@@ -33,8 +44,4 @@ fn ring_maxima(part: vec) -> vec {
 
 fn ring_summary(sum: vec, extreme: vec, other: vec) -> Summary {
     return Summary(ring_sums(sum).all, subgroupMax(extreme), subgroupMax(other));
-}
-
-fn uniform_decision(value: u32) -> u32 {
-    return subgroupBroadcastFirst(value);
 }

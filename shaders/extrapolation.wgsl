@@ -52,16 +52,16 @@ fn place_of(part: u32) -> Place {
 /// Prepares a part of an attempt of length h.
 fn begin_part(part: u32, h: real) {
     let place = place_of(part);
-    p.tau = h / real(place.row);
+    tau = h / real(place.row);
     load_curve(select(PART, CURVE, place.left + 1u == place.row));
 }
 
 /// Stores the curve at the end of a part, adds it to the combinations, and prepares the solves of the next part.
-fn end_part(part: u32, h: real) {
+fn end_part(part: u32, plan: Plan) {
     store_fields(PART, here(new_x), here(new_y), new_k, new_r);
     let place = place_of(part);
-    if place.left < SHARED_PARTS { add_part(place.left, shares_of(place.row, place.left, counters.order)); }
-    if place.left > 0u { after_step(); } else { begin_row(h / real(place.row + 1u)); }
+    if place.left < SHARED_PARTS { add_part(place.left, shares_of(place.row, place.left, plan.order)); }
+    if place.left > 0u { after_step(); } else { begin_row(plan.length / real(place.row + 1u), plan.taken); }
 }
 
 /// Adds the curve at the end of a part, `left` parts before the end of its row.
@@ -98,16 +98,21 @@ fn finish_attempt() {
     new_r = r + load_own(BEFORE + 3u);
 }
 
-/// The errors of order J-1 and J-2, of the new curve, which is observed.
-fn errors_of_attempt() -> vec2<real> {
+/// The largest differences between orders, of k and r, of the order of the attempt and of the one below.
+fn gaps_of_attempt() -> vec {
+    settle();
     let ir = vec(1.0) / new_r;
-    let m = ring_maxima(vec(
+    return ring_maxima(vec(
         block_max(bounded_abs(load_own(GAPS))), block_max(bounded_abs(load_own(GAPS + 1u) * ir)),
         block_max(bounded_abs(load_own(GAPS + 2u))), block_max(bounded_abs(load_own(GAPS + 3u) * ir)),
     ));
+}
+
+/// The errors of order J-1 and J-2, of the new curve, which is observed.
+fn errors_of_attempt(m: vec) -> vec2<real> {
     let size = max(others.x, others.y);
     let spread = min(others.x + others.y, size);
-    let scale = select(sqrt(size * spread), size, report.now.excess <= p.follow_to);
+    let scale = select(sqrt(size * spread), size, all_reports[member].report.now.excess <= all_parameters[member].follow_to);
     let relative = bounded_abs(m / scale);
     return vec2(max(relative.x, m.y), max(relative.z, m.w));
 }

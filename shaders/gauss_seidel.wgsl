@@ -2,51 +2,56 @@
 
 const SWEEPS_PER_CHECK = 8u;
 
-/// Sweeps `u` for rhs_x and, if `both`, `v` for rhs_y; returns how the solve ended.
-fn solve(both: bool, negligible: real) -> u32 {
-    if both { return solve_two(negligible); }
-    return solve_one(negligible);
+/// Sweeps `u` for rhs_x and, if `both`, `v` for rhs_y. Earlier dispatches have made `made` sweeps; this one may make
+/// `most` more.
+fn solve(both: bool, negligible: real, made: u32, most: u32) -> Solve {
+    if both { return solve_two(negligible, made, most); }
+    return solve_one(negligible, made, most);
 }
 
-/// Sweeps `u` for rhs_x; returns how the solve ended.
-fn solve_one(negligible: real) -> u32 {
+/// Sweeps `u` for rhs_x.
+fn solve_one(negligible: real, made: u32, most: u32) -> Solve {
+    let p = &all_parameters[member];
     v = vec(0.0);
     start_sweeps();
-    sweeps = counters.solve_sweeps;
     let size = system_size(rhs_x);
     sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));
     let tolerance = max(p.tolerance, real(EPSILON) * size);
     var ended = finite_or_not(size);
-    while ended == UNSOLVED && sweeps < dispatch.max_sweeps && budget > 0u {
+    var sweeps = made;
+    var left = most;
+    while ended == UNSOLVED && sweeps < dispatch.max_sweeps && left > 0u {
         let batch = min(SWEEPS_PER_CHECK, dispatch.max_sweeps - sweeps);
         for (var s = 0u; s < batch; s++) { sweep_one(); }
         sweeps += batch;
-        budget -= min(budget, batch);
+        left -= min(left, batch);
         let error = bounded_abs(row_of.weight * residual(rhs_x, narrow_window(behind.xy, u, ahead.xy)));
         ended = judge(block_max(error), block_max(bounded_abs(u)), tolerance, negligible);
     }
-    return paused_or(ended);
+    return paused_or(ended, sweeps);
 }
 
-/// Sweeps `u` for rhs_x and `v` for rhs_y, with the barriers of one; returns how the solve ended.
-fn solve_two(negligible: real) -> u32 {
+/// Sweeps `u` for rhs_x and `v` for rhs_y, with the barriers of one.
+fn solve_two(negligible: real, made: u32, most: u32) -> Solve {
+    let p = &all_parameters[member];
     start_sweeps();
-    sweeps = counters.solve_sweeps;
     let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
     sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));
     let tolerance = max(p.tolerance, real(EPSILON) * size);
     var ended = finite_or_not(size);
-    while ended == UNSOLVED && sweeps < dispatch.max_sweeps && budget > 0u {
+    var sweeps = made;
+    var left = most;
+    while ended == UNSOLVED && sweeps < dispatch.max_sweeps && left > 0u {
         let batch = min(SWEEPS_PER_CHECK, dispatch.max_sweeps - sweeps);
         for (var s = 0u; s < batch; s++) { sweep_two(); }
         sweeps += batch;
-        budget -= min(budget, batch);
+        left -= min(left, batch);
         let error_u = bounded_abs(row_of.weight * residual(rhs_x, narrow_window(behind.xy, u, ahead.xy)));
         let error_v = bounded_abs(row_of.weight * residual(rhs_y, narrow_window(behind.zw, v, ahead.zw)));
         let increment = max(bounded_abs(u), bounded_abs(v));
         ended = judge(block_max(max(error_u, error_v)), block_max(increment), tolerance, negligible);
     }
-    return paused_or(ended);
+    return paused_or(ended, sweeps);
 }
 
 /// The over-relaxation that needs about the fewest sweeps for a system of this size.

@@ -7,8 +7,6 @@
 // with the coarser one.
 
 const COARSEST = 5u;
-/// Maximum number of levels: enough for any ring that fits.
-const LEVELS = 8u;
 
 alias pair = vec2<real>;
 
@@ -22,8 +20,8 @@ var<workgroup> coarse_value: array<pair, COARSE>;
 var<workgroup> coarse_held: array<pair, COARSE>;
 /// Weights of coarse nodes j-1 ... j+2 at the finer node between j and j+1.
 var<workgroup> coarse_weights: array<vec, COARSE>;
-/// The same for the last node of an odd ring, indexed by the level of that ring.
-var<workgroup> odd_weights: array<vec, LEVELS>;
+/// The same for the last node of an odd ring, one after another.
+var<workgroup> odd_weights: array<vec, ODD_RINGS>;
 
 /// A level: how often the finest ring was halved, its nodes, and where it starts in the arrays, which exclude the
 /// finest level.
@@ -35,6 +33,11 @@ fn is_odd(ring: Level) -> bool {
 
 fn finest() -> Level {
     return Level(0u, NODES, 0u);
+}
+
+/// The place of an odd ring among the odd ones: level l is odd if bit l of NODES is set.
+fn odd_place(ring: Level) -> u32 {
+    return countOneBits(NODES & ((1u << ring.depth) - 1u));
 }
 
 /// The next coarser level.

@@ -160,11 +160,12 @@ const GAPS = 34u;
 /// The members that this dispatch advances, one per workgroup.
 @group(0) @binding(5) var<storage, read> all_due: array<u32>;
 
-/// Index of this workgroup's member, and its parameters.
+/// Index of this workgroup's member. Its parameters are read where they are needed: copies of them in every thread would
+/// take the registers of its nodes. Its counters and its report are read and written by thread 0 alone, so they need no
+/// barrier; what other threads must know of them, thread 0 says in a `Plan` or a decision.
 var<private> member: u32;
-var<private> p: Parameters;
-var<private> counters: Counters;
-var<private> report: Report;
+/// Length of the current step of the paper.
+var<private> tau: real;
 /// Its nodes in this thread's block: the curve at the start of a step.
 var<private> x: vec;
 var<private> y: vec;
@@ -191,6 +192,7 @@ fn load_own(field: u32) -> vec { return load_nodes(field, first + select(2u, 3u,
 
 /// Makes the curve at `base` the start of a step. Others have written what a block of three reads beyond its own.
 fn load_curve(base: u32) {
+    settle();
     storageBarrier();
     x = load_field(base);
     y = load_field(base + 1u);

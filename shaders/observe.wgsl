@@ -30,18 +30,19 @@ fn is_singular(turning: real) -> bool {
     let resolved = extremes.x <= real(MAX_TURN);
     let apart = real(MIN_EDGE) * mean_edge <= -extremes.w;
     let measured = extremes.y <= real(MAX_DRIFT);
-    let extended = p.least_length <= sums.x;
+    let extended = all_parameters[member].least_length <= sums.x;
     return !(resolved && apart && measured && extended && sums.w == turning);
 }
 
 /// `L²/(4π|A|)` minus that of the regular polygon.
 fn excess(length: real, area: real) -> real {
-    return length * length / (real(FOUR_PI) * abs(area)) - p.polygon_ratio;
+    return length * length / (real(FOUR_PI) * abs(area)) - all_parameters[member].polygon_ratio;
 }
 
 /// The first and the second derivative of ln excess along an adaptive step, by those of the nodes of the new curve.
 fn decline() -> vec2<real> {
     let slope = windows(load_own(SLOPE_BEFORE), load_own(SLOPE_BEFORE + 1u));
+    settle();
     let bend = windows(load_own(BEND_BEFORE), load_own(BEND_BEFORE + 1u));
     let ex = here(new_x) - minus1(new_x);
     let ey = here(new_y) - minus1(new_y);
@@ -67,7 +68,7 @@ fn decline() -> vec2<real> {
     let bend_of_ratio = real(2.0) * (all.y / length - growth * growth)
         - (half * all.w / sums.y - widening * widening);
     let ratio = length * length / (real(FOUR_PI) * abs(sums.y));
-    let over = ratio / (ratio - p.polygon_ratio);
+    let over = ratio / (ratio - all_parameters[member].polygon_ratio);
     let falls = over * slope_of_ratio;
     return vec2(falls, over * (bend_of_ratio + slope_of_ratio * slope_of_ratio) - falls * falls);
 }
@@ -75,6 +76,7 @@ fn decline() -> vec2<real> {
 /// The largest difference between the angle by which the new curvature turns the tangent over a segment and the angle
 /// by which the new polygon turns there.
 fn gap() -> real {
+    settle();
     let turned = turn(new_x, new_y);
     let apart = bounded_abs(new_k * turned.span - turned.angle);
     return ring_maxima(vec(block_max(apart), 0.0, 0.0, 0.0)).x;
@@ -98,7 +100,7 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     let fy = plus1(wy) - here(wy);
     let edge = sqrt(ex * ex + ey * ey);
     let cross = minus1(wx) * here(wy) - here(wx) * minus1(wy);
-    let energy = (real(0.5) * (kh * kh) + vec(p.length_penalty)) * rh;
+    let energy = (real(0.5) * (kh * kh) + vec(all_parameters[member].length_penalty)) * rh;
     let part = vec(block_sum(edge), block_sum(cross), block_sum(energy), block_sum(winding(ex, ey, fx, fy)));
     let shortest = -bounded_abs(edge);
     let extremes_of_block = vec(
@@ -108,6 +110,7 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
         block_max_signed(shortest),
     );
     let others_of_block = vec(block_max_signed(kh), block_max_signed(-kh), block_max(bounded_abs(moved)), 0.0);
+    settle();
     let all = ring_summary(part, extremes_of_block, others_of_block);
     sums = vec(all.sums.x, real(0.5) * all.sums.y, all.sums.zw);
     extremes = all.extremes;

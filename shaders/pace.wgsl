@@ -17,6 +17,8 @@ struct Stride { length: real, high: real, low: real, last: bool }
 
 /// The next step: the requested length, half of the remaining time, or all of it.
 fn stride() -> Stride {
+    let p = &all_parameters[member];
+    let report = &all_reports[member].report;
     let next = report.progress.next;
     let left = (p.end_high - report.progress.time_high) + (p.end_low - report.progress.time_low);
     if left <= next { return Stride(left, 0.0, 0.0, true); }
@@ -30,6 +32,8 @@ fn stride() -> Stride {
 
 /// Advances the clock.
 fn pass_time(by: Stride) {
+    let p = &all_parameters[member];
+    let report = &all_reports[member].report;
     report.progress.taken_before = report.progress.taken;
     report.progress.taken = by.length;
     if by.last {
@@ -46,13 +50,15 @@ fn pass_time(by: Stride) {
 }
 
 fn is_at_goal() -> bool {
+    let p = &all_parameters[member];
+    let report = &all_reports[member].report;
     return (p.goal_high - report.progress.time_high) + (p.goal_low - report.progress.time_low) <= real(0.0);
 }
 
 /// The largest error of a step of length h: an error below the rounding of the solves says nothing.
 fn allowed(h: real) -> real {
-    let edge = report.now.length / real(NODES);
-    return max(real(4.0 * ROUNDING * EPSILON) * (sqrt(h) / (edge * edge)), p.adaptive);
+    let edge = all_reports[member].report.now.length / real(NODES);
+    return max(real(4.0 * ROUNDING * EPSILON) * (sqrt(h) / (edge * edge)), all_parameters[member].adaptive);
 }
 
 /// The ratio of the next step to one of order `order` with error `error`, where `most` is allowed.
@@ -84,6 +90,6 @@ fn choose(length: real, order: u32, errors: vec2<real>, most_growth: real, most:
 
 /// The shortest step to try, `share` of `(L/n)⁴`.
 fn least_step(share: real) -> real {
-    let edge = report.now.length / real(NODES);
-    return max(share * (edge * edge) * (edge * edge), p.time_tick);
+    let edge = all_reports[member].report.now.length / real(NODES);
+    return max(share * (edge * edge) * (edge * edge), all_parameters[member].time_tick);
 }

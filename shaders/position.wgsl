@@ -2,6 +2,7 @@
 
 /// `wk`: the new curvatures; `wy`: the old y.
 fn position_equation(wk: Window, wy: Window) {
+    read_law();
     let kh = here(wk);
     let kp = plus1(wk);
     let irm = minus1(ir);
@@ -21,9 +22,9 @@ fn position_equation(wk: Window, wy: Window) {
     let row_b = (mean_phi * irh + drift) - (middle + low + row_a);
     let row_d = (mean_phi * irp - drift) - (middle + high + row_e);
     let q = (here(r_new) + plus1(r_new)) * real(0.5);
-    let rate = real(1.0) / p.tau;
+    let rate = real(1.0) / tau;
     let row_c = q * rate - (row_a + row_b + row_d + row_e);
-    normalise(row_a, row_b, row_c, row_d, row_e, p.tau * iqh);
+    normalise(row_a, row_b, row_c, row_d, row_e, tau * iqh);
     rhs_x = residual_of_old(row_a, row_b, row_d, row_e, x_window) * inverse;
     rhs_y = residual_of_old(row_a, row_b, row_d, row_e, wy) * inverse;
 }

@@ -21,7 +21,7 @@ fn turn(wx: Window, wy: Window) -> Turn {
 
 /// Pulls the new curvatures and lengths of a step.
 fn pull() {
-    let rate = p.pull * p.tau;
+    let rate = all_parameters[member].pull * tau;
     let share = real(1.0) / (real(1.0) + rate);
     let turned = turn(new_x, new_y);
     new_k = (new_k + rate * (turned.angle / turned.span)) * share;

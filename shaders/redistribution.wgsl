@@ -16,8 +16,8 @@ var<private> r_new: Window;
 var<private> ir: Window;
 var<private> iq: Window;
 
-/// Fills the variables above; returns the length L of the old state.
-fn redistribute() -> real {
+/// Fills the variables above, with tangential velocity if `moves`; returns the length L of the old state.
+fn redistribute(moves: bool) -> real {
     let old = windows(k, r);
     k_window = old.a;
     reciprocals(old.b);
@@ -28,11 +28,11 @@ fn redistribute() -> real {
     let length = sums.x;
     let mean_rkb = sums.y / length;
     let mean_length = length / real(NODES);
-    var growth = -(p.tau * (k * beta));
-    if p.redistribution > real(0.5) {
+    var growth = -(tau * (k * beta));
+    if moves {
         tangential_velocity(mean_rkb, mean_length);
-        let rate = p.omega * (mean_length * here(ir) - vec(1.0)) - vec(mean_rkb);
-        growth = p.tau * rate;
+        let rate = all_parameters[member].omega * (mean_length * here(ir) - vec(1.0)) - vec(mean_rkb);
+        growth = tau * rate;
     } else {
         alpha = vec(0.0);
         alpha_before = vec(0.0);
@@ -47,12 +47,15 @@ fn redistribute() -> real {
 
 /// beta on the window `wk` of the old curvatures.
 fn velocity(wk: Window) -> vec {
+    read_law();
     return b(k) - ((plus1(wk) - k) * here(iq) - (k - minus1(wk)) * minus1(iq)) * here(ir);
 }
 
 /// alpha by a running sum that restarts from the sum of whole blocks.
 fn tangential_velocity(mean_rkb: real, mean_length: real) {
-    let growth = rkb - r * mean_rkb + p.omega * (vec(mean_length) - r);
+    let growth = rkb - r * mean_rkb + all_parameters[member].omega * (vec(mean_length) - r);
+    // Others may still read the last sums.
+    workgroupBarrier();
     let start = ring_sums(vec(block_sum(growth), 0.0, 0.0, 0.0)).earlier.x;
     let two = growth.x + growth.y;
     let three = two + growth.z;

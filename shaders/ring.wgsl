@@ -18,6 +18,8 @@ override BLOCKS: u32;
 override THREADS: u32;
 /// Nodes of all coarser rings together, for multigrid.
 override COARSE: u32;
+/// Number of odd rings that have a coarser one, at least 1.
+override ODD_RINGS: u32;
 
 /// This thread, its block, and the first node of the block.
 var<private> lane: u32;
@@ -106,6 +108,8 @@ struct Window { low: vec, high: vec }
 
 /// The windows of two fields.
 struct Windows { a: Window, b: Window }
+/// The windows of three fields.
+struct ThreeWindows { a: Window, b: Window, c: Window }
 
 /// The field at i-2, i-1, i, i+1, i+2 for the four nodes i of the block.
 fn minus2(w: Window) -> vec { return w.low; }

@@ -15,12 +15,12 @@ fn after_step() {
     store_field(EARLIER + 2u, last_y);
 }
 
-/// Puts the start of the first part of a row, of length tau, by the derivatives at the end of the last step.
-fn begin_row(tau: real) {
+/// Puts the start of the first part of a row, of length `first`, by the derivatives at the end of the last step, of
+/// length `taken`.
+fn begin_row(first: real, taken: real) {
     if !SWEEPS { return; }
-    let taken = report.progress.taken;
     var ratio = taken;
-    if !(taken <= real(0.0)) { ratio = tau / taken; }
+    if !(taken <= real(0.0)) { ratio = first / taken; }
     let first_k = ratio * load_own(SLOPE + 2u);
     let first_x = ratio * load_own(SLOPE);
     let first_y = ratio * load_own(SLOPE + 1u);

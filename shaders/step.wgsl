@@ -10,32 +10,42 @@ var<private> new_r: vec;
 var<private> new_x: Window;
 var<private> new_y: Window;
 
-/// Computes the curve a time p.tau later; returns how its solves ended. An odd phase means that the curvature is
-/// solved.
-fn step() -> u32 {
-    let length = redistribute();
+/// What is left to do, the same in every thread: how the last solve ended, the systems that the attempt has solved, the
+/// sweeps made for the next one, and the steps of the paper and the sweeps that this dispatch may still make.
+struct Course { ended: u32, phase: u32, solve_sweeps: u32, steps: u32, sweeps: u32 }
+
+/// Computes the curve a time tau later, redistributed if `moves`. An odd phase means that the curvature is solved.
+fn step(begun: Course, moves: bool) -> Course {
+    var course = begun;
+    let length = redistribute(moves);
     let radius = length * real(HALF_OVER_PI);
     let rounding = real(NEGLIGIBLE * EPSILON);
 
+    // Without a solve in between, others may still read what was exchanged last.
+    if (begun.phase & 1u) != 0u { settle(); }
     // The two solves share a call, since compilers inline the body of every call.
-    for (var part = uniform_decision(counters.phase & 1u); part < 2u; part++) {
+    for (var part = begun.phase & 1u; part < 2u; part++) {
         let positions = part == 1u;
         if positions { begin_positions(); } else { begin_curvature(); }
-        let before = counters.solve_sweeps;
-        let ended = solve(positions, select(rounding / radius, rounding * radius, positions));
-        if positions { end_positions(sweeps - before); } else { end_curvature(sweeps - before); }
-        if ended != SOLVED { return ended; }
-        counters.phase += 1u;
-        counters.solve_sweeps = 0u;
+        let negligible = select(rounding / radius, rounding * radius, positions);
+        let done = solve(positions, negligible, course.solve_sweeps, course.sweeps);
+        let made = done.sweeps - course.solve_sweeps;
+        if positions { end_positions(made); } else { end_curvature(made); }
+        course.sweeps -= min(course.sweeps, made);
+        course.ended = done.ended;
+        course.solve_sweeps = done.sweeps;
+        if done.ended != SOLVED { return course; }
+        course.phase += 1u;
+        course.solve_sweeps = 0u;
     }
     let moved = windows(x + dx, y + dy);
     new_x = moved.a;
     new_y = moved.b;
     new_r = here(r_new);
-    if p.pull > real(0.0) { pull(); }
+    if all_parameters[member].pull > real(0.0) { pull(); }
     trace(2u, new_r);
     trace(19u, new_k);
-    return SOLVED;
+    return course;
 }
 
 fn begin_curvature() {
@@ -47,13 +57,16 @@ fn begin_curvature() {
 
 fn end_curvature(made: u32) {
     dk = u;
-    counters.sweeps_k += made;
+    if lane == 0u { all_counters[member].sweeps_k += made; }
     trace(9u, dk);
 }
 
 fn begin_positions() {
     new_k = k + dk;
-    let exchanged = windows(new_k, y);
+    // Lengths are exchanged again, so that their windows take no registers in the first solve.
+    let exchanged = three_windows(new_k, y, here(r_new));
+    r_new = exchanged.c;
+    reciprocals(r_new);
     k_window = exchanged.a;
     position_equation(k_window, exchanged.b);
     trace_system(10u);
@@ -66,7 +79,7 @@ fn begin_positions() {
 fn end_positions(made: u32) {
     dx = u;
     dy = v;
-    counters.sweeps_x += made;
+    if lane == 0u { all_counters[member].sweeps_x += made; }
     trace(17u, dx);
     trace(18u, dy);
 }

@@ -3,6 +3,8 @@
 
 /// One row per block, for sums over the ring.
 var<workgroup> partials: array<vec, BLOCKS>;
+/// A decision for the whole workgroup.
+var<workgroup> verdict: u32;
 
 /// `v` with the component that is not owned set to zero.
 fn owned(v: vec) -> vec {
@@ -37,7 +39,6 @@ struct Summary { sums: vec, extremes: vec, others: vec }
 /// The bound of the loop is read from the dispatch: a constant one is unrolled, which takes lavapipe's compiler as long
 /// as everything else together, and does not run faster.
 fn ring_sums(part: vec) -> Sums {
-    workgroupBarrier();
     if owns > 0u { partials[lane] = part; }
     workgroupBarrier();
     var sums = Sums(vec(0.0), vec(0.0));
@@ -46,4 +47,10 @@ fn ring_sums(part: vec) -> Sums {
         sums.all = sums.all + partials[t];
     }
     return sums;
+}
+
+/// The value in thread 0, for every thread, in a form on which control flow may depend.
+fn uniform_decision(value: u32) -> u32 {
+    if lane == 0u { verdict = value; }
+    return workgroupUniformLoad(&verdict);
 }

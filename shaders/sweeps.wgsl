@@ -14,16 +14,16 @@ var<private> ahead: vec;
 
 /// Begins sweeps from `u` and `v`: exchanges them with the adjacent blocks.
 fn start_sweeps() {
+    settle();
     let start = windows(u, v);
     behind = tails_before(start.a, start.b);
     ahead = fronts_after(start.a, start.b);
 }
 
 /// A solve that neither ended nor reached the cap has used up this dispatch's sweeps.
-fn paused_or(ended: u32) -> u32 {
-    if ended != UNSOLVED || sweeps >= dispatch.max_sweeps { return ended; }
-    counters.solve_sweeps = sweeps;
-    return PAUSED;
+fn paused_or(ended: u32, sweeps: u32) -> Solve {
+    let is_over = ended != UNSOLVED || sweeps >= dispatch.max_sweeps;
+    return Solve(select(PAUSED, ended, is_over), sweeps);
 }
 
 /// Largest scaled row sum; more than BIG if an entry or a right-hand side is not finite. Times EPSILON it is the

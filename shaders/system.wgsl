@@ -27,10 +27,9 @@ const NOT_FINITE = 2u;
 const DIVERGED = 3u;
 const PAUSED = 99u;
 
-/// Sweeps made by this solve, over all dispatches.
-var<private> sweeps: u32;
-/// Sweeps left in this dispatch.
-var<private> budget: u32;
+/// How a solve ended, and the sweeps that it has made over all dispatches.
+struct Solve { ended: u32, sweeps: u32 }
+
 /// The unknowns of the block: where sweeps start, then the result. The curvature system has only `u`.
 var<private> u: vec;
 var<private> v: vec;

@@ -8,7 +8,7 @@ var<private> term_second: vec;
 var<private> term_first: vec;
 
 fn curvature_terms() {
-    let rate = real(1.0) / p.tau;
+    let rate = real(1.0) / tau;
     let r_here = here(r_new);
     term_spacing = (r_here + plus1(r_new)) * real(0.5);
     term_cell = r_here;
@@ -19,7 +19,7 @@ fn curvature_terms() {
 
 /// `wk`: the new curvatures.
 fn position_terms(wk: Window) {
-    let rate = real(1.0) / p.tau;
+    let rate = real(1.0) / tau;
     let kh = here(wk);
     let kp = plus1(wk);
     let rp = plus1(r_new);

@@ -10,7 +10,7 @@ fn weigh(fine: Level, coarse: Level, j: u32) {
     let points = select(1u, 2u, has_two_between(fine, j));
     for (var point = 0u; point < points; point++) {
         let weights = lagrange(way, before, gap, next);
-        if point == 0u { coarse_weights[coarse.at + j] = weights; } else { odd_weights[fine.depth] = weights; }
+        if point == 0u { coarse_weights[coarse.at + j] = weights; } else { odd_weights[odd_place(fine)] = weights; }
         way += value_at(fine, node_between(j)).x;
     }
 }
@@ -27,7 +27,7 @@ fn restrict_residuals(fine: Level, coarse: Level, j: u32) -> pair {
     var sum = held_at(fine, fine_node(j)) + (near + far);
     if is_odd(fine) {
         for (var t = 0u; t < 4u; t++) {
-            if around_second(coarse, t) == j { sum = sum + odd_weights[fine.depth][t] * held_at(fine, last_node(fine)); }
+            if around_second(coarse, t) == j { sum = sum + odd_weights[odd_place(fine)][t] * held_at(fine, last_node(fine)); }
         }
     }
     return sum;
@@ -38,7 +38,7 @@ fn interpolate(fine: Level, coarse: Level, i: u32) -> pair {
     let j = coarse_node(fine, i);
     if is_coarse(fine, i) { return coarse_value[coarse.at + j]; }
     var w = coarse_weights[coarse.at + j];
-    if is_second_between(fine, i) { w = odd_weights[fine.depth]; }
+    if is_second_between(fine, i) { w = odd_weights[odd_place(fine)]; }
     return blend(w, coarse, j);
 }
 

@@ -1,22 +1,20 @@
 //! `report.html` in a real headless browser, if there is one; otherwise these tests are reported as ignored.
 //!
-//! The browser is Chromium or Chrome: the program named by `CURVELAX_BROWSER`, or the first in the path. It has no
-//! network.
+//! The browser is Chromium or Chrome, without a network.
 
 mod common;
 
 use std::{
-    env,
-    ffi::OsString,
     fs,
     path::{Path, PathBuf},
-    process::{Command, ExitCode},
+    process::ExitCode,
 };
 
-use common::program::{Done, run};
+use common::{
+    browser::{browser, headless},
+    program::{Done, run},
+};
 use libtest_mimic::{Arguments, Trial};
-
-const NAMES: [&str; 5] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
 
 /// Members that move for a while, one that never relaxes, a series and two cells: a page with everything that a page
 /// can have.
@@ -53,14 +51,6 @@ fn main() -> ExitCode {
     libtest_mimic::run(&arguments, trials.into()).exit_code()
 }
 
-fn browser() -> Option<PathBuf> {
-    let named = env::var_os("CURVELAX_BROWSER").map(PathBuf::from);
-    let folders: Vec<PathBuf> = env::split_paths(&env::var_os("PATH").unwrap_or_default()).collect();
-    named.or_else(|| {
-        NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|p| p.is_file())
-    })
-}
-
 /// A page after its script has run.
 struct Shown {
     dom: String,
@@ -72,16 +62,9 @@ impl Shown {
     /// Opens `page`, with `fragment` after its name.
     #[track_caller]
     fn new(browser: &Path, page: &Path, fragment: &str) -> Shown {
-        let profile = tempfile::tempdir().unwrap();
-        let mut user_data = OsString::from("--user-data-dir=");
-        user_data.push(profile.path());
-        // The sandbox needs rights that containers do not give; the page is our own.
-        let flags = "--headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --no-first-run \
-            --virtual-time-budget=3000 --enable-logging=stderr --v=0 --dump-dom";
-        let output = Command::new(browser)
-            .arg(user_data)
-            .arg("--host-resolver-rules=MAP * ~NOTFOUND")
-            .args(flags.split_whitespace())
+        let (mut command, _profile) = headless(browser);
+        let output = command
+            .args(["--disable-gpu", "--virtual-time-budget=3000", "--dump-dom"])
             .arg(format!("file://{}{fragment}", page.display()))
             .output()
             .unwrap();

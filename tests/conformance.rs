@@ -67,15 +67,16 @@ fn main() {
     }
     let conclusion = libtest_mimic::run(&arguments, trials);
     println!("conformance cases: {}", conclusion.num_passed);
-    record(conclusion.num_passed);
+    record(conclusion.num_passed, &found);
     conclusion.exit();
 }
 
-/// Records the number of cases for scripts.
-fn record(cases: u64) {
+/// Records the number of cases, and where they ran, for scripts.
+fn record(cases: u64, gpus: &[Gpu]) {
+    let names: Vec<&str> = gpus.iter().map(Gpu::name).collect();
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/target/conformance-cases.txt");
     let file = std::fs::OpenOptions::new().create(true).append(true).open(path);
-    let written = file.and_then(|mut file| writeln!(file, "{cases} conformance"));
+    let written = file.and_then(|mut file| writeln!(file, "{cases} conformance on {}", names.join(", ")));
     if let Err(error) = written {
         println!("cannot write {path}: {error}");
     }

@@ -21,7 +21,7 @@ use crate::{
     wgsl::{self, ShaderPart},
 };
 use gauss_seidel::SWEEPS_PER_CHECK;
-use multigrid::{Discretisation, KERNEL_LEVELS, Levels, SWEEPS_PER_CYCLE};
+use multigrid::{COARSEST, Discretisation, Levels, SWEEPS_PER_CYCLE};
 use sweeps::{Control, Swept};
 
 /// The solver of the periodic pentadiagonal systems.
@@ -247,7 +247,7 @@ impl Solves for Cycles {
             ],
             shuffles: false,
             rows_per_block: 3,
-            numbers: |n| 13 * multigrid::coarse_nodes(n) + 4 * KERNEL_LEVELS,
+            numbers: |n| 13 * multigrid::coarse_nodes(n) + 4 * multigrid::odd_rings(n).max(1) + COARSEST * COARSEST,
             sweeps_per_look: SWEEPS_PER_CYCLE,
             // At most 11 levels of 4 colours.
             iterations_per_look: 300,

@@ -1,6 +1,7 @@
 //! Shared parts of the integration tests: a curve that is stepped by hand, and measures of it.
 #![allow(dead_code, missing_docs)] // every test file uses a different part of it
 
+pub mod browser;
 pub mod polygons;
 pub mod program;
 

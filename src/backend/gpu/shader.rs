@@ -2,7 +2,10 @@
 
 use crate::{
     number::Real,
-    solver::{Blocks, Solver, multigrid::coarse_nodes},
+    solver::{
+        Blocks, Solver,
+        multigrid::{coarse_nodes, odd_rings},
+    },
     wgsl::{ShaderPart, parts},
 };
 
@@ -105,24 +108,28 @@ pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
 }
 
 /// Returns the `override` constants that size the kernel.
-pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 5] {
+pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
     [
         ("NODES", blocks.n as f64),
         ("FOURS", blocks.fours as f64),
         ("BLOCKS", blocks.count() as f64),
         ("THREADS", threads(blocks, subgroup) as f64),
         ("COARSE", coarse_nodes(blocks.n) as f64),
+        ("ODD_RINGS", odd_rings(blocks.n).max(1) as f64),
     ]
 }
 
-/// Returns the bytes of workgroup memory of the kernel: rows of four numbers per block, the solver's own needs, and one
-/// decision.
+/// Numbers and integers of a `Plan` in the kernel.
+const PLAN: (usize, usize) = (2, 4);
+
+/// Returns the bytes of workgroup memory of the kernel: rows of four numbers per block, the solver's own needs, the plan of
+/// an attempt, and a decision.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
 pub fn workgroup_bytes<T: Real>(blocks: Blocks, variant: Variant) -> usize {
     let kernel = &variant.solver.facts().kernel;
     let rows = if variant.subgroup { 1 } else { kernel.rows_per_block };
-    (4 * rows * blocks.count() + (kernel.numbers)(blocks.n)) * size_of::<T>() + 16
+    (4 * rows * blocks.count() + (kernel.numbers)(blocks.n) + PLAN.0) * size_of::<T>() + (PLAN.1 + 1) * size_of::<u32>()
 }
 
 #[cfg(test)]

@@ -37,7 +37,7 @@ use crate::number::{Mask, Number};
 
 pub use coarse::{BALANCE, Discretisation, Levels, Terms};
 pub use cycle::COARSE_SWEEPS;
-pub use levels::{COARSEST, KERNEL_LEVELS, coarse_nodes};
+pub use levels::{COARSEST, coarse_nodes, odd_rings};
 
 /// Sweeps of the finest level per cycle.
 pub const SWEEPS_PER_CYCLE: u32 = 2;

@@ -1,0 +1,226 @@
+//! The kernels as other compilers read them. A test without its compiler is reported as ignored.
+//!
+//! - Tint, in Chromium, is the second implementation of WGSL: it also proves that barriers are in uniform control flow,
+//!   which naga does not. SwiftShader, Chromium's software GPU, is the device for which it builds the pipelines.
+//! - spirv-val judges what naga makes of them for Vulkan.
+//! - ACO, AMD's compiler in Mesa, says whether their values fit into registers.
+
+mod common;
+#[allow(dead_code)] // its main function
+#[path = "../examples/kernels.rs"]
+mod kernels;
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    io::{BufRead, BufReader},
+    path::Path,
+    process::{Command, ExitCode, Stdio},
+};
+
+use common::browser::{browser, headless};
+use curvelax::{
+    backend::gpu::{Variant, shader},
+    solver::{Blocks, Solver},
+};
+use libtest_mimic::{Arguments, Trial};
+use serde::{Deserialize, Serialize};
+
+/// Builds every kernel and says on the console what becomes of it.
+const PAGE: &str = r#"<!doctype html><script type="module">
+const kernels = KERNELS;
+const say = (name, error) => console.log("VERDICT " + JSON.stringify({ name, error }));
+try {
+  const adapter = await navigator.gpu.requestAdapter();
+  const requiredFeatures = adapter.features.has("subgroups") ? ["subgroups"] : [];
+  const device = await adapter.requestDevice({ requiredFeatures });
+  for (const { name, code, constants } of kernels) {
+    device.pushErrorScope("validation");
+    const module = device.createShaderModule({ code });
+    const compute = { module, entryPoint: "evolve", constants };
+    let error = null;
+    await device.createComputePipelineAsync({ layout: "auto", compute }).catch((e) => { error = e.message; });
+    const refused = await device.popErrorScope();
+    say(name, refused ? refused.message : error);
+  }
+} catch (e) { say("page", String(e)); }
+say("end", null);
+</script>"#;
+
+#[derive(Serialize)]
+struct Kernel {
+    name: String,
+    code: String,
+    constants: BTreeMap<&'static str, f64>,
+}
+
+impl Kernel {
+    fn new(variant: Variant, n: usize) -> Kernel {
+        let blocks = Blocks::new(n).unwrap();
+        // naga 30 has subgroups without this line, and refuses it.
+        let enable = if variant.subgroup { "enable subgroups;\n" } else { "" };
+        Kernel {
+            name: format!("{variant:?}, n = {n}"),
+            code: format!("{enable}{}", shader::source::<f32>(variant)),
+            constants: shader::constants(blocks, 32).into_iter().collect(),
+        }
+    }
+
+    /// The kernel with one part of its text replaced.
+    fn with(self, from: &str, to: &str) -> Kernel {
+        assert_eq!(self.code.matches(from).count(), 1, "{from}");
+        Kernel { code: self.code.replace(from, to), ..self }
+    }
+}
+
+#[derive(Deserialize)]
+struct Verdict {
+    name: String,
+    error: Option<String>,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let browser = browser();
+    let mut trials = Vec::new();
+    let mut add = |name: &str, needed: bool, test: Box<dyn FnOnce() + Send>| {
+        let trial = Trial::test(name, move || {
+            test();
+            Ok(())
+        });
+        trials.push(trial.with_ignored_flag(!needed));
+    };
+    let in_browser = |test: fn(&Path)| -> Box<dyn FnOnce() + Send> {
+        let browser = browser.clone();
+        Box::new(move || test(&browser.expect("there is no browser")))
+    };
+    let found = browser.is_some();
+    add("tint_accepts_every_kernel_in_f32", found, in_browser(every_kernel_is_accepted));
+    add("tint_refuses_a_barrier_under_a_private_condition", found, in_browser(a_private_condition_is_refused));
+    add("spirv_val_accepts_every_kernel", answers("spirv-val", "--version"), Box::new(spirv_is_valid));
+    add("aco_spills_nothing_in_f32", has_aco(), Box::new(nothing_is_spilled));
+    eprintln!(
+        "Tint: {}; ignored tests lack their compiler (Debian: chromium, spirv-tools, mesa-vulkan-drivers, libvulkan-dev, \
+         gcc)",
+        browser.map_or("none".into(), |path| path.display().to_string())
+    );
+    libtest_mimic::run(&arguments, trials).exit_code()
+}
+
+/// Whether a program can be started.
+fn answers(program: &str, argument: &str) -> bool {
+    Command::new(program).arg(argument).stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|s| s.success())
+}
+
+/// Whether RADV, a C compiler and Vulkan's headers are there.
+fn has_aco() -> bool {
+    let folder = Path::new("/usr/share/vulkan/icd.d");
+    let has_driver = fs::read_dir(folder).is_ok_and(|mut files| {
+        files.any(|file| file.is_ok_and(|file| file.file_name().to_string_lossy().starts_with("radeon_icd")))
+    });
+    has_driver && Path::new("/usr/include/vulkan/vulkan.h").exists() && answers("cc", "--version")
+}
+
+/// Whether spirv-val finds a file valid.
+fn is_valid_spirv(path: &Path) -> bool {
+    let judged = Command::new("spirv-val").args(["--target-env", "vulkan1.1"]).arg(path).output().unwrap();
+    judged.status.success()
+}
+
+fn spirv_is_valid() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut judged = 0;
+    for n in [6, 100, 257] {
+        kernels::write_all(n, folder.path()).unwrap();
+    }
+    for file in fs::read_dir(folder.path()).unwrap() {
+        let path = file.unwrap().path();
+        if path.extension().is_some_and(|ending| ending == "spv") {
+            assert!(is_valid_spirv(&path), "{}", path.display());
+            judged += 1;
+        }
+    }
+    println!("{judged} kernels are valid");
+    assert!(judged > 40, "{judged} kernels");
+    // Negative control: a word of the code is changed.
+    let path = folder.path().join("direct-f32-n100.spv");
+    let mut bytes = fs::read(&path).unwrap();
+    let middle = bytes.len() / 8 * 4;
+    bytes[middle] ^= 0x40;
+    fs::write(&path, bytes).unwrap();
+    assert!(!is_valid_spirv(&path));
+}
+
+/// The kernels in `folder` with the number of registers that ACO spills, by `benches/compilers/run`.
+fn spilled(folder: &Path) -> BTreeMap<String, u32> {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/compilers/run");
+    let output = Command::new(script).arg("aco").env("KERNELS", folder).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = String::from_utf8(output.stdout).unwrap();
+    let rows = table.lines().map(|line| line.split('|').map(str::trim).collect::<Vec<_>>());
+    rows.filter_map(|row| Some((row.get(1)?.to_string(), row.get(3)?.parse().ok()?))).collect()
+}
+
+fn nothing_is_spilled() {
+    let folder = tempfile::tempdir().unwrap();
+    kernels::write_all(100, folder.path()).unwrap();
+    let spilled = spilled(folder.path());
+    let (f32, f64): (Vec<_>, Vec<_>) = spilled.iter().partition(|(name, _)| name.contains("-f32-"));
+    assert_eq!(f32.len(), 8, "{spilled:?}");
+    assert!(f32.iter().all(|(_, spilled)| **spilled == 0), "{f32:?}");
+    // Negative control: f64 does not fit, and is seen not to.
+    assert!(f64.iter().any(|(_, spilled)| **spilled > 0), "{f64:?}");
+}
+
+/// What Tint and the device say of each kernel: nothing, or the error.
+fn verdicts(browser: &Path, kernels: &[Kernel]) -> Vec<Option<String>> {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("kernels.html");
+    fs::write(&page, PAGE.replace("KERNELS", &serde_json::to_string(kernels).unwrap().replace("</", "<\\/"))).unwrap();
+    let (mut command, _profile) = headless(browser);
+    command.args(["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enable-features=Vulkan"]);
+    command.arg(format!("file://{}", page.display())).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let mut found = Vec::new();
+    // A line of the console: [...:CONSOLE:12] "VERDICT {...}", source: file:///... (12)
+    for line in BufReader::new(child.stderr.take().unwrap()).lines() {
+        let line = line.unwrap();
+        let Some(said) = line.split("\"VERDICT ").nth(1).and_then(|rest| rest.rsplit_once("\", source: ")) else {
+            continue;
+        };
+        let Verdict { name, error } = serde_json::from_str(said.0).unwrap();
+        if name == "end" {
+            break;
+        }
+        assert_eq!(name, kernels[found.len()].name, "{error:?}");
+        found.push(error);
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(found.len(), kernels.len(), "the page ended early");
+    found
+}
+
+fn every_kernel_is_accepted(browser: &Path) {
+    // Blocks of four only, and blocks of three.
+    let kernels: Vec<Kernel> =
+        [100, 30].into_iter().flat_map(|n| Variant::all().into_iter().map(move |v| Kernel::new(v, n))).collect();
+    let verdicts = verdicts(browser, &kernels);
+    let refused = kernels.iter().zip(verdicts).filter_map(|(kernel, error)| Some((&kernel.name, error?)));
+    assert_eq!(refused.collect::<Vec<_>>(), []);
+    println!("{} kernels are accepted", kernels.len());
+}
+
+/// The negative control: what is the same in every thread, but not seen to be.
+fn a_private_condition_is_refused(browser: &Path) {
+    let kernel = || Kernel::new(Variant::of(Solver::Direct), 100);
+    let kernels = [
+        kernel().with("= all_parameters[all_due[index]].redistribution", "= all_parameters[member].redistribution"),
+        kernel().with("while next.is_due != 0u &&", "while tau > 0.0 &&"),
+        kernel().with("fn take_member(index: u32) {", "fn take_member(index: u32) { nonsense();"),
+    ];
+    let verdicts = verdicts(browser, &kernels);
+    for (verdict, words) in verdicts.iter().zip(["uniform control flow", "uniform control flow", "nonsense"]) {
+        assert!(verdict.as_ref().is_some_and(|error| error.contains(words)), "{verdicts:?}");
+    }
+}
