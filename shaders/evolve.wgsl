@@ -144,7 +144,7 @@ fn judge_attempt(ended: u32, count: u32, h: real, errors: vec2<real>) -> u32 {
     let report = &all_reports[member].report;
     let counters = &all_counters[member];
     counters.solves += count;
-    if ADAPTIVE && ended == SOLVED && !(errors.x <= allowed(h)) {
+    if ADAPTIVE && ended == SOLVED && !(errors.x <= allowed(h, report.now.length)) {
         refuse_inaccurate(h, errors);
         return REFUSED;
     }
@@ -201,7 +201,7 @@ fn refuse_failure(h: real, cause: u32) {
 fn refuse_inaccurate(h: real, errors: vec2<real>) {
     let counters = &all_counters[member];
     let most = select(real(AFTER_REFUSALS), real(AFTER_REFUSAL), counters.refused == 0u);
-    let next = choose(h, counters.order, errors, most, allowed(h));
+    let next = choose(h, counters.order, errors, most, allowed(h, all_reports[member].report.now.length));
     counters.order = next.order;
     refuse(next.length, real(MIN_STEP), SINGULAR);
 }
@@ -235,7 +235,7 @@ fn lengthen(by: Stride, errors: vec2<real>, declines: vec2<real>) {
     let report = &all_reports[member].report;
     let counters = &all_counters[member];
     let most_growth = select(real(1.0), real(MAX_GROWTH), counters.refused == 0u);
-    let next = choose(by.length, counters.order, errors, most_growth, allowed(by.length));
+    let next = choose(by.length, counters.order, errors, most_growth, allowed(by.length, report.before.length));
     report.progress.next = next.length;
     counters.order = next.order;
     report.progress.slope = declines.x;

@@ -55,9 +55,10 @@ fn is_at_goal() -> bool {
     return (p.goal_high - report.progress.time_high) + (p.goal_low - report.progress.time_low) <= real(0.0);
 }
 
-/// The largest error of a step of length h: an error below the rounding of the solves says nothing.
-fn allowed(h: real) -> real {
-    let edge = all_reports[member].report.now.length / real(NODES);
+/// The largest error of a step of length h of a curve of length `length`: an error below the rounding of the solves says
+/// nothing.
+fn allowed(h: real, length: real) -> real {
+    let edge = length / real(NODES);
     return max(real(4.0 * ROUNDING * EPSILON) * (sqrt(h) / (edge * edge)), all_parameters[member].adaptive);
 }
 
