@@ -6,9 +6,9 @@
 // next dispatch recomputes the same rows and continues sweeping. Results do not depend on where a dispatch ends, to the
 // last bit.
 
-/// The attempt that thread 0 plans: whether one is due, the order of an adaptive step, the systems that are solved, the
-/// sweeps made for the next one, the length of the step and that of the last one.
-struct Plan { is_due: u32, order: u32, phase: u32, solve_sweeps: u32, length: real, taken: real }
+/// What thread 0 found of an attempt, and the next one that it plans: the order of an adaptive step, the systems that are
+/// solved, the sweeps made for the next one, the length of the step and that of the last one.
+struct Plan { found: u32, order: u32, phase: u32, solve_sweeps: u32, length: real, taken: real }
 
 var<workgroup> plan: Plan;
 
@@ -19,15 +19,16 @@ fn take_member(index: u32) {
     let moves = all_parameters[all_due[index]].redistribution > real(0.5);
     if lane == 0u { begin_dispatch(); }
     var next = workgroupUniformLoad(&plan);
-    if next.is_due == 0u { return; }
+    if (next.found & IS_DUE) == 0u { return; }
     load_curve(CURVE);
     dk = load_field(INCREMENTS);
     dx = load_field(INCREMENTS + 1u);
     dy = load_field(INCREMENTS + 2u);
     var course = Course(SOLVED, next.phase, next.solve_sweeps, dispatch.steps, dispatch.sweeps);
-    while next.is_due != 0u && course.steps > 0u && course.sweeps > 0u {
-        course = advance(next, course, moves);
-        next = workgroupUniformLoad(&plan);
+    while (next.found & IS_DUE) != 0u && course.steps > 0u && course.sweeps > 0u {
+        let advanced = advance(next, course, moves);
+        course = advanced.course;
+        next = advanced.next;
     }
     storageBarrier();
     if !ADAPTIVE { store_curve(CURVE); }
@@ -42,7 +43,7 @@ fn begin_dispatch() {
     let counters = &all_counters[member];
     counters.sweeps_k = 0u;
     counters.sweeps_x = 0u;
-    make_plan();
+    make_plan(REFUSED);
     plan.phase = counters.phase;
     plan.solve_sweeps = counters.solve_sweeps;
     // `pause` sets them again.
@@ -50,10 +51,10 @@ fn begin_dispatch() {
     counters.solve_sweeps = 0u;
 }
 
-/// Plans the next attempt.
-fn make_plan() {
+/// Plans the next attempt after one of which `found` was found.
+fn make_plan(found: u32) {
     let counters = &all_counters[member];
-    plan.is_due = select(0u, 1u, counters.status == RUNNING && counters.steps < counters.goal);
+    plan.found = found | select(0u, IS_DUE, counters.status == RUNNING && counters.steps < counters.goal);
     if ADAPTIVE {
         plan.order = counters.order;
         plan.length = stride().length;
@@ -67,11 +68,16 @@ const REFUSED = 0u;
 const ACCEPTED = 1u;
 const AT_GOAL = 2u;
 const MAY_RELAX = 4u;
+/// Another attempt is due.
+const IS_DUE = 8u;
+
+/// What is left to do, and the next attempt.
+struct Advanced { course: Course, next: Plan }
 
 /// Attempts the planned step and handles the result.
 ///
 /// A step and an observation are each called in one place only: compilers inline the whole body of every call.
-fn advance(planned: Plan, begun: Course, moves: bool) -> Course {
+fn advance(planned: Plan, begun: Course, moves: bool) -> Advanced {
     var course = begun;
     let count = select(1u, parts(planned.order), ADAPTIVE);
     if ADAPTIVE && course.phase == 0u && course.solve_sweeps == 0u {
@@ -88,7 +94,7 @@ fn advance(planned: Plan, begun: Course, moves: bool) -> Course {
     let solved = course.ended == SOLVED;
     if course.ended == PAUSED || (solved && course.phase < 2u * count) {
         if lane == 0u { pause(course); }
-        return course;
+        return Advanced(course, workgroupUniformLoad(&plan));
     }
     course.phase = 0u;
     course.solve_sweeps = 0u;
@@ -101,21 +107,28 @@ fn advance(planned: Plan, begun: Course, moves: bool) -> Course {
         if ADAPTIVE { gaps = gaps_of_attempt(); }
     }
     var errors = vec2<real>(0.0, 0.0);
-    var found = REFUSED;
     if lane == 0u {
         if ADAPTIVE && solved { errors = errors_of_attempt(gaps); }
-        found = judge_attempt(course.ended, count, planned.length, errors);
-        if found == REFUSED { make_plan(); }
+        let found = judge_attempt(course.ended, count, planned.length, errors);
+        plan.found = found;
+        // A fixed step whose curve need not be looked at again is concluded at once, which saves a decision.
+        let is_plain = !ADAPTIVE && found != REFUSED && (found & MAY_RELAX) == 0u;
+        if is_plain { conclude(planned.length, errors, vec2<real>(0.0, 0.0), 0.0); }
+        if is_plain || found == REFUSED { make_plan(found); }
     }
-    let judged = uniform_decision(found);
-    if judged == REFUSED { return course; }
-    var declines = vec2<real>(0.0, 0.0);
-    if ADAPTIVE { declines = decline(); }
-    var apart = real(0.0);
-    if (judged & MAY_RELAX) != 0u { apart = gap(); }
-    if lane == 0u {
-        conclude(planned.length, errors, declines, apart);
-        make_plan();
+    var next = workgroupUniformLoad(&plan);
+    let judged = next.found;
+    if (judged & ACCEPTED) == 0u { return Advanced(course, next); }
+    if ADAPTIVE || (judged & MAY_RELAX) != 0u {
+        var declines = vec2<real>(0.0, 0.0);
+        if ADAPTIVE { declines = decline(); }
+        var apart = real(0.0);
+        if (judged & MAY_RELAX) != 0u { apart = gap(); }
+        if lane == 0u {
+            conclude(planned.length, errors, declines, apart);
+            make_plan(judged);
+        }
+        next = workgroupUniformLoad(&plan);
     }
     if ADAPTIVE {
         keep_attempt();
@@ -128,14 +141,14 @@ fn advance(planned: Plan, begun: Course, moves: bool) -> Course {
     y = here(new_y);
     k = new_k;
     r = new_r;
-    return course;
+    return Advanced(course, next);
 }
 
 /// Stores where the attempt pauses, and ends the dispatch.
 fn pause(course: Course) {
     all_counters[member].phase = course.phase;
     all_counters[member].solve_sweeps = course.solve_sweeps;
-    plan.is_due = 0u;
+    plan.found = REFUSED;
 }
 
 /// Whether an attempt of `count` steps of the paper is accepted; reports the new curve if it is.
