@@ -37,11 +37,15 @@ fn pass_up(tail: vec) -> vec {
     return subgroupShuffle(tail, before);
 }
 
-/// Spare threads repeat the last block and do not change any maximum.
+/// Spare threads stay below what others bring.
+fn without_spares(part: vec) -> vec {
+    return select(vec(-4.0 * BIG), part, owns > 0u);
+}
+
 fn ring_maxima(part: vec) -> vec {
-    return subgroupMax(part);
+    return subgroupMax(without_spares(part));
 }
 
 fn ring_summary(sum: vec, extreme: vec, other: vec) -> Summary {
-    return Summary(ring_sums(sum).all, subgroupMax(extreme), subgroupMax(other));
+    return Summary(ring_sums(sum).all, ring_maxima(extreme), ring_maxima(other));
 }

@@ -100,7 +100,6 @@ fn finish_attempt() {
 
 /// The largest differences between orders, of k and r, of the order of the attempt and of the one below.
 fn gaps_of_attempt() -> vec {
-    settle();
     let ir = vec(1.0) / new_r;
     return ring_maxima(vec(
         block_max(bounded_abs(load_own(GAPS))), block_max(bounded_abs(load_own(GAPS + 1u) * ir)),

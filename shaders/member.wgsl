@@ -188,7 +188,7 @@ fn load_nodes(field: u32, last: u32) -> vec {
 fn load_field(field: u32) -> vec { return load_nodes(field, node(3u)); }
 
 /// Like `load_field`, for what no other thread needs: the last component of a block of three repeats its own third node.
-fn load_own(field: u32) -> vec { return load_nodes(field, first + select(2u, 3u, owns == 4u)); }
+fn load_own(field: u32) -> vec { return load_nodes(field, first + select(2u, 3u, is_four)); }
 
 /// Makes the curve at `base` the start of a step. Others have written what a block of three reads beyond its own.
 fn load_curve(base: u32) {

@@ -76,7 +76,7 @@ fn decline() -> vec2<real> {
 /// The largest difference between the angle by which the new curvature turns the tangent over a segment and the angle
 /// by which the new polygon turns there.
 fn gap() -> real {
-    settle();
+    if ADAPTIVE { settle(); }
     let turned = turn(new_x, new_y);
     let apart = bounded_abs(new_k * turned.span - turned.angle);
     return ring_maxima(vec(block_max(apart), 0.0, 0.0, 0.0)).x;

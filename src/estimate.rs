@@ -39,8 +39,6 @@ const PROGRAM_BYTES: u64 = 10_000_000;
 const POOL_NUMBERS: usize = STATE_FIELDS + 4;
 /// The same while a checkpoint is saved: the paused member, and its bytes.
 const KEPT_NUMBERS: usize = 2 * STATE_FIELDS;
-/// A run longer than this, in seconds, saves a checkpoint before it ends.
-const FIRST_STATE: f64 = 5.0;
 /// Bytes per node of the page and its pictures, up to the maximum number of nodes drawn.
 const PAGE_BYTES: usize = 25_000;
 /// Copies of the nodes of the members drawn.
@@ -119,11 +117,11 @@ struct CohortWork {
 }
 
 impl Estimate {
-    /// Estimates the run of a study, each stage on its choice.
+    /// Estimates the run of a study, each stage on its choice, that saves a checkpoint after each `interval`.
     ///
     /// # Errors
     /// Those of the run itself.
-    pub fn new(study: &Study, choices: Vec<Choice>) -> Result<Estimate> {
+    pub fn new(study: &Study, choices: Vec<Choice>, interval: Duration) -> Result<Estimate> {
         let (stages, cells) = (study.stages(), study.cells());
         let members = study.member_count();
         let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
@@ -184,7 +182,7 @@ impl Estimate {
                 [slots, resident],
                 rows,
                 cells[0].spec.points,
-                seconds.is_none_or(|seconds| seconds > FIRST_STATE),
+                seconds.is_none_or(|seconds| seconds > interval.as_secs_f64()),
             ) + level_members * size_of::<(u64, f64)>() as u64,
             platform,
             slots,
@@ -541,7 +539,7 @@ mod tests {
         let mut study = study(Spec { backend: BackendChoice::Cpu, points: 32, ..spec });
         let choices = choose_all(&study).unwrap();
         settle(&mut study, &choices);
-        let estimate = Estimate::new(&study, choices).unwrap();
+        let estimate = Estimate::new(&study, choices, Duration::MAX).unwrap();
         assert_eq!((estimate.members, estimate.cells), (10_000_000, 1));
         assert!(estimate.memory_bytes > 300_000_000, "{estimate:?}");
         assert!(estimate.pilot.members < 5_000_000 && estimate.pilot.seconds < 60.0, "{estimate:?}");

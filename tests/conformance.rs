@@ -40,7 +40,7 @@ const ADAPTIVE_SIZES: [usize; 3] = [7, 64, 101];
 
 /// Sizes at which the exchange by shuffles is compared with that by barriers: every number of blocks of three, and the
 /// largest ring for eight threads.
-const ONE_SUBGROUP: [usize; 5] = [6, 7, 29, 30, 32];
+const ONE_SUBGROUP: [usize; 6] = [6, 7, 28, 29, 30, 32];
 
 type Outcome = Result<(), Failed>;
 

@@ -82,7 +82,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     work.study.note().into_iter().for_each(|note| flags.say(&format!("note: {note}")));
     if args.dry_run {
         work.study.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
-        let estimate = Estimate::new(&work.study, work.choices)?;
+        let estimate = Estimate::new(&work.study, work.choices, flags.checkpoint_every())?;
         return match (flags.json, flags.quiet) {
             (true, _) => print_json(&estimate),
             (false, false) => print(&dry_run::table(&estimate, &work.study.cells()[0].spec)),

@@ -87,6 +87,11 @@ impl MannerFlags {
         }
     }
 
+    /// The interval between checkpoints.
+    pub fn checkpoint_every(&self) -> Duration {
+        self.checkpoint_every
+    }
+
     /// Makes the run stoppable from now on.
     pub fn manner(&self) -> Result<Manner> {
         let stop = Stop::default();
