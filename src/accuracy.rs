@@ -122,6 +122,12 @@ pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Opti
         let reached = rounded(round.discretisation, 2);
         if round.discretisation > DISCRETISATION * goal || round.unruly > UNRULY {
             if spec.points >= MAX_NODES {
+                if round.unruly > UNRULY {
+                    let percent = rounded(100.0 * round.unruly, 2);
+                    let problem =
+                        format!("at n = {}, the times of {percent} % of the members do not converge", spec.points);
+                    return refuse(&problem, "begin with fewer --points, or use a smoother curve");
+                }
                 let problem = format!("at n = {} the uncertainty of discretisation is still {reached}", spec.points);
                 return refuse(&problem, "use a larger number");
             }
@@ -207,7 +213,12 @@ fn of_cell(spec: &Spec, cell: &CellStatistics) -> Result<Round> {
         );
     }
     let Some((median, total, error)) = found else {
-        return refuse("too few members relaxed for a median with an interval", "use more --curves or --t-end");
+        let problem = format!(
+            "{} of {} members relaxed, too few for a median with an interval",
+            cell.sample.events(),
+            spec.curves
+        );
+        return refuse(&problem, "use more --curves or a longer --t-end, or a curve that relaxes");
     };
     let discretisation = error / median;
     let unruly = cell.discretisation.as_ref().map_or(0.0, |of| of.not_asymptotic as f64 / of.members.max(1) as f64);

@@ -135,6 +135,7 @@ fn a_wrong_sweep_names_its_key_and_cell() {
         (&["amplitude=0.1,word"], ["--sweep amplitude=word: ", "in the cell amplitude = word"]),
         (&["omega=1", "decay=1,2", "omega=2"], ["--sweep omega: given twice; ", "--sweep omega=V1,V2"]),
         (&["decay=1,2", "--decay=3"], ["--sweep decay: --decay is given, too", "leave one of them out"]),
+        (&["adaptive=1e-3", "--tau=1e-3"], ["--sweep adaptive: --tau is given, too", "leave one of them out"]),
         (
             &["relax-to=0.1,0.2", "--relax-to=0.1"],
             ["--sweep relax-to: --relax-to is given, too", "leave one of them out"],

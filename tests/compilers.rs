@@ -216,7 +216,7 @@ fn a_private_condition_is_refused(browser: &Path) {
     let kernel = || Kernel::new(Variant::of(Solver::Direct), 100);
     let kernels = [
         kernel().with("= all_parameters[all_due[index]].redistribution", "= all_parameters[member].redistribution"),
-        kernel().with("while next.is_due != 0u &&", "while tau > 0.0 &&"),
+        kernel().with("while (next.found & IS_DUE) != 0u &&", "while tau > 0.0 &&"),
         kernel().with("fn take_member(index: u32) {", "fn take_member(index: u32) { nonsense();"),
     ];
     let verdicts = verdicts(browser, &kernels);

@@ -12,12 +12,15 @@ use curvelax::{
 };
 use tempfile::TempDir;
 
-/// The curves of the tests, and the fraction of `t_error` with which they no longer hold: the bars are not idle.
-const PROBLEMS: [&str; 4] = [
+/// The curves of the tests.
+const PROBLEMS: [&str; 6] = [
     "shape = 'ellipse:2,1'",
     "shape = 'circle:1'\namplitude = 0.1\nmodes = '2..=6'",
     "shape = 'ellipse:2,1'\nflow = 'willmore'",
     "shape = 'nonconvex'\namplitude = 0.02\nmodes = '2..=3'",
+    // Deep thresholds and single modes, where ten times more exact steps take away only a part of their error.
+    "shape = 'ellipse:2,1'\nrelax-to = 1e-6",
+    "shape = 'circle:1'\namplitude = 0.2\nmodes = '2..=2'\nseed = 32",
 ];
 
 fn spec(text: &str, curves: u64, points: usize, adaptive: f64) -> Spec {
@@ -200,6 +203,11 @@ fn a_run_whose_error_cannot_be_told_says_why() {
 #[test]
 fn rounds_can_be_stopped_and_members_that_relax_late_have_limits() {
     let home = TempDir::new().unwrap();
+    // A name that cannot be used is told at once.
+    fs::write(home.path().join("file"), "").unwrap();
+    let taken = "run --accurate --accuracy 1e-3 --shape nonconvex --curves 400 --backend cpu --out file";
+    let (code, said) = curvelax(home.path(), taken);
+    assert!(code == Some(2) && said.contains("exists but is not a folder") && !said.contains("round"), "{said}");
     let long = "run --accurate --accuracy 1e-3 --shape nonconvex --curves 400 --backend cpu --max-time 1s --out long";
     let (code, said) = curvelax(home.path(), long);
     assert_eq!(code, Some(75), "{said}");

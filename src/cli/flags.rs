@@ -255,6 +255,9 @@ macro_rules! every_flag {
     };
 }
 
+/// Keys of which each replaces the other.
+const EXCLUSIVE: [[&str; 2]; 2] = [["tau", "adaptive"], ["relax-to", "relax-at"]];
+
 impl SpecFlags {
     /// Checks that no key is given by two flags. A sweep may replace a single value of the spec file.
     ///
@@ -268,12 +271,18 @@ impl SpecFlags {
             )));
         }
         let given = self.given();
-        match self.sweep.iter().find(|axis| given.contains(&axis.key)) {
-            None => Ok(()),
-            Some(SweepAxis { key, .. }) => Err(Error::Request(format!(
-                "--sweep {key}: --{key} is given, too, and its value would be lost; leave one of them out"
-            ))),
+        for SweepAxis { key, .. } in &self.sweep {
+            let replaced = |other: &&String| {
+                *other == key
+                    || EXCLUSIVE.iter().any(|pair| pair.contains(&key.as_str()) && pair.contains(&other.as_str()))
+            };
+            if let Some(other) = given.iter().find(replaced) {
+                return Err(Error::Request(format!(
+                    "--sweep {key}: --{other} is given, too, and its value would be lost; leave one of them out"
+                )));
+            }
         }
+        Ok(())
     }
 
     /// The keys given as flags, without those that are swept.

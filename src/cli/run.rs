@@ -73,6 +73,10 @@ pub fn run(args: RunArgs) -> Result<()> {
         let (cause, _) = manner.as_ref()?.stop.asked()?;
         Some(cause.error(" in the rounds of --accuracy, before the run began: nothing is saved"))
     };
+    // A name that cannot be used is told before the rounds, which may take minutes.
+    if let (true, Some(out)) = (runs && !args.resume, &args.out) {
+        OutputFolder::check_place(out, args.force)?;
+    }
     let spec = accuracy::plan(spec, |round| args.manner.say(&round.to_string()), stopped)?;
     let mut work = Work::new(spec)?;
     if args.print_spec {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Outcome, Spec, Status,
-    spec::{BackendChoice, FinalTime, Order, Pace, Precision, SolverChoice, Sor, Store},
+    spec::{BackendChoice, DEFAULT_RELAX_TO, FinalTime, Order, Pace, Precision, SolverChoice, Sor, Store},
     validate::tightest_adaptive,
 };
 use crate::{
@@ -30,6 +30,8 @@ const LONGER: f64 = 2.0;
 const LATEST: f64 = 1e300;
 /// Tolerance of the steps of a level beside fixed ones.
 const EXACT: f64 = 1e-4;
+/// Bound on [`depth`]: no excess is resolved further below the default threshold.
+const MOST_DEPTH: f64 = 1e3;
 
 /// A resolution at which members run besides their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -102,6 +104,14 @@ fn tolerance(spec: &Spec) -> f64 {
         Pace::Adaptive(tolerance) => (tolerance / FINER).max(tightest_adaptive(Precision::F64)),
         Pace::Fixed(_) => EXACT,
     }
+}
+
+/// How much larger the error of a time is than with the default threshold: steps follow the amplitude of the shape, the
+/// root of the excess, to a tolerance relative to the mean of that and of the curvature. Adaptive steps show it by
+/// themselves, when their tolerance changes.
+fn depth(spec: &Spec, excess: f64) -> f64 {
+    let share = spec.threshold(excess) / excess;
+    (DEFAULT_RELAX_TO / share).sqrt().sqrt().clamp(1.0, MOST_DEPTH)
 }
 
 /// Members of the pilot of a cell.
@@ -194,7 +204,8 @@ impl LevelTimes {
         };
         let points = RefinementLevel::ALL.map(|level| level.points(spec.points));
         let is_adaptive = matches!(spec.pace(), Pace::Adaptive(_));
-        let limit = Limit::of(&Times { own, levels, points, tolerance: tolerance(spec), is_adaptive });
+        let tolerance = tolerance(spec) * if is_adaptive { 1.0 } else { depth(spec, outcome.start.excess) };
+        let limit = Limit::of(&Times { own, levels, points, tolerance, is_adaptive });
         outcome.judged = Some(limit);
         if spec.refine {
             let Limit { t, error, order, .. } = limit;

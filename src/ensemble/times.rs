@@ -179,7 +179,7 @@ fn check_steps(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()> {
     if steps <= MAX_STEPS {
         return Ok(());
     }
-    let allowed = format!("use --t-end {} or less, or auto", short(t_end * MAX_STEPS / steps));
+    let allowed = format!("use --t-end {} or less, or auto", short(t_end * (MAX_STEPS / steps)));
     Err(Error::value("t-end", FinalTime::At(t_end), &format!("about {steps:.1e} steps {of}"), &allowed))
 }
 

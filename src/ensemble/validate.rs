@@ -364,7 +364,10 @@ impl Spec {
     fn tidy_snapshots(&mut self) -> Result<()> {
         let t_end = self.known_end().unwrap_or(*TIMES.end());
         if let Some(&t) = self.snapshots.iter().find(|t| !(**t >= 0.0 && **t <= t_end)) {
-            let allowed = format!("use times from 0 to --t-end {}", number(t_end));
+            let allowed = match self.known_end() {
+                Some(t_end) => format!("use times from 0 to --t-end {}", number(t_end)),
+                None => "use times from 0 on".into(),
+            };
             return Err(Error::value("snapshots", number(t), "not a time of the run", &allowed));
         }
         self.snapshots.iter_mut().for_each(|t| *t += 0.0); // -0 becomes 0

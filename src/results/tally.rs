@@ -319,7 +319,7 @@ impl Tally {
         if self.below_rounding > 0 {
             warnings.push(format!(
                 "{} of {members} started so nearly round that rounding hides the threshold: t_relax cannot be \
-                 determined; use --precision f64 or a larger --relax-to",
+                 determined; use --precision f64, or a larger --relax-to or --relax-at",
                 self.below_rounding
             ));
         }

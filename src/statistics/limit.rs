@@ -2,16 +2,16 @@
 //!
 //! Where n is large enough, t(n) = t + c n⁻² + d n⁻⁴ + …, and three resolutions give t. How far that is from what the two
 //! finest give with c alone bounds its error, and the steps in time leave a part that goes with their tolerance. The
-//! constants below were fitted to ensembles of 32 curves and flows at n = 64 to 200 with limits known from n = 400 and
-//! 600 (`docs/method.md#limit`): in 97 of 100 of those where most members converge at least 95 % of the intervals hold the limit.
+//! constants below were fitted to ensembles of curves and flows at n = 64 to 200 with limits known from n = 300 to 600
+//! (`docs/method.md#limit`).
 
 use serde::{Deserialize, Serialize};
 
 /// Share of the difference of the two extrapolations in the error.
 const OF_SPACE: f64 = 0.5;
-/// Share of what ten times more exact steps change.
-const OF_STEPS: f64 = 0.15;
-/// Share of the tolerance of the steps, relative to the time.
+/// Share of what ten times more exact steps change, and the least error of steps in units of their tolerance, relative to
+/// the time: the change may be small by chance.
+const OF_STEPS: f64 = 0.5;
 const OF_TOLERANCE: f64 = 0.3;
 /// Observed orders between which differences fall as they should.
 const ORDERS: std::ops::RangeInclusive<f64> = 1.97..=2.2;
@@ -82,10 +82,13 @@ impl Limit {
         let farthest = [half - between, between - full, half - full].map(f64::abs).into_iter().fold(0.0, f64::max);
         let is_ordered = order.is_some_and(|order| ORDERS.contains(&order)) || farthest < SMALL * full;
         let asymptotic = is_ordered && (half - full).abs() <= LARGE * full;
-        let steps = if is_adaptive { (own - full).abs() } else { tolerance * full };
+        let steps = if is_adaptive { (own - full).abs() } else { 0.0 };
         let (t, error) = match asymptotic {
-            true => (three, OF_SPACE * (three - two).abs() + OF_STEPS * steps + OF_TOLERANCE * tolerance * full),
-            false => (full, NOT_ASYMPTOTIC * farthest + steps),
+            true => {
+                let of_steps = (OF_STEPS * steps).max(OF_TOLERANCE * tolerance * full);
+                (three, OF_SPACE * (three - two).abs() + of_steps)
+            }
+            false => (full, NOT_ASYMPTOTIC * farthest + steps.max(tolerance * full)),
         };
         Limit { t, error, order, asymptotic, relative: own / t - 1.0 }
     }

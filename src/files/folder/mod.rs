@@ -52,6 +52,14 @@ impl OutputFolder {
         OutputFolder::open_for(path, existing, Owner::Run, OWN.map(String::from).into())
     }
 
+    /// Checks that [`OutputFolder::open`] may succeed, and touches nothing.
+    ///
+    /// # Errors
+    /// Those of [`OutputFolder::open`] that can be told from outside.
+    pub fn check_place(path: &Path, existing: impl Into<Existing>) -> Result<()> {
+        check_place(path, existing.into(), &OWN.map(String::from))
+    }
+
     /// Creates the folder and its parents, for `owner` to write the files `names` into. An existing folder is refused
     /// unless `existing` allows it. A folder that another command wrote, that cannot be written, or in which another
     /// run is writing is refused too.
@@ -65,23 +73,16 @@ impl OutputFolder {
             Error::Request(format!("--out {}: cannot be written ({e}); use one that can be written", path.display()))
         };
         let existing = existing.into();
-        check_length(path)?;
+        // Before its lock is touched.
+        check_place(path, existing, &names)?;
         let mut folder = OutputFolder::of(path, names);
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
-            if parent.exists() && !parent.is_dir() {
-                let problem = format!("{} is not a folder", parent.display());
-                return Err(Error::value("out", path.display(), &problem, "name a place inside a folder"));
-            }
             folder.make_all(parent).map_err(refuse)?;
         }
         match fs::create_dir(path) {
             Ok(()) => folder.made.push(path.to_path_buf()),
-            Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(refuse(e)),
-            Err(_) if !path.is_dir() => {
-                return Err(Error::value("out", path.display(), "exists but is not a folder", "name another"));
-            }
-            // Before its lock is touched.
-            Err(_) => existing.check(path, path, &folder.names)?,
+            Err(_) if path.is_dir() => {}
+            Err(e) => return Err(refuse(e)),
         }
         if !folder.claim().map_err(refuse)? {
             return Err(Error::value("out", path.display(), "a run is writing here", "use another folder"));
@@ -189,6 +190,23 @@ impl Drop for OutputFolder {
         if stays {
             let _ = self.made.iter().rev().try_for_each(fs::remove_dir);
         }
+    }
+}
+
+/// Checks that a folder may be made or used at `path`.
+fn check_place(path: &Path, existing: Existing, names: &[String]) -> Result<()> {
+    check_length(path)?;
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    if let Some(parent) = parent.filter(|parent| parent.exists() && !parent.is_dir()) {
+        let problem = format!("{} is not a folder", parent.display());
+        return Err(Error::value("out", path.display(), &problem, "name a place inside a folder"));
+    }
+    match path.is_dir() {
+        true => existing.check(path, path, names),
+        false if path.exists() => {
+            Err(Error::value("out", path.display(), "exists but is not a folder", "name another"))
+        }
+        false => Ok(()),
     }
 }
 
