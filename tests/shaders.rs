@@ -362,6 +362,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         "ACCEPTED",
         "AT_GOAL",
         "MAY_RELAX",
+        "IS_DUE",
         "STRAIGHT",
         "EXPONENTIAL",
         "SMOOTH",
