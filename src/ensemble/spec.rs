@@ -199,8 +199,8 @@ pub struct Spec {
     /// Local error tolerance of adaptive steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<f64>,
-    /// Highest order of adaptive steps; if absent, that of the precision. Not a key: only the cost of orders is
-    /// [measured](crate::work_precision) with it.
+    /// Highest order of adaptive steps; if absent, that of the precision. Not a key: only
+    /// [`WorkPrecision`](crate::WorkPrecision) sets it, to measure what every order costs.
     #[serde(skip)]
     pub most_order: Option<u32>,
     /// Final time; [`DEFAULT_T_END`] if absent.
