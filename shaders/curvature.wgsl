@@ -2,6 +2,7 @@
 
 fn curvature_equation() {
     let wk = k_window;
+    let k = here(wk);
     let irm = minus1(ir);
     let irh = here(ir);
     let irp = plus1(ir);

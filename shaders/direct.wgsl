@@ -13,6 +13,9 @@ var<workgroup> ring_low: array<vec, BLOCKS>;
 var<workgroup> ring_high: array<vec, BLOCKS>;
 var<workgroup> ring_rhs: array<vec, BLOCKS>;
 
+/// The largest increment of k in the block.
+var<private> largest_k: real;
+
 /// The first two nodes of the block as a function of the pairs around them.
 struct Interior { c: vec, p: vec, s: vec }
 
@@ -36,8 +39,11 @@ fn invert(m: vec) -> vec {
 fn solve(both: bool, negligible: real, made: u32, most: u32) -> Solve {
     if !both { rhs_y = vec(0.0); }
     solve_rows();
-    if !both { return Solve(SOLVED, 0u); }
-    let size = max(block_max(bounded_abs(dk)), max(block_max(bounded_abs(u)), block_max(bounded_abs(v))));
+    if !both {
+        largest_k = block_max(bounded_abs(u));
+        return Solve(SOLVED, 0u);
+    }
+    let size = max(largest_k, max(block_max(bounded_abs(u)), block_max(bounded_abs(v))));
     let largest = ring_maxima(vec(size, 0.0, 0.0, 0.0));
     return Solve(uniform_decision(select(NOT_FINITE, SOLVED, largest.x <= real(BIG))), 0u);
 }

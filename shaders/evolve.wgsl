@@ -6,9 +6,9 @@
 // next dispatch recomputes the same rows and continues sweeping. Results do not depend on where a dispatch ends, to the
 // last bit.
 
-/// What thread 0 found of an attempt, and the next one that it plans: the order of an adaptive step, the systems that are
-/// solved, the sweeps made for the next one, the length of the step and that of the last one.
-struct Plan { found: u32, order: u32, phase: u32, solve_sweeps: u32, length: real, taken: real }
+/// The member, what thread 0 found of an attempt, and the next one that it plans: the order of an adaptive step, the
+/// systems that are solved, the sweeps made for the next one, the length of the step and that of the last one.
+struct Plan { member: u32, found: u32, order: u32, phase: u32, solve_sweeps: u32, length: real, taken: real }
 
 var<workgroup> plan: Plan;
 
@@ -20,21 +20,13 @@ fn take_member(index: u32) {
     if lane == 0u { begin_dispatch(); }
     var next = workgroupUniformLoad(&plan);
     if (next.found & IS_DUE) == 0u { return; }
-    load_curve(CURVE);
-    dk = load_field(INCREMENTS);
-    dx = load_field(INCREMENTS + 1u);
-    dy = load_field(INCREMENTS + 2u);
+    curve = CURVE;
     var course = Course(SOLVED, next.phase, next.solve_sweeps, dispatch.steps, dispatch.sweeps);
     while (next.found & IS_DUE) != 0u && course.steps > 0u && course.sweeps > 0u {
         let advanced = advance(next, course, moves);
         course = advanced.course;
         next = advanced.next;
     }
-    storageBarrier();
-    if !ADAPTIVE { store_curve(CURVE); }
-    store_field(INCREMENTS, dk);
-    store_field(INCREMENTS + 1u, dx);
-    store_field(INCREMENTS + 2u, dy);
 }
 
 /// Plans the first attempt, perhaps one that was paused. In thread 0, like all functions below that read or change
@@ -43,6 +35,7 @@ fn begin_dispatch() {
     let counters = &all_counters[member];
     counters.sweeps_k = 0u;
     counters.sweeps_x = 0u;
+    plan.member = member;
     make_plan(REFUSED);
     plan.phase = counters.phase;
     plan.solve_sweeps = counters.solve_sweeps;
@@ -79,6 +72,8 @@ struct Advanced { course: Course, next: Plan }
 /// A step and an observation are each called in one place only: compilers inline the whole body of every call.
 fn advance(planned: Plan, begun: Course, moves: bool) -> Advanced {
     var course = begun;
+    find_member();
+    forget();
     let count = select(1u, parts(planned.order), ADAPTIVE);
     if ADAPTIVE && course.phase == 0u && course.solve_sweeps == 0u {
         begin_attempt();
@@ -101,9 +96,7 @@ fn advance(planned: Plan, begun: Course, moves: bool) -> Advanced {
     if ADAPTIVE && solved { finish_attempt(); }
     var gaps = vec(0.0);
     if solved {
-        let moved_x = here(new_x) - x;
-        let moved_y = here(new_y) - y;
-        observe(new_x, new_y, new_k, new_r, sqrt(moved_x * moved_x + moved_y * moved_y));
+        observe(new_x, new_y, new_k, new_r, displacement);
         if ADAPTIVE { gaps = gaps_of_attempt(); }
     }
     var errors = vec2<real>(0.0, 0.0);
@@ -135,12 +128,9 @@ fn advance(planned: Plan, begun: Course, moves: bool) -> Advanced {
     } else {
         after_step();
         // The curve before the step is stored if an output time may lie between the two.
-        if (judged & AT_GOAL) != 0u { store_curve(BEFORE); }
+        if (judged & AT_GOAL) != 0u { copy_curve(BEFORE, CURVE); }
+        store_fields(CURVE, here(new_x), here(new_y), new_k, new_r);
     }
-    x = here(new_x);
-    y = here(new_y);
-    k = new_k;
-    r = new_r;
     return Advanced(course, next);
 }
 

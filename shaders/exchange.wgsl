@@ -31,14 +31,11 @@ fn windows(a: vec, b: vec) -> Windows {
     return Windows(window(ring_a[before], a, ring_a[after]), window(ring_b[before], b, ring_b[after]));
 }
 
-/// The windows of three fields.
-fn three_windows(a: vec, b: vec, c: vec) -> ThreeWindows {
-    if owns > 0u { partials[lane] = c; }
-    share(a, b);
-    return ThreeWindows(
-        window(ring_a[before], a, ring_a[after]), window(ring_b[before], b, ring_b[after]),
-        window(partials[before], c, partials[after]),
-    );
+/// The window of one field.
+fn lone_window(a: vec) -> Window {
+    if owns > 0u { ring_a[lane] = a; }
+    workgroupBarrier();
+    return window(ring_a[before], a, ring_a[after]);
 }
 
 /// Passes the fronts of the blocks to the blocks before them. One barrier, here and in the next two: each has its own

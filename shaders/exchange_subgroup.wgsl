@@ -11,18 +11,11 @@ fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(subgroup_invocation_
 fn settle() {}
 
 fn windows(a: vec, b: vec) -> Windows {
-    return Windows(
-        window(subgroupShuffle(a, before), a, subgroupShuffle(a, after)),
-        window(subgroupShuffle(b, before), b, subgroupShuffle(b, after)),
-    );
+    return Windows(lone_window(a), lone_window(b));
 }
 
-fn three_windows(a: vec, b: vec, c: vec) -> ThreeWindows {
-    return ThreeWindows(
-        window(subgroupShuffle(a, before), a, subgroupShuffle(a, after)),
-        window(subgroupShuffle(b, before), b, subgroupShuffle(b, after)),
-        window(subgroupShuffle(c, before), c, subgroupShuffle(c, after)),
-    );
+fn lone_window(a: vec) -> Window {
+    return window(subgroupShuffle(a, before), a, subgroupShuffle(a, after));
 }
 
 fn pass_down(front: vec) -> vec {

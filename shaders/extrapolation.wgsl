@@ -53,7 +53,9 @@ fn place_of(part: u32) -> Place {
 fn begin_part(part: u32, h: real) {
     let place = place_of(part);
     tau = h / real(place.row);
-    load_curve(select(PART, CURVE, place.left + 1u == place.row));
+    curve = select(PART, CURVE, place.left + 1u == place.row);
+    // Others may still read what was exchanged at the end of the last part.
+    settle();
 }
 
 /// Stores the curve at the end of a part, adds it to the combinations, and prepares the solves of the next part.
@@ -66,44 +68,46 @@ fn end_part(part: u32, plan: Plan) {
 
 /// Adds the curve at the end of a part, `left` parts before the end of its row.
 fn add_part(left: u32, shares: Shares) {
-    let change_x = here(new_x) - load_own(CURVE);
-    let change_y = here(new_y) - load_own(CURVE + 1u);
-    let change_k = new_k - load_own(CURVE + 2u);
-    let change_r = new_r - load_own(CURVE + 3u);
+    let change_x = here(new_x) - load_field(CURVE);
+    let change_y = here(new_y) - load_field(CURVE + 1u);
+    let change_k = new_k - load_field(CURVE + 2u);
+    let change_r = new_r - load_field(CURVE + 3u);
     add_share(BEND_BEFORE, shares.bend, change_x, change_y, change_k, change_r);
     if left < 2u { add_share(SLOPE_BEFORE, shares.slope, change_x, change_y, change_k, change_r); }
     if left > 0u { return; }
     add_share(BEFORE, shares.value, change_x, change_y, change_k, change_r);
-    store_field(GAPS, load_own(GAPS) + shares.gap * change_k);
-    store_field(GAPS + 1u, load_own(GAPS + 1u) + shares.gap * change_r);
-    store_field(GAPS + 2u, load_own(GAPS + 2u) + shares.lower_gap * change_k);
-    store_field(GAPS + 3u, load_own(GAPS + 3u) + shares.lower_gap * change_r);
+    store_field(GAPS, load_field(GAPS) + shares.gap * change_k);
+    store_field(GAPS + 1u, load_field(GAPS + 1u) + shares.gap * change_r);
+    store_field(GAPS + 2u, load_field(GAPS + 2u) + shares.lower_gap * change_k);
+    store_field(GAPS + 3u, load_field(GAPS + 3u) + shares.lower_gap * change_r);
 }
 
 fn add_share(base: u32, share: real, change_x: vec, change_y: vec, change_k: vec, change_r: vec) {
-    store_field(base, load_own(base) + share * change_x);
-    store_field(base + 1u, load_own(base + 1u) + share * change_y);
-    store_field(base + 2u, load_own(base + 2u) + share * change_k);
-    store_field(base + 3u, load_own(base + 3u) + share * change_r);
+    store_field(base, load_field(base) + share * change_x);
+    store_field(base + 1u, load_field(base + 1u) + share * change_y);
+    store_field(base + 2u, load_field(base + 2u) + share * change_k);
+    store_field(base + 3u, load_field(base + 3u) + share * change_r);
 }
 
-/// Puts the curve at the end of the step into the registers of the new curve, and the one at its start into those of the
-/// old one.
+/// Puts the curve at the end of the step into the registers of the new curve.
 fn finish_attempt() {
-    load_curve(CURVE);
-    let moved = windows(x + load_own(BEFORE), y + load_own(BEFORE + 1u));
+    settle();
+    let x = load_field(CURVE);
+    let y = load_field(CURVE + 1u);
+    let moved = windows(x + load_field(BEFORE), y + load_field(BEFORE + 1u));
     new_x = moved.a;
     new_y = moved.b;
-    new_k = k + load_own(BEFORE + 2u);
-    new_r = r + load_own(BEFORE + 3u);
+    displaced(x, y);
+    new_k = load_field(CURVE + 2u) + load_field(BEFORE + 2u);
+    new_r = load_field(CURVE + 3u) + load_field(BEFORE + 3u);
 }
 
 /// The largest differences between orders, of k and r, of the order of the attempt and of the one below.
 fn gaps_of_attempt() -> vec {
     let ir = vec(1.0) / new_r;
     return ring_maxima(vec(
-        block_max(bounded_abs(load_own(GAPS))), block_max(bounded_abs(load_own(GAPS + 1u) * ir)),
-        block_max(bounded_abs(load_own(GAPS + 2u))), block_max(bounded_abs(load_own(GAPS + 3u) * ir)),
+        block_max(bounded_abs(load_field(GAPS))), block_max(bounded_abs(load_field(GAPS + 1u) * ir)),
+        block_max(bounded_abs(load_field(GAPS + 2u))), block_max(bounded_abs(load_field(GAPS + 3u) * ir)),
     ));
 }
 
@@ -119,10 +123,10 @@ fn errors_of_attempt(m: vec) -> vec2<real> {
 /// Makes what an accepted attempt has combined the state of the member.
 fn keep_attempt() {
     for (var field = 0u; field < 8u; field++) {
-        let kept = load_own(SLOPE + field);
-        store_field(SLOPE + field, load_own(SLOPE_BEFORE + field));
+        let kept = load_field(SLOPE + field);
+        store_field(SLOPE + field, load_field(SLOPE_BEFORE + field));
         store_field(SLOPE_BEFORE + field, kept);
     }
-    store_curve(BEFORE);
+    copy_curve(BEFORE, CURVE);
     store_fields(CURVE, here(new_x), here(new_y), new_k, new_r);
 }

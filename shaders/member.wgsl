@@ -154,8 +154,8 @@ const GAPS = 34u;
 @group(0) @binding(1) var<storage, read> all_parameters: array<Parameters>;
 @group(0) @binding(2) var<storage, read_write> all_counters: array<Counters>;
 @group(0) @binding(3) var<storage, read_write> all_reports: array<Record>;
-/// STATE_FIELDS fields of NODES numbers each.
-@group(0) @binding(4) var<storage, read_write> all_states: array<real>;
+/// STATE_FIELDS fields of BLOCKS rows each.
+@group(0) @binding(4) var<storage, read_write> all_states: array<vec>;
 
 /// The members that this dispatch advances, one per workgroup.
 @group(0) @binding(5) var<storage, read> all_due: array<u32>;
@@ -166,43 +166,31 @@ const GAPS = 34u;
 var<private> member: u32;
 /// Length of the current step of the paper.
 var<private> tau: real;
-/// Its nodes in this thread's block: the curve at the start of a step.
-var<private> x: vec;
-var<private> y: vec;
-var<private> k: vec;
-var<private> r: vec;
-/// Increments: where the next solve starts, then its result.
-var<private> dk: vec;
-var<private> dx: vec;
-var<private> dy: vec;
+/// Offset of the curve at its start.
+var<private> curve: u32;
 
-/// A field in this thread's block: its first three nodes, and the one at `last`.
-fn load_nodes(field: u32, last: u32) -> vec {
-    let base = (member * STATE_FIELDS + field) * NODES;
-    return vec(
-        all_states[base + first], all_states[base + first + 1u],
-        all_states[base + first + 2u], all_states[base + last],
-    );
+/// Finds the member again, where a step begins and between its solves: or else compilers compute the addresses of all
+/// fields once for a dispatch, and keep them, and the parameters, in registers.
+fn find_member() {
+    member = plan.member;
 }
 
-fn load_field(field: u32) -> vec { return load_nodes(field, node(3u)); }
-
-/// Like `load_field`, for what no other thread needs: the last component of a block of three repeats its own third node.
-fn load_own(field: u32) -> vec { return load_nodes(field, first + select(2u, 3u, is_four)); }
-
-/// Makes the curve at `base` the start of a step. Others have written what a block of three reads beyond its own.
-fn load_curve(base: u32) {
-    settle();
-    storageBarrier();
-    x = load_field(base);
-    y = load_field(base + 1u);
-    k = load_field(base + 2u);
-    r = load_field(base + 3u);
+/// Where a field of this thread's block is stored. No thread reads what another one stores, so no barrier is needed.
+fn row_at(field: u32) -> u32 {
+    return (member * STATE_FIELDS + field) * BLOCKS + block;
 }
 
-/// Stores the curve at the start of the step.
-fn store_curve(base: u32) {
-    store_fields(base, x, y, k, r);
+fn load_field(field: u32) -> vec {
+    return all_states[row_at(field)];
+}
+
+/// The last component of a block of three repeats its third node.
+fn store_field(field: u32, v: vec) {
+    if owns > 0u { all_states[row_at(field)] = vec(v.xyz, select(v.z, v.w, is_four)); }
+}
+
+fn copy_curve(to: u32, source: u32) {
+    for (var field = 0u; field < 4u; field++) { store_field(to + field, load_field(source + field)); }
 }
 
 fn store_fields(base: u32, xs: vec, ys: vec, ks: vec, rs: vec) {
@@ -210,13 +198,4 @@ fn store_fields(base: u32, xs: vec, ys: vec, ks: vec, rs: vec) {
     store_field(base + 1u, ys);
     store_field(base + 2u, ks);
     store_field(base + 3u, rs);
-}
-
-fn store_field(field: u32, v: vec) {
-    let base = (member * STATE_FIELDS + field) * NODES + first;
-    if owns == 0u { return; }
-    all_states[base] = v.x;
-    all_states[base + 1u] = v.y;
-    all_states[base + 2u] = v.z;
-    if owns == 4u { all_states[base + 3u] = v.w; }
 }

@@ -17,6 +17,15 @@ var<private> extremes: vec;
 /// Largest curvature, minus the smallest, largest displacement of a node.
 var<private> others: vec;
 
+/// How far the nodes of the new curve have moved.
+var<private> displacement: vec;
+
+fn displaced(x: vec, y: vec) {
+    let moved_x = here(new_x) - x;
+    let moved_y = here(new_y) - y;
+    displacement = sqrt(moved_x * moved_x + moved_y * moved_y);
+}
+
 /// Whether the sums and the curvature are finite.
 fn is_finite() -> bool {
     let big = real(BIG);
@@ -41,9 +50,9 @@ fn excess(length: real, area: real) -> real {
 
 /// The first and the second derivative of ln excess along an adaptive step, by those of the nodes of the new curve.
 fn decline() -> vec2<real> {
-    let slope = windows(load_own(SLOPE_BEFORE), load_own(SLOPE_BEFORE + 1u));
+    let slope = windows(load_field(SLOPE_BEFORE), load_field(SLOPE_BEFORE + 1u));
     settle();
-    let bend = windows(load_own(BEND_BEFORE), load_own(BEND_BEFORE + 1u));
+    let bend = windows(load_field(BEND_BEFORE), load_field(BEND_BEFORE + 1u));
     let ex = here(new_x) - minus1(new_x);
     let ey = here(new_y) - minus1(new_y);
     let fx = here(slope.a) - minus1(slope.a);

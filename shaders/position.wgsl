@@ -1,8 +1,8 @@
 // The system for the increments of x and y: the equations of the block. Twin of src/scheme/position.rs.
 
-/// `wk`: the new curvatures; `wy`: the old y.
-fn position_equation(wk: Window, wy: Window) {
+fn position_equation() {
     read_law();
+    let wk = k_window;
     let kh = here(wk);
     let kp = plus1(wk);
     let irm = minus1(ir);
@@ -25,8 +25,10 @@ fn position_equation(wk: Window, wy: Window) {
     let rate = real(1.0) / tau;
     let row_c = q * rate - (row_a + row_b + row_d + row_e);
     normalise(row_a, row_b, row_c, row_d, row_e, tau * iqh);
-    rhs_x = residual_of_old(row_a, row_b, row_d, row_e, x_window) * inverse;
-    rhs_y = residual_of_old(row_a, row_b, row_d, row_e, wy) * inverse;
+    settle();
+    let old = windows(load_field(curve), load_field(curve + 1u));
+    rhs_x = residual_of_old(row_a, row_b, row_d, row_e, old.a) * inverse;
+    rhs_y = residual_of_old(row_a, row_b, row_d, row_e, old.b) * inverse;
 }
 
 fn residual_of_old(a: vec, b: vec, d: vec, e: vec, w: Window) -> vec {

@@ -8,8 +8,6 @@ var<private> alpha_before: vec;
 /// The curvatures on the window of the block: the old ones, exchanged together with lengths; for the positions the new
 /// ones.
 var<private> k_window: Window;
-/// The old x on that window.
-var<private> x_window: Window;
 /// New lengths on the window of the block.
 var<private> r_new: Window;
 /// 1/r and 1/q on that window, of the old lengths, then of the new ones.
@@ -18,10 +16,12 @@ var<private> iq: Window;
 
 /// Fills the variables above, with tangential velocity if `moves`; returns the length L of the old state.
 fn redistribute(moves: bool) -> real {
+    let k = load_field(curve + 2u);
+    let r = load_field(curve + 3u);
     let old = windows(k, r);
     k_window = old.a;
     reciprocals(old.b);
-    let beta = velocity(k_window);
+    let beta = velocity(k, k_window);
     trace(0u, beta);
     rkb = r * k * beta;
     let sums = ring_sums(vec(block_sum(r), block_sum(rkb), 0.0, 0.0)).all;
@@ -30,7 +30,7 @@ fn redistribute(moves: bool) -> real {
     let mean_length = length / real(NODES);
     var growth = -(tau * (k * beta));
     if moves {
-        tangential_velocity(mean_rkb, mean_length);
+        tangential_velocity(r, mean_rkb, mean_length);
         let rate = all_parameters[member].omega * (mean_length * here(ir) - vec(1.0)) - vec(mean_rkb);
         growth = tau * rate;
     } else {
@@ -38,21 +38,19 @@ fn redistribute(moves: bool) -> real {
         alpha_before = vec(0.0);
     }
     trace(1u, alpha);
-    let next = windows(r * exponential(growth), x);
-    r_new = next.a;
-    x_window = next.b;
+    r_new = lone_window(r * exponential(growth));
     reciprocals(r_new);
     return length;
 }
 
-/// beta on the window `wk` of the old curvatures.
-fn velocity(wk: Window) -> vec {
+/// beta for the old curvatures, with their window `wk`.
+fn velocity(k: vec, wk: Window) -> vec {
     read_law();
     return b(k) - ((plus1(wk) - k) * here(iq) - (k - minus1(wk)) * minus1(iq)) * here(ir);
 }
 
 /// alpha by a running sum that restarts from the sum of whole blocks.
-fn tangential_velocity(mean_rkb: real, mean_length: real) {
+fn tangential_velocity(r: vec, mean_rkb: real, mean_length: real) {
     let growth = rkb - r * mean_rkb + all_parameters[member].omega * (vec(mean_length) - r);
     // Others may still read the last sums.
     workgroupBarrier();

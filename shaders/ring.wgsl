@@ -108,8 +108,6 @@ struct Window { low: vec, high: vec }
 
 /// The windows of two fields.
 struct Windows { a: Window, b: Window }
-/// The windows of three fields.
-struct ThreeWindows { a: Window, b: Window, c: Window }
 
 /// The field at i-2, i-1, i, i+1, i+2 for the four nodes i of the block.
 fn minus2(w: Window) -> vec { return w.low; }

@@ -4,15 +4,11 @@
 /// EARLIER.
 fn after_step() {
     if !SWEEPS { return; }
-    let last_k = dk;
-    let last_x = dx;
-    let last_y = dy;
-    dk = real(2.0) * last_k - load_field(EARLIER);
-    dx = real(2.0) * last_x - load_field(EARLIER + 1u);
-    dy = real(2.0) * last_y - load_field(EARLIER + 2u);
-    store_field(EARLIER, last_k);
-    store_field(EARLIER + 1u, last_x);
-    store_field(EARLIER + 2u, last_y);
+    for (var field = 0u; field < 3u; field++) {
+        let last = load_field(INCREMENTS + field);
+        store_field(INCREMENTS + field, real(2.0) * last - load_field(EARLIER + field));
+        store_field(EARLIER + field, last);
+    }
 }
 
 /// Puts the start of the first part of a row, of length `first`, by the derivatives at the end of the last step, of
@@ -21,14 +17,12 @@ fn begin_row(first: real, taken: real) {
     if !SWEEPS { return; }
     var ratio = taken;
     if !(taken <= real(0.0)) { ratio = first / taken; }
-    let first_k = ratio * load_own(SLOPE + 2u);
-    let first_x = ratio * load_own(SLOPE);
-    let first_y = ratio * load_own(SLOPE + 1u);
     let square = ratio * ratio;
-    dk = first_k + square * load_own(BEND + 2u);
-    dx = first_x + square * load_own(BEND);
-    dy = first_y + square * load_own(BEND + 1u);
-    store_field(EARLIER, first_k);
-    store_field(EARLIER + 1u, first_x);
-    store_field(EARLIER + 2u, first_y);
+    for (var field = 0u; field < 3u; field++) {
+        // Increments are of k, x and y, derivatives of x, y and k.
+        let derived = (field + 2u) % 3u;
+        let change = ratio * load_field(SLOPE + derived);
+        store_field(INCREMENTS + field, change + square * load_field(BEND + derived));
+        store_field(EARLIER + field, change);
+    }
 }

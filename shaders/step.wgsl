@@ -14,19 +14,52 @@ var<private> new_y: Window;
 /// sweeps made for the next one, and the steps of the paper and the sweeps that this dispatch may still make.
 struct Course { ended: u32, phase: u32, solve_sweeps: u32, steps: u32, sweeps: u32 }
 
+/// Forgets what the last step and the last attempt have left in private variables: compilers do not see that nothing
+/// reads it again, and would keep it in registers.
+fn forget() {
+    k_window = Window();
+    r_new = Window();
+    ir = Window();
+    iq = Window();
+    rkb = vec();
+    alpha = vec();
+    alpha_before = vec();
+    row_of = Rows();
+    rhs_x = vec();
+    rhs_y = vec();
+    inverse = vec();
+    u = vec();
+    v = vec();
+    new_x = Window();
+    new_y = Window();
+    new_k = vec();
+    new_r = vec();
+    sums = vec();
+    extremes = vec();
+    others = vec();
+    displacement = vec();
+}
+
 /// Computes the curve a time tau later, redistributed if `moves`. An odd phase means that the curvature is solved.
 fn step(begun: Course, moves: bool) -> Course {
     var course = begun;
+    find_member();
+    forget();
     let length = redistribute(moves);
     let radius = length * real(HALF_OVER_PI);
     let rounding = real(NEGLIGIBLE * EPSILON);
 
+    var positions = (begun.phase & 1u) != 0u;
     // Without a solve in between, others may still read what was exchanged last.
-    if (begun.phase & 1u) != 0u { settle(); }
+    if positions {
+        settle();
+        u = load_field(INCREMENTS);
+    } else {
+        begin_curvature();
+    }
     // The two solves share a call, since compilers inline the body of every call.
-    for (var part = begun.phase & 1u; part < 2u; part++) {
-        let positions = part == 1u;
-        if positions { begin_positions(); } else { begin_curvature(); }
+    loop {
+        if positions { begin_positions(); }
         let negligible = select(rounding / radius, rounding * radius, positions);
         let done = solve(positions, negligible, course.solve_sweeps, course.sweeps);
         let made = done.sweeps - course.solve_sweeps;
@@ -37,10 +70,15 @@ fn step(begun: Course, moves: bool) -> Course {
         if done.ended != SOLVED { return course; }
         course.phase += 1u;
         course.solve_sweeps = 0u;
+        if positions { break; }
+        positions = true;
     }
-    let moved = windows(x + dx, y + dy);
+    let x = load_field(curve);
+    let y = load_field(curve + 1u);
+    let moved = windows(x + u, y + v);
     new_x = moved.a;
     new_y = moved.b;
+    displaced(x, y);
     new_r = here(r_new);
     if all_parameters[member].pull > real(0.0) { pull(); }
     trace(2u, new_r);
@@ -52,36 +90,41 @@ fn begin_curvature() {
     curvature_equation();
     trace_system(3u);
     trace(8u, rhs_x);
-    u = dk;
+    if SWEEPS { u = load_field(INCREMENTS); }
 }
 
 fn end_curvature(made: u32) {
-    dk = u;
+    if SWEEPS { store_field(INCREMENTS, u); }
     if lane == 0u { all_counters[member].sweeps_k += made; }
-    trace(9u, dk);
+    trace(9u, u);
 }
 
 fn begin_positions() {
-    new_k = k + dk;
+    find_member();
+    new_k = load_field(curve + 2u) + u;
     // Lengths are exchanged again, so that their windows take no registers in the first solve.
-    let exchanged = three_windows(new_k, y, here(r_new));
-    r_new = exchanged.c;
-    reciprocals(r_new);
+    let exchanged = windows(new_k, here(r_new));
     k_window = exchanged.a;
-    position_equation(k_window, exchanged.b);
+    r_new = exchanged.b;
+    reciprocals(r_new);
+    position_equation();
     trace_system(10u);
     trace(15u, rhs_x);
     trace(16u, rhs_y);
-    u = dx;
-    v = dy;
+    if SWEEPS {
+        u = load_field(INCREMENTS + 1u);
+        v = load_field(INCREMENTS + 2u);
+    }
 }
 
 fn end_positions(made: u32) {
-    dx = u;
-    dy = v;
+    if SWEEPS {
+        store_field(INCREMENTS + 1u, u);
+        store_field(INCREMENTS + 2u, v);
+    }
     if lane == 0u { all_counters[member].sweeps_x += made; }
-    trace(17u, dx);
-    trace(18u, dy);
+    trace(17u, u);
+    trace(18u, v);
 }
 
 fn trace_system(field: u32) {

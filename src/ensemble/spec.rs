@@ -200,7 +200,7 @@ pub struct Spec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<f64>,
     /// Highest order of adaptive steps; if absent, that of the precision. Not a key: only
-    /// [`WorkPrecision`](crate::WorkPrecision) sets it, to measure what every order costs.
+    /// [`WorkPrecision`](crate::truth::WorkPrecision) sets it, to measure what every order costs.
     #[serde(skip)]
     pub most_order: Option<u32>,
     /// Final time; [`DEFAULT_T_END`] if absent.

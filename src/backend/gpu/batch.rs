@@ -21,7 +21,7 @@ use crate::{
         Parameters,
         member::{Counters, Report},
         run::Run,
-        state::STATE_FIELDS,
+        state::{STATE_FIELDS, State},
     },
     solver::Blocks,
 };
@@ -63,6 +63,19 @@ pub(super) struct Batch<T> {
     flight: Option<Flight>,
 }
 
+/// Numbers of a state in device memory: for every field a row of four per block.
+pub(super) fn state_numbers(blocks: Blocks) -> usize {
+    STATE_FIELDS * 4 * blocks.count()
+}
+
+/// Converts a state to rows; the last number of a block of three repeats its third node.
+fn to_rows<T: Real>(blocks: Blocks, state: &State<T>) -> Vec<T> {
+    let row = |field: &[T], (first, nodes): (usize, usize)| [0, 1, 2, 3].map(|c| field[first + c.min(nodes - 1)]);
+    let numbers = state.to_numbers();
+    let fields = numbers.chunks_exact(blocks.n);
+    fields.flat_map(|field| blocks.iter().flat_map(move |block| row(field, block))).collect()
+}
+
 /// A dispatch in progress.
 struct Flight {
     since: Moment,
@@ -91,7 +104,7 @@ struct Buffers {
 impl<T: Real> Batch<T> {
     /// Allocates room for `slots` members.
     pub fn new(device: &OpenGpu, pipeline: &wgpu::ComputePipeline, blocks: Blocks, slots: usize, traced: bool) -> Self {
-        let buffers = Buffers::new::<T>(&device.device, blocks.n, slots, traced);
+        let buffers = Buffers::new::<T>(&device.device, blocks, slots, traced);
         Batch {
             bindings: buffers.bind(&device.device, pipeline),
             buffers,
@@ -122,8 +135,16 @@ impl<T: Real> Batch<T> {
 
     /// Returns where the state of `slot` is stored.
     pub fn state_at(&self, slot: usize) -> (&wgpu::Buffer, u64, u64) {
-        let bytes = (STATE_FIELDS * self.blocks.n * size_of::<T>()) as u64;
+        let bytes = (state_numbers(self.blocks) * size_of::<T>()) as u64;
         (&self.buffers.states, slot as u64 * bytes, bytes)
+    }
+
+    /// Returns the state that is stored in `rows`.
+    pub fn state_of(&self, rows: &[T]) -> State<T> {
+        let nodes = |((_, nodes), row): ((usize, usize), &[T])| row[..nodes].to_vec();
+        let of_field = |field: &[T]| self.blocks.iter().zip(field.chunks_exact(4)).flat_map(nodes).collect::<Vec<T>>();
+        let numbers: Vec<T> = rows.chunks_exact(4 * self.blocks.count()).flat_map(of_field).collect();
+        State::from_numbers(&numbers)
     }
 
     pub fn trace(&self) -> Option<&wgpu::Buffer> {
@@ -132,7 +153,7 @@ impl<T: Real> Batch<T> {
 
     pub fn load(&mut self, device: &OpenGpu, slot: usize, run: &Run<T>) {
         let (states, offset, _) = self.state_at(slot);
-        device.queue.write_buffer(states, offset, bytemuck::cast_slice(&run.state.to_numbers()));
+        device.queue.write_buffer(states, offset, bytemuck::cast_slice(&to_rows(self.blocks, &run.state)));
         self.counters[slot] = run.counters;
         self.reports[slot] = run.report;
         self.set_parameters(slot, &run.parameters);
@@ -290,7 +311,7 @@ pub(super) fn staging(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
 }
 
 impl Buffers {
-    fn new<T: Real>(device: &wgpu::Device, n: usize, slots: usize, traced: bool) -> Buffers {
+    fn new<T: Real>(device: &wgpu::Device, blocks: Blocks, slots: usize, traced: bool) -> Buffers {
         let buffer = |label, bytes: usize, kind| {
             let usage = kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
             let size = bytes as u64;
@@ -306,9 +327,9 @@ impl Buffers {
             staging: staging(device, counters.size() + reports.size()),
             counters,
             reports,
-            states: numbers("states", STATE_FIELDS * n),
+            states: numbers("states", state_numbers(blocks)),
             due: buffer("due", slots * size_of::<u32>(), storage),
-            trace: traced.then(|| numbers("trace", TRACE_FIELDS * n)),
+            trace: traced.then(|| numbers("trace", TRACE_FIELDS * blocks.n)),
         }
     }
 

@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use super::{
     adapter::{Gpu, OpenGpu},
-    batch::{Batch, Caps, Reading, staging},
+    batch::{Batch, Caps, Reading, staging, state_numbers},
     clock::Moment,
-    shader::{TRACE_FIELDS, Variant},
+    shader::Variant,
 };
 use crate::{
     backend::Backend,
@@ -19,7 +19,6 @@ use crate::{
         Parameters, State, extrapolation,
         member::{Counters, Report},
         run::Run,
-        state::STATE_FIELDS,
     },
     solver::{Blocks, Solver},
 };
@@ -67,9 +66,8 @@ impl<T: Real> Kernel<T> {
         variant: Variant,
     ) -> Result<Self> {
         let limits = gpu.limits();
-        let fields = if variant.traced { STATE_FIELDS.max(TRACE_FIELDS) } else { STATE_FIELDS };
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let fit = (binding / (fields * blocks.n * size_of::<T>()) as u64) as usize;
+        let fit = (binding / (state_numbers(blocks) * size_of::<T>()) as u64) as usize;
         let slots = slots.min(fit).min(MAX_SLOTS).min(limits.max_compute_workgroups_per_dimension as usize).max(1);
         gpu.capacity()
             .check_size::<T>(blocks, variant.solver)
@@ -252,7 +250,7 @@ impl<T: Real> Backend for Kernel<T> {
         let Some((_, _, bytes)) = reads.first() else { return Ok(Vec::new()) };
         let length = *bytes as usize / size_of::<T>();
         let numbers = self.read(&reads)?;
-        Ok(numbers.chunks_exact(length).map(|numbers| State::from_numbers(numbers).convert()).collect())
+        Ok(numbers.chunks_exact(length).map(|rows| self.batches[0].state_of(rows).convert()).collect())
     }
 
     fn state(&mut self, slot: usize) -> Result<State<f64>> {

@@ -120,7 +120,7 @@ pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
 }
 
 /// Numbers and integers of a `Plan` in the kernel.
-const PLAN: (usize, usize) = (2, 4);
+const PLAN: (usize, usize) = (2, 5);
 
 /// Returns the bytes of workgroup memory of the kernel: rows of four numbers per block, the solver's own needs, the plan of
 /// an attempt, and a decision.
