@@ -6,9 +6,9 @@
 // next dispatch recomputes the same rows and continues sweeping. Results do not depend on where a dispatch ends, to the
 // last bit.
 
-/// The member, what thread 0 found of an attempt, and the next one that it plans: the order of an adaptive step, the
-/// systems that are solved, the sweeps made for the next one, the length of the step and that of the last one.
-struct Plan { member: u32, found: u32, order: u32, phase: u32, solve_sweeps: u32, length: real, taken: real }
+/// What thread 0 found of an attempt, and the next one that it plans: the order of an adaptive step, the systems that are
+/// solved, the sweeps made for the next one, the length of the step and that of the last one.
+struct Plan { found: u32, order: u32, phase: u32, solve_sweeps: u32, length: real, taken: real }
 
 var<workgroup> plan: Plan;
 
@@ -35,7 +35,7 @@ fn begin_dispatch() {
     let counters = &all_counters[member];
     counters.sweeps_k = 0u;
     counters.sweeps_x = 0u;
-    plan.member = member;
+    resident = member;
     make_plan(REFUSED);
     plan.phase = counters.phase;
     plan.solve_sweeps = counters.solve_sweeps;

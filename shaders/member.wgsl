@@ -168,25 +168,23 @@ var<private> member: u32;
 var<private> tau: real;
 /// Offset of the curve at its start.
 var<private> curve: u32;
+/// `member`, for `find_member`.
+var<workgroup> resident: u32;
 
 /// Finds the member again, where a step begins and between its solves: or else compilers compute the addresses of all
 /// fields once for a dispatch, and keep them, and the parameters, in registers.
 fn find_member() {
-    member = plan.member;
+    member = resident;
 }
 
-/// Where a field of this thread's block is stored. No thread reads what another one stores, so no barrier is needed.
-fn row_at(field: u32) -> u32 {
-    return (member * STATE_FIELDS + field) * BLOCKS + block;
-}
-
+/// A field in this thread's block. No thread loads what another one stores, so no barrier is needed.
 fn load_field(field: u32) -> vec {
-    return all_states[row_at(field)];
+    return all_states[row_in(member * STATE_FIELDS + field)];
 }
 
 /// The last component of a block of three repeats its third node.
 fn store_field(field: u32, v: vec) {
-    if owns > 0u { all_states[row_at(field)] = vec(v.xyz, select(v.z, v.w, is_four)); }
+    if owns > 0u { all_states[row_in(member * STATE_FIELDS + field)] = vec(v.xyz, select(v.z, v.w, is_four)); }
 }
 
 fn copy_curve(to: u32, source: u32) {

@@ -65,6 +65,11 @@ fn colour_of(i: u32) -> u32 {
     return select((i - FOURS) % 3u, i % 4u, i < 4u * FOURS);
 }
 
+/// The row of the block in a field.
+fn row_in(field: u32) -> u32 {
+    return field * BLOCKS + block;
+}
+
 /// The group of the block, for taking maxima.
 fn group() -> u32 {
     return block % dispatch.groups;

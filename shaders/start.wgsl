@@ -20,7 +20,7 @@ fn begin_row(first: real, taken: real) {
     let square = ratio * ratio;
     for (var field = 0u; field < 3u; field++) {
         // Increments are of k, x and y, derivatives of x, y and k.
-        let derived = (field + 2u) % 3u;
+        let derived = select(field - 1u, 2u, field == 0u);
         let change = ratio * load_field(SLOPE + derived);
         store_field(INCREMENTS + field, change + square * load_field(BEND + derived));
         store_field(EARLIER + field, change);

@@ -120,16 +120,16 @@ pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
 }
 
 /// Numbers and integers of a `Plan` in the kernel.
-const PLAN: (usize, usize) = (2, 5);
+const PLAN: (usize, usize) = (2, 4);
 
 /// Returns the bytes of workgroup memory of the kernel: rows of four numbers per block, the solver's own needs, the plan of
-/// an attempt, and a decision.
+/// an attempt, a decision and the member.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
 pub fn workgroup_bytes<T: Real>(blocks: Blocks, variant: Variant) -> usize {
     let kernel = &variant.solver.facts().kernel;
     let rows = if variant.subgroup { 1 } else { kernel.rows_per_block };
-    (4 * rows * blocks.count() + (kernel.numbers)(blocks.n) + PLAN.0) * size_of::<T>() + (PLAN.1 + 1) * size_of::<u32>()
+    (4 * rows * blocks.count() + (kernel.numbers)(blocks.n) + PLAN.0) * size_of::<T>() + (PLAN.1 + 2) * size_of::<u32>()
 }
 
 #[cfg(test)]
