@@ -127,22 +127,25 @@ fn must_be_named(ended: &Ended, remedy: &str, told: &str) {
 /// every thread separately, so the user's limit is lowered instead, as soon as the run has begun.
 pub fn none_left_for_signals(study: &'static Study, stops: &[(&str, i32, i32)]) -> Outcome {
     let max_time = [("--max-time 1s", 0, 75)];
-    for (cause, _, code) in stops.iter().chain(&max_time) {
+    for (cause, number, code) in stops.iter().chain(&max_time) {
         // A run may end before it can be stopped, if the tests get less processor time than it does.
-        let stopped = (0..20).any(|_| stopped_without_threads(study, cause, *code));
+        let stopped = (0..20).any(|_| stopped_without_threads(study, cause, *number, *code));
         assert!(stopped, "{cause}: every run was done before it could be stopped");
     }
     Found::new(stops.len() + 1, "stopped, 0 differing bytes")
 }
 
-/// Whether the run was still there to be stopped; if so, it ends with `code`.
-fn stopped_without_threads(study: &'static Study, cause: &str, code: i32) -> bool {
+/// Whether the run was still there to be stopped; if so, it ends with `code`. A signal that was ignored from outside, as
+/// under `nohup`, stops nothing.
+fn stopped_without_threads(study: &'static Study, cause: &str, number: i32, code: i32) -> bool {
     let nobody = AsNobody::new();
     let more = if cause.starts_with("--") { cause } else { "" };
     let arguments = format!("run {} --quiet --checkpoint-every 1s {more} --out out", study.arguments);
     let mut running = nobody.start("022", &arguments);
     let out = nobody.home.path().join("out");
+    let mut ignored = false;
     if running.wait_until(|_| out.join(".curvelax.state").exists()) {
+        ignored = more.is_empty() && !running.hears(number);
         running.signal("STOP");
         let id = running.id().to_string();
         let lowered = nobody.command(&["prlimit", "--pid", &id, "--nproc=1:1"]).status().unwrap();
@@ -160,7 +163,7 @@ fn stopped_without_threads(study: &'static Study, cause: &str, code: i32) -> boo
     copy(&out, &attempt.out());
     if ended.code == Some(0) {
         attempt.must_be_the_reference(&[format!("{cause}: {ended:?}")]);
-        return false;
+        return ignored;
     }
     assert_eq!(ended.code, Some(code), "{cause}: {ended:?}");
     attempt.must_end_well(ended);
