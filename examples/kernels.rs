@@ -96,7 +96,7 @@ fn write<T: Real>(folder: &Path, points: usize, variant: Variant, constants: &Co
 }
 
 /// SPIR-V as wgpu hands it to a driver: indices restricted, loops bounded, workgroup memory as it is found.
-fn as_wgpu_asks() -> spv::Options<'static> {
+pub(crate) fn as_wgpu_asks() -> spv::Options<'static> {
     let policies = BoundsCheckPolicies {
         index: BoundsCheckPolicy::Restrict,
         // Of drivers with robustBufferAccess2, which hardware has.

@@ -24,6 +24,7 @@ use curvelax::{
     solver::{Blocks, Solver},
 };
 use libtest_mimic::{Arguments, Trial};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
 use serde::{Deserialize, Serialize};
 
 /// Builds every kernel and says on the console what becomes of it.
@@ -98,7 +99,7 @@ fn main() -> ExitCode {
     add("tint_accepts_every_kernel_in_f32", found, in_browser(every_kernel_is_accepted));
     add("tint_refuses_a_barrier_under_a_private_condition", found, in_browser(a_private_condition_is_refused));
     add("spirv_val_accepts_every_kernel", answers("spirv-val", "--version"), Box::new(spirv_is_valid));
-    add("aco_spills_nothing_in_f32", has_aco(), Box::new(nothing_is_spilled));
+    add("aco_spills_nothing", has_aco(), Box::new(nothing_is_spilled));
     eprintln!(
         "Tint: {}; ignored tests lack their compiler (Debian: chromium, spirv-tools, mesa-vulkan-drivers, libvulkan-dev, \
          gcc)",
@@ -164,12 +165,32 @@ fn spilled(folder: &Path) -> BTreeMap<String, u32> {
 fn nothing_is_spilled() {
     let folder = tempfile::tempdir().unwrap();
     kernels::write_all(100, folder.path()).unwrap();
-    let spilled = spilled(folder.path());
-    let (f32, f64): (Vec<_>, Vec<_>) = spilled.iter().partition(|(name, _)| name.contains("-f32-"));
-    assert_eq!(f32.len(), 8, "{spilled:?}");
-    assert!(f32.iter().all(|(_, spilled)| **spilled == 0), "{f32:?}");
-    // Negative control: f64 does not fit, and is seen not to.
-    assert!(f64.iter().any(|(_, spilled)| **spilled > 0), "{f64:?}");
+    fs::write(folder.path().join("control.spv"), kernel_of(300)).unwrap();
+    let mut spilled = spilled(folder.path());
+    // Negative control: more values than there are registers.
+    assert!(spilled.remove("control").is_some_and(|spilled| spilled > 0));
+    // Mesa 22.3 fails on some in f64.
+    assert_eq!(spilled.keys().filter(|name| name.contains("-f32-")).count(), 8, "{spilled:?}");
+    assert!(spilled.values().all(|spilled| *spilled == 0), "{spilled:?}");
+}
+
+/// A kernel in SPIR-V that holds `values` numbers at once.
+fn kernel_of(values: usize) -> Vec<u8> {
+    let load = |i: usize| format!("let v{i} = all_states[{}u + lane];", 64 * i);
+    let store = |i: usize| format!("all_states[{}u ^ lane] = v{};", 64 * i + 1, values - 1 - i);
+    let all = |line: &dyn Fn(usize) -> String| (0..values).map(line).collect::<String>();
+    let source = format!(
+        "@group(0) @binding(4) var<storage, read_write> all_states: array<f32>;
+        @compute @workgroup_size(32) fn evolve(@builtin(local_invocation_index) lane: u32) {{
+            {} storageBarrier(); {}
+        }}",
+        all(&load),
+        all(&store)
+    );
+    let module = naga::front::wgsl::parse_str(&source).unwrap();
+    let info = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).unwrap();
+    let words = naga::back::spv::write_vec(&module, &info, &kernels::as_wgpu_asks(), None).unwrap();
+    words.into_iter().flat_map(u32::to_le_bytes).collect()
 }
 
 /// What Tint and the device say of each kernel: nothing, or the error.
