@@ -4,6 +4,7 @@
 //! program ends quietly.
 
 mod adapters;
+mod animate;
 mod bench;
 mod check;
 mod completions;
@@ -60,6 +61,7 @@ enum Command {
     Convergence(convergence::ConvergenceArgs),
     Figure(figure::FigureArgs),
     Plot(plot::PlotArgs),
+    Animate(animate::AnimateArgs),
     Adapters(adapters::AdaptersArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
@@ -77,6 +79,7 @@ pub fn main() -> ExitCode {
         Command::Convergence(args) => convergence::convergence(args),
         Command::Figure(args) => figure::figure(args),
         Command::Plot(args) => plot::plot(args),
+        Command::Animate(args) => animate::animate(args),
         Command::Adapters(args) => adapters::adapters(args),
         Command::Completions(args) => completions::completions(args),
         Command::Man(args) => man::man(args),

@@ -1,9 +1,11 @@
-//! Pictures from plain numbers: SVG, its style, axes and charts. Nothing here depends on a run or a file.
+//! Pictures from plain numbers: SVG, its style, axes and charts; pixels and GIF. Nothing here depends on a run or a file.
 
 pub mod axis;
 pub mod chart;
 pub mod charts;
+pub mod gif;
 pub mod plot;
+pub mod raster;
 pub mod style;
 pub mod svg;
 pub mod trace;

@@ -75,7 +75,8 @@ impl Svg {
         self.text
     }
 
-    fn line(&mut self, content: std::fmt::Arguments) {
+    /// Adds markup as it is: the caller escapes it.
+    pub fn line(&mut self, content: std::fmt::Arguments) {
         // Writing into a string cannot fail.
         let _ = writeln!(self.text, "{content}");
     }

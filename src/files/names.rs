@@ -45,6 +45,9 @@ pub const MESH: &str = "plots/mesh.svg";
 /// Everything at a glance.
 pub const REPORT: &str = "report.html";
 
+/// The first members in motion, from `curvelax animate`.
+pub const MOVIE: &str = "movie.gif";
+
 /// What a merge needs from a shard besides its tables, see [`shard`](crate::report::shard).
 pub const SHARD: &str = "shard.state";
 
@@ -56,8 +59,8 @@ pub const FIGURES: [&str; 8] =
 /// `.curvelax.rows.part` during a run.
 pub const ROWS: &str = "curvelax.rows";
 
-/// All files that a run may write; the one that vouches for the others comes first.
-pub const OWN: [&str; 20] = [
+/// All files that a run may write, or that are made from one without naming a place; the one that vouches for the others comes first.
+pub const OWN: [&str; 21] = [
     RUN,
     SHARD,
     SUMMARY,
@@ -77,6 +80,7 @@ pub const OWN: [&str; 20] = [
     DEPENDENCE,
     MESH,
     REPORT,
+    MOVIE,
     ROWS,
 ];
 

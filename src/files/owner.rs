@@ -32,6 +32,8 @@ pub enum Owner {
     Pictures,
     /// `plot` in the folder of the run that it draws.
     PicturesOfRun,
+    /// `animate`: one file that the user names, which may be in any folder.
+    Movie,
 }
 
 /// How an existing folder is treated.
@@ -60,7 +62,7 @@ impl Owner {
             Owner::Convergence => &[CONVERGENCE, WORK, WORK_PICTURE],
             Owner::Figure => &FIGURES,
             // They may be left over from a run whose other files are lost.
-            Owner::Pictures | Owner::PicturesOfRun => &[],
+            Owner::Pictures | Owner::PicturesOfRun | Owner::Movie => &[],
         }
     }
 
@@ -70,6 +72,7 @@ impl Owner {
             Owner::Convergence => "convergence",
             Owner::Figure => "figure",
             Owner::Pictures | Owner::PicturesOfRun => "plot",
+            Owner::Movie => "animate",
         }
     }
 
@@ -78,6 +81,9 @@ impl Owner {
     /// # Errors
     /// [`Error::Request`] naming that command and its file.
     pub fn check(self, place: &Path, path: &Path) -> Result<()> {
+        if self == Owner::Movie {
+            return Ok(());
+        }
         let own = if self == Owner::PicturesOfRun { Owner::Run } else { self };
         for other in [Owner::Run, Owner::Convergence, Owner::Figure].into_iter().filter(|other| *other != own) {
             if let Some(mark) = other.marks().iter().find(|mark| is_there(&place.join(mark))) {

@@ -31,7 +31,8 @@ const APART: std::ops::RangeInclusive<f64> = 0.12..=0.88;
 /// Nodes closer than this, in pixels, look like a line and are not marked.
 const MIN_SPACING: f64 = 2.5;
 
-const STYLE: &str = "
+/// The style of a gallery and of a movie.
+pub(super) const STYLE: &str = "
 .back { fill: #ffffff }
 .frame { fill: none; stroke: #e3e6ea }
 text { font-family: sans-serif; font-size: 12px; fill: #24292f }

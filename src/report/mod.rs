@@ -11,6 +11,7 @@ pub mod fingerprint;
 pub mod gallery;
 pub mod growing;
 pub mod merge;
+pub mod movie;
 pub mod overview;
 pub mod page;
 pub mod pictures;

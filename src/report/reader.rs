@@ -47,11 +47,19 @@ impl Finished {
     pub fn read(folder: &Path) -> Result<Finished> {
         let provenance = provenance(folder)?;
         let tally = tally(folder, &provenance)?;
-        let path = folder.join(names::PORTRAITS);
-        let films = if path.exists() { portraits::read(&path)? } else { Vec::new() };
+        let films = films(folder)?;
         let excess = mean_excess(folder, &provenance)?;
         Ok(Finished { provenance, tally, excess, films })
     }
+}
+
+/// Reads the portraits of the first members; none if the run could not save them.
+///
+/// # Errors
+/// Those of [`Finished::read`].
+pub fn films(folder: &Path) -> Result<Vec<Film>> {
+    let path = folder.join(names::PORTRAITS);
+    if path.exists() { portraits::read(&path) } else { Ok(Vec::new()) }
 }
 
 /// The keys that decide whether the rest can be understood.

@@ -1,0 +1,155 @@
+//! `curvelax animate`: a movie of the first members of a finished run, from its portraits.
+
+use std::path::{Path, PathBuf};
+
+use super::print;
+use crate::{
+    error::{Error, Result},
+    files::{OutputFolder, Owner, names},
+    report::{
+        gallery::MAX_PANELS,
+        movie::{Cut, HOLD, MOST_SECONDS, Movie, SECONDS, WIDTH, WIDTHS},
+        reader,
+    },
+    text::{count, number},
+};
+
+const EXAMPLES: &str = "\
+Examples:
+  curvelax animate ellipses
+  curvelax animate ellipses --out movie.svg
+  curvelax animate ellipses --out three.gif --members 3 --seconds 10 --width 600
+
+Members stand side by side, to one scale, with their start in grey. Between the times of plots/portraits.json their nodes
+move on straight lines. The clock in the picture runs so that the curves move evenly: slowly at first, ever faster later.
+The same folder gives the same bytes on every machine.";
+
+/// Make a movie of the first members of a finished run.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct AnimateArgs {
+    /// Folder of the run
+    #[arg(value_name = "DIR")]
+    run: PathBuf,
+    /// File for the movie, .gif or .svg, which must not exist yet [default: movie.gif in the folder of the run]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Seconds from the first state to the last, which stays for another second
+    #[arg(long, value_name = "S", default_value_t = SECONDS)]
+    seconds: f64,
+    /// Width of the picture in pixels
+    #[arg(long, value_name = "PX", default_value_t = WIDTH)]
+    width: u32,
+    /// Members shown at most: the first ones, or some of all cells of a sweep
+    #[arg(long, value_name = "K", default_value_t = MAX_PANELS)]
+    members: usize,
+    /// Replace an existing --out FILE
+    #[arg(long)]
+    force: bool,
+    /// Print nothing: only errors
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// The formats of a movie, by the extension of its file.
+#[derive(Clone, Copy)]
+enum Format {
+    Gif,
+    Svg,
+}
+
+impl Format {
+    /// The format of the file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for another extension than `.gif` or `.svg`.
+    fn of(path: &Path) -> Result<Format> {
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("gif") => Ok(Format::Gif),
+            Some("svg") => Ok(Format::Svg),
+            Some(_) => Err(Error::value("out", path.display(), "unknown extension", "write .gif or .svg")),
+            None => Err(Error::value("out", path.display(), "no extension", "write .gif or .svg")),
+        }
+    }
+}
+
+/// Runs the command.
+pub fn animate(args: AnimateArgs) -> Result<()> {
+    let cut = cut(&args)?;
+    let path = args.out.clone().unwrap_or_else(|| args.run.join(names::MOVIE));
+    let format = Format::of(&path)?;
+    // Before a folder is opened, which would create a missing one.
+    let spec = reader::provenance(&args.run)?.spec;
+    let films = reader::films(&args.run)?;
+    let cannot = |problem: &str| {
+        let place = args.run.join(names::PORTRAITS);
+        Err(Error::Request(format!("{}: {problem}", place.display())))
+    };
+    if films.is_empty() {
+        return cannot("no members to show: the run could not save them, or the file was removed; run again");
+    }
+    let Some(movie) = Movie::new(&films, &spec, &cut) else {
+        return cannot("no member has a state that can be drawn; see `status` in summary.csv");
+    };
+    let file = Target::open(&path, args.out.is_none() || args.force)?;
+    let (content, frames) = match format {
+        Format::Gif => movie.gif().map(|(bytes, frames)| (bytes, format!("{frames} frames, ")))?,
+        Format::Svg => (movie.svg().into_bytes(), String::new()),
+    };
+    file.write(&content)?;
+    if args.quiet {
+        return Ok(());
+    }
+    let shown = count(movie.members() as u64, "member");
+    let (seconds, size) = (number(cut.seconds + HOLD), content.len().div_ceil(1000));
+    print(&format!("results    {}: {shown}, {seconds} s, {frames}{size} kB\n", path.display()))
+}
+
+/// Checks the numbers.
+fn cut(args: &AnimateArgs) -> Result<Cut> {
+    let AnimateArgs { seconds, width, members, .. } = *args;
+    let [least, most] = MOST_SECONDS;
+    if !(least..=most).contains(&seconds) {
+        return Err(Error::value("seconds", seconds, "out of range", &format!("use {least} to {most}")));
+    }
+    let [least, most] = WIDTHS;
+    if !(least..=most).contains(&width) {
+        return Err(Error::value("width", width, "out of range", &format!("use {least} to {most} pixels")));
+    }
+    if !(1..=MAX_PANELS).contains(&members) {
+        return Err(Error::value("members", members, "out of range", &format!("use 1 to {MAX_PANELS}")));
+    }
+    Ok(Cut { seconds, width, members })
+}
+
+/// The file of the movie, in its open folder.
+struct Target {
+    folder: OutputFolder,
+    name: String,
+}
+
+impl Target {
+    /// Opens the folder of `path`, and makes it if there is none. An existing file is refused, unless it may be
+    /// `replaced`.
+    fn open(path: &Path, replaced: bool) -> Result<Target> {
+        let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
+            return Err(Error::value("out", path.display(), "not a name of a file in UTF-8", "use another name"));
+        };
+        if !replaced && path.symlink_metadata().is_ok() {
+            let remedy = "name another file, or add --force to replace it";
+            return Err(Error::value("out", path.display(), "already exists", remedy));
+        }
+        let folder = match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let folder = OutputFolder::open_for(folder, true, Owner::Movie, vec![name.into()])?;
+        Ok(Target { folder, name: name.into() })
+    }
+
+    fn write(&self, content: &[u8]) -> Result<()> {
+        let file = self.folder.write(&self.name, content)?;
+        self.folder.publish_all(vec![file])
+    }
+}
