@@ -55,6 +55,13 @@ pub fn few(study: &'static Study) -> Outcome {
             writes: true,
         },
         Case { name: "plot", arguments: "plot out --quiet".into(), least: 0, prepare: finished, writes: true },
+        Case {
+            name: "animate",
+            arguments: "animate out --out movie.gif --quiet".into(),
+            least: 0,
+            prepare: finished,
+            writes: true,
+        },
         Case { name: "bench", arguments: BENCH.into(), least: 1, prepare: Attempt::new, writes: false },
     ];
     let mut cases = 0;
