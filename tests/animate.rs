@@ -212,7 +212,7 @@ fn what_cannot_be_made_is_refused_with_its_reason() {
     refused(home, "out --members 13", "--members 13: out of range; use 1 to 12");
     refused(home, "out --out old.gif", "--out old.gif: already exists; name another file, or add --force");
     refused(home, "out --out folder.gif --force", "folder.gif is a folder; move it away");
-    refused(home, "out --out old.gif/movie.gif", "old.gif is not a folder");
+    refused(home, "out --out old.gif/movie.gif", "--out old.gif: exists but is not a folder");
     assert_eq!(fs::read(home.join("old.gif")).unwrap(), b"old");
     animated(home, &format!("out --out old.gif --force {SECOND}"));
     assert_eq!(Shown::read(&home.join("old.gif")).frames.len(), FRAMES);

@@ -44,7 +44,11 @@ const FOOT: f64 = 34.0;
 /// From one line of words to the next.
 const LINE: f64 = 17.0;
 /// Below the words of a panel.
-const BELOW: f64 = 12.0;
+const BELOW: f64 = 18.0;
+/// The clock has two digits from this moment on, however slowly it starts.
+const EARLY: f64 = 0.1;
+/// Most digits of the clock behind the point.
+const MAX_DIGITS: i32 = 8;
 /// Part of a panel that the bar of the scale has at least.
 const BAR: f64 = 0.22;
 
@@ -153,12 +157,14 @@ impl Movie {
 
     /// The clock at the time `t`, with equally many digits throughout.
     fn clock(&self, t: f64) -> String {
-        let end = format!("{:e}", self.pace.end());
-        let power: i32 = end.split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0);
+        let power = power_of(self.pace.end());
         let mut clock = String::from("t = ");
         // Writing into a string cannot fail.
         let _ = match power {
-            -3..6 => write!(clock, "{t:.*}", (3 - power).max(0) as usize),
+            -3..6 => {
+                let digits = (3 - power).max(1 - power_of(self.pace.time(EARLY)));
+                write!(clock, "{t:.*}", digits.clamp(0, MAX_DIGITS) as usize)
+            }
             _ if t == 0.0 => write!(clock, "0"),
             _ => write!(clock, "{t:.3e}"),
         };
@@ -182,6 +188,12 @@ impl Movie {
 
 /// What the head says of the grey line.
 const GREY: &str = "grey: start";
+
+/// The power of ten of the first digit of `value`.
+fn power_of(value: f64) -> i32 {
+    // Exact, which a logarithm is not on every machine.
+    format!("{value:e}").split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0)
+}
 
 /// The states of a film; none if they are not curves.
 fn drawable(film: &Film) -> Vec<Vec<DVec2>> {
@@ -248,6 +260,11 @@ pub(super) mod tests {
         assert_eq!([0.0, 0.1].map(|t| clock(0.1, t)), ["t = 0.0000", "t = 0.1000"]);
         assert_eq!([0.0, 1e-9, 1e-7].map(|t| clock(1e-7, t)), ["t = 0", "t = 1.000e-9", "t = 1.000e-7"]);
         assert_eq!(clock(2e5, 12345.6), "t = 12346 h");
+        // A member that moves most at first.
+        let film = |t: f64, x: f64| (t, vec![DVec2::ZERO, DVec2::X * x, DVec2::Y]);
+        let frames = vec![film(0.0, 9.0), film(1e-3, 2.0), film(0.5, 1.0)];
+        movie.pace = Pace::new(&[MovedMember::new(Status::Relaxed, frames)]);
+        assert_eq!([0.0, 2e-4, 0.5].map(|t| movie.clock(t)), ["t = 0.00000", "t = 0.00020", "t = 0.50000"]);
     }
 
     #[test]

@@ -31,7 +31,7 @@ impl MovedMember {
 
     /// The nodes at `t`; those of the last time behind it. None if the member has no state.
     pub fn at(&self, t: f64) -> Vec<DVec2> {
-        let after = self.frames.partition_point(|(at, _)| *at < t);
+        let after = self.frames.partition_point(|(at, _)| *at <= t);
         match (after.checked_sub(1).map(|i| &self.frames[i]), self.frames.get(after)) {
             (Some((low, from)), Some((high, to))) => {
                 let share = (t - low) / (high - low);

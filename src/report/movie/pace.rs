@@ -75,7 +75,7 @@ impl Pace {
 
 /// The value at `x` on the straight lines through `knots`, which ascend in x.
 fn along(knots: &[(f64, f64)], x: f64) -> f64 {
-    let after = knots.partition_point(|(at, _)| *at < x);
+    let after = knots.partition_point(|(at, _)| *at <= x);
     match (after.checked_sub(1).map(|i| knots[i]), knots.get(after).copied()) {
         (Some((low, from)), Some((high, to))) => from + (to - from) * ((x - low) / (high - low)),
         (None, Some((_, value))) | (Some((_, value)), None) => value,
