@@ -53,21 +53,21 @@ pub struct AnimateArgs {
 
 /// The formats of a movie, by the extension of its file.
 #[derive(Clone, Copy)]
-enum Format {
+enum MovieFormat {
     Gif,
     Svg,
 }
 
-impl Format {
+impl MovieFormat {
     /// The format of the file at `path`.
     ///
     /// # Errors
     /// [`Error::Request`] for another extension than `.gif` or `.svg`.
-    fn of(path: &Path) -> Result<Format> {
+    fn of(path: &Path) -> Result<MovieFormat> {
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
-            Some("gif") => Ok(Format::Gif),
-            Some("svg") => Ok(Format::Svg),
+            Some("gif") => Ok(MovieFormat::Gif),
+            Some("svg") => Ok(MovieFormat::Svg),
             Some(_) => Err(Error::value("out", path.display(), "unknown extension", "write .gif or .svg")),
             None => Err(Error::value("out", path.display(), "no extension", "write .gif or .svg")),
         }
@@ -78,7 +78,7 @@ impl Format {
 pub fn animate(args: AnimateArgs) -> Result<()> {
     let cut = cut(&args)?;
     let path = args.out.clone().unwrap_or_else(|| args.run.join(names::MOVIE));
-    let format = Format::of(&path)?;
+    let format = MovieFormat::of(&path)?;
     // Before a folder is opened, which would create a missing one.
     let spec = reader::provenance(&args.run)?.spec;
     let films = reader::films(&args.run)?;
@@ -92,10 +92,10 @@ pub fn animate(args: AnimateArgs) -> Result<()> {
     let Some(movie) = Movie::new(&films, &spec, &cut) else {
         return cannot("no member has a state that can be drawn; see `status` in summary.csv");
     };
-    let file = Target::open(&path, args.out.is_none() || args.force)?;
+    let file = MovieFile::open(&path, args.out.is_none() || args.force)?;
     let (content, frames) = match format {
-        Format::Gif => movie.gif().map(|(bytes, frames)| (bytes, format!("{frames} frames, ")))?,
-        Format::Svg => (movie.svg().into_bytes(), String::new()),
+        MovieFormat::Gif => movie.gif().map(|(bytes, frames)| (bytes, format!("{frames} frames, ")))?,
+        MovieFormat::Svg => (movie.svg().into_bytes(), String::new()),
     };
     file.write(&content)?;
     if args.quiet {
@@ -124,15 +124,15 @@ fn cut(args: &AnimateArgs) -> Result<Cut> {
 }
 
 /// The file of the movie, in its open folder.
-struct Target {
+struct MovieFile {
     folder: OutputFolder,
     name: String,
 }
 
-impl Target {
+impl MovieFile {
     /// Opens the folder of `path`, and makes it if there is none. An existing file is refused, unless it may be
     /// `replaced`.
-    fn open(path: &Path, replaced: bool) -> Result<Target> {
+    fn open(path: &Path, replaced: bool) -> Result<MovieFile> {
         let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
             return Err(Error::value("out", path.display(), "not a name of a file in UTF-8", "use another name"));
         };
@@ -145,7 +145,7 @@ impl Target {
             _ => Path::new("."),
         };
         let folder = OutputFolder::open_for(folder, true, Owner::Movie, vec![name.into()])?;
-        Ok(Target { folder, name: name.into() })
+        Ok(MovieFile { folder, name: name.into() })
     }
 
     fn write(&self, content: &[u8]) -> Result<()> {

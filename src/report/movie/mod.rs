@@ -18,7 +18,7 @@ use glam::DVec2;
 use super::page::spread;
 use crate::{draw::axis::tick_step, ensemble::Spec, files::portraits::Film, text::rounded};
 use moved::MovedMember;
-use pace::Pace;
+use pace::MoviePace;
 
 /// Width in pixels, unless another is requested.
 pub const WIDTH: u32 = 800;
@@ -67,7 +67,7 @@ pub struct Cut {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Movie {
     panels: Vec<MoviePanel>,
-    pace: Pace,
+    pace: MoviePace,
     /// Seconds of motion.
     seconds: f64,
     size: DVec2,
@@ -133,7 +133,7 @@ impl Movie {
             MoviePanel { member: MovedMember::new(film.status, frames), corner, names: names(film), end }
         });
         let panels: Vec<MoviePanel> = panels.collect();
-        let pace = Pace::new(&panels.iter().map(|panel| panel.member.clone()).collect::<Vec<_>>());
+        let pace = MoviePace::new(&panels.iter().map(|panel| panel.member.clone()).collect::<Vec<_>>());
         let length = tick_step(BAR * side / scale);
         let bar = match &spec.units {
             Some(units) => format!("{} {}", rounded(length, 1), units.length),
@@ -252,7 +252,7 @@ pub(super) mod tests {
         let mut movie = movie(1, 800);
         let mut clock = |end: f64, t: f64| {
             let nodes = vec![DVec2::ZERO, DVec2::X, DVec2::Y];
-            movie.pace = Pace::new(&[MovedMember::new(Status::Relaxed, vec![(0.0, nodes.clone()), (end, nodes)])]);
+            movie.pace = MoviePace::new(&[MovedMember::new(Status::Relaxed, vec![(0.0, nodes.clone()), (end, nodes)])]);
             movie.unit = if end > 1.0 { "h".into() } else { String::new() };
             movie.clock(t)
         };
@@ -263,7 +263,7 @@ pub(super) mod tests {
         // A member that moves most at first.
         let film = |t: f64, x: f64| (t, vec![DVec2::ZERO, DVec2::X * x, DVec2::Y]);
         let frames = vec![film(0.0, 9.0), film(1e-3, 2.0), film(0.5, 1.0)];
-        movie.pace = Pace::new(&[MovedMember::new(Status::Relaxed, frames)]);
+        movie.pace = MoviePace::new(&[MovedMember::new(Status::Relaxed, frames)]);
         assert_eq!([0.0, 2e-4, 0.5].map(|t| movie.clock(t)), ["t = 0.00000", "t = 0.00020", "t = 0.50000"]);
     }
 

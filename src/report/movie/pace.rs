@@ -20,15 +20,15 @@ const PLAIN: f64 = 0.15;
 
 /// The moments of a movie and their times.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pace {
+pub struct MoviePace {
     /// Ascending times from the first state of any member to the last, and the moment at which each is shown. Moments
     /// ascend from 0 to 1; between two of them the clock runs evenly.
     knots: Vec<(f64, f64)>,
 }
 
-impl Pace {
+impl MoviePace {
     /// The pace at which `members`, of which one has a state, move evenly.
-    pub fn new(members: &[MovedMember]) -> Pace {
+    pub fn new(members: &[MovedMember]) -> MoviePace {
         let mut times: Vec<f64> = members.iter().flat_map(|member| member.times()).collect();
         times.sort_by(f64::total_cmp);
         times.dedup();
@@ -53,7 +53,7 @@ impl Pace {
         // The sum is 1 up to rounding.
         let last = moment;
         knots.iter_mut().for_each(|(_, moment)| *moment = share(*moment, last));
-        Pace { knots }
+        MoviePace { knots }
     }
 
     /// The last time.
@@ -113,7 +113,7 @@ mod tests {
     fn curves_move_evenly_however_they_decay() {
         let times: Vec<f64> = (0..=200).map(|i| 0.01 * f64::from(i)).collect();
         let member = circle(&times, 6.0, 0.0);
-        let pace = Pace::new(std::slice::from_ref(&member));
+        let pace = MoviePace::new(std::slice::from_ref(&member));
         let radius = |s: f64| member.at(pace.time(s))[0].length();
         let ways: Vec<f64> = (0..20).map(|i| radius(0.05 * f64::from(i)) - radius(0.05 * f64::from(i + 1))).collect();
         // In plain time the first twentieth would hold 45 % of the way, and the last 1 in 10⁵.
@@ -124,7 +124,7 @@ mod tests {
     #[test]
     fn what_moves_along_itself_runs_in_plain_time() {
         let times: Vec<f64> = (0..=50).map(|i| 0.1 * f64::from(i * i)).collect();
-        let pace = Pace::new(&[circle(&times, 0.0, 0.002)]);
+        let pace = MoviePace::new(&[circle(&times, 0.0, 0.002)]);
         for s in [0.1, 0.5, 0.9] {
             assert!((pace.time(s) / (s * pace.end()) - 1.0).abs() < 0.1, "{s}: {}", pace.time(s));
         }
@@ -133,13 +133,13 @@ mod tests {
     #[test]
     fn moments_and_times_belong_together() {
         let members = [circle(&[0.0, 0.1, 0.5], 6.0, 0.0), circle(&[0.0, 0.2, 3.0], 1.0, 0.0)];
-        let pace = Pace::new(&members);
+        let pace = MoviePace::new(&members);
         assert_eq!((pace.time(0.0), pace.time(1.0), pace.end()), (0.0, 3.0, 3.0));
         assert_eq!((pace.moment(0.0), pace.moment(3.0), pace.moment(9.0)), (0.0, 1.0, 1.0));
         for t in [0.05, 0.1, 0.3, 2.0] {
             assert!((pace.time(pace.moment(t)) - t).abs() < 1e-12, "{t}");
         }
-        let still = Pace::new(&[circle(&[0.0], 6.0, 0.0)]);
+        let still = MoviePace::new(&[circle(&[0.0], 6.0, 0.0)]);
         assert_eq!((still.time(0.0), still.time(1.0), still.moment(0.0)), (0.0, 0.0, 0.0));
     }
 }
