@@ -287,7 +287,7 @@ fn limits(driver: Driver) -> Outcome {
 
 fn small_binding(driver: Driver) -> Outcome {
     // Room for fewer than the 24 members.
-    let small = run(driver, "binding 60000", "").ended(0)?;
+    let small = run(driver, "binding 20000", "").ended(0)?;
     small.told("back end: GPU Hostile", &[])?;
     let large = run(driver, "nothing", "").ended(0)?;
     require(small.tables() == large.tables(), || "the tables differ".into())
