@@ -1,5 +1,7 @@
 //! Which back end a spec gets, and why. Everything that can be refused is refused here, before any work.
 
+use std::{sync::Arc, time::Duration};
+
 use serde::{Deserialize, Serialize};
 
 use crate::backend::{
@@ -16,11 +18,15 @@ use crate::{
     },
     error::{Error, Result},
     scheme::{extrapolation::MOST_ORDER, step::Method},
-    solver::{Blocks, Order},
+    solver::{Blocks, Order, ring::MIN_POINTS},
 };
 
 /// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
 pub const MAX_POINTS_F32: usize = 320;
+
+/// Time for a driver to compile a kernel before `--backend auto` uses the CPU. Drivers take seconds, or a minute on a
+/// busy machine.
+const COMPILE_LIMIT: Duration = Duration::from_secs(120);
 
 /// Where a run is computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -191,7 +197,7 @@ pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
 
 fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<Choice> {
     let precision = fitting_precision(spec, n, adapter.name(), &adapter.capacity())?;
-    Ok(Choice { device: Device::Gpu(Box::new(adapter)), number: None, or_cpu: false, precision, reason })
+    Ok(Choice { device: Device::Gpu(Arc::new(adapter)), number: None, or_cpu: false, precision, reason })
 }
 
 /// The precision of the run on an adapter, if members of `n` nodes fit.
@@ -213,7 +219,8 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
     };
     fits.map_err(|needs| {
         let problem = format!("a member needs {needs}");
-        Error::value("points", n, &problem, &format!("use {most} or fewer, or --backend cpu"))
+        let fewer = if most < MIN_POINTS { String::new() } else { format!("use {most} or fewer, or ") };
+        Error::value("points", n, &problem, &format!("{fewer}--backend cpu"))
     })?;
     Ok(precision)
 }
@@ -310,6 +317,16 @@ impl Choice {
         Choice { or_cpu: true, ..self }
     }
 
+    /// Returns whether the CPU may take over from the GPU, since nobody asked for that GPU.
+    pub fn may_fall_back(&self) -> bool {
+        self.or_cpu
+    }
+
+    /// Replaces the reason of the choice.
+    pub fn because(self, reason: String) -> Choice {
+        Choice { reason, ..self }
+    }
+
     /// Returns the chosen device.
     pub fn device(&self) -> &Device {
         &self.device
@@ -320,25 +337,42 @@ impl Choice {
     /// # Errors
     /// As [`open`](Choice::open).
     pub fn open_for(&self, cohort: &[Cell]) -> Result<(Box<dyn Backend>, Platform)> {
+        self.open_for_and_tell(cohort, &|_| {})
+    }
+
+    /// Like [`open_for`](Choice::open_for); tells what it is waiting for, if that takes long.
+    ///
+    /// # Errors
+    /// As [`open`](Choice::open).
+    pub fn open_for_and_tell(&self, cohort: &[Cell], tell: &dyn Fn(&str)) -> Result<(Box<dyn Backend>, Platform)> {
         let curves = cohort.iter().map(|cell| cell.spec.member_count()).sum();
         let whole = Spec { curves, only: None, shard: None, ..cohort[0].spec.clone() };
-        self.open(&whole, whole.points)
+        self.open_and_tell(&whole, whole.points, tell)
     }
 
     /// Opens the device for the members of `spec`, of `n` nodes; a GPU must pass a
-    /// [self-test](crate::conformance::self_test()). If `--backend auto` chose a GPU that fails, it opens the CPU, and
-    /// the platform's reason says why.
+    /// [self-test](crate::conformance::self_test()). If `--backend auto` chose a GPU that fails or is not ready in two
+    /// minutes, it opens the CPU, and the platform's reason says why.
     ///
     /// # Errors
     /// [`Error::Device`] if a requested GPU cannot be opened or computes wrongly.
     pub fn open(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+        self.open_and_tell(spec, n, &|_| {})
+    }
+
+    fn open_and_tell(&self, spec: &Spec, n: usize, tell: &dyn Fn(&str)) -> Result<(Box<dyn Backend>, Platform)> {
         match self.precision {
-            Precision::F32 => self.open_in::<f32>(spec, n),
-            Precision::F64 => self.open_in::<f64>(spec, n),
+            Precision::F32 => self.open_in::<f32>(spec, n, tell),
+            Precision::F64 => self.open_in::<f64>(spec, n, tell),
         }
     }
 
-    fn open_in<T: Vectorised>(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
+    fn open_in<T: Vectorised>(
+        &self,
+        spec: &Spec,
+        n: usize,
+        tell: &dyn Fn(&str),
+    ) -> Result<(Box<dyn Backend>, Platform)> {
         let blocks = ring(n)?;
         let method = Method {
             solver: spec.solver(),
@@ -349,12 +383,15 @@ impl Choice {
         let opened = match &self.device {
             Device::Cpu => CpuBackend::<T>::for_members(blocks, method, threads(spec), spec.member_count())
                 .map(|backend| Box::new(backend) as Box<dyn Backend>),
-            Device::Gpu(gpu) => open_gpu::<T>(gpu, blocks, spec, &method),
+            Device::Gpu(gpu) => {
+                let limit = self.or_cpu.then_some(COMPILE_LIMIT);
+                open_gpu::<T>(gpu, blocks, spec, &method, limit, tell)
+            }
         };
         match opened {
             Ok(backend) => Ok((backend, self.platform(spec))),
             Err(Error::Device(fault)) if self.or_cpu => {
-                self.on_cpu(format!("the GPU failed: {fault}")).open_in::<T>(spec, n)
+                self.on_cpu(format!("the GPU failed: {fault}")).open_in::<T>(spec, n, tell)
             }
             Err(error) => Err(error),
         }
@@ -366,13 +403,24 @@ fn threads(spec: &Spec) -> usize {
     spec.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
 }
 
-/// Creates the kernel for the members of `spec`, which has passed its self-test.
-fn open_gpu<T: Vectorised>(gpu: &Gpu, blocks: Blocks, spec: &Spec, method: &Method) -> Result<Box<dyn Backend>> {
+/// Creates the kernel for the members of `spec`, which has passed its self-test. Compiling may take the time `limit`.
+fn open_gpu<T: Vectorised>(
+    gpu: &Arc<Gpu>,
+    blocks: Blocks,
+    spec: &Spec,
+    method: &Method,
+    limit: Option<Duration>,
+    tell: &dyn Fn(&str),
+) -> Result<Box<dyn Backend>> {
     let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
     let adaptive = spec.adaptive.is_some();
     let variant = Variant { adaptive, ..gpu.capacity().variant(blocks, spec.solver()) };
     // The self-test has its own cap: with the run's, a solve may end before it converges, and then roundings decide.
     let tested = Method { max_sweeps: MAX_SWEEPS, ..*method };
+    let then = limit.map_or(String::new(), |limit| format!("; after {} s the CPU is used instead", limit.as_secs()));
+    gpu.compile::<T>(blocks, variant, limit, &|| {
+        tell(&format!("GPU {} is still compiling the kernel{then}", gpu.name()));
+    })?;
     let mut kernel = Kernel::<T>::new(gpu, blocks, members, tested.max_sweeps, variant)?;
     let device = format!("{} ({})", gpu.name(), gpu.driver());
     self_test::<T>(&mut kernel, &device, gpu.is_hardware(), &tested, blocks.n, adaptive)?;

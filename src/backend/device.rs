@@ -1,6 +1,6 @@
 //! The device that advances members.
 
-use std::fmt;
+use std::{fmt, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ pub enum Device {
     /// The cores of this machine.
     Cpu,
     /// This adapter.
-    Gpu(Box<Gpu>),
+    Gpu(Arc<Gpu>),
 }
 
 /// The kinds of [`Device`].

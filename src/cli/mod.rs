@@ -32,6 +32,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use serde::Serialize;
 
 use crate::{
+    backend::gpu::abandoned,
     error::{Error, Result, without_controls},
     results::provenance::json,
 };
@@ -84,13 +85,14 @@ pub fn main() -> ExitCode {
         Command::Completions(args) => completions::completions(args),
         Command::Man(args) => man::man(args),
     };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            note(&format!("error: {error}"));
-            ExitCode::from(error.exit_code())
-        }
+    let code = done.err().map_or(0, |error| {
+        note(&format!("error: {error}"));
+        error.exit_code()
+    });
+    if abandoned::is_any() {
+        signals::exit(code);
     }
+    ExitCode::from(code)
 }
 
 /// Does the same as `Cli::try_parse_from`, but [explains](unknown::explain) unknown flags.

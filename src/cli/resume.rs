@@ -8,11 +8,11 @@ use super::{
     work::{MannerFlags, Work},
 };
 use crate::{
-    ensemble::{Spec, Study, spec::BackendChoice},
+    ensemble::{Spec, Standing, Study, spec::BackendChoice},
     error::{Error, Result},
     files::{OutputFolder, names},
     report::{
-        RunReport,
+        Manner, RunReport,
         checkpoint::{self, Head, Saved},
         reader,
     },
@@ -54,7 +54,7 @@ pub fn resume(args: ResumeArgs) -> Result<()> {
     args.manner.check_name(&args.run)?;
     let folder = OutputFolder::open_again(&args.run)?;
     let saved = checkpoint::find(&folder)?;
-    let place = ResumePlace { backend: args.backend, adapter: args.adapter, threads: args.threads };
+    let place = ResumePlace { backend: args.backend, adapter: args.adapter, threads: args.threads, why: None };
     resume_in(folder, saved, place, args.manner)
 }
 
@@ -107,23 +107,55 @@ pub fn resume_like(
     resume_in(folder, saved, ResumePlace { threads: spec.threads, ..ResumePlace::default() }, flags)
 }
 
+/// Carries out `work`. If a GPU fails that `--backend auto` chose, the run continues on the CPU from its last checkpoint,
+/// as by `resume --backend cpu`.
+pub fn carry_out(work: Work, report: RunReport, standing: Standing, flags: &MannerFlags) -> Result<()> {
+    let falls_back = work.may_fall_back();
+    let (path, stop) = (report.folder().to_path_buf(), report.stop().clone());
+    match work.carry_out(report, standing, flags) {
+        Err(Error::Device(fault)) if falls_back => {
+            let why = format!("the GPU failed: {fault}");
+            flags.say(&format!("note: on the CPU from here on: {why}"));
+            let folder = OutputFolder::open_again(&path)?;
+            let Some(saved) = checkpoint::find(&folder)? else { return Err(Error::Device(fault)) };
+            let place = ResumePlace { backend: Some(BackendChoice::Cpu), why: Some(why), ..ResumePlace::default() };
+            continue_in(folder, saved, place, flags.manner_with(stop), flags)
+        }
+        done => done,
+    }
+}
+
 /// Where a run is to continue, if not where it was.
 #[derive(Default)]
 struct ResumePlace {
     backend: Option<BackendChoice>,
     adapter: Option<String>,
     threads: Option<usize>,
+    /// Why, if not because it was requested.
+    why: Option<String>,
 }
 
-fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: ResumePlace, flags: MannerFlags) -> Result<()> {
+fn resume_in(folder: OutputFolder, saved: Option<Saved>, place: ResumePlace, flags: MannerFlags) -> Result<()> {
     let path = folder.path().to_path_buf();
-    let Some(mut saved) = saved else {
+    let Some(saved) = saved else {
         folder.tidy()?;
         flags.say(&format!("note: the run in {} is finished: nothing is left to do", path.display()));
         return flags.finished(&path);
     };
     // Before a device is looked for, which takes time.
     let manner = flags.manner()?;
+    continue_in(folder, saved, place, manner, &flags)
+}
+
+/// Continues the run in `folder` from a checkpoint.
+fn continue_in(
+    mut folder: OutputFolder,
+    mut saved: Saved,
+    mut place: ResumePlace,
+    manner: Manner,
+    flags: &MannerFlags,
+) -> Result<()> {
+    let path = folder.path().to_path_buf();
     if let Some(fault) = &saved.note {
         flags.say(&format!("warning: {}: {fault}", path.display()));
     }
@@ -135,13 +167,14 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: ResumePlace,
     }
     let began = origin.platform.clone();
     let elsewhere = place.backend.is_some() || place.adapter.is_some();
-    let new_threads = place.threads.is_some();
+    let (new_threads, why) = (place.threads.is_some(), place.why.take());
     let work = spec(&origin.spec, place)
         .and_then(|spec| Work::new_from(spec, &base))
         .map_err(|error| origin.explain(error))?;
+    let work = if why.is_some() { work.because("the GPU failed") } else { work };
     origin.check_outlines(&work.study)?;
     let mut here = work.platform();
-    here.reason = began.reason.clone();
+    here.reason = why.unwrap_or_else(|| began.reason.clone());
     if !here.computes_like(&began) {
         if !elsewhere {
             return Err(Error::Request(format!(
@@ -160,11 +193,11 @@ fn resume_in(mut folder: OutputFolder, saved: Option<Saved>, place: ResumePlace,
     }
     let (report, standing) = RunReport::resume(folder, &work.study, saved, manner)?;
     flags.say(&format!("resuming: {} of {} members are in the table", report.members(), work.study.member_count()));
-    work.carry_out(report, standing, &flags)
+    carry_out(work, report, standing, flags)
 }
 
 /// The spec of the checkpoint, with the changes by this command line.
-fn spec(text: &str, ResumePlace { backend, adapter, threads }: ResumePlace) -> Result<Spec> {
+fn spec(text: &str, ResumePlace { backend, adapter, threads, .. }: ResumePlace) -> Result<Spec> {
     let mut spec = Spec::from_toml(text).map_err(|e| state_spec(&e))?;
     if backend.is_some() || adapter.is_some() {
         spec.backend = backend.unwrap_or(BackendChoice::Gpu);

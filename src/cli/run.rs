@@ -105,7 +105,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     let platform = work.open(&flags)?;
     let origin = Origin::new(&work.study, platform)?;
     let report = RunReport::begin(folder, &work.study, origin, manner)?;
-    work.carry_out(report, Standing::default(), &flags)
+    resume::carry_out(work, report, Standing::default(), &flags)
 }
 
 /// The spec file, overlaid with the flags.

@@ -9,6 +9,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+pub use system::exit;
+
 use super::note;
 use crate::{
     error::Result,

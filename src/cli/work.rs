@@ -1,6 +1,9 @@
 //! A study in progress, for `run` and `resume`: the request, where it is computed, and how it is carried out.
 
-use std::{path::Path, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use super::{flags, note, print, signals};
 use crate::{
@@ -96,7 +99,12 @@ impl MannerFlags {
     pub fn manner(&self) -> Result<Manner> {
         let stop = Stop::default();
         signals::watch(&stop, self.max_time)?;
-        Ok(Manner { quiet: self.quiet, every: self.checkpoint_every, stop })
+        Ok(self.manner_with(stop))
+    }
+
+    /// The manner of a run that `stop` stops.
+    pub fn manner_with(&self, stop: Stop) -> Manner {
+        Manner { quiet: self.quiet, every: self.checkpoint_every, stop }
     }
 }
 
@@ -106,6 +114,8 @@ pub struct Work {
     pub study: Study,
     /// The back ends of its stages.
     pub choices: Vec<Choice>,
+    /// The request, and the directory to which its paths are relative.
+    asked: (Spec, PathBuf),
     /// The back end of the first cells of the study itself, once it is known to open; none if it opens again at no cost.
     opened: Option<Option<Box<dyn Backend>>>,
 }
@@ -118,21 +128,30 @@ impl Work {
 
     /// Does the same as [`Work::new`], with paths in the spec relative to the directory `base`.
     pub fn new_from(spec: Spec, base: &Path) -> Result<Work> {
-        let mut study = Study::new_from(spec, base)?;
+        let mut study = Study::new_from(spec.clone(), base)?;
         let choices = placement::choose_all(&study)?;
         placement::settle(&mut study, &choices);
-        Ok(Work { study, choices, opened: None })
+        Ok(Work { study, choices, asked: (spec, base.into()), opened: None })
     }
 
-    /// Opens the back end of the first cells of the study itself, and returns where it is. If that differs from the choice, it is recorded
-    /// in the spec.
+    /// Replaces the reason of the choices.
+    pub fn because(mut self, reason: &str) -> Work {
+        self.choices = self.choices.into_iter().map(|choice| choice.because(reason.into())).collect();
+        self
+    }
+
+    /// Opens the back end of the first cells of the study itself, and returns where it is. If that is not the GPU that
+    /// was chosen, the work becomes that of a request for the CPU, whose precision and tolerance may differ.
     pub fn open(&mut self, flags: &MannerFlags) -> Result<Platform> {
         let (cells, choice) = self.first();
         let (backend, platform) = open(cells, choice, flags)?;
         if choice.device().kind() != platform.backend {
             flags.say(&format!("note: on the CPU instead: {}", platform.reason));
-            self.study.cells_mut().iter_mut().for_each(|cell| platform.settle_place(&mut cell.spec));
-            self.study.settle_spec(|spec| platform.settle_place(spec));
+            let (asked, base) = &self.asked;
+            let spec = Spec { backend: platform.backend.into(), adapter: None, ..asked.clone() };
+            *self = Work::new_from(spec, &base.clone())?.because(&platform.reason);
+            self.opened = Some(None);
+            return Ok(self.platform());
         }
         // One on the CPU is opened when its turn comes: it would only hold memory while the levels run.
         self.opened = Some((platform.backend == DeviceKind::Gpu).then_some(backend));
@@ -145,13 +164,19 @@ impl Work {
         (&self.study.cells()[self.study.stages()[own].range.clone()], &self.choices[own])
     }
 
+    /// Returns whether the CPU may take over if the GPU fails.
+    pub fn may_fall_back(&self) -> bool {
+        self.first().1.may_fall_back()
+    }
+
     /// Where everything is computed, except perhaps the pilot.
     pub fn platform(&self) -> Platform {
         let (cells, choice) = self.first();
         choice.platform(&cells[0].spec)
     }
 
-    /// Runs the remaining work, and publishes all results.
+    /// Runs the remaining work, and publishes all results. If a GPU fails from which the CPU may take over, the run is
+    /// always saved.
     ///
     /// # Errors
     /// Those of the run, and [`Error::Request`] if `standing` does not match the report.
@@ -167,15 +192,22 @@ impl Work {
         }
         let early = [&self.study.warnings()[..], report.moves()].concat();
         early.iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
-        let out = report.folder().to_path_buf();
-        let Work { study, choices, opened } = self;
+        let (out, falls_back) = (report.folder().to_path_buf(), self.may_fall_back());
+        let Work { study, choices, opened, .. } = self;
         let done = advance(&study, choices, opened, standing, &mut report, flags);
         if let Err(error) = done {
-            let error = report.explain(error);
-            if report.give_up() {
-                kept(&out, &error, flags);
+            match report.explain(error) {
+                Error::Device(fault) if falls_back => {
+                    report.leave();
+                    return Err(Error::Device(fault));
+                }
+                error => {
+                    if report.give_up() {
+                        kept(&out, &error, flags);
+                    }
+                    return Err(error);
+                }
             }
-            return Err(error);
         }
         let (late, failed) = (report.warnings(), report.failed());
         let form = if flags.json { Form::Json } else { Form::Overview };
@@ -204,14 +236,15 @@ pub fn check_name(json: bool, out: &Path) -> Result<()> {
 /// Says how to resume a run that failed, unless the error does.
 fn kept(out: &Path, error: &Error, flags: &MannerFlags) {
     if !matches!(error, Error::Stopped(_) | Error::Interrupted(_) | Error::Lost(_)) {
-        flags.say(&format!("note: the run was saved: curvelax resume {} continues it", quoted(out)));
+        let on_cpu = if matches!(error, Error::Device(_)) { ", with --backend cpu on the CPU" } else { "" };
+        flags.say(&format!("note: the run was saved: curvelax resume {} continues it{on_cpu}", quoted(out)));
     }
 }
 
 /// Opens the back end chosen for a cohort.
 fn open(cohort: &[Cell], choice: &Choice, flags: &MannerFlags) -> Result<(Box<dyn Backend>, Platform)> {
     flags.say(&choice.sentence(&cohort[0].spec));
-    choice.open_for(cohort)
+    choice.open_for_and_tell(cohort, &|what| flags.say(&format!("note: {what}")))
 }
 
 /// Runs one stage after another, from `standing` in the report's current one; `opened` is as in [`Work`].

@@ -207,6 +207,17 @@ impl RunReport {
         stays
     }
 
+    /// Leaves a run that failed to another session, which continues from its last checkpoint, even if that is the
+    /// first one.
+    pub fn leave(mut self) {
+        self.growing.keep(true);
+    }
+
+    /// The means to stop the run.
+    pub fn stop(&self) -> &Stop {
+        &self.stop
+    }
+
     /// Returns the head of a checkpoint, once everything is on disk.
     fn head(&mut self) -> Result<Head> {
         let (tables, store, rows) = self.growing.mark()?;

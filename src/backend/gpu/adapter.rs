@@ -2,13 +2,16 @@
 
 use std::{
     collections::HashMap,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{
+        Arc, Mutex, PoisonError,
+        mpsc::{RecvTimeoutError, channel},
+    },
     time::Duration,
 };
 
 use crate::{
     backend::gpu::{
-        Variant,
+        Variant, abandoned,
         clock::Moment,
         pipeline::{self, Key},
         shader,
@@ -17,7 +20,11 @@ use crate::{
     guard::guarded,
     number::{Precision, Real},
     solver::{Blocks, Solver, ring::MIN_POINTS},
+    threads,
 };
+
+/// Time after which a driver that is still compiling is reported.
+const LONG: Duration = Duration::from_secs(5);
 
 /// An adapter that could run the kernel.
 pub struct Gpu {
@@ -194,6 +201,45 @@ impl Gpu {
             .entry((blocks.n, T::NAME, variant))
             .or_insert_with(|| pipeline::compile::<T>(&device.device, blocks, subgroup, variant));
         Ok((device.clone(), pipeline.clone()))
+    }
+
+    /// Opens the device and compiles the pipeline for [`pipeline`](Gpu::pipeline); calls `tell` if that takes long.
+    ///
+    /// Nothing can stop a driver's compiler. It therefore runs in a thread, which is abandoned after the `limit`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the adapter cannot be opened, the driver panics or the limit is over.
+    pub fn compile<T: Real>(
+        self: &Arc<Self>,
+        blocks: Blocks,
+        variant: Variant,
+        limit: Option<Duration>,
+        tell: &dyn Fn(),
+    ) -> Result<()> {
+        let (send, compiled) = channel();
+        let gpu = Arc::clone(self);
+        threads::start("compiler", move || {
+            let done = guarded(|| gpu.pipeline::<T>(blocks, variant).map(drop));
+            drop(send.send(done));
+        })?;
+        let first = limit.map_or(LONG, |limit| limit.min(LONG));
+        let done = compiled.recv_timeout(first).or_else(|_| {
+            tell();
+            match limit {
+                Some(limit) => compiled.recv_timeout(limit - first),
+                None => compiled.recv().map_err(RecvTimeoutError::from),
+            }
+        });
+        let fault = match done {
+            Ok(Ok(done)) => return done,
+            Ok(Err(panic)) => format!("{panic}; see `curvelax adapters`, or use --backend cpu"),
+            Err(_) => {
+                abandoned::abandon(Arc::clone(self));
+                let seconds = limit.unwrap_or_default().as_secs();
+                format!("the kernel is not compiled after {seconds} s; --backend gpu waits for it as long as it takes")
+            }
+        };
+        Err(Error::Device(format!("GPU {}: {fault}", self.name())))
     }
 
     /// Makes all kernels lose the device, as a driver reset does, to test the recovery.

@@ -9,6 +9,7 @@ use std::{
 };
 
 use super::{
+    abandoned,
     adapter::{OpenGpu, Waited},
     budget::Budget,
     clock::Moment,
@@ -287,6 +288,8 @@ impl Reading {
         while device.wait(&self.submission, left(since))? == Waited::OnItsWay {
             if left(since).is_zero() {
                 let seconds = since.elapsed().as_secs_f64();
+                // To release a device, wgpu waits until it is idle.
+                abandoned::abandon(device.clone());
                 return Err(device.error(&format!("a dispatch did not end in {seconds:.3} s and is given up")));
             }
         }

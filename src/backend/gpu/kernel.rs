@@ -21,6 +21,7 @@ use crate::{
         run::Run,
     },
     solver::{Blocks, Solver},
+    text::plural,
 };
 
 pub use super::{batch::DISPATCH_FIELDS, budget::Budget, pipeline::compile};
@@ -94,7 +95,8 @@ impl<T: Real> Kernel<T> {
         if let Some(fault) = device.fault() {
             let (members, n) = (batches.len() * slots, blocks.n);
             let mebibytes = batches.iter().map(Batch::bytes).sum::<u64>().div_ceil(1 << 20);
-            return Err(device.error(&format!("no room for {members} members of {n} points, {mebibytes} MiB: {fault}")));
+            let what = format!("{members} {} of {n} points", plural(members as u64, "member"));
+            return Err(device.error(&format!("no room for {what}, {mebibytes} MiB: {fault}")));
         }
         let ended = device.now();
         Ok(Kernel {

@@ -1,6 +1,7 @@
 //! The GPU back end: adapters, assembled shaders, and the kernel with its batches of slots. The only place that names
 //! wgpu.
 
+pub mod abandoned;
 pub mod adapter;
 mod batch;
 mod budget;

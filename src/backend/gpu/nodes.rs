@@ -1,9 +1,10 @@
 //! Device nodes: whether a hardware GPU may be present, as far as can be seen without its driver.
 
-/// Returns whether this machine may have a hardware GPU. On Linux, none is reachable without a node in `/dev`.
+/// Returns whether this machine may have a hardware GPU. On Linux, none is reachable without a node in `/dev`, except
+/// through a Vulkan driver that the user adds.
 pub fn may_have_hardware() -> bool {
     #[cfg(target_os = "linux")]
-    return linux::has_nodes("/dev".as_ref());
+    return linux::has_nodes("/dev".as_ref()) || std::env::var_os("VK_ADD_DRIVER_FILES").is_some();
     #[cfg(not(target_os = "linux"))]
     true
 }
