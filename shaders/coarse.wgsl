@@ -33,7 +33,6 @@ fn average(before: pair, own: pair, next: pair) -> pair {
 fn build() {
     var fine = finest();
     var coarse = coarser(fine);
-    settle();
     share(term_second, term_first);
     for (var j = lane; j < coarse.nodes; j += THREADS) { coarse_held[coarse.at + j] = average_held(fine, j); }
     settle();

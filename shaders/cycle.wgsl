@@ -51,7 +51,7 @@ fn sweep_coarse(ring: Level) {
     for (var phase = 0u; phase < at_run_time(4u * COARSE_SWEEPS); phase++) {
         let colour = colour_in(phase);
         if colour < own.nodes { relax_coarse(ring, own.first + colour); }
-        workgroupBarrier();
+        if ends_pass(ring, phase) { workgroupBarrier(); }
     }
 }
 

@@ -8,9 +8,12 @@
 // pivoting: the systems are perturbations of 1 + (positive) D^4.
 
 /// 2x2 matrices are stored as (m00, m01, m10, m11), pairs for x and y together as (x0, x1, y0, y1).
-/// The rows of pairs that have left the ring, divided by their own matrix; in the end all pairs in `ring_rhs`.
-var<workgroup> ring_low: array<vec, BLOCKS>;
-var<workgroup> ring_high: array<vec, BLOCKS>;
+/// The interiors of the blocks, with `partials`. They have their own arrays, so that nobody waits for the readers of
+/// what was exchanged before the solve.
+var<workgroup> interior_p: array<vec, BLOCKS>;
+var<workgroup> interior_s: array<vec, BLOCKS>;
+/// The right-hand sides of the rows of pairs that have left the ring, next to their coefficients in `ring_a` and
+/// `ring_b`, all divided by their own matrix; in the end all pairs.
 var<workgroup> ring_rhs: array<vec, BLOCKS>;
 
 /// The largest increment of k in the block.
@@ -44,6 +47,8 @@ fn solve(both: bool, negligible: real, made: u32, most: u32) -> Solve {
         return Solve(SOLVED, 0u);
     }
     let size = max(largest_k, max(block_max(bounded_abs(u)), block_max(bounded_abs(v))));
+    // Or it would live on to the next step.
+    largest_k = real(0.0);
     let largest = ring_maxima(vec(size, 0.0, 0.0, 0.0));
     return Solve(uniform_decision(select(NOT_FINITE, SOLVED, largest.x <= real(BIG))), 0u);
 }
@@ -91,17 +96,16 @@ fn pair_row(interior: Interior) -> PairRow {
         from_next = vec(e.z, 0.0, d.w, e.w);
         rhs = vec(rhs_x.zw, rhs_y.zw);
     }
-    workgroupBarrier();
     if owns > 0u {
-        ring_a[lane] = interior.p;
-        ring_b[lane] = interior.s;
+        interior_p[lane] = interior.p;
+        interior_s[lane] = interior.s;
         partials[lane] = interior.c;
     }
     workgroupBarrier();
     return PairRow(
         from_before - multiply(from_interior, interior.p),
-        own - multiply(from_interior, interior.s) - multiply(from_next, ring_a[after]),
-        -multiply(from_next, ring_b[after]),
+        own - multiply(from_interior, interior.s) - multiply(from_next, interior_p[after]),
+        -multiply(from_next, interior_s[after]),
         rhs - apply(from_interior, interior.c) - apply(from_next, partials[after]),
     );
 }
@@ -114,7 +118,7 @@ fn solve_ring(row: PairRow) -> vec {
     var high = row.high;
     var rhs = row.rhs;
     var stride = 1u;
-    // The bound is BLOCKS, see `ring_sums`.
+    // The bound is BLOCKS, see `sum_of_partials`.
     for (; stride < dispatch.blocks; stride = 2u * stride) {
         if leaves(stride) {
             let inverse = invert(own);
@@ -122,8 +126,8 @@ fn solve_ring(row: PairRow) -> vec {
             high = multiply(inverse, high);
             rhs = apply(inverse, rhs);
             if owns > 0u {
-                ring_low[lane] = low;
-                ring_high[lane] = high;
+                ring_a[lane] = low;
+                ring_b[lane] = high;
                 ring_rhs[lane] = rhs;
             }
         }
@@ -131,15 +135,15 @@ fn solve_ring(row: PairRow) -> vec {
         if stays(stride) {
             if before_leaves(stride) {
                 let at = before_by(stride);
-                own = own - multiply(low, ring_high[at]);
+                own = own - multiply(low, ring_b[at]);
                 rhs = rhs - apply(low, ring_rhs[at]);
-                low = -multiply(low, ring_low[at]);
+                low = -multiply(low, ring_a[at]);
             }
             if after_leaves(stride) {
                 let at = after_by(stride);
-                own = own - multiply(high, ring_low[at]);
+                own = own - multiply(high, ring_a[at]);
                 rhs = rhs - apply(high, ring_rhs[at]);
-                high = -multiply(high, ring_high[at]);
+                high = -multiply(high, ring_b[at]);
             }
         }
     }

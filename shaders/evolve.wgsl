@@ -23,10 +23,20 @@ fn take_member(index: u32) {
     curve = CURVE;
     var course = Course(SOLVED, next.phase, next.solve_sweeps, dispatch.steps, dispatch.sweeps);
     while (next.found & IS_DUE) != 0u && course.steps > 0u && course.sweeps > 0u {
-        let advanced = advance(next, course, moves);
+        let advanced = advance(next.order, course, moves);
         course = advanced.course;
         next = advanced.next;
     }
+    // Outside the loop, because some drivers execute every branch.
+    if !ADAPTIVE && (next.found & AT_GOAL) != 0u {
+        // An output time may lie between the two curves.
+        copy_curve(BEFORE, CURVE);
+        keep_step();
+    }
+}
+
+fn keep_step() {
+    store_fields(CURVE, here(new_x), here(new_y), new_k, new_r);
 }
 
 /// Plans the first attempt, perhaps one that was paused. In thread 0, like all functions below that read or change
@@ -70,20 +80,20 @@ struct Advanced { course: Course, next: Plan }
 /// Attempts the planned step and handles the result.
 ///
 /// A step and an observation are each called in one place only: compilers inline the whole body of every call.
-fn advance(planned: Plan, begun: Course, moves: bool) -> Advanced {
+fn advance(order: u32, begun: Course, moves: bool) -> Advanced {
     var course = begun;
     find_member();
     forget();
-    let count = select(1u, parts(planned.order), ADAPTIVE);
+    let count = select(1u, parts(order), ADAPTIVE);
     if ADAPTIVE && course.phase == 0u && course.solve_sweeps == 0u {
         begin_attempt();
-        begin_row(planned.length, planned.taken);
+        begin_row(plan.length, plan.taken);
     }
     course.ended = SOLVED;
     for (var part = course.phase / 2u; part < count && course.ended == SOLVED && course.steps > 0u; part++) {
-        if ADAPTIVE { begin_part(part, planned.length); }
+        if ADAPTIVE { begin_part(part); }
         course = step(course, moves);
-        if ADAPTIVE && course.ended == SOLVED { end_part(part, planned); }
+        if ADAPTIVE && course.ended == SOLVED { end_part(part); }
         course.steps -= 1u;
     }
     let solved = course.ended == SOLVED;
@@ -102,11 +112,11 @@ fn advance(planned: Plan, begun: Course, moves: bool) -> Advanced {
     var errors = vec2<real>(0.0, 0.0);
     if lane == 0u {
         if ADAPTIVE && solved { errors = errors_of_attempt(gaps); }
-        let found = judge_attempt(course.ended, count, planned.length, errors);
+        let found = judge_attempt(course.ended, count, plan.length, errors);
         plan.found = found;
         // A fixed step whose curve need not be looked at again is concluded at once, which saves a decision.
         let is_plain = !ADAPTIVE && found != REFUSED && (found & MAY_RELAX) == 0u;
-        if is_plain { conclude(planned.length, errors, vec2<real>(0.0, 0.0), 0.0); }
+        if is_plain { conclude(plan.length, errors, vec2<real>(0.0, 0.0), 0.0); }
         if is_plain || found == REFUSED { make_plan(found); }
     }
     var next = workgroupUniformLoad(&plan);
@@ -118,7 +128,7 @@ fn advance(planned: Plan, begun: Course, moves: bool) -> Advanced {
         var apart = real(0.0);
         if (judged & MAY_RELAX) != 0u { apart = gap(); }
         if lane == 0u {
-            conclude(planned.length, errors, declines, apart);
+            conclude(plan.length, errors, declines, apart);
             make_plan(judged);
         }
         next = workgroupUniformLoad(&plan);
@@ -127,9 +137,8 @@ fn advance(planned: Plan, begun: Course, moves: bool) -> Advanced {
         keep_attempt();
     } else {
         after_step();
-        // The curve before the step is stored if an output time may lie between the two.
-        if (judged & AT_GOAL) != 0u { copy_curve(BEFORE, CURVE); }
-        store_fields(CURVE, here(new_x), here(new_y), new_k, new_r);
+        // That at the goal waits until the one before is stored.
+        if (judged & AT_GOAL) == 0u { keep_step(); }
     }
     return Advanced(course, next);
 }

@@ -86,8 +86,7 @@ fn ring_summary(sum: vec, extreme: vec, other: vec) -> Summary {
         ring_b[lane] = other;
     }
     workgroupBarrier();
-    var all = Summary(vec(0.0), extreme, other);
-    for (var t = 0u; t < dispatch.blocks; t++) { all.sums = all.sums + partials[t]; }
+    var all = Summary(sum_of_partials(), extreme, other);
     for (var t = group(); t < dispatch.blocks; t += dispatch.groups) {
         all.extremes = max(all.extremes, ring_a[t]);
         all.others = max(all.others, ring_b[t]);

@@ -40,5 +40,5 @@ fn ring_maxima(part: vec) -> vec {
 }
 
 fn ring_summary(sum: vec, extreme: vec, other: vec) -> Summary {
-    return Summary(ring_sums(sum).all, ring_maxima(extreme), ring_maxima(other));
+    return Summary(ring_sums(sum), ring_maxima(extreme), ring_maxima(other));
 }

@@ -49,17 +49,17 @@ fn place_of(part: u32) -> Place {
     return Place(row, parts(row) - 1u - part);
 }
 
-/// Prepares a part of an attempt of length h.
-fn begin_part(part: u32, h: real) {
+/// Prepares a part of an attempt. The plan is read where it is needed, so that it takes no registers.
+fn begin_part(part: u32) {
     let place = place_of(part);
-    tau = h / real(place.row);
+    tau = plan.length / real(place.row);
     curve = select(PART, CURVE, place.left + 1u == place.row);
-    // Others may still read what was exchanged at the end of the last part.
-    settle();
 }
 
 /// Stores the curve at the end of a part, adds it to the combinations, and prepares the solves of the next part.
-fn end_part(part: u32, plan: Plan) {
+fn end_part(part: u32) {
+    // Others may still read what was exchanged last.
+    settle();
     store_fields(PART, here(new_x), here(new_y), new_k, new_r);
     let place = place_of(part);
     if place.left < SHARED_PARTS { add_part(place.left, shares_of(place.row, place.left, plan.order)); }
@@ -91,7 +91,6 @@ fn add_share(base: u32, share: real, change_x: vec, change_y: vec, change_k: vec
 
 /// Puts the curve at the end of the step into the registers of the new curve.
 fn finish_attempt() {
-    settle();
     let x = load_field(CURVE);
     let y = load_field(CURVE + 1u);
     let moved = windows(x + load_field(BEFORE), y + load_field(BEFORE + 1u));
@@ -128,5 +127,5 @@ fn keep_attempt() {
         store_field(SLOPE_BEFORE + field, kept);
     }
     copy_curve(BEFORE, CURVE);
-    store_fields(CURVE, here(new_x), here(new_y), new_k, new_r);
+    keep_step();
 }

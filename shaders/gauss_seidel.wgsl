@@ -13,6 +13,7 @@ fn solve(both: bool, negligible: real, made: u32, most: u32) -> Solve {
 fn solve_one(negligible: real, made: u32, most: u32) -> Solve {
     let p = &all_parameters[member];
     v = vec(0.0);
+    settle();
     start_sweeps();
     let size = system_size(rhs_x);
     sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));
@@ -34,6 +35,7 @@ fn solve_one(negligible: real, made: u32, most: u32) -> Solve {
 /// Sweeps `u` for rhs_x and `v` for rhs_y, with the barriers of one.
 fn solve_two(negligible: real, made: u32, most: u32) -> Solve {
     let p = &all_parameters[member];
+    settle();
     start_sweeps();
     let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
     sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));

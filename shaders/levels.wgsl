@@ -118,6 +118,12 @@ fn colour_in(phase: u32) -> u32 {
     return phase % 4u;
 }
 
+/// Whether a later colour reads what this phase writes in other blocks. Nodes of colours 2 and 3 read no other block's,
+/// and neither do those of colours 0 and 1 if all blocks have four nodes.
+fn ends_pass(ring: Level, phase: u32) -> bool {
+    return phase % 2u == 1u || (phase % 4u == 0u && ring.nodes % 4u != 0u);
+}
+
 /// Two shared fields at node i of the finest level.
 fn shared_at(i: u32) -> pair {
     return pair(ring_a[block_of(i)][colour_of(i)], ring_b[block_of(i)][colour_of(i)]);

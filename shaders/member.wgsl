@@ -168,6 +168,8 @@ var<private> member: u32;
 var<private> tau: real;
 /// Offset of the curve at its start.
 var<private> curve: u32;
+/// The row of this thread's block in the first field of the member.
+var<private> first_row: u32;
 /// `member`, for `find_member`.
 var<workgroup> resident: u32;
 
@@ -175,16 +177,18 @@ var<workgroup> resident: u32;
 /// fields once for a dispatch, and keep them, and the parameters, in registers.
 fn find_member() {
     member = resident;
+    first_row = row_in(member * STATE_FIELDS);
 }
 
-/// A field in this thread's block. No thread loads what another one stores, so no barrier is needed.
+/// A field in this thread's block. Nobody else loads what its owner stores, so no barrier is needed. Only spare threads
+/// do, and may get anything: what they compute reaches no other thread.
 fn load_field(field: u32) -> vec {
-    return all_states[row_in(member * STATE_FIELDS + field)];
+    return all_states[row_after(first_row, field)];
 }
 
 /// The last component of a block of three repeats its third node.
 fn store_field(field: u32, v: vec) {
-    if owns > 0u { all_states[row_in(member * STATE_FIELDS + field)] = vec(v.xyz, select(v.z, v.w, is_four)); }
+    if owns > 0u { all_states[row_after(first_row, field)] = vec(v.xyz, select(v.z, v.w, is_four)); }
 }
 
 fn copy_curve(to: u32, source: u32) {

@@ -15,12 +15,11 @@ fn solve(both: bool, negligible: real, made: u32, most: u32) -> Solve {
         v = vec(0.0);
     }
     sor = real(1.0);
-    settle();
     let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
     let tolerance = max(all_parameters[member].tolerance, real(EPSILON) * size);
+    var ended = finite_or_not(size);
     build();
     start_sweeps();
-    var ended = finite_or_not(size);
     var sweeps = made;
     var left = most;
     while ended == UNSOLVED {

@@ -68,7 +68,7 @@ fn decline() -> vec2<real> {
         + (minus1(new_x) * here(bend.b) - here(new_x) * minus1(bend.b))
         + real(2.0) * (minus1(slope.a) * here(slope.b) - here(slope.a) * minus1(slope.b));
     let part = vec(block_sum(stretch), block_sum(bent), block_sum(area), block_sum(area_bend));
-    let all = ring_sums(part).all;
+    let all = ring_sums(part);
     let length = sums.x;
     let half = real(0.5);
     let growth = all.x / length;

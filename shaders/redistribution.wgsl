@@ -24,7 +24,7 @@ fn redistribute(moves: bool) -> real {
     let beta = velocity(k, k_window);
     trace(0u, beta);
     rkb = r * k * beta;
-    let sums = ring_sums(vec(block_sum(r), block_sum(rkb), 0.0, 0.0)).all;
+    let sums = ring_sums(vec(block_sum(r), block_sum(rkb), 0.0, 0.0));
     let length = sums.x;
     let mean_rkb = sums.y / length;
     let mean_length = length / real(NODES);
@@ -54,7 +54,7 @@ fn tangential_velocity(r: vec, mean_rkb: real, mean_length: real) {
     let growth = rkb - r * mean_rkb + all_parameters[member].omega * (vec(mean_length) - r);
     // Others may still read the last sums.
     workgroupBarrier();
-    let start = ring_sums(vec(block_sum(growth), 0.0, 0.0, 0.0)).earlier.x;
+    let start = sum_before(block_sum(growth));
     let two = growth.x + growth.y;
     let three = two + growth.z;
     let running = vec(start + growth.x, start + two, start + three, start + (three + growth.w));

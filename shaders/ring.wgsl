@@ -5,8 +5,8 @@
 // A thread owns one block of four or three consecutive nodes, stored in the components of a `vec`; a node's colour is
 // its place in the block. For a block of three the fourth component repeats the first node of the next block: it is
 // computed too, but never written, summed or judged. The workgroup is filled up to whole subgroups with spare threads
-// that repeat the last block and write nothing: lavapipe loses the registers of a partly filled subgroup when a loop
-// with barriers ends.
+// that repeat the last block and write nothing of it: lavapipe loses the registers of a partly filled subgroup when a
+// loop with barriers ends.
 
 /// Nodes of a member.
 override NODES: u32;
@@ -65,9 +65,12 @@ fn colour_of(i: u32) -> u32 {
     return select((i - FOURS) % 3u, i % 4u, i < 4u * FOURS);
 }
 
-/// The row of the block in a field.
+/// The row of the block in a field, and in the field that is `by` fields after that of `row`.
 fn row_in(field: u32) -> u32 {
     return field * BLOCKS + block;
+}
+fn row_after(row: u32, by: u32) -> u32 {
+    return row + by * BLOCKS;
 }
 
 /// The group of the block, for taking maxima.
@@ -76,21 +79,21 @@ fn group() -> u32 {
 }
 
 // The direct solve halves the ring of blocks round by round: in each round every second remaining block, `stride`
-// apart, leaves.
+// apart, leaves. `stride` is a power of two, so that masks stand for remainders, which take GPUs thirty instructions.
 
 /// Whether the block leaves the ring in this round.
 fn leaves(stride: u32) -> bool {
-    return stride == block % (2u * stride);
+    return stride == (block & (2u * stride - 1u));
 }
 
 /// Whether it stays in the ring after this round.
 fn stays(stride: u32) -> bool {
-    return block % (2u * stride) == 0u;
+    return (block & (2u * stride - 1u)) == 0u;
 }
 
 /// Whether the block before it in the ring leaves. In a ring of an odd number the first and the last block both stay.
 fn before_leaves(stride: u32) -> bool {
-    return block > 0u || ((BLOCKS - 1u) / stride) % 2u == 1u;
+    return block > 0u || ((BLOCKS - 1u) & stride) != 0u;
 }
 
 /// Whether the block after it in the ring leaves.
@@ -100,7 +103,7 @@ fn after_leaves(stride: u32) -> bool {
 
 /// The block before it in the ring.
 fn before_by(stride: u32) -> u32 {
-    return select(block - stride, (BLOCKS - 1u) / stride * stride, block == 0u);
+    return select(block - stride, (BLOCKS - 1u) & ~(stride - 1u), block == 0u);
 }
 
 /// The block after it in the ring.

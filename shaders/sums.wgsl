@@ -28,25 +28,42 @@ fn block_max_signed(v: vec) -> real {
     return max(max(v.x, v.y), select(v.z, max(v.z, v.w), owns == 4u));
 }
 
-/// Sums over the ring: of the blocks before this one, and of all.
-struct Sums { earlier: vec, all: vec }
-
 /// Properties of a curve, known once its nodes are.
 struct Summary { sums: vec, extremes: vec, others: vec }
 
 /// Four sums over the ring from the sums over each block, added in block order.
+fn ring_sums(part: vec) -> vec {
+    if owns > 0u { partials[lane] = part; }
+    workgroupBarrier();
+    return sum_of_partials();
+}
+
+/// The sum of all rows of `partials`, in order. A round of the loop adds four: its counter, and the one that naga gives
+/// every loop, cost more than an addition.
 ///
 /// The bound of the loop is read from the dispatch: a constant one is unrolled, which takes lavapipe's compiler as long
 /// as everything else together, and does not run faster.
-fn ring_sums(part: vec) -> Sums {
-    if owns > 0u { partials[lane] = part; }
-    workgroupBarrier();
-    var sums = Sums(vec(0.0), vec(0.0));
-    for (var t = 0u; t < dispatch.blocks; t++) {
-        sums.earlier = select(sums.earlier, sums.all, t == block);
-        sums.all = sums.all + partials[t];
+fn sum_of_partials() -> vec {
+    var sum = vec(0.0);
+    var t = 0u;
+    for (; t + 4u <= dispatch.blocks; t += 4u) {
+        sum = sum + partials[t] + partials[t + 1u] + partials[t + 2u] + partials[t + 3u];
     }
-    return sums;
+    for (; t < dispatch.blocks; t++) { sum = sum + partials[t]; }
+    return sum;
+}
+
+/// The sum over the blocks before this one, added in block order.
+fn sum_before(part: real) -> real {
+    if owns > 0u { partials[lane].x = part; }
+    workgroupBarrier();
+    var sum = real(0.0);
+    var t = 0u;
+    for (; t + 4u <= block; t += 4u) {
+        sum = sum + partials[t].x + partials[t + 1u].x + partials[t + 2u].x + partials[t + 3u].x;
+    }
+    for (; t < block; t++) { sum = sum + partials[t].x; }
+    return sum;
 }
 
 /// The value in thread 0, for every thread, in a form on which control flow may depend.

@@ -14,7 +14,6 @@ var<private> ahead: vec;
 
 /// Begins sweeps from `u` and `v`: exchanges them with the adjacent blocks.
 fn start_sweeps() {
-    settle();
     let start = windows(u, v);
     behind = tails_before(start.a, start.b);
     ahead = fronts_after(start.a, start.b);
