@@ -81,7 +81,7 @@ fn number(pieces: &mut [Piece], index: usize) {
 /// The outlines of one array.
 fn of_array(source: Source, place: &str, bytes: &[u8]) -> Result<Vec<Piece>> {
     let refuse = |problem: String| source.refusal(place, &problem, REMEDY);
-    let coordinates = Numbers::read(bytes).map_err(|problem| refuse(problem))?;
+    let coordinates = PointArray::read(bytes).map_err(refuse)?;
     let (blocks, points) = match coordinates.shape[..] {
         [points, 2] => (1, points),
         [outlines, points, 2] => (outlines, points),
@@ -126,18 +126,18 @@ fn shown(shape: &[usize]) -> String {
 }
 
 /// Numbers with their shape.
-struct Numbers {
+struct PointArray {
     shape: Vec<usize>,
     order: Order,
     values: Vec<f64>,
 }
 
-impl Numbers {
+impl PointArray {
     /// Reads an array of integers or floats.
     ///
     /// # Errors
     /// The problem, in words.
-    fn read(bytes: &[u8]) -> Result<Numbers, String> {
+    fn read(bytes: &[u8]) -> Result<PointArray, String> {
         let data = check_header(bytes)?;
         let invalid = |e: std::io::Error| format!("no array: {}", shortened(&one_line(&e.to_string()), MAX_PROBLEM));
         let file = NpyFile::new(bytes).map_err(invalid)?;
@@ -172,7 +172,7 @@ impl Numbers {
             (TypeChar::Uint, 1) => numbers!(u8),
             _ => return Err(wrong_type()),
         };
-        Ok(Numbers { shape, order, values })
+        Ok(PointArray { shape, order, values })
     }
 
     /// The point of a row of a block.

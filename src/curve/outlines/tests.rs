@@ -155,7 +155,7 @@ fn coordinates_of_geojson_are_degrees_unless_the_file_says_or_shows_otherwise() 
         let all = read("map.geojson", text);
         (all[0].outline.warnings()[0].clone(), polygon::signed_area(all[0].outline.vertices()))
     };
-    let (warning, area) = said(&collection(&[near.clone()]));
+    let (warning, area) = said(&collection(std::slice::from_ref(&near)));
     assert!(warning.starts_with("map.geojson: feature 1: lon,lat projected to kilometres"), "{warning}");
     assert!((area / 6182.0 - 1.0).abs() < 1e-3, "{area}");
     // One place that is not on Earth shows that the file is a plane.
@@ -541,5 +541,6 @@ fn five_thousand_features_are_read_in_a_moment() {
     let seconds = begun.elapsed().as_secs_f64();
     println!("{} bytes in {seconds} s", text.len());
     assert_eq!((all.len(), all[4999].label.as_str(), &*all[4999].properties["class"]), (5000, "4999", "1"));
-    assert!(cfg!(debug_assertions) || seconds < 5.0, "{seconds} s");
+    // Under a second on an idle machine; anything quadratic takes minutes.
+    assert!(seconds < 60.0, "{seconds} s");
 }
