@@ -225,6 +225,9 @@ impl PointTable {
     /// The indices at which outlines begin.
     fn starts(&self, source: Source, columns: &Columns) -> Result<Vec<usize>> {
         let n = self.points.len();
+        if n == 0 {
+            return Ok(vec![0]);
+        }
         let keys: Vec<&[u32]> = self.ring_columns(columns).map(|i| &self.others[i][..]).collect();
         let new_key = |i: &usize| keys.iter().any(|key| key[*i] != key[*i - 1]);
         let inside = |kind: Break| self.breaks.iter().filter(move |(at, one)| *one == kind && (1..n).contains(at));
@@ -264,7 +267,7 @@ impl PointTable {
                 return Err(source.refusal(&place(self.lines[*start]), &problem, remedy));
             }
         }
-        Ok(if n == 0 { vec![0] } else { starts })
+        Ok(starts)
     }
 }
 
@@ -580,6 +583,7 @@ mod tests {
         let both = "id\tpart\tx\ty\n7\t1\t0\t0\n7\t1\t1\t0\n7\t1\t0\t1\n7\t2\t0\t0\n7\t2\t1\t0\n7\t2\t0\t1\n";
         assert_eq!(rings(both), labelled(&[("7/1", 3), ("7/2", 3)]));
         assert_eq!(rings("id,x,y\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n"), labelled(&[("isles", 4)]));
+        assert_refused("ring,x,y\n", &["the file holds no points"]);
         let again = "ring,x,y\nA,0,0\nA,1,0\nB,0,0\nB,1,0\nB,0,1\nA,0,1\n";
         assert_refused(again, &["line 7: the outline `A` appears again; write the points"]);
         let short = "ring,x,y\nA,0,0\nA,1,0\nA,1,1\nB,0,0\nB,1,0\n";
