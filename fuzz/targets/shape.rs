@@ -61,7 +61,8 @@ fn outline(bytes: &[u8], sampling: Sampling) {
     };
     let n = outline.vertices().len();
     assert!((3..=bytes.len()).contains(&n) && outline.vertices().iter().all(|point| point.is_finite()));
-    assert_eq!(outline.is_simple(), outline.warnings().is_empty());
+    // A projection is a warning, too.
+    assert!(outline.is_simple() || !outline.warnings().is_empty());
     let own = Outline::from_points(outline.vertices()).expect("the vertices of an outline are one");
     assert_eq!(own.vertices(), outline.vertices());
     let spec = Spec { points: 8, sampling, amplitude: 0.0, ..Spec::default() };

@@ -1,6 +1,6 @@
 //! Plane-curve mathematics in f64: shapes, perturbations, sampling into nodes, and measures of polygons.
 //!
-//! A [`Shape`] is what a user writes. [`Shape::resolve`] turns it into a [`BaseCurve`], a closed curve that can be
+//! A [`Shape`] is what a user writes; [`outlines`] reads those of files. [`Shape::resolve`] turns it into a [`BaseCurve`], a closed curve that can be
 //! evaluated at any parameter `u`. A [`RadialFactor`] maps the plane about the curve's centroid, which turns the
 //! base curve into a different curve for each member of an ensemble. A [`Sampler`] finally places n nodes on
 //! it. Nothing here draws random numbers: the ensemble does, and passes amplitudes and phases.
@@ -10,6 +10,7 @@
 mod base;
 mod crossing;
 mod outline;
+pub mod outlines;
 mod perturbation;
 pub mod polygon;
 mod sampling;

@@ -47,7 +47,8 @@ pub enum Shape {
     },
     /// `r(θ) = 1 + Σ a_m cos(mθ + φ_m)` in polar coordinates, θ = 2πu.
     Flower(Vec<FlowerMode>),
-    /// A closed polygon read from a table of points; `u` is the fraction of its length, see [`Outline`].
+    /// A closed polygon read from a file of one outline; `u` is the fraction of its length, see
+    /// [`outlines`](super::outlines).
     File(PathBuf),
 }
 
