@@ -1,0 +1,336 @@
+//! Distributions of one number, in the words in which they are written: `uniform(1.2..3)`.
+//!
+//! A draw is the quantile of one uniform number in (0, 1): it is monotonic in it, so that the points of a
+//! [design](super::Design) stay evenly spread, and it needs exactly one number.
+//!
+//! | | quantile at u |
+//! |---|---|
+//! | `uniform(a..b)` | a + u (b - a) |
+//! | `loguniform(a..b)` | a (b/a)^u |
+//! | `normal(mean,sd)` | mean + sd z(u) |
+//! | `lognormal(median,sigma)` | median exp(sigma z(u)) |
+//! | `choice(a,b,...)` | the value with the rank ⌊u count⌋ |
+//!
+//! z(u) is the quantile of the standard normal law by Wichura's algorithm AS 241 (PPND16, Applied Statistics 37, 1988),
+//! good to 16 digits.
+
+use std::{fmt, str::FromStr};
+
+use crate::{error::did_you_mean, text::number};
+
+/// More values than this are a list of another kind.
+const MAX_CHOICES: usize = 1000;
+/// The names of the distributions.
+pub const NAMES: [&str; 5] = ["uniform", "loguniform", "normal", "lognormal", "choice"];
+
+/// The law of one number.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Distribution {
+    /// Any number between two, all equally probable.
+    Uniform {
+        /// The smallest.
+        low: f64,
+        /// The largest.
+        high: f64,
+    },
+    /// A number whose logarithm is uniform.
+    LogUniform {
+        /// The smallest, above 0.
+        low: f64,
+        /// The largest.
+        high: f64,
+    },
+    /// The normal law.
+    Normal {
+        /// Its mean.
+        mean: f64,
+        /// Its standard deviation, above 0.
+        sd: f64,
+    },
+    /// A number whose logarithm is normal.
+    LogNormal {
+        /// Its median, above 0.
+        median: f64,
+        /// Standard deviation of its natural logarithm, above 0.
+        sigma: f64,
+    },
+    /// One of these values, all equally probable.
+    Choice(Vec<f64>),
+}
+
+impl Distribution {
+    /// The distribution `name(arguments)`.
+    ///
+    /// # Errors
+    /// A message for an unknown name, and for parameters that are not those of a distribution.
+    pub fn of(name: &str, arguments: &str) -> Result<Distribution, String> {
+        let wrong = |problem: &str, usage: &str| format!("{name}({arguments}): {problem}; write {usage}");
+        let finite = |word: &str| word.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+        let range = |usage: &str| {
+            let ends = arguments.split_once("..").and_then(|(low, high)| Some((finite(low)?, finite(high)?)));
+            let (low, high) = ends.ok_or_else(|| wrong("not a range of finite numbers", usage))?;
+            if low < high { Ok((low, high)) } else { Err(wrong("the range is empty", usage)) }
+        };
+        let pair = |what: &str, usage: &str| {
+            let pair = arguments.split_once(',').and_then(|(first, last)| Some((finite(first)?, finite(last)?)));
+            let (centre, scale) = pair.ok_or_else(|| wrong("not two finite numbers", usage))?;
+            if scale > 0.0 { Ok((centre, scale)) } else { Err(wrong(&format!("the {what} must be above 0"), usage)) }
+        };
+        match name {
+            "uniform" => range("uniform(A..B) with A < B").map(|(low, high)| Distribution::Uniform { low, high }),
+            "loguniform" => match range("loguniform(A..B) with 0 < A < B")? {
+                (low, high) if low > 0.0 => Ok(Distribution::LogUniform { low, high }),
+                _ => Err(wrong("a logarithm needs numbers above 0", "loguniform(A..B) with 0 < A < B")),
+            },
+            "normal" => {
+                let (mean, sd) = pair("standard deviation", "normal(MEAN,SD) with SD > 0")?;
+                Ok(Distribution::Normal { mean, sd })
+            }
+            "lognormal" => {
+                let usage =
+                    "lognormal(MEDIAN,SIGMA) with MEDIAN > 0 and SIGMA > 0, the standard deviation of the logarithm";
+                match pair("standard deviation of the logarithm", usage)? {
+                    (median, sigma) if median > 0.0 => Ok(Distribution::LogNormal { median, sigma }),
+                    _ => Err(wrong("the median must be above 0", usage)),
+                }
+            }
+            "choice" => {
+                let values: Option<Vec<f64>> = arguments.split(',').map(finite).collect();
+                match values {
+                    Some(values) if values.len() <= MAX_CHOICES => Ok(Distribution::Choice(values)),
+                    Some(values) => Err(format!("choice of {} values; at most {MAX_CHOICES}", values.len())),
+                    None => Err(wrong("not finite numbers", "choice(A,B,...)")),
+                }
+            }
+            _ => Err(format!(
+                "unknown distribution `{name}`{}; one of {}",
+                did_you_mean(name, NAMES),
+                "uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA), choice(A,B,...)"
+            )),
+        }
+    }
+
+    /// The number below which a share `u` in (0, 1) of all draws lies.
+    pub fn quantile(&self, u: f64) -> f64 {
+        match self {
+            Distribution::Uniform { low, high } => (low * (1.0 - u) + high * u).clamp(*low, *high),
+            Distribution::LogUniform { low, high } => (low.ln() * (1.0 - u) + high.ln() * u).exp().clamp(*low, *high),
+            Distribution::Normal { mean, sd } => mean + sd * normal_quantile(u),
+            Distribution::LogNormal { median, sigma } => median * (sigma * normal_quantile(u)).exp(),
+            Distribution::Choice(values) => values[((u * values.len() as f64) as usize).min(values.len() - 1)],
+        }
+    }
+
+    /// Its mean.
+    pub fn mean(&self) -> f64 {
+        match self {
+            Distribution::Uniform { low, high } => 0.5 * low + 0.5 * high,
+            Distribution::LogUniform { low, high } => (high - low) / (high / low).ln(),
+            Distribution::Normal { mean, .. } => *mean,
+            Distribution::LogNormal { median, sigma } => median * (0.5 * sigma * sigma).exp(),
+            Distribution::Choice(values) => values.iter().sum::<f64>() / values.len() as f64,
+        }
+    }
+
+    /// The values that can be drawn, if they are few; otherwise those at `u` near 0 and near 1.
+    pub fn extremes(&self) -> Vec<f64> {
+        match self {
+            Distribution::Choice(values) => values.clone(),
+            other => [SMALLEST, 1.0 - SMALLEST].map(|u| other.quantile(u)).to_vec(),
+        }
+    }
+}
+
+/// The smallest uniform number of [`Stream::uniforms`](super::Stream::uniforms); the largest is as far from 1.
+pub const SMALLEST: f64 = 0.5 / (1_u64 << 52) as f64;
+
+impl fmt::Display for Distribution {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Distribution::Uniform { low, high } => write!(f, "uniform({}..{})", number(*low), number(*high)),
+            Distribution::LogUniform { low, high } => write!(f, "loguniform({}..{})", number(*low), number(*high)),
+            Distribution::Normal { mean, sd } => write!(f, "normal({},{})", number(*mean), number(*sd)),
+            Distribution::LogNormal { median, sigma } => write!(f, "lognormal({},{})", number(*median), number(*sigma)),
+            Distribution::Choice(values) => {
+                let values: Vec<String> = values.iter().copied().map(number).collect();
+                write!(f, "choice({})", values.join(","))
+            }
+        }
+    }
+}
+
+impl FromStr for Distribution {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Distribution, String> {
+        let parts = text.trim().strip_suffix(')').and_then(|text| text.split_once('('));
+        let (name, arguments) = parts.ok_or_else(|| format!("`{text}` is not a distribution such as uniform(1..2)"))?;
+        Distribution::of(name.trim(), arguments)
+    }
+}
+
+/// The quantile of the standard normal law at `u` in (0, 1).
+pub fn normal_quantile(u: f64) -> f64 {
+    let centred = u - 0.5;
+    if centred.abs() <= 0.425 {
+        let r = 0.180625 - centred * centred;
+        return centred * ratio(&CENTRE, r);
+    }
+    let tail = if centred < 0.0 { u } else { 1.0 - u };
+    let r = (-tail.ln()).sqrt();
+    let size = if r <= 5.0 { ratio(&TAIL, r - 1.6) } else { ratio(&FAR_TAIL, r - 5.0) };
+    if centred < 0.0 { -size } else { size }
+}
+
+/// The ratio of two polynomials, with coefficients from the highest power down.
+fn ratio([over, under]: &[[f64; 8]; 2], r: f64) -> f64 {
+    let [over, under] = [over, under].map(|of| of.iter().fold(0.0, |sum, c| sum * r + c));
+    over / under
+}
+
+#[rustfmt::skip]
+const CENTRE: [[f64; 8]; 2] = [
+    [2.509_080_928_730_122_6727e+3, 3.343_057_558_358_812_8105e+4, 6.726_577_092_700_870_0853e+4,
+     4.592_195_393_154_987_1457e+4, 1.373_169_376_550_946_1125e+4, 1.971_590_950_306_551_4427e+3,
+     1.331_416_678_917_843_7745e+2, 3.387_132_872_796_366_6080e+0],
+    [5.226_495_278_852_854_5610e+3, 2.872_908_573_572_194_2674e+4, 3.930_789_580_009_271_0610e+4,
+     2.121_379_430_158_659_5867e+4, 5.394_196_021_424_751_1077e+3, 6.871_870_074_920_579_0830e+2,
+     4.231_333_070_160_091_1252e+1, 1.0],
+];
+#[rustfmt::skip]
+const TAIL: [[f64; 8]; 2] = [
+    [7.745_450_142_783_414_07640e-4, 2.272_384_498_926_918_45833e-2, 2.417_807_251_774_506_11770e-1,
+     1.270_458_252_452_368_38258e+0, 3.647_848_324_763_204_60504e+0, 5.769_497_221_460_691_40550e+0,
+     4.630_337_846_156_545_29590e+0, 1.423_437_110_749_683_57734e+0],
+    [1.050_750_071_644_416_84324e-9, 5.475_938_084_995_344_94600e-4, 1.519_866_656_361_645_71966e-2,
+     1.481_039_764_274_800_74590e-1, 6.897_673_349_851_000_04550e-1, 1.676_384_830_183_803_84940e+0,
+     2.053_191_626_637_758_82187e+0, 1.0],
+];
+#[rustfmt::skip]
+const FAR_TAIL: [[f64; 8]; 2] = [
+    [2.010_334_399_292_288_13265e-7, 2.711_555_568_743_487_57815e-5, 1.242_660_947_388_078_43860e-3,
+     2.653_218_952_657_612_30930e-2, 2.965_605_718_285_048_91230e-1, 1.784_826_539_917_291_33580e+0,
+     5.463_784_911_164_114_36990e+0, 6.657_904_643_501_103_77720e+0],
+    [2.044_263_103_389_939_78564e-15, 1.421_511_758_316_445_88870e-7, 1.846_318_317_510_054_68180e-5,
+     7.868_691_311_456_132_59100e-4, 1.487_536_129_085_061_48525e-2, 1.369_298_809_227_358_05310e-1,
+     5.998_322_065_558_879_37690e-1, 1.0],
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Stream;
+
+    const ALL: [&str; 6] = [
+        "uniform(-1.5..3)",
+        "loguniform(0.01..0.1)",
+        "normal(-2,0.5)",
+        "lognormal(0.5,0.2)",
+        "choice(3,-1,0.25,7)",
+        "lognormal(1e-12,1.5)",
+    ];
+
+    fn distribution(text: &str) -> Distribution {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn a_distribution_prints_as_it_is_parsed() {
+        for text in ALL {
+            assert_eq!(distribution(text).to_string(), text);
+        }
+        assert_eq!(distribution(" normal( 1 , 2 ) ").to_string(), "normal(1,2)");
+    }
+
+    #[test]
+    fn the_normal_quantile_is_the_inverse_of_the_error_function() {
+        let pinned = [(0.9, 1.2815515655446008), (0.001, -3.090232306167813), (1e-10, -6.361340902404056)];
+        for (u, z) in pinned {
+            assert!((normal_quantile(u) - z).abs() < 4e-16 * z.abs(), "{u}: {}", normal_quantile(u));
+        }
+        assert_eq!(normal_quantile(0.5), 0.0);
+        for k in 1..400 {
+            // Both tails down to the smallest number that is drawn, and the middle.
+            for u in [f64::from(k) / 400.0, SMALLEST.powf(f64::from(k) / 400.0)] {
+                let z = normal_quantile(u);
+                let back = 0.5 * libm::erfc(-z / std::f64::consts::SQRT_2);
+                assert!((back / u - 1.0).abs() < 2e-14, "{u}: {back}");
+                assert!((normal_quantile(1.0 - u) + z).abs() < 1e-15 + 1e-15 / u.min(1.0 - u), "{u}");
+            }
+        }
+    }
+
+    #[test]
+    fn means_and_quantiles_of_a_hundred_thousand_draws_are_the_exact_ones_within_four_standard_errors() {
+        let (seed, count) = (11, 100_000_u64);
+        for text in ALL {
+            let law = distribution(text);
+            let draw = |j| law.quantile(Stream::new(seed, j, 0).uniforms(0)[0]);
+            let mut draws: Vec<f64> = (0..count).map(draw).collect();
+            draws.sort_by(f64::total_cmp);
+            let n = count as f64;
+            let mean = draws.iter().sum::<f64>() / n;
+            let deviation = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+            let off = (mean - law.mean()) / (deviation / n.sqrt());
+            assert!(off.abs() < 4.0, "seed {seed}: the mean of {text} is off by {off} standard errors");
+            // The share of draws up to the exact quantile is binomial; a value of a choice holds several shares.
+            for u in [0.05, 0.25, 0.5, 0.75, 0.95] {
+                let exact = law.quantile(u);
+                let [below, up_to] = [draws.partition_point(|x| *x < exact), draws.partition_point(|x| *x <= exact)];
+                let bound = 4.0 * (u * (1.0 - u) / n).sqrt();
+                let [below, up_to] = [below, up_to].map(|count| count as f64 / n);
+                assert!(below - bound < u && u < up_to + bound, "seed {seed}: {text} at {u}: {below} to {up_to}");
+            }
+        }
+        // A law that is five per cent wider fails.
+        let wide = Distribution::Normal { mean: 0.0, sd: 1.05 };
+        let share =
+            (0..count).filter(|j| wide.quantile(Stream::new(seed, *j, 0).uniforms(0)[0]) < normal_quantile(0.05));
+        let off = (share.count() as f64 / count as f64 - 0.05) / (0.05 * 0.95 / count as f64).sqrt();
+        assert!(off > 4.0, "seed {seed}: {off}");
+    }
+
+    #[test]
+    fn wrong_parameters_are_refused_with_the_form() {
+        for (text, part) in [
+            ("uniform(3..1)", "the range is empty; write uniform(A..B)"),
+            ("uniform(1..1)", "the range is empty"),
+            ("uniform(1,2)", "not a range"),
+            ("uniform(1..inf)", "not a range of finite numbers"),
+            ("loguniform(0..1)", "needs numbers above 0"),
+            ("normal(1,-0.5)", "the standard deviation must be above 0; write normal(MEAN,SD)"),
+            ("normal(1,0)", "must be above 0"),
+            ("normal(1)", "not two finite numbers"),
+            ("normal(1,2,3)", "not two finite numbers"),
+            ("lognormal(-1,0.2)", "the median must be above 0"),
+            ("lognormal(1,-0.2)", "the standard deviation of the logarithm must be above 0"),
+            ("choice()", "not finite numbers"),
+            ("choice(1,nan)", "not finite numbers"),
+            ("unifrom(1..2)", "did you mean `uniform`?"),
+            ("gamma(1,2)", "unknown distribution `gamma`; one of uniform(A..B)"),
+            ("0.5", "is not a distribution"),
+        ] {
+            let message = text.parse::<Distribution>().unwrap_err();
+            assert!(message.contains(part), "{text}: {message}");
+        }
+        let many = format!("choice({})", vec!["1"; 1001].join(","));
+        assert!(many.parse::<Distribution>().unwrap_err().contains("choice of 1001 values"));
+    }
+
+    #[test]
+    fn a_quantile_is_monotonic_and_stays_in_the_support() {
+        for text in ALL {
+            let law = distribution(text);
+            if let Distribution::Choice(values) = &law {
+                assert!((1..100).all(|k| values.contains(&law.quantile(f64::from(k) / 100.0))));
+                continue;
+            }
+            let all: Vec<f64> = (1..1000).map(|k| law.quantile(f64::from(k) / 1000.0)).collect();
+            assert!(all.windows(2).all(|pair| pair[0] < pair[1]), "{text}");
+            let [low, high] = law.extremes()[..] else { panic!("{text}") };
+            assert!(low < all[0] && all[998] < high && low.is_finite() && high.is_finite(), "{text}");
+        }
+        let [low, high] = distribution("loguniform(0.1..0.3)").extremes()[..] else { panic!() };
+        assert!(low >= 0.1 && high <= 0.3);
+    }
+}
