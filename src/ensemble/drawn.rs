@@ -227,6 +227,8 @@ impl<T: Drawable> de::Visitor<'_> for DrawnVisitor<T> {
 /// Points at which a value is tried before any is refused, and for the share of those that are.
 const TRIED: u64 = 256;
 const COUNTED: u64 = 1 << 16;
+/// A share that counts as all.
+const NEARLY_ALL: f64 = 1.0 - 1e-6;
 /// Corners of the support that are tried.
 const MAX_CORNERS: usize = 4096;
 /// Parts of the interval in which the share of a single distribution is exact.
@@ -245,8 +247,11 @@ impl Refused {
     /// Looks for numbers of the distributions that are `refused`, with the reason: inside their support and at all its
     /// corners.
     pub fn of(distributions: &[&Distribution], refused: impl Fn(&[f64]) -> Option<String>) -> Option<Refused> {
-        let inside = || (0..TRIED).map(|point| numbers(distributions, point));
-        let reason = inside().chain(corners(distributions)).find_map(|numbers| refused(&numbers))?;
+        let inside = (0..TRIED).map(|point| numbers(distributions, point));
+        let first = inside.chain(corners(distributions)).find(|numbers| refused(numbers).is_some())?;
+        // A message shows few digits, where they are as wrong.
+        let short: Vec<f64> = first.iter().map(|number| rounded(*number, 3).parse().unwrap_or(*number)).collect();
+        let reason = refused(&short).or_else(|| refused(&first))?;
         let fails = |numbers: &[f64]| refused(numbers).is_some();
         let share = match distributions {
             [only] => exact_share(only, |number| fails(&[number])),
@@ -258,15 +263,13 @@ impl Refused {
 
 impl fmt::Display for Refused {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let reason = &self.reason;
         match self.share {
+            Some(share) if share > NEARLY_ALL => return write!(f, "every member would be refused ({reason})"),
             Some(share) => write!(f, "{} % of the members", rounded(100.0 * share, 2))?,
             None => write!(f, "a few members, under {} %", rounded(100.0 / COUNTED as f64, 1))?,
         }
-        write!(
-            f,
-            " would be refused ({}); narrow the distribution, or use uniform, loguniform or lognormal",
-            self.reason
-        )
+        write!(f, " would be refused ({reason}); narrow the distribution, or use uniform, loguniform or lognormal")
     }
 }
 
@@ -385,7 +388,7 @@ mod tests {
             ("circle:choice(1,2,-1,4)", ["25 % of the members", "the radius -1 is out of range"]),
             // Six deviations: too rare to be seen, but not impossible.
             ("circle:normal(3,0.5)", ["9.9e-8 % of the members", "the radius -"]),
-            ("flower:uniform(2..5):0.1", ["100 % of the members", "is not MODE"]),
+            ("flower:uniform(2..5):0.1", ["every member would be refused", "is not MODE"]),
             ("flower:2:uniform(0..0.6),3:uniform(0..0.6)", ["5.6 % of the members", "add up to"]),
             ("flower:choice(2,0.5):0.1", ["50 % of the members", "is not MODE"]),
         ] {
