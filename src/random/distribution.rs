@@ -1,7 +1,7 @@
 //! Distributions of one number, in the words in which they are written: `uniform(1.2..3)`.
 //!
-//! A draw is the quantile of one uniform number in (0, 1): it is monotonic in it, so that the points of a
-//! [design](super::Design) stay evenly spread, and it needs exactly one number.
+//! A draw is the quantile of one uniform number in (0, 1): it needs exactly one number, and the points of a
+//! [design](super::Design) stay evenly spread. A choice keeps the order in which its values are written.
 //!
 //! | | quantile at u |
 //! |---|---|
@@ -273,13 +273,21 @@ mod tests {
             let deviation = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
             let off = (mean - law.mean()) / (deviation / n.sqrt());
             assert!(off.abs() < 4.0, "seed {seed}: the mean of {text} is off by {off} standard errors");
-            // The share of draws up to the exact quantile is binomial; a value of a choice holds several shares.
+            if let Distribution::Choice(values) = &law {
+                let share = 1.0 / values.len() as f64;
+                for value in values {
+                    let found = draws.iter().filter(|draw| *draw == value).count() as f64 / n;
+                    let bound = 4.0 * (share * (1.0 - share) / n).sqrt();
+                    assert!((found - share).abs() < bound, "seed {seed}: {value} has {found} of the draws");
+                }
+                continue;
+            }
+            // The share of draws up to the exact quantile is binomial.
             for u in [0.05, 0.25, 0.5, 0.75, 0.95] {
                 let exact = law.quantile(u);
-                let [below, up_to] = [draws.partition_point(|x| *x < exact), draws.partition_point(|x| *x <= exact)];
+                let found = draws.partition_point(|x| *x <= exact) as f64 / n;
                 let bound = 4.0 * (u * (1.0 - u) / n).sqrt();
-                let [below, up_to] = [below, up_to].map(|count| count as f64 / n);
-                assert!(below - bound < u && u < up_to + bound, "seed {seed}: {text} at {u}: {below} to {up_to}");
+                assert!((found - u).abs() < bound, "seed {seed}: {found} of {text} are below its quantile at {u}");
             }
         }
         // A law that is five per cent wider fails.
