@@ -110,7 +110,7 @@ fn shards_one_member_and_a_changed_number_of_threads_give_the_rows_of_the_whole(
 #[test]
 fn a_stopped_run_resumes_to_the_files_of_one_that_was_not() {
     let home = home("lhs", "");
-    let common = "--backend cpu --quiet --threads 1 --curves 400 --points 100 --adaptive=1e-4 spec.toml";
+    let common = "--backend cpu --quiet --threads 1 --curves 1200 --points 100 --adaptive=1e-4 spec.toml";
     done(home.path(), &format!("run {common} --out whole"));
     let stopped = curvelax(home.path(), &format!("run {common} --max-time 1s --out part"));
     assert_eq!(stopped.status.code(), Some(75), "{}", String::from_utf8_lossy(&stopped.stderr));
