@@ -11,7 +11,7 @@ use curvelax::{
 fn main() -> curvelax::Result<()> {
     let spec = Spec {
         curves: 32,
-        flow: Flow::Willmore,
+        flow: Flow::Willmore.into(),
         t_end: Some(8.0.into()),
         stop_when_relaxed: Some(true),
         ..Spec::default()

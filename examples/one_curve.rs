@@ -8,7 +8,7 @@ use curvelax::{
 };
 
 fn main() -> curvelax::Result<()> {
-    let study = Study::new(Spec { curves: 1, amplitude: 0.0, series: Some(0.25), ..Spec::default() })?;
+    let study = Study::new(Spec { curves: 1, amplitude: 0.0.into(), series: Some(0.25), ..Spec::default() })?;
     let mut members = Vec::new();
     relax(&study, &mut members)?;
 

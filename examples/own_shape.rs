@@ -25,7 +25,7 @@ fn main() -> curvelax::Result<()> {
         // Steps that adapt, on to an excess that does not depend on n.
         let spec = Spec {
             curves: 1,
-            amplitude: 0.0,
+            amplitude: 0.0.into(),
             adaptive: Some(1e-3),
             pull: Pull::Auto,
             relax_at: Some(0.01),

@@ -110,7 +110,7 @@ impl Sink for RoundSums<'_> {
 pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Option<Error>) -> Result<Spec> {
     let Some(goal) = spec.accuracy else { return Ok(spec) };
     let mut spec = spec.validate()?;
-    if spec.amplitude > 0.0 {
+    if spec.has_different_members() {
         spec.curves = spec.curves.max(MIN_MEMBERS);
     }
     let refuse = |problem: &str, remedy: &str| Err(Error::value("accuracy", number(goal), problem, remedy));

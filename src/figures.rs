@@ -131,7 +131,7 @@ impl Figure {
             points: POINTS,
             shape: self.shape.parse().map_err(wrong)?,
             sampling: self.sampling,
-            amplitude: 0.0,
+            amplitude: 0.0.into(),
             flow: self.flow.parse().map_err(wrong)?,
             tau: Some(self.tau.into()),
             t_end: Some(self.times.iter().copied().fold(0.0, f64::max).into()),

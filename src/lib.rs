@@ -64,7 +64,7 @@
 //! ```
 //! use curvelax::{ensemble::{Spec, Study}, relax};
 //!
-//! let study = Study::new(Spec { curves: 1, amplitude: 0.0, t_end: Some(0.2.into()), ..Spec::default() })?;
+//! let study = Study::new(Spec { curves: 1, amplitude: 0.0.into(), t_end: Some(0.2.into()), ..Spec::default() })?;
 //! let mut members = Vec::new();
 //! relax(&study, &mut members)?;
 //! let (start, end) = (members[0].outcome.start, members[0].outcome.end);

@@ -8,7 +8,13 @@
 //! The uniforms have the same bits everywhere. A normal number needs one logarithm and one cosine, so two machines
 //! agree on it as far as their mathematical libraries do (a few units in the last place).
 
+mod design;
+pub mod distribution;
+
 use std::f64::consts::TAU;
+
+pub use design::{Design, DrawAddress, MAX_SOBOL};
+pub use distribution::Distribution;
 
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];

@@ -216,7 +216,11 @@ impl Pool<'_> {
         let mut ended = trajectory.end(last);
         // Not all cells have a level.
         let at = self.cells.binary_search_by_key(&ended.outcome.cell, |cell| cell.index);
-        ended.outcome.rate_theory = at.ok().and_then(|at| theory::rate_of(&self.cells[at].spec, &ended.outcome));
+        ended.outcome.rate_theory = at.ok().and_then(|at| {
+            let cell = &self.cells[at];
+            let values = cell.spec.values(cell.drawn_as(ended.outcome.member)).ok()?;
+            theory::rate_of(&cell.spec, &values, &ended.outcome)
+        });
         ended
     }
 

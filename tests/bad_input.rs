@@ -154,7 +154,7 @@ fn a_wrong_sweep_names_its_key_and_cell() {
 
 #[test]
 fn an_unknown_flag_is_answered_with_the_nearest() {
-    for (given, meant) in [("--tua", "--tau"), ("--curve", "--curves"), ("--relaxto", "--relax-to")] {
+    for (given, meant) in [("--tauu", "--tau"), ("--curve", "--curves"), ("--relaxto", "--relax-to")] {
         assert_says(&refused(&[given, "1"], &[]), &[given, &format!("similar argument exists: '{meant}'")]);
     }
 }
@@ -166,7 +166,7 @@ fn a_wrong_spec_file_is_shown_in_its_line() {
         ("t_end = 1", &["line 1, column 1", "^^^^^", "did you mean `t-end`?"]),
         ("curves = 'many'", &["line 1, column 10", "invalid type: string \"many\""]),
         ("curves = -3", &["line 1, column 10", "`-3`"]),
-        ("amplitude = '0.1'", &["line 1, column 13", "expected f64"]),
+        ("amplitude = '0.1'", &["line 1, column 13", "expected a number, or a distribution"]),
         ("solver = 'gaus-seidel'", &["unknown variant `gaus-seidel`", "did you mean `gauss-seidel`?"]),
         ("flow = 'wilmore'", &["line 1, column 8", "did you mean `willmore`?"]),
         ("no-redistribution = 1", &["line 1, column 21", "expected a boolean"]),

@@ -73,8 +73,8 @@ fn method(precision: Precision, solver: Solver) -> Spec {
         curves: 1,
         points: 61,
         sampling: Sampling::Parameter,
-        amplitude: 0.0,
-        flow: Flow::Elastic(0.4),
+        amplitude: 0.0.into(),
+        flow: Flow::Elastic(0.4).into(),
         tau: Some(1e-4.into()),
         t_end: Some(1e-2.into()),
         backend: BackendChoice::Cpu,
@@ -149,7 +149,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
                 tau: times(&spec, c.powi(4)),
                 t_end: Some((spec.final_time() * c.powi(4)).into()),
                 omega: Some(Omega::Rate(1.0 / c.powi(4))),
-                flow: Flow::Elastic(0.4 / (c * c)),
+                flow: Flow::Elastic(0.4 / (c * c)).into(),
                 ..spec.clone()
             };
             let (large, nodes) = relaxed(&scaled, move |u| c * potato(u));
@@ -187,7 +187,7 @@ fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
         let (outcome, plain) = relaxed(&spec, potato);
         assert!(outcome.steps > 8 && outcome.t_relax.is_some());
         for c in [2.0_f64, 0.25, 3.0] {
-            let flow = Flow::Elastic(0.4 / (c * c));
+            let flow = Flow::Elastic(0.4 / (c * c)).into();
             let t_end = Some((spec.final_time() * c.powi(4)).into());
             let (large, nodes) = relaxed(&Spec { t_end, flow, ..spec.clone() }, move |u| c * potato(u));
             let expected: Vec<DVec2> = plain.iter().map(|node| *node * c).collect();
@@ -201,13 +201,13 @@ fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
         // The negative controls: an unscaled ω and an unscaled pull make a difference.
         let fixed = Spec { omega: Some(Omega::Rate(1.0)), ..spec.clone() };
         let (_, slow) = relaxed(&fixed, potato);
-        let flow = Flow::Elastic(0.1);
+        let flow = Flow::Elastic(0.1).into();
         let (_, large) =
             relaxed(&Spec { t_end: Some((16.0 * spec.final_time()).into()), flow, ..fixed }, |u| 2.0 * potato(u));
         assert!(distance(&slow, &large.iter().map(|node| *node / 2.0).collect::<Vec<_>>()) > 1e-6);
         let rate = Pull::Rate(40.0);
         let (_, pulled) = relaxed(&Spec { pull: rate, ..spec.clone() }, potato);
-        let (t_end, flow) = (Some((16.0 * spec.final_time()).into()), Flow::Elastic(0.1));
+        let (t_end, flow) = (Some((16.0 * spec.final_time()).into()), Flow::Elastic(0.1).into());
         let (_, large) = relaxed(&Spec { t_end, flow, pull: rate, ..spec.clone() }, |u| 2.0 * potato(u));
         assert!(distance(&pulled, &large.iter().map(|node| *node / 2.0).collect::<Vec<_>>()) > 1e-6);
 
@@ -247,9 +247,9 @@ fn the_first_node_does_not_matter() {
 /// Steps and sweeps of a few runs, which are deterministic: if they change, the program has changed.
 #[test]
 fn the_work_of_a_run_is_what_it_was() {
-    let spec = |flow, n, sor| Spec {
+    let spec = |flow: Flow, n, sor| Spec {
         points: n,
-        flow,
+        flow: flow.into(),
         sor: Sor::Factor(sor),
         tau: Some(1e-3.into()),
         t_end: Some(0.1.into()),
@@ -368,8 +368,8 @@ fn single_precision_agrees_with_double_on_the_paper_s_ellipse() {
 
 /// Nodes at t = 1, and t_relax, of the 2:1 ellipse.
 fn relaxed_ellipse<T: Real>(n: usize, method: &Method, tolerance: f64) -> (Vec<DVec2>, f64) {
-    let shape = Shape::Ellipse { a: 2.0, b: 1.0 };
-    let spec = Spec { shape, sampling: Sampling::Arclength, points: n, amplitude: 0.0, ..Spec::default() };
+    let shape = Shape::Ellipse { a: 2.0, b: 1.0 }.into();
+    let spec = Spec { shape, sampling: Sampling::Arclength, points: n, amplitude: 0.0.into(), ..Spec::default() };
     let nodes = Family::new(&spec).unwrap().member(0).unwrap().nodes;
     let excess = polygon::excess(&nodes);
     let parameters = Parameters {

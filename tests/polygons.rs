@@ -38,7 +38,10 @@ fn nodes(outline: &[DVec2], n: usize) -> (Vec<DVec2>, Mollified) {
 }
 
 fn member(shape: Shape, points: usize, amplitude: f64, index: u64) -> Member {
-    Ensemble::new(&Spec { shape, points, amplitude, ..Spec::default() }).unwrap().member(index).unwrap()
+    Ensemble::new(&Spec { shape: shape.into(), points, amplitude: amplitude.into(), ..Spec::default() })
+        .unwrap()
+        .member(index)
+        .unwrap()
 }
 
 fn sharpest_turn(nodes: &[DVec2]) -> f64 {

@@ -42,7 +42,7 @@ fn adaptive(shape: &str, points: usize) -> Spec {
         shape: shape.parse().unwrap(),
         points,
         curves: 1,
-        amplitude: 0.0,
+        amplitude: 0.0.into(),
         adaptive: Some(1e-3),
         solver: Solver::Direct.into(),
         backend: BackendChoice::Cpu,
@@ -53,7 +53,7 @@ fn adaptive(shape: &str, points: usize) -> Spec {
 
 /// The members of `spec` as a program gets them from the library.
 fn run(spec: &Spec) -> Vec<Ended> {
-    run_of(spec, spec.shape.resolve().unwrap())
+    run_of(spec, spec.shape.typical().resolve().unwrap())
 }
 
 fn run_of(spec: &Spec, curve: BaseCurve) -> Vec<Ended> {
@@ -360,7 +360,7 @@ fn a_curve_whose_curvature_has_left_it_is_never_relaxed() {
         stop_when_relaxed: Some(true),
         ..adaptive("nonconvex", 100)
     };
-    let spec = Spec { amplitude: 0.05, curves: 48, ..spec };
+    let spec = Spec { amplitude: 0.05.into(), curves: 48, ..spec };
     let family = Family::new(&spec.clone().validate().unwrap()).unwrap();
     // Two at a step that is short enough, all at steps that are too long.
     let coarse = (11..=30).flat_map(|j| (0..spec.curves).map(move |member| (j, member)));
@@ -501,7 +501,7 @@ fn single_precision_against_double() {
             print!("| `{flow}` | {} |", if pace.is_none() { "adaptive" } else { "fixed" });
             for n in [50, 100, 200, 256, 320, 400, 512] {
                 let spec = Spec {
-                    flow: flow.clone(),
+                    flow: flow.clone().into(),
                     tau: pace.map(Tau::Step),
                     stop_when_relaxed: Some(true),
                     t_end: Some(20.0.into()),

@@ -141,7 +141,7 @@ fn members_that_take_other_branches_are_not_disturbed() {
     for solver in Solver::ALL {
         // Every branch alone, and all mixtures.
         let specs = [(Some(1e-3.into()), None), (None, Some(1e-2))].map(|(tau, adaptive)| {
-            let (solver, amplitude) = (solver.into(), 0.1);
+            let (solver, amplitude) = (solver.into(), 0.1.into());
             let mut mixed =
                 Spec { tau, adaptive, t_end: Some(0.03.into()), points: 32, solver, amplitude, ..Spec::default() };
             let axes = ["no-redistribution=true,false", "pull=0,3", "flow=surface-diffusion;willmore;poly:0.2"];
@@ -155,8 +155,13 @@ fn members_that_take_other_branches_are_not_disturbed() {
 
 #[test]
 fn members_that_fail_leave_the_lanes_to_others() {
-    let base =
-        Spec { t_end: Some(0.5.into()), points: 40, solver: Solver::Direct.into(), amplitude: 0.3, ..Spec::default() };
+    let base = Spec {
+        t_end: Some(0.5.into()),
+        points: 40,
+        solver: Solver::Direct.into(),
+        amplitude: 0.3.into(),
+        ..Spec::default()
+    };
     let fixed = [spec("lemniscate:1", Spec { tau: Some(1e-3.into()), ..base.clone() })];
     let adaptive = [spec("lemniscate:1", Spec { adaptive: Some(1e-3), ..base })];
     for specs in [&fixed, &adaptive] {

@@ -65,7 +65,7 @@ fn outline(bytes: &[u8], sampling: Sampling) {
     assert!(outline.is_simple() || !outline.warnings().is_empty());
     let own = Outline::from_points(outline.vertices()).expect("the vertices of an outline are one");
     assert_eq!(own.vertices(), outline.vertices());
-    let spec = Spec { points: 8, sampling, amplitude: 0.0, ..Spec::default() };
+    let spec = Spec { points: 8, sampling, amplitude: 0.0.into(), ..Spec::default() };
     if sampling == Sampling::Arclength {
         let family = Family::of(&spec, BaseCurve::from_outline(outline)).unwrap();
         let member = family.member(0).unwrap();

@@ -9,9 +9,9 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::{Deserialize, de::value::StrDeserializer};
 
 use crate::{
-    curve::{Modes, Sampling, Shape},
+    curve::{Modes, Perturbation, Sampling, Shape},
     ensemble::{
-        Shard, Spec,
+        Drawn, Shard, Spec,
         spec::{
             BackendChoice, DEFAULT_ADAPTIVE, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau,
             Units,
@@ -20,9 +20,12 @@ use crate::{
     },
     error::{Error, Result},
     flow::Flow,
+    random::Design,
 };
 
 const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
+const PERTURBATIONS: &[&str] = &["amplitude-phase", "gaussian"];
+const DESIGNS: &[&str] = &["random", "sobol", "lhs"];
 const ORDERS: &[&str] = &["coloured", "lexicographic"];
 pub(super) const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
 pub(super) const PRECISIONS: &[&str] = &["f32", "f64"];
@@ -52,29 +55,43 @@ pub struct SpecFlags {
     )]
     seed: Option<u64>,
     /// Base curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],... or file:PATH, a CSV
-    /// file with columns x,y. PATH is relative to the current folder, also in a spec file [default: ellipse:2,1]
+    /// file with columns x,y. PATH is relative to the current folder, also in a spec file. Any number may be a
+    /// distribution, drawn for each member: uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA) with
+    /// SIGMA the standard deviation of the logarithm, or choice(A,B,...) [default: ellipse:2,1]
     #[arg(
-        long, value_name = "SHAPE", value_parser = text::<Shape>, allow_hyphen_values = true,
+        long, value_name = "SHAPE", value_parser = text_of::<Drawn<Shape>>, allow_hyphen_values = true,
         help_heading = ENSEMBLE
     )]
-    shape: Option<Shape>,
+    shape: Option<Drawn<Shape>>,
     /// Placement of the nodes on the curve [default: arclength]
     #[arg(long, value_name = "HOW", value_parser = word::<Sampling>(SAMPLINGS), help_heading = ENSEMBLE)]
     sampling: Option<Sampling>,
-    /// Size σ of the random perturbation, 0 for none [default: 0.05]
+    /// Size σ of the random perturbation, 0 for none; or a distribution, as for --shape [default: 0.05]
     #[arg(
-        long, value_name = "SIGMA", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE
+        long, value_name = "SIGMA", value_parser = text_of::<Drawn<f64>>, allow_hyphen_values = true, help_heading = ENSEMBLE
     )]
-    amplitude: Option<f64>,
+    amplitude: Option<Drawn<f64>>,
     /// Modes of the random perturbation [default: 2..=8]
     #[arg(
-        long, value_name = "LO..=HI", value_parser = text::<Modes>, allow_hyphen_values = true,
+        long, value_name = "LO..=HI", value_parser = text_of::<Modes>, allow_hyphen_values = true,
         help_heading = ENSEMBLE
     )]
     modes: Option<Modes>,
-    /// Power p: mode m has standard deviation σ m^-p [default: 1]
-    #[arg(long, value_name = "P", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE)]
-    decay: Option<f64>,
+    /// Power p: mode m has standard deviation σ m^-p; or a distribution, as for --shape [default: 1]
+    #[arg(
+        long, value_name = "P", value_parser = text_of::<Drawn<f64>>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
+    decay: Option<Drawn<f64>>,
+    /// Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of cos and
+    /// sin with the same power [default: amplitude-phase]
+    #[arg(long, value_name = "LAW", value_parser = word::<Perturbation>(PERTURBATIONS), help_heading = ENSEMBLE)]
+    perturbation: Option<Perturbation>,
+    /// How the members of a cell are spread over the distributions of --shape, --flow, --amplitude and --decay: each on
+    /// its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay random
+    /// [default: random]
+    #[arg(long, value_name = "DESIGN", value_parser = word::<Design>(DESIGNS), help_heading = ENSEMBLE)]
+    design: Option<Design>,
     /// Run a cell for each value of this key, and for each combination if several keys are swept. Separate values that
     /// contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1' [default: none]
     #[arg(long, value_name = "KEY=V1,V2,...", value_parser = text_of::<SweepAxis>, help_heading = ENSEMBLE)]
@@ -95,12 +112,13 @@ pub struct SpecFlags {
     #[arg(long, value_name = "I/N", value_parser = shard, allow_hyphen_values = true, help_heading = ENSEMBLE)]
     shard: Option<Shard>,
 
-    /// Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,... [default: surface-diffusion]
+    /// Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions, as for --shape
+    /// [default: surface-diffusion]
     #[arg(
-        long, value_name = "FLOW", value_parser = text::<Flow>, allow_hyphen_values = true,
+        long, value_name = "FLOW", value_parser = text_of::<Drawn<Flow>>, allow_hyphen_values = true,
         help_heading = EVOLUTION
     )]
-    flow: Option<Flow>,
+    flow: Option<Drawn<Flow>>,
     /// Mobility B in length^4/time, for surface diffusion D_s gamma Omega^2 nu/(k_B T): times are then in the unit of time
     /// that it has, in all flags and all results [default: 1]
     #[arg(long, value_name = "B", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
@@ -248,7 +266,7 @@ pub const OUTPUT: &str = "Output";
 macro_rules! every_flag {
     ($to:ident) => {
         $to! {
-            curves points seed shape sampling amplitude modes decay flow no_redistribution pull solver
+            curves points seed shape sampling amplitude modes decay perturbation design flow no_redistribution pull solver
             order sor max_sweeps backend snapshots store common_random_numbers refine;
             accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
         }
@@ -395,10 +413,6 @@ pub(super) fn duration(text: &str) -> Result<Duration, String> {
     }
 }
 
-fn text<T: TryFrom<String, Error = String>>(text: &str) -> Result<T, String> {
-    T::try_from(text.to_owned())
-}
-
 fn text_of<T: std::str::FromStr<Err = String>>(text: &str) -> Result<T, String> {
     text.parse()
 }
@@ -486,7 +500,7 @@ mod tests {
     #[test]
     fn every_flag_replaces_its_key() {
         let spec = parse(
-            "--curves 3 --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --flow willmore --mobility 2 --units um,h \
+            "--curves 3 --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --perturbation gaussian --design lhs --flow willmore --mobility 2 --units um,h \
              --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --pull 3 --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \
@@ -541,6 +555,8 @@ mod tests {
         }
         assert_eq!(words::<Solver>(), Solver::NAMES);
         assert_eq!(words::<SolverChoice>(), SolverChoice::NAMES);
+        assert_eq!(words::<Perturbation>(), PERTURBATIONS);
+        assert_eq!(words::<Design>(), DESIGNS);
         assert_eq!(words::<Order>(), ORDERS);
         assert_eq!(words::<BackendChoice>(), BACKENDS);
         assert_eq!(words::<DeviceKind>(), DeviceKind::NAMES);

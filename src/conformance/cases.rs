@@ -34,7 +34,7 @@ fn tau(n: usize) -> f64 {
 /// Creates `count` different members of `n` nodes, each with its own curve, flow, τ, ω and κ, to run `steps` steps.
 pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec<Run<f64>>> {
     let amplitude = if n < 20 { 0.02 } else { 0.05 };
-    let spec = Spec { points: n, amplitude, seed: 20, ..Spec::default() };
+    let spec = Spec { points: n, amplitude: amplitude.into(), seed: 20, ..Spec::default() };
     let family = Family::new(&spec)?;
     let flows: [Flow; LAWS] = [
         Flow::SurfaceDiffusion,

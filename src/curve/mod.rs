@@ -19,7 +19,7 @@ mod shape;
 pub use base::BaseCurve;
 pub use crossing::{Undecided, clearance, crossing, crossing_within};
 pub use outline::{MAX_POINTS, Outline};
-pub use perturbation::{MIN_FACTOR, Modes, RadialFactor, RadialLaw, check_directions};
+pub use perturbation::{MIN_FACTOR, Modes, Perturbation, RadialFactor, RadialLaw, check_directions};
 pub use sampling::{Sampler, Sampling, resample};
 pub use shape::{FlowerMode, Shape};
 

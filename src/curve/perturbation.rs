@@ -4,7 +4,8 @@
 //! p ↦ c + (p - c)·(1 + Σ_m a_m cos(mθ + φ_m)),   m = low…high,
 //! ```
 //!
-//! with θ the polar angle of `p - c`, `a_m ~ N(0, (σ m^-p)²)` and `φ_m` uniform. The factor depends only on the angle.
+//! with θ the polar angle of `p - c`, `a_m ~ N(0, (σ m^-p)²)` and `φ_m` uniform; or, for [`Perturbation::Gaussian`], with
+//! independent normal coefficients of cos and sin. The factor depends only on the angle.
 //! While it is positive, the map therefore takes each ray onto itself, is one-to-one, and preserves embedding and
 //! orientation, whether or not the curve is star-shaped about c. Draws whose factor falls below [`MIN_FACTOR`] are
 //! redrawn, which cuts off the tails of the normal law.
@@ -32,6 +33,26 @@ const MAX_DEVIATION: f64 = 0.3;
 /// Angles per period of the highest mode at which the factor is checked. Between them it can be lower by
 /// at most (π/64)²/2 = 0.12 % of Σ|a_m|, far less than [`MIN_FACTOR`] for every permitted law.
 const ANGLES_PER_PERIOD: u32 = 64;
+
+/// How a mode is drawn. Both laws have the power `σ² m^-2p` in mode m, half of it in cos and half in sin, so that the
+/// radius along the angle has the spectrum of a curve with Hurst exponent `H = p - 1/2`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Perturbation {
+    /// A normal amplitude and a uniform phase. The coefficients of cos and sin are uncorrelated but not independent, with
+    /// kurtosis 4.5.
+    #[default]
+    AmplitudePhase,
+    /// Independent normal coefficients of cos and sin, with kurtosis 3: the radius is a Gaussian process.
+    Gaussian,
+}
+
+impl Perturbation {
+    /// Whether it is the default.
+    pub fn is_default(&self) -> bool {
+        *self == Perturbation::default()
+    }
+}
 
 /// Modes `low..=high` of the perturbation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -159,6 +180,16 @@ impl RadialFactor {
         RadialFactor { low, coefficients }
     }
 
+    /// Creates the factor with coefficients `(A_m, B_m)` of cos mθ and sin mθ for each of `low`, `low + 1`, …
+    pub fn of_coefficients(low: u32, modes: impl IntoIterator<Item = DVec2>) -> RadialFactor {
+        RadialFactor { low, coefficients: modes.into_iter().map(|c| DVec2::new(c.x, -c.y)).collect() }
+    }
+
+    /// Returns each mode with its coefficients `(A_m, B_m)` of cos mθ and sin mθ.
+    pub fn coefficients(&self) -> impl Iterator<Item = (u32, DVec2)> + '_ {
+        (self.low..).zip(self.coefficients.iter().map(|c| DVec2::new(c.x, -c.y)))
+    }
+
     /// Returns `Σ a_m cos(mθ + φ_m)` in the `direction` (cos θ, sin θ).
     pub fn excursion(&self, direction: DVec2) -> f64 {
         let polynomial = |sum: DVec2, c: &DVec2| sum.rotate(direction) + *c;
@@ -223,6 +254,19 @@ mod tests {
                 let expected: f64 = (low..).zip(modes).map(wave).sum();
                 assert!((factor.excursion(DVec2::from_angle(theta)) - expected).abs() < 1e-13, "{low} {theta}");
             }
+        }
+    }
+
+    #[test]
+    fn coefficients_of_cos_and_sin_are_those_of_the_sum() {
+        let coefficients = [DVec2::new(0.3, -0.1), DVec2::new(0.0, 0.2)];
+        let factor = RadialFactor::of_coefficients(3, coefficients);
+        assert!(factor.coefficients().eq([(3, coefficients[0]), (4, coefficients[1])]));
+        for j in 0..50 {
+            let theta = 0.13 * f64::from(j);
+            let wave = |(m, c): (u32, DVec2)| c.dot(DVec2::from_angle(f64::from(m) * theta));
+            let expected: f64 = factor.coefficients().map(wave).sum();
+            assert!((factor.excursion(DVec2::from_angle(theta)) - expected).abs() < 1e-13, "{theta}");
         }
     }
 

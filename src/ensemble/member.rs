@@ -1,19 +1,26 @@
 //! Members: member j of an ensemble is one base curve, randomly perturbed and sampled into n nodes.
 //!
 //! A member is a pure function of the spec and j. Its amplitudes and phases are draws addressed by (seed, j, attempt,
-//! mode). Batch, order, thread and the other members therefore do not matter, and mode m gets the same number whichever
+//! mode); numbers of its shape, flow and perturbation that are distributions have draws of their own (`values.rs`). Batch, order, thread and the other members therefore do not matter, and mode m gets the same number whichever
 //! other modes are requested. The number of nodes does not matter either: member j is the same curve at n = 100 and
 //! 200.
 
-use std::{f64::consts::TAU, sync::Arc};
+use std::{
+    borrow::Cow,
+    f64::consts::{FRAC_1_SQRT_2, TAU},
+    sync::Arc,
+};
 
 use glam::DVec2;
 
 use super::{Mollified, Spec, horizon::CurveScale, mollifier::mollify};
 use crate::random::Stream;
 use crate::{
-    curve::{BaseCurve, Outline, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions, polygon},
+    curve::{
+        BaseCurve, Outline, Perturbation, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions, polygon,
+    },
     error::{Error, Result},
+    flow::Flow,
     solver::ring::MIN_POINTS,
 };
 
@@ -37,14 +44,22 @@ pub struct Member {
     pub origin: DVec2,
     /// How its corners were rounded off; only outlines sampled by arclength can need it.
     pub mollified: Mollified,
+    /// Its law of motion, if each member has its own; otherwise that of the spec.
+    pub flow: Option<Flow>,
 }
 
-/// The curve of a spec, prepared once; every member is made from it.
+/// The curve of a spec, prepared once; every member is made from it, or from a curve of its own.
 #[derive(Clone)]
 pub struct Family {
+    /// The curve of all members; if each has its own, that of the typical values.
     sampler: Arc<Sampler>,
     law: RadialLaw,
+    perturbation: Perturbation,
     seed: u64,
+    /// The spec, if members have values of their own.
+    drawn: Option<Arc<Spec>>,
+    /// Members have curves of their own.
+    has_own_curves: bool,
     /// Directions at which a draw is checked.
     directions: Arc<[DVec2]>,
     warnings: Vec<String>,
@@ -52,9 +67,13 @@ pub struct Family {
     has_corners: bool,
     /// There is an outline, and it does not cross itself.
     simple: bool,
-    /// The size of the curve without perturbation.
-    scale: Arc<CurveScale>,
+    /// The size of the curve without perturbation; if members have curves of their own, of the curve of each of
+    /// [`Spec::probes`].
+    scales: Arc<[CurveScale]>,
 }
+
+/// Nodes of a curve that is only measured.
+const PROBE_NODES: usize = 512;
 
 impl Family {
     /// Loads the shape and checks the keys shape, sampling, points, amplitude, modes and decay.
@@ -62,10 +81,11 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if one of them, or the file of the shape, is wrong.
     pub fn new(spec: &Spec) -> Result<Family> {
-        Family::of(spec, spec.shape.resolve()?)
+        Family::of_curve(spec, spec.shape.typical().resolve()?, spec.shape.is_drawn())
     }
 
-    /// Does the same as [`Family::new`], with `curve` in place of the shape: for curves that no `--shape` can name.
+    /// Does the same as [`Family::new`], with `curve` in place of the shape, for all members: for curves that no `--shape`
+    /// can name.
     ///
     /// ```
     /// use curvelax::{
@@ -74,7 +94,7 @@ impl Family {
     /// };
     /// use glam::DVec2;
     ///
-    /// let spec = Spec { points: 64, amplitude: 0.0, ..Spec::default() }.validate()?;
+    /// let spec = Spec { points: 64, amplitude: 0.0.into(), ..Spec::default() }.validate()?;
     /// let circle = BaseCurve::from_formula(|u| DVec2::from_angle(std::f64::consts::TAU * u));
     /// let member = Family::of(&spec, circle)?.member(0)?;
     /// assert!(member.nodes.iter().all(|node| (node.length() - 1.0).abs() < 1e-6));
@@ -84,7 +104,12 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if one of the keys sampling, points, amplitude, modes and decay is wrong.
     pub fn of(spec: &Spec, curve: BaseCurve) -> Result<Family> {
-        let law = RadialLaw::new(spec.amplitude, spec.modes, spec.decay)?;
+        Family::of_curve(spec, curve, false)
+    }
+
+    /// Does the same as [`Family::new`], with `curve` as the typical one.
+    pub(crate) fn of_curve(spec: &Spec, curve: BaseCurve, has_own_curves: bool) -> Result<Family> {
+        let law = law(spec)?;
         let outline = curve.outline();
         if let (Sampling::Points, Some(own)) = (spec.sampling, outline.map(|outline| outline.vertices().len())) {
             check_own_points(spec.points, own)?;
@@ -92,17 +117,34 @@ impl Family {
         let has_corners = outline.is_some() && spec.sampling == Sampling::Arclength && spec.points >= MIN_POINTS;
         let simple = outline.is_some_and(|outline| outline.is_simple());
         let mut warnings = outline.map_or(Vec::new(), |outline| outline.warnings().to_vec());
-        if let Shape::Lemniscate { .. } = spec.shape {
+        if let Shape::Lemniscate { .. } = spec.shape.typical() {
             warnings.push(NO_EXCESS.into());
         }
-        let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
+        let sampler = sampler(curve, spec)?;
         let mut nodes = sampler.sample(&RadialFactor::default());
         if has_corners {
             mollify(&mut nodes, || sampler.area(&RadialFactor::default()), simple);
         }
-        let scale = Arc::new(CurveScale::of(&nodes));
+        let scales = match has_own_curves {
+            true => scales(spec)?,
+            false => [CurveScale::of(&nodes)].into(),
+        };
         let (sampler, directions) = (Arc::new(sampler), check_directions(spec.modes.high).into());
-        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, has_corners, simple, scale })
+        let Spec { perturbation, seed, .. } = *spec;
+        let drawn = drawn(spec);
+        Ok(Family {
+            sampler,
+            law,
+            perturbation,
+            seed,
+            drawn,
+            has_own_curves,
+            directions,
+            warnings,
+            has_corners,
+            simple,
+            scales,
+        })
     }
 
     /// Does the same as [`Family::new`] for a spec with the same shape, sampling and points as `other`; the large
@@ -111,14 +153,15 @@ impl Family {
     /// # Errors
     /// As [`Family::new`].
     pub(crate) fn like(other: &Family, spec: &Spec) -> Result<Family> {
-        let law = RadialLaw::new(spec.amplitude, spec.modes, spec.decay)?;
+        let law = law(spec)?;
         let directions = match other.law.modes().high == spec.modes.high {
             true => Arc::clone(&other.directions),
             false => check_directions(spec.modes.high).into(),
         };
-        let (sampler, scale) = (Arc::clone(&other.sampler), Arc::clone(&other.scale));
-        let warnings = other.warnings.clone();
-        Ok(Family { sampler, law, seed: spec.seed, directions, warnings, scale, ..*other })
+        let (sampler, scales) = (Arc::clone(&other.sampler), Arc::clone(&other.scales));
+        let (warnings, drawn) = (other.warnings.clone(), drawn(spec));
+        let Spec { perturbation, seed, .. } = *spec;
+        Ok(Family { sampler, law, perturbation, seed, drawn, directions, warnings, scales, ..*other })
     }
 
     /// Does the same as [`Family::new`] for a spec with the same shape as `other`, and another number of points.
@@ -126,7 +169,7 @@ impl Family {
     /// # Errors
     /// As [`Family::new`].
     pub(crate) fn resampled(other: &Family, spec: &Spec) -> Result<Family> {
-        Family::of(spec, other.sampler.curve().clone())
+        Family::of_curve(spec, other.sampler.curve().clone(), other.has_own_curves)
     }
 
     /// The outline of the curve, if it has one.
@@ -134,9 +177,10 @@ impl Family {
         self.sampler.outline()
     }
 
-    /// The size of the curve without perturbation.
-    pub(super) fn scale(&self) -> &CurveScale {
-        &self.scale
+    /// The size of the curve without perturbation; if members have curves of their own, of the curve of each of
+    /// [`Spec::probes`], the typical one first.
+    pub(super) fn scales(&self) -> &[CurveScale] {
+        &self.scales
     }
 
     /// Whether it shares the tables of its curve with `other`.
@@ -160,10 +204,18 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if no draw leaves the radius positive.
     pub fn member(&self, index: u64) -> Result<Member> {
-        let factor = self.radial_factor(index)?;
-        let mut nodes = self.sampler.sample(&factor);
+        let values = self.drawn.as_ref().map(|spec| Ok((spec, spec.values(index)?))).transpose()?;
+        let law = match &values {
+            Some((spec, values)) => RadialLaw::new(values.amplitude, spec.modes, values.decay)?,
+            None => self.law,
+        };
+        let factor = self.radial_factor(&law, index)?;
+        let own = values.as_ref().filter(|_| self.has_own_curves);
+        let sampler = own.map(|(spec, values)| sampler(values.shape.resolve()?, spec)).transpose()?;
+        let sampler = sampler.as_ref().unwrap_or(&self.sampler);
+        let mut nodes = sampler.sample(&factor);
         let mollified = match self.has_corners {
-            true => mollify(&mut nodes, || self.sampler.area(&factor), self.simple),
+            true => mollify(&mut nodes, || sampler.area(&factor), self.simple),
             false => Mollified::default(),
         };
         let length = polygon::length(&nodes);
@@ -173,30 +225,90 @@ impl Family {
         }
         let origin = polygon::area_centroid(&nodes);
         nodes.iter_mut().for_each(|node| *node -= origin);
-        Ok(Member { index, cell: 0, nodes, origin, mollified })
+        let flow = values.and_then(|(_, values)| match values.flow {
+            Cow::Owned(flow) => Some(flow),
+            Cow::Borrowed(_) => None,
+        });
+        Ok(Member { index, cell: 0, nodes, origin, mollified, flow })
+    }
+
+    /// The numbers that are drawn for member `index`, with their names: see [`Spec::drawn_numbers`].
+    pub fn drawn(&self, index: u64) -> Vec<(String, f64)> {
+        self.drawn.as_ref().map_or(Vec::new(), |spec| spec.drawn_numbers(index))
+    }
+
+    /// The coefficients of cos mθ and sin mθ in the perturbation of member `index`, with m.
+    ///
+    /// # Errors
+    /// As [`Family::member`].
+    pub fn coefficients(&self, index: u64) -> Result<Vec<(u32, DVec2)>> {
+        let law = match &self.drawn {
+            Some(spec) => {
+                let values = spec.values(index)?;
+                RadialLaw::new(values.amplitude, spec.modes, values.decay)?
+            }
+            None => self.law,
+        };
+        Ok(self.radial_factor(&law, index)?.coefficients().collect())
     }
 
     /// The first draw for member `index` that leaves the radius positive.
-    fn radial_factor(&self, index: u64) -> Result<RadialFactor> {
-        if self.law.is_none() {
+    fn radial_factor(&self, law: &RadialLaw, index: u64) -> Result<RadialFactor> {
+        if law.is_none() {
             return Ok(RadialFactor::default());
         }
-        let draws = (0..MAX_ATTEMPTS).map(|attempt| self.draw(Stream::new(self.seed, index, attempt)));
+        let draws = (0..MAX_ATTEMPTS).map(|attempt| self.draw(law, Stream::new(self.seed, index, attempt)));
         draws.into_iter().find(|factor| factor.is_embedding(&self.directions)).ok_or_else(|| {
             let problem = format!("member {index} has no positive radius in {MAX_ATTEMPTS} draws");
-            Error::value("amplitude", self.law.amplitude(), &problem, "lower --amplitude or raise --decay")
+            Error::value("amplitude", law.amplitude(), &problem, "lower --amplitude or raise --decay")
         })
     }
 
-    /// Mode m uses draw 2m for its amplitude and draw 2m + 1 for its phase.
-    fn draw(&self, stream: Stream) -> RadialFactor {
-        let modes = self.law.modes();
+    /// Mode m uses draw 2m for its amplitude and draw 2m + 1 for its phase; or one for cos and the other for sin.
+    fn draw(&self, law: &RadialLaw, stream: Stream) -> RadialFactor {
+        let modes = law.modes();
         let amplitude_and_phase = |m: u32| {
             let [turn, _] = stream.uniforms(2 * m + 1);
-            (self.law.deviation(m) * stream.normal(2 * m), TAU * turn)
+            (law.deviation(m) * stream.normal(2 * m), TAU * turn)
         };
-        RadialFactor::new(modes.low, (modes.low..=modes.high).map(amplitude_and_phase))
+        // Half the power of the mode each.
+        let cos_and_sin = |m: u32| {
+            let normals = DVec2::new(stream.normal(2 * m), stream.normal(2 * m + 1));
+            law.deviation(m) * FRAC_1_SQRT_2 * normals
+        };
+        match self.perturbation {
+            Perturbation::AmplitudePhase => {
+                RadialFactor::new(modes.low, (modes.low..=modes.high).map(amplitude_and_phase))
+            }
+            Perturbation::Gaussian => {
+                RadialFactor::of_coefficients(modes.low, (modes.low..=modes.high).map(cos_and_sin))
+            }
+        }
     }
+}
+
+/// The law of the perturbation at the typical values, whose modes all members have.
+fn law(spec: &Spec) -> Result<RadialLaw> {
+    RadialLaw::new(*spec.amplitude.typical(), spec.modes, *spec.decay.typical())
+}
+
+/// The spec, without its lists, if members have values of their own.
+fn drawn(spec: &Spec) -> Option<Arc<Spec>> {
+    let short = || Spec { only: None, snapshots: Vec::new(), ..spec.clone() };
+    spec.has_drawn_values().then(|| Arc::new(short()))
+}
+
+fn sampler(curve: BaseCurve, spec: &Spec) -> Result<Sampler> {
+    Sampler::new(curve, spec.sampling, spec.points)
+}
+
+/// The size of the curve of each of [`Spec::probes`].
+fn scales(spec: &Spec) -> Result<Arc<[CurveScale]>> {
+    let scale = |shape: &Shape| {
+        let sampler = Sampler::new(shape.resolve()?, Sampling::Parameter, PROBE_NODES)?;
+        Ok(CurveScale::of(&sampler.sample(&RadialFactor::default())))
+    };
+    spec.probes().iter().map(|values| scale(&values.shape)).collect()
 }
 
 /// Checks `--points` against the file's own number of points; the default counts as not given.
@@ -219,7 +331,7 @@ mod tests {
     use crate::curve::{Modes, crossing};
 
     fn spec(shape: &str, sampling: Sampling, points: usize, amplitude: f64) -> Spec {
-        Spec { shape: shape.parse::<Shape>().unwrap(), sampling, points, amplitude, ..Spec::default() }
+        Spec { shape: shape.parse().unwrap(), sampling, points, amplitude: amplitude.into(), ..Spec::default() }
     }
 
     fn family(spec: &Spec) -> Family {
@@ -260,13 +372,82 @@ mod tests {
         let (a_quarter, count) = (DVec2::from_angle(-TAU / 8.0), 20_000_u32);
         // With amplitude a and phase φ these are a cos φ and a sin φ: of equal variance, and uncorrelated.
         let parts = (0..count).map(|j| {
-            let factor = family.draw(Stream::new(1, j.into(), 0));
+            let factor = family.draw(&family.law, Stream::new(1, j.into(), 0));
             DVec2::new(factor.excursion(DVec2::X), factor.excursion(a_quarter)) / family.law.radial_deviation()
         });
         let [xx, xy, yy] = parts.fold([0.0; 3], |s, p| [s[0] + p.x * p.x, s[1] + p.x * p.y, s[2] + p.y * p.y]);
         let mean = [xx, xy, yy].map(|sum| sum / f64::from(count));
         // Standard errors are under 1/70: the fourth moment of a cos φ is 4.5.
         assert!((mean[0] - 1.0).abs() < 0.07 && (mean[2] - 1.0).abs() < 0.07 && mean[1].abs() < 0.05, "{mean:?}");
+    }
+
+    #[test]
+    fn coefficients_of_the_gaussian_law_are_normal_and_independent_and_those_of_the_default_are_not() {
+        let (count, modes) = (20_000_u64, Modes { low: 2, high: 3 });
+        // Means over members of the coefficients of mode 2, over their deviation: x², y², x⁴, x²y², and x² of mode 3.
+        let moments = |perturbation| {
+            let amplitude = 0.05.into();
+            let family = family(&Spec { modes, amplitude, perturbation, ..Spec::default() });
+            let [two, three] = [2, 3].map(|m| family.law.deviation(m) * FRAC_1_SQRT_2);
+            let mut sums = [0.0; 5];
+            for j in 0..count {
+                let all = family.coefficients(j).unwrap();
+                let (DVec2 { x, y }, other) = (all[0].1 / two, all[1].1.x / three);
+                let own = [x * x, y * y, x.powi(4), x * x * y * y, other * other];
+                sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += own / count as f64);
+            }
+            sums
+        };
+        let [normal, default] = [Perturbation::Gaussian, Perturbation::AmplitudePhase].map(moments);
+        // Standard errors: √(2/count) = 0.01 of x² and √(96/count) = 0.07 of x⁴ of a normal law.
+        for (found, exact) in normal.iter().zip([1.0, 1.0, 3.0, 1.0, 1.0]) {
+            assert!((found / exact - 1.0).abs() < 0.1, "seed 1: {normal:?}");
+        }
+        // E a⁴ E cos⁴ = 3·3/8 over 1/4, and E a⁴ E cos² sin² = 3/8 over 1/4.
+        for (found, exact) in default.iter().zip([1.0, 1.0, 4.5, 1.5, 1.0]) {
+            assert!((found / exact - 1.0).abs() < 0.15, "seed 1: {default:?}");
+        }
+    }
+
+    #[test]
+    fn the_power_of_a_mode_falls_as_two_p() {
+        let spec = Spec { perturbation: Perturbation::Gaussian, decay: 1.5.into(), ..Spec::default() };
+        let family = family(&Spec { modes: Modes { low: 2, high: 8 }, ..spec });
+        let mut power = [0.0; 7];
+        for j in 0..5000 {
+            for (sum, (_, c)) in power.iter_mut().zip(family.coefficients(j).unwrap()) {
+                *sum += c.length_squared() / 5000.0;
+            }
+        }
+        for (m, power) in (2..).zip(power) {
+            let exact = 0.05_f64.powi(2) * f64::from(m).powf(-3.0);
+            // A standard error is 1/√5000.
+            assert!((power / exact - 1.0).abs() < 0.07, "seed 1, mode {m}: {power} {exact}");
+        }
+    }
+
+    #[test]
+    fn a_member_with_drawn_values_is_the_member_of_a_spec_that_has_them() {
+        let text = "shape = 'ellipse:uniform(1.2..3),1'\nflow = 'elastic:lognormal(0.5,0.2)'\n\
+                    amplitude = 'uniform(0.01..0.1)'\ndecay = 'normal(1,0.1)'\npoints = 48";
+        for design in ["random", "sobol", "lhs"] {
+            let spec = Spec::from_toml(&format!("{text}\ndesign = '{design}'")).unwrap();
+            let family = family(&spec);
+            for j in [0, 3, 200, 255] {
+                let values = spec.values(j).unwrap();
+                let fixed = Spec {
+                    shape: values.shape.clone().into_owned().into(),
+                    amplitude: values.amplitude.into(),
+                    decay: values.decay.into(),
+                    ..Spec::from_toml("points = 48").unwrap()
+                };
+                let (own, alone) = (family.member(j).unwrap(), self::family(&fixed).member(j).unwrap());
+                assert_eq!(own.nodes, alone.nodes, "{design} {j}");
+                assert_eq!((own.flow, alone.flow), (Some(values.flow.into_owned()), None));
+                assert_eq!(family.drawn(j).len(), 4);
+            }
+            assert_ne!(family.member(0).unwrap().nodes, family.member(1).unwrap().nodes);
+        }
     }
 
     #[test]
@@ -312,7 +493,7 @@ mod tests {
     fn a_mode_is_the_same_draw_whichever_others_are_asked_for() {
         let factor = |low, high| {
             let family = family(&Spec { modes: Modes { low, high }, ..Spec::default() });
-            family.draw(Stream::new(1, 9, 0))
+            family.draw(&family.law, Stream::new(1, 9, 0))
         };
         let circle = |k: u32| DVec2::from_angle(0.1 * f64::from(k));
         for k in 0..20 {
@@ -343,10 +524,12 @@ mod tests {
     fn the_strongest_law_still_makes_embedded_curves_of_embedded_ones() {
         let mut spec = spec("nonconvex", Sampling::Arclength, 601, 0.37);
         spec.modes = Modes { low: 2, high: 5 };
-        spec.decay = 0.5;
+        spec.decay = 0.5.into();
         let family = family(&spec);
         assert!(family.law.radial_deviation() > 0.28, "{}", family.law.radial_deviation());
-        let redrawn = (0..50).filter(|&j| !family.draw(Stream::new(1, j, 0)).is_embedding(&family.directions)).count();
+        let redrawn = (0..50)
+            .filter(|&j| !family.draw(&family.law, Stream::new(1, j, 0)).is_embedding(&family.directions))
+            .count();
         assert!(redrawn > 0, "seed 1: no draw was rejected, the test has lost its point");
         for j in 0..50 {
             assert_eq!(crossing(&family.member(j).unwrap().nodes), None, "seed 1, member {j}");
@@ -391,13 +574,13 @@ mod tests {
     #[test]
     fn every_wrong_key_is_refused_before_any_member_is_made() {
         let wrong = [
-            (Spec { amplitude: 0.6, ..Spec::default() }, "--amplitude 0.6"),
+            (Spec { amplitude: 0.6.into(), ..Spec::default() }, "--amplitude 0.6"),
             (Spec { modes: Modes { low: 0, high: 3 }, ..Spec::default() }, "--modes `0..=3`"),
-            (Spec { decay: f64::NAN, ..Spec::default() }, "--decay NaN"),
+            (Spec { decay: f64::NAN.into(), ..Spec::default() }, "--decay NaN"),
             (Spec { points: 2, ..Spec::default() }, "--points 2"),
             (Spec { sampling: Sampling::Points, ..Spec::default() }, "--sampling points"),
-            (Spec { shape: Shape::Circle { radius: 0.0 }, ..Spec::default() }, "--shape circle:0"),
-            (Spec { shape: Shape::File("none.csv".into()), ..Spec::default() }, "--shape file:none.csv"),
+            (Spec { shape: Shape::Circle { radius: 0.0 }.into(), ..Spec::default() }, "--shape circle:0"),
+            (Spec { shape: Shape::File("none.csv".into()).into(), ..Spec::default() }, "--shape file:none.csv"),
         ];
         for (spec, key) in wrong {
             let error = Family::new(&spec).err().expect(key);

@@ -1,6 +1,7 @@
 //! The ensemble: the request ([`Spec`]), its members with their random numbers, and the result of each member
 //! ([`Outcome`]).
 
+pub mod drawn;
 pub mod ended;
 mod horizon;
 pub mod judged;
@@ -21,7 +22,9 @@ pub mod theory;
 mod times;
 mod units;
 mod validate;
+mod values;
 
+pub use drawn::Drawn;
 pub use ended::Ended;
 pub use judged::Judged;
 pub use levels::{LevelRow, LevelTimes, RefinementLevel};
@@ -34,3 +37,4 @@ pub use sink::{Sink, Wish};
 pub use spec::Spec;
 pub use standing::{Paused, Standing};
 pub use study::{Cell, Study};
+pub use values::MemberValues;

@@ -46,7 +46,7 @@ mod tests {
     #[test]
     fn the_own_speed_and_step_of_a_curve_are_the_papers_for_its_ellipse_and_scale_with_the_curve() {
         let own = |shape: &str| {
-            let spec = Spec { shape: shape.parse().unwrap(), amplitude: 0.0, points: 400, ..Spec::default() };
+            let spec = Spec { shape: shape.parse().unwrap(), amplitude: 0.0.into(), points: 400, ..Spec::default() };
             let rate = relaxation_rate(radius(&Family::new(&spec).unwrap().member(0).unwrap().nodes));
             [own_omega(rate), own_tau(rate)]
         };

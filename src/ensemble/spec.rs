@@ -8,16 +8,19 @@ use std::{fmt, marker::PhantomData, path::Path, str::FromStr};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::{
+    drawn::Drawn,
     seed,
     shard::Shard,
     sweep::{self, Sweep},
 };
 use crate::{
     backend::DeviceKind,
-    curve::{Modes, Sampling, Shape},
+    curve::{Modes, Perturbation, Sampling, Shape},
     error::{Error, Result, did_you_mean, shortened},
     flow::Flow,
-    input, text,
+    input,
+    random::Design,
+    text,
 };
 
 pub use super::units::Units;
@@ -176,17 +179,23 @@ pub struct Spec {
     #[serde(with = "seed")]
     pub seed: u64,
     /// The curve that is perturbed.
-    pub shape: Shape,
+    pub shape: Drawn<Shape>,
     /// How nodes are placed on it.
     pub sampling: Sampling,
     /// σ of the random perturbation; 0 for none.
-    pub amplitude: f64,
+    pub amplitude: Drawn<f64>,
     /// Modes of the random perturbation.
     pub modes: Modes,
     /// p: mode m has standard deviation σ·m^-p.
-    pub decay: f64,
+    pub decay: Drawn<f64>,
+    /// How a mode of the perturbation is drawn.
+    #[serde(skip_serializing_if = "Perturbation::is_default")]
+    pub perturbation: Perturbation,
+    /// How members are spread over the distributions of shape, flow, amplitude and decay.
+    #[serde(skip_serializing_if = "Design::is_random")]
+    pub design: Design,
     /// The law of motion.
-    pub flow: Flow,
+    pub flow: Drawn<Flow>,
     /// B of the flow in the user's units of length and time, in length⁴/time; 1 if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mobility: Option<f64>,
@@ -292,12 +301,14 @@ impl Default for Spec {
             curves: 256,
             points: 100,
             seed: 1,
-            shape: Shape::Ellipse { a: 2.0, b: 1.0 },
+            shape: Shape::Ellipse { a: 2.0, b: 1.0 }.into(),
             sampling: Sampling::Arclength,
-            amplitude: 0.05,
+            amplitude: 0.05.into(),
             modes: Modes { low: 2, high: 8 },
-            decay: 1.0,
-            flow: Flow::SurfaceDiffusion,
+            decay: 1.0.into(),
+            perturbation: Perturbation::default(),
+            design: Design::default(),
+            flow: Flow::SurfaceDiffusion.into(),
             mobility: None,
             units: None,
             tau: None,
@@ -348,7 +359,7 @@ impl Spec {
     /// use curvelax::{ensemble::Spec, flow::Flow};
     ///
     /// let spec = Spec::from_toml("flow = 'willmore'\ncurves = 8").unwrap();
-    /// assert_eq!((spec.flow, spec.curves, spec.points), (Flow::Willmore, 8, 100));
+    /// assert_eq!((spec.flow, spec.curves, spec.points), (Flow::Willmore.into(), 8, 100));
     /// assert!(Spec::from_toml("curvs = 8").unwrap_err().contains("did you mean `curves`?"));
     /// ```
     ///
@@ -464,11 +475,6 @@ impl Spec {
         self.mobility.unwrap_or(1.0)
     }
 
-    /// Returns the time `growth` of [`Flow::growth`] for a member of area `area`.
-    pub fn growth(&self, area: f64) -> Option<f64> {
-        self.flow.growth(area).map(|growth| growth / self.mobility())
-    }
-
     /// The final time, the latest one of all cells; infinite while it is still [`FinalTime::Auto`], which a
     /// [study](crate::ensemble::Study) replaces by numbers.
     pub fn final_time(&self) -> f64 {
@@ -515,25 +521,6 @@ impl Spec {
     /// The excess at which a member that starts with `excess` counts as relaxed.
     pub fn threshold(&self, excess: f64) -> f64 {
         self.relax_at.unwrap_or(self.relax_to.unwrap_or(DEFAULT_RELAX_TO) * excess)
-    }
-
-    /// The rate at which, by linear theory, the excess of a member of area `area` falls once only the slowest mode is
-    /// left: the lowest one of the shape and the perturbation. It is in 1/time, or an exponent: see
-    /// [`Flow::excess_rate`].
-    pub fn rate_in_theory(&self, area: f64) -> Option<f64> {
-        let drawn = (self.amplitude > 0.0).then(|| self.modes.low.max(2));
-        let mode = self.shape.lowest_mode().into_iter().chain(drawn).min()?;
-        let rate = self.flow.excess_rate(mode, area)?;
-        Some(if self.flow.growth(area).is_some() { rate } else { self.mobility() * rate })
-    }
-
-    /// The mean excess that the perturbation of a circle has in each mode from 2 on: ½ (m²-1) a_m².
-    pub(super) fn perturbed_excess(&self) -> impl Iterator<Item = f64> {
-        let (high, own) = (self.modes.high, self.clone());
-        (2..=if self.amplitude == 0.0 { 1 } else { high }).map(move |m| {
-            let (deviation, m) = (own.amplitude * f64::from(m).powf(-own.decay), f64::from(m));
-            if m < f64::from(own.modes.low) { 0.0 } else { 0.5 * (m * m - 1.0) * deviation * deviation }
-        })
     }
 
     /// The maximum sweeps per solve in use.
@@ -793,7 +780,7 @@ mod tests {
             relax_at: Some(0.01),
             pull: Pull::Rate(0.1),
             omega: Some(Omega::Rate(0.1 + 0.2)),
-            flow: Flow::Polynomial(vec![0.5, 0.0, -0.25]),
+            flow: Flow::Polynomial(vec![0.5, 0.0, -0.25]).into(),
             precision: Some(Precision::F32),
             tolerance: Some(3e-4),
             series: Some(0.01),
@@ -812,7 +799,15 @@ mod tests {
             ..Spec::default()
         };
         let own = Spec { tau: Some(Tau::Auto), t_end: Some(FinalTime::Auto), ..Spec::default() };
-        for spec in [spec, adaptive, own, Spec::default()] {
+        let drawn = Spec {
+            shape: "ellipse:uniform(1.2..3),1".parse().unwrap(),
+            flow: "elastic:lognormal(0.5,0.2)".parse().unwrap(),
+            amplitude: "uniform(0.01..0.1)".parse().unwrap(),
+            perturbation: Perturbation::Gaussian,
+            design: Design::Sobol,
+            ..Spec::default()
+        };
+        for spec in [spec, adaptive, own, drawn, Spec::default()] {
             let text = spec.to_toml().unwrap();
             assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");
         }
@@ -856,7 +851,9 @@ mod tests {
             "refine",
             "accuracy",
         ];
-        let optional = [&optional[..], &["only", "shard", "threads", "common-random-numbers", "sweep"]].concat();
+        let optional =
+            [&optional[..], &["perturbation", "design", "only", "shard", "threads", "common-random-numbers", "sweep"]]
+                .concat();
         for key in &optional {
             assert!(keys.iter().any(|known| known == key), "{key}");
         }

@@ -51,7 +51,7 @@ impl Study {
         let (free, given) = (spec.gives_no_times(), spec.clone());
         let spec = spec.validate()?;
         let cells = cells(&spec, base)?;
-        if !free || !cells.iter().any(|cell| times::is_far(&cell.spec, cell.family.scale())) {
+        if !free || !cells.iter().any(|cell| times::is_far(&cell.spec, cell.family.scales())) {
             return Study::of_cells(spec, cells);
         }
         let tau = if spec.adaptive.is_some() { None } else { Some(Tau::Auto) };
@@ -250,9 +250,13 @@ fn stages_of(level: Option<RefinementLevel>, specs: &[Option<Spec>]) -> Vec<Stag
     stages.into_iter().map(|(_, stage)| stage).filter(|stage| stage.level.is_none() || stage.members > 0).collect()
 }
 
-/// Whether two specs have one curve with the same nodes.
+/// Whether two specs have one curve with the same nodes. Curves that are drawn are the same if everything is that a draw
+/// depends on.
 fn same_curve(one: &Spec, other: &Spec) -> bool {
-    (one.points, one.sampling) == (other.points, other.sampling) && one.shape == other.shape
+    let drawn = |spec: &Spec| (spec.seed, spec.curves, spec.design, spec.common_random_numbers);
+    let same_draws = || drawn(one) == drawn(other) && one.distributions() == other.distributions();
+    let nodes = (one.points, one.sampling) == (other.points, other.sampling);
+    nodes && one.shape == other.shape && (!one.shape.is_drawn() || same_draws())
 }
 
 /// One ensemble of a study.
@@ -288,16 +292,16 @@ pub struct Cohort {
 impl Cell {
     /// The only cell of a spec without a sweep.
     pub fn only(spec: Spec, family: Family) -> Cell {
-        let spec = times::settled(spec, family.scale());
+        let spec = times::settled(spec, family.scales());
         Cell { index: 0, spec, family, first: 0, common: false }
     }
 
     /// Its spec with a number as the final time, checked against the curve.
     fn settled(&self) -> Result<Spec> {
-        let scale = self.family.scale();
+        let scales = self.family.scales();
         let Spec { only, shard, .. } = self.spec.clone();
-        let spec = times::settled(Spec { only: None, shard: None, ..self.spec.clone() }, scale).validate()?;
-        times::check(&spec, scale, self.family.points())?;
+        let spec = times::settled(Spec { only: None, shard: None, ..self.spec.clone() }, scales).validate()?;
+        times::check(&spec, scales, self.family.points())?;
         Ok(Spec { only, shard, ..spec })
     }
 
@@ -316,8 +320,13 @@ impl Cell {
     /// # Errors
     /// As [`Family::member`].
     pub fn member(&self, index: u64) -> Result<Member> {
-        let drawn = if self.common { index - self.first } else { index };
-        Ok(Member { index, cell: self.index, ..self.family.member(drawn)? })
+        Ok(Member { index, cell: self.index, ..self.family.member(self.drawn_as(index))? })
+    }
+
+    /// The index of the random numbers of the member with this index in the study: for [`Family::drawn`],
+    /// [`Family::coefficients`] and [`Spec::values`].
+    pub fn drawn_as(&self, index: u64) -> u64 {
+        if self.common { index - self.first } else { index }
     }
 
     /// What the user should know about it before the run, one sentence each.
@@ -327,7 +336,7 @@ impl Cell {
         if adaptive && solver.facts().slows_with_step {
             warnings.push(LONG_SWEEPS.into());
         }
-        warnings.extend(times::warnings(&self.spec, self.family.scale()));
+        warnings.extend(times::warnings(&self.spec, self.family.scales()));
         warnings
     }
 
@@ -371,9 +380,9 @@ impl Cell {
         }
         // Of a member that cannot be halved no level is of use.
         let half = RefinementLevel::Half.spec(own)?;
-        times::check(&half, self.family.scale(), half.points)?;
+        times::check(&half, self.family.scales(), half.points)?;
         let spec = level.spec(own)?;
-        times::check(&spec, self.family.scale(), spec.points)?;
+        times::check(&spec, self.family.scales(), spec.points)?;
         Ok(spec)
     }
 
@@ -418,7 +427,7 @@ fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize
                 before.iter().rfind(|cell| cell.spec.shape == own.shape).and_then(|cell| cell.family.outline());
             match outline {
                 Some(outline) => Family::of(&own, BaseCurve::from_outline(Arc::clone(outline)))?,
-                None => Family::of(&own, own.shape.resolve_from(base)?)?,
+                None => Family::of_curve(&own, own.shape.typical().resolve_from(base)?, own.shape.is_drawn())?,
             }
         }
     };

@@ -75,7 +75,7 @@ pub(super) fn label(value: &Value) -> String {
 impl FromStr for SweepAxis {
     type Err = String;
 
-    /// Parses `key=v1,v2`; if a value contains commas, semicolons separate the values.
+    /// Parses `key=v1,v2`; if a value contains commas outside parentheses, semicolons separate the values.
     fn from_str(text: &str) -> Result<SweepAxis, String> {
         let (key, values) = text.split_once('=').ok_or_else(|| format!("`{text}` has no `=`; write key=v1,v2,..."))?;
         let separator = if values.contains(';') { ';' } else { ',' };
@@ -90,9 +90,27 @@ impl FromStr for SweepAxis {
                 _ => Value::String(word.to_string()),
             }
         };
-        let words = values.split(separator).filter(|word| !word.trim().is_empty());
+        let words = split_outside(values, separator).into_iter().filter(|word| !word.trim().is_empty());
         Ok(SweepAxis { key: key.to_string(), values: words.map(value).collect() })
     }
+}
+
+/// The parts of `text` between separators, of which none is inside parentheses that are closed.
+fn split_outside(text: &str, separator: char) -> Vec<&str> {
+    let (mut parts, mut start, mut depth) = (Vec::new(), 0, 0_u32);
+    for (at, c) in text.char_indices() {
+        match c {
+            '(' if text[at..].contains(')') => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            c if c == separator && depth == 0 => {
+                parts.push(&text[start..at]);
+                start = at + c.len_utf8();
+            }
+            _ => {}
+        }
+    }
+    parts.push(&text[start..]);
+    parts
 }
 
 /// An integer as a value of `key`. Integers in TOML end at 2⁶³: a larger seed becomes text, and other keys with values
@@ -271,9 +289,19 @@ mod tests {
             ]
         );
         let spec = of_cell(&sweep, &Spec::default(), 1).unwrap();
-        assert_eq!(spec, Spec { amplitude: 1.0, ..Spec::default() });
+        assert_eq!(spec, Spec { amplitude: 1.0.into(), ..Spec::default() });
         let tiny = self::sweep(&["tolerance=1e-12,0.0001,0.0"]);
         assert_eq!(tiny.axes()[0].labels(), ["1e-12", "0.0001", "0"]);
+    }
+
+    #[test]
+    fn commas_in_parentheses_separate_no_values() {
+        let labels = |text: &str| text.parse::<SweepAxis>().unwrap().labels();
+        assert_eq!(labels("amplitude=0.05,lognormal(0.05,0.2),0.1"), ["0.05", "lognormal(0.05,0.2)", "0.1"]);
+        assert_eq!(labels("shape=ellipse:normal(3,0.1),1;circle:1"), ["ellipse:normal(3,0.1),1", "circle:1"]);
+        assert_eq!(labels("adapter=a(b,c"), ["a(b", "c"]);
+        let spec = of_cell(&sweep(&["amplitude=0.05,uniform(0.01..0.1)"]), &Spec::default(), 1).unwrap();
+        assert!(spec.amplitude.is_drawn() && spec.values(0).unwrap().amplitude != spec.values(1).unwrap().amplitude);
     }
 
     #[test]

@@ -12,7 +12,7 @@
 //! ([`Flow::linear_rate`]). R starts as that of the circle of the initial area. The excess is matched where it is known,
 //! at t_relax or t_half, and the rate is the slope of the least-squares line through the window of the fit.
 
-use super::{Outcome, Spec};
+use super::{MemberValues, Outcome, Spec};
 use crate::flow::Flow;
 
 /// Steps of the classical Runge–Kutta method in which excess or R² change by a factor of about e. The rate is then
@@ -23,24 +23,24 @@ const WINDOW: [f64; 2] = [1e-1, 1e-3];
 /// Distance in ln excess at which a point counts as on the edge of the window.
 const NEAR: f64 = 1e-9;
 
-/// The rate that a member of `spec` should have by linear theory; `None` without one.
-pub fn rate_of(spec: &Spec, outcome: &Outcome) -> Option<f64> {
-    match spec.flow {
+/// The rate that a member of `spec` with these values should have by linear theory; `None` without one.
+pub fn rate_of(spec: &Spec, values: &MemberValues, outcome: &Outcome) -> Option<f64> {
+    match *values.flow {
         Flow::Elastic(penalty) if penalty > 0.0 => {
-            let decay = Decline::new(spec, outcome.start.area)?;
+            let decay = Decline::new(spec, values, outcome.start.area)?;
             // Theory knows no mobility: its time is that of length⁴.
             let (t, level) = decay.known_point(spec, outcome);
             let rate = outcome.rate.and_then(|_| decay.rate_in_window((spec.mobility() * t, level)));
             rate.map(|rate| spec.mobility() * rate)
         }
         Flow::Elastic(_) => None,
-        _ => spec.rate_in_theory(outcome.start.area),
+        _ => spec.rate_in_theory(values, outcome.start.area),
     }
 }
 
 /// The rate at the time `t` of a member of `area` at the start, in an elastic flow.
-pub fn rate_at(spec: &Spec, area: f64, t: f64) -> Option<f64> {
-    let decline = Decline::new(spec, area)?;
+pub fn rate_at(spec: &Spec, values: &MemberValues, area: f64, t: f64) -> Option<f64> {
+    let decline = Decline::new(spec, values, area)?;
     decline.radius_squared(spec.mobility() * t).map(|u| spec.mobility() * decline.rate(u))
 }
 
@@ -54,13 +54,12 @@ struct Decline<'a> {
 }
 
 impl Decline<'_> {
-    fn new(spec: &Spec, area: f64) -> Option<Decline<'_>> {
-        let Flow::Elastic(penalty) = spec.flow else { return None };
-        let drawn = (spec.amplitude > 0.0).then(|| spec.modes.low.max(2));
-        let mode = spec.shape.lowest_mode().into_iter().chain(drawn).min()?;
+    fn new<'a>(spec: &Spec, values: &'a MemberValues, area: f64) -> Option<Decline<'a>> {
+        let Flow::Elastic(penalty) = *values.flow else { return None };
+        let mode = spec.slowest_mode(values)?;
         let start = area.abs() / std::f64::consts::PI;
         let known = penalty > 0.0 && start > 0.0 && start.is_finite();
-        known.then_some(Decline { flow: &spec.flow, penalty, mode, start })
+        known.then_some(Decline { flow: &values.flow, penalty, mode, start })
     }
 
     /// d(R²)/dt.
@@ -162,8 +161,12 @@ mod tests {
     use super::*;
     use crate::ensemble::Observables;
 
+    fn of(spec: &Spec, outcome: &Outcome) -> Option<f64> {
+        rate_of(spec, &spec.typical(), outcome)
+    }
+
     fn member(penalty: f64, radius: f64, t_relax: Option<f64>, t_half: Option<f64>) -> (Spec, Outcome) {
-        let spec = Spec { flow: Flow::Elastic(penalty), ..Spec::default() };
+        let spec = Spec { flow: Flow::Elastic(penalty).into(), ..Spec::default() };
         let area = std::f64::consts::PI * radius * radius;
         let start = Observables { area, excess: 1e-3, ..Observables::default() };
         (spec, Outcome { start, t_relax, t_half, rate: Some(1.0), ..Outcome::default() })
@@ -174,10 +177,10 @@ mod tests {
         for (penalty, radius, expected) in [(0.5, 1.0, 18.0), (0.125, 2.0, 18.0 / 16.0)] {
             let (spec, outcome) = member(penalty, radius, None, None);
             for outcome in [outcome.clone(), Outcome { t_half: Some(0.02), ..outcome.clone() }] {
-                let found = rate_of(&spec, &outcome).unwrap();
+                let found = of(&spec, &outcome).unwrap();
                 assert!((found / expected - 1.0).abs() < 1e-9, "{found}");
             }
-            assert!((rate_at(&spec, outcome.start.area, 3.0).unwrap() / expected - 1.0).abs() < 1e-12);
+            assert!((rate_at(&spec, &spec.typical(), outcome.start.area, 3.0).unwrap() / expected - 1.0).abs() < 1e-12);
         }
     }
 
@@ -186,17 +189,17 @@ mod tests {
         let (penalty, radius) = (0.05, 1.0);
         // The circle at rest is 3.16 times as large, so its modes are 100 times as slow.
         let (spec, outcome) = member(penalty, radius, None, None);
-        let free = rate_of(&spec, &outcome).unwrap();
+        let free = of(&spec, &outcome).unwrap();
         assert!(free > 3.0 && 18.0 * (2.0 * penalty).powi(2) < 0.2, "{free}");
         // Later in time the circle is larger and the mode slower.
-        let later = rate_of(&spec, &Outcome { t_relax: Some(2.0), ..outcome.clone() }).unwrap();
+        let later = of(&spec, &Outcome { t_relax: Some(2.0), ..outcome.clone() }).unwrap();
         assert!(later < 0.7 * free, "{later} {free}");
         // The known point decides, not the start: with λ → 0 the law is algebraic, ln excess ~ -8 ln(1 + 2t).
         let (spec, outcome) = member(1e-9, radius, None, None);
         let slope = |t: f64| 16.0 / (1.0 + 2.0 * t);
-        let found = rate_at(&spec, outcome.start.area, 0.3).unwrap();
+        let found = rate_at(&spec, &spec.typical(), outcome.start.area, 0.3).unwrap();
         assert!((found / slope(0.3) - 1.0).abs() < 1e-6, "{found} {}", slope(0.3));
-        let found = rate_of(&spec, &outcome).unwrap();
+        let found = of(&spec, &outcome).unwrap();
         let [first, last] = [1e-1_f64, 1e-3].map(|share| 0.5 * (share.powf(-0.125) - 1.0));
         assert!(slope(last) < found && found < slope(first), "{found}");
         let line: Vec<(f64, f64)> = (0..=10_000)
@@ -213,9 +216,9 @@ mod tests {
             for t_relax in [None, Some(1e-300), Some(1.0), Some(1e300)] {
                 let (spec, mut outcome) = member(penalty, 1.0, t_relax, Some(1e-200));
                 outcome.start.area = area;
-                let found = rate_of(&spec, &outcome);
+                let found = of(&spec, &outcome);
                 assert!(found.is_none_or(f64::is_finite), "{penalty} {area} {t_relax:?}: {found:?}");
-                assert!(rate_at(&spec, area, 1e300).is_none_or(|rate| !rate.is_nan()));
+                assert!(rate_at(&spec, &spec.typical(), area, 1e300).is_none_or(|rate| !rate.is_nan()));
             }
         }
     }
@@ -223,8 +226,8 @@ mod tests {
     #[test]
     fn without_a_fitted_rate_or_a_penalty_there_is_none() {
         let (spec, outcome) = member(0.5, 1.0, None, None);
-        assert_eq!(rate_of(&spec, &Outcome { rate: None, ..outcome.clone() }), None);
-        assert_eq!(rate_of(&Spec { flow: Flow::Elastic(-0.5), ..spec.clone() }, &outcome), None);
-        assert_eq!(rate_of(&Spec { flow: Flow::SurfaceDiffusion, ..spec }, &outcome), Some(24.0));
+        assert_eq!(of(&spec, &Outcome { rate: None, ..outcome.clone() }), None);
+        assert_eq!(of(&Spec { flow: Flow::Elastic(-0.5).into(), ..spec.clone() }, &outcome), None);
+        assert_eq!(of(&Spec { flow: Flow::SurfaceDiffusion.into(), ..spec }, &outcome), Some(24.0));
     }
 }

@@ -2,7 +2,7 @@
 //! warned about.
 
 use super::{
-    Spec,
+    MemberValues, Spec,
     horizon::CurveScale,
     rates::{own_omega, own_tau, strongest_pull},
     spec::{FinalTime, Omega, Pace, Pull, Tau},
@@ -31,19 +31,29 @@ const LONG_TAU: f64 = 100.0;
 const SHORT_TAU: f64 = 1e-5;
 const FAR_END: f64 = 1000.0;
 
-/// The spec of a cell with a number as its final time.
-pub fn settled(spec: Spec, scale: &CurveScale) -> Spec {
+/// The spec of a cell with a number as its final time. `scales` are the sizes of [`Spec::probes`], or that of the curve
+/// of all members; so they are below.
+pub fn settled(spec: Spec, scales: &[CurveScale]) -> Spec {
     match spec.t_end {
         Some(FinalTime::Auto) => {
-            let t_end = Some(FinalTime::At(cap(&spec, scale)));
+            let t_end = Some(FinalTime::At(cap(&spec, scales)));
             Spec { stop_when_relaxed: Some(spec.stops_when_relaxed()), t_end, ..spec }
         }
         _ => spec,
     }
 }
 
-/// What the user should know about times and rates that are far from what the curve of a cell needs, one sentence each.
-pub fn warnings(spec: &Spec, scale: &CurveScale) -> Vec<String> {
+/// The values of members with the size of their curve: the typical ones first, and if members have their own, those in
+/// the tails.
+fn probes<'a>(spec: &'a Spec, scales: &'a [CurveScale]) -> impl Iterator<Item = (MemberValues<'a>, &'a CurveScale)> {
+    let last = scales.len() - 1;
+    spec.probes().into_iter().enumerate().map(move |(i, values)| (values, &scales[i.min(last)]))
+}
+
+/// What the user should know about times and rates that are far from what the typical curve of a cell needs, one
+/// sentence each.
+pub fn warnings(spec: &Spec, scales: &[CurveScale]) -> Vec<String> {
+    let scale = &scales[0];
     let rate = rate(spec, scale);
     let (omega, tau) = (own_omega(rate), own_tau(rate));
     [far_omega(spec, omega), far_tau(spec, tau), far_end(spec, scale)].into_iter().flatten().collect()
@@ -77,9 +87,10 @@ fn far_tau(spec: &Spec, own: f64) -> Option<String> {
 }
 
 fn far_end(spec: &Spec, scale: &CurveScale) -> Option<String> {
-    let (t_end, expected) = (spec.final_time(), expected(spec, scale));
+    let values = spec.typical();
+    let (t_end, expected) = (spec.final_time(), expected(spec, &values, scale));
     // A curve that starts nearly round is expected to rest.
-    let slowest = expected.max(scale.first_radius(&spec.flow).powi(4) / (4.0 * spec.mobility()));
+    let slowest = expected.max(scale.first_radius(&values.flow).powi(4) / (4.0 * spec.mobility()));
     let what = match () {
         () if t_end < expected / FAR_END => "is far too early for a member to relax",
         () if t_end > slowest * FAR_END && !spec.stops_when_relaxed() => "is long after a member has relaxed",
@@ -93,27 +104,29 @@ fn rate(spec: &Spec, scale: &CurveScale) -> f64 {
     spec.mobility() * scale.rate()
 }
 
-/// Whether the default τ, ω and final time are far from what a curve of this size needs.
-pub fn is_far(spec: &Spec, scale: &CurveScale) -> bool {
-    let size = scale.radius.powi(4) / (spec.mobility() * PAPERS_SIZE);
+/// Whether the default τ, ω and final time are far from what the typical curve needs.
+pub fn is_far(spec: &Spec, scales: &[CurveScale]) -> bool {
+    let size = scales[0].radius.powi(4) / (spec.mobility() * PAPERS_SIZE);
     !(1.0 / SUITED..=SUITED).contains(&size)
 }
 
-/// The time at which a member ends if it has not relaxed.
-fn cap(spec: &Spec, scale: &CurveScale) -> f64 {
+/// The time at which a member ends if it has not relaxed: the latest for any of the probes.
+fn cap(spec: &Spec, scales: &[CurveScale]) -> f64 {
     // That of a curve which is not simple is no time that it needs.
-    let margin = if scale.simple { MARGIN } else { 1.0 };
-    rounded_up(margin * expected(spec, scale))
+    let margin = |scale: &CurveScale| if scale.simple { MARGIN } else { 1.0 };
+    let caps = probes(spec, scales).map(|(values, scale)| margin(scale) * expected(spec, &values, scale));
+    rounded_up(caps.fold(0.0, f64::max))
 }
 
 /// The time that a member needs to relax, by theory. Where theory has none, that of surface diffusion in the slowest
 /// mode; for a curve that is not simple, (L/2π)⁴.
-fn expected(spec: &Spec, scale: &CurveScale) -> f64 {
-    let own = |factor: f64| spec.perturbed_excess().map(|part| factor * part).collect::<Vec<_>>();
+fn expected(spec: &Spec, values: &MemberValues, scale: &CurveScale) -> f64 {
+    let parts = spec.perturbed_excess(values);
+    let own = |factor: f64| parts.iter().map(|part| factor * part).collect::<Vec<_>>();
     let start = scale.excess + own(1.0).iter().sum::<f64>();
     let threshold = spec.threshold(start);
-    let fourth = scale.first_radius(&spec.flow).powi(4) / spec.mobility();
-    match scale.relaxes_after(&spec.flow, &own(PERTURBED), threshold) {
+    let fourth = scale.first_radius(&values.flow).powi(4) / spec.mobility();
+    match scale.relaxes_after(&values.flow, &own(PERTURBED), threshold) {
         Some(t) if t > 0.0 => t / spec.mobility(),
         // It is round already.
         Some(_) => fourth / 24.0,
@@ -128,12 +141,16 @@ fn rounded_up(t: f64) -> f64 {
     f64::from_bits((t.to_bits() + rest) & !rest)
 }
 
-/// Checks the rates and times that depend on the curve, of `n` nodes.
+/// Checks the rates and times that depend on the curve, of `n` nodes; where members have their own, for all probes.
 ///
 /// # Errors
 /// [`Error::Request`] for a redistribution that overshoots or needs too many steps, for too many steps, and for a pull
 /// that is too strong.
-pub fn check(spec: &Spec, scale: &CurveScale, n: usize) -> Result<()> {
+pub fn check(spec: &Spec, scales: &[CurveScale], n: usize) -> Result<()> {
+    scales.iter().try_for_each(|scale| check_scale(spec, scale, n))
+}
+
+fn check_scale(spec: &Spec, scale: &CurveScale, n: usize) -> Result<()> {
     let rate = rate(spec, scale);
     check_redistribution(spec, own_omega(rate), own_tau(rate))?;
     check_steps(spec, own_omega(rate), own_tau(rate))?;

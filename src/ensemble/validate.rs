@@ -49,6 +49,7 @@ impl Spec {
         self.check_mobility()?;
         self.check_times()?;
         self.check_method()?;
+        self.check_drawn()?;
         self.check_relaxation()?;
         self.check_combinations()?;
         self.fill_defaults();
@@ -282,14 +283,14 @@ impl Spec {
             return Err(Error::value("max-sweeps", self.max_sweeps, problem, &format!("use 1 to {MAX_SWEEPS}")));
         }
         let resolved = self.points / 4;
-        if let Some(mode) = self.shape.highest_mode()
+        if let Some(mode) = self.highest_mode()
             && mode as usize > resolved
         {
             let problem = format!("{} nodes resolve no mode above {resolved}", self.points);
             let allowed = format!("use --points {} or more, or lower modes", 4 * u64::from(mode));
             return Err(Error::value("shape", &self.shape, &problem, &allowed));
         }
-        if self.amplitude != 0.0 && self.modes.high as usize > resolved {
+        if self.amplitude != 0.0.into() && self.modes.high as usize > resolved {
             let modes = String::from(self.modes);
             let problem = format!("{} nodes resolve no mode above {resolved}", self.points);
             let allowed = format!("use --points {} or more, or lower modes", 4 * u64::from(self.modes.high));
@@ -510,6 +511,8 @@ mod tests {
         ("tolerance = 1e-4\nadaptive = 0.001", "--tolerance 0.0001: the direct solver makes no sweeps; "),
         ("sor = 1.5\nsolver = 'direct'", "--sor 1.5: the direct solver makes no sweeps; "),
         ("max-sweeps = 9\nsolver = 'direct'", "--max-sweeps 9: the direct solver makes no sweeps; "),
+        ("amplitude = 'normal(0.05,0.02)'", "--amplitude normal(0.05,0.02): 0.62 % of the members would be refused"),
+        ("shape = 'flower:choice(2,26):0.1'", "--shape flower:choice(2,26):0.1: 100 nodes resolve no mode above 25"),
         ("adaptive = 0", "--adaptive 0: not a local error tolerance; use a number above 0, up to 1"),
         ("adaptive = -1", "--adaptive -1: "),
         ("adaptive = nan", "--adaptive NaN: "),

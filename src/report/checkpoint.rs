@@ -127,7 +127,7 @@ impl Origin {
 
 /// The outlines of a study, with the CRC-32C of each as read.
 fn outlines(study: &Study) -> BTreeMap<PathBuf, u32> {
-    let outline = |cell: &Cell| match &cell.spec.shape {
+    let outline = |cell: &Cell| match cell.spec.shape.typical() {
         Shape::File(path) => Some((path.clone(), cell.family.outline()?.digest())),
         _ => None,
     };

@@ -480,7 +480,7 @@ mod tests {
         let csv = Spec {
             curves: 3,
             points: POINTS,
-            amplitude: 0.0,
+            amplitude: 0.0.into(),
             series: Some(0.1),
             snapshots: vec![0.0],
             ..Spec::default()

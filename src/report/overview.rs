@@ -3,12 +3,14 @@
 use std::{fmt, path::Path, time::Duration};
 
 use crate::{
+    curve::Perturbation,
     ensemble::{
-        Spec,
+        Drawn, Spec,
         spec::{Pace, Tau, Units},
     },
     files::names::ENSEMBLE,
     placement::Platform,
+    random::Design,
     results::{
         cells::{CellStatistics, EnsembleStatistics, Rates},
         comparison::{CellDifference, LeftOut},
@@ -204,9 +206,20 @@ pub fn describe(spec: &Spec) -> String {
         Pace::Fixed(Tau::Auto) => ("tau", "tau = auto".into()),
         Pace::Adaptive(tolerance) => ("adaptive", format!("adaptive {tolerance:?}")),
     };
+    let drawn = |key: &str, value: &Drawn<f64>| if value.is_drawn() { format!("{key} {value}") } else { String::new() };
+    let perturbation = if spec.perturbation == Perturbation::Gaussian { "gaussian perturbation" } else { "" };
+    let design = match spec.design {
+        Design::Random => "",
+        Design::Sobol => "design sobol",
+        Design::Lhs => "design lhs",
+    };
     let parts = [
-        ("shape", String::from(spec.shape.clone())),
+        ("shape", spec.shape.to_string()),
         ("flow", spec.flow.to_string()),
+        ("amplitude", drawn("amplitude", &spec.amplitude)),
+        ("decay", drawn("decay", &spec.decay)),
+        ("perturbation", perturbation.into()),
+        ("design", design.into()),
         ("mobility", mobility(spec)),
         ("points", format!("n = {}", spec.points)),
         pace,

@@ -484,20 +484,24 @@ fn happened(cell: &CellStatistics, happened: bool) -> impl Iterator<Item = f64> 
 }
 
 /// The law by which, in linear theory, the excess of a curve of the members' mean area decreases, through the point
-/// where the mean has fallen to a tenth.
+/// where the mean has fallen to a tenth. There is none where each member has a shape or a flow of its own.
 fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
+    if spec.shape.is_drawn() || spec.flow.is_drawn() {
+        return None;
+    }
+    let values = spec.typical();
     let members: u64 = cell.counts.iter().sum();
     let area = cell.area / members as f64;
     let first = curve.mean.first()?;
     let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
     let (t, mean) = (curve.t[tenth], curve.mean[tenth]);
-    let rate = spec.rate_in_theory(area).or_else(|| theory::rate_at(spec, area, t))?;
+    let rate = spec.rate_in_theory(&values, area).or_else(|| theory::rate_at(spec, &values, area, t))?;
     // 24 instead of 24.0.
     let brief = |rate: f64| match rate.round() {
         whole if (rate - whole).abs() < 1e-6 * rate && rate < 1e4 => format!("{whole}"),
         _ => significant(rate, 3),
     };
-    Some(match (spec.growth(area), &spec.flow) {
+    Some(match (spec.growth(&values.flow, area), &*values.flow) {
         (Some(time), _) => Theory {
             label: format!("(1 + 2t/R⁴)^−{}", brief(rate)),
             law: DecayLaw::Algebraic { start: mean * (1.0 + t / time).powf(rate), time, power: rate },

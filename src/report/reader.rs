@@ -229,7 +229,10 @@ impl<'a> Summary<'a> {
             return Err(fields.unexpected_in("t_relax", &format!("a time up to {t_end}, the end of the run")));
         }
         // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
-        outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| theory::rate_of(spec, &outcome));
+        outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| {
+            let values = spec.values_of(member, cell).ok()?;
+            theory::rate_of(spec, &values, &outcome)
+        });
         let told = (outcome.t_limit, outcome.t_error);
         if let Some((_, spec)) = &self.spec_of {
             self.levels.judge(spec, &mut outcome);
@@ -317,7 +320,7 @@ mod tests {
         folder.publish_all(vec![table.ready().unwrap()]).unwrap();
         let mut spec = Spec { curves: 2, ..Spec::default() };
         spec.sweep.set("omega=1,2".parse().unwrap());
-        written.rate_theory = spec.rate_in_theory(-6.5);
+        written.rate_theory = spec.rate_in_theory(&spec.typical(), -6.5);
         let read: Vec<Outcome> =
             Summary::open(home.path(), &spec, &LevelTimes::default()).unwrap().map(Result::unwrap).collect();
         assert_eq!(read, [written.clone()]);

@@ -166,7 +166,8 @@ impl CellStatistics {
         let quantiles = QUANTILES.map(|(share, ..)| quantile(share));
         let (values, counts) = (spec.sweep.labels(cell), tally.counts);
         let rates = Rates::new(&bootstrap, &mem::take(&mut tally.rates), relative)?;
-        let (judged, copies) = (mem::take(&mut tally.judged), spec.amplitude == 0.0 && !spec.sweep.has("amplitude"));
+        let (judged, copies) =
+            (mem::take(&mut tally.judged), !spec.has_different_members() && !spec.sweep.has("amplitude"));
         let discretisation = DiscretisationError::of(&judged)?;
         let limits = CellLimits::of(&Sample::from(mem::take(&mut tally.limits)), &judged, &bootstrap, copies)?;
         Ok(CellStatistics { cell, values, counts, sample, mean, quantiles, interval, rates, discretisation, limits })

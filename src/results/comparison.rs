@@ -169,7 +169,7 @@ impl CellComparison {
             return refused(format!("{count} cells; the log-rank test compares at most {MAX_COMPARED}"));
         }
         for cell in 0..count as u64 {
-            if spec.of_cell(cell)?.amplitude == 0.0 {
+            if !spec.of_cell(cell)?.has_different_members() {
                 return refused(format!(
                     "cell {cell} has amplitude 0; its members are copies of one curve, not independent draws"
                 ));
@@ -318,7 +318,7 @@ mod tests {
         let mut spec = swept(2, 200);
         let compared = |spec: &Spec| CellComparison::independent(spec, &samples.iter().collect::<Vec<_>>()).unwrap();
         assert!(compared(&spec).log_rank().is_some());
-        spec.amplitude = 0.0;
+        spec.amplitude = 0.0.into();
         let refused = compared(&spec);
         assert!(
             refused.refusal().unwrap().starts_with("cell 0 has amplitude 0; its members are copies"),

@@ -10,6 +10,7 @@ use crate::{
         rates::{own_omega, own_tau, radius, relaxation_rate, strongest_pull},
         spec::{Omega, Pace, Precision, Pull, Sor, Tau},
     },
+    flow::Flow,
     schedule::{self, Clock, Outputs, Ticks},
     scheme::{
         Parameters, State,
@@ -40,7 +41,8 @@ impl<'a> Trajectory<'a> {
         let unit = unit_of(&member.nodes);
         let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
         let time_unit = unit.powi(4) / spec.mobility();
-        let parameters = parameters(spec, &nodes, [unit, time_unit], spec.tolerance_at(precision));
+        let flow = member.flow.clone().unwrap_or_else(|| spec.flow.typical().clone());
+        let parameters = parameters(spec, &flow, &nodes, [unit, time_unit], spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
         launch.counters.stop_when_relaxed = spec.stops_when_relaxed().into();
         launch.counters.order =
@@ -53,8 +55,9 @@ impl<'a> Trajectory<'a> {
         let (time, out_of_range) = begin_time(&mut launch, spec, time_unit, precision);
         let clock = time.unit(time_unit);
         launch.parameters.clock_end = spec.final_time() / clock;
-        launch.parameters.growth =
-            spec.growth(start.area).map_or(0.0, |growth| (growth / clock).min(*schedule::range(precision).end()));
+        launch.parameters.growth = spec
+            .growth(&flow, start.area)
+            .map_or(0.0, |growth| (growth / clock).min(*schedule::range(precision).end()));
         let status = match course {
             Course::Round if spec.stops_when_relaxed() => Some(Status::Relaxed),
             _ if beyond(&parameters, precision) => Some(Status::Nonfinite),
@@ -165,9 +168,9 @@ fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
 }
 
 /// The parameters of a member in the units `unit` of length and `time` of time, except thresholds and times.
-fn parameters(spec: &Spec, nodes: &[DVec2], [unit, time]: [f64; 2], tolerance: f64) -> Parameters<f64> {
+fn parameters(spec: &Spec, flow: &Flow, nodes: &[DVec2], [unit, time]: [f64; 2], tolerance: f64) -> Parameters<f64> {
     let rate = relaxation_rate(radius(nodes));
-    let of_flow = Parameters::of_flow(&spec.flow, 1.0);
+    let of_flow = Parameters::of_flow(flow, 1.0);
     // b(k) has the dimension of 1/length³.
     let law = |j: i32, c: f64| c * unit.powi(3 - j);
     Parameters {

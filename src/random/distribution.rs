@@ -1,0 +1,344 @@
+//! Distributions of one number, in the words in which they are written: `uniform(1.2..3)`.
+//!
+//! A draw is the quantile of one uniform number in (0, 1): it needs exactly one number, and the points of a
+//! [design](super::Design) stay evenly spread. A choice keeps the order in which its values are written.
+//!
+//! | | quantile at u |
+//! |---|---|
+//! | `uniform(a..b)` | a + u (b - a) |
+//! | `loguniform(a..b)` | a (b/a)^u |
+//! | `normal(mean,sd)` | mean + sd z(u) |
+//! | `lognormal(median,sigma)` | median exp(sigma z(u)) |
+//! | `choice(a,b,...)` | the value with the rank ⌊u count⌋ |
+//!
+//! z(u) is the quantile of the standard normal law by Wichura's algorithm AS 241 (PPND16, Applied Statistics 37, 1988),
+//! good to 16 digits.
+
+use std::{fmt, str::FromStr};
+
+use crate::{error::did_you_mean, text::number};
+
+/// More values than this are a list of another kind.
+const MAX_CHOICES: usize = 1000;
+/// The names of the distributions.
+pub const NAMES: [&str; 5] = ["uniform", "loguniform", "normal", "lognormal", "choice"];
+
+/// The law of one number.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Distribution {
+    /// Any number between two, all equally probable.
+    Uniform {
+        /// The smallest.
+        low: f64,
+        /// The largest.
+        high: f64,
+    },
+    /// A number whose logarithm is uniform.
+    LogUniform {
+        /// The smallest, above 0.
+        low: f64,
+        /// The largest.
+        high: f64,
+    },
+    /// The normal law.
+    Normal {
+        /// Its mean.
+        mean: f64,
+        /// Its standard deviation, above 0.
+        sd: f64,
+    },
+    /// A number whose logarithm is normal.
+    LogNormal {
+        /// Its median, above 0.
+        median: f64,
+        /// Standard deviation of its natural logarithm, above 0.
+        sigma: f64,
+    },
+    /// One of these values, all equally probable.
+    Choice(Vec<f64>),
+}
+
+impl Distribution {
+    /// The distribution `name(arguments)`.
+    ///
+    /// # Errors
+    /// A message for an unknown name, and for parameters that are not those of a distribution.
+    pub fn of(name: &str, arguments: &str) -> Result<Distribution, String> {
+        let wrong = |problem: &str, usage: &str| format!("{name}({arguments}): {problem}; write {usage}");
+        let finite = |word: &str| word.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+        let range = |usage: &str| {
+            let ends = arguments.split_once("..").and_then(|(low, high)| Some((finite(low)?, finite(high)?)));
+            let (low, high) = ends.ok_or_else(|| wrong("not a range of finite numbers", usage))?;
+            if low < high { Ok((low, high)) } else { Err(wrong("the range is empty", usage)) }
+        };
+        let pair = |what: &str, usage: &str| {
+            let pair = arguments.split_once(',').and_then(|(first, last)| Some((finite(first)?, finite(last)?)));
+            let (centre, scale) = pair.ok_or_else(|| wrong("not two finite numbers", usage))?;
+            if scale > 0.0 { Ok((centre, scale)) } else { Err(wrong(&format!("the {what} must be above 0"), usage)) }
+        };
+        match name {
+            "uniform" => range("uniform(A..B) with A < B").map(|(low, high)| Distribution::Uniform { low, high }),
+            "loguniform" => match range("loguniform(A..B) with 0 < A < B")? {
+                (low, high) if low > 0.0 => Ok(Distribution::LogUniform { low, high }),
+                _ => Err(wrong("a logarithm needs numbers above 0", "loguniform(A..B) with 0 < A < B")),
+            },
+            "normal" => {
+                let (mean, sd) = pair("standard deviation", "normal(MEAN,SD) with SD > 0")?;
+                Ok(Distribution::Normal { mean, sd })
+            }
+            "lognormal" => {
+                let usage =
+                    "lognormal(MEDIAN,SIGMA) with MEDIAN > 0 and SIGMA > 0, the standard deviation of the logarithm";
+                match pair("standard deviation of the logarithm", usage)? {
+                    (median, sigma) if median > 0.0 => Ok(Distribution::LogNormal { median, sigma }),
+                    _ => Err(wrong("the median must be above 0", usage)),
+                }
+            }
+            "choice" => {
+                let values: Option<Vec<f64>> = arguments.split(',').map(finite).collect();
+                match values {
+                    Some(values) if values.len() <= MAX_CHOICES => Ok(Distribution::Choice(values)),
+                    Some(values) => Err(format!("choice of {} values; at most {MAX_CHOICES}", values.len())),
+                    None => Err(wrong("not finite numbers", "choice(A,B,...)")),
+                }
+            }
+            _ => Err(format!(
+                "unknown distribution `{name}`{}; one of {}",
+                did_you_mean(name, NAMES),
+                "uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA), choice(A,B,...)"
+            )),
+        }
+    }
+
+    /// The number below which a share `u` in (0, 1) of all draws lies.
+    pub fn quantile(&self, u: f64) -> f64 {
+        match self {
+            Distribution::Uniform { low, high } => (low * (1.0 - u) + high * u).clamp(*low, *high),
+            Distribution::LogUniform { low, high } => (low.ln() * (1.0 - u) + high.ln() * u).exp().clamp(*low, *high),
+            Distribution::Normal { mean, sd } => mean + sd * normal_quantile(u),
+            Distribution::LogNormal { median, sigma } => median * (sigma * normal_quantile(u)).exp(),
+            Distribution::Choice(values) => values[((u * values.len() as f64) as usize).min(values.len() - 1)],
+        }
+    }
+
+    /// Its mean.
+    pub fn mean(&self) -> f64 {
+        match self {
+            Distribution::Uniform { low, high } => 0.5 * low + 0.5 * high,
+            Distribution::LogUniform { low, high } => (high - low) / (high / low).ln(),
+            Distribution::Normal { mean, .. } => *mean,
+            Distribution::LogNormal { median, sigma } => median * (0.5 * sigma * sigma).exp(),
+            Distribution::Choice(values) => values.iter().sum::<f64>() / values.len() as f64,
+        }
+    }
+
+    /// The values that can be drawn, if they are few; otherwise those at `u` near 0 and near 1.
+    pub fn extremes(&self) -> Vec<f64> {
+        match self {
+            Distribution::Choice(values) => values.clone(),
+            other => [SMALLEST, 1.0 - SMALLEST].map(|u| other.quantile(u)).to_vec(),
+        }
+    }
+}
+
+/// The smallest uniform number of [`Stream::uniforms`](super::Stream::uniforms); the largest is as far from 1.
+pub const SMALLEST: f64 = 0.5 / (1_u64 << 52) as f64;
+
+impl fmt::Display for Distribution {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Distribution::Uniform { low, high } => write!(f, "uniform({}..{})", number(*low), number(*high)),
+            Distribution::LogUniform { low, high } => write!(f, "loguniform({}..{})", number(*low), number(*high)),
+            Distribution::Normal { mean, sd } => write!(f, "normal({},{})", number(*mean), number(*sd)),
+            Distribution::LogNormal { median, sigma } => write!(f, "lognormal({},{})", number(*median), number(*sigma)),
+            Distribution::Choice(values) => {
+                let values: Vec<String> = values.iter().copied().map(number).collect();
+                write!(f, "choice({})", values.join(","))
+            }
+        }
+    }
+}
+
+impl FromStr for Distribution {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Distribution, String> {
+        let parts = text.trim().strip_suffix(')').and_then(|text| text.split_once('('));
+        let (name, arguments) = parts.ok_or_else(|| format!("`{text}` is not a distribution such as uniform(1..2)"))?;
+        Distribution::of(name.trim(), arguments)
+    }
+}
+
+/// The quantile of the standard normal law at `u` in (0, 1).
+pub fn normal_quantile(u: f64) -> f64 {
+    let centred = u - 0.5;
+    if centred.abs() <= 0.425 {
+        let r = 0.180625 - centred * centred;
+        return centred * ratio(&CENTRE, r);
+    }
+    let tail = if centred < 0.0 { u } else { 1.0 - u };
+    let r = (-tail.ln()).sqrt();
+    let size = if r <= 5.0 { ratio(&TAIL, r - 1.6) } else { ratio(&FAR_TAIL, r - 5.0) };
+    if centred < 0.0 { -size } else { size }
+}
+
+/// The ratio of two polynomials, with coefficients from the highest power down.
+fn ratio([over, under]: &[[f64; 8]; 2], r: f64) -> f64 {
+    let [over, under] = [over, under].map(|of| of.iter().fold(0.0, |sum, c| sum * r + c));
+    over / under
+}
+
+#[rustfmt::skip]
+const CENTRE: [[f64; 8]; 2] = [
+    [2509.0809287301227, 33430.57558358813, 67265.7709270087,
+     45921.95393154987, 13731.69376550946, 1971.5909503065513,
+     133.14166789178438, 3.3871328727963665],
+    [5226.495278852854, 28729.085735721943, 39307.89580009271,
+     21213.794301586597, 5394.196021424751, 687.1870074920579,
+     42.31333070160091, 1.0],
+];
+#[rustfmt::skip]
+const TAIL: [[f64; 8]; 2] = [
+    [0.0007745450142783414, 0.022723844989269184, 0.2417807251774506,
+     1.2704582524523684, 3.6478483247632045, 5.769497221460691,
+     4.630337846156546, 1.4234371107496835],
+    [1.0507500716444169e-9, 0.0005475938084995345, 0.015198666563616457,
+     0.14810397642748008, 0.6897673349851, 1.6763848301838038,
+     2.053191626637759, 1.0],
+];
+#[rustfmt::skip]
+const FAR_TAIL: [[f64; 8]; 2] = [
+    [2.0103343992922881e-7, 2.7115555687434876e-5, 0.0012426609473880784,
+     0.026532189526576124, 0.29656057182850487, 1.7848265399172913,
+     5.463784911164114, 6.657904643501103],
+    [2.0442631033899397e-15, 1.421511758316446e-7, 1.8463183175100548e-5,
+     0.0007868691311456133, 0.014875361290850615, 0.1369298809227358,
+     0.599832206555888, 1.0],
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Stream;
+
+    const ALL: [&str; 6] = [
+        "uniform(-1.5..3)",
+        "loguniform(0.01..0.1)",
+        "normal(-2,0.5)",
+        "lognormal(0.5,0.2)",
+        "choice(3,-1,0.25,7)",
+        "lognormal(1e-12,1.5)",
+    ];
+
+    fn distribution(text: &str) -> Distribution {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn a_distribution_prints_as_it_is_parsed() {
+        for text in ALL {
+            assert_eq!(distribution(text).to_string(), text);
+        }
+        assert_eq!(distribution(" normal( 1 , 2 ) ").to_string(), "normal(1,2)");
+    }
+
+    #[test]
+    fn the_normal_quantile_is_the_inverse_of_the_error_function() {
+        let pinned = [(0.9, 1.2815515655446008), (0.001, -3.090232306167813), (1e-10, -6.361340902404056)];
+        for (u, z) in pinned {
+            assert!((normal_quantile(u) - z).abs() < 4e-16 * z.abs(), "{u}: {}", normal_quantile(u));
+        }
+        assert_eq!(normal_quantile(0.5), 0.0);
+        for k in 1..400 {
+            // Both tails down to the smallest number that is drawn, and the middle.
+            for u in [f64::from(k) / 400.0, SMALLEST.powf(f64::from(k) / 400.0)] {
+                let z = normal_quantile(u);
+                let back = 0.5 * libm::erfc(-z / std::f64::consts::SQRT_2);
+                assert!((back / u - 1.0).abs() < 1e-13, "{u}: {back}");
+                assert!((normal_quantile(1.0 - u) + z).abs() < 1e-15 + 1e-15 / u.min(1.0 - u), "{u}");
+            }
+        }
+    }
+
+    #[test]
+    fn means_and_quantiles_of_a_hundred_thousand_draws_are_the_exact_ones_within_four_standard_errors() {
+        let (seed, count) = (11, 100_000_u64);
+        for text in ALL {
+            let law = distribution(text);
+            let draw = |j| law.quantile(Stream::new(seed, j, 0).uniforms(0)[0]);
+            let mut draws: Vec<f64> = (0..count).map(draw).collect();
+            draws.sort_by(f64::total_cmp);
+            let n = count as f64;
+            let mean = draws.iter().sum::<f64>() / n;
+            let deviation = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+            let off = (mean - law.mean()) / (deviation / n.sqrt());
+            assert!(off.abs() < 4.0, "seed {seed}: the mean of {text} is off by {off} standard errors");
+            if let Distribution::Choice(values) = &law {
+                let share = 1.0 / values.len() as f64;
+                for value in values {
+                    let found = draws.iter().filter(|draw| *draw == value).count() as f64 / n;
+                    let bound = 4.0 * (share * (1.0 - share) / n).sqrt();
+                    assert!((found - share).abs() < bound, "seed {seed}: {value} has {found} of the draws");
+                }
+                continue;
+            }
+            // The share of draws up to the exact quantile is binomial.
+            for u in [0.05, 0.25, 0.5, 0.75, 0.95] {
+                let exact = law.quantile(u);
+                let found = draws.partition_point(|x| *x <= exact) as f64 / n;
+                let bound = 4.0 * (u * (1.0 - u) / n).sqrt();
+                assert!((found - u).abs() < bound, "seed {seed}: {found} of {text} are below its quantile at {u}");
+            }
+        }
+        // A law that is five per cent wider fails.
+        let wide = Distribution::Normal { mean: 0.0, sd: 1.05 };
+        let share =
+            (0..count).filter(|j| wide.quantile(Stream::new(seed, *j, 0).uniforms(0)[0]) < normal_quantile(0.05));
+        let off = (share.count() as f64 / count as f64 - 0.05) / (0.05 * 0.95 / count as f64).sqrt();
+        assert!(off > 4.0, "seed {seed}: {off}");
+    }
+
+    #[test]
+    fn wrong_parameters_are_refused_with_the_form() {
+        for (text, part) in [
+            ("uniform(3..1)", "the range is empty; write uniform(A..B)"),
+            ("uniform(1..1)", "the range is empty"),
+            ("uniform(1,2)", "not a range"),
+            ("uniform(1..inf)", "not a range of finite numbers"),
+            ("loguniform(0..1)", "needs numbers above 0"),
+            ("normal(1,-0.5)", "the standard deviation must be above 0; write normal(MEAN,SD)"),
+            ("normal(1,0)", "must be above 0"),
+            ("normal(1)", "not two finite numbers"),
+            ("normal(1,2,3)", "not two finite numbers"),
+            ("lognormal(-1,0.2)", "the median must be above 0"),
+            ("lognormal(1,-0.2)", "the standard deviation of the logarithm must be above 0"),
+            ("choice()", "not finite numbers"),
+            ("choice(1,nan)", "not finite numbers"),
+            ("unifrom(1..2)", "did you mean `uniform`?"),
+            ("gamma(1,2)", "unknown distribution `gamma`; one of uniform(A..B)"),
+            ("0.5", "is not a distribution"),
+        ] {
+            let message = text.parse::<Distribution>().unwrap_err();
+            assert!(message.contains(part), "{text}: {message}");
+        }
+        let many = format!("choice({})", vec!["1"; 1001].join(","));
+        assert!(many.parse::<Distribution>().unwrap_err().contains("choice of 1001 values"));
+    }
+
+    #[test]
+    fn a_quantile_is_monotonic_and_stays_in_the_support() {
+        for text in ALL {
+            let law = distribution(text);
+            if let Distribution::Choice(values) = &law {
+                assert!((1..100).all(|k| values.contains(&law.quantile(f64::from(k) / 100.0))));
+                continue;
+            }
+            let all: Vec<f64> = (1..1000).map(|k| law.quantile(f64::from(k) / 1000.0)).collect();
+            assert!(all.windows(2).all(|pair| pair[0] < pair[1]), "{text}");
+            let [low, high] = law.extremes()[..] else { panic!("{text}") };
+            assert!(low < all[0] && all[998] < high && low.is_finite() && high.is_finite(), "{text}");
+        }
+        let [low, high] = distribution("loguniform(0.1..0.3)").extremes()[..] else { panic!() };
+        assert!(low >= 0.1 && high <= 0.3);
+    }
+}
