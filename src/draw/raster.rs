@@ -38,8 +38,8 @@ impl Letters {
     /// Pixels from the top of a letter's picture to the line on which letters stand.
     fn ascent(self) -> usize {
         match self {
-            Letters::Small => 12,
-            Letters::Large => 15,
+            Letters::Small => 13,
+            Letters::Large => 16,
         }
     }
 

@@ -261,6 +261,7 @@ pub(super) mod tests {
         assert_eq!([0.0, 1e-9, 1e-7].map(|t| clock(1e-7, t)), ["t = 0", "t = 1.000e-9", "t = 1.000e-7"]);
         assert_eq!(clock(2e5, 12345.6), "t = 12346 h");
         // A member that moves most at first.
+        movie.unit.clear();
         let film = |t: f64, x: f64| (t, vec![DVec2::ZERO, DVec2::X * x, DVec2::Y]);
         let frames = vec![film(0.0, 9.0), film(1e-3, 2.0), film(0.5, 1.0)];
         movie.pace = MoviePace::new(&[MovedMember::new(Status::Relaxed, frames)]);

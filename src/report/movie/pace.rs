@@ -18,6 +18,10 @@ use super::moved::MovedMember;
 /// The share w. At 0 the clock would jump over times in which nothing moves.
 const PLAIN: f64 = 0.15;
 
+/// Pixels that a member goes in a whole movie without anyone seeing it. If all together go no further, time is plain:
+/// what is left of their motion is rounding.
+const UNSEEN: f64 = 2.0;
+
 /// The moments of a movie and their times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MoviePace {
@@ -40,7 +44,7 @@ impl MoviePace {
             before = now;
         }
         let (all, whole) = (ways.iter().sum::<f64>(), times.last().unwrap_or(&0.0) - times.first().unwrap_or(&0.0));
-        let plain = if all > 0.0 { PLAIN } else { 1.0 };
+        let plain = if all > UNSEEN * members.len() as f64 { PLAIN } else { 1.0 };
         let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
         let mut moment = 0.0;
         let mut knots: Vec<(f64, f64)> = Vec::with_capacity(times.len());
@@ -87,7 +91,9 @@ fn along(knots: &[(f64, f64)], x: f64) -> f64 {
 fn way(before: &[DVec2], now: &[DVec2]) -> f64 {
     let n = before.len().min(now.len());
     let square = |i: usize| {
-        let tangent = (before[(i + 1) % n] - before[(i + n - 1) % n]).normalize_or_zero();
+        // Of both together: to that of one, a curve that turns along itself would seem to move.
+        let along = |nodes: &[DVec2]| nodes[(i + 1) % n] - nodes[(i + n - 1) % n];
+        let tangent = (along(before) + along(now)).normalize_or_zero();
         tangent.perp_dot(now[i] - before[i]).powi(2)
     };
     if n > 0 { ((0..n).map(square).sum::<f64>() / n as f64).sqrt() } else { 0.0 }
