@@ -39,18 +39,22 @@ struct Arguments {
     out: PathBuf,
 }
 
+const TOO_FEW: &str = "--points: too few";
+
 type Constants = BTreeMap<String, f64>;
 pub(crate) type Outcome<T> = Result<T, Box<dyn Error>>;
 
 fn main() -> Outcome<()> {
     let Arguments { points, out } = Arguments::parse();
-    println!("{} kernels in {}", write_all(points, &out)?, out.display());
+    let count = write_all(points, &out)?;
+    let lanes = 100.0 * shader::lanes_in_use(Blocks::new(points).ok_or(TOO_FEW)?, SUBGROUP);
+    println!("{count} kernels in {}; {lanes:.0} % of the lanes are in use at n = {points}", out.display());
     Ok(())
 }
 
 /// Writes all kernels; returns their number.
 pub(crate) fn write_all(points: usize, out: &Path) -> Outcome<usize> {
-    let blocks = Blocks::new(points).ok_or("--points: too few")?;
+    let blocks = Blocks::new(points).ok_or(TOO_FEW)?;
     fs::create_dir_all(out)?;
     let fits = |variant: &Variant| !variant.subgroup || blocks.count() <= SUBGROUP as usize;
     let constants = shader::constants(blocks, SUBGROUP);

@@ -357,7 +357,8 @@ class Machine:
         write = self.put(i, o[0])
         a, b = self.integer(i, o[1]), self.integer(i, o[2])
         if "HI" in parts:
-            c, shift, more = self.integer(i, o[3]), np.uint64(int(o[4], 0)), self.predicate(i, o[5])
+            c, shift = self.integer(i, o[3]), np.uint64(int(o[4], 0))
+            more = self.predicate(i, o[5]) if len(o) > 5 else lambda w: 0
             def run(w, lanes):
                 whole = (np.uint64(c(w)) << np.uint64(32) | a(w).astype(np.uint64)) << shift
                 write(w, lanes, (whole >> np.uint64(32)) + b(w) + np.asarray(more(w), np.uint64))

@@ -107,6 +107,20 @@ pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
     blocks.count().next_multiple_of(subgroup as usize)
 }
 
+/// Returns the share of a workgroup's threads that own a block of four nodes, or three quarters of one: lanes that do
+/// work while the kernel runs in subgroups of `subgroup` threads.
+///
+/// ```
+/// use curvelax::{backend::gpu::shader::lanes_in_use, solver::Blocks};
+///
+/// let lanes = |n| lanes_in_use(Blocks::new(n).unwrap(), 32);
+/// // Fewer nodes than a subgroup can hold leave lanes idle.
+/// assert_eq!([lanes(64), lanes(100), lanes(128), lanes(200), lanes(256)], [0.5, 0.78125, 1.0, 0.78125, 1.0]);
+/// ```
+pub fn lanes_in_use(blocks: Blocks, subgroup: u32) -> f64 {
+    blocks.n as f64 / (4 * threads(blocks, subgroup)) as f64
+}
+
 /// Returns the `override` constants that size the kernel.
 pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
     [
