@@ -33,8 +33,24 @@ fn apply(m: vec, v: vec) -> vec {
     return vec(m.x * v.x + m.y * v.y, m.z * v.x + m.w * v.y, m.x * v.z + m.y * v.w, m.z * v.z + m.w * v.w);
 }
 
+/// c - a b, each term subtracted for itself: GPUs fuse it with its product.
+fn less_product(c: vec, a: vec, b: vec) -> vec {
+    return vec(
+        c.x - a.x * b.x - a.y * b.z, c.y - a.x * b.y - a.y * b.w,
+        c.z - a.z * b.x - a.w * b.z, c.w - a.z * b.y - a.w * b.w,
+    );
+}
+
+/// c - m v, likewise.
+fn less_applied(c: vec, m: vec, v: vec) -> vec {
+    return vec(
+        c.x - m.x * v.x - m.y * v.y, c.y - m.z * v.x - m.w * v.y,
+        c.z - m.x * v.z - m.y * v.w, c.w - m.z * v.z - m.w * v.w,
+    );
+}
+
 fn invert(m: vec) -> vec {
-    return vec(m.w, -m.y, -m.z, m.x) / (m.x * m.w - m.y * m.z);
+    return vec(m.w, -m.y, -m.z, m.x) * (real(1.0) / (m.x * m.w - m.y * m.z));
 }
 
 /// Solves for `u` alone, or for `u` and `v`. Whether `u` alone is finite is judged with the positions, which saves a
@@ -56,7 +72,7 @@ fn solve(both: bool, negligible: real, made: u32, most: u32) -> Solve {
 fn solve_rows() {
     let interior = eliminate_interior();
     let own = solve_ring(pair_row(interior));
-    let m = interior.c - apply(interior.p, ring_rhs[before]) - apply(interior.s, own);
+    let m = less_applied(less_applied(interior.c, interior.p, ring_rhs[before]), interior.s, own);
     u = select(vec(m.x, own.xy, 0.0), vec(m.xy, own.xy), is_four);
     v = select(vec(m.z, own.zw, 0.0), vec(m.zw, own.zw), is_four);
 }
@@ -103,10 +119,10 @@ fn pair_row(interior: Interior) -> PairRow {
     }
     workgroupBarrier();
     return PairRow(
-        from_before - multiply(from_interior, interior.p),
-        own - multiply(from_interior, interior.s) - multiply(from_next, interior_p[after]),
-        -multiply(from_next, interior_s[after]),
-        rhs - apply(from_interior, interior.c) - apply(from_next, partials[after]),
+        less_product(from_before, from_interior, interior.p),
+        less_product(less_product(own, from_interior, interior.s), from_next, interior_p[after]),
+        multiply(-from_next, interior_s[after]),
+        less_applied(less_applied(rhs, from_interior, interior.c), from_next, partials[after]),
     );
 }
 
@@ -135,15 +151,15 @@ fn solve_ring(row: PairRow) -> vec {
         if stays(stride) {
             if before_leaves(stride) {
                 let at = before_by(stride);
-                own = own - multiply(low, ring_b[at]);
-                rhs = rhs - apply(low, ring_rhs[at]);
-                low = -multiply(low, ring_a[at]);
+                own = less_product(own, low, ring_b[at]);
+                rhs = less_applied(rhs, low, ring_rhs[at]);
+                low = multiply(-low, ring_a[at]);
             }
             if after_leaves(stride) {
                 let at = after_by(stride);
-                own = own - multiply(high, ring_a[at]);
-                rhs = rhs - apply(high, ring_rhs[at]);
-                high = -multiply(high, ring_b[at]);
+                own = less_product(own, high, ring_a[at]);
+                rhs = less_applied(rhs, high, ring_rhs[at]);
+                high = multiply(-high, ring_b[at]);
             }
         }
     }
@@ -153,7 +169,7 @@ fn solve_ring(row: PairRow) -> vec {
     for (stride = stride / 2u; stride > 0u; stride = stride / 2u) {
         workgroupBarrier();
         if leaves(stride) {
-            rhs = rhs - apply(low, ring_rhs[before_by(stride)]) - apply(high, ring_rhs[after_by(stride)]);
+            rhs = less_applied(less_applied(rhs, low, ring_rhs[before_by(stride)]), high, ring_rhs[after_by(stride)]);
             if owns > 0u { ring_rhs[lane] = rhs; }
         }
     }

@@ -38,7 +38,7 @@ fn ring_sums(part: vec) -> vec {
     return sum_of_partials();
 }
 
-/// The sum of all rows of `partials`, in order. A round of the loop adds four: its counter, and the one that naga gives
+/// The sum of all rows of `partials`, in order. A round of the loop adds eight: its counter, and the one that naga gives
 /// every loop, cost more than an addition.
 ///
 /// The bound of the loop is read from the dispatch: a constant one is unrolled, which takes lavapipe's compiler as long
@@ -46,8 +46,9 @@ fn ring_sums(part: vec) -> vec {
 fn sum_of_partials() -> vec {
     var sum = vec(0.0);
     var t = 0u;
-    for (; t + 4u <= dispatch.blocks; t += 4u) {
+    for (; t + 8u <= dispatch.blocks; t += 8u) {
         sum = sum + partials[t] + partials[t + 1u] + partials[t + 2u] + partials[t + 3u];
+        sum = sum + partials[t + 4u] + partials[t + 5u] + partials[t + 6u] + partials[t + 7u];
     }
     for (; t < dispatch.blocks; t++) { sum = sum + partials[t]; }
     return sum;
@@ -62,7 +63,9 @@ fn sum_before(part: real) -> real {
     for (; t + 4u <= block; t += 4u) {
         sum = sum + partials[t].x + partials[t + 1u].x + partials[t + 2u].x + partials[t + 3u].x;
     }
-    for (; t < block; t++) { sum = sum + partials[t].x; }
+    if t < block { sum = sum + partials[t].x; }
+    if t + 1u < block { sum = sum + partials[t + 1u].x; }
+    if t + 2u < block { sum = sum + partials[t + 2u].x; }
     return sum;
 }
 
