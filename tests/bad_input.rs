@@ -154,7 +154,7 @@ fn a_wrong_sweep_names_its_key_and_cell() {
 
 #[test]
 fn an_unknown_flag_is_answered_with_the_nearest() {
-    for (given, meant) in [("--tauu", "--tau"), ("--curve", "--curves"), ("--relaxto", "--relax-to")] {
+    for (given, meant) in [("--tua", "--tau"), ("--curve", "--curves"), ("--relaxto", "--relax-to")] {
         assert_says(&refused(&[given, "1"], &[]), &[given, &format!("similar argument exists: '{meant}'")]);
     }
 }
@@ -498,9 +498,9 @@ fn a_wrong_shape_is_refused_by_name() {
         ("twice.csv", "0,0\n1,0\n1,0\n1,1\n0,1\n"),
         ("line.csv", "0,0\n1,1\n2,2\n3,3\n"),
         ("no-area.csv", "0,0\n1,1\n1,0\n0,1\n"),
-        ("semicolon.csv", "x;y\n0;0\n1;0\n1;1\n"),
-        ("tab.csv", "\u{feff}x\ty\r\n0\t0\r\n1\t0\r\n1\t1\r\n"),
-        ("space.csv", "0 0\n1 0\n1 1\n"),
+        ("several.csv", "0,0\n1,0\n1,1\n\n0,0\n1,0\n1,1\n"),
+        ("holed.wkt", "POLYGON ((0 0, 9 0, 9 9, 0 0), (4 1, 5 1, 5 2, 4 1))\n"),
+        ("thousands.csv", "1,234;5,678\n2,234;5,678\n2,234;6,678\n"),
         ("three.csv", "0,0,0\n1,0,0\n1,1,0\n"),
     ];
     for (name, _) in files.into_iter().chain([("absent.csv", "")]) {

@@ -14,7 +14,8 @@ use crate::error::nearest;
 const LISTED: usize = 16;
 
 /// If `error` is about an unknown flag, adds which commands have it, or which flag of this command is similar. clap
-/// misses slips in short words, and suggests similar words if the flag belongs to another command.
+/// misses slips in short words, or takes them for parts of long ones, and suggests similar words if the flag belongs to
+/// another command.
 pub fn explain(error: &mut clap::Error, program: &Command, arguments: &[OsString]) {
     let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return };
     let Some(word) = given.strip_prefix("--").filter(|_| error.kind() == ErrorKind::UnknownArgument) else { return };
@@ -32,10 +33,9 @@ pub fn explain(error: &mut clap::Error, program: &Command, arguments: &[OsString
         let called = called.filter(|command| !owners.contains(&command.get_name()));
         error.remove(ContextKind::SuggestedArg);
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(belongs(&word, &owners, called)));
-    } else if let Some(near) = nearest(&word, flags(command))
-        && error.get(ContextKind::SuggestedArg).is_none()
-    {
+    } else if let Some(near) = nearest(&word, flags(command)) {
         error.remove(ContextKind::Suggested);
+        error.remove(ContextKind::SuggestedArg);
         error.insert(ContextKind::SuggestedArg, ContextValue::String(format!("--{near}")));
     }
 }

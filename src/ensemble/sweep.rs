@@ -11,7 +11,7 @@ use serde::{
 };
 use toml::Value;
 
-use crate::error::{Error, Result, did_you_mean};
+use crate::error::{Error, Result, did_you_mean, shortened};
 
 /// Keys that all members of a run have in common.
 const COMMON: [&str; 17] = [
@@ -40,6 +40,10 @@ pub const MAX_CELLS: u64 = 10_000;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sweep(Vec<SweepAxis>);
 
+/// Characters of the values in a title, and of one of them.
+const MAX_TITLE: usize = 80;
+const MAX_LABEL: usize = 40;
+
 /// One swept key with its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SweepAxis {
@@ -53,6 +57,20 @@ impl SweepAxis {
     /// The values as text for tables.
     pub fn labels(&self) -> Vec<String> {
         self.values.iter().map(label).collect()
+    }
+
+    /// The key with its values for a title. Of many only the first ones and the last one are named, with their number.
+    pub fn title(&self) -> String {
+        let labels: Vec<String> = self.labels().iter().map(|label| shortened(label, MAX_LABEL)).collect();
+        let named = |count: usize| labels[..count].join(", ");
+        let fits = |count: &usize| named(*count).chars().count() <= MAX_TITLE;
+        let values = match (labels.last(), (1..=labels.len()).rfind(fits).unwrap_or(1)) {
+            (Some(last), count) if count < labels.len() => {
+                format!("{}, …, {last} ({} values)", named(count), labels.len())
+            }
+            _ => labels.join(", "),
+        };
+        format!("{} = {values}", self.key)
     }
 
     /// The values as numbers, if all of them are.
@@ -271,6 +289,19 @@ mod tests {
         let mut sweep = Sweep::default();
         axes.iter().for_each(|axis| sweep.set(axis.parse().unwrap()));
         sweep
+    }
+
+    #[test]
+    fn a_title_names_what_fits_and_counts_the_rest() {
+        let title = |axis: &str| axis.parse::<SweepAxis>().unwrap().title();
+        assert_eq!(title("amplitude=0.05,0.1"), "amplitude = 0.05, 0.1");
+        let seeds = (1..=500).map(|seed| seed.to_string()).collect::<Vec<_>>().join(",");
+        let many = title(&format!("seed={seeds}"));
+        assert!(many.starts_with("seed = 1, 2, 3,") && many.ends_with(", …, 500 (500 values)"), "{many}");
+        assert!(many.chars().count() < 120, "{many}");
+        // One value too long for a title is cut, and still counted.
+        let files = format!("shape=file:{0}.csv;file:{0}2.csv;circle:1", "long/".repeat(40));
+        assert!(title(&files).ends_with(", …, circle:1 (3 values)"), "{}", title(&files));
     }
 
     #[test]

@@ -292,7 +292,7 @@ impl FinishedRun<'_> {
     }
 
     fn what(&self) -> String {
-        let swept = self.spec().sweep.axes().iter().map(|axis| format!("{} = {}", axis.key, axis.labels().join(", ")));
+        let swept = self.spec().sweep.axes().iter().map(SweepAxis::title);
         [describe(self.spec())].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
     }
 
