@@ -54,10 +54,10 @@ pub struct SpecFlags {
         help_heading = ENSEMBLE
     )]
     seed: Option<u64>,
-    /// Base curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],... or file:PATH, a CSV
-    /// file with columns x,y. PATH is relative to the current folder, also in a spec file. Any number may be a
-    /// distribution, drawn for each member: uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA) with
-    /// SIGMA the standard deviation of the logarithm, or choice(A,B,...) [default: ellipse:2,1]
+    /// Base curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],... or file:PATH, an
+    /// outline as CSV, GeoJSON, WKT or NumPy array. PATH is relative to the current folder, also in a spec file. Any number
+    /// may be a distribution, drawn for each member: uniform(A..B), loguniform(A..B), normal(MEAN,SD),
+    /// lognormal(MEDIAN,SIGMA) with SIGMA the standard deviation of the logarithm, or choice(A,B,...) [default: ellipse:2,1]
     #[arg(
         long, value_name = "SHAPE", value_parser = text_of::<Drawn<Shape>>, allow_hyphen_values = true,
         help_heading = ENSEMBLE

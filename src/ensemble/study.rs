@@ -195,6 +195,11 @@ impl Study {
     /// # Errors
     /// [`Error::Request`] for times and rates that do not suit the curve of a cell.
     fn of_cells(mut spec: Spec, mut cells: Vec<Cell>) -> Result<Study> {
+        if !spec.design.is_random() && !cells.iter().any(|cell| cell.spec.has_drawn_values()) {
+            let (problem, remedy) = ("nothing is drawn that it could spread", "write a distribution for a number");
+            let remedy = format!("{remedy}, such as --amplitude 'uniform(0.01..0.1)', or leave it out");
+            return Err(Error::value("design", spec.design.name(), problem, &remedy));
+        }
         for cell in &mut cells {
             let own = cell.settled();
             cell.spec = own.map_err(|error| of_cell(error, &spec, cell.index))?;
@@ -277,6 +282,9 @@ pub struct Cell {
 const LONG_SWEEPS: &str = "plain sweeps need more iterations the longer the step, and adaptive steps grow: a solve \
                            may need tens of thousands, where --solver multigrid needs a few hundred and direct none";
 
+const TOO_WIDE: &str = "standard errors and intervals are those of independent members, too wide for --design sobol and \
+                        lhs: the spread over several seeds is the error of such a run";
+
 /// How many times more nodes are looked for where so few cannot be refined.
 const MOST_MORE: usize = 8;
 
@@ -335,6 +343,9 @@ impl Cell {
         let Cohort { solver, adaptive, .. } = self.cohort();
         if adaptive && solver.facts().slows_with_step {
             warnings.push(LONG_SWEEPS.into());
+        }
+        if !self.spec.design.is_random() && self.spec.has_drawn_values() {
+            warnings.push(TOO_WIDE.into());
         }
         warnings.extend(times::warnings(&self.spec, self.family.scales()));
         warnings
@@ -513,6 +524,18 @@ mod tests {
         assert!(bytes(MAX_BYTES - 16_000_000).is_ok());
         let message = bytes(MAX_BYTES - 15_999_999).err().unwrap().to_string();
         assert!(message.starts_with("--sweep (2 cells): the curves of the first 1 take more than 4 GB; "), "{message}");
+    }
+
+    #[test]
+    fn a_design_needs_something_to_spread_and_says_what_its_errors_are() {
+        let study = |text: &str| Study::new(Spec::from_toml(text).unwrap());
+        let message = study("design = 'sobol'").err().unwrap().to_string();
+        assert!(message.starts_with("--design sobol: nothing is drawn that it could spread; write "), "{message}");
+        let drawn = "design = 'lhs'\nshape = 'ellipse:uniform(1.2..3),1'";
+        assert!(study(drawn).unwrap().warnings().contains(&TOO_WIDE.to_string()));
+        assert!(!study(&drawn.replace("lhs", "random")).unwrap().warnings().contains(&TOO_WIDE.to_string()));
+        // One cell may be drawn, and another not.
+        assert!(study("design = 'sobol'\n[sweep]\namplitude = [0.05, 'uniform(0.01..0.1)']").is_ok());
     }
 
     #[test]

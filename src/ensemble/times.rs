@@ -147,13 +147,21 @@ fn rounded_up(t: f64) -> f64 {
 /// [`Error::Request`] for a redistribution that overshoots or needs too many steps, for too many steps, and for a pull
 /// that is too strong.
 pub fn check(spec: &Spec, scales: &[CurveScale], n: usize) -> Result<()> {
-    scales.iter().try_for_each(|scale| check_scale(spec, scale, n))
+    if !spec.has_drawn_values() {
+        return scales.iter().try_for_each(|scale| check_scale(spec, scale, spec.final_time(), n));
+    }
+    probes(spec, scales).try_for_each(|(values, scale)| {
+        // A small member need not last as long as the largest one does.
+        let own = MARGIN * expected(spec, &values, scale);
+        let t_end = if spec.stops_when_relaxed() { own.min(spec.final_time()) } else { spec.final_time() };
+        check_scale(spec, scale, t_end, n)
+    })
 }
 
-fn check_scale(spec: &Spec, scale: &CurveScale, n: usize) -> Result<()> {
+fn check_scale(spec: &Spec, scale: &CurveScale, t_end: f64, n: usize) -> Result<()> {
     let rate = rate(spec, scale);
     check_redistribution(spec, own_omega(rate), own_tau(rate))?;
-    check_steps(spec, own_omega(rate), own_tau(rate))?;
+    check_steps(spec, t_end, own_omega(rate), own_tau(rate))?;
     let most = strongest_pull(rate, n);
     match spec.pull {
         Pull::Rate(pull) if pull > most => {
@@ -184,8 +192,7 @@ fn check_redistribution(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()>
 }
 
 /// Checks the number of steps to a final time that does not suit the curve.
-fn check_steps(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()> {
-    let t_end = spec.final_time();
+fn check_steps(spec: &Spec, t_end: f64, own_omega: f64, own_tau: f64) -> Result<()> {
     let (steps, of) = match (spec.pace(), spec.omega()) {
         (Pace::Fixed(Tau::Auto), _) => (t_end / own_tau, format!("of {}, --tau auto", short(own_tau))),
         (Pace::Adaptive(_), Omega::Auto) if !spec.no_redistribution => {
@@ -290,6 +297,15 @@ mod tests {
         let eight = at("lemniscate:1", "amplitude = 0");
         assert!((eight / (5.244_115_1 / std::f64::consts::TAU).powi(4) - 1.0).abs() < 0.02, "{eight}");
         assert!(at("circle:1", "flow = 'poly:-10'").is_finite());
+    }
+
+    #[test]
+    fn small_members_are_not_asked_to_last_as_long_as_large_ones() {
+        let adaptive = "adaptive = 0.001\nshape = 'circle:lognormal(1,0.8)'\n";
+        assert!(study(&format!("{adaptive}t-end = 'auto'")).is_ok());
+        // All of them do until a time that is given.
+        let message = study(&format!("{adaptive}t-end = 1e5")).err().unwrap().to_string();
+        assert!(message.starts_with("--t-end 100000: about "), "{message}");
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::{
 /// the first ones of the first cell, whichever run.
 const PROBED: u64 = 32;
 /// Shares of the distributions below and above which a bound looks.
-const TAILS: [f64; 2] = [0.001, 0.999];
+const TAILS: [f64; 2] = [1e-5, 1.0 - 1e-5];
 /// Bits of the places of a key.
 const PLACE_BITS: u32 = 16;
 

@@ -69,6 +69,15 @@ pub struct DrawAddress {
 }
 
 impl Design {
+    /// Its name in flags and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Design::Random => "random",
+            Design::Sobol => "sobol",
+            Design::Lhs => "lhs",
+        }
+    }
+
     /// Whether it is the default.
     pub fn is_random(&self) -> bool {
         *self == Design::Random

@@ -141,8 +141,10 @@ impl Distribution {
     }
 }
 
-/// The smallest uniform number of [`Stream::uniforms`](super::Stream::uniforms); the largest is as far from 1.
-pub const SMALLEST: f64 = 0.5 / (1_u64 << 52) as f64;
+/// The smallest share of a distribution that is drawn, and the distance of the largest one from 1: that of six standard
+/// deviations. One member in 10⁹ has the number there instead of one beyond. So ordinary laws, such as `normal(1,0.15)`
+/// for a radius, cannot give what is impossible.
+pub const SMALLEST: f64 = 1.0 / (1_u64 << 30) as f64;
 
 impl fmt::Display for Distribution {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {

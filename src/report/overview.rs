@@ -8,9 +8,9 @@ use crate::{
         Drawn, Spec,
         spec::{Pace, Tau, Units},
     },
+    error::shortened,
     files::names::ENSEMBLE,
     placement::Platform,
-    random::Design,
     results::{
         cells::{CellStatistics, EnsembleStatistics, Rates},
         comparison::{CellDifference, LeftOut},
@@ -49,7 +49,7 @@ impl fmt::Display for Overview<'_> {
         writeln!(f)?;
         self.cells(f)?;
         for (label, text) in [
-            ("ensemble", describe(self.spec)),
+            ("ensemble", shortened(&describe(self.spec), usize::MAX)),
             ("corners", self.tally.mollified.told().unwrap_or_default()),
             ("t_relax", self.relaxation()),
             ("t_limit", self.limit()),
@@ -208,18 +208,14 @@ pub fn describe(spec: &Spec) -> String {
     };
     let drawn = |key: &str, value: &Drawn<f64>| if value.is_drawn() { format!("{key} {value}") } else { String::new() };
     let perturbation = if spec.perturbation == Perturbation::Gaussian { "gaussian perturbation" } else { "" };
-    let design = match spec.design {
-        Design::Random => "",
-        Design::Sobol => "design sobol",
-        Design::Lhs => "design lhs",
-    };
+    let design = if spec.design.is_random() { String::new() } else { format!("design {}", spec.design.name()) };
     let parts = [
         ("shape", spec.shape.to_string()),
         ("flow", spec.flow.to_string()),
         ("amplitude", drawn("amplitude", &spec.amplitude)),
         ("decay", drawn("decay", &spec.decay)),
         ("perturbation", perturbation.into()),
-        ("design", design.into()),
+        ("design", design),
         ("mobility", mobility(spec)),
         ("points", format!("n = {}", spec.points)),
         pace,
