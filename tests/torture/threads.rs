@@ -105,6 +105,9 @@ fn shards(study: &'static Study) -> Attempt<'static> {
     attempt
 }
 
+/// Threads of the program itself that a run on a GPU needs: the last one waits for the driver's compiler.
+const OWN: usize = 3;
+
 /// A software GPU starts threads itself, some of which it can do without.
 pub fn few_on_the_gpu(study: &'static Study, most: usize) -> Outcome {
     let mut refused = 0;
@@ -115,7 +118,7 @@ pub fn few_on_the_gpu(study: &'static Study, most: usize) -> Outcome {
         if ended.code == Some(0) {
             attempt.must_be_the_reference(&[told]);
         } else {
-            must_be_named(&ended, if room < 2 { "ulimit -u" } else { "--backend cpu" }, &told);
+            must_be_named(&ended, if room < OWN { "ulimit -u" } else { "--backend cpu" }, &told);
             refused += 1;
         }
     }
