@@ -218,7 +218,7 @@ impl Pool<'_> {
         let at = self.cells.binary_search_by_key(&ended.outcome.cell, |cell| cell.index);
         ended.outcome.rate_theory = at.ok().and_then(|at| {
             let cell = &self.cells[at];
-            let values = cell.spec.values(cell.drawn_as(ended.outcome.member)).ok()?;
+            let values = cell.spec.values_of(ended.outcome.member, cell.index).ok()?;
             theory::rate_of(&cell.spec, &values, &ended.outcome)
         });
         ended

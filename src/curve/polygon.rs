@@ -43,8 +43,8 @@ pub fn area_centroid(points: &[DVec2]) -> DVec2 {
     if double_area.abs() > 2.0 * NO_AREA * length * length {
         let moment: DVec2 = fan(points).map(|(a, b)| a.perp_dot(b) * (a + b)).sum();
         let centroid = points[0] + moment / (3.0 * double_area);
-        let (low, high) = bounds(points);
-        if centroid.clamp(low, high) == centroid {
+        let within = |(low, high): (DVec2, DVec2)| centroid.clamp(low, high) == centroid;
+        if bounds(points.iter().copied()).is_some_and(within) {
             return centroid;
         }
     }
@@ -52,9 +52,9 @@ pub fn area_centroid(points: &[DVec2]) -> DVec2 {
     if length > 0.0 { points[0] + moment / length } else { points[0] }
 }
 
-/// Returns the lower left and upper right corner of the bounding box of the points.
-pub fn bounds(points: &[DVec2]) -> (DVec2, DVec2) {
-    points.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)))
+/// Returns the lower left and upper right corner of the bounding box of the points, if there are any.
+pub fn bounds(points: impl IntoIterator<Item = DVec2>) -> Option<(DVec2, DVec2)> {
+    points.into_iter().map(|p| (p, p)).reduce(|(low, high), (p, _)| (low.min(p), high.max(p)))
 }
 
 /// Returns the excess `L²/(4πA) - (n/π)·tan(π/n)`: 0 on the regular n-gon, the roundest of all n-gons, and > 0 on every

@@ -1,9 +1,9 @@
 //! Members: member j of an ensemble is one base curve, randomly perturbed and sampled into n nodes.
 //!
 //! A member is a pure function of the spec and j. Its amplitudes and phases are draws addressed by (seed, j, attempt,
-//! mode); numbers of its shape, flow and perturbation that are distributions have draws of their own (`values.rs`). Batch, order, thread and the other members therefore do not matter, and mode m gets the same number whichever
-//! other modes are requested. The number of nodes does not matter either: member j is the same curve at n = 100 and
-//! 200.
+//! mode); numbers of its shape, flow and perturbation that are distributions have draws of their own (`values.rs`).
+//! Batch, order, thread and the other members therefore do not matter, and mode m gets the same number whichever other
+//! modes are requested. The number of nodes does not matter either: member j is the same curve at n = 100 and 200.
 
 use std::{
     borrow::Cow,
@@ -13,7 +13,7 @@ use std::{
 
 use glam::DVec2;
 
-use super::{Mollified, Spec, horizon::CurveScale, mollifier::mollify};
+use super::{MemberValues, Mollified, Spec, horizon::CurveScale, mollifier::mollify};
 use crate::random::Stream;
 use crate::{
     curve::{
@@ -204,13 +204,9 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if no draw leaves the radius positive.
     pub fn member(&self, index: u64) -> Result<Member> {
-        let values = self.drawn.as_ref().map(|spec| Ok((spec, spec.values(index)?))).transpose()?;
-        let law = match &values {
-            Some((spec, values)) => RadialLaw::new(values.amplitude, spec.modes, values.decay)?,
-            None => self.law,
-        };
-        let factor = self.radial_factor(&law, index)?;
-        let own = values.as_ref().filter(|_| self.has_own_curves);
+        let values = self.values(index)?;
+        let factor = self.radial_factor(&self.law_of(values.as_ref())?, index)?;
+        let own = self.drawn.as_ref().zip(values.as_ref()).filter(|_| self.has_own_curves);
         let sampler = own.map(|(spec, values)| sampler(values.shape.resolve()?, spec)).transpose()?;
         let sampler = sampler.as_ref().unwrap_or(&self.sampler);
         let mut nodes = sampler.sample(&factor);
@@ -225,7 +221,7 @@ impl Family {
         }
         let origin = polygon::area_centroid(&nodes);
         nodes.iter_mut().for_each(|node| *node -= origin);
-        let flow = values.and_then(|(_, values)| match values.flow {
+        let flow = values.and_then(|values| match values.flow {
             Cow::Owned(flow) => Some(flow),
             Cow::Borrowed(_) => None,
         });
@@ -242,14 +238,18 @@ impl Family {
     /// # Errors
     /// As [`Family::member`].
     pub fn coefficients(&self, index: u64) -> Result<Vec<(u32, DVec2)>> {
-        let law = match &self.drawn {
-            Some(spec) => {
-                let values = spec.values(index)?;
-                RadialLaw::new(values.amplitude, spec.modes, values.decay)?
-            }
-            None => self.law,
-        };
+        let law = self.law_of(self.values(index)?.as_ref())?;
         Ok(self.radial_factor(&law, index)?.coefficients().collect())
+    }
+
+    /// The values of member `index`, if each has its own.
+    fn values(&self, index: u64) -> Result<Option<MemberValues<'_>>> {
+        self.drawn.as_ref().map(|spec| spec.values(index)).transpose()
+    }
+
+    /// The law of the perturbation of a member with these values.
+    fn law_of(&self, values: Option<&MemberValues>) -> Result<RadialLaw> {
+        values.map_or(Ok(self.law), |values| RadialLaw::new(values.amplitude, self.law.modes(), values.decay))
     }
 
     /// The first draw for member `index` that leaves the radius positive.

@@ -275,8 +275,6 @@ pub struct Cell {
     pub family: Family,
     /// Members of the cells before it.
     first: u64,
-    /// Member j of every cell is drawn from the same random numbers.
-    common: bool,
 }
 
 const LONG_SWEEPS: &str = "plain sweeps need more iterations the longer the step, and adaptive steps grow: a solve \
@@ -301,7 +299,7 @@ impl Cell {
     /// The only cell of a spec without a sweep.
     pub fn only(spec: Spec, family: Family) -> Cell {
         let spec = times::settled(spec, family.scales());
-        Cell { index: 0, spec, family, first: 0, common: false }
+        Cell { index: 0, spec, family, first: 0 }
     }
 
     /// Its spec with a number as the final time, checked against the curve.
@@ -334,7 +332,7 @@ impl Cell {
     /// The index of the random numbers of the member with this index in the study: for [`Family::drawn`],
     /// [`Family::coefficients`] and [`Spec::values`].
     pub fn drawn_as(&self, index: u64) -> u64 {
-        if self.common { index - self.first } else { index }
+        self.spec.drawn_as(index, self.index)
     }
 
     /// What the user should know about it before the run, one sentence each.
@@ -445,7 +443,7 @@ fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize
     // The number of points of a file has not been checked yet.
     let own = Spec { points: family.points(), ..own }.validate()?;
     let shard = spec.shard.map(|shard| shard.from(first));
-    Ok(Cell { index, spec: Spec { only, shard, ..own }, family, first, common: spec.common_random_numbers })
+    Ok(Cell { index, spec: Spec { only, shard, ..own }, family, first })
 }
 
 /// Makes and checks all cells of `spec`; one if nothing is swept.

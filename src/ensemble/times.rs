@@ -147,21 +147,16 @@ fn rounded_up(t: f64) -> f64 {
 /// [`Error::Request`] for a redistribution that overshoots or needs too many steps, for too many steps, and for a pull
 /// that is too strong.
 pub fn check(spec: &Spec, scales: &[CurveScale], n: usize) -> Result<()> {
-    if !spec.has_drawn_values() {
-        return scales.iter().try_for_each(|scale| check_scale(spec, scale, spec.final_time(), n));
-    }
-    probes(spec, scales).try_for_each(|(values, scale)| {
-        // A small member need not last as long as the largest one does.
-        let own = MARGIN * expected(spec, &values, scale);
-        let t_end = if spec.stops_when_relaxed() { own.min(spec.final_time()) } else { spec.final_time() };
-        check_scale(spec, scale, t_end, n)
-    })
+    probes(spec, scales).try_for_each(|(values, scale)| check_probe(spec, &values, scale, n))
 }
 
-fn check_scale(spec: &Spec, scale: &CurveScale, t_end: f64, n: usize) -> Result<()> {
+fn check_probe(spec: &Spec, values: &MemberValues, scale: &CurveScale, n: usize) -> Result<()> {
     let rate = rate(spec, scale);
     check_redistribution(spec, own_omega(rate), own_tau(rate))?;
-    check_steps(spec, t_end, own_omega(rate), own_tau(rate))?;
+    // A small member need not last as long as the largest one does.
+    let ends_itself = spec.has_drawn_values() && spec.stops_when_relaxed();
+    let own_end = || if ends_itself { MARGIN * expected(spec, values, scale) } else { f64::INFINITY };
+    check_steps(spec, own_end, own_omega(rate), own_tau(rate))?;
     let most = strongest_pull(rate, n);
     match spec.pull {
         Pull::Rate(pull) if pull > most => {
@@ -191,18 +186,26 @@ fn check_redistribution(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()>
     Err(Error::value("omega", spec.omega(), &overshooting(omega, tau), &allowed))
 }
 
-/// Checks the number of steps to a final time that does not suit the curve.
-fn check_steps(spec: &Spec, t_end: f64, own_omega: f64, own_tau: f64) -> Result<()> {
-    let (steps, of) = match (spec.pace(), spec.omega()) {
-        (Pace::Fixed(Tau::Auto), _) => (t_end / own_tau, format!("of {}, --tau auto", short(own_tau))),
-        (Pace::Adaptive(_), Omega::Auto) if !spec.no_redistribution => {
-            (t_end * own_omega, format!("of at most about 1/omega, and --omega auto is {}", short(own_omega)))
-        }
-        _ => return Ok(()),
+/// Checks the number of steps to a final time that does not suit the curve, or to the member's own end if that is before.
+/// An own end is asked for only where it matters: it is an integration.
+fn check_steps(spec: &Spec, own_end: impl Fn() -> f64, own_omega: f64, own_tau: f64) -> Result<()> {
+    let steps_to = |t_end: f64| match (spec.pace(), spec.omega()) {
+        (Pace::Fixed(Tau::Auto), _) => t_end / own_tau,
+        (Pace::Adaptive(_), Omega::Auto) if !spec.no_redistribution => t_end * own_omega,
+        _ => 0.0,
     };
+    if steps_to(spec.final_time()) <= MAX_STEPS {
+        return Ok(());
+    }
+    let t_end = own_end().min(spec.final_time());
+    let steps = steps_to(t_end);
     if steps <= MAX_STEPS {
         return Ok(());
     }
+    let of = match spec.pace() {
+        Pace::Fixed(_) => format!("of {}, --tau auto", short(own_tau)),
+        Pace::Adaptive(_) => format!("of at most about 1/omega, and --omega auto is {}", short(own_omega)),
+    };
     let allowed = format!("use --t-end {} or less, or auto", short(t_end * (MAX_STEPS / steps)));
     Err(Error::value("t-end", FinalTime::At(t_end), &format!("about {steps:.1e} steps {of}"), &allowed))
 }

@@ -62,7 +62,12 @@ impl Spec {
     /// # Errors
     /// As [`Spec::values`].
     pub fn values_of(&self, member: u64, cell: u64) -> Result<MemberValues<'_>> {
-        self.values(if self.common_random_numbers { member - cell * self.curves } else { member })
+        self.values(self.drawn_as(member, cell))
+    }
+
+    /// The index of the random numbers of the member with this index in a study, in its cell.
+    pub(super) fn drawn_as(&self, member: u64, cell: u64) -> u64 {
+        if self.common_random_numbers { member - cell * self.curves } else { member }
     }
 
     /// The numbers that are drawn for `member`, as for [`Spec::values`], each with its name: that of its key, and its

@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use crate::{
+    curve::polygon,
     draw::svg::{Svg, closed_path, coordinate, dots},
     ensemble::study::PORTRAITS,
     files::portraits::Film,
@@ -107,8 +108,7 @@ impl MemberPanel<'_> {
 
     /// Lower left and upper right corner of all states.
     fn bounds(&self) -> Option<(DVec2, DVec2)> {
-        let nodes = || self.states.iter().flatten().copied();
-        Some((nodes().reduce(DVec2::min)?, nodes().reduce(DVec2::max)?))
+        polygon::bounds(self.states.iter().flatten().copied())
     }
 }
 

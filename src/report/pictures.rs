@@ -296,8 +296,6 @@ impl FinishedRun<'_> {
         [describe(self.spec())].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
     }
 
-    /// The swept key with numeric values that colours show if there are many cells: the one with most values. Cells
-    /// that differ in other keys share a colour.
     /// The same, with the error of discretisation of the times in the picture.
     fn what_and_error(&self) -> String {
         let errors = self.statistics.cells.iter().filter_map(|cell| cell.discretisation.as_ref());
@@ -313,6 +311,8 @@ impl FinishedRun<'_> {
         format!("{}; discretisation about {range} %", self.what())
     }
 
+    /// The swept key with numeric values that colours show if there are many cells: the one with most values. Cells
+    /// that differ in other keys share a colour.
     fn colour_axis(&self) -> Option<(usize, &SweepAxis)> {
         let axes = self.spec().sweep.axes().iter().enumerate();
         axes.filter(|(_, axis)| axis.numbers().is_some()).max_by_key(|(i, axis)| (axis.values.len(), Reverse(*i)))

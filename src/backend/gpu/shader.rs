@@ -107,8 +107,8 @@ pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
     blocks.count().next_multiple_of(subgroup as usize)
 }
 
-/// Returns the share of a workgroup's threads that own a block of four nodes, or three quarters of one: lanes that do
-/// work while the kernel runs in subgroups of `subgroup` threads.
+/// Returns the share of lanes in use, with subgroups of `subgroup` threads: the nodes over four times the threads of a
+/// workgroup.
 ///
 /// ```
 /// use curvelax::{backend::gpu::shader::lanes_in_use, solver::Blocks};

@@ -260,7 +260,7 @@ mod tests {
         for i in 0..4 {
             assert!(points[i].distance(same[i]) < 1e-9 && points[i].distance(moved[i]) < 1e-3);
         }
-        let (low, high) = polygon::bounds(&points);
+        let (low, high) = polygon::bounds(points).unwrap();
         assert!((high - low).max_element() < 200.0, "{}", high - low);
     }
 

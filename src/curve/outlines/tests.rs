@@ -188,7 +188,7 @@ fn coordinates_of_geojson_are_degrees_unless_the_file_says_or_shows_otherwise() 
 fn an_outline_across_the_antimeridian_is_one_piece() {
     let fiji = [(179.9, -17.0), (-179.9, -17.0), (-179.9, -16.8), (179.9, -16.8)];
     let all = read("fiji.geojson", collection(&[feature(&polygon_of(&fiji), &json!({"name": "Fiji"}))]));
-    let (low, high) = polygon::bounds(all[0].outline.vertices());
+    let (low, high) = polygon::bounds(all[0].outline.vertices().iter().copied()).unwrap();
     assert!((high - low).max_element() < 25.0, "{}", high - low);
     assert!(all[0].outline.warnings()[0].contains("180, -16.9"), "{:?}", all[0].outline.warnings());
 }

@@ -16,7 +16,7 @@ use std::fmt::Write;
 use glam::DVec2;
 
 use super::page::spread;
-use crate::{draw::axis::tick_step, ensemble::Spec, files::portraits::Film, text::rounded};
+use crate::{curve::polygon, draw::axis::tick_step, ensemble::Spec, files::portraits::Film, text::rounded};
 use moved::MovedMember;
 use pace::MoviePace;
 
@@ -98,7 +98,8 @@ impl Movie {
         let shown = if spec.sweep.is_empty() { films.len().min(cut.members) } else { films.len() };
         let films: Vec<&Film> = spread(shown, cut.members).map(|i| &films[i]).collect();
         let states: Vec<Vec<Vec<DVec2>>> = films.iter().map(|film| drawable(film)).collect();
-        let boxes: Vec<Option<(DVec2, DVec2)>> = states.iter().map(|states| bounds(states)).collect();
+        let boxes: Vec<Option<(DVec2, DVec2)>> =
+            states.iter().map(|states| polygon::bounds(states.iter().flatten().copied())).collect();
         let extent = boxes.iter().flatten().map(|(low, high)| *high - *low).reduce(DVec2::max)?;
 
         let width = f64::from(cut.width);
@@ -202,12 +203,6 @@ fn drawable(film: &Film) -> Vec<Vec<DVec2>> {
         true => states,
         false => Vec::new(),
     }
-}
-
-/// Lower left and upper right corner of all states.
-fn bounds(states: &[Vec<DVec2>]) -> Option<(DVec2, DVec2)> {
-    let nodes = || states.iter().flatten().copied();
-    Some((nodes().reduce(DVec2::min)?, nodes().reduce(DVec2::max)?))
 }
 
 #[cfg(test)]

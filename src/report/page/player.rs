@@ -10,6 +10,7 @@ use serde::Serialize;
 use serde_json::{Serializer, ser::Formatter};
 
 use crate::{
+    curve::polygon,
     draw::{
         axis::{Scale, tick_step},
         svg::escape,
@@ -248,8 +249,7 @@ pub fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
 }
 
 fn bounds(frames: &[(f64, Vec<DVec2>)]) -> Option<(DVec2, DVec2)> {
-    let nodes = || frames.iter().flat_map(|(_, nodes)| nodes.iter().copied());
-    Some((nodes().reduce(DVec2::min)?, nodes().reduce(DVec2::max)?))
+    polygon::bounds(frames.iter().flat_map(|(_, nodes)| nodes.iter().copied()))
 }
 
 fn path(frame: &[u16]) -> String {
