@@ -191,6 +191,11 @@ fn round(spec: &Spec, stopped: &dyn Fn() -> Option<Error>) -> Result<Round> {
     let here = Spec { backend: BackendChoice::Cpu, adapter: None, shard: None, accuracy: None, ..spec.clone() };
     let here = Spec { series: None, snapshots: Vec::new(), store: Spec::default().store, ..here };
     let study = Study::new(here)?;
+    if study.spec().outlines.is_some() {
+        let goal = number(spec.accuracy.unwrap_or_default());
+        let problem = "it chooses the number of members, and outlines are as many as they are";
+        return Err(Error::value("accuracy", goal, problem, "use --accurate alone"));
+    }
     let mut sums = RoundSums { tally: Tally::of(study.spec(), &LevelTimes::default()), stopped };
     relax(&study, &mut sums)?;
     let statistics = EnsembleStatistics::new(study.spec(), &mut sums.tally)?;

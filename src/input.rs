@@ -103,17 +103,19 @@ pub(crate) fn text(path: &Path, most: u64) -> io::Result<String> {
     })
 }
 
-/// A reader that fails if a line is longer than [`MAX_LINE`] bytes, so that nobody who reads line by line holds more
-/// than that.
+/// A reader that fails if a line is longer than [`MAX_LINE`] bytes, or leaves a quote open, so that nobody who reads CSV
+/// holds more than that.
 pub(crate) struct Lines<R> {
     inner: R,
     /// Bytes since the last line end.
     since: usize,
+    /// Whether these leave a quote open.
+    quoted: bool,
 }
 
 impl<R: Read> Lines<R> {
     pub(crate) fn new(inner: R) -> Lines<R> {
-        Lines { inner, since: 0 }
+        Lines { inner, since: 0, quoted: false }
     }
 }
 
@@ -129,6 +131,12 @@ impl<R: Read> Read for Lines<R> {
         if first > MAX_LINE {
             let problem = format!("a line of more than {MAX_LINE} bytes");
             return Err(Error::new(ErrorKind::InvalidData, problem));
+        }
+        for byte in &buffer[..count] {
+            self.quoted ^= *byte == b'"';
+            if self.quoted && *byte == b'\n' {
+                return Err(Error::new(ErrorKind::InvalidData, "a quote that is not closed on its line"));
+            }
         }
         Ok(count)
     }

@@ -498,7 +498,7 @@ fn a_wrong_shape_is_refused_by_name() {
         ("twice.csv", "0,0\n1,0\n1,0\n1,1\n0,1\n"),
         ("line.csv", "0,0\n1,1\n2,2\n3,3\n"),
         ("no-area.csv", "0,0\n1,1\n1,0\n0,1\n"),
-        ("several.csv", "0,0\n1,0\n1,1\n\n0,0\n1,0\n1,1\n"),
+        ("several.csv", "0,0\n1,0\n1,1\n\n0,0\n1,0\n0,0\n"),
         ("holed.wkt", "POLYGON ((0 0, 9 0, 9 9, 0 0), (4 1, 5 1, 5 2, 4 1))\n"),
         ("thousands.csv", "1,234;5,678\n2,234;5,678\n2,234;6,678\n"),
         ("three.csv", "0,0,0\n1,0,0\n1,1,0\n"),

@@ -36,7 +36,8 @@ const STORES: &[&str] = &["csv", "zarr"];
 /// A value that begins with a hyphen is taken as a value, so that `--tau -1` is refused for its range.
 #[derive(clap::Args)]
 pub struct SpecFlags {
-    /// Members of the ensemble [default: 256]
+    /// Members of the ensemble; of several outlines, copies of each, and one as it is if the flag is not given
+    /// [default: 256]
     #[arg(
         long, value_name = "COUNT", value_parser = whole::<u64>, allow_hyphen_values = true,
         help_heading = ENSEMBLE
@@ -54,15 +55,25 @@ pub struct SpecFlags {
         help_heading = ENSEMBLE
     )]
     seed: Option<u64>,
-    /// Base curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],... or file:PATH, an
-    /// outline as CSV, GeoJSON, WKT or NumPy array. PATH is relative to the current folder, also in a spec file. Any number
-    /// may be a distribution, drawn for each member: uniform(A..B), loguniform(A..B), normal(MEAN,SD),
+    /// Base curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],...; or outlines as CSV,
+    /// GeoJSON, WKT or NumPy arrays: file:PATH, or files:PATTERN such as 'files:outlines/*.csv'. Each of several outlines is
+    /// a member. Paths are relative to the current folder, also in a spec file. Any number may be a distribution, drawn for each member: uniform(A..B), loguniform(A..B), normal(MEAN,SD),
     /// lognormal(MEDIAN,SIGMA) with SIGMA the standard deviation of the logarithm, or choice(A,B,...) [default: ellipse:2,1]
     #[arg(
         long, value_name = "SHAPE", value_parser = text_of::<Drawn<Shape>>, allow_hyphen_values = true,
         help_heading = ENSEMBLE
     )]
     shape: Option<Drawn<Shape>>,
+    /// Refuse outlines of another number than this, which a run fills in [default: any number]
+    #[arg(
+        long, value_name = "COUNT", value_parser = whole::<u64>, allow_hyphen_values = true,
+        help_heading = ENSEMBLE
+    )]
+    outlines: Option<u64>,
+    /// Compare the outlines by the values of this property of their features, column of their table, or `file`
+    /// [default: no groups]
+    #[arg(long, value_name = "PROPERTY", help_heading = ENSEMBLE)]
+    group_by: Option<String>,
     /// Placement of the nodes on the curve [default: arclength]
     #[arg(long, value_name = "HOW", value_parser = word::<Sampling>(SAMPLINGS), help_heading = ENSEMBLE)]
     sampling: Option<Sampling>,
@@ -268,7 +279,7 @@ macro_rules! every_flag {
         $to! {
             curves points seed shape sampling amplitude modes decay perturbation design flow no_redistribution pull solver
             order sor max_sweeps backend snapshots store common_random_numbers refine;
-            accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
+            outlines group_by accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
         }
     };
 }
@@ -340,6 +351,8 @@ impl SpecFlags {
         if self.accurate {
             self.recommend(spec);
         }
+        spec.left_out.curves &= self.curves.is_none();
+        spec.left_out.amplitude &= self.amplitude.is_none();
         macro_rules! replace {
             ($($key:ident)*; $($optional:ident)*) => {{
                 let SpecFlags { sweep: _, accurate: _, $($key,)* $($optional,)* } = self;
@@ -500,7 +513,7 @@ mod tests {
     #[test]
     fn every_flag_replaces_its_key() {
         let spec = parse(
-            "--curves 3 --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --perturbation gaussian --design lhs --flow willmore --mobility 2 --units um,h \
+            "--curves 3 --outlines 4 --group-by kind --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --perturbation gaussian --design lhs --flow willmore --mobility 2 --units um,h \
              --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --pull 3 --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \

@@ -110,7 +110,7 @@ pub fn run(args: RunArgs) -> Result<()> {
 
 /// The spec file, overlaid with the flags.
 fn resolve(file: Option<PathBuf>, flags: flags::SpecFlags) -> Result<Spec> {
-    let mut spec = file.map_or_else(|| Ok(Spec::default()), |path| Spec::read(&path))?;
+    let mut spec = file.map_or_else(|| Spec::from_toml("").map_err(Error::Request), |path| Spec::read(&path))?;
     flags.check_sweeps()?;
     flags.overlay(&mut spec);
     Ok(spec)

@@ -13,7 +13,10 @@ use std::{
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{BaseCurve, MAX_MODE, Outline};
+use super::{
+    BaseCurve, MAX_MODE, Outline,
+    outlines::{self, Labelled},
+};
 use crate::{
     error::{Error, did_you_mean},
     text::number,
@@ -47,9 +50,11 @@ pub enum Shape {
     },
     /// `r(θ) = 1 + Σ a_m cos(mθ + φ_m)` in polar coordinates, θ = 2πu.
     Flower(Vec<FlowerMode>),
-    /// A closed polygon read from a file of one outline; `u` is the fraction of its length, see
-    /// [`outlines`](super::outlines).
+    /// A closed polygon read from a file; `u` is the fraction of its length, see [`outlines`]. A file may hold several,
+    /// each a curve of its own.
     File(PathBuf),
+    /// The closed polygons of all files that match a [pattern](outlines::glob).
+    Files(String),
 }
 
 /// One term `a·cos(mθ + φ)` of a flower's radius.
@@ -63,8 +68,9 @@ pub struct FlowerMode {
     pub phase: f64,
 }
 
-const NAMES: [&str; 7] = ["ellipse", "circle", "nonconvex", "astroid", "lemniscate", "flower", "file"];
-const FORMS: &str = "one of ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],..., file:PATH";
+const NAMES: [&str; 8] = ["ellipse", "circle", "nonconvex", "astroid", "lemniscate", "flower", "file", "files"];
+const FORMS: &str = "one of ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],..., \
+                     file:PATH, files:PATTERN";
 
 /// Range of lengths in which fourth powers, the unit of times, and their inverses stay finite.
 const SIZES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
@@ -73,7 +79,8 @@ impl Shape {
     /// Checks the numbers and creates the curve, reading its file if it has one.
     ///
     /// # Errors
-    /// [`Error::Request`] for numbers out of range and for everything that [`Outline::read`] refuses.
+    /// [`Error::Request`] for numbers out of range, for everything that [`Outline::read`] refuses, and for files with
+    /// several outlines.
     pub fn resolve(&self) -> Result<BaseCurve, Error> {
         self.resolve_from(Path::new(""))
     }
@@ -92,7 +99,28 @@ impl Shape {
             Shape::Lemniscate { half_width } => BaseCurve::from_formula(move |u| lemniscate(half_width, u)),
             Shape::Flower(modes) => BaseCurve::from_formula(move |u| flower(&modes, u)),
             Shape::File(path) => BaseCurve::from_outline(Outline::read_from(base, &path)?),
+            Shape::Files(pattern) => {
+                let [path] = &outlines::glob(base, &pattern)?[..] else {
+                    let problem = "several files match, and one curve is expected";
+                    return Err(Error::Request(format!("--shape files:{pattern}: {problem}; give one of them")));
+                };
+                BaseCurve::from_outline(Outline::read_from(base, path)?)
+            }
         })
+    }
+
+    /// Reads all outlines of its file or files, named relative to the directory `base`; `None` for a formula.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for everything that [`outlines::read_files`] and [`outlines::glob`] refuse.
+    pub fn outlines_from(&self, base: &Path) -> Option<Result<Vec<Labelled>, Error>> {
+        match self {
+            Shape::File(path) => Some(outlines::read_all(base, path)),
+            Shape::Files(pattern) => {
+                Some(outlines::glob(base, pattern).and_then(|paths| outlines::read_files(base, &paths)))
+            }
+            _ => None,
+        }
     }
 
     /// Returns the lowest mode, 2 or more, by which the shape differs from a circle; it decays last. `None` for a
@@ -101,7 +129,7 @@ impl Shape {
         match self {
             Shape::Ellipse { a, b } => (a != b).then_some(2),
             Shape::Circle { .. } | Shape::Lemniscate { .. } => None,
-            Shape::Nonconvex | Shape::File(_) => Some(2),
+            Shape::Nonconvex | Shape::File(_) | Shape::Files(_) => Some(2),
             Shape::Astroid => Some(4),
             Shape::Flower(modes) => {
                 modes.iter().filter(|term| term.amplitude != 0.0).map(|term| term.mode.max(2)).min()
@@ -126,7 +154,8 @@ impl Shape {
             Shape::Lemniscate { half_width } => check_size("half-width", *half_width),
             Shape::Flower(modes) => check_flower(modes),
             Shape::File(path) if path.as_os_str().is_empty() => Err(MISSING_PATH.into()),
-            Shape::File(_) => Ok(()),
+            Shape::Files(pattern) if pattern.is_empty() => Err(MISSING_PATTERN.into()),
+            Shape::File(_) | Shape::Files(_) => Ok(()),
         }
     }
 }
@@ -166,6 +195,7 @@ fn check_size(what: &str, value: f64) -> Result<(), String> {
 }
 
 const MISSING_PATH: &str = "no path given; write for example file:outline.csv";
+const MISSING_PATTERN: &str = "no pattern given; write for example 'files:outlines/*.csv'";
 const MAX_PHASE: f64 = 1000.0;
 
 fn check_flower(modes: &[FlowerMode]) -> Result<(), String> {
@@ -204,6 +234,7 @@ impl fmt::Display for Shape {
                 write!(f, "flower:{}", terms.join(","))
             }
             Shape::File(path) => write!(f, "file:{}", path.display()),
+            Shape::Files(pattern) => write!(f, "files:{pattern}"),
         }
     }
 }
@@ -251,6 +282,7 @@ impl FromStr for Shape {
             }
             "flower" => Shape::Flower(flower_modes(arguments.unwrap_or_default())?),
             "file" => Shape::File(arguments.ok_or(MISSING_PATH)?.into()),
+            "files" => Shape::Files(arguments.ok_or(MISSING_PATTERN)?.into()),
             _ => return Err(format!("unknown shape `{name}`{}; {FORMS}", did_you_mean(name, NAMES))),
         };
         shape.check()?;
@@ -315,6 +347,7 @@ mod tests {
             "flower:3:0.2",
             "flower:2:-0.3,5:0.1:1.5",
             "file:some folder/a:b,c.csv",
+            "files:some folder/**/[ab]*.csv",
         ] {
             assert_eq!(shape(text).to_string(), text);
             let json = serde_json::to_string(&shape(text)).unwrap();

@@ -116,7 +116,7 @@ fn depth(spec: &Spec, excess: f64) -> f64 {
 
 /// Members of the pilot of a cell.
 fn pilot(spec: &Spec) -> u64 {
-    let all = spec.only.as_ref().map_or(spec.curves, |only| only.len() as u64);
+    let all = spec.only.as_ref().map_or(spec.members_per_cell(), |only| only.len() as u64);
     if spec.points > MAX_PILOT_POINTS { 0 } else { all.div_ceil(PILOT_SHARE).min(PILOT) }
 }
 

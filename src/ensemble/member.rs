@@ -7,7 +7,9 @@
 
 use std::{
     borrow::Cow,
+    collections::BTreeSet,
     f64::consts::{FRAC_1_SQRT_2, TAU},
+    path::Path,
     sync::Arc,
 };
 
@@ -17,7 +19,9 @@ use super::{MemberValues, Mollified, Spec, horizon::CurveScale, mollifier::molli
 use crate::random::Stream;
 use crate::{
     curve::{
-        BaseCurve, Outline, Perturbation, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions, polygon,
+        BaseCurve, Perturbation, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions,
+        outlines::{self, Labelled},
+        polygon,
     },
     error::{Error, Result},
     flow::Flow,
@@ -38,6 +42,10 @@ pub struct Member {
     pub index: u64,
     /// Index of its cell in a study, from 0.
     pub cell: u64,
+    /// The name of its outline; empty if it has none.
+    pub label: String,
+    /// The value of the property by which outlines are grouped; empty if they are not.
+    pub group: String,
     /// Nodes relative to `origin`, counter-clockwise, i = 1…n at index i-1.
     pub nodes: Vec<DVec2>,
     /// Area centroid of the nodes in the user's frame, subtracted so that f32 keeps its digits.
@@ -51,29 +59,44 @@ pub struct Member {
 /// The curve of a spec, prepared once; every member is made from it, or from a curve of its own.
 #[derive(Clone)]
 pub struct Family {
-    /// The curve of all members; if each has its own, that of the typical values.
+    /// The curve of all members; if each has its own, that of the typical values, or the first outline.
     sampler: Arc<Sampler>,
     law: RadialLaw,
     perturbation: Perturbation,
     seed: u64,
     /// The spec, if members have values of their own.
     drawn: Option<Arc<Spec>>,
-    /// Members have curves of their own.
-    has_own_curves: bool,
+    curves: Curves,
+    /// Property of the outlines whose values are groups.
+    group_by: Option<String>,
+    sampling: Sampling,
     /// Directions at which a draw is checked.
     directions: Arc<[DVec2]>,
     warnings: Vec<String>,
     /// The curve is an outline with equal spacing: its corners may be too sharp for n nodes.
     has_corners: bool,
-    /// There is an outline, and it does not cross itself.
-    simple: bool,
     /// The size of the curve without perturbation; if members have curves of their own, of the curve of each of
-    /// [`Spec::probes`].
+    /// [`Spec::probes`], or of some outlines.
     scales: Arc<[CurveScale]>,
 }
 
+/// What members are perturbations of.
+#[derive(Clone)]
+enum Curves {
+    /// One curve.
+    One,
+    /// The shape with each member's own numbers.
+    Drawn,
+    /// Member j of outline j modulo their number.
+    Outlines(Arc<[Labelled]>),
+}
+
+/// The group of outlines that do not have the property.
+const NO_GROUP: &str = "(none)";
 /// Nodes of a curve that is only measured.
 const PROBE_NODES: usize = 512;
+/// The outlines that stand for all are this many of the largest and of the longest ones, and of the smallest.
+const EXTREMES: usize = 8;
 
 impl Family {
     /// Loads the shape and checks the keys shape, sampling, points, amplitude, modes and decay.
@@ -81,7 +104,23 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if one of them, or the file of the shape, is wrong.
     pub fn new(spec: &Spec) -> Result<Family> {
-        Family::of_curve(spec, spec.shape.typical().resolve()?, spec.shape.is_drawn())
+        match spec.shape.typical().outlines_from(Path::new("")) {
+            Some(outlines) => Family::of_outlines(spec, outlines?.into()),
+            None => Family::of_shape(spec),
+        }
+    }
+
+    /// Does the same as [`Family::new`], for a shape that is a formula.
+    pub(super) fn of_shape(spec: &Spec) -> Result<Family> {
+        let curves = if spec.shape.is_drawn() { Curves::Drawn } else { Curves::One };
+        Family::of_curve(spec, spec.shape.typical().resolve()?, curves)
+    }
+
+    /// Does the same as [`Family::new`], with `outlines`, at least one, in place of the shape.
+    pub(super) fn of_outlines(spec: &Spec, outlines: Arc<[Labelled]>) -> Result<Family> {
+        let none = || Error::value("shape", &spec.shape, "there is no outline", "give one");
+        let first = Arc::clone(&outlines.first().ok_or_else(none)?.outline);
+        Family::of_curve(spec, BaseCurve::from_outline(first), Curves::Outlines(outlines))
     }
 
     /// Does the same as [`Family::new`], with `curve` in place of the shape, for all members: for curves that no `--shape`
@@ -104,33 +143,38 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if one of the keys sampling, points, amplitude, modes and decay is wrong.
     pub fn of(spec: &Spec, curve: BaseCurve) -> Result<Family> {
-        Family::of_curve(spec, curve, false)
+        Family::of_curve(spec, curve, Curves::One)
     }
 
     /// Does the same as [`Family::new`], with `curve` as the typical one.
-    pub(crate) fn of_curve(spec: &Spec, curve: BaseCurve, has_own_curves: bool) -> Result<Family> {
+    fn of_curve(spec: &Spec, curve: BaseCurve, curves: Curves) -> Result<Family> {
         let law = law(spec)?;
         let outline = curve.outline();
         if let (Sampling::Points, Some(own)) = (spec.sampling, outline.map(|outline| outline.vertices().len())) {
             check_own_points(spec.points, own)?;
+            check_equal_points(curves.outlines())?;
         }
         let has_corners = outline.is_some() && spec.sampling == Sampling::Arclength && spec.points >= MIN_POINTS;
         let simple = outline.is_some_and(|outline| outline.is_simple());
-        let mut warnings = outline.map_or(Vec::new(), |outline| outline.warnings().to_vec());
+        let mut warnings = match &curves {
+            Curves::Outlines(all) => outlines::warnings(all),
+            _ => outline.map_or(Vec::new(), |outline| outline.warnings().to_vec()),
+        };
         if let Shape::Lemniscate { .. } = spec.shape.typical() {
             warnings.push(NO_EXCESS.into());
         }
-        let sampler = sampler(curve, spec)?;
+        let sampler = Sampler::new(curve, spec.sampling, spec.points)?;
         let mut nodes = sampler.sample(&RadialFactor::default());
         if has_corners {
             mollify(&mut nodes, || sampler.area(&RadialFactor::default()), simple);
         }
-        let scales = match has_own_curves {
-            true => scales(spec)?,
-            false => [CurveScale::of(&nodes)].into(),
+        let scales = match &curves {
+            Curves::Drawn => scales(spec)?,
+            Curves::Outlines(all) if all.len() > 1 => scales_of(all)?,
+            _ => [CurveScale::of(&nodes)].into(),
         };
         let (sampler, directions) = (Arc::new(sampler), check_directions(spec.modes.high).into());
-        let Spec { perturbation, seed, .. } = *spec;
+        let Spec { perturbation, seed, sampling, .. } = *spec;
         let drawn = drawn(spec);
         Ok(Family {
             sampler,
@@ -138,11 +182,12 @@ impl Family {
             perturbation,
             seed,
             drawn,
-            has_own_curves,
+            curves,
+            group_by: spec.group_by.clone(),
+            sampling,
             directions,
             warnings,
             has_corners,
-            simple,
             scales,
         })
     }
@@ -159,9 +204,9 @@ impl Family {
             false => check_directions(spec.modes.high).into(),
         };
         let (sampler, scales) = (Arc::clone(&other.sampler), Arc::clone(&other.scales));
-        let (warnings, drawn) = (other.warnings.clone(), drawn(spec));
         let Spec { perturbation, seed, .. } = *spec;
-        Ok(Family { sampler, law, perturbation, seed, drawn, directions, warnings, scales, ..*other })
+        let drawn = drawn(spec);
+        Ok(Family { sampler, law, perturbation, seed, drawn, directions, scales, ..other.clone() })
     }
 
     /// Does the same as [`Family::new`] for a spec with the same shape as `other`, and another number of points.
@@ -169,16 +214,22 @@ impl Family {
     /// # Errors
     /// As [`Family::new`].
     pub(crate) fn resampled(other: &Family, spec: &Spec) -> Result<Family> {
-        Family::of_curve(spec, other.sampler.curve().clone(), other.has_own_curves)
+        Family::of_curve(spec, other.sampler.curve().clone(), other.curves.clone())
     }
 
-    /// The outline of the curve, if it has one.
-    pub fn outline(&self) -> Option<&Arc<Outline>> {
-        self.sampler.outline()
+    /// The outlines of the members, if they are read from files: that of member j is the one at j modulo their number.
+    pub fn outlines(&self) -> &[Labelled] {
+        self.curves.outlines()
+    }
+
+    /// The outline of member `index`, if it is read from a file.
+    pub fn outline(&self, index: u64) -> Option<&Labelled> {
+        let all = self.outlines();
+        all.get((index % all.len().max(1) as u64) as usize)
     }
 
     /// The size of the curve without perturbation; if members have curves of their own, of the curve of each of
-    /// [`Spec::probes`], the typical one first.
+    /// [`Spec::probes`], or of outlines that stand for all; the typical one first.
     pub(super) fn scales(&self) -> &[CurveScale] {
         &self.scales
     }
@@ -206,13 +257,20 @@ impl Family {
     pub fn member(&self, index: u64) -> Result<Member> {
         let values = self.values(index)?;
         let factor = self.radial_factor(&self.law_of(values.as_ref())?, index)?;
-        let own = self.drawn.as_ref().zip(values.as_ref()).filter(|_| self.has_own_curves);
-        let sampler = own.map(|(spec, values)| sampler(values.shape.resolve()?, spec)).transpose()?;
+        let outline = self.outline(index);
+        let own = match (&self.curves, &values, outline) {
+            (Curves::Drawn, Some(values), _) => Some(values.shape.resolve()?),
+            (Curves::Outlines(all), _, Some(own)) if all.len() > 1 => {
+                Some(BaseCurve::from_outline(Arc::clone(&own.outline)))
+            }
+            _ => None,
+        };
+        let sampler = own.map(|curve| Sampler::new(curve, self.sampling, self.points())).transpose()?;
         let sampler = sampler.as_ref().unwrap_or(&self.sampler);
         let mut nodes = sampler.sample(&factor);
-        let mollified = match self.has_corners {
-            true => mollify(&mut nodes, || sampler.area(&factor), self.simple),
-            false => Mollified::default(),
+        let mollified = match (self.has_corners, sampler.outline()) {
+            (true, Some(outline)) => mollify(&mut nodes, || sampler.area(&factor), outline.is_simple()),
+            _ => Mollified::default(),
         };
         let length = polygon::length(&nodes);
         // The area of loops that cancel is rounding only; its sign must not decide the orientation.
@@ -225,7 +283,11 @@ impl Family {
             Cow::Owned(flow) => Some(flow),
             Cow::Borrowed(_) => None,
         });
-        Ok(Member { index, cell: 0, nodes, origin, mollified, flow })
+        let label = outline.map_or(String::new(), |outline| outline.label.clone());
+        let group = outline.zip(self.group_by.as_deref()).map_or(String::new(), |(outline, property)| {
+            outline.property(property).filter(|value| !value.is_empty()).map_or(NO_GROUP.into(), Cow::into_owned)
+        });
+        Ok(Member { index, cell: 0, label, group, nodes, origin, mollified, flow })
     }
 
     /// The numbers that are drawn for member `index`, with their names: see [`Spec::drawn_numbers`].
@@ -298,17 +360,56 @@ fn drawn(spec: &Spec) -> Option<Arc<Spec>> {
     spec.has_drawn_values().then(|| Arc::new(short()))
 }
 
-fn sampler(curve: BaseCurve, spec: &Spec) -> Result<Sampler> {
-    Sampler::new(curve, spec.sampling, spec.points)
+impl Curves {
+    fn outlines(&self) -> &[Labelled] {
+        match self {
+            Curves::Outlines(all) => all,
+            _ => &[],
+        }
+    }
+}
+
+/// The size of a curve.
+fn scale(curve: BaseCurve) -> Result<CurveScale> {
+    let sampler = Sampler::new(curve, Sampling::Parameter, PROBE_NODES)?;
+    Ok(CurveScale::of(&sampler.sample(&RadialFactor::default())))
 }
 
 /// The size of the curve of each of [`Spec::probes`].
 fn scales(spec: &Spec) -> Result<Arc<[CurveScale]>> {
-    let scale = |shape: &Shape| {
-        let sampler = Sampler::new(shape.resolve()?, Sampling::Parameter, PROBE_NODES)?;
-        Ok(CurveScale::of(&sampler.sample(&RadialFactor::default())))
+    spec.probes().iter().map(|values| scale(values.shape.resolve()?)).collect()
+}
+
+/// The sizes of the outlines that stand for all: the one of median radius, and the extreme ones, each once.
+fn scales_of(outlines: &[Labelled]) -> Result<Arc<[CurveScale]>> {
+    let all = outlines.iter().map(|one| scale(BaseCurve::from_outline(Arc::clone(&one.outline))));
+    let all: Vec<CurveScale> = all.collect::<Result<_>>()?;
+    let ascending = |of: fn(&CurveScale) -> f64| {
+        let mut order: Vec<usize> = (0..all.len()).collect();
+        order.sort_by(|one, other| of(&all[*one]).total_cmp(&of(&all[*other])));
+        order
     };
-    spec.probes().iter().map(|values| scale(&values.shape)).collect()
+    let (by_radius, by_length) = (ascending(|scale| scale.radius), ascending(|scale| scale.radius_of_length));
+    let few = EXTREMES.min(all.len());
+    let median = by_radius[all.len() / 2];
+    let ends = [&by_radius[..few], &by_radius[all.len() - few..], &by_length[all.len() - few..]].concat();
+    let extremes: BTreeSet<usize> = ends.into_iter().filter(|i| *i != median).collect();
+    Ok([median].into_iter().chain(extremes).map(|i| all[i].clone()).collect())
+}
+
+/// Checks that all outlines have as many points, for `--sampling points`.
+fn check_equal_points(outlines: &[Labelled]) -> Result<()> {
+    let points = |one: &Labelled| one.outline.vertices().len();
+    let Some(first) = outlines.first() else { return Ok(()) };
+    let Some(other) = outlines.iter().find(|other| points(other) != points(first)) else { return Ok(()) };
+    let problem = format!(
+        "members have as many nodes each, and `{}` has {} points, `{}` {}",
+        first.label,
+        points(first),
+        other.label,
+        points(other)
+    );
+    Err(Error::value("sampling", "points", &problem, "use --sampling arclength"))
 }
 
 /// Checks `--points` against the file's own number of points; the default counts as not given.

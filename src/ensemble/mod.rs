@@ -9,6 +9,7 @@ pub mod levels;
 pub mod member;
 pub mod mollifier;
 pub mod outcome;
+mod outlines;
 pub mod rates;
 pub mod rows;
 mod seed;

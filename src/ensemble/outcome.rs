@@ -89,6 +89,10 @@ pub struct Outcome {
     pub t_error: Option<f64>,
     /// Observed order of the relaxation time in 1/n.
     pub order: Option<f64>,
+    /// Name of its outline; empty if it has none.
+    pub label: String,
+    /// Group of its outline; empty without `--group-by`.
+    pub group: String,
     /// What the [levels](super::LevelTimes) tell of the relaxation time, if the member ran at them.
     #[serde(skip)]
     pub judged: Option<Limit>,

@@ -5,7 +5,10 @@
 
 use std::{fmt, marker::PhantomData, path::Path, str::FromStr};
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{
+    Deserialize, Deserializer, Serialize, Serializer,
+    de::{self, IgnoredAny},
+};
 
 use super::{
     drawn::Drawn,
@@ -171,8 +174,14 @@ pub enum Store {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct Spec {
-    /// Number of members.
+    /// Number of members; of outlines, copies of each.
     pub curves: u64,
+    /// Number of outlines of the shape, if they are an ensemble; a study fills it in.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outlines: Option<u64>,
+    /// Property of the outlines whose values are groups.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub group_by: Option<String>,
     /// Nodes per member, n.
     pub points: usize,
     /// Seed of the ensemble.
@@ -280,6 +289,32 @@ pub struct Spec {
     /// Keys that vary from cell to cell.
     #[serde(skip_serializing_if = "Sweep::is_empty")]
     pub sweep: Sweep,
+    /// Keys that the request leaves out. Not a key.
+    #[serde(skip)]
+    pub left_out: LeftOut,
+}
+
+/// Keys that a request leaves out, of those whose default is another one for outlines: one copy of each, not perturbed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LeftOut {
+    /// There is no `curves`.
+    pub curves: bool,
+    /// There is no `amplitude`.
+    pub amplitude: bool,
+}
+
+/// The same keys in a spec file.
+#[derive(Deserialize)]
+struct Given {
+    curves: Option<IgnoredAny>,
+    amplitude: Option<IgnoredAny>,
+}
+
+/// Equal specs have equal values, wherever these come from.
+impl PartialEq for LeftOut {
+    fn eq(&self, _: &LeftOut) -> bool {
+        true
+    }
 }
 
 /// The paper's time step.
@@ -299,6 +334,8 @@ impl Default for Spec {
     fn default() -> Spec {
         Spec {
             curves: 256,
+            outlines: None,
+            group_by: None,
             points: 100,
             seed: 1,
             shape: Shape::Ellipse { a: 2.0, b: 1.0 }.into(),
@@ -339,6 +376,7 @@ impl Default for Spec {
             threads: None,
             common_random_numbers: false,
             sweep: Sweep::default(),
+            left_out: LeftOut::default(),
         }
     }
 }
@@ -366,7 +404,14 @@ impl Spec {
     /// # Errors
     /// The message has toml's line and caret, and suggests the nearest valid spelling.
     pub fn from_toml(text: &str) -> Result<Spec, String> {
-        toml::from_str(text).map_err(|e| format!("{}{}", told(&e), suggestion(e.message())))
+        // First, so that a large spec is in memory once. What is wrong is said below.
+        let given = toml::from_str::<Given>(text).ok();
+        let left_out = given.map_or(LeftOut::default(), |given| LeftOut {
+            curves: given.curves.is_none(),
+            amplitude: given.amplitude.is_none(),
+        });
+        let spec: Spec = toml::from_str(text).map_err(|e| format!("{}{}", told(&e), suggestion(e.message())))?;
+        Ok(Spec { left_out, ..spec })
     }
 
     /// Returns the spec as TOML that [`Spec::from_toml`] reads back to the same spec.
@@ -448,9 +493,14 @@ impl Spec {
         }
     }
 
+    /// Members of a cell, whether or not they run.
+    pub fn members_per_cell(&self) -> u64 {
+        self.curves.saturating_mul(self.outlines.unwrap_or(1))
+    }
+
     /// Members of all cells, whether or not they run.
     pub fn all_members(&self) -> u64 {
-        self.curves.saturating_mul(self.sweep.cells())
+        self.members_per_cell().saturating_mul(self.sweep.cells())
     }
 
     /// The first key, not among `but`, whose value differs in `other`: its name, the value here and the value there.
@@ -835,6 +885,8 @@ mod tests {
         let written: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
         assert!(written.keys().all(|key| keys.contains(key)));
         let optional = [
+            "outlines",
+            "group-by",
             "mobility",
             "units",
             "tau",

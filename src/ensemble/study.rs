@@ -4,6 +4,7 @@ use std::{borrow::Cow, ops::Range, path::Path, sync::Arc};
 
 use super::{
     Family, Member, RefinementLevel, Spec,
+    outlines::Outlines,
     spec::{FinalTime, Pace, Store, Tau},
     times,
 };
@@ -48,16 +49,18 @@ impl Study {
     /// # Errors
     /// As [`Study::new`].
     pub fn new_from(spec: Spec, base: &Path) -> Result<Study> {
+        let outlines = Outlines::read(&spec, base)?;
+        let spec = outlines.settle(spec)?;
         let (free, given) = (spec.gives_no_times(), spec.clone());
         let spec = spec.validate()?;
-        let cells = cells(&spec, base)?;
+        let cells = cells(&spec, &outlines)?;
         if !free || !cells.iter().any(|cell| times::is_far(&cell.spec, cell.family.scales())) {
             return Study::of_cells(spec, cells);
         }
         let tau = if spec.adaptive.is_some() { None } else { Some(Tau::Auto) };
         let own = Spec { tau, t_end: Some(FinalTime::Auto), omega: None, ..spec }.validate()?;
         drop(cells);
-        let cells = self::cells(&own, base)?;
+        let cells = self::cells(&own, &outlines)?;
         let chosen = [("--tau auto", own.tau != given.tau), ("--t-end auto", given.t_end.is_none())];
         let by_size = chosen.into_iter().filter_map(|(flag, is_new)| is_new.then_some(flag)).collect();
         Ok(Study { by_size, ..Study::of_cells(own, cells)? })
@@ -258,7 +261,7 @@ fn stages_of(level: Option<RefinementLevel>, specs: &[Option<Spec>]) -> Vec<Stag
 /// Whether two specs have one curve with the same nodes. Curves that are drawn are the same if everything is that a draw
 /// depends on.
 fn same_curve(one: &Spec, other: &Spec) -> bool {
-    let drawn = |spec: &Spec| (spec.seed, spec.curves, spec.design, spec.common_random_numbers);
+    let drawn = |spec: &Spec| (spec.seed, spec.members_per_cell(), spec.design, spec.common_random_numbers);
     let same_draws = || drawn(one) == drawn(other) && one.distributions() == other.distributions();
     let nodes = (one.points, one.sampling) == (other.points, other.sampling);
     nodes && one.shape == other.shape && (!one.shape.is_drawn() || same_draws())
@@ -412,14 +415,14 @@ impl Cohort {
 /// nodes.
 const MAX_BYTES: usize = 4_000_000_000;
 
-/// Makes cell `index` of `spec`, after the cells `before`; `bytes` counts the memory of all curves. Paths are relative
-/// to `base`.
-fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize) -> Result<Cell> {
-    let first = index * spec.curves;
+/// Makes cell `index` of `spec`, after the cells `before`; `bytes` counts the memory of all curves.
+fn cell(spec: &Spec, outlines: &Outlines, index: u64, before: &[Cell], bytes: &mut usize) -> Result<Cell> {
+    let per_cell = spec.members_per_cell();
+    let first = index * per_cell;
     let only = spec.only.as_ref().map(|only| {
         // They ascend.
         let below = |member: u64| only.partition_point(|m| *m < member);
-        only[below(first)..below(first + spec.curves)].iter().map(|member| member - first).collect()
+        only[below(first)..below(first + per_cell)].iter().map(|member| member - first).collect()
     });
     let own = Spec { only: None, shard: None, ..spec.of_cell(index)? }.validate()?;
     let family = match before.iter().rfind(|cell| same_curve(&cell.spec, &own)) {
@@ -431,12 +434,9 @@ fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize
                 let problem = format!("the curves of the first {} take more than {gigabytes} GB", index + 1);
                 return Err(Error::value("sweep", cells, &problem, "use fewer --points, or fewer cells at once"));
             }
-            // The file is read once, so that all cells have the outline that was checked.
-            let outline =
-                before.iter().rfind(|cell| cell.spec.shape == own.shape).and_then(|cell| cell.family.outline());
-            match outline {
-                Some(outline) => Family::of(&own, BaseCurve::from_outline(Arc::clone(outline)))?,
-                None => Family::of_curve(&own, own.shape.typical().resolve_from(base)?, own.shape.is_drawn())?,
+            match outlines.of(own.shape.typical()) {
+                Some(all) => Family::of_outlines(&own, Arc::clone(all))?,
+                None => Family::of_shape(&own)?,
             }
         }
     };
@@ -446,14 +446,12 @@ fn cell(spec: &Spec, base: &Path, index: u64, before: &[Cell], bytes: &mut usize
     Ok(Cell { index, spec: Spec { only, shard, ..own }, family, first })
 }
 
-/// Makes and checks all cells of `spec`; one if nothing is swept.
-///
-/// Paths in it are relative to the directory `base`.
-fn cells(spec: &Spec, base: &Path) -> Result<Vec<Cell>> {
+/// Makes and checks all cells of `spec`, whose files have been read; one if nothing is swept.
+fn cells(spec: &Spec, outlines: &Outlines) -> Result<Vec<Cell>> {
     let mut cells: Vec<Cell> = Vec::new();
     let mut bytes = 0;
     for index in 0..spec.sweep.cells() {
-        let cell = cell(spec, base, index, &cells, &mut bytes);
+        let cell = cell(spec, outlines, index, &cells, &mut bytes);
         cells.push(cell.map_err(|error| of_cell(error, spec, index))?);
     }
     let unequal = cells.windows(2).find(|pair| pair[0].spec.points != pair[1].spec.points);
@@ -518,7 +516,8 @@ mod tests {
     fn more_curves_than_a_memory_holds_are_refused_before_they_are_made() {
         // Parameter sampling is quick, and its tables are a fraction of those for equal spacing.
         let spec = swept(&["sampling=parameter,arclength"], Spec { points: 1_000_000, ..Spec::default() });
-        let bytes = |held: usize| cell(&spec, Path::new(""), 0, &[], &mut { held });
+        let outlines = Outlines::read(&spec, Path::new("")).unwrap();
+        let bytes = |held: usize| cell(&spec, &outlines, 0, &[], &mut { held });
         assert!(bytes(MAX_BYTES - 16_000_000).is_ok());
         let message = bytes(MAX_BYTES - 15_999_999).err().unwrap().to_string();
         assert!(message.starts_with("--sweep (2 cells): the curves of the first 1 take more than 4 GB; "), "{message}");

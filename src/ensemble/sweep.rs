@@ -14,8 +14,10 @@ use toml::Value;
 use crate::error::{Error, Result, did_you_mean, shortened};
 
 /// Keys that all members of a run have in common.
-const COMMON: [&str; 17] = [
+const COMMON: [&str; 19] = [
     "curves",
+    "outlines",
+    "group-by",
     "backend",
     "adapter",
     "precision",
@@ -379,6 +381,8 @@ mod tests {
         for (axes, part) in [
             (&["amplitud=1"][..], "--sweep amplitud: no such key (did you mean `amplitude`?)"),
             (&["curves=1,2"], "--sweep curves: it is the same for the whole run"),
+            (&["outlines=1,2"], "--sweep outlines: it is the same for the whole run"),
+            (&["group-by=a,b"], "--sweep group-by: it is the same for the whole run"),
             (&["amplitude="], "--sweep amplitude: no values"),
             (&["seed=1,2,3,4,5,6,7,8,9,10", "decay=1,2,3,4,5,6,7,8,9,10"], ""),
         ] {

@@ -46,8 +46,13 @@ pub fn settled(spec: Spec, scales: &[CurveScale]) -> Spec {
 /// The values of members with the size of their curve: the typical ones first, and if members have their own, those in
 /// the tails.
 fn probes<'a>(spec: &'a Spec, scales: &'a [CurveScale]) -> impl Iterator<Item = (MemberValues<'a>, &'a CurveScale)> {
-    let last = scales.len() - 1;
-    spec.probes().into_iter().enumerate().map(move |(i, values)| (values, &scales[i.min(last)]))
+    let (last, drawn) = (scales.len() - 1, spec.probes());
+    // Sizes of outlines have nothing to do with what is drawn.
+    let pairs = match spec.outlines {
+        Some(_) => (0..drawn.len()).map(|i| (i, 0)).chain((1..=last).map(|scale| (0, scale))).collect(),
+        None => (0..drawn.len()).map(|i| (i, i.min(last))).collect::<Vec<_>>(),
+    };
+    pairs.into_iter().map(move |(values, scale)| (drawn[values].clone(), &scales[scale]))
 }
 
 /// What the user should know about times and rates that are far from what the typical curve of a cell needs, one
@@ -104,10 +109,11 @@ fn rate(spec: &Spec, scale: &CurveScale) -> f64 {
     spec.mobility() * scale.rate()
 }
 
-/// Whether the default τ, ω and final time are far from what the typical curve needs.
+/// Whether the default τ, ω and final time are far from what the typical curve needs, or any outline.
 pub fn is_far(spec: &Spec, scales: &[CurveScale]) -> bool {
-    let size = scales[0].radius.powi(4) / (spec.mobility() * PAPERS_SIZE);
-    !(1.0 / SUITED..=SUITED).contains(&size)
+    let size = |scale: &CurveScale| scale.radius.powi(4) / (spec.mobility() * PAPERS_SIZE);
+    let asked = if spec.outlines.is_some() { scales } else { &scales[..1] };
+    !asked.iter().all(|scale| (1.0 / SUITED..=SUITED).contains(&size(scale)))
 }
 
 /// The time at which a member ends if it has not relaxed: the latest for any of the probes.
@@ -154,7 +160,7 @@ fn check_probe(spec: &Spec, values: &MemberValues, scale: &CurveScale, n: usize)
     let rate = rate(spec, scale);
     check_redistribution(spec, own_omega(rate), own_tau(rate))?;
     // A small member need not last as long as the largest one does.
-    let ends_itself = spec.has_drawn_values() && spec.stops_when_relaxed();
+    let ends_itself = (spec.has_drawn_values() || spec.outlines.is_some()) && spec.stops_when_relaxed();
     let own_end = || if ends_itself { MARGIN * expected(spec, values, scale) } else { f64::INFINITY };
     check_steps(spec, own_end, own_omega(rate), own_tau(rate))?;
     let most = strongest_pull(rate, n);

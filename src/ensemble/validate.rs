@@ -10,7 +10,7 @@ use super::spec::{
 use crate::{
     error::{Error, Result},
     solver::{Facts, ring::MIN_POINTS},
-    text::number,
+    text::{count, number},
 };
 
 /// More members than this are a typing error.
@@ -80,7 +80,9 @@ impl Spec {
     fn check_counts(&self) -> Result<()> {
         let members = self.all_members();
         if self.curves > 0 && self.curves <= MAX_CURVES && members > MAX_CURVES {
-            let problem = format!("{} cells make {members} members, too many", self.sweep.cells());
+            let cells = count(self.sweep.cells(), "cell");
+            let outlines = self.outlines.map_or(String::new(), |outlines| format!(" of {outlines} outlines"));
+            let problem = format!("{cells}{outlines} make {members} members, too many");
             return Err(Error::value("curves", self.curves, &problem, &format!("at most {MAX_CURVES} in all")));
         }
         if !(1..=MAX_CURVES).contains(&self.curves) {

@@ -67,7 +67,7 @@ impl Spec {
 
     /// The index of the random numbers of the member with this index in a study, in its cell.
     pub(super) fn drawn_as(&self, member: u64, cell: u64) -> u64 {
-        if self.common_random_numbers { member - cell * self.curves } else { member }
+        if self.common_random_numbers { member - cell * self.members_per_cell() } else { member }
     }
 
     /// The numbers that are drawn for `member`, as for [`Spec::values`], each with its name: that of its key, and its
@@ -90,7 +90,7 @@ impl Spec {
 
     /// Whether its members differ at all, without a sweep.
     pub fn has_different_members(&self) -> bool {
-        self.has_drawn_values() || *self.amplitude.typical() != 0.0
+        self.has_drawn_values() || *self.amplitude.typical() != 0.0 || self.outlines.is_some_and(|count| count > 1)
     }
 
     /// Values in the midst and in the tails of what is drawn, for bounds; the first are the [typical](Spec::typical)
@@ -102,7 +102,7 @@ impl Spec {
         let places: u32 = self.distributions().iter().map(|of_key| of_key.len() as u32).sum();
         let tail = |place: u32, u: f64| self.values_at(|at| if at.coordinate == place { u } else { 0.5 });
         let tails = (0..places).flat_map(|place| TAILS.map(|u| tail(place, u)));
-        let members = (0..PROBED.min(self.curves)).map(|member| self.values(member));
+        let members = (0..PROBED.min(self.members_per_cell())).map(|member| self.values(member));
         let probe = |values: Result<_>| values.unwrap_or_else(|_| self.typical());
         [self.typical()].into_iter().chain(tails.chain(members).map(probe)).collect()
     }
@@ -172,7 +172,7 @@ impl Spec {
 
     /// The numbers of each key, from the uniform ones of their places.
     fn numbers(&self, uniform: impl Fn(DrawAddress) -> f64) -> [Vec<f64>; 4] {
-        let Spec { seed, curves: members, .. } = *self;
+        let (seed, members) = (self.seed, self.members_per_cell());
         let (mut key, mut coordinate) = (0, 0);
         self.distributions().map(|of_key| {
             let number = |(rank, of): (u32, &Distribution)| {

@@ -24,6 +24,8 @@ pub const WORK: &str = "work_precision.csv";
 pub const WORK_PICTURE: &str = "work_precision.svg";
 /// Statistics by cell.
 pub const ENSEMBLE: &str = "ensemble.csv";
+/// The same by group of outlines.
+pub const GROUPS: &str = "groups.csv";
 /// How the run was made.
 pub const RUN: &str = "run.json";
 /// The first members at the start, during the run and at the end.
@@ -36,6 +38,8 @@ pub const RELAXATION: &str = "plots/relaxation.svg";
 pub const RATE: &str = "plots/rate.svg";
 /// Kaplan-Meier curves.
 pub const SURVIVAL: &str = "plots/survival.svg";
+/// The same by group of outlines.
+pub const GROUP_SURVIVAL: &str = "plots/groups.svg";
 /// Mean excess in time.
 pub const EXCESS: &str = "plots/excess.svg";
 /// Relaxation times against a swept key.
@@ -60,12 +64,13 @@ pub const FIGURES: [&str; 8] =
 pub const ROWS: &str = "curvelax.rows";
 
 /// All files that a run may write, or that are made from one without naming a place; the one that vouches for the others comes first.
-pub const OWN: [&str; 21] = [
+pub const OWN: [&str; 23] = [
     RUN,
     SHARD,
     SUMMARY,
     LEVELS,
     ENSEMBLE,
+    GROUPS,
     MEAN_EXCESS,
     RATES,
     SERIES,
@@ -76,6 +81,7 @@ pub const OWN: [&str; 21] = [
     RELAXATION,
     RATE,
     SURVIVAL,
+    GROUP_SURVIVAL,
     EXCESS,
     DEPENDENCE,
     MESH,
@@ -85,10 +91,10 @@ pub const OWN: [&str; 21] = [
 ];
 
 /// The tables of a run and its store, in the order in which people see them.
-pub const TABLES: [&str; 8] = [SUMMARY, ENSEMBLE, RATES, LEVELS, MEAN_EXCESS, SERIES, SNAPSHOTS, STORE];
+pub const TABLES: [&str; 9] = [SUMMARY, ENSEMBLE, GROUPS, RATES, LEVELS, MEAN_EXCESS, SERIES, SNAPSHOTS, STORE];
 
 /// The files that are drawn from the others.
-pub const PICTURES: [&str; 8] = [REPORT, RELAXATION, SURVIVAL, EXCESS, RATE, DEPENDENCE, MESH, CURVES];
+pub const PICTURES: [&str; 9] = [REPORT, RELAXATION, SURVIVAL, GROUP_SURVIVAL, EXCESS, RATE, DEPENDENCE, MESH, CURVES];
 
 /// The remedy for a file that was changed or truncated.
 pub const REMEDY: &str = "restore the file, or run again";

@@ -27,6 +27,9 @@ const LARGEST: f64 = 4095.0;
 pub struct Film {
     /// Index of the member.
     pub member: u64,
+    /// The name of its outline; empty if it has none.
+    #[serde(default)]
+    pub label: String,
     /// How it ended.
     pub status: Status,
     /// Its relaxation time.
@@ -74,7 +77,16 @@ impl Film {
         };
         let Outcome { member, status, t_relax, .. } = *outcome;
         let (times, nodes) = shown.iter().map(|(t, nodes)| (*t, coordinates(nodes))).unzip();
-        Film { member, status, t_relax, points: before.len(), corner: low.to_array(), unit, times, nodes }
+        let label = outcome.label.clone();
+        Film { member, label, status, t_relax, points: before.len(), corner: low.to_array(), unit, times, nodes }
+    }
+
+    /// Its name for people: that of its outline, cut to `most` characters, or its number.
+    pub fn name(&self, most: usize) -> String {
+        match &self.label[..] {
+            "" => format!("member {}", self.member),
+            label => shortened(label, most),
+        }
     }
 
     /// The nodes at each time; their number is always the same.

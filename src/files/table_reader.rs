@@ -45,8 +45,7 @@ impl<R: TableRow + Default> TableReader<R> {
             return Err(Error::Request(format!("{}, line {line}: {problem}; {REMEDY}", path.display())));
         }
         // Rows are checked here, where messages can say more.
-        let reader =
-            ReaderBuilder::new().has_headers(false).flexible(true).quoting(false).from_reader(Lines::new(file));
+        let reader = ReaderBuilder::new().has_headers(false).flexible(true).from_reader(Lines::new(file));
         let names = R::COLUMNS.iter().map(|column| column.name).collect();
         let mut table = TableReader { path, names, reader, line: StringRecord::new(), kind: PhantomData };
         if let Some(mut fields) = table.fields()? {

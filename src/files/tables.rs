@@ -55,6 +55,8 @@ columns! { Outcome:
     t_limit: event = t_limit, "with `--refine`: t_relax in the limit of many nodes and short steps";
     t_error: optional = t_error, "half-width of the 95 % interval of t_limit";
     order: optional = order, "observed order of t_relax in 1/n, 2 for a smooth curve; empty where differences do not fall";
+    label: word = label, "name of its outline; empty if it has none";
+    group: word = group, "value of the property `--group-by` of its outline";
 }
 
 columns! { LevelRow:
@@ -372,8 +374,8 @@ mod tests {
             text,
             "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
              length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
-             mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order\n\
-             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,\n"
+             mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order,label,group\n\
+             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,,,\n"
         );
     }
 

@@ -17,8 +17,8 @@ use super::{
     fingerprint::fingerprint,
 };
 use crate::{
-    curve::{Outline, Shape},
-    ensemble::{Cell, Ended, Paused, Standing, Study},
+    curve::outlines,
+    ensemble::{Ended, Paused, Standing, Study},
     error::{Error, Result},
     files::{
         folder::OutputFolder,
@@ -93,7 +93,7 @@ impl Origin {
     /// [`Error::Request`] for outlines in a current folder without a name.
     pub fn new(study: &Study, platform: Platform) -> Result<Origin> {
         let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let outlines: Vec<(PathBuf, u32)> = outlines(study).into_iter().collect();
+        let outlines: Vec<(PathBuf, u32)> = files(study).into_iter().collect();
         let base = if outlines.is_empty() { String::new() } else { here()? };
         Ok(Origin { spec: study.spec().to_toml()?, platform, moves: Vec::new(), base, outlines, started })
     }
@@ -103,7 +103,7 @@ impl Origin {
     /// # Errors
     /// [`Error::Request`] naming the first that differs.
     pub fn check_outlines(&self, study: &Study) -> Result<()> {
-        let read = outlines(study);
+        let read = files(study);
         match self.outlines.iter().find(|(path, crc)| read.get(path) != Some(crc)) {
             None => Ok(()),
             Some((path, _)) => Err(self.changed(path)),
@@ -112,8 +112,9 @@ impl Origin {
 
     /// The error that outlines have changed, or else `error`.
     pub fn explain(&self, error: Error) -> Error {
-        let read = |path| Outline::read_from(Path::new(&self.base), path).ok();
-        let changed = self.outlines.iter().find(|(path, crc)| read(path).map(|outline| outline.digest()) != Some(*crc));
+        let read = |path| outlines::read_all(Path::new(&self.base), path).ok();
+        let digest = |path| read(path).and_then(|all| all.first().map(|one| one.outline.digest()));
+        let changed = self.outlines.iter().find(|(path, crc)| digest(path) != Some(*crc));
         changed.map_or(error, |(path, _)| self.changed(path))
     }
 
@@ -125,13 +126,10 @@ impl Origin {
     }
 }
 
-/// The outlines of a study, with the CRC-32C of each as read.
-fn outlines(study: &Study) -> BTreeMap<PathBuf, u32> {
-    let outline = |cell: &Cell| match cell.spec.shape.typical() {
-        Shape::File(path) => Some((path.clone(), cell.family.outline()?.digest())),
-        _ => None,
-    };
-    study.cells().iter().filter_map(outline).collect()
+/// The files of the outlines of a study, with the CRC-32C of each as read.
+fn files(study: &Study) -> BTreeMap<PathBuf, u32> {
+    let all = study.cells().iter().flat_map(|cell| cell.family.outlines());
+    all.map(|one| (one.file.clone(), one.outline.digest())).collect()
 }
 
 /// The path of the current folder.

@@ -74,6 +74,9 @@ impl Complete<'_> {
         let tally = &tally;
         // Rows come first: they are saved even if the disk fills up.
         files.push(folder.write(names::ENSEMBLE, statistics.to_csv(spec)?)?);
+        if let Some(groups) = statistics.groups_to_csv()? {
+            files.push(folder.write(names::GROUPS, groups)?);
+        }
         let excess = &tally.mean_excess(spec)?;
         files.push(Table::of(folder.file(names::MEAN_EXCESS)?, excess)?);
         if let Some(shard) = shard {

@@ -7,8 +7,8 @@ use serde::Serialize;
 use toml::Value;
 
 use crate::results::{
-    cells::{CellStatistics, EnsembleStatistics, Numbers},
-    comparison::{CellDifference, LeftOut},
+    cells::{CellStatistics, EnsembleStatistics, GroupStatistics, Numbers},
+    comparison::{CellComparison, CellDifference, LeftOut},
     provenance::{Provenance, json},
     scaling::Scaling,
 };
@@ -31,6 +31,10 @@ pub struct Document<'a> {
     paired: Option<Vec<PairedDocument>>,
     /// Why the cells of a study are not compared; null if they are.
     not_compared: Option<String>,
+    /// The groups of outlines; null unless they are grouped.
+    groups: Option<Vec<GroupDocument<'a>>>,
+    /// For each cell, whether its groups could have one distribution; null if the test does not hold.
+    groups_log_rank: Option<Vec<Option<LogRankDocument>>>,
     /// The medians as a power of the swept value; null if no single scale is swept.
     power_law: Option<PowerLawDocument>,
 }
@@ -46,6 +50,14 @@ struct CellDocument<'a> {
     rate: Numbers,
     discretisation: Numbers,
     t_limit: Numbers,
+}
+
+/// A row of `groups.csv`.
+#[derive(Serialize)]
+struct GroupDocument<'a> {
+    group: &'a str,
+    #[serde(flatten)]
+    times: CellDocument<'a>,
 }
 
 #[derive(Serialize)]
@@ -69,6 +81,16 @@ struct PairedDocument {
     p: Option<f64>,
     exact: Option<bool>,
     left_out: BTreeMap<&'static str, usize>,
+}
+
+impl LogRankDocument {
+    fn of(comparison: &CellComparison) -> Option<LogRankDocument> {
+        comparison.log_rank().map(|test| LogRankDocument {
+            chi2: test.statistic,
+            degrees_of_freedom: test.degrees_of_freedom,
+            p: test.p_value,
+        })
+    }
 }
 
 impl PairedDocument {
@@ -137,21 +159,22 @@ impl<'a> Document<'a> {
     pub fn new(
         run: &'a Provenance,
         spec: &'a Spec,
-        statistics: &EnsembleStatistics,
+        statistics: &'a EnsembleStatistics,
         folder: &'a Path,
         files: &'a [&'static str],
     ) -> Document<'a> {
-        let EnsembleStatistics { cells, comparison, scaling, .. } = statistics;
+        let EnsembleStatistics { cells, comparison, groups, group_comparisons, scaling, .. } = statistics;
         let paired = comparison.paired_cells().map(|cells| cells.iter().map(PairedDocument::new).collect());
         let not_compared = comparison.refusal().map(String::from);
-        let log_rank = comparison.log_rank().map(|test| LogRankDocument {
-            chi2: test.statistic,
-            degrees_of_freedom: test.degrees_of_freedom,
-            p: test.p_value,
-        });
+        let log_rank = LogRankDocument::of(comparison);
+        let of_group =
+            |of: &'a GroupStatistics| GroupDocument { group: &of.group, times: CellDocument::new(spec, &of.times) };
+        let is_grouped = spec.group_by.is_some();
+        let groups = is_grouped.then(|| groups.iter().map(of_group).collect());
+        let groups_log_rank = is_grouped.then(|| group_comparisons.iter().map(LogRankDocument::of).collect());
         let power_law = scaling.as_ref().map(PowerLawDocument::new);
         let cells = cells.iter().map(|cell| CellDocument::new(spec, cell)).collect();
-        Document { run, folder, files, cells, log_rank, paired, not_compared, power_law }
+        Document { run, folder, files, cells, log_rank, paired, not_compared, groups, groups_log_rank, power_law }
     }
 
     /// Its text.

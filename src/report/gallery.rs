@@ -1,4 +1,5 @@
-//! `plots/curves.svg`: the first members at the start, during the run and at the end, all to one scale.
+//! `plots/curves.svg`: the first members at the start, during the run and at the end, to one scale if they can be seen
+//! at it.
 
 use glam::DVec2;
 
@@ -12,6 +13,8 @@ use crate::{
 /// Maximum number of members drawn.
 pub const MAX_PANELS: usize = PORTRAITS;
 
+/// Maximum characters of the name of a member.
+const MAX_NAME: usize = 24;
 const COLUMNS: usize = 4;
 /// Width and maximum height of a panel in pixels, and the free space inside it.
 const SIDE: f64 = 200.0;
@@ -22,6 +25,8 @@ const GAP: f64 = 14.0;
 const MARGIN: f64 = 24.0;
 const HEAD: f64 = 48.0;
 const FOOT: f64 = 40.0;
+/// Sizes that differ by more than this factor are drawn each to its own scale.
+const MIXED: f64 = 6.0;
 /// A picture this wide has room for the heading.
 const MIN_COLUMNS: usize = 2;
 /// Intermediate states: those with about this fraction of the way to the end left. The excess, which goes with the
@@ -75,7 +80,8 @@ pub fn draw(films: &[Film]) -> String {
     let panels: Vec<MemberPanel> = films.iter().take(MAX_PANELS).map(MemberPanel::new).collect();
     let columns = panels.len().clamp(MIN_COLUMNS, COLUMNS);
     let rows = panels.len().div_ceil(columns).max(1);
-    let PanelLayout { scale, frame } = layout(&panels);
+    let layout = PanelLayout::new(&panels);
+    let frame = layout.frame;
     let pitch = frame + DVec2::new(GAP, CAPTION);
     let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
     let height = HEAD + rows as f64 * pitch.y + FOOT;
@@ -86,9 +92,13 @@ pub fn draw(films: &[Film]) -> String {
     svg.text("note end", DVec2::new(width - MARGIN, 30.0), "grey: start, light: on the way, colour: end");
     for (i, panel) in panels.iter().enumerate() {
         let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
-        draw_panel(&mut svg, panel, DVec2::new(MARGIN, HEAD) + place * pitch, frame, scale);
+        draw_panel(&mut svg, panel, DVec2::new(MARGIN, HEAD) + place * pitch, &layout);
     }
-    draw_scale(&mut svg, DVec2::new(MARGIN, height - 20.0), scale);
+    let foot = DVec2::new(MARGIN, height - 20.0);
+    match layout.common {
+        Some(largest) => draw_scale(&mut svg, foot, layout.scale(largest)),
+        None => svg.text("note", foot + DVec2::new(0.0, 4.0), OWN_SCALES),
+    }
     svg.finish()
 }
 
@@ -126,12 +136,19 @@ fn shown(frames: &[Vec<DVec2>]) -> Vec<usize> {
     shown
 }
 
-fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, frame: DVec2, scale: f64) {
+fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelLayout) {
+    let frame = layout.frame;
     let middle = corner + 0.5 * frame;
-    let Film { member, status, t_relax, points, .. } = panel.film;
+    let Film { status, t_relax, points, .. } = panel.film;
     svg.open(&format!("panel {}", status.name()));
     svg.rectangle("frame", corner, frame, 6.0);
+    let mut name = panel.film.name(MAX_NAME);
     if let Some((low, high)) = panel.bounds() {
+        let own = (high - low).max_element();
+        let scale = layout.scale(own);
+        if layout.common.is_none() {
+            name += &format!(", {} across", rounded(own));
+        }
         // y grows downwards in SVG.
         let place = |p: &DVec2| middle + (*p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
         let last = panel.states.len() - 1;
@@ -149,7 +166,7 @@ fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, frame: DVec2, s
         Some(t) => format!("{} at t = {}", status.name(), rounded(*t)),
         None => status.name().into(),
     };
-    svg.text("middle", below, &format!("member {member}"));
+    svg.text("middle", below, &name);
     svg.text("middle word", below + DVec2::new(0.0, 15.0), &caption);
     svg.close();
 }
@@ -168,20 +185,38 @@ fn draw_scale(svg: &mut Svg, left: DVec2, scale: f64) {
 
 /// The layout common to all panels.
 struct PanelLayout {
-    /// Pixels per unit of length.
-    scale: f64,
+    /// The extent that fills a panel; if there is none, each member fills its own.
+    common: Option<f64>,
     /// Size of a panel.
     frame: DVec2,
 }
 
-/// Fits the largest of `panels` into its frame, which is no higher than the tallest panel needs.
-fn layout(panels: &[MemberPanel]) -> PanelLayout {
-    let extent =
-        panels.iter().filter_map(MemberPanel::bounds).map(|(low, high)| high - low).fold(DVec2::ZERO, DVec2::max);
-    let largest = extent.max_element();
-    let scale = if largest > 0.0 && largest.is_finite() { (SIDE - 2.0 * PADDING) / largest } else { 1.0 };
-    let height = (extent.y * scale + 2.0 * PADDING).clamp(MIN_HEIGHT, SIDE);
-    PanelLayout { scale, frame: DVec2::new(SIDE, height) }
+/// What is said where each member has its own scale.
+pub(super) const OWN_SCALES: &str = "each to its own scale";
+
+/// The largest of these extents, if all can be seen at one scale.
+pub(super) fn common_extent(extents: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+    let largest = extents.clone().fold(0.0, f64::max);
+    let smallest = extents.filter(|extent| *extent > 0.0).fold(largest, f64::min);
+    (largest <= MIXED * smallest).then_some(largest)
+}
+
+impl PanelLayout {
+    /// Fits `panels` into frames that are no higher than the tallest panel needs.
+    fn new(panels: &[MemberPanel]) -> PanelLayout {
+        let extents: Vec<DVec2> = panels.iter().filter_map(MemberPanel::bounds).map(|(low, high)| high - low).collect();
+        let common = common_extent(extents.iter().map(|extent| extent.max_element()));
+        let layout = PanelLayout { common, frame: DVec2::new(SIDE, SIDE) };
+        let heights = extents.iter().map(|extent| extent.y * layout.scale(extent.max_element()));
+        let height = (heights.fold(0.0, f64::max) + 2.0 * PADDING).clamp(MIN_HEIGHT, SIDE);
+        PanelLayout { frame: DVec2::new(SIDE, height), ..layout }
+    }
+
+    /// Pixels per unit of length, for a member of this extent.
+    fn scale(&self, own: f64) -> f64 {
+        let extent = self.common.unwrap_or(own);
+        if extent > 0.0 && extent.is_finite() { (SIDE - 2.0 * PADDING) / extent } else { 1.0 }
+    }
 }
 
 fn mean_spacing(points: &[DVec2]) -> f64 {
@@ -246,11 +281,25 @@ mod tests {
     fn one_scale_fits_the_largest_member() {
         let films = films(3, 60);
         let mut panels: Vec<MemberPanel> = films.iter().map(MemberPanel::new).collect();
+        panels[1].states[0].iter_mut().for_each(|p| *p *= 3.0);
+        let slack = |panels: &[MemberPanel], i: usize| {
+            let layout = PanelLayout::new(panels);
+            let (low, high) = panels[i].bounds().unwrap();
+            layout.frame - (high - low) * layout.scale((high - low).max_element()) - 2.0 * PADDING
+        };
+        let (large, small) = (slack(&panels, 1), slack(&panels, 0));
+        assert!(large.x.abs() < 1e-9 && large.y.abs() < 1e-9 && small.x > 0.3 * SIDE, "{large} {small}");
+        // Where the others would be specks, each fills its panel.
         panels[1].states[0].iter_mut().for_each(|p| *p *= 10.0);
-        let PanelLayout { scale, frame } = layout(&panels);
-        let (low, high) = panels[1].bounds().unwrap();
-        let slack = frame - (high - low) * scale - 2.0 * PADDING;
-        assert!(slack.x.abs() < 1e-9 && slack.y.abs() < 1e-9, "{slack}");
+        assert!((0..3).all(|i| slack(&panels, i).x.abs() < 1e-9));
+    }
+
+    #[test]
+    fn members_of_very_different_sizes_have_their_own_scales_and_say_so() {
+        assert_eq!(common_extent([1.0, 6.0, 2.0].into_iter()), Some(6.0));
+        assert_eq!(common_extent([1.0, 6.1, 2.0].into_iter()), None);
+        assert_eq!(common_extent([0.0, 2.0].into_iter()), Some(2.0));
+        assert_eq!(common_extent(std::iter::empty()), Some(0.0));
     }
 
     #[test]

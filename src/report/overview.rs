@@ -9,10 +9,10 @@ use crate::{
         spec::{Pace, Tau, Units},
     },
     error::shortened,
-    files::names::ENSEMBLE,
+    files::names::{ENSEMBLE, GROUPS},
     placement::Platform,
     results::{
-        cells::{CellStatistics, EnsembleStatistics, Rates},
+        cells::{CellStatistics, EnsembleStatistics, GroupStatistics, Rates},
         comparison::{CellDifference, LeftOut},
         discretisation::{CellLimits, DiscretisationError},
         scaling::Scaling,
@@ -24,6 +24,9 @@ use crate::{
 
 /// Maximum number of cells listed; the table has them all.
 const MAX_CELLS: usize = 40;
+
+/// Maximum characters of the name of a group.
+const MAX_GROUP: usize = 60;
 
 /// A completed run at a glance; its `Display` is the text for stdout.
 pub struct Overview<'a> {
@@ -48,6 +51,7 @@ impl fmt::Display for Overview<'_> {
         self.statuses(f)?;
         writeln!(f)?;
         self.cells(f)?;
+        self.groups(f)?;
         for (label, text) in [
             ("ensemble", shortened(&describe(self.spec), usize::MAX)),
             ("corners", self.tally.mollified.told().unwrap_or_default()),
@@ -149,13 +153,8 @@ impl Overview<'_> {
             1 => writeln!(f, "{:<11}1 more cell is in {ENSEMBLE}", "...")?,
             more => writeln!(f, "{:<11}{more} more cells are in {ENSEMBLE}", "...")?,
         }
-        if let Some(LogRank { statistic, degrees_of_freedom, p_value: p, .. }) = comparison.log_rank() {
-            let (p, chi) = (p_value(*p), significant(*statistic));
-            writeln!(
-                f,
-                "{:<11}log-rank test that all cells have one distribution: {p}, chi2 = {chi} ({degrees_of_freedom})",
-                "cells"
-            )?;
+        if let Some(test) = comparison.log_rank() {
+            writeln!(f, "{:<11}log-rank test that all cells have one distribution: {}", "cells", chi(test))?;
         }
         if let Some(why) = comparison.refusal() {
             writeln!(f, "{:<11}not compared: {why}", "cells")?;
@@ -172,6 +171,37 @@ impl Overview<'_> {
         }
         for text in scaling.iter().flat_map(|of| law(of, self.statistics.time())) {
             writeln!(f, "{:<11}{text}", "law")?;
+        }
+        writeln!(f)
+    }
+
+    /// One line per group of outlines, and how the groups of each cell compare.
+    fn groups(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Some(property) = &self.spec.group_by else { return Ok(()) };
+        let EnsembleStatistics { cells, groups, group_comparisons, .. } = self.statistics;
+        let cell = |rank: u64| if cells.len() < 2 { String::new() } else { format!(", cell {rank}") };
+        for GroupStatistics { group, times: of } in groups.iter().take(MAX_CELLS) {
+            let name = shortened(group, MAX_GROUP);
+            writeln!(f, "{:<11}{property} {name}{}: t_relax {}", "group", cell(of.cell), times(of))?;
+        }
+        match groups.len().saturating_sub(MAX_CELLS) {
+            0 => {}
+            1 => writeln!(f, "{:<11}1 more group is in {GROUPS}", "...")?,
+            more => writeln!(f, "{:<11}{more} more groups are in {GROUPS}", "...")?,
+        }
+        for (rank, comparison) in (0..).zip(group_comparisons).take(MAX_CELLS) {
+            if let Some(test) = comparison.log_rank() {
+                writeln!(
+                    f,
+                    "{:<11}log-rank test that all groups have one distribution{}: {}",
+                    "groups",
+                    cell(rank),
+                    chi(test)
+                )?;
+            }
+            if let Some(why) = comparison.refusal() {
+                writeln!(f, "{:<11}not compared{}: {why}", "groups", cell(rank))?;
+            }
         }
         writeln!(f)
     }
@@ -197,6 +227,12 @@ impl Overview<'_> {
             ),
         }
     }
+}
+
+/// The result of a log-rank test.
+fn chi(test: &LogRank) -> String {
+    let LogRank { statistic, degrees_of_freedom, p_value: p, .. } = test;
+    format!("{}, chi2 = {} ({degrees_of_freedom})", p_value(*p), significant(*statistic))
 }
 
 /// Describes the run in one line, without the swept keys.

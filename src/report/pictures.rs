@@ -17,7 +17,7 @@ use crate::{
     files::{names, portraits::Film},
     flow::Flow,
     results::{
-        cells::{CellStatistics, EnsembleStatistics, QUANTILES},
+        cells::{CellStatistics, EnsembleStatistics, GroupStatistics, QUANTILES},
         comparison::{CellComparison, CellDifference},
         discretisation::DiscretisationError,
         provenance::Provenance,
@@ -28,6 +28,10 @@ use crate::{
     text::{count, p_value, significant},
 };
 
+/// Maximum number of groups in a table of the page.
+const MAX_GROUPS: usize = 40;
+/// Maximum characters of the name of a member.
+const MAX_NAME: usize = 60;
 /// Digits of a number for reading.
 const DIGITS: usize = 4;
 
@@ -79,6 +83,7 @@ impl FinishedRun<'_> {
     /// [`Error::Request`](crate::Error::Request) if the values of a cell do not fit the spec.
     pub fn charts(&self) -> Result<Vec<Chart>> {
         let mut charts = vec![self.relaxation(), self.survival()];
+        charts.extend(self.groups());
         charts.extend(self.excess()?);
         charts.push(self.rates());
         charts.extend(self.dependence());
@@ -109,27 +114,31 @@ impl FinishedRun<'_> {
     }
 
     fn survival(&self) -> Chart {
-        let cells = &self.statistics.cells;
         let numbers = self.numbers();
-        let curves = cells.iter().enumerate().map(|(rank, cell)| {
-            let mut curve = SurvivalCurve {
-                label: self.label(cell.cell),
-                value: numbers.as_ref().map(|numbers| numbers[rank]),
-                ..SurvivalCurve::default()
-            };
-            for Step { time, survival, variance, .. } in KaplanMeier::new(&cell.sample).steps() {
-                let bound = |sign: f64| (survival + sign * HALF_INTERVAL * variance.sqrt()).clamp(0.0, 1.0);
-                curve.add_step(time, survival, (bound(-1.0), bound(1.0)));
-            }
-            happened(cell, false).for_each(|t| curve.add_censored(t));
-            curve
+        let curves = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
+            survival_curve(cell, self.label(cell.cell), numbers.as_ref().map(|numbers| numbers[rank]))
         });
         let (title, key) = ("Members not yet relaxed", self.colour_key());
         let survival =
             Survival { title, note: &self.what_and_error(), key: &key, curves: curves.collect(), time: None };
-        let caption =
-            "Kaplan-Meier estimate with Greenwood's 95 % band; a stroke marks a member that ended before it relaxed.";
-        chart(names::SURVIVAL, title, caption, survival.draw())
+        chart(names::SURVIVAL, title, SURVIVAL_CAPTION, survival.draw())
+    }
+
+    /// The members not yet relaxed, by group of their outlines.
+    fn groups(&self) -> Option<Chart> {
+        let (key, groups) = (self.spec().group_by.as_deref()?, &self.statistics.groups);
+        let curves: Vec<SurvivalCurve> = groups
+            .iter()
+            .map(|GroupStatistics { group, times }| survival_curve(times, self.group_label(group, times.cell), None))
+            .collect();
+        let title = format!("Members not yet relaxed, by {key}");
+        let note = &self.what_and_error();
+        let svg = (!curves.is_empty()).then(|| Survival { title: &title, note, key, curves, time: None }.draw())?;
+        Some(chart(names::GROUP_SURVIVAL, &title, SURVIVAL_CAPTION, svg))
+    }
+
+    fn group_label(&self, group: &str, cell: u64) -> String {
+        if self.spec().sweep.is_empty() { group.into() } else { format!("{group}, {}", self.label(cell)) }
     }
 
     /// The mean excess, for as long as all members of a cell are running.
@@ -268,7 +277,7 @@ impl FinishedRun<'_> {
             warnings: &self.provenance.warnings,
             members: self.trajectories(),
             plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
-            tables: [self.table()].into_iter().chain(self.pairs()).collect(),
+            tables: [self.table()].into_iter().chain(self.group_table()).chain(self.pairs()).collect(),
             spec: &spec,
             provenance: self.provenance(),
         };
@@ -282,9 +291,9 @@ impl FinishedRun<'_> {
             let at = film.t_relax.map_or(String::new(), |t| format!(" at t = {}", significant(t, 3)));
             let cell = match sweep.is_empty() {
                 true => String::new(),
-                false => format!(" ({})", sweep.name(film.member / self.spec().curves)),
+                false => format!(" ({})", sweep.name(film.member / self.spec().members_per_cell())),
             };
-            let label = format!("member {}{cell}: {}{at}", film.member, film.status.name());
+            let label = format!("{}{cell}: {}{at}", film.name(MAX_NAME), film.status.name());
             MovingMember { label, status: film.status.name(), times: film.times.clone(), nodes: film.frames() }
         };
         let shown = if sweep.is_empty() { self.films.len() } else { MAX_MEMBERS };
@@ -396,35 +405,28 @@ impl FinishedRun<'_> {
 
     fn table(&self) -> PageTable {
         let keys = self.spec().sweep.axes().iter().map(|axis| axis.key.clone());
-        let statuses = Status::ALL.iter().map(|status| status.name().to_string());
-        let numbers = ["mean", "standard error"].into_iter().chain(QUANTILES.map(|(_, name, _)| name));
-        let numbers = numbers.chain(["median rate", "over theory", "discretisation %", "median t_limit", "t_error"]);
-        let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
-        let row = |cell: &CellStatistics| {
-            let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
-            let mean = cell.mean;
-            let least = if mean.is_some_and(|mean| mean.restricted_to.is_some()) { "≥ " } else { "" };
-            let moments = [
-                mean.map_or(String::new(), |mean| format!("{least}{}", significant(mean.value, DIGITS))),
-                mean.and_then(|mean| mean.standard_error).map_or(String::new(), |error| significant(error, 2)),
-            ];
-            let quantiles = cell.quantiles.map(shown);
-            let counts = cell.counts.iter().map(u64::to_string);
-            let start = [cell.cell.to_string()].into_iter().chain(cell.values.iter().cloned());
-            let rates = ["median", "ratio"].map(|name| shown(cell.rates.numbers.get(name)));
-            let percent = cell.discretisation.as_ref().map(|error| 100.0 * error.mean);
-            let limits = cell.limits.as_ref();
-            let limits = [limits.and_then(|limits| limits.median), limits.and_then(|limits| limits.error)];
-            let errors =
-                [percent, limits[0], limits[1]].map(|value| value.map_or(String::new(), |v| significant(v, DIGITS)));
-            start.chain(counts).chain(moments).chain(quantiles).chain(rates).chain(errors).collect()
+        let rows = self.statistics.cells.iter().map(|cell| (&cell.values[..], cell));
+        let caption = "Members by status, statistics of t_relax (Kaplan-Meier), and rates of decay";
+        table(caption, keys, rows, names::ENSEMBLE)
+    }
+
+    /// The same by group of outlines.
+    fn group_table(&self) -> Option<PageTable> {
+        let key = self.spec().group_by.clone()?;
+        let groups = &self.statistics.groups;
+        let rows = groups.iter().take(MAX_GROUPS).map(|group| (std::slice::from_ref(&group.group), &group.times));
+        let shown = match groups.len().saturating_sub(MAX_GROUPS) {
+            0 => String::new(),
+            more => format!("; {more} more groups are in {}", names::GROUPS),
         };
-        PageTable {
-            caption: "Members by status, statistics of t_relax (Kaplan-Meier), and rates of decay".into(),
-            header: header.collect(),
-            rows: self.statistics.cells.iter().map(row).collect(),
-            source: names::ENSEMBLE.into(),
-        }
+        let tests = self.statistics.group_comparisons.iter().filter_map(|comparison| match comparison.log_rank() {
+            Some(test) => {
+                Some(format!("log-rank test that all groups have one distribution: {}", p_value(test.p_value)))
+            }
+            None => comparison.refusal().map(|why| format!("not compared: {why}")),
+        });
+        let tests: String = tests.map(|test| format!("; {test}")).collect();
+        Some(table(&format!("By {key}{shown}{tests}"), [key].into_iter(), rows, names::GROUPS))
     }
 
     /// The differences from the first cell, if cells share their random numbers.
@@ -471,6 +473,58 @@ impl FinishedRun<'_> {
         .filter(|(_, value)| !value.is_empty())
         .map(|(name, value)| (name.to_string(), value))
         .collect()
+    }
+}
+
+const SURVIVAL_CAPTION: &str =
+    "Kaplan-Meier estimate with Greenwood's 95 % band; a stroke marks a member that ended before it relaxed.";
+
+/// The Kaplan-Meier curve of a cell or a group.
+fn survival_curve(of: &CellStatistics, label: String, value: Option<f64>) -> SurvivalCurve {
+    let mut curve = SurvivalCurve { label, value, ..SurvivalCurve::default() };
+    for Step { time, survival, variance, .. } in KaplanMeier::new(&of.sample).steps() {
+        let bound = |sign: f64| (survival + sign * HALF_INTERVAL * variance.sqrt()).clamp(0.0, 1.0);
+        curve.add_step(time, survival, (bound(-1.0), bound(1.0)));
+    }
+    happened(of, false).for_each(|t| curve.add_censored(t));
+    curve
+}
+
+/// The statistics of cells or groups as a table of the page, each row after the values of `keys`.
+fn table<'a>(
+    caption: &str,
+    keys: impl Iterator<Item = String>,
+    rows: impl Iterator<Item = (&'a [String], &'a CellStatistics)>,
+    source: &str,
+) -> PageTable {
+    let statuses = Status::ALL.iter().map(|status| status.name().to_string());
+    let numbers = ["mean", "standard error"].into_iter().chain(QUANTILES.map(|(_, name, _)| name));
+    let numbers = numbers.chain(["median rate", "over theory", "discretisation %", "median t_limit", "t_error"]);
+    let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
+    let row = |(values, cell): (&[String], &CellStatistics)| {
+        let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
+        let mean = cell.mean;
+        let least = if mean.is_some_and(|mean| mean.restricted_to.is_some()) { "≥ " } else { "" };
+        let moments = [
+            mean.map_or(String::new(), |mean| format!("{least}{}", significant(mean.value, DIGITS))),
+            mean.and_then(|mean| mean.standard_error).map_or(String::new(), |error| significant(error, 2)),
+        ];
+        let quantiles = cell.quantiles.map(shown);
+        let counts = cell.counts.iter().map(u64::to_string);
+        let start = [cell.cell.to_string()].into_iter().chain(values.iter().cloned());
+        let rates = ["median", "ratio"].map(|name| shown(cell.rates.numbers.get(name)));
+        let percent = cell.discretisation.as_ref().map(|error| 100.0 * error.mean);
+        let limits = cell.limits.as_ref();
+        let limits = [limits.and_then(|limits| limits.median), limits.and_then(|limits| limits.error)];
+        let errors =
+            [percent, limits[0], limits[1]].map(|value| value.map_or(String::new(), |v| significant(v, DIGITS)));
+        start.chain(counts).chain(moments).chain(quantiles).chain(rates).chain(errors).collect()
+    };
+    PageTable {
+        caption: caption.into(),
+        header: header.collect(),
+        rows: rows.map(row).collect(),
+        source: source.into(),
     }
 }
 

@@ -152,7 +152,7 @@ pub fn levels(place: &Place, spec: &Spec) -> Result<LevelTimes> {
     let (mut table, mut levels) = (TableReader::<LevelRow>::open(place)?, LevelTimes::default());
     while let Some((row, fields)) = table.read()? {
         let LevelRow { member, cell, .. } = row;
-        if member >= spec.all_members() || cell != member / spec.curves {
+        if member >= spec.all_members() || cell != member / spec.members_per_cell() {
             let problem = format!("the cell of a member below {}", spec.all_members());
             return Err(fields.unexpected_in("cell", &problem));
         }
@@ -217,7 +217,7 @@ impl<'a> Summary<'a> {
             return Err(fields.unexpected_in("member", &format!("a member below {all}")));
         }
         self.last = Some(member);
-        let own = member / self.spec.curves;
+        let own = member / self.spec.members_per_cell();
         if cell != own {
             return Err(fields.unexpected_in("cell", &format!("{own}, the cell of member {member}")));
         }

@@ -140,12 +140,24 @@ fn places(quantiles: [Option<f64>; QUANTILES.len()], interval: Option<Interval>)
     quantiles.map(|((_, name, meaning), value)| Statistic { name, value, meaning }).chain(ends)
 }
 
+/// Relaxation times of the outlines of one group in a cell.
+pub struct GroupStatistics {
+    /// The value of the property.
+    pub group: String,
+    /// Their times.
+    pub times: CellStatistics,
+}
+
 /// Relaxation times of all cells, and how they compare.
 pub struct EnsembleStatistics {
     /// Each cell.
     pub cells: Vec<CellStatistics>,
     /// How the cells compare.
     pub comparison: CellComparison,
+    /// Each group of outlines, cell by cell, if they are grouped.
+    pub groups: Vec<GroupStatistics>,
+    /// How the groups of each cell compare.
+    pub group_comparisons: Vec<CellComparison>,
     /// The medians as a power of the swept value, if a single scale is swept.
     pub scaling: Option<Scaling>,
     /// Medians are compared in the limit, if all cells that have a median have that of limits.
@@ -283,7 +295,17 @@ impl EnsembleStatistics {
             CellMedian { cell: cell.cell, value, bounds: bounds.flatten(), has_copies: cell.has_copies() }
         });
         let scaling = Scaling::of(&spec.sweep, &medians.collect::<Vec<_>>());
-        Ok(EnsembleStatistics { cells, comparison, scaling, relative, of_limits })
+        let groups = mem::take(&mut tally.groups).into_iter().map(|((cell, group), mut of_group)| {
+            let times = CellStatistics::new(spec, cell, &mut of_group, relative)?;
+            Ok(GroupStatistics { group, times })
+        });
+        let groups: Vec<GroupStatistics> = groups.collect::<Result<_>>()?;
+        let group_comparisons = groups.chunk_by(|one, other| one.times.cell == other.times.cell).map(|of_cell| {
+            let samples: Vec<&Sample> = of_cell.iter().map(|group| &group.times.sample).collect();
+            CellComparison::of_groups(&samples, &of_cell.iter().map(|group| &*group.group).collect::<Vec<_>>())
+        });
+        let group_comparisons = group_comparisons.collect();
+        Ok(EnsembleStatistics { cells, comparison, groups, group_comparisons, scaling, relative, of_limits })
     }
 
     /// The time whose medians are compared.
@@ -293,9 +315,19 @@ impl EnsembleStatistics {
 
     /// The columns of `ensemble.csv`.
     pub fn columns(&self, spec: &Spec) -> Vec<CellColumn> {
-        let column = |name: String, holds, meaning: String| CellColumn { name, holds, meaning };
         let keys = spec.sweep.axes().iter();
         let keys = keys.map(|axis| column(axis.key.clone(), "swept value", format!("--{} of the cell", axis.key)));
+        self.columns_after(keys.collect())
+    }
+
+    /// The columns of `groups.csv`.
+    pub fn group_columns(&self) -> Vec<CellColumn> {
+        let group = column("group".into(), "word", "value of the property `--group-by`".into());
+        self.columns_after(vec![group])
+    }
+
+    /// The index of the cell, `keys`, and the numbers.
+    fn columns_after(&self, keys: Vec<CellColumn>) -> Vec<CellColumn> {
         let statuses = Status::ALL.into_iter().map(Status::name);
         let statuses = statuses.map(|name| column(name.into(), "integer", format!("members that ended {name}")));
         let numbers = self.cells.first().into_iter().flat_map(CellStatistics::quantities);
@@ -315,19 +347,36 @@ impl EnsembleStatistics {
 
     /// The text of `ensemble.csv`.
     pub fn to_csv(&self, spec: &Spec) -> Result<String> {
-        let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write ensemble.csv: {e}"));
-        let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
-        writer.write_record(self.columns(spec).into_iter().map(|column| column.name)).map_err(|e| failed(&e))?;
-        for cell in &self.cells {
-            let numbers = cell.quantities().map(|(_, Numbers { known, named })| {
-                (known, named.into_iter().map(|number| number.value).collect::<Vec<_>>())
-            });
-            let row = (cell.cell, &cell.values, cell.members(), cell.counts, numbers);
-            writer.serialize(row).map_err(|e| failed(&e))?;
-        }
-        let bytes = writer.into_inner().map_err(|e| failed(&e))?;
-        String::from_utf8(bytes).map_err(|e| failed(&e))
+        table(self.columns(spec), self.cells.iter().map(|cell| (&cell.values[..], cell)))
     }
+
+    /// The text of `groups.csv`, if outlines are grouped.
+    pub fn groups_to_csv(&self) -> Result<Option<String>> {
+        let rows = self.groups.iter().map(|group| (std::slice::from_ref(&group.group), &group.times));
+        (!self.groups.is_empty()).then(|| table(self.group_columns(), rows)).transpose()
+    }
+}
+
+fn column(name: String, holds: &'static str, meaning: String) -> CellColumn {
+    CellColumn { name, holds, meaning }
+}
+
+/// A table of these columns, with a row for each cell or group after its values.
+fn table<'a>(
+    columns: Vec<CellColumn>,
+    rows: impl Iterator<Item = (&'a [String], &'a CellStatistics)>,
+) -> Result<String> {
+    let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write statistics as CSV: {e}"));
+    let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+    writer.write_record(columns.into_iter().map(|column| column.name)).map_err(|e| failed(&e))?;
+    for (values, of) in rows {
+        let numbers = of.quantities().map(|(_, Numbers { known, named })| {
+            (known, named.into_iter().map(|number| number.value).collect::<Vec<_>>())
+        });
+        writer.serialize((of.cell, values, of.members(), of.counts, numbers)).map_err(|e| failed(&e))?;
+    }
+    let bytes = writer.into_inner().map_err(|e| failed(&e))?;
+    String::from_utf8(bytes).map_err(|e| failed(&e))
 }
 
 #[cfg(test)]

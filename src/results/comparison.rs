@@ -116,7 +116,7 @@ impl CellDifference {
 
 /// The ranks, within cell `cell`, of its members that run, in order.
 fn ranks(spec: &Spec, cell: u64) -> Box<dyn Iterator<Item = u64> + '_> {
-    let own: Range<u64> = cell * spec.curves..(cell + 1) * spec.curves;
+    let own: Range<u64> = cell * spec.members_per_cell()..(cell + 1) * spec.members_per_cell();
     let (start, shard) = (own.start, spec.shard);
     let all: Box<dyn Iterator<Item = u64>> = match &spec.only {
         None => Box::new(own),
@@ -160,30 +160,41 @@ impl CellComparison {
     /// # Errors
     /// [`Error::Request`](crate::Error::Request) if the values of a cell do not fit the spec.
     pub fn independent(spec: &Spec, samples: &[&Sample]) -> Result<CellComparison> {
-        let count = samples.len();
-        if count < 2 {
-            return Ok(CellComparison::Single);
-        }
-        let refused = |why: String| Ok(CellComparison::Refused(why));
-        if count > MAX_COMPARED {
-            return refused(format!("{count} cells; the log-rank test compares at most {MAX_COMPARED}"));
-        }
-        for cell in 0..count as u64 {
-            if !spec.of_cell(cell)?.has_different_members() {
-                return refused(format!(
+        for cell in 0..samples.len() as u64 {
+            if samples.len() > 1 && !spec.of_cell(cell)?.has_different_members() {
+                return Ok(CellComparison::Refused(format!(
                     "cell {cell} has amplitude 0; its members are copies of one curve, not independent draws"
-                ));
+                )));
             }
         }
+        Ok(CellComparison::by_log_rank(samples, "cell", |cell| cell.to_string(), "use more --curves"))
+    }
+
+    /// Compares the times of groups of outlines, with their names.
+    pub fn of_groups(samples: &[&Sample], names: &[&str]) -> CellComparison {
+        CellComparison::by_log_rank(samples, "group", |group| format!("`{}`", names[group]), "use fewer groups")
+    }
+
+    /// Compares independent samples; `what` is one of them, `name` its name, and `remedy` helps where they are too small.
+    fn by_log_rank(samples: &[&Sample], what: &str, name: impl Fn(usize) -> String, remedy: &str) -> CellComparison {
+        let count = samples.len();
+        if count < 2 {
+            return CellComparison::Single;
+        }
+        let refused = CellComparison::Refused;
+        if count > MAX_COMPARED {
+            return refused(format!("{count} {what}s; the log-rank test compares at most {MAX_COMPARED}"));
+        }
         let Some(test) = log_rank(samples) else {
-            return refused("fewer than two cells still have members when the first one relaxes".into());
+            return refused(format!("fewer than two {what}s still have members when the first one relaxes"));
         };
         let fewest = test.groups.iter().enumerate().min_by(|a, b| a.1.expected.total_cmp(&b.1.expected));
         match fewest.filter(|(_, group)| group.expected < LEAST_EXPECTED) {
-            None => Ok(CellComparison::LogRank(test)),
-            Some((cell, group)) => refused(format!(
-                "cell {cell} has {:.1} expected relaxations; the log-rank test needs {LEAST_EXPECTED} in each cell: \
-                 use more --curves",
+            None => CellComparison::LogRank(test),
+            Some((rank, group)) => refused(format!(
+                "{what} {} has {:.1} expected relaxations; the log-rank test needs {LEAST_EXPECTED} in each {what}: \
+                 {remedy}",
+                name(rank),
                 group.expected
             )),
         }

@@ -1,5 +1,7 @@
 //! Running totals over members, for the overview and `run.json`; the members themselves are not stored.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use crate::text::{plural, significant};
@@ -15,6 +17,8 @@ use crate::{
 pub struct Tally {
     /// By cell.
     pub cells: Vec<CellTally>,
+    /// By cell and group, if outlines are grouped.
+    pub groups: BTreeMap<(u64, String), CellTally>,
     /// Total steps of all members.
     pub steps: u64,
     /// Total steps of the paper's scheme that were computed, also in refused adaptive steps.
@@ -80,6 +84,27 @@ pub struct CellTally {
     pub limits: Observations,
     /// What the levels tell of the members that ran at them.
     pub judged: Vec<Limit>,
+}
+
+impl CellTally {
+    fn add(&mut self, outcome: &Outcome, refined: bool) -> Result<()> {
+        let CellTally { counts, times, others, area, rates, limits, judged, .. } = self;
+        times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
+        if refined {
+            // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
+            let end = outcome.t_limit.map_or(outcome.t_relax.unwrap_or(outcome.t_end), |_| outcome.t_end);
+            limits.push(Observation::new(outcome.t_limit, end))?;
+        }
+        judged.extend(outcome.judged);
+        *area += outcome.start.area.abs();
+        rates.extend(outcome.rate.map(|fitted| Rate { fitted, theory: outcome.rate_theory.unwrap_or(f64::NAN) }));
+        for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
+            for (count, status) in counts.iter_mut().zip(Status::ALL) {
+                *count += u64::from(counted && status == outcome.status);
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The part of a [`Tally`] that cannot be recomputed from `summary.csv`.
@@ -227,23 +252,12 @@ impl Tally {
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
-        let CellTally { counts, times, others, area, rates, limits, judged, .. } = &mut self.cells[cell];
-        times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
-        if refined {
-            // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
-            let end = outcome.t_limit.map_or(outcome.t_relax.unwrap_or(outcome.t_end), |_| outcome.t_end);
-            limits.push(Observation::new(outcome.t_limit, end))?;
+        self.cells[cell].add(outcome, refined)?;
+        if !outcome.group.is_empty() {
+            self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, refined)?;
         }
-        judged.extend(outcome.judged);
-        *area += outcome.start.area.abs();
-        rates.extend(outcome.rate.map(|fitted| Rate { fitted, theory: outcome.rate_theory.unwrap_or(f64::NAN) }));
         self.mesh_ratios.push(outcome.end.mesh_ratio as f32);
         self.metric_drifts.push(outcome.end.metric_drift as f32);
-        for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
-            for (count, status) in counts.iter_mut().zip(Status::ALL) {
-                *count += u64::from(counted && status == outcome.status);
-            }
-        }
         let drift = outcome.end.metric_drift;
         self.drifted.0 += u64::from(drift > DISTRUSTED_DRIFT);
         self.drifted.1 = self.drifted.1.max(drift);

@@ -84,6 +84,8 @@ impl Trajectory<'_> {
             end: Observables::new(&self.report.now, progress.turning, unit),
             self_crossing: self.crossed,
             solves: self.counters.solves.into(),
+            label: std::mem::take(&mut self.member.label),
+            group: std::mem::take(&mut self.member.group),
             ..Outcome::default()
         };
         Ended {

@@ -27,8 +27,10 @@ mod table;
 mod wkt;
 
 use std::{
+    borrow::Cow,
     collections::{BTreeMap, HashMap, HashSet},
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use ::glob::{MatchOptions, Pattern, glob_with};
@@ -54,7 +56,20 @@ pub struct Labelled {
     /// The file, as it was named.
     pub file: PathBuf,
     /// The outline; its digest is that of the file.
-    pub outline: Outline,
+    pub outline: Arc<Outline>,
+}
+
+impl Labelled {
+    /// The name of the property that every outline has: its file.
+    pub const FILE: &str = "file";
+
+    /// The value of the property `name`: one of its [properties](Labelled::properties), or its file.
+    pub fn property(&self, name: &str) -> Option<Cow<'_, str>> {
+        match self.properties.get(name) {
+            Some(value) => Some(value.into()),
+            None => (name == Labelled::FILE).then(|| self.file.to_string_lossy()),
+        }
+    }
 }
 
 /// Reads all outlines of the file at `path`, relative to the directory `base`, in their order; messages name only `path`.
@@ -127,7 +142,7 @@ impl Outline {
 /// The outline of a file that has one.
 fn only(source: Source, mut all: Vec<Labelled>) -> Result<Outline> {
     match (all.pop(), all.len()) {
-        (Some(one), 0) => Ok(one.outline),
+        (Some(one), 0) => Ok(Arc::unwrap_or_clone(one.outline)),
         (_, others) => {
             let problem = format!("the file holds {} where one is expected", count(others as u64 + 1, "outline"));
             Err(source.refusal("", &problem, "save the one that is meant in a file of its own"))
@@ -224,7 +239,7 @@ impl Format {
             };
             let label = piece.polygon.map_or(base.clone(), |number| format!("{base}/{number}"));
             let (properties, file) = (piece.properties.clone(), path.to_owned());
-            Ok(Labelled { label, properties, file, outline: outline(source, piece, digest)? })
+            Ok(Labelled { label, properties, file, outline: Arc::new(outline(source, piece, digest)?) })
         };
         all_or_first(pieces.into_iter().map(|piece| piece.and_then(labelled)).collect(), "outline")
     }
@@ -333,8 +348,15 @@ pub fn glob(base: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
 
 /// Returns the warnings of many outlines, each kind once, with the number of outlines that it is about.
 pub fn warnings(outlines: &[Labelled]) -> Vec<String> {
-    let kinds =
-        [CROSSES, "would take too long", REPEATED, projection::PROJECTED, geojson::NOT_DEGREES, geojson::OTHER_SYSTEM];
+    let kinds = [
+        CROSSES,
+        "would take too long",
+        REPEATED,
+        projection::PROJECTED,
+        geojson::NOT_DEGREES,
+        geojson::OTHER_SYSTEM,
+        table::X_AND_Y,
+    ];
     let all = || outlines.iter().flat_map(|one| one.outline.warnings());
     let said = |kind: &str| {
         let mut such = all().filter(|warning| warning.contains(kind));

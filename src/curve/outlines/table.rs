@@ -125,6 +125,8 @@ struct Columns {
     /// Columns named by the header; without one there are two.
     count: usize,
     in_degrees: bool,
+    /// There are coordinates of both kinds.
+    has_both: bool,
     /// The names and numbers of the other columns of a header.
     others: Vec<(String, usize)>,
     has_header: bool,
@@ -132,7 +134,16 @@ struct Columns {
 
 impl Columns {
     fn unnamed(separator: Separator) -> Columns {
-        Columns { separator, x: 0, y: 1, count: 2, in_degrees: false, others: Vec::new(), has_header: false }
+        Columns {
+            separator,
+            x: 0,
+            y: 1,
+            count: 2,
+            in_degrees: false,
+            has_both: false,
+            others: Vec::new(),
+            has_header: false,
+        }
     }
 
     /// The columns of a header; `None` if it does not name the coordinates.
@@ -140,13 +151,16 @@ impl Columns {
         let column =
             |names: &[&str]| fields.iter().position(|field| names.iter().any(|n| field.eq_ignore_ascii_case(n)));
         let plane = column(&["x"]).zip(column(&["y"]));
-        let degrees = || column(&["lon", "long", "lng", "longitude"]).zip(column(&["lat", "latitude"]));
-        let (x, y) = plane.or_else(degrees)?;
+        let degrees = column(&["lon", "long", "lng", "longitude"]).zip(column(&["lat", "latitude"]));
+        let (x, y) = plane.or(degrees)?;
         let others = (0..fields.len()).filter(|i| ![x, y].contains(i)).map(|i| (property(fields[i]), i)).collect();
-        let in_degrees = plane.is_none();
-        Some(Columns { separator, x, y, count: fields.len(), in_degrees, others, has_header: true })
+        let (in_degrees, has_both) = (plane.is_none(), plane.is_some() && degrees.is_some());
+        Some(Columns { separator, x, y, count: fields.len(), in_degrees, has_both, others, has_header: true })
     }
 }
+
+/// What a table with coordinates of both kinds is told.
+pub(super) const X_AND_Y: &str = "the columns x and y are the coordinates, not those of longitude and latitude";
 
 /// What ends an outline before a point.
 #[derive(Clone, Copy, PartialEq)]
@@ -198,7 +212,8 @@ pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>>
         };
         let places = Places { part, unit: "line", numbers: table.lines[span.clone()].to_vec() };
         let ring = RingPoints::new(table.points[span].to_vec(), places);
-        Ok(Piece { name, properties, in_degrees: columns.in_degrees, ..Piece::new(index + 1, ring) })
+        let notes = if columns.has_both { vec![X_AND_Y] } else { Vec::new() };
+        Ok(Piece { name, properties, in_degrees: columns.in_degrees, notes, ..Piece::new(index + 1, ring) })
     };
     Ok(spans.into_iter().enumerate().map(piece).collect())
 }
@@ -602,7 +617,9 @@ mod tests {
             assert_eq!(square.warnings(), [stated]);
             assert!(square.is_simple());
         }
-        assert_eq!(vertices("x,y,lon,lat\n0,0,9,9\n1,0,9,9\n1,1,9,9\n0,1,9,9\n"), SQUARE);
+        let both = "x,y,lon,lat\n0,0,9,9\n1,0,9,9\n1,1,9,9\n0,1,9,9\n";
+        assert_eq!(vertices(both), SQUARE);
+        assert_eq!(outline(both).unwrap().warnings(), [format!("shape.csv: {X_AND_Y}")]);
         assert_refused("lat,lon\n100,0\n0,1\n1,1\n", &["line 2: (0.0, 100.0) is not a longitude and a latitude"]);
     }
 

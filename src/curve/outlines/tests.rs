@@ -462,7 +462,7 @@ fn a_missing_file_and_a_folder_are_wrong_requests() {
 fn labels_are_different_also_if_a_name_looks_numbered() {
     let labelled = |label: &str| {
         let outline = Outline::from_points(&[DVec2::ZERO, DVec2::X, DVec2::Y]).unwrap();
-        Labelled { label: label.into(), properties: BTreeMap::new(), file: PathBuf::new(), outline }
+        Labelled { label: label.into(), properties: BTreeMap::new(), file: PathBuf::new(), outline: outline.into() }
     };
     let mut all = ["a", "a (2)", "a", "b", "a", "a (2)"].map(labelled);
     make_unique(&mut all);

@@ -61,7 +61,7 @@ impl SnapshotStore {
         }
         for index in spec.members() {
             member.push(&folder, &(index as i64).to_le_bytes())?;
-            cell.push(&folder, &((index / spec.curves) as i64).to_le_bytes())?;
+            cell.push(&folder, &((index / spec.members_per_cell()) as i64).to_le_bytes())?;
         }
         times.iter().try_for_each(|t| time.push(&folder, &t.to_le_bytes()))?;
         (1..=points as i64).try_for_each(|i| node.push(&folder, &i.to_le_bytes()))?;

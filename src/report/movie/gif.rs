@@ -10,6 +10,7 @@ use crate::{
     },
     ensemble::Status,
     error::{Error, Result},
+    report::gallery::OWN_SCALES,
 };
 
 /// Hundredths of a second for which a frame is shown. Browsers slow down frames of less than 2.
@@ -91,12 +92,16 @@ impl Movie {
                 self.write(&mut picture, panel, i, name, INK);
             }
         }
-        let [left, right] = self.bar_ends();
         let tick = DVec2::new(0.0, 4.0);
-        for line in [[left, right], [left - tick, left + tick], [right - tick, right + tick]] {
-            picture.line(&line, false, INK, 1.0);
+        match self.bar() {
+            Some(([left, right], text)) => {
+                for line in [[left, right], [left - tick, left + tick], [right - tick, right + tick]] {
+                    picture.line(&line, false, INK, 1.0);
+                }
+                picture.text(right + DVec2::new(8.0, 4.0), text, INK, Letters::Small);
+            }
+            None => picture.text(self.foot() + tick, OWN_SCALES, INK, Letters::Small),
         }
-        picture.text(right + DVec2::new(8.0, 4.0), &self.bar.1, INK, Letters::Small);
         Some(picture)
     }
 

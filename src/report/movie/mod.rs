@@ -1,4 +1,4 @@
-//! A movie of the first members: side by side, to one scale, from their portraits.
+//! A movie of the first members: side by side, to one scale if they can be seen at it, from their portraits.
 //!
 //! A portrait holds the nodes of a member at some times. Between two of these every node moves on a straight line,
 //! evenly in time. That is honest: node i stays node i during a run, and neighbouring times are so close that nodes
@@ -15,7 +15,7 @@ use std::fmt::Write;
 
 use glam::DVec2;
 
-use super::page::spread;
+use super::{gallery::common_extent, page::spread};
 use crate::{curve::polygon, draw::axis::tick_step, ensemble::Spec, files::portraits::Film, text::rounded};
 use moved::MovedMember;
 use pace::MoviePace;
@@ -34,6 +34,8 @@ pub const HOLD: f64 = 1.0;
 const MAX_COLUMNS: usize = 4;
 /// Narrowest panel next to another: the words below it have room.
 const MIN_SIDE: f64 = 148.0;
+/// Maximum characters of the name of a member.
+const MAX_NAME: usize = 20;
 const MIN_HEIGHT: f64 = 80.0;
 /// The free space inside a panel, between panels and around the picture.
 const PADDING: f64 = 12.0;
@@ -73,8 +75,8 @@ pub struct Movie {
     size: DVec2,
     /// Size of the frame of each panel.
     frame: DVec2,
-    /// The bar that shows the scale: its length in pixels, and what is written next to it.
-    bar: (f64, String),
+    /// The bar that shows the scale, if all members have one: its length in pixels, and what is written next to it.
+    bar: Option<(f64, String)>,
     /// The unit of time; empty if it has no name.
     unit: String,
 }
@@ -100,19 +102,31 @@ impl Movie {
         let states: Vec<Vec<Vec<DVec2>>> = films.iter().map(|film| drawable(film)).collect();
         let boxes: Vec<Option<(DVec2, DVec2)>> =
             states.iter().map(|states| polygon::bounds(states.iter().flatten().copied())).collect();
-        let extent = boxes.iter().flatten().map(|(low, high)| *high - *low).reduce(DVec2::max)?;
+        let extents = boxes.iter().flatten().map(|(low, high)| *high - *low);
+        extents.clone().next()?;
 
         let width = f64::from(cut.width);
         let fitting = ((width - 2.0 * MARGIN + GAP) / (MIN_SIDE + GAP)) as usize;
         let columns = fitting.clamp(1, MAX_COLUMNS).min(films.len());
         let side = ((width - 2.0 * MARGIN + GAP) / columns as f64 - GAP).floor();
-        let largest = extent.max_element();
-        let scale = if largest > 0.0 && largest.is_finite() { (side - 2.0 * PADDING) / largest } else { 1.0 };
-        let height = (extent.y * scale + 2.0 * PADDING).clamp(MIN_HEIGHT.min(side), side).ceil();
+        let fits = |extent: f64| match extent > 0.0 && extent.is_finite() {
+            true => (side - 2.0 * PADDING) / extent,
+            false => 1.0,
+        };
+        let common = common_extent(extents.clone().map(|extent| extent.max_element()));
+        let own_scale = |extent: DVec2| fits(common.unwrap_or(extent.max_element()));
+        let tallest = extents.map(|extent| extent.y * own_scale(extent)).fold(0.0, f64::max);
+        let height = (tallest + 2.0 * PADDING).clamp(MIN_HEIGHT.min(side), side).ceil();
         let frame = DVec2::new(side, height);
-        let names = |film: &Film| {
-            let own = format!("member {}", film.member);
-            let cell = (!spec.sweep.is_empty()).then(|| spec.sweep.name(film.member / spec.curves.max(1)));
+        let length_unit = spec.units.as_ref().map_or(String::new(), |units| format!(" {}", units.length));
+        let names = |film: &Film, extent: DVec2| {
+            let own = match common {
+                Some(_) => film.name(MAX_NAME),
+                None => {
+                    format!("{}, {}{length_unit} across", film.name(MAX_NAME), rounded(extent.max_element(), 2))
+                }
+            };
+            let cell = (!spec.sweep.is_empty()).then(|| spec.sweep.name(film.member / spec.members_per_cell().max(1)));
             [own].into_iter().chain(cell).collect::<Vec<_>>()
         };
         let lines = if spec.sweep.is_empty() { 2.0 } else { 3.0 };
@@ -123,6 +137,7 @@ impl Movie {
             let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
             let corner = DVec2::new(MARGIN, HEAD) + place * pitch;
             let (low, high) = bounds.unwrap_or_default();
+            let scale = own_scale(high - low);
             // y grows downwards in a picture.
             let pixel = |p: DVec2| corner + 0.5 * frame + (p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
             let moved = states.into_iter().map(|nodes| nodes.into_iter().map(pixel).collect());
@@ -131,22 +146,24 @@ impl Movie {
                 Some(t) => (t, format!("{} at t = {}", film.status.name(), rounded(t, 3))),
                 None => (film.times.last().copied().unwrap_or_default(), film.status.name().into()),
             };
-            MoviePanel { member: MovedMember::new(film.status, frames), corner, names: names(film), end }
+            let names = names(film, high - low);
+            MoviePanel { member: MovedMember::new(film.status, frames), corner, names, end }
         });
         let panels: Vec<MoviePanel> = panels.collect();
         let pace = MoviePace::new(&panels.iter().map(|panel| panel.member.clone()).collect::<Vec<_>>());
-        let length = tick_step(BAR * side / scale);
-        let bar = match &spec.units {
-            Some(units) => format!("{} {}", rounded(length, 1), units.length),
-            None => format!("length {}", rounded(length, 1)),
-        };
+        let bar = common.map(fits).map(|scale| {
+            let length = tick_step(BAR * side / scale);
+            let shown = rounded(length, 1);
+            let named = if spec.units.is_some() { format!("{shown}{length_unit}") } else { format!("length {shown}") };
+            (length * scale, named)
+        });
         Some(Movie {
             panels,
             pace,
             seconds: cut.seconds,
             size: DVec2::new(width, HEAD + rows as f64 * pitch.y + FOOT),
             frame,
-            bar: (length * scale, bar),
+            bar,
             unit: spec.units.as_ref().map_or(String::new(), |units| units.time.clone()),
         })
     }
@@ -175,10 +192,15 @@ impl Movie {
         clock
     }
 
-    /// Ends of the bar of the scale.
-    fn bar_ends(&self) -> [DVec2; 2] {
-        let left = DVec2::new(MARGIN, self.size.y - 16.0);
-        [left, left + DVec2::new(self.bar.0.round(), 0.0)]
+    /// Left end of the bar of the scale, or of what is said instead.
+    fn foot(&self) -> DVec2 {
+        DVec2::new(MARGIN, self.size.y - 16.0)
+    }
+
+    /// Ends of the bar of the scale, and what is written next to it.
+    fn bar(&self) -> Option<([DVec2; 2], &str)> {
+        let (length, text) = self.bar.as_ref()?;
+        Some(([self.foot(), self.foot() + DVec2::new(length.round(), 0.0)], text))
     }
 
     /// Where line `i` of the words below a panel stands: its middle.
@@ -237,7 +259,7 @@ pub(super) mod tests {
                     assert!(free.min_element() > PADDING - 1e-6, "{count} of {width}: {node} in {}", panel.corner);
                 }
             }
-            let [left, right] = movie.bar_ends();
+            let ([left, right], _) = movie.bar().unwrap();
             assert!(right.x - left.x > 0.2 * movie.frame.x && right.x - left.x < 0.8 * movie.frame.x);
         }
     }

@@ -14,7 +14,7 @@ use crate::{
         width::{SIZE, shortened},
     },
     ensemble::Status,
-    report::gallery,
+    report::gallery::{self, OWN_SCALES},
 };
 
 /// States of a member, between which a viewer moves its nodes on straight lines.
@@ -42,10 +42,14 @@ impl Movie {
         }
         self.clock_in(&mut svg);
         self.panels.iter().for_each(|panel| self.panel(&mut svg, panel));
-        let [left, right] = self.bar_ends();
-        let [x, end, y, top, bottom] = [left.x, right.x, left.y, left.y - 4.0, left.y + 4.0].map(coordinate);
-        svg.path("scale", &format!("M{x} {top}V{bottom}M{x} {y}H{end}M{end} {top}V{bottom}"));
-        svg.text("note", right + DVec2::new(8.0, 4.0), &self.bar.1);
+        match self.bar() {
+            Some(([left, right], text)) => {
+                let [x, end, y, top, bottom] = [left.x, right.x, left.y, left.y - 4.0, left.y + 4.0].map(coordinate);
+                svg.path("scale", &format!("M{x} {top}V{bottom}M{x} {y}H{end}M{end} {top}V{bottom}"));
+                svg.text("note", right + DVec2::new(8.0, 4.0), text);
+            }
+            None => svg.text("note", self.foot() + DVec2::new(0.0, 4.0), OWN_SCALES),
+        }
         svg.finish()
     }
 

@@ -1,6 +1,6 @@
 //! A few moving members: their nodes at some times, small enough to be part of a page.
 //!
-//! All members share one scale. A coordinate is an integer below 4096, written as two digits of base64. The script
+//! All members share one scale if they can be seen at it. A coordinate is an integer below 4096, written as two digits of base64. The script
 //! `page.js` reads them and moves the nodes on straight lines from one time to the next.
 
 use std::{fmt::Write as _, io};
@@ -16,6 +16,7 @@ use crate::{
         svg::escape,
     },
     files::portraits::DIGITS,
+    report::gallery::common_extent,
     text::significant,
 };
 
@@ -62,12 +63,12 @@ impl MovingMember {
     }
 }
 
-/// Members that can be shown, to one scale.
+/// Members that can be shown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Player {
     members: Vec<PlayedMember>,
-    /// Units of length in one unit of the coordinates.
-    unit: f64,
+    /// Units of length in one unit of the coordinates, if it is the same for all.
+    unit: Option<f64>,
     /// Height of a panel, in coordinates.
     height: f64,
 }
@@ -156,11 +157,14 @@ impl Player {
         let shown = trajectories.iter().map(|trajectory| (trajectory, trajectory.frames()));
         let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MAX_MEMBERS).collect();
         let boxes: Vec<(DVec2, DVec2)> = shown.iter().filter_map(|(_, frames)| bounds(frames)).collect();
-        let extent = boxes.iter().map(|(low, high)| *high - *low).reduce(DVec2::max)?;
-        let largest = extent.max_element();
-        let unit = if largest > 0.0 { largest / (LARGEST - 2.0 * PADDING) } else { 1.0 };
-        let height = (extent.y / unit + 2.0 * PADDING).clamp(MIN_HEIGHT * LARGEST, LARGEST).round();
+        let extents = boxes.iter().map(|(low, high)| *high - *low);
+        let unit_of = |extent: f64| if extent > 0.0 { extent / (LARGEST - 2.0 * PADDING) } else { 1.0 };
+        let common = common_extent(extents.clone().map(|extent| extent.max_element()));
+        let own_unit = |extent: DVec2| unit_of(common.unwrap_or(extent.max_element()));
+        let tallest = extents.map(|extent| extent.y / own_unit(extent)).reduce(f64::max)?;
+        let height = (tallest + 2.0 * PADDING).clamp(MIN_HEIGHT * LARGEST, LARGEST).round();
         let members = shown.into_iter().zip(boxes).map(|((trajectory, frames), (low, high))| {
+            let unit = own_unit(high - low);
             // y grows downwards in SVG.
             let place =
                 |p: DVec2| (p - 0.5 * (low + high)) * DVec2::new(1.0, -1.0) / unit + 0.5 * DVec2::new(LARGEST, height);
@@ -168,9 +172,13 @@ impl Player {
                 nodes.iter().flat_map(|p| place(*p).to_array()).map(|v| v.round().clamp(0.0, LARGEST) as u16).collect()
             };
             let (times, frames) = frames.iter().map(|(t, nodes)| (*t, whole(nodes))).unzip();
-            PlayedMember { label: trajectory.label.clone(), status: trajectory.status, times, frames }
+            let size = match common {
+                Some(_) => String::new(),
+                None => format!(", {} across", significant((high - low).max_element(), 2)),
+            };
+            PlayedMember { label: format!("{}{size}", trajectory.label), status: trajectory.status, times, frames }
         });
-        Some(Player { members: members.collect(), unit, height })
+        Some(Player { members: members.collect(), unit: common.map(unit_of), height })
     }
 
     /// Whether anything moves.
@@ -204,8 +212,11 @@ impl Player {
                 <span id=\"clock\" aria-hidden=\"true\"></span>\n</div>\n";
         }
         let grey = if self.moves() { "Grey: at the start. " } else { "" };
-        let length = significant(self.bar().0, 1);
-        html += &format!("<p class=\"small\">{grey}All to one scale; the bar has length {length}.</p>\n");
+        let scale = match self.bar() {
+            Some((length, _)) => format!("All to one scale; the bar has length {}.", significant(length, 1)),
+            None => "Each to its own scale.".into(),
+        };
+        html += &format!("<p class=\"small\">{grey}{scale}</p>\n");
         html
     }
 
@@ -230,15 +241,17 @@ impl Player {
         spread(all.len(), MAX_MARKS).map(|i| all[i]).collect()
     }
 
-    /// A round length, and the same in coordinates.
-    fn bar(&self) -> (f64, f64) {
-        let length = tick_step(0.15 * LARGEST * self.unit);
-        (length, length / self.unit)
+    /// A round length, and the same in coordinates, if all have one scale.
+    fn bar(&self) -> Option<(f64, f64)> {
+        let unit = self.unit?;
+        let length = tick_step(0.15 * LARGEST * unit);
+        Some((length, length / unit))
     }
 
     fn scale_bar(&self) -> String {
-        let (y, length) = (self.height - 0.4 * PADDING, self.bar().1.round());
-        format!("<path class=\"bar\" d=\"M{PADDING} {y}h{length}\"/>")
+        let y = self.height - 0.4 * PADDING;
+        let bar = |(_, length): (f64, f64)| format!("<path class=\"bar\" d=\"M{PADDING} {y}h{}\"/>", length.round());
+        self.bar().map_or(String::new(), bar)
     }
 }
 
@@ -302,7 +315,7 @@ mod tests {
             for (at, node) in frame.chunks_exact(2).zip(nodes) {
                 let back = (DVec2::new(f64::from(at[0]), player.height - f64::from(at[1]))
                     - 0.5 * DVec2::new(LARGEST, player.height))
-                    * player.unit;
+                    * player.unit.unwrap();
                 assert!(back.distance(*node) < 1e-3 * 4e6, "{back} {node}");
             }
         }

@@ -1,0 +1,113 @@
+//! The outlines of a request: those of the files that its shapes name, read once for all cells.
+
+use std::{path::Path, sync::Arc};
+
+use super::{Drawn, Spec};
+use crate::{
+    curve::{Shape, outlines::Labelled},
+    error::{Error, Result, shortened},
+    text::count,
+};
+
+/// The outlines of the shapes of a spec that are read from files.
+pub(super) struct Outlines(Vec<(Shape, Arc<[Labelled]>)>);
+
+impl Outlines {
+    /// Reads those of `spec` and its sweep; paths are relative to the directory `base`.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for everything that [`Shape::outlines_from`] refuses.
+    pub fn read(spec: &Spec, base: &Path) -> Result<Outlines> {
+        let swept = spec.sweep.axes().iter().filter(|axis| axis.key == "shape").flat_map(|axis| &axis.values);
+        // Other values are refused with their cell, later.
+        let swept: Vec<Drawn<Shape>> = swept.filter_map(|value| value.as_str()?.parse().ok()).collect();
+        let shapes = if swept.is_empty() { vec![&spec.shape] } else { swept.iter().collect() };
+        let mut all: Vec<(Shape, Arc<[Labelled]>)> = Vec::new();
+        for shape in shapes.into_iter().map(Drawn::typical) {
+            if all.iter().all(|(known, _)| known != shape)
+                && let Some(read) = shape.outlines_from(base)
+            {
+                all.push((shape.clone(), read?.into()));
+            }
+        }
+        Ok(Outlines(all))
+    }
+
+    /// Those of a shape, if it is read from files.
+    pub fn of(&self, shape: &Shape) -> Option<&Arc<[Labelled]>> {
+        self.0.iter().find(|(known, _)| known == shape).map(|(_, all)| all)
+    }
+
+    /// `spec` with their number, if they are an ensemble, and with what follows from it: where the request says nothing
+    /// else, one copy of each, as it is.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for cells with unequal numbers of outlines, for another number than `spec` has, and for keys that
+    /// mean nothing with outlines, or only with them.
+    pub fn settle(&self, mut spec: Spec) -> Result<Spec> {
+        let several = |(shape, all): &&(Shape, Arc<[Labelled]>)| matches!(shape, Shape::Files(_)) || all.len() > 1;
+        let Some((first, all)) = self.0.iter().find(several) else {
+            if let Some(asked) = spec.outlines.filter(|asked| *asked != 1) {
+                let problem = format!("the shape {} is one curve", spec.shape);
+                return Err(Error::value(
+                    "outlines",
+                    asked,
+                    &problem,
+                    "leave it out, or give the file of the outlines",
+                ));
+            }
+            return spec.group_by.is_none().then_some(spec).ok_or_else(|| {
+                let problem = "--group-by groups the outlines of a file by a property, and the shape is one curve";
+                Error::Request(format!("{problem}; leave it out"))
+            });
+        };
+        let found = all.len() as u64;
+        if let Some((other, others)) = self.0.iter().find(|(_, others)| others.len() as u64 != found) {
+            let (found, others) = (count(found, "outline"), count(others.len() as u64, "outline"));
+            return Err(Error::Request(format!(
+                "--sweep shape: cells have as many members each, and {first} has {found}, {other} {others}; read all with \
+                 one pattern, such as files:DIR/*.csv, and use --group-by file"
+            )));
+        }
+        if let Some(asked) = spec.outlines.filter(|asked| *asked != found) {
+            let problem = format!("{first} has {}", count(found, "outline"));
+            return Err(Error::value("outlines", asked, &problem, "restore the files, or leave --outlines out"));
+        }
+        if self.has_other_shapes(&spec) {
+            let problem =
+                format!("a sweep has {first}, with {}, and a shape that is one curve", count(found, "outline"));
+            return Err(Error::Request(format!("--sweep shape: {problem}; run them apart")));
+        }
+        if let Some(property) = &spec.group_by {
+            self.0.iter().try_for_each(|(_, all)| check_property(property, all))?;
+        }
+        spec.outlines = Some(found);
+        if spec.left_out.curves {
+            spec.curves = 1;
+            if spec.left_out.amplitude && !spec.sweep.has("amplitude") {
+                spec.amplitude = 0.0.into();
+            }
+        }
+        Ok(spec)
+    }
+
+    /// Whether the sweep has shapes that are no files.
+    fn has_other_shapes(&self, spec: &Spec) -> bool {
+        let swept = spec.sweep.axes().iter().filter(|axis| axis.key == "shape").flat_map(|axis| &axis.values);
+        let shapes = swept.filter_map(|value| value.as_str()?.parse::<Drawn<Shape>>().ok());
+        shapes.into_iter().any(|shape| self.of(shape.typical()).is_none())
+    }
+}
+
+/// Checks that some outline has `property`.
+fn check_property(property: &str, all: &[Labelled]) -> Result<()> {
+    if all.iter().any(|one| one.property(property).is_some()) {
+        return Ok(());
+    }
+    let mut known: Vec<&str> = all.iter().flat_map(|one| one.properties.keys()).map(String::as_str).collect();
+    known.sort_unstable();
+    known.dedup();
+    known.push(Labelled::FILE);
+    let remedy = format!("they have {}", shortened(&known.join(", "), 500));
+    Err(Error::value("group-by", property, "no outline has such a property", &remedy))
+}

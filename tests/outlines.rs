@@ -1,0 +1,275 @@
+//! Ensembles of outlines, as a user meets them: every outline a member with its label, copies of them, groups, and what
+//! is refused.
+
+use std::{collections::BTreeMap, f64::consts::TAU, fs, path::Path, process::Output};
+
+use assert_cmd::Command;
+use tempfile::TempDir;
+
+/// Outlines in the files of [`home`].
+const GRAINS: usize = 7;
+
+fn curvelax(home: &Path, arguments: &str) -> Output {
+    let mut command = Command::cargo_bin("curvelax").unwrap();
+    // Without this a layer of Mesa prints a message on stderr.
+    command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(arguments.split_whitespace()).output().unwrap()
+}
+
+#[track_caller]
+fn done(home: &Path, arguments: &str) -> String {
+    let output = curvelax(home, arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[track_caller]
+fn refused(home: &Path, arguments: &str, parts: &[&str]) {
+    let output = curvelax(home, &format!("run {arguments} --out out"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
+    assert!(parts.iter().all(|part| message.contains(part)), "{arguments}: {message}");
+    assert!(!home.join("out").exists() && message.lines().count() == 1, "{arguments}: {message}");
+}
+
+/// Points of grain `j`: of radius 0.5 to 2, with waves that differ from grain to grain.
+fn grain(j: usize) -> Vec<[f64; 2]> {
+    let radius = 0.5 + 0.25 * j as f64;
+    let point = |i: usize| {
+        let angle = TAU * i as f64 / 48.0;
+        let wave = 1.0 + 0.1 * (2.0 * angle + j as f64).cos() + 0.02 * j as f64 * (3.0 * angle).cos();
+        [100.0 + radius * wave * angle.cos(), radius * wave * angle.sin()]
+    };
+    (0..48).map(point).collect()
+}
+
+/// A folder with the grains as features of `grains.geojson`, and one by one in `csv`.
+fn home() -> TempDir {
+    let home = TempDir::new().unwrap();
+    fs::create_dir(home.path().join("csv")).unwrap();
+    let mut features = Vec::new();
+    for j in 0..GRAINS {
+        let points = grain(j);
+        let text: String = points.iter().map(|[x, y]| format!("{x:?},{y:?}\n")).collect();
+        fs::write(home.path().join(format!("csv/grain-{j}.csv")), text).unwrap();
+        let ring: Vec<[f64; 2]> = points.iter().chain(&points[..1]).copied().collect();
+        let mut properties = serde_json::json!({ "name": format!("grain {j}, \"{}\"", j * j) });
+        if j != 3 {
+            properties["phase"] = if j % 2 == 0 { "alpha".into() } else { "beta".into() };
+        }
+        let geometry = serde_json::json!({ "type": "Polygon", "coordinates": [ring] });
+        features.push(serde_json::json!({ "type": "Feature", "properties": properties, "geometry": geometry }));
+    }
+    let all = serde_json::json!({ "type": "FeatureCollection", "crs": null, "features": features });
+    fs::write(home.path().join("grains.geojson"), all.to_string()).unwrap();
+    home
+}
+
+/// The rows of a table under their headings.
+fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
+    let mut table = csv::Reader::from_path(path).unwrap();
+    let names: Vec<String> = table.headers().unwrap().iter().map(String::from).collect();
+    let row = |row: csv::StringRecord| names.iter().cloned().zip(row.iter().map(String::from)).collect();
+    table.records().map(|record| row(record.unwrap())).collect()
+}
+
+/// All files of a run but `run.json` and `shard.state`, by name.
+fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for folder in [folder.to_path_buf(), folder.join("plots")] {
+        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+            if path.is_file() && !["run.json", "shard.state"].contains(&&*name) {
+                all.insert(name, fs::read(&path).unwrap());
+            }
+        }
+    }
+    all
+}
+
+const RUN: &str = "--backend cpu --adaptive=1e-3 --points 40 --t-end auto";
+
+#[test]
+fn every_outline_is_a_member_that_is_the_same_alone() {
+    let home = home();
+    let home = home.path();
+    done(home, &format!("run --shape file:grains.geojson {RUN} --out features"));
+    done(home, &format!("run --shape files:csv/*.csv {RUN} --out files"));
+    let (features, files) = (rows(&home.join("features/summary.csv")), rows(&home.join("files/summary.csv")));
+    assert_eq!((features.len(), files.len()), (GRAINS, GRAINS));
+    for j in 0..GRAINS {
+        assert_eq!(features[j]["label"], format!("grain {j}, \"{}\"", j * j));
+        assert_eq!(files[j]["label"], format!("grain-{j}"));
+        let t_end = &features[j]["t_end"];
+        assert!(features[j]["status"] == "relaxed" && features[j]["t_relax"] == files[j]["t_relax"], "{j} at {t_end}");
+        // The final time of the cell is that of the largest one.
+        let spec = fs::read_to_string(home.join("features/run.json")).unwrap();
+        let spec: serde_json::Value = serde_json::from_str(&spec).unwrap();
+        let t_end = spec["spec"]["t-end"].as_f64().unwrap();
+        let alone = format!("run --shape file:csv/grain-{j}.csv --curves 1 --amplitude 0 {RUN} --out alone --force");
+        done(home, &alone.replace("--t-end auto", &format!("--t-end {t_end:?} --stop-when-relaxed")));
+        let alone = rows(&home.join("alone/summary.csv"));
+        assert_eq!(alone[0]["label"], format!("grain-{j}"));
+        for column in ["t_relax", "t_half", "rate", "excess_start", "area_end", "k_max", "solves"] {
+            assert_eq!(alone[0][column], features[j][column], "{column} of {j}");
+        }
+    }
+    // The control: other grains have other times.
+    assert_ne!(features[0]["t_relax"], features[1]["t_relax"]);
+}
+
+#[test]
+fn copies_are_perturbed_and_rank_after_all_outlines() {
+    let home = home();
+    let home = home.path();
+    done(home, &format!("run --shape file:grains.geojson --curves 3 {RUN} --out copies"));
+    done(home, &format!("run --shape file:grains.geojson --curves 3 --amplitude 0 {RUN} --out equal"));
+    let (copies, equal) = (rows(&home.join("copies/summary.csv")), rows(&home.join("equal/summary.csv")));
+    assert_eq!((copies.len(), equal.len()), (3 * GRAINS, 3 * GRAINS));
+    for j in 0..GRAINS {
+        for copy in [GRAINS, 2 * GRAINS] {
+            assert_eq!(copies[j]["label"], copies[j + copy]["label"]);
+            assert_eq!(equal[j]["t_relax"], equal[j + copy]["t_relax"]);
+            assert_ne!(copies[j]["t_relax"], copies[j + copy]["t_relax"]);
+        }
+    }
+    let spec = done(home, "run --shape file:grains.geojson --print-spec");
+    assert!(spec.contains("curves = 1\noutlines = 7\n") && spec.contains("amplitude = 0.0"), "{spec}");
+    fs::write(home.join("spec.toml"), spec).unwrap();
+    let again = done(home, "run spec.toml --print-spec");
+    assert_eq!(again, fs::read_to_string(home.join("spec.toml")).unwrap());
+    let perturbed = done(home, "run --shape file:grains.geojson --curves 256 --print-spec");
+    assert!(
+        perturbed.contains("curves = 256\noutlines = 7\n") && perturbed.contains("amplitude = 0.05"),
+        "{perturbed}"
+    );
+}
+
+#[test]
+fn groups_are_the_ensembles_of_their_members() {
+    let home = home();
+    let home = home.path();
+    let run = format!("run --shape file:grains.geojson --curves 9 --group-by phase --refine --modes 2..=4 {RUN}");
+    let said = done(home, &format!("{run} --out all"));
+    let groups = rows(&home.join("all/groups.csv"));
+    let names: Vec<&str> = groups.iter().map(|row| &*row["group"]).collect();
+    assert_eq!(names, ["(none)", "alpha", "beta"]);
+    let summary = rows(&home.join("all/summary.csv"));
+    for group in &groups {
+        let members = summary.iter().filter(|row| row["group"] == group["group"]).map(|row| row["member"].clone());
+        let members: Vec<String> = members.collect();
+        assert_eq!(group["members"], members.len().to_string());
+        done(home, &format!("{run} --only {} --out some --force", members.join(",")));
+        let alone = &rows(&home.join("some/ensemble.csv"))[0];
+        for (name, value) in group.iter().filter(|(name, _)| *name != "group") {
+            assert_eq!(value, &alone[name], "{name} of {}", group["group"]);
+        }
+    }
+    assert_ne!(groups[1]["t_relax_median"], groups[2]["t_relax_median"]);
+    assert!(said.contains("phase alpha: t_relax median ") && said.contains("\ngroups "), "{said}");
+    let svg = fs::read_to_string(home.join("all/plots/groups.svg")).unwrap();
+    assert!(svg.contains("alpha") && svg.contains("by phase"));
+    let page = fs::read_to_string(home.join("all/report.html")).unwrap();
+    assert!(page.contains("<caption>By phase; ") && page.contains("beta"));
+    // Pictures are drawn again without the files of the outlines.
+    fs::remove_file(home.join("grains.geojson")).unwrap();
+    let before = content(&home.join("all"));
+    fs::remove_file(home.join("all/plots/groups.svg")).unwrap();
+    done(home, "plot all");
+    assert_eq!(content(&home.join("all")), before);
+}
+
+#[test]
+fn shards_of_outlines_merge_into_the_run() {
+    let home = home();
+    let home = home.path();
+    let run = format!("run --shape files:csv/*.csv --curves 2 --group-by file --refine --modes 2..=4 {RUN}");
+    done(home, &format!("{run} --out whole"));
+    for shard in 0..3 {
+        done(home, &format!("{run} --shard {shard}/3 --out part-{shard}"));
+    }
+    done(home, "merge part-0 part-1 part-2 --out merged --quiet");
+    let (whole, merged) = (content(&home.join("whole")), content(&home.join("merged")));
+    assert!(whole.contains_key("groups.csv") && whole.contains_key("summary.csv"));
+    for (name, bytes) in &whole {
+        assert!(merged.get(name) == Some(bytes), "{name} differs");
+    }
+    // The control.
+    assert_ne!(content(&home.join("part-0"))["summary.csv"], whole["summary.csv"]);
+}
+
+#[test]
+fn a_run_of_outlines_continues_and_refuses_others() {
+    let home = home();
+    let home = home.path();
+    let run = format!("run --shape files:csv/*.csv --curves 2000 --threads 1 {RUN} --quiet");
+    let stopped = curvelax(home, &format!("{run} --max-time 1s --out stopped"));
+    assert_eq!(stopped.status.code(), Some(75), "{}", String::from_utf8_lossy(&stopped.stderr));
+    fs::write(home.join("csv/grain-9.csv"), "0,0\n1,0\n0,1\n").unwrap();
+    let more = curvelax(home, "resume stopped");
+    let message = String::from_utf8(more.stderr).unwrap();
+    assert!(
+        more.status.code() == Some(2) && message.contains("--outlines 7: files:csv/*.csv has 8 outlines"),
+        "{message}"
+    );
+    fs::remove_file(home.join("csv/grain-9.csv")).unwrap();
+    let original = fs::read(home.join("csv/grain-2.csv")).unwrap();
+    fs::write(home.join("csv/grain-2.csv"), "0,0\n1,0\n0,1\n").unwrap();
+    let changed = curvelax(home, "resume stopped");
+    let message = String::from_utf8(changed.stderr).unwrap();
+    assert!(changed.status.code() == Some(2) && message.contains("grain-2.csv has changed"), "{message}");
+    fs::write(home.join("csv/grain-2.csv"), original).unwrap();
+    done(home, "resume stopped --quiet");
+    done(home, &format!("{run} --out at-once"));
+    assert_eq!(content(&home.join("stopped")), content(&home.join("at-once")));
+}
+
+#[test]
+fn outlines_of_very_different_sizes_all_relax_in_their_own_times() {
+    let home = TempDir::new().unwrap();
+    let home = home.path();
+    for (name, size) in [("small", 1e-3), ("middle", 1.0), ("large", 300.0)] {
+        let text: String = grain(1).iter().map(|[x, y]| format!("{:?},{:?}\n", size * (x - 100.0), size * y)).collect();
+        fs::write(home.join(format!("{name}.csv")), text).unwrap();
+    }
+    let output = curvelax(home, "run --shape files:*.csv --adaptive=1e-3 --points 40 --backend cpu --out out");
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(0) && said.contains("used --t-end auto"), "{said}");
+    let times: BTreeMap<String, f64> = rows(&home.join("out/summary.csv"))
+        .into_iter()
+        .map(|row| (row["label"].clone(), row["t_relax"].parse().unwrap()))
+        .collect();
+    for (name, size) in [("small", 1e-3_f64), ("large", 300.0)] {
+        let ratio = times[name] / (times["middle"] * size.powi(4));
+        assert!((ratio - 1.0).abs() < 1e-9, "{name}: {ratio}");
+    }
+}
+
+#[test]
+fn wrong_requests_are_one_clear_message_before_any_work() {
+    let home = home();
+    let home = home.path();
+    fs::write(home.join("csv/triangle.txt"), "0,0\n1,0\n0,1\n").unwrap();
+    for (arguments, parts) in [
+        ("--shape files:none/*.csv", &["no file matches `none/*.csv`"][..]),
+        ("--shape files:csv/*.csv --group-by phase", &["--group-by phase: no outline has such a property", "file"]),
+        ("--shape file:grains.geojson --group-by phse", &["they have name, phase, file"]),
+        ("--group-by phase", &["the shape is one curve"]),
+        ("--outlines 3", &["--outlines 3: the shape ellipse:2,1 is one curve"]),
+        ("--shape file:grains.geojson --outlines 6", &["--outlines 6: file:grains.geojson has 7 outlines"]),
+        ("--shape file:grains.geojson --accurate --accuracy 0.01", &["outlines are as many as they are"]),
+        ("--shape file:grains.geojson --curves 0", &["--curves 0"]),
+        ("--shape file:grains.geojson --curves 200000000", &["--curves 200000000: ", "1400000000 members"]),
+        ("--shape files:csv/* --sampling points", &["`grain-0` has 48 points, `triangle` 3"]),
+        ("--sweep shape=file:grains.geojson;ellipse:2,1", &["a shape that is one curve; run them apart"]),
+        ("--sweep shape=files:csv/*.csv;files:csv/*", &["has 7 outlines, files:csv/* 8 outlines"]),
+        ("--shape file:grains.geojson --only 7", &["--only"]),
+    ] {
+        refused(home, arguments, parts);
+    }
+    // clap says two lines more.
+    let empty = curvelax(home, "run --shape files: --out out");
+    assert!(empty.status.code() == Some(2) && String::from_utf8_lossy(&empty.stderr).contains("no pattern given"));
+    // A valid neighbour of these.
+    done(home, &format!("run --sweep shape=file:grains.geojson;files:csv/*.csv {RUN} --out out"));
+    assert_eq!(rows(&home.join("out/summary.csv")).len(), 2 * GRAINS);
+}
