@@ -13,7 +13,7 @@ use crate::{
         MeshQuality, PowerLawLine, RelaxationTimes, Series, Setting, Survival, SurvivalCurve, Theory,
     },
     ensemble::{Spec, Status, sweep::SweepAxis, theory},
-    error::Result,
+    error::{Result, shortened},
     files::{names, portraits::Film},
     flow::Flow,
     results::{
@@ -270,7 +270,7 @@ impl FinishedRun<'_> {
         });
         let corners = self.tally.mollified.told().map_or(String::new(), |told| format!(" Corners were {told}."));
         let page = Page {
-            title: "curvelax run",
+            title: &self.title(),
             what: &format!("{}, {}.{corners}", count(self.tally.members(), "member"), self.what()),
             statuses: self.tally.counts().map(|(status, count)| (status.name(), count)).collect(),
             headline: self.headline(),
@@ -300,6 +300,15 @@ impl FinishedRun<'_> {
         spread(self.films.len(), shown).map(|i| trajectory(&self.films[i])).collect()
     }
 
+    /// What ran, for the window and the heading: shape, flow and the swept keys.
+    fn title(&self) -> String {
+        let Spec { shape, flow, sweep, .. } = self.spec();
+        let shape = if sweep.has("shape") { "curves".into() } else { shortened(&shape.to_string(), MAX_NAME) };
+        let flow = if sweep.has("flow") { String::new() } else { format!(" under {flow}") };
+        let keys = if sweep.is_empty() { String::new() } else { format!(", by {}", self.keys()) };
+        format!("{shape}{flow}{keys}")
+    }
+
     fn what(&self) -> String {
         let swept = self.spec().sweep.axes().iter().map(SweepAxis::title);
         [describe(self.spec())].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
@@ -308,7 +317,7 @@ impl FinishedRun<'_> {
     /// The same, with the error of discretisation of the times in the picture.
     fn what_and_error(&self) -> String {
         let errors = self.statistics.cells.iter().filter_map(|cell| cell.discretisation.as_ref());
-        let percent: Vec<f64> = errors.map(|error| 100.0 * error.mean).collect();
+        let percent: Vec<f64> = errors.filter(|error| error.converges()).map(|error| 100.0 * error.mean).collect();
         let [low, high] = [f64::min, f64::max].map(|of| percent.iter().copied().reduce(of).unwrap_or_default());
         let [low, high] = [low, high].map(|value| significant(value, 2));
         let range = match percent[..] {

@@ -26,6 +26,9 @@ const SCRIPT_DIGEST: &str = "sha256-775RypILJTOY0aphVAygxJe5VXjKB+pvwd32GxoMr5M=
 
 /// Longer tables are truncated, and say so.
 const MAX_ROWS: usize = 200;
+/// Tables with at most this many rows, and more columns than [`NARROW`], are turned: they fit a phone then.
+const FEW_ROWS: usize = 3;
+const NARROW: usize = 8;
 
 /// The content of a page.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -83,7 +86,7 @@ pub struct PageTable {
     pub header: Vec<String>,
     /// Cells as shown. Columns of numbers are aligned at the right.
     pub rows: Vec<Vec<String>>,
-    /// Where to find all rows of a truncated table; may be empty.
+    /// The file with all rows and digits, in the folder of the page; may be empty.
     pub source: String,
 }
 
@@ -231,6 +234,43 @@ impl PageFigure {
 
 impl PageTable {
     fn html(&self) -> String {
+        match self.rows.len() <= FEW_ROWS && self.header.len() > NARROW {
+            true => self.turned(),
+            false => self.upright(),
+        }
+    }
+
+    /// A row for each column, and a column for each row.
+    fn turned(&self) -> String {
+        let caption = escape(&self.caption);
+        let mut html = begin_table(&caption);
+        html += "<tbody>\n";
+        for (j, name) in self.header.iter().enumerate() {
+            let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escape(name));
+            for row in &self.rows {
+                // Writing into a string cannot fail.
+                let _ = write!(html, "<td class=\"number\">{}</td>", escape(row.get(j).map_or("", String::as_str)));
+            }
+            html += "</tr>\n";
+        }
+        html + "</tbody>\n</table>\n" + &self.link() + "</div>\n"
+    }
+
+    /// Where all rows are, with all digits.
+    fn link(&self) -> String {
+        let source = escape(&self.source);
+        let cut = match self.rows.len() > MAX_ROWS {
+            true => format!("The first {MAX_ROWS} of {} rows. ", grouped(self.rows.len() as u64)),
+            false => String::new(),
+        };
+        match source.is_empty() && cut.is_empty() {
+            true => String::new(),
+            false if source.is_empty() => format!("<p class=\"small\">{}</p>\n", cut.trim_end()),
+            false => format!("<p class=\"small\">{cut}All numbers: <a href=\"{source}\">{source}</a></p>\n"),
+        }
+    }
+
+    fn upright(&self) -> String {
         let caption = escape(&self.caption);
         let columns = self.header.len();
         let cell = |row: &[String], j: usize| escape(row.get(j).map_or("", String::as_str));
@@ -239,9 +279,8 @@ impl PageTable {
             (0..columns).map(|j| self.rows.iter().all(|row| row.get(j).is_none_or(|text| is_number(text)))).collect();
         let class = |j: usize| if numbers[j] { " class=\"number\"" } else { "" };
 
-        let mut html =
-            format!("<div class=\"table\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n<table>\n");
-        html += &format!("<caption>{caption}</caption>\n<thead><tr>");
+        let mut html = begin_table(&caption);
+        html += "<thead><tr>";
         for j in 0..columns {
             let _ = write!(html, "<th scope=\"col\"{}>{}</th>", class(j), cell(&self.header, j));
         }
@@ -258,14 +297,15 @@ impl PageTable {
             }
             html += "</tr>\n";
         }
-        html += "</tbody>\n</table>\n";
-        if self.rows.len() > MAX_ROWS {
-            let all = if self.source.is_empty() { String::new() } else { format!("; all are in {}", self.source) };
-            html +=
-                &paragraph("small", &format!("The first {MAX_ROWS} of {} rows{all}.", grouped(self.rows.len() as u64)));
-        }
-        html + "</div>\n"
+        html + "</tbody>\n</table>\n" + &self.link() + "</div>\n"
     }
+}
+
+fn begin_table(caption: &str) -> String {
+    format!(
+        "<div class=\"table\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n<table>\n\
+         <caption>{caption}</caption>\n"
+    )
 }
 
 /// Everything up to the body.

@@ -208,9 +208,24 @@ fn an_empty_page_says_so_and_holds_no_number_that_is_none() {
 fn long_tables_are_cut_and_say_so() {
     let html = table(10_000).html();
     assert_eq!(html.matches("<tr>").count(), 1 + MAX_ROWS);
-    assert!(html.contains("The first 200 of 10\u{a0}000 rows; all are in ensemble.csv."), "{html}");
+    let link = "The first 200 of 10\u{a0}000 rows. All numbers: <a href=\"ensemble.csv\">ensemble.csv</a>";
+    assert!(html.contains(link), "{html}");
     assert!(html.contains("<th scope=\"row\" class=\"number\">0.01</th>"), "{html}");
     assert!(table(3).html().matches("<tr>").count() == 4 && !table(3).html().contains("The first"));
+}
+
+#[test]
+fn tables_of_few_rows_and_many_columns_are_turned() {
+    let wide = |rows: usize| PageTable {
+        header: (0..9).map(|j| format!("column {j}")).collect(),
+        rows: vec![(0..9).map(|j| format!("{j}.5")).collect(); rows],
+        ..table(0)
+    };
+    let turned = wide(2).html();
+    assert_eq!(turned.matches("<tr>").count(), 9);
+    let row = "<tr><th scope=\"row\">column 3</th><td class=\"number\">3.5</td><td class=\"number\">3.5</td></tr>";
+    assert!(turned.contains(row) && turned.contains("href=\"ensemble.csv\""), "{turned}");
+    assert_eq!(wide(4).html().matches("<tr>").count(), 1 + 4);
 }
 
 #[test]
