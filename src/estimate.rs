@@ -18,7 +18,10 @@ use crate::{
     error::{Error, Result},
     placement::{Choice, Platform},
     report::gallery::MAX_PANELS,
-    results::tally::Rate,
+    results::{
+        explained::{DRAWN, LEAST_MEMBERS, PICTURED, TIMES},
+        tally::Rate,
+    },
     schedule::Clock,
     scheme::{member, state::STATE_FIELDS},
     simulate::{MAX_HELD, simulate, states_at_once},
@@ -54,6 +57,11 @@ const SERIES_ROW: f64 = 166.0;
 const NODE_ROW: f64 = 88.0;
 /// Bytes of the tables of a cell: its statistics and its mean excess.
 const CELL_BYTES: f64 = 2500.0;
+/// Bytes of a number in the table of features, and of a row on what explains the times.
+const FEATURE_BYTES: f64 = 20.3;
+const EXPLAINED_ROW: f64 = 68.0;
+/// Bytes of a member's dot against one feature, in the plot and in the page.
+const DOT_BYTES: f64 = 160.0;
 /// Bytes of plots and page, measured: without the members that are drawn, and for each of their nodes.
 const PLOTS_BYTES: f64 = 100_000.0;
 const DRAWN_NODE_BYTES: f64 = 355.0;
@@ -380,7 +388,18 @@ fn disk(cells: &[Cell], members: u64, rated: f64, series: f64, snapshots: f64) -
     };
     let drawn = members.min(MAX_PANELS as u64) as f64 * family.points().min(Portrait::MAX_NODES) as f64;
     let tables = members as f64 * (SUMMARY_ROW + rated * RATES_ROW) + series * SERIES_ROW + nodes;
-    (tables + cells.len() as f64 * CELL_BYTES + PLOTS_BYTES + drawn * DRAWN_NODE_BYTES) as u64
+    let features = spec.cell_features().len() as f64;
+    let explained = members as f64 * features * FEATURE_BYTES + explained(features, cells.len() as f64, members as f64);
+    (tables + explained + cells.len() as f64 * CELL_BYTES + PLOTS_BYTES + drawn * DRAWN_NODE_BYTES) as u64
+}
+
+/// Bytes of what explains the times: tables and dots, if cells have enough members.
+fn explained(features: f64, cells: f64, members: f64) -> f64 {
+    let rows = TIMES.len() as f64 * cells;
+    match members < LEAST_MEMBERS as f64 * cells {
+        true => rows * EXPLAINED_ROW,
+        false => rows * features * EXPLAINED_ROW + members.min(DRAWN as f64) * PICTURED as f64 * DOT_BYTES,
+    }
 }
 
 /// The cost of `all` members from that of the pilots, each scaled to its end.

@@ -330,7 +330,7 @@ fn files_of_a_run_without_end_are_refused_at_once() {
     let arguments = ["--curves", "2", "--t-end", "0.01", "--points", "40", "--backend", "cpu", "--quiet"];
     let run = curvelax(home.path(), &[&["run", "--out", "run"], &arguments[..]].concat());
     assert_eq!(run.status.code(), Some(0), "{}", String::from_utf8_lossy(&run.stderr));
-    let files = ["run.json", "summary.csv", "mean_excess.csv", "plots/portraits.json"];
+    let files = ["run.json", "summary.csv", "members.csv", "mean_excess.csv", "plots/portraits.json"];
     let table = |row: &str| [vec![b'x'; 1 << 26], row.as_bytes().to_vec()].concat();
     for (name, bytes, said) in [
         ("run.json", [b"{\"curvelax\":[".as_slice(), &b"0,".repeat(2_000_000)].concat(), ": EOF while parsing"),
@@ -341,6 +341,7 @@ fn files_of_a_run_without_end_are_refused_at_once() {
             ": not written by curvelax",
         ),
         ("summary.csv", table("\n"), ", line 1: a line of more than 65536 bytes; restore the file"),
+        ("members.csv", table("\n"), ", line 1: a line of more than 65536 bytes; restore the file"),
         ("mean_excess.csv", table("\n"), ", line 1: a line of more than 65536 bytes; restore the file"),
         (
             "plots/portraits.json",

@@ -113,7 +113,14 @@ fn a_run_out_of_time_keeps_its_state() {
     assert!(message.contains(&format!("with {kept} of 100000000 members in the table")), "{kept}: {message}");
     assert_eq!(
         names(&home.path().join("out")),
-        [".curvelax.state", ".curvelax.state.old", ".levels.csv.part", ".rates.csv.part", ".summary.csv.part"]
+        [
+            ".curvelax.state",
+            ".curvelax.state.old",
+            ".levels.csv.part",
+            ".members.csv.part",
+            ".rates.csv.part",
+            ".summary.csv.part"
+        ]
     );
     assert_eq!(output.stdout, b"");
     // Finished work is not repeated, and seconds add up, however little is done in one.

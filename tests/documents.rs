@@ -8,13 +8,14 @@ use std::{
 
 use assert_cmd::Command;
 use curvelax::{
-    ensemble::{LevelRow, Outcome, SeriesRow, Spec},
+    ensemble::{Feature, LevelRow, Outcome, SeriesRow, Spec},
     files::{
-        TableRow, names,
+        TableRow, members, names,
         tables::{CostRow, ErrorRow, NodeRow, RateRow},
     },
     results::{
         cells::EnsembleStatistics,
+        explained::ExplainedRow,
         tally::{MeanExcess, Tally},
     },
 };
@@ -133,9 +134,17 @@ fn columns() -> String {
     spec.sweep.set("amplitude=0.05,0.1".parse().unwrap());
     let cells = EnsembleStatistics::new(&spec, &mut Tally::default()).unwrap().columns(&spec);
     let of_cells = cells.into_iter().map(|column| [column.name, column.holds.to_owned(), column.meaning]);
+    let drawn = Spec::from_toml("shape = 'ellipse:uniform(1.5..2.5),1'\nmodes = '2..=3'").unwrap();
+    let indices = members::INDICES.map(|(name, meaning)| [name, "integer", meaning].map(str::to_owned));
+    let of_feature = |Feature { name, meaning, is_flag }: Feature| {
+        [name, if is_flag { "integer" } else { "float" }.to_owned(), meaning]
+    };
+    let of_members = indices.into_iter().chain(drawn.cell_features().into_iter().map(of_feature));
     [
         table_of::<Outcome>(names::SUMMARY, "member"),
+        table(names::MEMBERS, "member; here with `--shape 'ellipse:uniform(1.5..2.5),1' --modes 2..=3`", of_members),
         table(names::ENSEMBLE, "cell; here with `--sweep amplitude=0.05,0.1`", of_cells),
+        table_of::<ExplainedRow>(names::EXPLAINED, "cell, time and feature"),
         table_of::<RateRow>(names::RATES, "member with a rate"),
         table_of::<LevelRow>(names::LEVELS, "member and level ([limit](method.md#limit))"),
         table_of::<MeanExcess>(names::MEAN_EXCESS, "cell and time"),

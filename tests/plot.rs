@@ -45,16 +45,16 @@ fn pictures(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 #[test]
 fn pictures_come_back_byte_for_byte() {
     for (arguments, count) in [
-        ("--curves 7 --points 40 --adaptive=1e-3 --t-end 1", 7),
-        ("--curves 1 --points 32 --t-end 0.01", 7),
-        (RUN, 8),
-        ("--curves 5 --points 32 --tau 1e-3 --t-end 0.3 --series 0.013", 7),
-        ("--curves 9 --points 32 --adaptive=1e-3 --t-end 0.3 --series 0.1 --only 2,5,7 --snapshots 0,0.1", 7),
-        ("--curves 4 --points 32 --adaptive --t-end 0.3 --sweep amplitude=0.01,0.2,0.3 --sweep seed=1,2 --only 2,9", 8),
+        ("--curves 7 --points 40 --adaptive=1e-3 --t-end 1", 8),
+        ("--curves 1 --points 32 --t-end 0.01", 8),
+        (RUN, 9),
+        ("--curves 5 --points 32 --tau 1e-3 --t-end 0.3 --series 0.013", 8),
+        ("--curves 9 --points 32 --adaptive=1e-3 --t-end 0.3 --series 0.1 --only 2,5,7 --snapshots 0,0.1", 8),
+        ("--curves 4 --points 32 --adaptive --t-end 0.3 --sweep amplitude=0.01,0.2,0.3 --sweep seed=1,2 --only 2,9", 9),
         // Members that cross themselves and members that end badly.
-        ("--curves 6 --points 64 --shape lemniscate:1 --sampling parameter --adaptive=1e-3 --t-end 0.1", 7),
-        ("--curves 6 --points 32 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct", 6),
-        ("--curves 3 --points 700 --adaptive=1e-2 --t-end 0.05 --shape nonconvex", 7),
+        ("--curves 6 --points 64 --shape lemniscate:1 --sampling parameter --adaptive=1e-3 --t-end 0.1", 8),
+        ("--curves 6 --points 32 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct", 7),
+        ("--curves 3 --points 700 --adaptive=1e-2 --t-end 0.05 --shape nonconvex", 8),
     ] {
         let done = run(arguments);
         let drawn = pictures(&done.path());
@@ -250,6 +250,24 @@ fn a_mean_excess_that_is_not_that_of_the_run_is_refused() {
     refused(&done, |out| field(&table(out), 7, 3, "x"), "out/mean_excess.csv, line 8, column mean: expected a number");
     refused(&done, |out| field(&table(out), 7, 1, "0"), "column t: expected a time after ");
     refused(&done, |out| fs::remove_file(table(out)).unwrap(), "cannot read out/mean_excess.csv: ");
+}
+
+#[test]
+fn features_that_are_not_those_of_the_run_are_refused() {
+    let done = run(RUN);
+    let table = |out: &Path| out.join("members.csv");
+    let last = done.text("members.csv").lines().last().unwrap().len() + 1;
+    refused(&done, |out| shortened(&table(out), last), "out/members.csv: expected a row of member 5, found the end");
+    refused(&done, |out| shortened(&table(out), 5), "out/members.csv, line 7: expected an end of line");
+    refused(&done, |out| field(&table(out), 3, 2, "x"), "out/members.csv, line 4, column cos_2: expected a number");
+    refused(&done, |out| field(&table(out), 3, 0, "3"), "column member: expected 2, as in summary.csv, found `3`");
+    refused(&done, |out| field(&table(out), 3, 1, "1"), "column cell: expected 0, as in summary.csv, found `1`");
+    refused(
+        &done,
+        |out| field(&table(out), 0, 2, "cos_3"),
+        "column cos_2: expected the heading `cos_2`, found `cos_3`",
+    );
+    refused(&done, |out| fs::remove_file(table(out)).unwrap(), "cannot read out/members.csv: ");
 }
 
 #[test]

@@ -19,8 +19,16 @@ fn plots(done: &Done) -> Vec<String> {
 fn a_run_leaves_a_page_with_what_a_reader_asks_first() {
     let done = run(RUN);
     let page = done.text("report.html");
-    let names =
-        ["curves.svg", "excess.svg", "mesh.svg", "portraits.json", "rate.svg", "relaxation.svg", "survival.svg"];
+    let names = [
+        "curves.svg",
+        "excess.svg",
+        "features.svg",
+        "mesh.svg",
+        "portraits.json",
+        "rate.svg",
+        "relaxation.svg",
+        "survival.svg",
+    ];
     assert_eq!(plots(&done), names);
     for part in ["7 members", "ellipse:2,1, surface-diffusion", "median t_relax", "relaxed", "seed", "Kaplan-Meier"] {
         assert!(page.contains(part), "no {part:?}");

@@ -8,7 +8,7 @@ const BASE: &str = "--curves 5 --points 34 --t-end 0.05 --series 0.02 --snapshot
 
 /// The rows of a table without member and cell, for the members of one cell.
 fn rows(done: &Done, name: &str, cell: u64) -> Vec<String> {
-    let skipped = if name == "summary.csv" { 2 } else { 1 };
+    let skipped = if ["summary.csv", "members.csv"].contains(&name) { 2 } else { 1 };
     let members: Vec<u64> = (5 * cell..5 * cell + 5).collect();
     let rest = |line: String| line.splitn(skipped + 1, ',').last().unwrap().to_owned();
     done.lines_of(name, &members).into_iter().map(rest).collect()

@@ -28,6 +28,9 @@ use curvelax::{
 };
 use libfuzzer_sys::fuzz_target;
 
+/// The tables of a shard.
+const TABLES: [&str; 4] = [names::SUMMARY, names::MEMBERS, names::LEVELS, names::RATES];
+
 thread_local! {
     static SHARDS: RefCell<[Folder; 2]> = RefCell::new([0, 1].map(Folder::new));
 }
@@ -93,7 +96,7 @@ struct Folder {
     record: Record,
     shard: Shard,
     spec: Spec,
-    files: [(&'static str, File); 4],
+    files: Vec<(&'static str, File)>,
 }
 
 impl Folder {
@@ -119,11 +122,11 @@ impl Folder {
             outlines: Vec::new(),
             started: Duration::ZERO,
         };
-        let tables = [names::SUMMARY, names::LEVELS, names::RATES].map(|name| Mark { name: name.into(), length: 0, crc: 0 }).into();
+        let tables = TABLES.map(|name| Mark { name: name.into(), length: 0, crc: 0 }).into();
         let (wall, aside) = (Duration::ZERO, Aside::default());
         let head = Head { origin, wall, stage: 0, tables, store: None, rows: None, aside, films: Vec::new() };
-        let files =
-            [names::SHARD, names::SUMMARY, names::LEVELS, names::RATES].map(|name| (name, File::create(path.join(name)).unwrap()));
+        let files = [names::SHARD].into_iter().chain(TABLES);
+        let files = files.map(|name| (name, File::create(path.join(name)).unwrap())).collect();
         let record = Record { head, points: 100, warnings: Vec::new() };
         let mut folder = Folder { path, record, shard, spec, files };
         let state = to_bytes(&folder.record.head, 100, &[]).unwrap();

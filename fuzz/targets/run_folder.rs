@@ -19,9 +19,10 @@ use curvelax::{
 use libfuzzer_sys::fuzz_target;
 
 /// The letter of each file, its place and what it holds unless the input says something else.
-const FILES: [(u8, &str, &[u8]); 5] = [
+const FILES: [(u8, &str, &[u8]); 6] = [
     (b'r', names::RUN, include_bytes!("../base/run.json")),
     (b's', names::SUMMARY, include_bytes!("../base/summary.csv")),
+    (b'f', names::MEMBERS, include_bytes!("../base/members.csv")),
     (b'l', names::LEVELS, include_bytes!("../base/levels.csv")),
     (b'm', names::MEAN_EXCESS, include_bytes!("../base/mean_excess.csv")),
     (b'p', names::PORTRAITS, include_bytes!("../base/portraits.json")),
@@ -57,10 +58,10 @@ fuzz_target!(|data: &[u8]| FOLDER.with_borrow_mut(|folder| {
 
 /// Draws all pictures, or says why that cannot be; `told`: the run itself speaks of NaN.
 fn draw(run: Finished, told: bool) {
-    let Finished { provenance, mut tally, excess, films } = run;
+    let Finished { provenance, mut tally, excess, explained, films } = run;
     let drawn = EnsembleStatistics::new(&provenance.spec, &mut tally).and_then(|statistics| {
-        let (provenance, tally, statistics) = (&provenance, &tally, &statistics);
-        FinishedRun { provenance, tally, statistics, excess: &excess, films: &films }.pictures()
+        let (provenance, tally, statistics, explained) = (&provenance, &tally, &statistics, &explained);
+        FinishedRun { provenance, tally, statistics, excess: &excess, explained, films: &films }.pictures()
     });
     if let Ok(pictures) = drawn {
         for (name, text) in pictures {
@@ -77,7 +78,7 @@ fn checksum(data: &[u8]) -> u32 {
 /// A run's folder, of which only the files are written anew that change.
 struct Folder {
     path: PathBuf,
-    files: [(File, Vec<u8>); 5],
+    files: [(File, Vec<u8>); 6],
 }
 
 impl Folder {
@@ -91,7 +92,7 @@ impl Folder {
         Folder { path, files }
     }
 
-    fn hold(&mut self, content: [&[u8]; 5]) {
+    fn hold(&mut self, content: [&[u8]; 6]) {
         for ((file, held), new) in self.files.iter_mut().zip(content) {
             if held != new {
                 file.rewind().unwrap();

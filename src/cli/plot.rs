@@ -18,8 +18,8 @@ Examples:
   curvelax plot ellipses
   curvelax plot ellipses --out pictures
 
-Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, levels.csv, mean_excess.csv and plots/portraits.json
-in DIR. The same version of the program writes the same bytes as the run.";
+Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, members.csv, levels.csv, mean_excess.csv and
+plots/portraits.json in DIR. The same version of the program writes the same bytes as the run.";
 
 /// Redraw the plots and the report of a finished run.
 #[derive(clap::Args)]
@@ -49,12 +49,13 @@ pub fn plot(args: PlotArgs) -> Result<()> {
         None => (&args.run, true, Owner::PicturesOfRun),
     };
     let folder = OutputFolder::open_for(out, force, owner, names::PICTURES.map(String::from).into())?;
-    let Finished { provenance, mut tally, excess, films } = Finished::read(&args.run)?;
+    let Finished { provenance, mut tally, excess, explained, films } = Finished::read(&args.run)?;
     if films.is_empty() && !args.quiet {
         note(&format!("note: no {} in {}: without pictures of members", names::PORTRAITS, args.run.display()));
     }
     let statistics = &EnsembleStatistics::new(&provenance.spec, &mut tally)?;
-    let study = FinishedRun { provenance: &provenance, tally: &tally, statistics, excess: &excess, films: &films };
+    let (provenance, tally) = (&provenance, &tally);
+    let study = FinishedRun { provenance, tally, statistics, excess: &excess, explained: &explained, films: &films };
     let pictures = study.pictures()?;
     let files = pictures.iter().map(|(name, text)| folder.write(name, text)).collect::<Result<_>>()?;
     folder.publish_all(files)?;

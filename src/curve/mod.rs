@@ -9,6 +9,7 @@
 
 mod base;
 mod crossing;
+mod descriptors;
 mod outline;
 pub mod outlines;
 mod perturbation;
@@ -18,6 +19,7 @@ mod shape;
 
 pub use base::BaseCurve;
 pub use crossing::{Undecided, clearance, crossing, crossing_within};
+pub use descriptors::{DESCRIPTOR_COUNT, DESCRIPTORS, descriptors};
 pub use outline::{MAX_POINTS, Outline};
 pub use perturbation::{MIN_FACTOR, Modes, Perturbation, RadialFactor, RadialLaw, check_directions};
 pub use sampling::{Sampler, Sampling, resample};

@@ -101,6 +101,17 @@ pub fn mesh_ratio(points: &[DVec2]) -> f64 {
     longest / shortest
 }
 
+/// Sine of a turn to the right that still counts as straight: nodes on one side of a polygon are on a line up to
+/// rounding.
+const STRAIGHT: f64 = 1e-12;
+
+/// Returns whether the polygon is convex and counter-clockwise: it goes round once and turns right at no node.
+pub fn is_convex(points: &[DVec2]) -> bool {
+    let next = edges(points).chain(edges(points)).skip(1);
+    let turns_right = |(d, e): (DVec2, DVec2)| d.perp_dot(e) < -STRAIGHT * d.length() * e.length();
+    turning_number(points) == 1 && !edges(points).zip(next).any(turns_right)
+}
+
 /// Reverses the orientation of the polygon and keeps its first vertex first.
 pub fn turn_round(points: &mut [DVec2]) {
     if let [_, rest @ ..] = points {
@@ -134,6 +145,32 @@ mod tests {
             assert_near(mesh_ratio(&polygon), 1.0, 1e-12);
             assert_eq!(turning_number(&polygon), 1);
         }
+    }
+
+    #[test]
+    fn a_polygon_is_convex_while_it_turns_left_and_goes_round_once() {
+        let dented = |depth: f64| {
+            sampled(100, |t| ((1.0 + depth * (3.0 * t).cos()) * t.cos(), (1.0 + depth * (3.0 * t).cos()) * t.sin()))
+        };
+        // A ripple of mode k leaves a circle convex up to the amplitude 1/(k² - 1).
+        assert!(is_convex(&dented(0.09)) && !is_convex(&dented(0.15)));
+        let square: Vec<DVec2> = (0..40)
+            .map(|i| f64::from(i % 10) * 0.1)
+            .zip(0..40)
+            .map(|(t, i)| match i / 10 {
+                0 => DVec2::new(t, 0.0),
+                1 => DVec2::new(1.0, t),
+                2 => DVec2::new(1.0 - t, 1.0),
+                _ => DVec2::new(0.0, 1.0 - t),
+            })
+            .map(|p| p.rotate(DVec2::from_angle(0.1)))
+            .collect();
+        assert!(is_convex(&square));
+        let mut clockwise = square;
+        turn_round(&mut clockwise);
+        assert!(!is_convex(&clockwise));
+        // Twice round is not convex, though every turn is to the left.
+        assert!(!is_convex(&sampled(101, |t| ((2.0 * t).cos(), (2.0 * t).sin()))));
     }
 
     #[test]

@@ -69,8 +69,12 @@ pub enum LegendMark {
     Band,
     /// The [marker](draw_marker) of the series of this rank.
     Marker(usize),
+    /// One of many dots.
+    Points,
     /// A triangle that points up.
     Up,
+    /// The outline of one.
+    HollowUp,
     /// A triangle that points right.
     Right,
     /// The short stroke of a censored member.
@@ -97,7 +101,8 @@ impl Entry {
     /// Pixels of the sample before the label.
     fn sample(&self) -> f64 {
         match self.mark {
-            LegendMark::Marker(_) | LegendMark::Up | LegendMark::Right | LegendMark::Stroke => 10.0,
+            LegendMark::Marker(_) | LegendMark::Points | LegendMark::Up => 10.0,
+            LegendMark::HollowUp | LegendMark::Right | LegendMark::Stroke => 10.0,
             _ => SAMPLE,
         }
     }
@@ -114,7 +119,9 @@ impl Entry {
             LegendMark::Thick => svg.path("thick", &line),
             LegendMark::Band => svg.rectangle("band", at - DVec2::new(0.0, 5.0), DVec2::new(SAMPLE, 10.0), 0.0),
             LegendMark::Marker(rank) => draw_marker(svg, rank, middle),
+            LegendMark::Points => svg.path("points", &dots(&[middle])),
             LegendMark::Up => svg.path("solid", &triangle_up(middle)),
+            LegendMark::HollowUp => svg.path("hollow", &triangle_up(middle)),
             LegendMark::Right => svg.path("solid", &triangle_right(middle)),
             LegendMark::Stroke => svg.path("thin", &stroke(middle)),
         }

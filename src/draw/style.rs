@@ -38,6 +38,7 @@ const CHART_LIGHT: &str = "\
 .band { fill: currentColor; fill-opacity: 0.17 }
 .bars { fill: currentColor; fill-opacity: 0.8 }
 .dots { fill: none; stroke: currentColor; stroke-width: 8; stroke-linecap: round }
+.points { fill: none; stroke: currentColor; stroke-width: 5; stroke-linecap: round; stroke-opacity: 0.6 }
 .solid { fill: currentColor }
 .hollow { fill: #ffffff; stroke: currentColor; stroke-width: 1.7 }
 .cross { fill: none; stroke: currentColor; stroke-width: 2.4 }

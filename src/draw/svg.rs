@@ -38,6 +38,12 @@ impl Svg {
         }
     }
 
+    /// Adds a path in the style of its group, with a text that is shown while the pointer rests on it.
+    pub fn hinted_path(&mut self, data: &str, hint: &str) {
+        let hint = escape(hint);
+        self.line(format_args!("<path d=\"{data}\"><title>{hint}</title></path>"));
+    }
+
     /// Adds a line of text; `class` says how it is anchored.
     pub fn text(&mut self, class: &str, at: DVec2, content: &str) {
         let ([x, y], content) = ([at.x, at.y].map(coordinate), escape(content));

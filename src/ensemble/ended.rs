@@ -2,13 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Mollified, Outcome, Portrait, Rows};
+use super::{Features, Mollified, Outcome, Portrait, Rows};
 
 /// Everything a member leaves behind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ended {
     /// Its row of the summary.
     pub outcome: Outcome,
+    /// What was drawn for it, and its shape at the start.
+    pub features: Features,
     /// Its excess at the times of [`grid`](crate::schedule::grid) that it reached.
     pub excess: Vec<f64>,
     /// Its rows of the series, and its snapshots.

@@ -3,6 +3,7 @@
 
 pub mod drawn;
 pub mod ended;
+pub mod features;
 mod horizon;
 pub mod judged;
 pub mod levels;
@@ -27,6 +28,7 @@ mod values;
 
 pub use drawn::Drawn;
 pub use ended::Ended;
+pub use features::{Feature, Features};
 pub use judged::Judged;
 pub use levels::{LevelRow, LevelTimes, RefinementLevel};
 pub use member::{Family, Member};

@@ -73,14 +73,18 @@ impl Spec {
     /// The numbers that are drawn for `member`, as for [`Spec::values`], each with its name: that of its key, and its
     /// rank from 1 where the key is a shape or a flow.
     pub fn drawn_numbers(&self, member: u64) -> Vec<(String, f64)> {
-        let keys = ["shape", "flow", "amplitude", "decay"];
         let numbers = self.numbers(|place| self.design.uniform(&DrawAddress { member, ..place }));
-        let name =
-            |key: usize, rank: usize| if key < 2 { format!("{}_{}", keys[key], rank + 1) } else { keys[key].into() };
-        let of_key = |(key, numbers): (usize, Vec<f64>)| {
-            numbers.into_iter().enumerate().map(move |(rank, number)| (name(key, rank), number))
-        };
-        numbers.into_iter().enumerate().flat_map(of_key).collect()
+        drawn_names(self.drawn_counts()).into_iter().zip(numbers.into_iter().flatten()).collect()
+    }
+
+    /// How many numbers are drawn for the keys shape, flow, amplitude and decay.
+    pub(super) fn drawn_counts(&self) -> [usize; 4] {
+        self.distributions().map(<[Distribution]>::len)
+    }
+
+    /// Whether curves are perturbed, at least those of some members.
+    pub fn is_perturbed(&self) -> bool {
+        self.amplitude.is_drawn() || *self.amplitude.typical() != 0.0
     }
 
     /// Whether members have values of their own.
@@ -185,6 +189,13 @@ impl Spec {
             numbers
         })
     }
+}
+
+/// The names of the numbers that are drawn, so many for each of the keys shape, flow, amplitude and decay.
+pub(super) fn drawn_names(counts: [usize; 4]) -> Vec<String> {
+    let keys = ["shape", "flow", "amplitude", "decay"];
+    let name = |key: usize, rank: usize| if key < 2 { format!("{}_{}", keys[key], rank + 1) } else { keys[key].into() };
+    counts.into_iter().enumerate().flat_map(|(key, count)| (0..count).map(move |rank| name(key, rank))).collect()
 }
 
 /// The value of a key with these numbers.

@@ -63,7 +63,8 @@ macro_rules! columns {
 
 pub(super) use columns;
 
-fn known(value: f64) -> Option<f64> {
+/// The value, if it is known.
+pub(super) fn known(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
@@ -96,6 +97,8 @@ kinds! {
     signed of i32, "integer": |v| Field::Signed(i64::from(*v)), |fields| fields.whole();
     /// How a member ended.
     status of crate::ensemble::Status, "word": |v| Field::Word(v.name()), |fields| fields.status();
+    /// A count or an index, or none.
+    rank of Option<u64>, "integer": |v| v.map_or(Field::Float(None), Field::Whole), |fields| fields.whole_or_none();
     /// Any word.
     word of String, "word": |v| Field::Word(v), |fields| Ok(fields.word().to_owned());
     /// A float; one that is not finite is unknown.

@@ -16,14 +16,14 @@ const SHOWN: usize = 200;
 /// The fields of a line, read from left to right.
 pub struct Fields<'a> {
     path: &'a Path,
-    names: &'a [&'static str],
+    names: &'a [String],
     line: &'a StringRecord,
     taken: usize,
 }
 
 impl<'a> Fields<'a> {
     /// The fields of `line` in the file at `path`, under these headings.
-    pub(super) fn new(path: &'a Path, names: &'a [&'static str], line: &'a StringRecord) -> Fields<'a> {
+    pub(super) fn new(path: &'a Path, names: &'a [String], line: &'a StringRecord) -> Fields<'a> {
         Fields { path, names, line, taken: 0 }
     }
 }
@@ -39,6 +39,17 @@ impl Fields<'_> {
     pub fn whole<T: FromStr>(&mut self) -> Result<T> {
         let value = self.word().parse();
         value.map_err(|_| self.unexpected("a whole number"))
+    }
+
+    /// A whole number; none if unknown.
+    pub fn whole_or_none(&mut self) -> Result<Option<u64>> {
+        match self.word() {
+            "" => Ok(None),
+            word => match word.parse() {
+                Ok(number) => Ok(Some(number)),
+                Err(_) => Err(self.unexpected("a whole number or nothing")),
+            },
+        }
     }
 
     /// The name of a status.
@@ -84,7 +95,7 @@ impl Fields<'_> {
 
     /// The error that the field of the column `name` is not what was expected.
     pub fn unexpected_in(&self, name: &str, expected: &str) -> Error {
-        self.refused(self.names.iter().position(|own| *own == name).unwrap_or(0), expected)
+        self.refused(self.names.iter().position(|own| own == name).unwrap_or(0), expected)
     }
 
     fn refused(&self, field: usize, expected: &str) -> Error {

@@ -8,6 +8,10 @@ pub const SUMMARY: &str = "summary.csv";
 pub const RATES: &str = "rates.csv";
 /// Relaxation times at other resolutions, one row per member and level.
 pub const LEVELS: &str = "levels.csv";
+/// What was drawn for each member, and its shape at the start.
+pub const MEMBERS: &str = "members.csv";
+/// How much of the variance of the times each of that explains, by cell.
+pub const EXPLAINED: &str = "explained.csv";
 /// Mean excess in time, by cell.
 pub const MEAN_EXCESS: &str = "mean_excess.csv";
 /// Observables over time.
@@ -44,6 +48,8 @@ pub const GROUP_SURVIVAL: &str = "plots/groups.svg";
 pub const EXCESS: &str = "plots/excess.svg";
 /// Relaxation times against a swept key.
 pub const DEPENDENCE: &str = "plots/dependence.svg";
+/// Relaxation times against what explains them best.
+pub const FEATURES: &str = "plots/features.svg";
 /// Spacing of nodes and metric drift.
 pub const MESH: &str = "plots/mesh.svg";
 /// Everything at a glance.
@@ -64,13 +70,15 @@ pub const FIGURES: [&str; 8] =
 pub const ROWS: &str = "curvelax.rows";
 
 /// All files that a run may write, or that are made from one without naming a place; the one that vouches for the others comes first.
-pub const OWN: [&str; 23] = [
+pub const OWN: [&str; 26] = [
     RUN,
     SHARD,
     SUMMARY,
+    MEMBERS,
     LEVELS,
     ENSEMBLE,
     GROUPS,
+    EXPLAINED,
     MEAN_EXCESS,
     RATES,
     SERIES,
@@ -84,6 +92,7 @@ pub const OWN: [&str; 23] = [
     GROUP_SURVIVAL,
     EXCESS,
     DEPENDENCE,
+    FEATURES,
     MESH,
     REPORT,
     MOVIE,
@@ -91,10 +100,12 @@ pub const OWN: [&str; 23] = [
 ];
 
 /// The tables of a run and its store, in the order in which people see them.
-pub const TABLES: [&str; 9] = [SUMMARY, ENSEMBLE, GROUPS, RATES, LEVELS, MEAN_EXCESS, SERIES, SNAPSHOTS, STORE];
+pub const TABLES: [&str; 11] =
+    [SUMMARY, MEMBERS, ENSEMBLE, GROUPS, EXPLAINED, RATES, LEVELS, MEAN_EXCESS, SERIES, SNAPSHOTS, STORE];
 
 /// The files that are drawn from the others.
-pub const PICTURES: [&str; 9] = [REPORT, RELAXATION, SURVIVAL, GROUP_SURVIVAL, EXCESS, RATE, DEPENDENCE, MESH, CURVES];
+pub const PICTURES: [&str; 10] =
+    [REPORT, RELAXATION, SURVIVAL, GROUP_SURVIVAL, EXCESS, RATE, DEPENDENCE, FEATURES, MESH, CURVES];
 
 /// The remedy for a file that was changed or truncated.
 pub const REMEDY: &str = "restore the file, or run again";

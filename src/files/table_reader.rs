@@ -23,10 +23,7 @@ use crate::{
 
 /// A table with the columns of `R`, read row by row.
 pub struct TableReader<R> {
-    path: PathBuf,
-    names: Vec<&'static str>,
-    reader: csv::Reader<Lines<File>>,
-    line: StringRecord,
+    lines: LineReader,
     kind: PhantomData<fn() -> R>,
 }
 
@@ -36,6 +33,38 @@ impl<R: TableRow + Default> TableReader<R> {
     /// # Errors
     /// [`Error::Request`] if it does not exist, has other columns, or is truncated.
     pub fn open(place: &Place) -> Result<TableReader<R>> {
+        let names = R::COLUMNS.iter().map(|column| column.name.into()).collect();
+        Ok(TableReader { lines: LineReader::open(place, names)?, kind: PhantomData })
+    }
+
+    /// Returns the next row, and its fields for further checks.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a field that does not fit its column.
+    pub fn read(&mut self) -> Result<Option<(R, Fields<'_>)>> {
+        let Some(mut fields) = self.lines.fields()? else { return Ok(None) };
+        let mut record = R::default();
+        for column in R::COLUMNS {
+            (column.read)(&mut record, &mut fields)?;
+        }
+        Ok(Some((record, fields)))
+    }
+}
+
+/// A table with given headings, read line by line.
+pub(super) struct LineReader {
+    path: PathBuf,
+    names: Vec<String>,
+    reader: csv::Reader<Lines<File>>,
+    line: StringRecord,
+}
+
+impl LineReader {
+    /// Opens the table at `place`, and reads its header.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if it does not exist, has other headings than `names`, or is truncated.
+    pub fn open(place: &Place, names: Vec<String>) -> Result<LineReader> {
         let path = place.shown().to_path_buf();
         let file = input::open(place.at()).and_then(|mut file| Ok((line_cut_off(&mut file)?, file)));
         let (cut_off, file) =
@@ -46,34 +75,21 @@ impl<R: TableRow + Default> TableReader<R> {
         }
         // Rows are checked here, where messages can say more.
         let reader = ReaderBuilder::new().has_headers(false).flexible(true).from_reader(Lines::new(file));
-        let names = R::COLUMNS.iter().map(|column| column.name).collect();
-        let mut table = TableReader { path, names, reader, line: StringRecord::new(), kind: PhantomData };
+        let expected = names.clone();
+        let mut table = LineReader { path, names, reader, line: StringRecord::new() };
         if let Some(mut fields) = table.fields()? {
-            for column in R::COLUMNS {
-                if fields.word() != column.name {
-                    return Err(fields.unexpected(&format!("the heading `{}`", column.name)));
+            for name in expected {
+                if fields.word() != name {
+                    return Err(fields.unexpected(&format!("the heading `{name}`")));
                 }
             }
         }
         Ok(table)
     }
 
-    /// Returns the next row, and its fields for further checks.
-    ///
-    /// # Errors
-    /// [`Error::Request`] for a field that does not fit its column.
-    pub fn read(&mut self) -> Result<Option<(R, Fields<'_>)>> {
-        let Some(mut fields) = self.fields()? else { return Ok(None) };
-        let mut record = R::default();
-        for column in R::COLUMNS {
-            (column.read)(&mut record, &mut fields)?;
-        }
-        Ok(Some((record, fields)))
-    }
-
     /// The fields of the next line, as many as there are columns.
-    fn fields(&mut self) -> Result<Option<Fields<'_>>> {
-        let TableReader { path, names, reader, line, .. } = self;
+    pub fn fields(&mut self) -> Result<Option<Fields<'_>>> {
+        let LineReader { path, names, reader, line } = self;
         let some = reader.read_record(line).map_err(|e| {
             let problem = match e.kind() {
                 csv::ErrorKind::Utf8 { .. } => "not UTF-8: save it as UTF-8".into(),

@@ -14,7 +14,7 @@ use super::{
     part_file::{Mark, PartFile},
     place::Place,
 };
-use crate::results::tally::MeanExcess;
+use crate::results::{explained::ExplainedRow, tally::MeanExcess};
 use crate::{
     ensemble::{LevelRow, Outcome, SeriesRow, Snapshot},
     error::{Error, Result},
@@ -133,6 +133,17 @@ columns! { MeanExcess:
     sd: optional = sd, "its standard deviation";
 }
 
+columns! { ExplainedRow:
+    cell: whole = cell, "index of the cell";
+    time: word = time, "what is explained: t_relax or t_half";
+    feature: word = feature, "a column of `members.csv`, best first; or together: a regression on the chosen ones";
+    members: whole = members, "members that reached the time";
+    censored: whole = censored, "members that ended before";
+    spearman: optional = spearman, "rank correlation of feature and time";
+    r2: optional = r2, "share of the variance of the time that a straight line explains; of the regression cross-validated";
+    chosen: rank = chosen, "place of the feature in the regression, from 1, empty if it is not in it; of the regression how many it has";
+}
+
 /// A row of `convergence.csv`: the error of a run against an exact solution.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ErrorRow {
@@ -197,14 +208,14 @@ pub type SeriesTable = Table<SeriesRow>;
 /// `snapshots.csv`: the nodes of each member at given times.
 pub type SnapshotTable = Table<NodeRow>;
 
-impl<R: TableRow> Table<R> {
-    /// Begins a table with its header, or continues after the rows in `file`.
-    pub fn new(file: PartFile) -> Result<Self> {
+impl<R> Table<R> {
+    /// Begins a table with these headings, or continues after the rows in `file`.
+    pub(super) fn with_header<'a>(file: PartFile, names: impl Iterator<Item = &'a str>) -> Result<Self> {
         let begins = file.is_empty();
         let writer = WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
         let mut table = Table { writer, kind: PhantomData };
         if begins {
-            table.write(R::COLUMNS.iter().map(|column| Field::Word(column.name)))?;
+            table.write(names.map(Field::Word))?;
         }
         Ok(table)
     }
@@ -233,14 +244,22 @@ impl<R: TableRow> Table<R> {
         Ok(file)
     }
 
+    /// Writes the fields of a row.
+    pub(super) fn write<'a>(&mut self, fields: impl Iterator<Item = Field<'a>>) -> Result<()> {
+        let row: Vec<Field<'_>> = fields.collect();
+        self.writer.serialize(row).map_err(|e| Error::io("cannot write", self.writer.get_ref().target())(e.into()))
+    }
+}
+
+impl<R: TableRow> Table<R> {
+    /// Begins a table with its header, or continues after the rows in `file`.
+    pub fn new(file: PartFile) -> Result<Self> {
+        Table::with_header(file, R::COLUMNS.iter().map(|column| column.name))
+    }
+
     /// Writes a row.
     pub fn row(&mut self, record: &R) -> Result<()> {
         self.write(R::COLUMNS.iter().map(|column| (column.write)(record)))
-    }
-
-    fn write<'a>(&mut self, fields: impl Iterator<Item = Field<'a>>) -> Result<()> {
-        let row: Vec<Field<'_>> = fields.collect();
-        self.writer.serialize(row).map_err(|e| Error::io("cannot write", self.writer.get_ref().target())(e.into()))
     }
 
     /// Writes a whole table into `file`, ready for its final name.

@@ -224,7 +224,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        ensemble::{Extent, Mollified, Rows, SeriesRow, Snapshot, Status},
+        ensemble::{Extent, Features, Mollified, Rows, SeriesRow, Snapshot, Status},
         report::{envelope::sealed, fingerprint::layout},
         results::{provenance::tests::platform, tally::tests::outcome},
         scheme::member::{Counters, Report},
@@ -269,6 +269,7 @@ mod tests {
         };
         let early = Ended {
             outcome: outcome(2, Status::Relaxed, Some(0.5)),
+            features: Features(vec![0.5, f64::MAX]),
             excess: vec![0.5],
             rows: Rows {
                 snapshots: vec![Snapshot { member: 2, t: 0.0, x: vec![1.0], y: vec![2.0], k: vec![3.0], r: vec![4.0] }],
@@ -321,7 +322,7 @@ mod tests {
             ["Head", "Origin", "Platform", "DeviceKind", "Precision", "Duration", "Mark", "Film"],
             ["Aside", "MollifiedMembers", "Moments", "ExactSum", "Ended", "Outcome", "Status", "Observables"],
             ["Rows", "Extent", "SeriesRow", "Snapshot", "Portrait", "Mollified", "DVec2", "Paused"],
-            ["Counters", "Report", "Observed", "Progress", "Decay", "StoreMark", "ArrayMark", ""],
+            ["Counters", "Report", "Observed", "Progress", "Decay", "StoreMark", "ArrayMark", "Features"],
         ];
         let expected: BTreeSet<&str> = expected.into_iter().flatten().filter(|name| !name.is_empty()).collect();
         assert_eq!(named, expected);

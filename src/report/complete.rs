@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{document::Document, overview::Overview, pictures::FinishedRun};
+use super::{document::Document, overview::Overview, pictures::FinishedRun, reader};
 use crate::{
     ensemble::Spec,
     error::{Error, Result},
@@ -11,6 +11,7 @@ use crate::{
         names,
         part_file::PartFile,
         part_folder::PartFolder,
+        place::Place,
         portraits::{self, Film},
         tables::Table,
     },
@@ -55,6 +56,12 @@ pub fn listed(is_there: impl Fn(&str) -> bool) -> Vec<&'static str> {
     tables.chain([names::REPORT, PLOTS, names::RUN]).chain(shard).collect()
 }
 
+/// The place of the file `name`, under its temporary name.
+fn own<'a>(files: &'a [PartFile], name: &str) -> Result<&'a Place> {
+    let file = files.iter().find(|file| file.name() == name);
+    file.map(PartFile::part).ok_or_else(|| Error::Failed(format!("{name} was not written")))
+}
+
 impl Complete<'_> {
     /// Gives all files their final names, once all are on disk, and returns the text for stdout. `files` and `store`
     /// hold the results of the members; `shard` is [what a merge needs besides them](super::shard).
@@ -79,6 +86,9 @@ impl Complete<'_> {
         }
         let excess = &tally.mean_excess(spec)?;
         files.push(Table::of(folder.file(names::MEAN_EXCESS)?, excess)?);
+        let [summary, members] = [names::SUMMARY, names::MEMBERS].map(|name| own(&files, name));
+        let explained = &reader::explained(summary?, members?, spec)?;
+        files.push(Table::of(folder.file(names::EXPLAINED)?, &explained.rows)?);
         if let Some(shard) = shard {
             files.push(folder.write(names::SHARD, shard)?);
         }
@@ -87,7 +97,7 @@ impl Complete<'_> {
         let names = listed(|name| written.iter().any(|own| own == name));
         let provenance = &Provenance::new(spec, platform, tally, warnings, started, wall);
         let run = folder.write(names::RUN, provenance.to_json()?)?;
-        let study = FinishedRun { provenance, tally, statistics, excess, films };
+        let study = FinishedRun { provenance, tally, statistics, excess, explained, films };
         let mut drawn = Vec::new();
         let done = (|| {
             drawn.push(folder.write(names::PORTRAITS, portraits::to_json(films)?)?);

@@ -5,6 +5,7 @@ use crate::{
     error::{Error, Result},
     files::{
         folder::OutputFolder,
+        members::MemberTable,
         names,
         part_file::{Mark, PartFile},
         part_folder::PartFolder,
@@ -18,6 +19,7 @@ use crate::{
 /// The growing files of a spec.
 pub struct Growing {
     summary: SummaryTable,
+    members: MemberTable,
     levels: LevelTable,
     rates: RateTable,
     series: Option<SeriesTable>,
@@ -35,7 +37,7 @@ impl Growing {
         let snapshots = !spec.snapshots.is_empty() && spec.store == Store::Csv;
         let optional = [(names::SERIES, spec.series.is_some()), (names::SNAPSHOTS, snapshots)];
         let asked = optional.into_iter().filter(|(_, asked)| *asked).map(|(name, _)| name);
-        [names::SUMMARY, names::LEVELS, names::RATES].into_iter().chain(asked).collect()
+        [names::SUMMARY, names::MEMBERS, names::LEVELS, names::RATES].into_iter().chain(asked).collect()
     }
 
     /// Whether `spec` requires the store.
@@ -93,6 +95,7 @@ impl Growing {
         let asked = |name: &str| names.contains(&name).then(|| file(name)).transpose();
         Ok(Growing {
             summary: Table::new(file(names::SUMMARY)?)?,
+            members: MemberTable::new(file(names::MEMBERS)?, spec)?,
             levels: Table::new(file(names::LEVELS)?)?,
             rates: Table::new(file(names::RATES)?)?,
             series: asked(names::SERIES)?.map(Table::new).transpose()?,
@@ -112,7 +115,7 @@ impl Growing {
     pub fn add(&mut self, ended: &Ended) -> Result<()> {
         // Until everything is written.
         self.torn = true;
-        let Ended { outcome, rows, .. } = ended;
+        let Ended { outcome, features, rows, .. } = ended;
         for extent in &rows.spilled {
             let none = || Error::Failed(format!("the rows of member {} are not to be found", outcome.member));
             let (series, snapshots) = self.spill.as_mut().ok_or_else(none)?.read(extent)?;
@@ -123,6 +126,7 @@ impl Growing {
             store.member(outcome.status)?;
         }
         self.summary.row(outcome)?;
+        self.members.row(outcome, features)?;
         RateRow::of(outcome).iter().try_for_each(|row| self.rates.row(row))?;
         self.torn = false;
         Ok(())
@@ -165,7 +169,7 @@ impl Growing {
         if self.torn {
             return Err(Error::Failed("the rows of a member could not all be written".into()));
         }
-        let mut marks = vec![self.summary.mark()?, self.levels.mark()?, self.rates.mark()?];
+        let mut marks = vec![self.summary.mark()?, self.members.mark()?, self.levels.mark()?, self.rates.mark()?];
         marks.extend(self.series.as_mut().map(SeriesTable::mark).transpose()?);
         marks.extend(self.snapshots.as_mut().map(SnapshotTable::mark).transpose()?);
         let store = self.store.as_ref().map(SnapshotStore::mark).transpose()?;
@@ -175,6 +179,7 @@ impl Growing {
     /// Sets whether to keep them if the run fails.
     pub fn keep(&mut self, keep: bool) {
         self.summary.keep(keep);
+        self.members.keep(keep);
         self.levels.keep(keep);
         self.rates.keep(keep);
         self.series.iter().for_each(|table| table.keep(keep));
@@ -186,8 +191,8 @@ impl Growing {
     /// Completes all files on disk, ready for their final names; and returns the rows needed as long as there are
     /// checkpoints.
     pub fn ready(self) -> Result<(Vec<PartFile>, Option<PartFolder>, Option<Spill>)> {
-        let Growing { summary, levels, rates, series, snapshots, store, spill, .. } = self;
-        let mut files = vec![summary.ready()?, levels.ready()?, rates.ready()?];
+        let Growing { summary, members, levels, rates, series, snapshots, store, spill, .. } = self;
+        let mut files = vec![summary.ready()?, members.ready()?, levels.ready()?, rates.ready()?];
         files.extend(series.map(SeriesTable::ready).transpose()?);
         files.extend(snapshots.map(SnapshotTable::ready).transpose()?);
         Ok((files, store.map(SnapshotStore::ready).transpose()?, spill))

@@ -355,7 +355,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        ensemble::{Mollified, Observables, Portrait, Rows, Status, spec::Store},
+        ensemble::{Features, Mollified, Observables, Portrait, Rows, Status, spec::Store},
         files::names,
         results::{provenance, tally},
     };
@@ -385,6 +385,7 @@ mod tests {
         let of = |value| vec![value; POINTS];
         Ended {
             outcome: tally::tests::outcome(member, Status::Relaxed, Some(0.5)),
+            features: Features(vec![0.5; 26]),
             excess: vec![0.2, 0.1],
             rows: Rows {
                 spilled: Vec::new(),

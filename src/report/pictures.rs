@@ -10,7 +10,8 @@ use super::{
 use crate::{
     draw::charts::{
         CellValues, Decay, DecayCurve, DecayLaw, Dependence, DependencePoint, EstimatedNumber, FittedRates,
-        MeshQuality, PowerLawLine, RelaxationTimes, Series, Setting, Survival, SurvivalCurve, Theory,
+        MeshQuality, PowerLawLine, RelaxationTimes, Scatter, ScatterPanel, ScatterPoint, Series, Setting, Survival,
+        SurvivalCurve, Theory,
     },
     ensemble::{Spec, Status, sweep::SweepAxis, theory},
     error::{Result, shortened},
@@ -20,6 +21,7 @@ use crate::{
         cells::{CellStatistics, EnsembleStatistics, GroupStatistics, QUANTILES},
         comparison::{CellComparison, CellDifference},
         discretisation::DiscretisationError,
+        explained::{Explained, ExplainedRow, FeaturedMember, LEAST_MEMBERS, MOST_CENSORED, TIMES, TOGETHER},
         provenance::Provenance,
         scaling::Scaling,
         tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
@@ -34,6 +36,8 @@ const MAX_GROUPS: usize = 40;
 const MAX_NAME: usize = 60;
 /// Digits of a number for reading.
 const DIGITS: usize = 4;
+/// Features of a time that the page lists.
+const LISTED: usize = 6;
 
 /// A finished run.
 pub struct FinishedRun<'a> {
@@ -45,6 +49,8 @@ pub struct FinishedRun<'a> {
     pub statistics: &'a EnsembleStatistics,
     /// The mean excess in time.
     pub excess: &'a [MeanExcess],
+    /// What explains the times.
+    pub explained: &'a Explained,
     /// The first members.
     pub films: &'a [Film],
 }
@@ -87,6 +93,7 @@ impl FinishedRun<'_> {
         charts.extend(self.excess()?);
         charts.push(self.rates());
         charts.extend(self.dependence());
+        charts.push(self.features());
         charts.push(self.mesh());
         Ok(charts)
     }
@@ -246,6 +253,41 @@ impl FinishedRun<'_> {
         Some(chart(names::DEPENDENCE, &title, caption, svg))
     }
 
+    /// t_relax against the features that explain it best.
+    fn features(&self) -> Chart {
+        let Explained { rows, features, pictured, drawn } = self.explained;
+        let numbers = self.numbers();
+        let cells = self.statistics.cells.iter().enumerate();
+        let cells = cells.map(|(rank, cell)| (self.label(cell.cell), numbers.as_ref().map(|numbers| numbers[rank])));
+        let panel = |i: &usize| {
+            let known = drawn.iter().filter(|member| member.numbers[*i].is_finite());
+            let point = |member: &FeaturedMember| ScatterPoint {
+                cell: member.cell as usize,
+                member: member.member,
+                x: member.numbers[*i],
+                t: member.times[0].unwrap_or(member.t_end),
+                happened: member.times[0].is_some(),
+            };
+            let heading = explains(rows.iter().filter(|row| row.time == TIMES[0] && row.feature == features[*i]));
+            ScatterPanel { feature: features[*i].clone(), heading, points: known.map(point).collect() }
+        };
+        let title = "What explains the relaxation time";
+        let members = self.tally.members();
+        let some = match drawn.len() as u64 {
+            drawn if drawn < members => format!("{drawn} of {members} members are drawn, spread over all."),
+            _ => String::new(),
+        };
+        let reason = match rows.is_empty() {
+            true => "The members of a cell do not differ in any feature.".into(),
+            false => format!("Nothing is claimed: {}.", claims()),
+        };
+        let (notes, panels) = (vec![self.what(), some], pictured.iter().map(panel).collect());
+        let (key, cells, reason) = (&self.colour_key(), cells.collect(), &*reason);
+        let svg = Scatter { title, notes, quantity: TIMES[0], key, cells, panels, reason }.draw();
+        let caption = "The features of members.csv whose straight line explains most of t_relax.";
+        chart(names::FEATURES, title, caption, svg)
+    }
+
     fn mesh(&self) -> Chart {
         let title = "Mesh quality at the end";
         let quality = MeshQuality {
@@ -277,7 +319,12 @@ impl FinishedRun<'_> {
             warnings: &self.provenance.warnings,
             members: self.trajectories(),
             plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
-            tables: [self.table()].into_iter().chain(self.group_table()).chain(self.pairs()).collect(),
+            tables: [self.table()]
+                .into_iter()
+                .chain(self.group_table())
+                .chain(self.pairs())
+                .chain(self.explanation())
+                .collect(),
             spec: &spec,
             provenance: self.provenance(),
         };
@@ -438,6 +485,14 @@ impl FinishedRun<'_> {
         Some(table(&format!("By {key}{shown}{tests}"), [key].into_iter(), rows, names::GROUPS))
     }
 
+    /// The modes of the perturbation that are no features, if there are any.
+    fn left_out(&self) -> String {
+        match self.spec().modes_without_features() {
+            0 => String::new(),
+            modes => format!(". The {modes} highest modes of the perturbation are not among the features"),
+        }
+    }
+
     /// The differences from the first cell, if cells share their random numbers.
     fn pairs(&self) -> Option<PageTable> {
         let cells = self.statistics.comparison.paired_cells()?;
@@ -460,6 +515,41 @@ impl FinishedRun<'_> {
             header: header.into_iter().chain(left_out).map(String::from).collect(),
             rows: cells.iter().map(row).collect(),
             source: String::new(),
+        })
+    }
+
+    /// The best features of each time, cell by cell, and the regression on some.
+    fn explanation(&self) -> Option<PageTable> {
+        let rows = &self.explained.rows;
+        let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, 3));
+        let row = |of: &ExplainedRow| {
+            let feature = match (&*of.feature, of.chosen) {
+                (TOGETHER, Some(chosen)) => format!("{chosen} together"),
+                (feature, _) => feature.into(),
+            };
+            let counts = [of.members, of.censored].map(|count| count.to_string());
+            let chosen = of.chosen.filter(|_| of.feature != TOGETHER).map_or(String::new(), |place| place.to_string());
+            let start = [of.cell.to_string(), of.time.clone(), feature].into_iter().chain(counts);
+            start.chain([shown(of.spearman), shown(of.r2), chosen]).collect()
+        };
+        // The rows of a cell and a time are sorted, with the regression at the end.
+        let groups = rows.chunk_by(|a, b| (a.cell, &a.time) == (b.cell, &b.time));
+        let best = groups.flat_map(|group| {
+            let (regression, features) = group.split_last().into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
+            features.into_iter().flat_map(|rows| rows.iter().take(LISTED)).chain(regression)
+        });
+        let header = ["cell", "time", "feature", "members", "censored", "Spearman", "R²", "chosen"];
+        (!rows.is_empty()).then(|| PageTable {
+            caption: format!(
+                "What explains the times: the {LISTED} best features of each alone (R² of a straight line), and a linear \
+                 regression on the chosen ones (R² cross-validated), over the members that reached the time. \
+                 Otherwise empty: {}{}",
+                claims(),
+                self.left_out()
+            ),
+            header: header.map(String::from).into(),
+            rows: best.map(row).collect(),
+            source: names::EXPLAINED.into(),
         })
     }
 
@@ -539,6 +629,23 @@ fn table<'a>(
 
 fn chart(name: &'static str, title: &str, caption: &str, svg: String) -> Chart {
     Chart { name, figure: PageFigure { title: title.into(), caption: caption.into(), svg } }
+}
+
+/// When nothing is said about a time.
+fn claims() -> String {
+    let percent = 100.0 * MOST_CENSORED;
+    format!("there must be {LEAST_MEMBERS} members that reached the time, and at most {percent} % that did not")
+}
+
+/// How much a feature explains, in one cell or in several.
+fn explains<'a>(rows: impl Iterator<Item = &'a ExplainedRow>) -> String {
+    let (r2, rho): (Vec<f64>, Vec<f64>) = rows.filter_map(|row| row.r2.zip(row.spearman)).unzip();
+    let shown = |values: &[f64]| {
+        let [low, high] = [f64::min, f64::max].map(|of| values.iter().copied().reduce(of).unwrap_or_default());
+        let [low, high] = [low, high].map(|value| significant(value, 3));
+        if low == high { low } else { format!("{low} to {high}") }
+    };
+    format!("R² {}, Spearman {}", shown(&r2), shown(&rho))
 }
 
 /// Times at which members of the cell relaxed, or at which they ended without relaxing.
@@ -652,7 +759,8 @@ mod tests {
         let provenance = &Provenance::new(spec, &platform(), &tally, &[], Duration::ZERO, Duration::from_secs(1));
         let statistics = &EnsembleStatistics::new(spec, &mut tally).unwrap();
         let excess = &tally.mean_excess(spec).unwrap();
-        FinishedRun { provenance, tally: &tally, statistics, excess, films }.pictures().unwrap()
+        let explained = &Explained::default();
+        FinishedRun { provenance, tally: &tally, statistics, excess, explained, films }.pictures().unwrap()
     }
 
     /// 10⁵ members, all different, a third of them censored at various times.

@@ -11,12 +11,14 @@ use crate::{
     error::{Error, Result, shortened},
     files::{
         TableReader,
+        members::MemberReader,
         names::{self, REMEDY},
         place::Place,
         portraits::{self, Film},
     },
     input,
     results::{
+        explained::{Explained, Explaining, FeaturedMember},
         provenance::{FORMAT, Provenance, by_status},
         tally::{Aside, MeanExcess, Tally},
     },
@@ -35,6 +37,8 @@ pub struct Finished {
     pub tally: Tally,
     /// The mean excess in time.
     pub excess: Vec<MeanExcess>,
+    /// What explains the times.
+    pub explained: Explained,
     /// The first members; none if the run could not save them.
     pub films: Vec<Film>,
 }
@@ -49,7 +53,9 @@ impl Finished {
         let tally = tally(folder, &provenance)?;
         let films = films(folder)?;
         let excess = mean_excess(folder, &provenance)?;
-        Ok(Finished { provenance, tally, excess, films })
+        let [summary, members] = [names::SUMMARY, names::MEMBERS].map(|name| Place::named(&folder.join(name)));
+        let explained = explained(&summary, &members, &provenance.spec)?;
+        Ok(Finished { provenance, tally, excess, explained, films })
     }
 }
 
@@ -253,6 +259,41 @@ impl Iterator for Summary<'_> {
     }
 }
 
+/// Finds what explains the times in a `summary.csv` by the features in a `members.csv`, of a run of `spec`. Both are
+/// read as far as members enter.
+///
+/// # Errors
+/// [`Error::Request`] for rows that are not of the same members, each once.
+pub fn explained(summary: &Place, members: &Place, spec: &Spec) -> Result<Explained> {
+    let (mut outcomes, mut table) = (TableReader::<Outcome>::open(summary)?, MemberReader::open(members, spec)?);
+    let count = table.features().len();
+    let mut explaining = Explaining::new(table.features(), spec.sweep.cells());
+    while let Some((Outcome { member, cell, t_relax, t_half, t_end, .. }, _)) = outcomes.read()? {
+        let Some((own, of, mut fields)) = table.read()? else {
+            let problem = format!("expected a row of member {member}, found the end");
+            return Err(Error::Request(format!("{}: {problem}; {REMEDY}", members.shown().display())));
+        };
+        for (name, told, found) in [("member", member, own), ("cell", cell, of)] {
+            if told != found {
+                return Err(fields.unexpected_in(name, &format!("{told}, as in {}", names::SUMMARY)));
+            }
+        }
+        if explaining.wants(cell) {
+            let numbers = (0..count).map(|_| fields.known()).collect::<Result<_>>()?;
+            let place = member.saturating_sub(cell.saturating_mul(spec.curves));
+            explaining.add(FeaturedMember { member, cell, place, numbers, times: [t_relax, t_half], t_end });
+        } else if explaining.is_full() {
+            return Ok(explaining.finish());
+        }
+    }
+    match table.read()? {
+        Some((.., fields)) => {
+            Err(fields.unexpected_in("member", &format!("no more members, as in {}", names::SUMMARY)))
+        }
+        None => Ok(explaining.finish()),
+    }
+}
+
 /// Reads `mean_excess.csv`.
 ///
 /// # Errors
@@ -288,7 +329,8 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let base = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/base");
         std::fs::create_dir(home.path().join("plots")).unwrap();
-        for name in [names::RUN, names::SUMMARY, names::LEVELS, names::MEAN_EXCESS, names::PORTRAITS] {
+        let tables = [names::SUMMARY, names::MEMBERS, names::LEVELS, names::MEAN_EXCESS];
+        for name in tables.into_iter().chain([names::RUN, names::PORTRAITS]) {
             let own = Path::new(name).file_name().unwrap();
             std::fs::copy(base.join(own), home.path().join(name)).unwrap();
         }

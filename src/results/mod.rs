@@ -3,9 +3,11 @@
 pub mod cells;
 pub mod comparison;
 pub mod discretisation;
+pub mod explained;
 pub mod provenance;
 pub mod scaling;
 pub mod tally;
 
 pub use cells::EnsembleStatistics;
 pub use comparison::CellComparison;
+pub use explained::Explained;

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::{Course, ROUND, Time, Trajectory};
 use crate::{
-    ensemble::{Ended, Observables, Outcome, Portrait, Status},
+    ensemble::{Ended, Features, Observables, Outcome, Portrait, Status},
     scheme::{
         State,
         member::{self, Decay, NEVER},
@@ -89,6 +89,7 @@ impl Trajectory<'_> {
             ..Outcome::default()
         };
         Ended {
+            features: Features::of(&self.member, &self.start),
             excess: self.excess(),
             outcome,
             rows: self.rows,

@@ -7,7 +7,7 @@ use glam::DVec2;
 use tempfile::TempDir;
 
 /// The tables of a run.
-pub const FILES: [&str; 3] = ["summary.csv", "series.csv", "snapshots.csv"];
+pub const FILES: [&str; 4] = ["summary.csv", "members.csv", "series.csv", "snapshots.csv"];
 
 /// A finished run in a separate folder.
 pub struct Done {
@@ -49,7 +49,7 @@ impl Done {
         fs::read_to_string(self.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
     }
 
-    pub fn texts(&self) -> [String; 3] {
+    pub fn texts(&self) -> [String; 4] {
         FILES.map(|name| self.text(name))
     }
 

@@ -10,18 +10,21 @@ import polars as pl
 from common import Runs, columns
 
 ROOT = Path(__file__).resolve().parents[2]
-TABLES = ["summary.csv", "levels.csv", "ensemble.csv", "rates.csv", "mean_excess.csv", "series.csv", "snapshots.csv"]
+TABLES = ["summary.csv", "members.csv", "levels.csv", "ensemble.csv", "explained.csv", "rates.csv", "mean_excess.csv",
+          "series.csv", "snapshots.csv"]
 INTEGERS = {
     "summary.csv": ["member", "cell", "steps", "rejected", "sweeps_k", "sweeps_x", "turning", "solves"],
     "ensemble.csv": ["cell", "members", "relaxed", "unfinished", "singular", "nonfinite", "stalled", "t_relax_known",
                      "rate_known", "discretisation_known", "t_limit_known"],
+    "members.csv": ["member", "cell", "convex"],
+    "explained.csv": ["cell", "members", "censored"],
     "levels.csv": ["member", "level", "cell", "points", "solves"],
     "rates.csv": ["member", "cell"],
     "mean_excess.csv": ["cell", "members"],
     "series.csv": ["member"],
     "snapshots.csv": ["member", "i"],
 }
-TEXT = {"summary.csv": ["status"], "levels.csv": ["status"]}
+TEXT = {"summary.csv": ["status"], "levels.csv": ["status"], "explained.csv": ["time", "feature"]}
 
 
 def same(found, expected):

@@ -51,8 +51,17 @@ const INSTEAD: [[&str; 2]; 2] = [["tau", "adaptive"], ["relax-to", "relax-at"]];
 /// Keys for sweeps of the solver, which a direct solver refuses.
 const OF_SWEEPS: [&str; 3] = ["order", "tolerance", "sor"];
 /// Tables with a row per member or cell.
-const TABLES: [&str; 7] =
-    ["summary.csv", "levels.csv", "series.csv", "snapshots.csv", "ensemble.csv", "rates.csv", "mean_excess.csv"];
+const TABLES: [&str; 9] = [
+    "summary.csv",
+    "members.csv",
+    "levels.csv",
+    "series.csv",
+    "snapshots.csv",
+    "ensemble.csv",
+    "explained.csv",
+    "rates.csv",
+    "mean_excess.csv",
+];
 /// Draws of a study with incompatible values.
 const TRIES: usize = 20;
 /// An ellipse with a dent, as a file.
@@ -283,7 +292,8 @@ impl Trial {
             };
             let is_value =
                 |name: &str| !["member", "cell"].contains(&name) && self.drawn.axes.iter().all(|(key, _)| *key != name);
-            let values = header.iter().zip(&record).filter(|(name, _)| is_value(name));
+            // A cell has no values in columns that only others have.
+            let values = header.iter().zip(&record).filter(|(name, value)| is_value(name) && !value.is_empty());
             let place = member.map(|member| format!("member {}", member.wrapping_sub(first)));
             of_cell.then(|| place.into_iter().chain(values.map(|(name, v)| format!("{name} {v}"))).collect())
         };

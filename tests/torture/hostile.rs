@@ -65,10 +65,17 @@ pub fn in_the_place_of_files(csv: &Study, zarr: &Study) -> Outcome {
         cases.extend(marks.map(|mark| (state, mark.to_string(), resume)));
     }
     cases.extend(["zarr.json", "x/zarr.json", "member/c.0"].map(|name| ("zarr", format!("{store}/{name}"), resume)));
-    for name in ["run.json", "summary.csv", "mean_excess.csv", "plots/portraits.json"] {
+    for name in ["run.json", "summary.csv", "members.csv", "mean_excess.csv", "plots/portraits.json"] {
         cases.push(("done", name.into(), "plot place --quiet"));
     }
-    for name in ["shard.state", "summary.csv", "rates.csv", "snapshots.zarr/x/c.0.0.0", "snapshots.zarr/status/c.0"] {
+    for name in [
+        "shard.state",
+        "summary.csv",
+        "members.csv",
+        "rates.csv",
+        "snapshots.zarr/x/c.0.0.0",
+        "snapshots.zarr/status/c.0",
+    ] {
         cases.push(("shard", name.into(), "merge place --quiet --out merged"));
     }
     cases.push(("done", "run.json".into(), "resume place --quiet"));

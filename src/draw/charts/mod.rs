@@ -10,6 +10,7 @@ pub mod dependence;
 pub mod mesh;
 pub mod rates;
 pub mod relaxation;
+pub mod scatter;
 pub mod survival;
 pub mod work;
 
@@ -19,6 +20,7 @@ pub use dependence::{Dependence, DependencePoint, PowerLawLine, Series, Setting}
 pub use mesh::MeshQuality;
 pub use rates::FittedRates;
 pub use relaxation::RelaxationTimes;
+pub use scatter::{Scatter, ScatterPanel, ScatterPoint};
 pub use survival::{Survival, SurvivalCurve};
 pub use work::{WorkCurve, WorkDiagram, WorkPanels};
 

@@ -99,6 +99,9 @@ fn where_there_is_nothing_to_draw_the_picture_says_why() {
         ("dependence-none", "There are no cells to compare."),
         ("dependence-unreached", "In no cell did enough members relax for a median."),
         ("dependence-names", "The first 40 of 60 settings are drawn."),
+        ("scatter", "ended without t_relax, at its last time"),
+        ("scatter-none", "Nothing is claimed."),
+        ("scatter-unknown", "2 dots out of range."),
         ("mesh", "members with metric_drift above 0.1."),
         ("mesh-none", "No member has a mesh_ratio."),
         ("mesh-zero", "1 member with metric_drift 0 left out."),
@@ -134,6 +137,21 @@ fn medians_are_where_the_ticks_say() {
     for (end, at) in law.iter().zip([0.01, 0.01 * 1.6_f64.powi(7)]) {
         assert!(near(x(end[0]), at) && near(y(end[1]), 0.12 * at.powf(-0.312)), "{law:?}");
     }
+}
+
+#[test]
+fn members_are_where_the_ticks_say_and_tell_their_numbers() {
+    let svg = picture("scatter-one");
+    let (x, y) = (scale(svg, "x", false), scale(svg, "y", false));
+    let dot = svg.lines().find(|line| line.contains("<title>member 0: ")).unwrap();
+    let (told, at) = (dot.split(['>', '<']).nth(4).unwrap(), commands(attribute(dot, "d")));
+    let numbers: Vec<f64> =
+        told["member 0: ".len()..].replace('−', "-").split(", ").map(|number| number.parse().unwrap()).collect();
+    let (_, place) = &at[0];
+    assert!((x(place[0]) - numbers[0]).abs() < 1e-3 && near(y(place[1]), numbers[1]), "{dot}: {at:?}");
+    let all = picture("scatter");
+    assert_eq!(all.matches("<title>member ").count(), 4 * 256);
+    assert_eq!(all.matches(", ended ").count(), 4 * 15);
 }
 
 #[test]

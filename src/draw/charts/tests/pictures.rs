@@ -280,6 +280,32 @@ pub fn draw_all() -> Vec<(String, String)> {
     add("mesh-equal", mesh(&[1.0; 100], &[1e-3; 100]));
     add("mesh-unknown", mesh(&unknown, &unknown));
 
+    let scatter = |count: usize, cells: usize, panels: usize| {
+        let point = |i: usize, panel: usize| {
+            let x = 0.05 * normal(i);
+            let t = 0.8 + x + 0.03 * panel as f64 * (spread(i, 3) - 0.5);
+            ScatterPoint { cell: i % cells, member: i as u64, x, t, happened: i % 17 != 3 }
+        };
+        let panel = |panel: usize| ScatterPanel {
+            feature: ["cos_2", "descriptor_2", "excess_start", "k_min_start"][panel].into(),
+            heading: "R² 0.923, Spearman −0.930".into(),
+            points: (0..count).map(|i| point(i, panel)).collect(),
+        };
+        let cells = (0..cells).map(|i| (format!("amplitude = 0.{i}"), Some(0.1 * i as f64))).collect();
+        let (title, notes) = ("What explains the relaxation time", vec![NOTE.into()]);
+        let (key, panels, reason) = ("amplitude", (0..panels).map(panel).collect(), "Nothing is claimed.");
+        Scatter { title, notes, quantity: "t_relax", key, cells, panels, reason }
+    };
+    add("scatter", scatter(256, 1, 4).draw());
+    add("scatter-cells-3", scatter(250, 3, 4).draw());
+    add("scatter-cells-12", scatter(250, 12, 3).draw());
+    add("scatter-one", scatter(1, 1, 1).draw());
+    add("scatter-none", scatter(0, 1, 0).draw());
+    let mut unknown_dots = scatter(30, 1, 2);
+    unknown_dots.panels[1].points[4].x = f64::INFINITY;
+    unknown_dots.panels[0].points[5].t = f64::NAN;
+    add("scatter-unknown", unknown_dots.draw());
+
     let work = |rows: Vec<WorkPanels>| {
         let title = "What an error of the relaxation time costs";
         WorkDiagram { title, note: NOTE, costs: [("solves per member", ""), ("time per member", "ms")], rows }.draw()
