@@ -185,6 +185,12 @@ fn every_number_in_the_files_is_the_one_that_was_computed() {
     }
     assert!(members.iter().any(|ended| ended.outcome.t_relax.is_some()));
 
+    let features = spec.cell_features();
+    let names: Vec<&str> = features.iter().map(|feature| &*feature.name).collect();
+    for (row, ended) in done.rows("members.csv").iter().zip(&members) {
+        assert_eq!(read(row, &names), bits(&ended.features.0));
+    }
+
     let series = done.rows("series.csv");
     let computed: Vec<_> = members.iter().flat_map(|ended| &ended.rows.series).collect();
     assert_eq!(series.len(), computed.len());

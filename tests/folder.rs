@@ -23,20 +23,20 @@ fn limited(home: &Path, limit: &str, arguments: &str) -> Output {
     Command::new("sh").args(["-c", &script]).arg(program).current_dir(home).output().unwrap()
 }
 
-/// 400 members exceed the buffer of the table, so that a write fails during the run; 50 do not, and it fails at the
-/// end.
+/// 400 members exceed the buffer of a table, first of that with the longest rows, so that a write fails during the run; 50
+/// do not, and it fails at the end.
 #[test]
 fn a_run_on_a_full_disk_goes_on_when_there_is_room() {
-    for curves in [400, 50] {
+    for (curves, first) in [(400, "members.csv"), (50, "summary.csv")] {
         let home = TempDir::new().unwrap();
         let output = curvelax(home.path(), "4", &format!("--curves {curves} --out out"));
         let message = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(message.contains(NOTE), "{message}");
-        assert!(message.contains("error: cannot write out/summary.csv: "), "{message}");
+        assert!(message.contains(&format!("error: cannot write out/{first}: ")), "{message}");
         let quiet = curvelax(home.path(), "4", &format!("--curves {curves} --out quiet --quiet"));
         let message = String::from_utf8(quiet.stderr).unwrap();
-        assert!(message.starts_with("error: cannot write quiet/summary.csv: "), "{message}");
+        assert!(message.starts_with(&format!("error: cannot write quiet/{first}: ")), "{message}");
         assert_eq!(message.lines().count(), 1, "{message}");
         let resumed = limited(home.path(), "unlimited", "resume out --quiet");
         assert_eq!(resumed.status.code(), Some(0), "{}", String::from_utf8_lossy(&resumed.stderr));

@@ -414,16 +414,19 @@ mod tests {
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
         let overview = report(&out, &all, Some(portrait)).finish(&all, &[], Form::Overview).unwrap();
-        let always = ["ensemble.csv", "levels.csv", "mean_excess.csv", "plots", "rates.csv", "report.html", "run.json"];
+        let tables = ["ensemble.csv", "explained.csv", "levels.csv", "mean_excess.csv", "members.csv"];
+        let always = [&tables[..], &["plots", "rates.csv", "report.html", "run.json"]].concat();
         assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());
-        let plots = ["excess.svg", "mesh.svg", "portraits.json", "rate.svg", "relaxation.svg", "survival.svg"];
+        let charts = ["excess.svg", "features.svg", "mesh.svg", "portraits.json", "rate.svg", "relaxation.svg"];
+        let plots = [&charts[..], &["survival.svg"]].concat();
         assert_eq!(files(&out.join("plots")), [&["curves.svg"], &plots[..]].concat());
-        for (name, rows) in [(names::SUMMARY, 1), (names::SERIES, 1), (names::SNAPSHOTS, POINTS)] {
+        for (name, rows) in [(names::SUMMARY, 1), (names::MEMBERS, 1), (names::SERIES, 1), (names::SNAPSHOTS, POINTS)] {
             assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 1 + rows, "{name}");
         }
         assert!(
             overview.contains(
-                "ensemble.csv, rates.csv, levels.csv, mean_excess.csv, series.csv, snapshots.csv, report.html, plots/*.svg"
+                "summary.csv, members.csv, ensemble.csv, explained.csv, rates.csv, levels.csv, mean_excess.csv, series.csv, \
+                 snapshots.csv, report.html, plots/*.svg"
             ),
             "{overview}"
         );
@@ -531,7 +534,8 @@ mod tests {
         assert!(!begun(&out, &Spec::default(), &Stop::default()).give_up());
         assert_eq!(files(home.path()), [""; 0]);
         assert!(report(&out, &Spec::default(), None).give_up());
-        assert_eq!(files(&out), [".curvelax.state", ".levels.csv.part", ".rates.csv.part", ".summary.csv.part"]);
+        let parts = ["levels", "members", "rates", "summary"].map(|name| format!(".{name}.csv.part"));
+        assert_eq!(files(&out), [&[".curvelax.state".to_owned()], &parts[..]].concat());
         // Nothing has ended, but the run was asked to stop, which is not a failure.
         let stop = Stop::default();
         let running = begun(&home.path().join("stopped"), &Spec::default(), &stop);
