@@ -279,9 +279,15 @@ impl FinishedRun<'_> {
         };
         let reason = match rows.is_empty() {
             true => "The members of a cell do not differ in any feature.".into(),
-            false => format!("Nothing is claimed: {}.", claims()),
+            false => format!("Nothing is said about a time {}.", claims()),
         };
-        let (notes, panels) = (vec![self.what(), some], pictured.iter().map(panel).collect());
+        let is_told = |row: &&ExplainedRow| row.time == TIMES[0] && row.feature == TOGETHER;
+        let told: Vec<bool> = rows.iter().filter(is_told).map(|row| row.r2.is_some()).collect();
+        let silent = match told.iter().filter(|told| !**told).count() {
+            0 => String::new(),
+            silent => format!("{silent} of {} cells have no R²: too few members relaxed.", told.len()),
+        };
+        let (notes, panels) = (vec![self.what(), some, silent], pictured.iter().map(panel).collect());
         let (key, cells, reason) = (&self.colour_key(), cells.collect(), &*reason);
         let svg = Scatter { title, notes, quantity: TIMES[0], key, cells, panels, reason }.draw();
         let caption = "The features of members.csv whose straight line explains most of t_relax.";
@@ -536,14 +542,16 @@ impl FinishedRun<'_> {
         let groups = rows.chunk_by(|a, b| (a.cell, &a.time) == (b.cell, &b.time));
         let best = groups.flat_map(|group| {
             let (regression, features) = group.split_last().into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
-            features.into_iter().flat_map(|rows| rows.iter().take(LISTED)).chain(regression)
+            let shown = |(place, row): &(usize, &ExplainedRow)| *place < LISTED || row.chosen.is_some();
+            let features = features.into_iter().flat_map(move |rows| rows.iter().enumerate().filter(shown));
+            features.map(|(_, row)| row).chain(regression)
         });
         let header = ["cell", "time", "feature", "members", "censored", "Spearman", "R²", "chosen"];
         (!rows.is_empty()).then(|| PageTable {
             caption: format!(
                 "What explains the times: the {LISTED} best features of each alone (R² of a straight line), and a linear \
-                 regression on the chosen ones (R² cross-validated), over the members that reached the time. \
-                 Otherwise empty: {}{}",
+                 regression on the chosen ones (R² cross-validated), over the members that reached the time; nothing \
+                 {}{}",
                 claims(),
                 self.left_out()
             ),
@@ -634,7 +642,7 @@ fn chart(name: &'static str, title: &str, caption: &str, svg: String) -> Chart {
 /// When nothing is said about a time.
 fn claims() -> String {
     let percent = 100.0 * MOST_CENSORED;
-    format!("there must be {LEAST_MEMBERS} members that reached the time, and at most {percent} % that did not")
+    format!("if fewer than {LEAST_MEMBERS} members reached it, or more than {percent} % did not")
 }
 
 /// How much a feature explains, in one cell or in several.

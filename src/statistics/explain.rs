@@ -121,7 +121,7 @@ impl Regression {
         let mut best = (1, finite(cross_validated(1)).filter(|_| !own.is_empty())?);
         for count in 2..=own.len() {
             let r2 = cross_validated(count);
-            if !(r2 >= best.1 + GAIN) {
+            if r2.is_nan() || r2 < best.1 + GAIN {
                 break;
             }
             best = (count, r2);
