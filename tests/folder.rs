@@ -23,8 +23,8 @@ fn limited(home: &Path, limit: &str, arguments: &str) -> Output {
     Command::new("sh").args(["-c", &script]).arg(program).current_dir(home).output().unwrap()
 }
 
-/// 400 members exceed the buffer of a table, first of that with the longest rows, so that a write fails during the run; 50
-/// do not, and it fails at the end.
+/// 400 members exceed the buffer of a table, first of that with the longest rows, so that a write fails during the run;
+/// 50 do not, and it fails at the end.
 #[test]
 fn a_run_on_a_full_disk_goes_on_when_there_is_room() {
     for (curves, first) in [(400, "members.csv"), (50, "summary.csv")] {

@@ -17,9 +17,9 @@
 //! ```
 //!
 //! A translation changes only Z_0; a rotation and another first node turn the others; a scale multiplies them. The
-//! ratios |Z_m|/|Z_1| are therefore invariant (C. T. Zahn and R. Z. Roskies, *IEEE Trans. Comput.* C-21, 1972, 269, use the
-//! same invariances for the tangent angle). A curve with k-fold symmetry has only Z_{1+jk}, and a ripple of mode k on a
-//! circle shows in the two nearest of them. Descriptor k joins these:
+//! ratios |Z_m|/|Z_1| are therefore invariant (C. T. Zahn and R. Z. Roskies, *IEEE Trans. Comput.* C-21, 1972, 269, use
+//! the same invariances for the tangent angle). A curve with k-fold symmetry has only Z_{1+jk}, and a ripple of mode k
+//! on a circle shows in the two nearest of them. Descriptor k joins these:
 //!
 //! ```text
 //! d_k = √(|Z_{1+k}|² + |Z_{1-k}|²) / |Z_1|.

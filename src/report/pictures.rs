@@ -549,8 +549,8 @@ impl FinishedRun<'_> {
         let header = ["cell", "time", "feature", "members", "censored", "Spearman", "R²", "chosen"];
         (!rows.is_empty()).then(|| PageTable {
             caption: format!(
-                "What explains the times: the {LISTED} best features of each alone (R² of a straight line), and a linear \
-                 regression on the chosen ones (R² cross-validated), over the members that reached the time; nothing \
+                "What explains the times: the {LISTED} best features of each alone (R² of a straight line), and a \
+                 linear regression on the chosen ones (R² cross-validated), over the members that reached the time; nothing \
                  {}{}",
                 claims(),
                 self.left_out()

@@ -1,8 +1,8 @@
 //! What explains the times: how the relaxation times of the members of a cell depend on their features.
 //!
 //! Numbers enter as they are, without logarithms. A rank correlation near ±1 with a smaller R² therefore means a
-//! dependence that is monotone but not straight. A feature that is constant among the members, or unknown for one of them,
-//! is left out.
+//! dependence that is monotone but not straight. A feature that is constant among the members, or unknown for one of
+//! them, is left out.
 //!
 //! The first [`CONSIDERED`] members of a cell enter. One that ended before a time has none and cannot: the numbers hold
 //! for the members that reached the time, and the others, mostly the slow ones, are counted beside them. If these are

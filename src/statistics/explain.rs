@@ -7,9 +7,9 @@
 //! ±1 for every monotone dependence, the second is 1 only for a straight one.
 //!
 //! Together: a linear regression on a few features, which are selected forward: the next one is that which leaves the
-//! smallest sum of squared residuals. R² grows with every feature, even a meaningless one, so it is cross-validated (M. Stone,
-//! *J. R. Stat. Soc. B* 36, 1974, 111): the members are dealt into [`FOLDS`] parts, each part is predicted by a regression,
-//! *with its own selection*, on the others, and
+//! smallest sum of squared residuals. R² grows with every feature, even a meaningless one, so it is cross-validated (M.
+//! Stone, *J. R. Stat. Soc. B* 36, 1974, 111): the members are dealt into [`FOLDS`] parts, each part is predicted by a
+//! regression, *with its own selection*, on the others, and
 //!
 //! ```text
 //! R² = 1 - Σ (y - predicted)² / Σ (y - mean)².
@@ -19,8 +19,9 @@
 //!
 //! # Practice
 //!
-//! Everything is computed from the sums of products of each part, of columns of mean 0 and variance 1, so that one pass over
-//! the members serves all features. A feature that the ones before determine up to [`DEPENDENT`] is never selected.
+//! Everything is computed from the sums of products of each part, of columns of mean 0 and variance 1, so that one pass
+//! over the members serves all features. A feature that the ones before determine up to [`DEPENDENT`] is never
+//! selected.
 
 use super::{
     finite,
@@ -53,8 +54,8 @@ pub fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// The correlation of pairs of finite numbers, from -1 to 1; `None` if one side is constant, or beyond the range of f64.
-/// Its square is the R² of a straight line.
+/// The correlation of pairs of finite numbers, from -1 to 1; `None` if one side is constant, or beyond the range of
+/// f64. Its square is the R² of a straight line.
 pub fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     let [x, y] = [standardised(x)?, standardised(y)?];
     let sum: Sum = x.iter().zip(&y).map(|(x, y)| x * y).collect();
@@ -130,7 +131,8 @@ impl Regression {
     }
 }
 
-/// The part of a member: neighbours, and members of any arithmetic progression, are spread over all (Fibonacci hashing).
+/// The part of a member: neighbours, and members of any arithmetic progression, are spread over all (Fibonacci
+/// hashing).
 fn part_of(key: u64) -> usize {
     (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32) as usize % FOLDS
 }

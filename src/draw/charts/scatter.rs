@@ -31,7 +31,8 @@ pub struct Scatter<'a> {
     pub notes: Vec<String>,
     /// The time.
     pub quantity: &'a str,
-    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are many.
+    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
+    /// many.
     pub key: &'a str,
     /// The cells, each with its entry in the legend and its value, if it has one.
     pub cells: Vec<(String, Option<f64>)>,
