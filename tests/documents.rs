@@ -135,7 +135,7 @@ fn columns() -> String {
     let cells = EnsembleStatistics::new(&spec, &mut Tally::default()).unwrap().columns(&spec);
     let of_cells = cells.into_iter().map(|column| [column.name, column.holds.to_owned(), column.meaning]);
     let drawn = Spec::from_toml("shape = 'ellipse:uniform(1.5..2.5),1'\nmodes = '2..=3'").unwrap();
-    let indices = members::INDICES.map(|(name, meaning)| [name, "integer", meaning].map(str::to_owned));
+    let indices = members::OWN.map(|(name, holds, meaning)| [name, holds, meaning].map(str::to_owned));
     let of_feature = |Feature { name, meaning, is_flag }: Feature| {
         [name, if is_flag { "integer" } else { "float" }.to_owned(), meaning]
     };

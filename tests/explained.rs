@@ -17,17 +17,17 @@ const QUICK: &str = "--curves 60 --points 40 --modes 2..=4 --adaptive=1e-3 --sto
 fn the_features_are_those_of_the_spec() {
     let header = |flags: &str| run(flags).text("members.csv").lines().next().unwrap().to_owned();
     let short = "--curves 1 --points 40 --t-end 0.001";
-    assert_eq!(header(&format!("{short} --modes 2..=3")), format!("member,cell,cos_2,sin_2,cos_3,sin_3,{SHAPE}"));
+    assert_eq!(header(&format!("{short} --modes 2..=3")), format!("member,cell,label,cos_2,sin_2,cos_3,sin_3,{SHAPE}"));
     assert_eq!(header(&format!("{short} --amplitude 0")), format!("member,cell,{SHAPE}"));
     let drawn = "--shape ellipse:uniform(1.2..3),1 --amplitude uniform(0.01..0.02) --modes 4..=4";
-    assert_eq!(header(&format!("{short} {drawn}")), format!("member,cell,shape_1,amplitude,cos_4,sin_4,{SHAPE}"));
+    assert_eq!(header(&format!("{short} {drawn}")), format!("member,cell,label,shape_1,amplitude,cos_4,sin_4,{SHAPE}"));
 }
 
 #[test]
 fn cells_share_the_columns_and_leave_empty_what_they_have_not() {
     let done = run("--curves 2 --points 40 --t-end 0.001 --sweep amplitude=0,0.1 --sweep modes=2..=2,3..=3");
     let header = done.text("members.csv").lines().next().unwrap().to_owned();
-    assert_eq!(header, format!("member,cell,cos_2,sin_2,cos_3,sin_3,{SHAPE}"));
+    assert_eq!(header, format!("member,cell,label,cos_2,sin_2,cos_3,sin_3,{SHAPE}"));
     for row in done.rows("members.csv") {
         let has = |name: &str| !row[name].is_empty();
         let cell = row["cell"].as_str();
@@ -171,7 +171,7 @@ fn many_modes_have_the_columns_of_the_lowest_and_the_page_says_so() {
     let done = run("--curves 25 --points 200 --modes 5..=40 --amplitude 0.02 --adaptive=1e-2 --stop-when-relaxed");
     let header = done.text("members.csv").lines().next().unwrap().to_owned();
     assert!(
-        header.starts_with("member,cell,cos_5,sin_5,") && header.contains(",cos_36,sin_36,excess_start"),
+        header.starts_with("member,cell,label,cos_5,sin_5,") && header.contains(",cos_36,sin_36,excess_start"),
         "{header}"
     );
     assert!(done.text("report.html").contains("The 4 highest modes of the perturbation are not among the features"));

@@ -198,8 +198,8 @@ fn a_summary_that_is_not_whole_is_refused_with_its_place() {
         |out| replace(&summary(out), "member,cell,status", "member,cell,state"),
         "out/summary.csv, line 1, column status: expected the heading `status`, found `state`",
     );
-    refused(&done, |out| replace(&summary(out), ",self_crossing", ""), "line 1: expected 30 fields, found 29");
-    refused(&done, |out| replace(&summary(out), "\n2,0,", "\n2,0,0,"), "line 4: expected 30 fields, found 31");
+    refused(&done, |out| replace(&summary(out), ",self_crossing", ""), "line 1: expected 32 fields, found 31");
+    refused(&done, |out| replace(&summary(out), "\n2,0,", "\n2,0,0,"), "line 4: expected 32 fields, found 33");
     refused(
         &done,
         |out| field(&summary(out), 3, 13, "long"),
@@ -259,12 +259,12 @@ fn features_that_are_not_those_of_the_run_are_refused() {
     let last = done.text("members.csv").lines().last().unwrap().len() + 1;
     refused(&done, |out| shortened(&table(out), last), "out/members.csv: expected a row of member 5, found the end");
     refused(&done, |out| shortened(&table(out), 5), "out/members.csv, line 7: expected an end of line");
-    refused(&done, |out| field(&table(out), 3, 2, "x"), "out/members.csv, line 4, column cos_2: expected a number");
+    refused(&done, |out| field(&table(out), 3, 3, "x"), "out/members.csv, line 4, column cos_2: expected a number");
     refused(&done, |out| field(&table(out), 3, 0, "3"), "column member: expected 2, as in summary.csv, found `3`");
     refused(&done, |out| field(&table(out), 3, 1, "1"), "column cell: expected 0, as in summary.csv, found `1`");
     refused(
         &done,
-        |out| field(&table(out), 0, 2, "cos_3"),
+        |out| field(&table(out), 0, 3, "cos_3"),
         "column cos_2: expected the heading `cos_2`, found `cos_3`",
     );
     refused(&done, |out| fs::remove_file(table(out)).unwrap(), "cannot read out/members.csv: ");

@@ -351,8 +351,8 @@ impl SpecFlags {
         if self.accurate {
             self.recommend(spec);
         }
-        spec.left_out.curves &= self.curves.is_none();
-        spec.left_out.amplitude &= self.amplitude.is_none();
+        spec.omitted.curves &= self.curves.is_none();
+        spec.omitted.amplitude &= self.amplitude.is_none();
         macro_rules! replace {
             ($($key:ident)*; $($optional:ident)*) => {{
                 let SpecFlags { sweep: _, accurate: _, $($key,)* $($optional,)* } = self;

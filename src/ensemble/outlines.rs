@@ -82,9 +82,9 @@ impl Outlines {
             self.0.iter().try_for_each(|(_, all)| check_property(property, all))?;
         }
         spec.outlines = Some(found);
-        if spec.left_out.curves {
+        if spec.omitted.curves {
             spec.curves = 1;
-            if spec.left_out.amplitude && !spec.sweep.has("amplitude") {
+            if spec.omitted.amplitude && !spec.sweep.has("amplitude") {
                 spec.amplitude = 0.0.into();
             }
         }

@@ -291,12 +291,12 @@ pub struct Spec {
     pub sweep: Sweep,
     /// Keys that the request leaves out. Not a key.
     #[serde(skip)]
-    pub left_out: LeftOut,
+    pub omitted: OmittedKeys,
 }
 
 /// Keys that a request leaves out, of those whose default is another one for outlines: one copy of each, not perturbed.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct LeftOut {
+pub struct OmittedKeys {
     /// There is no `curves`.
     pub curves: bool,
     /// There is no `amplitude`.
@@ -311,8 +311,8 @@ struct Given {
 }
 
 /// Equal specs have equal values, wherever these come from.
-impl PartialEq for LeftOut {
-    fn eq(&self, _: &LeftOut) -> bool {
+impl PartialEq for OmittedKeys {
+    fn eq(&self, _: &OmittedKeys) -> bool {
         true
     }
 }
@@ -376,7 +376,7 @@ impl Default for Spec {
             threads: None,
             common_random_numbers: false,
             sweep: Sweep::default(),
-            left_out: LeftOut::default(),
+            omitted: OmittedKeys::default(),
         }
     }
 }
@@ -406,12 +406,12 @@ impl Spec {
     pub fn from_toml(text: &str) -> Result<Spec, String> {
         // First, so that a large spec is in memory once. What is wrong is said below.
         let given = toml::from_str::<Given>(text).ok();
-        let left_out = given.map_or(LeftOut::default(), |given| LeftOut {
+        let omitted = given.map_or(OmittedKeys::default(), |given| OmittedKeys {
             curves: given.curves.is_none(),
             amplitude: given.amplitude.is_none(),
         });
         let spec: Spec = toml::from_str(text).map_err(|e| format!("{}{}", told(&e), suggestion(e.message())))?;
-        Ok(Spec { left_out, ..spec })
+        Ok(Spec { omitted, ..spec })
     }
 
     /// Returns the spec as TOML that [`Spec::from_toml`] reads back to the same spec.

@@ -15,8 +15,11 @@ use crate::{
 };
 
 /// The first columns, with their meanings.
-pub const INDICES: [(&str, &str); 2] =
-    [("member", "index of the member, from 0"), ("cell", "index of its cell, from 0")];
+pub const OWN: [(&str, &str, &str); 3] = [
+    ("member", "integer", "index of the member, from 0"),
+    ("cell", "integer", "index of its cell, from 0"),
+    ("label", "word", "name of its outline; empty if it has none"),
+];
 
 /// The table, which grows row by row.
 pub struct MemberTable {
@@ -39,7 +42,7 @@ impl MemberTable {
 
     /// Writes the row of a member.
     pub fn row(&mut self, outcome: &Outcome, Features(numbers): &Features) -> Result<()> {
-        let Outcome { member, cell, .. } = *outcome;
+        let Outcome { member, cell, ref label, .. } = *outcome;
         let places = self.places(cell)?;
         let mut row = vec![f64::NAN; self.features.len()];
         for (place, number) in places.iter().zip(numbers) {
@@ -50,8 +53,8 @@ impl MemberTable {
             true => Field::Whole(u64::from(value > 0.0)),
             false => Field::Float(known(value)),
         };
-        let indices = [member, cell].map(Field::Whole);
-        self.table.write(indices.into_iter().chain(self.features.iter().zip(row).map(field)))
+        let own = [Field::Whole(member), Field::Whole(cell), Field::Word(label)];
+        self.table.write(own.into_iter().chain(self.features.iter().zip(row).map(field)))
     }
 
     /// The column of each feature of a cell.
@@ -84,7 +87,7 @@ impl MemberTable {
 
 /// The headings.
 fn header(features: &[Feature]) -> impl Iterator<Item = &str> {
-    INDICES.into_iter().map(|(name, _)| name).chain(features.iter().map(|feature| &*feature.name))
+    OWN.into_iter().map(|(name, ..)| name).chain(features.iter().map(|feature| &*feature.name))
 }
 
 /// The table of a run, read row by row.
@@ -116,6 +119,7 @@ impl MemberReader {
     pub fn read(&mut self) -> Result<Option<(u64, u64, Fields<'_>)>> {
         let Some(mut fields) = self.lines.fields()? else { return Ok(None) };
         let (member, cell) = (fields.whole()?, fields.whole()?);
+        fields.word();
         Ok(Some((member, cell, fields)))
     }
 }

@@ -213,7 +213,8 @@ mod tests {
             let stretch = f64::to_radians(latitude).cos();
             let corner = |(i, r): (usize, &f64)| {
                 let away = 0.02 * r * DVec2::from_angle(i as f64 * 2.0 * PI / radii.len() as f64);
-                (longitude + away.x / stretch, latitude + away.y)
+                let east: f64 = longitude + away.x / stretch + 540.0;
+                (east.rem_euclid(360.0) - 180.0, latitude + away.y)
             };
             let places: Vec<_> = radii.iter().enumerate().map(corner).collect();
             let corners: Vec<DVec3> = places.iter().map(|place| direction(authalic(DVec2::from(*place)))).collect();
