@@ -109,7 +109,7 @@ fn a_study_compares_its_cells() {
 #[test]
 fn the_mean_excess_is_drawn_with_its_slope() {
     let svg = run(RUN).text("plots/excess.svg");
-    assert!(svg.contains("exp(−24 t/R⁴)") && svg.contains("one standard deviation of the members"), "{svg}");
+    assert!(svg.contains("exp(−24 t/R⁴)") && svg.contains("5 to 95 % of the members"), "{svg}");
     let svg = run("--curves 7 --points 40 --adaptive=1e-3 --t-end 6 --flow willmore").text("plots/excess.svg");
     assert!(svg.contains("(1 + 2t/R⁴)^−8<"), "{svg}");
     let study = run(&format!("{RUN} --sweep amplitude=0.02,0.1"));

@@ -131,6 +131,9 @@ columns! { MeanExcess:
     members: whole = members, "members of the cell that reached t";
     mean: optional = mean, "their mean excess";
     sd: optional = sd, "its standard deviation";
+    q05: optional = q05, "its 5 % quantile, to 1 %";
+    median: optional = median, "its median, to 1 %";
+    q95: optional = q95, "its 95 % quantile, to 1 %";
 }
 
 columns! { ExplainedRow:
@@ -416,10 +419,14 @@ mod tests {
             table.ready()
         });
         assert_eq!(text, "member,cell,rate,rate_r2,rate_theory,rate_ratio\n3,0,6.0,0.5,,\n3,0,6.0,0.5,6.0,1.0\n");
-        let two = MeanExcess { cell: 0, t: 0.0, members: 2, mean: Some(0.375), sd: Some(0.1767766952966369) };
-        let one = MeanExcess { t: 0.5, members: 1, mean: Some(0.5), sd: None, ..two };
+        let quantiles = MeanExcess { q05: Some(0.25), median: Some(0.375), q95: Some(0.5), ..MeanExcess::default() };
+        let two = MeanExcess { members: 2, mean: Some(0.375), sd: Some(0.1767766952966369), ..quantiles };
+        let one = MeanExcess { t: 0.5, members: 1, mean: Some(0.5), sd: None, q05: None, ..two };
         let text = written("mean_excess.csv", |file| Table::of(file, &[two, one]));
-        assert_eq!(text, "cell,t,members,mean,sd\n0,0.0,2,0.375,0.1767766952966369\n0,0.5,1,0.5,\n");
+        assert_eq!(
+            text,
+            "cell,t,members,mean,sd,q05,median,q95\n0,0.0,2,0.375,0.1767766952966369,0.25,0.375,0.5\n0,0.5,1,0.5,,,0.375,0.5\n"
+        );
     }
 
     #[test]

@@ -156,15 +156,15 @@ impl FinishedRun<'_> {
             // Rows are sorted by cell.
             let first = self.excess.partition_point(|row| row.cell < rank as u64);
             let rows = self.excess[first..].iter().take_while(|row| row.cell == rank as u64 && row.members == all);
-            let rows: Vec<(f64, f64, f64)> =
-                rows.map_while(|row| Some((row.t, row.mean?, row.sd.unwrap_or(0.0)))).collect();
-            let bound = |sign: f64| rows.iter().map(|(_, mean, deviation)| mean + sign * deviation).collect();
+            let rows = rows.map_while(|row| Some((row.t, row.mean?, [row.q05?, row.q95?])));
+            let rows: Vec<(f64, f64, [f64; 2])> = rows.collect();
+            let bound = |i: usize| rows.iter().map(|(.., bounds)| bounds[i]).collect();
             DecayCurve {
                 label: self.label(rank as u64),
                 value: numbers.as_ref().map(|numbers| numbers[rank]),
                 t: rows.iter().map(|(t, ..)| *t).collect(),
                 mean: rows.iter().map(|(_, mean, _)| *mean).collect(),
-                band: Some((bound(-1.0), bound(1.0))),
+                band: Some((bound(0), bound(1))),
             }
         };
         let curves: Vec<DecayCurve> = self.tally.cells.iter().enumerate().map(curve).collect();
@@ -179,7 +179,7 @@ impl FinishedRun<'_> {
         let theory = theory.into_iter().collect();
         let (title, key) = ("Mean excess", self.colour_key());
         let note = format!("{}; over all members, as long as all of them run", self.what());
-        let band = "one standard deviation of the members";
+        let band = "5 to 95 % of the members";
         let svg = Decay { title, note: &note, band, key: &key, curves, theory, time: None }.draw();
         let caption =
             "How the excess, L²/(4πA) above that of a regular polygon, falls, and the slope that linear theory gives.";

@@ -9,7 +9,7 @@ use crate::{
     ensemble::{LevelTimes, Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
     error::Result,
     schedule::grid,
-    statistics::{Limit, Moments, Observation, Observations},
+    statistics::{Limit, Observation, Observations, Spread},
 };
 
 /// Counts and sums over the members that ended.
@@ -79,7 +79,7 @@ pub struct CellTally {
     /// Rates of the members that have one.
     pub rates: Vec<Rate>,
     /// Excess at the times of [`grid`], over the members that reached them.
-    pub excess: Vec<Moments>,
+    pub excess: Vec<Spread>,
     /// Limits of the times, of the members that have one; censored like the times for the others.
     pub limits: Observations,
     /// What the levels tell of the members that ran at them.
@@ -114,7 +114,7 @@ pub struct Aside {
     drifted: (u64, f64),
     below_rounding: u64,
     /// By cell.
-    excess: Vec<Vec<Moments>>,
+    excess: Vec<Vec<Spread>>,
 }
 
 impl Aside {
@@ -126,7 +126,7 @@ impl Aside {
         self.below_rounding = self.below_rounding.saturating_add(*below_rounding);
         self.excess.resize_with(self.excess.len().max(excess.len()), Vec::new);
         for (own, other) in self.excess.iter_mut().zip(excess) {
-            own.resize_with(own.len().max(other.len()), Moments::default);
+            own.resize_with(own.len().max(other.len()), Spread::default);
             own.iter_mut().zip(other).for_each(|(own, other)| own.merge(other));
         }
     }
@@ -145,11 +145,19 @@ pub struct MeanExcess {
     pub mean: Option<f64>,
     /// Its standard deviation.
     pub sd: Option<f64>,
+    /// Its 5 % quantile, to 1 %, as the next ones.
+    pub q05: Option<f64>,
+    /// Its median.
+    pub median: Option<f64>,
+    /// Its 95 % quantile.
+    pub q95: Option<f64>,
 }
 
 impl MeanExcess {
-    fn new(cell: u64, t: f64, of: &Moments) -> MeanExcess {
-        MeanExcess { cell, t, members: of.count(), mean: of.mean(), sd: of.deviation() }
+    fn new(cell: u64, t: f64, of: &Spread) -> MeanExcess {
+        let (moments, [q05, median, q95]) = (of.moments(), [0.05, 0.5, 0.95].map(|share| of.quantile(share)));
+        let (members, mean, sd) = (moments.count(), moments.mean(), moments.deviation());
+        MeanExcess { cell, t, members, mean, sd, q05, median, q95 }
     }
 }
 
@@ -277,8 +285,8 @@ impl Tally {
     /// Adds the excess of a member of `cell`, at the times of [`grid`] that it reached.
     pub fn add_excess(&mut self, cell: u64, excess: &[f64]) {
         let Some(tally) = self.cells.get_mut(cell as usize) else { return };
-        tally.excess.resize_with(tally.excess.len().max(excess.len()), Moments::default);
-        tally.excess.iter_mut().zip(excess).for_each(|(moments, excess)| moments.add(*excess));
+        tally.excess.resize_with(tally.excess.len().max(excess.len()), Spread::default);
+        tally.excess.iter_mut().zip(excess).for_each(|(spread, excess)| spread.add(*excess));
     }
 
     /// Adds data that are not in a row of the summary.
@@ -313,7 +321,7 @@ impl Tally {
         let mut rows = Vec::new();
         for (cell, CellTally { excess, .. }) in (0..).zip(&self.cells) {
             let t_end = spec.of_cell(cell)?.final_time();
-            let row = |(t, of): (f64, &Moments)| MeanExcess::new(cell, t, of);
+            let row = |(t, of): (f64, &Spread)| MeanExcess::new(cell, t, of);
             rows.extend(grid(t_end).zip(excess).map(row));
         }
         Ok(rows)

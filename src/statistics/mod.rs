@@ -57,6 +57,7 @@ mod log_rank;
 mod paired;
 mod sample;
 mod special;
+mod spread;
 mod sum;
 mod survival;
 
@@ -69,6 +70,7 @@ pub use limit::{Limit, Times};
 pub use log_rank::{GroupEvents, LogRank, log_rank};
 pub use paired::{PairedDifferences, SignedRank};
 pub use sample::{Observation, Observations, Sample};
+pub use spread::Spread;
 pub use survival::{Caveat, KaplanMeier, Mean, Step};
 
 /// Standard errors in half a 95 % interval of a normal estimate.
