@@ -504,12 +504,13 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
     if !adaptive {
         command.arg("--stop-when-relaxed");
     }
+    command.args(["--event", "short = length <= 0.98 * start", "--event", "bent = k_max <= 0.8 * start"]);
     let output = command.args(["--precision", T::NAME, "--points", &n.to_string(), "--out", "out"]).output()?;
     if !output.status.success() {
         return Err(String::from_utf8(output.stderr)?.into());
     }
     let (mut words, mut numbers) = (Vec::new(), Vec::new());
-    for name in ["summary.csv", "series.csv", "snapshots.csv"] {
+    for name in ["summary.csv", "series.csv", "snapshots.csv", "events.csv"] {
         let mut reader = csv::Reader::from_path(folder.path().join("out").join(name))?;
         let header = reader.headers()?.clone();
         for record in reader.records() {

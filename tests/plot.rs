@@ -13,7 +13,8 @@ use assert_cmd::Command;
 use common::program::{Done, run};
 
 /// A run with everything that `plot` reads: two cells, a series, and members that stay unfinished.
-const RUN: &str = "--curves 3 --points 32 --adaptive=1e-3 --t-end 0.4 --series 0.1 --sweep omega=1,2";
+const RUN: &str = "--curves 3 --points 32 --adaptive=1e-3 --t-end 0.4 --series 0.1 --sweep omega=1,2 --event convex=k_min>=0 \
+                   --event half=excess<=0.5*start";
 
 #[track_caller]
 fn plot(home: &Path, arguments: &str) -> Output {
@@ -47,7 +48,7 @@ fn pictures_come_back_byte_for_byte() {
     for (arguments, count) in [
         ("--curves 7 --points 40 --adaptive=1e-3 --t-end 1", 8),
         ("--curves 1 --points 32 --t-end 0.01", 8),
-        (RUN, 9),
+        (RUN, 10),
         ("--curves 5 --points 32 --tau 1e-3 --t-end 0.3 --series 0.013", 8),
         ("--curves 9 --points 32 --adaptive=1e-3 --t-end 0.3 --series 0.1 --only 2,5,7 --snapshots 0,0.1", 8),
         ("--curves 4 --points 32 --adaptive --t-end 0.3 --sweep amplitude=0.01,0.2,0.3 --sweep seed=1,2 --only 2,9", 9),

@@ -135,7 +135,16 @@ fn compare(name: &str, spec: &Spec, precision: Precision, open: Open, patience: 
 
 /// Members with all kinds of ends, and output times, some of them inside steps.
 fn specs() -> Vec<(&'static str, Spec)> {
-    let outputs = |more: Spec| Spec { curves: 13, series: Some(0.013), snapshots: vec![0.0, 0.02], points: 33, ..more };
+    let events = ["slow = excess <= 0.5 * start", "bent = k_max <= 3", "never = length <= 0.1"];
+    let event = events.map(|text| text.parse().expect("an event")).to_vec();
+    let outputs = |more: Spec| Spec {
+        event: event.clone(),
+        curves: 13,
+        series: Some(0.013),
+        snapshots: vec![0.0, 0.02],
+        points: 33,
+        ..more
+    };
     let fixed = |solver: Solver| {
         outputs(Spec { tau: Some(1e-3.into()), t_end: Some(0.15.into()), solver: solver.into(), ..Spec::default() })
     };

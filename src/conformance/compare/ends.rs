@@ -2,9 +2,11 @@
 
 use super::{
     device::{Left, on_gpu},
+    levels,
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
-    setup::{Tamper, blocks, method, tampered},
+    setup::{Tamper, method, tampered},
+    twin::{growth, twin},
 };
 use crate::{
     backend::gpu::{self, kernel::Budget},
@@ -15,9 +17,7 @@ use crate::{
     error::{Error, Result},
     number::Real,
     scheme::{
-        Curve, dense,
-        evolve::{Team, evolve},
-        extrapolation::{self, LEAST_ORDER},
+        Curve, dense, extrapolation,
         member::{Counters, Decay, NEVER, Progress, Report},
         run::Run,
         step::Method,
@@ -70,8 +70,16 @@ fn ends_agree<T: Real>(
     budget: Budget,
     tamper: Option<Tamper>,
 ) -> Result<Vec<ConformanceRow>> {
-    let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
-    compare_ends::<T>(adapter.is_hardware(), &method(solver), n, &launches, &ours)
+    let (hardware, method) = (adapter.is_hardware(), method(solver));
+    let watched = levels::watched::<T>(&launches, &method, n)?;
+    // In one kernel, which is compiled once.
+    let paused = watched.iter().map(|watched| watched.launch.clone()).collect();
+    let both = [tampered(launches.clone(), tamper), tampered(paused, tamper)].concat();
+    let mut ours = on_gpu::<T>(adapter, solver, n, &both, budget)?;
+    let paused = ours.split_off(launches.len());
+    let mut rows = compare_ends::<T>(hardware, &method, n, &launches, &ours)?;
+    rows.push(levels::agree::<T>(hardware, &method, n, &watched, &paused)?);
+    Ok(rows)
 }
 
 /// Compares a device's results of `launches` with those of the twin by `method`, within the bounds for hardware or
@@ -118,33 +126,6 @@ pub(in crate::conformance) fn compare_ends<T: Real>(
         }
     }
     Ok(rows)
-}
-
-/// A member's run on the CPU.
-struct Twin {
-    left: Left,
-    /// Its longest step.
-    longest: f64,
-    /// The largest decrease of the excess in one step.
-    steepest: f64,
-    /// The highest order of a step.
-    order: u32,
-}
-
-/// Runs the twin of `launch` to its goal.
-fn twin<T: Real>(launch: &Run<f64>, method: &Method, n: usize) -> Result<Twin> {
-    let mut run: Run<T> = launch.convert();
-    let (mut longest, mut steepest, mut order) = (0.0_f64, 0.0_f64, LEAST_ORDER);
-    let mut work = Team::new(blocks(n)?);
-    while run.counters.is_running() {
-        let before = run.report.now.excess.to_f64();
-        order = order.max(run.counters.order);
-        evolve(&mut run, method, &mut work, 1);
-        steepest = steepest.max((run.report.now.excess.to_f64() - before).abs());
-        longest = longest.max(run.report.progress.taken.to_f64());
-    }
-    let left = Left { state: run.state.convert(), counters: run.counters, report: run.report.convert() };
-    Ok(Twin { left, longest, steepest, order })
 }
 
 /// Checks that both sides ended alike, after equally many steps and with their events in the same ones; else returns
@@ -267,9 +248,4 @@ fn reported(report: &Report<f64>) -> Vec<f64> {
     let mut numbers = report.now.to_numbers();
     numbers.extend([report.progress.turning, report.progress.travel]);
     numbers
-}
-
-/// The growth of roundings over steps: like a random walk, since the flow itself damps them.
-fn growth(steps: u32) -> f64 {
-    f64::from(steps).sqrt()
 }

@@ -2,10 +2,12 @@
 
 mod device;
 mod ends;
+mod levels;
 mod row;
 mod scales;
 mod setup;
 mod stages;
+mod twin;
 
 pub use super::cases::MEMBERS;
 pub use device::{Left, on_gpu, on_gpu_by};
