@@ -168,6 +168,32 @@ fn shortened(path: &Path, by: usize) {
 }
 
 #[test]
+fn events_that_are_not_those_of_the_run_are_refused_with_their_place() {
+    let done = run(RUN);
+    let events = |out: &Path| out.join("events.csv");
+    let last = done.text("events.csv").lines().last().unwrap().len() + 1;
+    let missing = "out/events.csv: expected the events of member 5, found the end of the file";
+    refused(&done, |out| shortened(&events(out), last), missing);
+    refused(&done, |out| fs::remove_file(events(out)).unwrap(), "cannot read out/events.csv: ");
+    for (column, value, expected) in [
+        (0, "1", "column member: expected member 0, as the other table has it, found `1`"),
+        (2, "concave", "column event: expected convex, found `concave`"),
+        (
+            3,
+            "0.41",
+            "column t: expected a time up to the end of the member, or that end if censored is 1, found `0.41`",
+        ),
+    ] {
+        refused(&done, |out| field(&events(out), 1, column, value), &format!("out/events.csv, line 2, {expected}"));
+    }
+    let more = |out: &Path| {
+        let text = fs::read_to_string(events(out)).unwrap();
+        fs::write(events(out), text + "6,1,convex,0.1,0\n").unwrap();
+    };
+    refused(&done, more, "out/events.csv, line 14, column member: expected the end of the file, found `6`");
+}
+
+#[test]
 fn a_summary_that_is_not_whole_is_refused_with_its_place() {
     let done = run(RUN);
     let summary = |out: &Path| out.join("summary.csv");

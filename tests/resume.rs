@@ -204,7 +204,8 @@ fn main() -> ExitCode {
             let open = |spec: &Spec| -> Result<Box<dyn Backend>> {
                 let blocks = Blocks::new(spec.points).expect("a ring");
                 let variant = gpu.capacity().variant(blocks, spec.solver());
-                let variant = Variant { adaptive: spec.adaptive.is_some(), ..variant };
+                let watched = !spec.event.is_empty();
+                let variant = Variant { adaptive: spec.adaptive.is_some(), watched, ..variant };
                 let kernel = Kernel::<f64>::in_batches(&gpu, blocks, [2, 7], spec.max_sweeps, variant)?;
                 // So few that dispatches end inside solves; adaptive steps are long, and need thousands of sweeps.
                 let sweeps = if spec.adaptive.is_some() { 600 } else { 50 };

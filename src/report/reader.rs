@@ -141,9 +141,8 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     expected(folder, names::LEVELS, "rows", provenance.levels, levels.rows())?;
     let mut tally = Tally::of(spec, &levels);
     (tally.mollified, tally.below_rounding) = (provenance.mollified, provenance.below_rounding);
-    for outcome in Summary::open(folder, spec, &levels)? {
-        tally.add(&outcome?)?;
-    }
+    let mut rows = Summary::open(folder, spec, &levels)?;
+    rows.try_for_each(|outcome| tally.add(&outcome?))?;
     let summary = |what: &str, told: u64, found: u64| expected(folder, names::SUMMARY, what, told, found);
     summary("rows", provenance.members, tally.members())?;
     for (status, count) in by_status(&tally) {
@@ -151,6 +150,7 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
         summary(&format!("{status} members"), told, count)?;
     }
     summary("steps", provenance.steps, tally.steps)?;
+    rows.end()?;
     Ok(tally)
 }
 
@@ -182,9 +182,9 @@ pub fn levels((place, of_events): (&Place, Option<&Place>), spec: &Spec) -> Resu
 /// [`Error::Request`] for rows that are not of a run of `spec`.
 pub fn rows(place: (&Place, Option<&Place>), spec: &Spec, levels: &LevelTimes, aside: Aside) -> Result<Tally> {
     let mut tally = Tally::of(spec, levels);
-    for outcome in Summary::of(place, spec, levels)? {
-        tally.add(&outcome?)?;
-    }
+    let mut rows = Summary::of(place, spec, levels)?;
+    rows.try_for_each(|outcome| tally.add(&outcome?))?;
+    rows.end()?;
     tally.set_aside(aside);
     Ok(tally)
 }
@@ -226,10 +226,13 @@ impl<'a> Summary<'a> {
         Ok(Summary { levels, table: TableReader::open(place)?, events, last: None, spec: spec.clone(), spec_of: None })
     }
 
+    /// Checks that there are no events of further members.
+    fn end(mut self) -> Result<()> {
+        self.events.as_mut().map_or(Ok(()), EventTimes::end)
+    }
+
     fn read(&mut self) -> Result<Option<Outcome>> {
-        let Some((mut outcome, fields)) = self.table.read()? else {
-            return self.events.as_mut().map_or(Ok(()), EventTimes::end).map(|()| None);
-        };
+        let Some((mut outcome, fields)) = self.table.read()? else { return Ok(None) };
         let Outcome { member, cell, .. } = outcome;
         if let Some(last) = self.last.filter(|last| member <= *last) {
             return Err(fields.unexpected_in("member", &format!("a member after {last}: members ascend, each once")));

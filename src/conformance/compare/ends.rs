@@ -2,7 +2,6 @@
 
 use super::{
     device::{Left, on_gpu},
-    levels,
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
     setup::{Tamper, method, tampered},
@@ -26,7 +25,7 @@ use crate::{
 };
 
 /// Tolerance of adaptive steps in the comparison.
-const ADAPTIVE: f64 = 1e-3;
+pub(super) const ADAPTIVE: f64 = 1e-3;
 
 /// Fixed steps of a member that take as long as its adaptive run in the comparison.
 pub const ADAPTIVE_STEPS: u32 = 40;
@@ -70,16 +69,8 @@ fn ends_agree<T: Real>(
     budget: Budget,
     tamper: Option<Tamper>,
 ) -> Result<Vec<ConformanceRow>> {
-    let (hardware, method) = (adapter.is_hardware(), method(solver));
-    let watched = levels::watched::<T>(&launches, &method, n)?;
-    // In one kernel, which is compiled once.
-    let paused = watched.iter().map(|watched| watched.launch.clone()).collect();
-    let both = [tampered(launches.clone(), tamper), tampered(paused, tamper)].concat();
-    let mut ours = on_gpu::<T>(adapter, solver, n, &both, budget)?;
-    let paused = ours.split_off(launches.len());
-    let mut rows = compare_ends::<T>(hardware, &method, n, &launches, &ours)?;
-    rows.push(levels::agree::<T>(hardware, &method, n, &watched, &paused)?);
-    Ok(rows)
+    let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
+    compare_ends::<T>(adapter.is_hardware(), &method(solver), n, &launches, &ours)
 }
 
 /// Compares a device's results of `launches` with those of the twin by `method`, within the bounds for hardware or

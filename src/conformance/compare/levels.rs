@@ -1,31 +1,61 @@
 //! Where members pause because an observable reaches a level, and the times of the events that follow.
 
 use super::{
-    device::Left,
+    device::{Left, on_gpu},
+    ends::{ADAPTIVE, ADAPTIVE_STEPS},
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
+    setup::{Tamper, method, tampered},
     twin::{Twin, growth, twin},
 };
 use crate::{
-    conformance::bounds::{Bound, EVENT, REPORT},
+    backend::gpu::{self, kernel::Budget},
+    conformance::{
+        bounds::{Bound, EVENT, REPORT},
+        cases::{MEMBERS, adaptive_members, members},
+    },
     error::Result,
     number::{BIG, Real},
     scheme::{extrapolation, member::Observed, run::Run, step::Method},
+    solver::Solver,
 };
 
+/// Fixed steps.
+const STEPS: u32 = 100;
 /// Changes of an observable below this multiple of its rounding are not watched.
 const CLEAR: f64 = 1e3;
 
 /// A member that pauses where an observable has gone half of its way.
-pub(super) struct Watched {
+struct Watched {
     /// The member.
-    pub(super) launch: Run<f64>,
+    launch: Run<f64>,
     /// The place of the observable, and its level; none if no observable changes enough.
     level: Option<(usize, f64)>,
 }
 
+/// Compares the times at which watched observables reach their levels, within 100 fixed steps or adaptive ones over the
+/// time of [`ADAPTIVE_STEPS`], in dispatches of `budget`.
+pub fn events<T: Real>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    adaptive: bool,
+    budget: Budget,
+    tamper: Option<Tamper>,
+) -> Result<ConformanceRow> {
+    let launches = match adaptive {
+        false => members(n, MEMBERS, STEPS, T::PRECISION.tolerance())?,
+        true => adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?,
+    };
+    let method = method(solver);
+    let watched = watched::<T>(&launches, &method, n)?;
+    let paused = watched.iter().map(|watched| watched.launch.clone()).collect();
+    let ours = on_gpu::<T>(adapter, solver, n, &tampered(paused, tamper), budget)?;
+    agree::<T>(adapter.is_hardware(), &method, n, &watched, &ours)
+}
+
 /// The members of `launches`, each watching another observable.
-pub(super) fn watched<T: Real>(launches: &[Run<f64>], method: &Method, n: usize) -> Result<Vec<Watched>> {
+fn watched<T: Real>(launches: &[Run<f64>], method: &Method, n: usize) -> Result<Vec<Watched>> {
     let of = |(member, launch): (usize, &Run<f64>)| {
         let Twin { left, order, .. } = twin::<T>(launch, method, n)?;
         let scales = Scales::of(launch)?;
@@ -54,7 +84,7 @@ fn roundings(steps: u32, order: u32, adaptive: bool) -> f64 {
 }
 
 /// Compares the times of the events, see [`EVENT`].
-pub(super) fn agree<T: Real>(
+fn agree<T: Real>(
     hardware: bool,
     method: &Method,
     n: usize,
