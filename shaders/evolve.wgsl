@@ -167,6 +167,10 @@ fn judge_attempt(ended: u32, count: u32, h: real, errors: vec2<real>) -> u32 {
     }
     report.before = report.now;
     report.now = observed();
+    // The host looks at the curves before and after it.
+    if WATCHED {
+        if p.watched > real(0.5) && reaches_level(report.now) { counters.goal = counters.steps + 1u; }
+    }
     let at_goal = select(0u, AT_GOAL, counters.steps + 1u == counters.goal);
     let relaxes = counters.relax_step == NEVER && report.now.excess <= p.relax_at;
     return ACCEPTED | at_goal | select(0u, MAY_RELAX, relaxes);

@@ -1,6 +1,7 @@
 // The structs shared with the host, one entry per resident member. Twin of src/scheme/member.rs.
 
-/// Parameters of a member: the law, the step, sweeps, thresholds, adaptive steps and their times.
+/// Parameters of a member: the law, the step, sweeps, thresholds, adaptive steps and their times, levels
+/// at which it pauses.
 struct Parameters {
     c1: real, c2: real, c3: real, c4: real, c5: real, c6: real, c7: real, c8: real,
     tau: real,
@@ -27,6 +28,23 @@ struct Parameters {
     fit_from: real,
     fit_to: real,
     growth: real,
+    watched: real,
+    low_length: real,
+    low_area: real,
+    low_excess: real,
+    low_energy: real,
+    low_k_min: real,
+    low_k_max: real,
+    low_mesh_ratio: real,
+    low_metric_drift: real,
+    high_length: real,
+    high_area: real,
+    high_excess: real,
+    high_energy: real,
+    high_k_min: real,
+    high_k_max: real,
+    high_mesh_ratio: real,
+    high_metric_drift: real,
 }
 
 /// Observables of one curve.

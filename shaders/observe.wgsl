@@ -132,3 +132,15 @@ fn observed() -> Observed {
         sums.x, sums.y, excess(sums.x, sums.y), sums.z, -others.y, others.x, extremes.z / -extremes.w, extremes.y,
     );
 }
+
+/// Whether an observable has reached a level at which the member pauses.
+fn reaches_level(at: Observed) -> bool {
+    let p = &all_parameters[member];
+    let fell = at.length <= p.low_length || at.area <= p.low_area || at.excess <= p.low_excess
+        || at.energy <= p.low_energy || at.k_min <= p.low_k_min || at.k_max <= p.low_k_max
+        || at.mesh_ratio <= p.low_mesh_ratio || at.metric_drift <= p.low_metric_drift;
+    let rose = p.high_length <= at.length || p.high_area <= at.area || p.high_excess <= at.excess
+        || p.high_energy <= at.energy || p.high_k_min <= at.k_min || p.high_k_max <= at.k_max
+        || p.high_mesh_ratio <= at.mesh_ratio || p.high_metric_drift <= at.metric_drift;
+    return fell || rose;
+}

@@ -220,7 +220,7 @@ fn of_cell(spec: &Spec, cell: &CellStatistics) -> Result<Round> {
     let Some((median, total, error)) = found else {
         let problem = format!(
             "{} of {} members relaxed, too few for a median with an interval",
-            cell.sample.events(),
+            cell.times.sample.events(),
             spec.curves
         );
         return refuse(&problem, "use more --curves or a longer --t-end, or a curve that relaxes");

@@ -52,6 +52,7 @@ const SPILL_BYTES: u64 = 6_000_000;
 /// Bytes of a row of a table, measured: floats have 17 digits. A row of the snapshots is a node.
 const SUMMARY_ROW: f64 = 337.0;
 const RATES_ROW: f64 = 80.0;
+const EVENT_ROW: f64 = 38.0;
 const LEVEL_ROW: f64 = 55.0;
 const SERIES_ROW: f64 = 166.0;
 const NODE_ROW: f64 = 88.0;
@@ -179,7 +180,8 @@ impl Estimate {
         let seconds = sum(|work| work.seconds);
         // If none has ended yet, all may have one.
         let rated = if pilot.ended == 0 { 1.0 } else { pilot.rated as f64 / pilot.ended as f64 };
-        let level_rows = level_members as f64 * LEVEL_ROW;
+        let events = cells[0].spec.event.len() as u64;
+        let level_rows = level_members as f64 * (LEVEL_ROW + events as f64 * EVENT_ROW);
         Ok(Estimate {
             members,
             cells: cells.len(),
@@ -191,7 +193,8 @@ impl Estimate {
                 rows,
                 cells[0].spec.points,
                 seconds.is_none_or(|seconds| seconds > interval.as_secs_f64()),
-            ) + level_members * size_of::<(u64, f64)>() as u64,
+            ) + level_members * size_of::<(u64, f64)>() as u64
+                + events * (members + level_members) * size_of::<f64>() as u64,
             platform,
             slots,
             level_members,
@@ -387,7 +390,8 @@ fn disk(cells: &[Cell], members: u64, rated: f64, series: f64, snapshots: f64) -
         Store::Zarr => STORE_BYTES + nodes * 4.0 * size_of::<f64>() as f64,
     };
     let drawn = members.min(MAX_PANELS as u64) as f64 * family.points().min(Portrait::MAX_NODES) as f64;
-    let tables = members as f64 * (SUMMARY_ROW + rated * RATES_ROW) + series * SERIES_ROW + nodes;
+    let events = spec.event.len() as f64 * EVENT_ROW;
+    let tables = members as f64 * (SUMMARY_ROW + rated * RATES_ROW + events) + series * SERIES_ROW + nodes;
     let features = spec.cell_features().len() as f64;
     let explained = members as f64 * features * FEATURE_BYTES + explained(features, cells.len() as f64, members as f64);
     (tables + explained + cells.len() as f64 * CELL_BYTES + PLOTS_BYTES + drawn * DRAWN_NODE_BYTES) as u64

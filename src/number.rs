@@ -227,6 +227,14 @@ impl Precision {
         }
     }
 
+    /// Returns the number of this precision nearest to `value`.
+    pub fn rounded(self, value: f64) -> f64 {
+        match self {
+            Precision::F32 => f64::from(value as f32),
+            Precision::F64 => value,
+        }
+    }
+
     /// Returns the default tolerance of the sweeps.
     pub fn tolerance(self) -> f64 {
         match self {

@@ -414,7 +414,8 @@ fn open_gpu<T: Vectorised>(
 ) -> Result<Box<dyn Backend>> {
     let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
     let adaptive = spec.adaptive.is_some();
-    let variant = Variant { adaptive, ..gpu.capacity().variant(blocks, spec.solver()) };
+    let watched = !spec.event.is_empty();
+    let variant = Variant { adaptive, watched, ..gpu.capacity().variant(blocks, spec.solver()) };
     // The self-test has its own cap: with the run's, a solve may end before it converges, and then roundings decide.
     let tested = Method { max_sweeps: MAX_SWEEPS, ..*method };
     let then = limit.map_or(String::new(), |limit| format!("; after {} s the CPU is used instead", limit.as_secs()));

@@ -92,6 +92,9 @@ fn a_value_that_cannot_be_read_is_named_with_its_flag() {
         ("--order", "colored", "similar value exists: 'coloured'"),
         ("--backend", "cuda", "auto, gpu, cpu"),
         ("--precision", "f16", "f32, f64"),
+        ("--event", "convex = kmin >= 0", "no observable `kmin` (did you mean `k_min`?)"),
+        ("--event", "convex", "write NAME = OBSERVABLE <= LEVEL"),
+        ("--event", "t_relax = excess <= 1", "choose another name"),
         ("--store", "zar", "similar value exists: 'zarr'"),
     ] {
         let message = refused(&[flag, value], &[]);
@@ -108,6 +111,10 @@ fn combinations_without_sense_name_a_remedy() {
         ("--sor 1.5 --solver multigrid", ["--sor 1.5: ", "leave out --sor"]),
         ("--sor auto --solver direct", ["--sor auto: ", "leave out --sor"]),
         ("--adapter llvmpipe --backend cpu", ["--adapter llvmpipe: ", "leave out --adapter"]),
+        (
+            "--event a=length<=1 --event a=length<=2",
+            ["--event a = length <= 2: another event has this name; ", "use another name"],
+        ),
         ("--points 20", ["--modes 2..=8: ", "use --points 32 or more"]),
         (
             "--store zarr",

@@ -12,7 +12,7 @@ use curvelax::{
     backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
         ConformanceRow, Tamper, adaptive_members,
-        compare::{Left, adaptive, on_gpu, on_gpu_by, runs, stages},
+        compare::{Left, adaptive, events, on_gpu, on_gpu_by, runs, stages},
         members,
     },
     ensemble::{Cell, Ended, Family, Sink, Spec, Status, spec::Precision},
@@ -96,6 +96,10 @@ fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
         for n in ADAPTIVE_SIZES {
             add(format!("the curve agrees after adaptive steps, n = {n}"), adaptive_agree::<T>, n);
         }
+        for n in [7, 101] {
+            add(format!("events are at the same times, n = {n}"), events_agree::<T>, n);
+        }
+        add("a moved node fails the comparison of events".into(), a_moved_node_fails_events::<T>, 64);
         add("a moved node fails the comparison after adaptive steps".into(), a_moved_node_fails_adaptive::<T>, 64);
         add(
             "adaptive: where a dispatch ends or pauses, or a member lies, changes no bit".into(),
@@ -164,6 +168,27 @@ fn adaptive_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
         return Err("too few steps to compare".into());
     }
     check(&rows)
+}
+
+fn events_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    for adaptive in [false, true] {
+        check(&[events::<T>(gpu, solver, n, adaptive, dispatches_of(7), None)?])?;
+    }
+    Ok(())
+}
+
+fn a_moved_node_fails_events<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    // In f32 the bound of adaptive steps is as long as a step.
+    let paces = if T::PRECISION == Precision::F32 { &[false][..] } else { &[false, true] };
+    for adaptive in paces {
+        // This one watches its length, which moves with a node.
+        let tamper = Tamper { member: 8, node: n / 2, by: 1e9 * T::EPSILON.min(1e-10) };
+        let row = events::<T>(gpu, solver, n, *adaptive, dispatches_of(7), Some(tamper))?;
+        if row.passes() || row.at.0 != tamper.member {
+            return Err(format!("a moved node was not noticed: {}", line(&row)).into());
+        }
+    }
+    Ok(())
 }
 
 fn a_moved_node_fails_adaptive<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
@@ -504,12 +529,13 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
     if !adaptive {
         command.arg("--stop-when-relaxed");
     }
+    command.args(["--event", "short = length <= 0.98 * start", "--event", "bent = k_max <= 0.8 * start"]);
     let output = command.args(["--precision", T::NAME, "--points", &n.to_string(), "--out", "out"]).output()?;
     if !output.status.success() {
         return Err(String::from_utf8(output.stderr)?.into());
     }
     let (mut words, mut numbers) = (Vec::new(), Vec::new());
-    for name in ["summary.csv", "series.csv", "snapshots.csv"] {
+    for name in ["summary.csv", "series.csv", "snapshots.csv", "events.csv"] {
         let mut reader = csv::Reader::from_path(folder.path().join("out").join(name))?;
         let header = reader.headers()?.clone();
         for record in reader.records() {

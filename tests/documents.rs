@@ -11,10 +11,10 @@ use curvelax::{
     ensemble::{Feature, LevelRow, Outcome, SeriesRow, Spec},
     files::{
         TableRow, members, names,
-        tables::{CostRow, ErrorRow, NodeRow, RateRow},
+        tables::{CostRow, ErrorRow, EventLevelRow, EventRow, NodeRow, RateRow},
     },
     results::{
-        cells::EnsembleStatistics,
+        cells::{CellColumn, EnsembleStatistics},
         explained::ExplainedRow,
         tally::{MeanExcess, Tally},
     },
@@ -132,8 +132,10 @@ fn table_of<R: TableRow>(name: &str, rows: &str) -> String {
 fn columns() -> String {
     let mut spec = Spec::default();
     spec.sweep.set("amplitude=0.05,0.1".parse().unwrap());
-    let cells = EnsembleStatistics::new(&spec, &mut Tally::default()).unwrap().columns(&spec);
-    let of_cells = cells.into_iter().map(|column| [column.name, column.holds.to_owned(), column.meaning]);
+    spec.event.push("convex = k_min >= 0".parse().unwrap());
+    let cells = EnsembleStatistics::new(&spec, &mut Tally::default()).unwrap();
+    let told = |column: CellColumn| [column.name, column.holds.to_owned(), column.meaning];
+    let (of_cells, of_events) = (cells.columns(&spec), cells.event_columns());
     let drawn = Spec::from_toml("shape = 'ellipse:uniform(1.5..2.5),1'\nmodes = '2..=3'").unwrap();
     let indices = members::OWN.map(|(name, holds, meaning)| [name, holds, meaning].map(str::to_owned));
     let of_feature = |Feature { name, meaning, is_flag }: Feature| {
@@ -143,10 +145,13 @@ fn columns() -> String {
     [
         table_of::<Outcome>(names::SUMMARY, "member"),
         table(names::MEMBERS, "member; here with `--shape 'ellipse:uniform(1.5..2.5),1' --modes 2..=3`", of_members),
-        table(names::ENSEMBLE, "cell; here with `--sweep amplitude=0.05,0.1`", of_cells),
+        table(names::ENSEMBLE, "cell; here with `--sweep amplitude=0.05,0.1`", of_cells.into_iter().map(told)),
+        table_of::<EventRow>(names::EVENTS, "member and event, with `--event`"),
+        table(names::EVENT_STATISTICS, "cell and event, with `--event`", of_events.into_iter().map(told)),
         table_of::<ExplainedRow>(names::EXPLAINED, "cell, time and feature"),
         table_of::<RateRow>(names::RATES, "member with a rate"),
         table_of::<LevelRow>(names::LEVELS, "member and level ([limit](method.md#limit))"),
+        table_of::<EventLevelRow>(names::EVENT_LEVELS, "member, level and event, with `--event`"),
         table_of::<MeanExcess>(names::MEAN_EXCESS, "cell and time"),
         table_of::<SeriesRow>(names::SERIES, "member and time, with `--series`"),
         table_of::<NodeRow>(names::SNAPSHOTS, "member, time and node, with `--snapshots`"),

@@ -13,7 +13,8 @@ use assert_cmd::Command;
 use common::program::{Done, run};
 
 /// A run with everything that `plot` reads: two cells, a series, and members that stay unfinished.
-const RUN: &str = "--curves 3 --points 32 --adaptive=1e-3 --t-end 0.4 --series 0.1 --sweep omega=1,2";
+const RUN: &str = "--curves 3 --points 32 --adaptive=1e-3 --t-end 0.4 --series 0.1 --sweep omega=1,2 --event convex=k_min>=0 \
+                   --event half=excess<=0.5*start";
 
 #[track_caller]
 fn plot(home: &Path, arguments: &str) -> Output {
@@ -47,7 +48,7 @@ fn pictures_come_back_byte_for_byte() {
     for (arguments, count) in [
         ("--curves 7 --points 40 --adaptive=1e-3 --t-end 1", 8),
         ("--curves 1 --points 32 --t-end 0.01", 8),
-        (RUN, 9),
+        (RUN, 10),
         ("--curves 5 --points 32 --tau 1e-3 --t-end 0.3 --series 0.013", 8),
         ("--curves 9 --points 32 --adaptive=1e-3 --t-end 0.3 --series 0.1 --only 2,5,7 --snapshots 0,0.1", 8),
         ("--curves 4 --points 32 --adaptive --t-end 0.3 --sweep amplitude=0.01,0.2,0.3 --sweep seed=1,2 --only 2,9", 9),
@@ -164,6 +165,32 @@ fn replace(path: &Path, from: &str, to: &str) {
 fn shortened(path: &Path, by: usize) {
     let bytes = fs::read(path).unwrap();
     fs::write(path, &bytes[..bytes.len() - by]).unwrap();
+}
+
+#[test]
+fn events_that_are_not_those_of_the_run_are_refused_with_their_place() {
+    let done = run(RUN);
+    let events = |out: &Path| out.join("events.csv");
+    let last = done.text("events.csv").lines().last().unwrap().len() + 1;
+    let missing = "out/events.csv: expected the events of member 5, found the end of the file";
+    refused(&done, |out| shortened(&events(out), last), missing);
+    refused(&done, |out| fs::remove_file(events(out)).unwrap(), "cannot read out/events.csv: ");
+    for (column, value, expected) in [
+        (0, "1", "column member: expected member 0, as the other table has it, found `1`"),
+        (2, "concave", "column event: expected convex, found `concave`"),
+        (
+            3,
+            "0.41",
+            "column t: expected a time up to the end of the member, or that end if censored is 1, found `0.41`",
+        ),
+    ] {
+        refused(&done, |out| field(&events(out), 1, column, value), &format!("out/events.csv, line 2, {expected}"));
+    }
+    let more = |out: &Path| {
+        let text = fs::read_to_string(events(out)).unwrap();
+        fs::write(events(out), text + "6,1,convex,0.1,0\n").unwrap();
+    };
+    refused(&done, more, "out/events.csv, line 14, column member: expected the end of the file, found `6`");
 }
 
 #[test]

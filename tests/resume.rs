@@ -135,7 +135,16 @@ fn compare(name: &str, spec: &Spec, precision: Precision, open: Open, patience: 
 
 /// Members with all kinds of ends, and output times, some of them inside steps.
 fn specs() -> Vec<(&'static str, Spec)> {
-    let outputs = |more: Spec| Spec { curves: 13, series: Some(0.013), snapshots: vec![0.0, 0.02], points: 33, ..more };
+    let events = ["slow = excess <= 0.5 * start", "bent = k_max <= 3", "never = length <= 0.1"];
+    let event = events.map(|text| text.parse().expect("an event")).to_vec();
+    let outputs = |more: Spec| Spec {
+        event: event.clone(),
+        curves: 13,
+        series: Some(0.013),
+        snapshots: vec![0.0, 0.02],
+        points: 33,
+        ..more
+    };
     let fixed = |solver: Solver| {
         outputs(Spec { tau: Some(1e-3.into()), t_end: Some(0.15.into()), solver: solver.into(), ..Spec::default() })
     };
@@ -195,7 +204,8 @@ fn main() -> ExitCode {
             let open = |spec: &Spec| -> Result<Box<dyn Backend>> {
                 let blocks = Blocks::new(spec.points).expect("a ring");
                 let variant = gpu.capacity().variant(blocks, spec.solver());
-                let variant = Variant { adaptive: spec.adaptive.is_some(), ..variant };
+                let watched = !spec.event.is_empty();
+                let variant = Variant { adaptive: spec.adaptive.is_some(), watched, ..variant };
                 let kernel = Kernel::<f64>::in_batches(&gpu, blocks, [2, 7], spec.max_sweeps, variant)?;
                 // So few that dispatches end inside solves; adaptive steps are long, and need thousands of sweeps.
                 let sweeps = if spec.adaptive.is_some() { 600 } else { 50 };

@@ -16,7 +16,8 @@ use tempfile::TempDir;
 
 /// Cells of unequal cost, all files, members that end in several ways.
 const STUDY: &str = "--backend cpu --curves 22 --points 34 --sweep shape=ellipse:2,1;lemniscate:1;circle:1 --adaptive=1e-3 \
-                     --stop-when-relaxed --t-end 0.4 --series 0.05 --snapshots 0,0.1,0.4";
+                     --stop-when-relaxed --t-end 0.4 --series 0.05 --snapshots 0,0.1,0.4 --event slow=excess<=0.5*start \
+                     --event never=length<=0.1";
 /// A quick study with 12 members.
 const SMALL: &str = "--backend cpu --curves 12 --points 34 --tau 1e-3 --t-end 0.01 --solver direct";
 

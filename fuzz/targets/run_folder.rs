@@ -19,11 +19,14 @@ use curvelax::{
 use libfuzzer_sys::fuzz_target;
 
 /// The letter of each file, its place and what it holds unless the input says something else.
-const FILES: [(u8, &str, &[u8]); 6] = [
+const FILES: [(u8, &str, &[u8]); 8] = [
     (b'r', names::RUN, include_bytes!("../base/run.json")),
     (b's', names::SUMMARY, include_bytes!("../base/summary.csv")),
     (b'f', names::MEMBERS, include_bytes!("../base/members.csv")),
     (b'l', names::LEVELS, include_bytes!("../base/levels.csv")),
+    // Read only if the run has events.
+    (b'e', names::EVENTS, b""),
+    (b'v', names::EVENT_LEVELS, b""),
     (b'm', names::MEAN_EXCESS, include_bytes!("../base/mean_excess.csv")),
     (b'p', names::PORTRAITS, include_bytes!("../base/portraits.json")),
 ];
@@ -78,7 +81,7 @@ fn checksum(data: &[u8]) -> u32 {
 /// A run's folder, of which only the files are written anew that change.
 struct Folder {
     path: PathBuf,
-    files: [(File, Vec<u8>); 6],
+    files: [(File, Vec<u8>); 8],
 }
 
 impl Folder {
@@ -92,7 +95,7 @@ impl Folder {
         Folder { path, files }
     }
 
-    fn hold(&mut self, content: [&[u8]; 6]) {
+    fn hold(&mut self, content: [&[u8]; 8]) {
         for ((file, held), new) in self.files.iter_mut().zip(content) {
             if held != new {
                 file.rewind().unwrap();

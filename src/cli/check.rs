@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{flags, note, print, print_json};
 use crate::{
     backend::gpu::{Gpu, kernel::Budget},
-    conformance::{ConformanceRow, adaptive, compare::MEMBERS, runs, stages},
+    conformance::{ConformanceRow, adaptive, compare::MEMBERS, events, runs, stages},
     error::{Error, Result},
     number::Real,
     placement::no_adapter,
@@ -24,6 +24,8 @@ kernels, unless the driver has them in its cache: minutes the first time, second
 
 /// Numbers of nodes to compare: odd, a power of two, the default, a prime.
 const SIZES: [usize; 4] = [7, 64, 100, 101];
+/// Number of nodes for events.
+const EVENTS_SIZE: usize = 64;
 /// Steps after which whole runs are compared.
 const STEPS: [u32; 2] = [1, 100];
 /// The work of a kernel per dispatch.
@@ -38,22 +40,31 @@ enum Compared {
     Fixed,
     /// Whole runs in adaptive steps.
     Adaptive,
+    /// Events in fixed steps.
+    Events,
+    /// Events in adaptive steps.
+    AdaptiveEvents,
 }
 
 impl Compared {
-    const ALL: [Compared; 3] = [Compared::Stages, Compared::Fixed, Compared::Adaptive];
+    /// For every number of nodes.
+    const SIZED: [Compared; 3] = [Compared::Stages, Compared::Fixed, Compared::Adaptive];
+    /// For one.
+    const ONCE: [Compared; 2] = [Compared::Events, Compared::AdaptiveEvents];
 
     fn name(self) -> &'static str {
         match self {
             Compared::Stages => "stages of a step",
             Compared::Fixed => "fixed steps",
             Compared::Adaptive => "adaptive steps",
+            Compared::Events => "events",
+            Compared::AdaptiveEvents => "events, adaptive steps",
         }
     }
 }
 
 /// Kernels that are compiled and compared for each adapter and precision.
-const KERNELS: usize = Solver::ALL.len() * SIZES.len() * Compared::ALL.len();
+const KERNELS: usize = Solver::ALL.len() * (SIZES.len() * Compared::SIZED.len() + Compared::ONCE.len());
 
 /// Compare the GPU with the CPU on this machine's adapters, as a table; exit code 1 on failure.
 #[derive(clap::Args)]
@@ -156,7 +167,7 @@ fn compare_in<T: Real>(gpu: &Gpu, tell: &mut impl FnMut(&str, Solver, usize, Com
         let mut worst: Vec<ConformanceRow> = Vec::new();
         for n in SIZES {
             let mut rows = Vec::new();
-            for kind in Compared::ALL {
+            for kind in Compared::SIZED {
                 tell(T::NAME, solver, n, kind);
                 rows.extend(compare_kernel::<T>(gpu, solver, n, kind)?);
             }
@@ -170,6 +181,10 @@ fn compare_in<T: Real>(gpu: &Gpu, tell: &mut impl FnMut(&str, Solver, usize, Com
             }
         }
         all.extend(worst);
+        for kind in Compared::ONCE {
+            tell(T::NAME, solver, EVENTS_SIZE, kind);
+            all.extend(compare_kernel::<T>(gpu, solver, EVENTS_SIZE, kind)?);
+        }
     }
     Ok(all)
 }
@@ -187,6 +202,10 @@ fn compare_kernel<T: Real>(gpu: &Gpu, solver: Solver, n: usize, kind: Compared) 
             }
         }
         Compared::Adaptive => rows = adaptive::<T>(gpu, solver, n, BUDGET, None)?,
+        Compared::Events | Compared::AdaptiveEvents => {
+            let adaptive = matches!(kind, Compared::AdaptiveEvents);
+            rows.push(events::<T>(gpu, solver, n, adaptive, BUDGET, None)?);
+        }
     }
     Ok(rows)
 }

@@ -11,7 +11,7 @@ use serde::{Deserialize, de::value::StrDeserializer};
 use crate::{
     curve::{Modes, Perturbation, Sampling, Shape},
     ensemble::{
-        Drawn, Shard, Spec,
+        Drawn, Event, Shard, Spec,
         spec::{
             BackendChoice, DEFAULT_ADAPTIVE, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau,
             Units,
@@ -247,6 +247,15 @@ pub struct SpecFlags {
     )]
     threads: Option<usize>,
 
+    /// Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL. A level
+    /// is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio and
+    /// metric_drift. For several events give it several times: --event 'convex = k_min >= 0' --event
+    /// 'slow = excess <= 0.5 * start' [default: none]
+    #[arg(
+        long, value_name = "NAME=CONDITION", value_parser = text_of::<Event>, allow_hyphen_values = true,
+        help_heading = OUTPUT
+    )]
+    event: Option<Vec<Event>>,
     /// Write series.csv: one row per member every DT [default: off]
     #[arg(long, value_name = "DT", value_parser = real, allow_hyphen_values = true, help_heading = OUTPUT)]
     series: Option<f64>,
@@ -278,7 +287,7 @@ macro_rules! every_flag {
     ($to:ident) => {
         $to! {
             curves points seed shape sampling amplitude modes decay perturbation design flow no_redistribution pull solver
-            order sor max_sweeps backend snapshots store common_random_numbers refine;
+            order sor max_sweeps backend snapshots store common_random_numbers refine event;
             outlines group_by accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
         }
     };
@@ -517,7 +526,7 @@ mod tests {
              --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --pull 3 --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \
-             --refine --accuracy 0.01 --series 0.1 --snapshots 0,1 --store zarr --only 1,2 --shard 0/2 --threads 2 --common-random-numbers \
+             --refine --accuracy 0.01 --event convex=k_min>=0 --series 0.1 --snapshots 0,1 --store zarr --only 1,2 --shard 0/2 --threads 2 --common-random-numbers \
              --sweep phase=1,2"
                 .split_whitespace()
                 .collect::<Vec<_>>()

@@ -120,6 +120,10 @@ pub const PACE: [Bound; 6] = [
     bound("t_half, t_relax", NaturalScale::One, 1.0, 4.0),
 ];
 
+/// The time at which a watched observable reaches its level: a multiple of the time that the observable needs for its
+/// rounding, by its bound in [`REPORT`], and of the effect of a changed step length.
+pub const EVENT: Bound = bound("event", NaturalScale::One, 1.0, 4.0);
+
 impl Bound {
     /// Returns the factor k for this kind of adapter.
     pub fn factor(&self, hardware: bool) -> f64 {

@@ -5,7 +5,7 @@
 //! factors are in one table ([`bounds`]), with the reason for each scale.
 //!
 //! *Practice.* [`stages`] compares everything that one step computes, [`runs`] the curve after many steps, [`adaptive`]
-//! after adaptive ones. They use an ensemble in which every member has its own curve, flow, τ and ω ([`members`]).
+//! after adaptive ones, [`events`] where members pause at levels. They use an ensemble in which every member has its own curve, flow, τ and ω ([`members`]).
 //! `curvelax check` prints the table; `tests/conformance.rs` asserts it, with a negative control for each comparison. A
 //! run that begins on a GPU compares a few members first ([`self_test`](self_test::self_test)).
 
@@ -15,5 +15,5 @@ pub mod compare;
 pub mod self_test;
 
 pub use cases::{adaptive_members, members};
-pub use compare::{ConformanceRow, Tamper, adaptive, runs, stages};
+pub use compare::{ConformanceRow, Tamper, adaptive, events, runs, stages};
 pub use self_test::self_test;

@@ -73,7 +73,8 @@ impl RefinementLevel {
             tau: None,
             // A member that relaxes just in time needs longer where nodes are few.
             t_end: Some(FinalTime::At((LONGER * of.final_time()).min(LATEST))),
-            stop_when_relaxed: Some(true),
+            // What may happen after it is also judged.
+            stop_when_relaxed: Some(of.event.is_empty() || of.stops_when_relaxed()),
             series: None,
             snapshots: Vec::new(),
             store: Store::Csv,
@@ -139,14 +140,17 @@ pub struct LevelRow {
     pub t_relax: Option<f64>,
     /// Steps of the paper's scheme that were computed.
     pub solves: u64,
+    /// The times of its events, in the order of the spec: the rows of `event_levels.csv`.
+    pub events: Vec<Option<f64>>,
 }
 
 impl LevelRow {
     /// The row of a member that ended at `level` in `cell`.
     pub fn new(level: RefinementLevel, cell: &Spec, ended: &Outcome) -> LevelRow {
         let Outcome { member, cell: index, status, t_relax, solves, .. } = *ended;
+        let events = ended.events.clone();
         let (points, adaptive) = (cell.points as u64, cell.adaptive);
-        LevelRow { member, level: level.number(), cell: index, points, adaptive, status, t_relax, solves }
+        LevelRow { member, level: level.number(), cell: index, points, adaptive, status, t_relax, solves, events }
     }
 }
 
@@ -155,6 +159,8 @@ impl LevelRow {
 pub struct LevelTimes {
     /// By level: members, ascending, each with its time, NaN if it has none.
     times: [Vec<(u64, f64)>; RefinementLevel::ALL.len()],
+    /// By level: those of all events of one member after those of another, NaN likewise.
+    events: [Vec<f64>; RefinementLevel::ALL.len()],
 }
 
 impl LevelTimes {
@@ -169,6 +175,7 @@ impl LevelTimes {
             return Err(format!("a member after {last}: members of a level ascend, each once"));
         }
         own.push((row.member, row.t_relax.unwrap_or(f64::NAN)));
+        self.events[row.level as usize - 1].extend(row.events.iter().map(|t| t.unwrap_or(f64::NAN)));
         Ok(())
     }
 
@@ -177,35 +184,44 @@ impl LevelTimes {
         self.times.iter().map(|times| times.len() as u64).sum()
     }
 
-    /// Whether `member` ran at them and relaxed.
+    /// Whether `member` ran at them.
     pub fn has(&self, member: u64) -> bool {
-        self.time(RefinementLevel::Full, member).is_some()
+        self.place(RefinementLevel::Full, member).is_some()
+    }
+
+    fn place(&self, level: RefinementLevel, member: u64) -> Option<usize> {
+        self.times[level as usize].binary_search_by_key(&member, |(member, _)| *member).ok()
     }
 
     fn time(&self, level: RefinementLevel, member: u64) -> Option<f64> {
-        let own = &self.times[level as usize];
-        let at = own.binary_search_by_key(&member, |(member, _)| *member).ok()?;
-        Some(own[at].1).filter(|t| t.is_finite())
+        Some(self.times[level as usize][self.place(level, member)?].1).filter(|t| t.is_finite())
     }
 
-    /// Completes the row of a member of a cell of `spec` that ran at its own resolution: the error of its time, if it ran
-    /// at the levels, and with `--refine` its limit.
+    /// The time of the event at `place` among `count` of a member.
+    fn event_time(&self, level: RefinementLevel, member: u64, [place, count]: [usize; 2]) -> Option<f64> {
+        let at = self.place(level, member)? * count + place;
+        self.events[level as usize].get(at).copied().filter(|t| t.is_finite())
+    }
+
+    /// Completes the row of a member of a cell of `spec` that ran at its own resolution: the errors of its times, if it
+    /// ran at the levels, and with `--refine` the limit of its relaxation time.
     pub fn judge(&self, spec: &Spec, outcome: &mut Outcome) {
-        let at = |level| self.time(level, outcome.member);
-        let all = (|| {
-            Some((
-                outcome.t_relax?,
-                [at(RefinementLevel::Half)?, at(RefinementLevel::Between)?, at(RefinementLevel::Full)?],
-            ))
-        })();
-        // A member that is relaxed at its start has no time to judge.
-        let Some((own, levels)) = all.filter(|(own, levels)| *own > 0.0 && levels.iter().all(|t| *t > 0.0)) else {
-            return;
-        };
+        let (member, excess) = (outcome.member, outcome.start.excess);
         let points = RefinementLevel::ALL.map(|level| level.points(spec.points));
         let is_adaptive = matches!(spec.pace(), Pace::Adaptive(_));
-        let tolerance = tolerance(spec) * if is_adaptive { 1.0 } else { depth(spec, outcome.start.excess) };
-        let limit = Limit::of(&Times { own, levels, points, tolerance, is_adaptive });
+        let limit = |own: Option<f64>, at: &dyn Fn(RefinementLevel) -> Option<f64>| {
+            let own = own?;
+            let levels = [at(RefinementLevel::Half)?, at(RefinementLevel::Between)?, at(RefinementLevel::Full)?];
+            // What holds at the start has no time to judge.
+            let has_times = own > 0.0 && levels.iter().all(|t| *t > 0.0);
+            let tolerance = || tolerance(spec) * if is_adaptive { 1.0 } else { depth(spec, excess) };
+            has_times.then(|| Limit::of(&Times { own, levels, points, tolerance: tolerance(), is_adaptive }))
+        };
+        let count = outcome.events.len();
+        let of_event =
+            |(place, own): (usize, &Option<f64>)| limit(*own, &|level| self.event_time(level, member, [place, count]));
+        outcome.judged_events = outcome.events.iter().enumerate().map(of_event).collect();
+        let Some(limit) = limit(outcome.t_relax, &|level| self.time(level, member)) else { return };
         outcome.judged = Some(limit);
         if spec.refine {
             let Limit { t, error, order, .. } = limit;

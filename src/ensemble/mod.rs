@@ -3,6 +3,7 @@
 
 pub mod drawn;
 pub mod ended;
+pub mod event;
 pub mod features;
 mod horizon;
 pub mod judged;
@@ -28,6 +29,7 @@ mod values;
 
 pub use drawn::Drawn;
 pub use ended::Ended;
+pub use event::Event;
 pub use features::{Feature, Features};
 pub use judged::Judged;
 pub use levels::{LevelRow, LevelTimes, RefinementLevel};

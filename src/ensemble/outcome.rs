@@ -93,9 +93,14 @@ pub struct Outcome {
     pub label: String,
     /// Group of its outline; empty without `--group-by`.
     pub group: String,
+    /// First times of the [events](super::Event) of the spec, in their order.
+    pub events: Vec<Option<f64>>,
     /// What the [levels](super::LevelTimes) tell of the relaxation time, if the member ran at them.
     #[serde(skip)]
     pub judged: Option<Limit>,
+    /// The same of the times of the events, in their order.
+    #[serde(skip)]
+    pub judged_events: Vec<Option<Limit>>,
 }
 
 /// One row of `series.csv`.

@@ -12,6 +12,7 @@ use serde::{
 
 use super::{
     drawn::Drawn,
+    event::Event,
     seed,
     shard::Shard,
     sweep::{self, Sweep},
@@ -266,6 +267,9 @@ pub struct Spec {
     /// Total relative uncertainty of the median relaxation time to reach, by the choice of n, tolerance and members.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<f64>,
+    /// Events of which each member's first time is found.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub event: Vec<Event>,
     /// Interval between rows of `series.csv`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub series: Option<f64>,
@@ -368,6 +372,7 @@ impl Default for Spec {
             stop_when_relaxed: None,
             refine: false,
             accuracy: None,
+            event: Vec::new(),
             series: None,
             snapshots: Vec::new(),
             store: Store::Csv,
@@ -833,6 +838,7 @@ mod tests {
             flow: Flow::Polynomial(vec![0.5, 0.0, -0.25]).into(),
             precision: Some(Precision::F32),
             tolerance: Some(3e-4),
+            event: vec!["convex = k_min >= 0".parse().unwrap(), "slow = excess <= 0.5 * start".parse().unwrap()],
             series: Some(0.01),
             snapshots: vec![0.0, 1.0 / 3.0],
             store: Store::Zarr,
@@ -900,6 +906,7 @@ mod tests {
             "adapter",
             "precision",
             "series",
+            "event",
             "refine",
             "accuracy",
         ];

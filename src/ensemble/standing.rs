@@ -40,6 +40,8 @@ pub struct Paused {
     pub frames: Vec<(f64, Vec<DVec2>)>,
     /// When it was first found to cross itself.
     pub crossed: Option<f64>,
+    /// The times of its events so far, in the order of the spec.
+    pub events: Vec<Option<f64>>,
     /// Travel at which it is next checked for crossings.
     pub look_at: f64,
 }

@@ -14,7 +14,7 @@ use toml::Value;
 use crate::error::{Error, Result, did_you_mean, shortened};
 
 /// Keys that all members of a run have in common.
-const COMMON: [&str; 19] = [
+const COMMON: [&str; 20] = [
     "curves",
     "outlines",
     "group-by",
@@ -22,6 +22,7 @@ const COMMON: [&str; 19] = [
     "adapter",
     "precision",
     "threads",
+    "event",
     "series",
     "snapshots",
     "store",

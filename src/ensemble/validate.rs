@@ -3,6 +3,7 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that needs
 //! the file of the shape. Only the resolution of the highest mode is checked here.
 
+use super::event::{Event, MAX_EVENTS};
 use super::spec::{
     BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, Precision, Pull,
     Sor, Spec, Store, Tau, final_times,
@@ -52,6 +53,7 @@ impl Spec {
         self.check_drawn()?;
         self.check_relaxation()?;
         self.check_combinations()?;
+        self.check_events()?;
         self.fill_defaults();
         self.tidy_snapshots()?;
         self.tidy_only()?;
@@ -364,6 +366,19 @@ impl Spec {
         }
     }
 
+    fn check_events(&self) -> Result<()> {
+        let (events, count) = (&self.event, self.event.len());
+        if count > MAX_EVENTS {
+            let value = format!("({count} events)");
+            return Err(Error::value("event", value, "too many events", &format!("at most {MAX_EVENTS}")));
+        }
+        let twice = |(i, event): (usize, &Event)| events[..i].iter().any(|other| other.name == event.name);
+        match events.iter().enumerate().find(|at| twice(*at)) {
+            Some((_, event)) => Err(Error::value("event", event, "another event has this name", "use another name")),
+            None => Ok(()),
+        }
+    }
+
     fn tidy_snapshots(&mut self) -> Result<()> {
         let t_end = self.known_end().unwrap_or(*TIMES.end());
         if let Some(&t) = self.snapshots.iter().find(|t| !(**t >= 0.0 && **t <= t_end)) {
@@ -536,6 +551,7 @@ mod tests {
         ("relax-at = 0.1\nrelax-to = 0.1", "--relax-at 0.1: a member is relaxed at a fraction"),
         ("adapter = 'llvmpipe'\nbackend = 'cpu'", "--adapter llvmpipe: "),
         ("adapter = ' '", "--adapter '': "),
+        ("event = ['a = area <= 1', 'a = area <= 2']", "--event a = area <= 2: another event has this name"),
     ];
 
     /// TOML text at the edge of what is allowed.
@@ -578,6 +594,8 @@ mod tests {
         "pull = 'auto'",
         "relax-at = 3",
         "adapter = 'llvmpipe'",
+        "event = []",
+        "event = ['a = area <= 1', 'b = area <= 1']",
     ];
 
     #[test]
@@ -626,6 +644,14 @@ mod tests {
         assert_eq!(spec.snapshots, [0.0, 1.0]);
         assert!(spec.snapshots[0].is_sign_positive());
         assert_eq!(spec.only, Some(vec![3, 7]));
+    }
+
+    #[test]
+    fn too_many_events_are_refused() {
+        let of = |count: usize| (0..count).map(|i| format!("e{i} = area <= {i}").parse().unwrap()).collect();
+        assert!(Spec { event: of(MAX_EVENTS), ..Spec::default() }.validate().is_ok());
+        let message = Spec { event: of(MAX_EVENTS + 1), ..Spec::default() }.validate().unwrap_err().to_string();
+        assert_eq!(message, "--event (33 events): too many events; at most 32");
     }
 
     #[test]

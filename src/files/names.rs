@@ -12,6 +12,12 @@ pub const LEVELS: &str = "levels.csv";
 pub const MEMBERS: &str = "members.csv";
 /// How much of the variance of the times each of that explains, by cell.
 pub const EXPLAINED: &str = "explained.csv";
+/// First times of the events of the spec, one row per member and event.
+pub const EVENTS: &str = "events.csv";
+/// Their statistics, one row per cell and event.
+pub const EVENT_STATISTICS: &str = "event_statistics.csv";
+/// Times of events at other resolutions, one row per member, level and event.
+pub const EVENT_LEVELS: &str = "event_levels.csv";
 /// Mean excess in time, by cell.
 pub const MEAN_EXCESS: &str = "mean_excess.csv";
 /// Observables over time.
@@ -44,6 +50,8 @@ pub const RATE: &str = "plots/rate.svg";
 pub const SURVIVAL: &str = "plots/survival.svg";
 /// The same by group of outlines.
 pub const GROUP_SURVIVAL: &str = "plots/groups.svg";
+/// Kaplan-Meier curves of the events.
+pub const EVENT_SURVIVAL: &str = "plots/events.svg";
 /// Mean excess in time.
 pub const EXCESS: &str = "plots/excess.svg";
 /// Relaxation times against a swept key.
@@ -70,12 +78,15 @@ pub const FIGURES: [&str; 8] =
 pub const ROWS: &str = "curvelax.rows";
 
 /// All files that a run may write, or that are made from one without naming a place; the one that vouches for the others comes first.
-pub const OWN: [&str; 26] = [
+pub const OWN: [&str; 30] = [
     RUN,
     SHARD,
     SUMMARY,
     MEMBERS,
     LEVELS,
+    EVENTS,
+    EVENT_STATISTICS,
+    EVENT_LEVELS,
     ENSEMBLE,
     GROUPS,
     EXPLAINED,
@@ -90,6 +101,7 @@ pub const OWN: [&str; 26] = [
     RATE,
     SURVIVAL,
     GROUP_SURVIVAL,
+    EVENT_SURVIVAL,
     EXCESS,
     DEPENDENCE,
     FEATURES,
@@ -100,12 +112,26 @@ pub const OWN: [&str; 26] = [
 ];
 
 /// The tables of a run and its store, in the order in which people see them.
-pub const TABLES: [&str; 11] =
-    [SUMMARY, MEMBERS, ENSEMBLE, GROUPS, EXPLAINED, RATES, LEVELS, MEAN_EXCESS, SERIES, SNAPSHOTS, STORE];
+pub const TABLES: [&str; 14] = [
+    SUMMARY,
+    MEMBERS,
+    ENSEMBLE,
+    GROUPS,
+    EXPLAINED,
+    EVENTS,
+    EVENT_STATISTICS,
+    RATES,
+    LEVELS,
+    EVENT_LEVELS,
+    MEAN_EXCESS,
+    SERIES,
+    SNAPSHOTS,
+    STORE,
+];
 
 /// The files that are drawn from the others.
-pub const PICTURES: [&str; 10] =
-    [REPORT, RELAXATION, SURVIVAL, GROUP_SURVIVAL, EXCESS, RATE, DEPENDENCE, FEATURES, MESH, CURVES];
+pub const PICTURES: [&str; 11] =
+    [REPORT, RELAXATION, SURVIVAL, GROUP_SURVIVAL, EVENT_SURVIVAL, EXCESS, RATE, DEPENDENCE, FEATURES, MESH, CURVES];
 
 /// The remedy for a file that was changed or truncated.
 pub const REMEDY: &str = "restore the file, or run again";

@@ -90,6 +90,52 @@ columns! { RateRow:
     rate_ratio: optional = rate_ratio, "rate / rate_theory";
 }
 
+/// A row of `events.csv`: the time of an event of a member, or until when it was not seen.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EventRow {
+    /// Index of the member.
+    pub member: u64,
+    /// Index of its cell.
+    pub cell: u64,
+    /// Name of the event.
+    pub event: String,
+    /// When it happened, or when the member ended.
+    pub t: f64,
+    /// 1 if it had not happened by then.
+    pub censored: u64,
+}
+
+columns! { EventRow:
+    member: whole = member, "index of the member";
+    cell: whole = cell, "index of its cell";
+    event: word = event, "name of the event";
+    t: time = t, "first time at which its condition holds, found inside the step; of a censored one, when the member ended";
+    censored: whole = censored, "0: it happened at t; 1: it had not happened by then";
+}
+
+/// A row of `event_levels.csv`: the time of an event of a member at a level.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EventLevelRow {
+    /// Index of the member.
+    pub member: u64,
+    /// Number of the level.
+    pub level: u64,
+    /// Index of the cell.
+    pub cell: u64,
+    /// Name of the event.
+    pub event: String,
+    /// When it happened.
+    pub t: Option<f64>,
+}
+
+columns! { EventLevelRow:
+    member: whole = member, "index of the member";
+    level: whole = level, "as in `levels.csv`";
+    cell: whole = cell, "index of its cell";
+    event: word = event, "name of the event";
+    t: event = t, "first time at which its condition holds; empty if it was not seen";
+}
+
 columns! { SeriesRow:
     member: whole = member, "index of the member";
     t: time = t, "time";
@@ -204,6 +250,10 @@ pub struct Table<R> {
 pub type SummaryTable = Table<Outcome>;
 /// `levels.csv`: one row per member and level.
 pub type LevelTable = Table<LevelRow>;
+/// `event_levels.csv`: the events of each member at each level.
+pub type EventLevelTable = Table<EventLevelRow>;
+/// `events.csv`: the events of each member.
+pub type EventTable = Table<EventRow>;
 /// `rates.csv`: the fitted rate of each member that has one.
 pub type RateTable = Table<RateRow>;
 /// `series.csv`: the observables of each member over time.
@@ -279,6 +329,35 @@ impl RateRow {
         let Outcome { member, cell, rate, rate_r2, rate_theory, .. } = *member;
         let rate_ratio = rate_theory.map(|theory| rate.unwrap_or_default() / theory);
         rate.map(|_| RateRow { member, cell, rate, rate_r2, rate_theory, rate_ratio })
+    }
+}
+
+impl EventRow {
+    /// The rows of a member with the events of these names.
+    pub fn of<'a>(member: &'a Outcome, names: &'a [String]) -> impl Iterator<Item = EventRow> + 'a {
+        let Outcome { member, cell, t_end, events, .. } = member;
+        names.iter().zip(events).map(|(event, seen)| EventRow {
+            member: *member,
+            cell: *cell,
+            event: event.clone(),
+            t: seen.unwrap_or(*t_end),
+            censored: u64::from(seen.is_none()),
+        })
+    }
+}
+
+impl EventLevelRow {
+    /// The rows of a member at a level, with the events of these names.
+    pub fn of<'a>(of: &'a LevelRow, names: &'a [String]) -> impl Iterator<Item = EventLevelRow> + 'a {
+        let LevelRow { member, level, cell, events, .. } = of;
+        let row = |(event, t): (&String, &Option<f64>)| EventLevelRow {
+            member: *member,
+            level: *level,
+            cell: *cell,
+            event: event.clone(),
+            t: *t,
+        };
+        names.iter().zip(events).map(row)
     }
 }
 
@@ -404,6 +483,15 @@ mod tests {
     #[test]
     fn an_empty_table_is_a_header() {
         assert_eq!(summary(&[]).lines().count(), 1);
+    }
+
+    #[test]
+    fn events_have_these_bytes() {
+        let at = Observables::default();
+        let member = Outcome { events: vec![Some(0.1 + 0.2), None], ..outcome(at, at) };
+        let names = ["convex".to_string(), "slow".to_string()];
+        let text = written("events.csv", |file| Table::of(file, &EventRow::of(&member, &names).collect::<Vec<_>>()));
+        assert_eq!(text, "member,cell,event,t,censored\n3,0,convex,0.30000000000000004,0\n3,0,slow,0.5,1\n");
     }
 
     #[test]

@@ -244,6 +244,7 @@ mod tests {
             },
             frames: vec![(0.25, vec![glam::DVec2::new(1.0, 2.0)])],
             crossed: Some(0.1),
+            events: vec![Some(0.05), None],
             look_at: 0.2,
         }
     }
@@ -327,9 +328,14 @@ mod tests {
         ];
         let expected: BTreeSet<&str> = expected.into_iter().flatten().filter(|name| !name.is_empty()).collect();
         assert_eq!(named, expected);
-        for part in
-            ["spec: string", "state: list f64", "outlines: list ( string u32", "low: u128", "excess_at: ( f64 f64"]
-        {
+        for part in [
+            "spec: string",
+            "state: list f64",
+            "events: list option f64",
+            "outlines: list ( string u32",
+            "low: u128",
+            "excess_at: ( f64 f64",
+        ] {
             assert!(layout.contains(part), "{part}: {layout}");
         }
     }

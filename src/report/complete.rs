@@ -84,6 +84,9 @@ impl Complete<'_> {
         if let Some(groups) = statistics.groups_to_csv()? {
             files.push(folder.write(names::GROUPS, groups)?);
         }
+        if !spec.event.is_empty() {
+            files.push(folder.write(names::EVENT_STATISTICS, statistics.events_to_csv(spec)?)?);
+        }
         let excess = &tally.mean_excess(spec)?;
         files.push(Table::of(folder.file(names::MEAN_EXCESS)?, excess)?);
         let [summary, members] = [names::SUMMARY, names::MEMBERS].map(|name| own(&files, name));

@@ -7,10 +7,11 @@ use serde::Serialize;
 use toml::Value;
 
 use crate::results::{
-    cells::{CellStatistics, EnsembleStatistics, GroupStatistics, Numbers},
+    cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
     comparison::{CellComparison, CellDifference, LeftOut},
     provenance::{Provenance, json},
     scaling::Scaling,
+    times::Numbers,
 };
 use crate::{
     ensemble::{Spec, Status},
@@ -50,6 +51,15 @@ struct CellDocument<'a> {
     rate: Numbers,
     discretisation: Numbers,
     t_limit: Numbers,
+    /// By the names of the events.
+    events: BTreeMap<&'a str, EventDocument>,
+}
+
+/// A row of `event_statistics.csv`.
+#[derive(Serialize)]
+struct EventDocument {
+    t: Numbers,
+    discretisation: Numbers,
 }
 
 /// A row of `groups.csv`.
@@ -186,15 +196,18 @@ impl<'a> Document<'a> {
 impl<'a> CellDocument<'a> {
     fn new(spec: &'a Spec, statistics: &CellStatistics) -> CellDocument<'a> {
         let (cell, counts) = (statistics.cell, statistics.counts);
+        let event = |of: &EventStatistics| EventDocument { t: of.times.numbers(), discretisation: of.errors() };
+        let events = statistics.events.iter().map(event);
         CellDocument {
             cell,
             values: spec.sweep.axes().iter().map(|axis| &axis.key[..]).zip(spec.sweep.values(cell)).collect(),
             members: statistics.members(),
             members_by_status: Status::ALL.iter().map(|status| status.name()).zip(counts).collect(),
-            t_relax: statistics.times(),
+            t_relax: statistics.times.numbers(),
             rate: statistics.rates.numbers.clone(),
             discretisation: statistics.errors(),
             t_limit: statistics.limit(),
+            events: spec.event.iter().map(|event| &event.name[..]).zip(events).collect(),
         }
     }
 }
@@ -241,8 +254,8 @@ mod tests {
         for (cell, statistics) in json["cells"].as_array().unwrap().iter().zip(&statistics.cells) {
             let read = |name: &str| cell["t_relax"][name].as_f64();
             assert_eq!(read("median"), statistics.median());
-            assert_eq!(read("mean"), statistics.mean.map(|mean| mean.value));
-            assert_eq!(read("se"), statistics.mean.and_then(|mean| mean.standard_error));
+            assert_eq!(read("mean"), statistics.times.mean.map(|mean| mean.value));
+            assert_eq!(read("se"), statistics.times.mean.and_then(|mean| mean.standard_error));
             assert_eq!(read("q95"), None, "a quantile beyond the last event is unknown: {text}");
         }
         assert_eq!(json["log_rank"], serde_json::Value::Null);

@@ -11,7 +11,10 @@ use crate::{
         part_folder::PartFolder,
         place::Place,
         spill::Spill,
-        tables::{LevelTable, RateRow, RateTable, SeriesTable, SnapshotTable, SummaryTable, Table},
+        tables::{
+            EventLevelRow, EventLevelTable, EventRow, EventTable, LevelTable, RateRow, RateTable, SeriesTable,
+            SnapshotTable, SummaryTable, Table,
+        },
         zarr::{self, SnapshotStore},
     },
 };
@@ -22,6 +25,8 @@ pub struct Growing {
     members: MemberTable,
     levels: LevelTable,
     rates: RateTable,
+    /// Those of the members and those of the levels, with the names of the events.
+    events: Option<(EventTable, EventLevelTable, Vec<String>)>,
     series: Option<SeriesTable>,
     snapshots: Option<SnapshotTable>,
     store: Option<SnapshotStore>,
@@ -35,7 +40,13 @@ impl Growing {
     /// Names of the files for `spec`, except the store.
     pub fn names(spec: &Spec) -> Vec<&'static str> {
         let snapshots = !spec.snapshots.is_empty() && spec.store == Store::Csv;
-        let optional = [(names::SERIES, spec.series.is_some()), (names::SNAPSHOTS, snapshots)];
+        let events = !spec.event.is_empty();
+        let optional = [
+            (names::EVENTS, events),
+            (names::EVENT_LEVELS, events),
+            (names::SERIES, spec.series.is_some()),
+            (names::SNAPSHOTS, snapshots),
+        ];
         let asked = optional.into_iter().filter(|(_, asked)| *asked).map(|(name, _)| name);
         [names::SUMMARY, names::MEMBERS, names::LEVELS, names::RATES].into_iter().chain(asked).collect()
     }
@@ -98,6 +109,13 @@ impl Growing {
             members: MemberTable::new(file(names::MEMBERS)?, spec)?,
             levels: Table::new(file(names::LEVELS)?)?,
             rates: Table::new(file(names::RATES)?)?,
+            events: match asked(names::EVENTS)?.zip(asked(names::EVENT_LEVELS)?) {
+                Some((own, levels)) => {
+                    let names = spec.event.iter().map(|event| event.name.clone()).collect();
+                    Some((Table::new(own)?, Table::new(levels)?, names))
+                }
+                None => None,
+            },
             series: asked(names::SERIES)?.map(Table::new).transpose()?,
             snapshots: asked(names::SNAPSHOTS)?.map(Table::new).transpose()?,
             store,
@@ -108,7 +126,13 @@ impl Growing {
 
     /// Writes the row of a member at a level.
     pub fn add_level(&mut self, row: &LevelRow) -> Result<()> {
-        self.levels.row(row)
+        self.torn = true;
+        if let Some((_, table, names)) = &mut self.events {
+            EventLevelRow::of(row, names).try_for_each(|row| table.row(&row))?;
+        }
+        self.levels.row(row)?;
+        self.torn = false;
+        Ok(())
     }
 
     /// Writes the results of a member.
@@ -127,6 +151,9 @@ impl Growing {
         }
         self.summary.row(outcome)?;
         self.members.row(outcome, features)?;
+        if let Some((table, _, names)) = &mut self.events {
+            EventRow::of(outcome, names).try_for_each(|row| table.row(&row))?;
+        }
         RateRow::of(outcome).iter().try_for_each(|row| self.rates.row(row))?;
         self.torn = false;
         Ok(())
@@ -154,14 +181,14 @@ impl Growing {
         self.spill.insert(spill).add(series, snapshots)
     }
 
-    /// Where the rows of the members are for now.
-    pub fn rows(&self) -> &Place {
-        self.summary.part()
+    /// Where the rows of the members are for now, and those of their events.
+    pub fn rows(&self) -> (&Place, Option<&Place>) {
+        (self.summary.part(), self.events.as_ref().map(|(own, ..)| own.part()))
     }
 
-    /// Where the rows of the levels are for now.
-    pub fn levels(&self) -> &Place {
-        self.levels.part()
+    /// Where the rows of the levels are for now, and those of the events there.
+    pub fn levels(&self) -> (&Place, Option<&Place>) {
+        (self.levels.part(), self.events.as_ref().map(|(_, levels, _)| levels.part()))
     }
 
     /// Returns the extent of all files, once they are on disk.
@@ -170,6 +197,9 @@ impl Growing {
             return Err(Error::Failed("the rows of a member could not all be written".into()));
         }
         let mut marks = vec![self.summary.mark()?, self.members.mark()?, self.levels.mark()?, self.rates.mark()?];
+        if let Some((own, levels, _)) = &mut self.events {
+            marks.extend([own.mark()?, levels.mark()?]);
+        }
         marks.extend(self.series.as_mut().map(SeriesTable::mark).transpose()?);
         marks.extend(self.snapshots.as_mut().map(SnapshotTable::mark).transpose()?);
         let store = self.store.as_ref().map(SnapshotStore::mark).transpose()?;
@@ -182,6 +212,10 @@ impl Growing {
         self.members.keep(keep);
         self.levels.keep(keep);
         self.rates.keep(keep);
+        if let Some((own, levels, _)) = &self.events {
+            own.keep(keep);
+            levels.keep(keep);
+        }
         self.series.iter().for_each(|table| table.keep(keep));
         self.snapshots.iter().for_each(|table| table.keep(keep));
         self.store.iter_mut().for_each(|store| store.keep(keep));
@@ -191,8 +225,11 @@ impl Growing {
     /// Completes all files on disk, ready for their final names; and returns the rows needed as long as there are
     /// checkpoints.
     pub fn ready(self) -> Result<(Vec<PartFile>, Option<PartFolder>, Option<Spill>)> {
-        let Growing { summary, members, levels, rates, series, snapshots, store, spill, .. } = self;
+        let Growing { summary, members, levels, rates, events, series, snapshots, store, spill, .. } = self;
         let mut files = vec![summary.ready()?, members.ready()?, levels.ready()?, rates.ready()?];
+        if let Some((own, levels, _)) = events {
+            files.extend([own.ready()?, levels.ready()?]);
+        }
         files.extend(series.map(SeriesTable::ready).transpose()?);
         files.extend(snapshots.map(SnapshotTable::ready).transpose()?);
         Ok((files, store.map(SnapshotStore::ready).transpose()?, spill))

@@ -215,8 +215,9 @@ impl Shards {
         warnings.retain(|warning| seen.insert(warning.clone()));
         let own = |name: &str| files.iter().find(|file| file.name() == name).map(PartFile::part);
         let none = || Error::Failed("a table of the shards was not merged".into());
-        let levels = reader::levels(own(names::LEVELS).ok_or_else(none)?, spec)?;
-        let tally = reader::rows(own(names::SUMMARY).ok_or_else(none)?, spec, &levels, aside)?;
+        let levels = reader::levels((own(names::LEVELS).ok_or_else(none)?, own(names::EVENT_LEVELS)), spec)?;
+        let rows = (own(names::SUMMARY).ok_or_else(none)?, own(names::EVENTS));
+        let tally = reader::rows(rows, spec, &levels, aside)?;
         if tally.members() != spec.member_count() {
             let (found, all) = (tally.members(), spec.member_count());
             return Err(Error::Request(format!("the shards have {found} members, and their spec has {all}")));
@@ -373,7 +374,7 @@ impl ShardRows {
 
     /// What the next line is sorted by: its member, after the level in a table that has levels.
     fn key(&mut self) -> Result<Option<(u64, u64)>> {
-        let (shard, has_levels) = (self.shard, self.mark.name == names::LEVELS);
+        let (shard, has_levels) = (self.shard, [names::LEVELS, names::EVENT_LEVELS].contains(&&*self.mark.name));
         let key = match self.next()? {
             None => return Ok(None),
             Some(line) => {

@@ -5,18 +5,19 @@ use std::{fmt, path::Path, time::Duration};
 use crate::{
     curve::Perturbation,
     ensemble::{
-        Drawn, Spec,
+        Drawn, Event, Spec,
         spec::{Pace, Tau, Units},
     },
     error::shortened,
     files::names::{ENSEMBLE, GROUPS},
     placement::Platform,
     results::{
-        cells::{CellStatistics, EnsembleStatistics, GroupStatistics, Rates},
+        cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics, Rates},
         comparison::{CellDifference, LeftOut},
         discretisation::{CellLimits, DiscretisationError},
         scaling::Scaling,
         tally::Tally,
+        times::TimeStatistics,
     },
     statistics::{GoodnessOfFit, LogRank, PowerLaw},
     text::{duration, number, p_value, plural, rounded},
@@ -60,11 +61,15 @@ impl fmt::Display for Overview<'_> {
             ("error", self.error()),
             ("accuracy", self.accuracy()),
             ("rate", self.rate()),
+        ]
+        .into_iter()
+        .chain(self.events().into_iter().map(|text| ("event", text)))
+        .chain([
             ("work", self.work()),
             ("ran on", machine(self.platform)),
             ("wall time", duration(self.wall.as_secs_f64())),
             ("results", format!("{}: {}", self.folder.display(), self.files.join(", "))),
-        ] {
+        ]) {
             if !text.is_empty() {
                 writeln!(f, "{label:<11}{text}")?;
             }
@@ -89,8 +94,16 @@ impl Overview<'_> {
 
     fn relaxation(&self) -> String {
         match &self.statistics.cells[..] {
-            [cell] => times(cell),
+            [cell] => times(&cell.times),
             _ => String::new(),
+        }
+    }
+
+    /// A line for each event of a single ensemble.
+    fn events(&self) -> Vec<String> {
+        match &self.statistics.cells[..] {
+            [cell] => events(self.spec, cell).collect(),
+            _ => Vec::new(),
         }
     }
 
@@ -139,7 +152,7 @@ impl Overview<'_> {
             return Ok(());
         }
         for cell in cells.iter().take(MAX_CELLS) {
-            writeln!(f, "{:<11}{}: t_relax {}", cell.cell, self.spec.sweep.name(cell.cell), times(cell))?;
+            writeln!(f, "{:<11}{}: t_relax {}", cell.cell, self.spec.sweep.name(cell.cell), times(&cell.times))?;
             if let Some(limits) = &cell.limits {
                 writeln!(f, "{:<11}t_limit {}", "", limit(limits))?;
             }
@@ -147,6 +160,7 @@ impl Overview<'_> {
             if !errors.is_empty() {
                 writeln!(f, "{:<11}{errors}", "")?;
             }
+            events(self.spec, cell).try_for_each(|event| writeln!(f, "{:<11}{event}", ""))?;
         }
         match cells.len().saturating_sub(MAX_CELLS) {
             0 => {}
@@ -182,7 +196,7 @@ impl Overview<'_> {
         let cell = |rank: u64| if cells.len() < 2 { String::new() } else { format!(", cell {rank}") };
         for GroupStatistics { group, times: of } in groups.iter().take(MAX_CELLS) {
             let name = shortened(group, MAX_GROUP);
-            writeln!(f, "{:<11}{property} {name}{}: t_relax {}", "group", cell(of.cell), times(of))?;
+            writeln!(f, "{:<11}{property} {name}{}: t_relax {}", "group", cell(of.cell), times(&of.times))?;
         }
         match groups.len().saturating_sub(MAX_CELLS) {
             0 => {}
@@ -292,11 +306,23 @@ pub fn place(platform: &Platform) -> String {
     format!("{backend}{adapter}, {precision}")
 }
 
+/// A line for each event of a cell.
+fn events<'a>(spec: &'a Spec, cell: &'a CellStatistics) -> impl Iterator<Item = String> + 'a {
+    let line = |(event, of): (&Event, &EventStatistics)| {
+        let error = of.discretisation.as_ref().filter(|error| error.converges()).map_or(String::new(), |error| {
+            let [mean, half] = [error.mean, error.error].map(|value| rounded(100.0 * value, 2));
+            format!("; discretisation about {mean} % (± {half} %)")
+        });
+        format!("{}: {}{error}", event.name, times(&of.times))
+    };
+    spec.event.iter().zip(&cell.events).map(line)
+}
+
 /// Median and mean of the times of a cell, and how reliable they are.
-fn times(cell: &CellStatistics) -> String {
-    let (members, known) = (cell.members(), cell.sample.events() as u64);
-    let Some(mean) = cell.mean else { return format!("none of {members} {} reached it", plural(members, "member")) };
-    let median = match (cell.median(), cell.bounds()) {
+fn times(of: &TimeStatistics) -> String {
+    let (members, known) = (of.sample.len() as u64, of.sample.events() as u64);
+    let Some(mean) = of.mean else { return format!("none of {members} {} reached it", plural(members, "member")) };
+    let median = match (of.median(), of.bounds()) {
         (None, _) => "not reached by half of the members".to_string(),
         (Some(median), Some((lower, upper))) => {
             format!("{} (95 % interval {} to {})", significant(median), significant(lower), significant(upper))
@@ -334,7 +360,7 @@ fn limit(of: &CellLimits) -> String {
 
 /// What sampling and discretisation do to the median of a cell, and what to do about the larger one.
 fn errors(cell: &CellStatistics, spec: &Spec) -> String {
-    if cell.sample.events() == 0 {
+    if cell.times.sample.events() == 0 {
         return String::new();
     }
     let sampling = cell

@@ -13,20 +13,21 @@ use crate::{
         MeshQuality, PowerLawLine, RelaxationTimes, Scatter, ScatterPanel, ScatterPoint, Series, Setting, Survival,
         SurvivalCurve, Theory,
     },
-    ensemble::{Spec, Status, sweep::SweepAxis, theory},
+    ensemble::{Event, Spec, Status, sweep::SweepAxis, theory},
     error::{Result, shortened},
     files::{names, portraits::Film},
     flow::Flow,
     results::{
-        cells::{CellStatistics, EnsembleStatistics, GroupStatistics, QUANTILES},
+        cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
         comparison::{CellComparison, CellDifference},
         discretisation::DiscretisationError,
         explained::{Explained, ExplainedRow, FeaturedMember, LEAST_MEMBERS, MOST_CENSORED, TIMES, TOGETHER},
         provenance::Provenance,
         scaling::Scaling,
         tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
+        times::{QUANTILES, TimeStatistics},
     },
-    statistics::{HALF_INTERVAL, KaplanMeier, Step},
+    statistics::{HALF_INTERVAL, KaplanMeier, Sample, Step},
     text::{count, p_value, significant},
 };
 
@@ -90,6 +91,7 @@ impl FinishedRun<'_> {
     pub fn charts(&self) -> Result<Vec<Chart>> {
         let mut charts = vec![self.relaxation(), self.survival()];
         charts.extend(self.groups());
+        charts.extend(self.events());
         charts.extend(self.excess()?);
         charts.push(self.rates());
         charts.extend(self.dependence());
@@ -104,8 +106,8 @@ impl FinishedRun<'_> {
         let times = cells.iter().enumerate().map(|(rank, cell)| CellValues {
             label: self.label(cell.cell),
             value: numbers.as_ref().map(|numbers| numbers[rank]),
-            numbers: happened(cell, true).collect(),
-            members: cell.sample.len() as u64,
+            numbers: happened(&cell.times.sample, true).collect(),
+            members: cell.times.sample.len() as u64,
         });
         let others = Status::ALL.iter().enumerate().map(|(rank, status)| {
             let without = self.tally.cells.iter().map(|cell| cell.others[rank]).sum();
@@ -123,11 +125,17 @@ impl FinishedRun<'_> {
     fn survival(&self) -> Chart {
         let numbers = self.numbers();
         let curves = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
-            survival_curve(cell, self.label(cell.cell), numbers.as_ref().map(|numbers| numbers[rank]))
+            let value = numbers.as_ref().map(|numbers| numbers[rank]);
+            survival_curve(self.label(cell.cell), value, &cell.times.sample)
         });
         let (title, key) = ("Members not yet relaxed", self.colour_key());
-        let survival =
-            Survival { title, note: &self.what_and_error(), key: &key, curves: curves.collect(), time: None };
+        let survival = Survival {
+            title,
+            note: &self.what_and_error(),
+            key: &key,
+            curves: curves.collect(),
+            ..Survival::default()
+        };
         chart(names::SURVIVAL, title, SURVIVAL_CAPTION, survival.draw())
     }
 
@@ -136,16 +144,39 @@ impl FinishedRun<'_> {
         let (key, groups) = (self.spec().group_by.as_deref()?, &self.statistics.groups);
         let curves: Vec<SurvivalCurve> = groups
             .iter()
-            .map(|GroupStatistics { group, times }| survival_curve(times, self.group_label(group, times.cell), None))
+            .map(|GroupStatistics { group, times }| {
+                survival_curve(self.group_label(group, times.cell), None, &times.times.sample)
+            })
             .collect();
         let title = format!("Members not yet relaxed, by {key}");
         let note = &self.what_and_error();
-        let svg = (!curves.is_empty()).then(|| Survival { title: &title, note, key, curves, time: None }.draw())?;
+        let svg = (!curves.is_empty())
+            .then(|| Survival { title: &title, note, key, curves, ..Survival::default() }.draw())?;
         Some(chart(names::GROUP_SURVIVAL, &title, SURVIVAL_CAPTION, svg))
     }
 
     fn group_label(&self, group: &str, cell: u64) -> String {
         if self.spec().sweep.is_empty() { group.into() } else { format!("{group}, {}", self.label(cell)) }
+    }
+
+    /// A survival curve for each event of each cell, if there are events.
+    fn events(&self) -> Option<Chart> {
+        let spec = self.spec();
+        let curves = self.statistics.cells.iter().flat_map(|cell| {
+            let label = |event: &Event| match spec.sweep.is_empty() {
+                true => event.name.clone(),
+                false => format!("{}, {}", event.name, spec.sweep.name(cell.cell)),
+            };
+            let events = spec.event.iter().zip(&cell.events);
+            events.map(move |(event, of)| survival_curve(label(event), None, &of.times.sample))
+        });
+        let conditions = spec.event.iter().map(Event::to_string).collect::<Vec<_>>().join("; ");
+        let (title, note) = ("Events", format!("{conditions}; {}", self.what()));
+        let (share, none) = ("share without the event", "There are no members, so there are no events.");
+        let survival = Survival { title, note: &note, key: "event", share, none, curves: curves.collect(), time: None };
+        let caption = "Share of the members in which an event has not happened yet: Kaplan-Meier estimate with Greenwood's \
+                       95 % band; a stroke marks a member that ended before.";
+        (!spec.event.is_empty()).then(|| chart(names::EVENT_SURVIVAL, title, caption, survival.draw()))
     }
 
     /// The mean excess, for as long as all members of a cell are running.
@@ -328,6 +359,7 @@ impl FinishedRun<'_> {
             tables: [self.table()]
                 .into_iter()
                 .chain(self.group_table())
+                .chain(self.event_table())
                 .chain(self.pairs())
                 .chain(self.explanation())
                 .collect(),
@@ -422,7 +454,7 @@ impl FinishedRun<'_> {
                 let bounds =
                     |(low, high)| format!("95 %: {} to {}", significant(low, DIGITS), significant(high, DIGITS));
                 add("median t_relax", cell.median(), cell.bounds().map_or(String::new(), bounds));
-                let mean = cell.mean;
+                let mean = cell.times.mean;
                 let error = mean.and_then(|mean| mean.standard_error);
                 let note = match mean.and_then(|mean| mean.restricted_to) {
                     Some(_) => "a lower bound: some members had not relaxed at the end".into(),
@@ -442,7 +474,7 @@ impl FinishedRun<'_> {
                     };
                     headline.push(Headline { label: "discretisation".into(), value, note });
                 }
-                if let [Some(low), .., Some(high)] = cell.quantiles {
+                if let [Some(low), .., Some(high)] = cell.times.quantiles {
                     let range = format!("{} to {}", significant(low, 3), significant(high, 3));
                     headline.push(Headline { label: "nine in ten".into(), value: range, note: "5 to 95 %".into() });
                 }
@@ -497,6 +529,35 @@ impl FinishedRun<'_> {
             0 => String::new(),
             modes => format!(". The {modes} highest modes of the perturbation are not among the features"),
         }
+    }
+
+    /// The statistics of the events, if there are any.
+    fn event_table(&self) -> Option<PageTable> {
+        let spec = self.spec();
+        let header = ["cell", "event", "condition", "seen", "censored", "mean", "standard error"];
+        let header = header.into_iter().chain(QUANTILES.map(|(_, name, _)| name)).chain(["discretisation %"]);
+        let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
+        let row = |cell: u64, event: &Event, of: &EventStatistics| {
+            let TimeStatistics { sample, mean, quantiles, .. } = &of.times;
+            let least = if mean.is_some_and(|mean| mean.restricted_to.is_some()) { "≥ " } else { "" };
+            let moments = [
+                mean.map_or(String::new(), |mean| format!("{least}{}", significant(mean.value, DIGITS))),
+                mean.and_then(|mean| mean.standard_error).map_or(String::new(), |error| significant(error, 2)),
+            ];
+            let counts = [sample.events(), sample.censored()].map(|count| count.to_string());
+            let percent = of.discretisation.as_ref().map(|error| 100.0 * error.mean);
+            let start = [cell.to_string(), event.name.clone(), event.condition.to_string()].into_iter().chain(counts);
+            start.chain(moments).chain(quantiles.map(shown)).chain([shown(percent)]).collect()
+        };
+        let cells = self.statistics.cells.iter();
+        let rows = cells
+            .flat_map(|cell| spec.event.iter().zip(&cell.events).map(move |(event, of)| row(cell.cell, event, of)));
+        (!spec.event.is_empty()).then(|| PageTable {
+            caption: "Events: members in which they were seen, and the statistics of their times (Kaplan-Meier)".into(),
+            header: header.map(String::from).collect(),
+            rows: rows.collect(),
+            source: names::EVENT_STATISTICS.into(),
+        })
     }
 
     /// The differences from the first cell, if cells share their random numbers.
@@ -586,17 +647,6 @@ impl FinishedRun<'_> {
 const SURVIVAL_CAPTION: &str =
     "Kaplan-Meier estimate with Greenwood's 95 % band; a stroke marks a member that ended before it relaxed.";
 
-/// The Kaplan-Meier curve of a cell or a group.
-fn survival_curve(of: &CellStatistics, label: String, value: Option<f64>) -> SurvivalCurve {
-    let mut curve = SurvivalCurve { label, value, ..SurvivalCurve::default() };
-    for Step { time, survival, variance, .. } in KaplanMeier::new(&of.sample).steps() {
-        let bound = |sign: f64| (survival + sign * HALF_INTERVAL * variance.sqrt()).clamp(0.0, 1.0);
-        curve.add_step(time, survival, (bound(-1.0), bound(1.0)));
-    }
-    happened(of, false).for_each(|t| curve.add_censored(t));
-    curve
-}
-
 /// The statistics of cells or groups as a table of the page, each row after the values of `keys`.
 fn table<'a>(
     caption: &str,
@@ -610,13 +660,13 @@ fn table<'a>(
     let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
     let row = |(values, cell): (&[String], &CellStatistics)| {
         let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
-        let mean = cell.mean;
+        let mean = cell.times.mean;
         let least = if mean.is_some_and(|mean| mean.restricted_to.is_some()) { "≥ " } else { "" };
         let moments = [
             mean.map_or(String::new(), |mean| format!("{least}{}", significant(mean.value, DIGITS))),
             mean.and_then(|mean| mean.standard_error).map_or(String::new(), |error| significant(error, 2)),
         ];
-        let quantiles = cell.quantiles.map(shown);
+        let quantiles = cell.times.quantiles.map(shown);
         let counts = cell.counts.iter().map(u64::to_string);
         let start = [cell.cell.to_string()].into_iter().chain(values.iter().cloned());
         let rates = ["median", "ratio"].map(|name| shown(cell.rates.numbers.get(name)));
@@ -656,9 +706,20 @@ fn explains<'a>(rows: impl Iterator<Item = &'a ExplainedRow>) -> String {
     format!("R² {}, Spearman {}", shown(&r2), shown(&rho))
 }
 
-/// Times at which members of the cell relaxed, or at which they ended without relaxing.
-fn happened(cell: &CellStatistics, happened: bool) -> impl Iterator<Item = f64> + '_ {
-    cell.sample.observations().filter(move |seen| seen.happened == happened).map(|seen| seen.time)
+/// Times at which an event happened in members, or at which they ended without it.
+fn happened(sample: &Sample, happened: bool) -> impl Iterator<Item = f64> + '_ {
+    sample.observations().filter(move |seen| seen.happened == happened).map(|seen| seen.time)
+}
+
+/// The survival curve of some times, with its band.
+fn survival_curve(label: String, value: Option<f64>, sample: &Sample) -> SurvivalCurve {
+    let mut curve = SurvivalCurve { label, value, ..SurvivalCurve::default() };
+    for Step { time, survival, variance, .. } in KaplanMeier::new(sample).steps() {
+        let bound = |sign: f64| (survival + sign * HALF_INTERVAL * variance.sqrt()).clamp(0.0, 1.0);
+        curve.add_step(time, survival, (bound(-1.0), bound(1.0)));
+    }
+    happened(sample, false).for_each(|t| curve.add_censored(t));
+    curve
 }
 
 /// The law by which, in linear theory, the excess of a curve of the members' mean area decreases, through the point
@@ -735,7 +796,7 @@ fn median(cell: &CellStatistics) -> Option<EstimatedNumber> {
 }
 
 fn quartiles(cell: &CellStatistics) -> (Option<f64>, Option<f64>) {
-    let [_, lower, _, upper, _] = cell.quantiles;
+    let [_, lower, _, upper, _] = cell.times.quantiles;
     (lower, upper)
 }
 

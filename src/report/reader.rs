@@ -2,7 +2,7 @@
 //!
 //! Tables are read row by row, and each row is checked against the spec and the rows before it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
@@ -10,11 +10,12 @@ use crate::{
     ensemble::{LevelRow, LevelTimes, Outcome, Spec, theory},
     error::{Error, Result, shortened},
     files::{
-        TableReader,
+        TableReader, TableRow,
         members::MemberReader,
         names::{self, REMEDY},
         place::Place,
         portraits::{self, Film},
+        tables::{EventLevelRow, EventRow},
     },
     input,
     results::{
@@ -133,13 +134,15 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
 /// Those of [`Finished::read`].
 pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     let spec = &provenance.spec;
-    let levels = levels(&Place::named(&folder.join(names::LEVELS)), spec)?;
+    let place = |name: &str| Place::named(&folder.join(name));
+    let has_events = !spec.event.is_empty();
+    let of_events = has_events.then(|| place(names::EVENT_LEVELS));
+    let levels = levels((&place(names::LEVELS), of_events.as_ref()), spec)?;
     expected(folder, names::LEVELS, "rows", provenance.levels, levels.rows())?;
     let mut tally = Tally::of(spec, &levels);
     (tally.mollified, tally.below_rounding) = (provenance.mollified, provenance.below_rounding);
-    for outcome in Summary::open(folder, spec, &levels)? {
-        tally.add(&outcome?)?;
-    }
+    let mut rows = Summary::open(folder, spec, &levels)?;
+    rows.try_for_each(|outcome| tally.add(&outcome?))?;
     let summary = |what: &str, told: u64, found: u64| expected(folder, names::SUMMARY, what, told, found);
     summary("rows", provenance.members, tally.members())?;
     for (status, count) in by_status(&tally) {
@@ -147,35 +150,41 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
         summary(&format!("{status} members"), told, count)?;
     }
     summary("steps", provenance.steps, tally.steps)?;
+    rows.end()?;
     Ok(tally)
 }
 
-/// Reads the times at the levels of a run of `spec`.
+/// Reads the times at the levels of a run of `spec`: the place of its rows, and that of those of its events.
 ///
 /// # Errors
 /// [`Error::Request`] for rows that are not of such a run.
-pub fn levels(place: &Place, spec: &Spec) -> Result<LevelTimes> {
+pub fn levels((place, of_events): (&Place, Option<&Place>), spec: &Spec) -> Result<LevelTimes> {
     let (mut table, mut levels) = (TableReader::<LevelRow>::open(place)?, LevelTimes::default());
-    while let Some((row, fields)) = table.read()? {
+    let mut events = of_events.map(|place| EventTimes::<EventLevelRow>::open(place, spec)).transpose()?;
+    while let Some((mut row, fields)) = table.read()? {
         let LevelRow { member, cell, .. } = row;
         if member >= spec.all_members() || cell != member / spec.members_per_cell() {
             let problem = format!("the cell of a member below {}", spec.all_members());
             return Err(fields.unexpected_in("cell", &problem));
         }
+        if let Some(events) = &mut events {
+            row.events = events.next((member, row.level), |_| true)?;
+        }
         levels.add(&row).map_err(|expected| fields.unexpected_in("level", &expected))?;
     }
+    events.as_mut().map_or(Ok(()), EventTimes::end)?;
     Ok(levels)
 }
 
-/// Adds up the rows of a resumed run with those of its levels, and `aside`.
+/// Adds up the rows of a resumed run, and those of its events, with those of its levels, and `aside`.
 ///
 /// # Errors
 /// [`Error::Request`] for rows that are not of a run of `spec`.
-pub fn rows(place: &Place, spec: &Spec, levels: &LevelTimes, aside: Aside) -> Result<Tally> {
+pub fn rows(place: (&Place, Option<&Place>), spec: &Spec, levels: &LevelTimes, aside: Aside) -> Result<Tally> {
     let mut tally = Tally::of(spec, levels);
-    for outcome in Summary::of(place, spec, levels)? {
-        tally.add(&outcome?)?;
-    }
+    let mut rows = Summary::of(place, spec, levels)?;
+    rows.try_for_each(|outcome| tally.add(&outcome?))?;
+    rows.end()?;
     tally.set_aside(aside);
     Ok(tally)
 }
@@ -193,6 +202,8 @@ fn expected(folder: &Path, name: &str, what: &str, expected: u64, found: u64) ->
 pub struct Summary<'a> {
     levels: &'a LevelTimes,
     table: TableReader<Outcome>,
+    /// Those of their events.
+    events: Option<EventTimes<EventRow>>,
     last: Option<u64>,
     spec: Spec,
     /// The last cell and its spec.
@@ -205,11 +216,19 @@ impl<'a> Summary<'a> {
     /// # Errors
     /// [`Error::Request`] if it does not exist, has other columns, or is truncated.
     pub fn open(folder: &Path, spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
-        Summary::of(&Place::named(&folder.join(names::SUMMARY)), spec, levels)
+        let place = |name: &str| Place::named(&folder.join(name));
+        let events = (!spec.event.is_empty()).then(|| place(names::EVENTS));
+        Summary::of((&place(names::SUMMARY), events.as_ref()), spec, levels)
     }
 
-    fn of(place: &Place, spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
-        Ok(Summary { levels, table: TableReader::open(place)?, last: None, spec: spec.clone(), spec_of: None })
+    fn of((place, events): (&Place, Option<&Place>), spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
+        let events = events.map(|place| EventTimes::open(place, spec)).transpose()?;
+        Ok(Summary { levels, table: TableReader::open(place)?, events, last: None, spec: spec.clone(), spec_of: None })
+    }
+
+    /// Checks that there are no events of further members.
+    fn end(mut self) -> Result<()> {
+        self.events.as_mut().map_or(Ok(()), EventTimes::end)
     }
 
     fn read(&mut self) -> Result<Option<Outcome>> {
@@ -234,6 +253,11 @@ impl<'a> Summary<'a> {
         if outcome.t_relax.is_some_and(|t| t > t_end * (1.0 + LATE)) {
             return Err(fields.unexpected_in("t_relax", &format!("a time up to {t_end}, the end of the run")));
         }
+        if let Some(events) = &mut self.events {
+            let end = outcome.t_end;
+            outcome.events =
+                events.next((member, 0), |row| if row.censored == 0 { row.t <= end } else { row.t == end })?;
+        }
         // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
         outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| {
             let values = spec.values_of(member, cell).ok()?;
@@ -248,6 +272,91 @@ impl<'a> Summary<'a> {
             return Err(fields.unexpected_in("t_limit", &format!("{limit}, as {file} has it")));
         }
         Ok(Some(outcome))
+    }
+}
+
+/// A row of a table of events.
+trait EventTime: TableRow + Default {
+    /// Its member and level, 0 if it has none.
+    fn of(&self) -> (u64, u64);
+    /// Its event.
+    fn event(&self) -> &str;
+    /// When that happened.
+    fn time(&self) -> Option<f64>;
+}
+
+impl EventTime for EventRow {
+    fn of(&self) -> (u64, u64) {
+        (self.member, 0)
+    }
+
+    fn event(&self) -> &str {
+        &self.event
+    }
+
+    fn time(&self) -> Option<f64> {
+        (self.censored == 0).then_some(self.t)
+    }
+}
+
+impl EventTime for EventLevelRow {
+    fn of(&self) -> (u64, u64) {
+        (self.member, self.level)
+    }
+
+    fn event(&self) -> &str {
+        &self.event
+    }
+
+    fn time(&self) -> Option<f64> {
+        self.t
+    }
+}
+
+/// A table of events, read along with that of the members.
+struct EventTimes<R> {
+    path: PathBuf,
+    table: TableReader<R>,
+    names: Vec<String>,
+}
+
+impl<R: EventTime> EventTimes<R> {
+    fn open(place: &Place, spec: &Spec) -> Result<EventTimes<R>> {
+        let names = spec.event.iter().map(|event| event.name.clone()).collect();
+        Ok(EventTimes { path: place.shown().to_path_buf(), table: TableReader::open(place)?, names })
+    }
+
+    /// The times of the events of the next member, which must be that of `place` and of which all rows must `fit`.
+    fn next(&mut self, place: (u64, u64), fits: impl Fn(&R) -> bool) -> Result<Vec<Option<f64>>> {
+        let mut times = Vec::with_capacity(self.names.len());
+        for name in &self.names {
+            let Some((row, fields)) = self.table.read()? else {
+                let (path, member) = (self.path.display(), place.0);
+                let problem = format!("expected the events of member {member}, found the end of the file");
+                return Err(Error::Request(format!("{path}: {problem}; {REMEDY}")));
+            };
+            if row.of() != place {
+                return Err(fields.unexpected_in("member", &format!("member {}, as the other table has it", place.0)));
+            }
+            if row.event() != name {
+                return Err(fields.unexpected_in("event", name));
+            }
+            if !fits(&row) {
+                return Err(
+                    fields.unexpected_in("t", "a time up to the end of the member, or that end if censored is 1")
+                );
+            }
+            times.push(row.time());
+        }
+        Ok(times)
+    }
+
+    /// Checks that there are no more rows.
+    fn end(&mut self) -> Result<()> {
+        match self.table.read()? {
+            None => Ok(()),
+            Some((_, fields)) => Err(fields.unexpected_in("member", "the end of the file")),
+        }
     }
 }
 

@@ -5,29 +5,19 @@
 
 use std::mem;
 
-use csv::WriterBuilder;
-use serde::{Serialize, Serializer, ser::SerializeMap};
-
 use super::{
     comparison::CellComparison,
     discretisation::{CellLimits, DiscretisationError},
     scaling::{CellMedian, Scaling},
-    tally::{CellTally, Rate, Tally},
+    tally::{CellTally, EventTally, Rate, Tally},
+    times::{Numbers, QUANTILES, Statistic, TimeStatistics, places},
 };
 use crate::{
     ensemble::{Spec, Status},
     error::{Error, Result},
-    statistics::{Bootstrap, Description, Interval, KaplanMeier, Mean, Sample},
+    statistics::{Bootstrap, Description, Mean, Sample},
 };
-
-/// Fractions of the members whose times are in the table, with the names and meanings of the columns.
-pub const QUANTILES: [(f64, &str, &str); 5] = [
-    (0.05, "q05", "5 % quantile"),
-    (0.25, "q25", "25 % quantile"),
-    (0.5, "median", "median"),
-    (0.75, "q75", "75 % quantile"),
-    (0.95, "q95", "95 % quantile"),
-];
+use csv::WriterBuilder;
 
 /// Relaxation times of one cell.
 pub struct CellStatistics {
@@ -37,20 +27,24 @@ pub struct CellStatistics {
     pub values: Vec<String>,
     /// Members, by status.
     pub counts: [u64; Status::ALL.len()],
-    /// The times, sorted.
-    pub sample: Sample,
-    /// Mean time, restricted if the last member is censored.
-    pub mean: Option<Mean>,
-    /// Times by which each [fraction](QUANTILES) of the members has relaxed.
-    pub quantiles: [Option<f64>; QUANTILES.len()],
-    /// 95 % interval of the median.
-    pub interval: Option<Interval>,
+    /// The relaxation times.
+    pub times: TimeStatistics,
     /// Decay rates.
     pub rates: Rates,
     /// The error of discretisation, if it is known of some members.
     pub discretisation: Option<DiscretisationError>,
     /// The limits, if members have them.
     pub limits: Option<CellLimits>,
+    /// The events of the spec, in their order.
+    pub events: Vec<EventStatistics>,
+}
+
+/// An event in one cell.
+pub struct EventStatistics {
+    /// Its times.
+    pub times: TimeStatistics,
+    /// Their error of discretisation, if it is known of some members.
+    pub discretisation: Option<DiscretisationError>,
 }
 
 /// Fitted decay rates of the members of one cell that have one: complete data.
@@ -83,26 +77,6 @@ impl Rates {
     }
 }
 
-/// The numbers in `ensemble.csv` on one quantity of a cell, in the order and with the names of its columns.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Numbers {
-    /// Members with a known quantity.
-    pub known: usize,
-    /// All other numbers.
-    pub named: Vec<Statistic>,
-}
-
-/// A number of a cell.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Statistic {
-    /// Its column, without the quantity.
-    pub name: &'static str,
-    /// The number, if known.
-    pub value: Option<f64>,
-    /// What it means.
-    pub meaning: &'static str,
-}
-
 /// A column of `ensemble.csv`.
 pub struct CellColumn {
     /// The heading.
@@ -111,33 +85,6 @@ pub struct CellColumn {
     pub holds: &'static str,
     /// What it means.
     pub meaning: String,
-}
-
-impl Numbers {
-    /// Returns the number called `name`, if known.
-    pub fn get(&self, name: &str) -> Option<f64> {
-        self.named.iter().find(|statistic| statistic.name == name).and_then(|statistic| statistic.value)
-    }
-}
-
-impl Serialize for Numbers {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(1 + self.named.len()))?;
-        map.serialize_entry("known", &self.known)?;
-        self.named.iter().try_for_each(|Statistic { name, value, .. }| map.serialize_entry(name, value))?;
-        map.end()
-    }
-}
-
-/// Quantiles, and the interval of the median.
-fn places(quantiles: [Option<f64>; QUANTILES.len()], interval: Option<Interval>) -> impl Iterator<Item = Statistic> {
-    let [lower, upper] = interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
-    let ends = [
-        Statistic { name: "median_low", value: lower, meaning: "lower end of the 95 % interval of the median" },
-        Statistic { name: "median_high", value: upper, meaning: "upper end of the 95 % interval of the median" },
-    ];
-    let quantiles = QUANTILES.into_iter().zip(quantiles);
-    quantiles.map(|((_, name, meaning), value)| Statistic { name, value, meaning }).chain(ends)
 }
 
 /// Relaxation times of the outlines of one group in a cell.
@@ -169,20 +116,22 @@ pub struct EnsembleStatistics {
 impl CellStatistics {
     /// Moves times and rates out of `tally`.
     fn new(spec: &Spec, cell: u64, tally: &mut CellTally, relative: bool) -> Result<CellStatistics> {
-        let sample = Sample::from(mem::take(&mut tally.times));
-        let survival = KaplanMeier::new(&sample);
         let bootstrap = Bootstrap { seed: spec.seed.wrapping_add(cell), ..Bootstrap::default() };
-        let (mean, interval) = (survival.mean(), bootstrap.median(&sample));
-        // The usual median, also of an even number.
-        let quantile = |share| if share == 0.5 { survival.median() } else { survival.quantile(share) };
-        let quantiles = QUANTILES.map(|(share, ..)| quantile(share));
+        let times = TimeStatistics::new(mem::take(&mut tally.times), &bootstrap);
         let (values, counts) = (spec.sweep.labels(cell), tally.counts);
         let rates = Rates::new(&bootstrap, &mem::take(&mut tally.rates), relative)?;
         let (judged, copies) =
             (mem::take(&mut tally.judged), !spec.has_different_members() && !spec.sweep.has("amplitude"));
         let discretisation = DiscretisationError::of(&judged)?;
         let limits = CellLimits::of(&Sample::from(mem::take(&mut tally.limits)), &judged, &bootstrap, copies)?;
-        Ok(CellStatistics { cell, values, counts, sample, mean, quantiles, interval, rates, discretisation, limits })
+        let mut of_events = mem::take(&mut tally.events).into_iter();
+        let events = spec.event.iter().map(|_| {
+            let EventTally { times, judged } = of_events.next().unwrap_or_default();
+            let discretisation = DiscretisationError::of(&judged)?;
+            Ok(EventStatistics { times: TimeStatistics::new(times, &bootstrap), discretisation })
+        });
+        let events = events.collect::<Result<_>>()?;
+        Ok(CellStatistics { cell, values, counts, times, rates, discretisation, limits, events })
     }
 
     /// Number of members that ended.
@@ -190,32 +139,9 @@ impl CellStatistics {
         self.counts.iter().sum()
     }
 
-    /// The numbers on the times, for the table.
-    pub fn times(&self) -> Numbers {
-        let of = |number: fn(Mean) -> Option<f64>| self.mean.and_then(number);
-        let (mean, sd) = (of(|mean| Some(mean.value)), of(|mean| mean.standard_deviation));
-        let (se, restricted_to) = (of(|mean| mean.standard_error), of(|mean| mean.restricted_to));
-        let restricted =
-            "time to which the mean is restricted, a lower bound then, since the last members are censored";
-        let moments = [
-            Statistic { name: "mean", value: mean, meaning: "mean, by Kaplan–Meier" },
-            Statistic { name: "sd", value: sd, meaning: "standard deviation" },
-            Statistic { name: "se", value: se, meaning: "standard error of the mean" },
-            Statistic { name: "restricted_to", value: restricted_to, meaning: restricted },
-        ];
-        let places = places(self.quantiles, self.interval);
-        Numbers { known: self.sample.events(), named: moments.into_iter().chain(places).collect() }
-    }
-
     /// The numbers on the error of discretisation, for the table.
     pub fn errors(&self) -> Numbers {
-        let of = |number: fn(&DiscretisationError) -> f64| self.discretisation.as_ref().map(number);
-        let mean = "relative error of t_relax that n and the steps leave, negative if it is too early: mean of these";
-        let named = vec![
-            Statistic { name: "mean", value: of(|of| of.mean), meaning: mean },
-            Statistic { name: "error", value: of(|of| of.error), meaning: "half-width of its 95 % interval" },
-        ];
-        Numbers { known: self.discretisation.as_ref().map_or(0, |of| of.members), named }
+        errors(self.discretisation.as_ref(), OF_T_RELAX)
     }
 
     /// The numbers on the limits, for the table.
@@ -239,14 +165,13 @@ impl CellStatistics {
 
     /// The quantities in the table, with their numbers.
     fn quantities(&self) -> [(&'static str, Numbers); 4] {
-        let (times, rates) = (self.times(), self.rates.numbers.clone());
+        let (times, rates) = (self.times.numbers(), self.rates.numbers.clone());
         [("t_relax", times), ("rate", rates), ("discretisation", self.errors()), ("t_limit", self.limit())]
     }
 
     /// Time by which half of the members have relaxed.
     pub fn median(&self) -> Option<f64> {
-        let [_, _, median, ..] = self.quantiles;
-        median
+        self.times.median()
     }
 
     /// The median with its interval, that of the limits if they are asked for.
@@ -259,14 +184,37 @@ impl CellStatistics {
 
     /// Whether all its members relaxed at one time, as copies of one curve do.
     pub fn has_copies(&self) -> bool {
-        let mut seen = self.sample.observations();
+        let mut seen = self.times.sample.observations();
         seen.next().is_some_and(|first| first.happened && seen.all(|other| other == first))
     }
 
     /// The interval of the median, if both its ends are known.
     pub fn bounds(&self) -> Option<(f64, f64)> {
-        self.interval.and_then(|Interval { lower, upper, .. }| Some((lower?, upper?)))
+        self.times.bounds()
     }
+}
+
+impl EventStatistics {
+    /// The numbers on its error of discretisation, for the table.
+    pub fn errors(&self) -> Numbers {
+        errors(self.discretisation.as_ref(), OF_EVENT)
+    }
+}
+
+/// What the mean error of discretisation of a time means.
+const OF_T_RELAX: &str =
+    "relative error of t_relax that n and the steps leave, negative if it is too early: mean of these";
+const OF_EVENT: &str =
+    "relative error of the time that n and the steps leave, negative if it is too early: mean of these";
+
+/// The numbers on an error of discretisation.
+fn errors(of: Option<&DiscretisationError>, mean: &'static str) -> Numbers {
+    let number = |number: fn(&DiscretisationError) -> f64| of.map(number);
+    let named = vec![
+        Statistic { name: "mean", value: number(|of| of.mean), meaning: mean },
+        Statistic { name: "error", value: number(|of| of.error), meaning: "half-width of its 95 % interval" },
+    ];
+    Numbers { known: of.map_or(0, |of| of.members), named }
 }
 
 impl EnsembleStatistics {
@@ -284,7 +232,7 @@ impl EnsembleStatistics {
                 CellStatistics::new(spec, cell, of_cell, relative)
             })
             .collect::<Result<Vec<_>>>()?;
-        let samples: Vec<&Sample> = cells.iter().map(|cell| &cell.sample).collect();
+        let samples: Vec<&Sample> = cells.iter().map(|cell| &cell.times.sample).collect();
         let comparison = match paired {
             Some(paired) => paired,
             None => CellComparison::independent(spec, &samples)?,
@@ -301,7 +249,7 @@ impl EnsembleStatistics {
         });
         let groups: Vec<GroupStatistics> = groups.collect::<Result<_>>()?;
         let group_comparisons = groups.chunk_by(|one, other| one.times.cell == other.times.cell).map(|of_cell| {
-            let samples: Vec<&Sample> = of_cell.iter().map(|group| &group.times.sample).collect();
+            let samples: Vec<&Sample> = of_cell.iter().map(|group| &group.times.times.sample).collect();
             CellComparison::of_groups(&samples, &of_cell.iter().map(|group| &*group.group).collect::<Vec<_>>())
         });
         let group_comparisons = group_comparisons.collect();
@@ -343,6 +291,43 @@ impl EnsembleStatistics {
         all.push(column("members".into(), "integer", "members that ended".into()));
         all.extend(statuses.chain(numbers));
         all
+    }
+
+    /// The columns of `event_statistics.csv`.
+    pub fn event_columns(&self) -> Vec<CellColumn> {
+        let column =
+            |name: &str, holds, meaning: &str| CellColumn { name: name.into(), holds, meaning: meaning.into() };
+        let mut all = vec![
+            column("cell", "integer", "index of the cell, from 0"),
+            column("event", "word", "name of the event"),
+            column("members", "integer", "members that ended"),
+            column("known", "integer", "members of which the event was seen"),
+        ];
+        let some = self.cells.iter().flat_map(|cell| &cell.events).next();
+        let named = |numbers: Option<Numbers>| numbers.map_or(Vec::new(), |numbers| numbers.named);
+        let (times, errors) = (named(some.map(|of| of.times.numbers())), named(some.map(EventStatistics::errors)));
+        all.extend(times.iter().map(|of| column(of.name, "float", of.meaning)));
+        all.push(column("discretisation_known", "integer", "members of which that is known"));
+        all.extend(errors.iter().map(|of| column(&format!("discretisation_{}", of.name), "float", of.meaning)));
+        all
+    }
+
+    /// The text of `event_statistics.csv`: the events of each cell, in the order of the spec.
+    pub fn events_to_csv(&self, spec: &Spec) -> Result<String> {
+        let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write event_statistics.csv: {e}"));
+        let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+        writer.write_record(self.event_columns().into_iter().map(|column| column.name)).map_err(|e| failed(&e))?;
+        for (cell, (event, of)) in
+            self.cells.iter().flat_map(|cell| spec.event.iter().zip(&cell.events).map(move |of| (cell, of)))
+        {
+            let values = |of: Numbers| of.named.into_iter().map(|number| number.value).collect::<Vec<_>>();
+            let (times, errors) = (of.times.numbers(), of.errors());
+            let (known, judged) = (times.known, errors.known);
+            let row = (cell.cell, &event.name, of.times.sample.len(), known, values(times), judged, values(errors));
+            writer.serialize(row).map_err(|e| failed(&e))?;
+        }
+        let bytes = writer.into_inner().map_err(|e| failed(&e))?;
+        String::from_utf8(bytes).map_err(|e| failed(&e))
     }
 
     /// The text of `ensemble.csv`.

@@ -7,6 +7,7 @@ pub mod explained;
 pub mod provenance;
 pub mod scaling;
 pub mod tally;
+pub mod times;
 
 pub use cells::EnsembleStatistics;
 pub use comparison::CellComparison;

@@ -27,6 +27,10 @@ pub struct Tally {
     pub sweeps_k: u64,
     /// Total sweeps on position systems.
     pub sweeps_x: u64,
+    /// Names of the events of the spec.
+    pub events: Vec<String>,
+    /// For each of them, the members in which it holds from the start.
+    pub at_start: Vec<u64>,
     /// Whether members are to have limits.
     pub refined: bool,
     /// Rows of the levels.
@@ -84,11 +88,22 @@ pub struct CellTally {
     pub limits: Observations,
     /// What the levels tell of the members that ran at them.
     pub judged: Vec<Limit>,
+    /// By event, in the order of the spec.
+    pub events: Vec<EventTally>,
+}
+
+/// Totals over the members of one cell, for one event.
+#[derive(Clone, Debug, Default)]
+pub struct EventTally {
+    /// Times at which it happened, or up to which it had not.
+    pub times: Observations,
+    /// What the levels tell of these times, for the members that ran at them.
+    pub judged: Vec<Limit>,
 }
 
 impl CellTally {
     fn add(&mut self, outcome: &Outcome, refined: bool) -> Result<()> {
-        let CellTally { counts, times, others, area, rates, limits, judged, .. } = self;
+        let CellTally { counts, times, others, area, rates, limits, judged, events, .. } = self;
         times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
         if refined {
             // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
@@ -96,6 +111,11 @@ impl CellTally {
             limits.push(Observation::new(outcome.t_limit, end))?;
         }
         judged.extend(outcome.judged);
+        events.resize_with(outcome.events.len().max(events.len()), EventTally::default);
+        for (i, (own, t)) in events.iter_mut().zip(&outcome.events).enumerate() {
+            own.times.push(Observation::new(*t, outcome.t_end))?;
+            own.judged.extend(outcome.judged_events.get(i).copied().flatten());
+        }
         *area += outcome.start.area.abs();
         rates.extend(outcome.rate.map(|fitted| Rate { fitted, theory: outcome.rate_theory.unwrap_or(f64::NAN) }));
         for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
@@ -248,7 +268,9 @@ impl MollifiedMembers {
 impl Tally {
     /// That of a run of `spec` before its members, after these times at its levels.
     pub fn of(spec: &Spec, levels: &LevelTimes) -> Tally {
-        Tally { refined: spec.refine, levels: levels.rows(), ..Tally::default() }
+        let events: Vec<String> = spec.event.iter().map(|event| event.name.clone()).collect();
+        let at_start = vec![0; events.len()];
+        Tally { refined: spec.refine, levels: levels.rows(), events, at_start, ..Tally::default() }
     }
 
     /// Adds a member.
@@ -264,6 +286,7 @@ impl Tally {
         if !outcome.group.is_empty() {
             self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, refined)?;
         }
+        self.at_start.iter_mut().zip(&outcome.events).for_each(|(count, t)| *count += u64::from(*t == Some(0.0)));
         self.mesh_ratios.push(outcome.end.mesh_ratio as f32);
         self.metric_drifts.push(outcome.end.metric_drift as f32);
         let drift = outcome.end.metric_drift;
@@ -354,6 +377,10 @@ impl Tally {
                 judged().count(),
                 plural(judged().count() as u64, "member")
             ));
+        }
+        for (name, at_start) in self.events.iter().zip(&self.at_start).filter(|(_, at_start)| **at_start > 0) {
+            warnings
+                .push(format!("the event {name} holds from the start in {at_start} of {members}: its time is 0 there"));
         }
         let (drifted, worst) = self.drifted;
         if drifted > 0 {

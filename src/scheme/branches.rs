@@ -17,6 +17,8 @@ pub struct Branches {
     pub redistributed: bool,
     /// k and r are pulled towards the polygon's own.
     pub pulled: bool,
+    /// It pauses where an observable reaches a level.
+    pub watched: bool,
     /// Degree of `b(k)`.
     pub degree: usize,
 }
@@ -31,6 +33,7 @@ impl<T: Real> Parameters<T> {
             adaptive: positive(self.adaptive),
             redistributed: T::of(0.5).le(self.redistribution),
             pulled: positive(self.pull),
+            watched: T::of(0.5).le(self.watched),
             degree: highest.map_or(0, |j| j + 1),
         }
     }
@@ -49,12 +52,13 @@ mod tests {
             p.branches()
         };
         let paper = branches("surface-diffusion", |_| {});
-        assert_eq!(paper, Branches { adaptive: false, redistributed: true, pulled: false, degree: 0 });
+        assert_eq!(paper, Branches { adaptive: false, redistributed: true, pulled: false, watched: false, degree: 0 });
         let adaptive = branches("surface-diffusion", |p| p.adaptive = 1e-3);
         assert_eq!(adaptive, Branches { adaptive: true, ..paper });
         let free = branches("surface-diffusion", |p| p.redistribution = 0.0);
         assert_eq!(free, Branches { redistributed: false, ..paper });
         assert_eq!(branches("surface-diffusion", |p| p.pull = 2.0), Branches { pulled: true, ..paper });
+        assert_eq!(branches("surface-diffusion", |p| p.watched = 1.0), Branches { watched: true, ..paper });
         assert_eq!(branches("poly:0,-1,0,-0.0", |_| {}), Branches { degree: 2, ..paper });
         assert_eq!(branches("willmore", |_| {}), Branches { degree: 3, ..paper });
     }

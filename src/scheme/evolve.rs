@@ -96,7 +96,7 @@ pub fn evolve_abreast<N: Number, S: Solves>(group: Group<N::Real>, method: &Meth
     let enough = running.div_ceil(2);
     for made in 1..=attempts {
         let attempt = team.attempt::<S>(runs, live, branches, method);
-        team.conclude::<S>(runs, live, adaptive, method.most_order, &attempt);
+        team.conclude::<S>(runs, live, branches, method.most_order, &attempt);
         let all_leave = made == attempts || runs.iter().filter(|run| run.counters.is_running()).count() < enough;
         for lane in 0..runs.len() {
             if live.lane(lane) && (all_leave || !runs[lane].counters.is_running()) {
@@ -275,11 +275,12 @@ impl<N: Number> Team<N> {
         &mut self,
         runs: &mut [&mut Run<N::Real>],
         live: N::Mask,
-        adaptive: bool,
+        branches: Branches,
         most_order: u32,
         attempt: &Attempt<N>,
     ) {
-        let n = self.work.blocks.n;
+        let (n, adaptive) = (self.work.blocks.n, branches.adaptive);
+        let at_level = if branches.watched { self.at_level() } else { N::Mask::all_of(false) };
         let gap = self.gap_at_threshold(runs, live, attempt.excess);
         let (finite, singular) =
             (attempt.seen.is_finite(), attempt.seen.is_singular(self.turning, &self.parameters, n));
@@ -321,6 +322,9 @@ impl<N: Number> Team<N> {
                     lengthen(run, stride, errors, decline, allowed);
                 }
                 accepted(run, taken.after, &attempt.seen, lane, adaptive);
+                if at_level.lane(lane) {
+                    run.counters.goal = run.counters.steps;
+                }
             }
         }
         if S::FACTS.sweeps && !adaptive {
@@ -339,6 +343,14 @@ impl<N: Number> Team<N> {
         }
         let at_threshold = excess.le(self.parameters.relax_at).and(live).and(waiting);
         if at_threshold.any() { observe::gap(&self.work.new) } else { N::of(0.0) }
+    }
+
+    /// Where an observable of the new curves has reached a level at which the member pauses.
+    #[inline(always)]
+    fn at_level(&self) -> N::Mask {
+        let Team { parameters, work, .. } = self;
+        let sums = observe::sums(&work.new, parameters, work.blocks);
+        observe::reaches_level(&observe::observed(&sums, &observe::maxima(&work.new), parameters), parameters)
     }
 
     /// Accepts the new curves, except in the lanes that keep theirs.

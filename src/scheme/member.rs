@@ -115,6 +115,40 @@ numbers! {
         fit_to,
         /// The time `growth` if the excess falls as a power of `growth + t`; 0 if it falls exponentially.
         growth,
+        /// 1: the member pauses where an observable is at or below its `low_` level, or at or above its `high_` one.
+        watched,
+        /// Length at or below which the member pauses.
+        low_length,
+        /// Area at or below which the member pauses.
+        low_area,
+        /// Excess at or below which the member pauses.
+        low_excess,
+        /// Energy at or below which the member pauses.
+        low_energy,
+        /// Smallest curvature at or below which the member pauses.
+        low_k_min,
+        /// Largest curvature at or below which the member pauses.
+        low_k_max,
+        /// Mesh ratio at or below which the member pauses.
+        low_mesh_ratio,
+        /// Metric drift at or below which the member pauses.
+        low_metric_drift,
+        /// Length at or above which it does.
+        high_length,
+        /// Area at or above which it does.
+        high_area,
+        /// Excess at or above which it does.
+        high_excess,
+        /// Energy at or above which it does.
+        high_energy,
+        /// Smallest curvature at or above which it does.
+        high_k_min,
+        /// Largest curvature at or above which it does.
+        high_k_max,
+        /// Mesh ratio at or above which it does.
+        high_mesh_ratio,
+        /// Metric drift at or above which it does.
+        high_metric_drift,
     }
 }
 
@@ -285,6 +319,20 @@ impl Parameters<f64> {
             time_tick: 1.0,
             ..Parameters::default()
         }
+    }
+}
+
+impl<T: Copy> Parameters<T> {
+    /// Sets the levels at which the member pauses if it is watched.
+    pub fn set_levels(&mut self, low: &Observed<T>, high: &Observed<T>) {
+        (self.low_length, self.high_length) = (low.length, high.length);
+        (self.low_area, self.high_area) = (low.area, high.area);
+        (self.low_excess, self.high_excess) = (low.excess, high.excess);
+        (self.low_energy, self.high_energy) = (low.energy, high.energy);
+        (self.low_k_min, self.high_k_min) = (low.k_min, high.k_min);
+        (self.low_k_max, self.high_k_max) = (low.k_max, high.k_max);
+        (self.low_mesh_ratio, self.high_mesh_ratio) = (low.mesh_ratio, high.mesh_ratio);
+        (self.low_metric_drift, self.high_metric_drift) = (low.metric_drift, high.metric_drift);
     }
 }
 

@@ -129,6 +129,7 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> C
 }
 
 /// Computes the maxima over the ring.
+#[inline(always)]
 pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
     let low = N::of(-2.0 * BIG);
     let mut m = Maxima { drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
@@ -217,7 +218,8 @@ pub fn observe<T: Real>(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> 
 }
 
 /// Derives the observables from the sums and maxima of a curve.
-pub fn observed<T: Real>(sums: &CurveSums<T>, maxima: &Maxima<T>, p: &Parameters<T>) -> Observed<T> {
+#[inline(always)]
+pub fn observed<N: Number>(sums: &CurveSums<N>, maxima: &Maxima<N>, p: &Parameters<N>) -> Observed<N> {
     Observed {
         length: sums.length,
         area: sums.area,
@@ -228,4 +230,15 @@ pub fn observed<T: Real>(sums: &CurveSums<T>, maxima: &Maxima<T>, p: &Parameters
         mesh_ratio: maxima.longest / -maxima.minus_shortest,
         metric_drift: maxima.drift,
     }
+}
+
+/// Whether an observable has reached a level at which the member pauses.
+#[inline(always)]
+pub fn reaches_level<N: Number>(at: &Observed<N>, p: &Parameters<N>) -> N::Mask {
+    let fell = at.length.le(p.low_length).or(at.area.le(p.low_area)).or(at.excess.le(p.low_excess));
+    let fell = fell.or(at.energy.le(p.low_energy)).or(at.k_min.le(p.low_k_min)).or(at.k_max.le(p.low_k_max));
+    let fell = fell.or(at.mesh_ratio.le(p.low_mesh_ratio)).or(at.metric_drift.le(p.low_metric_drift));
+    let rose = p.high_length.le(at.length).or(p.high_area.le(at.area)).or(p.high_excess.le(at.excess));
+    let rose = rose.or(p.high_energy.le(at.energy)).or(p.high_k_min.le(at.k_min)).or(p.high_k_max.le(at.k_max));
+    fell.or(rose).or(p.high_mesh_ratio.le(at.mesh_ratio)).or(p.high_metric_drift.le(at.metric_drift))
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{Course, ROUND, Time, Trajectory};
+use super::{Course, Time, Trajectory, watch::ROUND};
 use crate::{
     ensemble::{Ended, Features, Observables, Outcome, Portrait, Status},
     scheme::{
@@ -86,6 +86,7 @@ impl Trajectory<'_> {
             solves: self.counters.solves.into(),
             label: std::mem::take(&mut self.member.label),
             group: std::mem::take(&mut self.member.group),
+            events: self.watches.iter().map(|watch| watch.t).collect(),
             ..Outcome::default()
         };
         Ended {

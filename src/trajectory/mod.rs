@@ -6,10 +6,14 @@
 //! user's, inside those of unit mobility.
 
 mod end;
+mod events;
 mod outputs;
 mod start;
+mod watch;
 
 use glam::DVec2;
+
+use watch::{Watch, aim_at_levels};
 
 use crate::{
     ensemble::{Member, Observables, Paused, Rows, Status},
@@ -23,8 +27,6 @@ use crate::{
     },
 };
 
-/// Excess below which a curve is a regular polygon up to rounding: such a member is relaxed at time 0.
-const ROUND: f64 = 1e-13;
 /// The fourth power of the shortest segment is the fastest time scale there is, and a clock must be able to count this
 /// multiple of it.
 const FASTEST: f64 = 0.1;
@@ -91,6 +93,8 @@ pub struct Trajectory<'a> {
     course: Course,
     /// When the polygon was first seen to cross itself.
     crossed: Option<f64>,
+    /// The events of its spec, in their order.
+    watches: Vec<Watch>,
     portrait: bool,
 }
 
@@ -117,6 +121,7 @@ impl Trajectory<'_> {
             rows: self.rows.clone(),
             frames: self.frames.clone(),
             crossed: self.crossed,
+            events: self.watches.iter().map(|watch| watch.t).collect(),
             look_at: self.launch.parameters.look_at,
         }
     }
@@ -126,18 +131,22 @@ impl Trajectory<'_> {
     /// # Errors
     /// [`Error::Request`] if a different member was paused.
     pub fn resume_from(&mut self, paused: Paused) -> Result<()> {
-        let Paused { counters, report, state, sweeps, served, rows, frames, crossed, look_at } = paused;
+        let Paused { counters, report, state, sweeps, served, rows, frames, crossed, events, look_at } = paused;
         let (index, numbers) = (self.member.index, STATE_FIELDS * self.member.nodes.len());
         let served = usize::try_from(served).unwrap_or(usize::MAX);
-        if state.len() != numbers || served > self.outputs.len() || counters.status != 0 {
+        let others = events.len() != self.watches.len();
+        if state.len() != numbers || served > self.outputs.len() || counters.status != 0 || others {
             return Err(Error::Request(format!(
                 "member {index} in the state is not that of the spec: {} numbers of {numbers}, {served} output times of \
-                 {}, status {}",
+                 {}, {} events of {}, status {}",
                 state.len(),
                 self.outputs.len(),
+                events.len(),
+                self.watches.len(),
                 counters.status
             )));
         }
+        self.watches.iter_mut().zip(events).for_each(|(watch, t)| watch.t = t);
         self.launch.state = State::from_numbers(&state);
         (self.launch.counters, self.launch.report, self.launch.parameters.look_at) = (counters, report, look_at);
         (self.rows, self.frames) = (rows, frames);
@@ -226,6 +235,7 @@ impl Trajectory<'_> {
     fn aim(&self) -> (u32, Parameters<f64>) {
         let steps = self.counters.steps;
         let mut parameters = self.launch.parameters;
+        aim_at_levels(&mut parameters, &self.watches);
         let output = self.outputs.get(self.served).map(|output| output.t);
         let goal = match self.time {
             Time::Fixed(clock) => {

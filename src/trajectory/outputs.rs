@@ -21,11 +21,11 @@ const LOOKS_PER_SPACING: f64 = 16.0;
 const LOOKS_PER_CROSSING: u32 = 10;
 
 impl Trajectory<'_> {
-    /// Returns whether [`Trajectory::serve`] needs the state: for a snapshot, for what lies inside an adaptive step, or to
-    /// check for crossings.
+    /// Returns whether [`Trajectory::serve`] needs the state: for a snapshot, for what lies inside an adaptive step, also
+    /// an event, or to check for crossings.
     pub fn wants_state(&self) -> bool {
         let mut due = self.outputs.from(self.served).take_while(|output| self.place(output.t).is_some());
-        self.is_look_due() || due.any(|output| self.needs_curve(&output))
+        self.is_look_due() || self.events_need_state() || due.any(|output| self.needs_curve(&output))
     }
 
     /// Whether an output is made from a curve: all but the rows of fixed steps, for which two reports do.
@@ -33,13 +33,14 @@ impl Trajectory<'_> {
         output.snapshot || output.frame || matches!(self.time, Time::Adaptive(_))
     }
 
-    /// Serves the output times that the last step has reached, and checks for crossings if due; `state` is
-    /// needed if [`Trajectory::wants_state`]. Returns whether all are served: it stops while `most` bytes of rows or
+    /// Serves the output times and finds the events that the last step has reached, and checks for crossings if due;
+    /// `state` is needed if [`Trajectory::wants_state`]. Returns whether all are served: it stops while `most` bytes of rows or
     /// more are in memory.
     pub fn serve(&mut self, state: Option<&State<f64>>, most: usize) -> bool {
         if let (true, Some(state)) = (self.is_look_due(), state) {
             self.look(state);
         }
+        self.locate_events(state);
         while let Some(output) = self.outputs.get(self.served)
             && let Some(fraction) = self.place(output.t)
         {
@@ -110,7 +111,7 @@ impl Trajectory<'_> {
 
     /// The curve inside the last step, as accurate as the step itself: for a fixed one, of first order, on a straight
     /// line.
-    fn curve_at(&self, fraction: f64, state: &State<f64>) -> Curve<f64> {
+    pub(super) fn curve_at(&self, fraction: f64, state: &State<f64>) -> Curve<f64> {
         match self.time {
             Time::Fixed(_) => {
                 let mut curve = state.curve.clone();
@@ -127,7 +128,7 @@ impl Trajectory<'_> {
     }
 
     /// Observes a curve inside the last step.
-    fn observe_inside(&self, fraction: f64, curve: &Curve<f64>) -> Observed<f64> {
+    pub(super) fn observe_inside(&self, fraction: f64, curve: &Curve<f64>) -> Observed<f64> {
         if fraction == 1.0 {
             return self.report.now;
         }

@@ -2,7 +2,10 @@
 
 use glam::DVec2;
 
-use super::{Course, FIRST_STEP, ROUND, Time, Trajectory};
+use super::{
+    Course, FIRST_STEP, Time, Trajectory,
+    watch::{ROUND, Watch, resolution},
+};
 use crate::{
     curve::polygon,
     ensemble::{
@@ -19,8 +22,6 @@ use crate::{
     },
 };
 
-/// An excess is a difference of numbers near 1: a threshold below this multiple of ε is within its rounding.
-const RESOLUTION: f64 = 128.0;
 /// A threshold that no excess reaches.
 const NO_THRESHOLD: f64 = -1.0;
 /// The rate is fitted while the excess is between these fractions of its start. Adaptive steps follow the shape to the
@@ -48,6 +49,7 @@ impl<'a> Trajectory<'a> {
         launch.counters.order =
             FIRST_ORDER.min(most_order(precision.epsilon())).min(spec.most_order.unwrap_or(FIRST_ORDER));
         let turning = launch.report.progress.turning;
+        let watches = Watch::of(&spec.event, &launch.report.now, unit, precision);
         let start = Observables::new(&launch.report.now, turning, unit);
         let limit = spec.threshold(start.excess);
         let course = Course::of(start.excess, turning, limit, precision);
@@ -80,6 +82,7 @@ impl<'a> Trajectory<'a> {
             sweeps: [0; 2],
             course,
             crossed: None,
+            watches,
             portrait: false,
         };
         trajectory.counters.status = status.map_or(0, |status| status as u32);
@@ -103,11 +106,6 @@ impl Course {
             _ => Course::Followed,
         }
     }
-}
-
-/// An excess below which a threshold lies in the rounding of the precision.
-fn resolution(precision: Precision) -> f64 {
-    RESOLUTION * precision.epsilon()
 }
 
 /// Sets the thresholds of the excess between `excess` and `limit`, and the length at which the curve has vanished.

@@ -12,7 +12,7 @@ CURVELAX = os.environ["CURVELAX"]
 # 11 members in each of two cells: some relax and end early, and one cell's sweeps stall at once.
 FLAGS = (
     "--curves 11 --points 33 --modes 2..=4 --t-end 0.64 --relax-to 0.03 --stop-when-relaxed --max-sweeps 12 --solver gauss-seidel"
-    " --sweep tolerance=1e-3,1e-12 --series 0.05 --snapshots 0,0.01,0.1,0.3 --backend cpu --quiet"
+    " --sweep tolerance=1e-3,1e-12 --series 0.05 --snapshots 0,0.01,0.1,0.3 --backend cpu --quiet --event half=excess<=0.5*start --event short=length<=9.4"
 )
 
 

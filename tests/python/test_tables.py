@@ -10,8 +10,8 @@ import polars as pl
 from common import Runs, columns
 
 ROOT = Path(__file__).resolve().parents[2]
-TABLES = ["summary.csv", "members.csv", "levels.csv", "ensemble.csv", "explained.csv", "rates.csv", "mean_excess.csv",
-          "series.csv", "snapshots.csv"]
+TABLES = ["summary.csv", "members.csv", "levels.csv", "ensemble.csv", "explained.csv", "events.csv",
+          "event_statistics.csv", "event_levels.csv", "rates.csv", "mean_excess.csv", "series.csv", "snapshots.csv"]
 INTEGERS = {
     "summary.csv": ["member", "cell", "steps", "rejected", "sweeps_k", "sweeps_x", "turning", "solves"],
     "ensemble.csv": ["cell", "members", "relaxed", "unfinished", "singular", "nonfinite", "stalled", "t_relax_known",
@@ -19,12 +19,16 @@ INTEGERS = {
     "members.csv": ["member", "cell", "convex"],
     "explained.csv": ["cell", "members", "censored"],
     "levels.csv": ["member", "level", "cell", "points", "solves"],
+    "events.csv": ["member", "cell", "censored"],
+    "event_statistics.csv": ["cell", "members", "known", "discretisation_known"],
+    "event_levels.csv": ["member", "level", "cell"],
     "rates.csv": ["member", "cell"],
     "mean_excess.csv": ["cell", "members"],
     "series.csv": ["member"],
     "snapshots.csv": ["member", "i"],
 }
-TEXT = {"summary.csv": ["status"], "levels.csv": ["status"], "explained.csv": ["time", "feature"]}
+TEXT = {"summary.csv": ["status"], "levels.csv": ["status"], "explained.csv": ["time", "feature"], "events.csv": ["event"],
+        "event_statistics.csv": ["event"], "event_levels.csv": ["event"]}
 
 
 def same(found, expected):

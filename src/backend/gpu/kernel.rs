@@ -43,6 +43,7 @@ pub struct Kernel<T> {
     slots_per_batch: usize,
     caps: Caps,
     solver: Solver,
+    watched: bool,
     budget: Budget,
     most: Budget,
     fixed: bool,
@@ -106,6 +107,7 @@ impl<T: Real> Kernel<T> {
             slots_per_batch: slots,
             caps: Caps { max_sweeps, most_order: extrapolation::most_order(T::EPSILON) },
             solver: variant.solver,
+            watched: variant.watched,
             budget: Budget::first(variant.solver, most),
             most,
             fixed: false,
@@ -188,6 +190,9 @@ impl<T: Real> Backend for Kernel<T> {
     }
 
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
+        if run.parameters.branches().watched && !self.watched {
+            return Err(Error::Failed("a member waits for a level, and the kernel was compiled without levels".into()));
+        }
         let (batch, at) = (slot / self.slots_per_batch, slot % self.slots_per_batch);
         self.batches[batch].load(&self.gpu, at, &run.convert());
         self.gpu.check()

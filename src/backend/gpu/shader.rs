@@ -19,6 +19,9 @@ pub struct Variant {
     pub solver: Solver,
     /// Makes adaptive steps. A constant, since a kernel with both kinds of steps takes twice as long to compile.
     pub adaptive: bool,
+    /// Members may pause where an observable reaches a level. A constant, since drivers of software GPUs execute every
+    /// branch.
+    pub watched: bool,
     /// Records what every stage of a step computes.
     pub traced: bool,
     /// A workgroup is one subgroup, whose threads exchange values by shuffles instead of barriers.
@@ -26,7 +29,8 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Returns all variants in use; traces need only fixed steps, since adaptive ones are made of them.
+    /// Returns all variants in use, without those that differ only in being watched; traces need only fixed steps, since
+    /// adaptive ones are made of them.
     pub fn all() -> Vec<Variant> {
         let exchanges =
             |solver: Solver| [false, true].into_iter().filter(move |by| !by || solver.facts().kernel.shuffles);
@@ -37,7 +41,7 @@ impl Variant {
 
     /// Returns the variant for fixed steps.
     pub const fn of(solver: Solver) -> Variant {
-        Variant { solver, adaptive: false, traced: false, subgroup: false }
+        Variant { solver, adaptive: false, watched: false, traced: false, subgroup: false }
     }
 
     /// Returns the files of the kernel, in the order of the step.
@@ -76,10 +80,11 @@ const TRACE_ON: [ShaderPart; 1] = parts!["trace_on.wgsl"];
 
 /// Returns the whole source in precision `T`.
 pub fn source<T: Real>(variant: Variant) -> String {
-    let Variant { solver, adaptive, .. } = variant;
+    let Variant { solver, adaptive, watched, .. } = variant;
     let (number, epsilon, sweeps) = (T::NAME, T::EPSILON, solver.sweeps());
     let mut text = format!(
-        "alias real = {number}; const EPSILON = {epsilon:e}; const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps};\n"
+        "alias real = {number}; const EPSILON = {epsilon:e}; const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps}; \
+         const WATCHED = {watched};\n"
     );
     for (_, part) in variant.parts() {
         text.push_str(part);
@@ -152,7 +157,7 @@ mod tests {
 
     #[test]
     fn a_line_of_the_source_is_found_in_its_file() {
-        for variant in Variant::all() {
+        for variant in Variant::all().into_iter().flat_map(|own| [own, Variant { watched: true, ..own }]) {
             let text = source::<f64>(variant);
             for (number, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.is_empty()) {
                 let (file, at) = locate(number + 1, variant).unwrap();

@@ -36,7 +36,8 @@ pub fn on_gpu<T: Real>(
     budget: Budget,
 ) -> Result<Vec<Left>> {
     let adaptive = launches.iter().any(|launch| launch.parameters.adaptive > 0.0);
-    let variant = Variant { adaptive, ..adapter.capacity().variant(blocks(n)?, solver) };
+    let watched = launches.iter().any(|launch| launch.parameters.branches().watched);
+    let variant = Variant { adaptive, watched, ..adapter.capacity().variant(blocks(n)?, solver) };
     on_gpu_by::<T>(adapter, variant, n, launches, budget)
 }
 

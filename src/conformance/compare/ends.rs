@@ -4,7 +4,8 @@ use super::{
     device::{Left, on_gpu},
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
-    setup::{Tamper, blocks, method, tampered},
+    setup::{Tamper, method, tampered},
+    twin::{growth, twin},
 };
 use crate::{
     backend::gpu::{self, kernel::Budget},
@@ -15,9 +16,7 @@ use crate::{
     error::{Error, Result},
     number::Real,
     scheme::{
-        Curve, dense,
-        evolve::{Team, evolve},
-        extrapolation::{self, LEAST_ORDER},
+        Curve, dense, extrapolation,
         member::{Counters, Decay, NEVER, Progress, Report},
         run::Run,
         step::Method,
@@ -26,7 +25,7 @@ use crate::{
 };
 
 /// Tolerance of adaptive steps in the comparison.
-const ADAPTIVE: f64 = 1e-3;
+pub(super) const ADAPTIVE: f64 = 1e-3;
 
 /// Fixed steps of a member that take as long as its adaptive run in the comparison.
 pub const ADAPTIVE_STEPS: u32 = 40;
@@ -118,33 +117,6 @@ pub(in crate::conformance) fn compare_ends<T: Real>(
         }
     }
     Ok(rows)
-}
-
-/// A member's run on the CPU.
-struct Twin {
-    left: Left,
-    /// Its longest step.
-    longest: f64,
-    /// The largest decrease of the excess in one step.
-    steepest: f64,
-    /// The highest order of a step.
-    order: u32,
-}
-
-/// Runs the twin of `launch` to its goal.
-fn twin<T: Real>(launch: &Run<f64>, method: &Method, n: usize) -> Result<Twin> {
-    let mut run: Run<T> = launch.convert();
-    let (mut longest, mut steepest, mut order) = (0.0_f64, 0.0_f64, LEAST_ORDER);
-    let mut work = Team::new(blocks(n)?);
-    while run.counters.is_running() {
-        let before = run.report.now.excess.to_f64();
-        order = order.max(run.counters.order);
-        evolve(&mut run, method, &mut work, 1);
-        steepest = steepest.max((run.report.now.excess.to_f64() - before).abs());
-        longest = longest.max(run.report.progress.taken.to_f64());
-    }
-    let left = Left { state: run.state.convert(), counters: run.counters, report: run.report.convert() };
-    Ok(Twin { left, longest, steepest, order })
 }
 
 /// Checks that both sides ended alike, after equally many steps and with their events in the same ones; else returns
@@ -267,9 +239,4 @@ fn reported(report: &Report<f64>) -> Vec<f64> {
     let mut numbers = report.now.to_numbers();
     numbers.extend([report.progress.turning, report.progress.travel]);
     numbers
-}
-
-/// The growth of roundings over steps: like a random walk, since the flow itself damps them.
-fn growth(steps: u32) -> f64 {
-    f64::from(steps).sqrt()
 }

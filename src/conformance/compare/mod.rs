@@ -2,15 +2,18 @@
 
 mod device;
 mod ends;
+mod levels;
 mod row;
 mod scales;
 mod setup;
 mod stages;
+mod twin;
 
 pub use super::cases::MEMBERS;
 pub use device::{Left, on_gpu, on_gpu_by};
 pub(super) use ends::compare_ends;
 pub use ends::{ADAPTIVE_STEPS, adaptive, runs};
+pub use levels::events;
 pub use row::ConformanceRow;
 pub use setup::{MAX_SWEEPS, Tamper};
 pub use stages::stages;

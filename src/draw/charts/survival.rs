@@ -20,7 +20,7 @@ const MAX_STROKES: f64 = 1200.0;
 const STROKE_GAP: f64 = 3.0;
 
 /// Survival curves of the cells of a study.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Survival<'a> {
     /// First line.
     pub title: &'a str,
@@ -29,10 +29,22 @@ pub struct Survival<'a> {
     /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
     /// many.
     pub key: &'a str,
+    /// What the height of a curve is.
+    pub share: &'a str,
+    /// The sentence in the place of the curves if there are none.
+    pub none: &'a str,
     /// The curves, in the order of the legend.
     pub curves: Vec<SurvivalCurve>,
     /// Scale of time; linear by default, unless [`Scale::of`] says otherwise for the middles of the curves.
     pub time: Option<Scale>,
+}
+
+/// Curves of relaxation times.
+impl Default for Survival<'_> {
+    fn default() -> Self {
+        let (share, none) = ("share not relaxed", "There are no members, so there is nothing to survive.");
+        Survival { title: "", note: "", key: "", share, none, curves: Vec::new(), time: None }
+    }
 }
 
 /// The survival curve of one cell.
@@ -127,7 +139,7 @@ impl Survival<'_> {
         let colours = Colours::of(&values, self.key);
         let sentences = vec![(*note).into(), colours.sentence(curves.len())];
         if curves.iter().all(|curve| curve.end(Scale::Linear).is_none()) {
-            return nothing(title, sentences, "There are no members, so there is nothing to survive.");
+            return nothing(title, sentences, self.none);
         }
         let bands = curves.len() <= MAX_BANDS && curves.iter().any(|curve| curve.band.is_some());
         let censored = curves.iter().any(|curve| !curve.censored.is_empty());
@@ -139,7 +151,7 @@ impl Survival<'_> {
         let scale = self.time.unwrap_or_else(|| Scale::of(curves.iter().filter_map(middle)));
         let scale = if times().any(|t| scale.holds(t)) { scale } else { Scale::Linear };
         let across = Axis::over("t", TIME, scale, times()).with_zero();
-        let upwards = Axis::new("share not relaxed", "", Scale::Linear, (0.0, 1.02));
+        let upwards = Axis::new(self.share, "", Scale::Linear, (0.0, 1.02));
         let panel = only_panel([&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);
         let lines = colours.shown.len() * if bands { 3 } else { 1 };

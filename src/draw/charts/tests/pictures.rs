@@ -135,7 +135,15 @@ pub fn draw_all() -> Vec<(String, String)> {
     }
 
     let survive = |curves: Vec<SurvivalCurve>, time: Option<Scale>| {
-        Survival { title: "Share that has not relaxed", note: NOTE, key: "amplitude", curves, time }.draw()
+        Survival {
+            title: "Share that has not relaxed",
+            note: NOTE,
+            key: "amplitude",
+            curves,
+            time,
+            ..Survival::default()
+        }
+        .draw()
     };
     let amplitude = |i: usize| 0.01 * 1.3_f64.powi(i as i32);
     let cells = |cells: usize, count: usize| -> Vec<SurvivalCurve> {
@@ -323,6 +331,10 @@ pub fn draw_all() -> Vec<(String, String)> {
     let hostile =
         "<script>alert(\"a & b\")</script> and a title that is so long that it has to be broken into lines \0";
     let curves = vec![SurvivalCurve { label: hostile.into(), ..cells(1, 20).remove(0) }; 2];
-    add("hostile", Survival { title: hostile, note: hostile, key: hostile, curves, time: None }.draw());
+    add(
+        "hostile",
+        Survival { title: hostile, note: hostile, key: hostile, share: hostile, none: hostile, curves, time: None }
+            .draw(),
+    );
     pictures
 }
