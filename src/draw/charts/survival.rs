@@ -35,7 +35,7 @@ pub struct Survival<'a> {
     pub none: &'a str,
     /// The curves, in the order of the legend.
     pub curves: Vec<SurvivalCurve>,
-    /// Scale of time; linear by default, unless [`Scale::of`] says otherwise for the middles of the curves.
+    /// Scale of time; linear by default, unless [`Scale::of`] says otherwise for the quartiles of the curves.
     pub time: Option<Scale>,
 }
 
@@ -96,6 +96,12 @@ impl SurvivalCurve {
         self.t.iter().chain(&self.censored).copied()
     }
 
+    /// Times by which a quarter, half and three quarters of the members have relaxed, if they have.
+    fn quartiles(&self) -> impl Iterator<Item = f64> + '_ {
+        let by = |share: f64| self.survival.partition_point(|survival| *survival > share);
+        [0.75, 0.5, 0.25].map(by).into_iter().filter_map(|at| self.t.get(at).copied())
+    }
+
     /// Time at which the last member relaxed or was censored.
     fn end(&self, scale: Scale) -> Option<f64> {
         self.times().filter(|t| scale.holds(*t)).reduce(f64::max)
@@ -147,8 +153,7 @@ impl Survival<'_> {
         let (mut svg, top) = heading.begin(8.0 + HEIGHT + FOOT);
 
         let times = || curves.iter().flat_map(SurvivalCurve::times);
-        let middle = |curve: &SurvivalCurve| curve.t.get(curve.t.len() / 2).copied();
-        let scale = self.time.unwrap_or_else(|| Scale::of(curves.iter().filter_map(middle)));
+        let scale = self.time.unwrap_or_else(|| Scale::of(curves.iter().flat_map(SurvivalCurve::quartiles)));
         let scale = if times().any(|t| scale.holds(t)) { scale } else { Scale::Linear };
         let across = Axis::over("t", TIME, scale, times()).with_zero();
         let upwards = Axis::new(self.share, "", Scale::Linear, (0.0, 1.02));
