@@ -21,6 +21,7 @@ fn a_run_leaves_a_page_with_what_a_reader_asks_first() {
     let page = done.text("report.html");
     let names = [
         "curves.svg",
+        "distribution.svg",
         "excess.svg",
         "features.svg",
         "mesh.svg",

@@ -44,6 +44,8 @@ pub const CURVES: &str = "plots/curves.svg";
 pub const PORTRAITS: &str = "plots/portraits.json";
 /// Distribution of the relaxation times.
 pub const RELAXATION: &str = "plots/relaxation.svg";
+/// The relaxation times of each cell as a box, and against two laws.
+pub const DISTRIBUTION: &str = "plots/distribution.svg";
 /// Fitted decay rates.
 pub const RATE: &str = "plots/rate.svg";
 /// Kaplan-Meier curves.
@@ -78,7 +80,7 @@ pub const FIGURES: [&str; 8] =
 pub const ROWS: &str = "curvelax.rows";
 
 /// All files that a run may write, or that are made from one without naming a place; the one that vouches for the others comes first.
-pub const OWN: [&str; 30] = [
+pub const OWN: [&str; 31] = [
     RUN,
     SHARD,
     SUMMARY,
@@ -98,6 +100,7 @@ pub const OWN: [&str; 30] = [
     PORTRAITS,
     CURVES,
     RELAXATION,
+    DISTRIBUTION,
     RATE,
     SURVIVAL,
     GROUP_SURVIVAL,
@@ -130,8 +133,20 @@ pub const TABLES: [&str; 14] = [
 ];
 
 /// The files that are drawn from the others.
-pub const PICTURES: [&str; 11] =
-    [REPORT, RELAXATION, SURVIVAL, GROUP_SURVIVAL, EVENT_SURVIVAL, EXCESS, RATE, DEPENDENCE, FEATURES, MESH, CURVES];
+pub const PICTURES: [&str; 12] = [
+    REPORT,
+    RELAXATION,
+    DISTRIBUTION,
+    SURVIVAL,
+    GROUP_SURVIVAL,
+    EVENT_SURVIVAL,
+    EXCESS,
+    RATE,
+    DEPENDENCE,
+    FEATURES,
+    MESH,
+    CURVES,
+];
 
 /// The remedy for a file that was changed or truncated.
 pub const REMEDY: &str = "restore the file, or run again";

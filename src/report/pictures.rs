@@ -9,14 +9,15 @@ use super::{
 };
 use crate::{
     draw::charts::{
-        CellValues, Decay, DecayCurve, DecayLaw, Dependence, DependencePoint, EstimatedNumber, FittedRates,
-        MeshQuality, PowerLawLine, RelaxationTimes, Scatter, ScatterPanel, ScatterPoint, Series, Setting, Survival,
-        SurvivalCurve, Theory,
+        CellQuantiles, CellValues, Decay, DecayCurve, DecayLaw, Dependence, DependencePoint, EstimatedNumber,
+        FittedRates, MeshQuality, PowerLawLine, RelaxationTimes, Scatter, ScatterPanel, ScatterPoint, Series, Setting,
+        Survival, SurvivalCurve, Theory, TimeDistribution,
     },
     ensemble::{Event, Spec, Status, sweep::SweepAxis, theory},
     error::{Result, shortened},
     files::{names, portraits::Film},
     flow::Flow,
+    random::normal_quantile,
     results::{
         cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
         comparison::{CellComparison, CellDifference},
@@ -33,6 +34,8 @@ use crate::{
 
 /// Maximum number of groups in a table of the page.
 const MAX_GROUPS: usize = 40;
+/// Maximum quantiles of a cell that are drawn against those of a law.
+const MOST_QUANTILES: usize = 99;
 /// Maximum characters of the name of a member.
 const MAX_NAME: usize = 60;
 /// Digits of a number for reading.
@@ -89,7 +92,7 @@ impl FinishedRun<'_> {
     /// # Errors
     /// [`Error::Request`](crate::Error::Request) if the values of a cell do not fit the spec.
     pub fn charts(&self) -> Result<Vec<Chart>> {
-        let mut charts = vec![self.relaxation(), self.survival()];
+        let mut charts = vec![self.relaxation(), self.distribution(), self.survival()];
         charts.extend(self.groups());
         charts.extend(self.events());
         charts.extend(self.excess()?);
@@ -120,6 +123,29 @@ impl FinishedRun<'_> {
         let svg = RelaxationTimes { title, note, key, cells, others: &others, median }.draw();
         let caption = "How many members relaxed when, and which share of all had relaxed by then, cell by cell.";
         chart(names::RELAXATION, title, caption, svg)
+    }
+
+    /// The times of each cell as a box, and their quantiles against those of two laws.
+    fn distribution(&self) -> Chart {
+        let numbers = self.numbers();
+        let cells = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
+            let survival = KaplanMeier::new(&cell.times.sample);
+            let known = cell.times.sample.len().min(MOST_QUANTILES);
+            let shares = || (0..known).map(|i| (i as f64 + 0.5) / known as f64);
+            let quantiles = survival.quantiles(shares());
+            CellQuantiles {
+                label: self.label(cell.cell),
+                value: numbers.as_ref().map(|numbers| numbers[rank]),
+                places: cell.times.quantiles,
+                quantiles: shares().map(normal_quantile).zip(quantiles).collect(),
+            }
+        });
+        let title = "Distribution of the relaxation times";
+        let (note, key, cells) = (&self.what_and_error(), &self.colour_key(), cells.collect());
+        let svg = TimeDistribution { title, note, quantity: "t_relax", key, cells }.draw();
+        let caption = "Above: the median, the middle half and the middle nine tenths of the members. Below: quantiles \
+                       against those of a normal and a lognormal law.";
+        chart(names::DISTRIBUTION, title, caption, svg)
     }
 
     fn survival(&self) -> Chart {

@@ -106,6 +106,16 @@ impl<'a> KaplanMeier<'a> {
         self.steps().find(|step| reaches(step.survival, 1.0 - p)).map(|step| step.time)
     }
 
+    /// Returns the [quantiles](KaplanMeier::quantile) of ascending fractions, in one pass, up to the first that is unknown.
+    pub fn quantiles(&self, ascending: impl IntoIterator<Item = f64>) -> Vec<f64> {
+        let mut steps = self.steps().peekable();
+        let quantile = |p: f64| {
+            while steps.next_if(|step| !reaches(step.survival, 1.0 - p)).is_some() {}
+            steps.peek().map(|step| step.time)
+        };
+        ascending.into_iter().map_while(quantile).collect()
+    }
+
     /// Returns the time by which half of the members have had the event.
     ///
     /// If S is exactly ½ between two events, this is the middle between them, as in R's `survfit`. Without censoring it
@@ -290,6 +300,17 @@ mod tests {
         assert_eq!(curve("1 2 3 3+ 3+ 4 5 6 7").median(), Some(4.5));
         // Nothing is known behind the second event.
         assert_eq!(["1 2 3+ 4+", "1 2+ 3+ 4+"].map(|times| curve(times).median()), [Some(2.0), None]);
+    }
+
+    #[test]
+    fn quantiles_in_one_pass_are_those_one_by_one_up_to_the_first_that_is_unknown() {
+        let times = (1..40_u32).map(|i| Observation { time: f64::from(i * i), happened: i % 7 > 0 && i < 35 });
+        let sample = Sample::new(times).unwrap();
+        let survival = KaplanMeier::new(&sample);
+        let shares: Vec<f64> = (0..50).map(|i| (f64::from(i) + 0.5) / 50.0).collect();
+        let one_by_one: Vec<f64> = shares.iter().map_while(|share| survival.quantile(*share)).collect();
+        assert!(one_by_one.len() > 30 && one_by_one.len() < 50, "{}", one_by_one.len());
+        assert_eq!(survival.quantiles(shares), one_by_one);
     }
 
     #[test]

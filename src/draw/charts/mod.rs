@@ -7,6 +7,7 @@
 pub mod bins;
 pub mod decay;
 pub mod dependence;
+pub mod distribution;
 pub mod mesh;
 pub mod rates;
 pub mod relaxation;
@@ -17,6 +18,7 @@ pub mod work;
 pub use bins::CellValues;
 pub use decay::{Decay, DecayCurve, DecayLaw, Theory};
 pub use dependence::{Dependence, DependencePoint, PowerLawLine, Series, Setting};
+pub use distribution::{CellQuantiles, TimeDistribution};
 pub use mesh::MeshQuality;
 pub use rates::FittedRates;
 pub use relaxation::RelaxationTimes;

@@ -314,6 +314,29 @@ pub fn draw_all() -> Vec<(String, String)> {
     unknown_dots.panels[0].points[5].t = f64::NAN;
     add("scatter-unknown", unknown_dots.draw());
 
+    let quantiles = |count: usize, known: f64| {
+        let cell = |i: usize| {
+            let at = |z: f64| 0.8 * (0.1 * i as f64 + (0.1 + 0.02 * i as f64) * z).exp();
+            let place = |(share, z): (f64, f64)| (share <= known).then(|| at(z));
+            CellQuantiles {
+                label: format!("amplitude = 0.{i}"),
+                value: Some(0.1 * i as f64),
+                places: [(0.05, -1.645), (0.25, -0.674), (0.5, 0.0), (0.75, 0.674), (0.95, 1.645)].map(place),
+                quantiles: (1..50).map(|j| f64::from(j) * 0.1 - 2.5).map(|z| (z, at(z))).collect(),
+            }
+        };
+        let (title, cells) = ("Distribution of the relaxation times", (0..count).map(cell).collect());
+        TimeDistribution { title, note: NOTE, quantity: "t_relax", key: "amplitude", cells }
+    };
+    add("distribution", quantiles(1, 1.0).draw());
+    add("distribution-cells-5", quantiles(5, 1.0).draw());
+    add("distribution-cells-30", quantiles(30, 1.0).draw());
+    add("distribution-censored", quantiles(2, 0.6).draw());
+    add("distribution-none", quantiles(2, 0.0).draw());
+    let mut unknown_place = quantiles(2, 1.0);
+    unknown_place.cells[1].places = [Some(f64::INFINITY), Some(-1.0), Some(0.0), Some(f64::NAN), None];
+    add("distribution-unknown", unknown_place.draw());
+
     let work = |rows: Vec<WorkPanels>| {
         let title = "What an error of the relaxation time costs";
         WorkDiagram { title, note: NOTE, costs: [("solves per member", ""), ("time per member", "ms")], rows }.draw()
