@@ -18,7 +18,7 @@ fn the_features_are_those_of_the_spec() {
     let header = |flags: &str| run(flags).text("members.csv").lines().next().unwrap().to_owned();
     let short = "--curves 1 --points 40 --t-end 0.001";
     assert_eq!(header(&format!("{short} --modes 2..=3")), format!("member,cell,label,cos_2,sin_2,cos_3,sin_3,{SHAPE}"));
-    assert_eq!(header(&format!("{short} --amplitude 0")), format!("member,cell,{SHAPE}"));
+    assert_eq!(header(&format!("{short} --amplitude 0")), format!("member,cell,label,{SHAPE}"));
     let drawn = "--shape ellipse:uniform(1.2..3),1 --amplitude uniform(0.01..0.02) --modes 4..=4";
     assert_eq!(header(&format!("{short} {drawn}")), format!("member,cell,label,shape_1,amplitude,cos_4,sin_4,{SHAPE}"));
 }

@@ -97,14 +97,14 @@ struct BenchRow {
     start_up_seconds: Option<f64>,
     curve_steps: u64,
     sweeps_per_step: Option<f64>,
-    steps_per_second: Option<Spread>,
+    steps_per_second: Option<StepRates>,
     nanoseconds_per_node: Option<f64>,
     failed: Option<String>,
 }
 
 /// Rates over the windows, in order.
 #[derive(Serialize)]
-struct Spread {
+struct StepRates {
     median: f64,
     min: f64,
     max: f64,
@@ -273,7 +273,7 @@ impl Case {
         let sweeps: u64 = self.samples.iter().map(|sample| sample.sweeps).sum();
         let rates: Vec<f64> =
             self.samples.iter().map(|sample| sample.steps as f64 / sample.elapsed.as_secs_f64()).collect();
-        let spread = bench.and_then(|_| Spread::of(rates));
+        let spread = bench.and_then(|_| StepRates::of(rates));
         let failed = match &self.bench {
             Err(error) => Some(error.to_string()),
             Ok(_) if steps == 0 => Some("no step was finished in this time; use more --seconds".into()),
@@ -303,13 +303,13 @@ impl Case {
     }
 }
 
-impl Spread {
-    fn of(windows: Vec<f64>) -> Option<Spread> {
+impl StepRates {
+    fn of(windows: Vec<f64>) -> Option<StepRates> {
         let mut sorted = windows.clone();
         sorted.sort_by(f64::total_cmp);
         let (min, max) = (*sorted.first()?, *sorted.last()?);
         let median = 0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]);
-        Some(Spread { median, min, max, windows })
+        Some(StepRates { median, min, max, windows })
     }
 }
 
@@ -339,7 +339,7 @@ fn table(rows: &[BenchRow]) -> String {
         let (solver, precision, n) = (row.solver.name(), row.precision.name(), row.points);
         text += &format!("{:<width$}  {solver:<13}{precision:<5}{n:>6}", place(row));
         text += &match (&row.failed, &row.steps_per_second) {
-            (None, Some(Spread { median, min, max, .. })) => {
+            (None, Some(StepRates { median, min, max, .. })) => {
                 let curves = row.curves.map_or(String::new(), |curves| curves.to_string());
                 let spread = format!("{min:.2e}..{max:.2e}");
                 let node = row.nanoseconds_per_node.map_or(String::new(), |ns| format!("{ns:.2}"));

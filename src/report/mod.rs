@@ -417,7 +417,15 @@ mod tests {
         let tables = ["ensemble.csv", "explained.csv", "levels.csv", "mean_excess.csv", "members.csv"];
         let always = [&tables[..], &["plots", "rates.csv", "report.html", "run.json"]].concat();
         assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());
-        let charts = ["excess.svg", "features.svg", "mesh.svg", "portraits.json", "rate.svg", "relaxation.svg"];
+        let charts = [
+            "distribution.svg",
+            "excess.svg",
+            "features.svg",
+            "mesh.svg",
+            "portraits.json",
+            "rate.svg",
+            "relaxation.svg",
+        ];
         let plots = [&charts[..], &["survival.svg"]].concat();
         assert_eq!(files(&out.join("plots")), [&["curves.svg"], &plots[..]].concat());
         for (name, rows) in [(names::SUMMARY, 1), (names::MEMBERS, 1), (names::SERIES, 1), (names::SNAPSHOTS, POINTS)] {

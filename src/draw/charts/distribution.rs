@@ -78,7 +78,10 @@ impl CellQuantiles {
             let [low, high] = [low, high].map(coordinate);
             lines += &format!("M{low} {top}H{high}V{bottom}H{low}Z");
         }
-        let shown = self.places.map(|place| place.map_or("not reached".into(), |t| significant(t, 4)));
+        let shown = self.places.map(|place| {
+            let shown = place.filter(|t| Scale::Linear.holds(*t)).map(|t| significant(t, 4));
+            shown.unwrap_or("unknown".into())
+        });
         svg.open("thin");
         svg.hinted_path(&lines, &format!("{}: 5, 25, 50, 75, 95 %: {}", self.label, shown.join(", ")));
         svg.close();
