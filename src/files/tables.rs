@@ -191,6 +191,7 @@ columns! { ExplainedRow:
     spearman: optional = spearman, "rank correlation of feature and time";
     r2: optional = r2, "share of the variance of the time that a straight line explains; of the regression cross-validated";
     chosen: rank = chosen, "place of the feature in the regression, from 1, empty if it is not in it; of the regression how many it has";
+    logarithm: word = logarithm, "what entered by its logarithm: time, or both time and feature; times over more than a factor of 30 do";
 }
 
 /// A row of `convergence.csv`: the error of a run against an exact solution.

@@ -1,7 +1,8 @@
 //! What explains the times: how the relaxation times of the members of a cell depend on their features.
 //!
-//! Numbers enter as they are, without logarithms. A rank correlation near ±1 with a smaller R² therefore means a
-//! dependence that is monotone but not straight. A feature that is constant among the members, or unknown for one of
+//! Times over more than [`WIDE`] times the smallest, as those of outlines of many sizes are, enter by their logarithms,
+//! and with them the positive features that vary as widely. All other numbers enter as they are. A rank correlation near ±1
+//! with a smaller R² means a dependence that is monotone but not straight. A feature that is constant among the members, or unknown for one of
 //! them, is left out.
 //!
 //! The first [`CONSIDERED`] members of a cell enter. One that ended before a time has none and cannot: the numbers hold
@@ -18,6 +19,8 @@ use crate::{
 pub const LEAST_MEMBERS: usize = 20;
 /// Largest share of members without a time beside which anything is claimed.
 pub const MOST_CENSORED: f64 = 0.1;
+/// Largest over smallest time above which logarithms are taken, as on the axes of pictures.
+const WIDE: f64 = 30.0;
 /// Members of a cell that enter: the first ones. More would only cost memory: the error of a correlation is 0.007.
 pub const CONSIDERED: usize = 20_000;
 /// Features that are drawn.
@@ -51,6 +54,8 @@ pub struct ExplainedRow {
     pub r2: Option<f64>,
     /// Place in the regression, from 1; of the regression the number of its features.
     pub chosen: Option<u64>,
+    /// What entered by its logarithm: `time`, or `both` time and feature; else empty.
+    pub logarithm: String,
 }
 
 /// A member with its features and times.
@@ -167,14 +172,22 @@ fn rows(members: &[FeaturedMember], time: usize, names: &[String]) -> Vec<Explai
         return vec![row(TOGETHER)];
     }
     let times: Vec<f64> = known.iter().filter_map(|member| member.times[time]).collect();
+    let by_logarithm = is_wide(&times);
+    let entering = |numbers: Vec<f64>| match by_logarithm && is_wide(&numbers) {
+        true => (numbers.iter().map(|number| number.ln()).collect(), "both"),
+        false => (numbers, if by_logarithm { "time" } else { "" }),
+    };
+    let (times, _) = entering(times);
     let keys: Vec<u64> = known.iter().map(|member| member.place).collect();
-    let columns: Vec<Vec<f64>> = varying.iter().map(|i| numbers(&known, *i)).collect();
+    let (columns, logarithms): (Vec<Vec<f64>>, Vec<&str>) =
+        varying.iter().map(|i| entering(numbers(&known, *i))).unzip();
     let regression = Regression::forward(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>(), &times, &keys);
     let place = |i: usize| regression.as_ref()?.chosen.iter().position(|own| *own == i).map(|place| place as u64 + 1);
     let of_feature = |(i, column): (usize, &Vec<f64>)| ExplainedRow {
         spearman: spearman(column, &times),
         r2: correlation(column, &times).map(|r| r * r),
         chosen: place(i),
+        logarithm: logarithms[i].into(),
         ..row(&names[varying[i]])
     };
     let mut rows: Vec<ExplainedRow> = columns.iter().enumerate().map(of_feature).collect();
@@ -182,9 +195,16 @@ fn rows(members: &[FeaturedMember], time: usize, names: &[String]) -> Vec<Explai
     rows.push(ExplainedRow {
         r2: regression.as_ref().map(|regression| regression.r2),
         chosen: regression.as_ref().map(|regression| regression.chosen.len() as u64),
+        logarithm: if by_logarithm { "time".into() } else { String::new() },
         ..row(TOGETHER)
     });
     rows
+}
+
+/// Whether the numbers are positive and over several magnitudes.
+fn is_wide(numbers: &[f64]) -> bool {
+    let (low, high) = numbers.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(*v), high.max(*v)));
+    low > 0.0 && high > WIDE * low
 }
 
 /// Whether the numbers are all known and not all equal.
@@ -254,6 +274,23 @@ pub(crate) mod tests {
         for (count, censored) in [(20, 0), (100, 10), (22, 2)] {
             assert!(explained(members(0, count, censored), 1).rows[0].r2.is_some(), "{count} {censored}");
         }
+    }
+
+    #[test]
+    fn times_of_many_magnitudes_enter_by_their_logarithms() {
+        let member = |i: u64| {
+            let size = (0.1 * i as f64).exp();
+            let (wave, t) = ((i as f64 * i as f64).sin(), size.powi(4));
+            let numbers = vec![wave, size, 1.0 + 0.1 * wave, f64::from(u8::from(i.is_multiple_of(2)))];
+            FeaturedMember { member: i, place: i, numbers, times: [Some(t), Some(1.0 + wave)], ..Default::default() }
+        };
+        let found = explained((0..60).map(member), 1);
+        let [best, others @ ..] = &found.rows[..4] else { panic!("{found:?}") };
+        assert_eq!((&*best.feature, &*best.logarithm), ("sin_2", "both"));
+        assert!(best.r2.unwrap() > 1.0 - 1e-12, "{best:?}");
+        assert!(others.iter().all(|row| row.logarithm == "time" && row.r2.unwrap() < 0.2), "{others:?}");
+        // The control: half the time is over one magnitude.
+        assert!(found.rows.iter().filter(|row| row.time == "t_half").all(|row| row.logarithm.is_empty()));
     }
 
     #[test]

@@ -130,14 +130,17 @@ impl TimeDistribution<'_> {
         let all = of.map(|of| cells.iter().map(|cell| cell.standardised(of)).collect::<Vec<_>>());
         let points = || all.iter().flatten().flatten();
         let normal = Axis::over("standard normal quantile", "", Scale::Linear, points().map(|(z, _)| *z));
-        let own = Axis::over("standardised quantile", "", Scale::Linear, points().map(|(_, y)| *y));
-        let left = Panel::left(&own, HEIGHT);
+        let axis = |of: &Vec<Vec<(f64, f64)>>| {
+            Axis::over("standardised quantile", "", Scale::Linear, of.iter().flatten().map(|(_, y)| *y))
+        };
+        let own = [axis(&all[0]), axis(&all[1])];
+        let left = own.iter().map(|axis| Panel::left(axis, HEIGHT)).fold(0.0, f64::max);
         let side = 0.5 * (WIDTH - MARGIN - GAP);
-        for (i, (law, all)) in ["normal", "lognormal"].iter().zip(&all).enumerate() {
+        for (i, ((law, all), own)) in ["normal", "lognormal"].iter().zip(&all).zip(&own).enumerate() {
             let corner = DVec2::new(left + i as f64 * (side + GAP), below);
             let heading = format!("against a {law} law");
             let size = DVec2::new(side - left, HEIGHT);
-            let panel = Panel { heading: &heading, corner, size, x: &normal, y: &own, labels_x: true };
+            let panel = Panel { heading: &heading, corner, size, x: &normal, y: own, labels_x: true };
             if all.iter().all(Vec::is_empty) {
                 panel.say(&mut svg, "The quartiles are not known, or equal.");
                 continue;

@@ -102,12 +102,15 @@ impl Scatter<'_> {
         let heading = Heading { title: self.title, sentences, legend: self.legend(&colours) };
         let (mut svg, top) = heading.begin(rows as f64 * row);
         let times = self.panels.iter().flat_map(|panel| &panel.points).filter(|point| point.is_drawable());
-        let time = Axis::over(self.quantity, TIME, Scale::Linear, times.map(|point| point.t));
+        let scale = Scale::of(times.clone().map(|point| point.t));
+        let time = Axis::over(self.quantity, TIME, scale, times.map(|point| point.t));
         let left = Panel::left(&time, HEIGHT);
         let across = 0.5 * (WIDTH - MARGIN - GAP - colours.room(HEIGHT));
         for (i, of) in self.panels.iter().enumerate() {
             let known = of.points.iter().filter(|point| point.is_drawable());
-            let axis = Axis::over(&of.feature, "", Scale::Linear, known.map(|point| point.x));
+            // Where times are over several magnitudes, features may be, too.
+            let own = if scale == Scale::Log { Scale::of(known.clone().map(|point| point.x)) } else { Scale::Linear };
+            let axis = Axis::over(&of.feature, "", own, known.map(|point| point.x));
             let corner =
                 DVec2::new(left + (i % COLUMNS) as f64 * (across + GAP), top + HEADING + (i / COLUMNS) as f64 * row);
             let size = DVec2::new(across - left, HEIGHT);
