@@ -1,9 +1,11 @@
 //! Distributions in the spec, as a user meets them: what is refused, and that a member is the same in any shard, alone,
 //! after an interruption and on a GPU.
 
-use std::{collections::BTreeMap, fs, path::Path, process::Output};
+mod common;
 
-use assert_cmd::Command;
+use std::{collections::BTreeMap, fs, path::Path};
+
+use common::command::{curvelax, done};
 use curvelax::{
     backend::gpu::Gpu,
     curve::Shape,
@@ -16,19 +18,6 @@ use tempfile::TempDir;
 const DRAWN: &str = "curves = 23\npoints = 32\nshape = 'ellipse:uniform(1.2..3),loguniform(0.5..1)'\n\
                      flow = 'elastic:lognormal(0.5,0.2)'\namplitude = 'uniform(0.01..0.1)'\ndecay = 'choice(1,1.5,2)'\n\
                      adaptive = 0.01\nt-end = 'auto'\nperturbation = 'gaussian'\n";
-
-fn curvelax(home: &Path, arguments: &str) -> Output {
-    let mut command = Command::cargo_bin("curvelax").unwrap();
-    // Without this a layer of Mesa prints a message on stderr.
-    command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(arguments.split_whitespace()).output().unwrap()
-}
-
-#[track_caller]
-fn done(home: &Path, arguments: &str) -> String {
-    let output = curvelax(home, arguments);
-    assert_eq!(output.status.code(), Some(0), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
 
 /// A folder with the spec, with `design` and `more` in it.
 fn home(design: &str, more: &str) -> TempDir {

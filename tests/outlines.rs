@@ -1,26 +1,15 @@
 //! Ensembles of outlines, as a user meets them: every outline a member with its label, copies of them, groups, and what
 //! is refused.
 
-use std::{collections::BTreeMap, f64::consts::TAU, fs, path::Path, process::Output};
+mod common;
 
-use assert_cmd::Command;
+use std::{collections::BTreeMap, f64::consts::TAU, fs, path::Path};
+
+use common::command::{curvelax, done};
 use tempfile::TempDir;
 
 /// Outlines in the files of [`home`].
 const GRAINS: usize = 7;
-
-fn curvelax(home: &Path, arguments: &str) -> Output {
-    let mut command = Command::cargo_bin("curvelax").unwrap();
-    // Without this a layer of Mesa prints a message on stderr.
-    command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(arguments.split_whitespace()).output().unwrap()
-}
-
-#[track_caller]
-fn done(home: &Path, arguments: &str) -> String {
-    let output = curvelax(home, arguments);
-    assert_eq!(output.status.code(), Some(0), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
 
 #[track_caller]
 fn refused(home: &Path, arguments: &str, parts: &[&str]) {

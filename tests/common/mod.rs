@@ -2,6 +2,7 @@
 #![allow(dead_code, missing_docs)] // every test file uses a different part of it
 
 pub mod browser;
+pub mod command;
 pub mod polygons;
 pub mod program;
 
