@@ -168,6 +168,23 @@ fn groups_are_the_ensembles_of_their_members() {
 }
 
 #[test]
+fn copies_of_an_outline_are_no_independent_draws_and_cells_with_the_same_outlines_are_pairs() {
+    let home = home();
+    let home = home.path();
+    let grouped = format!("run --shape file:grains.geojson --group-by phase {RUN} --out");
+    let output = curvelax(home, &format!("{grouped} copies --curves 20"));
+    let [table, said] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(table.contains("groups     not compared: members are copies of the same outlines"), "{table}");
+    assert!(said.contains("they hold for these outlines, not for a population"), "{said}");
+    assert!(said.contains("the outline `grain 3, \"9\"` of 7 have no property phase"), "{said}");
+    let once = curvelax(home, &format!("{grouped} once"));
+    let [table, said] = [once.stdout, once.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(!table.contains("copies") && !said.contains("not for a population"), "{table}{said}");
+    let swept = done(home, &format!("run --shape file:grains.geojson --sweep omega=auto,0 {RUN} --out swept"));
+    assert!(swept.contains("pairs ") && !swept.contains("log-rank"), "{swept}");
+}
+
+#[test]
 fn shards_of_outlines_merge_into_the_run() {
     let home = home();
     let home = home.path();

@@ -46,7 +46,7 @@ fn pictures(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 #[test]
 fn pictures_come_back_byte_for_byte() {
     for (arguments, count) in [
-        ("--curves 7 --points 40 --adaptive=1e-3 --t-end 1", 8),
+        ("--curves 7 --points 40 --adaptive=1e-3 --t-end 1", 9),
         ("--curves 1 --points 32 --t-end 0.01", 9),
         (RUN, 11),
         ("--curves 5 --points 32 --tau 1e-3 --t-end 0.3 --series 0.013", 9),

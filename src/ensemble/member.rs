@@ -27,6 +27,7 @@ use crate::{
     error::{Error, Result},
     flow::Flow,
     solver::ring::MIN_POINTS,
+    text::count,
 };
 
 /// Draws for one member before giving up. By Rice's formula the harshest law allowed, a thousand modes of one size,
@@ -169,6 +170,22 @@ impl Family {
             Curves::Outlines(all) => outlines::warnings(all),
             _ => outline.map_or(Vec::new(), |outline| outline.warnings().to_vec()),
         };
+        if let Some(property) = &spec.group_by {
+            let all = curves.outlines();
+            let without = all.iter().filter(|one| one.property(property).is_none_or(|value| value.is_empty()));
+            let labels: Vec<&str> = without.map(|one| &*one.label).collect();
+            if let Some(first) = labels.first() {
+                let others = match labels.len() - 1 {
+                    0 => String::new(),
+                    more => format!(" and {}", count(more as u64, "other")),
+                };
+                warnings.push(format!(
+                    "the outline `{first}`{others} of {} have no property {property}, or more than one value of it: their \
+                     group is {NO_GROUP}",
+                    all.len()
+                ));
+            }
+        }
         if let Shape::Lemniscate { .. } = spec.shape.typical() {
             warnings.push(NO_EXCESS.into());
         }

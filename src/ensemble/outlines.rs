@@ -27,7 +27,14 @@ impl Outlines {
             if all.iter().all(|(known, _)| known != shape)
                 && let Some(read) = shape.outlines_from(base)
             {
-                all.push((shape.clone(), read?.into()));
+                let of_cell = |error: Error| match error {
+                    Error::Request(message) if !swept.is_empty() => {
+                        let cell = (0..spec.sweep.cells()).find(|cell| has_shape(spec, *cell, shape)).unwrap_or(0);
+                        Error::Request(format!("{message} (in the cell {})", spec.sweep.name(cell)))
+                    }
+                    error => error,
+                };
+                all.push((shape.clone(), read.map_err(of_cell)?.into()));
             }
         }
         Ok(Outlines(all))
@@ -97,6 +104,12 @@ impl Outlines {
         let shapes = swept.filter_map(|value| value.as_str()?.parse::<Drawn<Shape>>().ok());
         shapes.into_iter().any(|shape| self.of(shape.typical()).is_none())
     }
+}
+
+/// Whether a cell has this shape.
+fn has_shape(spec: &Spec, cell: u64, shape: &Shape) -> bool {
+    let text = shape.to_string();
+    spec.sweep.values(cell).into_iter().any(|value| value.as_str() == Some(&text))
 }
 
 /// Checks that some outline has `property`.

@@ -286,6 +286,9 @@ const LONG_SWEEPS: &str = "plain sweeps need more iterations the longer the step
 const TOO_WIDE: &str = "standard errors and intervals are those of independent members, too wide for --design sobol and \
                         lhs: the spread over several seeds is the error of such a run";
 
+const OF_THESE: &str = "standard errors and intervals take copies of one outline for independent members: they hold for these \
+                        outlines, not for a population of which they are a sample";
+
 /// How many times more nodes are looked for where so few cannot be refined.
 const MOST_MORE: usize = 8;
 
@@ -347,6 +350,9 @@ impl Cell {
         }
         if !self.spec.design.is_random() && self.spec.has_drawn_values() {
             warnings.push(TOO_WIDE.into());
+        }
+        if self.spec.has_copies_of_outlines() {
+            warnings.push(OF_THESE.into());
         }
         warnings.extend(times::warnings(&self.spec, self.family.scales()));
         warnings

@@ -92,6 +92,11 @@ impl Spec {
         self.distributions().iter().any(|of_key| !of_key.is_empty())
     }
 
+    /// Whether several members are made of one of many outlines.
+    pub fn has_copies_of_outlines(&self) -> bool {
+        self.outlines.is_some() && self.curves > 1
+    }
+
     /// Whether its members differ at all, without a sweep.
     pub fn has_different_members(&self) -> bool {
         self.has_drawn_values() || *self.amplitude.typical() != 0.0 || self.outlines.is_some_and(|count| count > 1)

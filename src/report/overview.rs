@@ -20,7 +20,7 @@ use crate::{
         times::TimeStatistics,
     },
     statistics::{GoodnessOfFit, LogRank, PowerLaw},
-    text::{duration, number, p_value, plural, rounded},
+    text::{count, duration, number, p_value, plural, rounded},
 };
 
 /// Maximum number of cells listed; the table has them all.
@@ -313,7 +313,13 @@ fn events<'a>(spec: &'a Spec, cell: &'a CellStatistics) -> impl Iterator<Item = 
             let [mean, half] = [error.mean, error.error].map(|value| rounded(100.0 * value, 2));
             format!("; discretisation about {mean} % (± {half} %)")
         });
-        format!("{}: {}{error}", event.name, times(&of.times))
+        match of.stopped {
+            0 => format!("{}: {}{error}", event.name, times(&of.times)),
+            stopped => {
+                let (known, stopped) = (of.times.sample.events(), count(stopped, "member"));
+                format!("{}: reached by {known}; no statistics, as {stopped} stopped when relaxed", event.name)
+            }
+        }
     };
     spec.event.iter().zip(&cell.events).map(line)
 }

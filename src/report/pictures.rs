@@ -13,6 +13,7 @@ use crate::{
         FittedRates, MeshQuality, PowerLawLine, RelaxationTimes, Scatter, ScatterPanel, ScatterPoint, Series, Setting,
         Survival, SurvivalCurve, Theory, TimeDistribution,
     },
+    draw::style::SERIES,
     ensemble::{Event, Spec, Status, sweep::SweepAxis, theory},
     error::{Result, shortened},
     files::{names, portraits::Film},
@@ -34,6 +35,10 @@ use crate::{
 
 /// Maximum number of groups in a table of the page.
 const MAX_GROUPS: usize = 40;
+/// Curves that can be told apart by colour and dashes.
+const DISTINCT: usize = SERIES;
+/// Conditions of events in a note.
+const MAX_CONDITIONS: usize = 8;
 /// Maximum quantiles of a cell that are drawn against those of a law.
 const MOST_QUANTILES: usize = 99;
 /// Maximum characters of the name of a member.
@@ -167,15 +172,23 @@ impl FinishedRun<'_> {
 
     /// The members not yet relaxed, by group of their outlines.
     fn groups(&self) -> Option<Chart> {
-        let (key, groups) = (self.spec().group_by.as_deref()?, &self.statistics.groups);
-        let curves: Vec<SurvivalCurve> = groups
-            .iter()
-            .map(|GroupStatistics { group, times }| {
-                survival_curve(self.group_label(group, times.cell), None, &times.times.sample)
-            })
-            .collect();
+        let (key, all) = (self.spec().group_by.as_deref()?, &self.statistics.groups);
+        let mut groups: Vec<&GroupStatistics> = all.iter().collect();
+        if groups.len() > DISTINCT {
+            let median = |of: &GroupStatistics| of.times.median().unwrap_or(f64::INFINITY);
+            groups.sort_by(|one, other| median(one).total_cmp(&median(other)));
+            groups = spread(groups.len(), DISTINCT).map(|i| groups[i]).collect();
+        }
+        let curve = |GroupStatistics { group, times }: &GroupStatistics| {
+            survival_curve(self.group_label(group, times.cell), None, &times.times.sample)
+        };
+        let curves: Vec<SurvivalCurve> = groups.iter().map(|group| curve(group)).collect();
         let title = format!("Members not yet relaxed, by {key}");
-        let note = &self.what_and_error();
+        let some = match curves.len() < all.len() {
+            true => format!("; {} of {} groups, spread over the order of their medians", curves.len(), all.len()),
+            false => String::new(),
+        };
+        let note = &format!("{}{some}", self.what_and_error());
         let svg = (!curves.is_empty())
             .then(|| Survival { title: &title, note, key, curves, ..Survival::default() }.draw())?;
         Some(chart(names::GROUP_SURVIVAL, &title, SURVIVAL_CAPTION, svg))
@@ -193,13 +206,21 @@ impl FinishedRun<'_> {
                 true => event.name.clone(),
                 false => format!("{}, {}", event.name, spec.sweep.name(cell.cell)),
             };
-            let events = spec.event.iter().zip(&cell.events);
+            let events = spec.event.iter().zip(&cell.events).filter(|(_, of)| of.stopped == 0);
             events.map(move |(event, of)| survival_curve(label(event), None, &of.times.sample))
         });
-        let conditions = spec.event.iter().map(Event::to_string).collect::<Vec<_>>().join("; ");
-        let (title, note) = ("Events", format!("{conditions}; {}", self.what()));
+        let mut curves: Vec<SurvivalCurve> = curves.collect();
+        let all = curves.len();
+        curves.truncate(DISTINCT);
+        let some = if all > DISTINCT { format!("; the first {DISTINCT} of {all} curves") } else { String::new() };
+        let shown = spec.event.iter().take(MAX_CONDITIONS).map(Event::to_string);
+        let mut conditions = shown.collect::<Vec<_>>().join("; ");
+        if spec.event.len() > MAX_CONDITIONS {
+            conditions += &format!("; {} more", spec.event.len() - MAX_CONDITIONS);
+        }
+        let (title, note) = ("Events", format!("{conditions}; {}{some}", self.what()));
         let (share, none) = ("share without the event", "There are no members, so there are no events.");
-        let survival = Survival { title, note: &note, key: "event", share, none, curves: curves.collect(), time: None };
+        let survival = Survival { title, note: &note, key: "event", share, none, curves, time: None };
         let caption = "Share of the members in which an event has not happened yet: Kaplan-Meier estimate with Greenwood's \
                        95 % band; a stroke marks a member that ended before.";
         (!spec.event.is_empty()).then(|| chart(names::EVENT_SURVIVAL, title, caption, survival.draw()))
@@ -696,7 +717,8 @@ fn table<'a>(
         let counts = cell.counts.iter().map(u64::to_string);
         let start = [cell.cell.to_string()].into_iter().chain(values.iter().cloned());
         let rates = ["median", "ratio"].map(|name| shown(cell.rates.numbers.get(name)));
-        let percent = cell.discretisation.as_ref().map(|error| 100.0 * error.mean);
+        let known = cell.discretisation.as_ref().filter(|error| error.converges());
+        let percent = known.map(|error| 100.0 * error.mean);
         let limits = cell.limits.as_ref();
         let limits = [limits.and_then(|limits| limits.median), limits.and_then(|limits| limits.error)];
         let errors =

@@ -45,6 +45,9 @@ pub struct EventStatistics {
     pub times: TimeStatistics,
     /// Their error of discretisation, if it is known of some members.
     pub discretisation: Option<DiscretisationError>,
+    /// Members that were stopped when they relaxed, before the event. If there are any, censoring depends on how slow a
+    /// member is, and nothing is estimated.
+    pub stopped: u64,
 }
 
 /// Fitted decay rates of the members of one cell that have one: complete data.
@@ -126,9 +129,13 @@ impl CellStatistics {
         let limits = CellLimits::of(&Sample::from(mem::take(&mut tally.limits)), &judged, &bootstrap, copies)?;
         let mut of_events = mem::take(&mut tally.events).into_iter();
         let events = spec.event.iter().map(|_| {
-            let EventTally { times, judged } = of_events.next().unwrap_or_default();
+            let EventTally { times, judged, stopped } = of_events.next().unwrap_or_default();
             let discretisation = DiscretisationError::of(&judged)?;
-            Ok(EventStatistics { times: TimeStatistics::new(times, &bootstrap), discretisation })
+            let times = match stopped {
+                0 => TimeStatistics::new(times, &bootstrap),
+                _ => TimeStatistics::unknown(times),
+            };
+            Ok(EventStatistics { times, discretisation, stopped })
         });
         let events = events.collect::<Result<_>>()?;
         Ok(CellStatistics { cell, values, counts, times, rates, discretisation, limits, events })
@@ -224,7 +231,12 @@ impl EnsembleStatistics {
     pub fn new(spec: &Spec, tally: &mut Tally) -> Result<EnsembleStatistics> {
         let relative = tally.cells.iter().flat_map(|cell| &cell.rates).all(|rate| rate.theory().is_some());
         // Sorting takes the times out of the order of the members.
-        let paired = if spec.common_random_numbers { Some(CellComparison::paired(spec, tally)?) } else { None };
+        let same_outlines = spec.outlines.is_some() && !spec.sweep.has("shape");
+        let paired = match () {
+            () if spec.has_copies_of_outlines() => Some(CellComparison::of_copies(spec.sweep.cells())),
+            () if spec.common_random_numbers || same_outlines => Some(CellComparison::paired(spec, tally)?),
+            () => None,
+        };
         let mut none = CellTally::default();
         let cells = (0..spec.sweep.cells())
             .map(|cell| {
@@ -247,10 +259,21 @@ impl EnsembleStatistics {
             let times = CellStatistics::new(spec, cell, &mut of_group, relative)?;
             Ok(GroupStatistics { group, times })
         });
-        let groups: Vec<GroupStatistics> = groups.collect::<Result<_>>()?;
+        let mut groups: Vec<GroupStatistics> = groups.collect::<Result<_>>()?;
+        // Numbers ascend as numbers.
+        if let Some(numbers) = groups.iter().map(|of| of.group.parse::<f64>().ok()).collect::<Option<Vec<_>>>() {
+            let mut order: Vec<_> = numbers.into_iter().zip(groups).collect();
+            order.sort_by(|(a, one), (b, other)| one.times.cell.cmp(&other.times.cell).then(a.total_cmp(b)));
+            groups = order.into_iter().map(|(_, of)| of).collect();
+        }
         let group_comparisons = groups.chunk_by(|one, other| one.times.cell == other.times.cell).map(|of_cell| {
             let samples: Vec<&Sample> = of_cell.iter().map(|group| &group.times.times.sample).collect();
-            CellComparison::of_groups(&samples, &of_cell.iter().map(|group| &*group.group).collect::<Vec<_>>())
+            match spec.has_copies_of_outlines() {
+                true => CellComparison::of_copies(samples.len() as u64),
+                false => {
+                    CellComparison::of_groups(&samples, &of_cell.iter().map(|group| &*group.group).collect::<Vec<_>>())
+                }
+            }
         });
         let group_comparisons = group_comparisons.collect();
         Ok(EnsembleStatistics { cells, comparison, groups, group_comparisons, scaling, relative, of_limits })

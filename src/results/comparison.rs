@@ -170,6 +170,16 @@ impl CellComparison {
         Ok(CellComparison::by_log_rank(samples, "cell", |cell| cell.to_string(), "use more --curves"))
     }
 
+    /// The comparison of so many samples of copies of outlines: none.
+    pub fn of_copies(samples: u64) -> CellComparison {
+        if samples < 2 {
+            return CellComparison::Single;
+        }
+        CellComparison::Refused(
+            "members are copies of the same outlines, not independent draws; use --curves 1, a member for each".into(),
+        )
+    }
+
     /// Compares the times of groups of outlines, with their names.
     pub fn of_groups(samples: &[&Sample], names: &[&str]) -> CellComparison {
         CellComparison::by_log_rank(samples, "group", |group| format!("`{}`", names[group]), "use fewer groups")

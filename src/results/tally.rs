@@ -33,6 +33,8 @@ pub struct Tally {
     pub at_start: Vec<u64>,
     /// Whether members are to have limits.
     pub refined: bool,
+    /// Whether members end when they are relaxed.
+    pub stops: bool,
     /// Rows of the levels.
     pub levels: u64,
     /// Members whose corners were rounded off before the run.
@@ -99,10 +101,12 @@ pub struct EventTally {
     pub times: Observations,
     /// What the levels tell of these times, for the members that ran at them.
     pub judged: Vec<Limit>,
+    /// Members that were stopped when they relaxed, before the event.
+    pub stopped: u64,
 }
 
 impl CellTally {
-    fn add(&mut self, outcome: &Outcome, refined: bool) -> Result<()> {
+    fn add(&mut self, outcome: &Outcome, refined: bool, stops: bool) -> Result<()> {
         let CellTally { counts, times, others, area, rates, limits, judged, events, .. } = self;
         times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
         if refined {
@@ -114,6 +118,7 @@ impl CellTally {
         events.resize_with(outcome.events.len().max(events.len()), EventTally::default);
         for (i, (own, t)) in events.iter_mut().zip(&outcome.events).enumerate() {
             own.times.push(Observation::new(*t, outcome.t_end))?;
+            own.stopped += u64::from(stops && t.is_none() && outcome.status == Status::Relaxed);
             own.judged.extend(outcome.judged_events.get(i).copied().flatten());
         }
         *area += outcome.start.area.abs();
@@ -270,7 +275,8 @@ impl Tally {
     pub fn of(spec: &Spec, levels: &LevelTimes) -> Tally {
         let events: Vec<String> = spec.event.iter().map(|event| event.name.clone()).collect();
         let at_start = vec![0; events.len()];
-        Tally { refined: spec.refine, levels: levels.rows(), events, at_start, ..Tally::default() }
+        let stops = spec.stops_when_relaxed();
+        Tally { refined: spec.refine, stops, levels: levels.rows(), events, at_start, ..Tally::default() }
     }
 
     /// Adds a member.
@@ -282,9 +288,9 @@ impl Tally {
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
-        self.cells[cell].add(outcome, refined)?;
+        self.cells[cell].add(outcome, refined, self.stops)?;
         if !outcome.group.is_empty() {
-            self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, refined)?;
+            self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, refined, self.stops)?;
         }
         self.at_start.iter_mut().zip(&outcome.events).for_each(|(count, t)| *count += u64::from(*t == Some(0.0)));
         self.mesh_ratios.push(outcome.end.mesh_ratio as f32);
@@ -381,6 +387,15 @@ impl Tally {
         for (name, at_start) in self.events.iter().zip(&self.at_start).filter(|(_, at_start)| **at_start > 0) {
             warnings
                 .push(format!("the event {name} holds from the start in {at_start} of {members}: its time is 0 there"));
+        }
+        for (i, name) in self.events.iter().enumerate() {
+            let stopped: u64 = self.cells.iter().filter_map(|cell| cell.events.get(i)).map(|of| of.stopped).sum();
+            if stopped > 0 {
+                warnings.push(format!(
+                    "{stopped} of {members} were stopped when they relaxed, before the event {name}: the slow ones were \
+                     seen for longer, so it has no statistics; use --stop-when-relaxed=false, and a number as --t-end"
+                ));
+            }
         }
         let (drifted, worst) = self.drifted;
         if drifted > 0 {

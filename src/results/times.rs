@@ -57,6 +57,11 @@ impl TimeStatistics {
         TimeStatistics { sample, mean, quantiles, interval }
     }
 
+    /// Those of times from which nothing can be estimated.
+    pub fn unknown(times: Observations) -> TimeStatistics {
+        TimeStatistics { sample: Sample::from(times), mean: None, quantiles: [None; QUANTILES.len()], interval: None }
+    }
+
     /// The numbers for the table.
     pub fn numbers(&self) -> Numbers {
         let of = |number: fn(Mean) -> Option<f64>| self.mean.and_then(number);
