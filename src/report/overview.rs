@@ -313,10 +313,10 @@ fn events<'a>(spec: &'a Spec, cell: &'a CellStatistics) -> impl Iterator<Item = 
             let [mean, half] = [error.mean, error.error].map(|value| rounded(100.0 * value, 2));
             format!("; discretisation about {mean} % (± {half} %)")
         });
-        match of.stopped {
-            0 => format!("{}: {}{error}", event.name, times(&of.times)),
-            stopped => {
-                let (known, stopped) = (of.times.sample.events(), count(stopped, "member"));
+        match (of.stopped, of.times.sample.events()) {
+            (0, _) | (_, 0) => format!("{}: {}{error}", event.name, times(&of.times)),
+            (stopped, known) => {
+                let stopped = count(stopped, "member");
                 format!("{}: reached by {known}; no statistics, as {stopped} stopped when relaxed", event.name)
             }
         }

@@ -129,7 +129,7 @@ impl CellStatistics {
         let limits = CellLimits::of(&Sample::from(mem::take(&mut tally.limits)), &judged, &bootstrap, copies)?;
         let mut of_events = mem::take(&mut tally.events).into_iter();
         let events = spec.event.iter().map(|_| {
-            let EventTally { times, judged, stopped } = of_events.next().unwrap_or_default();
+            let EventTally { times, judged, stopped, .. } = of_events.next().unwrap_or_default();
             let discretisation = DiscretisationError::of(&judged)?;
             let times = match stopped {
                 0 => TimeStatistics::new(times, &bootstrap),

@@ -1,6 +1,6 @@
 //! What explains the times: how the relaxation times of the members of a cell depend on their features.
 //!
-//! Times over more than [`WIDE`] times the smallest, as those of outlines of many sizes are, enter by their logarithms,
+//! Times of which the largest is more than 30 times the smallest, as those of outlines of many sizes are, enter by their logarithms,
 //! and with them the positive features that vary as widely. All other numbers enter as they are. A rank correlation near ±1
 //! with a smaller R² means a dependence that is monotone but not straight. A feature that is constant among the members, or unknown for one of
 //! them, is left out.
@@ -282,7 +282,7 @@ pub(crate) mod tests {
             let size = (0.1 * i as f64).exp();
             let (wave, t) = ((i as f64 * i as f64).sin(), size.powi(4));
             let numbers = vec![wave, size, 1.0 + 0.1 * wave, f64::from(u8::from(i.is_multiple_of(2)))];
-            FeaturedMember { member: i, place: i, numbers, times: [Some(t), Some(1.0 + wave)], ..Default::default() }
+            FeaturedMember { member: i, place: i, numbers, times: [Some(t), Some(2.0 + wave)], ..Default::default() }
         };
         let found = explained((0..60).map(member), 1);
         let [best, others @ ..] = &found.rows[..4] else { panic!("{found:?}") };

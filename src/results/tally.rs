@@ -103,6 +103,8 @@ pub struct EventTally {
     pub judged: Vec<Limit>,
     /// Members that were stopped when they relaxed, before the event.
     pub stopped: u64,
+    /// Members in which it happened.
+    reached: u64,
 }
 
 impl CellTally {
@@ -118,6 +120,7 @@ impl CellTally {
         events.resize_with(outcome.events.len().max(events.len()), EventTally::default);
         for (i, (own, t)) in events.iter_mut().zip(&outcome.events).enumerate() {
             own.times.push(Observation::new(*t, outcome.t_end))?;
+            own.reached += u64::from(t.is_some());
             own.stopped += u64::from(stops && t.is_none() && outcome.status == Status::Relaxed);
             own.judged.extend(outcome.judged_events.get(i).copied().flatten());
         }
@@ -389,7 +392,8 @@ impl Tally {
                 .push(format!("the event {name} holds from the start in {at_start} of {members}: its time is 0 there"));
         }
         for (i, name) in self.events.iter().enumerate() {
-            let stopped: u64 = self.cells.iter().filter_map(|cell| cell.events.get(i)).map(|of| of.stopped).sum();
+            let some = self.cells.iter().filter_map(|cell| cell.events.get(i)).filter(|of| of.reached > 0);
+            let stopped: u64 = some.map(|of| of.stopped).sum();
             if stopped > 0 {
                 warnings.push(format!(
                     "{stopped} of {members} were stopped when they relaxed, before the event {name}: the slow ones were \

@@ -91,7 +91,7 @@ impl Regression {
     /// Selects features for `y`; `keys` are the numbers of the members, by which they are dealt into parts. All slices
     /// have one number per member, and all numbers are finite.
     ///
-    /// `None` if no feature or `y` varies, or with fewer than [`MEMBERS_PER_FEATURE`] members in all parts but one.
+    /// `None` if no feature or `y` varies, or with fewer than five members in all parts but one.
     pub fn forward(features: &[&[f64]], y: &[f64], keys: &[u64]) -> Option<Regression> {
         let varying = features.iter().enumerate().filter_map(|(i, feature)| Some((i, standardised(feature)?)));
         let (places, mut columns): (Vec<usize>, Vec<Vec<f64>>) = varying.unzip();
