@@ -1,9 +1,9 @@
 //! What explains the times: how the relaxation times of the members of a cell depend on their features.
 //!
-//! Times of which the largest is more than 30 times the smallest, as those of outlines of many sizes are, enter by their logarithms,
-//! and with them the positive features that vary as widely. All other numbers enter as they are. A rank correlation near ±1
-//! with a smaller R² means a dependence that is monotone but not straight. A feature that is constant among the members, or unknown for one of
-//! them, is left out.
+//! Times of which the largest is more than 30 times the smallest, as those of outlines of many sizes are, enter by their
+//! logarithms, and with them the positive features that vary as widely. All other numbers enter as they are. A rank
+//! correlation near ±1 with a smaller R² means a dependence that is monotone but not straight. A feature that is constant
+//! among the members, or unknown for one of them, is left out.
 //!
 //! The first [`CONSIDERED`] members of a cell enter. One that ended before a time has none and cannot: the numbers hold
 //! for the members that reached the time, and the others, mostly the slow ones, are counted beside them. If these are
