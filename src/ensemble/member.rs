@@ -98,11 +98,25 @@ enum Curves {
     /// The shape with each member's own numbers.
     Drawn,
     /// Member j of outline j modulo their number.
-    Outlines(Arc<[Labelled]>),
+    Outlines(Arc<OutlineSet>),
 }
 
 /// The group of outlines that do not have the property.
 const NO_GROUP: &str = "(none)";
+/// The outlines of a shape, with the sizes of those that stand for all: measured once for all cells and levels.
+pub(super) struct OutlineSet {
+    pub(super) all: Vec<Labelled>,
+    scales: Arc<[CurveScale]>,
+}
+
+impl OutlineSet {
+    pub(super) fn new(all: Vec<Labelled>) -> Result<OutlineSet> {
+        // The only one is measured with the nodes that it gets.
+        let scales = if all.len() > 1 { scales_of(&all)? } else { Arc::default() };
+        Ok(OutlineSet { all, scales })
+    }
+}
+
 /// Nodes of a curve that is only measured.
 const PROBE_NODES: usize = 512;
 /// The outlines that stand for all are this many of the largest and of the longest ones, and of the smallest.
@@ -115,7 +129,7 @@ impl Family {
     /// [`Error::Request`] if one of them, or the file of the shape, is wrong.
     pub fn new(spec: &Spec) -> Result<Family> {
         match spec.shape.typical().outlines_from(Path::new("")) {
-            Some(outlines) => Family::of_outlines(spec, outlines?.into()),
+            Some(outlines) => Family::of_outlines(spec, OutlineSet::new(outlines?)?.into()),
             None => Family::of_shape(spec),
         }
     }
@@ -127,9 +141,9 @@ impl Family {
     }
 
     /// Does the same as [`Family::new`], with `outlines`, at least one, in place of the shape.
-    pub(super) fn of_outlines(spec: &Spec, outlines: Arc<[Labelled]>) -> Result<Family> {
+    pub(super) fn of_outlines(spec: &Spec, outlines: Arc<OutlineSet>) -> Result<Family> {
         let none = || Error::value("shape", &spec.shape, "there is no outline", "give one");
-        let first = Arc::clone(&outlines.first().ok_or_else(none)?.outline);
+        let first = Arc::clone(&outlines.all.first().ok_or_else(none)?.outline);
         Family::of_curve(spec, BaseCurve::from_outline(first), Curves::Outlines(outlines))
     }
 
@@ -167,7 +181,7 @@ impl Family {
         let has_corners = outline.is_some() && spec.sampling == Sampling::Arclength && spec.points >= MIN_POINTS;
         let simple = outline.is_some_and(|outline| outline.is_simple());
         let mut warnings = match &curves {
-            Curves::Outlines(all) => outlines::warnings(all),
+            Curves::Outlines(set) => outlines::warnings(&set.all),
             _ => outline.map_or(Vec::new(), |outline| outline.warnings().to_vec()),
         };
         if let Some(property) = &spec.group_by {
@@ -196,7 +210,7 @@ impl Family {
         }
         let scales = match &curves {
             Curves::Drawn => scales(spec)?,
-            Curves::Outlines(all) if all.len() > 1 => scales_of(all)?,
+            Curves::Outlines(set) if set.all.len() > 1 => Arc::clone(&set.scales),
             _ => [CurveScale::of(&nodes)].into(),
         };
         let (sampler, directions) = (Arc::new(sampler), check_directions(spec.modes.high).into());
@@ -286,7 +300,7 @@ impl Family {
         let outline = self.outline(index);
         let own = match (&self.curves, &values, outline) {
             (Curves::Drawn, Some(values), _) => Some(values.shape.resolve()?),
-            (Curves::Outlines(all), _, Some(own)) if all.len() > 1 => {
+            (Curves::Outlines(set), _, Some(own)) if set.all.len() > 1 => {
                 Some(BaseCurve::from_outline(Arc::clone(&own.outline)))
             }
             _ => None,
@@ -400,7 +414,7 @@ fn drawn(spec: &Spec) -> Option<Arc<Spec>> {
 impl Curves {
     fn outlines(&self) -> &[Labelled] {
         match self {
-            Curves::Outlines(all) => all,
+            Curves::Outlines(set) => &set.all,
             _ => &[],
         }
     }

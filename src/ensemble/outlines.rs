@@ -2,7 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
-use super::{Drawn, Spec};
+use super::{Drawn, Spec, member::OutlineSet};
 use crate::{
     curve::{Shape, outlines::Labelled},
     error::{Error, Result, shortened},
@@ -10,7 +10,11 @@ use crate::{
 };
 
 /// The outlines of the shapes of a spec that are read from files.
-pub(super) struct Outlines(Vec<(Shape, Arc<[Labelled]>)>);
+pub(super) struct Outlines {
+    sets: Vec<(Shape, Arc<OutlineSet>)>,
+    /// There are shapes that are not.
+    has_formulas: bool,
+}
 
 impl Outlines {
     /// Reads those of `spec` and its sweep; paths are relative to the directory `base`.
@@ -22,27 +26,27 @@ impl Outlines {
         // Other values are refused with their cell, later.
         let swept: Vec<Drawn<Shape>> = swept.filter_map(|value| value.as_str()?.parse().ok()).collect();
         let shapes = if swept.is_empty() { vec![&spec.shape] } else { swept.iter().collect() };
-        let mut all: Vec<(Shape, Arc<[Labelled]>)> = Vec::new();
+        let mut outlines = Outlines { sets: Vec::new(), has_formulas: false };
         for shape in shapes.into_iter().map(Drawn::typical) {
-            if all.iter().all(|(known, _)| known != shape)
-                && let Some(read) = shape.outlines_from(base)
-            {
-                let of_cell = |error: Error| match error {
-                    Error::Request(message) if !swept.is_empty() => {
-                        let cell = (0..spec.sweep.cells()).find(|cell| has_shape(spec, *cell, shape)).unwrap_or(0);
-                        Error::Request(format!("{message} (in the cell {})", spec.sweep.name(cell)))
-                    }
-                    error => error,
-                };
-                all.push((shape.clone(), read.map_err(of_cell)?.into()));
+            if outlines.of(shape).is_some() {
+                continue;
             }
+            let Some(read) = shape.outlines_from(base) else {
+                outlines.has_formulas = true;
+                continue;
+            };
+            let set = read.and_then(OutlineSet::new).map_err(|error| {
+                let cell = (0..spec.sweep.cells()).find(|cell| has_shape(spec, *cell, shape)).unwrap_or(0);
+                spec.sweep.in_cell(error, cell)
+            })?;
+            outlines.sets.push((shape.clone(), set.into()));
         }
-        Ok(Outlines(all))
+        Ok(outlines)
     }
 
     /// Those of a shape, if it is read from files.
-    pub fn of(&self, shape: &Shape) -> Option<&Arc<[Labelled]>> {
-        self.0.iter().find(|(known, _)| known == shape).map(|(_, all)| all)
+    pub fn of(&self, shape: &Shape) -> Option<&Arc<OutlineSet>> {
+        self.sets.iter().find(|(known, _)| known == shape).map(|(_, set)| set)
     }
 
     /// `spec` with their number, if they are an ensemble, and with what follows from it: where the request says nothing
@@ -52,8 +56,8 @@ impl Outlines {
     /// [`Error::Request`] for cells with unequal numbers of outlines, for another number than `spec` has, and for keys that
     /// mean nothing with outlines, or only with them.
     pub fn settle(&self, mut spec: Spec) -> Result<Spec> {
-        let several = |(shape, all): &&(Shape, Arc<[Labelled]>)| matches!(shape, Shape::Files(_)) || all.len() > 1;
-        let Some((first, all)) = self.0.iter().find(several) else {
+        let several = |(shape, set): &&(Shape, Arc<OutlineSet>)| matches!(shape, Shape::Files(_)) || set.all.len() > 1;
+        let Some((first, set)) = self.sets.iter().find(several) else {
             if let Some(asked) = spec.outlines.filter(|asked| *asked != 1) {
                 let problem = format!("the shape {} is one curve", spec.shape);
                 return Err(Error::value(
@@ -68,9 +72,9 @@ impl Outlines {
                 Error::Request(format!("{problem}; leave it out"))
             });
         };
-        let found = all.len() as u64;
-        if let Some((other, others)) = self.0.iter().find(|(_, others)| others.len() as u64 != found) {
-            let (found, others) = (count(found, "outline"), count(others.len() as u64, "outline"));
+        let found = set.all.len() as u64;
+        if let Some((other, others)) = self.sets.iter().find(|(_, others)| others.all.len() as u64 != found) {
+            let (found, others) = (count(found, "outline"), count(others.all.len() as u64, "outline"));
             return Err(Error::Request(format!(
                 "--sweep shape: cells have as many members each, and {first} has {found}, {other} {others}; read all with \
                  one pattern, such as files:DIR/*.csv, and use --group-by file"
@@ -80,13 +84,13 @@ impl Outlines {
             let problem = format!("{first} has {}", count(found, "outline"));
             return Err(Error::value("outlines", asked, &problem, "restore the files, or leave --outlines out"));
         }
-        if self.has_other_shapes(&spec) {
+        if self.has_formulas {
             let problem =
                 format!("a sweep has {first}, with {}, and a shape that is one curve", count(found, "outline"));
             return Err(Error::Request(format!("--sweep shape: {problem}; run them apart")));
         }
         if let Some(property) = &spec.group_by {
-            self.0.iter().try_for_each(|(_, all)| check_property(property, all))?;
+            self.sets.iter().try_for_each(|(_, set)| check_property(property, &set.all))?;
         }
         spec.outlines = Some(found);
         if spec.omitted.curves {
@@ -96,13 +100,6 @@ impl Outlines {
             }
         }
         Ok(spec)
-    }
-
-    /// Whether the sweep has shapes that are no files.
-    fn has_other_shapes(&self, spec: &Spec) -> bool {
-        let swept = spec.sweep.axes().iter().filter(|axis| axis.key == "shape").flat_map(|axis| &axis.values);
-        let shapes = swept.filter_map(|value| value.as_str()?.parse::<Drawn<Shape>>().ok());
-        shapes.into_iter().any(|shape| self.of(shape.typical()).is_none())
     }
 }
 

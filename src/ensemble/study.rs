@@ -205,8 +205,8 @@ impl Study {
         }
         for cell in &mut cells {
             let own = cell.settled();
-            cell.spec = own.map_err(|error| of_cell(error, &spec, cell.index))?;
-            cell.check_refinement().map_err(|error| of_cell(error, &spec, cell.index))?;
+            cell.spec = own.map_err(|error| spec.sweep.in_cell(error, cell.index))?;
+            cell.check_refinement().map_err(|error| spec.sweep.in_cell(error, cell.index))?;
         }
         if spec.t_end == Some(FinalTime::Auto) && !spec.sweep.is_empty() {
             spec.t_end = Some(FinalTime::OfCells(cells.iter().map(|cell| cell.spec.final_time()).collect()));
@@ -458,7 +458,7 @@ fn cells(spec: &Spec, outlines: &Outlines) -> Result<Vec<Cell>> {
     let mut bytes = 0;
     for index in 0..spec.sweep.cells() {
         let cell = cell(spec, outlines, index, &cells, &mut bytes);
-        cells.push(cell.map_err(|error| of_cell(error, spec, index))?);
+        cells.push(cell.map_err(|error| spec.sweep.in_cell(error, index))?);
     }
     let unequal = cells.windows(2).find(|pair| pair[0].spec.points != pair[1].spec.points);
     if let (Store::Zarr, Some([one, other])) = (spec.store, unequal) {
@@ -467,16 +467,6 @@ fn cells(spec: &Spec, outlines: &Outlines) -> Result<Vec<Cell>> {
         return Err(Error::value("store", "zarr", &problem, "use --store csv, or one number of --points"));
     }
     Ok(cells)
-}
-
-/// Adds the cell of a sweep to an error about its request.
-fn of_cell(error: Error, spec: &Spec, index: u64) -> Error {
-    match error {
-        Error::Request(message) if !spec.sweep.is_empty() => {
-            Error::Request(format!("{message} (in the cell {})", spec.sweep.name(index)))
-        }
-        error => error,
-    }
 }
 
 #[cfg(test)]

@@ -206,6 +206,16 @@ impl Sweep {
         self.values(index).into_iter().map(label).collect()
     }
 
+    /// Adds a cell to an error about its request, if anything is swept.
+    pub(super) fn in_cell(&self, error: Error, index: u64) -> Error {
+        match error {
+            Error::Request(message) if !self.is_empty() => {
+                Error::Request(format!("{message} (in the cell {})", self.name(index)))
+            }
+            error => error,
+        }
+    }
+
     /// Checks that the keys are among `keys`, and the numbers of values. The values themselves are checked cell by
     /// cell.
     ///

@@ -180,7 +180,7 @@ impl FinishedRun<'_> {
             groups = spread(groups.len(), DISTINCT).map(|i| groups[i]).collect();
         }
         let curve = |GroupStatistics { group, times }: &GroupStatistics| {
-            survival_curve(self.group_label(group, times.cell), None, &times.times.sample)
+            survival_curve(self.label_in(group, times.cell), None, &times.times.sample)
         };
         let curves: Vec<SurvivalCurve> = groups.iter().map(|group| curve(group)).collect();
         let title = format!("Members not yet relaxed, by {key}");
@@ -194,20 +194,17 @@ impl FinishedRun<'_> {
         Some(chart(names::GROUP_SURVIVAL, &title, SURVIVAL_CAPTION, svg))
     }
 
-    fn group_label(&self, group: &str, cell: u64) -> String {
-        if self.spec().sweep.is_empty() { group.into() } else { format!("{group}, {}", self.label(cell)) }
+    /// The name of a group or an event of a cell in a legend.
+    fn label_in(&self, name: &str, cell: u64) -> String {
+        if self.spec().sweep.is_empty() { name.into() } else { format!("{name}, {}", self.label(cell)) }
     }
 
     /// A survival curve for each event of each cell, if there are events.
     fn events(&self) -> Option<Chart> {
         let spec = self.spec();
         let curves = self.statistics.cells.iter().flat_map(|cell| {
-            let label = |event: &Event| match spec.sweep.is_empty() {
-                true => event.name.clone(),
-                false => format!("{}, {}", event.name, spec.sweep.name(cell.cell)),
-            };
             let events = spec.event.iter().zip(&cell.events).filter(|(_, of)| of.stopped == 0);
-            events.map(move |(event, of)| survival_curve(label(event), None, &of.times.sample))
+            events.map(|(event, of)| survival_curve(self.label_in(&event.name, cell.cell), None, &of.times.sample))
         });
         let mut curves: Vec<SurvivalCurve> = curves.collect();
         let all = curves.len();
