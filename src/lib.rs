@@ -52,6 +52,7 @@
 //! | `draw` | SVG, axes and charts from plain numbers |
 //! | `files` | the folder of results: who may write there, and what each file holds |
 //! | `report` | a run's sink: tables, checkpoints, merge, `report.html` |
+//! | `session` | from a spec to a finished folder, for the program and the Python package |
 //! | `bench`, `estimate`, `figures` | speed of a back end; cost of a run; the paper's figures |
 //! | `cli` | the commands |
 //!
@@ -101,6 +102,8 @@ pub mod files;
 pub mod report;
 #[doc(hidden)]
 pub mod schedule;
+#[doc(hidden)]
+pub mod session;
 #[doc(hidden)]
 pub mod trajectory;
 

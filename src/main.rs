@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    curvelax::cli::main()
+    ExitCode::from(curvelax::cli::main(std::env::args_os()))
 }

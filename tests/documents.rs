@@ -8,16 +8,13 @@ use std::{
 
 use assert_cmd::Command;
 use curvelax::{
-    ensemble::{Feature, LevelRow, Outcome, SeriesRow, Spec},
+    ensemble::Spec,
     files::{
-        TableRow, members, names,
-        tables::{CostRow, ErrorRow, EventLevelRow, EventRow, NodeRow, RateRow},
+        TableRow, names,
+        tables::{CostRow, ErrorRow},
     },
-    results::{
-        cells::{CellColumn, EnsembleStatistics},
-        explained::ExplainedRow,
-        tally::{MeanExcess, Tally},
-    },
+    report,
+    results::{cells::EnsembleStatistics, tally::Tally},
 };
 
 /// The pages with a generated part, and the marks around it.
@@ -134,27 +131,24 @@ fn columns() -> String {
     spec.sweep.set("amplitude=0.05,0.1".parse().unwrap());
     spec.event.push("convex = k_min >= 0".parse().unwrap());
     let cells = EnsembleStatistics::new(&spec, &mut Tally::default()).unwrap();
-    let told = |column: CellColumn| [column.name, column.holds.to_owned(), column.meaning];
-    let (of_cells, of_events) = (cells.columns(&spec), cells.event_columns());
     let drawn = Spec::from_toml("shape = 'ellipse:uniform(1.5..2.5),1'\nmodes = '2..=3'").unwrap();
-    let indices = members::OWN.map(|(name, holds, meaning)| [name, holds, meaning].map(str::to_owned));
-    let of_feature = |Feature { name, meaning, is_flag }: Feature| {
-        [name, if is_flag { "integer" } else { "float" }.to_owned(), meaning]
+    let of_run = |name: &str, rows: &str| {
+        let spec = if name == names::MEMBERS { &drawn } else { &spec };
+        table(name, rows, report::columns::columns(name, spec, &cells).unwrap().into_iter())
     };
-    let of_members = indices.into_iter().chain(drawn.cell_features().into_iter().map(of_feature));
     [
-        table_of::<Outcome>(names::SUMMARY, "member"),
-        table(names::MEMBERS, "member; here with `--shape 'ellipse:uniform(1.5..2.5),1' --modes 2..=3`", of_members),
-        table(names::ENSEMBLE, "cell; here with `--sweep amplitude=0.05,0.1`", of_cells.into_iter().map(told)),
-        table_of::<EventRow>(names::EVENTS, "member and event, with `--event`"),
-        table(names::EVENT_STATISTICS, "cell and event, with `--event`", of_events.into_iter().map(told)),
-        table_of::<ExplainedRow>(names::EXPLAINED, "cell, time and feature"),
-        table_of::<RateRow>(names::RATES, "member with a rate"),
-        table_of::<LevelRow>(names::LEVELS, "member and level ([limit](method.md#limit))"),
-        table_of::<EventLevelRow>(names::EVENT_LEVELS, "member, level and event, with `--event`"),
-        table_of::<MeanExcess>(names::MEAN_EXCESS, "cell and time"),
-        table_of::<SeriesRow>(names::SERIES, "member and time, with `--series`"),
-        table_of::<NodeRow>(names::SNAPSHOTS, "member, time and node, with `--snapshots`"),
+        of_run(names::SUMMARY, "member"),
+        of_run(names::MEMBERS, "member; here with `--shape 'ellipse:uniform(1.5..2.5),1' --modes 2..=3`"),
+        of_run(names::ENSEMBLE, "cell; here with `--sweep amplitude=0.05,0.1`"),
+        of_run(names::EVENTS, "member and event, with `--event`"),
+        of_run(names::EVENT_STATISTICS, "cell and event, with `--event`"),
+        of_run(names::EXPLAINED, "cell, time and feature"),
+        of_run(names::RATES, "member with a rate"),
+        of_run(names::LEVELS, "member and level ([limit](method.md#limit))"),
+        of_run(names::EVENT_LEVELS, "member, level and event, with `--event`"),
+        of_run(names::MEAN_EXCESS, "cell and time"),
+        of_run(names::SERIES, "member and time, with `--series`"),
+        of_run(names::SNAPSHOTS, "member, time and node, with `--snapshots`"),
         table_of::<ErrorRow>(names::CONVERGENCE, "run of a problem, from `curvelax convergence --out`"),
         table_of::<CostRow>(names::WORK, "method, from `curvelax convergence --work-precision --out`"),
     ]

@@ -13,7 +13,7 @@ use syn::{
 };
 
 /// The modules of the crate; each may use only those above it.
-const LAYERS: [&str; 31] = [
+const LAYERS: [&str; 32] = [
     "wgsl",
     "error",
     "guard",
@@ -41,6 +41,7 @@ const LAYERS: [&str; 31] = [
     "draw",
     "files",
     "report",
+    "session",
     "bench",
     "estimate",
     "figures",

@@ -12,10 +12,7 @@ use crate::{
     curve::{Modes, Perturbation, Sampling, Shape},
     ensemble::{
         Drawn, Event, Shard, Spec,
-        spec::{
-            BackendChoice, DEFAULT_ADAPTIVE, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau,
-            Units,
-        },
+        spec::{BackendChoice, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau, Units},
         sweep::SweepAxis,
     },
     error::{Error, Result},
@@ -335,18 +332,6 @@ impl SpecFlags {
         every_flag!(given)
     }
 
-    /// Sets what `--accurate` stands for, except what is given on its own.
-    fn recommend(&mut self, spec: &mut Spec) {
-        if self.tau.is_none() && self.adaptive.is_none() && spec.adaptive.is_none() {
-            (self.adaptive, spec.tau) = (Some(DEFAULT_ADAPTIVE), None);
-        }
-        self.pull.get_or_insert(Pull::Auto);
-        self.omega.get_or_insert(Omega::Auto);
-        self.t_end.get_or_insert(FinalTime::Auto);
-        self.stop_when_relaxed.get_or_insert(true);
-        self.refine.get_or_insert(true);
-    }
-
     /// Replaces in `spec` the values given as flags.
     pub fn overlay(mut self, spec: &mut Spec) {
         std::mem::take(&mut self.sweep).into_iter().for_each(|axis| spec.sweep.set(axis));
@@ -358,7 +343,7 @@ impl SpecFlags {
             (spec.relax_to, spec.relax_at) = (None, None);
         }
         if self.accurate {
-            self.recommend(spec);
+            spec.make_accurate(&self.given());
         }
         spec.omitted.curves &= self.curves.is_none();
         spec.omitted.amplitude &= self.amplitude.is_none();

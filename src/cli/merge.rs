@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{flags, print, work::check_name};
+use super::{flags, manner::check_name, print};
 use crate::{
     error::{Error, Result},
     files::OutputFolder,

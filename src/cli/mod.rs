@@ -13,19 +13,18 @@ mod dry_run;
 mod figure;
 mod flags;
 mod man;
+mod manner;
 mod merge;
 mod plot;
 mod resume;
 mod run;
 mod signals;
 mod unknown;
-mod work;
 
 use std::{
     ffi::OsString,
     io::{self, Write},
     path::Path,
-    process::ExitCode,
 };
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -68,9 +67,10 @@ enum Command {
     Man(man::ManArgs),
 }
 
-/// Parses the arguments of the process, runs the command, and returns the exit code.
-pub fn main() -> ExitCode {
-    let cli = parse(std::env::args_os()).unwrap_or_else(|error| error.exit());
+/// Parses `arguments`, the first of which is the program, runs the command, and returns the exit code. Wrong arguments
+/// end the process.
+pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = parse(arguments).unwrap_or_else(|error| error.exit());
     let done = match cli.command {
         Command::Run(args) => run::run(*args),
         Command::Resume(args) => resume::resume(args),
@@ -92,7 +92,7 @@ pub fn main() -> ExitCode {
     if abandoned::is_any() {
         signals::exit(code);
     }
-    ExitCode::from(code)
+    code
 }
 
 /// Does the same as `Cli::try_parse_from`, but [explains](unknown::explain) unknown flags.

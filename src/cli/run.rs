@@ -2,17 +2,13 @@
 
 use std::path::PathBuf;
 
-use super::{
-    dry_run, flags, print, print_json, resume,
-    work::{MannerFlags, Work},
-};
+use super::{dry_run, flags, manner::MannerFlags, print, print_json};
 use crate::{
-    accuracy,
-    ensemble::{Spec, Standing},
+    ensemble::Spec,
     error::{Error, Result},
     estimate::Estimate,
     files::{Existing, OutputFolder},
-    report::{RunReport, checkpoint::Origin},
+    session::{self, Host, Work},
 };
 
 const EXAMPLES: &str = "\
@@ -69,16 +65,12 @@ pub fn run(args: RunArgs) -> Result<()> {
     let runs = !(args.print_spec || args.dry_run);
     // Rounds take time, too.
     let manner = if spec.accuracy.is_some() && runs { Some(args.manner.manner()?) } else { None };
-    let stopped = || {
-        let (cause, _) = manner.as_ref()?.stop.asked()?;
-        Some(cause.error(" in the rounds of --accuracy, before the run began: nothing is saved"))
-    };
     // A name that cannot be used is told before the rounds, which may take minutes.
     if let (true, Some(out)) = (runs && !args.resume, &args.out) {
         OutputFolder::check_place(out, args.force)?;
     }
-    let spec = accuracy::plan(spec, |round| args.manner.say(&round.to_string()), stopped)?;
-    let mut work = Work::new(spec)?;
+    let spec = session::planned(spec, manner.as_ref(), &args.manner)?;
+    let work = Work::new(spec)?;
     if args.print_spec {
         return print(&work.study.spec().to_toml()?);
     }
@@ -95,17 +87,16 @@ pub fn run(args: RunArgs) -> Result<()> {
     }
     let out = args.out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
     flags.check_name(&out)?;
-    let begun = if args.resume { resume::begun(&out)? } else { None };
+    let begun = if args.resume { session::begun(&out)? } else { None };
     if let Some(begun) = begun {
-        return resume::resume_like(begun, &work.study, asked, flags);
+        return match session::resume_like(begun, &work.study, asked, &flags)? {
+            Some(completed) => flags.completed(completed),
+            None => flags.finished(&out),
+        };
     }
     let manner = manner.map_or_else(|| flags.manner(), Ok)?;
     let existing = if args.resume { Existing::Filled } else { args.force.into() };
-    let folder = OutputFolder::open(&out, existing)?;
-    let platform = work.open(&flags)?;
-    let origin = Origin::new(&work.study, platform)?;
-    let report = RunReport::begin(folder, &work.study, origin, manner)?;
-    resume::carry_out(work, report, Standing::default(), &flags)
+    flags.completed(session::begin(work, &out, existing, manner, &flags)?)
 }
 
 /// The spec file, overlaid with the flags.

@@ -403,6 +403,27 @@ impl Spec {
         Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", path.display())))
     }
 
+    /// Sets what `--accurate` stands for, except the keys that are `given` beside it.
+    pub fn make_accurate(&mut self, given: &[String]) {
+        let is_free = |key: &str| !given.iter().any(|given| given == key);
+        if is_free("tau") && is_free("adaptive") && self.adaptive.is_none() {
+            (self.adaptive, self.tau) = (Some(DEFAULT_ADAPTIVE), None);
+        }
+        if is_free("pull") {
+            self.pull = Pull::Auto;
+        }
+        if is_free("omega") {
+            self.omega = Some(Omega::Auto);
+        }
+        if is_free("t-end") {
+            self.t_end = Some(FinalTime::Auto);
+        }
+        if is_free("stop-when-relaxed") {
+            self.stop_when_relaxed = Some(true);
+        }
+        self.refine |= is_free("refine");
+    }
+
     /// Parses the text of a spec file; absent keys have their defaults.
     ///
     /// ```

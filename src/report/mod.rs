@@ -4,6 +4,7 @@
 //! the [`Sink`] of the simulation: rows stream to disk, and only a few numbers per member stay in memory.
 
 pub mod checkpoint;
+pub mod columns;
 pub mod complete;
 pub mod document;
 pub mod envelope;
@@ -27,6 +28,7 @@ use std::{
 };
 
 pub use complete::Form;
+pub use progress::Progress;
 pub use stop::{Cause, Stop};
 
 use crate::{
@@ -40,7 +42,6 @@ use crate::{
 use checkpoint::{Head, Origin, Saved};
 use complete::Complete;
 use growing::Growing;
-use progress::Progress;
 
 /// A run that is asked to stop and does not reach a point where it can is ended after this time.
 const PATIENCE: Duration = Duration::from_millis(2500);
@@ -50,8 +51,8 @@ const SHARE_OF_STATES: u32 = 20;
 
 /// How a report works; the results do not depend on it.
 pub struct Manner {
-    /// Whether to suppress progress on stderr.
-    pub quiet: bool,
+    /// Where the progress is shown.
+    pub progress: Progress,
     /// Time between two checkpoints.
     pub every: Duration,
     /// The means to stop the run.
@@ -124,7 +125,7 @@ impl RunReport {
     }
 
     fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, manner: Manner) -> RunReport {
-        let Manner { quiet, every, stop } = manner;
+        let Manner { progress, every, stop } = manner;
         RunReport {
             growing,
             folder,
@@ -136,7 +137,7 @@ impl RunReport {
             members: study.member_count(),
             stages: study.stages().iter().map(|stage| stage.members).collect(),
             stage: 0,
-            progress: Progress::new(quiet),
+            progress,
             clock: Instant::now(),
             earlier: Duration::ZERO,
             every,
@@ -368,7 +369,7 @@ mod tests {
     }
 
     fn manner(stop: &Stop) -> Manner {
-        Manner { quiet: true, every: Duration::from_secs(1000), stop: stop.clone() }
+        Manner { progress: Progress::Quiet, every: Duration::from_secs(1000), stop: stop.clone() }
     }
 
     fn begun(out: &Path, spec: &Spec, stop: &Stop) -> RunReport {

@@ -29,7 +29,7 @@ use crate::{
         tally::{CellTally, DISTRUSTED_DRIFT, MeanExcess, Tally},
         times::{QUANTILES, TimeStatistics},
     },
-    statistics::{HALF_INTERVAL, KaplanMeier, Sample, Step},
+    statistics::{HALF_INTERVAL, KaplanMeier, Sample},
     text::{count, p_value, significant},
 };
 
@@ -62,6 +62,18 @@ pub struct FinishedRun<'a> {
     pub explained: &'a Explained,
     /// The first members.
     pub films: &'a [Film],
+}
+
+/// What a page says first: the fields of [`Page`] of the same names.
+pub struct PageHead {
+    /// Heading.
+    pub title: String,
+    /// What was run.
+    pub what: String,
+    /// Members by status.
+    pub statuses: Vec<(&'static str, u64)>,
+    /// The numbers to read first.
+    pub headline: Vec<Headline>,
 }
 
 /// A picture, and its place in the folder of the run.
@@ -382,6 +394,17 @@ impl FinishedRun<'_> {
         chart(names::MESH, title, caption, quality.draw())
     }
 
+    /// What the page says first.
+    pub fn head(&self) -> PageHead {
+        let corners = self.tally.mollified.told().map_or(String::new(), |told| format!(" Corners were {told}."));
+        PageHead {
+            title: self.title(),
+            what: format!("{}, {}.{corners}", count(self.tally.members(), "member"), self.what()),
+            statuses: self.tally.counts().map(|(status, count)| (status.name(), count)).collect(),
+            headline: self.headline(),
+        }
+    }
+
     /// The text of `report.html`; `gallery` is the picture of the first members.
     fn page(&self, charts: &[Chart], gallery: Option<&str>) -> Result<String> {
         // Equal results give equal bytes, on any number of threads.
@@ -391,12 +414,12 @@ impl FinishedRun<'_> {
             let caption = "Grey: the start. Light: on the way. Colour: the last state, by status.";
             chart(names::CURVES, title, caption, svg.into()).figure
         });
-        let corners = self.tally.mollified.told().map_or(String::new(), |told| format!(" Corners were {told}."));
+        let PageHead { title, what, statuses, headline } = self.head();
         let page = Page {
-            title: &self.title(),
-            what: &format!("{}, {}.{corners}", count(self.tally.members(), "member"), self.what()),
-            statuses: self.tally.counts().map(|(status, count)| (status.name(), count)).collect(),
-            headline: self.headline(),
+            title: &title,
+            what: &what,
+            statuses,
+            headline,
             warnings: &self.provenance.warnings,
             members: self.trajectories(),
             plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
@@ -759,9 +782,8 @@ fn happened(sample: &Sample, happened: bool) -> impl Iterator<Item = f64> + '_ {
 /// The survival curve of some times, with its band.
 fn survival_curve(label: String, value: Option<f64>, sample: &Sample) -> SurvivalCurve {
     let mut curve = SurvivalCurve { label, value, ..SurvivalCurve::default() };
-    for Step { time, survival, variance, .. } in KaplanMeier::new(sample).steps() {
-        let bound = |sign: f64| (survival + sign * HALF_INTERVAL * variance.sqrt()).clamp(0.0, 1.0);
-        curve.add_step(time, survival, (bound(-1.0), bound(1.0)));
+    for step in KaplanMeier::new(sample).steps() {
+        curve.add_step(step.time, step.survival, step.band());
     }
     happened(sample, false).for_each(|t| curve.add_censored(t));
     curve

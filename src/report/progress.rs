@@ -22,6 +22,8 @@ pub enum Progress {
     Quiet,
     /// On a terminal.
     Bar(ProgressBar),
+    /// To a function, with the members that have ended, all members, and the share of the work that is done.
+    Told(Box<dyn FnMut(u64, u64, f64)>),
     /// In a file or a pipe, with the start of the run.
     Lines(Instant, ProgressLines),
 }
@@ -57,6 +59,7 @@ impl Progress {
                 bar.set_message(members(done, total));
                 bar.set_position((share.clamp(0.0, 1.0) * TICKS as f64) as u64);
             }
+            Progress::Told(tell) => tell(done, total, share),
             Progress::Lines(began, lines) => {
                 if let Some(line) = lines.at(began.elapsed(), done, total, share) {
                     let _ = writeln!(io::stderr().lock(), "{line}");
@@ -69,7 +72,7 @@ impl Progress {
     /// long, and the line shows which one is running.
     pub fn step(&self, done: usize, total: usize, what: &str) {
         match self {
-            Progress::Quiet => {}
+            Progress::Quiet | Progress::Told(_) => {}
             Progress::Bar(bar) => {
                 bar.set_message(what.to_string());
                 bar.set_position(TICKS * done as u64 / total.max(1) as u64);

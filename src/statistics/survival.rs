@@ -4,7 +4,7 @@
 use std::fmt;
 
 use super::{
-    finite,
+    HALF_INTERVAL, finite,
     sample::{ProductLimit, ROUNDING, Sample, reaches},
     sum::Sum,
 };
@@ -25,6 +25,12 @@ pub struct Step {
 }
 
 impl Step {
+    /// The 95 % band of S by Greenwood's variance, cut off at 0 and 1.
+    pub fn band(&self) -> (f64, f64) {
+        let bound = |sign: f64| (self.survival + sign * HALF_INTERVAL * self.variance.sqrt()).clamp(0.0, 1.0);
+        (bound(-1.0), bound(1.0))
+    }
+
     /// The decrease of S here, from `survival` before.
     fn fall_from(&self, survival: f64) -> f64 {
         survival * (self.events as f64 / self.at_risk as f64)

@@ -1,10 +1,11 @@
 //! The arrays of a store: their names, units and dimensions.
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::{array::Array, chunks::DataType};
 use crate::{
     ensemble::{Spec, Status},
+    error::Result,
     schedule::Outputs,
 };
 
@@ -55,8 +56,29 @@ pub(super) fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) ->
     }
 }
 
+/// The attributes of all arrays together.
+pub(super) fn of_group(spec: &Spec) -> Result<Value> {
+    Ok(json!({
+        "title": "nodes of relaxing plane curves",
+        "curvelax": env!("CARGO_PKG_VERSION"),
+        // The number of threads does not change the results.
+        "spec": Spec { threads: None, ..spec.clone() }.to_toml()?,
+    }))
+}
+
+/// The attributes of each array of `spec` with `points` nodes by name, and under an empty name those of all together.
+///
+/// # Errors
+/// [`Error::Failed`](crate::Error::Failed) if the spec cannot be written.
+pub fn attributes(spec: &Spec, points: usize) -> Result<Vec<(&'static str, Value)>> {
+    let Arrays { member, time, node, cell, fields, status } = arrays(spec, points, &times(spec), 0);
+    let all = [member, time, node, cell, status].into_iter().chain(fields);
+    let of_arrays = all.map(|mut array| Ok((array.name, array.metadata["attributes"].take())));
+    [of_group(spec).map(|own| ("", own))].into_iter().chain(of_arrays).collect()
+}
+
 /// The times of the snapshots. Times equal to the final one up to rounding are replaced by it, as in `snapshots.csv`.
-pub(super) fn times(spec: &Spec) -> Vec<f64> {
+pub fn times(spec: &Spec) -> Vec<f64> {
     Outputs::new(spec.final_time(), None, &spec.snapshots, &[]).from(0).map(|output| output.t).collect()
 }
 

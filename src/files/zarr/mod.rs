@@ -16,6 +16,7 @@ mod store;
 #[cfg(test)]
 mod tests;
 
+pub use layout::{attributes, times};
 pub use mark::StoreMark;
 pub use reading::StoredMembers;
 pub use store::SnapshotStore;

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use super::{
     array::Array,
     chunks::{CHUNK_BYTES, DataType},
-    layout::{Arrays, arrays, nearest, times},
+    layout::{Arrays, arrays, nearest, of_group, times},
     mark::StoreMark,
     reading::StoredMembers,
 };
@@ -46,12 +46,7 @@ impl SnapshotStore {
         let group = json!({
             "zarr_format": 3,
             "node_type": "group",
-            "attributes": {
-                "title": "nodes of relaxing plane curves",
-                "curvelax": env!("CARGO_PKG_VERSION"),
-                // The number of threads does not change the results.
-                "spec": Spec { threads: None, ..spec.clone() }.to_toml()?,
-            },
+            "attributes": of_group(spec)?,
             "consolidated_metadata": { "kind": "inline", "must_understand": false, "metadata": consolidated },
         });
         folder.write("zarr.json", &pretty(&group)?)?;

@@ -1,0 +1,62 @@
+"""Snapshots as an xarray dataset: the same from memory and from files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _curvelax
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FIELDS = ["x", "y", "k", "r"]
+
+
+def snapshots(
+    run: _curvelax.FinishedRun, seen: _curvelax.Seen | None, folder: Path, table: Callable[[str], Any]
+) -> xr.Dataset:
+    """The snapshots of a run: from memory if all are there, else from its files."""
+    import xarray as xr
+
+    summary, times = table("summary"), run.times()
+    arrays = seen.arrays(summary.member.tolist(), times) if seen is not None else None
+    if arrays is None and (folder / "snapshots.zarr").exists():
+        return xr.open_zarr(folder / "snapshots.zarr", chunks=None)
+    if arrays is None:
+        arrays = _from_table(table("snapshots"), summary.member.to_numpy(), np.array(times))
+    attributes = {name: json.loads(text) for name, text in run.attributes()}
+    flags = attributes["status"]
+    codes = dict(zip(flags["flag_meanings"].split(), flags["flag_values"], strict=True))
+    for name in FIELDS:
+        attributes[name].pop("coordinates", None)
+
+    def variable(name: str, along: Any, values: Any) -> tuple[Any, Any, dict[str, Any]]:
+        return along, values, attributes[name]
+
+    coordinates = {
+        "member": variable("member", "member", summary.member.to_numpy()),
+        "time": variable("time", "time", np.array(times)),
+        "node": variable("node", "node", np.arange(1, arrays[0].shape[2] + 1)),
+        "cell": variable("cell", "member", summary.cell.to_numpy()),
+        "status": variable("status", "member", summary.status.map(codes).to_numpy(dtype="int8")),
+    }
+    axes = ("member", "time", "node")
+    fields = {name: variable(name, axes, values) for name, values in zip(FIELDS, arrays, strict=True)}
+    return xr.Dataset(fields, coordinates, attributes[""])
+
+
+def _from_table(rows: Any, members: np.ndarray, times: np.ndarray) -> list[np.ndarray]:
+    """The rows of ``snapshots.csv`` as arrays of member × time × node."""
+    nodes = int(rows.i.max()) if len(rows) else 0
+    place = (np.searchsorted(members, rows.member), np.searchsorted(times, rows.t), rows.i.to_numpy() - 1)
+    arrays = []
+    for name in FIELDS:
+        values = np.full((len(members), len(times), nodes), np.nan)
+        values[place] = rows[name]
+        arrays.append(values)
+    return arrays

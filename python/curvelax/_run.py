@@ -1,0 +1,183 @@
+"""Runs: from keywords to a :class:`Study`."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import shutil
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from . import _curvelax, _outlines
+from ._errors import CurvelaxWarning, Interrupted, RequestError
+from ._study import Study
+
+Progress = Callable[[int, int, float], object]
+
+
+def run(
+    spec: str | os.PathLike[str] | None = None,
+    /,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    progress: bool | Progress | None = None,
+    **keys: Any,
+) -> Study:
+    """Relaxes an ensemble of curves.
+
+    Parameters
+    ----------
+    spec
+        Spec file in TOML. Without one, keys that are not given have the defaults of ``curvelax run``.
+    out
+        Folder for the results, which must not exist yet. Without it, results go to a temporary folder, which is removed
+        when the study is no longer in use.
+    force
+        Write into an existing folder, replacing the files of an earlier run.
+    progress
+        Whether to show a bar, by tqdm; by default in notebooks and terminals, if tqdm is installed. A function is called
+        with the members that have ended, all members, and the share of the work that is done.
+    **keys
+        Keys of the spec, with ``_`` for ``-``: ``curves=1000``, ``flow="willmore"``, ``t_end="auto"``,
+        ``sweep={"amplitude": [0.05, 0.1]}``. ``accurate=True`` is ``--accurate``, and ``events={"half": "excess <= 0.5 *
+        start"}`` names events. ``shape`` may be an array of points (N, 2), several of these in a list, or a dict from labels
+        to these; lengths are in your unit, times in its fourth power.
+
+    Returns
+    -------
+    Study
+        The finished run.
+
+    Raises
+    ------
+    RequestError
+        For wrong keys or values, before any work.
+    RunError
+        If the run fails midway. What had ended is in ``out``; :func:`resume` continues.
+    Interrupted
+        If Ctrl-C (or the notebook's stop button) stopped it. Likewise.
+
+    Examples
+    --------
+    >>> import curvelax
+    >>> study = curvelax.run(curves=8, adaptive=1e-3, stop_when_relaxed=True, progress=False)
+    >>> len(study.summary)
+    8
+    """
+    shape, sweep = keys.get("shape"), keys.get("sweep")
+    if isinstance(sweep, dict) and any(map(_outlines.is_arrays, sweep.get("shape") or ())):
+        raise RequestError("sweep: shapes by arrays cannot be swept; give them as an ensemble by shape=[...]")
+    folder = Path(out) if out is not None else _temporary()
+    existing = "replaced" if force else "refused"
+    named = folder / _outlines.NAME
+    written = False
+    if isinstance(shape, os.PathLike):
+        keys["shape"] = f"file:{os.fspath(shape)}"
+    elif _outlines.is_arrays(shape):
+        outlines = _outlines.labelled(shape)
+        _curvelax.check_place(folder, existing)
+        existed = folder.exists()
+        keys["shape"] = _outlines.save(outlines, folder)
+        written = True
+        existing = existing if force else "filled"
+    try:
+        with _bar(progress) as show:
+            overview, seen = _curvelax.run(spec, keys, folder, existing, show, _say)
+    except RequestError:
+        if written and not force:
+            named.unlink(missing_ok=True)
+            if not existed:
+                with contextlib.suppress(OSError):
+                    folder.rmdir()
+        raise
+    except Interrupted as interrupted:
+        interrupted.folder = folder
+        raise
+    return Study(folder, overview=overview, seen=seen, temporary=out is None)
+
+
+def resume(out: str | os.PathLike[str], *, progress: bool | Progress | None = None) -> Study:
+    """Continues the interrupted run in the folder ``out``; a finished one is only read.
+
+    All files end up as those of an uninterrupted run. ``progress`` is as for :func:`run`.
+
+    Raises
+    ------
+    RequestError
+        If there is no run in ``out``.
+    RunError, Interrupted
+        As for :func:`run`.
+    """
+    folder = Path(out)
+    try:
+        with _bar(progress) as show:
+            overview = _curvelax.resume(folder, show, _say)
+    except Interrupted as interrupted:
+        interrupted.folder = folder
+        raise
+    return Study(folder, overview=overview)
+
+
+def load(out: str | os.PathLike[str]) -> Study:
+    """Reads the finished run in the folder ``out``, by this package or by the program.
+
+    Raises
+    ------
+    RequestError
+        If there is no finished run in ``out``.
+    """
+    study = Study(Path(out))
+    study.record  # noqa: B018  # read now, so that what is wrong is said here
+    return study
+
+
+def _temporary() -> Path:
+    """A folder to be made, in one that is removed at the end of the interpreter if not before."""
+    home = tempfile.mkdtemp(prefix="curvelax-")
+    atexit.register(shutil.rmtree, home, ignore_errors=True)
+    return Path(home) / "run"
+
+
+def _say(line: str) -> None:
+    """What the program says on stderr: warnings as such; the rest can be read in the overview."""
+    kind, _, text = line.partition(": ")
+    if kind == "warning":
+        warnings.warn(text, CurvelaxWarning, stacklevel=3)
+
+
+@contextlib.contextmanager
+def _bar(progress: bool | Progress | None) -> Iterator[Progress]:
+    """The function that shows progress."""
+    if callable(progress):
+        yield progress
+        return
+    wanted = progress if progress is not None else _is_watched()
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        if progress:
+            raise RequestError("progress: a bar needs tqdm: pip install tqdm, or give a function") from None
+        wanted = False
+    if not wanted:
+        yield lambda *_: None
+        return
+    bar_format = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}]"
+    with tqdm(total=1.0, bar_format=bar_format, leave=False) as bar:
+
+        def show(done: int, total: int, share: float) -> None:
+            bar.set_description_str(f"{done} of {total} members", refresh=False)
+            bar.update(share - bar.n)
+
+        yield show
+
+
+def _is_watched() -> bool:
+    """Whether somebody may look at a bar: in a notebook, or at a terminal."""
+    notebook = "IPython" in sys.modules and sys.modules["IPython"].get_ipython() is not None
+    return notebook or (sys.stderr is not None and sys.stderr.isatty())

@@ -1,0 +1,241 @@
+"""A finished run: its tables as frames, its snapshots as arrays, its pictures."""
+
+from __future__ import annotations
+
+import functools
+import html
+import json
+import shutil
+import weakref
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from . import _arrays, _curvelax, _frames
+from ._errors import RequestError
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import pandas as pd
+    import xarray as xr
+
+# What gives a run a table that it does not have.
+NEEDS = {
+    "events": "give events={'NAME': 'excess <= 0.5 * start'}",
+    "event_statistics": "give events={'NAME': 'excess <= 0.5 * start'}",
+    "event_levels": "give events={...} and refine=True",
+    "levels": "give refine=True or accurate=True",
+    "groups": "give group_by='PROPERTY', for outlines with properties",
+    "series": "give series=DT, the interval between rows",
+    "snapshots": "give snapshots=[T1, T2, ...]",
+}
+
+
+class Picture:
+    """A picture of a run, shown by notebooks; ``svg`` is its text."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.svg = path.read_text(encoding="utf-8")
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+    def __repr__(self) -> str:
+        return f"Picture({str(self.path)!r})"
+
+
+class Study:
+    """A finished run in its folder.
+
+    The tables are those of the program, with its columns: :meth:`describe` says what they mean. Times are in length⁴, or in
+    the units of the spec.
+
+    Attributes
+    ----------
+    folder
+        Folder of the results. A temporary one is removed with the study; :meth:`save` keeps it.
+    overview
+        What the program prints at the end of a run, if this run was made here.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        overview: str | None = None,
+        seen: _curvelax.Seen | None = None,
+        temporary: bool = False,
+    ) -> None:
+        self.folder = folder
+        self.overview = overview
+        self._seen = seen
+        self._finalizer = weakref.finalize(self, shutil.rmtree, folder, True) if temporary else None
+
+    @functools.cached_property
+    def _run(self) -> _curvelax.FinishedRun:
+        return _curvelax.FinishedRun(self.folder)
+
+    @functools.cached_property
+    def record(self) -> dict[str, Any]:
+        """How the run was made: the content of ``run.json``."""
+        self._run  # noqa: B018  # which says what is wrong with the folder
+        return json.loads((self.folder / "run.json").read_text(encoding="utf-8"))
+
+    @property
+    def spec(self) -> dict[str, Any]:
+        """The resolved spec, by the names of its keys."""
+        return self.record["spec"]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What one should know about the results, one sentence each."""
+        return self.record["warnings"]
+
+    @property
+    def tables(self) -> list[str]:
+        """Names of the tables of this run."""
+        return [name.removesuffix(".csv") for name in self._run.columns() if (self.folder / name).exists()]
+
+    def table(self, name: str, *, frames: Literal["pandas", "polars"] = "pandas") -> Any:
+        """The table ``name``, such as ``"rates"``, as a data frame of pandas or polars.
+
+        Floats have every bit. An unknown number is missing; columns have their types also if all of it is.
+
+        Raises
+        ------
+        RequestError
+            If the run has no such table: the message says what gives it one.
+        """
+        columns = self._run.columns()
+        own = columns.get(f"{name}.csv")
+        if own is None:
+            known = ", ".join(key.removesuffix(".csv") for key in columns)
+            raise RequestError(f"table {name!r}: there is none of this name; use one of {known}")
+        path = self.folder / f"{name}.csv"
+        if not path.exists():
+            remedy = NEEDS.get(name, "the run has none")
+            raise RequestError(f"table {name!r}: {self.folder} has no {path.name}: {remedy}")
+        return _frames.read(path, own, frames)
+
+    def describe(self, name: str = "summary") -> pd.DataFrame:
+        """The columns of the table ``name``: what each holds and means."""
+        import pandas as pd
+
+        own = self._run.columns().get(f"{name}.csv", [])
+        return pd.DataFrame(own, columns=["column", "holds", "meaning"]).set_index("column")
+
+    @functools.cached_property
+    def summary(self) -> pd.DataFrame:
+        """One row per member: status, ``t_relax``, rate, length, area, excess, …"""
+        return self.table("summary")
+
+    @functools.cached_property
+    def ensemble(self) -> pd.DataFrame:
+        """One row per cell of the sweep: counts, mean and median times with their errors."""
+        return self.table("ensemble")
+
+    @functools.cached_property
+    def members(self) -> pd.DataFrame:
+        """What was drawn for each member, and its shape at the start."""
+        return self.table("members")
+
+    @functools.cached_property
+    def events(self) -> pd.DataFrame:
+        """First times of the events of the spec, one row per member and event."""
+        return self.table("events")
+
+    @functools.cached_property
+    def explained(self) -> pd.DataFrame:
+        """How much of the variance of the times each feature explains."""
+        return self.table("explained")
+
+    @functools.cached_property
+    def series(self) -> pd.DataFrame:
+        """Observables of each member over time."""
+        return self.table("series")
+
+    @functools.cached_property
+    def snapshots(self) -> xr.Dataset:
+        """Nodes of the members at the times of ``snapshots``: x, y, k and r of member × time × node.
+
+        They come from memory where they fit, otherwise from the files of the run, from ``snapshots.zarr`` lazily. A member
+        that ended earlier is NaN. Needs xarray.
+
+        Raises
+        ------
+        RequestError
+            If the run has no snapshots.
+        """
+        if not self.spec.get("snapshots"):
+            raise RequestError(f"snapshots: {self.folder} has none: {NEEDS['snapshots']}")
+        return _arrays.snapshots(self._run, self._seen, self.folder, self.table)
+
+    def survival(self) -> pd.DataFrame:
+        """The members that have not relaxed yet, by cell (Kaplan and Meier).
+
+        Columns: ``cell``; ``time`` at which members relaxed; ``at_risk`` before it; ``survival``, the share that has not
+        relaxed after it; ``lower`` and ``upper``, its 95 % band (Greenwood).
+        """
+        import pandas as pd
+
+        parts = []
+        for cell, numbers in self._run.survival():
+            names = ["time", "at_risk", "survival", "lower", "upper"]
+            part = pd.DataFrame(dict(zip(names, numbers, strict=True)))
+            part.insert(0, "cell", cell)
+            parts.append(part.astype({"at_risk": "int64"}))
+        return pd.concat(parts, ignore_index=True)
+
+    def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes:
+        """Draws the survival curve of each cell with its 95 % band into ``ax``, or new axes. Needs matplotlib."""
+        import matplotlib.pyplot as plt
+
+        ax = ax or plt.subplots()[1]
+        labels = self._labels()
+        for cell, curve in self.survival().groupby("cell"):
+            time = [0.0, *curve.time]
+            (line,) = ax.step(time, [1.0, *curve.survival], where="post", label=labels.get(cell))
+            band = ([1.0, *curve.lower], [1.0, *curve.upper])
+            ax.fill_between(time, *band, step="post", alpha=0.2, color=line.get_color(), linewidth=0)
+        units = self.spec.get("units")
+        ax.set(xlabel=f"time ({units['time'] if isinstance(units, dict) else 'length⁴'})", ylabel="members not yet relaxed")
+        ax.set_ylim(0, 1.02)
+        if len(labels) > 1:
+            ax.legend(title=", ".join(self.spec["sweep"]))
+        return ax
+
+    def _labels(self) -> dict[int, str]:
+        """The values of the swept keys, by cell."""
+        keys = list(self.spec.get("sweep", {}))
+        return {row["cell"]: ", ".join(f"{row[key]}" for key in keys) for _, row in self.ensemble.iterrows()}
+
+    @property
+    def pictures(self) -> dict[str, Picture]:
+        """The pictures of the run by name, such as ``"curves"``, ``"survival"`` or ``"features"``."""
+        return {path.stem: Picture(path) for path in sorted((self.folder / "plots").glob("*.svg"))}
+
+    @property
+    def report(self) -> Path:
+        """The page ``report.html``: the whole run at a glance, in one file."""
+        return self.folder / "report.html"
+
+    def save(self, out: str | Path) -> Path:
+        """Copies the folder of results to ``out``, which must not exist; returns its path."""
+        out = Path(out)
+        if out.exists():
+            raise RequestError(f"out {out}: exists; name another folder")
+        return Path(shutil.copytree(self.folder, out))
+
+    def __repr__(self) -> str:
+        title, what, statuses, headline = self._run.head()
+        counts = ", ".join(f"{count} {status}" for status, count in statuses if count)
+        lines = [f"Study({str(self.folder)!r})", f"  {what}", f"  {counts}"]
+        return "\n".join(lines + [f"  {label}: {value}" + (f" ({note})" if note else "") for label, value, note in headline])
+
+    def _repr_html_(self) -> str:
+        title, what, statuses, headline = self._run.head()
+        rows = [(label, value, note) for label, value, note in headline]
+        rows += [(status, str(count), "members") for status, count in statuses if count]
+        cells = "".join("<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in row) + "</tr>" for row in rows)
+        notes = "".join(f"<p>⚠ {html.escape(warning)}</p>" for warning in self.warnings)
+        return f"<div><strong>{html.escape(title)}</strong><p>{html.escape(what)}</p><table>{cells}</table>{notes}</div>"

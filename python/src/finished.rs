@@ -1,0 +1,86 @@
+//! What the program knows of a finished run, for frames and pictures.
+
+use std::path::PathBuf;
+
+use curvelax::{
+    files::{names, zarr},
+    report::{columns::columns, pictures, reader::Finished},
+    results::{EnsembleStatistics, cells::CellStatistics},
+    statistics::{KaplanMeier, Step},
+};
+use numpy::PyArray1;
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::raise;
+
+/// A finished run as read from its folder.
+#[pyclass(frozen)]
+pub struct FinishedRun {
+    run: Finished,
+    statistics: EnsembleStatistics,
+}
+
+#[pymethods]
+impl FinishedRun {
+    /// Reads the run in `folder`.
+    #[new]
+    fn new(py: Python<'_>, folder: PathBuf) -> PyResult<FinishedRun> {
+        let read = py.detach(|| {
+            let mut run = Finished::read(&folder)?;
+            let statistics = EnsembleStatistics::new(&run.provenance.spec, &mut run.tally)?;
+            Ok(FinishedRun { run, statistics })
+        });
+        read.map_err(|error| raise(py, error, None))
+    }
+
+    /// The columns of each table that a run may have: heading, what its fields hold, and what they mean.
+    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        for name in names::TABLES.into_iter().filter(|name| *name != names::STORE) {
+            let own = columns(name, &self.run.provenance.spec, &self.statistics).map_err(|e| raise(py, e, None))?;
+            let own: Vec<(String, String, String)> =
+                own.into_iter().map(|[name, holds, text]| (name, holds, text)).collect();
+            all.set_item(name, own)?;
+        }
+        Ok(all)
+    }
+
+    /// The survival curve of each cell: the times at which it falls, the members at risk before, the share not relaxed
+    /// after, and its 95 % band.
+    fn survival<'py>(&self, py: Python<'py>) -> Vec<(u64, [Bound<'py, PyArray1<f64>>; 5])> {
+        let curve = |cell: &CellStatistics| {
+            let estimate = KaplanMeier::new(&cell.times.sample);
+            let array = |of: &dyn Fn(Step) -> f64| PyArray1::from_iter(py, estimate.steps().map(of));
+            let numbers = [
+                array(&|step| step.time),
+                array(&|step| step.at_risk as f64),
+                array(&|step| step.survival),
+                array(&|step| step.band().0),
+                array(&|step| step.band().1),
+            ];
+            (cell.cell, numbers)
+        };
+        self.statistics.cells.iter().map(curve).collect()
+    }
+
+    /// The times of its snapshots.
+    fn times(&self) -> Vec<f64> {
+        zarr::times(&self.run.provenance.spec)
+    }
+
+    /// The attributes of the arrays of its snapshots, as JSON: by name, and under an empty name those of all together.
+    fn attributes(&self, py: Python<'_>) -> PyResult<Vec<(&'static str, String)>> {
+        let all = zarr::attributes(&self.run.provenance.spec, 1).map_err(|error| raise(py, error, None))?;
+        Ok(all.into_iter().map(|(name, json)| (name, json.to_string())).collect())
+    }
+
+    /// What the report says first: its title, what was run, members by status, and headline numbers.
+    #[expect(clippy::type_complexity, reason = "a tuple in Python")]
+    fn head(&self) -> (String, String, Vec<(&'static str, u64)>, Vec<(String, String, String)>) {
+        let Finished { provenance, tally, excess, explained, films } = &self.run;
+        let head =
+            pictures::FinishedRun { provenance, tally, statistics: &self.statistics, excess, explained, films }.head();
+        let headline = head.headline.into_iter().map(|own| (own.label, own.value, own.note)).collect();
+        (head.title, head.what, head.statuses, headline)
+    }
+}

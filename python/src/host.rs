@@ -1,0 +1,97 @@
+//! The Python side of a run: its progress goes to a function, and Ctrl-C stops it.
+
+use std::{
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+
+use curvelax::{
+    ensemble::Snapshot,
+    report::{Cause, Form, Manner, Progress, Stop},
+    session::Host,
+};
+use pyo3::prelude::*;
+
+use crate::seen::Seen;
+
+/// Time between two looks at Python: its lock is not free.
+const PERIOD: Duration = Duration::from_millis(50);
+/// Time between checkpoints.
+const EVERY: Duration = Duration::from_secs(5);
+
+/// The functions that hear of a run.
+pub struct Notebook {
+    shared: Arc<Shared>,
+    seen: Mutex<Seen>,
+}
+
+struct Shared {
+    progress: Py<PyAny>,
+    say: Py<PyAny>,
+    stop: Stop,
+    /// What was raised in Python during the run.
+    raised: Mutex<Option<PyErr>>,
+}
+
+/// A poisoned lock holds nothing worse than a half-told story.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Shared {
+    /// Calls into Python; what is raised there stops the run.
+    fn ask(&self, call: impl FnOnce(Python<'_>) -> PyResult<()>) {
+        let told = Python::attach(|py| py.check_signals().and_then(|()| call(py)));
+        if let Err(raised) = told {
+            lock(&self.raised).get_or_insert(raised);
+            self.stop.ask(Cause::Interrupt);
+        }
+    }
+}
+
+impl Notebook {
+    /// Tells `progress` and `say`.
+    pub fn new(progress: Py<PyAny>, say: Py<PyAny>) -> Notebook {
+        let shared = Shared { progress, say, stop: Stop::default(), raised: Mutex::default() };
+        Notebook { shared: shared.into(), seen: Mutex::default() }
+    }
+
+    /// Moves out what was raised in Python.
+    pub fn raised(&self) -> Option<PyErr> {
+        lock(&self.shared.raised).take()
+    }
+
+    /// Moves out the snapshots.
+    pub fn seen(&self) -> Seen {
+        std::mem::take(&mut *lock(&self.seen))
+    }
+}
+
+impl Host for Notebook {
+    fn say(&self, line: &str) {
+        self.shared.ask(|py| self.shared.say.call1(py, (line,)).map(drop));
+    }
+
+    fn form(&self) -> Form {
+        Form::Overview
+    }
+
+    fn manner(&self) -> curvelax::Result<Manner> {
+        Ok(self.manner_with(self.shared.stop.clone()))
+    }
+
+    fn manner_with(&self, stop: Stop) -> Manner {
+        let (shared, mut last) = (self.shared.clone(), None::<Instant>);
+        let told = move |done: u64, total: u64, share: f64| {
+            if last.is_none_or(|last| last.elapsed() >= PERIOD) {
+                last = Some(Instant::now());
+                shared.ask(|py| shared.progress.call1(py, (done, total, share)).map(drop));
+            }
+        };
+        Manner { progress: Progress::Told(Box::new(told)), every: EVERY, stop }
+    }
+
+    fn see(&self, snapshots: &[Snapshot]) {
+        lock(&self.seen).add(snapshots);
+    }
+}

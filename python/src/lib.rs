@@ -1,0 +1,123 @@
+//! The compiled half of the Python package `curvelax`: runs, without the interpreter's lock, and what is known of a
+//! finished run. The other half, `curvelax/*.py`, makes frames and exceptions of it.
+
+mod finished;
+mod host;
+mod keys;
+mod seen;
+
+use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*};
+
+/// Raises `error` as the exception of `curvelax._errors` for its exit code; what was `raised` in Python meanwhile goes
+/// first.
+fn raise(py: Python<'_>, error: curvelax::Error, raised: Option<PyErr>) -> PyErr {
+    let of_code = |name: &str| -> PyResult<PyErr> {
+        let class = py.import("curvelax._errors")?.getattr(name)?;
+        Ok(PyErr::from_value(class.call1((error.to_string(),))?))
+    };
+    let name = match error {
+        curvelax::Error::Request(_) => "RequestError",
+        curvelax::Error::Interrupted(_) => "Interrupted",
+        _ => "RunError",
+    };
+    match raised {
+        Some(raised) if !raised.is_instance_of::<PyKeyboardInterrupt>(py) => raised,
+        _ => of_code(name).unwrap_or_else(|failed| failed),
+    }
+}
+
+#[pymodule]
+mod _curvelax {
+    use std::{ffi::OsString, path::PathBuf};
+
+    use curvelax::{
+        ensemble::Spec,
+        files::{Existing, OutputFolder},
+        session::{self, Host, ResumePlace, Work},
+    };
+    use pyo3::{
+        prelude::*,
+        types::{PyAny, PyDict},
+    };
+
+    use super::{
+        host::Notebook,
+        keys::{self, Keys},
+        raise,
+    };
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+
+    /// Runs the program with `arguments`, the first of which is its name; returns the exit code.
+    #[pyfunction]
+    fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+        py.detach(|| curvelax::cli::main(arguments))
+    }
+
+    /// How a folder that exists is treated, by name.
+    fn treatment(existing: &str) -> Existing {
+        match existing {
+            "filled" => Existing::Filled,
+            existing => Existing::from(existing == "replaced"),
+        }
+    }
+
+    /// Checks that a run may write into the folder `out`, which is `refused`, `filled` or `replaced` if it exists.
+    #[pyfunction]
+    fn check_place(py: Python<'_>, out: PathBuf, existing: &str) -> PyResult<()> {
+        OutputFolder::check_place(&out, treatment(existing)).map_err(|error| raise(py, error, None))
+    }
+
+    /// Runs the file `spec`, or the defaults, with `keys` instead of its own in the folder `out`, and returns the
+    /// overview and the snapshots.
+    ///
+    /// `existing` is as in `check_place`. `progress` is called with the members that have ended, all members and the
+    /// share of the work done; `say` with notes and warnings.
+    #[pyfunction]
+    fn run(
+        py: Python<'_>,
+        spec: Option<PathBuf>,
+        keys: &Bound<'_, PyDict>,
+        out: PathBuf,
+        existing: &str,
+        progress: Py<PyAny>,
+        say: Py<PyAny>,
+    ) -> PyResult<(String, Seen)> {
+        let Keys { text, given, accurate } = keys::read(spec.as_deref(), keys)?;
+        let existing = treatment(existing);
+        let host = Notebook::new(progress, say);
+        let done = py.detach(|| {
+            let mut spec = Spec::from_toml(&text).map_err(curvelax::Error::Request)?;
+            if accurate {
+                spec.make_accurate(&given);
+            }
+            let manner = host.manner()?;
+            OutputFolder::check_place(&out, existing)?;
+            let work = Work::new(session::planned(spec, Some(&manner), &host)?)?;
+            work.study.note().into_iter().for_each(|note| host.say(&format!("note: {note}")));
+            session::begin(work, &out, existing, manner, &host)
+        });
+        match done {
+            Ok(completed) => Ok((completed.text, host.seen())),
+            Err(error) => Err(raise(py, error, host.raised())),
+        }
+    }
+
+    /// Resumes the run in the folder `out`. Returns the overview, or `None` if the run is finished.
+    #[pyfunction]
+    fn resume(py: Python<'_>, out: PathBuf, progress: Py<PyAny>, say: Py<PyAny>) -> PyResult<Option<String>> {
+        let host = Notebook::new(progress, say);
+        match py.detach(|| session::resume(&out, ResumePlace::default(), &host)) {
+            Ok(completed) => Ok(completed.map(|completed| completed.text)),
+            Err(error) => Err(raise(py, error, host.raised())),
+        }
+    }
+
+    #[pymodule_export]
+    use super::finished::FinishedRun;
+    #[pymodule_export]
+    use super::seen::Seen;
+}

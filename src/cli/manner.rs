@@ -1,0 +1,131 @@
+//! How a run goes about its work, for `run` and `resume`: flags that change no result.
+
+use std::{path::Path, time::Duration};
+
+use super::{flags, note, print, signals};
+use crate::{
+    error::{Error, Result},
+    files::names,
+    report::{Form, Manner, Progress, Stop, complete::listed, document::Document, reader::Finished},
+    results::EnsembleStatistics,
+    session::{Completed, Host},
+    text::plural,
+};
+
+/// How a run goes about its work: nothing of it changes a result.
+#[derive(clap::Args)]
+pub struct MannerFlags {
+    /// Print no progress, notes or table: only errors, and the results if --json is given
+    #[arg(long, help_heading = flags::OUTPUT)]
+    pub quiet: bool,
+    /// Print the results as one JSON document instead of the table
+    #[arg(long, help_heading = flags::OUTPUT)]
+    pub json: bool,
+    /// Exit with code 3 if a member ends neither relaxed nor unfinished
+    #[arg(long, help_heading = flags::OUTPUT)]
+    strict: bool,
+    /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; `curvelax resume` continues
+    #[arg(long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, help_heading = flags::OUTPUT)]
+    max_time: Option<Duration>,
+    /// Interval between checkpoints for `curvelax resume`: a run that is killed loses at most this much work
+    #[arg(
+        long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, default_value = "5s",
+        help_heading = flags::OUTPUT
+    )]
+    checkpoint_every: Duration,
+}
+
+impl MannerFlags {
+    /// Checks that the results in `out` can be printed as requested.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a name that JSON cannot represent.
+    pub fn check_name(&self, out: &Path) -> Result<()> {
+        check_name(self.json, out)
+    }
+
+    /// Says about the finished run in `out` what is asked of one: its results as JSON, and whether members failed.
+    ///
+    /// # Errors
+    /// As [`MannerFlags::check_failed`], and those of reading the run.
+    pub fn finished(&self, out: &Path) -> Result<()> {
+        if !self.json && !self.strict {
+            return Ok(());
+        }
+        let Finished { provenance, mut tally, .. } = Finished::read(out)?;
+        let (failed, members) = (tally.failed(), tally.members());
+        if self.json {
+            let statistics = EnsembleStatistics::new(&provenance.spec, &mut tally)?;
+            let files = listed(|name| out.join(name).exists());
+            print(&Document::new(&provenance, &provenance.spec, &statistics, out, &files).to_json()?)?;
+        }
+        self.check_failed(failed, members, out)
+    }
+
+    /// Prints the results of a run that was just completed.
+    ///
+    /// # Errors
+    /// As [`MannerFlags::check_failed`].
+    pub fn completed(&self, Completed { text, failed, members, out }: Completed) -> Result<()> {
+        if self.json || !self.quiet {
+            print(&text)?;
+        }
+        self.check_failed(failed, members, &out)
+    }
+
+    /// Checks that no member failed, if that is asked for.
+    ///
+    /// # Errors
+    /// [`Error::Strict`] with how many did.
+    fn check_failed(&self, failed: u64, members: u64, out: &Path) -> Result<()> {
+        match failed {
+            1.. if self.strict => Err(Error::Strict(format!(
+                "--strict: {failed} of {members} {} ended neither relaxed nor unfinished; see `status` in {}",
+                plural(members, "member"),
+                out.join(names::SUMMARY).display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// The interval between checkpoints.
+    pub fn checkpoint_every(&self) -> Duration {
+        self.checkpoint_every
+    }
+}
+
+impl Host for MannerFlags {
+    /// Prints the line on stderr, unless quiet.
+    fn say(&self, line: &str) {
+        if !self.quiet {
+            note(line)
+        }
+    }
+
+    fn form(&self) -> Form {
+        if self.json { Form::Json } else { Form::Overview }
+    }
+
+    fn manner(&self) -> Result<Manner> {
+        let stop = Stop::default();
+        signals::watch(&stop, self.max_time)?;
+        Ok(self.manner_with(stop))
+    }
+
+    fn manner_with(&self, stop: Stop) -> Manner {
+        Manner { progress: Progress::new(self.quiet), every: self.checkpoint_every, stop }
+    }
+}
+
+/// Does the same as [`MannerFlags::check_name`], if `json` is set.
+pub fn check_name(json: bool, out: &Path) -> Result<()> {
+    match json && out.to_str().is_none() {
+        true => Err(Error::value(
+            "out",
+            out.display(),
+            "not UTF-8, which JSON requires",
+            "use another folder, or leave --json out",
+        )),
+        false => Ok(()),
+    }
+}

@@ -1,0 +1,423 @@
+"""The Python package, as installed from its wheel: the same bits as the program, types, errors, interruption."""
+
+import contextlib
+import doctest
+import filecmp
+import io
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import warnings
+from importlib import metadata, resources
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import xarray as xr
+
+import curvelax
+from common import CURVELAX, run
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+# What differs between equal runs: times, and the place of the outlines.
+CLOCKS = {"run.json", "report.html"}
+KEYS = {
+    "curves": 9, "points": 32, "adaptive": 1e-3, "stop_when_relaxed": True, "series": 0.2, "snapshots": [0, 0.01, 0.1, 5],
+    "t_end": 5, "events": {"half": "excess <= 0.5 * start", "never": "length >= 1e6"}, "backend": "cpu",
+}
+FLAGS = (
+    "--curves 9 --points 32 --adaptive=1e-3 --stop-when-relaxed --series 0.2 --snapshots 0,0.01,0.1,5 --t-end 5"
+    " --event half=excess<=0.5*start --event never=length>=1e6 --backend cpu --quiet"
+)
+SMALL = {"curves": 3, "points": 32, "adaptive": 1e-3, "stop_when_relaxed": True, "backend": "cpu", "progress": False}
+
+
+def angles(n):
+    return np.linspace(0, 2 * np.pi, n, endpoint=False)
+
+
+def ellipse(a, b, n=60):
+    return np.c_[a * np.cos(angles(n)), b * np.sin(angles(n))]
+
+
+def files(folder):
+    return sorted(str(path.relative_to(folder)) for path in pathlib.Path(folder).rglob("*") if path.is_file())
+
+
+class Package(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.home = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.home.cleanup)
+        cls.at = pathlib.Path(cls.home.name)
+        cls.program = run(FLAGS, cls.at / "program")
+        cls.study = curvelax.run(out=cls.at / "package", progress=False, **KEYS)
+
+    def refused(self, *words, **keys):
+        """The message of a refusal before any work."""
+        with self.assertRaises(curvelax.RequestError) as caught:
+            curvelax.run(progress=False, **keys)
+        for word in words:
+            self.assertIn(word, str(caught.exception))
+        return str(caught.exception)
+
+    # The same as the program
+
+    def test_files_are_those_of_the_program_to_the_last_byte(self):
+        names = files(self.program)
+        self.assertEqual(names, files(self.study.folder))
+        self.assertIn("snapshots.csv", names)
+        same, other, errors = filecmp.cmpfiles(self.program, self.study.folder, names, shallow=False)
+        self.assertEqual((set(other) - CLOCKS, errors), (set(), []))
+        other = curvelax.run(out=self.at / "seed", progress=False, **KEYS, seed=2)
+        same, _, _ = filecmp.cmpfiles(self.program, other.folder, names, shallow=False)
+        self.assertNotIn("summary.csv", same)
+
+    def test_the_wheel_has_the_program_and_its_version(self):
+        program = pathlib.Path(sys.executable).with_name("curvelax")
+        told = subprocess.run([program, "--version"], check=True, capture_output=True, text=True).stdout
+        own = subprocess.run([CURVELAX, "--version"], check=True, capture_output=True, text=True).stdout
+        self.assertEqual(told, own)
+        self.assertEqual(told.split(), ["curvelax", curvelax.__version__])
+        self.assertEqual(metadata.version("curvelax"), curvelax.__version__)
+        out = self.at / "wheel"
+        subprocess.run([program, "run", *FLAGS.split(), "--out", out], check=True)
+        self.assertTrue(filecmp.cmp(out / "summary.csv", self.program / "summary.csv", shallow=False))
+        wrong = subprocess.run([program, "run", "--curvs", "3"], capture_output=True, text=True)
+        self.assertEqual(wrong.returncode, 2)
+        self.assertIn("--curves", wrong.stderr)
+
+    def test_accurate_is_the_flag(self):
+        flags = "--accurate --points 64 --curves 4 --quiet --backend cpu"
+        out = run(flags, self.at / "accurate")
+        study = curvelax.run(accurate=True, points=64, curves=4, backend="cpu", progress=False)
+        self.assertEqual((out / "summary.csv").read_bytes(), (study.folder / "summary.csv").read_bytes())
+        self.assertEqual(study.spec, json.loads((out / "run.json").read_text())["spec"])
+
+    def test_a_spec_file_with_keywords_over_it(self):
+        spec = self.at / "spec.toml"
+        spec.write_text("curves = 5\nadaptive = 1e-2\nt-end = 0.01\n")
+        study = curvelax.run(spec, curves=np.int64(2), tau=np.float64(1e-3), progress=False)
+        self.assertEqual((study.spec["curves"], study.spec["tau"], study.spec["t-end"]), (2, 1e-3, 0.01))
+        self.assertNotIn("adaptive", study.spec)
+        spec.write_text("curves = 5\ncurvs = 2\n")
+        with self.assertRaises(curvelax.RequestError) as caught:
+            curvelax.run(spec)
+        for word in ["spec.toml", "line 2", "did you mean `curves`?"]:
+            self.assertIn(word, str(caught.exception))
+
+    # Frames
+
+    def test_frames_have_types_also_where_all_is_missing(self):
+        events = self.study.events
+        never = events[events.event == "never"]
+        self.assertEqual(len(never), 9)
+        self.assertEqual(never.censored.tolist(), [1] * 9)
+        kinds = {"Int64": pd.api.types.is_integer_dtype, "float64": pd.api.types.is_float_dtype}
+        for name in self.study.tables:
+            frame, polars = self.study.table(name), self.study.table(name, frames="polars")
+            self.assertEqual(list(frame), polars.columns)
+            self.assertEqual(len(frame), len(polars))
+            for column, (holds, _) in self.study.describe(name).iterrows():
+                if holds == "integer":
+                    self.assertTrue(kinds["Int64"](frame[column].dtype), f"{name}.{column}")
+                    self.assertEqual(polars[column].dtype, pl.Int64, f"{name}.{column}")
+                elif holds == "float":
+                    self.assertTrue(kinds["float64"](frame[column].dtype), f"{name}.{column}")
+                    self.assertEqual(polars[column].dtype, pl.Float64, f"{name}.{column}")
+                elif holds == "word":
+                    self.assertTrue(pd.api.types.is_string_dtype(frame[column].dtype), f"{name}.{column}")
+                    self.assertEqual(polars[column].dtype, pl.String, f"{name}.{column}")
+        # Without outlines, no member has a label: a column of text all the same.
+        self.assertEqual(self.study.summary.label.tolist(), [""] * 9)
+        self.assertTrue(self.study.summary.t_limit.isna().all())
+
+    def test_every_bit_of_a_float_is_there(self):
+        summary = self.study.summary
+        text = pd.read_csv(self.study.folder / "summary.csv", dtype=str)
+        self.assertEqual(summary.t_relax.map(float.hex).tolist(), [float(t).hex() for t in text.t_relax])
+        polars = self.study.table("summary", frames="polars")
+        self.assertEqual(polars["t_relax"].to_list(), summary.t_relax.tolist())
+        self.assertNotEqual(np.nextafter(summary.t_relax[0], 9).hex(), float(text.t_relax[0]).hex())
+
+    def test_every_table_is_told(self):
+        named = {path.stem for path in self.study.folder.glob("*.csv")}
+        self.assertEqual(set(self.study.tables), named)
+        self.assertLessEqual({"summary", "members", "ensemble", "events", "series", "snapshots"}, named)
+        self.assertEqual(list(self.study.describe("summary").index), list(self.study.summary))
+        with self.assertRaises(curvelax.RequestError) as caught:
+            self.study.table("groups")
+        self.assertIn("group_by=", str(caught.exception))
+        with self.assertRaises(curvelax.RequestError) as caught:
+            self.study.table("sumary")
+        self.assertIn("summary", str(caught.exception))
+
+    # Snapshots
+
+    def test_snapshots_are_the_same_from_memory_from_the_table_and_from_zarr(self):
+        stored = curvelax.run(out=self.at / "zarr", progress=False, **KEYS, store="zarr")
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            zarr = xr.open_zarr(stored.folder / "snapshots.zarr", chunks=None).load()
+        for name, data in {
+            "memory": self.study.snapshots,
+            "table": curvelax.load(self.study.folder).snapshots,
+            "memory, zarr": stored.snapshots,
+            "zarr": curvelax.load(stored.folder).snapshots.load(),
+        }.items():
+            with self.subTest(name):
+                # How snapshots are stored is part of the spec.
+                data.attrs["spec"] = data.attrs["spec"].replace('store = "csv"', 'store = "zarr"')
+                xr.testing.assert_identical(data, zarr)
+        self.assertTrue(np.isnan(zarr.x).any() and not np.isnan(zarr.x).all())
+        other = self.study.snapshots.copy(deep=True)
+        other.x[3, 1, 4] = np.nextafter(other.x[3, 1, 4], 9)
+        self.assertFalse(other.identical(zarr))
+        with self.assertRaises(curvelax.RequestError) as caught:
+            curvelax.run(**SMALL).snapshots
+        self.assertIn("snapshots=[", str(caught.exception))
+
+    # Statistics and pictures
+
+    def test_survival_is_the_product_limit(self):
+        curve = self.study.survival()
+        times = np.sort(self.study.summary.t_relax)
+        self.assertEqual(curve.time.tolist(), times.tolist())
+        self.assertEqual(curve.at_risk.tolist(), list(range(9, 0, -1)))
+        self.assertTrue(np.allclose(curve.survival, np.arange(8, -1, -1) / 9, atol=1e-15))
+        self.assertTrue(((curve.lower <= curve.survival) & (curve.survival <= curve.upper)).all())
+
+    def test_plot_draws_a_curve_for_each_cell(self):
+        import matplotlib
+
+        matplotlib.use("Agg")
+        study = curvelax.run(**SMALL, sweep={"amplitude": [0.02, 0.08]})
+        axes = study.plot()
+        self.assertEqual([text.get_text() for text in axes.get_legend().get_texts()], ["0.02", "0.08"])
+        for line, cell in zip(axes.get_lines(), (0, 1)):
+            own = study.summary[study.summary.cell == cell]
+            self.assertEqual(line.get_xdata()[1:].tolist(), sorted(own.t_relax))
+        self.assertEqual(study.plot(axes), axes)
+
+    def test_a_study_shows_itself(self):
+        self.assertIn("9 relaxed", repr(self.study))
+        page = self.study._repr_html_()
+        self.assertIn("median t_relax", page)
+        self.assertNotIn("<script", page)
+        self.assertIn("t_relax    median", self.study.overview)
+        self.assertTrue(self.study.pictures["survival"]._repr_svg_().startswith("<svg"))
+        self.assertTrue(self.study.report.exists())
+
+    # Outlines
+
+    def test_arrays_are_outlines(self):
+        shapes = {"NA": ellipse(2, 1), "b,c": ellipse(3, 1), "ü": ellipse(1, 1.5).astype("float32")}
+        study = curvelax.run(shape=shapes, accurate=True, points=32, backend="cpu", progress=False)
+        self.assertEqual(study.summary.label.tolist(), list(shapes))
+        self.assertEqual(study.members.label.tolist(), list(shapes))
+        listed = curvelax.run(shape=list(shapes.values()), accurate=True, points=32, backend="cpu", progress=False)
+        self.assertEqual(listed.summary.t_limit.tolist(), study.summary.t_limit.tolist())
+        self.assertEqual(listed.summary.label.tolist(), ["0", "1", "2"])
+        # The same by the program, from a file.
+        np.savetxt(self.at / "one.csv", shapes["b,c"], delimiter=",", fmt="%.17g")
+        flags = f"--shape file:{self.at / 'one.csv'} --accurate --points 32 --curves 1 --amplitude 0 --backend cpu --quiet"
+        program = pd.read_csv(run(flags, self.at / "one") / "summary.csv", float_precision="round_trip")
+        self.assertEqual(program.t_limit[0], study.summary.t_limit[1])
+        one = curvelax.run(shape=shapes["NA"], **SMALL)
+        self.assertEqual(len(one.summary), 3)
+        path = curvelax.run(shape=self.at / "one.csv", **SMALL)
+        self.assertEqual(path.spec["shape"], f"file:{self.at / 'one.csv'}")
+
+    def test_outlines_stay_with_their_run(self):
+        out = self.at / "outlines"
+        study = curvelax.run(shape=[ellipse(2, 1), ellipse(1, 3)], out=out, **{**SMALL, "curves": 2})
+        self.assertEqual(len(study.summary), 4)
+        with np.load(out / "outlines.npz") as saved:
+            self.assertTrue(np.array_equal(saved["1"], ellipse(1, 3)))
+        self.assertEqual(len(curvelax.resume(out).summary), 4)
+        with self.assertRaises(curvelax.RequestError) as caught:
+            curvelax.run(shape=[ellipse(2, 1)], out=out, **SMALL)
+        self.assertIn("outlines", str(caught.exception))
+        again = curvelax.run(shape=[ellipse(2, 1), ellipse(1, 2), ellipse(1, 4)], out=out, force=True, **{**SMALL, "curves": 1})
+        self.assertEqual(len(again.summary), 3)
+
+    def test_wrong_arrays_are_refused_in_clear_words(self):
+        ring = ellipse(2, 1)
+        nan = ring.copy()
+        nan[7, 1] = np.nan
+        out = self.at / "refused"
+        for words, shape in [
+            (("point 7", "nan"), nan),
+            (("shape[1]", "point 7"), None),
+            (("(60, 3)", "(N, 2)"), np.c_[ring, ring[:, 0]]),
+            (("2 points", "at least 3"), ring[:2]),
+            (("type <U1", "real numbers"), np.full((9, 2), "a")),
+            (("complex", "real numbers"), ring.astype(complex)),
+            (("type bool",), ring > 0),
+            (("no outlines",), []),
+            (("no outlines",), {}),
+            (("no array",), [[(0, 0), (1, 0), (1,)]]),
+            (("int is no outline",), 7),
+            (("no net area",), np.array([[0, 0], [1, 1], [1, 0], [0, 1.0]])),
+        ]:
+            with self.subTest(words=words):
+                keys = {"shape": {"0": ring, "1": nan} if shape is None else shape}
+                expected = ("'1'", "point 7") if shape is None else words
+                self.refused(*expected, **keys, out=out)
+                self.assertFalse(out.exists())
+        with self.assertRaises(curvelax.RequestError):
+            curvelax.run(sweep={"shape": [ring]}, out=out)
+
+    def test_wrong_keys_are_refused_with_the_nearest_one(self):
+        out = self.at / "keys"
+        self.refused("curvs", "did you mean `curves`?", curvs=3, out=out)
+        self.refused("points", points=2, out=out)
+        self.refused("did you mean `excess`?", events={"a": "exces <= 1"}, out=out)
+        self.refused("amplitude", amplitude=float("nan"), out=out)
+        self.refused("nofile.csv", shape="file:nofile.csv", out=out)
+        with self.assertRaises(TypeError) as caught:
+            curvelax.run(curves=object(), out=out)
+        self.assertIn("curves", str(caught.exception))
+        self.assertFalse(out.exists())
+        for folder, word in [(self.study.folder, "exist"), (self.at / "nowhere", "no")]:
+            call = curvelax.load if word == "no" else lambda out: curvelax.run(**SMALL, out=out)
+            with self.assertRaises(curvelax.RequestError) as caught:
+                call(folder)
+            self.assertIn(word, str(caught.exception))
+
+    # Long runs
+
+    def test_a_run_lets_other_threads_work_and_tells_its_progress(self):
+        counted, told, done = [0], [], threading.Event()
+
+        def count():
+            while not done.wait(0.001):
+                counted[0] += 1
+
+        thread = threading.Thread(target=count)
+        thread.start()
+        keys = {**SMALL, "curves": 400, "points": 64, "progress": lambda *state: told.append(state)}
+        curvelax.run(**keys)
+        done.set()
+        thread.join()
+        self.assertGreater(counted[0], 5)
+        shares = [share for _, _, share in told]
+        self.assertEqual(shares, sorted(shares))
+        # Members at coarser resolutions count, too.
+        self.assertTrue(told and all(done <= total and total >= 400 for done, total, _ in told))
+
+    def test_what_progress_raises_ends_the_run(self):
+        def fail(*_):
+            raise ZeroDivisionError("mine")
+
+        with self.assertRaises(ZeroDivisionError):
+            curvelax.run(**{**SMALL, "curves": 100_000, "progress": fail})
+
+    def test_an_interrupted_run_leaves_what_ended_and_is_resumed(self):
+        out = self.at / "interrupted"
+        keys = {**SMALL, "curves": 300, "points": 48}
+        whole = curvelax.run(**keys)
+
+        def interrupt(done, *_):
+            if done >= 20:
+                os.kill(os.getpid(), signal.SIGINT)
+
+        with self.assertRaises(KeyboardInterrupt) as caught:
+            curvelax.run(**{**keys, "progress": interrupt}, out=out)
+        self.assertIsInstance(caught.exception, curvelax.Interrupted)
+        self.assertEqual(caught.exception.folder, out)
+        self.assertIn("stopped by Ctrl-C", str(caught.exception))
+        # The interpreter lives, and so does its own Ctrl-C.
+        with self.assertRaises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(5)
+        with self.assertRaises(curvelax.RequestError):
+            curvelax.load(out)
+        resumed = curvelax.resume(out, progress=False)
+        self.assertEqual((out / "summary.csv").read_bytes(), (whole.folder / "summary.csv").read_bytes())
+        self.assertTrue(resumed.summary.equals(whole.summary))
+
+    def test_a_temporary_folder_goes_with_its_study_and_can_be_saved(self):
+        study = curvelax.run(**SMALL)
+        folder = study.folder
+        kept = study.save(self.at / "kept")
+        self.assertTrue(folder.exists())
+        with self.assertRaises(curvelax.RequestError):
+            study.save(kept)
+        del study
+        self.assertFalse(folder.exists())
+        self.assertEqual(len(curvelax.load(kept).summary), 3)
+
+    def test_warnings_of_a_run_are_warnings_of_python(self):
+        with self.assertWarns(curvelax.CurvelaxWarning):
+            study = curvelax.run(**{**SMALL, "points": 80, "modes": "2..=20"}, amplitude=0.25, t_end=0.01)
+        self.assertTrue(study.warnings)
+
+    # Documents
+
+    def test_the_examples_in_the_documents_run(self):
+        found = 0
+        with tempfile.TemporaryDirectory() as home:
+            before = os.getcwd()
+            os.chdir(home)
+            try:
+                for path in [ROOT / "python/README.md"]:
+                    failed, tried = doctest.testfile(str(path), module_relative=False, optionflags=doctest.ELLIPSIS)
+                    self.assertEqual(failed, 0, path)
+                    found += tried
+                for module in [curvelax, sys.modules["curvelax._run"]]:
+                    failed, tried = doctest.testmod(module, optionflags=doctest.ELLIPSIS)
+                    self.assertEqual(failed, 0, module)
+                    found += tried
+            finally:
+                os.chdir(before)
+        self.assertGreater(found, 5)
+
+    def test_the_tutorial_runs_to_its_figure(self):
+        import matplotlib
+
+        matplotlib.use("Agg")
+        blocks = re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/tutorial.md").read_text(), re.DOTALL | re.MULTILINE)
+        self.assertGreater(len(blocks), 5)
+        names = {}
+        before = os.getcwd()
+        with tempfile.TemporaryDirectory() as home:
+            (pathlib.Path(home) / "examples").symlink_to(ROOT / "examples")
+            os.chdir(home)
+            try:
+                for block in blocks:
+                    with contextlib.redirect_stdout(io.StringIO()) as told:
+                        exec(block, names)  # noqa: S102
+                    print(told.getvalue(), end="")
+                self.assertEqual(pathlib.Path("jamaica.png").read_bytes()[:4], b"\x89PNG")
+                if "KEEP_FIGURE" in os.environ:
+                    shutil.copy("jamaica.png", os.environ["KEEP_FIGURE"])
+            finally:
+                os.chdir(before)
+        cells, coast = names["cells"], names["coast"]
+        self.assertEqual(cells.relaxed.tolist(), [32, 32, 32])
+        # What the text says of the bars.
+        half = (cells.t_limit_median_high - cells.t_limit_median_low) / 2
+        self.assertTrue((cells.t_limit_error < half).all())
+        self.assertTrue((coast.t_error < 0.1 * coast.t_limit) and not names["best"].empty)
+
+    def test_types_are_told_to_checkers(self):
+        own = resources.files("curvelax")
+        self.assertTrue((own / "py.typed").is_file())
+        stubs = (own / "_curvelax.pyi").read_text()
+        for name in ["FinishedRun", "Seen", "run", "resume", "main", "check_place"]:
+            self.assertIn(name, stubs)
+            self.assertTrue(hasattr(sys.modules["curvelax._curvelax"], name), name)
+
+
+if __name__ == "__main__":
+    unittest.main()
