@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::backend::{
     Backend, Device, DeviceKind,
     cpu::{CpuBackend, Vectorised},
-    gpu::{Capacity, Gpu, Kernel, Variant, may_have_hardware},
+    gpu::{Capacity, Gpu, Kernel, LOADS_DRIVERS, Variant, may_have_hardware},
 };
 use crate::{
     conformance::{compare::MAX_SWEEPS, self_test},
@@ -145,7 +145,8 @@ fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
     if spec.order == Order::Lexicographic {
         return cpu(spec, n, "lexicographic sweeps run on the CPU".into());
     }
-    let mut reason = "no hardware GPU found".to_string();
+    let none = if LOADS_DRIVERS { "no hardware GPU found" } else { "a static program cannot load GPU drivers" };
+    let mut reason = none.to_string();
     for adapter in adapters.into_iter().filter(Gpu::is_hardware) {
         let name = adapter.name().to_string();
         match take(spec, n, adapter, format!("hardware GPU {name}")) {
@@ -180,15 +181,20 @@ fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
     }
 }
 
-/// Returns the error for a missing adapter; `names` are the existing ones.
-pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
-    let there = if names.is_empty() {
+/// Why there is no adapter, and what to do.
+pub fn why_no_adapter() -> &'static str {
+    if LOADS_DRIVERS {
         "this machine has none; use --backend cpu, or install a GPU driver (Debian's software GPU is \
          mesa-vulkan-drivers)"
-            .to_string()
     } else {
-        format!("there are: {}", names.join(", "))
-    };
+        "a static program cannot load GPU drivers; use --backend cpu, or the program for linux-gnu"
+    }
+}
+
+/// Returns the error for a missing adapter; `names` are the existing ones.
+pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
+    let there =
+        if names.is_empty() { why_no_adapter().to_string() } else { format!("there are: {}", names.join(", ")) };
     match asked {
         Some(name) => Error::Request(format!("--adapter {name}: no such adapter; {there} (see `curvelax adapters`)")),
         None => Error::Request(format!("--backend gpu: no GPU adapter; {there}")),

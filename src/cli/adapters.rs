@@ -75,7 +75,7 @@ pub fn adapters(args: AdaptersArgs) -> Result<()> {
     }
     let mut text: String = adapters.iter().enumerate().map(|(number, adapter)| adapter.describe(number)).collect();
     if adapters.is_empty() {
-        text += "no GPU adapter; Debian's software GPU is the package mesa-vulkan-drivers\n";
+        text += &format!("no GPU adapter: {}\n", placement::why_no_adapter());
     }
     print(&format!("{text}\n--backend auto, for the default run: {}\n", auto.sentence))
 }

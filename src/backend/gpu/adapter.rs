@@ -11,7 +11,7 @@ use std::{
 
 use crate::{
     backend::gpu::{
-        Variant, abandoned,
+        LOADS_DRIVERS, Variant, abandoned,
         clock::Moment,
         pipeline::{self, Key},
         shader,
@@ -95,6 +95,9 @@ impl Capacity {
 impl Gpu {
     /// Lists the adapters of this machine, hardware first, in the order in which `auto` prefers them.
     pub fn list() -> Vec<Gpu> {
+        if !LOADS_DRIVERS {
+            return Vec::new();
+        }
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.flags = wgpu::InstanceFlags::empty();
         descriptor.backends = wgpu::Backends::PRIMARY;

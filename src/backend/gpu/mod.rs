@@ -13,5 +13,5 @@ pub mod shader;
 
 pub use adapter::{Capacity, Gpu};
 pub use kernel::Kernel;
-pub use nodes::may_have_hardware;
+pub use nodes::{LOADS_DRIVERS, may_have_hardware};
 pub use shader::Variant;

@@ -1,5 +1,8 @@
 //! Device nodes: whether a hardware GPU may be present, as far as can be seen without its driver.
 
+/// Whether this program can load GPU drivers. A static one for Linux cannot: its C library has no dynamic loader.
+pub const LOADS_DRIVERS: bool = !cfg!(all(target_os = "linux", target_feature = "crt-static"));
+
 /// Returns whether this machine may have a hardware GPU. On Linux, none is reachable without a node in `/dev`, except
 /// through a Vulkan driver that the user adds.
 pub fn may_have_hardware() -> bool {
