@@ -343,17 +343,17 @@ impl Choice {
     /// # Errors
     /// As [`open`](Choice::open).
     pub fn open_for(&self, cohort: &[Cell]) -> Result<(Box<dyn Backend>, Platform)> {
-        self.open_for_and_tell(cohort, &|_| {})
+        self.open_watched(cohort, &Watch::default())
     }
 
-    /// Like [`open_for`](Choice::open_for); tells what it is waiting for, if that takes long.
+    /// Like [`open_for`](Choice::open_for), under the eyes of `watch`.
     ///
     /// # Errors
-    /// As [`open`](Choice::open).
-    pub fn open_for_and_tell(&self, cohort: &[Cell], tell: &dyn Fn(&str)) -> Result<(Box<dyn Backend>, Platform)> {
+    /// As [`open`](Choice::open), and that of the watch.
+    pub fn open_watched(&self, cohort: &[Cell], watch: &Watch) -> Result<(Box<dyn Backend>, Platform)> {
         let curves = cohort.iter().map(|cell| cell.spec.member_count()).sum();
         let whole = Spec { curves, only: None, shard: None, ..cohort[0].spec.clone() };
-        self.open_and_tell(&whole, whole.points, tell)
+        self.open_any(&whole, whole.points, watch)
     }
 
     /// Opens the device for the members of `spec`, of `n` nodes; a GPU must pass a
@@ -363,22 +363,17 @@ impl Choice {
     /// # Errors
     /// [`Error::Device`] if a requested GPU cannot be opened or computes wrongly.
     pub fn open(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
-        self.open_and_tell(spec, n, &|_| {})
+        self.open_any(spec, n, &Watch::default())
     }
 
-    fn open_and_tell(&self, spec: &Spec, n: usize, tell: &dyn Fn(&str)) -> Result<(Box<dyn Backend>, Platform)> {
+    fn open_any(&self, spec: &Spec, n: usize, watch: &Watch) -> Result<(Box<dyn Backend>, Platform)> {
         match self.precision {
-            Precision::F32 => self.open_in::<f32>(spec, n, tell),
-            Precision::F64 => self.open_in::<f64>(spec, n, tell),
+            Precision::F32 => self.open_in::<f32>(spec, n, watch),
+            Precision::F64 => self.open_in::<f64>(spec, n, watch),
         }
     }
 
-    fn open_in<T: Vectorised>(
-        &self,
-        spec: &Spec,
-        n: usize,
-        tell: &dyn Fn(&str),
-    ) -> Result<(Box<dyn Backend>, Platform)> {
+    fn open_in<T: Vectorised>(&self, spec: &Spec, n: usize, watch: &Watch) -> Result<(Box<dyn Backend>, Platform)> {
         let blocks = ring(n)?;
         let method = Method {
             solver: spec.solver(),
@@ -391,16 +386,30 @@ impl Choice {
                 .map(|backend| Box::new(backend) as Box<dyn Backend>),
             Device::Gpu(gpu) => {
                 let limit = self.or_cpu.then_some(COMPILE_LIMIT);
-                open_gpu::<T>(gpu, blocks, spec, &method, limit, tell)
+                open_gpu::<T>(gpu, blocks, spec, &method, limit, watch)
             }
         };
         match opened {
             Ok(backend) => Ok((backend, self.platform(spec))),
             Err(Error::Device(fault)) if self.or_cpu => {
-                self.on_cpu(format!("the GPU failed: {fault}")).open_in::<T>(spec, n, tell)
+                self.on_cpu(format!("the GPU failed: {fault}")).open_in::<T>(spec, n, watch)
             }
             Err(error) => Err(error),
         }
+    }
+}
+
+/// Watches a device being opened.
+pub struct Watch<'a> {
+    /// Hears what is waited for, if that takes long.
+    pub tell: &'a dyn Fn(&str),
+    /// Asked several times a second during the wait; an error ends it.
+    pub go_on: &'a dyn Fn() -> Result<()>,
+}
+
+impl Default for Watch<'_> {
+    fn default() -> Self {
+        Watch { tell: &|_| {}, go_on: &|| Ok(()) }
     }
 }
 
@@ -416,7 +425,7 @@ fn open_gpu<T: Vectorised>(
     spec: &Spec,
     method: &Method,
     limit: Option<Duration>,
-    tell: &dyn Fn(&str),
+    watch: &Watch,
 ) -> Result<Box<dyn Backend>> {
     let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
     let adaptive = spec.adaptive.is_some();
@@ -425,9 +434,8 @@ fn open_gpu<T: Vectorised>(
     // The self-test has its own cap: with the run's, a solve may end before it converges, and then roundings decide.
     let tested = Method { max_sweeps: MAX_SWEEPS, ..*method };
     let then = limit.map_or(String::new(), |limit| format!("; after {} s the CPU is used instead", limit.as_secs()));
-    gpu.compile::<T>(blocks, variant, limit, &|| {
-        tell(&format!("GPU {} is still compiling the kernel{then}", gpu.name()));
-    })?;
+    let waits = || (watch.tell)(&format!("GPU {} is still compiling the kernel{then}", gpu.name()));
+    gpu.compile::<T>(blocks, variant, limit, &waits, watch.go_on)?;
     let mut kernel = Kernel::<T>::new(gpu, blocks, members, tested.max_sweeps, variant)?;
     let device = format!("{} ({})", gpu.name(), gpu.driver());
     self_test::<T>(&mut kernel, &device, gpu.is_hardware(), &tested, blocks.n, adaptive)?;

@@ -12,8 +12,9 @@ use toml::Table;
 const WORKFLOW: &str = ".github/workflows/release.yml";
 
 /// Files that name the address of the repository or the version.
-const WITH_ADDRESS: [&str; 9] = [
+const WITH_ADDRESS: [&str; 10] = [
     "Cargo.toml",
+    "python/README.md",
     "CITATION.cff",
     "CODE_OF_CONDUCT.md",
     "SECURITY.md",
@@ -88,6 +89,7 @@ fn versions_and_addresses_agree() {
     let (version, repository) = (field(&package, "version"), field(&package, "repository"));
     assert_eq!(after(&read("CITATION.cff"), "version:"), version);
     assert_eq!(after(&read("Containerfile"), "ARG VERSION="), version);
+    assert_eq!(after(&read("python/Cargo.toml"), "version ="), version);
     let changelog = read("CHANGELOG.md");
     let newest = after(&changelog, "## ");
     assert!(newest.starts_with(version), "CHANGELOG.md begins with {newest}");

@@ -24,13 +24,16 @@ def read(path: Path, columns: list[tuple[str, str, str]], frames: str) -> Any:
 def _pandas(path: Path, kinds: dict[str, str]) -> Any:
     import pandas as pd
 
-    text = "str" if int(pd.__version__.split(".")[0]) >= 3 else "string"
+    version = tuple(map(int, pd.__version__.split(".")[:2]))
+    text = "str" if version >= (3, 0) else "string"
+    # The default from pandas 3.1 on; before it, the last bit is lost now and then.
+    exact = {} if version >= (3, 1) else {"float_precision": "round_trip"}
     types = {INTEGER: "Int64", FLOAT: "float64"}
     # The type of a swept value is that of its key.
     dtype = {name: types.get(holds, text) for name, holds in kinds.items() if holds != SWEPT}
     # A label may be "NA": only what is empty is missing, and an empty label is empty.
     missing = {name: [""] for name, holds in kinds.items() if holds in types}
-    frame = pd.read_csv(path, dtype=dtype, keep_default_na=False, na_values=missing, float_precision="round_trip")
+    frame = pd.read_csv(path, dtype=dtype, keep_default_na=False, na_values=missing, **exact)
     whole = [name for name in frame if kinds.get(name) == INTEGER and not frame[name].isna().any()]
     return frame.astype(dict.fromkeys(whole, "int64"))
 

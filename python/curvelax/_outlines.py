@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,11 +12,6 @@ import numpy as np
 from ._errors import RequestError
 
 NAME = "outlines.npz"
-
-
-def is_arrays(shape: Any) -> bool:
-    """Whether a shape is given by points, not by its name or file."""
-    return not isinstance(shape, (str, os.PathLike)) and shape is not None
 
 
 def labelled(shape: Any) -> dict[str, np.ndarray]:

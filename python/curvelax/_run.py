@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from . import _curvelax, _outlines
+from . import _curvelax
 from ._errors import CurvelaxWarning, Interrupted, RequestError
 from ._study import Study
 
@@ -71,27 +71,29 @@ def run(
     8
     """
     shape, sweep = keys.get("shape"), keys.get("sweep")
-    if isinstance(sweep, dict) and any(map(_outlines.is_arrays, sweep.get("shape") or ())):
+    if isinstance(sweep, dict) and any(map(_is_arrays, sweep.get("shape") or ())):
         raise RequestError("sweep: shapes by arrays cannot be swept; give them as an ensemble by shape=[...]")
     folder = Path(out) if out is not None else _temporary()
     existing = "replaced" if force else "refused"
-    named = folder / _outlines.NAME
-    written = False
+    written = None
     if isinstance(shape, os.PathLike):
         keys["shape"] = f"file:{os.fspath(shape)}"
-    elif _outlines.is_arrays(shape):
+    elif _is_arrays(shape):
+        # Here, for the program is to start without numpy.
+        from . import _outlines
+
         outlines = _outlines.labelled(shape)
         _curvelax.check_place(folder, existing)
         existed = folder.exists()
         keys["shape"] = _outlines.save(outlines, folder)
-        written = True
+        written = folder / _outlines.NAME
         existing = existing if force else "filled"
     try:
         with _bar(progress) as show:
             overview, seen = _curvelax.run(spec, keys, folder, existing, show, _say)
     except RequestError:
         if written and not force:
-            named.unlink(missing_ok=True)
+            written.unlink(missing_ok=True)
             if not existed:
                 with contextlib.suppress(OSError):
                     folder.rmdir()
@@ -135,6 +137,11 @@ def load(out: str | os.PathLike[str]) -> Study:
     study = Study(Path(out))
     study.record  # noqa: B018  # read now, so that what is wrong is said here
     return study
+
+
+def _is_arrays(shape: Any) -> bool:
+    """Whether a shape is given by points, not by its name or file."""
+    return not isinstance(shape, (str, os.PathLike)) and shape is not None
 
 
 def _temporary() -> Path:

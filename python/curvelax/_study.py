@@ -10,7 +10,7 @@ import weakref
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from . import _arrays, _curvelax, _frames
+from . import _curvelax, _frames
 from ._errors import RequestError
 
 if TYPE_CHECKING:
@@ -168,6 +168,8 @@ class Study:
         """
         if not self.spec.get("snapshots"):
             raise RequestError(f"snapshots: {self.folder} has none: {NEEDS['snapshots']}")
+        from . import _arrays
+
         return _arrays.snapshots(self._run, self._seen, self.folder, self.table)
 
     def survival(self) -> pd.DataFrame:

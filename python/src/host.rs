@@ -16,6 +16,9 @@ use crate::seen::Seen;
 
 /// Time between two looks at Python: its lock is not free.
 const PERIOD: Duration = Duration::from_millis(50);
+/// A run that is asked to stop has this time to reach a point where all its work is saved: nobody waits longer than a
+/// second in a notebook.
+const PATIENCE: Duration = Duration::from_millis(600);
 /// Time between checkpoints.
 const EVERY: Duration = Duration::from_secs(5);
 
@@ -23,6 +26,8 @@ const EVERY: Duration = Duration::from_secs(5);
 pub struct Notebook {
     shared: Arc<Shared>,
     seen: Mutex<Seen>,
+    /// When Python was last asked whether to go on.
+    asked: Mutex<Option<Instant>>,
 }
 
 struct Shared {
@@ -53,7 +58,7 @@ impl Notebook {
     /// Tells `progress` and `say`.
     pub fn new(progress: Py<PyAny>, say: Py<PyAny>) -> Notebook {
         let shared = Shared { progress, say, stop: Stop::default(), raised: Mutex::default() };
-        Notebook { shared: shared.into(), seen: Mutex::default() }
+        Notebook { shared: shared.into(), seen: Mutex::default(), asked: Mutex::default() }
     }
 
     /// Moves out what was raised in Python.
@@ -88,7 +93,19 @@ impl Host for Notebook {
                 shared.ask(|py| shared.progress.call1(py, (done, total, share)).map(drop));
             }
         };
-        Manner { progress: Progress::Told(Box::new(told)), every: EVERY, stop }
+        Manner { progress: Progress::Told(Box::new(told)), every: EVERY, stop, patience: PATIENCE }
+    }
+
+    fn go_on(&self) -> curvelax::Result<()> {
+        let is_due = lock(&self.asked).is_none_or(|last| last.elapsed() >= PERIOD);
+        if is_due {
+            *lock(&self.asked) = Some(Instant::now());
+            self.shared.ask(|_| Ok(()));
+        }
+        match self.shared.stop.asked() {
+            Some((cause, _)) => Err(cause.error(" before the run began: nothing is saved")),
+            None => Ok(()),
+        }
     }
 
     fn see(&self, snapshots: &[Snapshot]) {

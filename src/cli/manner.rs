@@ -12,6 +12,9 @@ use crate::{
     text::plural,
 };
 
+/// A run that is asked to stop has this time to reach a point where all its work is saved.
+const PATIENCE: Duration = Duration::from_millis(2500);
+
 /// How a run goes about its work: nothing of it changes a result.
 #[derive(clap::Args)]
 pub struct MannerFlags {
@@ -113,7 +116,7 @@ impl Host for MannerFlags {
     }
 
     fn manner_with(&self, stop: Stop) -> Manner {
-        Manner { progress: Progress::new(self.quiet), every: self.checkpoint_every, stop }
+        Manner { progress: Progress::new(self.quiet), every: self.checkpoint_every, stop, patience: PATIENCE }
     }
 }
 

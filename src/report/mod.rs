@@ -43,9 +43,6 @@ use checkpoint::{Head, Origin, Saved};
 use complete::Complete;
 use growing::Growing;
 
-/// A run that is asked to stop and does not reach a point where it can is ended after this time.
-const PATIENCE: Duration = Duration::from_millis(2500);
-
 /// Checkpoints use at most one part in `SHARE_OF_STATES` of the time of a run.
 const SHARE_OF_STATES: u32 = 20;
 
@@ -57,6 +54,9 @@ pub struct Manner {
     pub every: Duration,
     /// The means to stop the run.
     pub stop: Stop,
+    /// Time after which a run that was asked to stop is ended even if it has not reached a point where all its work can be
+    /// saved.
+    pub patience: Duration,
 }
 
 /// Everything written about a run.
@@ -84,6 +84,7 @@ pub struct RunReport {
     earlier: Duration,
     every: Duration,
     stop: Stop,
+    patience: Duration,
     /// When the last checkpoint was complete, and how long it took.
     kept: (Instant, Duration),
     /// Whether the checkpoint contains any work.
@@ -125,7 +126,7 @@ impl RunReport {
     }
 
     fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, manner: Manner) -> RunReport {
-        let Manner { progress, every, stop } = manner;
+        let Manner { progress, every, stop, patience } = manner;
         RunReport {
             growing,
             folder,
@@ -142,6 +143,7 @@ impl RunReport {
             earlier: Duration::ZERO,
             every,
             stop,
+            patience,
             kept: (Instant::now(), Duration::ZERO),
             has_begun: false,
         }
@@ -314,7 +316,7 @@ impl Sink for RunReport {
         let share = (before as f64 + share * total as f64) / all.max(1) as f64;
         self.progress.show(before + done, all, share);
         match self.stop.asked() {
-            Some((cause, when)) if when.elapsed() > PATIENCE => Err(cause.error(&self.so_far())),
+            Some((cause, when)) if when.elapsed() > self.patience => Err(cause.error(&self.so_far())),
             _ => Ok(()),
         }
     }
@@ -368,8 +370,10 @@ mod tests {
         names
     }
 
+    const PATIENCE: Duration = Duration::from_millis(300);
+
     fn manner(stop: &Stop) -> Manner {
-        Manner { progress: Progress::Quiet, every: Duration::from_secs(1000), stop: stop.clone() }
+        Manner { progress: Progress::Quiet, every: Duration::from_secs(1000), stop: stop.clone(), patience: PATIENCE }
     }
 
     fn begun(out: &Path, spec: &Spec, stop: &Stop) -> RunReport {

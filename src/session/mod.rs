@@ -32,6 +32,13 @@ pub trait Host {
     fn manner(&self) -> Result<Manner>;
     /// The manner of a run that `stop` stops.
     fn manner_with(&self, stop: Stop) -> Manner;
+    /// Asked several times a second while a run is prepared; an error ends it.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`](crate::Error::Interrupted) or the like, if the host wants no run any more.
+    fn go_on(&self) -> Result<()> {
+        Ok(())
+    }
     /// Sees snapshots of a member, in time order and before they are stored. Those that a resumed run has stored
     /// earlier are not seen again.
     fn see(&self, _snapshots: &[Snapshot]) {}
@@ -58,6 +65,9 @@ pub struct Completed {
 /// [`Error::Interrupted`](crate::Error::Interrupted) or [`Error::Stopped`](crate::Error::Stopped) if asked to stop.
 pub fn planned(spec: Spec, manner: Option<&Manner>, host: &dyn Host) -> Result<Spec> {
     let stopped = || {
+        if let Err(error) = host.go_on() {
+            return Some(error);
+        }
         let (cause, _) = manner?.stop.asked()?;
         Some(cause.error(" in the rounds of --accuracy, before the run began: nothing is saved"))
     };

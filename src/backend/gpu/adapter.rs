@@ -6,7 +6,7 @@ use std::{
         Arc, Mutex, PoisonError,
         mpsc::{RecvTimeoutError, channel},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use crate::{
@@ -25,6 +25,8 @@ use crate::{
 
 /// Time after which a driver that is still compiling is reported.
 const LONG: Duration = Duration::from_secs(5);
+/// Time between two questions whether to go on.
+const PERIOD: Duration = Duration::from_millis(100);
 
 /// An adapter that could run the kernel.
 pub struct Gpu {
@@ -206,18 +208,20 @@ impl Gpu {
         Ok((device.clone(), pipeline.clone()))
     }
 
-    /// Opens the device and compiles the pipeline for [`pipeline`](Gpu::pipeline); calls `tell` if that takes long.
+    /// Opens the device and compiles the pipeline for [`pipeline`](Gpu::pipeline); calls `tell` if that takes long, and
+    /// `go_on` several times a second, whose error ends the wait.
     ///
     /// Nothing can stop a driver's compiler. It therefore runs in a thread, which is abandoned after the `limit`.
     ///
     /// # Errors
-    /// [`Error::Device`] if the adapter cannot be opened, the driver panics or the limit is over.
+    /// [`Error::Device`] if the adapter cannot be opened, the driver panics or the limit is over, and that of `go_on`.
     pub fn compile<T: Real>(
         self: &Arc<Self>,
         blocks: Blocks,
         variant: Variant,
         limit: Option<Duration>,
         tell: &dyn Fn(),
+        go_on: &dyn Fn() -> Result<()>,
     ) -> Result<()> {
         let (send, compiled) = channel();
         let gpu = Arc::clone(self);
@@ -225,14 +229,19 @@ impl Gpu {
             let done = guarded(|| gpu.pipeline::<T>(blocks, variant).map(drop));
             drop(send.send(done));
         })?;
-        let first = limit.map_or(LONG, |limit| limit.min(LONG));
-        let done = compiled.recv_timeout(first).or_else(|_| {
-            tell();
-            match limit {
-                Some(limit) => compiled.recv_timeout(limit - first),
-                None => compiled.recv().map_err(RecvTimeoutError::from),
+        let begun = Instant::now();
+        let mut told = false;
+        let done = loop {
+            match compiled.recv_timeout(PERIOD) {
+                Err(RecvTimeoutError::Timeout) if limit.is_none_or(|limit| begun.elapsed() < limit) => {}
+                done => break done,
             }
-        });
+            if !told && begun.elapsed() >= LONG {
+                tell();
+                told = true;
+            }
+            go_on().inspect_err(|_| abandoned::abandon(Arc::clone(self)))?;
+        };
         let fault = match done {
             Ok(Ok(done)) => return done,
             Ok(Err(panic)) => format!("{panic}; see `curvelax adapters`, or use --backend cpu"),

@@ -62,6 +62,14 @@ class Package(unittest.TestCase):
         cls.program = run(FLAGS, cls.at / "program")
         cls.study = curvelax.run(out=cls.at / "package", progress=False, **KEYS)
 
+    def setUp(self):
+        """What libraries deprecate, users would see."""
+        catch = warnings.catch_warnings()
+        catch.__enter__()
+        self.addCleanup(catch.__exit__, None, None, None)
+        for category in (DeprecationWarning, FutureWarning):
+            warnings.simplefilter("error", category)
+
     def refused(self, *words, **keys):
         """The message of a refusal before any work."""
         with self.assertRaises(curvelax.RequestError) as caught:
@@ -230,7 +238,7 @@ class Package(unittest.TestCase):
         # The same by the program, from a file.
         np.savetxt(self.at / "one.csv", shapes["b,c"], delimiter=",", fmt="%.17g")
         flags = f"--shape file:{self.at / 'one.csv'} --accurate --points 32 --curves 1 --amplitude 0 --backend cpu --quiet"
-        program = pd.read_csv(run(flags, self.at / "one") / "summary.csv", float_precision="round_trip")
+        program = pd.read_csv(run(flags, self.at / "one") / "summary.csv", float_precision=None)
         self.assertEqual(program.t_limit[0], study.summary.t_limit[1])
         one = curvelax.run(shape=shapes["NA"], **SMALL)
         self.assertEqual(len(one.summary), 3)
@@ -358,9 +366,11 @@ class Package(unittest.TestCase):
         self.assertEqual(len(curvelax.load(kept).summary), 3)
 
     def test_warnings_of_a_run_are_warnings_of_python(self):
-        with self.assertWarns(curvelax.CurvelaxWarning):
-            study = curvelax.run(**{**SMALL, "points": 80, "modes": "2..=20"}, amplitude=0.25, t_end=0.01)
-        self.assertTrue(study.warnings)
+        with self.assertWarns(curvelax.CurvelaxWarning) as caught:
+            study = curvelax.run(shape=[ellipse(2, 1), ellipse(1, 3)], **SMALL)
+        self.assertIn("copies of one outline", str(caught.warning))
+        self.assertEqual(pathlib.Path(caught.filename).name, "test_package.py")
+        self.assertEqual(study.warnings, [str(caught.warning)])
 
     # Documents
 
