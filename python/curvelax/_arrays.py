@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _curvelax
+from ._errors import RequestError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +28,8 @@ def snapshots(
     summary, times = table("summary"), run.times()
     arrays = seen.arrays(summary.member.tolist(), times) if seen is not None else None
     if arrays is None and (folder / "snapshots.zarr").exists():
+        if importlib.util.find_spec("zarr") is None:
+            raise RequestError(f"snapshots: {folder / 'snapshots.zarr'} needs zarr 3: pip install zarr, on Python 3.11 or later")
         return xr.open_zarr(folder / "snapshots.zarr", chunks=None)
     if arrays is None:
         arrays = _from_table(table("snapshots"), summary.member.to_numpy(), np.array(times))

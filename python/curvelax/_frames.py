@@ -27,7 +27,7 @@ def _pandas(path: Path, kinds: dict[str, str]) -> Any:
     version = tuple(map(int, pd.__version__.split(".")[:2]))
     text = "str" if version >= (3, 0) else "string"
     # The default from pandas 3.1 on; before it, the last bit is lost now and then.
-    exact = {} if version >= (3, 1) else {"float_precision": "round_trip"}
+    exact: dict[str, Any] = {} if version >= (3, 1) else {"float_precision": "round_trip"}
     types = {INTEGER: "Int64", FLOAT: "float64"}
     # The type of a swept value is that of its key.
     dtype = {name: types.get(holds, text) for name, holds in kinds.items() if holds != SWEPT}

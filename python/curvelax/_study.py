@@ -196,7 +196,7 @@ class Study:
         labels = self._labels()
         for cell, curve in self.survival().groupby("cell"):
             time = [0.0, *curve.time]
-            (line,) = ax.step(time, [1.0, *curve.survival], where="post", label=labels.get(cell))
+            (line,) = ax.step(time, [1.0, *curve.survival], where="post", label=labels.get(int(cell)))
             band = ([1.0, *curve.lower], [1.0, *curve.upper])
             ax.fill_between(time, *band, step="post", alpha=0.2, color=line.get_color(), linewidth=0)
         units = self.spec.get("units")

@@ -3,6 +3,7 @@
 import contextlib
 import doctest
 import filecmp
+import importlib.util
 import io
 import json
 import os
@@ -171,6 +172,7 @@ class Package(unittest.TestCase):
 
     # Snapshots
 
+    @unittest.skipUnless(importlib.util.find_spec("zarr"), "zarr 3 needs Python 3.11")
     def test_snapshots_are_the_same_from_memory_from_the_table_and_from_zarr(self):
         stored = curvelax.run(out=self.at / "zarr", progress=False, **KEYS, store="zarr")
         with warnings.catch_warnings():
