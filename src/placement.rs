@@ -446,9 +446,7 @@ fn open_gpu<T: Vectorised>(
 mod tests {
     use super::*;
 
-    /// The minimum of every WebGPU device.
-    const LEAST: Capacity =
-        Capacity { f64: false, threads: 256, workgroup_bytes: 16_384, subgroup: 32, least_subgroup: 0 };
+    const LEAST: Capacity = Capacity::LEAST;
 
     fn refused(precision: Option<Precision>, n: usize, capacity: &Capacity) -> String {
         let spec = Spec { precision, ..Spec::default() };
