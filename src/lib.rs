@@ -102,6 +102,8 @@ pub mod bench;
 #[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod cli;
+#[doc(hidden)]
+pub mod draw;
 #[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod figures;
@@ -111,8 +113,6 @@ pub mod files;
 #[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod report;
-#[doc(hidden)]
-pub mod draw;
 #[doc(hidden)]
 pub mod schedule;
 #[doc(hidden)]

@@ -68,8 +68,8 @@ pub fn resume(
     standing: Standing,
     sink: &mut dyn Sink,
 ) -> Result<()> {
-    let plan = Plan::new(cells, precision, portraits);
-    let mut simulation = Simulation::new(&plan, backend.slots(), backend.batches(), standing)?;
+    let roster = Roster::new(cells, precision, portraits);
+    let mut simulation = Simulation::new(&roster, backend.slots(), backend.batches(), standing)?;
     let done = loop {
         match simulation.turn(backend, sink) {
             Ok(true) => {}
@@ -85,8 +85,8 @@ pub fn resume(
     done
 }
 
-/// What a [`Simulation`] is about.
-pub struct Plan<'a> {
+/// The members of a [`Simulation`], and when they leave something during it.
+pub struct Roster<'a> {
     cells: &'a [Cell],
     precision: Precision,
     /// For each cell: for members without a portrait, and for those with one.
@@ -94,9 +94,9 @@ pub struct Plan<'a> {
     portraits: usize,
 }
 
-impl<'a> Plan<'a> {
-    /// Plans to run the members of `cells` as [`simulate`] does.
-    pub fn new(cells: &'a [Cell], precision: Precision, portraits: usize) -> Plan<'a> {
+impl<'a> Roster<'a> {
+    /// Lists the members of `cells` as [`simulate`] does.
+    pub fn new(cells: &'a [Cell], precision: Precision, portraits: usize) -> Roster<'a> {
         let outputs = |framed: bool| -> Vec<_> {
             let of_cell = |Cell { spec, .. }: &Cell| {
                 // The pictures show the start and the end anyway.
@@ -106,7 +106,7 @@ impl<'a> Plan<'a> {
             };
             cells.iter().map(of_cell).collect()
         };
-        Plan { cells, precision, outputs: [outputs(false), outputs(true)], portraits }
+        Roster { cells, precision, outputs: [outputs(false), outputs(true)], portraits }
     }
 }
 
@@ -133,20 +133,17 @@ impl<'a> Simulation<'a> {
     /// Begins a run on a back end of so many slots in so many batches, or continues one.
     ///
     /// # Errors
-    /// [`Error::Request`] if members in `standing` are not those of the plan.
-    pub fn new(plan: &'a Plan<'a>, slots: usize, batches: usize, standing: Standing) -> Result<Simulation<'a>> {
-        let cells = plan.cells;
+    /// [`Error::Request`] if members in `standing` are not those of the roster.
+    pub fn new(roster: &'a Roster<'a>, slots: usize, batches: usize, standing: Standing) -> Result<Simulation<'a>> {
+        let cells = roster.cells;
         let Standing { next, early, resident } = standing;
-        let pool = Pool {
-            plan,
-            resident: (0..slots).map(|_| None).collect(),
-            paused: resident.unwrap_or_default(),
-            held: 0,
-        };
+        let pool =
+            Pool { roster, resident: (0..slots).map(|_| None).collect(), paused: resident.unwrap_or_default(), held: 0 };
         let total = cells.iter().map(|cell| cell.spec.member_count()).sum();
         let [first, last] = [cells.first(), cells.last()].map(|cell| cell.map_or(0, |cell| cell.index));
-        let is_own =
-            |(rank, ended): (&u64, &Ended)| (next..total).contains(rank) && (first..=last).contains(&ended.outcome.cell);
+        let is_own = |(rank, ended): (&u64, &Ended)| {
+            (next..total).contains(rank) && (first..=last).contains(&ended.outcome.cell)
+        };
         if next > total || !early.iter().all(is_own) {
             return Err(Error::Request(format!(
                 "the checkpoint has members that are not among the {total} of the spec"
@@ -241,7 +238,7 @@ pub fn states_at_once(n: usize) -> usize {
 
 /// The resident members of a run.
 struct Pool<'a> {
-    plan: &'a Plan<'a>,
+    roster: &'a Roster<'a>,
     resident: Vec<Option<(u64, Trajectory<'a>)>>,
     /// Members that continue from a checkpoint, by rank.
     paused: BTreeMap<u64, Paused>,
@@ -258,7 +255,7 @@ impl Pool<'_> {
         rank: u64,
         (cell, index): (usize, u64),
     ) -> Result<Option<Ended>> {
-        let Plan { cells, precision, outputs, portraits } = self.plan;
+        let Roster { cells, precision, outputs, portraits } = self.roster;
         let own = &cells[cell];
         let each = (portraits / cells.len().max(1)).max(1);
         // The same members whatever their shard.
@@ -282,7 +279,7 @@ impl Pool<'_> {
     fn end(&self, trajectory: Trajectory, last: Option<&State<f64>>) -> Ended {
         let mut ended = trajectory.end(last);
         // Not all cells have a level.
-        let cells = self.plan.cells;
+        let cells = self.roster.cells;
         let at = cells.binary_search_by_key(&ended.outcome.cell, |cell| cell.index);
         ended.outcome.rate_theory = at.ok().and_then(|at| {
             let cell = &cells[at];
@@ -294,7 +291,7 @@ impl Pool<'_> {
 
     /// Nodes of a member.
     fn points(&self) -> usize {
-        self.plan.cells.first().map_or(1, |cell| cell.family.points())
+        self.roster.cells.first().map_or(1, |cell| cell.family.points())
     }
 
     /// All unfinished members; none may be in a batch that is being advanced.

@@ -33,7 +33,8 @@ export class Instance {
     try {
       length = ask();
     } catch (error) {
-      throw new Error(`${this.host.said.trim() || error.message}; with fewer curves or nodes there is more memory`);
+      const words = this.host.said.trim() || error.message;
+      throw new Error(/memory/i.test(words) ? `${words}: use fewer curves or nodes` : words);
     }
     const said = JSON.parse(new TextDecoder().decode(new Uint8Array(memory.buffer, answer(), length)));
     if (said.error) throw new Error(said.error);

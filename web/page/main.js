@@ -28,7 +28,7 @@ function say(words, wrong = false) {
 
 function controls() {
   for (const key of Object.keys(address.DEFAULTS).filter((key) => key !== "points")) $(key).value = state[key];
-  $("points").value = address.unpacked(state.points).map((point) => point.map((v) => v.toFixed(4)).join(",")).join("\n");
+  $("points").value = address.decoded(state.points);
   shown();
 }
 
@@ -37,14 +37,8 @@ function shown() {
   document.querySelectorAll("output").forEach((output) => { output.value = $(output.htmlFor.value).value; });
   document.querySelectorAll("[data-shape]").forEach((part) => { part.hidden = part.dataset.shape !== state.shape; });
   document.querySelectorAll("[data-flow]").forEach((part) => { part.hidden = part.dataset.flow !== state.flow; });
-  show($("pad"), typed());
+  show($("pad"), address.pointsOf($("points").value));
   $("save").href = `data:text/csv;charset=utf-8,${encodeURIComponent(table())}`;
-}
-
-/** The points in the text field; lines that are no points are left out here, and refused by the library. */
-function typed() {
-  const points = $("points").value.split("\n").map((line) => line.split(",").map(Number));
-  return points.filter((point) => point.length === 2 && point.every(Number.isFinite));
 }
 
 /** The text of drawn.csv. */
@@ -52,6 +46,7 @@ function table() { return `x,y\n${$("points").value.trim()}\n`; }
 
 /** The file that the shape names, if it does. */
 async function file() {
+  if (state.shape === "drawn" && !$("points").value.trim()) throw new Error("Draw an outline on the pad, or type its points.");
   if (state.shape === "drawn") return { name: "drawn.csv", bytes: new TextEncoder().encode(table()) };
   if (state.shape === "file") {
     if (!dropped) throw new Error("Choose a file with an outline, or drop one on the page.");
@@ -111,7 +106,7 @@ async function run() {
     const precision = place === "gpu" ? "f32" : "f64";
     side.worker.postMessage({ compiled, settings: { ...wanted, precision }, file: outline, place });
   }
-  draw.settings = wanted;
+  Object.assign(draw, { settings: wanted, charted: -Infinity });
 }
 
 /** Takes a message of a worker. */
@@ -138,11 +133,12 @@ function hear(side, { error, none, compiling, begins, frame }) {
 
 function finish() {
   $("stop").disabled = true;
-  draw.charts = 0;
+  draw.charted = -Infinity;
+  compare();
   const { cpu } = sides;
   const times = [...cpu.rows.values()].map((row) => row.t_relax).filter((t) => t !== null);
   if (!$("status").classList.contains("wrong")) {
-    say(`${times.length} of ${cpu.rows.size} members have relaxed. ${$("difference").textContent}`);
+    say(`${times.length} of ${cpu.rows.size} members have relaxed.`);
   }
   document.body.dataset.done = "yes";
 }
@@ -152,21 +148,21 @@ function finish() {
 function draw(now) {
   requestAnimationFrame(draw);
   const running = Object.values(sides).filter((side) => side.frame);
-  const fresh = running.filter((side) => !side.drawn);
-  if (!fresh.length && draw.charts) return;
-  for (const side of fresh) {
+  for (const side of running.filter((side) => !side.drawn)) {
     side.tiles.draw(side.frame.nodes, side.begins.n, side.rows);
-    side.drawn = true;
+    [side.drawn, draw.isStale] = [true, true];
   }
-  if (!running.length || now - (draw.charts ?? 0) < CHARTS) return;
-  draw.charts = now;
+  // At the start there is no line to draw.
+  const hasLines = running.some((side) => side.frame.mean.length > 1);
+  if (!draw.isStale || !hasLines || now - draw.charted < CHARTS) return;
+  Object.assign(draw, { charted: now, isStale: false });
   const runs = running.map(({ label, begins: { times }, frame: { mean, times: relaxed, area } }) => (
     { label, t: times.slice(0, mean.length), mean, times: relaxed, area }));
   try {
     const charts = library.ask({ ask: "charts", settings: draw.settings, runs });
     for (const name of ["survival", "decay"]) {
       const shadow = $(name).shadowRoot ?? $(name).attachShadow({ mode: "open" });
-      shadow.innerHTML = `<style>svg { width: 100%; height: auto }</style>${charts[name]}`;
+      shadow.innerHTML = `<style>svg { display: block; width: 100%; min-width: 30rem; height: auto }</style>${charts[name]}`;
     }
   } catch (error) {
     say(error.message, true);
@@ -219,7 +215,7 @@ function rows() {
 /** Takes over what a control says. */
 function changed({ target }) {
   if (!(target.id in address.DEFAULTS)) return;
-  if (target.id === "points") state.points = address.packed(typed());
+  if (target.id === "points") state.points = address.coded(target.value);
   else state[target.id] = typeof address.DEFAULTS[target.id] === "number" ? target.valueAsNumber : target.value;
   if (Number.isNaN(state[target.id])) return say(`${target.id}: not a number`, true);
   address.write(state);
@@ -255,7 +251,7 @@ async function begin() {
     navigator.clipboard.writeText($("command").textContent).then(() => say("Copied."), () => say("Not copied.", true)));
   $("file").addEventListener("change", ({ target }) => take(target.files[0]));
   pad($("pad"), (points) => {
-    $("points").value = points.map((point) => point.map((v) => v.toFixed(4)).join(",")).join("\n");
+    $("points").value = address.snapped(points);
     $("points").dispatchEvent(new Event("input", { bubbles: true }));
   });
   const over = (on) => (event) => { event.preventDefault(); document.body.classList.toggle("dropping", on); };

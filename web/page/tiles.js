@@ -12,7 +12,7 @@ export class Tiles {
     canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
   }
 
-  /** Draws all members from their nodes, x and y of each; those that have ended are paler. */
+  /** Draws all members from their nodes, x and y of each; those that have ended are filled. */
   draw(nodes, n, ended) {
     const { canvas } = this, members = nodes.length / (2 * n);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.round(size * devicePixelRatio));
@@ -36,13 +36,13 @@ export class Tiles {
     }
     context.clearRect(0, 0, width, height);
     context.lineJoin = "round";
-    [this.colour, "--rest"].forEach((name, i) => {
+    context.strokeStyle = context.fillStyle = style.getPropertyValue(this.colour);
+    paths.forEach((path, i) => {
       context.lineWidth = (i ? 1 : 1.5) * devicePixelRatio;
-      context.strokeStyle = context.fillStyle = style.getPropertyValue(name);
-      context.globalAlpha = i ? 0.08 : 0.15;
-      context.fill(paths[i]);
-      context.globalAlpha = i ? 0.7 : 1;
-      context.stroke(paths[i]);
+      context.globalAlpha = i ? 0.25 : 0.08;
+      context.fill(path);
+      context.globalAlpha = i ? 0.5 : 1;
+      context.stroke(path);
     });
     context.globalAlpha = 1;
   }

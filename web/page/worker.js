@@ -3,9 +3,6 @@
 import { Instance } from "./instance.js";
 import { Kernel, adapter, isSoftware } from "./webgpu.js";
 
-/** Milliseconds between two frames. */
-const FRAME = 40;
-
 addEventListener("message", async ({ data: { compiled, settings, file, place } }) => {
   try {
     await run(compiled, settings, file, place);
@@ -20,23 +17,22 @@ async function run(compiled, settings, file, place) {
   const instance = await Instance.of(compiled, file);
   const asked = found ? { gpu: { hardware: !isSoftware(found) } } : "cpu";
   const { members, n, times, gpu } = instance.ask({ ask: "start", settings, place: asked });
-  postMessage({ compiling: Boolean(gpu) });
-  const kernel = gpu && (await Kernel.open(found, gpu));
   const { vendor = "", architecture = "", description = "" } = found?.info ?? {};
   postMessage({ begins: { members, n, times, adapter: description || `${vendor} ${architecture}`.trim() } });
-  let shown = 0;
+  let kernel = null;
   for (let goesOn = true; goesOn; ) {
     const turn = instance.ask({ ask: "turn" });
     goesOn = turn.goesOn;
-    if (goesOn && shown && performance.now() - shown < FRAME) {
-      if (turn.dispatch) instance.deliver(await kernel.dispatch(turn.dispatch, instance.memory));
-      continue;
+    if (turn.frame) {
+      const frame = instance.ask({ ask: "frame" });
+      const [nodes, excess] = [instance.nodes(2 * members * n), instance.excess(members * times.length)];
+      postMessage({ frame: { ...frame, nodes, excess } }, [nodes.buffer, excess.buffer]);
     }
-    const frame = instance.ask({ ask: "frame" });
-    const [nodes, excess] = [instance.nodes(2 * members * n), instance.excess(members * times.length)];
-    postMessage({ frame: { ...frame, nodes, excess } }, [nodes.buffer, excess.buffer]);
-    shown = performance.now();
-    // What is fetched is in memory until the next turn, so a frame may come in between.
-    if (turn.dispatch) instance.deliver(await kernel.dispatch(turn.dispatch, instance.memory));
+    if (!turn.dispatch) continue;
+    if (!kernel) {
+      postMessage({ compiling: true });
+      kernel = await Kernel.open(found, gpu);
+    }
+    instance.deliver(await kernel.dispatch(turn.dispatch, instance.memory));
   }
 }

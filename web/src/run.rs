@@ -17,7 +17,7 @@ use curvelax::{
         run::Run as MemberRun,
         step::Method,
     },
-    simulate::{Plan, Simulation},
+    simulate::{Roster, Simulation},
     solver::Blocks,
     trajectory::Placing,
 };
@@ -26,8 +26,10 @@ use serde_json::{Value, json};
 
 use crate::{gpu::WebGpu, settings::Settings};
 
-/// Time of a turn on the CPU: so that curves move and the worker hears.
+/// Time of a turn on the CPU, so that curves move.
 const TURN: Duration = Duration::from_millis(25);
+/// Time between two frames.
+const FRAME: Duration = Duration::from_millis(40);
 
 /// Where the members are advanced.
 #[derive(Clone, Copy, Deserialize)]
@@ -102,16 +104,23 @@ impl Run {
                 (Device::Gpu(gpu), Precision::F32, Some(hardware))
             }
         };
-        let stage = &study.stages()[study.own_stage()];
-        let plan = Box::leak(Box::new(Plan::new(study.cells(), precision, study.portraits(stage))));
-        let simulation = Simulation::new(plan, members, 1, Standing::default()).map_err(told)?;
+        // Without portraits, which the page does not show, and for which members would pause.
+        let roster = Box::leak(Box::new(Roster::new(study.cells(), precision, 0)));
+        let simulation = Simulation::new(roster, members, 1, Standing::default()).map_err(told)?;
         let times: Vec<f64> = grid(spec.final_time()).collect();
         let gpu = if let Device::Gpu(gpu) = &device { Some(gpu.description()) } else { None };
         let answer = json!({ "members": members, "n": spec.points, "times": times, "gpu": gpu });
         let run = Run {
             cell,
             simulation,
-            watched: Watched { device, placed: vec![None; members], last: Vec::new() },
+            watched: Watched {
+                device,
+                placed: vec![None; members],
+                states: vec![None; members],
+                last: Vec::new(),
+                seen: None,
+                is_due: true,
+            },
             ended: Vec::new(),
             hardware,
             told: 0,
@@ -127,7 +136,7 @@ impl Run {
         Ok((run, answer))
     }
 
-    /// Takes a turn. The answer has the dispatch that is to be made before the next one.
+    /// Takes a turn. The answer has the dispatch that is to be made before the next one, and whether a frame is due.
     pub fn turn(&mut self) -> Result<Value, String> {
         let gone = self.simulation.turn(&mut self.watched, &mut Collected(&mut self.ended));
         self.goes_on = gone.map_err(|error| error.to_string())?;
@@ -137,7 +146,8 @@ impl Run {
         let Run { watched: Watched { device, .. }, kept, .. } = self;
         let dispatch = if let Device::Gpu(gpu) = device { gpu.fetch(kept) } else { None };
         self.since = Instant::now();
-        Ok(json!({ "goesOn": self.goes_on, "dispatch": dispatch }))
+        let frame = self.watched.is_due || !self.goes_on;
+        Ok(json!({ "goesOn": self.goes_on, "dispatch": dispatch, "frame": frame }))
     }
 
     /// Takes what came back from the GPU.
@@ -150,12 +160,13 @@ impl Run {
     /// Brings nodes and excess up to date, and says what has happened.
     pub fn frame(&mut self) -> Result<Value, String> {
         let n = self.cell.spec.points;
+        self.watched.is_due = false;
         let mut shown = std::mem::take(&mut self.watched.last);
         let mut excesses = Vec::new();
         for (slot, trajectory) in self.simulation.resident() {
-            let state = self.watched.device.backend().state(slot).map_err(|error| error.to_string())?;
             let member = trajectory.index();
-            shown.push((member, trajectory.placing(), state));
+            let state = self.watched.states[slot].take();
+            shown.extend(state.map(|state| (member, trajectory.placing(), state)));
             excesses.push((member as usize, trajectory.excess()));
             self.relaxed[member as usize] = (trajectory.now(), false);
         }
@@ -239,12 +250,17 @@ impl Sink for Collected<'_> {
     }
 }
 
-/// A device that keeps the last states of members that leave.
+/// A device that keeps states to be shown: while it advances members, they cannot be asked for.
 struct Watched {
     device: Device,
     /// The member in each slot, after the last turn.
     placed: Vec<Option<(u64, Placing)>>,
+    /// Their states, when a frame is due.
+    states: Vec<Option<State<f64>>>,
+    /// The last states of members that have left.
     last: Vec<(u64, Placing, State<f64>)>,
+    seen: Option<Instant>,
+    is_due: bool,
 }
 
 impl Backend for Watched {
@@ -252,6 +268,7 @@ impl Backend for Watched {
         self.placed.len()
     }
     fn load(&mut self, slot: usize, run: &MemberRun<f64>) -> curvelax::Result<()> {
+        self.states[slot] = Some(run.state.clone());
         self.device.backend().load(slot, run)
     }
     fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>) {
@@ -273,7 +290,14 @@ impl Backend for Watched {
         self.device.backend().is_back(batch, most)
     }
     fn finish(&mut self, batch: usize) -> curvelax::Result<()> {
-        self.device.backend().finish(batch)
+        self.device.backend().finish(batch)?;
+        if self.seen.is_none_or(|seen| seen.elapsed() >= FRAME) {
+            (self.seen, self.is_due) = (Some(Instant::now()), true);
+            for slot in (0..self.placed.len()).filter(|slot| self.placed[*slot].is_some()) {
+                self.states[slot] = Some(self.device.backend().state(slot)?);
+            }
+        }
+        Ok(())
     }
     fn counters(&self, slot: usize) -> Counters {
         match &self.device {
