@@ -21,8 +21,7 @@ use crate::{
     solver::{Blocks, Order, ring::MIN_POINTS},
 };
 
-/// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
-pub const MAX_POINTS_F32: usize = 320;
+pub use crate::conformance::bounds::MAX_POINTS_F32;
 
 /// Time for a driver to compile a kernel before `--backend auto` uses the CPU. Drivers take seconds, or a minute on a
 /// busy machine.

@@ -137,8 +137,12 @@ impl<'a> Simulation<'a> {
     pub fn new(roster: &'a Roster<'a>, slots: usize, batches: usize, standing: Standing) -> Result<Simulation<'a>> {
         let cells = roster.cells;
         let Standing { next, early, resident } = standing;
-        let pool =
-            Pool { roster, resident: (0..slots).map(|_| None).collect(), paused: resident.unwrap_or_default(), held: 0 };
+        let pool = Pool {
+            roster,
+            resident: (0..slots).map(|_| None).collect(),
+            paused: resident.unwrap_or_default(),
+            held: 0,
+        };
         let total = cells.iter().map(|cell| cell.spec.member_count()).sum();
         let [first, last] = [cells.first(), cells.last()].map(|cell| cell.map_or(0, |cell| cell.index));
         let is_own = |(rank, ended): (&u64, &Ended)| {

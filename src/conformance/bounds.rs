@@ -7,6 +7,9 @@ use crate::{
     solver::Row as Coefficients,
 };
 
+/// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
+pub const MAX_POINTS_F32: usize = 320;
+
 /// The unit of a bound: the size of the terms whose rounding the quantity inherits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NaturalScale {

@@ -38,7 +38,6 @@ function shown() {
   document.querySelectorAll("[data-shape]").forEach((part) => { part.hidden = part.dataset.shape !== state.shape; });
   document.querySelectorAll("[data-flow]").forEach((part) => { part.hidden = part.dataset.flow !== state.flow; });
   show($("pad"), address.pointsOf($("points").value));
-  $("save").href = `data:text/csv;charset=utf-8,${encodeURIComponent(table())}`;
 }
 
 /** The text of drawn.csv. */
@@ -56,6 +55,16 @@ async function file() {
   const answer = await fetch(`${state.shape}.csv`);
   if (!answer.ok) throw new Error(`${state.shape}.csv: the server answers ${answer.status}`);
   return { name: `${state.shape}.csv`, bytes: new Uint8Array(await answer.arrayBuffer()) };
+}
+
+/** Offers the outline that the command reads, unless the user has its file. */
+function offer(outline) {
+  const link = $("save");
+  link.hidden = !outline || outline === dropped;
+  if (link.hidden) return;
+  link.href = `data:text/csv;charset=utf-8,${encodeURIComponent(new TextDecoder().decode(outline.bytes))}`;
+  link.download = outline.name;
+  link.textContent = `Save ${outline.name}, which it reads`;
 }
 
 /** The settings as the library takes them. */
@@ -87,6 +96,7 @@ async function run() {
     library.file = outline;
     const { members, command, warnings } = library.ask({ ask: "check", settings: wanted });
     $("command").textContent = command;
+    offer(outline);
     $("warnings").textContent = warnings.join(" ");
     say(`${members} members relax.`);
   } catch (error) {
@@ -99,6 +109,7 @@ async function run() {
   for (const [place, side] of Object.entries(sides)) {
     Object.assign(side, { begins: null, frame: null, rows: new Map(), over: false, drawn: true });
     side.tiles.clear();
+    side.tiles.canvas.hidden = false;
     side.says.textContent = "starts …";
     side.worker = new Worker(new URL("worker.js", import.meta.url), { type: "module" });
     side.worker.addEventListener("message", ({ data }) => hear(side, data));
@@ -112,10 +123,10 @@ async function run() {
 /** Takes a message of a worker. */
 function hear(side, { error, none, compiling, begins, frame }) {
   if (none) {
-    Object.assign(side, { over: true, none });
+    side.over = side.tiles.canvas.hidden = true;
     side.says.textContent = `– ${none}; the run is on the CPU alone.`;
   } else if (error) {
-    Object.assign(side, { over: true });
+    side.over = true;
     side.says.textContent = `– ${error}`;
     say(`${side.label}: ${error}`, true);
   } else if (compiling) {
@@ -127,6 +138,7 @@ function hear(side, { error, none, compiling, begins, frame }) {
     Object.assign(side, { frame, drawn: false, over: !frame.goesOn });
     const adapter = side.begins.adapter ? `, ${side.begins.adapter}` : "";
     side.says.textContent = `– ${frame.done} of ${side.begins.members} have ended${adapter}`;
+    side.tiles.canvas.ariaLabel = `${side.label}: ${frame.done} of ${side.begins.members} members have ended`;
   }
   if (Object.values(sides).every((own) => own.over)) finish();
 }
@@ -264,7 +276,9 @@ async function begin() {
   });
   requestAnimationFrame(draw);
   document.body.dataset.loaded = Math.round(performance.now());
-  run();
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  if (still) say("Nothing moves until you press Run, as your system asks for.");
+  else run();
 }
 
 if (typeof WebAssembly === "object") begin().catch((error) => say(error.message, true));

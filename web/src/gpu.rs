@@ -13,6 +13,7 @@ use curvelax::{
             shader,
         },
     },
+    conformance::bounds::MAX_POINTS_F32,
     scheme::{
         Parameters, State, extrapolation,
         member::{Counters, Report},
@@ -56,6 +57,10 @@ impl WebGpu {
             let most = capacity.max_points::<f32>(method.solver);
             Error::Request(format!("n = {} needs {needs}; WebGPU promises room for n up to {most}", blocks.n))
         })?;
+        if blocks.n > MAX_POINTS_F32 {
+            let problem = format!("n = {}: f32 was verified against f64 up to {MAX_POINTS_F32} nodes", blocks.n);
+            return Err(Error::Request(problem));
+        }
         let variant = Variant { adaptive, ..capacity.variant(blocks, method.solver) };
         // Whether a browser's GPU is hardware is not certain, and short dispatches show more.
         let most = Budget::most(false, blocks, variant);
