@@ -115,6 +115,7 @@ pub mod files;
 pub mod report;
 #[doc(hidden)]
 pub mod schedule;
+#[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod session;
 #[doc(hidden)]
