@@ -7,6 +7,8 @@ import { Tiles } from "./tiles.js";
 
 /** Milliseconds between two drawings of the charts, and after the last change of a control until a run starts. */
 const CHARTS = 400, PAUSE = 400;
+/** Charts are as wide as there is room, and readable. */
+const SIZE = "svg { display: block; width: 100%; min-width: 30rem; height: auto }";
 /** Outlines that come with the page. */
 const ISLANDS = ["iceland", "jamaica", "madagascar", "sri-lanka"];
 
@@ -45,8 +47,10 @@ function table() { return `x,y\n${$("points").value.trim()}\n`; }
 
 /** The file that the shape names, if it does. */
 async function file() {
-  if (state.shape === "drawn" && !$("points").value.trim()) throw new Error("Draw an outline on the pad, or type its points.");
-  if (state.shape === "drawn") return { name: "drawn.csv", bytes: new TextEncoder().encode(table()) };
+  if (state.shape === "drawn") {
+    if (!$("points").value.trim()) throw new Error("Draw an outline on the pad, or type its points.");
+    return { name: "drawn.csv", bytes: new TextEncoder().encode(table()) };
+  }
   if (state.shape === "file") {
     if (!dropped) throw new Error("Choose a file with an outline, or drop one on the page.");
     return dropped;
@@ -174,7 +178,7 @@ function draw(now) {
     const charts = library.ask({ ask: "charts", settings: draw.settings, runs });
     for (const name of ["survival", "decay"]) {
       const shadow = $(name).shadowRoot ?? $(name).attachShadow({ mode: "open" });
-      shadow.innerHTML = `<style>svg { display: block; width: 100%; min-width: 30rem; height: auto }</style>${charts[name]}`;
+      shadow.innerHTML = `<style>${SIZE}</style>${charts[name]}`;
     }
   } catch (error) {
     say(error.message, true);
@@ -193,7 +197,8 @@ function compare() {
     // Both have the start from the same library.
     if (apart >= 0 && i % gpu.begins.times.length) [most, noted] = [Math.max(most, apart), noted + 1];
   });
-  const both = [...gpu.rows.values()].filter((row) => row.t_relax !== null && cpu.rows.get(row.member)?.t_relax != null);
+  const relaxed = (row) => row?.t_relax != null;
+  const both = [...gpu.rows.values()].filter((row) => relaxed(row) && relaxed(cpu.rows.get(row.member)));
   const apart = both.map((row) => Math.abs(row.t_relax / cpu.rows.get(row.member).t_relax - 1));
   const times = both.length
     ? ` Their relaxation times by at most ${brief(Math.max(...apart))} of the time, over ${both.length} members.`

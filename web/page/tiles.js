@@ -15,7 +15,8 @@ export class Tiles {
   /** Draws all members from their nodes, x and y of each; those that have ended are filled. */
   draw(nodes, n, ended) {
     const { canvas } = this, members = nodes.length / (2 * n);
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.round(size * devicePixelRatio));
+    const pixels = (size) => Math.round(size * devicePixelRatio);
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map(pixels);
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     this.frames ??= new Array(members).fill(null);
     let columns = 1;

@@ -63,8 +63,8 @@ impl Settings {
         let (members, n) = (study.member_count(), study.points() as u64);
         if members > MOST_MEMBERS || members.saturating_mul(n) > MOST_NODES {
             return Err(format!(
-                "{members} members of {n} nodes: this page shows at most {MOST_MEMBERS}, and {MOST_NODES} nodes of all; \
-                 use fewer, or the program"
+                "{members} members of {n} nodes: this page shows at most {MOST_MEMBERS}, and {MOST_NODES} nodes \
+                 together; use fewer, or the program"
             ));
         }
         Ok(study)
