@@ -73,6 +73,9 @@
 //! # Ok::<(), curvelax::Error>(())
 //! ```
 
+// What only the program uses.
+#![cfg_attr(not(feature = "program"), allow(dead_code, unused_macros))]
+
 pub mod backend;
 pub mod conformance;
 pub mod curve;
@@ -80,42 +83,56 @@ pub mod ensemble;
 pub mod error;
 pub mod flow;
 pub mod number;
+#[cfg(feature = "program")]
 pub mod placement;
 pub mod random;
+#[cfg(feature = "program")]
 pub mod results;
 pub mod scheme;
 pub mod simulate;
 pub mod solver;
 pub mod statistics;
+#[cfg(feature = "program")]
 pub mod truth;
 
 // Public only for the program, and for the project's own tests, benchmarks and fuzzing.
+#[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod bench;
+#[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod cli;
 #[doc(hidden)]
+pub mod draw;
+#[cfg(feature = "program")]
+#[doc(hidden)]
 pub mod figures;
+#[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod files;
+#[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod report;
 #[doc(hidden)]
 pub mod schedule;
+#[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod session;
 #[doc(hidden)]
 pub mod trajectory;
 
+#[cfg(feature = "program")]
 mod accuracy;
-mod draw;
+#[cfg(feature = "program")]
 mod estimate;
 mod guard;
 mod input;
+#[cfg(feature = "program")]
 mod relax;
 mod text;
 mod threads;
 mod wgsl;
 
 pub use error::{Error, Result};
+#[cfg(feature = "program")]
 pub use relax::relax;

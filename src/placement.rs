@@ -21,8 +21,7 @@ use crate::{
     solver::{Blocks, Order, ring::MIN_POINTS},
 };
 
-/// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
-pub const MAX_POINTS_F32: usize = 320;
+pub use crate::conformance::bounds::MAX_POINTS_F32;
 
 /// Time for a driver to compile a kernel before `--backend auto` uses the CPU. Drivers take seconds, or a minute on a
 /// busy machine.
@@ -446,9 +445,7 @@ fn open_gpu<T: Vectorised>(
 mod tests {
     use super::*;
 
-    /// The minimum of every WebGPU device.
-    const LEAST: Capacity =
-        Capacity { f64: false, threads: 256, workgroup_bytes: 16_384, subgroup: 32, least_subgroup: 0 };
+    const LEAST: Capacity = Capacity::LEAST;
 
     fn refused(precision: Option<Precision>, n: usize, capacity: &Capacity) -> String {
         let spec = Spec { precision, ..Spec::default() };

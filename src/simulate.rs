@@ -6,6 +6,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    iter::Peekable,
     ops::Range,
     time::{Duration, Instant},
 };
@@ -67,35 +68,16 @@ pub fn resume(
     standing: Standing,
     sink: &mut dyn Sink,
 ) -> Result<()> {
-    let outputs = |framed: bool| -> Vec<_> {
-        let of_cell = |Cell { spec, .. }: &Cell| {
-            // The pictures show the start and the end anyway.
-            let inside = if framed { member::TIMES } else { 0 };
-            let frames: Vec<f64> = grid(spec.final_time()).skip(1).take(inside).collect();
-            Outputs::new(spec.final_time(), spec.series, &spec.snapshots, &frames)
-        };
-        cells.iter().map(of_cell).collect()
+    let roster = Roster::new(cells, precision, portraits);
+    let mut simulation = Simulation::new(&roster, backend.slots(), backend.batches(), standing)?;
+    let done = loop {
+        match simulation.turn(backend, sink) {
+            Ok(true) => {}
+            Ok(false) => break Ok(()),
+            Err(error) => break Err(error),
+        }
     };
-    let (outputs, framed) = (outputs(false), outputs(true));
-    let Standing { next, early, resident } = standing;
-    let mut pool = Pool {
-        cells,
-        precision,
-        outputs: [&outputs, &framed],
-        resident: (0..backend.slots()).map(|_| None).collect(),
-        portraits,
-        paused: resident.unwrap_or_default(),
-        held: 0,
-    };
-    let total = cells.iter().map(|cell| cell.spec.member_count()).sum();
-    let [first, last] = [cells.first(), cells.last()].map(|cell| cell.map_or(0, |cell| cell.index));
-    let is_own =
-        |(rank, ended): (&u64, &Ended)| (next..total).contains(rank) && (first..=last).contains(&ended.outcome.cell);
-    if next > total || !early.iter().all(is_own) {
-        return Err(Error::Request(format!("the checkpoint has members that are not among the {total} of the spec")));
-    }
-    let mut queue = Queue { total, ended: next + early.len() as u64, next, early, kept: false, told: Instant::now() };
-    let done = run(&mut pool, &mut queue, backend, sink);
+    let queue = &mut simulation.queue;
     if done.is_err() && !queue.kept {
         // Save the members that have ended; `done` already has the reason why the run ends.
         let _ = queue.checkpoint(None, sink);
@@ -103,36 +85,117 @@ pub fn resume(
     done
 }
 
-fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut dyn Sink) -> Result<()> {
-    let cells = pool.cells.iter().enumerate();
-    let members = cells.flat_map(|(cell, own)| own.members().map(move |member| (cell, member)));
-    // A checkpoint may hold as many rows as a run.
-    pool.relieve(queue, MAX_HELD, sink)?;
-    let ended: BTreeSet<u64> = queue.early.keys().copied().collect();
-    let left = (0..).zip(members).skip(queue.next as usize).filter(|(rank, _)| !ended.contains(rank));
-    let mut waiting = left.peekable();
-    // Members that end early wait for those before them; this bounds how many.
-    let ahead = (MEMBERS_AHEAD * backend.slots()) as u64;
-    // With two batches, one is being advanced while the other is handled.
-    let size = backend.slots() / backend.batches();
-    let mut on_the_way = vec![false; backend.batches()];
-    let mut told = false;
-    for batch in (0..backend.batches()).cycle() {
-        let slots = batch * size..(batch + 1) * size;
-        if on_the_way[batch] {
-            while !backend.is_back(batch, MAX_WAIT) {
+/// The members of a [`Simulation`], and when they leave something during it.
+pub struct Roster<'a> {
+    cells: &'a [Cell],
+    precision: Precision,
+    /// For each cell: for members without a portrait, and for those with one.
+    outputs: [Vec<Outputs>; 2],
+    portraits: usize,
+}
+
+impl<'a> Roster<'a> {
+    /// Lists the members of `cells` as [`simulate`] does.
+    pub fn new(cells: &'a [Cell], precision: Precision, portraits: usize) -> Roster<'a> {
+        let outputs = |framed: bool| -> Vec<_> {
+            let of_cell = |Cell { spec, .. }: &Cell| {
+                // The pictures show the start and the end anyway.
+                let inside = if framed { member::TIMES } else { 0 };
+                let frames: Vec<f64> = grid(spec.final_time()).skip(1).take(inside).collect();
+                Outputs::new(spec.final_time(), spec.series, &spec.snapshots, &frames)
+            };
+            cells.iter().map(of_cell).collect()
+        };
+        Roster { cells, precision, outputs: [outputs(false), outputs(true)], portraits }
+    }
+}
+
+/// Members that wait: their ranks, cells and indices.
+type Waiting<'a> = Peekable<Box<dyn Iterator<Item = (u64, (usize, u64))> + 'a>>;
+
+/// A run in turns, for a caller who has other things to do between them, such as a page in a browser; [`simulate`] takes
+/// one after another.
+pub struct Simulation<'a> {
+    pool: Pool<'a>,
+    queue: Queue,
+    waiting: Waiting<'a>,
+    /// Members that end early wait for those before them; this bounds how many.
+    ahead: u64,
+    /// The batch of the next turn, and those that are being advanced.
+    batch: usize,
+    on_the_way: Vec<bool>,
+    /// Whether all rows in memory have been checked, since a checkpoint may hold as many as a run.
+    is_relieved: bool,
+    told: bool,
+}
+
+impl<'a> Simulation<'a> {
+    /// Begins a run on a back end of so many slots in so many batches, or continues one.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if members in `standing` are not those of the roster.
+    pub fn new(roster: &'a Roster<'a>, slots: usize, batches: usize, standing: Standing) -> Result<Simulation<'a>> {
+        let cells = roster.cells;
+        let Standing { next, early, resident } = standing;
+        let pool = Pool {
+            roster,
+            resident: (0..slots).map(|_| None).collect(),
+            paused: resident.unwrap_or_default(),
+            held: 0,
+        };
+        let total = cells.iter().map(|cell| cell.spec.member_count()).sum();
+        let [first, last] = [cells.first(), cells.last()].map(|cell| cell.map_or(0, |cell| cell.index));
+        let is_own = |(rank, ended): (&u64, &Ended)| {
+            (next..total).contains(rank) && (first..=last).contains(&ended.outcome.cell)
+        };
+        if next > total || !early.iter().all(is_own) {
+            return Err(Error::Request(format!(
+                "the checkpoint has members that are not among the {total} of the spec"
+            )));
+        }
+        let ended: BTreeSet<u64> = early.keys().copied().collect();
+        let members = cells.iter().enumerate().flat_map(|(cell, own)| own.members().map(move |member| (cell, member)));
+        let left = (0..).zip(members).skip(next as usize).filter(move |(rank, _)| !ended.contains(rank));
+        let waiting: Box<dyn Iterator<Item = _>> = Box::new(left);
+        Ok(Simulation {
+            pool,
+            queue: Queue { total, ended: next + early.len() as u64, next, early, kept: false, told: Instant::now() },
+            waiting: waiting.peekable(),
+            ahead: (MEMBERS_AHEAD * slots) as u64,
+            batch: 0,
+            on_the_way: vec![false; batches],
+            is_relieved: false,
+            told: false,
+        })
+    }
+
+    /// Handles a batch, if it is back, and starts it again. Returns whether the run goes on.
+    ///
+    /// # Errors
+    /// Those of the back end and the sink, which end the run.
+    pub fn turn(&mut self, backend: &mut dyn Backend, sink: &mut dyn Sink) -> Result<bool> {
+        let Simulation { pool, queue, waiting, ahead, batch, on_the_way, is_relieved, told } = self;
+        if !std::mem::replace(is_relieved, true) {
+            pool.relieve(queue, MAX_HELD, sink)?;
+        }
+        // With two batches, one is being advanced while the other is handled.
+        let size = backend.slots() / backend.batches();
+        let slots = *batch * size..(*batch + 1) * size;
+        if on_the_way[*batch] {
+            if !backend.is_back(*batch, MAX_WAIT) {
                 queue.tell(pool, sink)?;
-                told = told || queue.checkpoint_before_the_stop(sink)?;
+                *told = *told || queue.checkpoint_before_the_stop(sink)?;
+                return Ok(true);
             }
-            backend.finish(batch)?;
-            on_the_way[batch] = false;
+            backend.finish(*batch)?;
+            on_the_way[*batch] = false;
             pool.collect(backend, slots.clone(), queue, sink)?;
         }
         // The sink must be heard even if members end at once.
         let mut over = 0;
         for slot in slots.clone() {
             while pool.resident[slot].is_none() && over < MAX_AT_ONCE {
-                let Some((rank, who)) = waiting.next_if(|(rank, _)| *rank < queue.next + ahead) else { break };
+                let Some((rank, who)) = waiting.next_if(|(rank, _)| *rank < queue.next + *ahead) else { break };
                 if let Some(ended) = pool.admit(backend, slot, rank, who)? {
                     over += 1;
                     queue.leave(rank, ended, sink)?;
@@ -141,7 +204,7 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
         }
         queue.tell(pool, sink)?;
         if pool.resident.iter().all(Option::is_none) && waiting.peek().is_none() {
-            break;
+            return Ok(false);
         }
         let wish = sink.wish();
         let goes_on = matches!(wish, Wish::Continue);
@@ -153,15 +216,23 @@ fn run(pool: &mut Pool, queue: &mut Queue, backend: &mut dyn Backend, sink: &mut
                 return Err(error);
             }
         } else if !goes_on {
-            told = told || queue.checkpoint_before_the_stop(sink)?;
-            continue;
+            *told = *told || queue.checkpoint_before_the_stop(sink)?;
+            *batch = (*batch + 1) % on_the_way.len();
+            return Ok(true);
         }
         if pool.resident[slots].iter().any(Option::is_some) {
-            backend.start(batch)?;
-            (on_the_way[batch], queue.kept) = (true, false);
+            backend.start(*batch)?;
+            (on_the_way[*batch], queue.kept) = (true, false);
         }
+        *batch = (*batch + 1) % on_the_way.len();
+        Ok(true)
     }
-    Ok(())
+
+    /// The members that are being advanced, each with its slot.
+    pub fn resident(&self) -> impl Iterator<Item = (usize, &Trajectory<'a>)> {
+        let resident = self.pool.resident.iter().enumerate();
+        resident.filter_map(|(slot, own)| own.as_ref().map(|(_, trajectory)| (slot, trajectory)))
+    }
 }
 
 /// Returns how many states of `n` nodes may be read back at once.
@@ -171,12 +242,8 @@ pub fn states_at_once(n: usize) -> usize {
 
 /// The resident members of a run.
 struct Pool<'a> {
-    cells: &'a [Cell],
-    precision: Precision,
-    /// For each cell: for members without a portrait, and for those with one.
-    outputs: [&'a [Outputs]; 2],
+    roster: &'a Roster<'a>,
     resident: Vec<Option<(u64, Trajectory<'a>)>>,
-    portraits: usize,
     /// Members that continue from a checkpoint, by rank.
     paused: BTreeMap<u64, Paused>,
     /// Bound on the bytes of rows in memory, including members that ended early.
@@ -192,12 +259,13 @@ impl Pool<'_> {
         rank: u64,
         (cell, index): (usize, u64),
     ) -> Result<Option<Ended>> {
-        let own = &self.cells[cell];
-        let each = (self.portraits / self.cells.len().max(1)).max(1);
+        let Roster { cells, precision, outputs, portraits } = self.roster;
+        let own = &cells[cell];
+        let each = (portraits / cells.len().max(1)).max(1);
         // The same members whatever their shard.
-        let portrait = cell < self.portraits && own.place(index) < each as u64;
-        let outputs = &self.outputs[usize::from(portrait)][cell];
-        let mut trajectory = Trajectory::new(own.member(index)?, &own.spec, self.precision, outputs);
+        let portrait = cell < *portraits && own.place(index) < each as u64;
+        let outputs = &outputs[usize::from(portrait)][cell];
+        let mut trajectory = Trajectory::new(own.member(index)?, &own.spec, *precision, outputs);
         trajectory.keep_portrait(portrait);
         if trajectory.is_over() {
             return Ok(Some(self.end(trajectory, None)));
@@ -215,9 +283,10 @@ impl Pool<'_> {
     fn end(&self, trajectory: Trajectory, last: Option<&State<f64>>) -> Ended {
         let mut ended = trajectory.end(last);
         // Not all cells have a level.
-        let at = self.cells.binary_search_by_key(&ended.outcome.cell, |cell| cell.index);
+        let cells = self.roster.cells;
+        let at = cells.binary_search_by_key(&ended.outcome.cell, |cell| cell.index);
         ended.outcome.rate_theory = at.ok().and_then(|at| {
-            let cell = &self.cells[at];
+            let cell = &cells[at];
             let values = cell.spec.values_of(ended.outcome.member, cell.index).ok()?;
             theory::rate_of(&cell.spec, &values, &ended.outcome)
         });
@@ -226,7 +295,7 @@ impl Pool<'_> {
 
     /// Nodes of a member.
     fn points(&self) -> usize {
-        self.cells.first().map_or(1, |cell| cell.family.points())
+        self.roster.cells.first().map_or(1, |cell| cell.family.points())
     }
 
     /// All unfinished members; none may be in a batch that is being advanced.

@@ -34,7 +34,12 @@ pub fn pool(count: usize) -> Result<Arc<ThreadPool>> {
     if let Some(pool) = pools.get(&count) {
         return Ok(Arc::clone(pool));
     }
-    let pool = ThreadPoolBuilder::new().num_threads(count).panic_handler(|_| {}).build();
+    let builder = ThreadPoolBuilder::new().panic_handler(|_| {});
+    // WebAssembly has no threads but the one that asks.
+    let pool = match cfg!(target_family = "wasm") {
+        true => builder.num_threads(1).use_current_thread().build(),
+        false => builder.num_threads(count).build(),
+    };
     let pool = Arc::new(pool.map_err(|e| match count {
         0 => no_more("a thread on each core", "try --threads 1, or ", &e),
         1 => no_more("1 thread", "", &e),
@@ -42,6 +47,14 @@ pub fn pool(count: usize) -> Result<Arc<ThreadPool>> {
     })?);
     pools.insert(count, Arc::clone(&pool));
     Ok(pool)
+}
+
+/// Lets a thread of `pool` do `work`; where there are no other threads, it is done at once.
+pub fn hand_over(pool: &ThreadPool, work: impl FnOnce() + Send + 'static) {
+    match cfg!(target_family = "wasm") {
+        true => pool.install(work),
+        false => pool.spawn(work),
+    }
 }
 
 fn no_more(what: &str, fewer: &str, error: &dyn Display) -> Error {

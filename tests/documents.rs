@@ -213,7 +213,8 @@ fn the_readme_has_at_most_a_thousand_words() {
 fn documents() -> BTreeSet<PathBuf> {
     let top = ["README.md", "CHANGELOG.md", "CODE_OF_CONDUCT.md", "CONTRIBUTING.md", "SECURITY.md"];
     let mut all: BTreeSet<PathBuf> = top.map(PathBuf::from).into();
-    let mut folders: Vec<PathBuf> = ["docs", "examples", "shaders", "benches", "tests"].map(PathBuf::from).into();
+    let mut folders: Vec<PathBuf> =
+        ["docs", "examples", "shaders", "benches", "tests", "web"].map(PathBuf::from).into();
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(root().join(&folder)).unwrap() {
             let entry = entry.unwrap();

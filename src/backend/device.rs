@@ -1,12 +1,16 @@
 //! The device that advances members.
 
-use std::{fmt, sync::Arc};
+use std::fmt;
+#[cfg(feature = "program")]
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+#[cfg(feature = "program")]
 use super::gpu::Gpu;
 
 /// A device that advances members, not yet opened.
+#[cfg(feature = "program")]
 pub enum Device {
     /// The cores of this machine.
     Cpu,
@@ -35,6 +39,7 @@ impl fmt::Display for DeviceKind {
     }
 }
 
+#[cfg(feature = "program")]
 impl Device {
     /// Returns the kind of this device.
     pub fn kind(&self) -> DeviceKind {
@@ -53,6 +58,7 @@ impl Device {
     }
 }
 
+#[cfg(feature = "program")]
 impl fmt::Display for Device {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

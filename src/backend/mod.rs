@@ -9,7 +9,9 @@ pub mod gpu;
 
 use std::time::Duration;
 
-pub use device::{Device, DeviceKind};
+#[cfg(feature = "program")]
+pub use device::Device;
+pub use device::DeviceKind;
 
 use crate::{
     error::Result,

@@ -2,9 +2,13 @@
 
 use crate::{
     backend::gpu::shader::TRACE_FIELDS,
+    number::Real,
     scheme::{Curve, Parameters, Workspace, member::Observed},
     solver::Row as Coefficients,
 };
+
+/// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
+pub const MAX_POINTS_F32: usize = 320;
 
 /// The unit of a bound: the size of the terms whose rounding the quantity inherits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,6 +127,26 @@ pub const PACE: [Bound; 6] = [
 /// The time at which a watched observable reaches its level: a multiple of the time that the observable needs for its
 /// rounding, by its bound in [`REPORT`], and of the effect of a changed step length.
 pub const EVENT: Bound = bound("event", NaturalScale::One, 1.0, 4.0);
+
+/// The growth of roundings over steps: like a random walk, since the flow itself damps them.
+pub fn growth(steps: u32) -> f64 {
+    f64::from(steps).sqrt()
+}
+
+/// Returns the bound of the difference between the times at which the excess of a member falls to a level in a kernel
+/// and in its twin, after `steps` fixed steps in numbers of type `T` (see [`EVENT`]); there it falls by `slope` per time.
+///
+/// ```
+/// use curvelax::conformance::bounds::excess_time;
+///
+/// // Four times the steps, twice the rounding; half the slope, twice the time that it takes.
+/// let bound = excess_time::<f32>(false, 100, 0.5);
+/// assert_eq!([excess_time::<f32>(false, 400, 0.5), excess_time::<f32>(false, 100, 0.25)], [2.0 * bound; 2]);
+/// ```
+pub fn excess_time<T: Real>(hardware: bool, steps: u32, slope: f64) -> f64 {
+    let excess = REPORT.iter().find(|bound| bound.quantity == "excess").map_or(f64::NAN, |own| own.factor(hardware));
+    EVENT.factor(hardware) * excess * T::EPSILON * growth(steps) / slope
+}
 
 impl Bound {
     /// Returns the factor k for this kind of adapter.

@@ -10,10 +10,16 @@
 //! run that begins on a GPU compares a few members first ([`self_test`](self_test::self_test)).
 
 pub mod bounds;
+#[cfg(feature = "program")]
 pub mod cases;
+#[cfg(feature = "program")]
 pub mod compare;
+#[cfg(feature = "program")]
 pub mod self_test;
 
+#[cfg(feature = "program")]
 pub use cases::{adaptive_members, members};
+#[cfg(feature = "program")]
 pub use compare::{ConformanceRow, Tamper, adaptive, events, runs, stages};
+#[cfg(feature = "program")]
 pub use self_test::self_test;

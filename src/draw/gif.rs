@@ -16,13 +16,15 @@ const UNCHANGED: u8 = 0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Palette(Vec<Colour>);
 
-impl Palette {
-    /// White alone.
-    pub fn new() -> Palette {
+/// White alone.
+impl Default for Palette {
+    fn default() -> Palette {
         // The first is never drawn.
         Palette(vec![WHITE, WHITE])
     }
+}
 
+impl Palette {
     /// Adds `steps` colours at equal distances from white to `colour`, which is the last of them.
     pub fn add(&mut self, colour: Colour, steps: u8) {
         for step in 1..=steps {
@@ -119,7 +121,7 @@ mod tests {
 
     #[test]
     fn the_nearest_colour_is_found_and_the_transparent_one_never() {
-        let mut palette = Palette::new();
+        let mut palette = Palette::default();
         palette.add(BLUE, 4);
         palette.add(BLUE, 2);
         assert_eq!(palette.0.len(), 6, "equal colours once: {palette:?}");
@@ -128,7 +130,7 @@ mod tests {
 
     #[test]
     fn a_frame_holds_only_what_is_new() {
-        let mut palette = Palette::new();
+        let mut palette = Palette::default();
         palette.add(BLUE, 1);
         let mut gif = MovingGif::new(30, 20, palette).unwrap();
         let mut raster = Raster::new(30, 20).unwrap();

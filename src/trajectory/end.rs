@@ -35,7 +35,7 @@ impl Trajectory<'_> {
     }
 
     /// The excess at the times of [`schedule::grid`](crate::schedule::grid) that the member has reached.
-    fn excess(&self) -> Vec<f64> {
+    pub fn excess(&self) -> Vec<f64> {
         let noted = &self.report.excess_at[..(self.counters.noted as usize).min(member::TIMES)];
         let end = self.is_at_end().then_some(self.report.now.excess);
         [self.start.excess].into_iter().chain(noted.iter().copied()).chain(end).collect()
@@ -62,8 +62,7 @@ impl Trajectory<'_> {
         let (origin, unit) = (self.member.origin, self.unit);
         let portrait = self.portrait.then(|| {
             let before: Vec<DVec2> = self.member.nodes.iter().map(|node| *node + origin).collect();
-            let placed = |state: &State<f64>| state.curve.positions().map(|node| node * unit + origin).collect();
-            let after = last.map_or_else(|| before.clone(), placed);
+            let after = last.map_or_else(|| before.clone(), |state| self.placing().nodes(state));
             Portrait { before, frames, after }
         });
         let outcome = Outcome {

@@ -70,6 +70,20 @@ impl Time {
     }
 }
 
+/// Where the lengths of a back end are in the user's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Placing {
+    unit: f64,
+    origin: DVec2,
+}
+
+impl Placing {
+    /// Returns the nodes of a state.
+    pub fn nodes(self, state: &State<f64>) -> Vec<DVec2> {
+        state.curve.positions().map(|node| node * self.unit + self.origin).collect()
+    }
+}
+
 /// A resident member.
 pub struct Trajectory<'a> {
     member: Member,
@@ -216,6 +230,16 @@ impl Trajectory<'_> {
             Time::Fixed(clock) => clock.time(self.counters.steps),
             Time::Adaptive(_) => (progress.time_high + progress.time_low) * self.time_unit,
         }
+    }
+
+    /// Returns the index of the member.
+    pub fn index(&self) -> u64 {
+        self.member.index
+    }
+
+    /// Returns how its states are placed in the user's frame.
+    pub fn placing(&self) -> Placing {
+        Placing { unit: self.unit, origin: self.member.origin }
     }
 
     /// Returns the fraction of its time that has passed.

@@ -60,6 +60,8 @@ pub struct CpuBackend<T> {
     pool: Arc<rayon::ThreadPool>,
     /// Steps of the next batch; results do not depend on it, to the last bit.
     steps: u32,
+    /// The time that a batch should take.
+    time: Duration,
 }
 
 /// The members in one part of the slots.
@@ -115,7 +117,16 @@ impl<T: Vectorised> CpuBackend<T> {
             crew: crew.into(),
             pool,
             steps: 1,
+            time: ADVANCE_TIME,
         })
+    }
+
+    /// Gets room for all of `members` members in one batch, which is advanced for `time`, or a step of each if that takes
+    /// longer: all of them move at once, for somebody who watches.
+    pub fn for_display(mut self, members: usize, time: Duration) -> Self {
+        self.batches = vec![CpuBatch { members: (0..members).map(|_| None).collect(), coming: None, back: None }];
+        (self.slots, self.time) = (members, time);
+        self
     }
 
     /// Returns the number of threads in use.
@@ -168,7 +179,7 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
         let (back, coming) = channel();
         batch.coming = Some(coming);
         let (crew, method, attempts) = (Arc::clone(&self.crew), self.method, self.steps);
-        self.pool.spawn(move || {
+        threads::hand_over(&self.pool, move || {
             let started = Instant::now();
             let mut running: Vec<&mut Run<T>> =
                 members.iter_mut().flatten().map(|run| &mut **run).filter(|run| run.counters.is_running()).collect();
@@ -199,7 +210,7 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
         let back = batch.back.take().map_or_else(|| coming.recv(), Ok);
         let (members, took) = back.map_err(|_| Error::Failed("a thread of the CPU back end has panicked".into()))?;
         batch.members = members;
-        let share = ADVANCE_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
+        let share = self.time.as_secs_f64() / took.as_secs_f64().max(1e-6);
         let steps = (f64::from(self.steps) * share) as u32;
         self.steps = steps.clamp(1, 2 * self.steps).min(most_steps(self.method.solver));
         Ok(())

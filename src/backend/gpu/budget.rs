@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{adapter::Gpu, shader::Variant};
+use super::shader::Variant;
 use crate::solver::{Blocks, Solver};
 
 /// Target time of a dispatch: short enough for every watchdog, long enough to hide its overhead of some 0.1 ms.
@@ -22,9 +22,9 @@ pub struct Budget {
 const SOFTWARE_ITERATIONS: u32 = 50_000;
 
 impl Budget {
-    /// The maximum budget of a dispatch on this adapter.
-    pub(super) fn most(gpu: &Gpu, blocks: Blocks, Variant { solver, adaptive, .. }: Variant) -> Budget {
-        if gpu.is_hardware() {
+    /// The maximum budget of a dispatch, on hardware or on a software GPU.
+    pub fn most(hardware: bool, blocks: Blocks, Variant { solver, adaptive, .. }: Variant) -> Budget {
+        if hardware {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
         // A sweep is one iteration. A check of the residual walks over at most all blocks; a step does so ten times, and
@@ -42,7 +42,7 @@ impl Budget {
     }
 
     /// The budget of the first dispatch: small, to be safe.
-    pub(super) fn first(solver: Solver, most: Budget) -> Budget {
+    pub fn first(solver: Solver, most: Budget) -> Budget {
         match solver.sweeps() {
             true => Budget { sweeps: most.sweeps.min(256), ..most },
             false => Budget { steps: 1, ..most },
@@ -50,7 +50,7 @@ impl Budget {
     }
 
     /// The budget after a dispatch that took `took`: at most twice the sweeps, or steps where there are no sweeps.
-    pub(super) fn after(self, took: Duration, solver: Solver, most: Budget) -> Budget {
+    pub fn after(self, took: Duration, solver: Solver, most: Budget) -> Budget {
         let share = DISPATCH_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
         let next = |now: u32, most: u32| ((f64::from(now) * share) as u32).clamp(1, 2 * now).min(most);
         match solver.sweeps() {

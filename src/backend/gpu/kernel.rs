@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 
 use super::{
     adapter::{Gpu, OpenGpu},
-    batch::{Batch, Caps, Reading, staging, state_numbers},
+    batch::{Batch, Reading, staging},
     clock::Moment,
+    mirror::{Caps, Mirror, state_numbers},
     shader::Variant,
 };
 use crate::{
@@ -24,7 +25,7 @@ use crate::{
     text::plural,
 };
 
-pub use super::{batch::DISPATCH_FIELDS, budget::Budget, pipeline::compile};
+pub use super::{budget::Budget, mirror::DISPATCH_FIELDS, pipeline::compile};
 
 /// Time after which a dispatch is abandoned. Drivers of hardware do so after some seconds; a dispatch on lavapipe lasts
 /// a fraction of a second, or longer while the driver compiles.
@@ -88,7 +89,7 @@ impl<T: Real> Kernel<T> {
         max_sweeps: u32,
         variant: Variant,
     ) -> Result<Self> {
-        let most = Budget::most(gpu, blocks, variant);
+        let most = Budget::most(gpu.is_hardware(), blocks, variant);
         let (device, pipeline) = gpu.pipeline::<T>(blocks, variant)?;
         device.check()?;
         let batch = || Batch::new(&device, &pipeline, blocks, slots, variant.traced);
@@ -175,8 +176,8 @@ impl<T: Real> Kernel<T> {
         (&self.batches[slot / self.slots_per_batch], slot % self.slots_per_batch)
     }
 
-    fn place_mut(&mut self, slot: usize) -> (&mut Batch<T>, usize) {
-        (&mut self.batches[slot / self.slots_per_batch], slot % self.slots_per_batch)
+    fn place_mut(&mut self, slot: usize) -> (&mut Mirror<T>, usize) {
+        (self.batches[slot / self.slots_per_batch].mirror_mut(), slot % self.slots_per_batch)
     }
 }
 
@@ -199,15 +200,15 @@ impl<T: Real> Backend for Kernel<T> {
     }
 
     fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>) {
-        let (batch, slot) = self.place_mut(slot);
-        batch.set_parameters(slot, &parameters.convert());
-        batch.set_counters(slot, |counters| counters.goal = goal);
+        let (mirror, slot) = self.place_mut(slot);
+        mirror.set_parameters(slot, &parameters.convert());
+        mirror.set_counters(slot, |counters| counters.goal = goal);
     }
 
     fn clear(&mut self, slot: usize) {
         // A goal that has already been reached: the slot is never due.
-        let (batch, slot) = self.place_mut(slot);
-        batch.set_counters(slot, |counters| *counters = Counters::default());
+        let (mirror, slot) = self.place_mut(slot);
+        mirror.set_counters(slot, |counters| *counters = Counters::default());
     }
 
     fn start(&mut self, batch: usize) -> Result<()> {
@@ -243,12 +244,12 @@ impl<T: Real> Backend for Kernel<T> {
 
     fn counters(&self, slot: usize) -> Counters {
         let (batch, slot) = self.place(slot);
-        batch.counters(slot)
+        batch.mirror().counters(slot)
     }
 
     fn report(&self, slot: usize) -> Report<f64> {
         let (batch, slot) = self.place(slot);
-        batch.report(slot).convert()
+        batch.mirror().report(slot).convert()
     }
 
     fn states(&mut self, slots: &[usize]) -> Result<Vec<State<f64>>> {
@@ -257,7 +258,7 @@ impl<T: Real> Backend for Kernel<T> {
         let Some((_, _, bytes)) = reads.first() else { return Ok(Vec::new()) };
         let length = *bytes as usize / size_of::<T>();
         let numbers = self.read(&reads)?;
-        Ok(numbers.chunks_exact(length).map(|rows| self.batches[0].state_of(rows).convert()).collect())
+        Ok(numbers.chunks_exact(length).map(|rows| self.batches[0].mirror().state_of(rows).convert()).collect())
     }
 
     fn state(&mut self, slot: usize) -> Result<State<f64>> {

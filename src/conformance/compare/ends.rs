@@ -5,12 +5,12 @@ use super::{
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
     setup::{Tamper, method, tampered},
-    twin::{growth, twin},
+    twin::twin,
 };
 use crate::{
     backend::gpu::{self, kernel::Budget},
     conformance::{
-        bounds::{Bound, DECAY, FIELDS, PACE, REPORT},
+        bounds::{Bound, DECAY, FIELDS, PACE, REPORT, growth},
         cases::{MEMBERS, adaptive_members, members},
     },
     error::{Error, Result},

@@ -6,12 +6,12 @@ use super::{
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
     setup::{Tamper, method, tampered},
-    twin::{Twin, growth, twin},
+    twin::{Twin, twin},
 };
 use crate::{
     backend::gpu::{self, kernel::Budget},
     conformance::{
-        bounds::{Bound, EVENT, REPORT},
+        bounds::{Bound, EVENT, REPORT, growth},
         cases::{MEMBERS, adaptive_members, members},
     },
     error::Result,

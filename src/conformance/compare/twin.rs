@@ -38,8 +38,3 @@ pub(super) fn twin<T: Real>(launch: &Run<f64>, method: &Method, n: usize) -> Res
     let left = Left { state: run.state.convert(), counters: run.counters, report: run.report.convert() };
     Ok(Twin { left, longest, steepest, order })
 }
-
-/// The growth of roundings over steps: like a random walk, since the flow itself damps them.
-pub(super) fn growth(steps: u32) -> f64 {
-    f64::from(steps).sqrt()
-}

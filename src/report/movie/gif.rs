@@ -64,7 +64,7 @@ impl Movie {
 
     /// Few colours for the words, enough for smooth lines, and those of the members that are there.
     fn palette(&self) -> Palette {
-        let mut palette = Palette::new();
+        let mut palette = Palette::default();
         palette.add(FRAME, 1);
         palette.add(INK, 6);
         palette.add(GREY_LINE, 4);

@@ -1,0 +1,290 @@
+// The page: its controls, the two workers, and what they tell.
+
+import { Instance } from "./instance.js";
+import { pad, show } from "./pad.js";
+import * as address from "./state.js";
+import { Tiles } from "./tiles.js";
+
+/** Milliseconds between two drawings of the charts, and after the last change of a control until a run starts. */
+const CHARTS = 400, PAUSE = 400;
+/** Charts are as wide as there is room, and readable. */
+const SIZE = "svg { display: block; width: 100%; min-width: 30rem; height: auto }";
+/** Outlines that come with the page. */
+const ISLANDS = ["iceland", "jamaica", "madagascar", "sri-lanka"];
+
+const $ = (id) => document.getElementById(id);
+const state = address.read();
+let compiled, library, dropped = null, later = 0;
+const sides = {
+  cpu: { label: "CPU, f64", tiles: new Tiles($("cpu"), "--cpu"), says: $("cpu-says") },
+  gpu: { label: "GPU, f32", tiles: new Tiles($("gpu"), "--gpu"), says: $("gpu-says") },
+};
+
+/** Says something in the line that screen readers announce. */
+function say(words, wrong = false) {
+  $("status").textContent = words;
+  $("status").classList.toggle("wrong", wrong);
+}
+
+// ---- settings
+
+function controls() {
+  for (const key of Object.keys(address.DEFAULTS).filter((key) => key !== "points")) $(key).value = state[key];
+  $("points").value = address.decoded(state.points);
+  shown();
+}
+
+/** Brings outputs and hidden controls up to date. */
+function shown() {
+  document.querySelectorAll("output").forEach((output) => { output.value = $(output.htmlFor.value).value; });
+  document.querySelectorAll("[data-shape]").forEach((part) => { part.hidden = part.dataset.shape !== state.shape; });
+  document.querySelectorAll("[data-flow]").forEach((part) => { part.hidden = part.dataset.flow !== state.flow; });
+  show($("pad"), address.pointsOf($("points").value));
+}
+
+/** The text of drawn.csv. */
+function table() { return `x,y\n${$("points").value.trim()}\n`; }
+
+/** The file that the shape names, if it does. */
+async function file() {
+  if (state.shape === "drawn") {
+    if (!$("points").value.trim()) throw new Error("Draw an outline on the pad, or type its points.");
+    return { name: "drawn.csv", bytes: new TextEncoder().encode(table()) };
+  }
+  if (state.shape === "file") {
+    if (!dropped) throw new Error("Choose a file with an outline, or drop one on the page.");
+    return dropped;
+  }
+  if (!ISLANDS.includes(state.shape)) return null;
+  const answer = await fetch(`${state.shape}.csv`);
+  if (!answer.ok) throw new Error(`${state.shape}.csv: the server answers ${answer.status}`);
+  return { name: `${state.shape}.csv`, bytes: new Uint8Array(await answer.arrayBuffer()) };
+}
+
+/** Offers the outline that the command reads, unless the user has its file. */
+function offer(outline) {
+  const link = $("save");
+  link.hidden = !outline || outline === dropped;
+  if (link.hidden) return;
+  link.href = `data:text/csv;charset=utf-8,${encodeURIComponent(new TextDecoder().decode(outline.bytes))}`;
+  link.download = outline.name;
+  link.textContent = `Save ${outline.name}, which it reads`;
+}
+
+/** The settings as the library takes them. */
+function settings(outline) {
+  const { aspect, petals, flow, lambda, steps, amplitude, n, curves, seed } = state;
+  const shapes = { ellipse: `ellipse:${aspect},1`, circle: "circle:1", flower: `flower:${petals}:0.3` };
+  return {
+    shape: outline ? `file:${outline.name}` : shapes[state.shape] ?? state.shape,
+    flow: flow === "elastic" ? `elastic:${lambda}` : flow,
+    amplitude, n, curves, seed, adaptive: steps !== "fixed",
+  };
+}
+
+// ---- a run
+
+function stop() {
+  clearTimeout(later);
+  for (const side of Object.values(sides)) side.worker?.terminate();
+  $("stop").disabled = true;
+}
+
+async function run() {
+  stop();
+  delete document.body.dataset.done;
+  let outline, wanted;
+  try {
+    outline = await file();
+    wanted = settings(outline);
+    library.file = outline;
+    const { members, command, warnings } = library.ask({ ask: "check", settings: wanted });
+    $("command").textContent = command;
+    offer(outline);
+    $("warnings").textContent = warnings.join(" ");
+    say(`${members} members relax.`);
+  } catch (error) {
+    say(error.message, true);
+    return;
+  }
+  $("stop").disabled = false;
+  $("difference").textContent = "";
+  $("members").tBodies[0].replaceChildren();
+  for (const [place, side] of Object.entries(sides)) {
+    Object.assign(side, { begins: null, frame: null, rows: new Map(), over: false, drawn: true });
+    side.tiles.clear();
+    side.tiles.canvas.hidden = false;
+    side.says.textContent = "starts …";
+    side.worker = new Worker(new URL("worker.js", import.meta.url), { type: "module" });
+    side.worker.addEventListener("message", ({ data }) => hear(side, data));
+    side.worker.addEventListener("error", (event) => hear(side, { error: event.message || "the worker failed" }));
+    const precision = place === "gpu" ? "f32" : "f64";
+    side.worker.postMessage({ compiled, settings: { ...wanted, precision }, file: outline, place });
+  }
+  Object.assign(draw, { settings: wanted, charted: -Infinity });
+}
+
+/** Takes a message of a worker. */
+function hear(side, { error, none, compiling, begins, frame }) {
+  if (none) {
+    side.over = side.tiles.canvas.hidden = true;
+    side.says.textContent = `– ${none}; the run is on the CPU alone.`;
+  } else if (error) {
+    side.over = true;
+    side.says.textContent = `– ${error}`;
+    say(`${side.label}: ${error}`, true);
+  } else if (compiling) {
+    side.says.textContent = "– the kernel is being compiled …";
+  } else if (begins) {
+    side.begins = begins;
+  } else if (frame) {
+    frame.ended.forEach((row) => side.rows.set(row.member, row));
+    Object.assign(side, { frame, drawn: false, over: !frame.goesOn });
+    const adapter = side.begins.adapter ? `, ${side.begins.adapter}` : "";
+    side.says.textContent = `– ${frame.done} of ${side.begins.members} have ended${adapter}`;
+    side.tiles.canvas.ariaLabel = `${side.label}: ${frame.done} of ${side.begins.members} members have ended`;
+  }
+  if (Object.values(sides).every((own) => own.over)) finish();
+}
+
+function finish() {
+  $("stop").disabled = true;
+  draw.charted = -Infinity;
+  compare();
+  const { cpu } = sides;
+  const times = [...cpu.rows.values()].map((row) => row.t_relax).filter((t) => t !== null);
+  if (!$("status").classList.contains("wrong")) {
+    say(`${times.length} of ${cpu.rows.size} members have relaxed.`);
+  }
+  document.body.dataset.done = "yes";
+}
+
+// ---- what is shown
+
+function draw(now) {
+  requestAnimationFrame(draw);
+  const running = Object.values(sides).filter((side) => side.frame);
+  for (const side of running.filter((side) => !side.drawn)) {
+    side.tiles.draw(side.frame.nodes, side.begins.n, side.rows);
+    [side.drawn, draw.isStale] = [true, true];
+  }
+  // At the start there is no line to draw.
+  const hasLines = running.some((side) => side.frame.mean.length > 1);
+  if (!draw.isStale || !hasLines || now - draw.charted < CHARTS) return;
+  Object.assign(draw, { charted: now, isStale: false });
+  const runs = running.map(({ label, begins: { times }, frame: { mean, times: relaxed, area } }) => (
+    { label, t: times.slice(0, mean.length), mean, times: relaxed, area }));
+  try {
+    const charts = library.ask({ ask: "charts", settings: draw.settings, runs });
+    for (const name of ["survival", "decay"]) {
+      const shadow = $(name).shadowRoot ?? $(name).attachShadow({ mode: "open" });
+      shadow.innerHTML = `<style>${SIZE}</style>${charts[name]}`;
+    }
+  } catch (error) {
+    say(error.message, true);
+  }
+  compare();
+}
+
+/** Tells how far both sides are apart: in times, and in the excess at all times that both have noted. */
+function compare() {
+  const { cpu, gpu } = sides;
+  rows();
+  if (!cpu.frame || !gpu.frame) return;
+  let most = 0, noted = 0;
+  gpu.frame.excess.forEach((excess, i) => {
+    const apart = Math.abs(excess - cpu.frame.excess[i]);
+    // Both have the start from the same library.
+    if (apart >= 0 && i % gpu.begins.times.length) [most, noted] = [Math.max(most, apart), noted + 1];
+  });
+  const relaxed = (row) => row?.t_relax != null;
+  const both = [...gpu.rows.values()].filter((row) => relaxed(row) && relaxed(cpu.rows.get(row.member)));
+  const apart = both.map((row) => Math.abs(row.t_relax / cpu.rows.get(row.member).t_relax - 1));
+  const times = both.length
+    ? ` Their relaxation times by at most ${brief(Math.max(...apart))} of the time, over ${both.length} members.`
+    : "";
+  $("difference").textContent = noted === 0 ? "" :
+    `CPU and GPU differ in the excess by at most ${brief(most)}, over ${noted} values so far.${times}`;
+}
+
+function brief(value) { return value === 0 ? "0" : value.toExponential(1); }
+
+/** The table of times; numbers in full. */
+function rows() {
+  const body = $("members").tBodies[0];
+  const all = new Set([...sides.cpu.rows.keys(), ...sides.gpu.rows.keys()]);
+  const text = [...all].sort((a, b) => a - b).map((member) => {
+    const [cpu, gpu] = [sides.cpu.rows.get(member), sides.gpu.rows.get(member)];
+    const apart = cpu?.t_relax != null && gpu?.t_relax != null ? brief(Math.abs(cpu.t_relax - gpu.t_relax)) : "";
+    const told = (row) => row?.t_relax ?? row?.status ?? "";
+    return [member, told(cpu), told(gpu), apart, gpu?.bound ?? ""];
+  });
+  if (text.length === body.rows.length && text.every((row, i) => row.join() === body.rows[i].dataset.text)) return;
+  body.replaceChildren(...text.map((cells) => {
+    const row = document.createElement("tr");
+    row.dataset.text = cells.join();
+    cells.forEach((cell) => { row.insertCell().textContent = cell; });
+    return row;
+  }));
+}
+
+// ---- the beginning
+
+/** Takes over what a control says. */
+function changed({ target }) {
+  if (!(target.id in address.DEFAULTS)) return;
+  if (target.id === "points") state.points = address.coded(target.value);
+  else state[target.id] = typeof address.DEFAULTS[target.id] === "number" ? target.valueAsNumber : target.value;
+  if (Number.isNaN(state[target.id])) return say(`${target.id}: not a number`, true);
+  address.write(state);
+  shown();
+  again();
+}
+
+function again() {
+  clearTimeout(later);
+  later = setTimeout(run, PAUSE);
+}
+
+async function take(taken) {
+  if (!taken) return;
+  dropped = { name: taken.name.replace(/[^\w.-]/g, "_"), bytes: new Uint8Array(await taken.arrayBuffer()) };
+  state.shape = $("shape").value = "file";
+  address.write(state);
+  shown();
+  run();
+}
+
+async function begin() {
+  const fetched = await fetch("curvelax.wasm");
+  if (!fetched.ok) throw new Error(`curvelax.wasm: the server answers ${fetched.status}`);
+  // Not streamed: some static hosts do not know the type of the file.
+  compiled = await WebAssembly.compile(await fetched.arrayBuffer());
+  library = await Instance.of(compiled);
+  controls();
+  $("settings").addEventListener("input", changed);
+  $("settings").addEventListener("submit", (event) => { event.preventDefault(); run(); });
+  $("stop").addEventListener("click", () => { stop(); say("Stopped."); });
+  $("copy").addEventListener("click", () =>
+    navigator.clipboard.writeText($("command").textContent).then(() => say("Copied."), () => say("Not copied.", true)));
+  $("file").addEventListener("change", ({ target }) => take(target.files[0]));
+  pad($("pad"), (points) => {
+    $("points").value = address.snapped(points);
+    $("points").dispatchEvent(new Event("input", { bubbles: true }));
+  });
+  const over = (on) => (event) => { event.preventDefault(); document.body.classList.toggle("dropping", on); };
+  addEventListener("dragover", over(true));
+  addEventListener("dragleave", over(false));
+  addEventListener("drop", (event) => { over(false)(event); take(event.dataTransfer.files[0]); });
+  addEventListener("hashchange", () => { Object.assign(state, address.read()); controls(); run(); });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    for (const side of Object.values(sides)) side.drawn = false;
+  });
+  requestAnimationFrame(draw);
+  document.body.dataset.loaded = Math.round(performance.now());
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  if (still) say("Nothing moves until you press Run, as your system asks for.");
+  else run();
+}
+
+if (typeof WebAssembly === "object") begin().catch((error) => say(error.message, true));
