@@ -8,7 +8,7 @@ import { Tiles } from "./tiles.js";
 /** Milliseconds between two drawings of the charts, and after the last change of a control until a run starts. */
 const CHARTS = 400, PAUSE = 400;
 /** Charts are as wide as there is room, and readable. */
-const SIZE = "svg { display: block; width: 100%; min-width: 30rem; height: auto }";
+const SIZE = "svg { display: block; width: 100%; min-width: 21rem; height: auto }";
 /** Outlines that come with the page. */
 const ISLANDS = ["iceland", "jamaica", "madagascar", "sri-lanka"];
 
@@ -203,7 +203,7 @@ function compare() {
   const times = both.length
     ? ` Their relaxation times by at most ${brief(Math.max(...apart))} of the time, over ${both.length} members.`
     : "";
-  $("difference").textContent = noted === 0 ? "" :
+  $("difference").textContent = most === 0 ? "" :
     `CPU and GPU differ in the excess by at most ${brief(most)}, over ${noted} values so far.${times}`;
 }
 
