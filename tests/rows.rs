@@ -66,7 +66,12 @@ impl Sink for Impatient<'_> {
 }
 
 fn manner() -> Manner {
-    Manner { quiet: true, every: Duration::from_secs(1000), stop: Stop::default() }
+    Manner {
+        progress: Progress::Quiet,
+        every: Duration::from_secs(1000),
+        stop: Stop::default(),
+        patience: Duration::from_secs(2),
+    }
 }
 
 /// Runs `spec` into `out` in pieces of `patience` or more checks; returns the number of pieces, and how often rows were
