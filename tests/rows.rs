@@ -12,7 +12,7 @@ use curvelax::{
     files::OutputFolder,
     placement,
     report::{
-        Form, Manner, RunReport, Stop,
+        Form, Manner, Progress, RunReport, Stop,
         checkpoint::{self, Origin},
     },
     simulate::resume,
