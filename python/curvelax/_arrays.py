@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _curvelax
-from ._errors import RequestError
+from ._errors import RequestError, RunError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +33,7 @@ def snapshots(
         return xr.open_zarr(folder / "snapshots.zarr", chunks=None)
     if arrays is None:
         arrays = _from_table(table("snapshots"), summary.member.to_numpy(), np.array(times))
+        _check_complete(arrays, summary, np.array(times), folder / "snapshots.csv")
     attributes = {name: json.loads(text) for name, text in run.attributes()}
     flags = attributes["status"]
     codes = dict(zip(flags["flag_meanings"].split(), flags["flag_values"], strict=True))
@@ -64,3 +65,12 @@ def _from_table(rows: Any, members: np.ndarray, times: np.ndarray) -> list[np.nd
         values[place] = rows[name]
         arrays.append(values)
     return arrays
+
+
+def _check_complete(arrays: list[np.ndarray], summary: Any, times: np.ndarray, path: Path) -> None:
+    """Every member has snapshots at the times before its end."""
+    lost = np.isnan(arrays[0][:, :, 0]) & (times < (1 - 1e-9) * summary.t_end.to_numpy()[:, None])
+    if lost.any():
+        member, time = np.argwhere(lost)[0]
+        where = f"member {summary.member[member]} at {times[time]}"
+        raise RunError(f"snapshots: {path} is incomplete: it has no {where}; restore it, or run again")

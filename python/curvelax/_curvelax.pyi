@@ -43,8 +43,8 @@ class FinishedRun:
     def columns(self) -> dict[str, list[tuple[str, str, str]]]:
         """Heading, type and meaning of the columns of each table."""
 
-    def survival(self) -> list[tuple[int, list[NDArray[np.float64]]]]:
-        """For each cell: times, members at risk, share not relaxed, and its 95 % band."""
+    def survival(self) -> list[tuple[int, list[NDArray[np.float64]], float | None]]:
+        """For each cell: times, members at risk, share not relaxed, and its 95 % band; the largest time known."""
 
     def times(self) -> list[float]:
         """Times of the snapshots."""

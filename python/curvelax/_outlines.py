@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,12 +25,12 @@ def labelled(shape: Any) -> dict[str, np.ndarray]:
     RequestError
         If one is no outline: the message says which, and why.
     """
+    if is_one(shape):
+        return {"outline": outline(shape, "shape")}
     if isinstance(shape, Mapping):
         named = {str(label): points for label, points in shape.items()}
         if len(named) < len(shape):
             raise RequestError("shape: two outlines have the same label")
-    elif is_one(shape):
-        named = {"outline": shape}
     elif isinstance(shape, (Sequence, np.ndarray)):
         named = {str(index): points for index, points in enumerate(shape)}
     else:
@@ -39,22 +40,34 @@ def labelled(shape: Any) -> dict[str, np.ndarray]:
         )
     if not named:
         raise RequestError("shape: there are no outlines; give at least one array of points (N, 2)")
-    alone = is_one(shape)
-    return {label: outline(points, "shape" if alone else f"shape[{label!r}]") for label, points in named.items()}
+    return {label: outline(points, f"shape[{label!r}]") for label, points in named.items()}
 
 
 def is_one(shape: Any) -> bool:
     """Whether ``shape`` is a single outline: its items are pairs of numbers, not arrays of points."""
+    if hasattr(shape, "columns"):
+        return True
     if isinstance(shape, np.ndarray):
         return shape.ndim <= 2 or shape.size == 0
     if isinstance(shape, Sequence) and len(shape) > 0:
         first = shape[0]
+        if isinstance(first, (str, os.PathLike)):
+            return False
         return np.isscalar(first) or (isinstance(first, (Sequence, np.ndarray)) and len(first) > 0 and np.isscalar(first[0]))
     return False
 
 
 def outline(points: Any, name: str) -> np.ndarray:
     """The points of one outline as 64-bit floats of shape (N, 2)."""
+    if isinstance(points, (str, os.PathLike)):
+        raise RequestError(
+            f"{name}: {str(points)!r} is no array; for several shapes use sweep={{'shape': [...]}}, for several files "
+            "shape='files:PATTERN'"
+        )
+    if np.ma.isMaskedArray(points) and np.ma.getmaskarray(points).any():
+        raise RequestError(f"{name}: points are masked; leave them out, such as by points[~points.mask.any(axis=1)]")
+    if hasattr(points, "columns"):
+        points = _of_frame(points, name)
     try:
         array = np.asarray(points)
     except ValueError as error:
@@ -72,16 +85,28 @@ def outline(points: Any, name: str) -> np.ndarray:
     return array
 
 
-def save(outlines: dict[str, np.ndarray], folder: Path) -> str:
-    """Writes outlines into ``folder``; returns the shape of a spec that names them."""
-    path = folder.absolute() / NAME
+def _of_frame(frame: Any, name: str) -> np.ndarray:
+    """The columns ``x`` and ``y`` of a data frame, or its only two."""
+    columns = [str(column) for column in frame.columns]
+    by_name = {column.lower(): place for place, column in enumerate(columns)}
+    if {"x", "y"} <= by_name.keys():
+        places = [by_name["x"], by_name["y"]]
+    elif len(columns) == 2:
+        places = [0, 1]
+    else:
+        raise RequestError(f"{name}: the frame has the columns {', '.join(columns)}; give it columns x and y")
+    return frame.to_numpy()[:, places]
+
+
+def save(outlines: dict[str, np.ndarray], path: Path) -> str:
+    """Writes outlines to ``path``; returns the shape of a spec that names them."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        # By name, not as keywords: a label may be "file".
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Not as keywords of numpy.savez: a label may be "file".
         with zipfile.ZipFile(path, "w") as archive:
             for label, points in outlines.items():
                 with archive.open(f"{label}.npy", "w", force_zip64=True) as file:
                     np.lib.format.write_array(file, points, allow_pickle=False)
     except OSError as error:
-        raise RequestError(f"out {folder}: the outlines cannot be written there ({error})") from None
+        raise RequestError(f"out {path.parent}: the outlines cannot be written there ({error})") from None
     return f"file:{path}"

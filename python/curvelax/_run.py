@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import contextlib
 import os
-import shutil
 import sys
 import tempfile
 import warnings
@@ -15,7 +14,7 @@ from typing import Any
 
 from . import _curvelax
 from ._errors import CurvelaxWarning, Interrupted, RequestError
-from ._study import Study
+from ._study import Study, remove
 
 Progress = Callable[[int, int, float], object]
 
@@ -71,36 +70,35 @@ def run(
     8
     """
     shape, sweep = keys.get("shape"), keys.get("sweep")
-    if isinstance(sweep, dict) and any(map(_is_arrays, sweep.get("shape") or ())):
-        raise RequestError("sweep: shapes by arrays cannot be swept; give them as an ensemble by shape=[...]")
-    folder = Path(out) if out is not None else _temporary()
+    swept = sweep.get("shape") if isinstance(sweep, dict) else None
+    if swept is not None and (shape is not None or any(map(_is_arrays, swept))):
+        raise RequestError("sweep: only named shapes and files are swept; give arrays as an ensemble by shape=[...] alone")
+    folder = _temporary() if out is None else _absolute(out)
     existing = "replaced" if force else "refused"
-    written = None
-    if isinstance(shape, os.PathLike):
-        keys["shape"] = f"file:{os.fspath(shape)}"
-    elif _is_arrays(shape):
-        # Here, for the program is to start without numpy.
-        from . import _outlines
-
-        outlines = _outlines.labelled(shape)
-        _curvelax.check_place(folder, existing)
-        existed = folder.exists()
-        keys["shape"] = _outlines.save(outlines, folder)
-        written = folder / _outlines.NAME
-        existing = existing if force else "filled"
+    existed, written, kept = folder.exists(), None, None
     try:
+        if isinstance(shape, os.PathLike):
+            keys["shape"] = f"file:{os.fspath(shape)}"
+        elif _is_arrays(shape):
+            # Here, for the program is to start without numpy.
+            from . import _outlines
+
+            outlines = _outlines.labelled(shape)
+            _curvelax.check_place(folder, existing)
+            written = folder / _outlines.NAME
+            if written.exists():
+                kept = written.rename(written.with_suffix(".before"))
+            keys["shape"] = _outlines.save(outlines, written)
+            existing = existing if force else "filled"
         with _bar(progress) as show:
             overview, seen = _curvelax.run(spec, keys, folder, existing, show, _say)
-    except RequestError:
-        if written and not force:
-            written.unlink(missing_ok=True)
-            if not existed:
-                with contextlib.suppress(OSError):
-                    folder.rmdir()
+    except BaseException as error:
+        _leave(folder, existed, written, kept)
+        if isinstance(error, KeyboardInterrupt):
+            raise _interrupted(error, folder) from None
         raise
-    except Interrupted as interrupted:
-        interrupted.folder = folder
-        raise
+    if kept is not None:
+        kept.unlink()
     return Study(folder, overview=overview, seen=seen, temporary=out is None)
 
 
@@ -116,13 +114,12 @@ def resume(out: str | os.PathLike[str], *, progress: bool | Progress | None = No
     RunError, Interrupted
         As for :func:`run`.
     """
-    folder = Path(out)
+    folder = _absolute(out)
     try:
         with _bar(progress) as show:
             overview = _curvelax.resume(folder, show, _say)
-    except Interrupted as interrupted:
-        interrupted.folder = folder
-        raise
+    except KeyboardInterrupt as error:
+        raise _interrupted(error, folder) from None
     return Study(folder, overview=overview)
 
 
@@ -134,7 +131,7 @@ def load(out: str | os.PathLike[str]) -> Study:
     RequestError
         If there is no finished run in ``out``.
     """
-    study = Study(Path(out))
+    study = Study(_absolute(out))
     study.record  # noqa: B018  # read now, so that what is wrong is said here
     return study
 
@@ -146,9 +143,35 @@ def _is_arrays(shape: Any) -> bool:
 
 def _temporary() -> Path:
     """A folder to be made, in one that is removed at the end of the interpreter if not before."""
-    home = tempfile.mkdtemp(prefix="curvelax-")
-    atexit.register(shutil.rmtree, home, ignore_errors=True)
-    return Path(home) / "run"
+    home = Path(tempfile.mkdtemp(prefix="curvelax-"))
+    atexit.register(remove, home, os.getpid())
+    return home / "run"
+
+
+def _absolute(out: str | os.PathLike[str]) -> Path:
+    """The folder, wherever the process goes."""
+    return Path(os.path.abspath(Path(out).expanduser()))
+
+
+def _leave(folder: Path, existed: bool, written: Path | None, kept: Path | None) -> None:
+    """Leaves a folder in which no run began as it was before."""
+    if folder.is_dir() and any(path.name.startswith(".curvelax") for path in folder.iterdir()):
+        return
+    with contextlib.suppress(OSError):
+        if written is not None:
+            written.unlink(missing_ok=True)
+        if kept is not None:
+            kept.replace(written)
+        if folder.is_dir() and not existed:
+            folder.rmdir()
+
+
+def _interrupted(error: KeyboardInterrupt, folder: Path) -> Interrupted:
+    """Ctrl-C of the program, or of the interpreter when the run was about to end."""
+    if not isinstance(error, Interrupted):
+        error = Interrupted(f"stopped by Ctrl-C at the end; curvelax.resume({str(folder)!r}) continues or reads the run")
+    error.folder = folder
+    return error
 
 
 def _say(line: str) -> None:
@@ -162,7 +185,16 @@ def _say(line: str) -> None:
 def _bar(progress: bool | Progress | None) -> Iterator[Progress]:
     """The function that shows progress."""
     if callable(progress):
-        yield progress
+        last = (0, 0, 0.0)
+
+        def tell(*state: Any) -> None:
+            nonlocal last
+            last = state
+            progress(*state)
+
+        yield tell
+        if 0 < last[1] and last[2] < 1.0:
+            progress(last[1], last[1], 1.0)
         return
     wanted = progress if progress is not None else _is_watched()
     try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import html
 import json
+import os
 import shutil
 import weakref
 from pathlib import Path
@@ -28,6 +29,12 @@ NEEDS = {
     "series": "give series=DT, the interval between rows",
     "snapshots": "give snapshots=[T1, T2, ...]",
 }
+
+
+def remove(home: Path, owner: int) -> None:
+    """Removes the temporary folder of a run, in the process that made it."""
+    if os.getpid() == owner:
+        shutil.rmtree(home, ignore_errors=True)
 
 
 class Picture:
@@ -69,7 +76,17 @@ class Study:
         self.folder = folder
         self.overview = overview
         self._seen = seen
-        self._finalizer = weakref.finalize(self, shutil.rmtree, folder, True) if temporary else None
+        self._finalizer = weakref.finalize(self, remove, folder.parent, os.getpid()) if temporary else None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy in another process reads the same folder, and does not own it."""
+        return Study, (self.folder,)
+
+    def __copy__(self) -> Study:
+        return self
+
+    def __deepcopy__(self, _memo: Any) -> Study:
+        return self
 
     @functools.cached_property
     def _run(self) -> _curvelax.FinishedRun:
@@ -106,22 +123,25 @@ class Study:
         RequestError
             If the run has no such table: the message says what gives it one.
         """
-        columns = self._run.columns()
-        own = columns.get(f"{name}.csv")
-        if own is None:
-            known = ", ".join(key.removesuffix(".csv") for key in columns)
-            raise RequestError(f"table {name!r}: there is none of this name; use one of {known}")
+        own = self._columns(name)
         path = self.folder / f"{name}.csv"
         if not path.exists():
             remedy = NEEDS.get(name, "the run has none")
             raise RequestError(f"table {name!r}: {self.folder} has no {path.name}: {remedy}")
         return _frames.read(path, own, frames)
 
+    def _columns(self, name: str) -> list[tuple[str, str, str]]:
+        columns = self._run.columns()
+        if f"{name}.csv" not in columns:
+            known = ", ".join(key.removesuffix(".csv") for key in columns)
+            raise RequestError(f"table {name!r}: there is none of this name; use one of {known}")
+        return columns[f"{name}.csv"]
+
     def describe(self, name: str = "summary") -> pd.DataFrame:
         """The columns of the table ``name``: what each holds and means."""
         import pandas as pd
 
-        own = self._run.columns().get(f"{name}.csv", [])
+        own = self._columns(name)
         return pd.DataFrame(own, columns=["column", "holds", "meaning"]).set_index("column")
 
     @functools.cached_property
@@ -170,18 +190,22 @@ class Study:
             raise RequestError(f"snapshots: {self.folder} has none: {NEEDS['snapshots']}")
         from . import _arrays
 
-        return _arrays.snapshots(self._run, self._seen, self.folder, self.table)
+        data = _arrays.snapshots(self._run, self._seen, self.folder, self.table)
+        if self._finalizer is not None and (self.folder / "snapshots.zarr").exists():
+            # Arrays that are read later need the folder, which goes with its study.
+            data.set_close(lambda: self)
+        return data
 
     def survival(self) -> pd.DataFrame:
         """The members that have not relaxed yet, by cell (Kaplan and Meier).
 
-        Columns: ``cell``; ``time`` at which members relaxed; ``at_risk`` before it; ``survival``, the share that has not
-        relaxed after it; ``lower`` and ``upper``, its 95 % band (Greenwood).
+        Columns: ``cell``; ``time``, 0 and the times at which members relaxed; ``at_risk``, members at risk just before;
+        ``survival``, the share that has not relaxed after it; ``lower`` and ``upper``, its 95 % band (Greenwood).
         """
         import pandas as pd
 
         parts = []
-        for cell, numbers in self._run.survival():
+        for cell, numbers, _ in self._run.survival():
             names = ["time", "at_risk", "survival", "lower", "upper"]
             part = pd.DataFrame(dict(zip(names, numbers, strict=True)))
             part.insert(0, "cell", cell)
@@ -194,17 +218,22 @@ class Study:
 
         ax = ax or plt.subplots()[1]
         labels = self._labels()
-        for cell, curve in self.survival().groupby("cell"):
-            time = [0.0, *curve.time]
-            (line,) = ax.step(time, [1.0, *curve.survival], where="post", label=labels.get(int(cell)))
-            band = ([1.0, *curve.lower], [1.0, *curve.upper])
-            ax.fill_between(time, *band, step="post", alpha=0.2, color=line.get_color(), linewidth=0)
-        units = self.spec.get("units")
-        ax.set(xlabel=f"time ({units['time'] if isinstance(units, dict) else 'length⁴'})", ylabel="members not yet relaxed")
+        for cell, (time, _, *shares), last in self._run.survival():
+            # To the last time of a member that did not relax.
+            time = [*time, time[-1] if last is None else last]
+            survival, lower, upper = ([*share, share[-1]] for share in shares)
+            (line,) = ax.step(time, survival, where="post", label=labels.get(cell))
+            ax.fill_between(time, lower, upper, step="post", alpha=0.2, color=line.get_color(), linewidth=0)
+        ax.set(xlabel=f"time ({self._time_unit()})", ylabel="members not yet relaxed")
         ax.set_ylim(0, 1.02)
         if len(labels) > 1:
             ax.legend(title=", ".join(self.spec["sweep"]))
         return ax
+
+    def _time_unit(self) -> str:
+        if "units" in self.spec:
+            return self.spec["units"].split(",")[1].strip()
+        return "unit of the mobility" if "mobility" in self.spec else "length⁴"
 
     def _labels(self) -> dict[int, str]:
         """The values of the swept keys, by cell."""

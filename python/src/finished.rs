@@ -11,7 +11,7 @@ use curvelax::{
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
 
-use crate::raise;
+use crate::{raise, unforked};
 
 /// A finished run as read from its folder.
 #[pyclass(frozen)]
@@ -25,6 +25,7 @@ impl FinishedRun {
     /// Reads the run in `folder`.
     #[new]
     fn new(py: Python<'_>, folder: PathBuf) -> PyResult<FinishedRun> {
+        unforked(py)?;
         let read = py.detach(|| {
             let mut run = Finished::read(&folder)?;
             let statistics = EnsembleStatistics::new(&run.provenance.spec, &mut run.tally)?;
@@ -45,20 +46,23 @@ impl FinishedRun {
         Ok(all)
     }
 
-    /// The survival curve of each cell: the times at which it falls, the members at risk before, the share not relaxed
-    /// after, and its 95 % band.
-    fn survival<'py>(&self, py: Python<'py>) -> Vec<(u64, [Bound<'py, PyArray1<f64>>; 5])> {
+    /// The survival curve of each cell: the times at which it falls after time 0, the members at risk before, the share
+    /// not relaxed after, and its 95 % band; and the largest time up to which it is known.
+    #[expect(clippy::type_complexity, reason = "a tuple in Python")]
+    fn survival<'py>(&self, py: Python<'py>) -> Vec<(u64, [Bound<'py, PyArray1<f64>>; 5], Option<f64>)> {
         let curve = |cell: &CellStatistics| {
             let estimate = KaplanMeier::new(&cell.times.sample);
-            let array = |of: &dyn Fn(Step) -> f64| PyArray1::from_iter(py, estimate.steps().map(of));
+            let array = |start: f64, of: &dyn Fn(Step) -> f64| {
+                PyArray1::from_iter(py, [start].into_iter().chain(estimate.steps().map(of)))
+            };
             let numbers = [
-                array(&|step| step.time),
-                array(&|step| step.at_risk as f64),
-                array(&|step| step.survival),
-                array(&|step| step.band().0),
-                array(&|step| step.band().1),
+                array(0.0, &|step| step.time),
+                array(estimate.members() as f64, &|step| step.at_risk as f64),
+                array(1.0, &|step| step.survival),
+                array(1.0, &|step| step.band().0),
+                array(1.0, &|step| step.band().1),
             ];
-            (cell.cell, numbers)
+            (cell.cell, numbers, estimate.last())
         };
         self.statistics.cells.iter().map(curve).collect()
     }

@@ -66,6 +66,14 @@ impl Notebook {
         lock(&self.shared.raised).take()
     }
 
+    /// Raises what was raised in Python while the run ended, and Ctrl-C.
+    ///
+    /// # Errors
+    /// Those.
+    pub fn heard(&self, py: Python<'_>) -> PyResult<()> {
+        self.raised().map_or_else(|| py.check_signals(), Err)
+    }
+
     /// Moves out the snapshots.
     pub fn seen(&self) -> Seen {
         std::mem::take(&mut *lock(&self.seen))

@@ -2,9 +2,8 @@
 
 use std::{fmt::Display, path::Path};
 
-use curvelax::ensemble::Spec;
+use curvelax::{Error, ensemble::Spec, ensemble::spec::DEFAULT_ADAPTIVE};
 use pyo3::{
-    exceptions::PyTypeError,
     prelude::*,
     types::{PyBool, PyDict, PyFloat, PyInt, PyString},
 };
@@ -21,51 +20,101 @@ const EXCLUDING: [(&str, &str); 4] =
 /// A spec as keywords give it.
 pub struct Keys {
     /// The text of its file.
-    pub text: String,
+    text: String,
     /// The keys of the keywords.
-    pub given: Vec<String>,
+    given: Vec<String>,
     /// Whether `accurate` is among them.
-    pub accurate: bool,
+    accurate: bool,
 }
 
-/// The keywords, over the keys of the file `spec`.
-///
-/// # Errors
-/// `TypeError` for a value that no spec file can hold, and those of the file.
-pub fn read(spec: Option<&Path>, keywords: &Bound<'_, PyDict>) -> PyResult<Keys> {
-    let mut table = spec.map_or_else(|| Ok(Table::new()), |path| file(path, keywords.py()))?;
-    let (mut given, mut accurate) = (Vec::new(), false);
-    for (key, value) in keywords {
-        let key: String = key.extract()?;
-        let (name, value) = match &*key {
-            _ if value.is_none() => continue,
-            "accurate" => {
-                accurate = value.is_truthy()?;
-                continue;
+/// Refuses `problem`.
+fn refuse<T>(py: Python<'_>, problem: String) -> PyResult<T> {
+    Err(raise(py, Error::Request(problem), None))
+}
+
+impl Keys {
+    /// The keywords, over the keys of the file `spec`.
+    ///
+    /// # Errors
+    /// `RequestError` for a value that no spec file can hold, for values that would be lost, and for those of the file.
+    pub fn read(spec: Option<&Path>, keywords: &Bound<'_, PyDict>) -> PyResult<Keys> {
+        let py = keywords.py();
+        let mut table = spec.map_or_else(|| Ok(Table::new()), |path| file(path, py))?;
+        let (mut given, mut swept, mut accurate) = (Vec::<String>::new(), Table::new(), false);
+        for (key, value) in keywords {
+            let key: String = key.extract()?;
+            let (name, value) = match &*key {
+                _ if value.is_none() => continue,
+                "accurate" => {
+                    accurate = value.is_truthy()?;
+                    continue;
+                }
+                "events" => ("event".into(), events(&value)?),
+                _ => (name(&key), self::value(&key, &value, 0)?),
+            };
+            if given.contains(&name) {
+                return refuse(py, format!("{key}: given twice, by two names of one key; leave one of them out"));
             }
-            "events" => ("event".into(), events(&value)?),
-            _ => (name(&key), self::value(&key, &value, 0)?),
-        };
-        // A keyword overrides the file, including the key that it excludes.
-        for (_, other) in EXCLUDING.iter().filter(|(one, _)| **one == *name) {
-            if !given.iter().any(|given| given == other) {
-                table.remove(*other);
+            given.push(name.clone());
+            match (&*name, value) {
+                // As by --adaptive without a value.
+                ("adaptive", Value::Boolean(true)) => drop(table.insert(name, DEFAULT_ADAPTIVE.into())),
+                ("adaptive", Value::Boolean(false)) => drop(table.remove("adaptive")),
+                ("sweep", Value::Table(own)) => swept = own,
+                (_, value) => drop(table.insert(name, value)),
             }
         }
-        given.push(name.clone());
-        table.insert(name, value);
+        // A keyword overrides the file, including the key that it excludes.
+        let is_given = |key: &str| given.iter().any(|given| given == key);
+        for (_, other) in EXCLUDING.iter().filter(|(one, other)| is_given(one) && !is_given(other)) {
+            table.remove(*other);
+        }
+        for key in swept.keys() {
+            let pair = EXCLUDING.iter().find(|(one, other)| one == key && is_given(other)).map(|(_, other)| *other);
+            if let Some(other) = pair.or(is_given(key).then_some(key)) {
+                let problem = format!("sweep {key}: {other} is given, too, and its value would be lost; leave one out");
+                return refuse(py, problem);
+            }
+        }
+        if !swept.is_empty() {
+            match table.entry("sweep").or_insert_with(|| Table::new().into()) {
+                Value::Table(all) => all.extend(swept),
+                other => *other = swept.into(),
+            }
+        }
+        let text = toml::to_string(&table).or_else(|e| refuse(py, e.to_string()))?;
+        Ok(Keys { text, given, accurate })
     }
-    let text = toml::to_string(&table).map_err(|e| PyTypeError::new_err(e.to_string()))?;
-    Ok(Keys { text, given, accurate })
+
+    /// The spec.
+    ///
+    /// # Errors
+    /// [`Error::Request`] with the key that is wrong.
+    pub fn spec(&self) -> curvelax::Result<Spec> {
+        let mut spec = Spec::from_toml(&self.text).map_err(|message| Error::Request(self.without_place(&message)))?;
+        if self.accurate {
+            spec.make_accurate(&self.given);
+        }
+        Ok(spec)
+    }
+
+    /// The message of toml with the line that is wrong instead of its number, in a text that nobody wrote.
+    fn without_place(&self, message: &str) -> String {
+        let number = message.strip_prefix("TOML parse error at line ").and_then(|rest| rest.split(',').next());
+        let line = number.and_then(|number| self.text.lines().nth(number.parse::<usize>().ok()?.checked_sub(1)?));
+        match (line, message.lines().last()) {
+            (Some(line), Some(problem)) => format!("{line}: {problem}"),
+            _ => message.to_owned(),
+        }
+    }
 }
 
 /// The keys of a spec file.
 fn file(path: &Path, py: Python<'_>) -> PyResult<Table> {
-    let request = |problem: &dyn Display| {
-        let error = curvelax::Error::Request(format!("in the spec {}: {problem}", path.display()));
-        raise(py, error, None)
-    };
-    let text = std::fs::read_to_string(path).map_err(|e| request(&e))?;
+    let request =
+        |problem: &dyn Display| raise(py, Error::Request(format!("in the spec {}: {problem}", path.display())), None);
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| request(&format!("{e}; the first argument is a spec file, a shape is given by shape=…")))?;
     // With the line of what is wrong.
     Spec::from_toml(&text).map_err(|e| request(&e))?;
     text.parse().map_err(|e: toml::de::Error| request(&e))
@@ -86,11 +135,12 @@ fn events(value: &Bound<'_, PyAny>) -> PyResult<Value> {
 }
 
 fn value(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
-    // A bool of Python is an int, too; numbers of NumPy know how to become Python's.
+    // Numbers of NumPy know how to become Python's.
     let scalar = match value.getattr("item") {
         Ok(item) if value.getattr("ndim").and_then(|n| n.extract::<usize>()).is_ok_and(|n| n == 0) => item.call0()?,
         _ => value.clone(),
     };
+    // Before int, which a bool of Python is, too.
     if scalar.is_instance_of::<PyBool>() {
         return Ok(Value::Boolean(scalar.extract()?));
     }
@@ -104,11 +154,17 @@ fn value(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
         return Ok(Value::String(scalar.extract()?));
     }
     if let Ok(table) = scalar.cast::<PyDict>() {
-        let entry = |(key, own): (Bound<'_, PyAny>, Bound<'_, PyAny>)| -> PyResult<_> {
-            let key: String = key.extract()?;
-            Ok((name(&key), self::value(&key, &own, depth + 1)?))
-        };
-        return table.iter().map(entry).collect::<PyResult<Table>>().map(Value::Table);
+        let mut all = Table::new();
+        for (own, value) in table {
+            let own: String = own.extract()?;
+            if all.insert(name(&own), self::value(&own, &value, depth + 1)?).is_some() {
+                return refuse(
+                    value.py(),
+                    format!("{key}: {own} is given twice, by two names of one key; leave one out"),
+                );
+            }
+        }
+        return Ok(Value::Table(all));
     }
     if let (true, Ok(items)) = (depth < DEEPEST, scalar.try_iter()) {
         let items = items.map(|item| self::value(key, &item?, depth + 1));
@@ -117,6 +173,5 @@ fn value(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if let Ok(path) = scalar.call_method0("__fspath__") {
         return Ok(Value::String(path.extract()?));
     }
-    let (kind, shown) = (scalar.get_type().name()?, scalar.repr()?);
-    Err(PyTypeError::new_err(format!("{key}: {kind} {shown} is neither a number, a text, a bool nor a list of these")))
+    refuse(value.py(), format!("{key}: {} is neither a number, a text, a bool nor a list of these", scalar.repr()?))
 }

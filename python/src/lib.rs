@@ -6,6 +6,8 @@ mod host;
 mod keys;
 mod seen;
 
+use std::sync::OnceLock;
+
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*};
 
 /// Raises `error` as the exception of `curvelax._errors` for its exit code; what was `raised` in Python meanwhile goes
@@ -26,12 +28,27 @@ fn raise(py: Python<'_>, error: curvelax::Error, raised: Option<PyErr>) -> PyErr
     }
 }
 
+/// Refuses a process that was forked from one in which curvelax has worked: the threads of a process are not forked, and
+/// would be waited for without end.
+///
+/// # Errors
+/// `RequestError`.
+fn unforked(py: Python<'_>) -> PyResult<()> {
+    static OWN: OnceLock<u32> = OnceLock::new();
+    let here = std::process::id();
+    if *OWN.get_or_init(|| here) == here {
+        return Ok(());
+    }
+    let problem = "this process was forked from one in which curvelax has run, and has none of its threads; start \
+                   processes by spawn or forkserver, such as multiprocessing.get_context(\"spawn\")";
+    Err(raise(py, curvelax::Error::Request(problem.into()), None))
+}
+
 #[pymodule]
 mod _curvelax {
     use std::{ffi::OsString, path::PathBuf};
 
     use curvelax::{
-        ensemble::Spec,
         files::{Existing, OutputFolder},
         session::{self, Host, ResumePlace, Work},
     };
@@ -40,11 +57,7 @@ mod _curvelax {
         types::{PyAny, PyDict},
     };
 
-    use super::{
-        host::Notebook,
-        keys::{self, Keys},
-        raise,
-    };
+    use super::{host::Notebook, keys::Keys, raise, unforked};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -86,34 +99,32 @@ mod _curvelax {
         progress: Py<PyAny>,
         say: Py<PyAny>,
     ) -> PyResult<(String, Seen)> {
-        let Keys { text, given, accurate } = keys::read(spec.as_deref(), keys)?;
+        unforked(py)?;
+        let keys = Keys::read(spec.as_deref(), keys)?;
         let existing = treatment(existing);
         let host = Notebook::new(progress, say);
         let done = py.detach(|| {
-            let mut spec = Spec::from_toml(&text).map_err(curvelax::Error::Request)?;
-            if accurate {
-                spec.make_accurate(&given);
-            }
+            let spec = keys.spec()?;
             let manner = host.manner()?;
             OutputFolder::check_place(&out, existing)?;
             let work = Work::new(session::planned(spec, Some(&manner), &host)?)?;
             work.study.note().into_iter().for_each(|note| host.say(&format!("note: {note}")));
             session::begin(work, &out, existing, manner, &host)
         });
-        match done {
-            Ok(completed) => Ok((completed.text, host.seen())),
-            Err(error) => Err(raise(py, error, host.raised())),
-        }
+        let completed = done.map_err(|error| raise(py, error, host.raised()))?;
+        host.heard(py)?;
+        Ok((completed.text, host.seen()))
     }
 
     /// Resumes the run in the folder `out`. Returns the overview, or `None` if the run is finished.
     #[pyfunction]
     fn resume(py: Python<'_>, out: PathBuf, progress: Py<PyAny>, say: Py<PyAny>) -> PyResult<Option<String>> {
+        unforked(py)?;
         let host = Notebook::new(progress, say);
-        match py.detach(|| session::resume(&out, ResumePlace::default(), &host)) {
-            Ok(completed) => Ok(completed.map(|completed| completed.text)),
-            Err(error) => Err(raise(py, error, host.raised())),
-        }
+        let done = py.detach(|| session::resume(&out, ResumePlace::default(), &host));
+        let completed = done.map_err(|error| raise(py, error, host.raised()))?;
+        host.heard(py)?;
+        Ok(completed.map(|completed| completed.text))
     }
 
     #[pymodule_export]

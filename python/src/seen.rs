@@ -37,7 +37,8 @@ impl Seen {
         members: Vec<u64>,
         times: Vec<f64>,
     ) -> PyResult<Option<[Bound<'py, PyArray3<f64>>; 4]>> {
-        let Some(nodes) = self.all.first().map(|one| one.x.len()).filter(|_| self.bytes <= MOST) else {
+        // Cells of a sweep may differ in nodes.
+        let Some(nodes) = self.all.iter().map(|one| one.x.len()).max().filter(|_| self.bytes <= MOST) else {
             return Ok(None);
         };
         let [a, b, c, d]: [fn(&Snapshot) -> &[f64]; 4] = [|of| &of.x, |of| &of.y, |of| &of.k, |of| &of.r];
@@ -47,7 +48,7 @@ impl Seen {
                 let place = members.binary_search(&one.member).ok();
                 if let Some((member, time)) = place.zip(times.iter().position(|t| *t == one.t)) {
                     let from = (member * times.len() + time) * nodes;
-                    all[from..from + nodes].copy_from_slice(field(one));
+                    all[from..from + one.x.len()].copy_from_slice(field(one));
                 }
             }
             PyArray1::from_vec(py, all).reshape([members.len(), times.len(), nodes])

@@ -9,6 +9,7 @@ import json
 import os
 import pathlib
 import re
+import pickle
 import shutil
 import signal
 import subprocess
@@ -17,6 +18,7 @@ import tempfile
 import threading
 import time
 import unittest
+import unittest.mock
 import warnings
 from importlib import metadata, resources
 
@@ -201,9 +203,9 @@ class Package(unittest.TestCase):
     def test_survival_is_the_product_limit(self):
         curve = self.study.survival()
         times = np.sort(self.study.summary.t_relax)
-        self.assertEqual(curve.time.tolist(), times.tolist())
-        self.assertEqual(curve.at_risk.tolist(), list(range(9, 0, -1)))
-        self.assertTrue(np.allclose(curve.survival, np.arange(8, -1, -1) / 9, atol=1e-15))
+        self.assertEqual(curve.time.tolist(), [0, *times])
+        self.assertEqual(curve.at_risk.tolist(), [9, *range(9, 0, -1)])
+        self.assertTrue(np.allclose(curve.survival, np.arange(9, -1, -1) / 9, atol=1e-15))
         self.assertTrue(((curve.lower <= curve.survival) & (curve.survival <= curve.upper)).all())
 
     def test_plot_draws_a_curve_for_each_cell(self):
@@ -215,8 +217,13 @@ class Package(unittest.TestCase):
         self.assertEqual([text.get_text() for text in axes.get_legend().get_texts()], ["0.02", "0.08"])
         for line, cell in zip(axes.get_lines(), (0, 1)):
             own = study.summary[study.summary.cell == cell]
-            self.assertEqual(line.get_xdata()[1:].tolist(), sorted(own.t_relax))
+            self.assertEqual(line.get_xdata()[1:-1].tolist(), sorted(own.t_relax))
         self.assertEqual(study.plot(axes), axes)
+        # A cell in which nobody relaxes stays at 1, to the end.
+        study = curvelax.run(**SMALL, sweep={"t_end": [0.1, 5]}, units="um,h", mobility=1)
+        first = study.plot().get_lines()[0]
+        self.assertEqual((first.get_xdata().tolist(), first.get_ydata().tolist()), ([0, 0.1], [1, 1]))
+        self.assertEqual(study.plot().get_xlabel(), "time (h)")
 
     def test_a_study_shows_itself(self):
         self.assertIn("9 relaxed", repr(self.study))
@@ -287,6 +294,95 @@ class Package(unittest.TestCase):
         with self.assertRaises(curvelax.RequestError):
             curvelax.run(sweep={"shape": [ring]}, out=out)
 
+    def test_frames_and_masked_arrays_are_read_as_they_are_meant(self):
+        x, y = ellipse(2, 1).T
+        keys = {**SMALL, "curves": 1, "amplitude": 0}
+        plain = curvelax.run(shape=np.c_[x, y], **keys).summary
+        for frame in [pd.DataFrame({"y": y, "X": x, "id": 1}), pd.DataFrame({"a": x, "b": y}), pl.DataFrame({"x": x, "y": y})]:
+            self.assertTrue(curvelax.run(shape=frame, **keys).summary.equals(plain))
+        self.assertFalse(curvelax.run(shape=pd.DataFrame({"x": x, "y": 2 * y}), **keys).summary.equals(plain))
+        masked = np.ma.array(np.c_[x, y])
+        self.assertTrue(curvelax.run(shape=masked, **keys).summary.equals(plain))
+        masked[5:9] = np.ma.masked
+        self.refused("masked", shape=masked)
+        self.refused("columns a, b, c", shape=pd.DataFrame({"a": x, "b": y, "c": y}))
+
+    def test_nothing_given_is_lost(self):
+        out = self.at / "lost"
+        for words, keys in [
+            ("event: given twice", {"events": {"a": "excess <= 1"}, "event": ["b = excess <= 1"]}),
+            ("points is given, too", {"points": 64, "sweep": {"points": [32, 40]}}),
+            ("adaptive is given, too", {"adaptive": 1e-3, "sweep": {"tau": [1e-3, 1e-4]}}),
+            ("two names of one key", {"t-end": 1, "t_end": 2}),
+            ("two names of one key", {"sweep": {"t-end": [1], "t_end": [2]}}),
+            ("only named shapes", {"shape": ellipse(2, 1), "sweep": {"shape": ["circle:1"]}}),
+            ("only named shapes", {"sweep": {"shape": np.zeros((2, 9, 2))}}),
+            ("sweep={'shape'", {"shape": ["circle:1", "circle:2"]}),
+        ]:
+            with self.subTest(words=words):
+                self.refused(words, **keys, out=out)
+                self.assertFalse(out.exists())
+        spec = self.at / "swept.toml"
+        spec.write_text("[sweep]\namplitude = [0.02, 0.04]\n")
+        study = curvelax.run(spec, **{**SMALL, "points": None}, sweep={"points": [32, 40]})
+        self.assertEqual(study.ensemble[["amplitude", "points"]].to_numpy().tolist(), [[0.02, 32], [0.02, 40], [0.04, 32], [0.04, 40]])
+        self.assertEqual(curvelax.run(**{**SMALL, "adaptive": True}).spec["adaptive"], 1e-3)
+
+    def test_a_refused_run_leaves_a_folder_as_it_was(self):
+        out = self.at / "as it was"
+        curvelax.run(shape=ellipse(2, 1), out=out, **SMALL)
+        before = {name: (out / name).read_bytes() for name in files(out)}
+        for keys in [{"typo": 1}, {"curves": object()}]:
+            self.refused(shape=ellipse(3, 1), out=out, force=True, **keys)
+            self.assertEqual({name: (out / name).read_bytes() for name in files(out)}, before)
+        curvelax.run(shape=ellipse(3, 1), out=out, force=True, **SMALL)
+        self.assertEqual(files(out), sorted(before))
+        self.assertNotEqual((out / "outlines.npz").read_bytes(), before["outlines.npz"])
+
+    def test_a_study_stays_with_its_folder(self):
+        study = curvelax.run(out=os.path.relpath(self.at / "relative"), **SMALL)
+        elsewhere = pickle.loads(pickle.dumps(study))
+        before = os.getcwd()
+        os.chdir(self.at)
+        try:
+            self.assertTrue(study.folder.is_absolute() and elsewhere.summary.equals(study.summary))
+        finally:
+            os.chdir(before)
+        with unittest.mock.patch.dict(os.environ, {"HOME": str(self.at)}):
+            self.assertEqual(curvelax.run(out="~/home", **SMALL).folder, self.at / "home")
+        # A child that ends leaves its parent's results alone.
+        temporary = curvelax.run(**SMALL)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            child = os.fork()
+        if child == 0:
+            try:
+                curvelax.run(**SMALL)
+            except curvelax.RequestError as error:
+                temporary._finalizer()
+                os._exit(7 if "spawn" in str(error) else 1)
+            os._exit(2)
+        self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), 7)
+        self.assertEqual(len(temporary.summary), 3)
+
+    def test_snapshots_of_cells_with_other_nodes_and_of_a_damaged_table(self):
+        keys = {**SMALL, "points": None, "sweep": {"points": [32, 40]}, "snapshots": [0, 0.05]}
+        study = curvelax.run(out=self.at / "nodes", **keys)
+        loaded = curvelax.load(study.folder)
+        xr.testing.assert_identical(study.snapshots, loaded.snapshots)
+        self.assertEqual(study.snapshots.sizes["node"], 40)
+        path = study.folder / "snapshots.csv"
+        path.write_text("".join(path.read_text().splitlines(keepends=True)[:100]))
+        with self.assertRaises(curvelax.RunError) as caught:
+            curvelax.load(study.folder).snapshots
+        self.assertIn("incomplete", str(caught.exception))
+
+    def test_warnings_may_be_errors(self):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", curvelax.CurvelaxWarning)
+            with self.assertRaises(curvelax.CurvelaxWarning):
+                curvelax.run(shape=[ellipse(2, 1), ellipse(1, 3)], **SMALL)
+
     def test_wrong_keys_are_refused_with_the_nearest_one(self):
         out = self.at / "keys"
         self.refused("curvs", "did you mean `curves`?", curvs=3, out=out)
@@ -294,9 +390,8 @@ class Package(unittest.TestCase):
         self.refused("did you mean `excess`?", events={"a": "exces <= 1"}, out=out)
         self.refused("amplitude", amplitude=float("nan"), out=out)
         self.refused("nofile.csv", shape="file:nofile.csv", out=out)
-        with self.assertRaises(TypeError) as caught:
-            curvelax.run(curves=object(), out=out)
-        self.assertIn("curves", str(caught.exception))
+        self.refused("curves", "neither a number", curves=object(), out=out)
+        self.assertTrue(self.refused(curves=3.5, out=out).startswith("curves = 3.5: "))
         self.assertFalse(out.exists())
         for folder, word in [(self.study.folder, "exist"), (self.at / "nowhere", "no")]:
             call = curvelax.load if word == "no" else lambda out: curvelax.run(**SMALL, out=out)
@@ -323,6 +418,7 @@ class Package(unittest.TestCase):
         shares = [share for _, _, share in told]
         self.assertEqual(shares, sorted(shares))
         # Members at coarser resolutions count, too.
+        self.assertEqual(told[-1][2], 1)
         self.assertTrue(told and all(done <= total and total >= 400 for done, total, _ in told))
 
     def test_what_progress_raises_ends_the_run(self):
