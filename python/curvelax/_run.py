@@ -160,8 +160,8 @@ def _leave(folder: Path, existed: bool, written: Path | None, kept: Path | None)
     with contextlib.suppress(OSError):
         if written is not None:
             written.unlink(missing_ok=True)
-        if kept is not None:
-            kept.replace(written)
+            if kept is not None:
+                kept.replace(written)
         if folder.is_dir() and not existed:
             folder.rmdir()
 

@@ -218,9 +218,9 @@ class Study:
 
         ax = ax or plt.subplots()[1]
         labels = self._labels()
-        for cell, (time, _, *shares), last in self._run.survival():
+        for cell, (times, _, *shares), last in self._run.survival():
             # To the last time of a member that did not relax.
-            time = [*time, time[-1] if last is None else last]
+            time = [*times, times[-1] if last is None else last]
             survival, lower, upper = ([*share, share[-1]] for share in shares)
             (line,) = ax.step(time, survival, where="post", label=labels.get(cell))
             ax.fill_between(time, lower, upper, step="post", alpha=0.2, color=line.get_color(), linewidth=0)
