@@ -17,7 +17,14 @@ use libfuzzer_sys::fuzz_target;
 
 /// The spec of the seeds, and its first member.
 static START: LazyLock<(Spec, Member)> = LazyLock::new(|| {
-    let spec = Spec { points: 6, curves: 3, amplitude: 0.0.into(), tau: Some(0.05.into()), t_end: Some(0.3.into()), ..Spec::default() };
+    let spec = Spec {
+        points: 6,
+        curves: 3,
+        amplitude: 0.0.into(),
+        tau: Some(0.05.into()),
+        t_end: Some(0.3.into()),
+        ..Spec::default()
+    };
     let spec = spec.validate().expect("a right spec");
     let member = Family::new(&spec).and_then(|family| family.member(0)).expect("a member");
     (spec, member)
