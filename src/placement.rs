@@ -342,14 +342,14 @@ impl Choice {
     /// # Errors
     /// As [`open`](Choice::open).
     pub fn open_for(&self, cohort: &[Cell]) -> Result<(Box<dyn Backend>, Platform)> {
-        self.open_watched(cohort, &Watch::default())
+        self.open_watched(cohort, &OpeningWatch::default())
     }
 
     /// Like [`open_for`](Choice::open_for), under the eyes of `watch`.
     ///
     /// # Errors
     /// As [`open`](Choice::open), and that of the watch.
-    pub fn open_watched(&self, cohort: &[Cell], watch: &Watch) -> Result<(Box<dyn Backend>, Platform)> {
+    pub fn open_watched(&self, cohort: &[Cell], watch: &OpeningWatch) -> Result<(Box<dyn Backend>, Platform)> {
         let curves = cohort.iter().map(|cell| cell.spec.member_count()).sum();
         let whole = Spec { curves, only: None, shard: None, ..cohort[0].spec.clone() };
         self.open_any(&whole, whole.points, watch)
@@ -362,17 +362,22 @@ impl Choice {
     /// # Errors
     /// [`Error::Device`] if a requested GPU cannot be opened or computes wrongly.
     pub fn open(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
-        self.open_any(spec, n, &Watch::default())
+        self.open_any(spec, n, &OpeningWatch::default())
     }
 
-    fn open_any(&self, spec: &Spec, n: usize, watch: &Watch) -> Result<(Box<dyn Backend>, Platform)> {
+    fn open_any(&self, spec: &Spec, n: usize, watch: &OpeningWatch) -> Result<(Box<dyn Backend>, Platform)> {
         match self.precision {
             Precision::F32 => self.open_in::<f32>(spec, n, watch),
             Precision::F64 => self.open_in::<f64>(spec, n, watch),
         }
     }
 
-    fn open_in<T: Vectorised>(&self, spec: &Spec, n: usize, watch: &Watch) -> Result<(Box<dyn Backend>, Platform)> {
+    fn open_in<T: Vectorised>(
+        &self,
+        spec: &Spec,
+        n: usize,
+        watch: &OpeningWatch,
+    ) -> Result<(Box<dyn Backend>, Platform)> {
         let blocks = ring(n)?;
         let method = Method {
             solver: spec.solver(),
@@ -399,16 +404,16 @@ impl Choice {
 }
 
 /// Watches a device being opened.
-pub struct Watch<'a> {
+pub struct OpeningWatch<'a> {
     /// Hears what is waited for, if that takes long.
     pub tell: &'a dyn Fn(&str),
     /// Asked several times a second during the wait; an error ends it.
     pub go_on: &'a dyn Fn() -> Result<()>,
 }
 
-impl Default for Watch<'_> {
+impl Default for OpeningWatch<'_> {
     fn default() -> Self {
-        Watch { tell: &|_| {}, go_on: &|| Ok(()) }
+        OpeningWatch { tell: &|_| {}, go_on: &|| Ok(()) }
     }
 }
 
@@ -424,7 +429,7 @@ fn open_gpu<T: Vectorised>(
     spec: &Spec,
     method: &Method,
     limit: Option<Duration>,
-    watch: &Watch,
+    watch: &OpeningWatch,
 ) -> Result<Box<dyn Backend>> {
     let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
     let adaptive = spec.adaptive.is_some();

@@ -7,7 +7,7 @@ use crate::{
     backend::{Backend, DeviceKind},
     ensemble::{Cell, Ended, Extent, Judged, LevelRow, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish},
     error::{Error, Result},
-    placement::{self, Choice, Platform, Watch},
+    placement::{self, Choice, OpeningWatch, Platform},
     report::RunReport,
     simulate,
     text::quoted,
@@ -132,7 +132,7 @@ fn kept(out: &Path, error: &Error, host: &dyn Host) {
 /// Opens the back end chosen for a cohort.
 fn open(cohort: &[Cell], choice: &Choice, host: &dyn Host) -> Result<(Box<dyn Backend>, Platform)> {
     host.say(&choice.sentence(&cohort[0].spec));
-    let watch = Watch { tell: &|what| host.say(&format!("note: {what}")), go_on: &|| host.go_on() };
+    let watch = OpeningWatch { tell: &|what| host.say(&format!("note: {what}")), go_on: &|| host.go_on() };
     choice.open_watched(cohort, &watch)
 }
 
