@@ -5,7 +5,7 @@
 //! path.
 
 use std::{
-    fs::{self, File},
+    fs::File,
     io,
     path::{Path, PathBuf},
     sync::Arc,
@@ -76,8 +76,8 @@ fn descriptor(_: &File) -> Option<PathBuf> {
 #[cfg(unix)]
 pub fn lies_at(file: &File, path: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
-    let id = |of: fs::Metadata| (of.dev(), of.ino());
-    match fs::metadata(path) {
+    let id = |of: std::fs::Metadata| (of.dev(), of.ino());
+    match std::fs::metadata(path) {
         Ok(there) => Ok(id(file.metadata()?) == id(there)),
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(false),
         Err(e) => Err(e),

@@ -14,7 +14,10 @@ const ISLANDS = ["iceland", "jamaica", "madagascar", "sri-lanka"];
 
 const $ = (id) => document.getElementById(id);
 const state = address.read();
-let compiled, library, dropped = null, later = 0;
+/** Somebody wants nothing to move unasked. */
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+/** The number of the last run: one that still waits for its file gives way to a later one. */
+let compiled, library, dropped = null, later = 0, last = 0;
 const sides = {
   cpu: { label: "CPU, f64", tiles: new Tiles($("cpu"), "--cpu"), says: $("cpu-says") },
   gpu: { label: "GPU, f32", tiles: new Tiles($("gpu"), "--gpu"), says: $("gpu-says") },
@@ -31,6 +34,11 @@ function say(words, wrong = false) {
 function controls() {
   for (const key of Object.keys(address.DEFAULTS).filter((key) => key !== "points")) $(key).value = state[key];
   $("points").value = address.decoded(state.points);
+  // What the controls show is what runs.
+  for (const control of document.querySelectorAll("#settings select, #settings input[type=range]")) {
+    if (control.value === "") control.value = address.DEFAULTS[control.id];
+    state[control.id] = control.type === "range" ? control.valueAsNumber : control.value;
+  }
   shown();
 }
 
@@ -45,20 +53,20 @@ function shown() {
 /** The text of drawn.csv. */
 function table() { return `x,y\n${$("points").value.trim()}\n`; }
 
-/** The file that the shape names, if it does. */
-async function file() {
-  if (state.shape === "drawn") {
+/** The file that this shape names, if it does. */
+async function file(shape) {
+  if (shape === "drawn") {
     if (!$("points").value.trim()) throw new Error("Draw an outline on the pad, or type its points.");
     return { name: "drawn.csv", bytes: new TextEncoder().encode(table()) };
   }
-  if (state.shape === "file") {
+  if (shape === "file") {
     if (!dropped) throw new Error("Choose a file with an outline, or drop one on the page.");
     return dropped;
   }
-  if (!ISLANDS.includes(state.shape)) return null;
-  const answer = await fetch(`${state.shape}.csv`);
-  if (!answer.ok) throw new Error(`${state.shape}.csv: the server answers ${answer.status}`);
-  return { name: `${state.shape}.csv`, bytes: new Uint8Array(await answer.arrayBuffer()) };
+  if (!ISLANDS.includes(shape)) return null;
+  const answer = await fetch(`${shape}.csv`);
+  if (!answer.ok) throw new Error(`${shape}.csv: the server answers ${answer.status}`);
+  return { name: `${shape}.csv`, bytes: new Uint8Array(await answer.arrayBuffer()) };
 }
 
 /** Offers the outline that the command reads, unless the user has its file. */
@@ -71,12 +79,12 @@ function offer(outline) {
   link.textContent = `Save ${outline.name}, which it reads`;
 }
 
-/** The settings as the library takes them. */
-function settings(outline) {
-  const { aspect, petals, flow, lambda, steps, amplitude, n, curves, seed } = state;
+/** The chosen settings as the library takes them. */
+function settings(chosen, outline) {
+  const { shape, aspect, petals, flow, lambda, steps, amplitude, n, curves, seed } = chosen;
   const shapes = { ellipse: `ellipse:${aspect},1`, circle: "circle:1", flower: `flower:${petals}:0.3` };
   return {
-    shape: outline ? `file:${outline.name}` : shapes[state.shape] ?? state.shape,
+    shape: outline ? `file:${outline.name}` : shapes[shape] ?? shape,
     flow: flow === "elastic" ? `elastic:${lambda}` : flow,
     amplitude, n, curves, seed, adaptive: steps !== "fixed",
   };
@@ -86,6 +94,7 @@ function settings(outline) {
 
 function stop() {
   clearTimeout(later);
+  last += 1;
   for (const side of Object.values(sides)) side.worker?.terminate();
   $("stop").disabled = true;
 }
@@ -93,10 +102,13 @@ function stop() {
 async function run() {
   stop();
   delete document.body.dataset.done;
+  const own = last, chosen = { ...state };
+  $("stop").disabled = false;
   let outline, wanted;
   try {
-    outline = await file();
-    wanted = settings(outline);
+    outline = await file(chosen.shape);
+    if (own !== last) return;
+    wanted = settings(chosen, outline);
     library.file = outline;
     const { members, command, warnings } = library.ask({ ask: "check", settings: wanted });
     $("command").textContent = command;
@@ -104,10 +116,12 @@ async function run() {
     $("warnings").textContent = warnings.join(" ");
     say(`${members} members relax.`);
   } catch (error) {
+    if (own !== last) return;
+    $("stop").disabled = $("save").hidden = true;
+    $("command").textContent = $("warnings").textContent = "";
     say(error.message, true);
     return;
   }
-  $("stop").disabled = false;
   $("difference").textContent = "";
   $("members").tBodies[0].replaceChildren();
   for (const [place, side] of Object.entries(sides)) {
@@ -115,11 +129,13 @@ async function run() {
     side.tiles.clear();
     side.tiles.canvas.hidden = false;
     side.says.textContent = "starts …";
-    side.worker = new Worker(new URL("worker.js", import.meta.url), { type: "module" });
-    side.worker.addEventListener("message", ({ data }) => hear(side, data));
-    side.worker.addEventListener("error", (event) => hear(side, { error: event.message || "the worker failed" }));
+    const worker = new Worker(new URL("worker.js", import.meta.url), { type: "module" });
+    const heard = (words) => own === last && hear(side, words);
+    worker.addEventListener("message", ({ data }) => heard(data));
+    worker.addEventListener("error", (event) => heard({ error: event.message || "the worker failed" }));
+    side.worker = worker;
     const precision = place === "gpu" ? "f32" : "f64";
-    side.worker.postMessage({ compiled, settings: { ...wanted, precision }, file: outline, place });
+    worker.postMessage({ compiled, settings: { ...wanted, precision }, file: outline, place });
   }
   Object.assign(draw, { settings: wanted, charted: -Infinity });
 }
@@ -153,9 +169,9 @@ function finish() {
   compare();
   const { cpu } = sides;
   const times = [...cpu.rows.values()].map((row) => row.t_relax).filter((t) => t !== null);
-  if (!$("status").classList.contains("wrong")) {
-    say(`${times.length} of ${cpu.rows.size} members have relaxed.`);
-  }
+  const wrong = $("status").classList.contains("wrong");
+  const relaxed = `${times.length} of ${cpu.rows.size} members have relaxed.`;
+  say(wrong ? `${$("status").textContent} On the CPU, ${relaxed}` : relaxed, wrong);
   document.body.dataset.done = "yes";
 }
 
@@ -233,9 +249,12 @@ function rows() {
 /** Takes over what a control says. */
 function changed({ target }) {
   if (!(target.id in address.DEFAULTS)) return;
-  if (target.id === "points") state.points = address.coded(target.value);
-  else state[target.id] = typeof address.DEFAULTS[target.id] === "number" ? target.valueAsNumber : target.value;
-  if (Number.isNaN(state[target.id])) return say(`${target.id}: not a number`, true);
+  const isNumber = typeof address.DEFAULTS[target.id] === "number";
+  const value = isNumber ? target.valueAsNumber : target.value;
+  if (isNumber && !address.holds(target.id, value)) {
+    return say(`${target.labels[0].textContent}: give a whole number from 0 to ${Number.MAX_SAFE_INTEGER}.`, true);
+  }
+  state[target.id] = target.id === "points" ? address.coded(value) : value;
   address.write(state);
   shown();
   again();
@@ -243,12 +262,19 @@ function changed({ target }) {
 
 function again() {
   clearTimeout(later);
-  later = setTimeout(run, PAUSE);
+  if (still.matches) say("Press Run to start.");
+  else later = setTimeout(run, PAUSE);
 }
 
 async function take(taken) {
   if (!taken) return;
-  dropped = { name: taken.name.replace(/[^\w.-]/g, "_"), bytes: new Uint8Array(await taken.arrayBuffer()) };
+  try {
+    // The name stands in a command, in quotes.
+    const name = taken.name.replace(/[^\p{L}\p{N} ._()-]/gu, "_").replace(/^\.+/, "_");
+    dropped = { name, bytes: new Uint8Array(await taken.arrayBuffer()) };
+  } catch (error) {
+    return say(`${taken.name}: it cannot be read (${error.message}).`, true);
+  }
   state.shape = $("shape").value = "file";
   address.write(state);
   shown();
@@ -262,9 +288,10 @@ async function begin() {
   compiled = await WebAssembly.compile(await fetched.arrayBuffer());
   library = await Instance.of(compiled);
   controls();
+  document.querySelectorAll("#settings fieldset, #run").forEach((part) => { part.disabled = false; });
   $("settings").addEventListener("input", changed);
   $("settings").addEventListener("submit", (event) => { event.preventDefault(); run(); });
-  $("stop").addEventListener("click", () => { stop(); say("Stopped."); });
+  $("stop").addEventListener("click", () => { stop(); say("Stopped."); $("run").focus(); });
   $("copy").addEventListener("click", () =>
     navigator.clipboard.writeText($("command").textContent).then(() => say("Copied."), () => say("Not copied.", true)));
   $("file").addEventListener("change", ({ target }) => take(target.files[0]));
@@ -282,8 +309,7 @@ async function begin() {
   });
   requestAnimationFrame(draw);
   document.body.dataset.loaded = Math.round(performance.now());
-  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-  if (still) say("Nothing moves until you press Run, as your system asks for.");
+  if (still.matches) say("Nothing moves until you press Run, as your system asks for.");
   else run();
 }
 

@@ -1,5 +1,11 @@
 // Not a module, since browsers load modules from web servers only.
 "use strict";
+// A script that is not there.
+addEventListener("error", ({ target }) => {
+  if (target instanceof HTMLScriptElement) {
+    document.getElementById("status").textContent = "A part of this page is missing; load it again, or build it again.";
+  }
+}, true);
 addEventListener("DOMContentLoaded", () => {
   const status = document.getElementById("status");
   if (location.protocol === "file:") {

@@ -31,13 +31,18 @@ export function pointsOf(table) {
 /** A table that fits an address well. */
 export function snapped(points) { return lines(unpacked(packed(points))); }
 
-/** A table for an address, packed if nothing is lost. */
+/** A table for an address, packed if nothing is lost; else as it is, after "=". */
 export function coded(table) {
   const short = packed(pointsOf(table));
-  return lines(unpacked(short)) === table.trim() ? short : table.trim().replaceAll("\n", ";");
+  return lines(unpacked(short)) === table.trim() ? short : `=${table.trim()}`;
 }
 
-export function decoded(text) { return /[^0-9a-z]/.test(text) ? text.replaceAll(";", "\n") : lines(unpacked(text)); }
+export function decoded(text) { return text.startsWith("=") ? text.slice(1) : lines(unpacked(text)); }
+
+/** Whether a key may have this number. */
+export function holds(key, number) {
+  return WHOLE.includes(key) ? Number.isSafeInteger(number) && number >= 0 : Number.isFinite(number);
+}
 
 /** Reads the fragment; what is missing or no number has its default. */
 export function read() {
@@ -46,7 +51,7 @@ export function read() {
     const text = given.get(key), own = DEFAULTS[key];
     if (text === null || typeof own !== "number") return text ?? own;
     const number = text.trim() ? Number(text) : NaN;
-    return (WHOLE.includes(key) ? Number.isSafeInteger(number) && number >= 0 : Number.isFinite(number)) ? number : own;
+    return holds(key, number) ? number : own;
   };
   return Object.fromEntries(Object.keys(DEFAULTS).map((key) => [key, value(key)]));
 }
