@@ -193,7 +193,7 @@ def _bar(progress: bool | Progress | None) -> Iterator[Progress]:
             progress(*state)
 
         yield tell
-        if 0 < last[1] and last[2] < 1.0:
+        if last[0] < last[1] or last[2] < 1.0:
             progress(last[1], last[1], 1.0)
         return
     wanted = progress if progress is not None else _is_watched()
