@@ -2,7 +2,14 @@
 
 use std::{fmt::Display, path::Path};
 
-use curvelax::{Error, ensemble::Spec, ensemble::spec::DEFAULT_ADAPTIVE};
+use curvelax::{
+    Error,
+    ensemble::{
+        Spec,
+        spec::DEFAULT_ADAPTIVE,
+        sweep::{EXCLUSIVE, check_not_given},
+    },
+};
 use pyo3::{
     prelude::*,
     types::{PyBool, PyDict, PyFloat, PyInt, PyString},
@@ -13,9 +20,6 @@ use crate::raise;
 
 /// Deepest list in a list.
 const DEEPEST: usize = 4;
-/// Keys of which one takes the place of the other.
-const EXCLUDING: [(&str, &str); 4] =
-    [("tau", "adaptive"), ("adaptive", "tau"), ("relax-to", "relax-at"), ("relax-at", "relax-to")];
 
 /// A spec as keywords give it.
 pub struct Keys {
@@ -66,16 +70,10 @@ impl Keys {
         }
         // A keyword overrides the file, including the key that it excludes.
         let is_given = |key: &str| given.iter().any(|given| given == key);
-        for (_, other) in EXCLUDING.iter().filter(|(one, other)| is_given(one) && !is_given(other)) {
-            table.remove(*other);
+        for pair in EXCLUSIVE.iter().filter(|pair| pair.iter().any(|key| is_given(key))) {
+            pair.iter().filter(|key| !is_given(key)).for_each(|key| drop(table.remove(*key)));
         }
-        for key in swept.keys() {
-            let pair = EXCLUDING.iter().find(|(one, other)| one == key && is_given(other)).map(|(_, other)| *other);
-            if let Some(other) = pair.or(is_given(key).then_some(key)) {
-                let problem = format!("sweep {key}: {other} is given, too, and its value would be lost; leave one out");
-                return refuse(py, problem);
-            }
-        }
+        swept.keys().try_for_each(|key| check_not_given(key, &given)).map_err(|error| raise(py, error, None))?;
         if !swept.is_empty() {
             match table.entry("sweep").or_insert_with(|| Table::new().into()) {
                 Value::Table(all) => all.extend(swept),

@@ -13,7 +13,7 @@ use crate::{
     ensemble::{
         Drawn, Event, Shard, Spec,
         spec::{BackendChoice, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau, Units},
-        sweep::SweepAxis,
+        sweep::{self, SweepAxis},
     },
     error::{Error, Result},
     flow::Flow,
@@ -290,9 +290,6 @@ macro_rules! every_flag {
     };
 }
 
-/// Keys of which each replaces the other.
-const EXCLUSIVE: [[&str; 2]; 2] = [["tau", "adaptive"], ["relax-to", "relax-at"]];
-
 impl SpecFlags {
     /// Checks that no key is given by two flags. A sweep may replace a single value of the spec file.
     ///
@@ -306,18 +303,7 @@ impl SpecFlags {
             )));
         }
         let given = self.given();
-        for SweepAxis { key, .. } in &self.sweep {
-            let replaced = |other: &&String| {
-                *other == key
-                    || EXCLUSIVE.iter().any(|pair| pair.contains(&key.as_str()) && pair.contains(&other.as_str()))
-            };
-            if let Some(other) = given.iter().find(replaced) {
-                return Err(Error::Request(format!(
-                    "--sweep {key}: --{other} is given, too, and its value would be lost; leave one of them out"
-                )));
-            }
-        }
-        Ok(())
+        self.sweep.iter().try_for_each(|axis| sweep::check_not_given(&axis.key, &given))
     }
 
     /// The keys given as flags, without those that are swept.

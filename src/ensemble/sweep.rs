@@ -36,6 +36,8 @@ const COMMON: [&str; 20] = [
     "max-sweeps",
     "units",
 ];
+/// Keys of which each replaces the other.
+pub const EXCLUSIVE: [[&str; 2]; 2] = [["tau", "adaptive"], ["relax-to", "relax-at"]];
 /// More cells than this are a typing error.
 pub const MAX_CELLS: u64 = 10_000;
 
@@ -54,6 +56,21 @@ pub struct SweepAxis {
     pub key: String,
     /// Its values: numbers, words or booleans.
     pub values: Vec<Value>,
+}
+
+/// Checks that neither the swept `key` nor one that it replaces is among the keys `given` beside the sweep.
+///
+/// # Errors
+/// [`Error::Request`] naming the key whose value would be lost.
+pub fn check_not_given(key: &str, given: &[String]) -> Result<()> {
+    let replaced = |other: &&String| {
+        *other == key || EXCLUSIVE.iter().any(|pair| pair.contains(&key) && pair.contains(&other.as_str()))
+    };
+    given.iter().find(replaced).map_or(Ok(()), |other| {
+        Err(Error::Request(format!(
+            "--sweep {key}: --{other} is given, too, and its value would be lost; leave one of them out"
+        )))
+    })
 }
 
 impl SweepAxis {
