@@ -254,6 +254,11 @@ impl Choice {
         self.precision
     }
 
+    /// Returns whether the members are advanced by software that acts as a GPU.
+    pub fn is_software_gpu(&self) -> bool {
+        self.device.gpu().is_some_and(|gpu| !gpu.is_hardware())
+    }
+
     /// Describes the choice in one line: what was chosen and why, and which solver.
     pub fn sentence(&self, spec: &Spec) -> String {
         format!("{}; {}", self.place(), spec.solver().facts().title)

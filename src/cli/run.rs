@@ -50,7 +50,7 @@ pub struct RunArgs {
     resume: bool,
     #[command(flatten)]
     manner: MannerFlags,
-    /// Predict memory, disk space, steps and time of the run from a pilot of about two seconds, and stop
+    /// Predict memory, disk space, steps and time of the run from a pilot of some two seconds of work, and stop
     #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
     dry_run: bool,
     /// Print the resolved spec and stop
@@ -63,8 +63,8 @@ pub fn run(args: RunArgs) -> Result<()> {
     let spec = resolve(args.spec, args.flags)?;
     let asked = spec.backend;
     let runs = !(args.print_spec || args.dry_run);
-    // Rounds take time, too.
-    let manner = if spec.accuracy.is_some() && runs { Some(args.manner.manner()?) } else { None };
+    // Rounds and pilots take time, too.
+    let manner = if spec.accuracy.is_some() || args.dry_run { Some(args.manner.manner()?) } else { None };
     // A name that cannot be used is told before the rounds, which may take minutes.
     if let (true, Some(out)) = (runs && !args.resume, &args.out) {
         OutputFolder::check_place(out, args.force)?;
@@ -78,7 +78,11 @@ pub fn run(args: RunArgs) -> Result<()> {
     work.study.note().into_iter().for_each(|note| flags.say(&format!("note: {note}")));
     if args.dry_run {
         work.study.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
-        let estimate = Estimate::new(&work.study, work.choices, flags.checkpoint_every())?;
+        let stopped = || {
+            let (cause, _) = manner.as_ref()?.stop.asked()?;
+            Some(cause.error(" in the pilot: nothing is saved"))
+        };
+        let estimate = Estimate::new(&work.study, work.choices, flags.checkpoint_every(), &stopped)?;
         return match (flags.json, flags.quiet) {
             (true, _) => print_json(&estimate),
             (false, false) => print(&dry_run::table(&estimate, &work.study.cells()[0].spec)),

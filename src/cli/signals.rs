@@ -40,16 +40,21 @@ pub fn watch(stop: &Stop, most: Option<Duration>) -> Result<()> {
             // The clock is gone if the process is ending.
             let _ = ask.send(());
         });
-        if let Some(cause) = to_stop.asked().map(|(cause, _)| cause) {
+        if let Some(error) = last_word(&to_stop) {
             // The clock does not wait for the message, as nobody may read it.
-            note(&format!("error: {}", last_word(cause)));
+            note(&format!("error: {error}"));
         }
     })?;
     Ok(())
 }
 
-fn last_word(cause: Cause) -> crate::Error {
-    cause.error(" at once; curvelax resume continues from the last checkpoint")
+/// The error of a process that is ended, if it was asked to stop.
+fn last_word(stop: &Stop) -> Option<crate::Error> {
+    let (cause, _) = stop.asked()?;
+    Some(cause.error(match stop.has_begun() {
+        true => " at once; curvelax resume continues from the last checkpoint",
+        false => " at once: nothing is saved",
+    }))
 }
 
 /// Waits until the run is `asked` to stop or `most` is over, and then for its end. When time is up, whatever is still
@@ -65,10 +70,10 @@ fn clock(stop: &Stop, asked: &Receiver<()>, most: Option<Duration>, ears: system
         Err(RecvTimeoutError::Timeout) => {}
         Err(RecvTimeoutError::Disconnected) => return,
     }
-    if let Some((cause, _)) = stop.asked() {
+    if let Some(error) = last_word(stop) {
         ears.close();
         thread::sleep(LAST_WORD);
-        system::exit(last_word(cause).exit_code());
+        system::exit(error.exit_code());
     }
 }
 

@@ -127,6 +127,7 @@ impl RunReport {
 
     fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, manner: Manner) -> RunReport {
         let Manner { progress, every, stop, patience } = manner;
+        stop.set_begun();
         RunReport {
             growing,
             folder,

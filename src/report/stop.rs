@@ -50,6 +50,7 @@ pub struct Stop(Arc<Inner>);
 #[derive(Debug, Default)]
 struct Inner {
     asked: OnceLock<(Cause, Instant)>,
+    begun: AtomicBool,
     kept: AtomicBool,
 }
 
@@ -62,6 +63,16 @@ impl Stop {
     /// Why and when it was asked.
     pub fn asked(&self) -> Option<(Cause, Instant)> {
         self.0.asked.get().copied()
+    }
+
+    /// Whether there is a run that can be resumed; before it, nothing is saved.
+    pub fn has_begun(&self) -> bool {
+        self.0.begun.load(Ordering::Acquire)
+    }
+
+    /// Records that a run has begun.
+    pub(super) fn set_begun(&self) {
+        self.0.begun.store(true, Ordering::Release);
     }
 
     /// Whether all results finished when the run was asked to stop are saved.

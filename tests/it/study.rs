@@ -1,8 +1,6 @@
 //! Studies from outside: cells, their members and their tables.
 
-mod common;
-
-use common::program::{Done, FILES, run, run_with};
+use crate::common::program::{Done, FILES, run, run_with};
 
 const BASE: &str = "--curves 5 --points 34 --t-end 0.05 --series 0.02 --snapshots 0.03 --adaptive=1e-3";
 

@@ -1,15 +1,13 @@
 //! Numbers at the ends of their ranges: seeds beyond the integers of TOML, curves and times beyond those of a
 //! precision. Each is refused before the run, or ends its member with a status; everything written reads back.
 
-mod common;
-
 use std::{
     fs,
     path::Path,
     process::{Command, Output},
 };
 
-use common::program::{Row, number, run_with};
+use crate::common::program::{Row, number, run_with};
 use tempfile::TempDir;
 
 /// The first seed that is not a number in TOML, and the last of all.

@@ -1,10 +1,8 @@
 //! The page and the plots of a run, from outside.
 
-mod common;
-
 use std::fs;
 
-use common::program::{Done, run, run_with};
+use crate::common::program::{Done, run, run_with};
 
 const RUN: &str = "--curves 7 --points 40 --adaptive=1e-3 --t-end 1";
 

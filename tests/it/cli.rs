@@ -1,7 +1,5 @@
 //! The program's conventions: JSON, exit codes, `--max-time`, the dry run, completions, the man page.
 
-mod common;
-
 use std::{
     fs,
     path::Path,
@@ -9,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::program::{number, run};
+use crate::common::program::{number, run};
 use serde_json::Value;
 use tempfile::TempDir;
 

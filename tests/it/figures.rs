@@ -1,7 +1,5 @@
 //! The paper's figures: their files, that they show the data, and that the pictures in the docs are the same.
 
-mod common;
-
 use std::{fs, path::Path, process::Output};
 
 use assert_cmd::Command;
@@ -13,7 +11,7 @@ use curvelax::{
 use glam::DVec2;
 use tempfile::TempDir;
 
-use common::program::{Row, column, positions};
+use crate::common::program::{Row, column, positions};
 
 fn figure(folder: &Path, arguments: &str) -> Output {
     let mut command = Command::cargo_bin("curvelax").unwrap();

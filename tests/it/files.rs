@@ -1,7 +1,5 @@
 //! The tables of a run: output times, columns, numbers that read back, specs that repeat a run.
 
-mod common;
-
 use assert_cmd::Command;
 use curvelax::{
     backend::cpu::CpuBackend,
@@ -13,7 +11,7 @@ use curvelax::{
 use glam::DVec2;
 use tempfile::TempDir;
 
-use common::{
+use crate::common::{
     SWEEPS,
     program::{Row, column, number, positions, run, run_with},
 };

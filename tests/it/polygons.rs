@@ -1,8 +1,6 @@
 //! Random simple polygons: the guarantees of the generator, and their treatment as outlines.
 
-mod common;
-
-use common::polygons::{self, CORNERS, Family};
+use crate::common::polygons::{self, CORNERS, Family};
 use curvelax::{
     curve::{Shape, crossing, polygon},
     ensemble::{Family as Ensemble, Member, Mollified, Spec, mollifier::MAX_VERTEX_TURN},

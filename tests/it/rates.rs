@@ -1,10 +1,8 @@
 //! Decay rates and the mean excess of a run, from outside: against the definition and against theory.
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::program::{Done, Row, column, number, run};
+use crate::common::program::{Done, Row, column, number, run};
 
 /// Fraction of all members whose rate is within 2 % of the theoretical one, which `theory` recomputes.
 fn share_as_in_theory(done: &Done, theory: impl Fn(f64) -> f64) -> f64 {

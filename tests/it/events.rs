@@ -1,11 +1,9 @@
 //! Events of one's own: found where a fine series of the same members has them, to the order of the steps.
 
-mod common;
-
 use std::fs;
 
+use crate::common::program::{Done, Row, number, run};
 use assert_cmd::Command;
-use common::program::{Done, Row, number, run};
 use tempfile::TempDir;
 
 /// Members whose shortest and largest curvature, length and excess pass levels at different times.

@@ -1,11 +1,9 @@
 //! Ensembles of outlines, as a user meets them: every outline a member with its label, copies of them, groups, and what
 //! is refused.
 
-mod common;
-
 use std::{collections::BTreeMap, f64::consts::TAU, fs, path::Path};
 
-use common::command::{curvelax, done};
+use crate::common::command::{curvelax, done};
 use tempfile::TempDir;
 
 /// Outlines in the files of [`home`].

@@ -1,14 +1,12 @@
 //! Movies of finished runs.
 
-mod common;
-
 use std::{
     fs,
     path::Path,
     process::{Command, Output},
 };
 
-use common::program::{Done, run};
+use crate::common::program::{Done, run};
 use gif::{DisposalMethod, Repeat};
 
 /// Members that relax at different times.

@@ -3,8 +3,6 @@
 //! Bounds are slightly above the measured values; each comparison has a control that fails it. Runs are on the CPU,
 //! solved directly, in f64, unless noted.
 
-mod common;
-
 use std::{collections::BTreeMap, f64::consts::TAU, time::Instant};
 
 use curvelax::{
@@ -34,7 +32,7 @@ use curvelax::{
 use glam::DVec2;
 use rayon::prelude::*;
 
-use common::{DIRECT, dumbbell, file, polygons, wavy_circle};
+use crate::common::{DIRECT, dumbbell, file, polygons, wavy_circle};
 
 /// An unperturbed curve with adaptive steps, solved directly.
 fn adaptive(shape: &str, points: usize) -> Spec {
@@ -550,18 +548,18 @@ fn extrapolate(run: &mut Run<f64>, t: f64, steps: u32, order: u32) {
 #[test]
 fn extrapolated_steps_have_their_orders() {
     let (circle, mode) = (wavy_circle(100, 1.0, 2, 0.0), wavy_circle(100, 1.0, 3, 1e-4));
-    let radius: fn(&[DVec2]) -> f64 = common::radius;
+    let radius: fn(&[DVec2]) -> f64 = crate::common::radius;
     for (name, flow, nodes, settling, t, measure) in [
         (
             "an ellipse's length",
             Flow::SurfaceDiffusion,
-            common::ellipse(100),
+            crate::common::ellipse(100),
             0.1,
             0.4,
             polygon::length as fn(&[DVec2]) -> f64,
         ),
         ("the Willmore circle", Flow::Willmore, circle, 0.0, 1.0, radius),
-        ("a small mode", Flow::SurfaceDiffusion, mode, 0.0, 1.0 / 72.0, |nodes| common::mode(nodes, 3)),
+        ("a small mode", Flow::SurfaceDiffusion, mode, 0.0, 1.0 / 72.0, |nodes| crate::common::mode(nodes, 3)),
     ] {
         // The fast initial times of the spacing, which no step here resolves, are passed first.
         let mut start = unbounded(&nodes, &flow);

@@ -1,10 +1,8 @@
 //! What was drawn for members, their shape at the start, and what of it explains their times.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::program::{Row, column, number, positions, run};
+use crate::common::program::{Row, column, number, positions, run};
 use glam::DVec2;
 
 const SHAPE: &str = "excess_start,energy_start,k_min_start,k_max_start,descriptor_2,descriptor_3,descriptor_4,\

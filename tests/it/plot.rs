@@ -1,7 +1,5 @@
 //! Pictures drawn again from the files of a run.
 
-mod common;
-
 use std::{
     collections::BTreeMap,
     fs,
@@ -9,8 +7,8 @@ use std::{
     process::Output,
 };
 
+use crate::common::program::{Done, run};
 use assert_cmd::Command;
-use common::program::{Done, run};
 
 /// A run with everything that `plot` reads: two cells, a series, and members that stay unfinished.
 const RUN: &str = "--curves 3 --points 32 --adaptive=1e-3 --t-end 0.4 --series 0.1 --sweep omega=1,2 --event convex=k_min>=0 \

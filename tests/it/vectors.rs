@@ -1,8 +1,6 @@
 //! Members side by side in vector instructions against one member at a time: the same bits, whatever runs next to a
 //! member, on any number of threads. Each comparison has a negative control.
 
-mod common;
-
 use curvelax::{
     Result,
     backend::{

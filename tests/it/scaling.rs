@@ -1,12 +1,10 @@
 //! A curve scaled by s gives the same results with times scaled by s⁴, whatever s: in metres as in nanometres.
 
-mod common;
-
 use std::{fs, path::Path};
 
 use glam::DVec2;
 
-use common::program::{Done, Row, number, run_with};
+use crate::common::program::{Done, Row, number, run_with};
 
 /// A power of two loses no bits.
 const EXACT: [f64; 5] = [1.0, 9.313225746154785e-10, 0.125, 1024.0, 1073741824.0];
@@ -44,7 +42,7 @@ fn outline(points: &[DVec2], s: f64) -> String {
 }
 
 fn nonconvex() -> Vec<DVec2> {
-    common::nodes(300, |u| {
+    crate::common::nodes(300, |u| {
         let (sine, cosine) = u.sin_cos();
         let bays = sine * (0.2 + sine * (3.0 * u).sin().powi(2));
         DVec2::new(cosine, 0.5 * sine + cosine.sin() + bays)

@@ -79,7 +79,7 @@ fn every_shader_is_valid_in_both_precisions() {
 fn an_error_names_the_shader_file_and_line() {
     let source = shader::source::<f32>(SWEEPS).replacen("fn pull() {", "fn pull() { nonsense;", 1);
     let message = validated(&source, SWEEPS, Capabilities::empty()).unwrap_err();
-    let line = include_str!("../shaders/pull.wgsl").lines().position(|line| line == "fn pull() {").unwrap() + 1;
+    let line = include_str!("../../shaders/pull.wgsl").lines().position(|line| line == "fn pull() {").unwrap() + 1;
     assert!(message.starts_with(&format!("pull.wgsl:{line}:")), "{message}");
 }
 

@@ -1,7 +1,5 @@
 //! Ensembles through the program and the library: repetition, events, statuses, input.
 
-mod common;
-
 use std::{collections::HashMap, fs, path::Path};
 
 use assert_cmd::Command;
@@ -14,7 +12,7 @@ use curvelax::{
 use glam::DVec2;
 use tempfile::TempDir;
 
-use common::{
+use crate::common::{
     DIRECT, SWEEPS, distance, nodes,
     program::{Done, FILES, Row, number, positions, run, run_with},
 };

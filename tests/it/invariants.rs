@@ -3,8 +3,6 @@
 //!
 //! Every test prints its measurements.
 
-mod common;
-
 use std::f64::consts::TAU;
 
 use curvelax::{
@@ -27,7 +25,7 @@ use curvelax::{
 };
 use glam::DVec2;
 
-use common::{DIRECT, SWEEPS, Stepper, distance, ellipse, nodes};
+use crate::common::{DIRECT, SWEEPS, Stepper, distance, ellipse, nodes};
 
 /// Stores the only member of a run.
 struct Last(Option<Ended>);

@@ -1,10 +1,8 @@
 //! `snapshots.zarr` from outside: the files in the folder, their bytes, and the effects of a failed run.
 
-mod common;
-
 use std::{collections::BTreeMap, fs, path::Path};
 
-use common::program::{Done, number, run};
+use crate::common::program::{Done, number, run};
 use curvelax::ensemble::Spec;
 use serde_json::Value;
 
@@ -80,7 +78,7 @@ fn equal_runs_give_equal_bytes_and_the_spec_in_the_store_repeats_them() {
     let group: Value = serde_json::from_slice(&bytes["zarr.json"]).unwrap();
     let text = group["attributes"]["spec"].as_str().unwrap();
     Spec::from_toml(text).unwrap();
-    assert!(store(&common::program::run_with(&[("spec.toml", text)], "spec.toml")) == bytes);
+    assert!(store(&crate::common::program::run_with(&[("spec.toml", text)], "spec.toml")) == bytes);
 }
 
 #[test]

@@ -1,11 +1,9 @@
 //! Distributions in the spec, as a user meets them: what is refused, and that a member is the same in any shard, alone,
 //! after an interruption and on a GPU.
 
-mod common;
-
 use std::{collections::BTreeMap, fs, path::Path};
 
-use common::command::{curvelax, done};
+use crate::common::command::{curvelax, done};
 use curvelax::{
     backend::gpu::Gpu,
     curve::Shape,

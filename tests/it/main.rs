@@ -1,0 +1,40 @@
+//! The tests that need nothing of their own process: one program, so that the library is linked once. A file is a module,
+//! and `cargo test --release --test it MODULE::` runs its tests.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod animate;
+mod bad_input;
+mod bench;
+mod cli;
+mod convergence;
+mod distributions;
+mod documents;
+mod ensemble;
+mod events;
+mod explained;
+mod extremes;
+mod figures;
+mod files;
+mod folder;
+mod interrupted;
+mod invariants;
+mod modules_depend_downward;
+mod outlines;
+mod plot;
+mod polygons;
+mod rates;
+mod reference;
+mod refine;
+mod relaxation;
+mod report;
+mod rows;
+mod scaling;
+mod shaders;
+mod shards;
+mod statistics;
+mod store;
+mod study;
+mod twins;
+mod vectors;
