@@ -14,6 +14,10 @@ use crate::{
     solver::{Blocks, Solver, Solves, by_solver},
 };
 
+/// Fuzzing (`fuzz/run`) advances no member, and would take minutes to count the branches of the vector code. Tests in
+/// this library would take as long to compile it again; tests/it/vectors.rs compares it with one member at a time.
+const WITHOUT_VECTORS: bool = cfg!(any(fuzzing, test));
+
 /// Vector instructions for members side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Vectors {
@@ -31,11 +35,12 @@ impl Vectors {
     /// All variants, the widest last.
     pub const ALL: [Vectors; 4] = [Vectors::None, Vectors::Bits128, Vectors::Bits256, Vectors::Bits512];
 
-    /// Returns whether this processor has them.
+    /// Returns whether this processor has them, and this program the code for them.
     pub fn are_available(self) -> bool {
         #[cfg(target_arch = "x86_64")]
         match self {
             Vectors::None => true,
+            _ if WITHOUT_VECTORS => false,
             Vectors::Bits128 => pulp::x86::V2::is_available(),
             Vectors::Bits256 => pulp::x86::V3::is_available(),
             Vectors::Bits512 => pulp::x86::V4::is_available(),
@@ -91,8 +96,7 @@ vectorised!(f64 f32);
 fn crew_by<M: Solves, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Crew<T>>> {
     match vectors {
         Vectors::None => Some(Teams::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
-        // Fuzzing (`fuzz/run`) advances no member, and would take minutes to count the branches of all this code.
-        _ if cfg!(fuzzing) => None,
+        _ if WITHOUT_VECTORS => None,
         #[cfg(target_arch = "x86_64")]
         Vectors::Bits128 if M::FACTS.sweeps => abreast::<_, M, T, 1>(pulp::x86::V2::try_new(), blocks, threads),
         #[cfg(target_arch = "x86_64")]

@@ -2,19 +2,17 @@
 //!
 //! The browser is Chromium or Chrome, without a network.
 
-mod common;
-
 use std::{
     fs,
     path::{Path, PathBuf},
     process::ExitCode,
 };
 
-use common::{
+use crate::common::{
     browser::{browser, headless},
     program::{Done, run},
 };
-use libtest_mimic::{Arguments, Trial};
+use libtest_mimic::Trial;
 
 /// Members that move for a while, one that never relaxes, a series and two cells: a page with everything that a page
 /// can have.
@@ -23,8 +21,8 @@ const RUN: &str = "--curves 4 --points 40 --adaptive=1e-3 --t-end 0.5 --series 0
 /// A name and a test.
 type Test = (&'static str, fn(&Path));
 
-fn main() -> ExitCode {
-    let arguments = Arguments::from_args();
+/// The tests; without a browser they are ignored.
+pub fn trials() -> Vec<Trial> {
     let browser = browser();
     match &browser {
         Some(path) => eprintln!("browser: {}", path.display()),
@@ -48,7 +46,7 @@ fn main() -> ExitCode {
         });
         trial.with_ignored_flag(missing)
     });
-    libtest_mimic::run(&arguments, trials.into()).exit_code()
+    trials.into()
 }
 
 /// A page after its script has run.

@@ -5,9 +5,8 @@
 //! - spirv-val judges what naga makes of them for Vulkan.
 //! - ACO, AMD's compiler in Mesa, says whether their values fit into registers.
 
-mod common;
 #[allow(dead_code)] // its main function
-#[path = "../examples/kernels.rs"]
+#[path = "../../examples/kernels.rs"]
 mod kernels;
 
 use std::{
@@ -15,15 +14,15 @@ use std::{
     fs,
     io::{BufRead, BufReader},
     path::Path,
-    process::{Command, ExitCode, Stdio},
+    process::{Command, Stdio},
 };
 
-use common::browser::{browser, headless};
+use crate::common::browser::{browser, headless};
 use curvelax::{
     backend::gpu::{Variant, shader},
     solver::{Blocks, Solver},
 };
-use libtest_mimic::{Arguments, Trial};
+use libtest_mimic::Trial;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use serde::{Deserialize, Serialize};
 
@@ -80,8 +79,8 @@ struct Verdict {
     error: Option<String>,
 }
 
-fn main() -> ExitCode {
-    let arguments = Arguments::from_args();
+/// The tests, of which those are ignored whose compiler is missing.
+pub fn trials() -> Vec<Trial> {
     let browser = browser();
     let mut trials = Vec::new();
     let mut add = |name: &str, needed: bool, test: Box<dyn FnOnce() + Send>| {
@@ -105,7 +104,7 @@ fn main() -> ExitCode {
          gcc)",
         browser.map_or("none".into(), |path| path.display().to_string())
     );
-    libtest_mimic::run(&arguments, trials).exit_code()
+    trials
 }
 
 /// Whether a program can be started.

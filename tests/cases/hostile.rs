@@ -1,23 +1,22 @@
 //! The program on adapters that open but fail: they compute wrongly, compile for ever, are lost or hang, or hold little.
 //!
-//! Each is a real Vulkan driver, lavapipe or SwiftShader, behind `hostile/driver.c`, which passes all calls on but does
+//! Each is a real Vulkan driver, lavapipe or SwiftShader, behind `driver.c`, which passes all calls on but does
 //! one thing badly and calls itself hardware. The program is the one that users get: `--backend auto` must end on the CPU
 //! with one note, and `--backend gpu` with one error.
 //!
 //! Nothing depends on the speed of the machine. What never ends is waited for as long as the program says: two minutes.
 
-mod common;
-
 use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
-    process::{Command, ExitCode, Output, Stdio},
+    process::{Command, Output, Stdio},
     sync::OnceLock,
 };
 
-use common::program::Row;
-use libtest_mimic::{Arguments, Failed, Trial};
+use crate::common::program::Row;
+use crate::may_lack_gpu;
+use libtest_mimic::{Failed, Trial};
 use tempfile::TempDir;
 
 type Outcome = Result<(), Failed>;
@@ -30,9 +29,6 @@ const MIDWAY: &str = "40";
 
 /// An addition that the members of the self-test need.
 const ADDITION: &str = "40";
-
-/// Trials at once: most wait, for a compiler or for nothing.
-const ABREAST: usize = 4;
 
 /// A driver behind the hostile one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,10 +72,9 @@ impl Driver {
     }
 }
 
-fn main() -> ExitCode {
-    let mut arguments = Arguments::from_args();
-    arguments.test_threads.get_or_insert(ABREAST);
-    let allowed = std::env::var("ALLOW_NO_GPU").is_ok_and(|value| value == "1");
+/// The tests; without lavapipe they fail, unless that is allowed.
+pub fn trials() -> Vec<Trial> {
+    let allowed = may_lack_gpu();
     let compiles = Path::new("/usr/include/vulkan/vulkan.h").exists()
         && Command::new("cc").arg("--version").stdout(Stdio::null()).status().is_ok_and(|status| status.success());
     let mut trials = Vec::new();
@@ -104,7 +99,7 @@ fn main() -> ExitCode {
     eprintln!(
         "ignored tests lack a driver or a C compiler (Debian: mesa-vulkan-drivers, chromium, gcc, libvulkan-dev)"
     );
-    libtest_mimic::run(&arguments, trials).exit_code()
+    trials
 }
 
 fn require(holds: bool, otherwise: impl FnOnce() -> String) -> Outcome {
@@ -117,7 +112,7 @@ fn compiled() -> &'static Path {
     let folder = FOLDER.get_or_init(|| {
         let folder = TempDir::new().unwrap();
         let library = folder.path().join("libhostile.so");
-        let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/hostile/driver.c");
+        let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cases/driver.c");
         let mut command = Command::new("cc");
         command.args(["-Wall", "-Wextra", "-Werror", "-O1", "-shared", "-fPIC", "-o"]).arg(&library).arg(source);
         assert!(command.arg("-ldl").status().unwrap().success());

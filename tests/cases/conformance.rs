@@ -6,8 +6,10 @@
 use std::{
     io::{BufRead, BufReader, Write},
     process::Stdio,
+    sync::atomic::{AtomicU64, Ordering},
 };
 
+use crate::may_lack_gpu;
 use curvelax::{
     backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
@@ -29,7 +31,7 @@ use curvelax::{
     solver::{Blocks, Solver},
 };
 use glam::DVec2;
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 
 /// The sizes: the two smallest, a power of two, divisible by 3, by 4, a prime, every remainder modulo 4 (the number of
 /// blocks of three), and one beyond 64 threads.
@@ -44,16 +46,18 @@ const ONE_SUBGROUP: [usize; 6] = [6, 7, 28, 29, 30, 32];
 
 type Outcome = Result<(), Failed>;
 
-fn main() {
-    let arguments = Arguments::from_args();
+/// Cases that have passed.
+static PASSED: AtomicU64 = AtomicU64::new(0);
+
+/// The cases of all adapters.
+pub fn trials() -> Vec<Trial> {
     let found = Gpu::list();
-    let allowed = std::env::var("ALLOW_NO_GPU").is_ok_and(|value| value == "1");
     let mut trials = Vec::new();
     if found.is_empty() {
         let missing = || -> Outcome {
             Err("no GPU adapter: install one (Debian: mesa-vulkan-drivers), or set ALLOW_NO_GPU=1".into())
         };
-        trials.push(Trial::test("an adapter is there", missing).with_ignored_flag(allowed));
+        trials.push(Trial::test("an adapter is there", missing).with_ignored_flag(may_lack_gpu()));
     }
     for (index, gpu) in found.iter().enumerate() {
         println!("adapter {index}: {} ({}, {})", gpu.name(), gpu.device_type(), gpu.driver());
@@ -65,14 +69,12 @@ fn main() {
     if !found.is_empty() {
         trials.push(Trial::test("the program says which kernel it compares before it compiles it", check_tells));
     }
-    let conclusion = libtest_mimic::run(&arguments, trials);
-    println!("conformance cases: {}", conclusion.num_passed);
-    record(conclusion.num_passed, &found);
-    conclusion.exit();
+    trials
 }
 
-/// Records the number of cases, and where they ran, for scripts.
-fn record(cases: u64, gpus: &[Gpu]) {
+/// Records how many cases have passed, and where they ran, for scripts.
+pub fn record() {
+    let (cases, gpus) = (PASSED.load(Ordering::Relaxed), Gpu::list());
     let names: Vec<&str> = gpus.iter().map(Gpu::name).collect();
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/target/conformance-cases.txt");
     let file = std::fs::OpenOptions::new().create(true).append(true).open(path);
@@ -87,7 +89,11 @@ fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
         let word = solver.name();
         let mut add = |name: String, case: fn(&Gpu, Solver, usize) -> Outcome, n: usize| {
             let name = format!("{} {word} adapter {index}: {name}", T::NAME);
-            trials.push(Trial::test(name, move || case(&Gpu::list()[index], solver, n)));
+            trials.push(Trial::test(name, move || {
+                case(&Gpu::list()[index], solver, n)?;
+                PASSED.fetch_add(1, Ordering::Relaxed);
+                Ok(())
+            }));
         };
         for n in SIZES {
             add(format!("every stage of a step agrees, n = {n}"), stages_agree::<T>, n);

@@ -4,8 +4,7 @@
 //! A missed bound means an error, not that the bound is too tight. Without an adapter, GPU cases fail, unless
 //! `ALLOW_NO_GPU=1`: then they are reported as ignored.
 
-mod common;
-
+use crate::may_lack_gpu;
 use curvelax::{
     backend::gpu::Gpu,
     ensemble::{
@@ -18,21 +17,21 @@ use curvelax::{
     truth::{ConvergenceRow, LEMNISCATE_LIFE, Measure, Problem, Solved, Varied, problems, studies},
 };
 use glam::DVec2;
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 
-use common::{DIRECT, Stepper, radius, slope, wavy_circle};
+use crate::common::{DIRECT, Stepper, radius, slope, wavy_circle};
 
 type Outcome = Result<(), Failed>;
 
-fn main() {
-    let arguments = Arguments::from_args();
+/// The tests of all problems by all methods.
+pub fn trials() -> Vec<Trial> {
     let mut trials = vec![
         Trial::test("errors fall at order two in h and one in tau, within their bounds", orders),
         Trial::test("the Willmore circle under tau = h² has the published errors", willmore_circle),
         Trial::test("the misprint of the paper fails the bound and does not converge", misprint),
     ];
     let gpu = Gpu::list().into_iter().next();
-    let allowed = std::env::var("ALLOW_NO_GPU").is_ok_and(|value| value == "1");
+    let allowed = may_lack_gpu();
     for backend in [BackendChoice::Cpu, BackendChoice::Gpu] {
         for precision in [Precision::F64, Precision::F32] {
             let on_gpu = backend == BackendChoice::Gpu;
@@ -53,7 +52,7 @@ fn main() {
             }
         }
     }
-    libtest_mimic::run(&arguments, trials).exit();
+    trials
 }
 
 /// Whether a run is within its bound of the exact value, and not within it of the mistaken one.

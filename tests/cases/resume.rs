@@ -1,11 +1,9 @@
 //! A run that is interrupted repeatedly ends like one that is not, bit for bit: on the CPU and on a GPU, between any
 //! two dispatches, with any number of slots, and also if the members in progress are lost.
 
-mod common;
-
 use std::{collections::BTreeMap, process::ExitCode};
 
-use common::{dumbbell, file};
+use crate::common::{dumbbell, file};
 use curvelax::{
     Error, Result,
     backend::{
@@ -21,7 +19,7 @@ use curvelax::{
     simulate::resume,
     solver::Blocks,
 };
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 
 /// Receives members and stops the run repeatedly.
 #[derive(Default)]
@@ -184,8 +182,8 @@ fn on_the_cpu<T: Vectorised>(spec: &Spec) -> Result<Box<dyn Backend>> {
     Ok(Box::new(CpuBackend::<T>::new(blocks, method, 2)?))
 }
 
-fn main() -> ExitCode {
-    let arguments = Arguments::from_args();
+/// The tests.
+pub fn trials() -> Vec<Trial> {
     let mut trials = Vec::new();
     for (name, spec) in specs() {
         let title = format!("{name}, {:?}", spec.solver());
@@ -215,5 +213,5 @@ fn main() -> ExitCode {
         };
         trials.push(Trial::test(format!("gpu f64, {title}"), on_a_gpu).with_ignored_flag(!there));
     }
-    libtest_mimic::run(&arguments, trials).exit_code()
+    trials
 }
