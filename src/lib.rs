@@ -26,7 +26,7 @@
 //!
 //! # Modules
 //!
-//! Each module uses only those above it (`tests/modules_depend_downward.rs`).
+//! Each module uses only those above it (`tests/it/modules_depend_downward.rs`).
 //!
 //! | module | holds |
 //! |---|---|

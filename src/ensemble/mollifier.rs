@@ -15,7 +15,7 @@
 //! A part of the outline that is thinner than the spacing rules out equal spacing, small turns and no crossing at once.
 //! The rounds then stop before the first crossing, and the problem is reported. If parts of the outline at least four
 //! spacings apart along it are at least one spacing apart in the plane, no turn above the bound and no crossing remains
-//! (checked on random polygons in `tests/polygons.rs`).
+//! (checked on random polygons in `tests/it/polygons.rs`).
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};

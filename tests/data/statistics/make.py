@@ -1,4 +1,4 @@
-"""Reference numbers for tests/statistics.rs: writes the samples, *.csv, and what is known of them, reference.toml.
+"""Reference numbers for tests/it/statistics.rs: writes the samples, *.csv, and what is known of them, reference.toml.
 
 Survival curves, medians, quantiles, restricted means and log-rank tests are those of lifelines, quantiles and moments
 of complete data those of numpy and scipy, fits those of scipy. Two things lifelines does not give to 1e-12: the
