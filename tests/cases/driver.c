@@ -1,4 +1,4 @@
-// A Vulkan driver that passes every call on to another one and does one thing badly, for tests/hostile.rs.
+// A Vulkan driver that passes every call on to another one and does one thing badly, for tests/cases/hostile.rs.
 //
 // HOSTILE_DRIVER   the library of the other driver
 // HOSTILE_FAULT    what it does badly:

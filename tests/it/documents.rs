@@ -20,9 +20,9 @@ use curvelax::{
 /// The pages with a generated part, and the marks around it.
 const FLAGS: &str = "docs/flags.md";
 const FILES: &str = "docs/files.md";
-const BEGIN: &str = "<!-- Generated from the program: UPDATE_DOCS=1 cargo test --test documents -->\n";
+const BEGIN: &str = "<!-- Generated from the program: UPDATE_DOCS=1 cargo test --test it documents -->\n";
 const END: &str = "<!-- The end of what is generated. -->\n";
-const REMEDY: &str = "UPDATE_DOCS=1 cargo test --test documents rewrites it";
+const REMEDY: &str = "UPDATE_DOCS=1 cargo test --test it documents rewrites it";
 
 const MAX_WORDS: usize = 1000;
 

@@ -407,7 +407,7 @@ fn single_precision_follows_double_as_n_grows() {
 }
 
 #[test]
-#[ignore = "takes a minute: cargo test --release --test invariants -- --ignored --nocapture"]
+#[ignore = "takes a minute: cargo test --release --test it invariants -- --ignored --nocapture"]
 fn single_precision_follows_double_up_to_its_limit() {
     assert_f32_follows(MAX_POINTS_F32);
     f32_errors(400);
