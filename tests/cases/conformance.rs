@@ -9,7 +9,7 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
-use crate::may_lack_gpu;
+use crate::{everything, may_lack_gpu};
 use curvelax::{
     backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
@@ -34,15 +34,24 @@ use glam::DVec2;
 use libtest_mimic::{Failed, Trial};
 
 /// The sizes: the two smallest, a power of two, divisible by 3, by 4, a prime, every remainder modulo 4 (the number of
-/// blocks of three), and one beyond 64 threads.
+/// blocks of three), and one beyond 64 threads. Each has kernels of its own, whose compiler takes most of the time, so
+/// `tests/run` has three of them, and `tests/run --all` has all.
 const SIZES: [usize; 8] = [6, 7, 64, 99, 100, 101, 102, 257];
+const FEW_SIZES: [usize; 3] = [7, 64, 101];
 
-/// Sizes of the adaptive comparison.
+/// Sizes of the adaptive comparison and of that of events.
 const ADAPTIVE_SIZES: [usize; 3] = [7, 64, 101];
+const FEW_ADAPTIVE_SIZES: [usize; 2] = [7, 101];
 
 /// Sizes at which the exchange by shuffles is compared with that by barriers: every number of blocks of three, and the
 /// largest ring for eight threads.
 const ONE_SUBGROUP: [usize; 6] = [6, 7, 28, 29, 30, 32];
+const FEW_ONE_SUBGROUP: [usize; 2] = [7, 32];
+
+/// All of them, or those of a test that is to be quick.
+fn sizes(all: &'static [usize], few: &'static [usize]) -> impl Iterator<Item = usize> {
+    if everything() { all } else { few }.iter().copied()
+}
 
 type Outcome = Result<(), Failed>;
 
@@ -95,11 +104,11 @@ fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
                 Ok(())
             }));
         };
-        for n in SIZES {
+        for n in sizes(&SIZES, &FEW_SIZES) {
             add(format!("every stage of a step agrees, n = {n}"), stages_agree::<T>, n);
             add(format!("the curve agrees after 1 and 100 steps, n = {n}"), runs_agree::<T>, n);
         }
-        for n in ADAPTIVE_SIZES {
+        for n in sizes(&ADAPTIVE_SIZES, &FEW_ADAPTIVE_SIZES) {
             add(format!("the curve agrees after adaptive steps, n = {n}"), adaptive_agree::<T>, n);
         }
         for n in [7, 101] {
@@ -121,7 +130,7 @@ fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
         add("how many slots there are, in how many batches, changes no bit".into(), slots::<T>, 23);
         add("permuted members give permuted results, bit for bit".into(), permutation::<T>, 101);
         add("where a dispatch ends or pauses changes no bit".into(), dispatches::<T>, 64);
-        for n in ONE_SUBGROUP.into_iter().filter(|_| solver.facts().kernel.shuffles) {
+        for n in sizes(&ONE_SUBGROUP, &FEW_ONE_SUBGROUP).filter(|_| solver.facts().kernel.shuffles) {
             add(format!("shuffles and barriers give the same bits, n = {n}"), exchanges::<T>, n);
         }
         add("members that end badly leave the others untouched".into(), bad_members::<T>, 99);

@@ -15,6 +15,11 @@ use std::{process::ExitCode, thread::available_parallelism};
 
 use libtest_mimic::{Arguments, Trial};
 
+/// Whether to run all cases, as `tests/run --all` does, or those of a quarter of an hour.
+fn everything() -> bool {
+    std::env::var("CURVELAX_TESTS").is_ok_and(|value| value == "all")
+}
+
 /// Whether tests that need a GPU are ignored where there is none. Otherwise they fail.
 fn may_lack_gpu() -> bool {
     std::env::var("ALLOW_NO_GPU").is_ok_and(|value| value == "1")
