@@ -17,7 +17,7 @@ use crate::{
     error::{Error, Result},
     placement::{Choice, Platform},
 };
-use pilot::{CohortWork, Limits, Sample, points, sample};
+use pilot::{CohortSample, CohortWork, Limits, points, sample};
 use size::Residents;
 
 /// Work of the pilots of all cohorts, in updates of nodes: for each thread of the CPU, and on a GPU, which may be one in
@@ -110,7 +110,7 @@ impl Estimate {
                 (None, false) => WORK_ON_GPU,
             };
             let work = if stage.level.is_some() { LEVELS * work / level_count as f64 } else { work / own_count as f64 };
-            let Sample { work, pilots, rows: [each, in_pilot], reads_back } =
+            let CohortSample { work, pilots, rows: [each, in_pilot], reads_back } =
                 sample(&mut cells, precision, backend.as_mut(), &Limits { work, until, stopped })?;
             let slots = backend.slots();
             let of = |members: u64, rows: f64| Residents {

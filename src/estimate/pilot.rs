@@ -120,7 +120,7 @@ enum End {
 }
 
 /// Receives the members of a pilot, and ends it.
-struct Watch<'a> {
+struct PilotSink<'a> {
     seen: Seen,
     limits: &'a Limits<'a>,
     /// Set by the back end once the work is done.
@@ -128,7 +128,7 @@ struct Watch<'a> {
     end: End,
 }
 
-impl Sink for Watch<'_> {
+impl Sink for PilotSink<'_> {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         let seen = &mut self.seen;
         seen.left += 1;
@@ -173,7 +173,7 @@ struct Rationed<'a> {
     budget: f64,
     /// Steps that a member may make so far.
     ration: u32,
-    places: Vec<Option<Place>>,
+    places: Vec<Option<PilotSlot>>,
     work: f64,
     dispatches: u64,
     is_done: &'a Flag<bool>,
@@ -181,7 +181,7 @@ struct Rationed<'a> {
 
 /// What is known of the member in a slot.
 #[derive(Clone, Copy, Default)]
-struct Place {
+struct PilotSlot {
     solves: u32,
     /// Whether it is in the dispatch in progress.
     is_running: bool,
@@ -212,7 +212,7 @@ impl Backend for Rationed<'_> {
 
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
         self.inner.load(slot, run)?;
-        self.places[slot] = Some(Place { solves: run.counters.solves, ..Place::default() });
+        self.places[slot] = Some(PilotSlot { solves: run.counters.solves, ..PilotSlot::default() });
         self.aim(slot, run.counters.goal, &run.parameters);
         Ok(())
     }
@@ -260,7 +260,7 @@ impl Backend for Rationed<'_> {
                 self.work += self.nodes as f64 * (sweeps + UPDATES_PER_SOLVE * solves);
             }
             *place =
-                Place { solves: now.solves, is_running: false, waits: now.status != 0 || now.steps >= self.ration };
+                PilotSlot { solves: now.solves, is_running: false, waits: now.status != 0 || now.steps >= self.ration };
         }
         if self.places.iter().flatten().all(|place| place.waits) {
             if self.work < self.budget {
@@ -290,7 +290,7 @@ impl Backend for Rationed<'_> {
 }
 
 /// What the pilots of a cohort show.
-pub struct Sample {
+pub struct CohortSample {
     /// The cost of the whole cohort.
     pub work: CohortWork,
     /// The pilots, each larger than the one before.
@@ -308,7 +308,7 @@ pub fn sample(
     precision: Precision,
     backend: &mut dyn Backend,
     limits: &Limits<'_>,
-) -> Result<Sample> {
+) -> Result<CohortSample> {
     let own: Vec<Option<Vec<u64>>> = cohort.iter().map(|cell| cell.spec.only.clone()).collect();
     let all: u64 = cohort.iter().map(|cell| cell.spec.member_count()).sum();
     let mut pilots: Vec<Seen> = Vec::new();
@@ -342,7 +342,7 @@ pub fn sample(
     let rows = ended.map_or_else(|| all_rows(cohort), |seen| seen.rows / seen.left as f64);
     let share = pilots.last().map_or(1.0, |seen| seen.share.clamp(0.0, 1.0));
     let reads_back = cohort.iter().any(|cell| !cell.spec.snapshots.is_empty()) && share > 0.0;
-    Ok(Sample { work, pilots, rows: [rows, share * rows], reads_back })
+    Ok(CohortSample { work, pilots, rows: [rows, share * rows], reads_back })
 }
 
 /// Nodes of a member of a cohort.
@@ -363,11 +363,11 @@ fn pilot(
     if budget == f64::INFINITY {
         rationed.ration = u32::MAX;
     }
-    let mut watch = Watch { seen: Seen::new(count), limits, is_done: &is_done, end: End::Complete };
+    let mut watch = PilotSink { seen: Seen::new(count), limits, is_done: &is_done, end: End::Complete };
     let started = Instant::now();
     let ended = simulate(cohort, precision, &mut rationed, 0, &mut watch);
     let (work, dispatches) = (rationed.work, rationed.dispatches);
-    let Watch { mut seen, end, .. } = watch;
+    let PilotSink { mut seen, end, .. } = watch;
     if end == End::Complete {
         ended?;
     }

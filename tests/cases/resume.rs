@@ -1,7 +1,7 @@
 //! A run that is interrupted repeatedly ends like one that is not, bit for bit: on the CPU and on a GPU, between any
 //! two dispatches, with any number of slots, and also if the members in progress are lost.
 
-use std::{collections::BTreeMap, process::ExitCode};
+use std::collections::BTreeMap;
 
 use crate::common::{dumbbell, file};
 use curvelax::{
