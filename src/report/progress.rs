@@ -22,11 +22,11 @@ pub enum Progress {
     /// Shows nothing.
     Quiet,
     /// On a terminal.
-    Bar(ProgressBar, Pace),
+    Bar(ProgressBar, ProgressPace),
     /// To a function, with the members that have ended, all members, and the share of the work that is done.
     Told(Box<dyn FnMut(u64, u64, f64)>),
     /// In a file or a pipe, with the start of the run.
-    Lines(Instant, ProgressLines, Pace),
+    Lines(Instant, ProgressLines, ProgressPace),
 }
 
 /// Lines at even times; none for a run that ends before the first.
@@ -38,11 +38,11 @@ pub struct ProgressLines {
 
 /// How fast the work is done: since the first share that was shown, because a resumed run did that part earlier.
 #[derive(Default)]
-pub struct Pace {
+pub struct ProgressPace {
     first: Option<(Instant, f64)>,
 }
 
-impl Pace {
+impl ProgressPace {
     /// The time left when `share` of the work is done, if there is an estimate.
     fn left(&mut self, share: f64) -> Option<Duration> {
         let (began, before) = *self.first.get_or_insert_with(|| (Instant::now(), share));
@@ -66,7 +66,7 @@ impl Progress {
         if quiet {
             return Progress::Quiet;
         }
-        let lines = || Progress::Lines(Instant::now(), ProgressLines::default(), Pace::default());
+        let lines = || Progress::Lines(Instant::now(), ProgressLines::default(), ProgressPace::default());
         if !io::stderr().is_terminal() {
             return lines();
         }
@@ -74,7 +74,7 @@ impl Progress {
         let bar = ProgressBar::new(TICKS);
         bar.set_style(style(colour).unwrap_or_else(|_| ProgressStyle::default_bar()));
         // A terminal that cannot go back in a line, such as TERM=dumb, shows no bars.
-        if bar.is_hidden() { lines() } else { Progress::Bar(bar, Pace::default()) }
+        if bar.is_hidden() { lines() } else { Progress::Bar(bar, ProgressPace::default()) }
     }
 
     /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done.
@@ -130,7 +130,7 @@ fn style(colour: bool) -> Result<ProgressStyle, TemplateError> {
 }
 
 /// Shows `what` and the time left. The bar's own estimate is 0 as long as it knows nothing.
-fn show_bar(bar: &ProgressBar, pace: &mut Pace, what: &str, share: f64) {
+fn show_bar(bar: &ProgressBar, pace: &mut ProgressPace, what: &str, share: f64) {
     let left = pace.left(share).map_or(String::new(), |left| format!("  {:#} left", HumanDuration(left)));
     bar.set_message(format!("{what}{left}"));
     bar.set_position((share * TICKS as f64) as u64);
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn a_bar_starts_without_an_estimate() {
-        let (bar, mut pace) = (ProgressBar::hidden(), Pace::default());
+        let (bar, mut pace) = (ProgressBar::hidden(), ProgressPace::default());
         for share in [0.0, 1e-9, 0.3] {
             show_bar(&bar, &mut pace, "0 of 2 members", share);
             assert_eq!(bar.message(), "0 of 2 members", "{share}");
