@@ -249,6 +249,12 @@ fn ring(n: usize) -> Result<Blocks> {
 }
 
 impl Choice {
+    /// What the user should know about the choice: nobody gets a software GPU who did not ask for a GPU.
+    pub fn warning(&self) -> Option<String> {
+        let gpu = self.device.gpu().filter(|_| self.is_software_gpu())?;
+        Some(format!("{} is a software GPU, and the CPU back end is faster: use --backend cpu", gpu.name()))
+    }
+
     /// Returns the number type of the run.
     pub fn precision(&self) -> Precision {
         self.precision

@@ -77,16 +77,47 @@ pub fn grouped(number: u64) -> String {
     text
 }
 
-/// `path` as a word of a command line: in quotes if it needs them.
-pub fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "/._-+:@%=,".contains(c);
-    match !text.is_empty() && text.chars().all(plain) && !text.starts_with('-') {
-        true => text,
-        // A path that begins with a dash would be read as a flag.
-        false if text.starts_with('-') => format!("'./{}'", text.replace('\'', "'\\''")),
-        false => format!("'{}'", text.replace('\'', "'\\''")),
+/// The first `most` names, and the number of others.
+pub fn listed(names: &[String], most: usize, between: &str) -> String {
+    let mut text = names.iter().take(most).cloned().collect::<Vec<_>>().join(between);
+    if names.len() > most {
+        text += &format!("{between}and {} more", names.len() - most);
     }
+    text
+}
+
+/// `path` as a word of a command line, for bash, zsh and the like, and on Windows for both of its shells: in quotes if it
+/// needs them. It is always on one line.
+pub fn quoted(path: &Path) -> String {
+    // A path that begins with a dash would be read as a flag.
+    let dashed = path.as_os_str().as_encoded_bytes().starts_with(b"-");
+    let path = if dashed { Path::new(".").join(path) } else { path.to_path_buf() };
+    let separator = |c: char| cfg!(windows) && c == '\\';
+    let plain = |c: char| c.is_alphanumeric() || "/._-+:@%=,".contains(c) || separator(c);
+    match path.to_str() {
+        Some(text) if !text.is_empty() && text.chars().all(plain) => text.into(),
+        // No path of Windows has a double quote in it.
+        _ if cfg!(windows) => format!("\"{}\"", path.display()),
+        Some(text) if !text.contains(char::is_control) => format!("'{}'", text.replace('\'', "'\\''")),
+        _ => format!("$'{}'", escaped(path.as_os_str().as_encoded_bytes())),
+    }
+}
+
+/// `bytes` as they stand between `$'` and `'`: control characters and what is not UTF-8 as octal numbers.
+fn escaped(bytes: &[u8]) -> String {
+    let mut text = String::new();
+    let number = |text: &mut String, bytes: &[u8]| text.extend(bytes.iter().map(|byte| format!("\\{byte:03o}")));
+    for chunk in bytes.utf8_chunks() {
+        for c in chunk.valid().chars() {
+            match c {
+                '\'' | '\\' => text.extend(['\\', c]),
+                c if c.is_control() => number(&mut text, c.encode_utf8(&mut [0; 4]).as_bytes()),
+                c => text.push(c),
+            }
+        }
+        number(&mut text, chunk.invalid());
+    }
+    text
 }
 
 /// Seconds in the unit that a person would use.
@@ -117,6 +148,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg(not(windows))]
     fn a_path_in_a_command_is_quoted_if_it_must_be() {
         for (path, word) in [
             ("out/run-1.b", "out/run-1.b"),
@@ -124,10 +156,28 @@ mod tests {
             ("my run", "'my run'"),
             ("it's", "'it'\\''s'"),
             ("a;b", "'a;b'"),
+            ("a$b `c`", "'a$b `c`'"),
             ("-x y", "'./-x y'"),
+            ("--force", "./--force"),
+            ("two\nlines\tit's \\", "$'two\\012lines\\011it\\'s \\\\'"),
             ("", "''"),
         ] {
             assert_eq!(quoted(Path::new(path)), word);
+        }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_shell_reads_a_quoted_path_as_it_is() {
+        use std::{ffi::OsStr, os::unix::ffi::OsStrExt, process::Command};
+        let names =
+            ["plain", "-n", "a b", "it's", "\"$HOME\" `id` \\ !x", "~", "new\nline", "\u{1b}[31m\u{85}9", "größe"];
+        for name in names.map(str::as_bytes).into_iter().chain([&b"b\xff\x317"[..]]) {
+            let word = quoted(Path::new(OsStr::from_bytes(name)));
+            assert!(!word.contains(char::is_control), "{word:?}");
+            let read = Command::new("bash").args(["-c", &format!("printf %s {word}")]).output().unwrap();
+            let read = read.stdout.strip_prefix(b"./").unwrap_or(&read.stdout);
+            assert_eq!(read, name, "{word}");
         }
     }
 

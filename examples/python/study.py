@@ -7,7 +7,7 @@ slope which the fit should find.
     python examples/python/study.py --out study
 
 runs curvelax for six amplitudes, reads its tables with pandas and the nodes of one member with xarray, prints the fit and
-leaves study/study.png. Times are in units of length⁴; the radius is 1.
+leaves the run in study/run and the figure as study/study.png. Times are in units of length⁴; the radius is 1.
 """
 
 import argparse
@@ -137,10 +137,12 @@ def main():
     parser.add_argument("--curves", metavar="COUNT", type=int, default=128, help="members of a cell [default: 128]")
     arguments = parser.parse_args()
 
-    run(program(arguments.curvelax), arguments.out, arguments.curves)
-    table = members(arguments.out)
+    # A folder of its own: --force replaces a run, and refuses a folder that holds anything else.
+    out = arguments.out / "run"
+    run(program(arguments.curvelax), out, arguments.curves)
+    table = members(out)
     print(table.groupby("amplitude").t_relax.describe()[["count", "mean", "std", "50%"]])
-    snapshots = xr.open_zarr(arguments.out / "snapshots.zarr", chunks=None)
+    snapshots = xr.open_zarr(out / "snapshots.zarr", chunks=None)
     picture = arguments.out / "study.png"
     slope, error = draw(table, snapshots, picture)
     print(f"slope of median t_relax against ln σ: {slope:.4f} (standard error {error:.4f}), theory 1/12 = {1 / RATE:.4f}")

@@ -38,7 +38,7 @@ def run(
         Folder for the results, which must not exist yet. Without it, results go to a temporary folder, which is removed
         when the study is no longer in use.
     force
-        Write into an existing folder, replacing the files of an earlier run.
+        Write into an existing folder, replacing the earlier run in it. A folder that holds anything else is refused.
     progress
         Whether to show a bar, by tqdm; by default in notebooks and terminals, if tqdm is installed. A function is called
         with the members that have ended, all members, and the share of the work that is done.
@@ -85,11 +85,13 @@ def run(
 
             outlines = _outlines.labelled(shape)
             _curvelax.check_place(folder, existing)
+            # Where there is no run, the outlines will be the only file.
+            free = not force or _is_free(folder)
             written = folder / _outlines.NAME
             if written.exists():
                 kept = written.rename(written.with_suffix(".before"))
             keys["shape"] = _outlines.save(outlines, written)
-            existing = existing if force else "filled"
+            existing = "filled" if free else existing
         with _bar(progress) as show:
             overview, seen = _curvelax.run(spec, keys, folder, existing, show, _say)
     except BaseException as error:
@@ -164,6 +166,15 @@ def _leave(folder: Path, existed: bool, written: Path | None, kept: Path | None)
                 kept.replace(written)
         if folder.is_dir() and not existed:
             folder.rmdir()
+
+
+def _is_free(folder: Path) -> bool:
+    """Whether nothing in the folder has the name of a file of a run."""
+    try:
+        _curvelax.check_place(folder, "filled")
+    except RequestError:
+        return False
+    return True
 
 
 def _interrupted(error: KeyboardInterrupt, folder: Path) -> Interrupted:

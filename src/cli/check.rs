@@ -144,7 +144,7 @@ pub fn check(args: CheckArgs) -> Result<()> {
 }
 
 /// All rows of an adapter.
-fn compare(gpu: &Gpu, progress: Progress) -> Result<Vec<ConformanceRow>> {
+fn compare(gpu: &Gpu, mut progress: Progress) -> Result<Vec<ConformanceRow>> {
     let total = if gpu.has_f64() { 2 * KERNELS } else { KERNELS };
     let mut done = 0;
     let mut tell = |precision: &str, solver: Solver, n: usize, kind: Compared| {

@@ -14,7 +14,7 @@ use crate::{
         merge::{Shards, listed_ranges},
         shard,
     },
-    text::plural,
+    text::{plural, quoted},
 };
 
 const EXAMPLES: &str = "\
@@ -37,7 +37,7 @@ pub struct MergeArgs {
     /// Folder for the results, which must not exist yet
     #[arg(long, value_name = "DIR", required_unless_present = "missing", help_heading = flags::OUTPUT)]
     out: Option<PathBuf>,
-    /// Write into an existing --out DIR, replacing the files of an earlier run
+    /// Write into an existing --out DIR, replacing the earlier run in it. A folder that holds anything else is refused
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
     /// Print the missing shards and the line that submits them to Slurm, and stop
@@ -45,7 +45,7 @@ pub struct MergeArgs {
     missing: bool,
     /// The job script in that line
     #[arg(long, value_name = "FILE", default_value = "array.sh", requires = "missing", help_heading = flags::OUTPUT)]
-    script: String,
+    script: PathBuf,
     /// Print no table: only errors, and the results if --json is given
     #[arg(long, conflicts_with = "missing", help_heading = flags::OUTPUT)]
     quiet: bool,
@@ -72,13 +72,13 @@ pub fn merge(args: MergeArgs) -> Result<()> {
 }
 
 /// Which shards are missing, and how to submit them.
-fn missing(shards: &Shards, script: &str) -> String {
+fn missing(shards: &Shards, script: &Path) -> String {
     let (missing, count) = (shards.missing(), shards.count());
     if missing.is_empty() {
         return format!("all {count} {} are present\n", plural(count, "shard"));
     }
     let array = listed_ranges(&missing);
-    let submit = format!("sbatch --array={array} --export=ALL,{}={count} {script}", flags::SHARDS);
+    let submit = format!("sbatch --array={array} --export=ALL,{}={count} {}", flags::SHARDS, quoted(script));
     shards.told().into_iter().chain([submit]).map(|line| line + "\n").collect()
 }
 

@@ -41,7 +41,7 @@ pub struct RunArgs {
     /// Folder for the results, which must not exist yet
     #[arg(long, value_name = "DIR", required_unless_present_any = ["print_spec", "dry_run"], help_heading = flags::OUTPUT)]
     out: Option<PathBuf>,
-    /// Write into an existing DIR, replacing the files of an earlier run
+    /// Write into an existing DIR, replacing the earlier run in it. A folder that holds anything else is refused
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
     /// Resume the run in DIR if it was interrupted, leave it if it is finished, start it if there is none. The same line
@@ -77,7 +77,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     let flags = args.manner;
     work.study.note().into_iter().for_each(|note| flags.say(&format!("note: {note}")));
     if args.dry_run {
-        work.study.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
+        work.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
         let stopped = || {
             let (cause, _) = manner.as_ref()?.stop.asked()?;
             Some(cause.error(" in the pilot: nothing is saved"))

@@ -7,6 +7,7 @@ mod column;
 pub mod disk;
 mod fields;
 pub mod folder;
+mod foreign;
 pub mod members;
 pub mod names;
 pub mod owner;

@@ -114,6 +114,9 @@ pub const OWN: [&str; 31] = [
     ROWS,
 ];
 
+/// The outlines that the Python package leaves with a run, and those of the earlier run until it is replaced.
+pub const OUTLINES: [&str; 2] = ["outlines.npz", "outlines.before"];
+
 /// The tables of a run and its store, in the order in which people see them.
 pub const TABLES: [&str; 14] = [
     SUMMARY,

@@ -9,6 +9,7 @@ use std::{
 use super::{
     claim::LOCK,
     disk::{entries, is_own_store},
+    foreign::foreign,
     names::{
         CONVERGENCE, FIGURES, PLOTS, PROBE, RUN, SHARD, STATE, STATE_OLD, STATE_PART, WORK, WORK_PICTURE, is_store,
         part,
@@ -16,8 +17,11 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    text::quoted,
+    text::{listed, quoted},
 };
+
+/// Maximum number of files listed in a message.
+const NAMED: usize = 4;
 
 /// Who writes into a folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +47,8 @@ pub enum Existing {
     Refused,
     /// Accepted, unless a name in it is needed.
     Filled,
-    /// Accepted; files of an earlier run of the same command are replaced.
+    /// Accepted; files of an earlier run of the same command are replaced. Commands that also remove such files accept no
+    /// others.
     Replaced,
 }
 
@@ -97,15 +102,23 @@ impl Owner {
 }
 
 impl Existing {
-    /// Refuses the folder at `place`, called `path`, in which files `names` will be written, if something in it would
+    /// Refuses the folder at `place`, called `path`, in which `owner` will write files `names`, if something in it would
     /// be lost.
     ///
     /// # Errors
     /// [`Error::Request`] naming what is there.
-    pub fn check(self, place: &Path, path: &Path, names: &[String]) -> Result<()> {
+    pub fn check(self, owner: Owner, place: &Path, path: &Path, names: &[String]) -> Result<()> {
         let refuse = |problem: &str, allowed: &str| Err(Error::value("out", path.display(), problem, allowed));
         if self == Existing::Replaced {
-            return Ok(());
+            // Other commands replace the files that they write, and remove none.
+            let found = if owner == Owner::Run { foreign(place) } else { Ok(Vec::new()) };
+            let found = found.map_err(|e| Error::Request(format!("--out {}: cannot be read ({e})", path.display())))?;
+            if found.is_empty() {
+                return Ok(());
+            }
+            let names: Vec<String> = found.iter().map(|path| path.display().to_string()).collect();
+            let problem = format!("it holds {}, which no run wrote", listed(&names, NAMED, ", "));
+            return refuse(&problem, "use another folder, or move away what is not of a run");
         }
         if [STATE, STATE_OLD].iter().any(|state| is_there(&place.join(state))) {
             let resume = format!("curvelax resume {} continues it, --force starts over", quoted(path));

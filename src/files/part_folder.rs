@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// The suffix of a file that is to replace another.
-const SUCCESSOR: &str = "part";
+pub(super) const SUCCESSOR: &str = "part";
 
 /// An incomplete folder; it is removed with its contents when dropped, unless [kept](PartFolder::keep).
 #[derive(Debug)]
@@ -142,6 +142,7 @@ mod tests {
     use super::*;
     use crate::files::{
         OutputFolder,
+        folder::tests::OLD,
         names::{RUN, STORE},
     };
 
@@ -165,6 +166,7 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let old = home.path().join(STORE);
         fs::create_dir_all(old.join("y")).unwrap();
+        fs::write(home.path().join(RUN), OLD).unwrap();
         fs::write(old.join("zarr.json"), "old").unwrap();
         fs::write(old.join("y/c.0"), "old").unwrap();
         let folder = OutputFolder::open(home.path(), true).unwrap();
@@ -172,7 +174,7 @@ mod tests {
         assert_eq!(names(&home.path().join(".snapshots.zarr.part")), ["x", "zarr.json"]);
         assert_eq!(names(&old), ["y", "zarr.json"]);
         store.sync().unwrap();
-        folder.publish(Vec::new(), Some(store), folder.write(RUN, "new").unwrap()).unwrap();
+        folder.publish(Vec::new(), Some(store), folder.write(RUN, OLD).unwrap()).unwrap();
         drop(folder);
         assert_eq!(names(home.path()), [RUN, STORE]);
         assert_eq!(names(&old), ["x", "zarr.json"]);
@@ -180,7 +182,7 @@ mod tests {
 
         // A run without a store removes it.
         let folder = OutputFolder::open(home.path(), true).unwrap();
-        folder.publish(Vec::new(), None, folder.write(RUN, "newer").unwrap()).unwrap();
+        folder.publish(Vec::new(), None, folder.write(RUN, OLD).unwrap()).unwrap();
         drop(folder);
         assert_eq!(names(home.path()), [RUN]);
     }
@@ -216,10 +218,11 @@ mod tests {
     fn what_no_run_has_left_is_not_removed() {
         for (file, problem) in [
             ("snapshots.zarr", "is not a folder"),
-            ("snapshots.zarr/mine", "is not the folder of an earlier run"),
-            (".snapshots.zarr.part/mine", "is not the folder of an earlier run"),
+            ("snapshots.zarr/mine", "it holds snapshots.zarr/mine, which no run wrote"),
+            (".snapshots.zarr.part/mine", "it holds .snapshots.zarr.part/mine, which no run wrote"),
         ] {
             let home = tempfile::tempdir().unwrap();
+            fs::write(home.path().join(RUN), OLD).unwrap();
             let mine = home.path().join(file);
             fs::create_dir_all(mine.parent().unwrap()).unwrap();
             fs::write(&mine, "mine").unwrap();

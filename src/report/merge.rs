@@ -33,6 +33,7 @@ use crate::{
     },
     input::{self, MAX_LINE},
     results::tally::Aside,
+    text::listed,
 };
 
 /// Bytes read at once, from all shards together and at least from one.
@@ -71,7 +72,7 @@ impl Shards {
         };
         let Some((first, own)) = found.iter().find_map(of) else {
             let folders: Vec<String> = found.iter().map(unfinished).collect();
-            let message = format!("no folder says which study it is a shard of: {}", listed(&folders, "; "));
+            let message = format!("no folder says which study it is a shard of: {}", listed(&folders, NAMED, "; "));
             return Err(Error::Request(message));
         };
         let Some(shard) = own.shard else {
@@ -247,7 +248,7 @@ impl Shards {
         Err(Error::Request(format!(
             "{there} of {} shards are done; {}; `curvelax merge --missing` prints what submits them",
             there as u64 + total(&missing),
-            listed(&self.told(), "; ")
+            listed(&self.told(), NAMED, "; ")
         )))
     }
 }
@@ -274,15 +275,6 @@ fn unfinished(found: &Found) -> String {
         Found::Done(part) => part.path.display().to_string(),
         Found::Unfinished { path, why, .. } => format!("{}: {why}", path.display()),
     }
-}
-
-/// The first few lines, and the number of others.
-fn listed(lines: &[String], between: &str) -> String {
-    let mut text = lines.iter().take(NAMED).cloned().collect::<Vec<_>>().join(between);
-    if lines.len() > NAMED {
-        text += &format!("{between}and {} more", lines.len() - NAMED);
-    }
-    text
 }
 
 /// Ascending ranges in Slurm's notation: `0,3,5-9`.

@@ -23,6 +23,7 @@ use crate::{
         provenance::{FORMAT, Provenance, by_status},
         tally::{Aside, MeanExcess, Tally},
     },
+    text::quoted,
 };
 
 /// Relative distance behind the end at which a time is still rounding, in f32.
@@ -90,9 +91,9 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
     if !path.exists() {
         let begun = folder.join(format!(".{}.part", names::SUMMARY)).exists();
         let problem = if begun {
-            "the run there has not finished; curvelax resume continues it"
+            format!("the run there has not finished; curvelax resume {} continues it", quoted(folder))
         } else {
-            "no run there; give its folder"
+            "no run there; give its folder".into()
         };
         return Err(Error::Request(format!("{}: {problem} (no {})", folder.display(), names::RUN)));
     }

@@ -12,6 +12,7 @@ use crate::{
         checkpoint::{self, Head, Saved},
         reader,
     },
+    text::quoted,
 };
 
 /// Resumes the run in the folder at `path`. `None` means that it is finished.
@@ -67,7 +68,8 @@ pub fn resume_like(
         if asked != BackendChoice::Auto && asked != there.into() {
             return Err(Error::Request(format!(
                 "--resume: the run in {path} is on the {there}; leave out --backend, or move it with curvelax resume \
-                 --backend"
+                 {} --backend",
+                quoted(folder.path())
             )));
         }
     }

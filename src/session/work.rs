@@ -74,6 +74,11 @@ impl Work {
         self.first().1.may_fall_back()
     }
 
+    /// What the user should know about the study and where it is computed.
+    pub fn warnings(&self) -> Vec<String> {
+        self.study.warnings().into_iter().chain(self.first().1.warning()).collect()
+    }
+
     /// Where everything is computed, except perhaps the pilot.
     pub fn platform(&self) -> Platform {
         let (cells, choice) = self.first();
@@ -95,7 +100,7 @@ impl Work {
                                                {rows}"
             )));
         }
-        let early = [&self.study.warnings()[..], report.moves()].concat();
+        let early = [&self.warnings()[..], report.moves()].concat();
         early.iter().for_each(|warning| host.say(&format!("warning: {warning}")));
         let (out, falls_back) = (report.folder().to_path_buf(), self.may_fall_back());
         let Work { study, choices, opened, .. } = self;

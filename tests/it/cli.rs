@@ -1,4 +1,4 @@
-//! The program's conventions: JSON, exit codes, `--max-time`, the dry run, completions, the man page.
+//! The program's conventions: JSON, --quiet, exit codes, `--max-time`, the dry run, completions, the man page.
 
 use std::{
     fs,
@@ -8,6 +8,7 @@ use std::{
 };
 
 use crate::common::program::{number, run};
+use curvelax::backend::gpu::Gpu;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -310,4 +311,62 @@ fn the_man_page_has_every_command_with_its_flags() {
     assert!(page.contains(".TH curvelax 1") && page.contains("max\\-time"), "{page}");
     let without = page.replace(".SH \"curvelax bench\"", ".PP");
     assert_ne!(sections(&without), commands, "a command that is missing is not missed");
+}
+
+/// Of each command that has the flag, except `check`, which takes minutes.
+#[test]
+fn quiet_says_nothing_but_errors() {
+    let home = TempDir::new().unwrap();
+    // With a warning: sweeps slow down with adaptive steps.
+    let warned = "--curves 2 --points 34 --adaptive=1e-2 --solver gauss-seidel --t-end 0.01";
+    let loud = curvelax(home.path(), &format!("run {warned} --backend auto --out loud"));
+    let said = String::from_utf8(loud.stderr).unwrap();
+    assert!(
+        said.contains("back end: ") && said.contains("\nwarning: plain sweeps ") && !loud.stdout.is_empty(),
+        "{said}"
+    );
+    fs::remove_file(home.path().join("loud/plots/portraits.json")).unwrap();
+    for arguments in [
+        format!("run {warned} --backend auto --out run"),
+        format!("run {warned} --dry-run"),
+        format!("run {warned} --shard 0/1 --out shard"),
+        "merge shard --out merged".into(),
+        "resume run".into(),
+        "plot loud".into(),
+        "animate run --out movie.svg".into(),
+        "figure fig1a --out figure".into(),
+        "convergence --problem willmore-circle --backend cpu".into(),
+    ] {
+        assert_eq!(printed(home.path(), &format!("{arguments} --quiet")), "", "{arguments}");
+    }
+    // The rates are its result, and in no file.
+    let bench = "bench --backend cpu --solver direct --precision f64 --points 34 --seconds 0.01 --repeats 1 --quiet";
+    assert!(printed(home.path(), bench).contains("direct"));
+    let stopped = curvelax(home.path(), "run --curves 100000000 --backend cpu --max-time 1s --out long --quiet");
+    let said = String::from_utf8(stopped.stderr).unwrap();
+    assert!(said.starts_with("error: stopped by --max-time ") && said.lines().count() == 1, "{said}");
+    assert_eq!(printed(home.path(), "resume run --quiet"), "");
+}
+
+#[test]
+fn a_software_gpu_that_was_asked_for_is_warned_about_once() {
+    let Some((number, gpu)) = Gpu::list().into_iter().enumerate().find(|(_, gpu)| !gpu.is_hardware()) else {
+        assert!(std::env::var("ALLOW_NO_GPU").is_ok(), "no software GPU; ALLOW_NO_GPU=1 leaves this out");
+        return;
+    };
+    let home = TempDir::new().unwrap();
+    let run = "run --curves 2 --points 34 --t-end 0.01 --precision f32 --solver direct";
+    let warning = format!("{} is a software GPU, and the CPU back end is faster: use --backend cpu", gpu.name());
+    let warnings = |out: &str| -> Vec<String> {
+        let text = fs::read_to_string(home.path().join(out).join("run.json")).unwrap();
+        serde_json::from_value(serde_json::from_str::<Value>(&text).unwrap()["warnings"].take()).unwrap()
+    };
+    let loud = curvelax(home.path(), &format!("{run} --backend gpu --adapter {number} --out loud"));
+    let said = String::from_utf8(loud.stderr).unwrap();
+    assert_eq!(said.matches(&format!("warning: {warning}\n")).count(), 1, "{said}");
+    printed(home.path(), &format!("{run} --backend gpu --adapter {number} --out quiet --quiet"));
+    assert_eq!([warnings("loud"), warnings("quiet")], [[warning.clone()], [warning]]);
+    let cpu = curvelax(home.path(), &format!("{run} --backend cpu --out cpu"));
+    assert!(cpu.status.success() && !String::from_utf8_lossy(&cpu.stderr).contains("software GPU"));
+    assert_eq!(warnings("cpu"), [""; 0]);
 }

@@ -266,3 +266,31 @@ mod unix {
         assert!(!odd.join("named").exists());
     }
 }
+
+/// A user copies the line that a message proposes.
+#[test]
+#[cfg(unix)]
+fn proposed_commands_are_those_of_any_folder_in_a_shell() {
+    let home = TempDir::new().unwrap();
+    let out = "-it's $HOME\n`x`";
+    let given = format!("--out={out}");
+    let run = |more: &[&str]| {
+        let words = format!("run --backend cpu {LONG} --quiet");
+        program(home.path(), &words).arg(&given).args(more).output().unwrap()
+    };
+    let proposed = |message: &str| {
+        let (_, rest) = message.split_once("curvelax resume ").unwrap_or_else(|| panic!("{message}"));
+        rest.split_once(" continues").unwrap_or_else(|| panic!("{message}")).0.to_string()
+    };
+    let stopped = said(&run(&[]), 75);
+    assert_eq!(stopped.lines().count(), 1, "{stopped}");
+    let word = proposed(&stopped);
+    let exists = said(&run(&[]), 2);
+    let mut plot = program(home.path(), "plot");
+    let unfinished = said(&plot.arg(format!("./{out}")).output().unwrap(), 2);
+    assert_eq!([proposed(&exists), proposed(&unfinished)], [word.as_str(), &word]);
+    let line = format!("exec \"$0\" resume {word} --max-time 1s");
+    let program = assert_cmd::cargo::cargo_bin("curvelax");
+    let resumed = Command::new("bash").args(["-c", &line]).arg(program).current_dir(home.path()).output().unwrap();
+    assert!(said(&resumed, 75).contains("resuming: "), "{line}");
+}

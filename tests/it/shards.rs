@@ -342,6 +342,7 @@ fn what_is_missing_is_printed_with_the_line_that_submits_it() {
     let folders = "shards 1,4-8,10-11 of 12: not among the folders";
     assert_eq!(printed(&format!("merge --missing {all}")), format!("{folders}\n{submit} array.sh\n"));
     assert_eq!(printed(&format!("merge --missing --script job {all}")), format!("{folders}\n{submit} job\n"));
+    assert_eq!(printed(&format!("merge --missing --script $job {all}")), format!("{folders}\n{submit} '$job'\n"));
     // An interrupted shard says which one it is.
     let words = "s/5 is of another study than s/0: tau is 0.000000001, and 0.001 there";
     refused(home.path(), &format!("merge --missing {all} {five}"), &[words]);

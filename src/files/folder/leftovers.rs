@@ -73,14 +73,15 @@ mod tests {
 
     use super::*;
     use crate::files::{
-        folder::tests::names,
-        names::{CURVES, SUMMARY},
+        folder::tests::{OLD, names},
+        names::{CURVES, RUN, SUMMARY},
     };
 
     #[test]
     fn names_that_no_file_could_take_are_refused_before_any_work() {
         for (folders, files) in [(&[SUMMARY][..], &[][..]), (&["plots", CURVES], &[]), (&[], &["plots"])] {
             let home = tempfile::tempdir().unwrap();
+            fs::write(home.path().join(RUN), OLD).unwrap();
             folders.iter().for_each(|name| fs::create_dir(home.path().join(name)).unwrap());
             files.iter().for_each(|name| fs::write(home.path().join(name), "mine").unwrap());
             let before = names(home.path());

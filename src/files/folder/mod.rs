@@ -5,7 +5,7 @@ mod leftovers;
 mod publish;
 mod resumed;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 use std::{
     fs, io,
@@ -57,7 +57,7 @@ impl OutputFolder {
     /// # Errors
     /// Those of [`OutputFolder::open`] that can be told from outside.
     pub fn check_place(path: &Path, existing: impl Into<Existing>) -> Result<()> {
-        check_place(path, existing.into(), &OWN.map(String::from))
+        check_place(path, existing.into(), Owner::Run, &OWN.map(String::from))
     }
 
     /// Creates the folder and its parents, for `owner` to write the files `names` into. An existing folder is refused
@@ -74,7 +74,7 @@ impl OutputFolder {
         };
         let existing = existing.into();
         // Before its lock is touched.
-        check_place(path, existing, &names)?;
+        check_place(path, existing, owner, &names)?;
         let mut folder = OutputFolder::of(path, names);
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             folder.make_all(parent).map_err(refuse)?;
@@ -88,8 +88,8 @@ impl OutputFolder {
             return Err(Error::value("out", path.display(), "a run is writing here", "use another folder"));
         }
         // Another run may have started and ended in between.
-        existing.check(folder.place.at(), path, &folder.names)?;
         owner.check(folder.place.at(), path)?;
+        existing.check(owner, folder.place.at(), path, &folder.names)?;
         folder.check_names()?;
         folder.probe().map_err(refuse)?;
         // Leftovers of an interrupted run; its lock is gone, so it is no longer writing.
@@ -194,7 +194,7 @@ impl Drop for OutputFolder {
 }
 
 /// Checks that a folder may be made or used at `path`.
-fn check_place(path: &Path, existing: Existing, names: &[String]) -> Result<()> {
+fn check_place(path: &Path, existing: Existing, owner: Owner, names: &[String]) -> Result<()> {
     check_length(path)?;
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
     if let Some(parent) = parent.filter(|parent| parent.exists() && !parent.is_dir()) {
@@ -202,7 +202,10 @@ fn check_place(path: &Path, existing: Existing, names: &[String]) -> Result<()> 
         return Err(Error::value("out", path.display(), &problem, "name a place inside a folder"));
     }
     match path.is_dir() {
-        true => existing.check(path, path, names),
+        true => {
+            owner.check(path, path)?;
+            existing.check(owner, path, path, names)
+        }
         false if path.exists() => {
             Err(Error::value("out", path.display(), "exists but is not a folder", "name another"))
         }

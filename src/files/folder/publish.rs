@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use crate::files::{
         claim::LOCK,
-        folder::tests::names,
+        folder::tests::{OLD, names},
         names::{CURVES, SERIES, SUMMARY},
         owner::Owner,
     };
@@ -103,19 +103,23 @@ mod tests {
     #[test]
     fn force_replaces_the_files_of_a_run_and_no_others() {
         let home = tempfile::tempdir().unwrap();
-        for name in [SUMMARY, SERIES, RUN, "notes.txt"] {
-            fs::write(home.path().join(name), "old").unwrap();
+        for name in [SUMMARY, SERIES, RUN, ".notes"] {
+            fs::write(home.path().join(name), OLD).unwrap();
         }
         let folder = OutputFolder::open(home.path(), true).unwrap();
         let summary = folder.write(SUMMARY, "new").unwrap();
         let run = folder.write(RUN, "new").unwrap();
         for name in [SUMMARY, SERIES, RUN] {
-            assert_eq!(fs::read(home.path().join(name)).unwrap(), b"old", "{name} goes before the new files are ready");
+            assert_eq!(
+                fs::read_to_string(home.path().join(name)).unwrap(),
+                OLD,
+                "{name} goes before the new files are ready"
+            );
         }
         folder.publish(vec![summary], None, run).unwrap();
         drop(folder);
-        assert_eq!(names(home.path()), ["notes.txt", RUN, SUMMARY]);
-        for (name, text) in [(SUMMARY, "new"), (RUN, "new"), ("notes.txt", "old")] {
+        assert_eq!(names(home.path()), [".notes", RUN, SUMMARY]);
+        for (name, text) in [(SUMMARY, "new"), (RUN, "new"), (".notes", OLD)] {
             assert_eq!(fs::read_to_string(home.path().join(name)).unwrap(), text, "{name}");
         }
     }

@@ -8,6 +8,9 @@ use crate::files::{
     names::{RUN, SUMMARY},
 };
 
+/// A `run.json` that an earlier run left.
+pub const OLD: &str = "{\"curvelax\": \"0.1.0\"}";
+
 pub(super) fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> =
         fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();

@@ -212,7 +212,8 @@ fn a_run_leaves_the_same_bits_as_in_its_table() {
         }
     }
 
-    let out = OutputFolder::open(home.path(), true).unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let out = OutputFolder::open(elsewhere.path(), true).unwrap();
     let mut table = SnapshotTable::new(out.file("snapshots.csv").unwrap()).unwrap();
     members.iter().flat_map(|(_, snapshots)| snapshots).for_each(|own| table.snapshot(own).unwrap());
     let text = fs::read_to_string(table.ready().unwrap().part().at()).unwrap();

@@ -339,6 +339,16 @@ class Package(unittest.TestCase):
         self.assertEqual(files(out), sorted(before))
         self.assertNotEqual((out / "outlines.npz").read_bytes(), before["outlines.npz"])
 
+    def test_force_replaces_a_run_and_nothing_else(self):
+        out = self.at / "forced"
+        out.mkdir()
+        curvelax.run(shape=ellipse(2, 1), out=out, force=True, **SMALL)
+        (out / "notes.txt").write_text("mine")
+        before = {name: (out / name).read_bytes() for name in files(out)}
+        for shape in [ellipse(3, 1), "ellipse:3,1"]:
+            self.assertIn("notes.txt", self.refused(shape=shape, out=out, force=True))
+            self.assertEqual({name: (out / name).read_bytes() for name in files(out)}, before)
+
     def test_a_study_stays_with_its_folder(self):
         study = curvelax.run(out=os.path.relpath(self.at / "relative"), **SMALL)
         elsewhere = pickle.loads(pickle.dumps(study))
