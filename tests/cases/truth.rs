@@ -4,7 +4,7 @@
 //! A missed bound means an error, not that the bound is too tight. Without an adapter, GPU cases fail, unless
 //! `ALLOW_NO_GPU=1`: then they are reported as ignored.
 
-use crate::may_lack_gpu;
+use crate::{everything, may_lack_gpu};
 use curvelax::{
     backend::gpu::Gpu,
     ensemble::{
@@ -38,7 +38,10 @@ pub fn trials() -> Vec<Trial> {
             if on_gpu && precision == Precision::F64 && gpu.as_ref().is_some_and(|gpu| !gpu.has_f64()) {
                 continue;
             }
-            for solver in Solver::ALL {
+            // Conformance compares the other kernels with the CPU.
+            let precise = gpu.as_ref().is_none_or(|gpu| gpu.capacity().best_precision() == precision);
+            let is_wanted = |solver| !on_gpu || everything() || (precise && solver == Solver::Direct);
+            for solver in Solver::ALL.into_iter().filter(|solver| is_wanted(*solver)) {
                 let method = Spec { backend, precision: Some(precision), solver: solver.into(), ..Spec::default() };
                 for problem in problems() {
                     let name = format!("{backend:?} {precision:?} {solver:?}: {}", problem.name).to_lowercase();
