@@ -7,7 +7,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::common::program::{number, run};
+use crate::common::{
+    command::stopped_when,
+    program::{number, run},
+};
 use curvelax::backend::gpu::Gpu;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -101,15 +104,22 @@ fn a_run_out_of_time_keeps_its_state() {
     // Months of work.
     let long = "run --backend cpu --points 34 --adaptive=1e-3 --curves 100000000 --stop-when-relaxed";
     let started = Instant::now();
-    let mut output = curvelax(home.path(), &format!("{long} --max-time 2s --out out"));
+    let timed = curvelax(home.path(), &format!("{long} --max-time 2s --out timed"));
+    let message = String::from_utf8(timed.stderr).unwrap();
+    assert_eq!(timed.status.code(), Some(75), "{message}");
+    assert!(started.elapsed().as_secs() >= 2, "{message}");
+    // A machine that is very busy ends it before it has.
+    assert!(["after ", "at once"].iter().any(|way| message.contains(&format!("error: stopped by --max-time {way}"))));
+    // However slow it is.
+    let table = home.path().join("out/.summary.csv.part");
+    let rows = || fs::read_to_string(&table).map_or(0, |text| text.lines().count().saturating_sub(1));
+    let output = stopped_when(home.path(), &format!("{long} --out out"), || rows() > 0);
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(75), "{message}");
-    assert!(started.elapsed().as_secs() >= 2, "{message}");
-    assert!(message.contains("error: stopped by --max-time after "), "{message}");
-    assert!(message.contains("members in the table; curvelax resume out continues\n"), "{message}");
-    let rows = || fs::read_to_string(home.path().join("out/.summary.csv.part")).unwrap().lines().count() - 1;
     let kept = rows();
-    assert!(message.contains(&format!("with {kept} of 100000000 members in the table")), "{kept}: {message}");
+    let told = format!("with {kept} of 100000000 members in the table; curvelax resume out continues\n");
+    let at_once = message.contains("error: stopped by SIGTERM at once");
+    assert!(at_once || (message.contains("error: stopped by SIGTERM after ") && message.contains(&told)), "{message}");
     assert_eq!(
         names(&home.path().join("out")),
         [
@@ -122,12 +132,12 @@ fn a_run_out_of_time_keeps_its_state() {
         ]
     );
     assert_eq!(output.stdout, b"");
-    // Finished work is not repeated, and seconds add up, however little is done in one.
-    while rows() < kept + 100 {
-        assert!(started.elapsed().as_secs() < 600, "{kept} members in ten minutes");
+    // Finished work is not repeated.
+    for _ in 0..3 {
         let before = rows();
-        output = curvelax(home.path(), "resume out --max-time 1s");
+        let output = stopped_when(home.path(), "resume out", || rows() > before);
         let message = String::from_utf8(output.stderr).unwrap();
+        assert!(rows() > before, "{message}");
         assert_eq!(output.status.code(), Some(75), "{message}");
         assert!(message.contains(&format!("resuming: {before} of 100000000 members are in the table\n")), "{message}");
     }
@@ -215,9 +225,9 @@ fn peak(folder: &Path, arguments: &str, out: &str) -> f64 {
     let filler = std::thread::spawn(move || writer.write_all(&vec![b' '; 1 << 22]));
     let mut child = command.spawn().unwrap();
     drop(command);
-    let (out, started) = (folder.join(out), Instant::now());
+    let out = folder.join(out);
     while !out.join("run.json").exists() || out.join(".curvelax.lock").exists() {
-        assert!(child.try_wait().unwrap().is_none() && started.elapsed().as_secs() < 600, "{arguments}");
+        assert!(child.try_wait().unwrap().is_none(), "{arguments}");
         std::thread::sleep(Duration::from_millis(1));
     }
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
@@ -225,6 +235,7 @@ fn peak(folder: &Path, arguments: &str, out: &str) -> f64 {
     std::io::copy(&mut reader, &mut std::io::sink()).unwrap();
     filler.join().unwrap().unwrap();
     assert!(child.wait().unwrap().success(), "{arguments}");
+    fs::remove_dir_all(out).unwrap();
     1024.0 * line.trim().trim_end_matches(" kB").parse::<f64>().unwrap()
 }
 
@@ -238,8 +249,8 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
                 --tau 0.02";
     let runs = [
         "--curves 300 --adaptive=1e-3 --stop-when-relaxed".to_string(),
-        format!("--curves 250000 --t-end 0.02 {many}"),
-        format!("--curves 350000 --t-end 0.9 --relax-to 1e-3 {many}"),
+        format!("--curves 150000 --t-end 0.02 {many}"),
+        format!("--curves 210000 --t-end 0.9 --relax-to 1e-3 {many}"),
         // More rows than may be in memory, and members of very many nodes.
         "--curves 12 --points 32 --adaptive=0.1 --t-end 1 --series 1e-5".to_string(),
         "--curves 12 --points 500 --adaptive=0.1 --t-end 0.01 --snapshots SNAPSHOTS --store zarr".to_string(),
@@ -249,15 +260,91 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
     let snapshots = (0..400).map(|i| (f64::from(i) * 2.5e-5).to_string()).collect::<Vec<_>>().join(",");
     let runs = runs.map(|spec| spec.replace("SNAPSHOTS", &snapshots));
     for (rank, spec) in runs.iter().enumerate() {
-        // Whether a run saves a checkpoint, which takes memory, must not depend on how fast it is.
-        let base = format!("run --backend cpu {spec} --checkpoint-every 1h --quiet");
+        // Whether a run saves a checkpoint, which takes memory, must not depend on how fast it is, and its pool not on the
+        // number of cores.
+        let base = format!("run --backend cpu --threads 1 {spec} --checkpoint-every 1h --quiet");
         let said = json(home.path(), &format!("{base} --dry-run --json"))["memory_bytes"].as_f64().unwrap();
         let taken = peak(home.path(), &base, &rank.to_string());
         assert!((said / taken - 1.0).abs() < 0.2, "{spec}: {said} foretold, {taken} taken");
         foretold.push(said);
     }
     // One estimate would not do for the other.
-    assert!(foretold[2] > 1.4 * foretold[1], "{foretold:?}");
+    assert!(foretold[2] > 1.25 * foretold[1], "{foretold:?}");
+}
+
+/// An estimate as the program makes it while it is held for 2.5 s after each of `holds`.
+#[cfg(target_os = "linux")]
+fn held_estimate(home: &Path, arguments: &str, holds: &[u64]) -> Value {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
+    command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(["run", "--dry-run", "--json", "--quiet"]);
+    let child = command.args(arguments.split_whitespace()).stdout(Stdio::piped()).spawn().unwrap();
+    let signal = |name: &str| {
+        let _ = Command::new("kill").args([name, &child.id().to_string()]).stderr(Stdio::null()).status();
+    };
+    for milliseconds in holds {
+        std::thread::sleep(Duration::from_millis(*milliseconds));
+        signal("-STOP");
+        std::thread::sleep(Duration::from_millis(2500));
+        signal("-CONT");
+    }
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{arguments}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_estimate_does_not_depend_on_how_fast_its_pilot_is() {
+    let home = TempDir::new().unwrap();
+    for arguments in [
+        "--backend cpu --threads 2 --curves 7 --points 50000 --adaptive --t-end 1e-15 --checkpoint-every 1h",
+        "--backend cpu --threads 2 --curves 100000 --adaptive=1e-6 --series 0.01 --checkpoint-every 9h",
+    ] {
+        let [free, held] = [&[][..], &[300, 300]].map(|holds| held_estimate(home.path(), arguments, holds));
+        for key in ["steps_per_member", "disk_bytes", "members", "slots"] {
+            assert!(free[key] == held[key] && !free[key].is_null(), "{arguments}, {key}: {free}, {held}");
+        }
+        for key in ["members", "ended", "relaxed"] {
+            assert_eq!(free["pilot"][key], held["pilot"][key], "{arguments}, {key}");
+        }
+        let [free, held] = [&free, &held].map(|estimate| estimate["memory_bytes"].as_f64().unwrap());
+        assert!((free / held - 1.0).abs() < 0.05, "{arguments}: {free}, {held}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_memory_of_a_sweep_is_that_of_its_largest_cell_in_any_order() {
+    let home = TempDir::new().unwrap();
+    let study = "run --backend cpu --threads 1 --curves 2 --adaptive --t-end 1e-13 --checkpoint-every 1h --quiet";
+    let foretold = |points: &str| {
+        let dry_run = format!("{study} --sweep points={points} --dry-run --json");
+        json(home.path(), &dry_run)["memory_bytes"].as_f64().unwrap()
+    };
+    let [rising, falling, small] = ["64,20000", "20000,64", "64,65"].map(foretold);
+    let taken = peak(home.path(), &format!("{study} --sweep points=20000,64"), "out");
+    for said in [rising, falling] {
+        assert!((said / taken - 1.0).abs() < 0.2, "{said} foretold, {taken} taken");
+    }
+    assert!(small < 0.5 * taken, "{small} foretold for small members, {taken} taken by large ones");
+}
+
+#[cfg(unix)]
+#[test]
+fn the_pilot_of_a_dry_run_can_be_stopped() {
+    let home = TempDir::new().unwrap();
+    // A sweep of this many nodes takes seconds, and a step of this length thousands of them.
+    let long = "run --backend cpu --threads 1 --curves 64 --points 1000000 --dry-run";
+    let started = Instant::now();
+    let begun = || started.elapsed() > Duration::from_millis(300);
+    for (arguments, code, cause) in [(format!("{long} --max-time 1s"), 75, "--max-time"), (long.into(), 75, "SIGTERM")] {
+        let output = stopped_when(home.path(), &arguments, || !arguments.ends_with('s') && begun());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        let last = said.lines().last().unwrap();
+        assert!(last.starts_with(&format!("error: stopped by {cause}")) && last.ends_with("nothing is saved"), "{said}");
+    }
+    assert_eq!(names(home.path()), [""; 0]);
 }
 
 /// Vulkan's loader lists what it loads; without `XDG_RUNTIME_DIR` a layer of Mesa prints a message, too.

@@ -3,7 +3,7 @@
 
 use std::{collections::BTreeMap, f64::consts::TAU, fs, path::Path};
 
-use crate::common::command::{curvelax, done};
+use crate::common::command::{curvelax, done, stopped_run};
 use tempfile::TempDir;
 
 /// Outlines in the files of [`home`].
@@ -206,8 +206,7 @@ fn a_run_of_outlines_continues_and_refuses_others() {
     let home = home();
     let home = home.path();
     let run = format!("run --shape files:csv/*.csv --curves 2000 --threads 1 {RUN} --quiet");
-    let stopped = curvelax(home, &format!("{run} --max-time 1s --out stopped"));
-    assert_eq!(stopped.status.code(), Some(75), "{}", String::from_utf8_lossy(&stopped.stderr));
+    stopped_run(home, &run, "stopped");
     fs::write(home.join("csv/grain-9.csv"), "0,0\n1,0\n0,1\n").unwrap();
     let more = curvelax(home, "resume stopped");
     let message = String::from_utf8(more.stderr).unwrap();
