@@ -17,7 +17,6 @@ use super::{
     fingerprint::fingerprint,
 };
 use crate::{
-    curve::outlines,
     ensemble::{Ended, Paused, Standing, Study},
     error::{Error, Result},
     files::{
@@ -28,6 +27,7 @@ use crate::{
         spill::SpilledRows,
         zarr,
     },
+    input::{self, MAX_OUTLINE},
     placement::Platform,
     results::tally::Aside,
 };
@@ -112,15 +112,33 @@ impl Origin {
 
     /// The error that outlines have changed, or else `error`.
     pub fn explain(&self, error: Error) -> Error {
-        let read = |path| outlines::read_all(Path::new(&self.base), path).ok();
-        let digest = |path| read(path).and_then(|all| all.first().map(|one| one.outline.digest()));
-        let changed = self.outlines.iter().find(|(path, crc)| digest(path) != Some(*crc));
-        changed.map_or(error, |(path, _)| self.changed(path))
+        self.first_changed(Path::new(&self.base)).map_or(error, |path| self.changed(path))
+    }
+
+    /// Follows outlines that were moved together with the `folder` of the run, such as those of a project: if they are
+    /// not where they were, paths are relative to the nearest folder around it from which all are found, unchanged.
+    /// Returns whether they were moved.
+    pub fn follow(&mut self, folder: &Path) -> bool {
+        if self.outlines.is_empty() || self.first_changed(Path::new(&self.base)).is_none() {
+            return false;
+        }
+        let around = folder.ancestors().skip(1).filter(|folder| self.first_changed(folder).is_none());
+        let found = around.filter_map(Path::to_str).map(String::from).next();
+        let is_moved = found.is_some();
+        self.base = found.unwrap_or_else(|| std::mem::take(&mut self.base));
+        is_moved
+    }
+
+    /// The first outline that, with paths relative to `base`, is not as it was.
+    fn first_changed(&self, base: &Path) -> Option<&Path> {
+        let digest = |path: &Path| input::bytes(&base.join(path), MAX_OUTLINE).ok().map(|bytes| crc32c::crc32c(&bytes));
+        self.outlines.iter().find(|(path, crc)| digest(path) != Some(*crc)).map(|(path, _)| path.as_path())
     }
 
     fn changed(&self, path: &Path) -> Error {
         Error::Request(format!(
-            "the outline {} has changed or disappeared since the run began: restore it, or start over",
+            "the outline {} has changed or disappeared since the run began: restore it, put it in the same place next to \
+             the run, or start over",
             Path::new(&self.base).join(path).display()
         ))
     }

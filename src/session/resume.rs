@@ -136,11 +136,14 @@ fn continue_in(
         host.say(&format!("warning: {}: {fault}", path.display()));
     }
     let origin = &mut saved.head.origin;
-    let base = PathBuf::from(&origin.base);
     if !origin.outlines.is_empty() {
         folder.make_absolute()?;
-        check_base(&base)?;
+        if origin.follow(folder.path()) {
+            host.say(&format!("note: outlines are read from {}, where they are now", origin.base));
+        }
+        check_base(Path::new(&origin.base))?;
     }
+    let base = PathBuf::from(&origin.base);
     let began = origin.platform.clone();
     let elsewhere = place.backend.is_some() || place.adapter.is_some();
     let (new_threads, why) = (place.threads.is_some(), place.why.take());

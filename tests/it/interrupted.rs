@@ -9,6 +9,8 @@ use std::{
 
 use tempfile::TempDir;
 
+use crate::common::command::stopped_run;
+
 /// A billion steps, about an hour, stopped after a second.
 const LONG: &str = "--curves 3 --points 34 --tau 1e-9 --t-end 1 --solver direct --series 0.1 --max-time 1s";
 
@@ -88,6 +90,33 @@ fn an_outline_is_found_again_from_anywhere_and_has_to_be_the_same() {
     fs::write(begun.join("square.csv"), square).unwrap();
     let message = said(&curvelax(&elsewhere, "resume ../begun/out --max-time 1s"), 75);
     assert!(message.contains("resuming: 0 of 3 members"), "{message}");
+}
+
+#[test]
+fn a_project_that_was_moved_is_resumed_with_its_outlines() {
+    let home = TempDir::new().unwrap();
+    let [before, after] = ["before", "after"].map(|name| home.path().join(name));
+    fs::create_dir_all(before.join("shapes")).unwrap();
+    for (name, y) in [("a", "1.5"), ("b", "1.25")] {
+        fs::write(before.join(format!("shapes/{name}.csv")), format!("x,y\n0,0\n1,0\n1,{y}\n0,1\n")).unwrap();
+    }
+    let run =
+        "run --backend cpu --shape files:shapes/*.csv --curves 2000 --points 34 --adaptive=1e-4 --threads 1 --quiet";
+    said(&curvelax(&before, &format!("{run} --out whole")), 0);
+    stopped_run(&before, run, "runs/out");
+    fs::rename(&before, &after).unwrap();
+    // One that has changed is not taken for it.
+    let b = fs::read(after.join("shapes/b.csv")).unwrap();
+    fs::write(after.join("shapes/b.csv"), "x,y\n0,0\n1,0\n0,1\n").unwrap();
+    refused(&after, "runs/out", "", &["shapes/b.csv has changed or disappeared since the run began"]);
+    fs::write(after.join("shapes/b.csv"), b).unwrap();
+    let message = said(&curvelax(home.path(), "resume after/runs/out"), 0);
+    let note = format!("note: outlines are read from {}, where they are now", after.canonicalize().unwrap().display());
+    assert!(message.contains(&note) && message.contains("resuming: "), "{message}");
+    for table in ["summary.csv", "members.csv", "ensemble.csv"] {
+        let [whole, resumed] = ["whole", "runs/out"].map(|out| fs::read(after.join(out).join(table)).unwrap());
+        assert!(whole == resumed, "{table}");
+    }
 }
 
 #[test]
