@@ -87,6 +87,62 @@ fn events_converge_with_the_steps_as_their_order_promises() {
     }
 }
 
+/// A level that an observable of a member passes and leaves again: the member, the event, and about when it happens.
+struct Turn {
+    member: usize,
+    event: String,
+    t: f64,
+    width: f64,
+}
+
+/// A level just short of each turning point of the series of each member, which is a part `depth` of the way of the
+/// observable away.
+fn turns(series: &[Vec<Row>], depth: f64) -> Vec<Turn> {
+    let mut turns = Vec::new();
+    for (member, rows) in series.iter().enumerate() {
+        for name in ["length", "energy", "k_min", "k_max", "mesh_ratio"] {
+            let (t, of): (Vec<f64>, Vec<f64>) = rows.iter().map(|row| (number(row, "t"), number(row, name))).unzip();
+            let way = of.iter().fold(f64::MIN, |a, b| a.max(*b)) - of.iter().fold(f64::MAX, |a, b| a.min(*b));
+            for (sign, condition) in [(1.0, ">="), (-1.0, "<=")] {
+                // The highest value, or the lowest one, if it is inside and well above that at both ends.
+                let at = (0..of.len()).max_by(|a, b| (sign * of[*a]).total_cmp(&(sign * of[*b]))).unwrap();
+                let level = of[at] - sign * depth * way;
+                let is_inside = [of[0], of[of.len() - 1]].iter().all(|end| sign * (level - end) > 1e-2 * way);
+                let before = of.iter().position(|value| sign * (value - level) >= 0.0).unwrap();
+                let after = of.iter().rposition(|value| sign * (value - level) >= 0.0).unwrap();
+                if is_inside && after > before {
+                    let event = format!("{name}{condition}{level:e}");
+                    turns.push(Turn { member, event, t: t[before], width: t[after] - t[before] });
+                }
+            }
+        }
+    }
+    turns
+}
+
+#[test]
+fn a_level_that_is_reached_and_left_again_within_a_step_is_found() {
+    let members = "--shape nonconvex --curves 6 --points 48 --pull auto --adaptive=1e-3 --t-end 0.06";
+    let turns = turns(&series_of(&run(&format!("{members} --series 2e-5"))), 2e-4);
+    assert!((8..=32).contains(&turns.len()), "{} turning points", turns.len());
+    let events: String =
+        turns.iter().enumerate().map(|(i, turn)| format!(" --event e{i}={}", turn.event)).collect();
+    for precision in ["f64", "f32"] {
+        let done = run(&format!("{members}{events} --precision {precision}"));
+        let rows = done.rows("events.csv");
+        for (i, turn) in turns.iter().enumerate() {
+            let row = &rows[turn.member * turns.len() + i];
+            assert_eq!((&row["event"], &row["member"]), (&format!("e{i}"), &turn.member.to_string()));
+            eprintln!("{precision} {}: {} {} {} {}", turn.event, row["t"], row["censored"], turn.t, turn.width);
+            // Single precision may turn short of the level.
+            if precision == "f64" || row["censored"] == "0" {
+                assert_eq!(row["censored"], "0", "{}: at {} for {}", turn.event, turn.t, turn.width);
+                assert!((number(row, "t") - turn.t).abs() <= 2.5e-5 + 0.5 * turn.width, "{}: {row:?}", turn.event);
+            }
+        }
+    }
+}
+
 #[test]
 fn half_of_the_excess_is_an_event_like_the_one_that_every_member_has() {
     for (pace, bound) in [("--tau 1e-5 --solver direct", 0.0), ("--tau 3e-5", 0.0), ("--adaptive=1e-3", 1e-5)] {
