@@ -291,7 +291,11 @@ mod tests {
         for field in 0..fields {
             let passes = |value: &dyn Fn(f64) -> f64, level: f64| {
                 let (mut p, mut low, mut high) = (Parameters::default(), vec![-BIG; fields], vec![BIG; fields]);
-                if level < 1.0 { low[field] = level } else { high[field] = level }
+                if level < 1.0 {
+                    low[field] = level
+                } else {
+                    high[field] = level
+                }
                 p.set_levels(&Observed::from_numbers(&low), &Observed::from_numbers(&high));
                 passes_level(&seen(value), &p)
             };

@@ -13,7 +13,7 @@ use super::{Time, Trajectory, watch::Watch};
 use crate::scheme::State;
 
 /// Parts of an adaptive step in which a crossing is looked for before it is narrowed down: an observable may turn round
-/// inside a step.
+/// inside a step, even more than once.
 const PARTS_OF_STEP: u32 = 8;
 /// Width of the narrowed part, as a fraction of the step, and bounds on the attempts, by secants and in all.
 const NARROW: f64 = 1e-12;
@@ -46,7 +46,7 @@ impl Trajectory<'_> {
             if watch.is_due(&self.report.now) {
                 self.watches[place].t = Some(self.time_of(&watch, state));
             } else if let (true, true, Some(state)) = (self.may_have_passed(), watch.is_pending(), state) {
-                self.watches[place].t = self.turned_past(&watch, state).map(|at| self.time_at(at));
+                self.watches[place].t = self.first_past(&watch, state).map(|at| self.time_at(at));
             }
         }
     }
@@ -58,7 +58,7 @@ impl Trajectory<'_> {
                 let fraction = watch.on_line(&self.report.before, &self.report.now);
                 clock.inside(self.counters.steps.saturating_sub(1), fraction)
             }
-            (Time::Adaptive(_), Some(state)) => self.time_at(self.first_past(watch, state)),
+            (Time::Adaptive(_), Some(state)) => self.time_at(self.first_past(watch, state).unwrap_or(1.0)),
             (Time::Adaptive(_), None) => self.now(),
         }
     }
@@ -71,51 +71,37 @@ impl Trajectory<'_> {
         ((progress.time_high + (progress.time_low - past)) * self.time_unit).clamp(0.0, self.now())
     }
 
-    /// Where inside the last adaptive step it is first reached and left again before the end, as a fraction of it.
-    fn turned_past(&self, watch: &Watch, state: &State<f64>) -> Option<f64> {
-        let ends = [&self.report.before, &self.report.now].map(|at| watch.distance(at));
-        turned_past(ends, |at| watch.distance(&self.observe_inside(at, &self.curve_at(at, state))))
-    }
-
     /// Where inside the last adaptive step it is first reached, as a fraction of it.
-    fn first_past(&self, watch: &Watch, state: &State<f64>) -> f64 {
-        let distance = |at: f64| watch.distance(&self.observe_inside(at, &self.curve_at(at, state)));
-        let mut before = (0.0, watch.distance(&self.report.before));
-        if before.1 <= 0.0 {
-            return 0.0;
-        }
-        for part in 1..=PARTS_OF_STEP {
-            let at = f64::from(part) / f64::from(PARTS_OF_STEP);
-            let past = (at, if part < PARTS_OF_STEP { distance(at) } else { watch.distance(&self.report.now) });
-            if past.1 <= 0.0 {
-                return narrowed(before, past, distance);
-            }
-            before = past;
-        }
-        1.0
+    fn first_past(&self, watch: &Watch, state: &State<f64>) -> Option<f64> {
+        let ends = [&self.report.before, &self.report.now].map(|at| watch.distance(at));
+        first_past(ends, |at| watch.distance(&self.observe_inside(at, &self.curve_at(at, state))))
     }
 }
 
-/// The first place in a step at which a distance is 0, if there is one, though it is positive at both `ends`: from part to
-/// part, the lowest place between those around it.
-fn turned_past(ends: [f64; 2], distance: impl Fn(f64) -> f64) -> Option<f64> {
-    let parts = PARTS_OF_STEP as usize;
-    let at = |part: usize| part as f64 / f64::from(PARTS_OF_STEP);
-    let mut seen = vec![ends[0]];
-    seen.extend((1..parts).map(|part| distance(at(part))));
-    seen.push(ends[1]);
-    for part in 0..=parts {
-        let (first, last) = (part.saturating_sub(1), (part + 1).min(parts));
-        let before = (at(first), seen[first]);
-        if before.1 <= 0.0 {
-            return Some(before.0);
+/// The first place in a step at which a distance is 0 or less, if it is found, by the distances at both `ends` and inside:
+/// from part to part, at the end of one or where the distance turns round.
+fn first_past(ends: [f64; 2], distance: impl Fn(f64) -> f64) -> Option<f64> {
+    let place = |part: u32| match part {
+        0 => (0.0, ends[0]),
+        PARTS_OF_STEP.. => (1.0, ends[1]),
+        _ => (f64::from(part) / f64::from(PARTS_OF_STEP), distance(f64::from(part) / f64::from(PARTS_OF_STEP))),
+    };
+    let (mut before, mut own) = (place(0), place(0));
+    if own.1 <= 0.0 {
+        return Some(0.0);
+    }
+    for part in 1..=PARTS_OF_STEP + 1 {
+        let next = place(part);
+        if own.1 <= before.1 && own.1 <= next.1 {
+            let turn = lowest(own, [before.0, next.0], &distance);
+            if turn.1 <= 0.0 {
+                return Some(narrowed(before, turn, distance));
+            }
         }
-        let is_lowest = seen[part] <= seen[first] && seen[part] <= seen[last];
-        let own = (at(part), seen[part]);
-        let found = if is_lowest && own.1 > 0.0 { lowest(own, [before.0, at(last)], &distance) } else { own };
-        if found.1 <= 0.0 {
-            return Some(narrowed(before, found, distance));
+        if next.1 <= 0.0 {
+            return Some(narrowed(own, next, distance));
         }
+        (before, own) = (own, next);
     }
     None
 }
@@ -178,7 +164,7 @@ mod tests {
     #[test]
     fn a_distance_that_turns_round_inside_a_step_is_found_where_it_is_first_zero() {
         let parabola = |at: f64, depth: f64| move |x: f64| (x - at).powi(2) - depth * depth;
-        let found = |distance: &dyn Fn(f64) -> f64| turned_past([distance(0.0), distance(1.0)], distance);
+        let found = |distance: &dyn Fn(f64) -> f64| first_past([distance(0.0), distance(1.0)], distance);
         for (at, depth) in [(0.3, 0.01), (0.5, 1e-5), (0.02, 1e-3), (0.99, 1e-4), (0.4, 0.39), (0.125, 1e-4)] {
             let t = found(&parabola(at, depth)).expect("it turns round below 0");
             assert!((t - (at - depth)).abs() < 1e-9, "{at} {depth}: {t}");
