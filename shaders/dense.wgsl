@@ -2,6 +2,8 @@
 
 const RESOLVED = 131072.0;
 const BISECTIONS = 54u;
+const EARLY_LOOK = 0.0625;
+const LATE_LOOK = 0.9375;
 
 /// A value and its first and second derivative.
 struct Jet { value: real, slope: real, bend: real }
@@ -27,6 +29,26 @@ fn arc_at(arc: Arc, at: real) -> real {
     let fourth = real(8.0) * a.slope + real(7.0) * b.slope - real(15.0) * rise + half * (three * a.bend) - b.bend;
     let fifth = real(6.0) * rise - three * (a.slope + b.slope) + half * (b.bend - a.bend);
     return a.value + at * (a.slope + at * (half * a.bend + at * (third + at * (fourth + at * fifth))));
+}
+
+/// How much of the value and the derivatives at each end goes into the value at a fraction of a step of length h. Those
+/// at its start are in units of the step before, of length `shorter`; 0 if there was none.
+fn arc_weights(at: real, h: real, shorter: real) -> Arc {
+    let none = Jet();
+    let one = Jet(1.0, 0.0, 0.0);
+    let sloped = Jet(0.0, 1.0, 0.0);
+    let bent = Jet(0.0, 0.0, 1.0);
+    if shorter <= real(0.0) {
+        let end = Jet(
+            arc_at(arc_first(0.0, one), at), arc_at(arc_first(0.0, sloped), at), arc_at(arc_first(0.0, bent), at),
+        );
+        return Arc(Jet(arc_at(arc_first(1.0, none), at), 0.0, 0.0), end);
+    }
+    let ratio = h / shorter;
+    let slope = ratio * arc_at(Arc(sloped, none), at);
+    let bend = ratio * ratio * arc_at(Arc(bent, none), at);
+    let end = Jet(arc_at(Arc(none, one), at), arc_at(Arc(none, sloped), at), arc_at(Arc(none, bent), at));
+    return Arc(Jet(arc_at(Arc(one, none), at), slope, bend), end);
 }
 
 /// The fraction of the step at which the value falls to `aim`, which lies between its ends.
@@ -90,4 +112,11 @@ fn taken_fraction_at(taken: Taken, excess: real) -> real {
     let aim = ln_ratio(taken.before, excess);
     if taken.fall.kind == EXPONENTIAL { return aim / taken.fall.fallen; }
     return arc_crossing(taken.fall.arc, aim);
+}
+
+/// A field inside the step of an attempt, which ends at `end`, by the weights that `w` is.
+fn field_inside(w: Arc, field: u32, end: vec) -> vec {
+    return w.start.value * load_field(CURVE + field) + w.start.slope * load_field(SLOPE + field)
+        + w.start.bend * load_field(BEND + field) + w.end.value * end
+        + w.end.slope * load_field(SLOPE_BEFORE + field) + w.end.bend * load_field(BEND_BEFORE + field);
 }

@@ -79,7 +79,8 @@ struct Advanced { course: Course, next: Plan }
 
 /// Attempts the planned step and handles the result.
 ///
-/// A step and an observation are each called in one place only: compilers inline the whole body of every call.
+/// A step and an observation are each called in one place only, but for looks inside the steps of members that pause at
+/// levels: compilers inline the whole body of every call.
 fn advance(order: u32, begun: Course, moves: bool) -> Advanced {
     var course = begun;
     find_member();
@@ -105,14 +106,16 @@ fn advance(order: u32, begun: Course, moves: bool) -> Advanced {
     course.solve_sweeps = 0u;
     if ADAPTIVE && solved { finish_attempt(); }
     var gaps = vec(0.0);
+    var looks = Looks();
     if solved {
+        if ADAPTIVE && WATCHED { looks = look_inside(); }
         observe(new_x, new_y, new_k, new_r, displacement);
         if ADAPTIVE { gaps = gaps_of_attempt(); }
     }
     var errors = vec2<real>(0.0, 0.0);
     if lane == 0u {
         if ADAPTIVE && solved { errors = errors_of_attempt(gaps); }
-        let found = judge_attempt(course.ended, count, plan.length, errors);
+        let found = judge_attempt(course.ended, count, plan.length, errors, looks);
         plan.found = found;
         // A fixed step whose curve need not be looked at again is concluded at once, which saves a decision.
         let is_plain = !ADAPTIVE && found != REFUSED && (found & MAY_RELAX) == 0u;
@@ -151,7 +154,7 @@ fn pause(course: Course) {
 }
 
 /// Whether an attempt of `count` steps of the paper is accepted; reports the new curve if it is.
-fn judge_attempt(ended: u32, count: u32, h: real, errors: vec2<real>) -> u32 {
+fn judge_attempt(ended: u32, count: u32, h: real, errors: vec2<real>, looks: Looks) -> u32 {
     let p = &all_parameters[member];
     let report = &all_reports[member].report;
     let counters = &all_counters[member];
@@ -169,7 +172,10 @@ fn judge_attempt(ended: u32, count: u32, h: real, errors: vec2<real>) -> u32 {
     report.now = observed();
     // The host looks at the curves before and after it.
     if WATCHED {
-        if p.watched > real(0.5) && reaches_level(report.now) { counters.goal = counters.steps + 1u; }
+        let watched = p.watched > real(0.5);
+        let passed = ADAPTIVE && watched && passes_level(report.before, looks, report.now);
+        counters.passed = select(0u, 1u, passed);
+        if passed || (watched && reaches_level(report.now)) { counters.goal = counters.steps + 1u; }
     }
     let at_goal = select(0u, AT_GOAL, counters.steps + 1u == counters.goal);
     let relaxes = counters.relax_step == NEVER && report.now.excess <= p.relax_at;

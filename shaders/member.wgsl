@@ -124,6 +124,7 @@ struct Counters {
     fit_points: u32,
     fit_over: u32,
     noted: u32,
+    passed: u32,
 }
 
 const RUNNING = 0u;

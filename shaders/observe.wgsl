@@ -144,3 +144,56 @@ fn reaches_level(at: Observed) -> bool {
         || p.high_mesh_ratio <= at.mesh_ratio || p.high_metric_drift <= at.metric_drift;
     return fell || rose;
 }
+
+/// Whether a value above `level` at both ends of a step may have reached it inside, by the values at the start, at the two
+/// looks and at the end: if it is there at a look, or if the lines through the first two and through the last two values
+/// meet at or below it. A value that turns once does not fall below those lines.
+fn falls_inside(start: real, early: real, late: real, end: real, level: real) -> bool {
+    let fall = start - early;
+    let rise = end - late;
+    let first = early - level;
+    let last = late - level;
+    let there = first <= real(0.0) || last <= real(0.0);
+    let turns = !(fall <= real(0.0) || rise <= real(0.0));
+    return there || (turns && first * rise + last * fall <= real((LATE_LOOK - EARLY_LOOK) / EARLY_LOOK) * (fall * rise));
+}
+
+/// Whether a value may have reached one of its levels inside a step.
+fn passes(start: real, early: real, late: real, end: real, low: real, high: real) -> bool {
+    return falls_inside(start, early, late, end, low) || falls_inside(-start, -early, -late, -end, -high);
+}
+
+/// The observables of the last attempt near its start and near its end.
+struct Looks { early: Observed, late: Observed }
+
+/// Whether an observable may have reached a level inside a step from `a` to `d` and left it again, by those at both ends
+/// and at the two looks. Where the host looks closely, it may turn out that none has.
+fn passes_level(a: Observed, looks: Looks, d: Observed) -> bool {
+    let p = &all_parameters[member];
+    let b = looks.early;
+    let c = looks.late;
+    return passes(a.length, b.length, c.length, d.length, p.low_length, p.high_length)
+        || passes(a.area, b.area, c.area, d.area, p.low_area, p.high_area)
+        || passes(a.excess, b.excess, c.excess, d.excess, p.low_excess, p.high_excess)
+        || passes(a.energy, b.energy, c.energy, d.energy, p.low_energy, p.high_energy)
+        || passes(a.k_min, b.k_min, c.k_min, d.k_min, p.low_k_min, p.high_k_min)
+        || passes(a.k_max, b.k_max, c.k_max, d.k_max, p.low_k_max, p.high_k_max)
+        || passes(a.mesh_ratio, b.mesh_ratio, c.mesh_ratio, d.mesh_ratio, p.low_mesh_ratio, p.high_mesh_ratio)
+        || passes(
+            a.metric_drift, b.metric_drift, c.metric_drift, d.metric_drift, p.low_metric_drift, p.high_metric_drift,
+        );
+}
+
+/// Observes the curve inside the step of an attempt near its start and near its end.
+fn look_inside() -> Looks {
+    var looks = Looks();
+    for (var look = 0u; look < 2u; look++) {
+        let weights = arc_weights(select(real(LATE_LOOK), real(EARLY_LOOK), look == 0u), plan.length, plan.taken);
+        settle();
+        let nodes = windows(field_inside(weights, 0u, here(new_x)), field_inside(weights, 1u, here(new_y)));
+        let ks = field_inside(weights, 2u, new_k);
+        observe(nodes.a, nodes.b, ks, field_inside(weights, 3u, new_r), vec(0.0));
+        if look == 0u { looks.early = observed(); } else { looks.late = observed(); }
+    }
+    return looks;
+}

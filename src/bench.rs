@@ -1,7 +1,7 @@
 //! Measures how fast a back end advances curves, in curve-steps per second.
 //!
-//! A curve-step is one step of the paper's scheme for one curve; an adaptive attempt is three. A [`Bench`] fills the
-//! slots of a back end with members of the default family and advances them through the same calls as a run: `load`,
+//! A curve-step is one step of the paper's scheme for one curve; an attempt of an adaptive step makes several. A [`Bench`]
+//! fills the slots of a back end with members of the default family and advances them through the same calls as a run: `load`,
 //! `aim`, `advance`, and a look at the counters. Other work of a run (making members, checking for crossings, outputs)
 //! is left out. All numbers count steps made, not steps requested.
 
@@ -181,8 +181,7 @@ impl Bench {
 
 /// Curve-steps since the start.
 fn made(run: &Run<f64>, counters: &Counters) -> u64 {
-    let attempts = u64::from(counters.steps) + u64::from(counters.rejected);
-    if run.parameters.adaptive > 0.0 { 3 * attempts } else { attempts }
+    u64::from(if run.parameters.adaptive > 0.0 { counters.solves } else { counters.steps })
 }
 
 fn is_at_end(run: &Run<f64>, counters: &Counters, report: &Report<f64>) -> bool {
@@ -288,6 +287,15 @@ mod tests {
             assert_eq!(u64::from(loads.get()), 2 + steps.get() / 12, "stride {stride}");
             assert!(loads.get() > 10);
         }
+    }
+
+    #[test]
+    fn an_adaptive_step_counts_as_the_solves_that_it_made() {
+        let mut run = fives(1).0.members[0].clone();
+        let counters = Counters { steps: 2, rejected: 1, solves: 45, ..Counters::default() };
+        assert_eq!(made(&run, &counters), 2);
+        run.parameters.adaptive = 1e-3;
+        assert_eq!(made(&run, &counters), 45);
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub enum Error {
     /// The folder was removed or replaced while the command was writing there. Exit code 1.
     #[error("{0}")]
     Lost(String),
-    /// The run is complete and its files are written, but members ended in a way that counts as an error. Exit code 3.
+    /// The run is complete and its files are written, but they do not hold what was asked for. Exit code 3.
     #[error("{0}")]
     Strict(String),
     /// The run was stopped early, as requested. Exit code 75.

@@ -14,7 +14,7 @@ pub(crate) const MAX_SPEC: u64 = 1 << 20;
 pub(crate) const MAX_OUTLINE: u64 = 1 << 26;
 /// Maximum bytes of a `run.json`: the longest spec, line by line.
 pub(crate) const MAX_RUN: u64 = 1 << 22;
-/// Maximum bytes of the first members: ten times the size of twelve.
+/// Maximum bytes of the first members: ten times the size of [`PORTRAITS`](crate::ensemble::study::PORTRAITS) of them.
 pub(crate) const MAX_PORTRAITS: u64 = 1 << 23;
 /// Maximum bytes of a line of a table: a thousand numbers.
 pub(crate) const MAX_LINE: usize = 1 << 16;

@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+/// Significant digits that tell any two numbers apart.
+const MOST_DIGITS: usize = 17;
+
 /// `value` with `digits` significant digits: plain from 10⁻³ to 10⁶, otherwise with a power of ten.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
@@ -34,6 +37,16 @@ pub fn number(value: f64) -> String {
 pub fn rounded(value: f64, digits: usize) -> String {
     let scientific = format!("{value:.*e}", digits.max(1) - 1);
     scientific.parse().map_or_else(|_| value.to_string(), number)
+}
+
+/// `value` rounded to two significant digits, or to as many more as show on which side of `limit` it is; `no interval` if
+/// it is infinite.
+pub fn rounded_beside(value: f64, limit: f64) -> String {
+    if !value.is_finite() {
+        return "no interval".into();
+    }
+    let shows = |text: &String| text.parse::<f64>().is_ok_and(|shown| (shown > limit) == (value > limit));
+    (2..).map(|digits| rounded(value, digits)).take(MOST_DIGITS).find(shows).unwrap_or_else(|| number(value))
 }
 
 /// A probability with its sign: `p = 0.35`, `p = 2.1e-19`. It is never 0.
@@ -145,6 +158,23 @@ mod tests {
     fn numbers_have_the_digits_asked_for() {
         let shown = [0.0, 0.41234, -2.0, 9.9996, 1234.5, 1e-7, 2e6].map(|value| significant(value, 3));
         assert_eq!(shown, ["0", "0.412", "\u{2212}2.00", "10.0", "1234", "1.00·10⁻⁷", "2.00·10⁶"]);
+    }
+
+    #[test]
+    fn a_number_next_to_a_limit_has_digits_enough_to_show_its_side() {
+        for (value, shown) in [
+            (0.001, "0.001"),
+            (0.00196, "0.002"),
+            (0.0020001, "0.0020001"),
+            (0.002049, "0.00205"),
+            (0.0023, "0.0023"),
+            (0.002, "0.002"),
+            (f64::INFINITY, "no interval"),
+        ] {
+            assert_eq!(rounded_beside(value, 0.002), shown);
+        }
+        assert_eq!(rounded_beside(0.0147, 0.0149), "0.0147");
+        assert_eq!(rounded_beside(0.1_f64.next_up(), 0.1), "0.10000000000000002");
     }
 
     #[test]

@@ -50,7 +50,7 @@ mod _curvelax {
 
     use curvelax::{
         files::{Existing, OutputFolder},
-        session::{self, Host, ResumePlace, Work},
+        session::{self, Completed, Host, ResumePlace, Work},
     };
     use pyo3::{
         prelude::*,
@@ -112,8 +112,16 @@ mod _curvelax {
             session::begin(work, &out, existing, manner, &host)
         });
         let completed = done.map_err(|error| raise(py, error, host.raised()))?;
+        tell_verdict(&host, &completed);
         host.heard(py)?;
         Ok((completed.text, host.seen()))
+    }
+
+    /// Warns if a run does not hold what was asked for, where the program has exit code 3: its results are there to look at.
+    fn tell_verdict(host: &Notebook, completed: &Completed) {
+        if let Err(error) = completed.verdict.check(false, &completed.out) {
+            host.say(&format!("warning: {error}"));
+        }
     }
 
     /// Resumes the run in the folder `out`. Returns the overview, or `None` if the run is finished.
@@ -123,6 +131,7 @@ mod _curvelax {
         let host = Notebook::new(progress, say);
         let done = py.detach(|| session::resume(&out, ResumePlace::default(), &host));
         let completed = done.map_err(|error| raise(py, error, host.raised()))?;
+        completed.iter().for_each(|completed| tell_verdict(&host, completed));
         host.heard(py)?;
         Ok(completed.map(|completed| completed.text))
     }

@@ -22,10 +22,10 @@ Examples:
   curvelax bench --backend cpu --solver direct --points 100,200,400
   curvelax bench --adapter llvmpipe --precision f32 --json > bench.json
 
-A curve-step is one step of the paper's scheme for one curve; an adaptive attempt makes three. Members of the default
-ensemble (perturbed 2:1 ellipses, surface diffusion, tau = 0.001) are advanced as in a run. The cases alternate, so that
-other load on the machine affects all of them. Start-up is the time to open the back end and make the first step, in which
-kernels are compiled. The rates exclude it and a warm-up. The default takes less than a minute.";
+A curve-step is one step of the paper's scheme for one curve. Members of the default ensemble (perturbed 2:1 ellipses, surface
+diffusion, tau = 0.001) are advanced as in a run. The cases alternate, so that other load on the machine affects all of
+them. Start-up is the time to open the back end and make the first step, in which kernels are compiled. The rates exclude
+it and a warm-up. The default takes less than a minute.";
 
 /// Members at once on hardware: enough to fill it.
 const CURVES: u64 = 8192;

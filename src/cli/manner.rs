@@ -5,11 +5,14 @@ use std::{path::Path, time::Duration};
 use super::{flags, note, print, signals};
 use crate::{
     error::{Error, Result},
-    files::names,
-    report::{Form, Manner, Progress, Stop, complete::listed, document::Document, reader::Finished},
-    results::EnsembleStatistics,
+    report::{
+        Form, Manner, Progress, Stop,
+        complete::listed,
+        document::Document,
+        reader::{self, Finished},
+    },
+    results::{EnsembleStatistics, Verdict},
     session::{Completed, Host},
-    text::plural,
 };
 
 /// A run that is asked to stop has this time to reach a point where all its work is saved.
@@ -47,48 +50,37 @@ impl MannerFlags {
         check_name(self.json, out)
     }
 
-    /// Says about the finished run in `out` what is asked of one: its results as JSON, and whether members failed.
+    /// Says about the finished run in `out` what was said at its end: its results as JSON, if they are asked for, and
+    /// whether it holds what was asked for.
     ///
     /// # Errors
-    /// As [`MannerFlags::check_failed`], and those of reading the run.
+    /// As [`Verdict::check`], and those of reading the run.
     pub fn finished(&self, out: &Path) -> Result<()> {
-        if !self.json && !self.strict {
-            return Ok(());
-        }
-        let Finished { provenance, mut tally, .. } = Finished::read(out)?;
-        let (failed, members) = (tally.failed(), tally.members());
-        if self.json {
-            let statistics = EnsembleStatistics::new(&provenance.spec, &mut tally)?;
-            let files = listed(|name| out.join(name).exists());
-            print(&Document::new(&provenance, &provenance.spec, &statistics, out, &files).to_json()?)?;
-        }
-        self.check_failed(failed, members, out)
+        let provenance = reader::provenance(out)?;
+        let verdict = match self.json || Verdict::needs_statistics(&provenance) {
+            false => Verdict::new(&provenance, None),
+            true => {
+                let Finished { mut tally, .. } = Finished::read(out)?;
+                let statistics = EnsembleStatistics::new(&provenance.spec, &mut tally)?;
+                if self.json {
+                    let files = listed(|name| out.join(name).exists());
+                    print(&Document::new(&provenance, &provenance.spec, &statistics, out, &files).to_json()?)?;
+                }
+                Verdict::new(&provenance, Some(&statistics))
+            }
+        };
+        verdict.check(self.strict, out)
     }
 
     /// Prints the results of a run that was just completed.
     ///
     /// # Errors
-    /// As [`MannerFlags::check_failed`].
-    pub fn completed(&self, Completed { text, failed, members, out }: Completed) -> Result<()> {
+    /// As [`Verdict::check`].
+    pub fn completed(&self, Completed { text, verdict, out }: Completed) -> Result<()> {
         if self.json || !self.quiet {
             print(&text)?;
         }
-        self.check_failed(failed, members, &out)
-    }
-
-    /// Checks that no member failed, if that is asked for.
-    ///
-    /// # Errors
-    /// [`Error::Strict`] with how many did.
-    fn check_failed(&self, failed: u64, members: u64, out: &Path) -> Result<()> {
-        match failed {
-            1.. if self.strict => Err(Error::Strict(format!(
-                "--strict: {failed} of {members} {} ended neither relaxed nor unfinished; see `status` in {}",
-                plural(members, "member"),
-                out.join(names::SUMMARY).display()
-            ))),
-            _ => Ok(()),
-        }
+        verdict.check(self.strict, &out)
     }
 
     /// The interval between checkpoints.

@@ -67,8 +67,11 @@ pub fn merge(args: MergeArgs) -> Result<()> {
     check_place(&out, &args.shards)?;
     let folder = OutputFolder::open(&out, args.force)?;
     let form = if args.json { Form::Json } else { Form::Overview };
-    let text = shards.merge(&folder, form)?;
-    if args.json || !args.quiet { print(&text) } else { Ok(()) }
+    let (text, verdict) = shards.merge(&folder, form)?;
+    if args.json || !args.quiet {
+        print(&text)?;
+    }
+    verdict.check(false, &out)
 }
 
 /// Which shards are missing, and how to submit them.

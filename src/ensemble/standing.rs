@@ -28,7 +28,8 @@ pub struct Paused {
     pub counters: Counters,
     /// Its report there.
     pub report: Report<f64>,
-    /// All fields of its [`State`](crate::scheme::State) there, one after another: `18n` numbers.
+    /// All fields of its [`State`](crate::scheme::State) there, one after another: for each node
+    /// [`STATE_FIELDS`](crate::scheme::state::STATE_FIELDS) numbers.
     pub state: Vec<f64>,
     /// Sweeps so far, on curvature and on position systems.
     pub sweeps: [u64; 2],

@@ -16,7 +16,7 @@ use crate::{
         tables::Table,
     },
     placement::Platform,
-    results::{cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
+    results::{Verdict, cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
 };
 
 /// Output on stdout for a completed run.
@@ -63,7 +63,7 @@ fn own<'a>(files: &'a [PartFile], name: &str) -> Result<&'a Place> {
 }
 
 impl Complete<'_> {
-    /// Gives all files their final names, once all are on disk, and returns the text for stdout. `files` and `store`
+    /// Gives all files their final names, once all are on disk, and returns the text for stdout and the verdict. `files` and `store`
     /// hold the results of the members; `shard` is [what a merge needs besides them](super::shard).
     ///
     /// # Errors
@@ -75,7 +75,7 @@ impl Complete<'_> {
         store: Option<PartFolder>,
         shard: Option<&[u8]>,
         form: Form,
-    ) -> Result<String> {
+    ) -> Result<(String, Verdict)> {
         let Complete { spec, platform, mut tally, films, warnings, started, wall } = self;
         let statistics = &EnsembleStatistics::new(spec, &mut tally)?;
         let tally = &tally;
@@ -119,12 +119,10 @@ impl Complete<'_> {
             Error::Failed(format!("{error}; the tables in {folder} are complete, some pictures are missing"))
         })?;
         let (folder, files) = (folder.path(), &names[..]);
-        match form {
-            Form::Overview => {
-                let overview = Overview { spec, platform, tally, statistics, wall, folder, files };
-                Ok(overview.to_string())
-            }
-            Form::Json => Document::new(provenance, spec, statistics, folder, files).to_json(),
-        }
+        let text = match form {
+            Form::Overview => Overview { spec, platform, tally, statistics, wall, folder, files }.to_string(),
+            Form::Json => Document::new(provenance, spec, statistics, folder, files).to_json()?,
+        };
+        Ok((text, Verdict::new(provenance, Some(statistics))))
     }
 }

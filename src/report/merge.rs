@@ -32,7 +32,7 @@ use crate::{
         zarr::{SnapshotStore, StoredMembers},
     },
     input::{self, MAX_LINE},
-    results::tally::Aside,
+    results::{Verdict, tally::Aside},
     text::listed,
 };
 
@@ -188,11 +188,11 @@ impl Shards {
         lines
     }
 
-    /// Merges them in `folder`, and returns the text for stdout.
+    /// Merges them in `folder`, and returns the text for stdout and the verdict.
     ///
     /// # Errors
     /// [`Error::Request`] if a shard is missing or has changed since it was completed; `folder` is then left empty.
-    pub fn merge(self, folder: &OutputFolder, form: Form) -> Result<String> {
+    pub fn merge(self, folder: &OutputFolder, form: Form) -> Result<(String, Verdict)> {
         self.check_complete()?;
         let Shards { parts, spec, .. } = self;
         let spec = &spec;

@@ -36,7 +36,7 @@ use crate::{
     error::{Error, Result},
     files::{OutputFolder, portraits::Film},
     placement::Platform,
-    results::tally::Tally,
+    results::{Verdict, tally::Tally},
     text::{duration, plural, quoted},
 };
 use checkpoint::{Head, Origin, Saved};
@@ -256,13 +256,8 @@ impl RunReport {
         self.tally.warnings()
     }
 
-    /// Number of members that ended neither relaxed nor unfinished.
-    pub fn failed(&self) -> u64 {
-        self.tally.failed()
-    }
-
     /// Gives all files their final names with [`Complete::publish`]; `early` are the warnings given before.
-    pub fn finish(mut self, spec: &Spec, early: &[String], form: Form) -> Result<String> {
+    pub fn finish(mut self, spec: &Spec, early: &[String], form: Form) -> Result<(String, Verdict)> {
         // All rows are written: a run killed from now on only needs to draw its pictures again.
         let next = self.rows() - self.before();
         self.checkpoint(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;
@@ -279,7 +274,7 @@ impl RunReport {
         let warnings = &[early, &tally.warnings()].concat();
         let complete = Complete { spec, platform, tally, films: &films, warnings, started: *started, wall };
         let published = complete.publish(&folder, files, store, shard.as_deref(), form);
-        let done = published.and_then(|text| folder.forget_states().map(|()| text));
+        let done = published.and_then(|published| folder.forget_states().map(|()| published));
         if done.is_ok() {
             // No checkpoint refers to it any more.
             spill.iter().for_each(|spill| spill.keep(false));
@@ -419,7 +414,7 @@ mod tests {
         let portrait = Portrait { before: triangle.clone(), frames: Vec::new(), after: triangle };
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
-        let overview = report(&out, &all, Some(portrait)).finish(&all, &[], Form::Overview).unwrap();
+        let (overview, _) = report(&out, &all, Some(portrait)).finish(&all, &[], Form::Overview).unwrap();
         let tables = ["ensemble.csv", "explained.csv", "levels.csv", "mean_excess.csv", "members.csv"];
         let always = [&tables[..], &["plots", "rates.csv", "report.html", "run.json"]].concat();
         assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());

@@ -20,7 +20,7 @@ use crate::{
         times::TimeStatistics,
     },
     statistics::{GoodnessOfFit, LogRank, PowerLaw},
-    text::{count, duration, number, p_value, plural, rounded},
+    text::{count, duration, number, p_value, plural, rounded, rounded_beside},
 };
 
 /// Maximum number of cells listed; the table has them all.
@@ -125,12 +125,11 @@ impl Overview<'_> {
 
     /// What `--accuracy` asked for, and what was reached in the cell that is farthest from it.
     fn accuracy(&self) -> String {
-        let Some(goal) = self.spec.accuracy else { return String::new() };
-        let cells = self.statistics.cells.iter().map(|cell| cell.limits.as_ref().and_then(CellLimits::uncertainty));
-        let worst = cells.map(|reached| reached.unwrap_or(f64::INFINITY)).fold(0.0, f64::max);
-        let reached = if worst.is_finite() { rounded(worst, 2) } else { "no interval".into() };
+        // A shard has some of the members that it takes.
+        let Some(goal) = self.spec.accuracy.filter(|_| self.spec.shard.is_none()) else { return String::new() };
+        let worst = self.statistics.uncertainty();
         let missed = if worst > goal { ": missed, use more --curves to begin with" } else { "" };
-        format!("{} asked for, {reached} reached{missed}", number(goal))
+        format!("{} asked for, {} reached{missed}", number(goal), rounded_beside(worst, goal))
     }
 
     /// The rates of a single ensemble; empty if no member has one.

@@ -116,6 +116,14 @@ pub struct EnsembleStatistics {
     pub relative: bool,
 }
 
+impl EnsembleStatistics {
+    /// The relative uncertainty of the median limit, in the cell where it is largest; infinite if one has none.
+    pub fn uncertainty(&self) -> f64 {
+        let cells = self.cells.iter().map(|cell| cell.limits.as_ref().and_then(CellLimits::uncertainty));
+        cells.map(|reached| reached.unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
+    }
+}
+
 impl CellStatistics {
     /// Moves times and rates out of `tally`.
     fn new(spec: &Spec, cell: u64, tally: &mut CellTally, relative: bool) -> Result<CellStatistics> {

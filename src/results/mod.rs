@@ -8,7 +8,9 @@ pub mod provenance;
 pub mod scaling;
 pub mod tally;
 pub mod times;
+pub mod verdict;
 
 pub use cells::EnsembleStatistics;
 pub use comparison::CellComparison;
 pub use explained::Explained;
+pub use verdict::Verdict;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::text::{plural, significant};
 use crate::{
-    ensemble::{LevelTimes, Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN},
+    ensemble::{LevelTimes, Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN, sweep::Sweep},
     error::Result,
     schedule::grid,
     statistics::{Limit, Observation, Observations, Spread},
@@ -35,6 +35,8 @@ pub struct Tally {
     pub refined: bool,
     /// Whether members end when they are relaxed.
     pub stops: bool,
+    /// What distinguishes the cells.
+    sweep: Sweep,
     /// Rows of the levels.
     pub levels: u64,
     /// Members whose corners were rounded off before the run.
@@ -80,6 +82,8 @@ pub struct CellTally {
     pub times: Observations,
     /// Members that have not relaxed, by status.
     pub others: [u64; Status::ALL.len()],
+    /// Simple curves whose final time came before they relaxed.
+    late: u64,
     /// Sum of the initial areas.
     pub area: f64,
     /// Rates of the members that have one.
@@ -109,7 +113,7 @@ pub struct EventTally {
 
 impl CellTally {
     fn add(&mut self, outcome: &Outcome, refined: bool, stops: bool) -> Result<()> {
-        let CellTally { counts, times, others, area, rates, limits, judged, events, .. } = self;
+        let CellTally { counts, times, others, late, area, rates, limits, judged, events, .. } = self;
         times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
         if refined {
             // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
@@ -124,6 +128,7 @@ impl CellTally {
             own.stopped += u64::from(stops && t.is_none() && outcome.status == Status::Relaxed);
             own.judged.extend(outcome.judged_events.get(i).copied().flatten());
         }
+        *late += u64::from(outcome.status == Status::Unfinished && outcome.start.turning.abs() == 1);
         *area += outcome.start.area.abs();
         rates.extend(outcome.rate.map(|fitted| Rate { fitted, theory: outcome.rate_theory.unwrap_or(f64::NAN) }));
         for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
@@ -134,6 +139,11 @@ impl CellTally {
         Ok(())
     }
 }
+
+/// The rank of relaxed members in [`Status::ALL`].
+const RELAXED: usize = 0;
+/// Maximum number of cells that a warning names.
+const NAMED_CELLS: usize = 5;
 
 /// The part of a [`Tally`] that cannot be recomputed from `summary.csv`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -279,7 +289,8 @@ impl Tally {
         let events: Vec<String> = spec.event.iter().map(|event| event.name.clone()).collect();
         let at_start = vec![0; events.len()];
         let stops = spec.stops_when_relaxed();
-        Tally { refined: spec.refine, stops, levels: levels.rows(), events, at_start, ..Tally::default() }
+        let sweep = spec.sweep.clone();
+        Tally { refined: spec.refine, stops, sweep, levels: levels.rows(), events, at_start, ..Tally::default() }
     }
 
     /// Adds a member.
@@ -370,6 +381,7 @@ impl Tally {
                  --tau or --adaptive, or more --points, helps"
             ));
         }
+        warnings.extend(self.late());
         if self.below_rounding > 0 {
             warnings.push(format!(
                 "{} of {members} started so nearly round that rounding hides the threshold: t_relax cannot be \
@@ -410,6 +422,29 @@ impl Tally {
             ));
         }
         warnings
+    }
+
+    /// The warning about cells in which no member relaxed, because the final time came first.
+    fn late(&self) -> Option<String> {
+        let is_late = |cell: &CellTally| cell.late > 0 && cell.counts[RELAXED] == 0;
+        let late: Vec<u64> = (0..).zip(&self.cells).filter(|(_, cell)| is_late(cell)).map(|(rank, _)| rank).collect();
+        let longer = if self.stops { "a longer --t-end" } else { "a longer --t-end or --t-end auto" };
+        let remedy = format!("use {longer}, or a larger --relax-to or --relax-at");
+        if late.is_empty() {
+            return None;
+        }
+        if self.cells.len() == 1 {
+            return Some(format!("no member relaxed before its final time; {remedy}"));
+        }
+        let mut named: Vec<String> = late.iter().take(NAMED_CELLS).map(|rank| self.sweep.name(*rank)).collect();
+        if late.len() > NAMED_CELLS {
+            named.push(format!("{} more", late.len() - NAMED_CELLS));
+        }
+        let (cells, all) = (late.len(), self.cells.len());
+        Some(format!(
+            "no member relaxed before its final time in {cells} of {all} cells ({}); {remedy}",
+            named.join("; ")
+        ))
     }
 
     /// Number of members that ended neither relaxed nor unfinished.
@@ -483,6 +518,38 @@ pub(crate) mod tests {
         assert!(warnings[0].contains(parts) && warnings[0].contains("more than 10 %; use more --points"));
         tally.mollified.crossed = 0;
         assert!(!tally.warnings()[0].contains("crossings"));
+    }
+
+    #[test]
+    fn cells_in_which_no_member_relaxed_are_named_with_the_remedy() {
+        let late = |cell: u64| {
+            let mut late = outcome(cell, Status::Unfinished, None);
+            (late.cell, late.start.turning) = (cell, -1);
+            late
+        };
+        let mut alone = Tally::default();
+        alone.add(&late(0)).unwrap();
+        let remedy = "use a longer --t-end or --t-end auto, or a larger --relax-to or --relax-at";
+        assert_eq!(alone.warnings(), [format!("no member relaxed before its final time; {remedy}")]);
+        alone.add(&outcome(1, Status::Relaxed, Some(0.5))).unwrap();
+        assert_eq!(alone.warnings(), [""; 0]);
+
+        let spec = Spec::from_toml("[sweep]\namplitude = [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08]").unwrap();
+        let mut study = Tally::of(&Spec { stop_when_relaxed: Some(true), ..spec }, &LevelTimes::default());
+        study.add(&outcome(0, Status::Relaxed, Some(0.5))).unwrap();
+        (1..8).for_each(|cell| study.add(&late(cell)).unwrap());
+        let cells = "amplitude = 0.02; amplitude = 0.03; amplitude = 0.04; amplitude = 0.05; amplitude = 0.06; 2 more";
+        let remedy = "use a longer --t-end, or a larger --relax-to or --relax-at";
+        assert_eq!(
+            study.warnings(),
+            [format!("no member relaxed before its final time in 7 of 8 cells ({cells}); {remedy}")]
+        );
+        // A figure of eight does not relax, however long it is given.
+        let mut eight = late(0);
+        eight.start.turning = 0;
+        let mut immersed = Tally::default();
+        immersed.add(&eight).unwrap();
+        assert_eq!(immersed.warnings(), [""; 0]);
     }
 
     #[test]

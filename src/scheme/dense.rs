@@ -1,7 +1,7 @@
 //! What lies inside an adaptive step: a polynomial through both of its ends. Twin of `shaders/dense.wgsl`.
 
 use super::{Curve, State, member::Progress};
-use crate::number::{BIG, Real, ln_ratio};
+use crate::number::{BIG, Number, Real, ln_ratio};
 
 /// Multiple of ε below which the derivatives of ln excess are mostly rounding: their weights amplify it a thousand times,
 /// and the excess is a small difference of numbers near 1. In f32 this is most of a run.
@@ -9,8 +9,12 @@ pub const RESOLVED: f64 = 131_072.0;
 /// Number of halvings that find the place of an event: beyond the precision of every number.
 pub const BISECTIONS: u32 = 54;
 
+/// Where inside a step, near its start and near its end, observables are computed to tell how they leave the one and
+/// come to the other.
+pub const LOOKS: [f64; 2] = [0.0625, 0.9375];
+
 /// A value and its first and second derivative.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Jet<T> {
     /// The value.
     pub value: T,
@@ -21,7 +25,7 @@ pub struct Jet<T> {
 }
 
 /// The polynomial of degree 5 with given values and derivatives at both ends of a step, with time from 0 to 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Arc<T> {
     /// At the start.
     pub start: Jet<T>,
@@ -59,6 +63,24 @@ impl<T: Real> Arc<T> {
         a.value + at * (a.slope + at * (half * a.bend + at * (third + at * (fourth + at * fifth))))
     }
 
+    /// Returns how much of the value and the derivatives at each end goes into the value at the fraction `at` of a step
+    /// of length h. Those at its start are in units of the step before, of length `before`; 0 if there was none.
+    pub fn weights(at: T, h: T, before: T) -> Arc<T> {
+        let none = Jet::default();
+        let unit = T::of(1.0);
+        let (one, sloped, bent) =
+            (Jet { value: unit, ..none }, Jet { slope: unit, ..none }, Jet { bend: unit, ..none });
+        let ends = |start: Jet<T>, end: Jet<T>| Arc { start, end }.at(at);
+        let zero = T::of(0.0);
+        if before.le(zero) {
+            let first = |start: T, end: Jet<T>| Arc::first(start, end).at(at);
+            let end = Jet { value: first(zero, one), slope: first(zero, sloped), bend: first(zero, bent) };
+            return Arc { start: Jet { value: first(unit, none), ..none }, end };
+        }
+        let start = Jet::scaled(ends(one, none), ends(sloped, none), ends(bent, none), h / before);
+        Arc { start, end: Jet { value: ends(none, one), slope: ends(none, sloped), bend: ends(none, bent) } }
+    }
+
     /// Returns the fraction of the step at which the value falls to `target`, which lies between its ends.
     pub fn crossing(&self, target: T) -> T {
         let half = T::of(0.5);
@@ -79,6 +101,40 @@ impl<T: Real> Arc<T> {
         let (Jet { slope: a, bend: b, .. }, Jet { slope: c, bend: d, .. }) = (self.start, self.end);
         let most = T::of(BIG);
         a.abs().le(most) && b.abs().le(most) && c.abs().le(most) && d.abs().le(most)
+    }
+}
+
+impl<N: Number> Arc<N> {
+    /// Sets one lane.
+    #[inline(always)]
+    pub(super) fn set_lane(&mut self, lane: usize, of: Arc<N::Real>) {
+        for (own, of) in [(&mut self.start, of.start), (&mut self.end, of.end)] {
+            own.value.set_lane(lane, of.value);
+            own.slope.set_lane(lane, of.slope);
+            own.bend.set_lane(lane, of.bend);
+        }
+    }
+
+    /// Puts the curve inside the step to `new` into `state.part`, by the [`weights`](Arc::weights) that this is.
+    #[inline(always)]
+    pub(super) fn look(&self, state: &mut State<N>, new: &Curve<N>) {
+        let Arc { start: a, end: b } = *self;
+        let State { curve, slope, bend, slope_before, bend_before, part, .. } = state;
+        let starts = curve.fields().into_iter().zip(slope.fields()).zip(bend.fields());
+        // During an attempt the derivatives at its end are in the place of those before.
+        let ends = new.fields().into_iter().zip(slope_before.fields()).zip(bend_before.fields());
+        for (to, (start, end)) in part.fields_mut().into_iter().zip(starts.zip(ends)) {
+            let (((x0, u0), s0), ((x1, u1), s1)) = (start, end);
+            for i in 0..x0.len() {
+                to[i] = a.value * x0[i]
+                    + a.slope * u0[i]
+                    + a.bend * s0[i]
+                    + b.value * x1[i]
+                    + b.slope * u1[i]
+                    + b.bend * s1[i];
+            }
+            to.close();
+        }
     }
 }
 
@@ -206,6 +262,19 @@ mod tests {
         for i in 0..=10 {
             let t = 0.1 * f64::from(i);
             assert!((arc.at(t) - p(t)).abs() < 1e-14, "{t}");
+        }
+    }
+
+    #[test]
+    fn weights_give_the_value_of_the_polynomial() {
+        let [start, end] = [jet([1.0, -2.0, 0.5]), jet([0.3, -0.7, 1.1])];
+        let dot = |a: Jet<f64>, b: Jet<f64>| a.value * b.value + a.slope * b.slope + a.bend * b.bend;
+        for at in LOOKS {
+            let weights = Arc::weights(at, 3.0, 2.0);
+            let arc = Arc { start: Jet::scaled(start.value, start.slope, start.bend, 1.5), end };
+            assert!((dot(weights.start, start) + dot(weights.end, end) - arc.at(at)).abs() < 1e-14, "{at}");
+            let (weights, arc) = (Arc::weights(at, 3.0, 0.0), Arc::first(start.value, end));
+            assert!((dot(weights.start, start) + dot(weights.end, end) - arc.at(at)).abs() < 1e-14, "{at}");
         }
     }
 

@@ -6,9 +6,9 @@
 
 use super::{
     Branches, Parameters, State, Status, Workspace, decay,
-    dense::{Fall, Taken},
+    dense::{Arc, Fall, LOOKS, Taken},
     extrapolation::{self, AllShares, SHARED_PARTS},
-    member::{Counters, NEVER},
+    member::{Counters, NEVER, Observed},
     observe::{self, Glance},
     pace::{self, Allowed, Stride},
     run::Run,
@@ -280,7 +280,8 @@ impl<N: Number> Team<N> {
         attempt: &Attempt<N>,
     ) {
         let (n, adaptive) = (self.work.blocks.n, branches.adaptive);
-        let at_level = if branches.watched { self.at_level() } else { N::Mask::all_of(false) };
+        let [at_level, passed] =
+            if branches.watched { self.at_levels(runs, adaptive) } else { [N::Mask::all_of(false); 2] };
         let gap = self.gap_at_threshold(runs, live, attempt.excess);
         let (finite, singular) =
             (attempt.seen.is_finite(), attempt.seen.is_singular(self.turning, &self.parameters, n));
@@ -322,7 +323,8 @@ impl<N: Number> Team<N> {
                     lengthen(run, stride, errors, decline, allowed);
                 }
                 accepted(run, taken.after, &attempt.seen, lane, adaptive);
-                if at_level.lane(lane) {
+                run.counters.passed = passed.lane(lane).into();
+                if at_level.lane(lane) || passed.lane(lane) {
                     run.counters.goal = run.counters.steps;
                 }
             }
@@ -345,12 +347,33 @@ impl<N: Number> Team<N> {
         if at_threshold.any() { observe::gap(&self.work.new) } else { N::of(0.0) }
     }
 
-    /// Where an observable of the new curves has reached a level at which the member pauses.
+    /// Where an observable of the new curves has reached a level at which the member pauses, and where one may have done
+    /// so inside an adaptive step and left it again.
     #[inline(always)]
-    fn at_level(&self) -> N::Mask {
-        let Team { parameters, work, .. } = self;
-        let sums = observe::sums(&work.new, parameters, work.blocks);
-        observe::reaches_level(&observe::observed(&sums, &observe::maxima(&work.new), parameters), parameters)
+    fn at_levels(&mut self, runs: &[&mut Run<N::Real>], adaptive: bool) -> [N::Mask; 2] {
+        let Team { state, parameters, strides, work, .. } = self;
+        let mut seen = [Observed::default(); 2 + LOOKS.len()];
+        let last = seen.len() - 1;
+        // In a loop, since the whole body of an observation is inlined.
+        for look in if adaptive { 0..=last } else { last..=last } {
+            if look != 0 && look != last {
+                let mut weights = Arc::default();
+                for (lane, run) in runs.iter().enumerate() {
+                    let (h, before) = (strides[lane].length, run.report.progress.taken);
+                    weights.set_lane(lane, Arc::weights(N::Real::of(LOOKS[look - 1]), h, before));
+                }
+                weights.look(state, &work.new);
+            }
+            let curve = match look {
+                0 => &state.curve,
+                look if look == last => &work.new,
+                _ => &state.part,
+            };
+            let sums = observe::sums(curve, parameters, work.blocks);
+            seen[look] = observe::observed(&sums, &observe::maxima(curve), parameters);
+        }
+        let passed = if adaptive { observe::passes_level(&seen, parameters) } else { N::Mask::all_of(false) };
+        [observe::reaches_level(&seen[last], parameters), passed]
     }
 
     /// Accepts the new curves, except in the lanes that keep theirs.

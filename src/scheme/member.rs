@@ -291,6 +291,8 @@ pub struct Counters {
     pub fit_over: u32,
     /// Times of the grid that the member has passed.
     pub noted: u32,
+    /// 1: an observable may have reached a level inside the last adaptive step and left it again, and the member paused.
+    pub passed: u32,
 }
 
 impl Parameters<f64> {
@@ -390,7 +392,7 @@ impl Counters {
     }
 
     /// Field names in memory order.
-    pub const FIELDS: [&'static str; 17] = [
+    pub const FIELDS: [&'static str; 18] = [
         "status",
         "steps",
         "rejected",
@@ -408,6 +410,7 @@ impl Counters {
         "fit_points",
         "fit_over",
         "noted",
+        "passed",
     ];
 }
 

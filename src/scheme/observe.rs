@@ -3,7 +3,7 @@
 //!
 //! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r.
 
-use super::{Curve, Parameters, member::Observed, pull, state::edge};
+use super::{Curve, Parameters, dense::LOOKS, member::Observed, pull, state::edge};
 use crate::{
     number::{BIG, Mask, Number, Real},
     solver::{self, Blocks},
@@ -241,4 +241,74 @@ pub fn reaches_level<N: Number>(at: &Observed<N>, p: &Parameters<N>) -> N::Mask 
     let rose = p.high_length.le(at.length).or(p.high_area.le(at.area)).or(p.high_excess.le(at.excess));
     let rose = rose.or(p.high_energy.le(at.energy)).or(p.high_k_min.le(at.k_min)).or(p.high_k_max.le(at.k_max));
     fell.or(rose).or(p.high_mesh_ratio.le(at.mesh_ratio)).or(p.high_metric_drift.le(at.metric_drift))
+}
+
+/// Whether a value above `level` at both ends of a step may have reached it inside, by the values at the start, at the
+/// two [`LOOKS`] and at the end: if it is there at a look, or if the lines through the first two and through the last two
+/// values meet at or below it. A value that turns once does not fall below those lines.
+#[inline(always)]
+fn falls_inside<N: Number>([start, early, late, end]: [N; 4], level: N) -> N::Mask {
+    let (zero, between) = (N::of(0.0), N::of((LOOKS[1] - LOOKS[0]) / LOOKS[0]));
+    let (fall, rise) = (start - early, end - late);
+    let (early, late) = (early - level, late - level);
+    let there = early.le(zero).or(late.le(zero));
+    let turns = fall.le(zero).or(rise.le(zero)).not();
+    there.or(turns.and((early * rise + late * fall).le(between * (fall * rise))))
+}
+
+/// Whether an observable may have reached a level inside a step and left it again, by the observables at the start, at
+/// the two [`LOOKS`] and at the end. Where the host looks closely, it may turn out that none has.
+#[inline(always)]
+pub fn passes_level<N: Number>(at: &[Observed<N>; 4], p: &Parameters<N>) -> N::Mask {
+    let passes = |of: fn(&Observed<N>) -> N, low: N, high: N| {
+        let values = at.each_ref().map(of);
+        falls_inside(values, low).or(falls_inside(values.map(|value| -value), -high))
+    };
+    let length = passes(|at| at.length, p.low_length, p.high_length);
+    let area = passes(|at| at.area, p.low_area, p.high_area);
+    let excess = passes(|at| at.excess, p.low_excess, p.high_excess);
+    let energy = passes(|at| at.energy, p.low_energy, p.high_energy);
+    let k_min = passes(|at| at.k_min, p.low_k_min, p.high_k_min);
+    let k_max = passes(|at| at.k_max, p.low_k_max, p.high_k_max);
+    let mesh_ratio = passes(|at| at.mesh_ratio, p.low_mesh_ratio, p.high_mesh_ratio);
+    let metric_drift = passes(|at| at.metric_drift, p.low_metric_drift, p.high_metric_drift);
+    length.or(area).or(excess).or(energy).or(k_min).or(k_max).or(mesh_ratio).or(metric_drift)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The observables at both ends of a step and at the looks, all of which are `value`.
+    fn seen(value: impl Fn(f64) -> f64) -> [Observed<f64>; 4] {
+        let all = |at: f64| Observed::from_numbers(&[value(at); Observed::<f64>::FIELDS.len()]);
+        [0.0, LOOKS[0], LOOKS[1], 1.0].map(all)
+    }
+
+    #[test]
+    fn a_level_that_a_value_reaches_inside_a_step_and_leaves_again_is_not_passed_over() {
+        let fields = Observed::<f64>::FIELDS.len();
+        for field in 0..fields {
+            let passes = |value: &dyn Fn(f64) -> f64, level: f64| {
+                let (mut p, mut low, mut high) = (Parameters::default(), vec![-BIG; fields], vec![BIG; fields]);
+                if level < 1.0 {
+                    low[field] = level
+                } else {
+                    high[field] = level
+                }
+                p.set_levels(&Observed::from_numbers(&low), &Observed::from_numbers(&high));
+                passes_level(&seen(value), &p)
+            };
+            for turn in [0.07, 0.2, 0.5, 0.9] {
+                // An exponential that falls and one that rises: they meet in a place where the sum is 0.9 or 1.1.
+                let sum = |x: f64| (-9.0 * x).exp() + (9.0 * (x - 2.0 * turn)).exp() - 2.0 * (-9.0 * turn).exp();
+                let (dip, bump) = (|x: f64| 0.9 + sum(x), |x: f64| 1.1 - sum(x));
+                assert!(passes(&dip, 0.901) && passes(&bump, 1.099), "{field} {turn}");
+                // A level in the other direction.
+                assert!(!passes(&|x| dip(x) - 1.0, 1.0 + dip(0.0) + dip(1.0)), "{field} {turn}");
+            }
+            let (falls, bends) = (|x: f64| 2.0 - x, |x: f64| 1.5 + 0.01 * (x - 0.5).powi(2));
+            assert!(!passes(&falls, 0.5) && !passes(&bends, 0.5), "{field}");
+        }
+    }
 }

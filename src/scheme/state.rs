@@ -234,7 +234,7 @@ impl<T: Real> State<T> {
         State::starting(Curve::from_nodes(nodes))
     }
 
-    /// Returns all fields one after another, `38n` numbers.
+    /// Returns all fields one after another: [`STATE_FIELDS`] numbers for each node.
     pub fn to_numbers(&self) -> Vec<T> {
         self.fields().into_iter().flat_map(|field| field.nodes().iter().copied()).collect()
     }

@@ -17,6 +17,7 @@ use crate::{
     error::Result,
     files::{Existing, OutputFolder},
     report::{Form, Manner, RunReport, Stop, checkpoint::Origin},
+    results::Verdict,
 };
 
 /// Who has a run carried out: a user at a command line, or a program.
@@ -49,10 +50,8 @@ pub trait Host {
 pub struct Completed {
     /// The results in the host's form.
     pub text: String,
-    /// Members that ended neither relaxed nor unfinished.
-    pub failed: u64,
-    /// All members.
-    pub members: u64,
+    /// How it ended as a whole.
+    pub verdict: Verdict,
     /// Folder of the results.
     pub out: PathBuf,
 }

@@ -119,10 +119,11 @@ impl Work {
                 }
             }
         }
-        let (late, failed) = (report.warnings(), report.failed());
-        let text = report.finish(study.spec(), &early, host.form()).inspect_err(|error| kept(&out, error, host))?;
+        let late = report.warnings();
+        let (text, verdict) =
+            report.finish(study.spec(), &early, host.form()).inspect_err(|error| kept(&out, error, host))?;
         late.iter().for_each(|warning| host.say(&format!("warning: {warning}")));
-        Ok(Completed { text, failed, members: study.member_count(), out })
+        Ok(Completed { text, verdict, out })
     }
 }
 

@@ -251,7 +251,7 @@ impl Solves for Cycles {
             sweeps_per_look: SWEEPS_PER_CYCLE,
             // At most 11 levels of 4 colours.
             iterations_per_look: 300,
-            // Includes the inversion of a matrix of 5 rows.
+            // Includes the inversion of the matrix of the coarsest level.
             iterations_per_solve: 300,
         },
     };

@@ -51,7 +51,7 @@ impl Watch {
         Watch { level: if is_lost { f64::NAN } else { watch.level }, ..watch }
     }
 
-    fn is_pending(&self) -> bool {
+    pub(super) fn is_pending(&self) -> bool {
         self.t.is_none() && !self.level.is_nan()
     }
 

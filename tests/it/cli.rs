@@ -84,7 +84,7 @@ fn json_of_adapters_says_what_the_table_says() {
 fn strict_fails_where_members_end_badly_and_only_there() {
     let home = TempDir::new().unwrap();
     // Steps so long that they merge nodes, and members that have not relaxed.
-    let bad = "run --backend cpu --points 34 --curves 3 --shape nonconvex --tau 0.05 --t-end 0.1 --quiet";
+    let bad = "run --backend cpu --points 34 --curves 3 --shape nonconvex --sweep tau=0.05,1e-3 --t-end 0.1 --quiet";
     let output = curvelax(home.path(), &format!("{bad} --strict --out strict"));
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(3), "{message}");
@@ -96,6 +96,45 @@ fn strict_fails_where_members_end_badly_and_only_there() {
     assert_eq!(names(&home.path().join("strict")), names(&home.path().join("mild")));
     let good = curvelax(home.path(), &format!("{SMALL} --strict --out good"));
     assert_eq!(good.status.code(), Some(0), "{}", String::from_utf8_lossy(&good.stderr));
+}
+
+#[test]
+fn a_run_in_which_every_member_failed_says_so_however_it_ends() {
+    let home = TempDir::new().unwrap();
+    let refused = |arguments: &str, all: &str| {
+        let output = curvelax(home.path(), arguments);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(3), "{arguments}: {message}");
+        assert!(message.contains(&format!("error: every member failed ({all}); see `status` in ")), "{message}");
+    };
+    // One sweep solves nothing.
+    let bad = "run --backend cpu --points 34 --curves 4 --tau 0.05 --t-end 0.1 --max-sweeps 1 --quiet";
+    let all = "4 stalled of 4 members";
+    refused(&format!("{bad} --out whole"), all);
+    refused(&format!("{bad} --out whole --resume"), all);
+    refused("resume whole --quiet", all);
+    // Members are judged together: by the merge.
+    for index in 0..2 {
+        let output = curvelax(home.path(), &format!("{bad} --shard {index}/2 --out shard-{index}"));
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    refused("merge shard-0 shard-1 --quiet --out merged", all);
+    assert_eq!(names(&home.path().join("whole")), names(&home.path().join("merged")));
+}
+
+#[test]
+fn cells_in_which_no_member_relaxed_are_named() {
+    let home = TempDir::new().unwrap();
+    let short = "run --backend cpu --points 34 --curves 4 --adaptive=1e-3 --t-end 0.1";
+    let output = curvelax(home.path(), &format!("{short} --sweep relax-to=0.9,0.02,0.01 --out cells"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    let cells = "in 2 of 3 cells (relax-to = 0.02; relax-to = 0.01)";
+    let remedy = "use a longer --t-end or --t-end auto, or a larger --relax-to or --relax-at";
+    let warning = format!("warning: no member relaxed before its final time {cells}; {remedy}\n");
+    assert!(output.status.success() && message.contains(&warning), "{message}");
+    let output = curvelax(home.path(), &format!("{short} --out one"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains(&format!("warning: no member relaxed before its final time; {remedy}\n")), "{message}");
 }
 
 #[test]

@@ -85,6 +85,72 @@ fn events_converge_with_the_steps_as_their_order_promises() {
     }
 }
 
+/// Rows for which an observable that has turned round stays away from the level: longer than a step.
+const AWAY: usize = 100;
+
+/// A level that an observable of a member reaches and leaves again.
+struct Turn {
+    member: usize,
+    condition: String,
+    /// The times of the first and the last row there.
+    from: f64,
+    to: f64,
+}
+
+/// A level just short of each turning point of the series of a member that is farther than all before, by `depth` of the
+/// whole way of the observable.
+fn turns(member: usize, rows: &[Row], depth: f64) -> Vec<Turn> {
+    let mut turns = Vec::new();
+    for name in ["length", "excess", "energy", "k_min", "k_max", "mesh_ratio"] {
+        let of: Vec<f64> = rows.iter().map(|row| number(row, name)).collect();
+        let way = of.iter().fold(f64::MIN, |a, b| a.max(*b)) - of.iter().fold(f64::MAX, |a, b| a.min(*b));
+        for (sign, sense) in [(1.0, ">="), (-1.0, "<=")] {
+            let mut farthest = sign * of[0];
+            for at in 1..of.len() - 1 {
+                let level = sign * of[at] - depth * way;
+                let is_there = |place: &usize| sign * of[*place] >= level;
+                let turns_here = sign * of[at] > sign * of[at - 1] && sign * of[at] > sign * of[at + 1];
+                let to = (at..of.len()).take_while(is_there).last().unwrap();
+                // One that is soon there again may turn round twice within a step.
+                let stays = (to + 1..of.len().min(to + AWAY)).all(|place| !is_there(&place));
+                if turns_here && level > farthest && to + 1 < of.len() && stays {
+                    let from = (0..of.len()).find(is_there).unwrap();
+                    let [from, to] = [from, to].map(|place| number(&rows[place], "t"));
+                    turns.push(Turn { member, condition: format!("{name}{sense}{:e}", sign * level), from, to });
+                }
+                farthest = farthest.max(sign * of[at]);
+            }
+        }
+    }
+    turns
+}
+
+#[test]
+fn a_level_that_is_reached_and_left_again_within_a_step_is_found() {
+    for (shape, least) in [("--shape nonconvex --pull auto", 6), ("--shape flower:5:0.3 --amplitude 0.1", 4)] {
+        let members = format!("{shape} --curves 4 --points 48 --adaptive=1e-3 --t-end 0.02");
+        let series = series_of(&run(&format!("{members} --series 1e-5")));
+        let all = |member: usize| turns(member, &series[member], 1e-3);
+        let turns: Vec<Turn> = (0..series.len()).flat_map(all).collect();
+        assert!((least..=32).contains(&turns.len()), "{} turning points", turns.len());
+        let named = |(i, turn): (usize, &Turn)| format!(" --event e{i}={}", turn.condition);
+        let done = run(&format!("{members}{}", turns.iter().enumerate().map(named).collect::<String>()));
+        let rows = done.rows("events.csv");
+        let mut late = Vec::new();
+        for (i, Turn { member, condition, from, to }) in turns.iter().enumerate() {
+            let row = &rows[member * turns.len() + i];
+            assert_eq!((&row["event"], &row["member"]), (&format!("e{i}"), &member.to_string()));
+            // The row of the series is the first one past the level.
+            let found = row["censored"] == "0" && (from - 1.1e-5..=from + 1e-9).contains(&number(row, "t"));
+            if !found {
+                late.push(format!("{condition} from {from} to {to}: {} ({})", row["t"], row["censored"]));
+            }
+        }
+        eprintln!("{shape}: {} turning points, {} not found", turns.len(), late.len());
+        assert!(late.is_empty(), "{shape}: {} of {} not found:\n{}", late.len(), turns.len(), late.join("\n"));
+    }
+}
+
 #[test]
 fn half_of_the_excess_is_an_event_like_the_one_that_every_member_has() {
     for (pace, bound) in [("--tau 1e-5 --solver direct", 0.0), ("--tau 3e-5", 0.0), ("--adaptive=1e-3", 1e-5)] {

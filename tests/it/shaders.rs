@@ -330,6 +330,8 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("POINTS", f64::from(decay::POINTS)),
         ("RESOLVED", dense::RESOLVED),
         ("BISECTIONS", f64::from(dense::BISECTIONS)),
+        ("EARLY_LOOK", dense::LOOKS[0]),
+        ("LATE_LOOK", dense::LOOKS[1]),
         ("NEGLIGIBLE", NEGLIGIBLE),
         ("SWEEPS_PER_CHECK", f64::from(SWEEPS_PER_CHECK)),
         ("AUTO_SCALE", AUTO_SCALE),

@@ -43,7 +43,7 @@ pub struct Page<'a> {
     pub headline: Vec<Headline>,
     /// What the reader should know, one sentence each.
     pub warnings: &'a [String],
-    /// A few members to watch; the first six are shown.
+    /// A few members to watch; the first [`MAX_MEMBERS`](player::MAX_MEMBERS) are shown.
     pub members: Vec<MovingMember>,
     /// The pictures.
     pub plots: Vec<PageFigure>,
