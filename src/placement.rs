@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::backend::{
     Backend, Device, DeviceKind,
     cpu::{CpuBackend, Vectorised},
-    gpu::{Capacity, Gpu, Kernel, LOADS_DRIVERS, Variant, may_have_hardware},
+    gpu::{Capacity, Gpu, Kernel, LOADS_DRIVERS, Variant, may_have_hardware, patience},
 };
 use crate::{
     conformance::{compare::MAX_SWEEPS, self_test},
@@ -22,10 +22,6 @@ use crate::{
 };
 
 pub use crate::conformance::bounds::MAX_POINTS_F32;
-
-/// Time for a driver to compile a kernel before `--backend auto` uses the CPU. Drivers take seconds, or a minute on a
-/// busy machine.
-const COMPILE_LIMIT: Duration = Duration::from_secs(120);
 
 /// Where a run is computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -400,7 +396,7 @@ impl Choice {
             Device::Cpu => CpuBackend::<T>::for_members(blocks, method, threads(spec), spec.member_count())
                 .map(|backend| Box::new(backend) as Box<dyn Backend>),
             Device::Gpu(gpu) => {
-                let limit = self.or_cpu.then_some(COMPILE_LIMIT);
+                let limit = if self.or_cpu { Some(patience()?) } else { None };
                 open_gpu::<T>(gpu, blocks, spec, &method, limit, watch)
             }
         };

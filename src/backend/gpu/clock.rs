@@ -38,8 +38,13 @@ impl Moment {
         let elapsed = self.at.elapsed();
         let Some((before, now)) = self.worked.zip(processor_time()) else { return elapsed };
         let processors = std::thread::available_parallelism().map_or(1, usize::from) as u32;
-        (now.saturating_sub(before) / processors).max(elapsed / MAX_CROWDED)
+        spent(elapsed, now.saturating_sub(before), processors)
     }
+}
+
+/// The time that counts if the process had `worked` on so many processors while `elapsed` went by.
+fn spent(elapsed: Duration, worked: Duration, processors: u32) -> Duration {
+    (worked / processors).max(elapsed / MAX_CROWDED)
 }
 
 /// Processor time of all threads of the process so far, where the system reports it.
@@ -60,16 +65,15 @@ mod tests {
 
     #[test]
     fn only_on_a_software_gpu_does_time_without_a_processor_count_little() {
+        let seconds = Duration::from_secs;
+        assert_eq!(spent(seconds(60), seconds(8), 4), seconds(2));
+        assert_eq!(spent(seconds(60), seconds(0), 4), seconds(60) / MAX_CROWDED);
+        // All processors, and more of them than the system says there are.
+        assert_eq!(spent(seconds(60), seconds(240), 4), seconds(60));
         let [hardware, software] = [false, true].map(Moment::now);
-        // Other tests of this process also compute: at most on all processors, but no clock is that exact.
-        std::thread::sleep(Duration::from_millis(300));
-        assert!(hardware.spent() >= Duration::from_millis(300));
-        let (spent, elapsed) = (software.spent(), software.elapsed());
-        assert!(spent >= Duration::from_millis(300) / MAX_CROWDED && spent <= elapsed + Duration::from_millis(50));
-        if let (Some(before), Some(now)) = (software.worked, processor_time()) {
-            let processors = std::thread::available_parallelism().map_or(1, usize::from) as u32;
-            assert!(now >= before && spent <= ((now - before) / processors).max(software.elapsed() / MAX_CROWDED));
-        }
+        std::thread::sleep(Duration::from_millis(30));
+        assert!(hardware.spent() >= Duration::from_millis(30));
+        assert!(software.spent() >= Duration::from_millis(30) / MAX_CROWDED);
         assert_eq!(hardware.later(software).at, software.at);
         assert_eq!(software.later(hardware).at, software.at);
     }

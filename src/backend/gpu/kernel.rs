@@ -25,11 +25,9 @@ use crate::{
     text::plural,
 };
 
+use super::patience;
 pub use super::{budget::Budget, mirror::DISPATCH_FIELDS, pipeline::compile};
 
-/// Time after which a dispatch is abandoned. Drivers of hardware do so after some seconds; a dispatch on lavapipe lasts
-/// a fraction of a second, or longer while the driver compiles.
-const DISPATCH_LIMIT: Duration = Duration::from_secs(120);
 /// Maximum slots of a batch; more resident members gain nothing.
 const MAX_SLOTS: usize = 8192;
 /// Minimum members of a batch if there are two: enough for the threads of a software GPU, or to fill a large GPU, which
@@ -112,7 +110,7 @@ impl<T: Real> Kernel<T> {
             budget: Budget::first(variant.solver, most),
             most,
             fixed: false,
-            limit: DISPATCH_LIMIT,
+            limit: patience()?,
             ended,
         })
     }

@@ -17,6 +17,8 @@ pub mod mirror;
 #[cfg(feature = "program")]
 mod nodes;
 #[cfg(feature = "program")]
+mod patience;
+#[cfg(feature = "program")]
 mod pipeline;
 pub mod shader;
 
@@ -28,4 +30,6 @@ pub use capacity::Capacity;
 pub use kernel::Kernel;
 #[cfg(feature = "program")]
 pub use nodes::{LOADS_DRIVERS, may_have_hardware};
+#[cfg(feature = "program")]
+pub use patience::patience;
 pub use shader::Variant;
