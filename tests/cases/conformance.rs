@@ -81,15 +81,15 @@ pub fn trials() -> Vec<Trial> {
     trials
 }
 
-/// Records how many cases have passed, and where they ran, for scripts.
+/// Appends to the file that CURVELAX_CASES names how many cases have passed, and where they ran, for scripts.
 pub fn record() {
+    let Some(path) = std::env::var_os("CURVELAX_CASES") else { return };
     let (cases, gpus) = (PASSED.load(Ordering::Relaxed), Gpu::list());
     let names: Vec<&str> = gpus.iter().map(Gpu::name).collect();
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/target/conformance-cases.txt");
-    let file = std::fs::OpenOptions::new().create(true).append(true).open(path);
+    let file = std::fs::OpenOptions::new().create(true).append(true).open(&path);
     let written = file.and_then(|mut file| writeln!(file, "{cases} conformance on {}", names.join(", ")));
     if let Err(error) = written {
-        println!("cannot write {path}: {error}");
+        println!("cannot write {}: {error}", path.display());
     }
 }
 

@@ -42,7 +42,7 @@ const POINTS: usize = 11;
 /// Members of a cohort: every lane of the widest vectors is used twice, and not all vectors are full.
 const COHORT: usize = 40;
 /// A test that waits this long hangs.
-const HANGS: Duration = Duration::from_secs(600);
+const HANGS: Duration = Duration::from_secs(6 * 3600);
 /// More advances than members of a few steps can need.
 const MANY_ADVANCES: usize = 10_000;
 
@@ -529,7 +529,9 @@ fn slow_dispatch(gpu: &Gpu) -> Outcome {
         require(kernel.is_back(0, HANGS), || "a dispatch beyond its limit is waited for".into())?;
         let (waited, finished) = (started.elapsed(), kernel.finish(0));
         if finished.is_err() {
-            require(waited >= limit.mul_f64(0.9), || format!("given up after {waited:.1?} of {limit:.1?}"))?;
+            // A software GPU is given processor time by the number of processors; with a quota, a process may have nearly
+            // twice as much as their whole number.
+            require(waited >= limit / 2, || format!("given up after {waited:.1?} of {limit:.1?}"))?;
             return named(finished, gpu, "a dispatch did not end in ");
         }
         require(!limit.is_zero(), || format!("a dispatch of {waited:.1?} is not given up"))?;

@@ -225,7 +225,7 @@ fn refused_at_once(folder: &Path, arguments: &[&str], start: &str) {
     let program = assert_cmd::cargo::cargo_bin("curvelax");
     let mut command = Command::new("sh");
     command.args(["-c", "ulimit -v 300000 && ulimit -t 60 && exec \"$0\" \"$@\""]).arg(program).args(arguments);
-    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).timeout(std::time::Duration::from_secs(600));
+    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).timeout(std::time::Duration::from_secs(6 * 3600));
     let output = command.output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     let shown: String = message.chars().take(300).collect();

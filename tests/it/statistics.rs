@@ -342,7 +342,12 @@ fn survival_by_definition(observations: &[Observation], t: f64) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 300,
+        failure_persistence: None,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(1), // the same cases in every run
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn a_curve_is_its_definition_and_falls_and_its_numbers_are_numbers(observations in samples()) {

@@ -41,7 +41,7 @@ pub fn members() -> Outcome {
     let (_home, ended) = run("--curves 1 --quiet --t-end 0.01");
     assert_eq!((ended.code, &*ended.said), (Some(0), ""));
     let home = TempDir::new().unwrap();
-    let dry = "run --backend cpu --curves 10000000 --tau 0.01 --dry-run --json";
+    let dry = "run --backend cpu --threads 1 --curves 10000000 --tau 0.01 --dry-run --json";
     let output = curvelax(home.path(), dry).output().unwrap();
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
     let bytes = json["memory_bytes"].as_f64().unwrap();
