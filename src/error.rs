@@ -126,70 +126,6 @@ pub(crate) fn without_controls(text: &str) -> String {
     shown
 }
 
-/// Maximum characters of a word in a message. Longer ones are shortened, unless they are paths: commands in messages are
-/// there to be copied.
-const MAX_READABLE: usize = 200;
-/// Characters that are left of a longer one.
-const SHORT_WORD: usize = 60;
-
-/// Shortens the words of `text` that are too long to read: it may quote a value of any length.
-pub(crate) fn with_short_words(text: &str) -> String {
-    let shorten = |word: &str| match word.len() > MAX_READABLE && !word.contains(['/', '\\']) {
-        true => {
-            let end: String = word.chars().rev().take_while(|c| !c.is_alphanumeric()).collect();
-            let end: String = end.chars().rev().collect();
-            format!("{} ({} characters){end}", shortened(word, SHORT_WORD), word.chars().count())
-        }
-        false => word.to_owned(),
-    };
-    text.split_inclusive(char::is_whitespace)
-        .map(|part| {
-            let word = part.trim_end_matches(char::is_whitespace);
-            shorten(word) + &part[word.len()..]
-        })
-        .collect()
-}
-
-/// Says in the words of users what serde says in those of Rust: "invalid type: string "x", expected f64" becomes "the text
-/// "x" where a number is expected". A message may go on with its place, " at line 3 column 5".
-pub(crate) fn in_plain_words(message: &str) -> String {
-    let keys = [
-        ("unknown field `", "unknown key `"),
-        ("unknown variant `", "unknown value `"),
-        ("missing field `", "missing key `"),
-    ];
-    if let Some((rust, plain)) = keys.into_iter().find(|(rust, _)| message.starts_with(rust)) {
-        return message.replacen(rust, plain, 1);
-    }
-    let kinds = ["invalid type: ", "invalid value: "];
-    let parts = kinds.into_iter().find_map(|kind| message.strip_prefix(kind)?.rsplit_once(", expected "));
-    let Some((found, rest)) = parts else { return message.to_owned() };
-    let (wanted, place) = rest.find(" at line ").map_or((rest, ""), |at| rest.split_at(at));
-    let number = |kind: &str| found.strip_prefix(kind).map(|text| text.split('`').nth(1).unwrap_or(text).to_owned());
-    let found = match found {
-        "sequence" => "a list".into(),
-        "map" => "a table".into(),
-        "null" | "unit value" | "Option value" => "nothing".into(),
-        _ => ["integer ", "floating point ", "boolean "]
-            .into_iter()
-            .find_map(number)
-            .unwrap_or_else(|| found.replacen("string ", "the text ", 1)),
-    };
-    let wanted = match wanted {
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0",
-        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
-        "f32" | "f64" => "a number",
-        "a boolean" => "true or false",
-        "a string" => "text in quotes",
-        "a sequence" => "a list in brackets",
-        "a map" => "a table",
-        wanted if wanted.starts_with("struct ") => "a table",
-        wanted if wanted.starts_with("tuple ") => "a list in brackets",
-        wanted => wanted,
-    };
-    format!("{found} where {wanted} is expected{place}")
-}
-
 /// Joins a message of several lines, such as a tree of causes or a text with a caret under it, into one line.
 pub(crate) fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
@@ -198,41 +134,6 @@ pub(crate) fn one_line(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn long_words_are_shortened_and_paths_are_not() {
-        let long = "z".repeat(10_000);
-        let shown = with_short_words(&format!("error: --tau '{long}': no number;\n  a\t{long}"));
-        let word = "z".repeat(59);
-        let expected =
-            format!("error: --tau '{word}... (10003 characters)': no number;\n  a\t{word}z... (10000 characters)");
-        assert_eq!(shown, expected);
-        let path = format!("curvelax resume /{long}/{long}  continues it\n");
-        assert_eq!(with_short_words(&path), path);
-        assert_eq!(with_short_words(""), "");
-    }
-
-    #[test]
-    fn types_are_called_by_the_names_that_users_have_for_them() {
-        for (rust, plain) in [
-            ("invalid type: string \"x\", expected f64", "the text \"x\" where a number is expected"),
-            ("invalid value: integer `-5`, expected u64", "-5 where a whole number from 0 is expected"),
-            ("invalid type: integer `99` as i128, expected usize", "99 where a whole number from 0 is expected"),
-            ("invalid type: floating point `1.5`, expected u32", "1.5 where a whole number from 0 is expected"),
-            ("invalid type: sequence, expected a boolean", "a list where true or false is expected"),
-            ("invalid type: map, expected a number or \"auto\"", "a table where a number or \"auto\" is expected"),
-            (
-                "invalid type: string \", expected u8\", expected a sequence at line 3 column 5",
-                "the text \", expected u8\" where a list in brackets is expected at line 3 column 5",
-            ),
-            ("unknown field `a`, expected one of `b`, `c`", "unknown key `a`, expected one of `b`, `c`"),
-            ("unknown variant `a`, expected `b`", "unknown value `a`, expected `b`"),
-            ("missing field `a` at line 1 column 2", "missing key `a` at line 1 column 2"),
-            ("duplicate key", "duplicate key"),
-        ] {
-            assert_eq!(in_plain_words(rust), plain);
-        }
-    }
 
     #[test]
     fn the_nearest_spelling_is_found_if_there_is_one() {

@@ -32,7 +32,7 @@ use serde::Serialize;
 
 use crate::{
     backend::gpu::abandoned,
-    error::{Error, Result, with_short_words, without_controls},
+    error::{Error, Result, without_controls},
     results::provenance::json,
 };
 
@@ -67,12 +67,10 @@ enum Command {
     Man(man::ManArgs),
 }
 
-/// Parses `arguments`, the first of which is the program, runs the command, and returns the exit code.
+/// Parses `arguments`, the first of which is the program, runs the command, and returns the exit code. Wrong arguments
+/// end the process.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let cli = match parse(arguments) {
-        Ok(cli) => cli,
-        Err(error) => return refuse(&error),
-    };
+    let cli = parse(arguments).unwrap_or_else(|error| error.exit());
     let done = match cli.command {
         Command::Run(args) => run::run(*args),
         Command::Resume(args) => resume::resume(args),
@@ -95,20 +93,6 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         signals::exit(code);
     }
     code
-}
-
-/// Prints the help, or what is wrong with the arguments, and returns the exit code.
-fn refuse(error: &clap::Error) -> u8 {
-    let text = error.render();
-    let plain = text.to_string();
-    // Only where a value is too long to read: clap knows which colours the terminal has.
-    let shown = with_short_words(&plain);
-    if error.use_stderr() && shown != plain {
-        let _ = write!(io::stderr().lock(), "{}", without_controls(&shown));
-    } else {
-        let _ = error.print();
-    }
-    u8::try_from(error.exit_code()).unwrap_or(2)
 }
 
 /// Does the same as `Cli::try_parse_from`, but [explains](unknown::explain) unknown flags.
@@ -138,7 +122,7 @@ fn print_json(value: &impl Serialize) -> Result<()> {
 
 /// Writes a line to stderr; if that fails, nothing can be done.
 pub(crate) fn note(line: &str) {
-    let _ = writeln!(io::stderr().lock(), "{}", without_controls(&with_short_words(line)));
+    let _ = writeln!(io::stderr().lock(), "{}", without_controls(line));
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ use super::{
 use crate::{
     backend::DeviceKind,
     curve::{Modes, Perturbation, Sampling, Shape},
-    error::{Error, Result, did_you_mean, in_plain_words, shortened},
+    error::{Error, Result, did_you_mean, shortened},
     flow::Flow,
     input,
     random::Design,
@@ -480,12 +480,7 @@ impl Spec {
             table.insert(axis.key.clone(), value.clone());
             // One key at a time, so that the message names the wrong one.
             Spec::deserialize(table.clone()).map_err(|e| {
-                Error::Request(format!(
-                    "--sweep {}={}: {}",
-                    axis.key,
-                    sweep::label(value),
-                    in_plain_words(e.message().trim_end())
-                ))
+                Error::Request(format!("--sweep {}={}: {}", axis.key, sweep::label(value), e.message().trim_end()))
             })?;
         }
         let mut spec = Spec::deserialize(table).map_err(|e| failed(&e))?;
@@ -634,13 +629,12 @@ const MAX_SHOWN: usize = 1000;
 
 /// What is wrong, with the line and a caret; for an overlong line, only where.
 fn told(error: &toml::de::Error) -> String {
-    let plain = in_plain_words(error.message());
-    let whole = error.to_string().replacen(error.message(), &plain, 1);
+    let whole = error.to_string();
     if whole.lines().all(|line| line.len() <= MAX_SHOWN) {
         return whole.trim_end().to_owned();
     }
     let place = whole.lines().next().unwrap_or_default();
-    format!("{}: {}", shortened(place, MAX_SHOWN), shortened(plain.trim_end(), MAX_SHOWN))
+    format!("{}: {}", shortened(place, MAX_SHOWN), shortened(error.message().trim_end(), MAX_SHOWN))
 }
 
 /// Suggests the nearest of the names that serde lists after "unknown field `x`, expected one of `a`, `b`".
@@ -969,7 +963,7 @@ mod tests {
         let long = "x".repeat(100_000);
         for (text, start) in [
             (format!("\nshape = '{long}'"), "TOML parse error at line 2, column 9: unknown shape `xxx"),
-            (format!("{long} = 1"), "TOML parse error at line 1, column 1: unknown key `xxx"),
+            (format!("{long} = 1"), "TOML parse error at line 1, column 1: unknown field `xxx"),
             (format!("a = {}", "[".repeat(100_000)), "TOML parse error at line 1, column 85: cannot recurse further"),
         ] {
             let message = Spec::from_toml(&text).unwrap_err();
@@ -980,11 +974,11 @@ mod tests {
     #[test]
     fn a_wrong_key_or_word_is_shown_in_its_line_with_the_nearest_spelling() {
         let message = Spec::from_toml("curves = 3\nomga = 1\n").unwrap_err();
-        for part in ["line 2, column 1", "2 | omga = 1", "^^^^", "unknown key `omga`", "did you mean `omega`?"] {
+        for part in ["line 2, column 1", "2 | omga = 1", "^^^^", "unknown field `omga`", "did you mean `omega`?"] {
             assert!(message.contains(part), "no {part:?} in: {message}");
         }
         let message = Spec::from_toml("order = 'colored'").unwrap_err();
-        assert!(message.contains("unknown value `colored`"), "{message}");
+        assert!(message.contains("unknown variant `colored`"), "{message}");
         assert!(message.contains("did you mean `coloured`?"), "{message}");
     }
 }

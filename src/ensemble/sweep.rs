@@ -226,8 +226,6 @@ impl Sweep {
     /// Adds a cell to an error about its request, if anything is swept.
     pub(super) fn in_cell(&self, error: Error, index: u64) -> Error {
         match error {
-            // Which value is wrong is said there.
-            Error::Request(message) if message.starts_with("--sweep ") => Error::Request(message),
             Error::Request(message) if !self.is_empty() => {
                 Error::Request(format!("{message} (in the cell {})", self.name(index)))
             }

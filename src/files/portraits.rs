@@ -12,7 +12,7 @@ use super::names::{self, REMEDY};
 use crate::{
     draw::axis::Scale,
     ensemble::{Outcome, Portrait, Status},
-    error::{Error, Result, in_plain_words, shortened},
+    error::{Error, Result, shortened},
     input,
 };
 
@@ -131,7 +131,7 @@ pub fn read(path: &Path) -> Result<Vec<Film>> {
     let text = input::text(path, input::MAX_PORTRAITS);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
     let Portraits { members } = serde_json::from_str(&text).map_err(|e| {
-        let problem = shortened(&in_plain_words(&e.to_string()), 200);
+        let problem = shortened(&e.to_string(), 200);
         Error::Request(format!("{}: {problem}; {REMEDY}", path.display()))
     })?;
     match members.iter().find_map(|film| Some((film.member, film.fault()?))) {
@@ -218,7 +218,7 @@ pub(crate) mod tests {
             ("\"nodes\":[\"", "\"nodes\":[\"!!!!", "member 5: expected digits of base64"),
             ("\"nodes\":[\"", "\"nodes\":[\"AAAA", "member 5: expected equally many nodes"),
             ("\"unit\":", "\"unit\":-", "member 5: expected a corner and a positive unit"),
-            ("relaxed", "slack", "unknown value `slack`"),
+            ("relaxed", "slack", "unknown variant `slack`"),
             ("}\n", "\n", "EOF while parsing"),
         ] {
             let error = twisted(from, to).unwrap_err();

@@ -29,7 +29,6 @@ mod wkt;
 use std::{
     borrow::Cow,
     collections::{BTreeMap, HashMap, HashSet},
-    io::ErrorKind,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -152,25 +151,9 @@ fn only(source: Source, mut all: Vec<Labelled>) -> Result<Outline> {
 }
 
 fn content(base: &Path, path: &Path) -> Result<Vec<u8>> {
-    input::bytes(&base.join(path), MAX_OUTLINE).map_err(|e| {
-        let (problem, remedy) = match e.kind() {
-            ErrorKind::NotFound if path.is_absolute() => ("there is no such file".into(), "check the path".into()),
-            ErrorKind::NotFound => {
-                let folder = if base.as_os_str().is_empty() { Path::new(".") } else { base };
-                let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.into());
-                let problem = format!("there is no such file in {}", folder.display());
-                (problem, "check the path, which starts from there".into())
-            }
-            ErrorKind::IsADirectory => {
-                ("it is a folder".into(), format!("name a file in it, or all: 'files:{}/*.csv'", path.display()))
-            }
-            ErrorKind::PermissionDenied => {
-                ("it may not be read".into(), "give yourself the right to read it, or copy it".into())
-            }
-            _ => (format!("cannot read it: {e}"), format!("give a file of at most {} MiB", MAX_OUTLINE >> 20)),
-        };
-        Source::new(path).refusal("", &problem, &remedy)
-    })
+    let remedy = format!("give a CSV file x,y of at most {MAX_OUTLINE} bytes");
+    let bytes = input::bytes(&base.join(path), MAX_OUTLINE);
+    bytes.map_err(|e| Source::new(path).refusal("", &format!("cannot read it: {e}"), &remedy))
 }
 
 /// The format of a file.
@@ -197,16 +180,6 @@ const FOREIGN: [(&[u8], &str, &str); 9] = [
 ];
 const CONVERT: &str = "convert it: ogr2ogr -f GeoJSON outlines.geojson FILE";
 const TRACE: &str = "trace the outline, and save its points as CSV, with columns x,y";
-
-/// `ogr2ogr` reads no SVG. docs/outlines.md has the lines.
-const SAMPLE: &str =
-    "sample its path, for example with svgpathtools in Python, and save the points as CSV, with columns x,y";
-
-/// Whether a text that begins as XML is a picture.
-fn is_svg(text: &[u8]) -> bool {
-    let head = String::from_utf8_lossy(&text[..text.len().min(4096)]).to_ascii_lowercase();
-    head.contains("<svg")
-}
 
 impl Format {
     /// The format by the extension of `path`, if the content agrees.
@@ -238,7 +211,6 @@ impl Format {
             .iter()
             .any(|word| text.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes())));
         match (format, text.first()) {
-            (_, Some(b'<')) if is_svg(text) => refuse("an SVG picture, not a table of points", SAMPLE),
             (_, Some(b'<')) => refuse("an HTML or XML page, not a table of points", CONVERT),
             (Format::Table | Format::Wkt, Some(b'{' | b'[')) => refuse("JSON", "give it the extension .geojson"),
             (Format::Table | Format::GeoJson, _) if is_wkt => refuse("well-known text", "give it the extension .wkt"),

@@ -356,8 +356,10 @@ impl Reader<'_> {
         if columns.others.is_empty() && table.points.len() - since == MAX_POINTS {
             self.source.check_number(&Places::lines(), MAX_POINTS + 1)?;
         }
-        let point =
-            DVec2::new(self.coordinate(line, "x", x, columns, table)?, self.coordinate(line, "y", y, columns, table)?);
+        let point = DVec2::new(
+            self.coordinate(line, x, columns.separator, table)?,
+            self.coordinate(line, y, columns.separator, table)?,
+        );
         table.points.push(point);
         table.lines.push(line);
         for ((_, column), values) in columns.others.iter().zip(&mut table.others) {
@@ -419,19 +421,8 @@ impl Reader<'_> {
         self.source.refusal(&place(line), &problem, remedy)
     }
 
-    fn coordinate(
-        &self,
-        line: usize,
-        axis: &str,
-        field: &str,
-        columns: &Columns,
-        table: &mut PointTable,
-    ) -> Result<f64> {
-        let place = || match columns.in_degrees {
-            true => format!("{}, column {}", place(line), if axis == "x" { "lon" } else { "lat" }),
-            false => format!("{}, column {axis}", place(line)),
-        };
-        let value = match Written::of(field, columns.separator) {
+    fn coordinate(&self, line: usize, field: &str, separator: Separator, table: &mut PointTable) -> Result<f64> {
+        let value = match Written::of(field, separator) {
             Written::Number(value) => {
                 table.has_decimal_points |= field.contains('.');
                 value
@@ -445,15 +436,11 @@ impl Reader<'_> {
                 value
             }
             Written::Word => {
-                let problem = match field.is_empty() {
-                    true => "the field is empty".into(),
-                    false => format!("`{}` is not a number", shortened(field, SHOWN)),
-                };
-                let remedy = "write numbers such as 1.0,0.5; a row in which both are empty separates two outlines";
-                return Err(self.source.refusal(&place(), &problem, remedy));
+                let problem = format!("`{}` is not a number", shortened(field, SHOWN));
+                return Err(self.source.refusal(&place(line), &problem, "write x,y such as 1.0,0.5"));
             }
         };
-        self.source.check_coordinate(place, value, &shortened(field, SHOWN))?;
+        self.source.check_coordinate(|| place(line), value, &shortened(field, SHOWN))?;
         Ok(value)
     }
 }
@@ -506,17 +493,17 @@ mod tests {
 
     #[test]
     fn a_line_that_is_no_pair_of_finite_numbers_is_refused_with_its_number_and_value() {
-        assert_refused("0,0\n# c\n1,zero\n1,1\n", &["line 3, column x:", "`zero` is not a number"]);
-        assert_refused("0,0\n1,nan\n1,1\n", &["line 2, column y:", "`nan` is not finite"]);
-        assert_refused("inf,0\n1,0\n1,1\n", &["line 1, column x:", "`inf` is not finite"]);
-        assert_refused("0,0\n1e31,0\n1,1\n", &["line 2, column x:", "`1e31` is too large"]);
+        assert_refused("0,0\n# c\n1,zero\n1,1\n", &["line 3:", "`zero` is not a number"]);
+        assert_refused("0,0\n1,nan\n1,1\n", &["line 2:", "`nan` is not finite"]);
+        assert_refused("inf,0\n1,0\n1,1\n", &["line 1:", "`inf` is not finite"]);
+        assert_refused("0,0\n1e31,0\n1,1\n", &["line 2:", "`1e31` is too large"]);
         assert_refused("0,0\n1\n1,1\n", &["line 2:", "columns is 1 "]);
         assert_refused("0,0,7\n1,0,7\n1,1,7\n", &["line 1:", "columns is 3 ", "header"]);
         assert_refused("x,y\n0,0\n1\n", &["line 3:", "columns is 1 "]);
         assert_refused("x,y\n0,0\n1,0,9\n1,1\n", &["line 3:", "columns is 3 where the header names 2;"]);
         assert_refused("u,v\n0,0\n1,0\n1,1\n", &["line 1:", "`u,v` names no columns x and y"]);
         assert_refused("lon,y\n0,0\n1,0\n1,1\n", &["line 1:", "`lon,y` names no columns x and y; begin with"]);
-        assert_refused("x,y\nx,y\n0,0\n", &["line 2, column x:", "`x` is not a number"]);
+        assert_refused("x,y\nx,y\n0,0\n", &["line 2:", "`x` is not a number"]);
     }
 
     #[test]
@@ -558,9 +545,9 @@ mod tests {
         );
         assert_eq!(vertices("0;0\n1,234;0\n1,234;0,5\n")[1], (1.234, 0.0));
         assert_refused("0;0.5\n1,234;0\n1,234;1,5\n", &["line 2: the comma of `1,234`"]);
-        assert_refused("0;0\n1,234,567;0\n1;1\n", &["line 2, column x: `1,234,567` is not a number"]);
-        assert_refused("0;0\n1,234.5;0\n1;1\n", &["line 2, column x: `1,234.5` is not a number"]);
-        assert_refused("x;y\n0;0\n1,;0\n1;1\n", &["line 3, column x: `1,` is not a number"]);
+        assert_refused("0;0\n1,234,567;0\n1;1\n", &["line 2: `1,234,567` is not a number"]);
+        assert_refused("0;0\n1,234.5;0\n1;1\n", &["line 2: `1,234.5` is not a number"]);
+        assert_refused("x;y\n0;0\n1,;0\n1;1\n", &["line 3: `1,` is not a number"]);
     }
 
     #[test]
@@ -586,7 +573,7 @@ mod tests {
             }
         }
         // A row that is only half missing separates nothing.
-        assert_refused("0,0\n1,0\n,1\n0,1\n", &["line 3, column x: the field is empty"]);
+        assert_refused("0,0\n1,0\n,1\n0,1\n", &["line 3: `` is not a number"]);
     }
 
     #[test]
