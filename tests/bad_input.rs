@@ -156,7 +156,35 @@ fn a_wrong_sweep_names_its_key_and_cell() {
         assert_says(&refused(&arguments, &[]), &parts);
     }
     let message = refused(&["spec.toml"], &[("spec.toml", "[sweep]\namplitude = 1\n")]);
-    assert_says(&message, &["line 2, column 13", "invalid type: integer `1`"]);
+    assert_says(&message, &["line 2, column 13", "expected a list in brackets, found the number 1; "]);
+}
+
+#[test]
+fn a_spec_file_is_told_what_is_wanted_without_types_of_rust() {
+    for (text, parts) in [
+        ("curves = 'x'", &["expected a whole number from 0, found the text \"x\""][..]),
+        ("curves = '8'", &["found the text \"8\"; leave the quotes out"]),
+        ("curves = 1.5", &["expected a whole number from 0, found the number 1.5"]),
+        ("max-sweeps = 99999999999", &["expected a whole number from 0 to 4294967295, found the number 99999999999"]),
+        ("mobility = 'x'", &["expected a number, found the text \"x\""]),
+        ("mobility = 99999999999999999999", &["expected a number, found the number 99999999999999999999"]),
+        ("snapshots = ['a']", &["expected a number, found the text \"a\""]),
+        ("tau = true", &["expected a number or \"auto\", found true"]),
+        ("tau = [1]", &["expected a number or \"auto\", found a list"]),
+        ("refine = 'true'", &["expected true or false, found the text \"true\"; leave the quotes out"]),
+        ("modes = 3", &["expected a text in quotes, found the number 3"]),
+        ("event = 'a = area <= 1'", &["expected a list in brackets, found the text", "; put it in brackets"]),
+        ("order = 1", &["expected a word in quotes"]),
+        ("shape = {a = 1}", &["expected a text in quotes, found a table"]),
+        ("[sweep]\namplitude = [99999999999999999999999]", &["line 2", "expected a number, a text, or true or false"]),
+    ] {
+        let message = refused(&["spec.toml"], &[("spec.toml", text)]);
+        assert_says(&message, parts);
+        assert_says(&message, &["in the spec spec.toml: ", "line ", "column "]);
+        for word in ["f64", "u64", "u32", "i128", "usize", "boolean", "sequence", "enum", "invalid type", "floating"] {
+            assert!(!message.contains(word), "{word} in: {message}");
+        }
+    }
 }
 
 #[test]
@@ -171,14 +199,14 @@ fn a_wrong_spec_file_is_shown_in_its_line() {
     for (text, parts) in [
         ("curves = 8\ntua = 1\n", &["line 2, column 1", "2 | tua = 1", "^^^", "did you mean `tau`?", "`omega`"][..]),
         ("t_end = 1", &["line 1, column 1", "^^^^^", "did you mean `t-end`?"]),
-        ("curves = 'many'", &["line 1, column 10", "invalid type: string \"many\""]),
-        ("curves = -3", &["line 1, column 10", "`-3`"]),
+        ("curves = 'many'", &["line 1, column 10", "expected a whole number from 0, found the text \"many\""]),
+        ("curves = -3", &["line 1, column 10", "found the number -3"]),
         ("amplitude = '0.1'", &["line 1, column 13", "expected a number, or a distribution"]),
         ("solver = 'gaus-seidel'", &["unknown variant `gaus-seidel`", "did you mean `gauss-seidel`?"]),
         ("flow = 'wilmore'", &["line 1, column 8", "did you mean `willmore`?"]),
-        ("no-redistribution = 1", &["line 1, column 21", "expected a boolean"]),
+        ("no-redistribution = 1", &["line 1, column 21", "expected true or false, found the number 1"]),
         ("snapshots = 'a,b'", &["line 1, column 13", "`a` in `a,b`"]),
-        ("only = [1, -2]", &["line 1, column 12", "`-2`"]),
+        ("only = [1, -2]", &["line 1, column 12", "found the number -2"]),
         ("tau = 1\ntau = 2", &["line 2", "duplicate key"]),
         ("tau = ", &["line 1"]),
         ("[sweeps]", &["unknown field `sweeps`", "did you mean `sweep`?"]),

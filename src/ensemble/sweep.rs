@@ -163,7 +163,7 @@ fn from_whole(key: &str, whole: u64) -> Value {
 
 /// A value as it is read.
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number, a text, or true or false")]
 enum Read {
     Value(Value),
     Whole(u64),
