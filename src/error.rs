@@ -134,6 +134,21 @@ pub(crate) fn echo(value: impl std::fmt::Display) -> String {
     shortened(&value.to_string(), ECHOED)
 }
 
+/// Characters of a path that a message echoes at its beginning and at its end.
+const ECHOED_ENDS: (usize, usize) = (60, 140);
+
+/// A path as a message echoes it: of a long one the beginning and the end, which has the name of the file.
+pub(crate) fn echo_path(path: &Path) -> String {
+    let text = path.display().to_string();
+    let (start, end) = ECHOED_ENDS;
+    match text.char_indices().nth_back(end - 1) {
+        Some((at, _)) if text.chars().count() > start + end => {
+            format!("{}{}", shortened(&text, start), shortened(&text[at..], 2 * end))
+        }
+        _ => shortened(&text, 2 * (start + end)),
+    }
+}
+
 /// What a reader of TOML or JSON says is wrong, in words that do not take Rust, its values shortened. The names of types
 /// are those of serde: `invalid type: string "x", expected f64` becomes `expected a number, found the text "x"`.
 pub(crate) fn plainly(message: &str) -> String {
@@ -258,6 +273,15 @@ mod tests {
         let endless = "tau".repeat(10_000_000);
         assert_eq!(nearest(&endless, [format!("x{endless}").as_str()]), None);
         assert_eq!(nearest(&format!("{}s", "x".repeat(63)), ["x".repeat(63).as_str()]), Some("x".repeat(63).as_str()));
+    }
+
+    #[test]
+    fn a_long_path_is_echoed_by_its_ends() {
+        let short = "folder/".repeat(20) + "file.csv";
+        assert_eq!(echo_path(Path::new(&short)), short);
+        let long = echo_path(Path::new(&("folder/".repeat(2000) + "file.csv")));
+        assert!(long.starts_with("folder/folder/") && long.contains("...") && long.ends_with("/file.csv"), "{long}");
+        assert_eq!(long.chars().count(), 203);
     }
 
     #[test]

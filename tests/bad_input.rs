@@ -188,6 +188,61 @@ fn a_spec_file_is_told_what_is_wanted_without_types_of_rust() {
 }
 
 #[test]
+fn a_file_of_outlines_that_is_not_there_is_told_with_the_path_looked_for() {
+    let home = TempDir::new().unwrap();
+    fs::create_dir(home.path().join("folder.csv")).unwrap();
+    fs::write(home.path().join("file.csv"), "0,0\n1,0\n1,1\n").unwrap();
+    let folder = home.path().canonicalize().unwrap().display().to_string();
+    for (shape, parts) in [
+        ("file:none.csv", &["there is no such file; looked for ", &format!("{folder}/none.csv: check the name")][..]),
+        ("file:no/none.csv", &["there is no such file; looked for ", &format!("{folder}/no/none.csv: check")]),
+        ("file:file.csv/none.csv", &["there is no such file; looked for "]),
+        ("file:folder.csv", &["it is a folder; give a file in it, or all of them: 'files:folder.csv/*.csv'"]),
+        (
+            "files:no*.csv",
+            &[&format!("no file matches in {folder}; check folder and extension"), "'files:outlines/*.csv'"],
+        ),
+        ("files:folder.csv/", &["it is a folder; write 'files:folder.csv/*.csv'"]),
+    ] {
+        let output = curvelax(home.path(), &["run", "--shape", shape, "--out", "new/out"]);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{shape}: {message}");
+        assert_says(&message, parts);
+        assert_says(&message, &[&format!("error: --shape {shape}: ")]);
+        assert!(!message.contains("67108864") && !message.contains("os error"), "{message}");
+        assert!(!home.path().join("new").exists());
+    }
+}
+
+#[test]
+fn a_wrong_cell_of_a_table_of_outlines_is_named_by_row_and_column() {
+    for (table, part) in [
+        (
+            "x,y,label\n0,0,a\n1,0,a,b\n1,1,a\n",
+            "line 3, column 4: the number of columns is 4 where the header names 3 (this one holds `b`); remove it",
+        ),
+        (
+            "x,y,label\n0,0,a\n1,0\n1,1,a\n",
+            "line 3: the number of columns is 2 where the header names 3: there is no label; complete",
+        ),
+        (
+            "x,y\n0,0\n1e308,0\n1,1\n",
+            "line 3, column 1 (x): `1e308` is too large; coordinates are numbers from -1e30 to 1e30",
+        ),
+        ("0,0\n1,1e400\n1,1\n", "line 2, column 2: `1e400` is too large; "),
+        ("label,y,x\na,0,0\na,-inf,1\na,1,1\n", "line 3, column 2 (y): `-inf` is not finite; "),
+        ("lon,lat\n0,0\nnan,0\n1,1\n", "line 3, column 1 (longitude): `nan` is not finite; "),
+        ("x,y\n0,0\n,0\n1,1\n", "line 3, column 1 (x): the cell is empty; write a number, "),
+        ("x;y\n0;0\n1;\n1;1\n", "line 3, column 2 (y): the cell is empty; "),
+        ("x,y\n0,0\n1,abc\n1,1\n", "line 3, column 2 (y): `abc` is not a number; "),
+    ] {
+        let message = refused(&["--shape", "file:t.csv"], &[("t.csv", table)]);
+        assert_says(&message, &[&format!("error: --shape file:t.csv: {part}")]);
+        assert_eq!(message.lines().count(), 1, "{message}");
+    }
+}
+
+#[test]
 fn an_unknown_flag_is_answered_with_the_nearest() {
     for (given, meant) in [("--tua", "--tau"), ("--curve", "--curves"), ("--relaxto", "--relax-to")] {
         assert_says(&refused(&[given, "1"], &[]), &[given, &format!("similar argument exists: '{meant}'")]);
@@ -305,8 +360,8 @@ fn a_spec_without_end_is_refused_at_once() {
         fs::write(in_home(name), text).unwrap();
     }
     for (spec, start) in [
-        ("huge.toml", "error: cannot read the spec huge.toml: 3221225472 bytes; at most 1048576 are read"),
-        ("over.toml", "error: cannot read the spec over.toml: 1048577 bytes; "),
+        ("huge.toml", "error: cannot read the spec huge.toml: 3 GB; at most 1 MB are read"),
+        ("over.toml", "error: cannot read the spec over.toml: 1 byte too many; at most 1 MB"),
         ("pipe", "error: cannot read the spec pipe: a pipe or a device; save what it holds in a file"),
         ("/dev/zero", "error: cannot read the spec /dev/zero: a pipe or a device; "),
         ("folder", "error: cannot read the spec folder: is a directory"),
@@ -344,12 +399,12 @@ fn an_outline_without_end_is_refused_at_once() {
     fs::write(in_home("nul.csv"), "0,0\n1,0\n1,\0\u{1b}\n").unwrap();
     fs::write(in_home("points.csv"), "0,0\n1,1\n".repeat(1 << 20)).unwrap();
     for (file, said) in [
-        ("huge.csv", " cannot read it: 3221225472 bytes; at most 67108864 are read; give a CSV file x,y"),
+        ("huge.csv", " cannot read it: 3 GB; at most 64 MB are read; thin the outline out"),
         ("pipe", " cannot read it: a pipe or a device; "),
         ("/dev/zero", " cannot read it: a pipe or a device; "),
-        ("commas.csv", " line 1: a line of 67108864 bytes; write a point a line, x,y, of at most 65536 bytes"),
-        ("latin.csv", " line 1: a line of 67108864 bytes; "),
-        ("nul.csv", " line 3: `\\0\\u{1b}` is not a number; "),
+        ("commas.csv", " line 1: a line of 64 MB; write a point a line, x,y, of at most 64 KB"),
+        ("latin.csv", " line 1: a line of 64 MB; "),
+        ("nul.csv", " line 3, column 2: `\\0\\u{1b}` is not a number; "),
         ("points.csv", " the file holds more than 1000000 points; "),
     ] {
         let shape = format!("file:{file}");
