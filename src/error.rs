@@ -46,6 +46,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 impl Error {
     /// A wrong value of a key: `--KEY VALUE: PROBLEM; ALLOWED`.
     pub fn value(key: &str, value: impl std::fmt::Display, problem: &str, allowed: &str) -> Self {
+        let value = shortened(&value.to_string(), MAX_VALUE);
         Error::Request(format!("--{key} {value}: {problem}; {allowed}"))
     }
 
@@ -126,6 +127,8 @@ pub(crate) fn without_controls(text: &str) -> String {
     shown
 }
 
+/// Maximum characters of a value that is all of a flag; it may be a path.
+pub(crate) const MAX_VALUE: usize = 200;
 /// Maximum characters of a value that a message echoes.
 const ECHOED: usize = 60;
 
@@ -139,14 +142,29 @@ const ECHOED_ENDS: (usize, usize) = (60, 140);
 
 /// A path as a message echoes it: of a long one the beginning and the end, which has the name of the file.
 pub(crate) fn echo_path(path: &Path) -> String {
-    let text = path.display().to_string();
+    ends(&path.display().to_string())
+}
+
+/// The beginning and the end of a long text.
+fn ends(text: &str) -> String {
     let (start, end) = ECHOED_ENDS;
     match text.char_indices().nth_back(end - 1) {
         Some((at, _)) if text.chars().count() > start + end => {
-            format!("{}{}", shortened(&text, start), shortened(&text[at..], 2 * end))
+            format!("{}{}", shortened(text, start), shortened(&text[at..], 2 * end))
         }
-        _ => shortened(&text, 2 * (start + end)),
+        // Escaped, each character may be several.
+        _ => shortened(text, 2 * (start + end)),
     }
+}
+
+/// A message without words of endless length, such as the path of a folder from a wrong variable of a shell.
+pub(crate) fn with_short_words(message: &str) -> String {
+    let most = 2 * (ECHOED_ENDS.0 + ECHOED_ENDS.1);
+    if message.len() <= most {
+        return message.to_owned();
+    }
+    let words = message.split_inclusive(char::is_whitespace);
+    words.map(|word| if word.len() > most { ends(word) } else { word.to_owned() }).collect()
 }
 
 /// What a reader of TOML or JSON says is wrong, in words that do not take Rust, its values shortened. The names of types

@@ -139,7 +139,7 @@ fn a_wrong_sweep_names_its_key_and_cell() {
         (&["store=csv,zarr"], ["--sweep store: ", "run once for each value"]),
         (&["amplitude="], ["--sweep amplitude: no values", "amplitude=v1,v2"]),
         (&["amplitude"], ["has no `=`", "key=v1,v2"]),
-        (&["amplitude=0.1,word"], ["--sweep amplitude=word: ", "in the cell amplitude = word"]),
+        (&["amplitude=0.1,word"], ["--sweep amplitude=word: ", "expected a number, or a distribution"]),
         (&["omega=1", "decay=1,2", "omega=2"], ["--sweep omega: given twice; ", "--sweep omega=V1,V2"]),
         (&["decay=1,2", "--decay=3"], ["--sweep decay: --decay is given, too", "leave one of them out"]),
         (&["adaptive=1e-3", "--tau=1e-3"], ["--sweep adaptive: --tau is given, too", "leave one of them out"]),
@@ -240,6 +240,88 @@ fn a_wrong_cell_of_a_table_of_outlines_is_named_by_row_and_column() {
         assert_says(&message, &[&format!("error: --shape file:t.csv: {part}")]);
         assert_eq!(message.lines().count(), 1, "{message}");
     }
+}
+
+#[test]
+fn an_overlong_value_is_echoed_by_its_beginning() {
+    let long = "a".repeat(10_000);
+    let of = |template: &str| template.replace("LONG", &long);
+    let flags = "curves points seed shape outlines sampling amplitude modes decay perturbation design sweep flow mobility \
+                 units tau adaptive t-end omega pull solver order tolerance sor max-sweeps backend precision relax-to \
+                 relax-at only shard accuracy event series snapshots store";
+    let mut all: Vec<Vec<String>> =
+        flags.split_whitespace().map(|flag| vec![format!("--{flag}"), long.clone()]).collect();
+    for arguments in [
+        &["--shape", "file:LONG"][..],
+        &["--shape", "file:LONG/LONG.csv"],
+        &["--shape", "files:LONG"],
+        &["--shape", "ellipse:LONG,1"],
+        &["--shape", "flower:LONG"],
+        &["--shape", "circle:uniform(LONG)"],
+        &["--shape", "circle:uniform(LONG"],
+        &["--shape", "LONG(1)"],
+        &["--flow", "elastic:LONG"],
+        &["--amplitude", "LONG(1..2)"],
+        &["--t-end", "1,LONG"],
+        &["--sweep", "LONG=1,2"],
+        &["--sweep", "amplitude=0.02,LONG"],
+        &["--sweep", "shape=circle:1,LONG"],
+        &["--sweep", "shape=circle:1,file:LONG"],
+        &["--event", "a = LONG <= 1"],
+        &["--event", "a = area <= LONG"],
+        &["--event", "LONG = area <= 1"],
+        &["--LONG"],
+        &["--LONG=1"],
+        &["--refine=LONG"],
+        &["--accurate=LONG"],
+        &["LONG"],
+        &["LONG.toml"],
+        &["spec.toml", "LONG"],
+        &["--shape", "file:square.csv", "--group-by", "LONG"],
+    ] {
+        all.push(arguments.iter().map(|argument| of(argument)).collect());
+    }
+    let square = ("square.csv", "0,0\n1,0\n1,1\n0,1\n");
+    for arguments in &all {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let message = refused(&arguments, &[square, ("spec.toml", "")]);
+        let shown: Vec<String> = arguments.iter().map(|argument| argument.chars().take(40).collect()).collect();
+        assert!(message.len() < 1500, "{shown:?}: {} bytes: {}", message.len(), &message[..1500]);
+    }
+    for text in [
+        "shape = 'LONG'",
+        "shape = 'circle:LONG'",
+        "flow = 'LONG'",
+        "modes = 'LONG'",
+        "tau = 'LONG'",
+        "mobility = 'LONG'",
+        "snapshots = '1,LONG'",
+        "event = ['LONG']",
+        "order = 'LONG'",
+        "LONG = 1",
+        "LONG",
+        "[sweep]\nLONG = [1]",
+        "[sweep]\namplitude = [1, 'LONG']",
+        "[sweep]\namplitude = [['LONG']]",
+    ] {
+        let message = refused(&["spec.toml"], &[("spec.toml", &of(text))]);
+        assert!(message.len() < 1500, "{text}: {} bytes: {}", message.len(), &message[..1500]);
+    }
+    let table = of("x,y,label\n0,0,LONG\n1,0,LONG\n1,1,other\n0,1,LONG\n");
+    for table in [of("x,y\n0,0\n1,LONG\n"), of("LONG\n"), of("x,y\n1,2,LONG\n"), table] {
+        let message = refused(&["--shape", "file:t.csv"], &[("t.csv", &table)]);
+        assert!(message.len() < 1500, "{} bytes: {}", message.len(), &message[..1500]);
+    }
+}
+
+#[test]
+fn a_wrong_value_of_a_sweep_is_told_once() {
+    let message = refused(&["--sweep", "amplitude=0.02,abc"], &[]);
+    assert_says(&message, &["error: --sweep amplitude=abc: expected a number, or a distribution"]);
+    assert_eq!(message.matches("abc").count(), 1, "{message}");
+    // Which cell it is, is not told by the wrong value alone.
+    let message = refused(&["--sweep", "amplitude=0.02,-1"], &[]);
+    assert_says(&message, &["error: --amplitude -1: ", "(in the cell amplitude = -1)"]);
 }
 
 #[test]
@@ -455,7 +537,7 @@ fn files_of_a_run_without_end_are_refused_at_once() {
         fs::remove_file(&place).unwrap();
         if name.ends_with("json") {
             endless(&place, 3 << 30);
-            let start = format!("error: cannot read run/{name}: 3221225472 bytes; at most ");
+            let start = format!("error: cannot read run/{name}: 3 GB; at most ");
             refused_at_once(home.path(), &["plot", "run"], &start);
         }
         fs::write(&place, kept).unwrap();

@@ -20,7 +20,7 @@ use super::{
 use crate::{
     backend::DeviceKind,
     curve::{Modes, Perturbation, Sampling, Shape},
-    error::{Error, Result, did_you_mean, echo, expected_of, plainly, shortened},
+    error::{Error, Result, did_you_mean, echo, echo_path, expected_of, plainly, shortened},
     flow::Flow,
     input,
     random::Design,
@@ -399,8 +399,8 @@ impl Spec {
     /// The result is not yet [validated](Spec::validate): flags may still replace wrong values.
     pub fn read(path: &Path) -> Result<Spec> {
         let text = input::text(path, input::MAX_SPEC)
-            .map_err(|e| Error::Request(format!("cannot read the spec {}: {e}", path.display())))?;
-        Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", path.display())))
+            .map_err(|e| Error::Request(format!("cannot read the spec {}: {e}", echo_path(path))))?;
+        Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", echo_path(path))))
     }
 
     /// Sets what `--accurate` stands for, except the keys that are `given` beside it.
@@ -664,9 +664,10 @@ macro_rules! number_or_auto {
             fn from_str(text: &str) -> Result<$kind, String> {
                 match text.trim() {
                     "auto" => Ok($kind::Auto),
-                    text => {
-                        text.parse().map($kind::$number).map_err(|_| format!("`{text}` is neither a number nor `auto`"))
-                    }
+                    text => text
+                        .parse()
+                        .map($kind::$number)
+                        .map_err(|_| format!("`{}` is neither a number nor `auto`", echo(text))),
                 }
             }
         }
@@ -735,7 +736,7 @@ impl FromStr for FinalTime {
     fn from_str(text: &str) -> Result<FinalTime, String> {
         let number = |word: &str| {
             let number = word.trim().parse::<f64>();
-            number.map_err(|_| format!("`{}` is neither a number nor `auto`", word.trim()))
+            number.map_err(|_| format!("`{}` is neither a number nor `auto`", echo(word.trim())))
         };
         match text.trim() {
             "auto" => Ok(FinalTime::Auto),
@@ -849,7 +850,9 @@ impl<'de, T: Deserialize<'de> + FromStr> de::Visitor<'de> for ListVisitor<T> {
 
     fn visit_str<E: de::Error>(self, text: &str) -> Result<Vec<T>, E> {
         let item = |word: &str| {
-            word.trim().parse().map_err(|_| E::custom(format!("`{word}` in `{text}` is not a number of this list")))
+            word.trim()
+                .parse()
+                .map_err(|_| E::custom(format!("`{}` in `{}` is not a number of this list", echo(word), echo(text))))
         };
         text.split(',').map(item).collect()
     }

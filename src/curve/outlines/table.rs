@@ -540,10 +540,10 @@ mod tests {
 
     #[test]
     fn a_line_that_is_no_pair_of_finite_numbers_is_refused_with_its_number_and_value() {
-        assert_refused("0,0\n# c\n1,zero\n1,1\n", &["line 3:", "`zero` is not a number"]);
-        assert_refused("0,0\n1,nan\n1,1\n", &["line 2:", "`nan` is not finite"]);
-        assert_refused("inf,0\n1,0\n1,1\n", &["line 1:", "`inf` is not finite"]);
-        assert_refused("0,0\n1e31,0\n1,1\n", &["line 2:", "`1e31` is too large"]);
+        assert_refused("0,0\n# c\n1,zero\n1,1\n", &["line 3, column 2:", "`zero` is not a number"]);
+        assert_refused("0,0\n1,nan\n1,1\n", &["line 2, column 2:", "`nan` is not finite"]);
+        assert_refused("inf,0\n1,0\n1,1\n", &["line 1, column 1:", "`inf` is not finite"]);
+        assert_refused("0,0\n1e31,0\n1,1\n", &["line 2, column 1:", "`1e31` is too large"]);
         assert_refused("0,0\n1\n1,1\n", &["line 2:", "columns is 1 "]);
         assert_refused(
             "0,0,7\n1,0,7\n1,1,7\n",
