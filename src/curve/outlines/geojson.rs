@@ -114,7 +114,7 @@ fn read(source: Source, item: usize, text: &str, bare: bool, numbered: bool) -> 
         let said = one_line(&e.to_string());
         // Its line and column are counted in the feature.
         let said = said.rsplit_once(" at line ").map_or(&*said, |(said, _)| said);
-        let problem = format!("no valid feature: {}", shortened(said, MAX_PROBLEM));
+        let problem = format!("no valid feature: {}", shortened(&plainly(said), MAX_PROBLEM));
         source.refusal(&unnamed, &problem, "correct it as RFC 7946 says, or remove it")
     };
     let feature: Feature = match bare {

@@ -174,6 +174,7 @@ fn unread(path: &Path, whole: &Path, error: &io::Error) -> Error {
         ErrorKind::PermissionDenied => {
             refusal("there is no permission to read it", "give yourself the right, for example by chmod u+r")
         }
+        ErrorKind::InvalidFilename => refusal(&cannot, "use a shorter path, for example a relative one"),
         ErrorKind::FileTooLarge => refusal(&cannot, "thin the outline out, or save fewer outlines in a file"),
         _ => refusal(&cannot, "give a table x,y, GeoJSON, WKT or NumPy arrays"),
     }
