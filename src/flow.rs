@@ -9,7 +9,7 @@ use std::{f64::consts::PI, fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::did_you_mean;
+use crate::error::{did_you_mean, echo};
 
 /// Highest power of `k` in `b(k)`; the size of the coefficient array shared with the kernel.
 pub const MAX_DEGREE: usize = 8;
@@ -145,7 +145,7 @@ pub(crate) fn parse_numbers(list: &str) -> Result<Vec<f64>, String> {
     list.split(',')
         .map(|word| match word.trim().parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(format!("`{word}` is not a finite number")),
+            _ => Err(format!("`{}` is not a finite number", echo(word))),
         })
         .collect()
 }

@@ -8,6 +8,8 @@ use std::{
     path::Path,
 };
 
+use crate::text::{bytes as in_words, count};
+
 /// Maximum bytes of a spec: half a million members listed by number.
 pub(crate) const MAX_SPEC: u64 = 1 << 20;
 /// Maximum bytes of an outline: a million points with all their digits.
@@ -73,10 +75,17 @@ fn at_once(options: &mut OpenOptions) -> &mut OpenOptions {
 /// Those of [`open`], and one for a longer file.
 pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
-    let too_long = |size: &str| Error::new(ErrorKind::FileTooLarge, format!("{size} bytes; at most {most} are read"));
+    let limit = in_words(most);
+    let too_long = |size: &str| Error::new(ErrorKind::FileTooLarge, format!("{size}; at most {limit} are read"));
     let size = file.metadata()?.len();
     if size > most {
-        return Err(too_long(&size.to_string()));
+        // A little more than 64 MB would be 64 MB, too.
+        let rounded = in_words(size);
+        return Err(too_long(&if rounded == limit {
+            format!("{} too many", count(size - most, "byte"))
+        } else {
+            rounded
+        }));
     }
     // System files do not know their size beforehand.
     let mut bytes = Vec::new();
@@ -87,7 +96,7 @@ pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
         _ => e,
     });
     match read? as u64 > most {
-        true => Err(too_long(&format!("more than {most}"))),
+        true => Err(too_long(&format!("more than {limit}"))),
         false => Ok(bytes),
     }
 }
@@ -152,7 +161,7 @@ mod tests {
         let path = home.path().join("file");
         fs::write(&path, "1234").unwrap();
         assert_eq!(bytes(&path, 4).unwrap(), b"1234");
-        assert_eq!(bytes(&path, 3).unwrap_err().to_string(), "4 bytes; at most 3 are read");
+        assert_eq!(bytes(&path, 3).unwrap_err().to_string(), "4 bytes; at most 3 bytes are read");
         assert_eq!(bytes(home.path(), 4).unwrap_err().kind(), ErrorKind::IsADirectory);
         fs::write(&path, b"ab\xff").unwrap();
         assert_eq!(text(&path, 4).unwrap_err().to_string(), "byte 2 is not UTF-8; save it as UTF-8");
@@ -162,7 +171,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     fn a_file_without_a_size_and_a_device_have_no_end_that_is_waited_for() {
         let error = bytes(Path::new("/proc/self/status"), 10).unwrap_err().to_string();
-        assert_eq!(error, "more than 10 bytes; at most 10 are read");
+        assert_eq!(error, "more than 10 bytes; at most 10 bytes are read");
         assert!(bytes(Path::new("/dev/zero"), 10).unwrap_err().to_string().starts_with("a pipe or a device; "));
     }
 

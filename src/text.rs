@@ -133,6 +133,20 @@ fn escaped(bytes: &[u8]) -> String {
     text
 }
 
+/// Bytes in the unit that a person would use, each 1024 times the one before: `64 MB`.
+pub fn bytes(bytes: u64) -> String {
+    let units = ["KB", "MB", "GB", "TB"];
+    if bytes < 1024 {
+        return count(bytes, "byte");
+    }
+    let (mut size, mut unit) = (bytes as f64 / 1024.0, 0);
+    while size >= 1024.0 && unit + 1 < units.len() {
+        (size, unit) = (size / 1024.0, unit + 1);
+    }
+    let size = if size < 10.0 { (size * 10.0).round() / 10.0 } else { size.round() };
+    format!("{size} {}", units[unit])
+}
+
 /// Seconds in the unit that a person would use.
 pub fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
@@ -147,6 +161,13 @@ pub fn duration(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_are_in_units_that_people_read() {
+        let sizes = [0, 1, 1023, 1 << 10, 1536, 1 << 26, 3 << 30, 1 << 34, (1 << 26) + 1];
+        let told = ["0 bytes", "1 byte", "1023 bytes", "1 KB", "1.5 KB", "64 MB", "3 GB", "16 GB", "64 MB"];
+        assert_eq!(sizes.map(bytes), told);
+    }
 
     #[test]
     fn thousands_are_apart_in_long_numbers() {

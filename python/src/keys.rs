@@ -18,6 +18,9 @@ use toml::{Table, Value};
 
 use crate::raise;
 
+/// Maximum characters of a wrong key and value that a message echoes.
+const ECHOED: usize = 200;
+
 /// Deepest list in a list.
 const DEEPEST: usize = 4;
 
@@ -101,7 +104,16 @@ impl Keys {
         let number = message.strip_prefix("TOML parse error at line ").and_then(|rest| rest.split(',').next());
         let line = number.and_then(|number| self.text.lines().nth(number.parse::<usize>().ok()?.checked_sub(1)?));
         match (line, message.lines().last()) {
-            (Some(line), Some(problem)) => format!("{line}: {problem}"),
+            (Some(line), Some(problem)) => {
+                // Of a long line the message has the place in front instead of the line above.
+                let problem = match problem.strip_prefix("TOML parse error at ") {
+                    Some(rest) => rest.split_once(": ").map_or(problem, |(_, problem)| problem),
+                    None => problem,
+                };
+                let start: String = line.chars().take(ECHOED).collect();
+                let more = if start.len() < line.len() { "..." } else { "" };
+                format!("{start}{more}: {problem}")
+            }
             _ => message.to_owned(),
         }
     }

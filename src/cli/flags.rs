@@ -15,7 +15,7 @@ use crate::{
         spec::{BackendChoice, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau, Units},
         sweep::{self, SweepAxis},
     },
-    error::{Error, Result},
+    error::{Error, Result, echo},
     flow::Flow,
     random::Design,
 };
@@ -298,6 +298,7 @@ impl SpecFlags {
     pub fn check_sweeps(&self) -> Result<()> {
         let twice = |(i, axis): (usize, &SweepAxis)| self.sweep[..i].iter().any(|other| other.key == axis.key);
         if let Some((_, SweepAxis { key, .. })) = self.sweep.iter().enumerate().find(|at| twice(*at)) {
+            let key = echo(key);
             return Err(Error::Request(format!(
                 "--sweep {key}: given twice; give all values at once, --sweep {key}=V1,V2"
             )));
@@ -366,7 +367,7 @@ fn shard(text: &str) -> Result<Shard, String> {
 fn slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
     let number = |name: &str| {
         let text = variable(name).ok_or_else(|| format!("no {name}: this is not a task of a Slurm job array"))?;
-        text.parse::<u64>().map_err(|_| format!("{name}={text} is not a whole number"))
+        text.parse::<u64>().map_err(|_| format!("{name}={} is not a whole number", echo(&text)))
     };
     let index = number("SLURM_ARRAY_TASK_ID")?;
     if variable(SHARDS).is_some() {

@@ -32,7 +32,7 @@ use serde::Serialize;
 
 use crate::{
     backend::gpu::abandoned,
-    error::{Error, Result, without_controls},
+    error::{Error, Result, with_short_words, without_controls},
     results::provenance::json,
 };
 
@@ -86,7 +86,9 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Man(args) => man::man(args),
     };
     let code = done.err().map_or(0, |error| {
-        note(&format!("error: {error}"));
+        // What stopped a run says how to continue it, with the whole path.
+        let message = error.to_string();
+        note(&format!("error: {}", if error.exit_code() <= 2 { with_short_words(&message) } else { message }));
         error.exit_code()
     });
     if abandoned::is_any() {
@@ -102,6 +104,7 @@ fn parse(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Result<Cli
     let parsed = program.clone().try_get_matches_from(&arguments).and_then(|matches| Cli::from_arg_matches(&matches));
     parsed.map_err(|mut error| {
         unknown::explain(&mut error, &program, &arguments);
+        unknown::shorten(&mut error);
         error
     })
 }

@@ -8,7 +8,7 @@ use clap::{
     error::{ContextKind, ContextValue, ErrorKind},
 };
 
-use crate::error::nearest;
+use crate::error::{MAX_VALUE, nearest, shortened};
 
 /// Maximum flags of a command that are listed; the help has more.
 const LISTED: usize = 16;
@@ -38,6 +38,35 @@ pub fn explain(error: &mut clap::Error, program: &Command, arguments: &[OsString
         error.remove(ContextKind::SuggestedArg);
         error.insert(ContextKind::SuggestedArg, ContextValue::String(format!("--{near}")));
     }
+}
+
+/// Shortens the values that `error` echoes.
+pub fn shorten(error: &mut clap::Error) {
+    let is_long = |text: &str| text.chars().count() > MAX_VALUE;
+    let short = |text: &String| shortened(text, MAX_VALUE);
+    let long: Vec<(ContextKind, ContextValue)> = error
+        .context()
+        .filter_map(|(kind, value)| {
+            let short = match value {
+                ContextValue::String(text) if is_long(text) => ContextValue::String(short(text)),
+                ContextValue::Strings(all) if all.iter().any(|text| is_long(text)) => {
+                    ContextValue::Strings(all.iter().map(short).collect())
+                }
+                // How to give the value itself, which is in the message already.
+                ContextValue::StyledStrs(_) if kind == ContextKind::Suggested && is_value(error) => ContextValue::None,
+                _ => return None,
+            };
+            Some((kind, short))
+        })
+        .collect();
+    for (kind, value) in long {
+        error.insert(kind, value);
+    }
+}
+
+/// Whether `error` is about an overlong argument.
+fn is_value(error: &clap::Error) -> bool {
+    matches!(error.get(ContextKind::InvalidArg), Some(ContextValue::String(given)) if given.chars().count() > MAX_VALUE)
 }
 
 fn flags(command: &Command) -> impl Iterator<Item = &str> {

@@ -12,7 +12,7 @@ use glam::DVec2;
 
 use super::{Undecided, crossing_within, polygon};
 use crate::{
-    error::{Error, Result, shortened},
+    error::{Error, Result, echo_path, shortened},
     text::count,
 };
 
@@ -231,7 +231,7 @@ impl<'a> Source<'a> {
     /// What is to be said of a place in the file; of the file itself if the place is empty.
     pub(super) fn said(&self, place: &str, what: &str) -> String {
         let separator = if place.is_empty() { "" } else { ": " };
-        format!("{}: {place}{separator}{what}", self.path.display())
+        format!("{}: {place}{separator}{what}", echo_path(self.path))
     }
 
     pub(super) fn refusal(&self, place: &str, problem: &str, remedy: &str) -> Error {
@@ -253,7 +253,9 @@ impl<'a> Source<'a> {
         if value.abs() <= MAX_COORDINATE {
             return Ok(());
         }
-        let problem = if value.is_finite() { "is too large" } else { "is not finite" };
+        // 1e400 is read as infinity.
+        let is_number = value.is_finite() || shown.contains(|c: char| c.is_ascii_digit());
+        let problem = if is_number { "is too large" } else { "is not finite" };
         let remedy = format!("coordinates are numbers from -{MAX_COORDINATE:e} to {MAX_COORDINATE:e}");
         Err(self.refusal(&place(), &format!("`{shown}` {problem}"), &remedy))
     }

@@ -20,7 +20,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::MAX_MODE;
-use crate::error::Error;
+use crate::error::{Error, echo};
 
 /// Minimum radial factor of an accepted draw. A larger bound would reject curves that relax well; a smaller one would
 /// admit necks that no number of nodes resolves.
@@ -83,7 +83,7 @@ impl FromStr for Modes {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Modes, String> {
-        let wrong = || format!("`{text}` is not a range of modes; write LO..=HI, for example 2..=8");
+        let wrong = || format!("`{}` is not a range of modes; write LO..=HI, for example 2..=8", echo(text));
         let (low, high) = text.split_once("..=").ok_or_else(wrong)?;
         let mode = |word: &str| word.trim().parse().map_err(|_| wrong());
         let modes = Modes { low: mode(low)?, high: mode(high)? };

@@ -17,7 +17,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::{BaseCurve, MAX_POINTS, Outline, RadialFactor};
-use crate::error::{Error, did_you_mean};
+use crate::error::{Error, did_you_mean, echo};
 
 /// Samples per node, and their minimum number, for measuring equal spacing. Halving it doubles the
 /// error of the spacing; the time to create a member is proportional to it.
@@ -63,7 +63,7 @@ impl FromStr for Sampling {
     fn from_str(text: &str) -> Result<Sampling, String> {
         Sampling::ALL.into_iter().find(|sampling| sampling.name() == text).ok_or_else(|| {
             let names = Sampling::ALL.map(Sampling::name);
-            format!("unknown sampling `{text}`{}; one of {}", did_you_mean(text, names), names.join(", "))
+            format!("unknown sampling `{}`{}; one of {}", echo(text), did_you_mean(text, names), names.join(", "))
         })
     }
 }

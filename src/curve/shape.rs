@@ -18,7 +18,7 @@ use super::{
     outlines::{self, Labelled},
 };
 use crate::{
-    error::{Error, did_you_mean},
+    error::{Error, did_you_mean, echo, echo_path},
     text::number,
 };
 
@@ -90,7 +90,7 @@ impl Shape {
     /// # Errors
     /// As [`Shape::resolve`].
     pub fn resolve_from(&self, base: &Path) -> Result<BaseCurve, Error> {
-        self.check().map_err(|message| Error::Request(format!("--shape {self}: {message}")))?;
+        self.check().map_err(|message| Error::Request(format!("--shape {}: {message}", echo(self))))?;
         Ok(match self.clone() {
             Shape::Ellipse { a, b } => BaseCurve::from_formula(move |u| ellipse(a, b, u)),
             Shape::Circle { radius } => BaseCurve::from_formula(move |u| ellipse(radius, radius, u)),
@@ -102,7 +102,10 @@ impl Shape {
             Shape::Files(pattern) => {
                 let [path] = &outlines::glob(base, &pattern)?[..] else {
                     let problem = "several files match, and one curve is expected";
-                    return Err(Error::Request(format!("--shape files:{pattern}: {problem}; give one of them")));
+                    return Err(Error::Request(format!(
+                        "--shape files:{}: {problem}; give one of them",
+                        echo_path(Path::new(&pattern))
+                    )));
                 };
                 BaseCurve::from_outline(Outline::read_from(base, path)?)
             }
@@ -283,7 +286,7 @@ impl FromStr for Shape {
             "flower" => Shape::Flower(flower_modes(arguments.unwrap_or_default())?),
             "file" => Shape::File(arguments.ok_or(MISSING_PATH)?.into()),
             "files" => Shape::Files(arguments.ok_or(MISSING_PATTERN)?.into()),
-            _ => return Err(format!("unknown shape `{name}`{}; {FORMS}", did_you_mean(name, NAMES))),
+            _ => return Err(format!("unknown shape `{}`{}; {FORMS}", echo(name), did_you_mean(name, NAMES))),
         };
         shape.check()?;
         Ok(shape)
@@ -296,7 +299,7 @@ fn numbers<const N: usize>(arguments: Option<&str>, usage: &str) -> Result<[f64;
     let words: [&str; N] = words.try_into().map_err(|_| usage.to_owned())?;
     let mut values = [0.0; N];
     for (value, word) in values.iter_mut().zip(words) {
-        *value = word.trim().parse().map_err(|_| format!("`{word}` is not a number; {usage}"))?;
+        *value = word.trim().parse().map_err(|_| format!("`{}` is not a number; {usage}", echo(word)))?;
     }
     Ok(values)
 }
@@ -307,7 +310,7 @@ fn flower_modes(list: &str) -> Result<Vec<FlowerMode>, String> {
 
 /// Parses `M:A` or `M:A:PHASE`.
 fn flower_mode(text: &str) -> Result<FlowerMode, String> {
-    let wrong = || format!("`{text}` is not MODE:AMPLITUDE or MODE:AMPLITUDE:PHASE; write for example 3:0.2");
+    let wrong = || format!("`{}` is not MODE:AMPLITUDE or MODE:AMPLITUDE:PHASE; write for example 3:0.2", echo(text));
     let (mode, rest) = text.split_once(':').ok_or_else(wrong)?;
     let (amplitude, phase) = rest.split_once(':').unwrap_or((rest, "0"));
     let number = |word: &str| word.trim().parse::<f64>().map_err(|_| wrong());

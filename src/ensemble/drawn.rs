@@ -9,6 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use crate::{
     curve::Shape,
+    error::echo,
     flow::Flow,
     random::{Design, Distribution, DrawAddress, MAX_SOBOL, distribution::SMALLEST},
     text::rounded,
@@ -130,7 +131,7 @@ impl DrawnText {
         let (mut before, mut distributions, mut rest) = (Vec::new(), Vec::new(), text);
         while let Some((head, tail)) = rest.split_once('(') {
             let name = head.rsplit(|c: char| !c.is_alphanumeric() && c != '-' && c != '_').next().unwrap_or_default();
-            let open = || format!("`{name}({tail}` has no closing parenthesis");
+            let open = || format!("`{}` has no closing parenthesis", echo(format_args!("{name}({tail}")));
             let (arguments, after) = tail.split_once(')').ok_or_else(open)?;
             distributions.push(Distribution::of(name, arguments)?);
             before.push(head[..head.len() - name.len()].to_owned());

@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 use super::{Drawn, Spec, member::OutlineSet};
 use crate::{
     curve::{Shape, outlines::Labelled},
-    error::{Error, Result, shortened},
+    error::{Error, Result, echo, shortened},
     text::count,
 };
 
@@ -59,7 +59,7 @@ impl Outlines {
         let several = |(shape, set): &&(Shape, Arc<OutlineSet>)| matches!(shape, Shape::Files(_)) || set.all.len() > 1;
         let Some((first, set)) = self.sets.iter().find(several) else {
             if let Some(asked) = spec.outlines.filter(|asked| *asked != 1) {
-                let problem = format!("the shape {} is one curve", spec.shape);
+                let problem = format!("the shape {} is one curve", echo(&spec.shape));
                 return Err(Error::value(
                     "outlines",
                     asked,

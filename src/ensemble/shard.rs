@@ -4,6 +4,8 @@ use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
+use crate::error::echo;
+
 /// The members j of a study with j mod N = I, counted through all cells of a sweep, so that slow cells are spread over
 /// all shards. Written `I/N`.
 ///
@@ -64,7 +66,7 @@ impl FromStr for Shard {
     fn from_str(text: &str) -> Result<Shard, String> {
         let whole = |text: &str| text.trim().parse::<u64>().ok();
         let parts = text.split_once('/').and_then(|(index, count)| Some((whole(index)?, whole(count)?)));
-        let (index, count) = parts.ok_or_else(|| format!("`{text}` is not a shard; write I/N, such as 0/8"))?;
+        let (index, count) = parts.ok_or_else(|| format!("`{}` is not a shard; write I/N, such as 0/8", echo(text)))?;
         Shard::new(index, count)
     }
 }

@@ -20,7 +20,7 @@ use super::{
 use crate::{
     backend::DeviceKind,
     curve::{Modes, Perturbation, Sampling, Shape},
-    error::{Error, Result, did_you_mean, shortened},
+    error::{Error, Result, did_you_mean, echo, echo_path, expected_of, plainly, shortened},
     flow::Flow,
     input,
     random::Design,
@@ -399,8 +399,8 @@ impl Spec {
     /// The result is not yet [validated](Spec::validate): flags may still replace wrong values.
     pub fn read(path: &Path) -> Result<Spec> {
         let text = input::text(path, input::MAX_SPEC)
-            .map_err(|e| Error::Request(format!("cannot read the spec {}: {e}", path.display())))?;
-        Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", path.display())))
+            .map_err(|e| Error::Request(format!("cannot read the spec {}: {e}", echo_path(path))))?;
+        Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", echo_path(path))))
     }
 
     /// Sets what `--accurate` stands for, except the keys that are `given` beside it.
@@ -480,7 +480,8 @@ impl Spec {
             table.insert(axis.key.clone(), value.clone());
             // One key at a time, so that the message names the wrong one.
             Spec::deserialize(table.clone()).map_err(|e| {
-                Error::Request(format!("--sweep {}={}: {}", axis.key, sweep::label(value), e.message().trim_end()))
+                let (key, value) = (&axis.key, echo(sweep::label(value)));
+                Error::Request(format!("--sweep {key}={value}: {}", expected_of(e.message().trim_end())))
             })?;
         }
         let mut spec = Spec::deserialize(table).map_err(|e| failed(&e))?;
@@ -624,17 +625,20 @@ pub(super) fn final_times(times: usize, cells: u64) -> Error {
     Error::value("t-end", format!("({times} times)"), &problem, "give one time, auto, or one for each cell")
 }
 
-/// Lines longer than this are not shown with a caret; the list of all keys is half as long.
+/// Lines longer than this are not shown with a caret.
+const MAX_LINE: usize = 300;
+/// Maximum characters of a message; the list of all keys is half as long.
 const MAX_SHOWN: usize = 1000;
 
 /// What is wrong, with the line and a caret; for an overlong line, only where.
 fn told(error: &toml::de::Error) -> String {
     let whole = error.to_string();
-    if whole.lines().all(|line| line.len() <= MAX_SHOWN) {
-        return whole.trim_end().to_owned();
+    let (whole, message) = (whole.trim_end(), error.message().trim_end());
+    let problem = shortened(&plainly(message), MAX_SHOWN);
+    match whole.strip_suffix(message) {
+        Some(shown) if shown.lines().all(|line| line.len() <= MAX_LINE) => format!("{shown}{problem}"),
+        _ => format!("{}: {problem}", shortened(whole.lines().next().unwrap_or_default(), MAX_LINE)),
     }
-    let place = whole.lines().next().unwrap_or_default();
-    format!("{}: {}", shortened(place, MAX_SHOWN), shortened(error.message().trim_end(), MAX_SHOWN))
 }
 
 /// Suggests the nearest of the names that serde lists after "unknown field `x`, expected one of `a`, `b`".
@@ -660,9 +664,10 @@ macro_rules! number_or_auto {
             fn from_str(text: &str) -> Result<$kind, String> {
                 match text.trim() {
                     "auto" => Ok($kind::Auto),
-                    text => {
-                        text.parse().map($kind::$number).map_err(|_| format!("`{text}` is neither a number nor `auto`"))
-                    }
+                    text => text
+                        .parse()
+                        .map($kind::$number)
+                        .map_err(|_| format!("`{}` is neither a number nor `auto`", echo(text))),
                 }
             }
         }
@@ -731,7 +736,7 @@ impl FromStr for FinalTime {
     fn from_str(text: &str) -> Result<FinalTime, String> {
         let number = |word: &str| {
             let number = word.trim().parse::<f64>();
-            number.map_err(|_| format!("`{}` is neither a number nor `auto`", word.trim()))
+            number.map_err(|_| format!("`{}` is neither a number nor `auto`", echo(word.trim())))
         };
         match text.trim() {
             "auto" => Ok(FinalTime::Auto),
@@ -845,7 +850,9 @@ impl<'de, T: Deserialize<'de> + FromStr> de::Visitor<'de> for ListVisitor<T> {
 
     fn visit_str<E: de::Error>(self, text: &str) -> Result<Vec<T>, E> {
         let item = |word: &str| {
-            word.trim().parse().map_err(|_| E::custom(format!("`{word}` in `{text}` is not a number of this list")))
+            word.trim()
+                .parse()
+                .map_err(|_| E::custom(format!("`{}` in `{}` is not a number of this list", echo(word), echo(text))))
         };
         text.split(',').map(item).collect()
     }

@@ -11,7 +11,7 @@ use serde::{
 };
 use toml::Value;
 
-use crate::error::{Error, Result, did_you_mean, shortened};
+use crate::error::{Error, Result, did_you_mean, echo, shortened};
 
 /// Keys that all members of a run have in common.
 const COMMON: [&str; 20] = [
@@ -115,7 +115,8 @@ impl FromStr for SweepAxis {
 
     /// Parses `key=v1,v2`; if a value contains commas outside parentheses, semicolons separate the values.
     fn from_str(text: &str) -> Result<SweepAxis, String> {
-        let (key, values) = text.split_once('=').ok_or_else(|| format!("`{text}` has no `=`; write key=v1,v2,..."))?;
+        let (key, values) =
+            text.split_once('=').ok_or_else(|| format!("`{}` has no `=`; write key=v1,v2,...", echo(text)))?;
         let separator = if values.contains(';') { ';' } else { ',' };
         let key = key.trim();
         let value = |word: &str| {
@@ -163,7 +164,7 @@ fn from_whole(key: &str, whole: u64) -> Value {
 
 /// A value as it is read.
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number, a text, or true or false")]
 enum Read {
     Value(Value),
     Whole(u64),
@@ -226,8 +227,11 @@ impl Sweep {
     /// Adds a cell to an error about its request, if anything is swept.
     pub(super) fn in_cell(&self, error: Error, index: u64) -> Error {
         match error {
-            Error::Request(message) if !self.is_empty() => {
-                Error::Request(format!("{message} (in the cell {})", self.name(index)))
+            // A message about a value of the sweep names it already.
+            Error::Request(message) if !self.is_empty() && !message.starts_with("--sweep ") => {
+                let keys = self.0.iter().map(|axis| &axis.key).zip(self.values(index));
+                let parts = keys.map(|(key, value)| format!("{key} = {}", shortened(&label(value), MAX_LABEL)));
+                Error::Request(format!("{message} (in the cell {})", parts.collect::<Vec<_>>().join(", ")))
             }
             error => error,
         }
@@ -240,22 +244,25 @@ impl Sweep {
     /// [`Error::Request`] for a key that is unknown, cannot vary or has no values, and for too many cells.
     pub fn check(&self, keys: &[String]) -> Result<()> {
         for (i, SweepAxis { key, values }) in self.0.iter().enumerate() {
+            let shown = echo(key);
             if !keys.contains(key) {
                 let hint = did_you_mean(key, keys.iter().map(String::as_str));
-                return Err(Error::Request(format!("--sweep {key}: no such key{hint}; see --print-spec for the keys")));
+                return Err(Error::Request(format!(
+                    "--sweep {shown}: no such key{hint}; see --print-spec for the keys"
+                )));
             }
             if COMMON.contains(&key.as_str()) {
                 let message = "it is the same for the whole run; run once for each value";
-                return Err(Error::Request(format!("--sweep {key}: {message}")));
+                return Err(Error::Request(format!("--sweep {shown}: {message}")));
             }
             if values.is_empty() {
-                return Err(Error::Request(format!("--sweep {key}: no values; write {key}=v1,v2,...")));
+                return Err(Error::Request(format!("--sweep {shown}: no values; write {shown}=v1,v2,...")));
             }
             if let Some(value) = values.iter().find(|value| value.is_array() || value.is_table()) {
-                return Err(Error::Request(format!("--sweep {key}: {value} is not a single value")));
+                return Err(Error::Request(format!("--sweep {shown}: {} is not a single value", echo(value))));
             }
             if self.0[..i].iter().any(|before| before.key == *key) {
-                return Err(Error::Request(format!("--sweep {key}: named twice; put all its values behind one")));
+                return Err(Error::Request(format!("--sweep {shown}: named twice; put all its values behind one")));
             }
         }
         match self.cells() {

@@ -4,6 +4,8 @@ use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
+use crate::error::echo;
+
 /// Characters of a unit's name.
 const MAX_NAME: usize = 16;
 
@@ -54,7 +56,7 @@ impl FromStr for Units {
 
     /// Parses `LENGTH,TIME`.
     fn from_str(text: &str) -> Result<Units, String> {
-        let wrong = || format!("`{text}` does not name a unit of length and one of time, for example `um,h`");
+        let wrong = || format!("`{}` does not name a unit of length and one of time, for example `um,h`", echo(text));
         let (length, time) = text.split_once(',').ok_or_else(wrong)?;
         let name = |word: &str| {
             let word = word.trim();

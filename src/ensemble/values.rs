@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     curve::{RadialLaw, Shape},
-    error::{Error, Result},
+    error::{Error, Result, echo},
     flow::Flow,
     random::{Design, Distribution, DrawAddress, MAX_SOBOL},
 };
@@ -150,7 +150,7 @@ impl Spec {
                 false => ["amplitude", &self.amplitude.to_string()],
                 true => ["decay", &self.decay.to_string()],
             };
-            return Err(Error::Request(format!("--{key} {value}: {refused}")));
+            return Err(Error::Request(format!("--{key} {}: {refused}", echo(value))));
         }
         Ok(())
     }
@@ -208,7 +208,7 @@ fn own<'a, T: Drawable>(key: &str, drawn: &'a Drawn<T>, numbers: &[f64]) -> Resu
     if !drawn.is_drawn() {
         return Ok(Cow::Borrowed(drawn.typical()));
     }
-    let refused = |message: String| Error::Request(format!("--{key} {}: {message}", drawn));
+    let refused = |message: String| Error::Request(format!("--{key} {}: {message}", echo(drawn)));
     drawn.at(numbers).map(Cow::Owned).map_err(refused)
 }
 

@@ -12,7 +12,7 @@ use super::names::{self, REMEDY};
 use crate::{
     draw::axis::Scale,
     ensemble::{Outcome, Portrait, Status},
-    error::{Error, Result, shortened},
+    error::{Error, Result, plainly, shortened},
     input,
 };
 
@@ -131,7 +131,7 @@ pub fn read(path: &Path) -> Result<Vec<Film>> {
     let text = input::text(path, input::MAX_PORTRAITS);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
     let Portraits { members } = serde_json::from_str(&text).map_err(|e| {
-        let problem = shortened(&e.to_string(), 200);
+        let problem = shortened(&plainly(&e.to_string()), 200);
         Error::Request(format!("{}: {problem}; {REMEDY}", path.display()))
     })?;
     match members.iter().find_map(|film| Some((film.member, film.fault()?))) {

@@ -16,7 +16,10 @@
 
 use std::{fmt, str::FromStr};
 
-use crate::{error::did_you_mean, text::number};
+use crate::{
+    error::{did_you_mean, echo},
+    text::number,
+};
 
 /// More values than this are a list of another kind.
 const MAX_CHOICES: usize = 1000;
@@ -64,7 +67,7 @@ impl Distribution {
     /// # Errors
     /// A message for an unknown name, and for parameters that are not those of a distribution.
     pub fn of(name: &str, arguments: &str) -> Result<Distribution, String> {
-        let wrong = |problem: &str, usage: &str| format!("{name}({arguments}): {problem}; write {usage}");
+        let wrong = |problem: &str, usage: &str| format!("{name}({}): {problem}; write {usage}", echo(arguments));
         let finite = |word: &str| word.trim().parse::<f64>().ok().filter(|value| value.is_finite());
         let range = |usage: &str| {
             let ends = arguments.split_once("..").and_then(|(low, high)| Some((finite(low)?, finite(high)?)));
@@ -103,7 +106,8 @@ impl Distribution {
                 }
             }
             _ => Err(format!(
-                "unknown distribution `{name}`{}; one of {}",
+                "unknown distribution `{}`{}; one of {}",
+                echo(name),
                 did_you_mean(name, NAMES),
                 "uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA), choice(A,B,...)"
             )),
@@ -166,7 +170,8 @@ impl FromStr for Distribution {
 
     fn from_str(text: &str) -> Result<Distribution, String> {
         let parts = text.trim().strip_suffix(')').and_then(|text| text.split_once('('));
-        let (name, arguments) = parts.ok_or_else(|| format!("`{text}` is not a distribution such as uniform(1..2)"))?;
+        let (name, arguments) =
+            parts.ok_or_else(|| format!("`{}` is not a distribution such as uniform(1..2)", echo(text)))?;
         Distribution::of(name.trim(), arguments)
     }
 }

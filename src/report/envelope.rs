@@ -12,7 +12,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{files::disk, input};
+use crate::{files::disk, input, text};
 
 const MAGIC: [u8; 16] = *b"curvelax state\r\n";
 /// Version of the format: of the envelope, and of numbers whose order no layout shows.
@@ -147,7 +147,8 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
 /// Checks piece by piece that the last of the `length` bytes are the checksum of those before them.
 fn check_whole(file: &mut File, length: u64) -> io::Result<()> {
     if length > input::MAX_STATE {
-        return Err(io::Error::other(format!("it has {length} bytes; at most {} are read", input::MAX_STATE)));
+        let (size, most) = (text::bytes(length), text::bytes(input::MAX_STATE));
+        return Err(io::Error::other(format!("it has {size}; at most {most} are read")));
     }
     file.rewind()?;
     let (_, crc) = disk::checksum(&mut (&*file).take(length - AFTER as u64), 0)?;

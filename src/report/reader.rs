@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::{
     ensemble::{LevelRow, LevelTimes, Outcome, Spec, theory},
-    error::{Error, Result, shortened},
+    error::{Error, Result, plainly, shortened},
     files::{
         TableReader, TableRow,
         members::MemberReader,
@@ -99,7 +99,7 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
     }
     let text = input::text(&path, input::MAX_RUN);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
-    let no_json = |e: serde_json::Error| format!(": {}; {REMEDY}", shortened(&e.to_string(), SHOWN));
+    let no_json = |e: serde_json::Error| format!(": {}; {REMEDY}", shortened(&plainly(&e.to_string()), SHOWN));
     let RunHead { curvelax, format } = match serde_json::from_str(&text) {
         Ok(head) => head,
         Err(e) => return refuse(no_json(e)),

@@ -144,7 +144,7 @@ fn a_wrong_sweep_names_its_key_and_cell() {
         (&["store=csv,zarr"], ["--sweep store: ", "run once for each value"]),
         (&["amplitude="], ["--sweep amplitude: no values", "amplitude=v1,v2"]),
         (&["amplitude"], ["has no `=`", "key=v1,v2"]),
-        (&["amplitude=0.1,word"], ["--sweep amplitude=word: ", "in the cell amplitude = word"]),
+        (&["amplitude=0.1,word"], ["--sweep amplitude=word: ", "expected a number, or a distribution"]),
         (&["omega=1", "decay=1,2", "omega=2"], ["--sweep omega: given twice; ", "--sweep omega=V1,V2"]),
         (&["decay=1,2", "--decay=3"], ["--sweep decay: --decay is given, too", "leave one of them out"]),
         (&["adaptive=1e-3", "--tau=1e-3"], ["--sweep adaptive: --tau is given, too", "leave one of them out"]),
@@ -161,7 +161,172 @@ fn a_wrong_sweep_names_its_key_and_cell() {
         assert_says(&refused(&arguments, &[]), &parts);
     }
     let message = refused(&["spec.toml"], &[("spec.toml", "[sweep]\namplitude = 1\n")]);
-    assert_says(&message, &["line 2, column 13", "invalid type: integer `1`"]);
+    assert_says(&message, &["line 2, column 13", "expected a list in brackets, found the number 1; "]);
+}
+
+#[test]
+fn a_spec_file_is_told_what_is_wanted_without_types_of_rust() {
+    for (text, parts) in [
+        ("curves = 'x'", &["expected a whole number from 0, found the text \"x\""][..]),
+        ("curves = '8'", &["found the text \"8\"; leave the quotes out"]),
+        ("curves = 1.5", &["expected a whole number from 0, found the number 1.5"]),
+        ("max-sweeps = 99999999999", &["expected a whole number from 0 to 4294967295, found the number 99999999999"]),
+        ("mobility = 'x'", &["expected a number, found the text \"x\""]),
+        ("mobility = 99999999999999999999", &["expected a number, found the number 99999999999999999999"]),
+        ("snapshots = ['a']", &["expected a number, found the text \"a\""]),
+        ("tau = true", &["expected a number or \"auto\", found true"]),
+        ("tau = [1]", &["expected a number or \"auto\", found a list"]),
+        ("refine = 'true'", &["expected true or false, found the text \"true\"; leave the quotes out"]),
+        ("modes = 3", &["expected a text in quotes, found the number 3"]),
+        ("event = 'a = area <= 1'", &["expected a list in brackets, found the text", "; put it in brackets"]),
+        ("order = 1", &["expected a word in quotes"]),
+        ("shape = {a = 1}", &["expected a text in quotes, found a table"]),
+        ("[sweep]\namplitude = [99999999999999999999999]", &["line 2", "expected a number, a text, or true or false"]),
+    ] {
+        let message = refused(&["spec.toml"], &[("spec.toml", text)]);
+        assert_says(&message, parts);
+        assert_says(&message, &["in the spec spec.toml: ", "line ", "column "]);
+        for word in ["f64", "u64", "u32", "i128", "usize", "boolean", "sequence", "enum", "invalid type", "floating"] {
+            assert!(!message.contains(word), "{word} in: {message}");
+        }
+    }
+}
+
+#[test]
+fn a_file_of_outlines_that_is_not_there_is_told_with_the_path_looked_for() {
+    let home = TempDir::new().unwrap();
+    fs::create_dir(home.path().join("folder.csv")).unwrap();
+    fs::write(home.path().join("file.csv"), "0,0\n1,0\n1,1\n").unwrap();
+    let folder = home.path().canonicalize().unwrap().display().to_string();
+    for (shape, parts) in [
+        ("file:none.csv", &["there is no such file; looked for ", &format!("{folder}/none.csv: check the name")][..]),
+        ("file:no/none.csv", &["there is no such file; looked for ", &format!("{folder}/no/none.csv: check")]),
+        ("file:file.csv/none.csv", &["there is no such file; looked for "]),
+        ("file:folder.csv", &["it is a folder; give a file in it, or all of them: 'files:folder.csv/*.csv'"]),
+        (
+            "files:no*.csv",
+            &[&format!("no file matches in {folder}; check folder and extension"), "'files:outlines/*.csv'"],
+        ),
+        ("files:folder.csv/", &["it is a folder; write 'files:folder.csv/*.csv'"]),
+    ] {
+        let output = curvelax(home.path(), &["run", "--shape", shape, "--out", "new/out"]);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{shape}: {message}");
+        assert_says(&message, parts);
+        assert_says(&message, &[&format!("error: --shape {shape}: ")]);
+        assert!(!message.contains("67108864") && !message.contains("os error"), "{message}");
+        assert!(!home.path().join("new").exists());
+    }
+}
+
+#[test]
+fn a_wrong_cell_of_a_table_of_outlines_is_named_by_row_and_column() {
+    for (table, part) in [
+        (
+            "x,y,label\n0,0,a\n1,0,a,b\n1,1,a\n",
+            "line 3, column 4: the number of columns is 4 where the header names 3 (this one holds `b`); remove it",
+        ),
+        (
+            "x,y,label\n0,0,a\n1,0\n1,1,a\n",
+            "line 3: the number of columns is 2 where the header names 3: there is no label; complete",
+        ),
+        (
+            "x,y\n0,0\n1e308,0\n1,1\n",
+            "line 3, column 1 (x): `1e308` is too large; coordinates are numbers from -1e30 to 1e30",
+        ),
+        ("0,0\n1,1e400\n1,1\n", "line 2, column 2: `1e400` is too large; "),
+        ("label,y,x\na,0,0\na,-inf,1\na,1,1\n", "line 3, column 2 (y): `-inf` is not finite; "),
+        ("lon,lat\n0,0\nnan,0\n1,1\n", "line 3, column 1 (longitude): `nan` is not finite; "),
+        ("x,y\n0,0\n,0\n1,1\n", "line 3, column 1 (x): the cell is empty; write a number, "),
+        ("x;y\n0;0\n1;\n1;1\n", "line 3, column 2 (y): the cell is empty; "),
+        ("x,y\n0,0\n1,abc\n1,1\n", "line 3, column 2 (y): `abc` is not a number; "),
+    ] {
+        let message = refused(&["--shape", "file:t.csv"], &[("t.csv", table)]);
+        assert_says(&message, &[&format!("error: --shape file:t.csv: {part}")]);
+        assert_eq!(message.lines().count(), 1, "{message}");
+    }
+}
+
+#[test]
+fn an_overlong_value_is_echoed_by_its_beginning() {
+    let long = "a".repeat(10_000);
+    let of = |template: &str| template.replace("LONG", &long);
+    let flags = "curves points seed shape outlines sampling amplitude modes decay perturbation design sweep flow mobility \
+                 units tau adaptive t-end omega pull solver order tolerance sor max-sweeps backend precision relax-to \
+                 relax-at only shard accuracy event series snapshots store";
+    let mut all: Vec<Vec<String>> =
+        flags.split_whitespace().map(|flag| vec![format!("--{flag}"), long.clone()]).collect();
+    for arguments in [
+        &["--shape", "file:LONG"][..],
+        &["--shape", "file:LONG/LONG.csv"],
+        &["--shape", "files:LONG"],
+        &["--shape", "ellipse:LONG,1"],
+        &["--shape", "flower:LONG"],
+        &["--shape", "circle:uniform(LONG)"],
+        &["--shape", "circle:uniform(LONG"],
+        &["--shape", "LONG(1)"],
+        &["--flow", "elastic:LONG"],
+        &["--amplitude", "LONG(1..2)"],
+        &["--t-end", "1,LONG"],
+        &["--sweep", "LONG=1,2"],
+        &["--sweep", "amplitude=0.02,LONG"],
+        &["--sweep", "shape=circle:1,LONG"],
+        &["--sweep", "shape=circle:1,file:LONG"],
+        &["--event", "a = LONG <= 1"],
+        &["--event", "a = area <= LONG"],
+        &["--event", "LONG = area <= 1"],
+        &["--LONG"],
+        &["--LONG=1"],
+        &["--refine=LONG"],
+        &["--accurate=LONG"],
+        &["LONG"],
+        &["LONG.toml"],
+        &["spec.toml", "LONG"],
+        &["--shape", "file:square.csv", "--group-by", "LONG"],
+    ] {
+        all.push(arguments.iter().map(|argument| of(argument)).collect());
+    }
+    let square = ("square.csv", "0,0\n1,0\n1,1\n0,1\n");
+    for arguments in &all {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let message = refused(&arguments, &[square, ("spec.toml", "")]);
+        let shown: Vec<String> = arguments.iter().map(|argument| argument.chars().take(40).collect()).collect();
+        assert!(message.len() < 1500, "{shown:?}: {} bytes: {}", message.len(), &message[..1500]);
+    }
+    for text in [
+        "shape = 'LONG'",
+        "shape = 'circle:LONG'",
+        "flow = 'LONG'",
+        "modes = 'LONG'",
+        "tau = 'LONG'",
+        "mobility = 'LONG'",
+        "snapshots = '1,LONG'",
+        "event = ['LONG']",
+        "order = 'LONG'",
+        "LONG = 1",
+        "LONG",
+        "[sweep]\nLONG = [1]",
+        "[sweep]\namplitude = [1, 'LONG']",
+        "[sweep]\namplitude = [['LONG']]",
+    ] {
+        let message = refused(&["spec.toml"], &[("spec.toml", &of(text))]);
+        assert!(message.len() < 1500, "{text}: {} bytes: {}", message.len(), &message[..1500]);
+    }
+    let table = of("x,y,label\n0,0,LONG\n1,0,LONG\n1,1,other\n0,1,LONG\n");
+    for table in [of("x,y\n0,0\n1,LONG\n"), of("LONG\n"), of("x,y\n1,2,LONG\n"), table] {
+        let message = refused(&["--shape", "file:t.csv"], &[("t.csv", &table)]);
+        assert!(message.len() < 1500, "{} bytes: {}", message.len(), &message[..1500]);
+    }
+}
+
+#[test]
+fn a_wrong_value_of_a_sweep_is_told_once() {
+    let message = refused(&["--sweep", "amplitude=0.02,abc"], &[]);
+    assert_says(&message, &["error: --sweep amplitude=abc: expected a number, or a distribution"]);
+    assert_eq!(message.matches("abc").count(), 1, "{message}");
+    // Which cell it is, is not told by the wrong value alone.
+    let message = refused(&["--sweep", "amplitude=0.02,-1"], &[]);
+    assert_says(&message, &["error: --amplitude -1: ", "(in the cell amplitude = -1)"]);
 }
 
 #[test]
@@ -176,14 +341,14 @@ fn a_wrong_spec_file_is_shown_in_its_line() {
     for (text, parts) in [
         ("curves = 8\ntua = 1\n", &["line 2, column 1", "2 | tua = 1", "^^^", "did you mean `tau`?", "`omega`"][..]),
         ("t_end = 1", &["line 1, column 1", "^^^^^", "did you mean `t-end`?"]),
-        ("curves = 'many'", &["line 1, column 10", "invalid type: string \"many\""]),
-        ("curves = -3", &["line 1, column 10", "`-3`"]),
+        ("curves = 'many'", &["line 1, column 10", "expected a whole number from 0, found the text \"many\""]),
+        ("curves = -3", &["line 1, column 10", "found the number -3"]),
         ("amplitude = '0.1'", &["line 1, column 13", "expected a number, or a distribution"]),
         ("solver = 'gaus-seidel'", &["unknown variant `gaus-seidel`", "did you mean `gauss-seidel`?"]),
         ("flow = 'wilmore'", &["line 1, column 8", "did you mean `willmore`?"]),
-        ("no-redistribution = 1", &["line 1, column 21", "expected a boolean"]),
+        ("no-redistribution = 1", &["line 1, column 21", "expected true or false, found the number 1"]),
         ("snapshots = 'a,b'", &["line 1, column 13", "`a` in `a,b`"]),
-        ("only = [1, -2]", &["line 1, column 12", "`-2`"]),
+        ("only = [1, -2]", &["line 1, column 12", "found the number -2"]),
         ("tau = 1\ntau = 2", &["line 2", "duplicate key"]),
         ("tau = ", &["line 1"]),
         ("[sweeps]", &["unknown field `sweeps`", "did you mean `sweep`?"]),
@@ -282,8 +447,8 @@ fn a_spec_without_end_is_refused_at_once() {
         fs::write(in_home(name), text).unwrap();
     }
     for (spec, start) in [
-        ("huge.toml", "error: cannot read the spec huge.toml: 3221225472 bytes; at most 1048576 are read"),
-        ("over.toml", "error: cannot read the spec over.toml: 1048577 bytes; "),
+        ("huge.toml", "error: cannot read the spec huge.toml: 3 GB; at most 1 MB are read"),
+        ("over.toml", "error: cannot read the spec over.toml: 1 byte too many; at most 1 MB"),
         ("pipe", "error: cannot read the spec pipe: a pipe or a device; save what it holds in a file"),
         ("/dev/zero", "error: cannot read the spec /dev/zero: a pipe or a device; "),
         ("folder", "error: cannot read the spec folder: is a directory"),
@@ -321,12 +486,12 @@ fn an_outline_without_end_is_refused_at_once() {
     fs::write(in_home("nul.csv"), "0,0\n1,0\n1,\0\u{1b}\n").unwrap();
     fs::write(in_home("points.csv"), "0,0\n1,1\n".repeat(1 << 20)).unwrap();
     for (file, said) in [
-        ("huge.csv", " cannot read it: 3221225472 bytes; at most 67108864 are read; give a CSV file x,y"),
+        ("huge.csv", " cannot read it: 3 GB; at most 64 MB are read; thin the outline out"),
         ("pipe", " cannot read it: a pipe or a device; "),
         ("/dev/zero", " cannot read it: a pipe or a device; "),
-        ("commas.csv", " line 1: a line of 67108864 bytes; write a point a line, x,y, of at most 65536 bytes"),
-        ("latin.csv", " line 1: a line of 67108864 bytes; "),
-        ("nul.csv", " line 3: `\\0\\u{1b}` is not a number; "),
+        ("commas.csv", " line 1: a line of 64 MB; write a point a line, x,y, of at most 64 KB"),
+        ("latin.csv", " line 1: a line of 64 MB; "),
+        ("nul.csv", " line 3, column 2: `\\0\\u{1b}` is not a number; "),
         ("points.csv", " the file holds more than 1000000 points; "),
     ] {
         let shape = format!("file:{file}");
@@ -377,7 +542,7 @@ fn files_of_a_run_without_end_are_refused_at_once() {
         fs::remove_file(&place).unwrap();
         if name.ends_with("json") {
             endless(&place, 3 << 30);
-            let start = format!("error: cannot read run/{name}: 3221225472 bytes; at most ");
+            let start = format!("error: cannot read run/{name}: 3 GB; at most ");
             refused_at_once(home.path(), &["plot", "run"], &start);
         }
         fs::write(&place, kept).unwrap();

@@ -323,7 +323,11 @@ fn what_is_no_finished_run_of_this_program_is_refused() {
     );
     refused(&done, |out| replace(&json(out), "  \"format\": 1,\n", ""), "expected a number under `format`");
     refused(&done, |out| replace(&json(out), "\"points\": 32", "\"points\": 1"), "out/run.json, spec: --points 1: ");
-    refused(&done, |out| replace(&json(out), "\"points\": 32", "\"points\": \"n\""), "invalid type: string \"n\"");
+    refused(
+        &done,
+        |out| replace(&json(out), "\"points\": 32", "\"points\": \"n\""),
+        "expected a whole number from 0, found the text \"n\" at line ",
+    );
     refused(&done, |out| shortened(&json(out), 40), "out/run.json: EOF while parsing");
     let portraits = |out: &Path| out.join("plots/portraits.json");
     refused(&done, |out| shortened(&portraits(out), 40), "out/plots/portraits.json: EOF while parsing");

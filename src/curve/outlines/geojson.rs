@@ -15,7 +15,7 @@ use serde_json::{Value, value::RawValue};
 use super::piece::{NoOutline, Piece, Properties, closed, label, outer_ring, outer_rings, property};
 use crate::{
     curve::outline::{Places, RingPoints, Source},
-    error::{Error, Result, one_line, shortened},
+    error::{Error, Result, one_line, plainly, shortened},
 };
 
 /// Maximum characters of foreign text in a message.
@@ -56,7 +56,7 @@ pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>>
         source.refusal("", &format!("byte {} is not UTF-8", e.valid_up_to()), "GeoJSON is in UTF-8: save it so")
     })?;
     let file: GeoFile = serde_json::from_str(text).map_err(|e| {
-        let problem = format!("not JSON: {}", shortened(&one_line(&e.to_string()), MAX_PROBLEM));
+        let problem = format!("not JSON: {}", shortened(&plainly(&one_line(&e.to_string())), MAX_PROBLEM));
         source.refusal("", &problem, "give one FeatureCollection; a file with a feature a line needs one around them")
     })?;
     let features = match (file.kind.as_deref(), &file.features) {
@@ -114,7 +114,7 @@ fn read(source: Source, item: usize, text: &str, bare: bool, numbered: bool) -> 
         let said = one_line(&e.to_string());
         // Its line and column are counted in the feature.
         let said = said.rsplit_once(" at line ").map_or(&*said, |(said, _)| said);
-        let problem = format!("no valid feature: {}", shortened(said, MAX_PROBLEM));
+        let problem = format!("no valid feature: {}", shortened(&plainly(said), MAX_PROBLEM));
         source.refusal(&unnamed, &problem, "correct it as RFC 7946 says, or remove it")
     };
     let feature: Feature = match bare {

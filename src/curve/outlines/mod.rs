@@ -29,6 +29,7 @@ mod wkt;
 use std::{
     borrow::Cow,
     collections::{BTreeMap, HashMap, HashSet},
+    io::{self, ErrorKind},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -41,7 +42,7 @@ use super::{
     outline::{CROSSES, REPEATED, Source},
 };
 use crate::{
-    error::{Error, Result, shortened},
+    error::{Error, Result, echo_path, shortened},
     input::{self, MAX_OUTLINE},
     text::count,
 };
@@ -151,9 +152,32 @@ fn only(source: Source, mut all: Vec<Labelled>) -> Result<Outline> {
 }
 
 fn content(base: &Path, path: &Path) -> Result<Vec<u8>> {
-    let remedy = format!("give a CSV file x,y of at most {MAX_OUTLINE} bytes");
-    let bytes = input::bytes(&base.join(path), MAX_OUTLINE);
-    bytes.map_err(|e| Source::new(path).refusal("", &format!("cannot read it: {e}"), &remedy))
+    let whole = base.join(path);
+    input::bytes(&whole, MAX_OUTLINE).map_err(|e| unread(path, &whole, &e))
+}
+
+/// The refusal of the file at `path`, which is looked for at `whole`.
+fn unread(path: &Path, whole: &Path, error: &io::Error) -> Error {
+    let refusal = |problem: &str, remedy: &str| Source::new(path).refusal("", problem, remedy);
+    let cannot = format!("cannot read it: {error}");
+    match error.kind() {
+        // A part of the path may also be a file.
+        ErrorKind::NotFound | ErrorKind::NotADirectory => {
+            let sought = std::path::absolute(whole).unwrap_or_else(|_| whole.to_owned());
+            let remedy = format!("looked for {}: check the name and the folder", echo_path(&sought));
+            refusal("there is no such file", &remedy)
+        }
+        ErrorKind::IsADirectory => {
+            let remedy = format!("give a file in it, or all of them: 'files:{}/*.csv'", echo_path(path));
+            refusal("it is a folder", &remedy)
+        }
+        ErrorKind::PermissionDenied => {
+            refusal("there is no permission to read it", "give yourself the right, for example by chmod u+r")
+        }
+        ErrorKind::InvalidFilename => refusal(&cannot, "use a shorter path, for example a relative one"),
+        ErrorKind::FileTooLarge => refusal(&cannot, "thin the outline out, or save fewer outlines in a file"),
+        _ => refusal(&cannot, "give a table x,y, GeoJSON, WKT or NumPy arrays"),
+    }
 }
 
 /// The format of a file.
@@ -316,7 +340,8 @@ fn make_unique(outlines: &mut [Labelled]) {
 /// # Errors
 /// [`Error::Request`] if the pattern is wrong, a directory cannot be read, or nothing matches.
 pub fn glob(base: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
-    let refuse = |problem: &str, remedy: &str| Error::Request(format!("--shape files:{pattern}: {problem}; {remedy}"));
+    let shown = echo_path(Path::new(pattern));
+    let refuse = |problem: &str, remedy: &str| Error::Request(format!("--shape files:{shown}: {problem}; {remedy}"));
     const REMEDY: &str = "write for example 'files:outlines/*.csv', with * ? [abc] or **";
     let base_text =
         base.to_str().ok_or_else(|| refuse("the current folder is not UTF-8", "call it by another name"))?;
@@ -329,7 +354,7 @@ pub fn glob(base: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for path in glob_with(whole, options).map_err(wrong)? {
         let path = path.map_err(|e| {
-            let (at, e) = (e.path().display(), e.error());
+            let (at, e) = (echo_path(e.path()), e.error());
             refuse(&format!("cannot read {at}: {e}"), "make it readable, or use a narrower pattern")
         })?;
         if !path.is_dir() {
@@ -339,8 +364,12 @@ pub fn glob(base: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     paths.sort();
     match paths.is_empty() {
         true => {
-            let place = if base_text.is_empty() { "the current folder" } else { base_text };
-            Err(refuse(&format!("no file matches `{pattern}` in {place}"), REMEDY))
+            if base.join(pattern).is_dir() {
+                return Err(refuse("it is a folder", &format!("write 'files:{}/*.csv'", shown.trim_end_matches('/'))));
+            }
+            let place = std::path::absolute(if base_text.is_empty() { Path::new(".") } else { base });
+            let place = place.as_deref().map_or("the current folder".into(), echo_path);
+            Err(refuse(&format!("no file matches in {place}"), &format!("check folder and extension; {REMEDY}")))
         }
         false => Ok(paths),
     }

@@ -14,6 +14,7 @@ use crate::{
     curve::outline::{Places, RingPoints, Source},
     error::{Error, Result, one_line, shortened},
     input::MAX_OUTLINE,
+    text,
 };
 
 /// Maximum characters of foreign text in a message.
@@ -48,7 +49,7 @@ pub(super) fn pieces_of_zip(source: Source, bytes: &[u8]) -> Result<Vec<Result<P
         let mut array = Vec::new();
         let read = entry.take(left + 1).read_to_end(&mut array).map_err(|e| broken(&place, e.to_string()))?;
         left = left.checked_sub(read as u64).ok_or_else(|| {
-            let problem = format!("the arrays unpack to more than {MAX_OUTLINE} bytes");
+            let problem = format!("the arrays unpack to more than {}", text::bytes(MAX_OUTLINE));
             source.refusal(&place, &problem, "save fewer in one file")
         })?;
         let outlines = of_array(source, &place, &array).map(|mut outlines| {

@@ -23,7 +23,7 @@ use crate::{
     },
     error::{Error, Result, shortened},
     input::MAX_LINE,
-    text::count,
+    text::{self, count},
 };
 
 /// Maximum characters of foreign text in a message.
@@ -31,6 +31,10 @@ const SHOWN: usize = 40;
 
 /// Names of the column of a ring; they are compared without regard to case.
 const RING_COLUMNS: [&str; 4] = ["ring", "id", "part", "label"];
+
+fn is_ring_column(name: &str) -> bool {
+    RING_COLUMNS.iter().any(|ring| name.eq_ignore_ascii_case(ring))
+}
 
 /// What separates columns.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -232,7 +236,7 @@ impl PointTable {
 
     /// The columns that name the ring of a point. A column that differs at every point numbers the points instead.
     fn ring_columns<'a>(&'a self, columns: &'a Columns) -> impl Iterator<Item = usize> + 'a {
-        let names_rings = |(name, _): &(String, usize)| RING_COLUMNS.iter().any(|ring| name.eq_ignore_ascii_case(ring));
+        let names_rings = |(name, _): &(String, usize)| is_ring_column(name);
         let numbers_points = |values: &[u32]| values.len() > 1 && values.windows(2).all(|pair| pair[0] != pair[1]);
         (0..columns.others.len()).filter(move |i| names_rings(&columns.others[*i]) && !numbers_points(&self.others[*i]))
     }
@@ -303,8 +307,11 @@ impl Reader<'_> {
         let mut known: HashMap<String, u32> = HashMap::new();
         for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
             if content.len() > MAX_LINE {
-                let problem = format!("a line of {} bytes", content.len());
-                let remedy = format!("write a point a line, x,y, of at most {MAX_LINE} bytes");
+                let most = text::bytes(MAX_LINE as u64);
+                let size = text::bytes(content.len() as u64);
+                let size = if size == most { format!("more than {most}") } else { size };
+                let remedy = format!("write a point a line, x,y, of at most {most}");
+                let problem = format!("a line of {size}");
                 return Err(self.source.refusal(&place(line), &problem, &remedy));
             }
             // Other columns may be in any encoding.
@@ -357,9 +364,16 @@ impl Reader<'_> {
             self.source.check_number(&Places::lines(), MAX_POINTS + 1)?;
         }
         let point = DVec2::new(
-            self.coordinate(line, x, columns.separator, table)?,
-            self.coordinate(line, y, columns.separator, table)?,
+            self.coordinate(line, x, columns, columns.x, table)?,
+            self.coordinate(line, y, columns, columns.y, table)?,
         );
+        // Other columns may be left out at the end of a row, as spreadsheets do. A ring without a name would be another.
+        let is_ring = |(name, at): &&(String, usize)| *at >= fields.len() && is_ring_column(name);
+        if let Some((name, _)) = columns.others.iter().find(is_ring) {
+            let (found, all) = (fields.len(), columns.count);
+            let problem = format!("the number of columns is {found} where the header names {all}: there is no {name}");
+            return Err(self.source.refusal(&place(line), &problem, "complete the row"));
+        }
         table.points.push(point);
         table.lines.push(line);
         for ((_, column), values) in columns.others.iter().zip(&mut table.others) {
@@ -411,18 +425,47 @@ impl Reader<'_> {
             true => format!("the header names {}", columns.count),
             false => "x,y is expected".into(),
         };
-        let problem = format!("the number of columns is {found} where {expected}");
+        // The first one that nothing was said of.
+        let excess = own.split(content).get(columns.count).map(|field| shortened(field, SHOWN));
+        let place = match &excess {
+            Some(_) => format!("line {line}, column {}", columns.count + 1),
+            None => place(line),
+        };
+        let holds = match &excess {
+            Some(field) if !field.is_empty() => format!(" (this one holds `{field}`)"),
+            _ => String::new(),
+        };
+        let problem = format!("the number of columns is {found} where {expected}{holds}");
         let remedy = match own {
+            _ if excess.is_some() && columns.has_header => "remove it, or name it in the header",
             Separator::Comma if found == 4 => {
                 "name further columns in a header; where commas are decimal, separate by semicolons: 1,5;2,5"
             }
             _ => "separate by commas, and name further columns in a header",
         };
-        self.source.refusal(&place(line), &problem, remedy)
+        self.source.refusal(&place, &problem, remedy)
     }
 
-    fn coordinate(&self, line: usize, field: &str, separator: Separator, table: &mut PointTable) -> Result<f64> {
-        let value = match Written::of(field, separator) {
+    /// The number in the column at the index `at`.
+    fn coordinate(
+        &self,
+        line: usize,
+        field: &str,
+        columns: &Columns,
+        at: usize,
+        table: &mut PointTable,
+    ) -> Result<f64> {
+        let cell = || {
+            let name = match (columns.has_header, at == columns.x, columns.in_degrees) {
+                (false, ..) => "",
+                (true, true, false) => " (x)",
+                (true, false, false) => " (y)",
+                (true, true, true) => " (longitude)",
+                (true, false, true) => " (latitude)",
+            };
+            format!("line {line}, column {}{name}", at + 1)
+        };
+        let value = match Written::of(field, columns.separator) {
             Written::Number(value) => {
                 table.has_decimal_points |= field.contains('.');
                 value
@@ -435,12 +478,16 @@ impl Reader<'_> {
                 table.thousands.get_or_insert_with(|| (line, shortened(field, SHOWN)));
                 value
             }
+            Written::Word if field.is_empty() => {
+                let remedy = "write a number, or leave out both coordinates where another outline begins";
+                return Err(self.source.refusal(&cell(), "the cell is empty", remedy));
+            }
             Written::Word => {
                 let problem = format!("`{}` is not a number", shortened(field, SHOWN));
-                return Err(self.source.refusal(&place(line), &problem, "write x,y such as 1.0,0.5"));
+                return Err(self.source.refusal(&cell(), &problem, "write x,y such as 1.0,0.5"));
             }
         };
-        self.source.check_coordinate(|| place(line), value, &shortened(field, SHOWN))?;
+        self.source.check_coordinate(cell, value, &shortened(field, SHOWN))?;
         Ok(value)
     }
 }
@@ -493,17 +540,23 @@ mod tests {
 
     #[test]
     fn a_line_that_is_no_pair_of_finite_numbers_is_refused_with_its_number_and_value() {
-        assert_refused("0,0\n# c\n1,zero\n1,1\n", &["line 3:", "`zero` is not a number"]);
-        assert_refused("0,0\n1,nan\n1,1\n", &["line 2:", "`nan` is not finite"]);
-        assert_refused("inf,0\n1,0\n1,1\n", &["line 1:", "`inf` is not finite"]);
-        assert_refused("0,0\n1e31,0\n1,1\n", &["line 2:", "`1e31` is too large"]);
+        assert_refused("0,0\n# c\n1,zero\n1,1\n", &["line 3, column 2:", "`zero` is not a number"]);
+        assert_refused("0,0\n1,nan\n1,1\n", &["line 2, column 2:", "`nan` is not finite"]);
+        assert_refused("inf,0\n1,0\n1,1\n", &["line 1, column 1:", "`inf` is not finite"]);
+        assert_refused("0,0\n1e31,0\n1,1\n", &["line 2, column 1:", "`1e31` is too large"]);
         assert_refused("0,0\n1\n1,1\n", &["line 2:", "columns is 1 "]);
-        assert_refused("0,0,7\n1,0,7\n1,1,7\n", &["line 1:", "columns is 3 ", "header"]);
+        assert_refused(
+            "0,0,7\n1,0,7\n1,1,7\n",
+            &["line 1, column 3:", "columns is 3 ", "(this one holds `7`)", "header"],
+        );
         assert_refused("x,y\n0,0\n1\n", &["line 3:", "columns is 1 "]);
-        assert_refused("x,y\n0,0\n1,0,9\n1,1\n", &["line 3:", "columns is 3 where the header names 2;"]);
+        assert_refused(
+            "x,y\n0,0\n1,0,9\n1,1\n",
+            &["line 3, column 3: ", "columns is 3 where the header names 2 (this one holds `9`); remove it"],
+        );
         assert_refused("u,v\n0,0\n1,0\n1,1\n", &["line 1:", "`u,v` names no columns x and y"]);
         assert_refused("lon,y\n0,0\n1,0\n1,1\n", &["line 1:", "`lon,y` names no columns x and y; begin with"]);
-        assert_refused("x,y\nx,y\n0,0\n", &["line 2:", "`x` is not a number"]);
+        assert_refused("x,y\nx,y\n0,0\n", &["line 2, column 1 (x):", "`x` is not a number"]);
     }
 
     #[test]
@@ -536,7 +589,10 @@ mod tests {
         for text in ["0;-0,5\n1,5;0,25\n0;1\n", "0\t-0,5\n1,5\t0,25\n0\t1,0\n", "x y\n0,0 -0,5\n1,5 2,5e-1\n0 1\n"] {
             assert_eq!(vertices(text), triangle, "{text:?}");
         }
-        assert_refused("1,5,2,5\n1,5,3,5\n2,5,3,5\n", &["line 1:", "columns is 4 ", "separate by semicolons: 1,5;2,5"]);
+        assert_refused(
+            "1,5,2,5\n1,5,3,5\n2,5,3,5\n",
+            &["line 1, column 3:", "columns is 4 ", "separate by semicolons: 1,5;2,5"],
+        );
         // Three digits after every comma: 1.234 or 1234.
         let threes = "0;0\n1,234;0\n1,234;5,678\n";
         assert_refused(
@@ -545,9 +601,9 @@ mod tests {
         );
         assert_eq!(vertices("0;0\n1,234;0\n1,234;0,5\n")[1], (1.234, 0.0));
         assert_refused("0;0.5\n1,234;0\n1,234;1,5\n", &["line 2: the comma of `1,234`"]);
-        assert_refused("0;0\n1,234,567;0\n1;1\n", &["line 2: `1,234,567` is not a number"]);
-        assert_refused("0;0\n1,234.5;0\n1;1\n", &["line 2: `1,234.5` is not a number"]);
-        assert_refused("x;y\n0;0\n1,;0\n1;1\n", &["line 3: `1,` is not a number"]);
+        assert_refused("0;0\n1,234,567;0\n1;1\n", &["line 2, column 1: `1,234,567` is not a number"]);
+        assert_refused("0;0\n1,234.5;0\n1;1\n", &["line 2, column 1: `1,234.5` is not a number"]);
+        assert_refused("x;y\n0;0\n1,;0\n1;1\n", &["line 3, column 1 (x): `1,` is not a number"]);
     }
 
     #[test]
@@ -573,7 +629,7 @@ mod tests {
             }
         }
         // A row that is only half missing separates nothing.
-        assert_refused("0,0\n1,0\n,1\n0,1\n", &["line 3: `` is not a number"]);
+        assert_refused("0,0\n1,0\n,1\n0,1\n", &["line 3, column 1: the cell is empty; write a number"]);
     }
 
     #[test]
@@ -627,8 +683,8 @@ mod tests {
     fn a_line_without_end_is_refused_before_it_is_cut_into_columns() {
         let long = |columns: usize| format!("x,y{}\n0,0\n1,0\n1,1\n", ",".repeat(columns));
         assert_eq!(vertices(&long(MAX_LINE - 3)).len(), 3);
-        assert_refused(&long(MAX_LINE - 2), &["line 1: a line of 65537 bytes; ", "x,y, of at most 65536 bytes"]);
-        assert_refused(&format!("0,0\n{}", " ".repeat(1 << 20)), &["line 2: a line of 1048576 bytes"]);
+        assert_refused(&long(MAX_LINE - 2), &["line 1: a line of more than 64 KB; ", "x,y, of at most 64 KB"]);
+        assert_refused(&format!("0,0\n{}", " ".repeat(1 << 20)), &["line 2: a line of 1 MB"]);
     }
 
     #[test]
