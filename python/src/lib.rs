@@ -49,7 +49,7 @@ mod _curvelax {
     use std::{ffi::OsString, path::PathBuf};
 
     use curvelax::{
-        files::{Existing, OutputFolder},
+        files::{Existing, OutputFolder, names},
         session::{self, Completed, Host, ResumePlace, Work},
     };
     use pyo3::{
@@ -119,7 +119,7 @@ mod _curvelax {
 
     /// Warns if a run does not hold what was asked for, where the program has exit code 3: its results are there to look at.
     fn tell_verdict(host: &Notebook, completed: &Completed) {
-        if let Err(error) = completed.verdict.check(false, &completed.out) {
+        if let Err(error) = completed.verdict.check(false, &completed.out.join(names::SUMMARY)) {
             host.say(&format!("warning: {error}"));
         }
     }

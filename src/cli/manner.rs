@@ -5,6 +5,7 @@ use std::{path::Path, time::Duration};
 use super::{flags, note, print, signals};
 use crate::{
     error::{Error, Result},
+    files::names,
     report::{
         Form, Manner, Progress, Stop,
         complete::listed,
@@ -69,7 +70,7 @@ impl MannerFlags {
                 Verdict::new(&provenance, Some(&statistics))
             }
         };
-        verdict.check(self.strict, out)
+        verdict.check(self.strict, &out.join(names::SUMMARY))
     }
 
     /// Prints the results of a run that was just completed.
@@ -80,7 +81,7 @@ impl MannerFlags {
         if self.json || !self.quiet {
             print(&text)?;
         }
-        verdict.check(self.strict, &out)
+        verdict.check(self.strict, &out.join(names::SUMMARY))
     }
 
     /// The interval between checkpoints.

@@ -8,7 +8,7 @@ use std::{
 use super::{flags, manner::check_name, print};
 use crate::{
     error::{Error, Result},
-    files::OutputFolder,
+    files::{OutputFolder, names},
     report::{
         Form,
         merge::{Shards, listed_ranges},
@@ -71,7 +71,7 @@ pub fn merge(args: MergeArgs) -> Result<()> {
     if args.json || !args.quiet {
         print(&text)?;
     }
-    verdict.check(false, &out)
+    verdict.check(false, &out.join(names::SUMMARY))
 }
 
 /// Which shards are missing, and how to submit them.

@@ -6,7 +6,6 @@ use super::{EnsembleStatistics, provenance::Provenance};
 use crate::{
     ensemble::Status,
     error::{Error, Result},
-    files::names,
     text::{number, plural, rounded_beside},
 };
 
@@ -43,15 +42,15 @@ impl Verdict {
         provenance.spec.accuracy.is_some()
     }
 
-    /// Checks that the run in `out` holds what was asked for: some member that did not fail, no member that failed if it
+    /// Checks that the run with this `summary.csv` holds what was asked for: some member that did not fail, no member that failed if it
     /// is `strict`, and the accuracy.
     ///
     /// # Errors
     /// [`Error::Strict`] with what is missing.
-    pub fn check(&self, strict: bool, out: &Path) -> Result<()> {
+    pub fn check(&self, strict: bool, summary: &Path) -> Result<()> {
         let Verdict { members, ref failed, missed, is_part } = *self;
         let count: u64 = failed.iter().map(|(_, count)| count).sum();
-        let see = format!("see `status` in {}", out.join(names::SUMMARY).display());
+        let see = format!("see `status` in {}", summary.display());
         let all = format!("{members} {}", plural(members, "member"));
         if count > 0 && strict {
             return Err(Error::Strict(format!(
@@ -95,7 +94,7 @@ mod tests {
     }
 
     fn said(verdict: &Verdict, strict: bool) -> Option<String> {
-        let error = verdict.check(strict, Path::new("out")).err()?;
+        let error = verdict.check(strict, Path::new("out/summary.csv")).err()?;
         assert_eq!(error.exit_code(), 3);
         Some(error.to_string())
     }
