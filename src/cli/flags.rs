@@ -195,7 +195,7 @@ pub struct SpecFlags {
     refine: Option<bool>,
     /// Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for sampling and
     /// discretisation together, is within X times the median. --curves, --points and --adaptive are what it begins with.
-    /// Needs --refine [default: off]
+    /// A run that misses it exits with code 3. Needs --refine [default: off]
     #[arg(long, value_name = "X", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
     accuracy: Option<f64>,
 

@@ -247,7 +247,7 @@ pub fn reaches_level<N: Number>(at: &Observed<N>, p: &Parameters<N>) -> N::Mask 
 /// two [`LOOKS`] and at the end: if it is there at a look, or if the lines through the first two and through the last two
 /// values meet at or below it. A value that turns once does not fall below those lines.
 #[inline(always)]
-fn falls_inside<N: Number>([start, early, late, end]: [N; 4], level: N) -> N::Mask {
+pub fn falls_inside<N: Number>([start, early, late, end]: [N; 4], level: N) -> N::Mask {
     let (zero, between) = (N::of(0.0), N::of((LOOKS[1] - LOOKS[0]) / LOOKS[0]));
     let (fall, rise) = (start - early, end - late);
     let (early, late) = (early - level, late - level);

@@ -10,7 +10,7 @@
 //! extremum on the curves inside.
 
 use super::{Time, Trajectory, watch::Watch};
-use crate::scheme::State;
+use crate::scheme::{State, dense::LOOKS, member::Observed, observe::falls_inside};
 
 /// Parts of an adaptive step in which a crossing is looked for before it is narrowed down: an observable may turn round
 /// inside a step, even more than once.
@@ -41,14 +41,24 @@ impl Trajectory<'_> {
     /// Finds the times of the events in the last step; `state` is needed if
     /// [`events_need_state`](Trajectory::events_need_state).
     pub(super) fn locate_events(&mut self, state: Option<&State<f64>>) {
+        let passed = state.filter(|_| self.may_have_passed()).map(|state| (state, self.looks(state)));
         for place in 0..self.watches.len() {
             let watch = self.watches[place];
             if watch.is_due(&self.report.now) {
                 self.watches[place].t = Some(self.time_of(&watch, state));
-            } else if let (true, true, Some(state)) = (self.may_have_passed(), watch.is_pending(), state) {
-                self.watches[place].t = self.first_past(&watch, state).map(|at| self.time_at(at));
+            } else if let Some((state, looks)) = passed.filter(|_| watch.is_pending()) {
+                // Each by its own level, so that no event depends on what else is watched.
+                let distances = looks.map(|at| watch.distance(&at));
+                let found = if falls_inside(distances, 0.0) { self.first_past(&watch, state) } else { None };
+                self.watches[place].t = found.map(|at| self.time_at(at));
             }
         }
+    }
+
+    /// The observables at both ends of the last adaptive step and at the two looks inside.
+    fn looks(&self, state: &State<f64>) -> [Observed<f64>; 4] {
+        let [early, late] = LOOKS.map(|at| self.observe_inside(at, &self.curve_at(at, state)));
+        [self.report.before, early, late, self.report.now]
     }
 
     /// When it is reached in the last step.

@@ -123,6 +123,23 @@ fn a_run_in_which_every_member_failed_says_so_however_it_ends() {
 }
 
 #[test]
+fn a_run_that_missed_its_accuracy_says_so_also_when_it_is_found_finished() {
+    let home = TempDir::new().unwrap();
+    printed(home.path(), "run --backend cpu --accurate --points 64 --curves 16 --quiet --out out");
+    let file = home.path().join("out/run.json");
+    let mut run: Value = serde_json::from_str(&fs::read_to_string(&file).unwrap()).unwrap();
+    for (goal, code) in [(0.5, 0), (1e-3, 3)] {
+        run["spec"]["accuracy"] = goal.into();
+        fs::write(&file, run.to_string()).unwrap();
+        let output = curvelax(home.path(), "resume out --quiet");
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{message}");
+        let missed = message.starts_with("error: --accuracy 0.001: 0.") && message.contains(" was reached; use more");
+        assert_eq!(missed, code == 3, "{message}");
+    }
+}
+
+#[test]
 fn cells_in_which_no_member_relaxed_are_named() {
     let home = TempDir::new().unwrap();
     let short = "run --backend cpu --points 34 --curves 4 --adaptive=1e-3 --t-end 0.1";

@@ -8,13 +8,15 @@ use std::{
 
 use assert_cmd::Command;
 use curvelax::{
-    ensemble::Spec,
+    backend::gpu::shader::{Variant, workgroup_bytes},
+    ensemble::{Spec, event::MAX_EVENTS},
     files::{
         TableRow, names,
         tables::{CostRow, ErrorRow},
     },
     report,
     results::{cells::EnsembleStatistics, tally::Tally},
+    solver::{Blocks, Solver},
 };
 
 /// The pages with a generated part, and the marks around it.
@@ -184,6 +186,24 @@ fn generated(page: &str, text: &str) {
         fs::write(&path, new).unwrap();
     } else {
         assert!(old == new, "{page} differs from the program: {REMEDY}");
+    }
+}
+
+/// Sentences of the pages with numbers that the program has as constants.
+fn facts() -> Vec<(&'static str, String)> {
+    let blocks = Blocks::new(100).unwrap();
+    let bytes = [workgroup_bytes::<f32>, workgroup_bytes::<f64>].map(|of| of(blocks, Variant::of(Solver::GaussSeidel)));
+    vec![
+        (FLAGS, format!("A spec has at most {MAX_EVENTS} events.")),
+        ("shaders/README.md", format!("{} bytes in f32 and {} in f64 at n = 100", bytes[0], bytes[1])),
+    ]
+}
+
+#[test]
+fn numbers_in_the_pages_are_those_of_the_program() {
+    for (page, fact) in facts() {
+        let text = read(&root().join(page));
+        assert!(text.split_whitespace().collect::<Vec<_>>().join(" ").contains(&fact), "{page} does not say: {fact}");
     }
 }
 

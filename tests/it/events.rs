@@ -152,6 +152,18 @@ fn a_level_that_is_reached_and_left_again_within_a_step_is_found() {
 }
 
 #[test]
+fn an_event_does_not_depend_on_what_else_is_watched() {
+    let members = "--shape nonconvex --pull auto --curves 4 --points 48 --adaptive=1e-3 --t-end 0.02";
+    // The largest curvature of a member turns round twice within a step, beyond the first level and short of the second.
+    let level = "--event level=k_max<=4.96";
+    let of_level = |events: &str| -> Vec<Row> {
+        let rows = run(&format!("{members} {events}")).rows("events.csv");
+        rows.into_iter().filter(|row| row["event"] == "level").collect()
+    };
+    assert_eq!(of_level(level), of_level(&format!("{level} --event other=k_max<=5 --event third=energy<=10")));
+}
+
+#[test]
 fn half_of_the_excess_is_an_event_like_the_one_that_every_member_has() {
     for (pace, bound) in [("--tau 1e-5 --solver direct", 0.0), ("--tau 3e-5", 0.0), ("--adaptive=1e-3", 1e-5)] {
         let done = run(&format!("--curves 11 --points 48 --t-end 0.1 {pace} --event half=excess<=0.5*start"));
