@@ -2,9 +2,10 @@
 
 use std::{collections::HashMap, fs};
 
-use assert_cmd::Command;
 use glam::DVec2;
 use tempfile::TempDir;
+
+use super::command;
 
 /// The tables of a run.
 pub const FILES: [&str; 4] = ["summary.csv", "members.csv", "series.csv", "snapshots.csv"];
@@ -25,10 +26,8 @@ pub fn run_with(files: &[(&str, &str)], arguments: &str) -> Done {
     for (name, text) in files {
         fs::write(home.path().join(name), text).unwrap();
     }
-    let mut command = Command::cargo_bin("curvelax").unwrap();
-    // Without this a layer of Mesa prints a message on stderr.
-    command.current_dir(home.path()).env("XDG_RUNTIME_DIR", home.path()).arg("run");
-    command.args(arguments.split_whitespace()).args(["--backend", "cpu", "--quiet", "--out", "out"]);
+    let mut command = command::program(home.path());
+    command.arg("run").args(arguments.split_whitespace()).args(["--backend", "cpu", "--quiet", "--out", "out"]);
     let output = command.output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     let code = output.status.code();

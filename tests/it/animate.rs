@@ -1,12 +1,11 @@
 //! Movies of finished runs.
 
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Output},
-};
+use std::{fs, path::Path, process::Output};
 
-use crate::common::program::{Done, run};
+use crate::common::{
+    command::{curvelax, done},
+    program::{Done, run},
+};
 use gif::{DisposalMethod, Repeat};
 
 /// Members that relax at different times.
@@ -17,9 +16,7 @@ const FRAMES: usize = 21;
 
 #[track_caller]
 fn animate(home: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    command.current_dir(home).env("XDG_RUNTIME_DIR", home).arg("animate").args(arguments.split_whitespace());
-    command.output().unwrap()
+    curvelax(home, &format!("animate {arguments}"))
 }
 
 /// What the program prints; it must succeed with nothing on stderr.
@@ -235,13 +232,10 @@ fn unfinished(done: &Done) {
 
 #[test]
 fn a_new_run_in_the_folder_takes_the_movie_of_the_old_one_away() {
-    let done = run("--curves 1 --points 32 --adaptive=1e-3 --t-end 0.1");
-    animated(done.home.path(), &format!("out {SECOND}"));
-    animated(done.home.path(), &format!("out {SECOND}"));
-    assert!(done.path().join("movie.gif").exists());
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    command.current_dir(done.home.path()).env("XDG_RUNTIME_DIR", done.home.path());
-    command.args("run --curves 2 --points 32 --t-end 0.1 --backend cpu --quiet --out out --force".split(' '));
-    assert!(command.status().unwrap().success());
-    assert!(!done.path().join("movie.gif").exists());
+    let old = run("--curves 1 --points 32 --adaptive=1e-3 --t-end 0.1");
+    animated(old.home.path(), &format!("out {SECOND}"));
+    animated(old.home.path(), &format!("out {SECOND}"));
+    assert!(old.path().join("movie.gif").exists());
+    done(old.home.path(), "run --curves 2 --points 32 --t-end 0.1 --backend cpu --quiet --out out --force");
+    assert!(!old.path().join("movie.gif").exists());
 }

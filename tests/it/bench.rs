@@ -2,18 +2,16 @@
 
 use std::process::Output;
 
-use assert_cmd::Command;
 use curvelax::solver::Solver;
 use serde_json::Value;
+
+use crate::common::command::curvelax;
 
 const QUICK: &str = "--seconds 0.06 --repeats 3 --quiet";
 
 fn bench(arguments: &str) -> Output {
     let home = tempfile::TempDir::new().unwrap();
-    let mut command = Command::cargo_bin("curvelax").unwrap();
-    // Without this a layer of Mesa prints a message on stderr.
-    command.current_dir(home.path()).env("XDG_RUNTIME_DIR", home.path()).arg("bench");
-    command.args(arguments.split_whitespace()).output().unwrap()
+    curvelax(home.path(), &format!("bench {arguments}"))
 }
 
 /// The rows of `bench ARGUMENTS --json`, which must succeed with nothing on stderr.

@@ -8,18 +8,12 @@ use std::{
 };
 
 use crate::common::{
-    command::stopped_when,
+    command::{command, curvelax, hearing, program, signal, signalled_when, stopped_when},
     program::{number, run},
 };
 use curvelax::backend::gpu::Gpu;
 use serde_json::Value;
 use tempfile::TempDir;
-
-fn curvelax(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    // Without this a layer of Mesa prints a message on stderr.
-    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).args(arguments.split_whitespace()).output().unwrap()
-}
 
 /// The output of the program, which must succeed with nothing on stderr.
 #[track_caller]
@@ -172,10 +166,13 @@ fn a_run_out_of_time_keeps_its_state() {
     let output = stopped_when(home.path(), &format!("{long} --out out"), || rows() > 0);
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(75), "{message}");
+    // Then the state may be older than the table.
+    let at_once = |message: &str| message.contains("error: stopped by SIGTERM at once");
     let kept = rows();
     let told = format!("with {kept} of 100000000 members in the table; curvelax resume out continues\n");
-    let at_once = message.contains("error: stopped by SIGTERM at once");
-    assert!(at_once || (message.contains("error: stopped by SIGTERM after ") && message.contains(&told)), "{message}");
+    let mut is_exact = !at_once(&message);
+    let says_so = message.contains("error: stopped by SIGTERM after ") && message.contains(&told);
+    assert!(says_so || !is_exact, "{message}");
     assert_eq!(
         names(&home.path().join("out")),
         [
@@ -195,7 +192,9 @@ fn a_run_out_of_time_keeps_its_state() {
         let message = String::from_utf8(output.stderr).unwrap();
         assert!(rows() > before, "{message}");
         assert_eq!(output.status.code(), Some(75), "{message}");
-        assert!(message.contains(&format!("resuming: {before} of 100000000 members are in the table\n")), "{message}");
+        let resuming = format!("resuming: {before} of 100000000 members are in the table\n");
+        assert!(message.contains(&resuming) || !is_exact, "{message}");
+        is_exact = !at_once(&message);
     }
 }
 
@@ -268,19 +267,24 @@ fn the_disk_space_of_a_run_is_foretold_within_a_quarter() {
     assert!(sizes().fold(0.0, f64::max) > 4.0 * sizes().fold(f64::INFINITY, f64::min));
 }
 
-/// The peak resident size of `curvelax ARGUMENTS --out OUT`. Its stdout is a pipe that is full: once its files are
+/// The peak resident size of `curvelax ARGUMENTS --out OUT`. Its stdout is a socket that is full: once its files are
 /// complete, it waits there until the size has been read.
 #[cfg(target_os = "linux")]
 fn peak(folder: &Path, arguments: &str, out: &str) -> f64 {
-    use std::io::Write;
+    use std::{
+        io::{ErrorKind, Write},
+        os::{fd::OwnedFd, unix::net::UnixStream},
+    };
 
-    let (mut reader, mut writer) = std::io::pipe().unwrap();
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).args(arguments.split_whitespace());
-    command.args(["--json", "--out", out]).stdout(writer.try_clone().unwrap());
-    let filler = std::thread::spawn(move || writer.write_all(&vec![b' '; 1 << 22]));
-    let mut child = command.spawn().unwrap();
-    drop(command);
+    let (mut reader, mut writer) = UnixStream::pair().unwrap();
+    writer.set_nonblocking(true).unwrap();
+    for spaces in [&[b' '; 4096][..], b" "] {
+        let full = std::iter::repeat_with(|| writer.write(spaces)).find_map(Result::err).unwrap();
+        assert_eq!(full.kind(), ErrorKind::WouldBlock);
+    }
+    writer.set_nonblocking(false).unwrap();
+    let mut child =
+        command(folder, &format!("{arguments} --json --out {out}")).stdout(OwnedFd::from(writer)).spawn().unwrap();
     let out = folder.join(out);
     while !out.join("run.json").exists() || out.join(".curvelax.lock").exists() {
         assert!(child.try_wait().unwrap().is_none(), "{arguments}");
@@ -289,11 +293,14 @@ fn peak(folder: &Path, arguments: &str, out: &str) -> f64 {
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
     std::io::copy(&mut reader, &mut std::io::sink()).unwrap();
-    filler.join().unwrap().unwrap();
     assert!(child.wait().unwrap().success(), "{arguments}");
     fs::remove_dir_all(out).unwrap();
     1024.0 * line.trim().trim_end_matches(" kB").parse::<f64>().unwrap()
 }
+
+/// A run on any machine is over before. One that takes longer saves checkpoints, which need memory.
+#[cfg(target_os = "linux")]
+const NEVER: &str = "100000h";
 
 #[cfg(target_os = "linux")]
 #[test]
@@ -318,7 +325,7 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
     for (rank, spec) in runs.iter().enumerate() {
         // Whether a run saves a checkpoint, which takes memory, must not depend on how fast it is, and its pool not on the
         // number of cores.
-        let base = format!("run --backend cpu --threads 1 {spec} --checkpoint-every 1h --quiet");
+        let base = format!("run --backend cpu --threads 1 {spec} --checkpoint-every {NEVER} --quiet");
         let said = json(home.path(), &format!("{base} --dry-run --json"))["memory_bytes"].as_f64().unwrap();
         let taken = peak(home.path(), &base, &rank.to_string());
         assert!((said / taken - 1.0).abs() < 0.2, "{spec}: {said} foretold, {taken} taken");
@@ -331,17 +338,13 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
 /// An estimate as the program makes it while it is held for 2.5 s after each of `holds`.
 #[cfg(target_os = "linux")]
 fn held_estimate(home: &Path, arguments: &str, holds: &[u64]) -> Value {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(["run", "--dry-run", "--json", "--quiet"]);
-    let child = command.args(arguments.split_whitespace()).stdout(Stdio::piped()).spawn().unwrap();
-    let signal = |name: &str| {
-        let _ = Command::new("kill").args([name, &child.id().to_string()]).stderr(Stdio::null()).status();
-    };
+    let mut dry_run = command(home, &format!("run --dry-run --json --quiet --checkpoint-every {NEVER} {arguments}"));
+    let mut child = dry_run.stdout(Stdio::piped()).spawn().unwrap();
     for milliseconds in holds {
         std::thread::sleep(Duration::from_millis(*milliseconds));
-        signal("-STOP");
+        signal(&mut child, "STOP");
         std::thread::sleep(Duration::from_millis(2500));
-        signal("-CONT");
+        signal(&mut child, "CONT");
     }
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{arguments}");
@@ -353,8 +356,8 @@ fn held_estimate(home: &Path, arguments: &str, holds: &[u64]) -> Value {
 fn an_estimate_does_not_depend_on_how_fast_its_pilot_is() {
     let home = TempDir::new().unwrap();
     for arguments in [
-        "--backend cpu --threads 2 --curves 7 --points 50000 --adaptive --t-end 1e-15 --checkpoint-every 1h",
-        "--backend cpu --threads 2 --curves 100000 --adaptive=1e-6 --series 0.01 --checkpoint-every 9h",
+        "--backend cpu --threads 2 --curves 7 --points 50000 --adaptive --t-end 1e-15",
+        "--backend cpu --threads 2 --curves 100000 --adaptive=1e-6 --series 0.01",
     ] {
         let [free, held] = [&[][..], &[300, 300]].map(|holds| held_estimate(home.path(), arguments, holds));
         for key in ["steps_per_member", "disk_bytes", "members", "slots"] {
@@ -372,12 +375,14 @@ fn an_estimate_does_not_depend_on_how_fast_its_pilot_is() {
 #[test]
 fn the_memory_of_a_sweep_is_that_of_its_largest_cell_in_any_order() {
     let home = TempDir::new().unwrap();
-    let study = "run --backend cpu --threads 1 --curves 2 --adaptive --t-end 1e-13 --checkpoint-every 1h --quiet";
+    let study = "run --backend cpu --threads 1 --curves 2 --adaptive --t-end 1e-13 --quiet";
+    let study = format!("{study} --checkpoint-every {NEVER}");
     let foretold = |points: &str| {
         let dry_run = format!("{study} --sweep points={points} --dry-run --json");
         json(home.path(), &dry_run)["memory_bytes"].as_f64().unwrap()
     };
     let [rising, falling, small] = ["64,20000", "20000,64", "64,65"].map(foretold);
+    assert!((rising / falling - 1.0).abs() < 0.05, "{rising} and {falling}");
     let taken = peak(home.path(), &format!("{study} --sweep points=20000,64"), "out");
     for said in [rising, falling] {
         assert!((said / taken - 1.0).abs() < 0.2, "{said} foretold, {taken} taken");
@@ -389,27 +394,24 @@ fn the_memory_of_a_sweep_is_that_of_its_largest_cell_in_any_order() {
 #[test]
 fn the_pilot_of_a_dry_run_can_be_stopped() {
     let home = TempDir::new().unwrap();
-    // A sweep of this many nodes takes seconds, and a step of this length thousands of them.
-    let long = "run --backend cpu --threads 1 --curves 64 --points 1000000 --dry-run";
-    let stopped = |output: &Output, cause: &str| {
+    // Each step needs more sweeps than any machine makes in hours. A warning comes when signals are received.
+    let long = "run --dry-run --backend cpu --threads 1 --curves 64 --points 10000 --adaptive --solver gauss-seidel \
+                --max-sweeps 100000000";
+    let stopped = |output: &Output, cause: &str, code: i32| {
         let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(75), "{said}");
-        let last = said.lines().last().unwrap();
-        assert!(
-            last.starts_with(&format!("error: stopped by {cause}")) && last.ends_with("nothing is saved"),
-            "{said}"
-        );
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        assert_eq!(said.matches("error: ").count(), 1, "{said}");
+        // A machine that is very busy ends it before it answers.
+        let expected =
+            ["in the pilot", "at once"].map(|when| format!("error: stopped by {cause} {when}: nothing is saved"));
+        assert!(expected.iter().any(|line| said.lines().last() == Some(line)), "{said}");
+        assert!(output.stdout.is_empty());
     };
-    stopped(&curvelax(home.path(), &format!("{long} --max-time 1s")), "--max-time");
-    let mut patience = Duration::from_millis(300);
-    loop {
-        let started = Instant::now();
-        let output = stopped_when(home.path(), long, || started.elapsed() > patience);
-        // A signal that comes before the program hears it ends it without a code.
-        if output.status.code().is_some() {
-            break stopped(&output, "SIGTERM");
-        }
-        patience *= 2;
+    stopped(&curvelax(home.path(), &format!("{long} --max-time 1s")), "--max-time", 75);
+    for (signal, cause, code) in [("TERM", "SIGTERM", 75), ("INT", "Ctrl-C", 130)] {
+        let Some(mut command) = hearing(home.path(), signal) else { continue };
+        command.args(long.split_whitespace());
+        stopped(&signalled_when(&mut command, signal, |said| said.contains("warning: ")), cause, code);
     }
     assert_eq!(names(home.path()), [""; 0]);
 }
@@ -419,12 +421,16 @@ fn the_pilot_of_a_dry_run_can_be_stopped() {
 #[test]
 fn a_first_run_loads_no_driver_where_no_gpu_can_be() {
     let home = TempDir::new().unwrap();
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    command.current_dir(home.path()).env_remove("XDG_RUNTIME_DIR").env("VK_LOADER_DEBUG", "all");
-    command.args(["run", "--curves", "3", "--t-end", "0.01", "--out", "out"]);
-    let said = String::from_utf8(command.output().unwrap().stderr).unwrap();
-    let has_nodes = ["/dev/dri", "/dev/nvidiactl", "/dev/kfd", "/dev/dxg"].iter().any(|node| Path::new(node).exists());
-    assert!(has_nodes || said == "back end: CPU, f64 (no hardware GPU found); Gauss-Seidel sweeps\n", "{said}");
+    let mut first = program(home.path());
+    first.env_remove("XDG_RUNTIME_DIR").env("VK_LOADER_DEBUG", "all").env_remove("VK_ADD_DRIVER_FILES");
+    first.args(["run", "--curves", "3", "--t-end", "0.01", "--out", "out"]);
+    let said = String::from_utf8(first.output().unwrap().stderr).unwrap();
+    let kinds = ["dri", "nvidia", "nvhost", "nvgpu", "kfd", "dxg", "mali", "kgsl", "pvr", "galcore"];
+    let devices = fs::read_dir("/dev").into_iter().flatten().map(|entry| entry.unwrap().file_name());
+    let has_nodes = devices.into_iter().any(|name| kinds.iter().any(|kind| name.to_string_lossy().starts_with(kind)));
+    // A slow run prints how far it is.
+    let lines: Vec<&str> = said.lines().filter(|line| !line.contains(" of 3 members, ")).collect();
+    assert!(has_nodes || lines == ["back end: CPU, f64 (no hardware GPU found); Gauss-Seidel sweeps"], "{said}");
 }
 
 #[test]

@@ -2,14 +2,12 @@
 
 use std::{fs, process::Output};
 
-use assert_cmd::Command;
 use tempfile::TempDir;
 
+use crate::common::command::curvelax;
+
 fn convergence(home: &TempDir, arguments: &str) -> Output {
-    // Without this a layer of Mesa prints a message on stderr.
-    let mut command = Command::cargo_bin("curvelax").unwrap();
-    command.current_dir(home.path()).env("XDG_RUNTIME_DIR", home.path()).arg("convergence");
-    command.args(arguments.split_whitespace()).output().unwrap()
+    curvelax(home.path(), &format!("convergence {arguments}"))
 }
 
 fn text(bytes: Vec<u8>) -> String {

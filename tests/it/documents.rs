@@ -6,7 +6,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use assert_cmd::Command;
 use curvelax::{
     backend::gpu::shader::{Variant, workgroup_bytes},
     ensemble::{Spec, event::MAX_EVENTS},
@@ -18,6 +17,8 @@ use curvelax::{
     results::{cells::EnsembleStatistics, tally::Tally},
     solver::{Blocks, Solver},
 };
+
+use crate::common::command::program;
 
 /// The pages with a generated part, and the marks around it.
 const FLAGS: &str = "docs/flags.md";
@@ -38,7 +39,7 @@ fn read(path: &Path) -> String {
 
 /// The help of a command, or of the program.
 fn help(command: Option<&str>) -> String {
-    let output = Command::cargo_bin("curvelax").unwrap().args(command).arg("--help").output().unwrap();
+    let output = program(root()).args(command).arg("--help").output().unwrap();
     assert!(output.status.success(), "{command:?}");
     String::from_utf8(output.stdout).unwrap()
 }

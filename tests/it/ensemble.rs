@@ -2,7 +2,6 @@
 
 use std::{collections::HashMap, fs, path::Path};
 
-use assert_cmd::Command;
 use curvelax::{
     backend::{Backend, cpu::CpuBackend},
     ensemble::{Family, Spec},
@@ -13,7 +12,9 @@ use glam::DVec2;
 use tempfile::TempDir;
 
 use crate::common::{
-    DIRECT, SWEEPS, distance, nodes,
+    DIRECT, SWEEPS,
+    command::curvelax,
+    distance, nodes,
     program::{Done, FILES, Row, number, positions, run, run_with},
 };
 
@@ -175,9 +176,7 @@ fn a_figure_eight_with_unequal_lobes_ends_singular() {
 }
 
 fn run_quiet_with_warning(home: &Path, flags: &str, out: &str) -> Row {
-    let mut command = Command::cargo_bin("curvelax").unwrap();
-    command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(["run", "--backend", "cpu", "--out", out]);
-    let output = command.args(flags.split_whitespace()).output().unwrap();
+    let output = curvelax(home, &format!("run --backend cpu --out {out} {flags}"));
     assert_eq!(output.status.code(), Some(3), "its one member fails");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("crosses"), "no warning of the crossing: {said}");

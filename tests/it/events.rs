@@ -2,8 +2,10 @@
 
 use std::fs;
 
-use crate::common::program::{Done, Row, number, run};
-use assert_cmd::Command;
+use crate::common::{
+    command::program,
+    program::{Done, Row, number, run},
+};
 use tempfile::TempDir;
 
 /// Members whose shortest and largest curvature, length and excess pass levels at different times.
@@ -196,8 +198,7 @@ fn single_precision_finds_the_events_of_double_precision() {
 #[test]
 fn what_holds_from_the_start_is_told_and_what_does_not_happen_is_censored_at_the_end() {
     let home = TempDir::new().unwrap();
-    let mut command = Command::cargo_bin("curvelax").unwrap();
-    command.current_dir(&home).env("XDG_RUNTIME_DIR", home.path());
+    let mut command = program(home.path());
     command.args(["run", "--backend", "cpu", "--curves", "5", "--points", "48", "--adaptive=1e-3", "--t-end", "0.3"]);
     command.args([
         "--event",

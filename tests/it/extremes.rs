@@ -1,25 +1,18 @@
 //! Numbers at the ends of their ranges: seeds beyond the integers of TOML, curves and times beyond those of a
 //! precision. Each is refused before the run, or ends its member with a status; everything written reads back.
 
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Output},
-};
+use std::{fs, process::Output};
 
-use crate::common::program::{Row, number, run_with};
+use crate::common::{
+    command::curvelax,
+    program::{Row, number, run_with},
+};
 use tempfile::TempDir;
 
 /// The first seed that is not a number in TOML, and the last of all.
 const SEEDS: [u64; 2] = [1 << 63, u64::MAX];
 /// A study that ends at once.
 const SMALL: &str = "--curves 4 --points 34 --tau 1e-3 --t-end 0.01 --solver direct --backend cpu --quiet";
-
-fn curvelax(home: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    command.args(arguments.split_whitespace()).current_dir(home).env("XDG_RUNTIME_DIR", home);
-    command.output().unwrap()
-}
 
 /// The output on stdout and on stderr, if it ended with this code.
 #[track_caller]

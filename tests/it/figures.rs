@@ -2,7 +2,6 @@
 
 use std::{fs, path::Path, process::Output};
 
-use assert_cmd::Command;
 use curvelax::{
     ensemble::{Ended, Spec, spec::Solver},
     figures::{FIGURES, Figure, POINTS},
@@ -11,12 +10,13 @@ use curvelax::{
 use glam::DVec2;
 use tempfile::TempDir;
 
-use crate::common::program::{Row, column, positions};
+use crate::common::{
+    command::curvelax,
+    program::{Row, column, positions},
+};
 
 fn figure(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::cargo_bin("curvelax").unwrap();
-    command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).arg("figure");
-    command.args(arguments.split_whitespace()).output().unwrap()
+    curvelax(folder, &format!("figure {arguments}"))
 }
 
 /// Writes the files of these figures to `out` below the folder returned.

@@ -1,6 +1,5 @@
 //! The tables of a run: output times, columns, numbers that read back, specs that repeat a run.
 
-use assert_cmd::Command;
 use curvelax::{
     backend::cpu::CpuBackend,
     ensemble::{Cell, Ended, Family, Spec, spec::Precision},
@@ -13,6 +12,7 @@ use tempfile::TempDir;
 
 use crate::common::{
     SWEEPS,
+    command::done,
     program::{Row, column, number, positions, run, run_with},
 };
 
@@ -25,10 +25,7 @@ fn the_printed_spec_repeats_the_run_of_the_flags() {
                  --shape flower:3:0.2 --amplitude 0.02 --modes 3..=6 --decay 0.5 --solver direct --relax-to 0.5 \
                  --series 0.004 --snapshots 0.01,0.03 --stop-when-relaxed --threads 1";
     let home = TempDir::new().unwrap();
-    let mut print = Command::cargo_bin("curvelax").unwrap();
-    print.env("XDG_RUNTIME_DIR", home.path()).args(["run", "--backend", "cpu", "--print-spec"]);
-    let printed = print.args(flags.split_whitespace()).output().unwrap();
-    let printed = String::from_utf8(printed.stdout).unwrap();
+    let printed = done(home.path(), &format!("run --backend cpu --print-spec {flags}"));
     let (by_flags, by_file) = (run(flags), run_with(&[("spec.toml", &printed)], "spec.toml"));
     assert!(by_flags.texts() == by_file.texts(), "{printed}");
     assert!(run(&flags.replace("0.0007", "0.0008")).texts() != by_file.texts());

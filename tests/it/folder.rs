@@ -1,13 +1,11 @@
 //! The output folder when the disk or the folder does not let the program finish.
 #![cfg(unix)]
 
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Output},
-};
+use std::{fs, path::Path, process::Output};
 
 use tempfile::TempDir;
+
+use crate::common::command::{self, done, script};
 
 const NOTE: &str = "note: the run was saved: curvelax resume out continues it\n";
 
@@ -18,9 +16,11 @@ fn curvelax(home: &Path, limit: &str, arguments: &str) -> Output {
 }
 
 fn limited(home: &Path, limit: &str, arguments: &str) -> Output {
-    let program = assert_cmd::cargo::cargo_bin("curvelax");
-    let script = format!("ulimit -f {limit}; exec \"$0\" {arguments}");
-    Command::new("sh").args(["-c", &script]).arg(program).current_dir(home).output().unwrap()
+    // A limit that is lower already cannot be raised.
+    if limit == "unlimited" {
+        return command::curvelax(home, arguments);
+    }
+    script("sh", home, &format!("ulimit -f {limit} && exec \"$0\" {arguments}")).output().unwrap()
 }
 
 /// 400 members exceed the buffer of a table, first of that with the longest rows, so that a write fails during the run;
@@ -71,9 +71,8 @@ fn a_disk_that_is_full_for_the_pictures_leaves_the_tables_and_they_can_be_drawn_
     assert!(!out.join("report.html").exists() && !out.join("plots/curves.svg").exists());
     assert!(fs::read_dir(&out).unwrap().all(|entry| !entry.unwrap().file_name().to_string_lossy().contains("part")));
 
-    let program = assert_cmd::cargo::cargo_bin("curvelax");
-    let drawn = Command::new(program).args(["plot", "out", "--quiet"]).current_dir(home.path()).status().unwrap();
-    assert!(drawn.success() && out.join("report.html").exists());
+    done(home.path(), "plot out --quiet");
+    assert!(out.join("report.html").exists());
     assert!(out.join("plots/curves.svg").exists());
     assert!(limited(home.path(), "unlimited", "resume out --quiet").status.success());
     assert!(out.join("plots/curves.svg").exists() && !out.join(".curvelax.state").exists());

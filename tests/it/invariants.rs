@@ -52,11 +52,13 @@ fn relaxed(spec: &Spec, curve: impl Fn(f64) -> DVec2 + Send + Sync + 'static) ->
     (ended.outcome, ended.portrait.unwrap().after)
 }
 
-/// A curve without any symmetry, about as large as the unit circle.
+/// A curve without any symmetry, about as large as the unit circle. Its sines are not those of the system, so that it has
+/// the same bits on every machine.
 fn potato(u: f64) -> DVec2 {
     let theta = TAU * u;
-    let wave = |m: f64, a: f64, phase: f64| a * (m * theta + phase).cos();
-    DVec2::from_angle(theta) * (1.0 + wave(2.0, 0.2, 0.0) + wave(3.0, 0.1, 0.5) + wave(5.0, 0.05, 1.0))
+    let wave = |m: f64, a: f64, phase: f64| a * libm::cos(m * theta + phase);
+    DVec2::new(libm::cos(theta), libm::sin(theta))
+        * (1.0 + wave(2.0, 0.2, 0.0) + wave(3.0, 0.1, 0.5) + wave(5.0, 0.05, 1.0))
 }
 
 /// The fixed step of `spec`, `factor` times as long.

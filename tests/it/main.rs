@@ -33,6 +33,7 @@ mod rows;
 mod scaling;
 mod shaders;
 mod shards;
+mod starts;
 mod statistics;
 mod store;
 mod study;

@@ -7,8 +7,10 @@ use std::{
     process::Output,
 };
 
-use crate::common::program::{Done, run};
-use assert_cmd::Command;
+use crate::common::{
+    command::curvelax,
+    program::{Done, run},
+};
 
 /// A run with everything that `plot` reads: two cells, a series, and members that stay unfinished.
 const RUN: &str = "--curves 3 --points 32 --adaptive=1e-3 --t-end 0.4 --series 0.1 --sweep omega=1,2 --event convex=k_min>=0 \
@@ -16,9 +18,7 @@ const RUN: &str = "--curves 3 --points 32 --adaptive=1e-3 --t-end 0.4 --series 0
 
 #[track_caller]
 fn plot(home: &Path, arguments: &str) -> Output {
-    let mut command = Command::cargo_bin("curvelax").unwrap();
-    command.current_dir(home).env("XDG_RUNTIME_DIR", home).arg("plot").args(arguments.split_whitespace());
-    command.output().unwrap()
+    curvelax(home, &format!("plot {arguments}"))
 }
 
 /// Every file below `folder` with its bytes.

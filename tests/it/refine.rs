@@ -1,6 +1,6 @@
 //! `--refine`, the pilot of every run and `--accuracy`, against runs that are much finer.
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, path::Path, process::Output};
 
 use curvelax::{
     Error,
@@ -11,6 +11,8 @@ use curvelax::{
     relax,
 };
 use tempfile::TempDir;
+
+use crate::common::command::{self, stopped_after};
 
 /// The curves of the tests.
 const PROBLEMS: [&str; 6] = [
@@ -90,8 +92,11 @@ fn a_pilot_tells_the_error_of_fixed_and_adaptive_steps() {
 }
 
 fn curvelax(home: &Path, arguments: &str) -> (Option<i32>, String) {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    let output = command.args(arguments.split_whitespace()).current_dir(home).output().unwrap();
+    told(&command::curvelax(home, arguments))
+}
+
+/// Exit code, and what is on stderr.
+fn told(output: &Output) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
@@ -192,8 +197,7 @@ fn a_goal_beyond_reach_is_refused_with_what_was_reached() {
 fn a_run_whose_error_cannot_be_told_says_why() {
     let home = TempDir::new().unwrap();
     let flags = "run --points 16 --modes 2..=4 --curves 2 --tau 0.01 --backend cpu --out out";
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    let output = command.args(flags.split_whitespace()).current_dir(home.path()).output().unwrap();
+    let output = command::curvelax(home.path(), flags);
     let told = String::from_utf8_lossy(&output.stdout);
     assert!(told.contains("discretisation not known: no member has times at n, n/√2 and n/2 nodes"), "{told}");
     assert_eq!(fs::read_to_string(home.path().join("out/levels.csv")).unwrap().lines().count(), 1);
@@ -208,8 +212,9 @@ fn rounds_can_be_stopped_and_members_that_relax_late_have_limits() {
     let taken = "run --accurate --accuracy 1e-3 --shape nonconvex --curves 400 --backend cpu --out file";
     let (code, said) = curvelax(home.path(), taken);
     assert!(code == Some(2) && said.contains("exists but is not a folder") && !said.contains("round"), "{said}");
-    let long = "run --accurate --accuracy 1e-3 --shape nonconvex --curves 400 --backend cpu --max-time 1s --out long";
-    let (code, said) = curvelax(home.path(), long);
+    // After one round, many remain.
+    let long = "run --accurate --accuracy 1e-3 --shape nonconvex --curves 400 --backend cpu --out long";
+    let (code, said) = told(&stopped_after(home.path(), long, "round 1: "));
     assert_eq!(code, Some(75), "{said}");
     assert!(said.contains("in the rounds of --accuracy") && !home.path().join("long").exists(), "{said}");
     // Coarse levels relax later than the end of the run.

@@ -4,7 +4,10 @@ use std::{fs, path::Path};
 
 use glam::DVec2;
 
-use crate::common::program::{Done, Row, number, run_with};
+use crate::common::{
+    command::done,
+    program::{Done, Row, number, run_with},
+};
 
 /// A power of two loses no bits.
 const EXACT: [f64; 5] = [1.0, 9.313225746154785e-10, 0.125, 1024.0, 1073741824.0];
@@ -171,12 +174,7 @@ fn a_member_that_does_not_relax_ends_at_the_cap() {
 #[test]
 fn shards_with_times_by_size_merge_to_the_whole_run() {
     let home = tempfile::tempdir().unwrap();
-    let program = |arguments: &str| {
-        let mut command = assert_cmd::Command::cargo_bin("curvelax").unwrap();
-        command.current_dir(&home).env("XDG_RUNTIME_DIR", home.path());
-        let output = command.args(arguments.split_whitespace()).arg("--quiet").output().unwrap();
-        assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
-    };
+    let program = |arguments: &str| done(home.path(), &format!("{arguments} --quiet"));
     let study = "--backend cpu --threads 1 --curves 5 --points 34 --tau auto --solver direct --t-end auto --sweep \
                  shape=ellipse:2,1;circle:0.001;lemniscate:1";
     program(&format!("run {study} --out whole"));

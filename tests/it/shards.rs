@@ -4,7 +4,7 @@ use std::{
     collections::BTreeMap,
     fs::{self, File},
     path::Path,
-    process::{Command, Output},
+    process::Output,
 };
 
 use curvelax::{
@@ -14,25 +14,14 @@ use curvelax::{
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::common::command::{command, curvelax, script, stopped_after, stopped_run};
+
 /// Cells of unequal cost, all files, members that end in several ways.
 const STUDY: &str = "--backend cpu --curves 22 --points 34 --sweep shape=ellipse:2,1;lemniscate:1;circle:1 --adaptive=1e-3 \
                      --stop-when-relaxed --t-end 0.4 --series 0.05 --snapshots 0,0.1,0.4 --event slow=excess<=0.5*start \
                      --event never=length<=0.1";
 /// A quick study with 12 members.
 const SMALL: &str = "--backend cpu --curves 12 --points 34 --tau 1e-3 --t-end 0.01 --solver direct";
-
-fn program(home: &Path, arguments: &str) -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("curvelax"));
-    command.args(arguments.split_whitespace()).current_dir(home).env("XDG_RUNTIME_DIR", home);
-    for name in ["SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "CURVELAX_SHARDS"] {
-        command.env_remove(name);
-    }
-    command
-}
-
-fn curvelax(home: &Path, arguments: &str) -> Output {
-    program(home, arguments).output().unwrap()
-}
 
 /// Its message on stderr, if it ended with this code.
 #[track_caller]
@@ -160,8 +149,8 @@ fn more_shards_than_files_may_be_open_are_joined() {
     done(home.path(), &format!("run {study} --out one"));
     sharded(home.path(), study, 80, "all");
     fs::remove_dir_all(home.path().join("all")).unwrap();
-    let merge = format!("ulimit -n 40; exec {} merge all-80/* --out all --quiet", env!("CARGO_BIN_EXE_curvelax"));
-    let output = Command::new("bash").args(["-c", &merge]).current_dir(home.path()).output().unwrap();
+    let merge = "ulimit -n 40; exec \"$0\" merge all-80/* --out all --quiet";
+    let output = script("bash", home.path(), merge).output().unwrap();
     assert_eq!(said(&output, 0), "");
     assert_eq!(differences(&home.path().join("one"), &home.path().join("all")), [""; 0]);
 }
@@ -219,6 +208,14 @@ fn refused(home: &Path, arguments: &str, words: &[&str]) {
     let line = message.lines().last().unwrap_or_default();
     assert!(words.iter().all(|word| line.contains(word)), "{arguments}: {message}");
     assert!(!home.join("no").exists(), "{arguments}: something was written");
+}
+
+/// A lock as a run holds it. It ends with `unlock` at once. A file that is only dropped may live on for a moment in a child
+/// that another test is starting.
+fn locked(path: &Path) -> File {
+    let lock = File::create(path).unwrap();
+    lock.lock().unwrap();
+    lock
 }
 
 /// The three shards of [`SMALL`] in `s/0`, `s/1`, `s/2`.
@@ -313,13 +310,12 @@ fn shards_that_are_not_what_they_were_are_refused_by_name() {
     fs::write(path.join("s/2/shard.state"), state).unwrap();
 
     // One that is running, and one that was interrupted.
-    let lock = File::create(path.join("s/0/.curvelax.lock")).unwrap();
-    lock.lock().unwrap();
+    let lock = locked(&path.join("s/0/.curvelax.lock"));
     refused(path, MERGE, &["2 of 3 shards are done", "s/0: a run is writing here"]);
-    drop(lock);
+    lock.unlock().unwrap();
     fs::remove_file(path.join("s/0/.curvelax.lock")).unwrap();
     let long = SMALL.replace("1e-3", "1e-9").replace("0.01", "1");
-    said(&curvelax(path, &format!("run {long} --shard 2/3 --max-time 1s --out long")), 75);
+    stopped_run(path, &format!("run {long} --shard 2/3"), "long");
     refused(path, "merge long --out no", &["shard 2/3: long: interrupted; curvelax resume long continues it"]);
     done(path, MERGE);
 }
@@ -331,7 +327,7 @@ fn what_is_missing_is_printed_with_the_line_that_submits_it() {
         done(home.path(), &format!("run {SMALL} --shard {index}/12 --out s/{index}"));
     }
     let long = SMALL.replace("1e-3", "1e-9");
-    said(&curvelax(home.path(), &format!("run {long} --shard 5/12 --max-time 1s --out s/5")), 75);
+    stopped_run(home.path(), &format!("run {long} --shard 5/12"), "s/5");
     let printed = |arguments: &str| {
         let output = curvelax(home.path(), arguments);
         assert_eq!(said(&output, 0), "");
@@ -368,11 +364,9 @@ fn what_is_missing_of_a_billion_shards_is_told_as_ranges() {
         done(home.path(), &format!("{huge} {more} --shard 7/1000000000 --out {out}/7"));
     }
     let missing = |folder: &str| {
-        let mut limited = Command::new("sh");
         // Listing each shard by number would take 8 GB.
         let line = "ulimit -v 1000000; exec \"$0\" merge --missing \"$1\"";
-        let program = assert_cmd::cargo::cargo_bin("curvelax");
-        let output = limited.current_dir(home.path()).args(["-c", line]).arg(program).arg(folder).output().unwrap();
+        let output = script("sh", home.path(), line).arg(folder).output().unwrap();
         assert_eq!(said(&output, 0), "");
         String::from_utf8(output.stdout).unwrap()
     };
@@ -387,8 +381,8 @@ fn what_is_missing_of_a_billion_shards_is_told_as_ranges() {
 fn a_task_of_a_job_array_knows_its_shard() {
     let home = TempDir::new().unwrap();
     let run = |variables: &[(&str, &str)]| {
-        let mut command = program(home.path(), &format!("run {SMALL} --shard slurm --print-spec"));
-        let output = command.envs(variables.iter().copied()).output().unwrap();
+        let mut job = command(home.path(), &format!("run {SMALL} --shard slurm --print-spec"));
+        let output = job.envs(variables.iter().copied()).output().unwrap();
         let text = [output.stdout, output.stderr].concat();
         (output.status.code(), String::from_utf8(text).unwrap())
     };
@@ -428,18 +422,17 @@ fn one_line_begins_a_run_goes_on_with_it_and_leaves_it() {
     // A billion steps: it is never over.
     let long = SMALL.replace("1e-3", "1e-9").replace("0.01", "1");
     let line = format!("run {long} --only 1,3 --resume --out out");
-    said(&curvelax(home.path(), &format!("{line} --max-time 1s")), 75);
+    stopped_run(home.path(), &format!("run {long} --only 1,3 --resume"), "out");
     // An orphan of this job is still running.
-    let lock = File::create(home.path().join("out/.curvelax.lock")).unwrap();
-    lock.lock().unwrap();
+    let lock = locked(&home.path().join("out/.curvelax.lock"));
     refused(home.path(), &line, &["out: a run is writing here"]);
-    drop(lock);
+    lock.unlock().unwrap();
     refused(
         home.path(),
         &format!("{line} --seed 2"),
         &["--resume: the run in out has another spec: seed is 1 there and 2 here"],
     );
-    let message = said(&curvelax(home.path(), &format!("{line} --max-time 1s")), 75);
+    let message = said(&stopped_after(home.path(), &line, "resuming: "), 75);
     assert!(message.contains("resuming: 0 of 2 members are in the table"), "{message}");
     let short = format!("run {SMALL} --resume --out short");
     // A folder in which nothing was begun is not in the way.

@@ -8,7 +8,7 @@ use std::{fs, path::PathBuf};
 use curvelax::statistics::{
     Bootstrap, Description, Interval, KaplanMeier, Line, Observation, PowerLaw, Sample, log_rank,
 };
-use proptest::prelude::*;
+use proptest::{prelude::*, test_runner::RngSeed};
 use toml::{Table, Value};
 
 const SETS: [&str; 5] = ["leukaemia", "ties", "heavy", "uncensored", "thousand"];
@@ -341,11 +341,21 @@ fn survival_by_definition(observations: &[Observation], t: f64) -> f64 {
     times.iter().map(factor).product()
 }
 
+/// The same cases in every run, or others with `CURVELAX_TESTS=all`; the seed that is printed is then that of `Fixed`.
+fn seed() -> RngSeed {
+    let seed = match std::env::var("CURVELAX_TESTS") {
+        Ok(tests) if tests == "all" => std::time::UNIX_EPOCH.elapsed().map_or(1, |time| time.as_nanos() as u64),
+        _ => 1,
+    };
+    eprintln!("random cases of seed {seed}");
+    RngSeed::Fixed(seed)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 300,
         failure_persistence: None,
-        rng_seed: proptest::test_runner::RngSeed::Fixed(1), // the same cases in every run
+        rng_seed: seed(),
         ..ProptestConfig::default()
     })]
 

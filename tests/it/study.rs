@@ -1,6 +1,9 @@
 //! Studies from outside: cells, their members and their tables.
 
-use crate::common::program::{Done, FILES, run, run_with};
+use crate::common::{
+    command::program,
+    program::{Done, FILES, run, run_with},
+};
 
 const BASE: &str = "--curves 5 --points 34 --t-end 0.05 --series 0.02 --snapshots 0.03 --adaptive=1e-3";
 
@@ -37,9 +40,7 @@ fn the_specs_of_the_examples_are_right() {
         std::fs::read_dir(root.join("examples/specs")).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert!(files.len() >= 4);
     for file in files {
-        let mut command = assert_cmd::Command::cargo_bin("curvelax").unwrap();
-        command.current_dir(root).env("XDG_RUNTIME_DIR", root).arg("run").arg(&file).arg("--print-spec");
-        let output = command.output().unwrap();
+        let output = program(root).arg("run").arg(&file).arg("--print-spec").output().unwrap();
         let printed = String::from_utf8(output.stdout).unwrap();
         assert!(output.status.success() && printed.contains("[sweep]"), "{}: {:?}", file.display(), output.stderr);
     }

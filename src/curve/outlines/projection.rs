@@ -180,7 +180,7 @@ fn close_over_poles(ring: &mut RingPoints) {
 mod tests {
     use std::path::Path;
 
-    use proptest::prelude::*;
+    use proptest::{prelude::*, test_runner::RngSeed};
 
     use super::*;
     use crate::curve::outline::Places;
@@ -203,11 +203,20 @@ mod tests {
         DVec3::new(latitude.cos() * longitude.cos(), latitude.cos() * longitude.sin(), latitude.sin())
     }
 
+    /// The same cases in every run, or others with `CURVELAX_TESTS=all`; the seed that is printed is then that of `Fixed`.
+    fn seed() -> RngSeed {
+        let seed = match std::env::var("CURVELAX_TESTS") {
+            Ok(tests) if tests == "all" => std::time::UNIX_EPOCH.elapsed().map_or(1, |time| time.as_nanos() as u64),
+            _ => 1,
+        };
+        eprintln!("random cases of seed {seed}");
+        RngSeed::Fixed(seed)
+    }
+
     proptest! {
-        // The same cases in every run.
         #![proptest_config(ProptestConfig {
             failure_persistence: None,
-            rng_seed: proptest::test_runner::RngSeed::Fixed(1),
+            rng_seed: seed(),
             ..ProptestConfig::default()
         })]
         #[test]
