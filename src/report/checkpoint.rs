@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     curve::outlines,
-    ensemble::{Ended, Paused, Standing, Study},
+    ensemble::{Ended, Outlines, Paused, Standing, Study},
     error::{Error, Result},
     files::{
         folder::OutputFolder,
@@ -93,7 +93,7 @@ impl Origin {
     /// [`Error::Request`] for outlines in a current folder without a name.
     pub fn new(study: &Study, platform: Platform) -> Result<Origin> {
         let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let outlines: Vec<(PathBuf, u32)> = files(study).into_iter().collect();
+        let outlines: Vec<(PathBuf, u32)> = files(&study.outlines()).into_iter().collect();
         let base = if outlines.is_empty() { String::new() } else { here()? };
         Ok(Origin { spec: study.spec().to_toml()?, platform, moves: Vec::new(), base, outlines, started })
     }
@@ -103,11 +103,13 @@ impl Origin {
     /// # Errors
     /// [`Error::Request`] naming the first that differs.
     pub fn check_outlines(&self, study: &Study) -> Result<()> {
-        let read = files(study);
-        match self.outlines.iter().find(|(path, crc)| read.get(path) != Some(crc)) {
-            None => Ok(()),
-            Some((path, _)) => Err(self.changed(path)),
-        }
+        self.differs(&study.outlines()).map_or(Ok(()), |path| Err(self.changed(path)))
+    }
+
+    /// The first file of the beginning that is not among these, as it was.
+    pub fn differs(&self, outlines: &Outlines) -> Option<&Path> {
+        let read = files(outlines);
+        self.outlines.iter().find(|(path, crc)| read.get(path) != Some(crc)).map(|(path, _)| path.as_path())
     }
 
     /// The error that outlines have changed, or else `error`.
@@ -120,16 +122,15 @@ impl Origin {
 
     fn changed(&self, path: &Path) -> Error {
         Error::Request(format!(
-            "the outline {} has changed or disappeared since the run began: restore it, or start over",
+            "the outline {} has changed or disappeared since the run began: restore it, or continue with what was read then by curvelax resume",
             Path::new(&self.base).join(path).display()
         ))
     }
 }
 
-/// The files of the outlines of a study, with the CRC-32C of each as read.
-fn files(study: &Study) -> BTreeMap<PathBuf, u32> {
-    let all = study.cells().iter().flat_map(|cell| cell.family.outlines());
-    all.map(|one| (one.file.clone(), one.outline.digest())).collect()
+/// The files of outlines, with the CRC-32C of each as read.
+fn files(outlines: &Outlines) -> BTreeMap<PathBuf, u32> {
+    outlines.all().map(|one| (one.file.clone(), one.outline.digest())).collect()
 }
 
 /// The path of the current folder.
