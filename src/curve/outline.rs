@@ -101,6 +101,12 @@ impl Outline {
         Outline { vertices, reached, simple: true, warnings: Vec::new(), digest: 0 }
     }
 
+    /// The outline that was taken apart into these parts; `None` if they cannot be those of one.
+    pub(super) fn of_parts(vertices: Vec<DVec2>, simple: bool, warnings: Vec<String>, digest: u32) -> Option<Outline> {
+        let valid = (3..=MAX_POINTS).contains(&vertices.len()) && vertices.iter().all(|point| point.is_finite());
+        valid.then(|| Outline { simple, warnings, digest, ..Outline::through(vertices) })
+    }
+
     /// The same outline, read from a file whose bytes have the CRC-32C `digest`, with more to say about it.
     pub(super) fn read_as(mut self, digest: u32, notes: impl IntoIterator<Item = String>) -> Outline {
         self.warnings.extend(notes);

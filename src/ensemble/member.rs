@@ -103,6 +103,7 @@ enum Curves {
 
 /// The group of outlines that do not have the property.
 const NO_GROUP: &str = "(none)";
+
 /// The outlines of a shape, with the sizes of those that stand for all: measured once for all cells and levels.
 pub(super) struct OutlineSet {
     pub(super) all: Vec<Labelled>,
@@ -260,6 +261,14 @@ impl Family {
     /// The outlines of the members, if they are read from files: that of member j is the one at j modulo their number.
     pub fn outlines(&self) -> &[Labelled] {
         self.curves.outlines()
+    }
+
+    /// The same with their sizes.
+    pub(super) fn outline_set(&self) -> Option<&Arc<OutlineSet>> {
+        match &self.curves {
+            Curves::Outlines(set) => Some(set),
+            _ => None,
+        }
     }
 
     /// The outline of member `index`, if it is read from a file.

@@ -36,6 +36,7 @@ pub use levels::{LevelRow, LevelTimes, RefinementLevel};
 pub use member::{Family, Member};
 pub use mollifier::Mollified;
 pub use outcome::{Observables, Outcome, Portrait, SeriesRow, Snapshot, Status};
+pub use outlines::Outlines;
 pub use rows::{Extent, Rows};
 pub use shard::Shard;
 pub use sink::{Sink, Wish};

@@ -2,33 +2,42 @@
 
 use std::{path::Path, sync::Arc};
 
-use super::{Drawn, Spec, member::OutlineSet};
+use super::{Cell, Drawn, Spec, member::OutlineSet};
 use crate::{
-    curve::{Shape, outlines::Labelled},
+    curve::{
+        Shape,
+        outlines::{Labelled, SavedOutline},
+    },
     error::{Error, Result, echo, shortened},
     text::count,
 };
 
 /// The outlines of the shapes of a spec that are read from files.
-pub(super) struct Outlines {
+#[derive(Clone, Default)]
+pub struct Outlines {
     sets: Vec<(Shape, Arc<OutlineSet>)>,
     /// There are shapes that are not.
     has_formulas: bool,
 }
 
 impl Outlines {
-    /// Reads those of `spec` and its sweep; paths are relative to the directory `base`.
+    /// Those of `spec` and its sweep: from `known` if it has them, and otherwise read from files, whose paths are relative
+    /// to the directory `base`.
     ///
     /// # Errors
     /// [`Error::Request`] for everything that [`Shape::outlines_from`] refuses.
-    pub fn read(spec: &Spec, base: &Path) -> Result<Outlines> {
+    pub(super) fn read(spec: &Spec, base: &Path, known: &Outlines) -> Result<Outlines> {
         let swept = spec.sweep.axes().iter().filter(|axis| axis.key == "shape").flat_map(|axis| &axis.values);
         // Other values are refused with their cell, later.
         let swept: Vec<Drawn<Shape>> = swept.filter_map(|value| value.as_str()?.parse().ok()).collect();
         let shapes = if swept.is_empty() { vec![&spec.shape] } else { swept.iter().collect() };
-        let mut outlines = Outlines { sets: Vec::new(), has_formulas: false };
+        let mut outlines = Outlines::default();
         for shape in shapes.into_iter().map(Drawn::typical) {
             if outlines.of(shape).is_some() {
+                continue;
+            }
+            if let Some(set) = known.of(shape) {
+                outlines.sets.push((shape.clone(), Arc::clone(set)));
                 continue;
             }
             let Some(read) = shape.outlines_from(base) else {
@@ -44,8 +53,48 @@ impl Outlines {
         Ok(outlines)
     }
 
+    /// Those of all shapes of some cells.
+    pub(super) fn of_cells(cells: &[Cell]) -> Outlines {
+        let mut outlines = Outlines::default();
+        for cell in cells {
+            let shape = cell.spec.shape.typical();
+            match cell.family.outline_set() {
+                Some(set) if outlines.of(shape).is_none() => outlines.sets.push((shape.clone(), Arc::clone(set))),
+                _ => {}
+            }
+        }
+        outlines
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.sets.is_empty()
+    }
+
+    /// All of them, shape by shape.
+    pub fn all(&self) -> impl Iterator<Item = &Labelled> {
+        self.sets.iter().flat_map(|(_, set)| &set.all)
+    }
+
+    /// The text of each shape with its outlines in parts.
+    pub fn saved(&self) -> Vec<(String, Vec<SavedOutline<'_>>)> {
+        self.sets
+            .iter()
+            .map(|(shape, set)| (shape.to_string(), set.all.iter().map(SavedOutline::new).collect()))
+            .collect()
+    }
+
+    /// The outlines of which these are the parts; `None` if there are none.
+    pub fn restored(saved: Vec<(String, Vec<SavedOutline<'_>>)>) -> Option<Outlines> {
+        let set = |(shape, parts): (String, Vec<SavedOutline<'_>>)| {
+            let all: Option<Vec<Labelled>> = parts.into_iter().map(SavedOutline::restored).collect();
+            Some((shape.parse().ok()?, OutlineSet::new(all?).ok()?.into()))
+        };
+        Some(Outlines { sets: saved.into_iter().map(set).collect::<Option<_>>()?, has_formulas: false })
+    }
+
     /// Those of a shape, if it is read from files.
-    pub fn of(&self, shape: &Shape) -> Option<&Arc<OutlineSet>> {
+    pub(super) fn of(&self, shape: &Shape) -> Option<&Arc<OutlineSet>> {
         self.sets.iter().find(|(known, _)| known == shape).map(|(_, set)| set)
     }
 
@@ -55,7 +104,7 @@ impl Outlines {
     /// # Errors
     /// [`Error::Request`] for cells with unequal numbers of outlines, for another number than `spec` has, and for keys that
     /// mean nothing with outlines, or only with them.
-    pub fn settle(&self, mut spec: Spec) -> Result<Spec> {
+    pub(super) fn settle(&self, mut spec: Spec) -> Result<Spec> {
         let several = |(shape, set): &&(Shape, Arc<OutlineSet>)| matches!(shape, Shape::Files(_)) || set.all.len() > 1;
         let Some((first, set)) = self.sets.iter().find(several) else {
             if let Some(asked) = spec.outlines.filter(|asked| *asked != 1) {

@@ -41,15 +41,16 @@ impl Study {
     /// [`Error::Request`] for a value out of range, naming its cell; for curves with different numbers of nodes that
     /// would share an array; and for more curves than fit into memory.
     pub fn new(spec: Spec) -> Result<Study> {
-        Study::new_from(spec, Path::new(""))
+        Study::new_from(spec, Path::new(""), &Outlines::default())
     }
 
-    /// Does the same as [`Study::new`], with paths in the spec relative to the directory `base`.
+    /// Does the same as [`Study::new`], with the outlines that are `known`; other paths in the spec are relative to the
+    /// directory `base`.
     ///
     /// # Errors
     /// As [`Study::new`].
-    pub fn new_from(spec: Spec, base: &Path) -> Result<Study> {
-        let outlines = Outlines::read(&spec, base)?;
+    pub fn new_from(spec: Spec, base: &Path, known: &Outlines) -> Result<Study> {
+        let outlines = Outlines::read(&spec, base, known)?;
         let spec = outlines.settle(spec)?;
         let (free, given) = (spec.gives_no_times(), spec.clone());
         let spec = spec.validate()?;
@@ -89,6 +90,11 @@ impl Study {
     /// Its cells; one if nothing is swept.
     pub fn cells(&self) -> &[Cell] {
         &self.cells
+    }
+
+    /// The outlines of its shapes that are read from files.
+    pub fn outlines(&self) -> Outlines {
+        Outlines::of_cells(&self.cells)
     }
 
     /// Its stages, in the order in which they run: the levels, and then its own members.
@@ -548,7 +554,7 @@ mod tests {
     fn more_curves_than_a_memory_holds_are_refused_before_they_are_made() {
         // Parameter sampling is quick, and its tables are a fraction of those for equal spacing.
         let spec = swept(&["sampling=parameter,arclength"], Spec { points: 1_000_000, ..Spec::default() });
-        let outlines = Outlines::read(&spec, Path::new("")).unwrap();
+        let outlines = Outlines::read(&spec, Path::new(""), &Outlines::default()).unwrap();
         let bytes = |held: usize| cell(&spec, &outlines, 0, &[], &mut { held });
         assert!(bytes(MAX_BYTES - 16_000_000).is_ok());
         let message = bytes(MAX_BYTES - 15_999_999).err().unwrap().to_string();

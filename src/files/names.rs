@@ -164,6 +164,9 @@ pub const STATE_OLD: &str = ".curvelax.state.old";
 /// The next checkpoint, while it is being written.
 pub const STATE_PART: &str = ".curvelax.state.part";
 
+/// What was read of outlines, for as long as there is a checkpoint, see [`outlines`](crate::report::outlines).
+pub const OUTLINES: &str = ".curvelax.outlines";
+
 /// Tests whether a folder can be written, and holds the replacement of another file.
 pub const PROBE: &str = ".curvelax.part";
 

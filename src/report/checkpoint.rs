@@ -17,7 +17,8 @@ use super::{
     fingerprint::fingerprint,
 };
 use crate::{
-    ensemble::{Ended, Paused, Standing, Study},
+    curve::outlines,
+    ensemble::{Ended, Outlines, Paused, Standing, Study},
     error::{Error, Result},
     files::{
         folder::OutputFolder,
@@ -27,7 +28,6 @@ use crate::{
         spill::SpilledRows,
         zarr,
     },
-    input::{self, MAX_OUTLINE},
     placement::Platform,
     results::tally::Aside,
 };
@@ -93,7 +93,7 @@ impl Origin {
     /// [`Error::Request`] for outlines in a current folder without a name.
     pub fn new(study: &Study, platform: Platform) -> Result<Origin> {
         let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let outlines: Vec<(PathBuf, u32)> = files(study).into_iter().collect();
+        let outlines: Vec<(PathBuf, u32)> = files(&study.outlines()).into_iter().collect();
         let base = if outlines.is_empty() { String::new() } else { here()? };
         Ok(Origin { spec: study.spec().to_toml()?, platform, moves: Vec::new(), base, outlines, started })
     }
@@ -103,51 +103,34 @@ impl Origin {
     /// # Errors
     /// [`Error::Request`] naming the first that differs.
     pub fn check_outlines(&self, study: &Study) -> Result<()> {
-        let read = files(study);
-        match self.outlines.iter().find(|(path, crc)| read.get(path) != Some(crc)) {
-            None => Ok(()),
-            Some((path, _)) => Err(self.changed(path)),
-        }
+        self.differs(&study.outlines()).map_or(Ok(()), |path| Err(self.changed(path)))
+    }
+
+    /// The first file of the beginning that is not among these, as it was.
+    pub fn differs(&self, outlines: &Outlines) -> Option<&Path> {
+        let read = files(outlines);
+        self.outlines.iter().find(|(path, crc)| read.get(path) != Some(crc)).map(|(path, _)| path.as_path())
     }
 
     /// The error that outlines have changed, or else `error`.
     pub fn explain(&self, error: Error) -> Error {
-        self.first_changed(Path::new(&self.base)).map_or(error, |path| self.changed(path))
-    }
-
-    /// Follows outlines that were moved together with the `folder` of the run, such as those of a project: if they are
-    /// not where they were, paths are relative to the nearest folder around it from which all are found, unchanged.
-    /// Returns whether they were moved.
-    pub fn follow(&mut self, folder: &Path) -> bool {
-        if self.outlines.is_empty() || self.first_changed(Path::new(&self.base)).is_none() {
-            return false;
-        }
-        let around = folder.ancestors().skip(1).filter(|folder| self.first_changed(folder).is_none());
-        let found = around.filter_map(Path::to_str).map(String::from).next();
-        let is_moved = found.is_some();
-        self.base = found.unwrap_or_else(|| std::mem::take(&mut self.base));
-        is_moved
-    }
-
-    /// The first outline that, with paths relative to `base`, is not as it was.
-    fn first_changed(&self, base: &Path) -> Option<&Path> {
-        let digest = |path: &Path| input::bytes(&base.join(path), MAX_OUTLINE).ok().map(|bytes| crc32c::crc32c(&bytes));
-        self.outlines.iter().find(|(path, crc)| digest(path) != Some(*crc)).map(|(path, _)| path.as_path())
+        let read = |path| outlines::read_all(Path::new(&self.base), path).ok();
+        let digest = |path| read(path).and_then(|all| all.first().map(|one| one.outline.digest()));
+        let changed = self.outlines.iter().find(|(path, crc)| digest(path) != Some(*crc));
+        changed.map_or(error, |(path, _)| self.changed(path))
     }
 
     fn changed(&self, path: &Path) -> Error {
         Error::Request(format!(
-            "the outline {} has changed or disappeared since the run began: restore it, put it in the same place next to \
-             the run, or start over",
+            "the outline {} has changed or disappeared since the run began: restore it, or continue with what was read then by curvelax resume",
             Path::new(&self.base).join(path).display()
         ))
     }
 }
 
-/// The files of the outlines of a study, with the CRC-32C of each as read.
-fn files(study: &Study) -> BTreeMap<PathBuf, u32> {
-    let all = study.cells().iter().flat_map(|cell| cell.family.outlines());
-    all.map(|one| (one.file.clone(), one.outline.digest())).collect()
+/// The files of outlines, with the CRC-32C of each as read.
+fn files(outlines: &Outlines) -> BTreeMap<PathBuf, u32> {
+    outlines.all().map(|one| (one.file.clone(), one.outline.digest())).collect()
 }
 
 /// The path of the current folder.

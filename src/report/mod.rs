@@ -13,6 +13,7 @@ pub mod gallery;
 pub mod growing;
 pub mod merge;
 pub mod movie;
+pub mod outlines;
 pub mod overview;
 pub mod page;
 pub mod pictures;
@@ -96,7 +97,8 @@ impl RunReport {
     pub fn begin(folder: OutputFolder, study: &Study, origin: Origin, manner: Manner) -> Result<RunReport> {
         let growing = Growing::begin(&folder, study.spec(), study.points())?;
         let mut report = RunReport::new(folder, growing, study, origin, manner);
-        match report.checkpoint(&Standing { resident: Some(BTreeMap::new()), ..Standing::default() }) {
+        let first = Standing { resident: Some(BTreeMap::new()), ..Standing::default() };
+        match outlines::save(&report.folder, &study.outlines()).and_then(|()| report.checkpoint(&first)) {
             Ok(()) => Ok(report),
             Err(error) => {
                 let error = report.explain(error);

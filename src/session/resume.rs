@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use super::{Completed, Host, Work};
 use crate::{
-    ensemble::{Spec, Standing, Study, spec::BackendChoice},
+    ensemble::{Outlines, Spec, Standing, Study, spec::BackendChoice},
     error::{Error, Result},
     files::{OutputFolder, names},
     report::{
         Manner, RunReport,
         checkpoint::{self, Head, Saved},
-        reader,
+        outlines, reader,
     },
     text::quoted,
 };
@@ -136,19 +136,20 @@ fn continue_in(
         host.say(&format!("warning: {}: {fault}", path.display()));
     }
     let origin = &mut saved.head.origin;
-    if !origin.outlines.is_empty() {
-        folder.make_absolute()?;
-        if origin.follow(folder.path()) {
-            host.say(&format!("note: outlines are read from {}, where they are now", origin.base));
-        }
-        check_base(Path::new(&origin.base))?;
-    }
     let base = PathBuf::from(&origin.base);
+    let known = outlines::find(&folder, origin).unwrap_or_else(|fault| {
+        host.say(&format!("warning: {}: {fault}", path.display()));
+        Outlines::default()
+    });
+    if known.is_empty() && !origin.outlines.is_empty() {
+        folder.make_absolute()?;
+        check_base(&base)?;
+    }
     let began = origin.platform.clone();
     let elsewhere = place.backend.is_some() || place.adapter.is_some();
     let (new_threads, why) = (place.threads.is_some(), place.why.take());
     let work = spec(&origin.spec, place)
-        .and_then(|spec| Work::new_from(spec, &base))
+        .and_then(|spec| Work::new_from(spec, &base, &known))
         .map_err(|error| origin.explain(error))?;
     let work = if why.is_some() { work.because("the GPU failed") } else { work };
     origin.check_outlines(&work.study)?;

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use super::{Completed, Host};
 use crate::{
     backend::{Backend, DeviceKind},
-    ensemble::{Cell, Ended, Extent, Judged, LevelRow, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish},
+    ensemble::{
+        Cell, Ended, Extent, Judged, LevelRow, Outlines, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish,
+    },
     error::{Error, Result},
     placement::{self, Choice, OpeningWatch, Platform},
     report::RunReport,
@@ -28,12 +30,13 @@ pub struct Work {
 impl Work {
     /// Checks everything that can be wrong with `spec` on this machine.
     pub fn new(spec: Spec) -> Result<Work> {
-        Work::new_from(spec, Path::new(""))
+        Work::new_from(spec, Path::new(""), &Outlines::default())
     }
 
-    /// Does the same as [`Work::new`], with paths in the spec relative to the directory `base`.
-    pub fn new_from(spec: Spec, base: &Path) -> Result<Work> {
-        let mut study = Study::new_from(spec.clone(), base)?;
+    /// Does the same as [`Work::new`], with the outlines that are `known`; other paths in the spec are relative to the
+    /// directory `base`.
+    pub fn new_from(spec: Spec, base: &Path, known: &Outlines) -> Result<Work> {
+        let mut study = Study::new_from(spec.clone(), base, known)?;
         let choices = placement::choose_all(&study)?;
         placement::settle(&mut study, &choices);
         Ok(Work { study, choices, asked: (spec, base.into()), opened: None })
@@ -54,7 +57,7 @@ impl Work {
             host.say(&format!("note: on the CPU instead: {}", platform.reason));
             let (asked, base) = &self.asked;
             let spec = Spec { backend: platform.backend.into(), adapter: None, ..asked.clone() };
-            *self = Work::new_from(spec, &base.clone())?.because(&platform.reason);
+            *self = Work::new_from(spec, &base.clone(), &self.study.outlines())?.because(&platform.reason);
             self.opened = Some(None);
             return Ok(self.platform());
         }

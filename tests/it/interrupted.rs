@@ -59,7 +59,7 @@ fn refused_place(home: &Path, run: &str, words: &str) {
 }
 
 #[test]
-fn an_outline_is_found_again_from_anywhere_and_has_to_be_the_same() {
+fn a_run_resumes_from_what_it_read_of_its_outline_wherever_that_is() {
     let home = TempDir::new().unwrap();
     let (begun, elsewhere) = (home.path().join("begun"), home.path().join("elsewhere"));
     [&begun, &elsewhere].into_iter().for_each(|folder| fs::create_dir(folder).unwrap());
@@ -69,40 +69,36 @@ fn an_outline_is_found_again_from_anywhere_and_has_to_be_the_same() {
     fs::write(elsewhere.join("square.csv"), "x,y\n0,0\n2,0\n0,1\n").unwrap();
     let run = format!("run --backend cpu --shape file:square.csv {LONG}");
     stopped_run(&begun, &run, "out");
+    let resumed = |run: &str| {
+        let message = said(&stopped_after(&elsewhere, &format!("resume {run}"), "resuming: "), 75);
+        assert!(message.contains("resuming: 0 of 3 members") && !message.contains("warning"), "{message}");
+    };
     fs::write(begun.join("square.csv"), square.replace("1,1", "1,1.5")).unwrap();
-    refused(&elsewhere, "../begun/out", "", &["square.csv has changed or disappeared since the run began"]);
+    resumed("../begun/out");
     fs::remove_file(begun.join("square.csv")).unwrap();
-    refused(&elsewhere, "../begun/out", "", &["square.csv has changed or disappeared since the run began"]);
-    fs::write(begun.join("square.csv"), square).unwrap();
-    let message = said(&stopped_after(&elsewhere, "resume ../begun/out", "resuming: "), 75);
-    assert!(message.contains("resuming: 0 of 3 members"), "{message}");
+    resumed("../begun/out");
+    fs::rename(&begun, home.path().join("moved")).unwrap();
+    resumed("../moved/out");
 }
 
 #[test]
-fn a_project_that_was_moved_is_resumed_with_its_outlines() {
+fn a_damaged_copy_of_the_outlines_is_replaced_by_their_files() {
     let home = TempDir::new().unwrap();
-    let [before, after] = ["before", "after"].map(|name| home.path().join(name));
-    fs::create_dir_all(before.join("shapes")).unwrap();
-    for (name, y) in [("a", "1.5"), ("b", "1.25")] {
-        fs::write(before.join(format!("shapes/{name}.csv")), format!("x,y\n0,0\n1,0\n1,{y}\n0,1\n")).unwrap();
-    }
-    let run =
-        "run --backend cpu --shape files:shapes/*.csv --curves 2000 --points 34 --adaptive=1e-4 --threads 1 --quiet";
-    said(&curvelax(&before, &format!("{run} --out whole")), 0);
-    stopped_run(&before, run, "runs/out");
-    fs::rename(&before, &after).unwrap();
-    // One that has changed is not taken for it.
-    let b = fs::read(after.join("shapes/b.csv")).unwrap();
-    fs::write(after.join("shapes/b.csv"), "x,y\n0,0\n1,0\n0,1\n").unwrap();
-    refused(&after, "runs/out", "", &["shapes/b.csv has changed or disappeared since the run began"]);
-    fs::write(after.join("shapes/b.csv"), b).unwrap();
-    let message = said(&curvelax(home.path(), "resume after/runs/out"), 0);
-    let note = format!("note: outlines are read from {}, where they are now", after.canonicalize().unwrap().display());
-    assert!(message.contains(&note) && message.contains("resuming: "), "{message}");
-    for table in ["summary.csv", "members.csv", "ensemble.csv"] {
-        let [whole, resumed] = ["whole", "runs/out"].map(|out| fs::read(after.join(out).join(table)).unwrap());
-        assert!(whole == resumed, "{table}");
-    }
+    let square = "x,y\n0,0\n1,0\n1,1\n0,1\n";
+    fs::write(home.path().join("square.csv"), square).unwrap();
+    stopped_run(home.path(), &format!("run --backend cpu --shape file:square.csv {LONG}"), "out");
+    let copy = home.path().join("out/.curvelax.outlines");
+    let mut bytes = fs::read(&copy).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    fs::write(&copy, bytes).unwrap();
+    let message = said(&stopped_after(home.path(), "resume out", "resuming: "), 75);
+    let warning =
+        "warning: out: .curvelax.outlines: its checksum is wrong; the outlines are read from their files again";
+    assert!(message.contains(warning), "{message}");
+    fs::write(home.path().join("square.csv"), square.replace("1,1", "1,1.5")).unwrap();
+    refused(home.path(), "out", "", &["square.csv has changed or disappeared since the run began"]);
+    fs::remove_file(&copy).unwrap();
+    refused(home.path(), "out", "", &["square.csv has changed or disappeared since the run began"]);
 }
 
 #[test]
@@ -213,6 +209,39 @@ mod unix {
         let run = fs::read_to_string(home.path().join("out/run.json")).unwrap();
         assert!(run.contains("\"the run began on cpu another and continued on cpu\""), "{run}");
         assert!(!home.path().join("out/.curvelax.state").exists());
+    }
+
+    #[test]
+    fn a_project_that_was_moved_resumes_to_the_same_bytes() {
+        let home = TempDir::new().unwrap();
+        let (before, after, whole) = (home.path().join("a"), home.path().join("b"), home.path().join("whole"));
+        let project = |folder: &Path| {
+            fs::create_dir(folder).unwrap();
+            fs::write(folder.join("one.csv"), "x,y\n0,0\n1,0\n1,1\n0,1\n").unwrap();
+            fs::write(folder.join("two.csv"), "x,y,kind\n0,0,b\n3,0,b\n0,1,b\n").unwrap();
+        };
+        project(&before);
+        let short = SHORT.replace("--curves 3", "--group-by file").replace("--t-end 1", "--t-end 0.05");
+        let run = format!("run --backend cpu --shape files:*.csv {short}");
+        stopped_run(&before, &run, "out");
+        let out = before.join("out");
+        assert!(out.join(".curvelax.outlines").exists());
+        fs::rename(&before, &after).unwrap();
+        // Neither found nor needed.
+        fs::rename(after.join("two.csv"), after.join("three.csv")).unwrap();
+        let message = said(&curvelax(home.path(), "resume b/out"), 0);
+        assert!(message.contains("resuming: ") && message.contains("of 2 members"), "{message}");
+        project(&whole);
+        said(&curvelax(&whole, &format!("{run} --out out")), 0);
+        let tables = |project: &Path| -> Vec<(String, Vec<u8>)> {
+            let named = |(path, bytes): (String, Vec<u8>)| (path.rsplit('/').next().unwrap().to_string(), bytes);
+            let all = contents(&project.join("out")).into_iter().map(named);
+            all.filter(|(name, _)| !["run.json", "report.html"].contains(&name.as_str())).collect()
+        };
+        let names = |all: &[(String, Vec<u8>)]| all.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+        let (moved, straight) = (tables(&after), tables(&whole));
+        assert_eq!(names(&moved), names(&straight), "no copy of the outlines is left");
+        moved.iter().zip(&straight).for_each(|(a, b)| assert!(a == b, "{} differs", a.0));
     }
 
     #[test]

@@ -23,6 +23,7 @@ mod geojson;
 mod npy;
 mod piece;
 mod projection;
+mod saved;
 mod table;
 mod wkt;
 
@@ -37,6 +38,7 @@ use std::{
 use ::glob::{MatchOptions, Pattern, glob_with};
 
 use self::piece::Piece;
+pub use self::saved::SavedOutline;
 use super::{
     Outline,
     outline::{CROSSES, REPEATED, Source},

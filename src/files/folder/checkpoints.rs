@@ -1,4 +1,4 @@
-//! The checkpoint in a folder, and the one before it.
+//! The checkpoint in a folder, the one before it, and the outlines that belong to both.
 
 use std::{fs, io::Write};
 
@@ -7,7 +7,7 @@ use crate::{
     error::Result,
     files::{
         disk::{create, remove, sync_folder},
-        names::{STATE, STATE_OLD, STATE_PART},
+        names::{OUTLINES, STATE, STATE_OLD, STATE_PART},
     },
 };
 
@@ -33,6 +33,17 @@ impl OutputFolder {
         sync_folder(&self.place)
     }
 
+    /// Saves the outlines of the run, before its first checkpoint.
+    pub fn keep_outlines(&self, bytes: &[u8]) -> Result<()> {
+        self.check_claim()?;
+        let outlines = self.place(OUTLINES);
+        let written = create(outlines.at()).and_then(|mut file| {
+            file.write_all(bytes)?;
+            file.sync_all()
+        });
+        written.map_err(outlines.io("cannot write"))
+    }
+
     /// Removes a damaged last checkpoint, lest it become the previous one.
     pub fn forget_last_state(&self) -> Result<()> {
         let state = self.place(STATE);
@@ -40,9 +51,9 @@ impl OutputFolder {
     }
 
     /// Removes the checkpoints, the older one first: alone it would resume with files that already have their final
-    /// names.
+    /// names. The outlines are needed until there is none.
     pub fn forget_states(&self) -> Result<()> {
-        for name in [STATE_PART, STATE_OLD, STATE] {
+        for name in [STATE_PART, STATE_OLD, STATE, OUTLINES] {
             let place = self.place(name);
             remove(place.at()).map_err(place.io("cannot remove"))?;
         }
@@ -74,6 +85,7 @@ mod tests {
         assert_eq!(state_of(&folder), ["4", "2"]);
         let error = OutputFolder::open(home.path(), false).unwrap_err().to_string();
         assert!(error.contains("a run was interrupted here; curvelax resume ") && error.contains("--force"), "{error}");
+        folder.keep_outlines(b"outlines").unwrap();
         folder.forget_states().unwrap();
         drop(folder);
         assert_eq!(names(home.path()), [""; 0]);

@@ -7,7 +7,7 @@ use crate::{
     error::{Error, Result},
     files::{
         disk::{is_own_store, is_real_folder, remove_any},
-        names::{PLOTS, PROBE, STATE, STATE_OLD, STATE_PART, is_store},
+        names::{OUTLINES, PLOTS, PROBE, STATE, STATE_OLD, STATE_PART, is_store},
         place::Place,
     },
 };
@@ -25,7 +25,7 @@ impl OutputFolder {
         if needed && !new_plots && !is_real_folder(plots.at()) {
             return in_the_way(&plots, if plots.at().is_symlink() { "a link, not a folder" } else { "not a folder" });
         }
-        let others = [STATE, STATE_OLD, STATE_PART, PROBE].map(|name| self.place(name));
+        let others = [STATE, STATE_OLD, STATE_PART, OUTLINES, PROBE].map(|name| self.place(name));
         let own = self.names.iter().flat_map(|name| [self.place(name), self.part(name)]);
         for place in own.chain(others) {
             let path = place.at();
