@@ -9,7 +9,7 @@ use std::{
 use super::{
     claim::LOCK,
     disk::{IS_STORE, entries, is_real_folder},
-    names::{OUTLINES, OWN, PLOTS, PROBE, RUN, STATE, STATE_OLD, STATE_PART, is_store, part},
+    names::{OUTLINES, OWN, PLOTS, PROBE, PYTHON_OUTLINES, RUN, STATE, STATE_OLD, STATE_PART, is_store, part},
     part_folder::SUCCESSOR,
 };
 use crate::input;
@@ -22,9 +22,9 @@ use crate::input;
 pub fn foreign(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let there = |name: &&str| folder.join(name).symlink_metadata().is_ok();
     let has_run = [STATE, STATE_OLD].iter().any(there) || is_of_run(&folder.join(RUN));
-    let finished = OWN.into_iter().chain(OUTLINES).filter(|_| has_run).map(PathBuf::from);
+    let finished = OWN.into_iter().chain(PYTHON_OUTLINES).filter(|_| has_run).map(PathBuf::from);
     let unfinished = OWN.into_iter().map(|name| part(Path::new(name)));
-    let working = [LOCK, PROBE, STATE, STATE_OLD, STATE_PART].map(PathBuf::from);
+    let working = [LOCK, OUTLINES, PROBE, STATE, STATE_OLD, STATE_PART].map(PathBuf::from);
     let own: BTreeSet<PathBuf> = finished.chain(unfinished).chain(working).collect();
     let mut found = Vec::new();
     let mut look = |path: &Path| {

@@ -115,7 +115,7 @@ pub const OWN: [&str; 31] = [
 ];
 
 /// The outlines that the Python package leaves with a run, and those of the earlier run until it is replaced.
-pub const OUTLINES: [&str; 2] = ["outlines.npz", "outlines.before"];
+pub const PYTHON_OUTLINES: [&str; 2] = ["outlines.npz", "outlines.before"];
 
 /// The tables of a run and its store, in the order in which people see them.
 pub const TABLES: [&str; 14] = [
