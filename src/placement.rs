@@ -444,7 +444,8 @@ fn open_gpu<T: Vectorised>(
     let variant = Variant { adaptive, watched, ..gpu.capacity().variant(blocks, spec.solver()) };
     // The self-test has its own cap: with the run's, a solve may end before it converges, and then roundings decide.
     let tested = Method { max_sweeps: MAX_SWEEPS, ..*method };
-    let then = limit.map_or(String::new(), |limit| format!("; after {} s the CPU is used instead", limit.as_secs()));
+    let then =
+        limit.map_or(String::new(), |limit| format!("; after {} s the CPU is used instead", limit.as_secs_f64()));
     let waits = || (watch.tell)(&format!("GPU {} is still compiling the kernel{then}", gpu.name()));
     gpu.compile::<T>(blocks, variant, limit, &waits, watch.go_on)?;
     let mut kernel = Kernel::<T>::new(gpu, blocks, members, tested.max_sweeps, variant)?;

@@ -12,7 +12,7 @@ use crate::{
         document::Document,
         reader::{self, Finished},
     },
-    results::{EnsembleStatistics, Verdict},
+    results::{EnsembleStatistics, RunVerdict},
     session::{Completed, Host},
 };
 
@@ -55,11 +55,11 @@ impl MannerFlags {
     /// whether it holds what was asked for.
     ///
     /// # Errors
-    /// As [`Verdict::check`], and those of reading the run.
+    /// As [`RunVerdict::check`], and those of reading the run.
     pub fn finished(&self, out: &Path) -> Result<()> {
         let provenance = reader::provenance(out)?;
-        let verdict = match self.json || Verdict::needs_statistics(&provenance) {
-            false => Verdict::new(&provenance, None),
+        let verdict = match self.json || RunVerdict::needs_statistics(&provenance) {
+            false => RunVerdict::new(&provenance, None),
             true => {
                 let Finished { mut tally, .. } = Finished::read(out)?;
                 let statistics = EnsembleStatistics::new(&provenance.spec, &mut tally)?;
@@ -67,7 +67,7 @@ impl MannerFlags {
                     let files = listed(|name| out.join(name).exists());
                     print(&Document::new(&provenance, &provenance.spec, &statistics, out, &files).to_json()?)?;
                 }
-                Verdict::new(&provenance, Some(&statistics))
+                RunVerdict::new(&provenance, Some(&statistics))
             }
         };
         verdict.check(self.strict, &out.join(names::SUMMARY))
@@ -76,7 +76,7 @@ impl MannerFlags {
     /// Prints the results of a run that was just completed.
     ///
     /// # Errors
-    /// As [`Verdict::check`].
+    /// As [`RunVerdict::check`].
     pub fn completed(&self, Completed { text, verdict, out }: Completed) -> Result<()> {
         if self.json || !self.quiet {
             print(&text)?;

@@ -16,7 +16,7 @@ use crate::{
         tables::Table,
     },
     placement::Platform,
-    results::{Verdict, cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
+    results::{RunVerdict, cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
 };
 
 /// Output on stdout for a completed run.
@@ -75,7 +75,7 @@ impl Complete<'_> {
         store: Option<PartFolder>,
         shard: Option<&[u8]>,
         form: Form,
-    ) -> Result<(String, Verdict)> {
+    ) -> Result<(String, RunVerdict)> {
         let Complete { spec, platform, mut tally, films, warnings, started, wall } = self;
         let statistics = &EnsembleStatistics::new(spec, &mut tally)?;
         let tally = &tally;
@@ -123,6 +123,6 @@ impl Complete<'_> {
             Form::Overview => Overview { spec, platform, tally, statistics, wall, folder, files }.to_string(),
             Form::Json => Document::new(provenance, spec, statistics, folder, files).to_json()?,
         };
-        Ok((text, Verdict::new(provenance, Some(statistics))))
+        Ok((text, RunVerdict::new(provenance, Some(statistics))))
     }
 }

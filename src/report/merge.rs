@@ -32,7 +32,7 @@ use crate::{
         zarr::{SnapshotStore, StoredMembers},
     },
     input::{self, MAX_LINE},
-    results::{Verdict, tally::Aside},
+    results::{RunVerdict, tally::Aside},
     text::listed,
 };
 
@@ -192,7 +192,7 @@ impl Shards {
     ///
     /// # Errors
     /// [`Error::Request`] if a shard is missing or has changed since it was completed; `folder` is then left empty.
-    pub fn merge(self, folder: &OutputFolder, form: Form) -> Result<(String, Verdict)> {
+    pub fn merge(self, folder: &OutputFolder, form: Form) -> Result<(String, RunVerdict)> {
         self.check_complete()?;
         let Shards { parts, spec, .. } = self;
         let spec = &spec;

@@ -37,7 +37,7 @@ use crate::{
     error::{Error, Result},
     files::{OutputFolder, portraits::Film},
     placement::Platform,
-    results::{Verdict, tally::Tally},
+    results::{RunVerdict, tally::Tally},
     text::{duration, plural, quoted},
 };
 use checkpoint::{Head, Origin, Saved};
@@ -259,7 +259,7 @@ impl RunReport {
     }
 
     /// Gives all files their final names with [`Complete::publish`]; `early` are the warnings given before.
-    pub fn finish(mut self, spec: &Spec, early: &[String], form: Form) -> Result<(String, Verdict)> {
+    pub fn finish(mut self, spec: &Spec, early: &[String], form: Form) -> Result<(String, RunVerdict)> {
         // All rows are written: a run killed from now on only needs to draw its pictures again.
         let next = self.rows() - self.before();
         self.checkpoint(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;

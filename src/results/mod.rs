@@ -13,4 +13,4 @@ pub mod verdict;
 pub use cells::EnsembleStatistics;
 pub use comparison::CellComparison;
 pub use explained::Explained;
-pub use verdict::Verdict;
+pub use verdict::RunVerdict;

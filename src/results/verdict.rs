@@ -11,7 +11,7 @@ use crate::{
 
 /// How a completed run ended as a whole.
 #[derive(Clone, Debug)]
-pub struct Verdict {
+pub struct RunVerdict {
     members: u64,
     /// Members that ended neither relaxed nor unfinished, by status.
     failed: Vec<(Status, u64)>,
@@ -21,15 +21,15 @@ pub struct Verdict {
     is_part: bool,
 }
 
-impl Verdict {
-    /// The verdict on the run of `provenance`, whose `statistics` are needed if [they are judged](Verdict::needs_statistics).
-    pub fn new(provenance: &Provenance, statistics: Option<&EnsembleStatistics>) -> Verdict {
+impl RunVerdict {
+    /// The verdict on the run of `provenance`, whose `statistics` are needed if [they are judged](RunVerdict::needs_statistics).
+    pub fn new(provenance: &Provenance, statistics: Option<&EnsembleStatistics>) -> RunVerdict {
         let count = |status: Status| provenance.members_by_status.get(status.name()).copied().unwrap_or(0);
         let failures = Status::ALL.into_iter().filter(|status| status.is_failure());
         let failed = failures.map(|status| (status, count(status))).filter(|(_, count)| *count > 0).collect();
         let reached = statistics.map(EnsembleStatistics::uncertainty);
         let missed = provenance.spec.accuracy.zip(reached).filter(|(goal, reached)| reached > goal);
-        Verdict {
+        RunVerdict {
             members: provenance.members,
             failed,
             missed: missed.map(|(goal, reached)| [goal, reached]),
@@ -48,7 +48,7 @@ impl Verdict {
     /// # Errors
     /// [`Error::Strict`] with what is missing.
     pub fn check(&self, strict: bool, summary: &Path) -> Result<()> {
-        let Verdict { members, ref failed, missed, is_part } = *self;
+        let RunVerdict { members, ref failed, missed, is_part } = *self;
         let count: u64 = failed.iter().map(|(_, count)| count).sum();
         let see = format!("see `status` in {}", summary.display());
         let all = format!("{members} {}", plural(members, "member"));
@@ -83,17 +83,17 @@ mod tests {
         results::{provenance::tests::platform, tally::Tally},
     };
 
-    fn verdict(relaxed: u64, failed: [u64; 3], shard: Option<&str>) -> Verdict {
+    fn verdict(relaxed: u64, failed: [u64; 3], shard: Option<&str>) -> RunVerdict {
         let spec = Spec { shard: shard.map(|shard| shard.parse().unwrap()), ..Spec::default() };
         let mut run = Provenance::new(&spec, &platform(), &Tally::default(), &[], Duration::ZERO, Duration::ZERO);
         let counts = [("relaxed", relaxed), ("singular", failed[0]), ("nonfinite", failed[1]), ("stalled", failed[2])];
         run.members_by_status =
             counts.map(|(name, count)| (name.to_string(), count)).into_iter().collect::<BTreeMap<_, _>>();
         run.members = relaxed + failed.iter().sum::<u64>();
-        Verdict::new(&run, None)
+        RunVerdict::new(&run, None)
     }
 
-    fn said(verdict: &Verdict, strict: bool) -> Option<String> {
+    fn said(verdict: &RunVerdict, strict: bool) -> Option<String> {
         let error = verdict.check(strict, Path::new("out/summary.csv")).err()?;
         assert_eq!(error.exit_code(), 3);
         Some(error.to_string())
@@ -113,11 +113,11 @@ mod tests {
 
     #[test]
     fn an_accuracy_that_was_missed_is_told_in_digits_that_show_it() {
-        let missed = Verdict { missed: Some([0.002, 0.002_01]), ..verdict(4, [0; 3], None) };
+        let missed = RunVerdict { missed: Some([0.002, 0.002_01]), ..verdict(4, [0; 3], None) };
         let text = "--accuracy 0.002: 0.00201 was reached; use more --curves to begin with";
         assert_eq!(said(&missed, false).as_deref(), Some(text));
-        let none = Verdict { missed: Some([0.002, f64::INFINITY]), ..missed.clone() };
+        let none = RunVerdict { missed: Some([0.002, f64::INFINITY]), ..missed.clone() };
         assert!(said(&none, false).unwrap().contains("no interval was reached"));
-        assert_eq!(said(&Verdict { is_part: true, ..missed }, false), None);
+        assert_eq!(said(&RunVerdict { is_part: true, ..missed }, false), None);
     }
 }

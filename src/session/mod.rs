@@ -17,7 +17,7 @@ use crate::{
     error::Result,
     files::{Existing, OutputFolder},
     report::{Form, Manner, RunReport, Stop, checkpoint::Origin},
-    results::Verdict,
+    results::RunVerdict,
 };
 
 /// Who has a run carried out: a user at a command line, or a program.
@@ -51,7 +51,7 @@ pub struct Completed {
     /// The results in the host's form.
     pub text: String,
     /// How it ended as a whole.
-    pub verdict: Verdict,
+    pub verdict: RunVerdict,
     /// Folder of the results.
     pub out: PathBuf,
 }

@@ -130,7 +130,10 @@ static VkResult own_vkQueueSubmit(VkQueue queue, uint32_t count, const VkSubmitI
     int is_due = submissions++ >= amount;
     if (lost || (is_due && does("lost"))) return lose();
     // What was never submitted never ends.
-    if (is_due && does("hangs")) return VK_SUCCESS;
+    if (is_due && does("hangs")) {
+        if (submissions == amount + 1) fprintf(stderr, "hostile: hangs\n");
+        return VK_SUCCESS;
+    }
     return real_vkQueueSubmit(queue, count, submits, fence);
 }
 

@@ -64,7 +64,8 @@ fn adaptive_steps_are_measured_with_solvers_that_profit_from_them() {
     assert_eq!(solvers, ["direct", "multigrid"]);
     for row in &rows {
         assert_eq!((&row["curves"], row["adaptive"].as_f64()), (&Value::from(2), Some(1e-3)));
-        assert_eq!(row["curve_steps"].as_u64().unwrap() % 3, 0, "an attempt is three steps: {row}");
+        // The shortest attempt, of order 2, makes one step and two of half the length.
+        assert!(row["curve_steps"].as_u64().unwrap() >= 3 * 2, "{row}");
     }
 }
 

@@ -184,13 +184,15 @@ impl Gpu {
         let begun = Instant::now();
         let mut told = false;
         let done = loop {
-            match compiled.recv_timeout(PERIOD) {
-                Err(RecvTimeoutError::Timeout) if limit.is_none_or(|limit| begun.elapsed() < limit) => {}
-                done => break done,
-            }
-            if !told && begun.elapsed() >= LONG {
+            let done = compiled.recv_timeout(PERIOD);
+            let is_late = matches!(done, Err(RecvTimeoutError::Timeout));
+            // First, so that it is told even if this thread gets no processor until the limit is over.
+            if is_late && !told && begun.elapsed() >= LONG {
                 tell();
                 told = true;
+            }
+            if !is_late || limit.is_some_and(|limit| begun.elapsed() >= limit) {
+                break done;
             }
             go_on().inspect_err(|_| abandoned::abandon(Arc::clone(self)))?;
         };
@@ -199,7 +201,7 @@ impl Gpu {
             Ok(Err(panic)) => format!("{panic}; see `curvelax adapters`, or use --backend cpu"),
             Err(_) => {
                 abandoned::abandon(Arc::clone(self));
-                let seconds = limit.unwrap_or_default().as_secs();
+                let seconds = limit.unwrap_or_default().as_secs_f64();
                 format!("the kernel is not compiled after {seconds} s; --backend gpu waits for it as long as it takes")
             }
         };

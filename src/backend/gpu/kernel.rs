@@ -135,6 +135,12 @@ impl<T: Real> Kernel<T> {
         self
     }
 
+    /// Returns the time of the dispatch in progress that counts towards the limit, to test it.
+    #[doc(hidden)]
+    pub fn spent(&self, batch: usize) -> Option<Duration> {
+        self.batches[batch].since().map(|since| since.later(self.ended).spent())
+    }
+
     /// Time left for a batch started at a given moment. A device runs one dispatch after another, so the time counts
     /// from the start of this one or the end of the one before, whichever is later.
     fn left(&self) -> impl Fn(Moment) -> Duration + use<T> {
