@@ -235,26 +235,6 @@ pub struct Stage {
     pub members: u64,
 }
 
-/// What pandas reads as a missing value unless it is told not to.
-const MISSING: [&str; 18] = [
-    "#N/A", "#N/A N/A", "#NA", "-1.#IND", "-1.#QNAN", "-NaN", "-nan", "1.#IND", "1.#QNAN", "<NA>", "N/A", "NA", "NULL",
-    "NaN", "None", "n/a", "nan", "null",
-];
-
-/// What other programs make of labels: the tables have these as they are, since other files know them by these names.
-fn label_warnings<'a>(labels: impl Iterator<Item = &'a str> + Clone) -> Vec<String> {
-    let is_formula = |label: &&str| label.starts_with(['=', '+', '-', '@']) && label.parse::<f64>().is_err();
-    let missing = labels.clone().find(|label| MISSING.contains(label)).map(|label| {
-        format!(
-            "the label {label:?} is a missing value to pandas: read tables with keep_default_na=False, na_values=[\"\"]"
-        )
-    });
-    let formula = labels.clone().find(is_formula).map(|label| {
-        format!("the label {label:?} is a formula to a spreadsheet: import the column `label` as text, or rename the outline")
-    });
-    missing.into_iter().chain(formula).collect()
-}
-
 /// All stages of a study of these cells. Where its members are computed changes none of them.
 fn stages(cells: &[Cell]) -> Vec<Stage> {
     let mut stages = Vec::new();
@@ -381,7 +361,6 @@ impl Cell {
             warnings.push(OF_THESE.into());
         }
         warnings.extend(times::warnings(&self.spec, self.family.scales()));
-        warnings.extend(label_warnings(self.family.outlines().iter().map(|one| one.label.as_str())));
         warnings
     }
 
@@ -504,21 +483,6 @@ mod tests {
         let mut spec = base;
         axes.iter().for_each(|axis| spec.sweep.set(axis.parse().unwrap()));
         spec.validate().unwrap()
-    }
-
-    #[test]
-    fn labels_that_other_programs_misread_are_named_with_the_remedy() {
-        let said = |labels: &[&str]| label_warnings(labels.iter().copied());
-        assert_eq!(said(&["Namibia", "-5", "+1e3", "a=b", "N"]), [""; 0]);
-        let [missing, formula] = &said(&["Namibia", "NA", "null", "=1+1", "@x"])[..] else { panic!() };
-        assert!(
-            missing
-                .starts_with("the label \"NA\" is a missing value to pandas: read tables with keep_default_na=False")
-        );
-        assert!(
-            formula.starts_with("the label \"=1+1\" is a formula to a spreadsheet: import the column `label` as text")
-        );
-        assert_eq!(said(&["-x"]).len() + said(&["+A1"]).len() + said(&["@SUM(1)"]).len(), 3);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::common::{
     browser::{browser, headless},
     program::{Done, run},
 };
-use libtest_mimic::Trial;
+use libtest_mimic::{Completion, Trial};
 
 /// Members that move for a while, one that never relaxes, a series and two cells: a page with everything that a page
 /// can have.
@@ -22,30 +22,24 @@ type Test = (&'static str, fn(&Path));
 
 /// The tests; without a browser they are ignored.
 pub fn trials() -> Vec<Trial> {
-    let browser = browser();
-    match &browser {
-        Some(path) => eprintln!("browser: {}", path.display()),
-        None => eprintln!(
-            "browser: none, so the page is not tested in one: install Chromium (Debian: apt-get install chromium), or \
-             name one by CURVELAX_BROWSER"
-        ),
-    }
     let tests: [Test; 4] = [
         ("the_slider_moves_the_members_and_nothing_is_said_on_the_console", the_slider_moves_the_members),
         ("a_run_that_does_not_move_has_no_slider", a_run_that_does_not_move),
         ("a_page_whose_script_is_broken_is_found_out", a_broken_page_is_found_out),
         ("a_page_that_asks_for_the_network_is_found_out", a_request_is_found_out),
     ];
-    let missing = browser.is_none();
-    let trials = tests.map(|(name, test)| {
-        let browser = browser.clone();
-        let trial = Trial::test(name, move || {
-            test(&browser.ok_or("there is no browser")?);
-            Ok(())
-        });
-        trial.with_ignored_flag(missing)
-    });
-    trials.into()
+    tests.map(|(name, test)| in_browser(name, test)).into()
+}
+
+/// A test that is ignored without a browser.
+pub fn in_browser(name: &str, test: fn(&Path)) -> Trial {
+    Trial::ignorable_test(name, move || match browser() {
+        Ok(browser) => {
+            test(browser);
+            Ok(Completion::Completed)
+        }
+        Err(missing) => Ok(Completion::ignored_with(missing)),
+    })
 }
 
 /// A page after its script has run.

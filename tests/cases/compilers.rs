@@ -14,10 +14,13 @@ use std::{
     fs,
     io::{BufRead, BufReader},
     path::Path,
-    process::{Command, Stdio},
+    process::{Child, Command, Stdio},
+    sync::mpsc::channel,
+    thread,
+    time::Duration,
 };
 
-use crate::common::browser::{browser, headless};
+use crate::{browser::in_browser, common::browser::headless};
 use curvelax::{
     backend::gpu::{Variant, shader},
     solver::{Blocks, Solver},
@@ -26,14 +29,21 @@ use libtest_mimic::Trial;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use serde::{Deserialize, Serialize};
 
-/// Builds every kernel and says on the console what becomes of it.
-const PAGE: &str = r#"<!doctype html><script type="module">
-const kernels = KERNELS;
+/// No page needs this long on any machine; one that does hangs.
+const HANGS: Duration = Duration::from_secs(6 * 3600);
+
+/// Builds every kernel and says on the console what becomes of it. Whatever ends the script early is said, too.
+const PAGE: &str = r#"<!doctype html><script>
 const say = (name, error) => console.log("VERDICT " + JSON.stringify({ name, error }));
+onerror = (message) => say("page", message);
+onunhandledrejection = ({ reason }) => say("page", String(reason));
+</script><script type="module">
+const kernels = KERNELS;
 try {
   const adapter = await navigator.gpu.requestAdapter();
   const requiredFeatures = adapter.features.has("subgroups") ? ["subgroups"] : [];
   const device = await adapter.requestDevice({ requiredFeatures });
+  device.lost.then(({ message }) => say("page", "the device was lost: " + message));
   for (const { name, code, constants } of kernels) {
     device.pushErrorScope("validation");
     const module = device.createShaderModule({ code });
@@ -81,30 +91,22 @@ struct Verdict {
 
 /// The tests, of which those are ignored whose compiler is missing.
 pub fn trials() -> Vec<Trial> {
-    let browser = browser();
-    let mut trials = Vec::new();
-    let mut add = |name: &str, needed: bool, test: Box<dyn FnOnce() + Send>| {
+    let of = |name: &str, needed: bool, test: fn()| {
         let trial = Trial::test(name, move || {
             test();
             Ok(())
         });
-        trials.push(trial.with_ignored_flag(!needed));
+        trial.with_ignored_flag(!needed)
     };
-    let in_browser = |test: fn(&Path)| -> Box<dyn FnOnce() + Send> {
-        let browser = browser.clone();
-        Box::new(move || test(&browser.expect("there is no browser")))
-    };
-    let found = browser.is_some();
-    add("tint_accepts_every_kernel_in_f32", found, in_browser(every_kernel_is_accepted));
-    add("tint_refuses_a_barrier_under_a_private_condition", found, in_browser(a_private_condition_is_refused));
-    add("spirv_val_accepts_every_kernel", answers("spirv-val", "--version"), Box::new(spirv_is_valid));
-    add("aco_spills_nothing", has_aco(), Box::new(nothing_is_spilled));
     eprintln!(
-        "Tint: {}; ignored tests lack their compiler (Debian: chromium, spirv-tools, mesa-vulkan-drivers, libvulkan-dev, \
-         gcc)",
-        browser.map_or("none".into(), |path| path.display().to_string())
+        "ignored tests lack their compiler (Debian: chromium, spirv-tools, mesa-vulkan-drivers, libvulkan-dev, gcc)"
     );
-    trials
+    vec![
+        in_browser("tint_accepts_every_kernel_in_f32", every_kernel_is_accepted),
+        in_browser("tint_refuses_a_barrier_under_a_private_condition", a_private_condition_is_refused),
+        of("spirv_val_accepts_every_kernel", answers("spirv-val", "--version"), spirv_is_valid),
+        of("aco_spills_nothing", has_aco(), nothing_is_spilled),
+    ]
 }
 
 /// Whether a program can be started.
@@ -192,6 +194,16 @@ fn kernel_of(values: usize) -> Vec<u8> {
     words.into_iter().flat_map(u32::to_le_bytes).collect()
 }
 
+/// A browser, which would otherwise stay open.
+struct Open(Child);
+
+impl Drop for Open {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
 /// What Tint and the device say of each kernel: nothing, or the error.
 fn verdicts(browser: &Path, kernels: &[Kernel]) -> Vec<Option<String>> {
     let folder = tempfile::tempdir().unwrap();
@@ -201,24 +213,26 @@ fn verdicts(browser: &Path, kernels: &[Kernel]) -> Vec<Option<String>> {
     command.args(["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enable-features=Vulkan"]);
     command.arg(format!("file://{}", page.display())).stdout(Stdio::null()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
+    let said = BufReader::new(child.stderr.take().unwrap());
+    let _open = Open(child);
+    // The browser says nothing, and does not end, if its page hangs.
+    let (send, lines) = channel();
+    thread::spawn(move || said.lines().map_while(Result::ok).try_for_each(|line| send.send(line)));
     let mut found = Vec::new();
     // A line of the console: [...:CONSOLE:12] "VERDICT {...}", source: file:///... (12)
-    for line in BufReader::new(child.stderr.take().unwrap()).lines() {
-        let line = line.unwrap();
+    while let Ok(line) = lines.recv_timeout(HANGS) {
         let Some(said) = line.split("\"VERDICT ").nth(1).and_then(|rest| rest.rsplit_once("\", source: ")) else {
             continue;
         };
         let Verdict { name, error } = serde_json::from_str(said.0).unwrap();
         if name == "end" {
-            break;
+            assert_eq!(found.len(), kernels.len(), "the page ended early");
+            return found;
         }
-        assert_eq!(name, kernels[found.len()].name, "{error:?}");
+        assert_eq!(Some(&name), kernels.get(found.len()).map(|kernel| &kernel.name), "{error:?}");
         found.push(error);
     }
-    child.kill().unwrap();
-    child.wait().unwrap();
-    assert_eq!(found.len(), kernels.len(), "the page ended early");
-    found
+    panic!("the page did not get to its end, after {} of {} kernels", found.len(), kernels.len());
 }
 
 fn every_kernel_is_accepted(browser: &Path) {

@@ -9,7 +9,7 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
-use crate::{everything, may_lack_gpu};
+use crate::{common::command, everything, may_lack_gpu};
 use curvelax::{
     backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
@@ -530,8 +530,7 @@ fn adaptive_largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
 fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Result<(Vec<String>, Vec<f64>), Failed> {
     let folder = tempfile::tempdir()?;
     let solver = solver.name();
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
-    command.current_dir(&folder).env("XDG_RUNTIME_DIR", folder.path());
+    let mut command = command::program(folder.path());
     let shape = folder.path().join("dumbbell.csv");
     std::fs::write(&shape, dumbbell())?;
     // A short last step, output times inside steps, and members that stop when they are relaxed.
@@ -599,8 +598,7 @@ fn sizes_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
 /// t_relax of ellipses of three sizes, 40 orders of magnitude apart in time.
 fn times_of_sizes<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Result<Vec<String>, Failed> {
     let folder = tempfile::tempdir()?;
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
-    command.current_dir(&folder).env("XDG_RUNTIME_DIR", folder.path());
+    let mut command = command::program(folder.path());
     command.args(["run", "--curves", "2", "--sweep", "shape=ellipse:2e-6,1e-6;ellipse:2,1;ellipse:2e4,1e4"]);
     command.args(pace).args(["--t-end", "auto", "--relax-to", "0.3", "--backend", backend, "--solver", solver.name()]);
     let output = command.args(["--precision", T::NAME, "--points", &n.to_string(), "--out", "out"]).output()?;
@@ -663,11 +661,12 @@ fn tables_agree<T: Real>(solver: Solver, n: usize, pace: &[&str]) -> Result<Vec<
 /// `curvelax check` may need minutes, during which it shows progress. The test does not wait for its end.
 fn check_tells() -> Outcome {
     let folder = tempfile::tempdir()?;
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
-    command.arg("check").env("XDG_RUNTIME_DIR", folder.path()).stdout(Stdio::null()).stderr(Stdio::piped());
-    let mut child = command.spawn()?;
-    let said: Vec<String> =
-        BufReader::new(child.stderr.take().ok_or("no stderr")?).lines().take(3).collect::<Result<_, _>>()?;
+    let mut command = command::command(folder.path(), "check");
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn()?;
+    // Drivers may have something to say first.
+    let lines = BufReader::new(child.stderr.take().ok_or("no stderr")?).lines();
+    let lines = lines.skip_while(|line| line.as_ref().is_ok_and(|line| !line.starts_with("comparing ")));
+    let said: Vec<String> = lines.take(3).collect::<Result<_, _>>()?;
     child.kill()?;
     child.wait()?;
     let kernels =
@@ -685,14 +684,11 @@ fn program_refuses<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let points = (most + 1).to_string();
     let arguments = ["run", "--backend", "gpu", "--adapter", gpu.name(), "--precision", T::NAME, "--points", &points];
     let solver = solver.name();
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_curvelax"));
-    command
-        .current_dir(&folder)
-        .env("XDG_RUNTIME_DIR", folder.path())
-        .args(arguments)
-        .args(["--solver", solver, "--out", "out"]);
-    let output = command.output()?;
-    let message = String::from_utf8(output.stderr)?;
+    let mut command = command::program(folder.path());
+    let output = command.args(arguments).args(["--solver", solver, "--out", "out"]).output()?;
+    // Drivers may have something to say first.
+    let said = String::from_utf8(output.stderr)?;
+    let message = said.find("error: ").map_or("", |begin| &said[begin..]);
     let beyond_f32 = T::NAME == "f32" && most >= MAX_POINTS_F32;
     let remedy = if beyond_f32 { "use fewer points".to_string() } else { format!("use {most} or fewer") };
     let named = message.starts_with(&format!("error: --points {points}: ")) && message.contains(&remedy);

@@ -1,23 +1,55 @@
-//! Chromium or Chrome: the program named by `CURVELAX_BROWSER`, or the first in the path.
+//! Chromium or Chrome: the program named by `CURVELAX_BROWSER`, or the first in the path that shows a page.
 
 use std::{
     env,
     ffi::OsString,
+    fs,
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Stdio},
+    sync::OnceLock,
 };
 
 use tempfile::TempDir;
 
 const NAMES: [&str; 5] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
+/// What the page of the probe says once its script has run.
+const MARK: &str = "curvelax-7919";
 
-/// The browser of this machine.
-pub fn browser() -> Option<PathBuf> {
-    let named = env::var_os("CURVELAX_BROWSER").map(PathBuf::from);
+/// The browser of this machine, or why there is none; it is tried when somebody asks for the first time.
+pub fn browser() -> Result<&'static Path, &'static str> {
+    static FOUND: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    FOUND.get_or_init(find).as_deref().map_err(String::as_str)
+}
+
+fn find() -> Result<PathBuf, String> {
+    let there = candidates();
+    if there.is_empty() {
+        return Err("there is no Chromium (Debian: apt-get install chromium); CURVELAX_BROWSER names another".into());
+    }
+    let names: Vec<String> = there.iter().map(|path| path.display().to_string()).collect();
+    // One from a snap has folders of its own in the place of /tmp.
+    let shows = there.into_iter().find(|browser| shows_a_page(browser));
+    shows.ok_or_else(|| format!("no page in {} is shown by {}", env::temp_dir().display(), names.join(", ")))
+}
+
+fn candidates() -> Vec<PathBuf> {
+    if let Some(named) = env::var_os("CURVELAX_BROWSER") {
+        // `none`, for example.
+        return Some(PathBuf::from(named)).filter(|named| named.is_file()).into_iter().collect();
+    }
     let folders: Vec<PathBuf> = env::split_paths(&env::var_os("PATH").unwrap_or_default()).collect();
-    named.or_else(|| {
-        NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|p| p.is_file())
-    })
+    let all = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    all.filter(|path| path.is_file()).collect()
+}
+
+fn shows_a_page(browser: &Path) -> bool {
+    let (number, home) = (MARK.split_once('-').unwrap().1, tempfile::tempdir().unwrap());
+    let page = home.path().join("page.html");
+    let script = format!("document.body.textContent = 'curvelax-' + ({number} + 1 - 1)");
+    fs::write(&page, format!("<!doctype html><body><script>{script}</script>")).unwrap();
+    let (mut command, _profile) = headless(browser);
+    command.args(["--disable-gpu", "--dump-dom"]).arg(format!("file://{}", page.display())).stderr(Stdio::null());
+    command.output().is_ok_and(|output| String::from_utf8_lossy(&output.stdout).contains(MARK))
 }
 
 /// The command that opens a page without a window and without a network, with its console on stderr; and its profile.
@@ -29,6 +61,8 @@ pub fn headless(browser: &Path) -> (Command, TempDir) {
     command.arg(user_data).arg("--host-resolver-rules=MAP * ~NOTFOUND");
     // The sandbox needs rights that containers do not give; the page is our own.
     command.args(["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run"]);
+    // Neither a slow software GPU nor a page that has to wait for a processor hangs.
+    command.args(["--disable-gpu-watchdog", "--disable-hang-monitor"]);
     command.args(["--enable-logging=stderr", "--v=0"]);
     (command, profile)
 }

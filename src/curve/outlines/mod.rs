@@ -207,16 +207,6 @@ const FOREIGN: [(&[u8], &str, &str); 9] = [
 const CONVERT: &str = "convert it: ogr2ogr -f GeoJSON outlines.geojson FILE";
 const TRACE: &str = "trace the outline, and save its points as CSV, with columns x,y";
 
-/// `ogr2ogr` reads no SVG. docs/outlines.md has the lines.
-const SAMPLE: &str =
-    "sample its path, for example with svgpathtools in Python, and save the points as CSV, with columns x,y";
-
-/// Whether a text that begins as XML is a picture.
-fn is_svg(text: &[u8]) -> bool {
-    let head = String::from_utf8_lossy(&text[..text.len().min(4096)]).to_ascii_lowercase();
-    head.contains("<svg")
-}
-
 impl Format {
     /// The format by the extension of `path`, if the content agrees.
     fn of(source: Source, path: &Path, bytes: &[u8]) -> Result<Format> {
@@ -247,7 +237,6 @@ impl Format {
             .iter()
             .any(|word| text.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes())));
         match (format, text.first()) {
-            (_, Some(b'<')) if is_svg(text) => refuse("an SVG picture, not a table of points", SAMPLE),
             (_, Some(b'<')) => refuse("an HTML or XML page, not a table of points", CONVERT),
             (Format::Table | Format::Wkt, Some(b'{' | b'[')) => refuse("JSON", "give it the extension .geojson"),
             (Format::Table | Format::GeoJson, _) if is_wkt => refuse("well-known text", "give it the extension .wkt"),

@@ -418,11 +418,6 @@ fn a_file_that_is_not_what_its_extension_says_is_refused_with_the_way_out() {
         ("a.csv", b"PK\x03\x04abc", "the file is a zip archive; unpack it; save spreadsheets as CSV"),
         ("a.xlsx", b"PK\x03\x04abc", "the file is a zip archive; unpack it; save spreadsheets as CSV"),
         ("a.shp", b"\0\0\x27\x0a\0\0", "a shapefile, not a table of points; convert it: ogr2ogr -f GeoJSON"),
-        (
-            "a.svg",
-            b"<?xml version=\"1.0\"?><svg xmlns=\"http://www.w3.org/2000/svg\"/>",
-            "an SVG picture, not a table of points; sample its path",
-        ),
         ("a.gpkg", b"SQLite format 3\0", "perhaps a GeoPackage, not a table of points; convert it: ogr2ogr"),
         ("a.csv.gz", b"\x1f\x8b\x08", "compressed, not a table of points; unpack it"),
         ("a.csv", b"\x89PNG\r\n\x1a\n\0", "an image, not a table of points; trace the outline"),
