@@ -241,7 +241,7 @@ mod unix {
             fs::write(folder.join("two.csv"), "x,y,kind\n0,0,b\n3,0,b\n0,1,b\n").unwrap();
         };
         project(&before);
-        let short = SHORT.replace("--curves 3", "--group-by file").replace("--t-end 1", "--t-end 0.05");
+        let short = SHORT.replace("--curves 3", "--group-by file").replace("--t-end 1", "--t-end 0.01");
         let run = format!("run --backend cpu --shape files:*.csv {short} --out out --force");
         let (out, since) = (before.join("out"), Instant::now());
         loop {
