@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use crate::{
     Found, Outcome,
-    folder::{Content, content, copy, differences},
+    folder::{content, copy, differences},
     program::{Ended, Running, curvelax, through},
     random::Random,
     study::{Attempt, Study},
