@@ -64,7 +64,7 @@ def main():
     if merged.returncode != 0:
         sys.exit(f"curvelax merge ended with exit code {merged.returncode}")
 
-    table = pd.read_csv(Path(out) / "summary.csv", index_col="member")
+    table = pd.read_csv(Path(out) / "summary.csv", index_col="member", keep_default_na=False, na_values=[""])
     columns = {"members": ("status", "size"), "relaxed": ("t_relax", "count"), "median": ("t_relax", "median")}
     print(table.groupby("cell").agg(**columns))
 

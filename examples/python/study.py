@@ -63,8 +63,10 @@ def run(curvelax, out, curves):
 
 def members(out):
     """summary.csv with the amplitude of each member's cell."""
-    table = pd.read_csv(out / "summary.csv", index_col="member")
-    cells = pd.read_csv(out / "ensemble.csv", index_col="cell")
+    # Only what is empty is missing: a label may be "NA".
+    empty = {"keep_default_na": False, "na_values": [""]}
+    table = pd.read_csv(out / "summary.csv", index_col="member", **empty)
+    cells = pd.read_csv(out / "ensemble.csv", index_col="cell", **empty)
     return table.join(cells["amplitude"], on="cell")
 
 

@@ -185,8 +185,11 @@ impl Family {
             Curves::Outlines(set) => outlines::warnings(&set.all),
             _ => outline.map_or(Vec::new(), |outline| outline.warnings().to_vec()),
         };
+        warnings.extend(outlines::misread("label", curves.outlines().iter().map(|one| &*one.label)));
         if let Some(property) = &spec.group_by {
             let all = curves.outlines();
+            let groups: Vec<_> = all.iter().filter_map(|one| one.property(property)).collect();
+            warnings.extend(outlines::misread("group", groups.iter().map(|group| &**group)));
             let without = all.iter().filter(|one| one.property(property).is_none_or(|value| value.is_empty()));
             let labels: Vec<&str> = without.map(|one| &*one.label).collect();
             if let Some(first) = labels.first() {

@@ -2,7 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
-use super::{Cell, Drawn, Spec, member::OutlineSet};
+use super::{Drawn, Spec, member::OutlineSet};
 use crate::{
     curve::{
         Shape,
@@ -53,14 +53,12 @@ impl Outlines {
         Ok(outlines)
     }
 
-    /// Those of all shapes of some cells.
-    pub(super) fn of_cells(cells: &[Cell]) -> Outlines {
+    /// Those of all these shapes.
+    pub(super) fn of_shapes<'a>(sets: impl Iterator<Item = (&'a Shape, &'a Arc<OutlineSet>)>) -> Outlines {
         let mut outlines = Outlines::default();
-        for cell in cells {
-            let shape = cell.spec.shape.typical();
-            match cell.family.outline_set() {
-                Some(set) if outlines.of(shape).is_none() => outlines.sets.push((shape.clone(), Arc::clone(set))),
-                _ => {}
+        for (shape, set) in sets {
+            if outlines.of(shape).is_none() {
+                outlines.sets.push((shape.clone(), Arc::clone(set)));
             }
         }
         outlines

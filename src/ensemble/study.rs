@@ -94,7 +94,8 @@ impl Study {
 
     /// The outlines of its shapes that are read from files.
     pub fn outlines(&self) -> Outlines {
-        Outlines::of_cells(&self.cells)
+        let cells = self.cells.iter();
+        Outlines::of_shapes(cells.filter_map(|cell| Some((cell.spec.shape.typical(), cell.family.outline_set()?))))
     }
 
     /// Its stages, in the order in which they run: the levels, and then its own members.

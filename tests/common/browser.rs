@@ -34,8 +34,7 @@ fn find() -> Result<PathBuf, String> {
 
 fn candidates() -> Vec<PathBuf> {
     if let Some(named) = env::var_os("CURVELAX_BROWSER") {
-        // `none`, for example.
-        return Some(PathBuf::from(named)).filter(|named| named.is_file()).into_iter().collect();
+        return vec![named.into()];
     }
     let folders: Vec<PathBuf> = env::split_paths(&env::var_os("PATH").unwrap_or_default()).collect();
     let all = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));

@@ -77,7 +77,8 @@ pub fn is_setting(name: &str) -> bool {
     SETTINGS.iter().any(|start| name.starts_with(start))
 }
 
-fn without_settings(mut command: Command, home: &Path) -> Command {
+/// Takes the user's settings from a command, and lets it run in `home`.
+pub fn without_settings(mut command: Command, home: &Path) -> Command {
     for (name, _) in env::vars_os().filter(|(name, _)| name.to_str().is_some_and(is_setting)) {
         command.env_remove(name);
     }

@@ -276,3 +276,24 @@ fn wrong_requests_are_one_clear_message_before_any_work() {
     done(home, &format!("run --sweep shape=file:grains.geojson;files:csv/*.csv {RUN} --out out"));
     assert_eq!(rows(&home.join("out/summary.csv")).len(), 2 * GRAINS);
 }
+
+#[test]
+fn labels_that_other_programs_misread_are_written_as_they_are_with_one_warning_each() {
+    let home = TempDir::new().unwrap();
+    let names = ["NA", "=1+1", "None", "@a"];
+    let rows: String = names.iter().map(|name| format!("0,0,{name}\n1,0,{name}\n1,1,{name}\n0,2,{name}\n")).collect();
+    fs::write(home.path().join("odd.csv"), format!("x,y,label\n{rows}")).unwrap();
+    let line = "run --backend cpu --shape file:odd.csv --points 20 --tau 1e-3 --t-end 2e-3 --solver direct --out out";
+    let output = curvelax(home.path(), line);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{message}");
+    for said in [
+        "the label `NA` and 1 other would be a missing value to pandas: read the tables with keep_default_na=False",
+        "the label `=1+1` and 1 other may be evaluated as a formula by a spreadsheet: import the column label as text",
+    ] {
+        assert_eq!(message.matches(&format!("warning: {said}")).count(), 1, "{message}");
+    }
+    let labels: Vec<String> =
+        self::rows(&home.path().join("out/summary.csv")).iter().map(|row| row["label"].clone()).collect();
+    assert_eq!(labels, names);
+}

@@ -49,7 +49,7 @@ fn none_of(text: &str) -> Vec<&str> {
 
 #[test]
 fn runs_of_one_member_of_none_in_a_cell_and_of_none_that_relaxed_leave_no_number_that_is_none() {
-    let none_relaxed = "had not relaxed when time was up";
+    let none_relaxed = "no member relaxed before its final time";
     for (arguments, said) in [
         ("--curves 1 --points 40 --adaptive=1e-3", "The only member relaxed."),
         ("--curves 1 --points 40 --adaptive=1e-3 --t-end 0.01 --series 0.01", none_relaxed),

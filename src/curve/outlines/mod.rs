@@ -205,7 +205,12 @@ const FOREIGN: [(&[u8], &str, &str); 9] = [
     (b"%PDF", "a PDF", "save the outline as CSV, with columns x,y"),
 ];
 const CONVERT: &str = "convert it: ogr2ogr -f GeoJSON outlines.geojson FILE";
+/// The lines are in `docs/outlines.md`: GDAL reads no SVG.
+const SAMPLE: &str = "sample its paths by Python's svgelements, with the lines under SVG in docs/outlines.md";
 const TRACE: &str = "trace the outline, and save its points as CSV, with columns x,y";
+
+/// Bytes of an XML file before its element `<svg`.
+const MAX_BEFORE_SVG: usize = 4096;
 
 impl Format {
     /// The format by the extension of `path`, if the content agrees.
@@ -237,6 +242,9 @@ impl Format {
             .iter()
             .any(|word| text.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes())));
         match (format, text.first()) {
+            (_, Some(b'<')) if text.windows(4).take(MAX_BEFORE_SVG).any(|tag| tag == b"<svg") => {
+                refuse("an SVG drawing, not a table of points", SAMPLE)
+            }
             (_, Some(b'<')) => refuse("an HTML or XML page, not a table of points", CONVERT),
             (Format::Table | Format::Wkt, Some(b'{' | b'[')) => refuse("JSON", "give it the extension .geojson"),
             (Format::Table | Format::GeoJson, _) if is_wkt => refuse("well-known text", "give it the extension .wkt"),
@@ -375,6 +383,33 @@ pub fn glob(base: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
         }
         false => Ok(paths),
     }
+}
+
+/// Words that pandas reads as missing values unless it is told otherwise.
+const MISSING: [&str; 18] = [
+    "#N/A", "#N/A N/A", "#NA", "-1.#IND", "-1.#QNAN", "-NaN", "-nan", "1.#IND", "1.#QNAN", "<NA>", "N/A", "NA", "NULL",
+    "NaN", "None", "n/a", "nan", "null",
+];
+
+/// Returns the warnings about words in the column `column` of the tables that other programs misread.
+pub fn misread<'a>(column: &str, words: impl Iterator<Item = &'a str> + Clone) -> Vec<String> {
+    let missing = words.clone().filter(|word| MISSING.contains(word)).collect();
+    // A number is no formula.
+    let formulas =
+        words.filter(|word| word.starts_with(['=', '+', '-', '@']) && word.parse::<f64>().is_err()).collect();
+    let warning = |such: Vec<&str>, what: &str, remedy: &str| {
+        let others: HashSet<&&str> = such.iter().filter(|word| **word != such[0]).collect();
+        let others = match others.len() as u64 {
+            0 => String::new(),
+            more => format!(" and {}", count(more, "other")),
+        };
+        such.first().map(|first| format!("the {column} `{first}`{others} {what}: {remedy}"))
+    };
+    let pandas = "would be a missing value to pandas";
+    let keep = "read the tables with keep_default_na=False, na_values=[\"\"], or by the Python package";
+    let sheet = "may be evaluated as a formula by a spreadsheet";
+    let text = format!("import the column {column} as text, see docs/files.md");
+    warning(missing, pandas, keep).into_iter().chain(warning(formulas, sheet, &text)).collect()
 }
 
 /// Returns the warnings of many outlines, each kind once, with the number of outlines that it is about.

@@ -425,6 +425,7 @@ fn a_file_that_is_not_what_its_extension_says_is_refused_with_the_way_out() {
         ("a.wkt", b"\x01\0\0", "the file is binary"),
         ("a.csv", b" <!DOCTYPE html><html>", "an HTML or XML page, not a table of points"),
         ("a.geojson", b"<?xml version='1.0'?>", "an HTML or XML page"),
+        ("a.svg", b"<?xml version='1.0'?>\n<svg width='9'>", "an SVG drawing, not a table of points; sample its paths"),
         ("a.csv", b"{\"type\": \"Feature\"}", "the file is JSON; give it the extension .geojson"),
         ("a.csv", b"\xef\xbb\xbfPolygon ((0 0, 1 0, 0 1))", "the file is well-known text; give it the extension .wkt"),
         ("a.json", b"POLYGON ((0 0, 1 0, 0 1))", "give it the extension .wkt"),
@@ -436,6 +437,33 @@ fn a_file_that_is_not_what_its_extension_says_is_refused_with_the_way_out() {
     ] {
         assert_refused(file, bytes, &[said]);
     }
+}
+
+#[test]
+fn the_lines_for_svg_are_in_the_document_that_the_message_names() {
+    let text = include_str!("../../../docs/outlines.md");
+    let (_, lines) = text.split_once("## SVG\n").expect("a section SVG");
+    let lines = lines.split("\n## ").next().unwrap();
+    assert!(
+        SAMPLE.contains("docs/outlines.md") && SAMPLE.contains("svgelements") && lines.contains("import svgelements")
+    );
+}
+
+#[test]
+fn words_that_other_programs_misread_have_a_warning_with_the_remedy() {
+    for word in MISSING {
+        let warnings = misread("label", ["a", word].into_iter());
+        assert!(
+            warnings[0].starts_with(&format!("the label `{word}` would be a missing value to pandas")),
+            "{warnings:?}"
+        );
+        assert!(warnings[0].contains("keep_default_na=False, na_values=[\"\"]"), "{warnings:?}");
+    }
+    let warnings = misread("group", ["=1+1", "+a", "-5", "+1e3", "=1+1", "@b", "a=b"].into_iter());
+    let expected = "the group `=1+1` and 2 others may be evaluated as a formula by a spreadsheet: import the column group as \
+                    text, see docs/files.md";
+    assert_eq!(warnings, [expected]);
+    assert!(misread("label", ["Namibia", "na", "", "-5"].into_iter()).is_empty());
 }
 
 #[test]
