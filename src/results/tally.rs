@@ -128,7 +128,7 @@ impl CellTally {
             own.stopped += u64::from(stops && t.is_none() && outcome.status == Status::Relaxed);
             own.judged.extend(outcome.judged_events.get(i).copied().flatten());
         }
-        *late += u64::from(outcome.status == Status::Unfinished && outcome.start.turning.abs() == 1);
+        *late += u64::from(outcome.status == Status::Unfinished && outcome.end.turning.abs() == 1);
         *area += outcome.start.area.abs();
         rates.extend(outcome.rate.map(|fitted| Rate { fitted, theory: outcome.rate_theory.unwrap_or(f64::NAN) }));
         for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
@@ -524,7 +524,7 @@ pub(crate) mod tests {
     fn cells_in_which_no_member_relaxed_are_named_with_the_remedy() {
         let late = |cell: u64| {
             let mut late = outcome(cell, Status::Unfinished, None);
-            (late.cell, late.start.turning) = (cell, -1);
+            (late.cell, late.end.turning) = (cell, -1);
             late
         };
         let mut alone = Tally::default();
@@ -546,7 +546,7 @@ pub(crate) mod tests {
         );
         // A figure of eight does not relax, however long it is given.
         let mut eight = late(0);
-        eight.start.turning = 0;
+        eight.end.turning = 0;
         let mut immersed = Tally::default();
         immersed.add(&eight).unwrap();
         assert_eq!(immersed.warnings(), [""; 0]);

@@ -9,6 +9,10 @@ mod attacks;
 #[cfg(target_os = "linux")]
 mod calls;
 #[cfg(target_os = "linux")]
+#[path = "../common/command.rs"]
+#[allow(dead_code)] // the waits, which other tests use
+mod command;
+#[cfg(target_os = "linux")]
 mod controls;
 #[cfg(target_os = "linux")]
 mod differential;

@@ -11,17 +11,15 @@ use std::{
     time::{Duration, Instant},
 };
 
+pub use crate::command::binary;
+use crate::command::without_settings;
+
 /// Interval between checks of a process.
 const GLANCE: Duration = Duration::from_millis(1);
 /// No process of these tests runs this long on any machine; one that does hangs.
-pub const HANGS: Duration = Duration::from_secs(1800);
+pub const HANGS: Duration = Duration::from_secs(12 * 3600);
 /// A tick of the processor time in `/proc`, on every relevant machine.
 const TICK: Duration = Duration::from_millis(10);
-
-/// The built program.
-pub fn binary() -> PathBuf {
-    assert_cmd::cargo::cargo_bin("curvelax")
-}
 
 /// `curvelax ARGUMENTS` in the folder `home`.
 pub fn curvelax(home: &Path, arguments: &str) -> Command {
@@ -31,9 +29,8 @@ pub fn curvelax(home: &Path, arguments: &str) -> Command {
 /// The same, started by another program such as `strace`.
 pub fn through(home: &Path, starter: &[&str], arguments: &str) -> Command {
     let mut words = hearing().iter().chain(starter).map(PathBuf::from).chain([binary()]);
-    let mut command = Command::new(words.next().unwrap());
-    // Without this a layer of Mesa prints a message on stderr.
-    command.current_dir(home).env("XDG_RUNTIME_DIR", home).args(words).args(arguments.split_whitespace());
+    let mut command = without_settings(Command::new(words.next().unwrap()), home);
+    command.args(words).args(arguments.split_whitespace());
     command
 }
 
@@ -190,8 +187,9 @@ impl Running {
 /// `kill -s NAME` for all at once.
 pub fn signal(name: &str, all: &[&Running]) {
     let ids = all.iter().map(|running| running.id().to_string());
-    // They may have ended.
-    let _ = Command::new("kill").args(["-s", name]).args(ids).stderr(Stdio::null()).status();
+    // They may have ended. Every shell has this command, while some systems have no program of this name.
+    let mut kill = Command::new("sh");
+    let _ = kill.args(["-c", "kill -s \"$0\" \"$@\"", name]).args(ids).stderr(Stdio::null()).status();
 }
 
 impl Drop for Running {

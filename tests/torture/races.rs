@@ -1,8 +1,10 @@
 //! Two programs that start in one folder at the same time.
 
+use std::time::Instant;
+
 use crate::{
     Found, Outcome,
-    program::{Ended, Running, signal, through},
+    program::{Ended, HANGS, Running, signal, through},
     study::{Attempt, Study},
 };
 
@@ -39,8 +41,10 @@ impl Twins {
 /// `races` double starts: exactly one proceeds, and the other does not touch its files.
 pub fn double_starts(study: &Study, races: usize) -> Outcome {
     let middle = Attempt::interrupted(study);
-    let mut second_won = 0;
-    for race in 0..races {
+    let (mut race, mut second_won) = (0, 0);
+    let since = Instant::now();
+    while race < races {
+        assert!(since.elapsed() < HANGS, "no run is caught at work");
         let twins = Twins::ALL[race % Twins::ALL.len()];
         let attempt = match twins {
             Twins::Runs => Attempt::new(study),
@@ -50,6 +54,8 @@ pub fn double_starts(study: &Study, races: usize) -> Outcome {
             let mut command = through(attempt.home.path(), &HELD, &arguments);
             Running::start(&mut command)
         }));
+        let Some(ended) = ended else { continue };
+        race += 1;
         let codes = ended.each_ref().map(|ended| ended.code);
         assert!(matches!(codes, [Some(0), Some(2)] | [Some(2), Some(0)]), "{twins:?}: {ended:?}");
         let refused: &Ended = ended.iter().find(|ended| ended.code == Some(2)).unwrap();
@@ -61,8 +67,8 @@ pub fn double_starts(study: &Study, races: usize) -> Outcome {
 }
 
 /// Starts both at once. The one that begins to work is paused until the other one has ended: it must not finish before
-/// the other one checks, however little work there is.
-fn together(mut both: [Running; 2]) -> [Ended; 2] {
+/// the other one checks, however little work there is. None if it did: that was no race.
+fn together(mut both: [Running; 2]) -> Option<[Ended; 2]> {
     for one in &mut both {
         one.wait_until(Running::is_held);
     }
@@ -73,17 +79,15 @@ fn together(mut both: [Running; 2]) -> [Ended; 2] {
         at_work = [one, &*other].iter().position(|running| running.has_open(TABLE));
         at_work.is_some()
     });
-    match at_work {
-        Some(0) => hold_until_the_end(one, other),
-        Some(_) => hold_until_the_end(other, one),
-        // The first one has ended.
-        None => {}
+    let [winner, loser] = match at_work? {
+        0 => [one, other],
+        _ => [other, one],
+    };
+    winner.signal("STOP");
+    if !winner.wait_until(Running::is_held) || !winner.has_open(TABLE) {
+        return None;
     }
-    both.map(Running::end)
-}
-
-fn hold_until_the_end(held: &Running, other: &mut Running) {
-    held.signal("STOP");
-    other.wait_until(|_| false);
-    held.signal("CONT");
+    loser.wait_until(|_| false);
+    winner.signal("CONT");
+    Some(both.map(Running::end))
 }
