@@ -1,7 +1,8 @@
 //! A long run needs no more than a short one: memory and open files, sampled while it runs.
 //!
 //! The run would last for months and is stopped after enough samples, one each time its table has grown: samples are
-//! equally far apart in work, however fast it is done.
+//! equally far apart in work, however fast it is done. They begin when it has saved its state twice, and so has done all
+//! that it will do again.
 
 use std::fs;
 
@@ -12,8 +13,8 @@ use crate::{
     program::{Running, curvelax, status},
 };
 
-/// Permitted growth of the resident memory after the start-up: pages that the allocator had not touched, among them those of
-/// a checkpoint, which holds a state of 38 numbers a node for each resident member.
+/// Permitted growth of the memory: what the allocator has not used yet, or not returned, among it that of a checkpoint,
+/// which holds a state of 38 numbers a node for each resident member.
 const SLACK_KIB: u64 = 4096;
 
 /// Collects `samples` of a run whose members make `steps` steps each.
@@ -26,27 +27,26 @@ pub fn constant(samples: usize, steps: u64) -> Outcome {
     );
     let mut running = Running::start(&mut curvelax(home.path(), &arguments));
     let table = home.path().join("out/.summary.csv.part");
-    let (mut taken, mut length) = (Vec::new(), 0);
+    let second_state = home.path().join("out/.curvelax.state.old");
+    let (mut steady, mut length) = (Vec::new(), 0);
     running.wait_until(|running| {
         let now = fs::metadata(&table).map_or(0, |table| table.len());
         if now > length {
             length = now;
-            taken.extend(sample(running.id()));
+            steady.extend(sample(running.id()).filter(|_| second_state.exists()));
         }
-        taken.len() >= samples
+        steady.len() >= samples
     });
     running.signal("TERM");
     let took = running.age();
     let ended = running.end();
     assert!(ended.code == Some(75) && ended.errors().len() == 1, "{ended:?}");
     let rows = fs::read_to_string(&table).unwrap().lines().count() as u64 - 1;
-    // The first fifth is the start-up.
-    let steady = &taken[taken.len() / 5..];
     let bounds = |values: Vec<u64>| (*values.iter().min().unwrap(), *values.iter().max().unwrap());
     let (least, most) = bounds(steady.iter().map(|sample| sample.0).collect());
     let (fewest_files, most_files) = bounds(steady.iter().map(|sample| sample.1).collect());
     let told = format!(
-        "{:.0e} steps in {:.0} s: {least} to {most} KiB resident, {fewest_files} to {most_files} files open",
+        "{:.0e} steps in {:.0} s: {least} to {most} KiB of memory, {fewest_files} to {most_files} files open",
         (rows * steps) as f64,
         took.as_secs_f64()
     );
@@ -57,10 +57,10 @@ pub fn constant(samples: usize, steps: u64) -> Outcome {
     Found::new(steady.len(), told)
 }
 
-/// Private memory in KiB, wherever it is, and the number of open files. Pages of the program itself come and go with
-/// other work of the machine.
+/// Writable memory in KiB, and the number of open files. How much of that memory is resident depends on the size of the
+/// system's pages and on other work of the machine.
 fn sample(process: u32) -> Option<(u64, u64)> {
     let kib = |name| status(process, name)?.trim_end_matches(" kB").parse::<u64>().ok();
     let files = fs::read_dir(format!("/proc/{process}/fd")).ok()?.count();
-    Some((kib("RssAnon:")? + kib("VmSwap:")?, files as u64))
+    Some((kib("VmData:")?, files as u64))
 }

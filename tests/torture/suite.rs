@@ -316,5 +316,5 @@ fn the_rest(suite: &mut Suite, seed: u64) {
     suite.test("rings_of_any_size", "done, or refused by name", || sizes::rings(sizes));
     suite.test("ensembles_of_any_size", "done, or refused by name", sizes::members);
     let (samples, steps) = (100, suite.of(100, 5000));
-    suite.test("memory_and_open_files_stay", "2 MiB, 3 files", move || soak::constant(samples, steps));
+    suite.test("memory_and_open_files_stay", "4 MiB, 3 files", move || soak::constant(samples, steps));
 }
