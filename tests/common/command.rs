@@ -2,6 +2,7 @@
 
 use std::{
     env, fs,
+    io::Write,
     path::{Path, PathBuf},
     process::{Child, Command, Output, Stdio},
     thread,
@@ -31,7 +32,7 @@ const SETTINGS: [&str; 16] = [
     "WGPU_",
 ];
 /// How often a run may be over before it is stopped. One that cannot be stopped is over each time.
-const TRIES: u32 = 20;
+const TRIES: u32 = 100;
 
 /// The built program.
 pub fn binary() -> PathBuf {
@@ -121,10 +122,19 @@ pub fn signalled_when(command: &mut Command, name: &str, mut is_time: impl FnMut
     let [out, err] = [(); 2].map(|()| NamedTempFile::new().unwrap());
     let said = || String::from_utf8_lossy(&fs::read(err.path()).unwrap()).into_owned();
     let mut child = command.stdout(out.reopen().unwrap()).stderr(err.reopen().unwrap()).spawn().unwrap();
+    // It is there already when the time comes, as the run may be a short one.
+    let mut sender = Command::new("sh");
+    sender.args(["-c", "read _ && kill -s \"$0\" \"$1\"", name, &child.id().to_string()]).stderr(Stdio::null());
+    let mut sender = sender.stdin(Stdio::piped()).spawn().expect("sh");
     while !is_time(&said()) && child.try_wait().unwrap().is_none() {
         thread::sleep(Duration::from_millis(1));
     }
-    signal(&mut child, name);
+    // The number of a child whose end is known may be that of another process.
+    let go = sender.stdin.take();
+    if let (Some(mut go), None) = (go, child.try_wait().unwrap()) {
+        go.write_all(b"\n").unwrap();
+    }
+    sender.wait().unwrap();
     let status = child.wait().unwrap();
     let [stdout, stderr] = [&out, &err].map(|file| fs::read(file.path()).unwrap());
     Output { status, stdout, stderr }

@@ -136,7 +136,9 @@ fn a_finished_run_answers_again_with_its_results_and_its_failures() {
         assert!(said(&output, 3).contains("--strict: 4 of 4 members ended neither relaxed nor unfinished"), "{again}");
         assert_eq!(json(&output), json(&first), "{again}");
     }
-    assert!(curvelax(home.path(), "resume bad --json").status.success());
+    let output = curvelax(home.path(), "resume bad --json");
+    assert!(said(&output, 3).contains("error: every member failed (4 "));
+    assert_eq!(json(&output), json(&first));
     assert_eq!(curvelax(home.path(), "resume bad").stdout, b"");
 }
 
@@ -221,7 +223,7 @@ mod unix {
             fs::write(folder.join("two.csv"), "x,y,kind\n0,0,b\n3,0,b\n0,1,b\n").unwrap();
         };
         project(&before);
-        let short = SHORT.replace("--curves 3", "--group-by file").replace("--t-end 1", "--t-end 0.05");
+        let short = SHORT.replace("--curves 3", "--group-by file");
         let run = format!("run --backend cpu --shape files:*.csv {short}");
         stopped_run(&before, &run, "out");
         let out = before.join("out");
