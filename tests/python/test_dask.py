@@ -19,7 +19,7 @@ STUDY = Path(__file__).parents[2] / "examples" / "python" / "dask_study.py"
 SHARDS = 4
 MEMBERS = 1600
 # What is waited for so long hangs: nothing here depends on how fast a machine is.
-HANGS = 600
+HANGS = 6 * 3600
 # A failed task is tried again so often.
 RETRIES = 3
 # Two cells.
@@ -92,15 +92,26 @@ def end(process):
         pass
 
 
+class Over(AssertionError):
+    """The study ended before what was waited for came."""
+
+
 def soon(look, study, meanwhile=lambda: None):
     """The first result of `look` that is something, while the study goes on."""
     until = time.monotonic() + HANGS
-    while time.monotonic() < until and study.poll() is None:
+    while time.monotonic() < until:
+        if study.poll() is not None:
+            raise Over(f"the study ended with {study.returncode}")
         meanwhile()
         if found := look():
             return found
         time.sleep(0.01)
     raise AssertionError("what was waited for did not come")
+
+
+def is_over(process):
+    """Whether it has ended, even if nobody has asked how yet."""
+    return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
 
 
 def caught(study):
@@ -110,14 +121,17 @@ def caught(study):
         try:
             worker = curvelax.parent()
             curvelax.resume()
-            soon(lambda: not curvelax.is_running() or (table.exists() and table.stat().st_size > 0), study)
+            # Looked at as often as possible, as it may need a few milliseconds only.
+            while not (is_over(curvelax) or (table.exists() and table.stat().st_size > 0)):
+                time.sleep(0.0005)
             curvelax.suspend()
-            soon(lambda: curvelax.status() == psutil.STATUS_STOPPED, study)
+            soon(lambda: is_over(curvelax) or curvelax.status() == psutil.STATUS_STOPPED, study)
+            # Once it is suspended, its table shows whether it is at work.
+            if table.exists() and not is_over(curvelax):
+                return curvelax, worker, out
+            curvelax.resume()
         except (psutil.NoSuchProcess, FileNotFoundError):
-            continue  # ended too soon
-        if table.exists():
-            return curvelax, worker, out
-        curvelax.resume()
+            pass  # ended too soon
     return None
 
 
@@ -134,6 +148,16 @@ class Dask(unittest.TestCase):
 
     def study(self, name, kill, deaths="3"):
         """Runs the study in two workers, of which `kill` kills one; its exit code, what it printed, and its folder."""
+        until = time.monotonic() + HANGS
+        while (done := self.attempt(name, kill, deaths)) is None:
+            self.assertLess(time.monotonic(), until, "no shard is ever caught at work")
+            # The same again.
+            for left in self.home.glob(f"{name}*"):
+                shutil.rmtree(left) if left.is_dir() else left.unlink()
+        return done
+
+    def attempt(self, name, kill, deaths):
+        """The same, or None if all shards were over before one was caught at work."""
         out = self.home / name
         command = [sys.executable, STUDY, self.home / "spec.toml", "--shards", SHARDS, "--workers", 2, "--out", out]
         wrapper = self.home / f"{name}.sh"
@@ -151,7 +175,12 @@ class Dask(unittest.TestCase):
             study = subprocess.Popen(list(map(str, command)), stdout=log, stderr=log, env=environment)
             try:
                 if kill:
-                    self.kill(study, kill, wrapper)
+                    try:
+                        shard = soon(lambda: caught(study), study)
+                    except Over:
+                        self.assertEqual(study.returncode, 0, Path(log.name).read_text())
+                        return None
+                    self.kill(study, kill, wrapper, *shard)
                 until = time.monotonic() + HANGS
                 while (code := study.poll()) is None:
                     self.assertLess(time.monotonic(), until, "the study hangs")
@@ -162,9 +191,8 @@ class Dask(unittest.TestCase):
             log.seek(0)
             return code, log.read(), out
 
-    def kill(self, study, who, wrapper):
+    def kill(self, study, who, wrapper, curvelax, worker, out):
         """Kills a worker in the middle of its shard: with its curvelax, or without."""
-        curvelax, worker, out = soon(lambda: caught(study), study)
         self.addCleanup(end, curvelax)
         worker.kill()
         if who == "both":
@@ -182,8 +210,8 @@ class Dask(unittest.TestCase):
         soon(lambda: len(list(out.parent.glob("*/run.json"))) == SHARDS - 1, study, wake_others)
         log = Path(f"{wrapper}.log")
         soon(lambda: log.read_text().count(f"--out {out}\n") > 2 + RETRIES, study, wake_others)
-        curvelax.resume()
         self.assertIsNone(study.poll(), "the study did not wait")
+        curvelax.resume()
 
     def assert_whole(self, out):
         """Each member once, and every byte that of the single run."""

@@ -31,14 +31,14 @@ cluster_start() {
     mkdir -p "$cluster/munge" "$cluster/state" "$cluster/spool"
     (umask 077 && head -c 128 /dev/urandom >"$cluster/munge/key")
     # SlurmdTimeout: a node that says nothing for so long is down, and one on a busy machine must not be. cred_expire: what
-    # a message may take, and also how long a requeued task has to wait, two minutes if nothing is said. config_overrides:
-    # two cores for each node, whatever there is.
+    # a message may take on such a machine, and also how long a requeued task has to wait. config_overrides: two cores for
+    # each node, whatever there is.
     cat >"$SLURM_CONF" <<CONF
 ClusterName=curvelax
 SlurmctldHost=localhost
 SlurmctldPort=$port
 AuthType=auth/munge
-AuthInfo=socket=$cluster/munge/socket,cred_expire=20
+AuthInfo=socket=$cluster/munge/socket,cred_expire=300
 SlurmUser=$user
 SlurmdUser=$user
 ProctrackType=proctrack/linuxproc
@@ -52,9 +52,9 @@ SelectTypeParameters=CR_Core
 SlurmdParameters=config_overrides
 SchedulerParameters=bf_interval=2,sched_interval=5
 ReturnToService=2
-SlurmdTimeout=20
-MessageTimeout=60
-TCPTimeout=10
+SlurmdTimeout=300
+MessageTimeout=100
+TCPTimeout=60
 KillWait=5
 JobRequeue=1
 MinJobAge=3600
