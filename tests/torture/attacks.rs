@@ -11,13 +11,14 @@ use tempfile::TempDir;
 use crate::{
     Found, Outcome,
     folder::{content, copy, differences},
-    program::{Ended, Running, curvelax, through},
+    program::{Ended, Running, curvelax, status, through},
     random::Random,
     study::{Attempt, Study},
 };
 
-/// Calls at which a run is paused while its folder is taken away.
-const HELD_AT: [&str; 6] = ["openat", "rename", "unlink", "fsync", "mkdir", "write"];
+/// Calls at which a run is paused while its folder is taken away, under their names on all kinds of processors.
+const RENAME: &str = "?rename,?renameat,?renameat2";
+const HELD_AT: [&str; 6] = ["openat", RENAME, "?unlink,?unlinkat", "fsync", "?mkdir,?mkdirat", "write"];
 
 /// A run that `strace` paused at the n-th use of a call.
 struct Held {
@@ -36,9 +37,7 @@ impl Held {
         if !running.wait_until(stopped) {
             return None;
         }
-        let id = running.id();
-        let children = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).unwrap();
-        Some(Held { program: children.split_whitespace().next().unwrap().parse().unwrap(), running })
+        Some(Held { program: traced(&log)?, running })
     }
 
     fn resume(self) -> Ended {
@@ -47,9 +46,16 @@ impl Held {
     }
 }
 
+/// The process whose calls are in a log of `strace`: the number of one of its threads begins every line.
+fn traced(log: &Path) -> Option<u32> {
+    let log = fs::read_to_string(log).ok()?;
+    let mut threads = log.lines().filter_map(|line| line.split_whitespace().next()?.parse().ok());
+    threads.find_map(|thread| status(thread, "Tgid:")?.parse().ok())
+}
+
 fn signal(process: u32, name: &str) {
-    let status = std::process::Command::new("kill").args(["-s", name, &process.to_string()]).status().unwrap();
-    assert!(status.success());
+    let kill = ["-c", "kill -s \"$0\" \"$1\"", name, &process.to_string()];
+    assert!(std::process::Command::new("sh").args(kill).status().unwrap().success());
 }
 
 /// The folder of a run is moved or removed at every `stride`-th call, and another run uses its path: that run must not
@@ -111,7 +117,7 @@ pub fn lock_removed(study: &Study) -> Outcome {
     let mut cases = 0;
     for n in 1.. {
         let attempt = Attempt::new(study);
-        let Some(held) = Held::start(&attempt, "rename", n) else { break };
+        let Some(held) = Held::start(&attempt, RENAME, n) else { break };
         fs::remove_file(attempt.out().join(".curvelax.lock")).unwrap();
         let second = attempt.resume().end();
         assert!(second.code == Some(2) && second.said.contains("a run is writing here"), "{n}: {second:?}");
@@ -245,30 +251,40 @@ pub fn folders_without_a_run(study: &Study) -> Outcome {
     Found::new(cases, "refused, or done where nothing was lost")
 }
 
-/// An outline is read once by a run and once when it is resumed, whatever is swept, and a changed one is refused.
+/// An outline is read once by a run and not again when it is resumed, whatever is swept, even if it has changed.
 pub fn outlines() -> Outcome {
     let home = TempDir::new().unwrap();
     let outline = home.path().join("q.csv");
     fs::write(&outline, "0,0\n3,0\n3,2\n0,2\n").unwrap();
     let run = "run --backend cpu --threads 1 --shape file:q.csv --curves 2 --tau 1e-8 --t-end 1 --solver direct --quiet \
-               --sweep points=34,52 --max-time 1s --out out";
+               --sweep points=34,52 --checkpoint-every 1s --out out";
+    let resume = "resume out --quiet --checkpoint-every 1s";
     let mut cases = 0;
-    for (arguments, reads) in [(run, 1), ("resume out --quiet --max-time 1s", 0)] {
-        let log = home.path().join("calls");
-        let starter = ["strace", "-f", "-qq", "-o", log.to_str().unwrap(), "-e", "trace=openat"];
-        let ended = Running::start(&mut through(home.path(), &starter, arguments)).end();
-        assert_eq!(ended.code, Some(75), "{ended:?}");
-        let opened = fs::read_to_string(&log).unwrap().lines().filter(|line| line.contains("q.csv")).count();
-        assert_eq!(opened, reads, "{arguments}");
+    for (arguments, reads) in [(run, 1), (resume, 0)] {
+        assert_eq!(reads_of_outline(home.path(), arguments), reads, "{arguments}");
         cases += 1;
     }
     for text in ["0,0\n3,0\n3,1\n0,1\n", "0,0\n", ""] {
         fs::write(&outline, text).unwrap();
-        let ended = Running::start(&mut curvelax(home.path(), "resume out --quiet --max-time 1s")).end();
-        assert_eq!(ended.code, Some(75), "{ended:?}");
+        assert_eq!(reads_of_outline(home.path(), resume), 0);
         cases += 1;
     }
     Found::new(cases, "read once; not read again, even where it changed")
+}
+
+/// How often a run opens its outline until it is at work and is stopped.
+fn reads_of_outline(home: &Path, arguments: &str) -> usize {
+    let log = home.join("calls");
+    let starter = ["strace", "-f", "-qq", "-o", log.to_str().unwrap(), "-e", "trace=openat"];
+    // It is at work when it has written a state of its own.
+    let state = || fs::metadata(home.join("out/.curvelax.state")).map(|state| state.ino()).ok();
+    let before = state();
+    let mut running = Running::start(&mut through(home, &starter, arguments));
+    assert!(running.wait_until(|_| state().is_some_and(|now| Some(now) != before)), "{arguments}: it has ended");
+    signal(traced(&log).unwrap(), "TERM");
+    let ended = running.end();
+    assert_eq!(ended.code, Some(75), "{ended:?}");
+    fs::read_to_string(&log).unwrap().lines().filter(|line| line.contains("q.csv")).count()
 }
 
 /// Paths near the maximum length of the system: the run succeeds, or is refused with nothing left over.

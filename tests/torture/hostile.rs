@@ -13,12 +13,14 @@ use tempfile::TempDir;
 use crate::{
     Found, Outcome,
     folder::{content, copy},
-    program::{Running, binary, through},
+    program::{Running, curvelax, through},
     study::{Attempt, Study},
 };
 
-/// Address space that is enough for the small runs of these tests, but not for reading a whole huge file.
-const LITTLE: [&str; 3] = ["sh", "-c", "ulimit -v 1000000; exec \"$0\" \"$@\""];
+/// Address space that is enough for the small runs of these tests, but not for reading a whole huge file. Threads need some
+/// of it, too, so that there must not be as many as cores.
+const LITTLE: [&str; 3] =
+    ["sh", "-c", "export RAYON_NUM_THREADS=1 MALLOC_ARENA_MAX=1; ulimit -v 1000000; exec \"$0\" \"$@\""];
 
 /// Replacements of a file.
 const THINGS: [&str; 5] = ["a pipe", "a device", "a folder", "2 GiB", "nothing to be opened"];
@@ -147,8 +149,7 @@ pub fn in_the_way(csv: &Study, zarr: &Study) -> Outcome {
 
     let home = TempDir::new().unwrap();
     for json in [true, false] {
-        let mut command = Command::new(binary());
-        command.current_dir(home.path()).env("XDG_RUNTIME_DIR", home.path()).arg("run");
+        let mut command = curvelax(home.path(), "run");
         command.args(csv.arguments.split_whitespace()).arg("--quiet").arg("--out").arg(OsStr::from_bytes(b"\xff"));
         let ended = Running::start(command.args(json.then_some("--json"))).end();
         assert_eq!(ended.code, Some(if json { 2 } else { 0 }), "{ended:?}");

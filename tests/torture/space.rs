@@ -8,7 +8,8 @@ use std::{
 use crate::{
     Found, Outcome,
     calls::must_be_a_decent_end,
-    program::{Running, binary},
+    command::script,
+    program::Running,
     study::{Attempt, Study},
 };
 
@@ -67,10 +68,8 @@ pub fn limited_files(study: &Study, limits: &[usize]) -> Outcome {
     for blocks in limits {
         for trap in ["trap '' XFSZ; ", ""] {
             let attempt = Attempt::new(study);
-            let script = format!("{trap}ulimit -f {blocks}; exec \"$0\" {}", attempt.run());
-            let mut command = Command::new("sh");
-            command.current_dir(attempt.home.path()).arg("-c").arg(script).arg(binary());
-            let ended = Running::start(&mut command).end();
+            let limited = format!("{trap}ulimit -f {blocks}; exec \"$0\" {}", attempt.run());
+            let ended = Running::start(&mut script("sh", attempt.home.path(), &limited)).end();
             match trap.is_empty() {
                 true => assert!(matches!((ended.code, ended.signal), (Some(0..=2), _) | (_, Some(25))), "{ended:?}"),
                 false => drop(must_be_a_decent_end(&ended, &format!("at most {blocks} blocks: {ended:?}"))),

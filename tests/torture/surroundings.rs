@@ -6,6 +6,7 @@ use std::{
     os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
     process::{Command, Stdio},
+    sync::OnceLock,
 };
 
 use tempfile::TempDir;
@@ -13,7 +14,8 @@ use tempfile::TempDir;
 use crate::{
     Found, Outcome,
     calls::must_be_a_decent_end,
-    program::{Ended, Running, binary, curvelax, is_there},
+    command::{script, without_settings},
+    program::{Ended, Running, binary, curvelax},
     space::Disk,
     study::{Attempt, Study},
 };
@@ -33,9 +35,33 @@ impl AsNobody {
     pub fn new() -> AsNobody {
         let home = TempDir::new().unwrap();
         let program = home.path().join("curvelax");
-        fs::copy(binary(), &program).unwrap();
+        // Not by this process: children that other tests start at this moment would have the copy open for writing, and a
+        // program that is open for writing cannot be started.
+        let copied = Command::new("cp").arg(binary()).arg(&program).status().unwrap();
+        assert!(copied.success(), "{}", program.display());
+        set_mode(&program, 0o755);
         set_mode(home.path(), 0o777);
         AsNobody { program, home, is_root: is_root() }
+    }
+
+    /// What such a user is missing here, if anything: setpriv, a temporary folder to enter and to start programs in, or
+    /// permissions that bind.
+    pub fn is_missing() -> Option<&'static str> {
+        static WORKS: OnceLock<bool> = OnceLock::new();
+        let works = WORKS.get_or_init(|| {
+            let nobody = AsNobody::new();
+            let closed = nobody.home.path().join("closed");
+            fs::create_dir(&closed).unwrap();
+            set_mode(&closed, 0o555);
+            let script = "\"$0\" --version && touch mine && ! touch closed/other";
+            let output = nobody.command(&["sh", "-c", script]).arg(&nobody.program).output();
+            let works = output.as_ref().is_ok_and(|output| output.status.success());
+            if !works {
+                eprintln!("as a user without rights: {output:?}");
+            }
+            works
+        });
+        (!works).then_some("user without rights who can start a program in a temporary folder")
     }
 
     fn go(&self, umask: &str, arguments: &str) -> Ended {
@@ -50,15 +76,33 @@ impl AsNobody {
     /// A command run by this user.
     pub fn command(&self, words: &[&str]) -> Command {
         let starter: &[&str] = if self.is_root { &NOBODY } else { &["env"] };
-        let mut command = Command::new(starter[0]);
-        command.args(&starter[1..]).args(words).current_dir(self.home.path());
+        let mut command = without_settings(Command::new(starter[0]), self.home.path());
+        command.args(&starter[1..]).args(words);
         command
+    }
+
+    /// Copies a folder into this user's, who may read all of it, whatever the mask of the tests' own user.
+    fn copy(&self, from: &Path, name: &str) -> PathBuf {
+        let to = self.home.path().join(name);
+        crate::folder::copy(from, &to);
+        let readable = Command::new("chmod").args(["-R", "a+rX"]).arg(&to).status().unwrap();
+        assert!(readable.success());
+        to
     }
 }
 
 fn is_root() -> bool {
     let output = Command::new("id").arg("-u").output().unwrap();
     output.stdout == b"0\n"
+}
+
+/// Whether no permission binds this process, as usually with root.
+fn is_unbound() -> bool {
+    let home = TempDir::new().unwrap();
+    let path = home.path().join("closed");
+    fs::write(&path, "").unwrap();
+    set_mode(&path, 0);
+    fs::File::options().read(true).write(true).open(path).is_ok()
 }
 
 fn set_mode(path: &Path, mode: u32) {
@@ -81,14 +125,14 @@ pub fn folders_that_cannot_be_written(study: &Study) -> Outcome {
 
     let attempt = Attempt::interrupted(study);
     let before = attempt.names();
-    crate::folder::copy(&attempt.out(), &nobody.home.path().join("out"));
-    set_mode(&nobody.home.path().join("out"), 0o555);
+    let out = nobody.copy(&attempt.out(), "out");
+    set_mode(&out, 0o555);
     let ended = nobody.go("022", "resume out");
     assert!(matches!(ended.code, Some(1 | 2)) && ended.errors()[0].contains("out"), "{ended:?}");
-    assert!(nobody.home.path().join("out/.curvelax.state").exists());
-    let after: Vec<String> = crate::folder::content(&nobody.home.path().join("out")).into_keys().collect();
+    assert!(out.join(".curvelax.state").exists());
+    let after: Vec<String> = crate::folder::content(&out).into_keys().collect();
     assert_eq!(after, before);
-    set_mode(&nobody.home.path().join("out"), 0o777);
+    set_mode(&out, 0o777);
     attempt.must_end_well(ended);
     Found::new(4, "refused by name, nothing lost")
 }
@@ -123,11 +167,9 @@ pub fn no_rights_for_new_files(study: &Study) -> Outcome {
     let ended = nobody.go("477", &format!("run {} --quiet --out out", study.arguments));
     must_be_a_decent_end(&ended, &format!("{ended:?}"));
     let attempt = Attempt::new(study);
-    if is_root() {
-        let mut command = Command::new("sh");
-        let script = format!("umask 777; exec \"$0\" {}", attempt.run());
-        command.args(["-c", &script]).arg(binary()).current_dir(attempt.home.path());
-        let ended = Running::start(&mut command).end();
+    if is_unbound() {
+        let masked = format!("umask 777; exec \"$0\" {}", attempt.run());
+        let ended = Running::start(&mut script("sh", attempt.home.path(), &masked)).end();
         assert_eq!(ended.code, Some(0), "{ended:?}");
         attempt.must_be_the_reference(&[format!("{ended:?}")]);
     }
@@ -163,14 +205,12 @@ pub fn vanished_folder(study: &Study, cases: usize, seed: u64) -> Outcome {
 pub fn nobody_listens(study: &Study) -> Outcome {
     let talkative = |attempt: &Attempt| attempt.run().replace("--quiet ", "");
     let shells = ["exec \"$0\" ARGUMENTS >&-", "exec \"$0\" ARGUMENTS 2>&-", "exec \"$0\" ARGUMENTS >&- 2>&- <&-"];
-    for script in shells {
+    for shell in shells {
         let attempt = Attempt::new(study);
-        let script = script.replace("ARGUMENTS", &talkative(&attempt));
-        let mut command = Command::new("sh");
-        command.args(["-c", &script]).arg(binary()).current_dir(attempt.home.path());
-        let ended = Running::start(&mut command).end();
-        assert_eq!(ended.code, Some(0), "{script}: {ended:?}");
-        attempt.must_be_the_reference(&[script]);
+        let closed = shell.replace("ARGUMENTS", &talkative(&attempt));
+        let ended = Running::start(&mut script("sh", attempt.home.path(), &closed)).end();
+        assert_eq!(ended.code, Some(0), "{closed}: {ended:?}");
+        attempt.must_be_the_reference(&[closed]);
     }
     for (stdout, stderr) in [(true, false), (false, true), (true, true)] {
         for json in ["", " --json"] {
@@ -226,21 +266,28 @@ pub fn no_locks(study: &Study) -> Outcome {
     Found::new(5, "0 differing bytes")
 }
 
+/// Starts a program at a time that follows, the same moment in all time zones.
+const FAKETIME: [&str; 3] = ["env", "TZ=UTC", "faketime"];
+
+/// Whether `faketime` is installed, and changes the clock of a program.
 pub fn has_faketime() -> bool {
-    is_there("faketime")
+    let mut command = Command::new(FAKETIME[0]);
+    let output = command.args(&FAKETIME[1..]).args(["1999-12-31 23:59:59", "date", "+%Y"]).output();
+    output.is_ok_and(|output| output.stdout == b"1999\n")
 }
 
 /// Clocks of other centuries, and one that goes back between a run and its continuation.
 pub fn wrong_clocks(study: &Study) -> Outcome {
     let clocks = ["1970-01-01 00:00:00", "1999-12-31 23:59:59", "2038-01-19 03:14:07", "2106-02-07 06:28:15"];
     for clock in clocks {
+        let starter = [&FAKETIME[..], &[clock]].concat();
         let attempt = Attempt::new(study);
-        let ended = attempt.start_through(&["faketime", clock]).end();
+        let ended = attempt.start_through(&starter).end();
         assert_eq!((ended.code, &*ended.said), (Some(0), ""), "{clock}");
         attempt.must_be_the_reference(&[clock.into()]);
         // Begun today.
         let attempt = Attempt::interrupted(study);
-        let ended = attempt.resume_through(&["faketime", clock]).end();
+        let ended = attempt.resume_through(&starter).end();
         assert_eq!((ended.code, &*ended.said), (Some(0), ""), "{clock}");
         attempt.must_be_the_reference(&[clock.into()]);
         let mut json = String::new();

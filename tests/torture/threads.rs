@@ -17,7 +17,8 @@ use crate::{
 fn start(attempt: &Attempt, room: usize, arguments: &str) -> Running {
     let inject = format!("inject=clone,clone3:error=EAGAIN:when={}+", room + 1);
     let starter = ["strace", "-f", "-qq", "-o", "/dev/null", "-e", "trace=clone,clone3", "-e", &inject];
-    Running::start(&mut through(attempt.home.path(), &starter, arguments))
+    // The threads of a software GPU, which has as many as cores if nothing is said.
+    Running::start(through(attempt.home.path(), &starter, arguments).env("LP_NUM_THREADS", "2"))
 }
 
 /// A command with less and less room.
@@ -136,50 +137,70 @@ fn must_be_named(ended: &Ended, remedy: &str, told: &str) {
 /// Runs that have all threads they need, but can start no more when they are to stop. `strace` counts the calls of
 /// every thread separately, so the user's limit is lowered instead, as soon as the run has begun.
 pub fn none_left_for_signals(study: &'static Study, stops: &[(&str, i32, i32)]) -> Outcome {
-    let max_time = [("--max-time 1s", 0, 75)];
-    for (cause, number, code) in stops.iter().chain(&max_time) {
-        // A run may end before it can be stopped, if the tests get less processor time than it does.
-        let stopped = (0..20).any(|_| stopped_without_threads(study, cause, *number, *code));
-        assert!(stopped, "{cause}: every run was done before it could be stopped");
+    let signals = stops.iter().map(|(name, number, code)| (Some((*name, *number)), *code));
+    for (signal, code) in signals.chain([(None, 75)]) {
+        // A run may end before it can be stopped, if the tests get less processor time than it does. The clock gives it
+        // more and more time to begin.
+        let stopped = (0..20).any(|tries| {
+            let stop = signal.map_or(Stop::MaxTime(1 << (tries / 2)), |(name, number)| Stop::Signal(name, number));
+            stopped_without_threads(study, stop, code)
+        });
+        assert!(stopped, "{signal:?}: every run was done before it could be stopped");
     }
     Found::new(stops.len() + 1, "stopped, 0 differing bytes")
 }
 
-/// Whether the run was still there to be stopped; if so, it ends with `code`. A signal that was ignored from outside, as
-/// under `nohup`, stops nothing.
-fn stopped_without_threads(study: &'static Study, cause: &str, number: i32, code: i32) -> bool {
+/// What stops a run: a signal, or the end of its seconds.
+#[derive(Clone, Copy, Debug)]
+enum Stop<'a> {
+    Signal(&'a str, i32),
+    MaxTime(u64),
+}
+
+/// Whether the run was still there to be stopped, and had begun; if so, it ends with `code`. A signal that was ignored from
+/// outside, as under `nohup`, stops nothing.
+fn stopped_without_threads(study: &'static Study, stop: Stop, code: i32) -> bool {
     let nobody = AsNobody::new();
-    let more = if cause.starts_with("--") { cause } else { "" };
+    let more = match stop {
+        Stop::Signal(..) => String::new(),
+        Stop::MaxTime(seconds) => format!("--max-time {seconds}s"),
+    };
     let arguments = format!("run {} --quiet --checkpoint-every 1s {more} --out out", study.arguments);
     let mut running = nobody.start("022", &arguments);
     let out = nobody.home.path().join("out");
     let mut ignored = false;
-    if running.wait_until(|_| out.join(".curvelax.state").exists()) {
-        ignored = more.is_empty() && !running.hears(number);
+    let is_caught = running.wait_until(|_| out.join(".curvelax.state").exists());
+    if is_caught {
         running.signal("STOP");
         let id = running.id().to_string();
         let lowered = nobody.command(&["prlimit", "--pid", &id, "--nproc=1:1"]).status().unwrap();
-        assert!(lowered.success() || running.is_over(), "{cause}");
-        if more.is_empty() {
-            running.signal(cause);
-        } else {
+        assert!(lowered.success() || running.is_over(), "{stop:?}");
+        match stop {
+            Stop::Signal(name, number) => {
+                ignored = !running.hears(number);
+                running.signal(name);
+            }
             // Its time passes, however fast it is.
-            sleep(Duration::from_millis(1500));
+            Stop::MaxTime(seconds) => sleep(Duration::from_secs(seconds)),
         }
         running.signal("CONT");
     }
     let ended = running.end();
     let attempt = Attempt::new(study);
+    if !is_caught && ended.code != Some(0) {
+        assert!(matches!(stop, Stop::MaxTime(_)) && ended.code == Some(code), "{stop:?}: {ended:?}");
+        return false;
+    }
     copy(&out, &attempt.out());
     if ended.code == Some(0) {
-        attempt.must_be_the_reference(&[format!("{cause}: {ended:?}")]);
+        attempt.must_be_the_reference(&[format!("{stop:?}: {ended:?}")]);
         return ignored;
     }
-    assert_eq!(ended.code, Some(code), "{cause}: {ended:?}");
+    assert_eq!(ended.code, Some(code), "{stop:?}: {ended:?}");
     attempt.must_end_well(ended);
     true
 }
 
 pub fn can_limit() -> bool {
-    is_there("prlimit") && is_there("setpriv")
+    is_there("prlimit")
 }
