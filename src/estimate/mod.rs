@@ -151,7 +151,9 @@ impl Estimate {
         let most = cells.iter().map(|cell| cell.family.points()).max().unwrap_or(0);
         // A run of unknown length may be long.
         let kept = seconds.is_none_or(|seconds| seconds > interval.as_secs_f64());
-        let memory = size::memory(size::program(in_pilots), members, rated, most, &residents, kept);
+        let largest_cell = cells.iter().map(|cell| cell.spec.member_count()).max().unwrap_or(0);
+        let explained = size::explaining(largest_cell, cells[0].spec.cell_features().len());
+        let memory = size::memory(size::program(in_pilots), members, rated, most, explained, &residents, kept);
         Ok(Estimate {
             members,
             cells: cells.len(),

@@ -4,7 +4,7 @@ use crate::{
     ensemble::{Cell, Portrait, spec::Store},
     report::gallery::MAX_PANELS,
     results::{
-        explained::{DRAWN, LEAST_MEMBERS, PICTURED, TIMES},
+        explained::{CONSIDERED, DRAWN, FeaturedMember, LEAST_MEMBERS, PICTURED, TIMES},
         tally::Rate,
     },
     scheme::{member, state::STATE_FIELDS},
@@ -21,6 +21,8 @@ const KEPT_NUMBERS: usize = 2 * STATE_FIELDS;
 const PAGE_BYTES: usize = 25_000;
 /// Copies of the nodes of the members drawn.
 const PORTRAIT_COPIES: usize = 3;
+/// Copies of the numbers of the members whose times are explained. Measured.
+const EXPLAINED_COPIES: usize = 4;
 /// Additional bytes if rows go to disk before their members end: rows are written and read again. Measured.
 const SPILL_BYTES: u64 = 6_000_000;
 
@@ -128,8 +130,17 @@ fn numbers(count: usize) -> u64 {
 /// The peak is at the end of the run, with a full pool and the tally, or after it, with the statistics and the charts
 /// but no pool. For each member the tally has its time and two numbers of half size about its mesh; for a fraction
 /// `rated` also its rate and that of theory. Times are sorted in place, and rates one number at a time; the number that
-/// is drawn replaces them. A chart sorts the numbers that it shows.
-pub fn memory(program: u64, members: u64, rated: f64, n: usize, stages: &[Residents], kept: bool) -> u64 {
+/// is drawn replaces them. A chart sorts the numbers that it shows. Before that, the times of the first members of a cell
+/// are [explained](explaining).
+pub fn memory(
+    program: u64,
+    members: u64,
+    rated: f64,
+    n: usize,
+    explained: u64,
+    stages: &[Residents],
+    kept: bool,
+) -> u64 {
     let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MAX_PANELS);
     let shown = n.min(Portrait::MAX_NODES);
     let portraits = numbers(2 * shown * (member::PARTS + 1) * drawn);
@@ -139,8 +150,14 @@ pub fn memory(program: u64, members: u64, rated: f64, n: usize, stages: &[Reside
     let [fitted, charted] = [rated, members.saturating_sub(rated)].map(|count| count * size_of::<f64>() as u64);
     let statistics = fitted.max(charted);
     let resident = stages.iter().map(|stage| stage.in_run(drawn, kept)).max().unwrap_or(0);
-    let reporting = PORTRAIT_COPIES as u64 * portraits + page + statistics;
+    let reporting = PORTRAIT_COPIES as u64 * portraits + page + statistics.max(explained);
     program + tally + (resident + portraits).max(reporting)
+}
+
+/// Bytes of the first members of a cell, each with so many features, while it is explained what their times depend on.
+pub fn explaining(members_of_cell: u64, features: usize) -> u64 {
+    let each = size_of::<FeaturedMember>() + EXPLAINED_COPIES * features * size_of::<f64>();
+    members_of_cell.min(CONSIDERED as u64) * each as u64
 }
 
 /// Peak resident size of this process without the members of its largest pilot.

@@ -29,7 +29,8 @@ fn main() -> ExitCode {
     let mut arguments = Arguments::from_args();
     // Many trials wait: for a program, a compiler, or the two minutes after which a GPU is given up. These are first.
     arguments.test_threads.get_or_insert(2 + available_parallelism().map_or(1, usize::from));
-    let modules: [(&str, fn() -> Vec<Trial>); 7] = [
+    type Trials = fn() -> Vec<Trial>;
+    let modules: [(&str, Trials); 7] = [
         ("hostile", hostile::trials),
         ("conformance", conformance::trials),
         ("faults", faults::trials),
