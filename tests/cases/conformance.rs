@@ -120,7 +120,7 @@ fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
         add(
             "adaptive: where a dispatch ends or pauses, or a member lies, changes no bit".into(),
             adaptive_bits::<T>,
-            7,
+            31,
         );
         if everything() {
             add("adaptive: a dispatch may do as much as it is allowed to".into(), adaptive_largest::<T>, 0);
