@@ -152,7 +152,8 @@ impl Estimate {
         // A run of unknown length may be long.
         let kept = seconds.is_none_or(|seconds| seconds > interval.as_secs_f64());
         let largest_cell = cells.iter().map(|cell| cell.spec.member_count()).max().unwrap_or(0);
-        let explained = size::explaining(largest_cell, cells[0].spec.cell_features().len());
+        let timed = if pilot.ended == 0 { 1.0 } else { pilot.relaxed.max(pilot.rated) as f64 / pilot.ended as f64 };
+        let explained = size::explaining(largest_cell, cells[0].spec.cell_features().len(), timed);
         let memory = size::memory(size::program(in_pilots), members, rated, most, explained, &residents, kept);
         Ok(Estimate {
             members,

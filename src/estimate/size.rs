@@ -22,7 +22,7 @@ const PAGE_BYTES: usize = 25_000;
 /// Copies of the nodes of the members drawn.
 const PORTRAIT_COPIES: usize = 3;
 /// Copies of the numbers of the members whose times are explained. Measured.
-const EXPLAINED_COPIES: usize = 4;
+const EXPLAINED_COPIES: f64 = 2.0;
 /// Additional bytes if rows go to disk before their members end: rows are written and read again. Measured.
 const SPILL_BYTES: u64 = 6_000_000;
 
@@ -154,10 +154,12 @@ pub fn memory(
     program + tally + (resident + portraits).max(reporting)
 }
 
-/// Bytes of the first members of a cell, each with so many features, while it is explained what their times depend on.
-pub fn explaining(members_of_cell: u64, features: usize) -> u64 {
-    let each = size_of::<FeaturedMember>() + EXPLAINED_COPIES * features * size_of::<f64>();
-    members_of_cell.min(CONSIDERED as u64) * each as u64
+/// Bytes of the first members of a cell, each with so many features, while it is explained what their times depend on. Of
+/// those that have times, a fraction `timed`, the numbers are copied.
+pub fn explaining(members_of_cell: u64, features: usize, timed: f64) -> u64 {
+    let numbers = (features * size_of::<f64>()) as f64;
+    let each = size_of::<FeaturedMember>() as f64 + numbers * (1.0 + EXPLAINED_COPIES * timed);
+    (members_of_cell.min(CONSIDERED as u64) as f64 * each) as u64
 }
 
 /// Peak resident size of this process without the members of its largest pilot.

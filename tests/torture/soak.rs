@@ -43,15 +43,19 @@ pub fn constant(samples: usize, steps: u64) -> Outcome {
     assert!(ended.code == Some(75) && ended.errors().len() == 1, "{ended:?}");
     let rows = fs::read_to_string(&table).unwrap().lines().count() as u64 - 1;
     let bounds = |values: Vec<u64>| (*values.iter().min().unwrap(), *values.iter().max().unwrap());
-    let (least, most) = bounds(steady.iter().map(|sample| sample.0).collect());
+    // What a checkpoint needs for a moment is no growth: the least of the first quarter is compared with that of the last.
+    let memory: Vec<u64> = steady.iter().map(|sample| sample.0).collect();
+    let least = |samples: &[u64]| *samples.iter().min().unwrap();
+    let [before, after] = [&memory[..memory.len() / 4], &memory[memory.len() * 3 / 4..]].map(least);
+    let most = *memory.iter().max().unwrap();
     let (fewest_files, most_files) = bounds(steady.iter().map(|sample| sample.1).collect());
     let told = format!(
-        "{:.0e} steps in {:.0} s: {least} to {most} KiB of memory, {fewest_files} to {most_files} files open",
+        "{:.0e} steps in {:.0} s: from {before} to {after} KiB of memory, {most} for a moment, {fewest_files} to {most_files} files open",
         (rows * steps) as f64,
         took.as_secs_f64()
     );
     eprintln!("{told}");
-    assert!(most - least <= SLACK_KIB, "{told}");
+    assert!(after.saturating_sub(before) <= SLACK_KIB, "{told}");
     // A checkpoint that is being written is open for a moment.
     assert!(most_files - fewest_files <= 3, "{told}");
     Found::new(steady.len(), told)

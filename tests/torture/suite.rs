@@ -322,6 +322,6 @@ fn the_rest(suite: &mut Suite, seed: u64) {
     let sizes: &[usize] = suite.of(&[6, 7, 11, 64, 1000], &[6, 7, 11, 64, 1000, 100_000, 1_000_000]);
     suite.test("rings_of_any_size", "done, or refused by name", || sizes::rings(sizes));
     suite.test("ensembles_of_any_size", "done, or refused by name", sizes::members);
-    let (samples, steps) = (100, suite.of(100, 5000));
+    let (samples, steps) = (140, suite.of(100, 5000));
     suite.test("memory_and_open_files_stay", "4 MiB, 3 files", move || soak::constant(samples, steps));
 }
