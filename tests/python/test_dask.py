@@ -33,10 +33,13 @@ adaptive = [1e-3, 1e-5]
 """
 
 
-# What the study starts in the place of curvelax: notes each start, and while there is a file `hold` waits to be woken.
+# What the study starts in the place of curvelax: notes each start, and while there is a file `hold`, a shard waits to be
+# woken.
 WRAPPER = """#!/bin/sh
 echo "$*" >>"$0.log"
-[ ! -e "$0.hold" ] || kill -STOP $$
+case "$* " in
+*" --shard "*) [ ! -e "$0.hold" ] || kill -STOP $$ ;;
+esac
 exec "$CURVELAX_ITSELF" "$@"
 """
 
