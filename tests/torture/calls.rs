@@ -74,9 +74,12 @@ fn counts(prepared: &Prepared, calls: &[&str]) -> BTreeMap<String, RangeInclusiv
     let ended = prepared.go(&attempt, &starter);
     assert_eq!(ended.code, Some(0), "{ended:?}");
     let mut by_thread = BTreeMap::<(String, String), [usize; 2]>::new();
+    // Not any folder of this name: Cargo sets LD_LIBRARY_PATH, where build scripts have such folders.
+    let out = attempt.out();
+    let folders = ["\"out\"", "\"out/", out.to_str().unwrap()];
     let mut has_begun = false;
     for line in fs::read_to_string(&file).unwrap().lines() {
-        has_begun |= ["\"out\"", "\"out/", "/out\"", "/out/"].iter().any(|path| line.contains(path));
+        has_begun |= folders.iter().any(|folder| line.contains(folder));
         let mut words = line.splitn(2, ' ');
         let (thread, call) = (words.next().unwrap(), words.next().unwrap_or_default().trim_start());
         if let Some((call, _)) = call.split_once('(').filter(|(call, _)| calls.contains(call)) {
