@@ -20,6 +20,24 @@ fn arc_first(start: real, end: Jet) -> Arc {
 
 /// The value at a fraction of the step.
 fn arc_at(arc: Arc, at: real) -> real {
+    let powers = arc_powers(arc);
+    let a = arc.start;
+    let bend = real(0.5) * a.bend;
+    return a.value + at * (a.slope + at * (bend + at * (powers.third + at * (powers.fourth + at * powers.fifth))));
+}
+
+/// The slope at a fraction of the step.
+fn arc_slope_at(arc: Arc, at: real) -> real {
+    let powers = arc_powers(arc);
+    let a = arc.start;
+    let higher = real(4.0) * powers.fourth + at * (real(5.0) * powers.fifth);
+    return a.slope + at * (a.bend + at * (real(3.0) * powers.third + at * higher));
+}
+
+/// Coefficients of the third, fourth and fifth power.
+struct Powers { third: real, fourth: real, fifth: real }
+
+fn arc_powers(arc: Arc) -> Powers {
     let a = arc.start;
     let b = arc.end;
     let half = real(0.5);
@@ -28,7 +46,7 @@ fn arc_at(arc: Arc, at: real) -> real {
     let third = real(10.0) * rise - real(6.0) * a.slope - real(4.0) * b.slope + half * (b.bend - three * a.bend);
     let fourth = real(8.0) * a.slope + real(7.0) * b.slope - real(15.0) * rise + half * (three * a.bend) - b.bend;
     let fifth = real(6.0) * rise - three * (a.slope + b.slope) + half * (b.bend - a.bend);
-    return a.value + at * (a.slope + at * (half * a.bend + at * (third + at * (fourth + at * fifth))));
+    return Powers(third, fourth, fifth);
 }
 
 /// How much of the value and the derivatives at each end goes into the value at a fraction of a step of length h. Those
@@ -51,10 +69,25 @@ fn arc_weights(at: real, h: real, shorter: real) -> Arc {
     return Arc(Jet(arc_at(Arc(one, none), at), slope, bend), end);
 }
 
-/// The fraction of the step at which the value falls to `aim`, which lies between its ends.
-fn arc_crossing(arc: Arc, aim: real) -> real {
+/// Whether the value falls at the start and rises at the end.
+fn arc_dips(arc: Arc) -> bool { return !(real(0.0) <= arc.start.slope || arc.end.slope <= real(0.0)); }
+
+/// The fraction of the step up to which the value falls: less than 1 if it rises at the end.
+fn arc_turn(arc: Arc) -> real {
     var low = real(0.0);
     var high = real(1.0);
+    if !arc_dips(arc) { return high; }
+    for (var i = 0u; i < BISECTIONS; i++) {
+        let middle = real(0.5) * (low + high);
+        if arc_slope_at(arc, middle) <= real(0.0) { low = middle; } else { high = middle; }
+    }
+    return low;
+}
+
+/// The fraction of the step at which the value falls to `aim`, which lies between those at the start and at `end`.
+fn arc_crossing(arc: Arc, aim: real, end: real) -> real {
+    var low = real(0.0);
+    var high = end;
     for (var i = 0u; i < BISECTIONS; i++) {
         let middle = real(0.5) * (low + high);
         if arc_at(arc, middle) <= aim { high = middle; } else { low = middle; }
@@ -111,7 +144,17 @@ fn taken_fraction_at(taken: Taken, excess: real) -> real {
     if taken.fall.kind == STRAIGHT { return (taken.before - excess) / (taken.before - taken.after); }
     let aim = ln_ratio(taken.before, excess);
     if taken.fall.kind == EXPONENTIAL { return aim / taken.fall.fallen; }
-    return arc_crossing(taken.fall.arc, aim);
+    var end = real(1.0);
+    if !(taken.after <= excess) { end = arc_turn(taken.fall.arc); }
+    return arc_crossing(taken.fall.arc, aim, end);
+}
+
+/// Whether the excess falls to `excess`, even if it then rises again.
+fn taken_falls_to(taken: Taken, excess: real) -> bool {
+    if taken.after <= excess { return true; }
+    if taken.fall.kind != SMOOTH || excess <= real(0.0) || !arc_dips(taken.fall.arc) { return false; }
+    let end = arc_turn(taken.fall.arc);
+    return !(real(1.0) <= end) && arc_at(taken.fall.arc, end) <= ln_ratio(taken.before, excess);
 }
 
 /// A field inside the step of an attempt, which ends at `end`, by the weights that `w` is.

@@ -178,7 +178,7 @@ fn judge_attempt(ended: u32, count: u32, h: real, errors: vec2<real>, looks: Loo
         if passed || (watched && reaches_level(report.now)) { counters.goal = counters.steps + 1u; }
     }
     let at_goal = select(0u, AT_GOAL, counters.steps + 1u == counters.goal);
-    let relaxes = counters.relax_step == NEVER && report.now.excess <= p.relax_at;
+    let relaxes = counters.relax_step == NEVER && report.now.excess <= nearness() * p.relax_at;
     return ACCEPTED | at_goal | select(0u, MAY_RELAX, relaxes);
 }
 
@@ -228,13 +228,16 @@ fn refuse_inaccurate(h: real, errors: vec2<real>) {
     refuse(next.length, real(MIN_STEP), SINGULAR);
 }
 
+/// Excess after a step, as a multiple of a threshold, up to which it may have reached the threshold.
+fn nearness() -> real { return select(real(1.0), real(NEAR), ADAPTIVE); }
+
 /// Records the steps in which the excess falls to half its start and to the relaxation threshold, and where inside
 /// them.
 fn record_events(taken: Taken, apart: real) {
     let p = &all_parameters[member];
     let report = &all_reports[member].report;
     let counters = &all_counters[member];
-    if counters.half_step == NEVER && report.now.excess <= p.half_at {
+    if counters.half_step == NEVER && taken_falls_to(taken, p.half_at) {
         counters.half_step = counters.steps;
         report.progress.half_high = report.progress.time_high;
         report.progress.half_low = report.progress.time_low;
@@ -242,8 +245,8 @@ fn record_events(taken: Taken, apart: real) {
         report.progress.half_fraction = taken_fraction_at(taken, p.half_at);
     }
     // A curve whose curvature is not that of its polygon does not count as relaxed.
-    let due = counters.relax_step == NEVER && report.now.excess <= p.relax_at;
-    if due && apart <= real(MAX_GAP) {
+    let near = counters.relax_step == NEVER && report.now.excess <= nearness() * p.relax_at;
+    if near && taken_falls_to(taken, p.relax_at) && apart <= real(MAX_GAP) {
         counters.relax_step = counters.steps;
         report.progress.relax_high = report.progress.time_high;
         report.progress.relax_low = report.progress.time_low;

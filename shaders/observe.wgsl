@@ -8,6 +8,8 @@ const MIN_EDGE = 1e-5;
 const MAX_DRIFT = 1.0;
 /// Gap between k and the polygon's turn above which no member counts as relaxed.
 const MAX_GAP = 0.5;
+/// Excess at the end of an adaptive step, as a multiple of a threshold, above which nobody looks for a dip below it.
+const NEAR = 4.0;
 const FOUR_PI = 12.566370614359172;
 
 /// Sums of the new curve: length, area, energy, turning.

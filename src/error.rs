@@ -188,7 +188,7 @@ pub(crate) fn plainly(message: &str) -> String {
         (None, what) if what.starts_with("data did not match any variant") => {
             "expected a number, a text, or true or false".into()
         }
-        (None, what) => with_short_quotes(what),
+        (None, what) => with_short_quotes(&without_types(what)),
     };
     plain + place
 }
@@ -257,6 +257,24 @@ fn wanted_otherwise(found: &str, wanted: &str) -> Option<String> {
         }
         _ => None,
     }
+}
+
+/// What serde and the readers of JSON call fields, variants and the like, in words.
+fn without_types(what: &str) -> String {
+    const WORDS: [(&str, &str); 7] = [
+        ("unknown variant ", "unknown value "),
+        ("unknown field ", "unknown key "),
+        ("duplicate field ", "the key is there twice: "),
+        ("EOF while parsing", "it ends inside"),
+        ("recursion limit exceeded", "lists or tables nested too deeply"),
+        ("expected value", "expected a value"),
+        ("invalid number", "not a number"),
+    ];
+    if let Some(key) = what.strip_prefix("missing field ") {
+        return format!("the key {key} is missing");
+    }
+    let known = WORDS.iter().find_map(|(start, plain)| Some(format!("{plain}{}", what.strip_prefix(start)?)));
+    known.unwrap_or_else(|| what.to_owned())
 }
 
 /// Shortens what stands between backticks.
@@ -332,7 +350,10 @@ mod tests {
             ("invalid type: map, expected a number or \"auto\"", "expected a number or \"auto\", found a table"),
             ("wanted string or table", "expected a word in quotes"),
             ("data did not match any variant of untagged enum Read", "expected a number, a text, or true or false"),
-            ("missing field `points` at line 3 column 1", "missing field `points` at line 3 column 1"),
+            ("missing field `points` at line 3 column 1", "the key `points` is missing at line 3 column 1"),
+            ("unknown variant `x`, expected `a` or `b`", "unknown value `x`, expected `a` or `b`"),
+            ("unknown field `x`, expected `a` or `b`", "unknown key `x`, expected `a` or `b`"),
+            ("EOF while parsing an object at line 1 column 9", "it ends inside an object at line 1 column 9"),
         ] {
             assert_eq!(plainly(said), told);
         }

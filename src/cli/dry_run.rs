@@ -2,7 +2,7 @@
 
 use crate::{
     ensemble::Spec,
-    estimate::Estimate,
+    estimate::{Estimate, Pilot},
     report::overview::machine,
     text::{duration, plural},
 };
@@ -29,9 +29,18 @@ pub fn table(estimate: &Estimate, spec: &Spec) -> String {
             "time",
             estimate.seconds.map_or(unknown("a step"), |seconds| format!("about {} after start-up", duration(seconds))),
         ),
-        ("pilot", format!("{} of {} started members ended in {}", pilot.ended, pilot.members, duration(pilot.seconds))),
+        ("pilot", started(pilot)),
     ];
     rows.iter().map(|(label, text)| format!("{label:<11}{text}\n")).collect()
+}
+
+/// What became of the members of the pilot. If some failed, the rest of the estimate is that of short runs.
+fn started(Pilot { members, ended, failed, seconds, .. }: &Pilot) -> String {
+    let failed = match failed {
+        0 => String::new(),
+        _ => format!("; {failed} failed: a run with --only 0 says why"),
+    };
+    format!("{ended} of {members} started members ended in {}{failed}", duration(*seconds))
 }
 
 /// The members that run besides, for the error of discretisation.
@@ -55,7 +64,7 @@ fn size(bytes: u64) -> String {
 mod tests {
     use super::*;
     use crate::backend::DeviceKind;
-    use crate::{estimate::Pilot, number::Precision, placement::Platform};
+    use crate::{number::Precision, placement::Platform};
 
     #[test]
     fn an_estimate_looks_like_this() {
@@ -80,7 +89,7 @@ mod tests {
             dispatches: Some(740),
             start_up_seconds: 0.014,
             seconds: Some(31.9),
-            pilot: Pilot { members: 130, ended: 130, relaxed: 129, rated: 120, seconds: 1.4 },
+            pilot: Pilot { members: 130, ended: 130, failed: 0, relaxed: 129, rated: 120, seconds: 1.4 },
         };
         let expected = "\
 members    3000 in 1 cell

@@ -3,7 +3,7 @@
 //! A spec is read once ([`Spec::from_toml`]), overlaid with the flags by `cli`, and checked once ([`Spec::validate`],
 //! in `validate.rs`). Everything after that relies on it.
 
-use std::{fmt, marker::PhantomData, path::Path, str::FromStr};
+use std::{fmt, io::ErrorKind, marker::PhantomData, path::Path, str::FromStr};
 
 use serde::{
     Deserialize, Deserializer, Serialize, Serializer,
@@ -398,8 +398,13 @@ impl Spec {
     ///
     /// The result is not yet [validated](Spec::validate): flags may still replace wrong values.
     pub fn read(path: &Path) -> Result<Spec> {
-        let text = input::text(path, input::MAX_SPEC)
-            .map_err(|e| Error::Request(format!("cannot read the spec {}: {e}", echo_path(path))))?;
+        let text = input::text(path, input::MAX_SPEC).map_err(|e| {
+            let problem = match e.kind() {
+                ErrorKind::NotFound => "it does not exist; check its name and the folder".into(),
+                _ => e.to_string(),
+            };
+            Error::Request(format!("cannot read the spec {}: {problem}", echo_path(path)))
+        })?;
         Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", echo_path(path))))
     }
 
@@ -970,7 +975,7 @@ mod tests {
         let long = "x".repeat(100_000);
         for (text, start) in [
             (format!("\nshape = '{long}'"), "TOML parse error at line 2, column 9: unknown shape `xxx"),
-            (format!("{long} = 1"), "TOML parse error at line 1, column 1: unknown field `xxx"),
+            (format!("{long} = 1"), "TOML parse error at line 1, column 1: unknown key `xxx"),
             (format!("a = {}", "[".repeat(100_000)), "TOML parse error at line 1, column 85: cannot recurse further"),
         ] {
             let message = Spec::from_toml(&text).unwrap_err();
@@ -981,11 +986,11 @@ mod tests {
     #[test]
     fn a_wrong_key_or_word_is_shown_in_its_line_with_the_nearest_spelling() {
         let message = Spec::from_toml("curves = 3\nomga = 1\n").unwrap_err();
-        for part in ["line 2, column 1", "2 | omga = 1", "^^^^", "unknown field `omga`", "did you mean `omega`?"] {
+        for part in ["line 2, column 1", "2 | omga = 1", "^^^^", "unknown key `omga`", "did you mean `omega`?"] {
             assert!(message.contains(part), "no {part:?} in: {message}");
         }
         let message = Spec::from_toml("order = 'colored'").unwrap_err();
-        assert!(message.contains("unknown variant `colored`"), "{message}");
+        assert!(message.contains("unknown value `colored`"), "{message}");
         assert!(message.contains("did you mean `coloured`?"), "{message}");
     }
 }

@@ -68,6 +68,8 @@ pub struct Pilot {
     pub members: u64,
     /// Members that ended.
     pub ended: u64,
+    /// Members that ended neither relaxed nor at the end of their time.
+    pub failed: u64,
     /// Members that relaxed.
     pub relaxed: u64,
     /// Members that have a rate.
@@ -193,6 +195,7 @@ impl Pilot {
     fn add(&mut self, seen: &pilot::Seen) {
         self.members += seen.members;
         self.ended += seen.left;
+        self.failed += seen.failed;
         self.relaxed += seen.relaxed;
         self.rated += seen.rated;
         self.seconds += seen.seconds;

@@ -73,6 +73,7 @@ pub struct Seen {
     pub members: u64,
     /// Members that have ended, and the steps that they made.
     pub left: u64,
+    pub failed: u64,
     pub relaxed: u64,
     pub rated: u64,
     pub steps: u64,
@@ -94,6 +95,7 @@ impl Seen {
         Seen {
             members,
             left: 0,
+            failed: 0,
             relaxed: 0,
             rated: 0,
             steps: 0,
@@ -132,6 +134,7 @@ impl Sink for PilotSink<'_> {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         let seen = &mut self.seen;
         seen.left += 1;
+        seen.failed += u64::from(ended.outcome.status.is_failure());
         seen.relaxed += u64::from(ended.outcome.t_relax.is_some());
         seen.rated += u64::from(ended.outcome.rate.is_some());
         seen.steps += ended.outcome.steps;

@@ -218,7 +218,7 @@ pub(crate) mod tests {
             ("\"nodes\":[\"", "\"nodes\":[\"!!!!", "member 5: expected digits of base64"),
             ("\"nodes\":[\"", "\"nodes\":[\"AAAA", "member 5: expected equally many nodes"),
             ("\"unit\":", "\"unit\":-", "member 5: expected a corner and a positive unit"),
-            ("relaxed", "slack", "unknown variant `slack`"),
+            ("relaxed", "slack", "unknown value `slack`"),
             ("}\n", "\n", "EOF while parsing"),
         ] {
             let error = twisted(from, to).unwrap_err();

@@ -122,7 +122,8 @@ impl Origin {
 
     fn changed(&self, path: &Path) -> Error {
         Error::Request(format!(
-            "the outline {} has changed or disappeared since the run began: restore it, or continue with what was read then by curvelax resume",
+            "the outline {} has changed or disappeared since the run began: restore it; where the run's \
+             folder still has the file .curvelax.outlines, curvelax resume continues with what was read then",
             Path::new(&self.base).join(path).display()
         ))
     }

@@ -376,8 +376,10 @@ impl Tally {
         let members = format!("{} {}", self.members(), plural(self.members(), "member"));
         let failed = self.failed();
         if failed > 0 {
+            let stalled = self.counts().any(|(status, count)| status == Status::Stalled && count > 0);
+            let direct = if stalled { "where sweeps stalled, --solver direct helps; " } else { "" };
             warnings.push(format!(
-                "{failed} of {members} failed (see `status`); unless the flow itself becomes singular, a smaller \
+                "{failed} of {members} failed (see `status`); {direct}unless the flow itself becomes singular, a smaller \
                  --tau or --adaptive, or more --points, helps"
             ));
         }

@@ -51,16 +51,22 @@ impl<T: Real> Arc<T> {
 
     /// Returns the value at the fraction `at` of the step.
     pub fn at(&self, at: T) -> T {
+        let [third, fourth, fifth] = self.powers();
+        let Jet { value, slope, bend } = self.start;
+        value + at * (slope + at * (T::of(0.5) * bend + at * (third + at * (fourth + at * fifth))))
+    }
+
+    /// Returns the coefficients of the third, fourth and fifth power.
+    fn powers(&self) -> [T; 3] {
         let (three, four, six) = (T::of(3.0), T::of(4.0), T::of(6.0));
         let (seven, eight, ten, fifteen) = (T::of(7.0), T::of(8.0), T::of(10.0), T::of(15.0));
         let half = T::of(0.5);
         let Arc { start: a, end: b } = self;
         let rise = b.value - a.value;
-        // Coefficients of the third, fourth and fifth power.
         let third = ten * rise - six * a.slope - four * b.slope + half * (b.bend - three * a.bend);
         let fourth = eight * a.slope + seven * b.slope - fifteen * rise + half * (three * a.bend) - b.bend;
         let fifth = six * rise - three * (a.slope + b.slope) + half * (b.bend - a.bend);
-        a.value + at * (a.slope + at * (half * a.bend + at * (third + at * (fourth + at * fifth))))
+        [third, fourth, fifth]
     }
 
     /// Returns how much of the value and the derivatives at each end goes into the value at the fraction `at` of a step
@@ -81,10 +87,41 @@ impl<T: Real> Arc<T> {
         Arc { start, end: Jet { value: ends(none, one), slope: ends(none, sloped), bend: ends(none, bent) } }
     }
 
-    /// Returns the fraction of the step at which the value falls to `target`, which lies between its ends.
-    pub fn crossing(&self, target: T) -> T {
+    /// Returns the slope at the fraction `at` of the step.
+    fn slope_at(&self, at: T) -> T {
+        let (three, four, five) = (T::of(3.0), T::of(4.0), T::of(5.0));
+        let [third, fourth, fifth] = self.powers();
+        self.start.slope + at * (self.start.bend + at * (three * third + at * (four * fourth + at * (five * fifth))))
+    }
+
+    /// Returns whether the value falls at the start and rises at the end.
+    fn dips(&self) -> bool {
+        !(T::of(0.0).le(self.start.slope) || self.end.slope.le(T::of(0.0)))
+    }
+
+    /// Returns the fraction of the step up to which the value falls: less than 1 if it rises at the end.
+    fn turn(&self) -> T {
+        let (zero, half) = (T::of(0.0), T::of(0.5));
+        let (mut low, mut high) = (zero, T::of(1.0));
+        if !self.dips() {
+            return high;
+        }
+        for _ in 0..BISECTIONS {
+            let middle = half * (low + high);
+            if self.slope_at(middle).le(zero) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+
+    /// Returns the fraction of the step at which the value falls to `target`, which lies between those at the start and
+    /// at `high`.
+    pub fn crossing(&self, target: T, mut high: T) -> T {
         let half = T::of(0.5);
-        let (mut low, mut high) = (T::of(0.0), T::of(1.0));
+        let mut low = T::of(0.0);
         for _ in 0..BISECTIONS {
             let middle = half * (low + high);
             if self.at(middle).le(target) {
@@ -201,8 +238,23 @@ impl<T: Real> Taken<T> {
         match self.fall {
             Fall::Straight => (self.before - excess) / (self.before - self.after),
             Fall::Exponential(fallen) => ln_ratio(self.before, excess) / fallen,
-            Fall::Smooth(arc) => arc.crossing(ln_ratio(self.before, excess)),
+            Fall::Smooth(arc) => {
+                let turn = if self.after.le(excess) { T::of(1.0) } else { arc.turn() };
+                arc.crossing(ln_ratio(self.before, excess), turn)
+            }
         }
+    }
+
+    /// Whether the excess falls to `excess`, even if it then rises again.
+    pub(super) fn falls_to(&self, excess: T) -> bool {
+        let dips = |arc: &Arc<T>| {
+            if excess.le(T::of(0.0)) || !arc.dips() {
+                return false;
+            }
+            let turn = arc.turn();
+            !T::of(1.0).le(turn) && arc.at(turn).le(ln_ratio(self.before, excess))
+        };
+        self.after.le(excess) || matches!(&self.fall, Fall::Smooth(arc) if dips(arc))
     }
 }
 
@@ -282,11 +334,29 @@ mod tests {
     fn an_event_is_found_where_an_exponential_is() {
         let at = |t: f64| [(-0.8 * t).exp(), -0.8 * (-0.8 * t).exp(), 0.64 * (-0.8 * t).exp()];
         let arc = Arc { start: jet(at(0.0)), end: jet(at(1.0)) };
-        let found = arc.crossing(at(0.3)[0]);
+        let found = arc.crossing(at(0.3)[0], 1.0);
         // A parabola or a cubic would be off by 10⁻³ or more.
         assert!((found - 0.3).abs() < 1e-5, "{found}");
-        assert!((arc.crossing(at(1.0)[0]) - 1.0).abs() < 1e-12);
+        assert!((arc.crossing(at(1.0)[0], 1.0) - 1.0).abs() < 1e-12);
         let wild = Arc { start: jet([1.0, f64::NAN, 0.0]), end: jet([0.0; 3]) };
-        assert!((0.0..=1.0).contains(&wild.crossing(0.5)) && !wild.is_tame());
+        assert!((0.0..=1.0).contains(&wild.crossing(0.5, 1.0)) && !wild.is_tame());
+    }
+
+    #[test]
+    fn an_excess_that_dips_inside_a_step_falls_to_what_lies_above_the_dip() {
+        // ln excess: down to -0.09 at 0.3, and up to 0.4 at the end.
+        let log = |t: f64| (t - 0.3).powi(2) - 0.09;
+        let arc = Arc { start: jet([0.0, -0.6, 2.0]), end: jet([log(1.0), 1.4, 2.0]) };
+        let taken = Taken { h: 1.0, before: 2.0, after: 2.0 * log(1.0).exp(), fall: Fall::Smooth(arc), gap: 0.0 };
+        assert!((arc.turn() - 0.3).abs() < 1e-12);
+        let level = |t: f64| 2.0 * log(t).exp();
+        for at in [0.1, 0.2, 0.29] {
+            assert!(taken.falls_to(level(at)) && (taken.fraction_at(level(at)) - at).abs() < 1e-9, "{at}");
+        }
+        assert!(!taken.falls_to(0.999 * level(0.3)) && !taken.falls_to(0.0) && taken.falls_to(taken.after));
+        // Nothing lies below the end of a fall.
+        let fall = Fall::Smooth(Arc { start: jet([0.0, -1.0, 0.0]), end: jet([-1.0, -1.0, 0.0]) });
+        let falls = Taken { after: 2.0 * (-1.0_f64).exp(), fall, ..taken };
+        assert!(!falls.falls_to(0.99 * falls.after) && falls.falls_to(falls.after));
     }
 }

@@ -282,7 +282,7 @@ impl<N: Number> Team<N> {
         let (n, adaptive) = (self.work.blocks.n, branches.adaptive);
         let [at_level, passed] =
             if branches.watched { self.at_levels(runs, adaptive) } else { [N::Mask::all_of(false); 2] };
-        let gap = self.gap_at_threshold(runs, live, attempt.excess);
+        let gap = self.gap_at_threshold(runs, live, attempt.excess, adaptive);
         let (finite, singular) =
             (attempt.seen.is_finite(), attempt.seen.is_singular(self.turning, &self.parameters, n));
         let mut kept = N::Mask::all_of(false);
@@ -317,7 +317,7 @@ impl<N: Number> Team<N> {
                 let excess = [self.excess.lane(lane), attempt.excess.lane(lane)];
                 let decline = attempt.decline.map(|of| of.lane(lane));
                 let taken = taken(run, stride, excess, decline, gap.lane(lane), adaptive);
-                record_events(run, &taken);
+                record_events(run, &taken, adaptive);
                 decay::follow(run, &taken);
                 if let Some(allowed) = allowed {
                     lengthen(run, stride, errors, decline, allowed);
@@ -336,15 +336,15 @@ impl<N: Number> Team<N> {
     }
 
     /// The gap between k and the polygon of the new curves, if one of them may have relaxed. It costs a fifth of a
-    /// direct step, and is computed once.
+    /// direct step, and is computed a few times.
     #[inline(always)]
-    fn gap_at_threshold(&self, runs: &[&mut Run<N::Real>], live: N::Mask, excess: N) -> N {
+    fn gap_at_threshold(&self, runs: &[&mut Run<N::Real>], live: N::Mask, excess: N, adaptive: bool) -> N {
         let mut waiting = N::Mask::all_of(false);
         for (lane, run) in runs.iter().enumerate() {
             waiting.set_lane(lane, run.counters.relax_step == NEVER);
         }
-        let at_threshold = excess.le(self.parameters.relax_at).and(live).and(waiting);
-        if at_threshold.any() { observe::gap(&self.work.new) } else { N::of(0.0) }
+        let near = excess.le(N::of(nearness(adaptive)) * self.parameters.relax_at).and(live).and(waiting);
+        if near.any() { observe::gap(&self.work.new) } else { N::of(0.0) }
     }
 
     /// Where an observable of the new curves has reached a level at which the member pauses, and where one may have done
@@ -478,18 +478,23 @@ fn refuse_inaccurate<T: Real>(run: &mut Run<T>, n: usize, h: T, errors: [T; 2], 
     refuse(run, n, next, pace::MIN_STEP, Status::Singular);
 }
 
+/// Excess after a step, as a multiple of a threshold, up to which it may have reached the threshold.
+fn nearness(adaptive: bool) -> f64 {
+    if adaptive { observe::NEAR } else { 1.0 }
+}
+
 /// Records the steps in which the excess falls to half its start and to the relaxation threshold, and where inside
 /// them. A curve whose curvature is not that of its polygon does not count as relaxed.
-fn record_events<T: Real>(run: &mut Run<T>, taken: &Taken<T>) {
+fn record_events<T: Real>(run: &mut Run<T>, taken: &Taken<T>, adaptive: bool) {
     let Run { report, counters, parameters: p, .. } = run;
     let progress = &mut report.progress;
-    if counters.half_step == NEVER && taken.after.le(p.half_at) {
+    if counters.half_step == NEVER && taken.falls_to(p.half_at) {
         counters.half_step = counters.steps;
         (progress.half_high, progress.half_low) = (progress.time_high, progress.time_low);
         (progress.half_length, progress.half_fraction) = (taken.h, taken.fraction_at(p.half_at));
     }
-    let due = counters.relax_step == NEVER && taken.after.le(p.relax_at);
-    if due && taken.gap.le(T::of(observe::MAX_GAP)) {
+    let near = counters.relax_step == NEVER && taken.after.le(T::of(nearness(adaptive)) * p.relax_at);
+    if near && taken.falls_to(p.relax_at) && taken.gap.le(T::of(observe::MAX_GAP)) {
         counters.relax_step = counters.steps;
         (progress.relax_high, progress.relax_low) = (progress.time_high, progress.time_low);
         (progress.relax_length, progress.relax_fraction) = (taken.h, taken.fraction_at(p.relax_at));

@@ -19,6 +19,9 @@ pub const MAX_DRIFT: f64 = 1.0;
 /// Gap between k and the polygon's turn, in rad, above which no member counts as relaxed: the curvature, which moves
 /// the member, is not that of the polygon, which looks round.
 pub const MAX_GAP: f64 = 0.5;
+/// Excess at the end of an adaptive step, as a multiple of a threshold, above which nobody looks for a dip below the
+/// threshold inside the step.
+pub const NEAR: f64 = 4.0;
 
 /// The four sums, in the order of the kernel's `vec4`.
 #[derive(Clone, Copy, Debug)]

@@ -343,14 +343,14 @@ fn a_wrong_spec_file_is_shown_in_its_line() {
         ("curves = 'many'", &["line 1, column 10", "expected a whole number from 0, found the text \"many\""]),
         ("curves = -3", &["line 1, column 10", "found the number -3"]),
         ("amplitude = '0.1'", &["line 1, column 13", "expected a number, or a distribution"]),
-        ("solver = 'gaus-seidel'", &["unknown variant `gaus-seidel`", "did you mean `gauss-seidel`?"]),
+        ("solver = 'gaus-seidel'", &["unknown value `gaus-seidel`", "did you mean `gauss-seidel`?"]),
         ("flow = 'wilmore'", &["line 1, column 8", "did you mean `willmore`?"]),
         ("no-redistribution = 1", &["line 1, column 21", "expected true or false, found the number 1"]),
         ("snapshots = 'a,b'", &["line 1, column 13", "`a` in `a,b`"]),
         ("only = [1, -2]", &["line 1, column 12", "found the number -2"]),
         ("tau = 1\ntau = 2", &["line 2", "duplicate key"]),
         ("tau = ", &["line 1"]),
-        ("[sweeps]", &["unknown field `sweeps`", "did you mean `sweep`?"]),
+        ("[sweeps]", &["unknown key `sweeps`", "did you mean `sweep`?"]),
     ] {
         let message = refused(&["spec.toml"], &[("spec.toml", text)]);
         assert_says(&message, &["in the spec spec.toml: TOML parse error"]);
@@ -374,7 +374,7 @@ fn toml_numbers_meet_the_same_checks_as_flags() {
 
 #[test]
 fn a_spec_file_that_cannot_be_read_is_named() {
-    assert_says(&refused(&["absent.toml"], &[]), &["cannot read the spec absent.toml: "]);
+    assert_says(&refused(&["absent.toml"], &[]), &["cannot read the spec absent.toml: it does not exist; check its name"]);
     assert_says(&refused(&["."], &[]), &["cannot read the spec .: "]);
 }
 
@@ -457,8 +457,8 @@ fn a_spec_without_end_is_refused_at_once() {
         ("deep.toml", "error: in the spec deep.toml: TOML parse error at line 1, column 89: cannot recurse further"),
         ("dotted.toml", "error: in the spec dotted.toml: recursion limit"),
         ("nested.toml", "error: --sweep omega: [[[["),
-        ("key.toml", "error: in the spec key.toml: TOML parse error at line 1, column 1: unknown field `aaa"),
-        ("word.toml", "error: in the spec word.toml: TOML parse error at line 1, column 10: unknown variant `aaa"),
+        ("key.toml", "error: in the spec key.toml: TOML parse error at line 1, column 1: unknown key `aaa"),
+        ("word.toml", "error: in the spec word.toml: TOML parse error at line 1, column 10: unknown value `aaa"),
         (
             "escape.toml",
             "error: in the spec escape.toml: TOML parse error at line 1, column 9: unknown shape `\\u{1b}[",
