@@ -26,14 +26,6 @@ fn arc_at(arc: Arc, at: real) -> real {
     return a.value + at * (a.slope + at * (bend + at * (powers.third + at * (powers.fourth + at * powers.fifth))));
 }
 
-/// The slope at a fraction of the step.
-fn arc_slope_at(arc: Arc, at: real) -> real {
-    let powers = arc_powers(arc);
-    let a = arc.start;
-    let higher = real(4.0) * powers.fourth + at * (real(5.0) * powers.fifth);
-    return a.slope + at * (a.bend + at * (real(3.0) * powers.third + at * higher));
-}
-
 /// Coefficients of the third, fourth and fifth power.
 struct Powers { third: real, fourth: real, fifth: real }
 
@@ -67,6 +59,14 @@ fn arc_weights(at: real, h: real, shorter: real) -> Arc {
     let bend = ratio * ratio * arc_at(Arc(bent, none), at);
     let end = Jet(arc_at(Arc(none, one), at), arc_at(Arc(none, sloped), at), arc_at(Arc(none, bent), at));
     return Arc(Jet(arc_at(Arc(one, none), at), slope, bend), end);
+}
+
+/// The slope at a fraction of the step.
+fn arc_slope_at(arc: Arc, at: real) -> real {
+    let powers = arc_powers(arc);
+    let a = arc.start;
+    let higher = real(4.0) * powers.fourth + at * (real(5.0) * powers.fifth);
+    return a.slope + at * (a.bend + at * (real(3.0) * powers.third + at * higher));
 }
 
 /// Whether the value falls at the start and rises at the end.

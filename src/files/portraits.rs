@@ -219,7 +219,7 @@ pub(crate) mod tests {
             ("\"nodes\":[\"", "\"nodes\":[\"AAAA", "member 5: expected equally many nodes"),
             ("\"unit\":", "\"unit\":-", "member 5: expected a corner and a positive unit"),
             ("relaxed", "slack", "unknown value `slack`"),
-            ("}\n", "\n", "EOF while parsing"),
+            ("}\n", "\n", "it ends inside"),
         ] {
             let error = twisted(from, to).unwrap_err();
             assert!(error.contains(said) && error.contains("portraits.json"), "{error}");

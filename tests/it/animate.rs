@@ -220,7 +220,7 @@ fn unfinished(done: &Done) {
     let portraits = done.path().join("plots/portraits.json");
     let kept = fs::read_to_string(&portraits).unwrap();
     fs::write(&portraits, &kept[..kept.len() - 40]).unwrap();
-    refused(home, "out", "out/plots/portraits.json: EOF while parsing");
+    refused(home, "out", "out/plots/portraits.json: it ends inside");
     fs::write(&portraits, "{\"members\":[]}").unwrap();
     refused(home, "out", "out/plots/portraits.json: no members to show: the run could not save them");
     fs::remove_file(&portraits).unwrap();

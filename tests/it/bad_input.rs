@@ -511,8 +511,8 @@ fn files_of_a_run_without_end_are_refused_at_once() {
     let files = ["run.json", "summary.csv", "members.csv", "mean_excess.csv", "plots/portraits.json"];
     let table = |row: &str| [vec![b'x'; 1 << 26], row.as_bytes().to_vec()].concat();
     for (name, bytes, said) in [
-        ("run.json", [b"{\"curvelax\":[".as_slice(), &b"0,".repeat(2_000_000)].concat(), ": EOF while parsing"),
-        ("run.json", [b"{\"a\":".as_slice(), &b"[".repeat(4_000_000)].concat(), ": EOF while parsing"),
+        ("run.json", [b"{\"curvelax\":[".as_slice(), &b"0,".repeat(2_000_000)].concat(), ": it ends inside"),
+        ("run.json", [b"{\"a\":".as_slice(), &b"[".repeat(4_000_000)].concat(), ": it ends inside"),
         (
             "run.json",
             [b"{\"spec\":\"".as_slice(), &b"a".repeat(4_000_000), b"\"}"].concat(),
@@ -524,7 +524,7 @@ fn files_of_a_run_without_end_are_refused_at_once() {
         (
             "plots/portraits.json",
             [br#"{"members":[{"nodes":["#.as_slice(), &br#""","#.repeat(2_700_000)].concat(),
-            ": EOF while parsing",
+            ": it ends inside",
         ),
     ] {
         let place = home.path().join("run").join(name);

@@ -315,7 +315,7 @@ fn what_is_no_finished_run_of_this_program_is_refused() {
         "out/run.json: not written by curvelax",
     );
     refused(&done, |out| fs::write(json(out), "[]").unwrap(), "out/run.json: not written by curvelax");
-    refused(&done, |out| fs::write(json(out), "curvelax").unwrap(), "out/run.json: expected value at line 1");
+    refused(&done, |out| fs::write(json(out), "curvelax").unwrap(), "out/run.json: expected a value at line 1");
     refused(
         &done,
         |out| replace(&json(out), "\"format\": 1", "\"format\": 2"),
@@ -328,9 +328,9 @@ fn what_is_no_finished_run_of_this_program_is_refused() {
         |out| replace(&json(out), "\"points\": 32", "\"points\": \"n\""),
         "expected a whole number from 0, found the text \"n\" at line ",
     );
-    refused(&done, |out| shortened(&json(out), 40), "out/run.json: EOF while parsing");
+    refused(&done, |out| shortened(&json(out), 40), "out/run.json: it ends inside");
     let portraits = |out: &Path| out.join("plots/portraits.json");
-    refused(&done, |out| shortened(&portraits(out), 40), "out/plots/portraits.json: EOF while parsing");
+    refused(&done, |out| shortened(&portraits(out), 40), "out/plots/portraits.json: it ends inside");
     refused(&done, |out| replace(&portraits(out), "\"nodes\":[\"", "\"nodes\":[\"!"), "portraits.json, member 0: ");
 }
 

@@ -10,7 +10,7 @@ use curvelax::{
     scheme::{
         decay, dense, extrapolation,
         member::{self, Counters, Decay, NEVER, Observed, Parameters, Progress, Report},
-        observe::{MAX_DRIFT, MAX_GAP, MAX_TURN, MIN_EDGE},
+        observe::{MAX_DRIFT, MAX_GAP, MAX_TURN, MIN_EDGE, NEAR},
         pace,
         state::{CURVE_FIELDS, LASTING_FIELDS, NEEDED_FIELDS, STATE_FIELDS},
         step::NEGLIGIBLE,
@@ -300,6 +300,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("MIN_EDGE", MIN_EDGE),
         ("MAX_DRIFT", MAX_DRIFT),
         ("MAX_GAP", MAX_GAP),
+        ("NEAR", NEAR),
         ("SAFETY", pace::SAFETY),
         ("MAX_GROWTH", pace::MAX_GROWTH),
         ("MIN_GROWTH", pace::MIN_GROWTH),
