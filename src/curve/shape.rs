@@ -269,7 +269,10 @@ impl FromStr for Shape {
         let (name, arguments) = text.split_once(':').map_or((text, None), |(name, rest)| (name, Some(rest)));
         let shape = match name {
             "ellipse" => {
-                let [a, b] = numbers(arguments, "ellipse takes its two half-axes, for example ellipse:2,1; several shapes in --sweep are separated by semicolons")?;
+                let [a, b] = numbers(
+                    arguments,
+                    "ellipse takes its two half-axes, for example ellipse:2,1; in --sweep, semicolons separate shapes",
+                )?;
                 Shape::Ellipse { a, b }
             }
             "circle" => {

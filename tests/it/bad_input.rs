@@ -374,7 +374,10 @@ fn toml_numbers_meet_the_same_checks_as_flags() {
 
 #[test]
 fn a_spec_file_that_cannot_be_read_is_named() {
-    assert_says(&refused(&["absent.toml"], &[]), &["cannot read the spec absent.toml: it does not exist; check its name"]);
+    assert_says(
+        &refused(&["absent.toml"], &[]),
+        &["cannot read the spec absent.toml: it does not exist; check its name"],
+    );
     assert_says(&refused(&["."], &[]), &["cannot read the spec .: "]);
 }
 

@@ -156,7 +156,8 @@ fn a_level_that_is_reached_and_left_again_within_a_step_is_found() {
 /// The excess falls to 1.56e-4 and rises again within a few steps, since the flow makes one mode grow.
 #[test]
 fn a_member_relaxes_where_its_excess_dips_below_the_threshold() {
-    let member = "--amplitude 0 --curves 1 --points 96 --flow poly:-6 --shape flower:2:0.01,5:0.05 --t-end 0.4 --pull auto";
+    let member =
+        "--amplitude 0 --curves 1 --points 96 --flow poly:-6 --shape flower:2:0.01,5:0.05 --t-end 0.4 --pull auto";
     // The first is at the end of a step, too. A threshold below the dip is reached by nothing.
     for (level, dips) in [("0.000158", true), ("0.0001565", true), ("0.00015635", true), ("0.00015625", false)] {
         let done = run(&format!("{member} --adaptive=0.001 --relax-at {level} --event e=excess<={level}"));
