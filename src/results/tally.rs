@@ -377,7 +377,9 @@ impl Tally {
         let failed = self.failed();
         if failed > 0 {
             let stalled = self.counts().any(|(status, count)| status == Status::Stalled && count > 0);
-            let direct = if stalled { "where sweeps stalled, --solver direct helps; " } else { "" };
+            // Members that creep are stalled, too, without a sweep.
+            let swept = self.sweeps_k > 0 || self.sweeps_x > 0;
+            let direct = if stalled && swept { "where sweeps stalled, --solver direct helps; " } else { "" };
             warnings.push(format!(
                 "{failed} of {members} failed (see `status`); {direct}unless the flow itself becomes singular, a smaller \
                  --tau or --adaptive, or more --points, helps"
@@ -497,6 +499,17 @@ pub(crate) mod tests {
         assert_eq!((tally.members(), tally.steps, tally.sweeps_k, tally.sweeps_x), (5, 50, 100, 25));
         let counts: Vec<u64> = tally.counts().map(|(_, count)| count).collect();
         assert_eq!(counts, [2, 3, 0, 0, 0]);
+    }
+
+    #[test]
+    fn only_members_that_sweep_are_advised_to_solve_directly() {
+        let advice = |status, sweeps_k, sweeps_x| {
+            let mut tally = Tally::default();
+            tally.add(&Outcome { sweeps_k, sweeps_x, ..outcome(0, status, None) }).unwrap();
+            tally.warnings().concat().contains("--solver direct")
+        };
+        assert!(advice(Status::Stalled, 20, 0));
+        assert!(!advice(Status::Stalled, 0, 0) && !advice(Status::Singular, 20, 0));
     }
 
     #[test]
