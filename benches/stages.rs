@@ -1,9 +1,9 @@
-//! The stages of a step, each alone, in f64 and f32 on one core: `cargo bench --bench stages`.
+//! The stages of a step, each alone, in f64 and f32 on one core: `cargo bench -p curvelax-benches --bench stages`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use curvelax::scheme::evolve::Evolves;
 use curvelax::{
     ensemble::{Family, Spec, spec::Precision},
-    number::Real,
     schedule::Outputs,
     scheme::{
         Curve, Increments, Parameters, State, Workspace,
@@ -18,14 +18,14 @@ use curvelax::{
 };
 
 /// A member of the default ensemble after ten steps, when its increments no longer jump.
-struct Start<T: Real> {
+struct Start<T: Evolves> {
     curve: Curve<T>,
     increments: Increments<T>,
     parameters: Parameters<T>,
     work: Workspace<T>,
 }
 
-impl<T: Real> Start<T> {
+impl<T: Evolves> Start<T> {
     fn new(points: usize) -> Start<T> {
         let spec = Spec { points, ..Spec::default() };
         let member = Family::new(&spec).and_then(|family| family.member(7)).expect("the default member");
@@ -44,7 +44,7 @@ impl<T: Real> Start<T> {
     }
 }
 
-fn stages<T: Real>(c: &mut Criterion) {
+fn stages<T: Evolves>(c: &mut Criterion) {
     let points = 100;
     let mut group = c.benchmark_group(format!("stages/{}/n={points}", T::NAME));
     let Start { curve, mut increments, parameters: p, mut work } = Start::<T>::new(points);

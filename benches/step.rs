@@ -1,10 +1,10 @@
-//! One step of the scheme on the CPU with each solver, and making a member: `cargo bench`.
+//! One step of the scheme on the CPU with each solver, and making a member: `cargo bench -p curvelax-benches`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use curvelax::scheme::evolve::Evolves;
 use curvelax::{
     ensemble::{Family, Spec},
     flow::Flow,
-    number::Real,
     scheme::{
         Parameters, State, Workspace,
         step::{self, Method},
@@ -14,7 +14,7 @@ use curvelax::{
 use glam::DVec2;
 
 /// The paper's ellipse after ten steps, when the increments no longer jump.
-fn ellipse<T: Real>(n: usize) -> (State<T>, Parameters<T>, Workspace<T>) {
+fn ellipse<T: Evolves>(n: usize) -> (State<T>, Parameters<T>, Workspace<T>) {
     let node = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64) * DVec2::new(2.0, 1.0);
     let mut state = State::<T>::from_nodes(&(1..=n).map(node).collect::<Vec<_>>());
     let parameters = Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3).convert();
@@ -30,7 +30,7 @@ fn method(solver: Solver) -> Method {
     Method::coloured(solver, 200_000)
 }
 
-fn step_in<T: Real>(c: &mut Criterion) {
+fn step_in<T: Evolves>(c: &mut Criterion) {
     for n in [100, 200] {
         for (name, solver) in [
             ("direct", Solver::Direct),

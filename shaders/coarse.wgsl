@@ -1,5 +1,5 @@
 // The coarse systems of multigrid: rho u + u'''' + p u'' + w u' rediscretised on every coarse ring. Twin of
-// src/solver/multigrid/coarse.rs.
+// crates/flow/src/solver/multigrid/coarse.rs.
 
 /// The damping of p on coarse levels.
 const BALANCE = 0.1111111111111111;

@@ -1,4 +1,4 @@
-// The system for the increment of k: the equations of the block. Twin of src/scheme/curvature.rs.
+// The system for the increment of k: the equations of the block. Twin of crates/flow/src/scheme/curvature.rs.
 
 fn curvature_equation() {
     let wk = k_window;

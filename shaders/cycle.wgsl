@@ -1,5 +1,5 @@
 // A V-cycle: residuals down to the coarsest ring without sweeps, corrections up with sweeps on every ring. Twin of
-// src/solver/multigrid/cycle.rs.
+// crates/flow/src/solver/multigrid/cycle.rs.
 
 const COARSE_SWEEPS = 4u;
 

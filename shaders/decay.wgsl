@@ -1,5 +1,5 @@
 // The decay of a member's excess: the line fitted to its logarithm, and its values at the times of a grid. Twin of
-// src/scheme/decay.rs.
+// crates/flow/src/scheme/decay.rs.
 
 const PARTS = 32u;
 const TIMES = 31u;

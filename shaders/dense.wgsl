@@ -1,4 +1,4 @@
-// What lies inside an adaptive step: a polynomial through both of its ends. Twin of src/scheme/dense.rs.
+// What lies inside an adaptive step: a polynomial through both of its ends. Twin of crates/flow/src/scheme/dense.rs.
 
 const RESOLVED = 131072.0;
 const BISECTIONS = 54u;

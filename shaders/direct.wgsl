@@ -1,4 +1,4 @@
-// A direct solve inside the workgroup, instead of sweeps. Its independent check is src/solver/direct.rs.
+// A direct solve inside the workgroup, instead of sweeps. Its independent check is crates/flow/src/solver/direct.rs.
 //
 // Every block keeps its last two unknowns `s` and eliminates the others: its first two nodes become
 // `m = c - P p - S s`, with `p` the last two unknowns of the block before. This leaves a ring of pairs,

@@ -1,5 +1,5 @@
 // The entry point's work: one workgroup advances one member by up to `dispatch.steps` steps towards its goal. Twin of
-// src/scheme/evolve.rs. A fixed step that fails is not accepted: the member ends in its last good state. An adaptive
+// crates/flow/src/scheme/evolve.rs. A fixed step that fails is not accepted: the member ends in its last good state. An adaptive
 // step is retried with a shorter length until that is too short to mean anything.
 //
 // A dispatch also ends when its sweeps are used up. The attempt then pauses: the increments so far are stored, and the

@@ -1,5 +1,5 @@
 // The adaptive step: the paper's scheme with 1, 2, ... J parts, extrapolated to order J. Twin of
-// src/scheme/extrapolation.rs.
+// crates/flow/src/scheme/extrapolation.rs.
 
 const LEAST_ORDER = 2u;
 const SHARED_PARTS = 3u;

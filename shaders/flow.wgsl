@@ -1,5 +1,5 @@
 // The law b(k) = c1 k + ... + c8 k^8 and phi(k) = k^2 - b(k)/k, by Horner's rule without division. Twin of
-// src/scheme/flow.rs.
+// crates/flow/src/scheme/flow.rs.
 
 struct Law { c1: real, c2: real, c3: real, c4: real, c5: real, c6: real, c7: real, c8: real }
 

@@ -1,5 +1,5 @@
 // The rings of multigrid: their sizes, their places in the arrays, and which nodes are adjacent, above or below.
-// Twin of src/solver/multigrid/levels.rs.
+// Twin of crates/flow/src/solver/multigrid/levels.rs.
 //
 // Level l is a ring of NODES >> l nodes, down to COARSEST or fewer. The finest one stays in registers, block by block,
 // and its fields are shared in the rings for the way down. The coarser ones are stored consecutively in the arrays

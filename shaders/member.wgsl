@@ -1,4 +1,4 @@
-// The structs shared with the host, one entry per resident member. Twin of src/scheme/member.rs.
+// The structs shared with the host, one entry per resident member. Twin of crates/flow/src/scheme/member.rs.
 
 /// Parameters of a member: the law, the step, sweeps, thresholds, adaptive steps and their times, levels
 /// at which it pauses.

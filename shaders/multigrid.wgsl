@@ -1,4 +1,4 @@
-// Coloured sweeps inside V-cycles on the ring. Twin of src/solver/multigrid/mod.rs. The sweeps are in sweeps.wgsl, the
+// Coloured sweeps inside V-cycles on the ring. Twin of crates/flow/src/solver/multigrid/mod.rs. The sweeps are in sweeps.wgsl, the
 // rings in levels.wgsl, the coarse systems in coarse.wgsl, the transfer between two rings in transfer.wgsl, and the
 // cycle in cycle.wgsl.
 

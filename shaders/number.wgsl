@@ -1,4 +1,4 @@
-// Numbers: `real` is f32 or f64, chosen by the line that the host prepends. Twin of src/number.rs.
+// Numbers: `real` is f32 or f64, chosen by the line that the host prepends. Twin of crates/flow/src/number.rs.
 
 alias vec = vec4<real>;
 

@@ -1,4 +1,4 @@
-// Sums and maxima of a curve, and what they determine. Twin of src/scheme/observe.rs.
+// Sums and maxima of a curve, and what they determine. Twin of crates/flow/src/scheme/observe.rs.
 
 /// |k| r at which a curve counts as unresolved.
 const MAX_TURN = 2.0;

@@ -1,4 +1,4 @@
-// Adaptive time: the length of the next step, and a clock that loses nothing. Twin of src/scheme/pace.rs.
+// Adaptive time: the length of the next step, and a clock that loses nothing. Twin of crates/flow/src/scheme/pace.rs.
 
 const SAFETY = 0.9;
 const MAX_GROWTH = 8.0;

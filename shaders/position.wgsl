@@ -1,4 +1,4 @@
-// The system for the increments of x and y: the equations of the block. Twin of src/scheme/position.rs.
+// The system for the increments of x and y: the equations of the block. Twin of crates/flow/src/scheme/position.rs.
 
 fn position_equation() {
     read_law();

@@ -1,4 +1,4 @@
-// The turn of the polygon, and the pull of k and r towards it. Twin of src/scheme/pull.rs.
+// The turn of the polygon, and the pull of k and r towards it. Twin of crates/flow/src/scheme/pull.rs.
 
 /// The turn of the polygon at both ends of a segment together, the length over which it turns, and the segment's own.
 struct Turn { angle: vec, span: vec, edge: vec }

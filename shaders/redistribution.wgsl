@@ -1,4 +1,4 @@
-// Velocity, tangential redistribution and the new lengths. Twin of src/scheme/redistribution.rs.
+// Velocity, tangential redistribution and the new lengths. Twin of crates/flow/src/scheme/redistribution.rs.
 
 /// r k beta of the old state.
 var<private> rkb: vec;

@@ -1,5 +1,5 @@
 // The ring of nodes, cut into blocks: which nodes or blocks are adjacent, and what a thread knows of its neighbours.
-// Twin of src/solver/ring.rs. All arithmetic on indices of nodes and blocks is here and, for the coarse rings of
+// Twin of crates/flow/src/solver/ring.rs. All arithmetic on indices of nodes and blocks is here and, for the coarse rings of
 // multigrid, in levels.wgsl. Addresses in storage buffers are computed in member.wgsl and trace_on.wgsl.
 //
 // A thread owns one block of four or three consecutive nodes, stored in the components of a `vec`; a node's colour is

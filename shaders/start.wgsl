@@ -1,4 +1,4 @@
-// Where sweeps start: increments predicted from those of the last two solves. Twin of src/scheme/start.rs.
+// Where sweeps start: increments predicted from those of the last two solves. Twin of crates/flow/src/scheme/start.rs.
 
 /// After a step of the paper: extrapolates its increments to the next one of the same length, and remembers them in
 /// EARLIER.

@@ -1,4 +1,4 @@
-// Sums and maxima over a block, and sums over the ring of blocks. In Rust, `Sums` (src/solver/ring.rs) adds node after
+// Sums and maxima over a block, and sums over the ring of blocks. In Rust, `Sums` (crates/flow/src/solver/ring.rs) adds node after
 // node, in the same order.
 
 /// One row per block, for sums over the ring.

@@ -1,5 +1,5 @@
 // Coloured Gauss–Seidel sweeps and their stopping criterion, shared by gauss_seidel.wgsl and multigrid.wgsl. Twin of
-// src/solver/sweeps.rs.
+// crates/flow/src/solver/sweeps.rs.
 //
 // Rows, right-hand sides and unknowns stay in registers. Neighbours of a block of four need its first two nodes (its
 // front) and its last two (its tail), and the first two need none of another block's first two. So colours 0 and 1 are

@@ -1,4 +1,4 @@
-// What multigrid needs from the two systems: rho u + u'''' + p u'' + w u'. Twin of src/scheme/terms.rs.
+// What multigrid needs from the two systems: rho u + u'''' + p u'' + w u'. Twin of crates/flow/src/scheme/terms.rs.
 
 /// Distance to the next node, length of the cell, rho, p and w for the nodes of the block.
 var<private> term_spacing: vec;

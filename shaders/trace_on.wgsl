@@ -1,6 +1,6 @@
 // The kernel of the conformance test writes the results of every stage, for the host to compare with its twin.
 
-/// TRACE_FIELDS fields of NODES numbers per member; the host lists them in src/conformance/bounds.rs.
+/// TRACE_FIELDS fields of NODES numbers per member; the host lists them in crates/backend/src/bounds.rs.
 @group(0) @binding(6) var<storage, read_write> traces: array<real>;
 
 const TRACE_FIELDS = 20u;

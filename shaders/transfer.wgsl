@@ -1,5 +1,5 @@
 // Transfer between a ring of multigrid and the next coarser one: residuals down, corrections up. Twin of
-// src/solver/multigrid/transfer.rs.
+// crates/flow/src/solver/multigrid/transfer.rs.
 
 /// The weights between the finer ring and coarse nodes j and j+1.
 fn weigh(fine: Level, coarse: Level, j: u32) {

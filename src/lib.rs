@@ -24,37 +24,23 @@
 //!
 //! Lengths are in the user's unit and times in its fourth power.
 //!
-//! # Modules
+//! # Crates
 //!
-//! Each module uses only those above it (`tests/it/modules_depend_downward.rs`).
+//! This crate is the program, and gathers the others. Each can be used alone, with those above it:
 //!
-//! | module | holds |
-//! |---|---|
-//! | [`error`] | what, where, numbers, remedy, exit code |
-//! | `wgsl` | the files of `shaders/`, compiled in |
-//! | `guard`, `threads` | panics of other crates become errors; every thread is started here |
-//! | `input`, `text`, [`random`] | files opened for reading; numbers as text; random numbers addressed by key |
-//! | [`number`] | the number type of the scheme |
-//! | [`flow`] | the law b(k) |
-//! | [`curve`] | plane curves in f64: shapes, perturbation, sampling, measures |
-//! | [`solver`] | periodic pentadiagonal systems: rows, sweeps, direct solution |
-//! | [`statistics`] | censored times, their mean and median with intervals, tests between groups, fits |
-//! | [`scheme`] | the paper's step, one file per stage, named as in `shaders/` |
-//! | [`backend`] | slots in which members advance, on the CPU or a GPU |
-//! | [`ensemble`] | the spec, its members, the result of a member |
-//! | `schedule`, `trajectory`, [`simulate`] | steps and output times; one member's trajectory; the loop over all |
-//! | [`conformance`] | the GPU compared with the CPU, stage by stage and over whole runs |
-//! | [`placement`] | which back end a spec gets, and why |
-//! | [`relax`](fn@relax) | from a study to the results of its members |
-//! | [`truth`] | problems with exact solutions, and the error and order against them |
-//! | [`results`] | the results of a study: sums, statistics by cell, the record of the run |
-//! | `accuracy` | nodes, tolerance and members for `--accuracy` |
-//! | `draw` | SVG, axes and charts from plain numbers |
-//! | `files` | the folder of results: who may write there, and what each file holds |
-//! | `report` | a run's sink: tables, checkpoints, merge, `report.html` |
-//! | `session` | from a spec to a finished folder, for the program and the Python package |
-//! | `bench`, `estimate`, `figures` | speed of a back end; cost of a run; the paper's figures |
-//! | `cli` | the commands |
+//! | crate | modules here | holds |
+//! |---|---|---|
+//! | `curvelax-shaders` | | the files of `shaders/`, compiled in |
+//! | `curvelax-base` | [`error`], [`random`] | errors with what, where, numbers and remedy; input files, text, random numbers by key, threads |
+//! | `curvelax-flow` | [`number`], [`flow`], [`solver`], [`scheme`] | the paper: the law b(k), periodic pentadiagonal systems, the step |
+//! | `curvelax-backend` | [`backend`] | slots in which members advance: the CPU, and the source of the kernel |
+//! | `curvelax-gpu` | [`backend::gpu`] | the kernel through wgpu |
+//! | `curvelax-curve` | [`curve`] | plane curves in f64: shapes, outlines, perturbation, sampling, measures |
+//! | `curvelax-statistics` | [`statistics`] | censored times, their mean and median with intervals, tests between groups, fits |
+//! | `curvelax-ensemble` | [`ensemble`], [`simulate`] | the spec, its members, their trajectories and results |
+//! | `curvelax-study` | [`placement`], [`relax`](fn@relax), [`conformance`], [`truth`], [`results`] | from a spec to results, on the device that suits it; exact solutions; what results say |
+//! | `curvelax-draw` | | SVG, axes and charts from plain numbers |
+//! | `curvelax-run` | | from a spec to a finished folder: tables, checkpoints, reports |
 //!
 //! # Example
 //!
@@ -73,66 +59,36 @@
 //! # Ok::<(), curvelax::Error>(())
 //! ```
 
-// What only the program uses.
-#![cfg_attr(not(feature = "program"), allow(dead_code, unused_macros))]
+pub use curvelax_base::{Error, Result, error, random};
+pub use curvelax_curve as curve;
+pub use curvelax_ensemble as ensemble;
+pub use curvelax_ensemble::simulate;
+pub use curvelax_flow::{flow, number, scheme, solver};
+pub use curvelax_statistics as statistics;
+pub use curvelax_study::{conformance, placement, relax, results, truth};
 
-pub mod backend;
-pub mod conformance;
-pub mod curve;
-pub mod ensemble;
-pub mod error;
-pub mod flow;
-pub mod number;
-#[cfg(feature = "program")]
-pub mod placement;
-pub mod random;
-#[cfg(feature = "program")]
-pub mod results;
-pub mod scheme;
-pub mod simulate;
-pub mod solver;
-pub mod statistics;
-#[cfg(feature = "program")]
-pub mod truth;
+/// Back ends, which advance members: slots for resident members, on the CPU or on a GPU.
+pub mod backend {
+    pub use curvelax_backend::{Backend, DeviceKind, cpu};
+    pub use curvelax_gpu::Device;
+
+    /// The kernel and what runs it.
+    pub mod gpu {
+        pub use curvelax_backend::gpu::*;
+        pub use curvelax_gpu::*;
+    }
+}
 
 // Public only for the program, and for the project's own tests, benchmarks and fuzzing.
-#[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod bench;
-#[cfg(feature = "program")]
 #[doc(hidden)]
 pub mod cli;
 #[doc(hidden)]
-pub mod draw;
-#[cfg(feature = "program")]
+pub use curvelax_draw as draw;
 #[doc(hidden)]
-pub mod figures;
-#[cfg(feature = "program")]
+pub use curvelax_ensemble::{schedule, trajectory};
 #[doc(hidden)]
-pub mod files;
-#[cfg(feature = "program")]
-#[doc(hidden)]
-pub mod report;
-#[doc(hidden)]
-pub mod schedule;
-#[cfg(feature = "program")]
-#[doc(hidden)]
-pub mod session;
-#[doc(hidden)]
-pub mod trajectory;
+pub use curvelax_run::{estimate, figures, files, report, session};
 
-#[cfg(feature = "program")]
-mod accuracy;
-#[cfg(feature = "program")]
-mod estimate;
-mod guard;
-mod input;
-#[cfg(feature = "program")]
-mod relax;
-mod text;
-mod threads;
-mod wgsl;
-
-pub use error::{Error, Result};
-#[cfg(feature = "program")]
-pub use relax::relax;
+use curvelax_base::text;

@@ -29,9 +29,13 @@ fn read(path: &str) -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
+/// The package of the program, with what it shares with the other crates.
 fn package() -> Table {
     let manifest: Table = read("Cargo.toml").parse().unwrap();
-    manifest["package"].as_table().unwrap().clone()
+    let mut package = manifest["package"].as_table().unwrap().clone();
+    let shared = manifest["workspace"]["package"].as_table().unwrap().clone();
+    package.extend(shared);
+    package
 }
 
 fn field<'a>(table: &'a Table, key: &str) -> &'a str {

@@ -28,7 +28,7 @@ import scheme  # noqa: E402
 MULTIPROCESSORS, HERTZ = 132, 1.7e9
 REGISTERS_OF_A_SCHEDULER = 16384
 FIXED_STEP, FIRST_ADAPTIVE_STEP, OMEGA = 1e-3, 4e-5, 10.0
-# The largest order of an adaptive step by precision, as in src/scheme/extrapolation.rs; the attempts have it.
+# The largest order of an adaptive step by precision, as in crates/flow/src/scheme/extrapolation.rs; the attempts have it.
 MOST_ORDER = {"f32": 4, "f64": 6}
 AGREES = {"f32": 1e-4, "f64": 1e-12}
 NEVER = 2**32 - 1

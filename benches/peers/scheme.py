@@ -1,4 +1,4 @@
-"""One step of the paper's scheme for any array library, as in src/scheme/{redistribution,curvature,position,observe}.rs.
+"""One step of the paper's scheme for any array library, as in crates/flow/src/scheme/{redistribution,curvature,position,observe}.rs.
 
 Fields have the node on their first axis and, where there are several curves, the curve on their last. A law
 b(k) = c1 k + c3 k^3 is the pair (c1, c3): (0, 0) surface diffusion, (0, -1/2) Willmore, (LAMBDA, -1/2) elastic.

@@ -50,7 +50,7 @@ fuzz_target!(|data: &[u8]| FOLDER.with_borrow_mut(|folder| {
     folder.hold(content);
     match Finished::read(&folder.path) {
         // Words of the run may say anything.
-        Ok(run) if checksum(data) % DRAWN == 0 => draw(run, data.windows(3).any(|word| word == b"NaN")),
+        Ok(run) if checksum(data).is_multiple_of(DRAWN) => draw(run, data.windows(3).any(|word| word == b"NaN")),
         Ok(_) => {}
         Err(error) => {
             let message = error.to_string();

@@ -71,7 +71,7 @@ pub fn adapters(args: AdaptersArgs) -> Result<()> {
     let Spec { backend, adapter, precision, .. } = settled;
     let auto = Auto { backend, adapter, precision, sentence: choice.sentence(&spec) };
     if args.json {
-        return print_json(&Listing { curvelax: env!("CARGO_PKG_VERSION"), adapters, auto });
+        return print_json(&Listing { curvelax: curvelax_base::VERSION, adapters, auto });
     }
     let mut text: String = adapters.iter().enumerate().map(|(number, adapter)| adapter.describe(number)).collect();
     if adapters.is_empty() {

@@ -150,7 +150,7 @@ pub fn bench(args: BenchArgs) -> Result<()> {
     }
     let rows: Vec<BenchRow> = cases.iter().map(Case::row).collect();
     if args.json {
-        let benches = Benches { curvelax: env!("CARGO_PKG_VERSION"), seconds, repeats, rows: &rows };
+        let benches = Benches { curvelax: curvelax_base::VERSION, seconds, repeats, rows: &rows };
         print_json(&benches)?;
     } else {
         print(&table(&rows))?;

@@ -7,11 +7,11 @@ use crate::{
     backend::gpu::{Gpu, kernel::Budget},
     conformance::{ConformanceRow, adaptive, compare::MEMBERS, events, runs, stages},
     error::{Error, Result},
-    number::Real,
     placement::no_adapter,
     report::progress::Progress,
     solver::Solver,
 };
+use curvelax_flow::scheme::evolve::Evolves;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -135,7 +135,7 @@ pub fn check(args: CheckArgs) -> Result<()> {
         }
     }
     if args.json {
-        print_json(&Checks { curvelax: env!("CARGO_PKG_VERSION"), failed, adapters })?;
+        print_json(&Checks { curvelax: curvelax_base::VERSION, failed, adapters })?;
     }
     match failed {
         0 => Ok(()),
@@ -161,7 +161,10 @@ fn compare(gpu: &Gpu, mut progress: Progress) -> Result<Vec<ConformanceRow>> {
 
 /// The worst row of every quantity over all sizes; for solvers after the first, without stages before a solve. Every
 /// kernel is announced before it is compiled.
-fn compare_in<T: Real>(gpu: &Gpu, tell: &mut impl FnMut(&str, Solver, usize, Compared)) -> Result<Vec<ConformanceRow>> {
+fn compare_in<T: Evolves>(
+    gpu: &Gpu,
+    tell: &mut impl FnMut(&str, Solver, usize, Compared),
+) -> Result<Vec<ConformanceRow>> {
     let mut all = Vec::new();
     for solver in Solver::ALL {
         let mut worst: Vec<ConformanceRow> = Vec::new();
@@ -189,7 +192,7 @@ fn compare_in<T: Real>(gpu: &Gpu, tell: &mut impl FnMut(&str, Solver, usize, Com
     Ok(all)
 }
 
-fn compare_kernel<T: Real>(gpu: &Gpu, solver: Solver, n: usize, kind: Compared) -> Result<Vec<ConformanceRow>> {
+fn compare_kernel<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize, kind: Compared) -> Result<Vec<ConformanceRow>> {
     let mut rows = Vec::new();
     match kind {
         Compared::Stages => {

@@ -15,8 +15,8 @@ use super::note;
 use crate::{
     error::Result,
     report::{Cause, Stop},
-    threads,
 };
+use curvelax_base::threads;
 
 /// Time for a run to end after it was asked to stop.
 const PATIENCE: Duration = Duration::from_secs(4);

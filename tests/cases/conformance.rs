@@ -10,6 +10,7 @@ use std::{
 };
 
 use crate::{common::command, everything, may_lack_gpu};
+use curvelax::scheme::evolve::Evolves;
 use curvelax::{
     backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
@@ -18,7 +19,6 @@ use curvelax::{
         members,
     },
     ensemble::{Cell, Ended, Family, Sink, Spec, Status, spec::Precision},
-    number::Real,
     placement::MAX_POINTS_F32,
     scheme::{
         State,
@@ -94,7 +94,7 @@ pub fn record() {
 }
 
 /// Few sizes are used, so that tests share kernels, which the driver keeps.
-fn cases<T: Real>(index: usize, trials: &mut Vec<Trial>) {
+fn cases<T: Evolves>(index: usize, trials: &mut Vec<Trial>) {
     for solver in Solver::ALL {
         let word = solver.name();
         let mut add = |name: String, case: fn(&Gpu, Solver, usize) -> Outcome, n: usize| {
@@ -171,16 +171,16 @@ fn line(row: &ConformanceRow) -> String {
     )
 }
 
-fn stages_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn stages_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     check(&stages::<T>(gpu, solver, n, None)?)
 }
 
-fn runs_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn runs_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     check(&runs::<T>(gpu, solver, n, 1, dispatches_of(1), None)?)?;
     check(&runs::<T>(gpu, solver, n, 100, dispatches_of(7), None)?)
 }
 
-fn adaptive_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn adaptive_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let rows = adaptive::<T>(gpu, solver, n, dispatches_of(7), None)?;
     if rows.iter().any(|row| row.steps < 5) {
         return Err("too few steps to compare".into());
@@ -188,14 +188,14 @@ fn adaptive_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     check(&rows)
 }
 
-fn events_agree<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn events_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     for adaptive in [false, true] {
         check(&[events::<T>(gpu, solver, n, adaptive, dispatches_of(7), None)?])?;
     }
     Ok(())
 }
 
-fn a_moved_node_fails_events<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn a_moved_node_fails_events<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     // In f32 the bound of adaptive steps is as long as a step.
     let paces = if T::PRECISION == Precision::F32 { &[false][..] } else { &[false, true] };
     for adaptive in paces {
@@ -209,7 +209,7 @@ fn a_moved_node_fails_events<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Ou
     Ok(())
 }
 
-fn a_moved_node_fails_adaptive<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn a_moved_node_fails_adaptive<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let tamper = Tamper { member: 4, node: n / 2, by: 65536.0 * T::EPSILON };
     // Either a row fails, or the member makes other steps.
     match adaptive::<T>(gpu, solver, n, dispatches_of(7), Some(tamper)) {
@@ -223,7 +223,7 @@ fn a_moved_node_fails_adaptive<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> 
     }
 }
 
-fn adaptive_bits<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn adaptive_bits<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let mut launches = adaptive_members(n, 5, 20, 1e-3, T::PRECISION)?;
     // Two members end when they are relaxed; all relax during the run.
     for launch in &mut launches[1..3] {
@@ -257,7 +257,7 @@ fn adaptive_bits<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     Ok(())
 }
 
-fn adaptive_bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn adaptive_bad_members<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let good = adaptive_members(n, 5, 20, 1e-3, T::PRECISION)?;
     let alone = on_gpu::<T>(gpu, solver, n, &good, dispatches_of(5))?;
     let mut mixed = good.clone();
@@ -277,7 +277,7 @@ fn adaptive_bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome
 }
 
 /// The negative control: a displacement far below anything visible must fail, and the row must name the member.
-fn a_moved_node_fails<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn a_moved_node_fails<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let tamper = Tamper { member: 4, node: n / 2, by: 4096.0 * T::EPSILON };
     let after_step = stages::<T>(gpu, solver, n, Some(tamper))?;
     let after_run = runs::<T>(gpu, solver, n, 1, dispatches_of(1), Some(tamper))?;
@@ -299,7 +299,7 @@ fn a_moved_node_fails<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     Ok(())
 }
 
-fn permutation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn permutation<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let launches = members(n, 7, 20, 1e-4)?;
     let order = [3, 0, 6, 2, 5, 1, 4];
     let permuted: Vec<Run<f64>> = order.iter().map(|j| launches[*j].clone()).collect();
@@ -327,7 +327,7 @@ fn same(a: &Left, b: &Left, what: &str) -> Outcome {
     Ok(())
 }
 
-fn dispatches<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn dispatches<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let launches = members(n, 5, 50, 1e-4)?;
     let at_once = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(50))?;
     for per_dispatch in [1, 7] {
@@ -355,7 +355,7 @@ impl Sink for Outcomes {
 }
 
 /// Members that end at different times, observed during the run, refilled into slots of two batches.
-fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn slots<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let spec = Spec {
         curves: 13,
         points: n,
@@ -393,7 +393,7 @@ fn slots<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 
 /// A kernel whose workgroup is one subgroup gives the same bits as one of any size, if the adapter's subgroups hold the
 /// ring.
-fn exchanges<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn exchanges<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let by_shuffles = gpu.capacity().variant(Blocks::new(n).ok_or("n")?, solver);
     if by_shuffles.subgroup != (gpu.capacity().least_subgroup >= 8) {
         return Err(format!("{by_shuffles:?} on subgroups of {}", gpu.capacity().least_subgroup).into());
@@ -422,7 +422,7 @@ fn replace_nodes(run: &mut Run<f64>, change: impl FnOnce(&mut Vec<DVec2>)) {
 }
 
 /// One member for each way to fail, at different places; the good ones must not be affected.
-fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn bad_members<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let good = members(n, 8, 20, 1e-4)?;
     let alone = on_gpu::<T>(gpu, solver, n, &good, dispatches_of(5))?;
     let mut mixed = good.clone();
@@ -452,7 +452,7 @@ fn bad_members<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     Ok(())
 }
 
-fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn relaxation<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let mut launches = members(n, 5, 60, T::PRECISION.tolerance())?;
     for launch in &mut launches {
         launch.counters.stop_when_relaxed = 1;
@@ -486,7 +486,7 @@ fn relaxation<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     Ok(())
 }
 
-fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
+fn largest<T: Evolves>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let most = gpu.capacity().max_points::<T>(solver);
     let n = most.min(1024);
     // The solver's other needs for a ring may be twice those of its rows, or more.
@@ -512,7 +512,7 @@ fn largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
 }
 
 /// A dispatch at its maximum work loses nothing: llvmpipe silently leaves all loops when they get too long.
-fn adaptive_largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
+fn adaptive_largest<T: Evolves>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let n = gpu.capacity().max_points::<T>(solver).min(1024);
     let launches = adaptive_members(n, 2, 60, 1e-3, T::PRECISION)?;
     let little = on_gpu::<T>(gpu, solver, n, &launches, Budget { steps: 1, sweeps: 64 })?;
@@ -527,7 +527,12 @@ fn adaptive_largest<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
 }
 
 /// Numbers of the tables that the program writes, with the statuses first.
-fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Result<(Vec<String>, Vec<f64>), Failed> {
+fn tables<T: Evolves>(
+    backend: &str,
+    solver: Solver,
+    n: usize,
+    pace: &[&str],
+) -> Result<(Vec<String>, Vec<f64>), Failed> {
     let folder = tempfile::tempdir()?;
     let solver = solver.name();
     let mut command = command::program(folder.path());
@@ -573,12 +578,12 @@ fn tables<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Re
 }
 
 /// The program from outside: equal statuses, and numbers within the accuracy of the solves.
-fn programs_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn programs_agree<T: Evolves>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
     tables_agree::<T>(solver, n, &["--tau", "0.003", "--relax-to", "0.3"]).map(drop)
 }
 
 /// Times to relax of a tiny and a huge curve, with times and rates by their size.
-fn sizes_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn sizes_agree<T: Evolves>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
     let bound = if T::PRECISION == Precision::F32 { 2e-3 } else { 1e-6 };
     let paces = [&["--tau", "auto"][..], &["--adaptive", "--pull", "auto"]];
     // Longer steps would need too many sweeps.
@@ -596,7 +601,7 @@ fn sizes_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
 }
 
 /// t_relax of ellipses of three sizes, 40 orders of magnitude apart in time.
-fn times_of_sizes<T: Real>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Result<Vec<String>, Failed> {
+fn times_of_sizes<T: Evolves>(backend: &str, solver: Solver, n: usize, pace: &[&str]) -> Result<Vec<String>, Failed> {
     let folder = tempfile::tempdir()?;
     let mut command = command::program(folder.path());
     command.args(["run", "--curves", "2", "--sweep", "shape=ellipse:2e-6,1e-6;ellipse:2,1;ellipse:2e4,1e4"]);
@@ -622,7 +627,7 @@ fn dumbbell() -> String {
 }
 
 /// Adaptive steps: output times and events inside them, refused ones, members that begin to cross themselves.
-fn adaptive_programs_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn adaptive_programs_agree<T: Evolves>(_: &Gpu, solver: Solver, n: usize) -> Outcome {
     tables_agree::<T>(solver, n, &["--adaptive", "--pull", "auto", "--relax-at", "0.05"])?;
     // Longer ones would need too many sweeps.
     if solver.facts().slows_with_step {
@@ -641,7 +646,7 @@ fn adaptive_programs_agree<T: Real>(_: &Gpu, solver: Solver, n: usize) -> Outcom
 }
 
 /// Compares the tables; returns the entries that are not numbers.
-fn tables_agree<T: Real>(solver: Solver, n: usize, pace: &[&str]) -> Result<Vec<String>, Failed> {
+fn tables_agree<T: Evolves>(solver: Solver, n: usize, pace: &[&str]) -> Result<Vec<String>, Failed> {
     let (gpu, cpu) = (tables::<T>("gpu", solver, n, pace)?, tables::<T>("cpu", solver, n, pace)?);
     if gpu.0 != cpu.0 || gpu.1.len() != cpu.1.len() || gpu.1.len() < 1000 {
         return Err(format!("{:?} on the GPU, {:?} on the CPU", gpu.0, cpu.0).into());
@@ -678,7 +683,7 @@ fn check_tells() -> Outcome {
 }
 
 /// The same from outside: exit code 2, one message with both numbers, nothing written.
-fn program_refuses<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
+fn program_refuses<T: Evolves>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     let most = gpu.capacity().max_points::<T>(solver);
     let folder = tempfile::tempdir()?;
     let points = (most + 1).to_string();
@@ -699,7 +704,7 @@ fn program_refuses<T: Real>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
 }
 
 /// Positions within 5·10⁻⁴ (f32) and 10⁻⁵ (f64) of the direct f64 solution on the CPU: the tolerances' errors.
-fn paper<T: Real>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+fn paper<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let node = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64) * DVec2::new(2.0, 1.0);
     let mut launch = members(n, 1, 2000, T::PRECISION.tolerance())?.remove(0);
     replace_nodes(&mut launch, |nodes| *nodes = (1..=n).map(node).collect());

@@ -9,6 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use curvelax::scheme::evolve::Evolves;
 use curvelax::{
     Error,
     backend::{
@@ -21,7 +22,6 @@ use curvelax::{
         Cell, Ended, Family, Spec, Status,
         spec::{BackendChoice, Precision},
     },
-    number::Real,
     placement,
     scheme::{
         Parameters, State,
@@ -92,7 +92,7 @@ fn on_the_cpu<T: Vectorised>(solver: Solver, adaptive: bool, trials: &mut Vec<Tr
 }
 
 /// One kernel for both, since lavapipe needs a second or more to compile one.
-fn on_the_gpu<T: Real>(index: usize, solver: Solver, adaptive: bool, trials: &mut Vec<Trial>) {
+fn on_the_gpu<T: Evolves>(index: usize, solver: Solver, adaptive: bool, trials: &mut Vec<Trial>) {
     let name = format!("{} {} {}, adapter {index}", T::NAME, solver.name(), pace(adaptive));
     let case = move || -> Outcome {
         let gpu = &Gpu::list()[index];
@@ -154,7 +154,7 @@ fn renew(run: &mut Run<f64>, change: impl FnOnce(&mut [DVec2])) {
 }
 
 /// Members that are all different; lanes require that either all or none are redistributed, and likewise pulled.
-fn launches<T: Real>(count: usize, adaptive: bool) -> curvelax::Result<Vec<Run<f64>>> {
+fn launches<T: Evolves>(count: usize, adaptive: bool) -> curvelax::Result<Vec<Run<f64>>> {
     let few = 13;
     let some = match adaptive {
         true => adaptive_members(POINTS, few, 40, 1e-3, T::PRECISION)?,
@@ -197,7 +197,7 @@ fn finished(backend: &mut dyn Backend, launches: &[Run<f64>]) -> Result<Vec<(Cou
 }
 
 /// Tries every poison for which `takes` holds, at every place among the others.
-fn poison<T: Real>(
+fn poison<T: Evolves>(
     backend: &mut dyn Backend,
     adaptive: bool,
     where_: &str,
@@ -248,7 +248,7 @@ fn poison_on_the_cpu<T: Vectorised>(solver: Solver, adaptive: bool) -> Outcome {
     Ok(())
 }
 
-fn poison_on_the_gpu<T: Real>(kernel: Kernel<T>, gpu: &Gpu, solver: Solver, adaptive: bool) -> Outcome {
+fn poison_on_the_gpu<T: Evolves>(kernel: Kernel<T>, gpu: &Gpu, solver: Solver, adaptive: bool) -> Outcome {
     let mut kernel = kernel.with_budget(Budget { steps: 1 << 10, sweeps: 1 << 20 });
     let where_ = format!("{} {} {} {}", T::NAME, solver.name(), pace(adaptive), gpu.name());
     // The members of a dispatch share nothing but its end, so not every poison is tried at every place.
@@ -357,7 +357,7 @@ fn the_self_test_finds_a_liar<T: Vectorised>(solver: Solver, adaptive: bool) -> 
     Ok(())
 }
 
-fn the_self_test_passes<T: Real>(
+fn the_self_test_passes<T: Evolves>(
     kernel: &mut Kernel<T>,
     gpu: &Gpu,
     solver: Solver,

@@ -8,9 +8,9 @@ pub mod program;
 
 use std::f64::consts::TAU;
 
+use curvelax::scheme::evolve::Evolves;
 use curvelax::{
     curve::{BaseCurve, Outline},
-    number::Real,
     scheme::{
         Parameters, State, Workspace,
         extrapolation::MOST_ORDER,
@@ -41,14 +41,14 @@ pub fn wavy_circle(n: usize, radius: f64, m: u32, amplitude: f64) -> Vec<DVec2> 
 }
 
 /// A curve with everything needed to step it.
-pub struct Stepper<T: Real> {
+pub struct Stepper<T: Evolves> {
     pub state: State<T>,
     pub work: Workspace<T>,
     p: Parameters<T>,
     method: Method,
 }
 
-impl<T: Real> Stepper<T> {
+impl<T: Evolves> Stepper<T> {
     pub fn new(nodes: &[DVec2], p: &Parameters<f64>, method: Method) -> Stepper<T> {
         Stepper {
             state: State::from_nodes(nodes),

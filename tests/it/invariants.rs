@@ -5,6 +5,7 @@
 
 use std::f64::consts::TAU;
 
+use curvelax::scheme::evolve::Evolves;
 use curvelax::{
     curve::{BaseCurve, Sampling, Shape, polygon},
     ensemble::{
@@ -12,7 +13,6 @@ use curvelax::{
         spec::{BackendChoice, Omega, Precision, Pull, Solver, SolverChoice, Sor, Tau},
     },
     flow::Flow,
-    number::Real,
     placement::{self, MAX_POINTS_F32},
     scheme::{
         Parameters, State,
@@ -343,7 +343,7 @@ fn what_is_no_energy_of_a_flow_does_not_fall() {
 }
 
 /// The paper's ellipse at t = 2.
-fn paper_ellipse<T: Real>(method: Method, tolerance: f64) -> Vec<DVec2> {
+fn paper_ellipse<T: Evolves>(method: Method, tolerance: f64) -> Vec<DVec2> {
     let p = Parameters { tolerance, ..Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3) };
     Stepper::<T>::new(&ellipse(100), &p, method).steps(2000).positions()
 }
@@ -367,7 +367,7 @@ fn single_precision_agrees_with_double_on_the_paper_s_ellipse() {
 }
 
 /// Nodes at t = 1, and t_relax, of the 2:1 ellipse.
-fn relaxed_ellipse<T: Real>(n: usize, method: &Method, tolerance: f64) -> (Vec<DVec2>, f64) {
+fn relaxed_ellipse<T: Evolves>(n: usize, method: &Method, tolerance: f64) -> (Vec<DVec2>, f64) {
     let shape = Shape::Ellipse { a: 2.0, b: 1.0 }.into();
     let spec = Spec { shape, sampling: Sampling::Arclength, points: n, amplitude: 0.0.into(), ..Spec::default() };
     let nodes = Family::new(&spec).unwrap().member(0).unwrap().nodes;

@@ -1,5 +1,6 @@
-//! Modules depend downward only: no folder or file of `src` uses one above it in [`LAYERS`], and no files form a circle
-//! of uses. Tests inside the files may use anything. Type names are unique across the crate.
+//! Modules depend downward only: Cargo keeps the order of the crates, this test that of the modules inside. No folder or
+//! file uses one above it in [`LAYERS`], and no files form a circle of uses. Tests inside the files may use anything. Type
+//! names are unique across the crates.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -12,40 +13,45 @@ use syn::{
     visit::{self, Visit},
 };
 
-/// The modules of the crate; each may use only those above it.
-const LAYERS: [&str; 32] = [
-    "wgsl",
-    "error",
-    "guard",
-    "threads",
-    "text",
-    "input",
-    "random",
-    "number",
+/// Crates and modules; each may use only those above it. A name stands for what has no longer one; `program` for `src`.
+const LAYERS: [&str; 37] = [
+    "shaders",
+    "base/error",
+    "base/guard",
+    "base/threads",
+    "base/text",
+    "base/input",
+    "base/random",
+    "base",
+    "flow/number",
+    "flow/flow",
+    "flow/solver",
+    "flow/scheme",
     "flow",
-    "curve",
-    "solver",
-    "statistics",
-    "scheme",
     "backend",
+    "gpu",
+    "curve",
+    "statistics",
     "ensemble",
-    "schedule",
-    "trajectory",
-    "simulate",
-    "conformance",
-    "placement",
-    "relax",
-    "truth",
-    "results",
-    "accuracy",
+    "ensemble/schedule",
+    "ensemble/trajectory",
+    "ensemble/simulate",
+    "study/conformance",
+    "study/placement",
+    "study/relax",
+    "study/truth",
+    "study/results",
+    "study/samples",
+    "study/accuracy",
+    "study",
     "draw",
-    "files",
-    "report",
-    "session",
-    "bench",
-    "estimate",
-    "figures",
-    "cli",
+    "run/files",
+    "run/report",
+    "run/session",
+    "run/estimate",
+    "run/figures",
+    "run",
+    "program",
 ];
 
 type Module = Vec<String>;
@@ -73,7 +79,10 @@ impl Names {
     fn absolute(&self, path: &[String]) -> Option<Module> {
         let mut base = self.module.clone();
         match path.first()?.as_str() {
-            "crate" => Some(path[1..].to_vec()),
+            "crate" => Some([&base[..1], &path[1..]].concat()),
+            other if other.starts_with("curvelax_") => {
+                Some([&[other["curvelax_".len()..].to_owned()], &path[1..]].concat())
+            }
             "self" => Some([&base[..], &path[1..]].concat()),
             "super" => {
                 let up = path.iter().take_while(|part| *part == "super").count();
@@ -131,14 +140,15 @@ impl<'a> Visit<'a> for Names {
 
     fn visit_path(&mut self, path: &'a syn::Path) {
         let parts: Vec<String> = path.segments.iter().map(|part| part.ident.to_string()).collect();
-        if parts.len() > 1 && ["crate", "super", "self"].contains(&parts[0].as_str()) {
+        let is_ours = ["crate", "super", "self"].contains(&parts[0].as_str()) || parts[0].starts_with("curvelax_");
+        if parts.len() > 1 && is_ours {
             self.used.extend(self.absolute(&parts));
         }
         visit::visit_path(self, path);
     }
 }
 
-/// All files of `src` by their modules.
+/// All files by their crates and modules.
 fn sources() -> BTreeMap<Module, String> {
     fn walk(folder: &Path, module: &Module, all: &mut BTreeMap<Module, String>) {
         for entry in fs::read_dir(folder).unwrap() {
@@ -147,16 +157,20 @@ fn sources() -> BTreeMap<Module, String> {
             let child = [&module[..], std::slice::from_ref(&stem)].concat();
             if path.is_dir() {
                 walk(&path, &child, all);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                let module = if ["mod", "lib", "main"].contains(&stem.as_str()) { module.clone() } else { child };
-                if !module.is_empty() {
-                    all.insert(module, fs::read_to_string(&path).unwrap());
-                }
+            } else if path.extension().is_some_and(|extension| extension == "rs") && stem != "main" {
+                let module = if ["mod", "lib"].contains(&stem.as_str()) { module.clone() } else { child };
+                all.insert(module, fs::read_to_string(&path).unwrap());
             }
         }
     }
     let mut all = BTreeMap::new();
-    walk(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &Vec::new(), &mut all);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    walk(&root.join("src"), &vec!["program".to_owned()], &mut all);
+    for entry in fs::read_dir(root.join("crates")).unwrap() {
+        let path = entry.unwrap().path();
+        walk(&path.join("src"), &vec![path.file_name().unwrap().to_string_lossy().into_owned()], &mut all);
+    }
+    all.insert(vec!["shaders".to_owned()], fs::read_to_string(root.join("shaders/lib.rs")).unwrap());
     // Files that are modules of tests only.
     let of_tests = |module: &Module| module.iter().any(|part| part == "tests");
     all.retain(|module, _| !of_tests(module));
@@ -197,7 +211,10 @@ fn arrows(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Modul
 /// Violations of the rule, one per line.
 fn faults(sources: &BTreeMap<Module, String>) -> Vec<String> {
     let arrows = arrows(sources);
-    let layer = |module: &Module| LAYERS.iter().position(|name| *name == module[0]);
+    let layer = |module: &Module| {
+        let name = |length: usize| module[..length].join("/");
+        (1..=module.len()).rev().find_map(|length| LAYERS.iter().position(|layer| *layer == name(length)))
+    };
     let mut faults = Vec::new();
     for (from, others) in &arrows {
         let shown = from.join("/");
@@ -256,16 +273,19 @@ fn arrows_upward_and_circles_are_found() {
         faults(&sources)
     };
     let up = ["statistics/fit uses ensemble/spec, which is above it"];
-    assert_eq!(with(&[("statistics/fit", "use crate::{ensemble::Spec, number::Real};")]), up);
-    assert_eq!(with(&[("statistics/fit", "fn f() -> Option<crate::ensemble::Spec> { None }")]), up);
-    assert_eq!(with(&[("statistics/fit", "#[cfg(test)] mod more { use crate::ensemble::Spec; }")]), [""; 0]);
+    assert_eq!(with(&[("statistics/fit", "use curvelax_ensemble::Spec;")]), up);
+    assert_eq!(with(&[("statistics/fit", "fn f() -> Option<curvelax_ensemble::Spec> { None }")]), up);
+    assert_eq!(with(&[("statistics/fit", "#[cfg(test)] mod more { use curvelax_ensemble::Spec; }")]), [""; 0]);
+    // Within a crate, where Cargo does not see it.
+    let up = ["flow/number uses flow/solver/ring, which is above it"];
+    assert_eq!(with(&[("flow/number", "fn f() -> crate::solver::ring::Blocks {}")])[..1], up);
     let circle = with(&[("statistics/sum", "use super::fit::Line;"), ("statistics/fit", "use super::sum::sum;")]);
     assert!(circle.len() == 1 && circle[0].contains("statistics/fit, statistics/sum"), "{circle:?}");
     // Through a re-export, and to the folder that holds the file.
     let circle = with(&[("statistics/sum", "use super::Line;"), ("statistics/fit", "use super::sum::sum;")]);
     assert!(circle.len() == 1 && circle[0].contains("statistics/fit, statistics/sum"), "{circle:?}");
-    let circle = with(&[("report/complete", "use super::RunReport;")]);
-    assert!(circle.len() == 1 && circle[0].contains("report, report/complete"), "{circle:?}");
+    let circle = with(&[("run/report/complete", "use super::RunReport;")]);
+    assert!(circle.len() == 1 && circle[0].contains("run/report, run/report/complete"), "{circle:?}");
 }
 
 /// The types that a file defines outside its tests and its functions.
@@ -311,10 +331,10 @@ fn type_names_are_unique() {
 fn a_type_name_that_is_used_twice_is_found() {
     let with = |line: &str| {
         let mut sources = sources();
-        sources.get_mut(&vec!["error".to_owned()]).unwrap().push_str(line);
+        sources.get_mut(&vec!["base".to_owned(), "error".to_owned()]).unwrap().push_str(line);
         shared_names(&sources)
     };
-    let shared = ["Outline: curve/outline, error"];
+    let shared = ["Outline: base/error, curve/outline"];
     assert_eq!(with("struct Outline;"), shared);
     assert_eq!(with("mod inner { pub enum Outline {} }"), shared);
     assert_eq!(with("type Outline<T> = Option<T>;"), shared);

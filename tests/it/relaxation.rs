@@ -5,6 +5,7 @@
 
 use std::{collections::BTreeMap, f64::consts::TAU, time::Instant};
 
+use curvelax::scheme::evolve::Evolves;
 use curvelax::{
     curve::{BaseCurve, Sampling, crossing, polygon},
     ensemble::{
@@ -12,7 +13,6 @@ use curvelax::{
         spec::{BackendChoice, Omega, Precision, Pull, Sor, Tau},
     },
     flow::Flow,
-    number::Real,
     placement,
     schedule::{Outputs, Ticks},
     scheme::{
@@ -70,7 +70,7 @@ fn one(spec: &Spec) -> Outcome {
 }
 
 /// Runs a member to its end by hand, so that its last state can be inspected, even where the program refuses its n.
-fn follow<T: Real>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
+fn follow<T: Evolves>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let n = member.nodes.len();
     let outputs = Outputs::new(spec.final_time(), spec.series, &spec.snapshots, &[]);
     let mut trajectory = Trajectory::new(member, spec, T::PRECISION, &outputs);
@@ -276,7 +276,7 @@ fn rows_at_given_times_do_not_depend_on_where_steps_fell_and_change_no_step() {
 }
 
 /// The clock of a run to `t_end` in numbers of type T.
-fn clock<T: Real>(t_end: f64, next: f64) -> (Ticks, Progress<T>, Parameters<T>) {
+fn clock<T: Evolves>(t_end: f64, next: f64) -> (Ticks, Progress<T>, Parameters<T>) {
     let ticks = Ticks::new(t_end, T::PRECISION);
     let (end_high, end_low) = ticks.split(t_end);
     let p = Parameters { end_high, end_low, time_unit: ticks.unit, time_tick: ticks.tick, ..Parameters::default() };

@@ -183,7 +183,7 @@ fn missing_twins_and_unnecessary_exceptions_are_found() {
     };
     assert_eq!(appended("shaders/pace.wgsl", "fn hurry() {}\n"), ["pace.wgsl: hurry has no twin"]);
     assert_eq!(
-        faults("src/scheme/pace.rs", &|old| old.replace("fn growth", "fn stretch")),
+        faults("crates/flow/src/scheme/pace.rs", &|old| old.replace("fn growth", "fn stretch")),
         ["pace.wgsl: growth has no twin"]
     );
     assert_eq!(exception("growth"), ["the exception of growth is unnecessary"]);
@@ -201,7 +201,7 @@ fn missing_twins_and_unnecessary_exceptions_are_found() {
         ["pace.wgsl: the twin of stride is in another place"]
     );
     assert_eq!(
-        faults(README, &|old| old.replace("`src/scheme/pace.rs`", "`src/scheme/space.rs`"))[0],
+        faults(README, &|old| old.replace("`crates/flow/src/scheme/pace.rs`", "`src/scheme/space.rs`"))[0],
         "there is no src/scheme/space.rs"
     );
     let unlisted = faults(README, &|old| old.replace("| `pace.wgsl` |", "| |"));
@@ -209,7 +209,7 @@ fn missing_twins_and_unnecessary_exceptions_are_found() {
     // Tests and other files provide no twins.
     let hidden = "#[cfg(test)]\nmod more { fn next_length() {} }\n";
     assert_eq!(
-        faults("src/scheme/pace.rs", &|old| old.replace("fn growth", "fn stretch") + hidden),
+        faults("crates/flow/src/scheme/pace.rs", &|old| old.replace("fn growth", "fn stretch") + hidden),
         ["pace.wgsl: growth has no twin"]
     );
 }

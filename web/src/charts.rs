@@ -1,10 +1,8 @@
 //! The charts: those of the program's report, with a curve for the CPU and one for the GPU.
 
-use curvelax::{
-    draw::charts::{Decay, DecayCurve, DecayLaw, Survival, SurvivalCurve, Theory},
-    ensemble::{Spec, theory},
-    statistics::{HALF_INTERVAL, KaplanMeier, Observation, Sample, Step},
-};
+use curvelax_draw::charts::{Decay, DecayCurve, DecayLaw, Survival, SurvivalCurve, Theory};
+use curvelax_ensemble::{Spec, theory};
+use curvelax_statistics::{HALF_INTERVAL, KaplanMeier, Observation, Sample, Step};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -3,17 +3,17 @@
 
 use std::{cell::RefCell, collections::BTreeMap, mem, time::Duration};
 
-use curvelax::{
-    Error, Result,
-    backend::{
-        Backend,
-        gpu::{
-            Budget, Capacity, Variant,
-            mirror::{Binding, Caps, Mirror},
-            shader,
-        },
+use curvelax_backend::bounds::MAX_POINTS_F32;
+use curvelax_backend::{
+    Backend,
+    gpu::{
+        Budget, Capacity, Variant,
+        mirror::{Binding, Caps, Mirror},
+        shader,
     },
-    conformance::bounds::MAX_POINTS_F32,
+};
+use curvelax_base::error::{Error, Result};
+use curvelax_flow::{
     scheme::{
         Parameters, State, extrapolation,
         member::{Counters, Report},

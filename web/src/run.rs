@@ -2,29 +2,33 @@
 
 use std::time::{Duration, Instant};
 
-use curvelax::{
-    backend::{
-        Backend,
-        cpu::{CpuBackend, Vectors},
-    },
-    conformance::bounds,
-    curve::polygon,
-    ensemble::{Cell, Ended, Sink, Standing, Study, spec::Precision},
+use curvelax_backend::bounds;
+use curvelax_backend::{
+    Backend,
+    cpu::{CpuBackend, Vectors},
+};
+use curvelax_curve::polygon;
+use curvelax_ensemble::{
+    Cell, Ended, Sink, Standing, Study,
     schedule::grid,
+    simulate::{Roster, Simulation},
+    spec::Precision,
+    trajectory::Placing,
+};
+use curvelax_flow::{
     scheme::{
         Parameters, State, extrapolation,
         member::{Counters, Report},
         run::Run as MemberRun,
         step::Method,
     },
-    simulate::{Roster, Simulation},
     solver::Blocks,
-    trajectory::Placing,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::{gpu::WebGpu, settings::Settings};
+use crate::gpu::WebGpu;
+use crate::settings::Settings;
 
 /// Time of a turn on the CPU, so that curves move.
 const TURN: Duration = Duration::from_millis(25);
@@ -83,7 +87,7 @@ pub struct Run {
 impl Run {
     /// Starts a run, and says what the page has to know.
     pub fn start(settings: &Settings, place: Place) -> Result<(Run, Value), String> {
-        let told = |error: curvelax::Error| error.to_string();
+        let told = |error: curvelax_base::Error| error.to_string();
         let study: &'static Study = Box::leak(Box::new(settings.study()?));
         let [cell] = study.cells() else { return Err("this page runs one ensemble at a time".into()) };
         let (spec, members) = (&cell.spec, study.member_count() as usize);
@@ -244,7 +248,7 @@ impl Run {
 struct Collected<'a>(&'a mut Vec<Ended>);
 
 impl Sink for Collected<'_> {
-    fn member(&mut self, ended: &Ended) -> curvelax::Result<()> {
+    fn member(&mut self, ended: &Ended) -> curvelax_base::Result<()> {
         self.0.push(ended.clone());
         Ok(())
     }
@@ -267,7 +271,7 @@ impl Backend for Watched {
     fn slots(&self) -> usize {
         self.placed.len()
     }
-    fn load(&mut self, slot: usize, run: &MemberRun<f64>) -> curvelax::Result<()> {
+    fn load(&mut self, slot: usize, run: &MemberRun<f64>) -> curvelax_base::Result<()> {
         self.states[slot] = Some(run.state.clone());
         self.device.backend().load(slot, run)
     }
@@ -283,13 +287,13 @@ impl Backend for Watched {
     fn batches(&self) -> usize {
         1
     }
-    fn start(&mut self, batch: usize) -> curvelax::Result<()> {
+    fn start(&mut self, batch: usize) -> curvelax_base::Result<()> {
         self.device.backend().start(batch)
     }
     fn is_back(&mut self, batch: usize, most: Duration) -> bool {
         self.device.backend().is_back(batch, most)
     }
-    fn finish(&mut self, batch: usize) -> curvelax::Result<()> {
+    fn finish(&mut self, batch: usize) -> curvelax_base::Result<()> {
         self.device.backend().finish(batch)?;
         if self.seen.is_none_or(|seen| seen.elapsed() >= FRAME) {
             (self.seen, self.is_due) = (Some(Instant::now()), true);
@@ -311,7 +315,7 @@ impl Backend for Watched {
             Device::Gpu(gpu) => gpu.report(slot),
         }
     }
-    fn state(&mut self, slot: usize) -> curvelax::Result<State<f64>> {
+    fn state(&mut self, slot: usize) -> curvelax_base::Result<State<f64>> {
         self.device.backend().state(slot)
     }
 }

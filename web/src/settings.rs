@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use curvelax::ensemble::{Spec, Study};
+use curvelax_ensemble::{Spec, Study};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -1,0 +1,188 @@
+//! The kernel's source: a fixed list of WGSL files after one line that chooses the number and the kind of steps.
+
+use curvelax_flow::{
+    number::Real,
+    solver::{
+        Blocks, Solver,
+        multigrid::{coarse_nodes, odd_rings},
+    },
+};
+use curvelax_shaders::{self as shaders, ShaderPart};
+
+/// Fields that a traced kernel records per member; `conformance::bounds::STAGES` names them in the same order.
+pub const TRACE_FIELDS: usize = 20;
+
+/// The variant of a kernel: everything but its number and sizes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Variant {
+    /// Solver of the pentadiagonal systems.
+    pub solver: Solver,
+    /// Makes adaptive steps. A constant, since a kernel with both kinds of steps takes twice as long to compile.
+    pub adaptive: bool,
+    /// Members may pause where an observable reaches a level. A constant, since drivers of software GPUs execute every
+    /// branch.
+    pub watched: bool,
+    /// Records what every stage of a step computes.
+    pub traced: bool,
+    /// A workgroup is one subgroup, whose threads exchange values by shuffles instead of barriers.
+    pub subgroup: bool,
+}
+
+impl Variant {
+    /// Returns all variants in use, without those that differ only in being watched; traces need only fixed steps, since
+    /// adaptive ones are made of them.
+    pub fn all() -> Vec<Variant> {
+        let exchanges =
+            |solver: Solver| [false, true].into_iter().filter(move |by| !by || solver.facts().kernel.shuffles);
+        let exchanging = |solver| exchanges(solver).map(move |subgroup| Variant { subgroup, ..Variant::of(solver) });
+        let made_for = |own| [own, Variant { traced: true, ..own }, Variant { adaptive: true, ..own }];
+        Solver::ALL.into_iter().flat_map(exchanging).flat_map(made_for).collect()
+    }
+
+    /// Returns the variant for fixed steps.
+    pub const fn of(solver: Solver) -> Variant {
+        Variant { solver, adaptive: false, watched: false, traced: false, subgroup: false }
+    }
+
+    /// Returns the files of the kernel, in the order of the step.
+    pub fn parts(self) -> impl Iterator<Item = ShaderPart> {
+        let solver = of_solver(self.solver);
+        let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
+        let exchange = if self.subgroup { EXCHANGE_SUBGROUP } else { EXCHANGE };
+        COMMON.into_iter().chain(exchange).chain(solver.iter().copied()).chain(trace)
+    }
+}
+
+const COMMON: [ShaderPart; 18] = [
+    shaders::NUMBER,
+    shaders::RING,
+    shaders::SUMS,
+    shaders::MEMBER,
+    shaders::FLOW,
+    shaders::REDISTRIBUTION,
+    shaders::SYSTEM,
+    shaders::CURVATURE,
+    shaders::POSITION,
+    shaders::PULL,
+    shaders::OBSERVE,
+    shaders::STEP,
+    shaders::START,
+    shaders::EXTRAPOLATION,
+    shaders::PACE,
+    shaders::DENSE,
+    shaders::DECAY,
+    shaders::EVOLVE,
+];
+const EXCHANGE: [ShaderPart; 1] = [shaders::EXCHANGE];
+const EXCHANGE_SUBGROUP: [ShaderPart; 1] = [shaders::EXCHANGE_SUBGROUP];
+const TRACE_OFF: [ShaderPart; 1] = [shaders::TRACE_OFF];
+const TRACE_ON: [ShaderPart; 1] = [shaders::TRACE_ON];
+
+/// Returns the files of a solver.
+fn of_solver(solver: Solver) -> &'static [ShaderPart] {
+    match solver {
+        Solver::GaussSeidel => &[shaders::SWEEPS, shaders::GAUSS_SEIDEL],
+        Solver::Multigrid => &[
+            shaders::SWEEPS,
+            shaders::TERMS,
+            shaders::LEVELS,
+            shaders::COARSE,
+            shaders::TRANSFER,
+            shaders::CYCLE,
+            shaders::MULTIGRID,
+        ],
+        Solver::Direct => &[shaders::DIRECT],
+    }
+}
+
+/// Returns the whole source in precision `T`.
+pub fn source<T: Real>(variant: Variant) -> String {
+    let Variant { solver, adaptive, watched, .. } = variant;
+    let (number, epsilon, sweeps) = (T::NAME, T::EPSILON, solver.sweeps());
+    let mut text = format!(
+        "alias real = {number}; const EPSILON = {epsilon:e}; const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps}; \
+         const WATCHED = {watched};\n"
+    );
+    for (_, part) in variant.parts() {
+        text.push_str(part);
+        text.push('\n');
+    }
+    text
+}
+
+/// Returns the file and line, within `shaders/`, of a line (from 1) of [`source`].
+pub fn locate(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
+    let mut before = 1;
+    for (file, part) in variant.parts() {
+        let lines = part.lines().count() + 1;
+        if line > before && line <= before + lines {
+            return Some((file, line - before));
+        }
+        before += lines;
+    }
+    None
+}
+
+/// Returns the threads of a workgroup: one per block, rounded up to whole subgroups of `subgroup` threads. The
+/// one-subgroup kernel needs the smallest subgroup there is.
+pub fn threads(blocks: Blocks, subgroup: u32) -> usize {
+    blocks.count().next_multiple_of(subgroup as usize)
+}
+
+/// Returns the share of lanes in use, with subgroups of `subgroup` threads: the nodes over four times the threads of a
+/// workgroup.
+///
+/// ```
+/// use curvelax_backend::gpu::shader::lanes_in_use;
+/// use curvelax_flow::solver::Blocks;
+///
+/// let lanes = |n| lanes_in_use(Blocks::new(n).unwrap(), 32);
+/// // Fewer nodes than a subgroup can hold leave lanes idle.
+/// assert_eq!([lanes(64), lanes(100), lanes(128), lanes(200), lanes(256)], [0.5, 0.78125, 1.0, 0.78125, 1.0]);
+/// ```
+pub fn lanes_in_use(blocks: Blocks, subgroup: u32) -> f64 {
+    blocks.n as f64 / (4 * threads(blocks, subgroup)) as f64
+}
+
+/// Returns the `override` constants that size the kernel.
+pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
+    [
+        ("NODES", blocks.n as f64),
+        ("FOURS", blocks.fours as f64),
+        ("BLOCKS", blocks.count() as f64),
+        ("THREADS", threads(blocks, subgroup) as f64),
+        ("COARSE", coarse_nodes(blocks.n) as f64),
+        ("ODD_RINGS", odd_rings(blocks.n).max(1) as f64),
+    ]
+}
+
+/// Numbers and integers of a `Plan` in the kernel.
+const PLAN: (usize, usize) = (2, 4);
+
+/// Returns the bytes of workgroup memory of the kernel: rows of four numbers per block, the solver's own needs, the plan of
+/// an attempt, a decision and the member.
+///
+/// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
+pub fn workgroup_bytes<T: Real>(blocks: Blocks, variant: Variant) -> usize {
+    let kernel = &variant.solver.facts().kernel;
+    let rows = if variant.subgroup { 1 } else { kernel.rows_per_block };
+    (4 * rows * blocks.count() + (kernel.numbers)(blocks.n) + PLAN.0) * size_of::<T>() + (PLAN.1 + 2) * size_of::<u32>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_the_source_is_found_in_its_file() {
+        for variant in Variant::all().into_iter().flat_map(|own| [own, Variant { watched: true, ..own }]) {
+            let text = source::<f64>(variant);
+            for (number, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.is_empty()) {
+                let (file, at) = locate(number + 1, variant).unwrap();
+                let (_, part) = variant.parts().find(|part| part.0 == file).unwrap();
+                assert_eq!(part.lines().nth(at - 1), Some(line), "{file}:{at}");
+            }
+        }
+        assert_eq!(locate(1, Variant::of(Solver::GaussSeidel)), None);
+    }
+}

@@ -1,0 +1,14 @@
+//! What every crate of curvelax uses: errors that name what, where, the numbers and the remedy; files opened for reading;
+//! numbers as text; random numbers addressed by key; threads and guards against panics of other crates.
+
+pub mod error;
+pub mod guard;
+pub mod input;
+pub mod random;
+pub mod text;
+pub mod threads;
+
+pub use error::{Error, Result};
+
+/// The version of the program, and of the files that it writes.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");

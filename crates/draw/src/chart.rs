@@ -1,0 +1,453 @@
+//! The parts of all charts: a heading with sentences and a legend, panels with axes, colours of curves.
+//!
+//! A chart is laid out from top to bottom in this order. Text widths are known only [roughly](super::width), from
+//! above.
+
+use glam::DVec2;
+
+use super::{
+    axis::{Axis, Scale, range},
+    style,
+    svg::{Svg, coordinate, dots},
+    width::{SIZE, TITLE, shortened, width, wrapped},
+};
+use curvelax_base::text::significant;
+
+/// Width of every chart, in pixels.
+pub const WIDTH: f64 = 680.0;
+/// Margin at the left and right of a chart.
+pub const MARGIN: f64 = 20.0;
+/// Space below a panel for tick labels and the name of the axis.
+pub const FOOT: f64 = 52.0;
+/// Space above a panel that has a heading.
+pub const HEADING: f64 = 22.0;
+
+const TITLE_LINE: f64 = 20.0;
+const LINE: f64 = 17.0;
+const LEGEND_LINE: f64 = 20.0;
+const SAMPLE: f64 = 26.0;
+const AXIS_SIZE: f64 = 13.0;
+const TICK: f64 = 5.0;
+const MINOR_TICK: f64 = 3.0;
+/// More curves than this are not drawn: they would hide each other.
+const MAX_CURVES: usize = 24;
+/// Width of the colour bar itself.
+const BAR: f64 = 14.0;
+
+/// An estimated number with its bounds, if known.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EstimatedNumber {
+    /// The number.
+    pub value: f64,
+    /// Its confidence interval, 95 % by convention; `None` if unknown.
+    pub interval: Option<(f64, f64)>,
+}
+
+impl EstimatedNumber {
+    /// `0.412 (95 %: 0.401 to 0.420)`.
+    pub fn shown(&self) -> String {
+        let value = significant(self.value, 3);
+        match self.interval {
+            Some((low, high)) => format!("{value} (95 %: {} to {})", significant(low, 3), significant(high, 3)),
+            None => value,
+        }
+    }
+}
+
+/// How an entry of a legend is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LegendMark {
+    /// A line in the dash pattern of its class.
+    Series,
+    /// A dashed line.
+    Dashed,
+    /// A thin line.
+    Thin,
+    /// A thick line.
+    Thick,
+    /// An area.
+    Band,
+    /// The [marker](draw_marker) of the series of this rank.
+    Marker(usize),
+    /// One of many dots.
+    Points,
+    /// A triangle that points up.
+    Up,
+    /// The outline of one.
+    HollowUp,
+    /// A triangle that points right.
+    Right,
+    /// The short stroke of a censored member.
+    Stroke,
+}
+
+/// An entry of a legend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// Class of its colour.
+    pub class: String,
+    /// How it is drawn.
+    pub mark: LegendMark,
+    /// What it stands for.
+    pub label: String,
+}
+
+impl Entry {
+    /// An entry in the colour of `class`.
+    pub fn new(class: &str, mark: LegendMark, label: &str) -> Entry {
+        Entry { class: class.into(), mark, label: label.into() }
+    }
+
+    /// Pixels of the sample before the label.
+    fn sample(&self) -> f64 {
+        match self.mark {
+            LegendMark::Marker(_) | LegendMark::Points | LegendMark::Up => 10.0,
+            LegendMark::HollowUp | LegendMark::Right | LegendMark::Stroke => 10.0,
+            _ => SAMPLE,
+        }
+    }
+
+    fn draw(&self, svg: &mut Svg, at: DVec2) {
+        let [x, y] = at.to_array().map(coordinate);
+        let middle = at + DVec2::new(0.5 * self.sample(), 0.0);
+        let line = format!("M{x} {y}h{SAMPLE}");
+        svg.open(&self.class);
+        match self.mark {
+            LegendMark::Series => svg.path("series", &line),
+            LegendMark::Dashed => svg.path("dashed", &line),
+            LegendMark::Thin => svg.path("thin", &line),
+            LegendMark::Thick => svg.path("thick", &line),
+            LegendMark::Band => svg.rectangle("band", at - DVec2::new(0.0, 5.0), DVec2::new(SAMPLE, 10.0), 0.0),
+            LegendMark::Marker(rank) => draw_marker(svg, rank, middle),
+            LegendMark::Points => svg.path("points", &dots(&[middle])),
+            LegendMark::Up => svg.path("solid", &triangle_up(middle)),
+            LegendMark::HollowUp => svg.path("hollow", &triangle_up(middle)),
+            LegendMark::Right => svg.path("solid", &triangle_right(middle)),
+            LegendMark::Stroke => svg.path("thin", &stroke(middle)),
+        }
+        svg.close();
+    }
+}
+
+/// Draws the marker of the series of this rank; each of the [series](style::SERIES) has its own shape.
+pub fn draw_marker(svg: &mut Svg, rank: usize, at: DVec2) {
+    let [x, y] = at.to_array().map(coordinate);
+    let square = format!("M{x} {y}m-3.6 -3.6h7.2v7.2h-7.2Z");
+    let diamond = format!("M{x} {y}m0 -5l5 5l-5 5l-5 -5Z");
+    match rank % style::SERIES {
+        0 => svg.path("dots", &dots(&[at])),
+        1 => svg.path("solid", &square),
+        2 => svg.path("solid", &diamond),
+        3 => svg.path("hollow", &format!("M{x} {y}m-4 0a4 4 0 0 0 8 0a4 4 0 0 0 -8 0Z")),
+        4 => svg.path("hollow", &square),
+        5 => svg.path("hollow", &diamond),
+        6 => svg.path("cross", &format!("M{x} {y}m-4 -4l8 8m0 -8l-8 8")),
+        _ => svg.path("cross", &format!("M{x} {y}m-5 0h10m-5 -5v10")),
+    }
+}
+
+/// Path data of a triangle about `at` that points up.
+pub fn triangle_up(at: DVec2) -> String {
+    let [x, y] = (at - DVec2::new(0.0, 5.0)).to_array().map(coordinate);
+    format!("M{x} {y}l5 9h-10Z")
+}
+
+/// Path data of a triangle about `at` that points right.
+pub fn triangle_right(at: DVec2) -> String {
+    let [x, y] = (at + DVec2::new(5.0, 0.0)).to_array().map(coordinate);
+    format!("M{x} {y}l-9 5v-10Z")
+}
+
+/// Path data of a short upright stroke about `at`.
+pub fn stroke(at: DVec2) -> String {
+    let [x, y] = (at - DVec2::new(0.0, 4.0)).to_array().map(coordinate);
+    format!("M{x} {y}v8")
+}
+
+/// The text above the panels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Heading<'a> {
+    /// The title, also for screen readers.
+    pub title: &'a str,
+    /// Sentences below it, each a paragraph; empty ones are omitted.
+    pub sentences: Vec<String>,
+    /// The legend; entries without a label are omitted.
+    pub legend: Vec<Entry>,
+}
+
+impl Heading<'_> {
+    /// Begins a picture with this heading and `body` pixels below it; returns where these begin.
+    pub fn begin(&self, body: f64) -> (Svg, f64) {
+        let room = WIDTH - 2.0 * MARGIN;
+        let titles = wrapped(self.title, TITLE, room);
+        let lines: Vec<String> = self.sentences.iter().flat_map(|text| wrapped(text, SIZE, room)).collect();
+        let rows = self.rows(room);
+        let above = [(titles.len(), TITLE_LINE), (lines.len(), LINE), (rows.len(), LEGEND_LINE)];
+        let top = 22.0 + above.iter().map(|(count, height)| *count as f64 * height).sum::<f64>();
+
+        let mut svg = Svg::new(WIDTH, top + body, &style::chart(), self.title);
+        svg.rectangle("back", DVec2::ZERO, DVec2::new(WIDTH, top + body), 0.0);
+        let mut y = 6.0;
+        let mut next = |height: f64| {
+            y += height;
+            DVec2::new(MARGIN, y)
+        };
+        titles.iter().for_each(|line| svg.text("head", next(TITLE_LINE), line));
+        lines.iter().for_each(|line| svg.text("note", next(LINE), line));
+        for row in rows {
+            let left = next(LEGEND_LINE);
+            for (x, entry) in row {
+                let at = left + DVec2::new(x, 2.0);
+                entry.draw(&mut svg, at - DVec2::new(0.0, 4.0));
+                svg.text("label", at + DVec2::new(entry.sample() + 6.0, 0.0), &entry.label);
+            }
+        }
+        (svg, top)
+    }
+
+    /// The rows of the legend, each entry with its position.
+    fn rows(&self, room: f64) -> Vec<Vec<(f64, Entry)>> {
+        let most = room - SAMPLE - 6.0;
+        let fitted = |entry: &Entry| Entry { label: shortened(&entry.label, SIZE, most), ..entry.clone() };
+        let entries: Vec<Entry> = self.legend.iter().filter(|entry| !entry.label.is_empty()).map(fitted).collect();
+        let extent = |entry: &Entry| entry.sample() + 24.0 + width(&entry.label, SIZE);
+        let mut rows: Vec<Vec<(f64, Entry)>> = Vec::new();
+        let mut end = f64::INFINITY;
+        for entry in entries {
+            let extent = extent(&entry);
+            if end + extent - 18.0 > room {
+                rows.push(Vec::new());
+                end = 0.0;
+            }
+            rows.last_mut().expect("pushed above").push((end, entry));
+            end += extent;
+        }
+        rows
+    }
+}
+
+/// Axes with room for data.
+#[derive(Clone, Debug)]
+pub struct Panel<'a> {
+    /// A line above it, or empty.
+    pub heading: &'a str,
+    /// The upper left corner, in pixels.
+    pub corner: DVec2,
+    /// Width and height, in pixels.
+    pub size: DVec2,
+    /// Horizontal axis.
+    pub x: &'a Axis,
+    /// Vertical axis.
+    pub y: &'a Axis,
+    /// Whether the horizontal axis has labels; otherwise those of a panel below apply.
+    pub labels_x: bool,
+}
+
+impl Panel<'_> {
+    /// Space needed at the left of a panel of this height.
+    pub fn left(y: &Axis, height: f64) -> f64 {
+        let labels = y.ticks_upwards(height).labelled.into_iter().map(|(_, label)| width(&label, SIZE));
+        MARGIN + AXIS_SIZE + 16.0 + labels.fold(0.0, f64::max)
+    }
+
+    /// The lower right corner.
+    pub fn end(&self) -> DVec2 {
+        self.corner + self.size
+    }
+
+    /// The horizontal position of a value, in pixels.
+    pub fn across(&self, x: f64) -> f64 {
+        self.corner.x + self.size.x * self.x.share(x)
+    }
+
+    /// The vertical position of a value, in pixels, restricted to the panel.
+    pub fn height(&self, y: f64) -> f64 {
+        // y grows downwards in SVG.
+        self.end().y - self.size.y * self.y.share(y).clamp(0.0, 1.0)
+    }
+
+    /// The position of a point, inside the panel or not.
+    pub fn place(&self, x: f64, y: f64) -> DVec2 {
+        DVec2::new(self.across(x), self.end().y - self.size.y * self.y.share(y))
+    }
+
+    /// Draws the axes.
+    pub fn draw(&self, svg: &mut Svg) {
+        self.draw_x(svg);
+        self.draw_y(svg);
+        self.draw_frame(svg);
+    }
+
+    /// Draws the border and the heading.
+    pub fn draw_frame(&self, svg: &mut Svg) {
+        svg.rectangle("frame", self.corner, self.size, 0.0);
+        let middle = self.corner.x + 0.5 * self.size.x;
+        svg.text_unless_empty("middle", DVec2::new(middle, self.corner.y - 8.0), self.heading);
+    }
+
+    /// Draws grid, ticks, labels and name of the horizontal axis.
+    pub fn draw_x(&self, svg: &mut Svg) {
+        let [top, bottom] = [self.corner.y, self.end().y].map(coordinate);
+        let ticks = self.x.ticks_across(self.size.x);
+        let (mut grid, mut marks) = (String::new(), String::new());
+        for value in &ticks.minor {
+            marks += &format!("M{} {bottom}v-{MINOR_TICK}", coordinate(self.across(*value)));
+        }
+        for (value, label) in &ticks.labelled {
+            let x = self.across(*value);
+            grid += &format!("M{} {top}V{bottom}", coordinate(x));
+            marks += &format!("M{} {bottom}v-{TICK}", coordinate(x));
+            if self.labels_x {
+                svg.text("x tick middle", DVec2::new(x, self.end().y + 16.0), label);
+            }
+        }
+        svg.path("grid", &grid);
+        svg.path("ticks", &marks);
+        if self.labels_x {
+            let name = shortened(&self.x.title(&ticks), AXIS_SIZE, self.size.x);
+            svg.text("axis middle", DVec2::new(self.corner.x + 0.5 * self.size.x, self.end().y + 38.0), &name);
+        }
+    }
+
+    /// Draws grid, ticks, labels and name of the vertical axis.
+    pub fn draw_y(&self, svg: &mut Svg) {
+        let [left, right] = [self.corner.x, self.end().x].map(coordinate);
+        let ticks = self.y.ticks_upwards(self.size.y);
+        let (mut grid, mut marks) = (String::new(), String::new());
+        for value in &ticks.minor {
+            marks += &format!("M{left} {}h{MINOR_TICK}", coordinate(self.height(*value)));
+        }
+        for (value, label) in &ticks.labelled {
+            let y = self.height(*value);
+            grid += &format!("M{left} {}H{right}", coordinate(y));
+            marks += &format!("M{left} {}h{TICK}", coordinate(y));
+            svg.text("y tick end", DVec2::new(self.corner.x - 6.0, y + 4.0), label);
+        }
+        svg.path("grid", &grid);
+        svg.path("ticks", &marks);
+        let name = shortened(&self.y.title(&ticks), AXIS_SIZE, self.size.y);
+        let from_left = Panel::left(self.y, self.size.y) - MARGIN - AXIS_SIZE + 3.0;
+        let at = DVec2::new(self.corner.x - from_left, self.corner.y + 0.5 * self.size.y);
+        svg.text_upwards("axis middle", at, &name);
+    }
+
+    /// Writes a sentence in the middle, if there is nothing to draw.
+    pub fn say(&self, svg: &mut Svg, sentence: &str) {
+        svg.rectangle("frame", self.corner, self.size, 0.0);
+        let lines = wrapped(sentence, SIZE, self.size.x - 24.0);
+        let first = self.corner + 0.5 * self.size - DVec2::new(0.0, 0.5 * LINE * (lines.len() as f64 - 1.0) - 4.0);
+        for (i, line) in lines.iter().enumerate() {
+            svg.text("note middle", first + DVec2::new(0.0, i as f64 * LINE), line);
+        }
+    }
+}
+
+/// A picture that says why there is nothing to draw.
+pub fn nothing(title: &str, sentences: Vec<String>, reason: &str) -> String {
+    let (mut svg, top) = Heading { title, sentences, legend: Vec::new() }.begin(180.0);
+    let axis = Axis::new("", "", Scale::Linear, (0.0, 1.0));
+    let panel = Panel {
+        heading: "",
+        corner: DVec2::new(MARGIN, top),
+        size: DVec2::new(WIDTH - 2.0 * MARGIN, 180.0 - MARGIN),
+        x: &axis,
+        y: &axis,
+        labels_x: false,
+    };
+    panel.say(&mut svg, reason);
+    svg.finish()
+}
+
+/// Colours of curves: a few are distinct, many form an ordered scale.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Colours {
+    /// Which curves are drawn, and the class of each.
+    pub shown: Vec<(usize, String)>,
+    /// The scale of the colours, if they are ordered.
+    pub bar: Option<Axis>,
+}
+
+impl Colours {
+    /// Colours for one curve per value of `key`. If a value is unknown, or there is none, curves are numbered from 0
+    /// and ordered by that.
+    pub fn of(values: &[Option<f64>], key: &str) -> Colours {
+        let count = values.len();
+        if count <= style::SERIES {
+            return Colours { shown: (0..count).map(|i| (i, format!("s{i}"))).collect(), bar: None };
+        }
+        let known = |value: &f64| Scale::Linear.holds(*value);
+        let given: Option<Vec<f64>> = values.iter().map(|value| value.filter(known)).collect();
+        let key = if given.is_some() { key } else { "cell" };
+        let values = given.unwrap_or_else(|| (0..count).map(|i| i as f64).collect());
+        let scale = Scale::of(values.iter().copied());
+        let ends = range(values.iter().copied()).filter(|(low, high)| low < high);
+        let axis = match ends {
+            Some(ends) => Axis::new(key, "", scale, ends),
+            None => Axis::over(key, "", scale, values.iter().copied()),
+        };
+        let mut order: Vec<usize> = (0..count).collect();
+        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+        let most = count.min(MAX_CURVES);
+        let picked = (0..most).map(|i| order[i * (count - 1) / (most - 1)]);
+        let class = |i: usize| {
+            let step = (axis.share(values[i]) * style::RAMP as f64) as usize;
+            (i, format!("r{}", step.min(style::RAMP - 1)))
+        };
+        Colours { shown: picked.map(class).collect(), bar: Some(axis) }
+    }
+
+    /// Legend entries of distinct curves, named by `label`.
+    pub fn legend<'a>(&self, label: impl Fn(usize) -> &'a str) -> impl Iterator<Item = Entry> {
+        let told_apart = self.shown.iter().filter(|_| self.bar.is_none());
+        told_apart.map(move |(i, class)| Entry::new(class, LegendMark::Series, label(*i)))
+    }
+
+    /// The marker of the curve drawn at this rank: ordered colours need no shapes.
+    pub fn rank(&self, rank: usize) -> usize {
+        if self.bar.is_some() { 0 } else { rank }
+    }
+
+    /// A sentence if not all of `count` curves are drawn.
+    pub fn sentence(&self, count: usize) -> String {
+        match self.shown.len() {
+            shown if shown < count => format!("{shown} of {count} cells are drawn, spread over all."),
+            _ => String::new(),
+        }
+    }
+
+    /// Space for the colour bar next to a panel of this height.
+    pub fn room(&self, height: f64) -> f64 {
+        self.bar.as_ref().map_or(0.0, |bar| 2.0 * BAR + Panel::left(bar, height) - MARGIN)
+    }
+
+    /// Draws the colour bar at the right of a panel.
+    pub fn draw_bar(&self, svg: &mut Svg, panel: &Panel) {
+        let Some(bar) = &self.bar else { return };
+        let corner = DVec2::new(panel.end().x + BAR, panel.corner.y);
+        let step = panel.size.y / style::RAMP as f64;
+        for i in 0..style::RAMP {
+            let at = corner + DVec2::new(0.0, (style::RAMP - 1 - i) as f64 * step);
+            svg.open(&format!("r{i}"));
+            // A slight overlap avoids seams.
+            svg.rectangle("solid", at, DVec2::new(BAR, step + if i > 0 { 0.5 } else { 0.0 }), 0.0);
+            svg.close();
+        }
+        let ticks = bar.ticks_upwards(panel.size.y);
+        let mut right: f64 = 0.0;
+        for (value, label) in &ticks.labelled {
+            let y = panel.end().y - panel.size.y * bar.share(*value);
+            svg.path("ticks", &format!("M{} {}h3", coordinate(corner.x + BAR), coordinate(y)));
+            svg.text("tick", DVec2::new(corner.x + BAR + 6.0, y + 4.0), label);
+            right = right.max(width(label, SIZE));
+        }
+        svg.rectangle("frame", corner, DVec2::new(BAR, panel.size.y), 0.0);
+        let name = shortened(&bar.title(&ticks), AXIS_SIZE, panel.size.y);
+        let at = DVec2::new(corner.x + BAR + right + 12.0 + AXIS_SIZE, panel.corner.y + 0.5 * panel.size.y);
+        svg.text_upwards("axis middle", at, &name);
+    }
+}
+
+/// Whether a point can be shown on axes of these scales.
+pub fn drawable(x: (Scale, f64), y: (Scale, f64)) -> bool {
+    x.0.holds(x.1) && y.0.holds(y.1)
+}

@@ -1,0 +1,189 @@
+//! The mean excess over time, with its band and the slope from theory.
+
+use glam::DVec2;
+
+use super::{MAX_BANDS, TIME, only_panel};
+use crate::{
+    axis::{Axis, Scale},
+    chart::{Colours, Entry, FOOT, Heading, LegendMark, Panel, drawable, nothing},
+    trace,
+};
+
+const HEIGHT: f64 = 300.0;
+/// Smaller fractions of the largest excess are rounding, and not drawn.
+const ROUNDING: f64 = 1e-18;
+/// Segments of a theoretical line, which is straight on some axes only.
+const PIECES: i32 = 100;
+/// A band may extend the axis below its curve by this factor.
+const BELOW: f64 = 1e-2;
+
+/// Mean excess of the cells of a study against time, on a logarithmic axis.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Decay<'a> {
+    /// First line.
+    pub title: &'a str,
+    /// A sentence below it that says over which members the mean is, or nothing.
+    pub note: &'a str,
+    /// Meaning of the bands, such as `5 to 95 % of the members`.
+    pub band: &'a str,
+    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
+    /// many.
+    pub key: &'a str,
+    /// The curves, in the order of the legend.
+    pub curves: Vec<DecayCurve>,
+    /// Theoretical lines to compare with.
+    pub theory: Vec<Theory>,
+    /// Scale of time: linear for exponential decay, logarithmic for an algebraic law.
+    pub time: Option<Scale>,
+}
+
+/// The mean excess of one cell.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DecayCurve {
+    /// Its entry in the legend.
+    pub label: String,
+    /// The value of a numeric key, for the colour bar.
+    pub value: Option<f64>,
+    /// Ascending times, in length⁴.
+    pub t: Vec<f64>,
+    /// Mean excess at each time.
+    pub mean: Vec<f64>,
+    /// Lower and upper bounds at each time, or nothing; values that are not positive are drawn at the bottom.
+    pub band: Option<(Vec<f64>, Vec<f64>)>,
+}
+
+/// A theoretical line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Theory {
+    /// Its entry in the legend, such as `exp(−24 t/R⁴)`.
+    pub label: String,
+    /// The line.
+    pub law: DecayLaw,
+}
+
+/// The law by which excess decreases.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DecayLaw {
+    /// start·exp(−rate·t).
+    Exponential {
+        /// Excess at t = 0.
+        start: f64,
+        /// 24/R⁴ for surface diffusion, in 1/length⁴.
+        rate: f64,
+    },
+    /// start·(1 + t/time)^(−power).
+    Algebraic {
+        /// Excess at t = 0.
+        start: f64,
+        /// R₀⁴/2 for the Willmore flow, in length⁴.
+        time: f64,
+        /// The slope at late times on logarithmic axes, without its sign.
+        power: f64,
+    },
+}
+
+impl DecayLaw {
+    /// The excess at this time.
+    pub fn at(self, t: f64) -> f64 {
+        match self {
+            DecayLaw::Exponential { start, rate } => start * (-rate * t).exp(),
+            DecayLaw::Algebraic { start, time, power } => start * (1.0 + t / time).powf(-power),
+        }
+    }
+
+    /// Path data of its line across a panel.
+    fn line(self, panel: &Panel) -> String {
+        let (scale, (first, last)) = (panel.x.scale(), panel.x.range());
+        let [first, last] = [first, last].map(|t| scale.level(t));
+        let times = (0..=PIECES).map(|i| scale.value(first + (last - first) * f64::from(i) / f64::from(PIECES)));
+        let points = times.map(|t| (t, self.at(t))).filter(|(t, excess)| drawable((scale, *t), (Scale::Log, *excess)));
+        let points: Vec<DVec2> = points.map(|(t, excess)| panel.place(t, excess)).collect();
+        clipped(&points, panel)
+    }
+}
+
+/// Path data of the parts of a line inside a panel.
+fn clipped(points: &[DVec2], panel: &Panel) -> String {
+    trace::clipped(points, panel.corner, panel.end()).iter().map(|part| trace::path(part)).collect()
+}
+
+impl DecayCurve {
+    /// Positions of those of `values` that can be shown; values below the axis are drawn at the bottom.
+    fn line(&self, values: &[f64], panel: &Panel, least: f64, floor: bool) -> Vec<DVec2> {
+        let low = panel.y.range().0;
+        let raised = |value: f64| if floor && value < low { low } else { value };
+        let pairs = self.t.iter().zip(values).map(|(t, value)| (*t, raised(*value)));
+        let pairs = pairs.filter(|(t, value)| drawable((panel.x.scale(), *t), (panel.y.scale(), *value)));
+        let points: Vec<DVec2> = pairs.map(|(t, value)| panel.place(t, value)).collect();
+        trace::thinned(&points, least)
+    }
+}
+
+impl Decay<'_> {
+    /// The text of an SVG file.
+    pub fn draw(&self) -> String {
+        let Decay { title, note, curves, theory, .. } = self;
+        let values: Vec<Option<f64>> = curves.iter().map(|curve| curve.value).collect();
+        let colours = Colours::of(&values, self.key);
+        let sentences = vec![(*note).into(), colours.sentence(curves.len())];
+        let times = || curves.iter().flat_map(|curve| curve.t.iter().copied());
+        let scale = self.time.filter(|scale| times().any(|t| scale.holds(t))).unwrap_or(Scale::Linear);
+        let drawn = |curve: &DecayCurve| {
+            curve.t.iter().zip(&curve.mean).filter(|(t, mean)| drawable((scale, **t), (Scale::Log, **mean))).count()
+        };
+        match curves.iter().map(drawn).max() {
+            None | Some(0) => return nothing(title, sentences, "There is no positive mean excess to draw."),
+            Some(1) => {
+                return nothing(
+                    title,
+                    sentences,
+                    "The mean excess is known at one time only: there is no line to draw.",
+                );
+            }
+            _ => {}
+        }
+        let bands = curves.len() <= MAX_BANDS && curves.iter().any(|curve| curve.band.is_some());
+        let heading = Heading { title, sentences, legend: self.legend(&colours, bands) };
+        let (mut svg, top) = heading.begin(8.0 + HEIGHT + FOOT);
+
+        let across = Axis::over("t", TIME, scale, times()).with_zero();
+        let upwards = self.excess(bands);
+        let panel = only_panel([&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
+        panel.draw(&mut svg);
+        let least = trace::tolerance(colours.shown.len() * if bands { 3 } else { 1 }, panel.size.x);
+        for (i, class) in &colours.shown {
+            let curve = &curves[*i];
+            svg.open(class);
+            if let Some((low, high)) = curve.band.as_ref().filter(|_| bands) {
+                let [low, high] = [low, high].map(|bound| curve.line(bound, &panel, least, true));
+                svg.path("band", &trace::band(&high, &low));
+            }
+            svg.path("series", &clipped(&curve.line(&curve.mean, &panel, least, false), &panel));
+            svg.close();
+        }
+        svg.open("ink");
+        theory.iter().for_each(|theory| svg.path("dashed", &theory.law.line(&panel)));
+        svg.close();
+        colours.draw_bar(&mut svg, &panel);
+        svg.finish()
+    }
+
+    /// The vertical axis: all means above rounding, and the bands where they are near.
+    fn excess(&self, bands: bool) -> Axis {
+        let means = || self.curves.iter().flat_map(|curve| curve.mean.iter().copied()).filter(|e| Scale::Log.holds(*e));
+        let largest = means().fold(0.0, f64::max);
+        let least = means().filter(|mean| *mean > ROUNDING * largest).fold(largest, f64::min);
+        let bounds = self.curves.iter().filter_map(|curve| curve.band.as_ref()).filter(|_| bands);
+        let bounds = bounds.flat_map(|(low, high)| low.iter().chain(high).copied());
+        let near = move |bound: &f64| *bound > BELOW * least && *bound < largest / BELOW;
+        let shown = means().filter(|mean| *mean >= least).chain(bounds.filter(near));
+        Axis::over("mean excess", "", Scale::Log, shown)
+    }
+
+    fn legend(&self, colours: &Colours, bands: bool) -> Vec<Entry> {
+        let curves = colours.legend(|i| &self.curves[i].label);
+        let band = bands.then(|| Entry::new("faint", LegendMark::Band, self.band));
+        let theory = self.theory.iter().map(|theory| Entry::new("ink", LegendMark::Dashed, &theory.label));
+        curves.chain(band).chain(theory).collect()
+    }
+}

@@ -1,0 +1,131 @@
+//! Mesh quality of the members: how unequal the spacing of nodes is at the end, and how far lengths have drifted.
+
+use glam::DVec2;
+
+use super::bins::{Bins, guide};
+use crate::{
+    axis::{Axis, Scale},
+    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH},
+    svg::Svg,
+    width::{SIZE, shortened},
+};
+use curvelax_base::text::{count, significant};
+
+const HEIGHT: f64 = 200.0;
+const GAP: f64 = 14.0;
+
+/// Mesh quality of the members at their end.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MeshQuality<'a> {
+    /// First line.
+    pub title: &'a str,
+    /// A sentence below it, or nothing.
+    pub note: &'a str,
+    /// Longest over shortest edge, one number per member: a picture shows less than seven digits.
+    pub mesh_ratio: &'a [f32],
+    /// max |r_i − |e_i||/|e_i|, one number per member.
+    pub metric_drift: &'a [f32],
+    /// Metric drift above which results are distrusted, and the number of members above it; or nothing.
+    pub distrusted: Option<(f64, u64)>,
+}
+
+/// The values of one panel.
+struct MeshMeasure {
+    name: &'static str,
+    scale: Scale,
+    /// Bins, if there are any values.
+    bins: Option<Bins>,
+    heading: String,
+    /// Number of values that the axis cannot show.
+    zeros: usize,
+    unknown: usize,
+}
+
+impl MeshMeasure {
+    fn new(name: &'static str, values: &[f32]) -> MeshMeasure {
+        let known = || values.iter().map(|value| f64::from(*value)).filter(|value| Scale::Linear.holds(*value));
+        // A drift of 0 should not crowd all others at the left.
+        let positive = || known().filter(|value| *value > 0.0);
+        let scale = if known().any(|value| value < 0.0) { Scale::Linear } else { Scale::of(positive()) };
+        let mut sorted: Vec<f64> = known().filter(|value| scale.holds(*value)).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let known = known().count();
+        MeshMeasure {
+            name,
+            scale,
+            bins: (!sorted.is_empty()).then(|| Bins::of(&sorted, scale)),
+            heading: middle_and_most(&sorted),
+            zeros: known - sorted.len(),
+            unknown: values.len() - known,
+        }
+    }
+
+    fn sentence(&self) -> String {
+        let zeros = match self.zeros {
+            0 => String::new(),
+            zeros => format!("{} with {} 0 left out. ", count(zeros as u64, "member"), self.name),
+        };
+        let unknown = match self.unknown {
+            0 => String::new(),
+            unknown => format!("{} without {}.", count(unknown as u64, "member"), self.name),
+        };
+        (zeros + &unknown).trim().into()
+    }
+
+    /// Draws the panel from `corner`, `width` wide including its labels.
+    fn draw(&self, svg: &mut Svg, corner: DVec2, width: f64, bound: Option<f64>) {
+        let empty = Axis::new(self.name, "", Scale::Linear, (0.0, 1.0));
+        let Some(bins) = &self.bins else {
+            let size = DVec2::new(width - MARGIN, HEIGHT);
+            let corner = corner + DVec2::new(MARGIN, 0.0);
+            let panel = Panel { heading: "", corner, size, x: &empty, y: &empty, labels_x: false };
+            return panel.say(svg, &format!("No member has a {}.", self.name));
+        };
+        let (across, members) = (bins.axis(self.name, "", self.scale), Axis::counts("members", bins.most()));
+        let left = Panel::left(&members, HEIGHT);
+        let size = DVec2::new(width - left, HEIGHT);
+        let heading = shortened(&self.heading, SIZE, size.x);
+        let corner = corner + DVec2::new(left, 0.0);
+        let panel = Panel { heading: &heading, corner, size, x: &across, y: &members, labels_x: true };
+        panel.draw_x(svg);
+        panel.draw_y(svg);
+        bins.draw(svg, &panel);
+        if let Some(bound) = bound.filter(|bound| across.holds(*bound)) {
+            svg.open("ink");
+            guide(svg, &panel, bound);
+            svg.close();
+        }
+        panel.draw_frame(svg);
+    }
+}
+
+fn middle_and_most(sorted: &[f64]) -> String {
+    let Some(last) = sorted.len().checked_sub(1) else { return String::new() };
+    let [middle, most] = [last / 2, last].map(|i| significant(sorted[i], 3));
+    format!("median {middle}, largest {most}")
+}
+
+impl MeshQuality<'_> {
+    /// The text of an SVG file.
+    pub fn draw(&self) -> String {
+        let ratio = MeshMeasure::new("mesh_ratio", self.mesh_ratio);
+        let drift = MeshMeasure::new("metric_drift", self.metric_drift);
+        let distrusted = self.distrusted.filter(|(bound, _)| Scale::Log.holds(*bound));
+        let verdict = match distrusted {
+            Some((bound, above)) if above > 0 => {
+                format!("{} with metric_drift above {}.", count(above, "member"), significant(bound, 1))
+            }
+            _ => String::new(),
+        };
+        let sentences = vec![self.note.into(), verdict, ratio.sentence(), drift.sentence()];
+        let label = |(bound, _)| format!("metric_drift {}, above which results are distrusted", significant(bound, 1));
+        let shown = distrusted.filter(|(_, above)| *above > 0).map(label);
+        let legend = shown.iter().map(|label| Entry::new("ink", LegendMark::Dashed, label)).collect();
+        let (mut svg, top) = Heading { title: self.title, sentences, legend }.begin(HEADING + HEIGHT + FOOT);
+        let width = 0.5 * (WIDTH - MARGIN - GAP);
+        let corner = DVec2::new(0.0, top + HEADING);
+        ratio.draw(&mut svg, corner, width, None);
+        drift.draw(&mut svg, corner + DVec2::new(width + GAP, 0.0), width, distrusted.map(|(bound, _)| bound));
+        svg.finish()
+    }
+}

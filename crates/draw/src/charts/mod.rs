@@ -1,0 +1,53 @@
+//! The charts of studies and of measurements, each from plain numbers to the text of an SVG file.
+//!
+//! Equal data give equal bytes. Values that are not finite are omitted, and counted if they stand for members. If there
+//! is nothing to draw, the picture says why. A picture stays below about 100 kB for any number of members: members are
+//! counted in bins, and lines are thinned to visible detail.
+
+pub mod bins;
+pub mod decay;
+pub mod dependence;
+pub mod distribution;
+pub mod mesh;
+pub mod rates;
+pub mod relaxation;
+pub mod scatter;
+pub mod survival;
+pub mod work;
+
+pub use bins::CellValues;
+pub use decay::{Decay, DecayCurve, DecayLaw, Theory};
+pub use dependence::{Dependence, DependencePoint, PowerLawLine, Series, Setting};
+pub use distribution::{CellQuantiles, TimeDistribution};
+pub use mesh::MeshQuality;
+pub use rates::FittedRates;
+pub use relaxation::RelaxationTimes;
+pub use scatter::{Scatter, ScatterPanel, ScatterPoint};
+pub use survival::{Survival, SurvivalCurve};
+pub use work::{WorkCurve, WorkDiagram, WorkPanels};
+
+pub use super::chart::EstimatedNumber;
+
+use glam::DVec2;
+
+use super::{
+    axis::Axis,
+    chart::{MARGIN, Panel, WIDTH},
+};
+
+/// The unit of all times.
+const TIME: &str = "length⁴";
+/// With more curves than this, bands would hide each other.
+const MAX_BANDS: usize = 4;
+
+/// The panel of a picture that has only one, `height` high below `top`, with `room` for a colour bar at its right.
+fn only_panel<'a>([x, y]: [&'a Axis; 2], top: f64, height: f64, room: f64) -> Panel<'a> {
+    let left = Panel::left(y, height);
+    let size = DVec2::new(WIDTH - left - MARGIN - room, height);
+    Panel { heading: "", corner: DVec2::new(left, top + 8.0), size, x, y, labels_x: true }
+}
+
+#[doc(hidden)]
+pub mod samples;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,363 @@
+//! Pictures of every kind of data, to test and to look at.
+
+use std::sync::OnceLock;
+
+use crate::{axis::Scale, charts::*};
+
+/// Numbers in (0, 1), equal on every machine: Halton numbers of base 2 or 3.
+fn spread(i: usize, base: usize) -> f64 {
+    let (mut share, mut value, mut i) = (1.0, 0.0, i + 1);
+    while i > 0 {
+        share /= base as f64;
+        value += share * (i % base) as f64;
+        i /= base;
+    }
+    value
+}
+
+/// Roughly normal, with mean 0 and variance 1: quantiles of the logistic distribution, scaled.
+fn normal(i: usize) -> f64 {
+    let u = spread(i, 2);
+    (u / (1.0 - u)).ln() / 1.814
+}
+
+fn times(count: usize, median: f64, width: f64) -> Vec<f64> {
+    (0..count).map(|i| median * (width * normal(i)).exp()).collect()
+}
+
+/// A Kaplan-Meier curve of members censored at `end`; some are censored earlier.
+pub fn survival(label: &str, value: Option<f64>, count: usize, median: f64, end: f64) -> SurvivalCurve {
+    let mut all: Vec<(f64, bool)> =
+        times(count, median, 0.5).into_iter().enumerate().map(|(i, t)| (t.min(end), t < end && i % 17 != 3)).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut curve = SurvivalCurve { label: label.into(), value, ..SurvivalCurve::default() };
+    let (mut share, mut low, mut high) = (1.0, vec![], vec![]);
+    for (i, (t, relaxed)) in all.iter().enumerate() {
+        if *relaxed {
+            share *= 1.0 - 1.0 / (count - i) as f64;
+            curve.t.push(*t);
+            curve.survival.push(share);
+            let error = 1.96 * (share * (1.0 - share) / count as f64).sqrt();
+            low.push((share - error).max(0.0));
+            high.push((share + error).min(1.0));
+        } else {
+            curve.censored.push(*t);
+        }
+    }
+    curve.band = Some((low, high));
+    curve
+}
+
+/// The mean excess of a cell that decays at this rate after a faster start, at `count` times up to 1.5.
+pub fn decay(label: &str, value: Option<f64>, rate: f64, count: usize) -> DecayCurve {
+    let t: Vec<f64> = (0..count).map(|i| 1.5 * i as f64 / (count - 1) as f64).collect();
+    let mean: Vec<f64> = t.iter().map(|t| 0.07 * (-rate * t).exp() + 0.03 * (-9.0 * rate * t).exp()).collect();
+    let band = (mean.iter().map(|e| 0.6 * e).collect(), mean.iter().map(|e| 1.5 * e).collect());
+    DecayCurve { label: label.into(), value, t, mean, band: Some(band) }
+}
+
+fn level(at: Setting, median: f64) -> DependencePoint {
+    let median = EstimatedNumber { value: median, interval: Some((0.95 * median, 1.06 * median)) };
+    DependencePoint { at, median: Some(median), quartiles: (Some(0.8 * median.value), Some(1.3 * median.value)) }
+}
+
+/// Medians scattered about factor·amplitude^(−0.31), at `count` amplitudes from 0.01.
+pub fn amplitudes(label: &str, factor: f64, count: usize) -> Series {
+    let amplitude = |i: usize| 0.01 * 1.6_f64.powi(i as i32);
+    let law = |x: f64| factor * x.powf(-0.31);
+    let levels = (0..count).map(|i| level(Setting::Number(amplitude(i)), law(amplitude(i)) * (1.0 + 0.05 * normal(i))));
+    let exponent = EstimatedNumber { value: -0.312, interval: Some((-0.33, -0.294)) };
+    let fit = Some(PowerLawLine { exponent, factor, rejected: false });
+    Series { label: label.into(), value: Some(factor), levels: levels.collect(), fit }
+}
+
+const NOTE: &str = "ellipse:2,1, surface-diffusion, n = 100, adaptive 0.0001, t-end = 2, seed 1";
+
+/// Every chart with data of every kind, and its name; drawn once.
+pub fn pictures() -> &'static [(String, String)] {
+    static PICTURES: OnceLock<Vec<(String, String)>> = OnceLock::new();
+    PICTURES.get_or_init(draw_all)
+}
+
+/// See [`pictures`].
+pub fn draw_all() -> Vec<(String, String)> {
+    let mut pictures = Vec::new();
+    let mut add = |name: &str, svg: String| pictures.push((name.to_owned(), svg));
+    let unknown = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN_POSITIVE];
+    let some = [("unfinished", 88), ("stalled", 12), ("singular", 0)];
+
+    let relaxation = |times: &[f64], others: &[(&str, u64)], median: Option<f64>| {
+        let median = median.map(|value| EstimatedNumber { value, interval: Some((0.97 * value, 1.04 * value)) });
+        let members = times.len() as u64 + others.iter().map(|(_, count)| count).sum::<u64>();
+        let cells = vec![CellValues { numbers: times.to_vec(), members, ..CellValues::default() }];
+        RelaxationTimes { title: "Relaxation times", note: NOTE, key: "", cells, others, median }.draw()
+    };
+    add("relaxation", relaxation(&times(412, 0.4, 0.2), &some, Some(0.42)));
+    add("relaxation-wide", relaxation(&times(5000, 1e-6, 1.5), &[], Some(1e-6)));
+    add("relaxation-none", relaxation(&[], &some, None));
+    add("relaxation-empty", relaxation(&[], &[], None));
+    add("relaxation-one", relaxation(&[0.4], &[], Some(0.4)));
+    add("relaxation-zero", relaxation(&[0.0, 0.0], &[], Some(0.0)));
+    add("relaxation-equal", relaxation(&[0.4; 100], &[("unfinished", 1)], Some(0.4)));
+    add("relaxation-unknown", relaxation(&unknown, &[], Some(f64::NAN)));
+    add("relaxation-million", relaxation(&times(1_000_000, 0.4, 0.3), &some, Some(0.4)));
+
+    let rates = |rates: &[f64], relative: bool, without: u64| {
+        let cells = vec![CellValues { numbers: rates.to_vec(), members: rates.len() as u64, ..CellValues::default() }];
+        FittedRates { title: "Rates of decay", note: NOTE, key: "", cells, relative, unit: "length⁻⁴", without }.draw()
+    };
+    add("rates", rates(&times(412, 1.0, 0.01), true, 3));
+    add("rates-absolute", rates(&times(412, 24.0, 0.5), false, 0));
+    add("rates-negative", rates(&[-0.1, 0.4, 1.0], true, 0));
+    add("rates-none", rates(&[], true, 256));
+    add("rates-one", rates(&[1.0], true, 0));
+    add("rates-unknown", rates(&unknown, true, 0));
+    add("rates-million", rates(&times(1_000_000, 1.0, 0.3), true, 1));
+
+    let by_cell = |count: usize, members: usize| -> Vec<CellValues> {
+        let cell = |i: usize| CellValues {
+            label: format!("amplitude = {i}"),
+            value: Some(i as f64),
+            numbers: times(members, 1.0 + 0.1 * i as f64, 0.1),
+            members: members as u64 + 7,
+        };
+        (0..count).map(cell).collect()
+    };
+    for (count, members) in [(2, 512), (8, 256), (20, 100), (300, 1000)] {
+        let (note, key, cells) = (NOTE, "amplitude", by_cell(count, members));
+        let others = [("unfinished", 7 * count as u64)];
+        let title = "Relaxation times";
+        let svg = RelaxationTimes { title, note, key, cells: cells.clone(), others: &others, median: None }.draw();
+        add(&format!("relaxation-cells-{count}"), svg);
+        let (title, unit) = ("Rates of decay", "length⁻⁴");
+        let svg = FittedRates { title, note, key, cells, relative: true, unit, without: 7 * count as u64 }.draw();
+        add(&format!("rates-cells-{count}"), svg);
+    }
+
+    let survive = |curves: Vec<SurvivalCurve>, time: Option<Scale>| {
+        Survival {
+            title: "Share that has not relaxed",
+            note: NOTE,
+            key: "amplitude",
+            curves,
+            time,
+            ..Survival::default()
+        }
+        .draw()
+    };
+    let amplitude = |i: usize| 0.01 * 1.3_f64.powi(i as i32);
+    let cells = |cells: usize, count: usize| -> Vec<SurvivalCurve> {
+        let cell = |i: usize| {
+            let a = amplitude(i);
+            survival(&format!("amplitude = {a:.3}"), Some(a), count, 0.3 + 0.1 * i as f64, 1.4)
+        };
+        (0..cells).map(cell).collect()
+    };
+    add("survival-1", survive(cells(1, 256), None));
+    add("survival-3", survive(cells(3, 512), None));
+    add("survival-8", survive(cells(8, 512), None));
+    add("survival-20", survive(cells(20, 200), None));
+    add("survival-1000", survive(cells(40, 2000).into_iter().cycle().take(1000).collect(), None));
+    add("survival-million", survive(cells(4, 250_000), None));
+    add("survival-log", survive(cells(3, 200), Some(Scale::Log)));
+    add("survival-none", survive(vec![], None));
+    add("survival-empty", survive(vec![SurvivalCurve::default(); 12], None));
+    let alone = SurvivalCurve { label: "all".into(), t: vec![0.4], survival: vec![0.0], ..SurvivalCurve::default() };
+    add("survival-one", survive(vec![alone.clone()], None));
+    add("survival-censored", survive(vec![SurvivalCurve { t: vec![], censored: vec![2.0; 9], ..alone.clone() }], None));
+    let (t, survival) = (unknown.to_vec(), unknown.to_vec());
+    add("survival-unknown", survive(vec![SurvivalCurve { t, survival, ..alone }], Some(Scale::Log)));
+
+    let theory =
+        Theory { label: "exp(−24 t/R⁴), R = 1.41".into(), law: DecayLaw::Exponential { start: 0.06, rate: 6.0 } };
+    let algebraic = DecayLaw::Algebraic { start: 0.09, time: 0.5, power: 4.0 };
+    let algebraic = Theory { label: "(1 + 2t/R₀⁴)⁻⁴".into(), law: algebraic };
+    let fall = |curves: Vec<DecayCurve>, time: Option<Scale>| {
+        let theory = if time == Some(Scale::Log) { &algebraic } else { &theory };
+        let theory = vec![theory.clone()];
+        Decay {
+            title: "Mean excess in time",
+            note: NOTE,
+            band: "5 to 95 % of the members",
+            key: "amplitude",
+            curves,
+            theory,
+            time,
+        }
+        .draw()
+    };
+    let falls = |cells: usize, count: usize| -> Vec<DecayCurve> {
+        let cell =
+            |i: usize| decay(&format!("amplitude = {:.3}", amplitude(i)), Some(amplitude(i)), 6.0 + i as f64, count);
+        (0..cells).map(cell).collect()
+    };
+    add("decay-1", fall(falls(1, 60), None));
+    add("decay-3", fall(falls(3, 200), None));
+    add("decay-30", fall(falls(30, 5000), None));
+    add("decay-long", fall(vec![decay("all", None, 60.0, 500)], None));
+    add("decay-log", fall(falls(2, 400), Some(Scale::Log)));
+    add("decay-million", fall(falls(4, 250_000), None));
+    add("decay-none", fall(vec![], None));
+    add("decay-one", fall(vec![DecayCurve { t: vec![0.0], mean: vec![0.1], ..DecayCurve::default() }], None));
+    let zero = DecayCurve { t: vec![0.0, 1.0], mean: vec![0.0; 2], ..DecayCurve::default() };
+    add("decay-zero", fall(vec![zero.clone()], None));
+    add("decay-equal", fall(vec![DecayCurve { mean: vec![0.1; 2], ..zero }], None));
+    let unknowns = unknown.to_vec();
+    let band = Some((unknowns.clone(), unknowns.clone()));
+    add(
+        "decay-unknown",
+        fall(vec![DecayCurve { t: unknowns.clone(), mean: unknowns, band, ..DecayCurve::default() }], None),
+    );
+
+    let depend = |series: Vec<Series>, key: &str| {
+        let title = "Relaxation time against amplitude";
+        Dependence {
+            title,
+            note: NOTE,
+            quantity: "t_relax",
+            key,
+            other_key: "aspect",
+            series,
+            across: None,
+            time: None,
+        }
+        .draw()
+    };
+    add("dependence", depend(vec![amplitudes("all", 0.12, 8)], "amplitude"));
+    let mut partial = amplitudes("all", 0.12, 8);
+    partial.fit = None;
+    partial.levels[0].median = None;
+    partial.levels[0].quartiles.1 = None;
+    partial.levels[1].quartiles.1 = None;
+    let linear = Dependence {
+        title: "Linear axes",
+        quantity: "t_relax",
+        key: "amplitude",
+        series: vec![partial],
+        ..Dependence::default()
+    };
+    add("dependence-partial", linear.draw());
+    let series = |count: usize| -> Vec<Series> {
+        (0..count).map(|i| amplitudes(&format!("aspect = {}", i + 1), 0.1 * 1.3_f64.powi(i as i32), 6)).collect()
+    };
+    add("dependence-3", depend(series(3), "amplitude"));
+    add("dependence-8", depend(series(8), "amplitude"));
+    add("dependence-12", depend(series(12), "amplitude"));
+    let named = |names: &[&str], factor: f64| -> Series {
+        let levels = names.iter().enumerate();
+        let levels = levels.map(|(i, name)| level(Setting::Name((*name).into()), factor * (1.0 + 0.4 * i as f64)));
+        Series { label: format!("λ = {factor}"), value: None, levels: levels.collect(), fit: None }
+    };
+    let flows = ["surface-diffusion", "willmore", "elastic:0.5", "poly:0.1,0.25,0.333333333,0.1,0.0001,12345"];
+    add("dependence-named", depend(vec![named(&flows, 0.3)], "flow"));
+    add("dependence-named-3", depend([0.1, 0.2, 0.4].map(|factor| named(&flows, factor)).into(), "flow"));
+    let names: Vec<String> = (0..60).map(|i| format!("file:island-{i}.csv")).collect();
+    add("dependence-names", depend(vec![named(&names.iter().map(String::as_str).collect::<Vec<_>>(), 0.3)], "shape"));
+    add("dependence-none", depend(vec![], "amplitude"));
+    add("dependence-one", depend(vec![amplitudes("all", 0.12, 1)], "amplitude"));
+    let level = DependencePoint { at: Setting::Number(f64::NAN), median: None, quartiles: (None, None) };
+    add(
+        "dependence-unreached",
+        depend(vec![Series { levels: vec![level.clone(); 3], ..Series::default() }], "amplitude"),
+    );
+    let median = Some(EstimatedNumber { value: 0.4, interval: Some((f64::NAN, f64::INFINITY)) });
+    let (at, fit) = (
+        Setting::Number(0.0),
+        Some(PowerLawLine {
+            exponent: EstimatedNumber { value: f64::NAN, interval: None },
+            factor: 0.0,
+            rejected: true,
+        }),
+    );
+    let levels = vec![DependencePoint { at, median, quartiles: (Some(f64::NAN), None) }, level];
+    add("dependence-unknown", depend(vec![Series { levels, fit, ..Series::default() }], "amplitude"));
+
+    let mesh = |mesh_ratio: &[f64], metric_drift: &[f64]| {
+        let [mesh_ratio, metric_drift] =
+            [mesh_ratio, metric_drift].map(|values| values.iter().map(|v| *v as f32).collect::<Vec<_>>());
+        let [mesh_ratio, metric_drift] = [&mesh_ratio[..], &metric_drift[..]];
+        let distrusted = Some((0.1, metric_drift.iter().filter(|drift| **drift > 0.1).count() as u64));
+        MeshQuality { title: "Mesh quality at the end", note: NOTE, mesh_ratio, metric_drift, distrusted }.draw()
+    };
+    let ratios = |count: usize| -> Vec<f64> { times(count, 0.05, 0.4).iter().map(|t| 1.0 + t).collect() };
+    add("mesh", mesh(&ratios(512), &times(512, 1e-3, 2.2)));
+    add("mesh-million", mesh(&ratios(1_000_000), &times(1_000_000, 1e-3, 0.5)));
+    add("mesh-none", mesh(&[], &[]));
+    add("mesh-one", mesh(&[1.0], &[0.0]));
+    add("mesh-zero", mesh(&[1.0, 1.1], &[0.0, 1e-4, 1e-2]));
+    add("mesh-equal", mesh(&[1.0; 100], &[1e-3; 100]));
+    add("mesh-unknown", mesh(&unknown, &unknown));
+
+    let scatter = |count: usize, cells: usize, panels: usize| {
+        let point = |i: usize, panel: usize| {
+            let x = 0.05 * normal(i);
+            let t = 0.8 + x + 0.03 * panel as f64 * (spread(i, 3) - 0.5);
+            ScatterPoint { cell: i % cells, member: i as u64, x, t, happened: i % 17 != 3 }
+        };
+        let panel = |panel: usize| ScatterPanel {
+            feature: ["cos_2", "descriptor_2", "excess_start", "k_min_start"][panel].into(),
+            heading: "R² 0.923, Spearman −0.930".into(),
+            points: (0..count).map(|i| point(i, panel)).collect(),
+        };
+        let cells = (0..cells).map(|i| (format!("amplitude = 0.{i}"), Some(0.1 * i as f64))).collect();
+        let (title, notes) = ("What explains the relaxation time", vec![NOTE.into()]);
+        let (key, panels, reason) = ("amplitude", (0..panels).map(panel).collect(), "Nothing is claimed.");
+        Scatter { title, notes, quantity: "t_relax", key, cells, panels, reason }
+    };
+    add("scatter", scatter(256, 1, 4).draw());
+    add("scatter-cells-3", scatter(250, 3, 4).draw());
+    add("scatter-cells-12", scatter(250, 12, 3).draw());
+    add("scatter-one", scatter(1, 1, 1).draw());
+    add("scatter-none", scatter(0, 1, 0).draw());
+    let mut unknown_dots = scatter(30, 1, 2);
+    unknown_dots.panels[1].points[4].x = f64::INFINITY;
+    unknown_dots.panels[0].points[5].t = f64::NAN;
+    add("scatter-unknown", unknown_dots.draw());
+
+    let quantiles = |count: usize, known: f64| {
+        let cell = |i: usize| {
+            let at = |z: f64| 0.8 * (0.1 * i as f64 + (0.1 + 0.02 * i as f64) * z).exp();
+            let place = |(share, z): (f64, f64)| (share <= known).then(|| at(z));
+            CellQuantiles {
+                label: format!("amplitude = 0.{i}"),
+                value: Some(0.1 * i as f64),
+                places: [(0.05, -1.645), (0.25, -0.674), (0.5, 0.0), (0.75, 0.674), (0.95, 1.645)].map(place),
+                quantiles: (1..50).map(|j| f64::from(j) * 0.1 - 2.5).map(|z| (z, at(z))).collect(),
+            }
+        };
+        let (title, cells) = ("Distribution of the relaxation times", (0..count).map(cell).collect());
+        TimeDistribution { title, note: NOTE, quantity: "t_relax", key: "amplitude", cells }
+    };
+    add("distribution", quantiles(1, 1.0).draw());
+    add("distribution-cells-5", quantiles(5, 1.0).draw());
+    add("distribution-cells-30", quantiles(30, 1.0).draw());
+    add("distribution-censored", quantiles(2, 0.6).draw());
+    add("distribution-none", quantiles(2, 0.0).draw());
+    let mut unknown_place = quantiles(2, 1.0);
+    unknown_place.cells[1].places = [Some(f64::INFINITY), Some(-1.0), Some(0.0), Some(f64::NAN), None];
+    add("distribution-unknown", unknown_place.draw());
+
+    let work = |rows: Vec<WorkPanels>| {
+        let title = "What an error of the relaxation time costs";
+        WorkDiagram { title, note: NOTE, costs: [("solves per member", ""), ("time per member", "ms")], rows }.draw()
+    };
+    let way = |order: i32| {
+        let point = |i: i32| (10_f64.powi(-i * order), [10.0 * 4_f64.powi(i), 0.1 * 4_f64.powi(i)]);
+        WorkCurve { label: format!("order up to {order}"), points: (1..5).map(point).collect() }
+    };
+    let panels = |label: &str| WorkPanels { label: label.into(), curves: (1..7).map(way).collect() };
+    add("work", work(vec![panels("direct"), panels("multigrid"), panels("gauss-seidel")]));
+    add("work-none", work(vec![]));
+    let unknown_cost = WorkCurve { label: "one".into(), points: vec![(0.0, [1.0, 2.0]), (1e-3, [f64::NAN, 2.0])] };
+    add("work-unknown", work(vec![WorkPanels { label: "direct".into(), curves: vec![unknown_cost] }]));
+
+    let hostile =
+        "<script>alert(\"a & b\")</script> and a title that is so long that it has to be broken into lines \0";
+    let curves = vec![SurvivalCurve { label: hostile.into(), ..cells(1, 20).remove(0) }; 2];
+    add(
+        "hostile",
+        Survival { title: hostile, note: hostile, key: hostile, share: hostile, none: hostile, curves, time: None }
+            .draw(),
+    );
+    pictures
+}

@@ -1,0 +1,148 @@
+//! A time against features of the members: one panel for each feature, one dot for each member.
+//!
+//! The pointer on a dot shows its member and its numbers.
+
+use glam::DVec2;
+
+use super::TIME;
+use crate::{
+    axis::{Axis, Scale},
+    chart::{Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH, drawable, nothing, triangle_up},
+    svg::{Svg, dots},
+    width::{SIZE, shortened},
+};
+use curvelax_base::text::{count, significant};
+
+const HEIGHT: f64 = 200.0;
+const GAP: f64 = 14.0;
+/// Panels side by side.
+const COLUMNS: usize = 2;
+
+/// A time against features.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scatter<'a> {
+    /// First line.
+    pub title: &'a str,
+    /// Sentences below it.
+    pub notes: Vec<String>,
+    /// The time.
+    pub quantity: &'a str,
+    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
+    /// many.
+    pub key: &'a str,
+    /// The cells, each with its entry in the legend and its value, if it has one.
+    pub cells: Vec<(String, Option<f64>)>,
+    /// The features, best first.
+    pub panels: Vec<ScatterPanel>,
+    /// Why there are none.
+    pub reason: &'a str,
+}
+
+/// The time against one feature.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ScatterPanel {
+    /// Name of the feature.
+    pub feature: String,
+    /// How much it explains.
+    pub heading: String,
+    /// The members.
+    pub points: Vec<ScatterPoint>,
+}
+
+/// A member.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ScatterPoint {
+    /// Its cell, as an index into those of the chart.
+    pub cell: usize,
+    /// Its index.
+    pub member: u64,
+    /// Its feature.
+    pub x: f64,
+    /// Its time, or when it ended without reaching it.
+    pub t: f64,
+    /// It reached the time.
+    pub happened: bool,
+}
+
+impl ScatterPoint {
+    fn is_drawable(&self) -> bool {
+        drawable((Scale::Linear, self.x), (Scale::Linear, self.t))
+    }
+
+    /// The mark, with a text for the pointer.
+    fn draw(&self, svg: &mut Svg, panel: &Panel) {
+        let at = panel.place(self.x, self.t);
+        let ended = if self.happened { "" } else { " ended" };
+        let (x, t) = (significant(self.x, 3), significant(self.t, 4));
+        let mark = if self.happened { dots(&[at]) } else { triangle_up(at) };
+        svg.hinted_path(&mark, &format!("member {}: {x},{ended} {t}", self.member));
+    }
+}
+
+impl Scatter<'_> {
+    /// The text of an SVG file.
+    pub fn draw(&self) -> String {
+        let mut sentences = self.notes.clone();
+        if self.panels.is_empty() {
+            return nothing(self.title, sentences, self.reason);
+        }
+        let values: Vec<Option<f64>> = self.cells.iter().map(|(_, value)| *value).collect();
+        let colours = Colours::of(&values, self.key);
+        sentences.push(colours.sentence(self.cells.len()));
+        let hidden = self.panels.iter().flat_map(|panel| &panel.points).filter(|point| !point.is_drawable()).count();
+        if hidden > 0 {
+            sentences.push(format!("{} out of range.", count(hidden as u64, "dot")));
+        }
+        let rows = self.panels.len().div_ceil(COLUMNS);
+        let row = HEADING + HEIGHT + FOOT;
+        let heading = Heading { title: self.title, sentences, legend: self.legend(&colours) };
+        let (mut svg, top) = heading.begin(rows as f64 * row);
+        let times = self.panels.iter().flat_map(|panel| &panel.points).filter(|point| point.is_drawable());
+        let scale = Scale::of(times.clone().map(|point| point.t));
+        let time = Axis::over(self.quantity, TIME, scale, times.map(|point| point.t));
+        let left = Panel::left(&time, HEIGHT);
+        let across = 0.5 * (WIDTH - MARGIN - GAP - colours.room(HEIGHT));
+        for (i, of) in self.panels.iter().enumerate() {
+            let known = of.points.iter().filter(|point| point.is_drawable());
+            // Where times are over several magnitudes, features may be, too.
+            let own = if scale == Scale::Log { Scale::of(known.clone().map(|point| point.x)) } else { Scale::Linear };
+            let axis = Axis::over(&of.feature, "", own, known.map(|point| point.x));
+            let corner =
+                DVec2::new(left + (i % COLUMNS) as f64 * (across + GAP), top + HEADING + (i / COLUMNS) as f64 * row);
+            let size = DVec2::new(across - left, HEIGHT);
+            let heading = shortened(&of.heading, SIZE, size.x);
+            let panel = Panel { heading: &heading, corner, size, x: &axis, y: &time, labels_x: true };
+            panel.draw_x(&mut svg);
+            panel.draw_y(&mut svg);
+            for (cell, class) in &colours.shown {
+                svg.open(class);
+                for (class, happened) in [("points", true), ("hollow", false)] {
+                    let is_one = |point: &&ScatterPoint| point.cell == *cell && point.happened == happened;
+                    let mut own = of.points.iter().filter(is_one).filter(|point| point.is_drawable()).peekable();
+                    if own.peek().is_some() {
+                        svg.open(class);
+                        own.for_each(|point| point.draw(&mut svg, &panel));
+                        svg.close();
+                    }
+                }
+                svg.close();
+            }
+            panel.draw_frame(&mut svg);
+            if i == COLUMNS - 1 || i + 1 == self.panels.len().min(COLUMNS) {
+                colours.draw_bar(&mut svg, &panel);
+            }
+        }
+        svg.finish()
+    }
+
+    fn legend(&self, colours: &Colours) -> Vec<Entry> {
+        let several = self.cells.len() > 1 && colours.bar.is_none();
+        let cells = colours.shown.iter().filter(|_| several);
+        let cells = cells.map(|(i, class)| Entry::new(class, LegendMark::Points, &self.cells[*i].0));
+        let censored = self.panels.iter().any(|panel| panel.points.iter().any(|point| !point.happened));
+        let class = if several { "faint" } else { "s0" };
+        let text = format!("ended without {}, at its last time", self.quantity);
+        let censored = censored.then(|| Entry::new(class, LegendMark::HollowUp, &text));
+        cells.chain(censored).collect()
+    }
+}

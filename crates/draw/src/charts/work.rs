@@ -1,0 +1,94 @@
+//! What an error costs: one row of panels for each solver, error against solves and against time.
+
+use glam::DVec2;
+
+use crate::{
+    axis::{Axis, Scale},
+    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH, draw_marker, drawable, nothing},
+    trace,
+};
+
+const HEIGHT: f64 = 200.0;
+const GAP: f64 = 24.0;
+
+/// Errors and costs of several methods.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WorkDiagram<'a> {
+    /// First line.
+    pub title: &'a str,
+    /// A sentence below it, or nothing.
+    pub note: &'a str,
+    /// Names of the costs, one for each column of panels, with their units.
+    pub costs: [(&'a str, &'a str); 2],
+    /// The rows of panels.
+    pub rows: Vec<WorkPanels>,
+}
+
+/// The panels of one solver.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WorkPanels {
+    /// What all its methods share.
+    pub label: String,
+    /// The methods; those of the same rank have the same colour in all rows.
+    pub curves: Vec<WorkCurve>,
+}
+
+/// A method at several resolutions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WorkCurve {
+    /// Its entry in the legend.
+    pub label: String,
+    /// Error, and both costs; points that cannot be drawn on logarithmic axes are left out.
+    pub points: Vec<(f64, [f64; 2])>,
+}
+
+impl WorkDiagram<'_> {
+    /// The text of an SVG file.
+    pub fn draw(&self) -> String {
+        let WorkDiagram { title, note, costs, rows } = self;
+        let shown = |points: &[(f64, [f64; 2])], column: usize| -> Vec<(f64, f64)> {
+            let pairs = points.iter().map(|(error, costs)| (costs[column], *error));
+            pairs.filter(|(cost, error)| drawable((Scale::Log, *cost), (Scale::Log, *error))).collect()
+        };
+        let curves = || rows.iter().flat_map(|row| &row.curves);
+        let all = |column: usize| curves().flat_map(move |curve| shown(&curve.points, column));
+        if all(0).next().is_none() {
+            return nothing(title, vec![(*note).into()], "No run gave an error.");
+        }
+        let entry = |(rank, curve): (usize, &WorkCurve)| {
+            Entry::new(&format!("s{rank}"), LegendMark::Marker(rank), &curve.label)
+        };
+        let longest = rows.iter().max_by_key(|row| row.curves.len());
+        let legend = longest.into_iter().flat_map(|row| row.curves.iter().enumerate().map(entry)).collect();
+        let row_height = HEADING + HEIGHT + FOOT;
+        let heading = Heading { title, sentences: vec![(*note).into()], legend };
+        let (mut svg, top) = heading.begin(rows.len() as f64 * row_height);
+        let errors = Axis::over("error of t_relax", "", Scale::Log, all(0).map(|(_, error)| error));
+        let across = [0, 1].map(|column| {
+            let (name, unit) = costs[column];
+            Axis::over(name, unit, Scale::Log, all(column).map(|(cost, _)| cost))
+        });
+        let left = Panel::left(&errors, HEIGHT);
+        let size = DVec2::new(0.5 * (WIDTH - left - MARGIN - GAP), HEIGHT);
+        for (i, row) in rows.iter().enumerate() {
+            for (column, x) in across.iter().enumerate() {
+                let corner = DVec2::new(left + column as f64 * (size.x + GAP), top + HEADING + i as f64 * row_height);
+                let panel = Panel { heading: &row.label, corner, size, x, y: &errors, labels_x: true };
+                panel.draw_x(&mut svg);
+                if column == 0 {
+                    panel.draw_y(&mut svg);
+                }
+                panel.draw_frame(&mut svg);
+                for (rank, curve) in row.curves.iter().enumerate() {
+                    let points = shown(&curve.points, column);
+                    let places: Vec<DVec2> = points.iter().map(|(cost, error)| panel.place(*cost, *error)).collect();
+                    svg.open(&format!("s{rank}"));
+                    svg.path("thin", &trace::path(&places));
+                    places.iter().for_each(|at| draw_marker(&mut svg, rank, *at));
+                    svg.close();
+                }
+            }
+        }
+        svg.finish()
+    }
+}

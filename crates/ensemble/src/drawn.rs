@@ -1,0 +1,423 @@
+//! A value of the spec in which numbers may be distributions: `ellipse:uniform(1.2..3),1`.
+//!
+//! Such a value is a *template*: text with distributions in it. A number for each gives text without any, which is read
+//! as ever, so that shapes and flows know nothing of distributions. Numbers print to read back exactly.
+
+use std::{fmt, marker::PhantomData, str::FromStr, sync::Arc};
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+use curvelax_base::{
+    error::echo,
+    random::{Design, Distribution, DrawAddress, MAX_SOBOL, distribution::SMALLEST},
+    text::rounded,
+};
+use curvelax_curve::Shape;
+use curvelax_flow::flow::Flow;
+
+/// What may be drawn.
+pub trait Drawable: Clone + PartialEq + fmt::Display + Serialize {
+    /// What a value in a file is.
+    const EXPECTED: &'static str;
+
+    /// Reads a value without distributions.
+    ///
+    /// # Errors
+    /// A message.
+    fn read(text: &str) -> Result<Self, String>;
+
+    /// The value that a number is, if it is one.
+    fn of_number(number: f64) -> Option<Self>;
+
+    /// Whether parentheses in `text` are those of distributions.
+    fn has_distributions(text: &str) -> bool {
+        text.contains('(')
+    }
+}
+
+impl Drawable for f64 {
+    const EXPECTED: &'static str = "a number, or a distribution in quotes such as \"uniform(0.01..0.1)\"";
+
+    fn read(text: &str) -> Result<f64, String> {
+        text.trim().parse().map_err(|_| "not a number".into())
+    }
+
+    fn of_number(number: f64) -> Option<f64> {
+        Some(number)
+    }
+}
+
+impl Drawable for Shape {
+    const EXPECTED: &'static str = "a string";
+
+    fn read(text: &str) -> Result<Shape, String> {
+        text.parse()
+    }
+
+    fn of_number(_: f64) -> Option<Shape> {
+        None
+    }
+
+    /// Names of files have parentheses of their own.
+    fn has_distributions(text: &str) -> bool {
+        text.contains('(') && !text.starts_with("file:")
+    }
+}
+
+impl Drawable for Flow {
+    const EXPECTED: &'static str = "a string";
+
+    fn read(text: &str) -> Result<Flow, String> {
+        text.parse()
+    }
+
+    fn of_number(_: f64) -> Option<Flow> {
+        None
+    }
+}
+
+/// A value that is the same for all members, or drawn for each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawn<T> {
+    typical: T,
+    template: Option<Arc<DrawnText>>,
+}
+
+/// Text with distributions in it.
+#[derive(Debug, PartialEq)]
+struct DrawnText {
+    /// The text before each distribution.
+    before: Vec<String>,
+    distributions: Vec<Distribution>,
+    /// The text after the last.
+    after: String,
+}
+
+impl<T> Drawn<T> {
+    /// The value of all members; if each has its own, the one at the medians of the distributions.
+    pub fn typical(&self) -> &T {
+        &self.typical
+    }
+
+    /// Whether each member has its own value.
+    pub fn is_drawn(&self) -> bool {
+        self.template.is_some()
+    }
+
+    /// The distributions in it, from left to right.
+    pub fn distributions(&self) -> &[Distribution] {
+        self.template.as_ref().map_or(&[], |template| &template.distributions)
+    }
+}
+
+impl<T: Drawable> Drawn<T> {
+    /// The value with these numbers in the place of its distributions.
+    ///
+    /// # Errors
+    /// A message if there is no such value; a spec that was read has one for all numbers that can be drawn.
+    pub fn at(&self, numbers: &[f64]) -> Result<T, String> {
+        self.template.as_ref().map_or_else(|| Ok(self.typical.clone()), |template| T::read(&template.at(numbers)))
+    }
+}
+
+impl<T> From<T> for Drawn<T> {
+    fn from(value: T) -> Drawn<T> {
+        Drawn { typical: value, template: None }
+    }
+}
+
+impl DrawnText {
+    fn read(text: &str) -> Result<DrawnText, String> {
+        let (mut before, mut distributions, mut rest) = (Vec::new(), Vec::new(), text);
+        while let Some((head, tail)) = rest.split_once('(') {
+            let name = head.rsplit(|c: char| !c.is_alphanumeric() && c != '-' && c != '_').next().unwrap_or_default();
+            let open = || format!("`{}` has no closing parenthesis", echo(format_args!("{name}({tail}")));
+            let (arguments, after) = tail.split_once(')').ok_or_else(open)?;
+            distributions.push(Distribution::of(name, arguments)?);
+            before.push(head[..head.len() - name.len()].to_owned());
+            rest = after;
+        }
+        Ok(DrawnText { before, distributions, after: rest.to_owned() })
+    }
+
+    fn filled<I: fmt::Display>(&self, with: impl IntoIterator<Item = I>) -> String {
+        let parts = self.before.iter().zip(with).map(|(before, item)| format!("{before}{item}"));
+        parts.collect::<String>() + &self.after
+    }
+
+    fn at(&self, numbers: &[f64]) -> String {
+        self.filled(numbers)
+    }
+}
+
+impl<T: Drawable> FromStr for Drawn<T> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Drawn<T>, String> {
+        if !T::has_distributions(text) {
+            return T::read(text).map(Drawn::from);
+        }
+        let template = DrawnText::read(text)?;
+        let of: Vec<&Distribution> = template.distributions.iter().collect();
+        if let Some(refused) = Refused::of(&of, |numbers| T::read(&template.at(numbers)).err()) {
+            return Err(refused.to_string());
+        }
+        let medians: Vec<f64> = of.iter().map(|of| of.quantile(0.5)).collect();
+        let typical = T::read(&template.at(&medians))?;
+        Ok(Drawn { typical, template: Some(Arc::new(template)) })
+    }
+}
+
+impl<T: fmt::Display> fmt::Display for Drawn<T> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match &self.template {
+            None => self.typical.fmt(f),
+            Some(template) => f.write_str(&template.filled(&template.distributions)),
+        }
+    }
+}
+
+impl<T: Drawable> Serialize for Drawn<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if self.is_drawn() { serializer.collect_str(self) } else { self.typical.serialize(serializer) }
+    }
+}
+
+impl<'de, T: Drawable> Deserialize<'de> for Drawn<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Drawn<T>, D::Error> {
+        deserializer.deserialize_any(DrawnVisitor(PhantomData))
+    }
+}
+
+struct DrawnVisitor<T>(PhantomData<T>);
+
+impl<T: Drawable> DrawnVisitor<T> {
+    fn number<E: de::Error>(self, number: f64, found: de::Unexpected) -> Result<Drawn<T>, E> {
+        T::of_number(number).map(Drawn::from).ok_or_else(|| E::invalid_type(found, &self))
+    }
+}
+
+impl<T: Drawable> de::Visitor<'_> for DrawnVisitor<T> {
+    type Value = Drawn<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(T::EXPECTED)
+    }
+
+    fn visit_f64<E: de::Error>(self, number: f64) -> Result<Drawn<T>, E> {
+        self.number(number, de::Unexpected::Float(number))
+    }
+
+    fn visit_i64<E: de::Error>(self, number: i64) -> Result<Drawn<T>, E> {
+        self.number(number as f64, de::Unexpected::Signed(number))
+    }
+
+    fn visit_u64<E: de::Error>(self, number: u64) -> Result<Drawn<T>, E> {
+        self.number(number as f64, de::Unexpected::Unsigned(number))
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Drawn<T>, E> {
+        // A number in quotes is a mistake, as for all other keys.
+        if T::of_number(0.0).is_some() && !T::has_distributions(text) {
+            return Err(E::invalid_type(de::Unexpected::Str(text), &self));
+        }
+        text.parse().map_err(E::custom)
+    }
+}
+
+/// Points at which a value is tried before any is refused, and for the share of those that are.
+const TRIED: u64 = 256;
+const COUNTED: u64 = 1 << 16;
+/// A share that counts as all.
+const NEARLY_ALL: f64 = 1.0 - 1e-6;
+/// Corners of the support that are tried.
+const MAX_CORNERS: usize = 4096;
+/// Parts of the interval in which the share of a single distribution is exact.
+const PARTS: u32 = 4096;
+
+/// What a distribution must not give.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refused {
+    /// The share of members with such a value, as far as it is known.
+    pub share: Option<f64>,
+    /// What is wrong with one of them.
+    pub reason: String,
+}
+
+impl Refused {
+    /// Looks for numbers of the distributions that are `refused`, with the reason: inside their support and at all its
+    /// corners.
+    pub fn of(distributions: &[&Distribution], refused: impl Fn(&[f64]) -> Option<String>) -> Option<Refused> {
+        // Random points are made quickly, and every cell of a sweep reads its values.
+        let inside = (0..TRIED).map(|point| numbers(distributions, Design::Random, point));
+        let first = inside.chain(corners(distributions)).find(|numbers| refused(numbers).is_some())?;
+        // A message shows few digits, where they are as wrong.
+        let short: Vec<f64> = first.iter().map(|number| rounded(*number, 3).parse().unwrap_or(*number)).collect();
+        let reason = refused(&short).or_else(|| refused(&first))?;
+        let fails = |numbers: &[f64]| refused(numbers).is_some();
+        let share = match distributions {
+            [only] => exact_share(only, |number| fails(&[number])),
+            _ => {
+                let even = if distributions.len() > MAX_SOBOL { Design::Random } else { Design::Sobol };
+                let failed = (0..COUNTED).filter(|point| fails(&numbers(distributions, even, *point)));
+                failed.count() as f64 / COUNTED as f64
+            }
+        };
+        Some(Refused { share: Some(share).filter(|share| *share > 0.0), reason })
+    }
+}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let reason = &self.reason;
+        match self.share {
+            Some(share) if share > NEARLY_ALL => return write!(f, "every member would be refused ({reason})"),
+            Some(share) => write!(f, "{} % of the members", rounded(100.0 * share, 2))?,
+            None => write!(f, "a few members, under {} %", rounded(100.0 / COUNTED as f64, 1))?,
+        }
+        write!(f, " would be refused ({reason}); narrow the distribution, or use uniform, loguniform or lognormal")
+    }
+}
+
+/// Point number `point` of a design in the support.
+fn numbers(distributions: &[&Distribution], design: Design, point: u64) -> Vec<f64> {
+    let at = |place: u32| DrawAddress { seed: 0, members: COUNTED, member: point, place, coordinate: place };
+    (0..).zip(distributions).map(|(place, of)| of.quantile(design.uniform(&at(place)))).collect()
+}
+
+/// All corners of the support, if they are not too many.
+pub(super) fn corners(distributions: &[&Distribution]) -> impl Iterator<Item = Vec<f64>> + use<> {
+    let extremes: Vec<Vec<f64>> = distributions.iter().map(|of| of.extremes()).collect();
+    let all = extremes.iter().map(Vec::len).fold(1_usize, usize::saturating_mul);
+    let step = all.div_ceil(MAX_CORNERS).max(1);
+    (0..all.min(MAX_CORNERS)).map(move |corner| {
+        let mut rest = corner * step;
+        let number = |values: &Vec<f64>| {
+            let value = values[rest % values.len()];
+            rest /= values.len();
+            value
+        };
+        extremes.iter().map(number).collect()
+    })
+}
+
+/// The share of draws that fail.
+fn exact_share(of: &Distribution, fails: impl Fn(f64) -> bool) -> f64 {
+    if let Distribution::Choice(values) = of {
+        return values.iter().filter(|value| fails(**value)).count() as f64 / values.len() as f64;
+    }
+    // Distances from the nearer end, where a tail may be thin.
+    let below: Vec<f64> = {
+        let tail = std::iter::successors(Some(SMALLEST), |u| Some(2.0 * u)).take_while(|u| *u < 1.0 / f64::from(PARTS));
+        tail.chain((1..=PARTS / 2).map(|part| f64::from(part) / f64::from(PARTS))).collect()
+    };
+    let side = |upper: bool| {
+        let failed = |distance: f64| fails(of.quantile(if upper { 1.0 - distance } else { distance }));
+        let first = if failed(below[0]) { below[0] } else { 0.0 };
+        let parts = below.windows(2).map(|pair| match [failed(pair[0]), failed(pair[1])] {
+            [true, true] => pair[1] - pair[0],
+            [false, false] => 0.0,
+            [near, _] => {
+                let [mut low, mut high] = [pair[0], pair[1]];
+                for _ in 0..50 {
+                    let middle = 0.5 * (low + high);
+                    if failed(middle) == near { low = middle } else { high = middle }
+                }
+                if near { low - pair[0] } else { pair[1] - low }
+            }
+        });
+        first + parts.sum::<f64>()
+    };
+    side(false) + side(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shape(text: &str) -> Drawn<Shape> {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn a_value_without_distributions_is_what_it_was() {
+        let plain = shape("ellipse:2,1");
+        assert!(!plain.is_drawn() && plain.distributions().is_empty());
+        assert_eq!(plain, Shape::Ellipse { a: 2.0, b: 1.0 }.into());
+        assert_eq!(plain.at(&[]).unwrap(), *plain.typical());
+        assert_eq!(serde_json::to_string(&Drawn::from(0.05)).unwrap(), "0.05");
+        assert_eq!(serde_json::to_string(&plain).unwrap(), "\"ellipse:2,1\"");
+        // A file may have any name.
+        let file = shape("file:normal(1,2).csv");
+        assert!(!file.is_drawn());
+        assert_eq!(file.to_string(), "file:normal(1,2).csv");
+    }
+
+    #[test]
+    fn a_template_prints_as_it_is_read_and_takes_its_numbers_exactly() {
+        for text in
+            ["ellipse:uniform(1.2..3),1", "flower:choice(2,3,5):uniform(0.1..0.2):0.5,7:0.1", "circle:lognormal(1,0.2)"]
+        {
+            let drawn = shape(text);
+            assert!(drawn.is_drawn());
+            assert_eq!(drawn.to_string(), text);
+            let json = serde_json::to_string(&drawn).unwrap();
+            assert_eq!(serde_json::from_str::<Drawn<Shape>>(&json).unwrap(), drawn);
+        }
+        let flower = shape("flower:choice(2,3,5):uniform(0.1..0.3):0.5,7:0.1");
+        assert_eq!(flower.typical().to_string(), "flower:3:0.2:0.5,7:0.1");
+        assert_eq!(flower.at(&[5.0, 0.1 + 0.2]).unwrap().to_string(), "flower:5:0.30000000000000004:0.5,7:0.1");
+        let flow: Drawn<Flow> = "poly:normal(0,1),2,uniform(-1..0)".parse().unwrap();
+        assert_eq!(flow.at(&[1e-300, -0.5]).unwrap(), Flow::Polynomial(vec![1e-300, 2.0, -0.5]));
+    }
+
+    #[test]
+    fn a_number_is_a_number_or_a_distribution_but_not_a_word() {
+        let read = |json: &str| serde_json::from_str::<Drawn<f64>>(json);
+        assert_eq!(read("1").unwrap(), 1.0.into());
+        assert_eq!(*read("\"uniform(0.01..0.1)\"").unwrap().typical(), 0.055);
+        assert!(read("\"0.05\"").unwrap_err().to_string().contains("a number, or a distribution in quotes"));
+        assert!(read("true").is_err());
+        assert!(serde_json::from_str::<Drawn<Flow>>("1").unwrap_err().to_string().contains("expected a string"));
+        assert!("uniform(1..2)x".parse::<Drawn<f64>>().is_err() && "(1)".parse::<Drawn<f64>>().is_err());
+        assert!("uniform(1..2".parse::<Drawn<f64>>().unwrap_err().contains("no closing parenthesis"));
+    }
+
+    #[test]
+    fn an_impossible_shape_is_refused_with_the_share_of_members() {
+        let refusal = |text: &str| text.parse::<Drawn<Shape>>().unwrap_err();
+        for (text, parts) in [
+            ("ellipse:normal(1,0.5),1", ["2.3 % of the members would be refused (the half-axis -", "lognormal"]),
+            ("ellipse:normal(1,0.5),normal(1,0.5)", ["4.5 % of the members", "half-axis"]),
+            ("circle:uniform(-1..3)", ["25 % of the members", "the radius -"]),
+            ("circle:choice(1,2,-1,4)", ["25 % of the members", "the radius -1 is out of range"]),
+            // Six deviations: too rare to be seen, but not impossible.
+            ("circle:normal(3,0.5)", ["9.9e-8 % of the members", "the radius -"]),
+            ("flower:uniform(2..5):0.1", ["every member would be refused", "is not MODE"]),
+            ("flower:2:uniform(0..0.7),3:uniform(0..0.7)", ["16 % of the members", "add up to"]),
+            ("flower:choice(2,0.5):0.1", ["50 % of the members", "is not MODE"]),
+        ] {
+            let message = refusal(text);
+            assert!(parts.iter().all(|part| message.contains(part)), "{text}: {message}");
+        }
+        // The smallest number that can be drawn is six deviations below the mean.
+        assert!("circle:normal(1,0.15)".parse::<Drawn<Shape>>().is_ok());
+        assert!("circle:normal(1,0.17)".parse::<Drawn<Shape>>().is_err());
+        assert!("elastic:lognormal(0.5,0.2)".parse::<Drawn<Flow>>().is_ok());
+        assert!("willmore:uniform(1..2)".parse::<Drawn<Flow>>().unwrap_err().contains("takes no argument"));
+    }
+
+    #[test]
+    fn the_share_of_one_distribution_is_exact() {
+        let law = Distribution::Normal { mean: 0.0, sd: 1.0 };
+        for z in [0.5, 2.0, 5.0] {
+            let tail = 0.5 * libm::erfc(z / std::f64::consts::SQRT_2);
+            let found = exact_share(&law, |x| x < -z);
+            assert!((found / tail - 1.0).abs() < 1e-2, "{z}: {found} {tail}");
+            let both = exact_share(&law, |x| x.abs() > z);
+            assert!((both / (2.0 * tail) - 1.0).abs() < 0.1, "{z}: {both} {tail}");
+        }
+        assert!((exact_share(&law, |x| x < 1.0) - 0.8413447460685429).abs() < 1e-8);
+        assert_eq!(exact_share(&law, |x| x.abs() > 6.1), 0.0, "beyond what is drawn");
+    }
+}

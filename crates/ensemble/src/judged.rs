@@ -1,0 +1,61 @@
+//! Between a run and its sink: members of a level become rows, and those of the study get what the levels tell of them.
+
+use super::{
+    Cell, Ended, Extent, LevelRow, LevelTimes, Outcome, SeriesRow, Sink, Snapshot, Spec, Standing, Wish,
+    levels::RefinementLevel,
+};
+use curvelax_base::error::{Error, Result};
+
+/// Hands the members of a level to a sink as rows, and those of the study with what the levels tell of them.
+pub struct Judged<'a> {
+    /// The level that runs, if it is not the study itself.
+    pub level: Option<RefinementLevel>,
+    /// Its cells.
+    pub cells: &'a [Cell],
+    /// The times so far.
+    pub levels: &'a mut LevelTimes,
+    /// Receives everything.
+    pub sink: &'a mut dyn Sink,
+}
+
+impl Judged<'_> {
+    fn cell(&self, ended: &Outcome) -> Result<&Spec> {
+        let at = self.cells.binary_search_by_key(&ended.cell, |cell| cell.index);
+        let none = |_| Error::Failed(format!("member {} is of no cell that runs", ended.member));
+        at.map(|at| &self.cells[at].spec).map_err(none)
+    }
+}
+
+impl Sink for Judged<'_> {
+    fn member(&mut self, ended: &Ended) -> Result<()> {
+        match self.level {
+            Some(level) => {
+                let row = LevelRow::new(level, self.cell(&ended.outcome)?, &ended.outcome);
+                self.levels.add(&row).map_err(|e| Error::Failed(format!("levels: expected {e}")))?;
+                self.sink.level(&row)
+            }
+            None if !self.levels.has(ended.outcome.member) => self.sink.member(ended),
+            None => {
+                let mut judged = ended.clone();
+                self.levels.judge(self.cell(&ended.outcome)?, &mut judged.outcome);
+                self.sink.member(&judged)
+            }
+        }
+    }
+
+    fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
+        self.sink.spill(series, snapshots)
+    }
+
+    fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
+        self.sink.progress(done, total, share)
+    }
+
+    fn wish(&mut self) -> Wish {
+        self.sink.wish()
+    }
+
+    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
+        self.sink.checkpoint(standing)
+    }
+}

@@ -1,0 +1,99 @@
+//! The end of a member's trajectory: its results.
+
+use glam::DVec2;
+
+use super::{Course, Time, Trajectory, watch::ROUND};
+use crate::{Ended, Features, Observables, Outcome, Portrait, Status};
+use curvelax_flow::scheme::{
+    State,
+    member::{self, Decay, NEVER},
+};
+
+/// A fit with fewer points says nothing.
+const MIN_POINTS: u32 = 8;
+
+impl Trajectory<'_> {
+    /// Sets whether to store the nodes at both ends of the run.
+    pub fn keep_portrait(&mut self, keep: bool) {
+        self.portrait = keep;
+    }
+
+    /// Returns whether [`Trajectory::end`] needs the last state.
+    pub fn keeps_portrait(&self) -> bool {
+        self.portrait
+    }
+
+    /// Slope of the line fitted to -ln excess, in 1/time, or against the logarithm of time if the excess falls as a
+    /// power of it; and the fraction of the variance that the line explains.
+    fn rate(&self) -> Option<(f64, f64)> {
+        let Decay { xx, xy, yy, .. } = self.report.decay;
+        let clock = if self.launch.parameters.growth > 0.0 { 1.0 } else { self.time.unit(self.time_unit) };
+        let (rate, r2) = (-xy / xx / clock, xy * xy / (xx * yy));
+        (self.counters.fit_points >= MIN_POINTS && rate.is_finite() && r2.is_finite()).then_some((rate, r2))
+    }
+
+    /// The excess at the times of [`schedule::grid`](crate::schedule::grid) that the member has reached.
+    pub fn excess(&self) -> Vec<f64> {
+        let noted = &self.report.excess_at[..(self.counters.noted as usize).min(member::TIMES)];
+        let end = self.is_at_end().then_some(self.report.now.excess);
+        [self.start.excess].into_iter().chain(noted.iter().copied()).chain(end).collect()
+    }
+
+    /// Returns the member's results, without what theory predicts of them; `last` is its last state, for the portrait.
+    pub fn end(mut self, last: Option<&State<f64>>) -> Ended {
+        let frames = std::mem::take(&mut self.frames);
+        let progress = &self.report.progress;
+        let inside = |step: u32, [high, low, length, fraction]: [f64; 4]| match (self.time, step) {
+            (_, NEVER) => None,
+            (Time::Fixed(clock), step) => Some(clock.inside(step, fraction)),
+            (Time::Adaptive(_), _) => Some((high + (low + fraction * length)) * self.time_unit),
+        };
+        let p = progress;
+        let relaxed = inside(self.counters.relax_step, [p.relax_high, p.relax_low, p.relax_length, p.relax_fraction]);
+        let halved = inside(self.counters.half_step, [p.half_high, p.half_low, p.half_length, p.half_fraction]);
+        let t_relax = if self.course == Course::Round { Some(0.0) } else { relaxed };
+        let t_half = if self.start.excess <= ROUND { Some(0.0) } else { halved };
+        let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.counters.status);
+        // What happens to a curve at rest takes nothing from its time.
+        let status = if t_relax.is_some() { Status::Relaxed } else { failed.unwrap_or(Status::Unfinished) };
+        let (rate, rate_r2) = self.rate().unzip();
+        let (origin, unit) = (self.member.origin, self.unit);
+        let portrait = self.portrait.then(|| {
+            let before: Vec<DVec2> = self.member.nodes.iter().map(|node| *node + origin).collect();
+            let after = last.map_or_else(|| before.clone(), |state| self.placing().nodes(state));
+            Portrait { before, frames, after }
+        });
+        let outcome = Outcome {
+            member: self.member.index,
+            cell: self.member.cell,
+            status,
+            t_end: self.now(),
+            steps: self.counters.steps.into(),
+            rejected: self.counters.rejected.into(),
+            sweeps_k: self.sweeps[0],
+            sweeps_x: self.sweeps[1],
+            t_relax,
+            t_half,
+            rate,
+            rate_r2,
+            rate_theory: None,
+            start: self.start,
+            end: Observables::new(&self.report.now, progress.turning, unit),
+            self_crossing: self.crossed,
+            solves: self.counters.solves.into(),
+            label: std::mem::take(&mut self.member.label),
+            group: std::mem::take(&mut self.member.group),
+            events: self.watches.iter().map(|watch| watch.t).collect(),
+            ..Outcome::default()
+        };
+        Ended {
+            features: Features::of(&self.member, &self.start),
+            excess: self.excess(),
+            outcome,
+            rows: self.rows,
+            portrait,
+            mollified: self.member.mollified,
+            unresolved: self.course == Course::Unresolved,
+        }
+    }
+}

@@ -1,0 +1,282 @@
+//! One member's trajectory through a run, seen from the host: where it starts, where it pauses next, its results.
+//!
+//! A member is advanced in units of its own size: lengths are divided by a power of two near its radius and times by
+//! the fourth power of that, without rounding, so that no threshold of the scheme and no range of a precision
+//! depends on the user's unit. Times are also multiplied by the mobility, here and nowhere else: outside they are the
+//! user's, inside those of unit mobility.
+
+mod end;
+mod events;
+mod outputs;
+mod start;
+mod watch;
+
+use glam::DVec2;
+
+use watch::{Watch, aim_at_levels};
+
+use crate::{
+    Member, Observables, Paused, Rows, Status,
+    schedule::{Clock, Outputs, Ticks},
+};
+use curvelax_base::error::{Error, Result};
+use curvelax_flow::scheme::{
+    Parameters, State,
+    member::{Counters, Report},
+    run::Run,
+    state::STATE_FIELDS,
+};
+
+/// The fourth power of the shortest segment is the fastest time scale there is, and a clock must be able to count this
+/// multiple of it.
+const FASTEST: f64 = 0.1;
+/// The first adaptive step in the same unit. A smooth curve could take a longer one. A rough curve would refuse it, and
+/// what comes of a step that is far too long depends on roundings.
+const FIRST_STEP: f64 = 3.0;
+/// Maximum number of adaptive steps to a tolerance of 1; it scales with the inverse root of the tolerance, and a member
+/// that exceeds it is stalled. Curves that relax take some 3 to 30; one that creeps, because only tiny steps can be
+/// solved, would never end.
+const MAX_STEPS: f64 = 1000.0;
+/// Further steps per time 1/ω: a curve at rest takes one or two, since lengths approach their mean explicitly.
+const MAX_STEPS_AT_REST: f64 = 4.0;
+
+/// What can be said about the relaxation of a member.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Course {
+    /// Its excess is followed to the threshold.
+    Followed,
+    /// It is at or below the threshold from the start, or a regular polygon.
+    Round,
+    /// It is so nearly round that its threshold is within the rounding of the precision.
+    Unresolved,
+    /// It is not a simple curve: whatever its excess, it does not relax to a circle.
+    Immersed,
+}
+
+/// How a member's time advances.
+#[derive(Clone, Copy, Debug)]
+enum Time {
+    Fixed(Clock),
+    Adaptive(Ticks),
+}
+
+impl Time {
+    /// Unit of the clock of [`decay`](curvelax_flow::scheme::decay), for a member advanced in times of `unit`.
+    fn unit(self, unit: f64) -> f64 {
+        match self {
+            Time::Fixed(clock) => clock.tau,
+            Time::Adaptive(_) => unit,
+        }
+    }
+}
+
+/// Where the lengths of a back end are in the user's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Placing {
+    unit: f64,
+    origin: DVec2,
+}
+
+impl Placing {
+    /// Returns the nodes of a state.
+    pub fn nodes(self, state: &State<f64>) -> Vec<DVec2> {
+        state.curve.positions().map(|node| node * self.unit + self.origin).collect()
+    }
+}
+
+/// A resident member.
+pub struct Trajectory<'a> {
+    member: Member,
+    /// A power of two near the member's radius: the unit of length in which it is advanced.
+    unit: f64,
+    /// The fourth power of that over the mobility: the unit of time.
+    time_unit: f64,
+    t_end: f64,
+    time: Time,
+    launch: Run<f64>,
+    /// Output times, and how many of them the member has passed.
+    outputs: &'a Outputs,
+    served: usize,
+    counters: Counters,
+    report: Report<f64>,
+    start: Observables,
+    rows: Rows,
+    /// Times and the drawn nodes, in the user's frame.
+    frames: Vec<(f64, Vec<DVec2>)>,
+    sweeps: [u64; 2],
+    course: Course,
+    /// When the polygon was first seen to cross itself.
+    crossed: Option<f64>,
+    /// The events of its spec, in their order.
+    watches: Vec<Watch>,
+    portrait: bool,
+}
+
+impl Trajectory<'_> {
+    /// Returns what the back end needs to start or continue the member; its state is then held there only.
+    pub fn launch(&mut self) -> Run<f64> {
+        let (goal, parameters) = self.aim();
+        let state = std::mem::replace(&mut self.launch.state, State::zeros(0));
+        let mut run = Run { state, parameters, counters: self.launch.counters, report: self.launch.report };
+        if self.needs_aim() {
+            run.counters.goal = goal;
+        }
+        run
+    }
+
+    /// Returns the member between two dispatches, with the back end's data.
+    pub fn pause(&self, counters: Counters, report: Report<f64>, state: &State<f64>) -> Paused {
+        Paused {
+            counters,
+            report,
+            state: state.to_numbers(),
+            sweeps: self.sweeps,
+            served: self.served as u64,
+            rows: self.rows.clone(),
+            frames: self.frames.clone(),
+            crossed: self.crossed,
+            events: self.watches.iter().map(|watch| watch.t).collect(),
+            look_at: self.launch.parameters.look_at,
+        }
+    }
+
+    /// Continues a newly created member where it was [paused](Trajectory::pause).
+    ///
+    /// # Errors
+    /// [`Error::Request`] if a different member was paused.
+    pub fn resume_from(&mut self, paused: Paused) -> Result<()> {
+        let Paused { counters, report, state, sweeps, served, rows, frames, crossed, events, look_at } = paused;
+        let (index, numbers) = (self.member.index, STATE_FIELDS * self.member.nodes.len());
+        let served = usize::try_from(served).unwrap_or(usize::MAX);
+        let others = events.len() != self.watches.len();
+        if state.len() != numbers || served > self.outputs.len() || counters.status != 0 || others {
+            return Err(Error::Request(format!(
+                "member {index} in the state is not that of the spec: {} numbers of {numbers}, {served} output times of \
+                 {}, {} events of {}, status {}",
+                state.len(),
+                self.outputs.len(),
+                events.len(),
+                self.watches.len(),
+                counters.status
+            )));
+        }
+        self.watches.iter_mut().zip(events).for_each(|(watch, t)| watch.t = t);
+        self.launch.state = State::from_numbers(&state);
+        (self.launch.counters, self.launch.report, self.launch.parameters.look_at) = (counters, report, look_at);
+        (self.rows, self.frames) = (rows, frames);
+        (self.served, self.crossed) = (served, crossed);
+        self.sweeps = sweeps;
+        self.take(counters, &report);
+        Ok(())
+    }
+
+    /// Processes a report of the back end.
+    pub fn observe(&mut self, counters: Counters, report: &Report<f64>) {
+        self.sweeps[0] += u64::from(counters.sweeps_k);
+        self.sweeps[1] += u64::from(counters.sweeps_x);
+        self.take(counters, report);
+        let creeps = self.counters.status == 0 && !self.is_at_end() && counters.steps >= self.most_steps();
+        let failed = Status::ALL.iter().any(|status| status.is_failure() && *status as u32 == self.counters.status);
+        if creeps || (failed && self.is_timed_too_coarsely()) {
+            self.counters.status = Status::Stalled as u32;
+        }
+    }
+
+    /// Whether even the shortest step that the clock can count was longer than the curve needed at its start.
+    fn is_timed_too_coarsely(&self) -> bool {
+        let Time::Adaptive(ticks) = self.time else { return false };
+        let edge = self.start.length / self.unit / self.member.nodes.len() as f64;
+        ticks.tick > FASTEST * edge.powi(4)
+    }
+
+    fn take(&mut self, counters: Counters, report: &Report<f64>) {
+        self.counters = counters;
+        // Until the first step is accepted, the host knows the start better, in f64.
+        if counters.steps > 0 {
+            self.report = *report;
+        }
+    }
+
+    /// Maximum number of accepted steps before the member is stalled.
+    fn most_steps(&self) -> u32 {
+        match self.time {
+            Time::Fixed(_) => u32::MAX,
+            Time::Adaptive(_) => {
+                let p = &self.launch.parameters;
+                let turnovers = p.redistribution * p.omega * (p.end_high + p.end_low);
+                (MAX_STEPS / p.adaptive.sqrt() + MAX_STEPS_AT_REST * turnovers).ceil() as u32
+            }
+        }
+    }
+
+    /// Returns whether the member has ended.
+    pub fn is_over(&self) -> bool {
+        self.counters.status != 0 || self.is_at_end()
+    }
+
+    fn is_at_end(&self) -> bool {
+        let (progress, p) = (&self.report.progress, &self.launch.parameters);
+        match self.time {
+            Time::Fixed(clock) => self.counters.steps >= clock.steps,
+            Time::Adaptive(_) => (progress.time_high, progress.time_low) == (p.end_high, p.end_low),
+        }
+    }
+
+    /// Returns the time of the last accepted state.
+    pub fn now(&self) -> f64 {
+        let progress = &self.report.progress;
+        match self.time {
+            _ if self.is_at_end() => self.t_end,
+            Time::Fixed(clock) => clock.time(self.counters.steps),
+            Time::Adaptive(_) => (progress.time_high + progress.time_low) * self.time_unit,
+        }
+    }
+
+    /// Returns the index of the member.
+    pub fn index(&self) -> u64 {
+        self.member.index
+    }
+
+    /// Returns how its states are placed in the user's frame.
+    pub fn placing(&self) -> Placing {
+        Placing { unit: self.unit, origin: self.member.origin }
+    }
+
+    /// Returns the fraction of its time that has passed.
+    pub fn share(&self) -> f64 {
+        self.now() / self.t_end
+    }
+
+    /// Returns the next goal, as a number of steps, and the parameters until then; `None` if the goal is unchanged.
+    pub fn next_aim(&self) -> Option<(u32, Parameters<f64>)> {
+        self.needs_aim().then(|| self.aim())
+    }
+
+    fn needs_aim(&self) -> bool {
+        self.counters.steps >= self.counters.goal
+    }
+
+    fn aim(&self) -> (u32, Parameters<f64>) {
+        let steps = self.counters.steps;
+        let mut parameters = self.launch.parameters;
+        aim_at_levels(&mut parameters, &self.watches);
+        let output = self.outputs.get(self.served).map(|output| output.t);
+        let goal = match self.time {
+            Time::Fixed(clock) => {
+                let goal = output.map_or(clock.steps, |t| clock.locate(t).0);
+                let ends_short = clock.ends_short() && goal == clock.steps;
+                let before_last = ends_short && steps + 1 < clock.steps;
+                let tau = if ends_short && !before_last { clock.last() } else { clock.tau };
+                parameters.tau = tau / self.time_unit;
+                if before_last { clock.steps - 1 } else { goal }
+            }
+            Time::Adaptive(ticks) => {
+                let end = (parameters.end_high, parameters.end_low);
+                let split = |t: f64| if t >= self.t_end { end } else { ticks.split(t / self.time_unit) };
+                (parameters.goal_high, parameters.goal_low) = output.map_or(end, split);
+                self.most_steps()
+            }
+        };
+        (goal, parameters)
+    }
+}

@@ -1,0 +1,206 @@
+//! The start of a member: its unit, its thresholds, its clock.
+
+use glam::DVec2;
+
+use super::{
+    Course, FIRST_STEP, Time, Trajectory,
+    watch::{ROUND, Watch, resolution},
+};
+use crate::{
+    Member, Observables, Rows, Spec, Status,
+    rates::{own_omega, own_tau, radius, relaxation_rate, strongest_pull},
+    schedule::{self, Clock, Outputs, Ticks},
+    spec::{Omega, Pace, Precision, Pull, Sor, Tau},
+};
+use curvelax_curve::polygon;
+use curvelax_flow::{
+    flow::Flow,
+    scheme::{
+        Parameters, State,
+        extrapolation::most_order,
+        run::{FIRST_ORDER, Run},
+    },
+};
+
+/// A threshold that no excess reaches.
+const NO_THRESHOLD: f64 = -1.0;
+/// The rate is fitted while the excess is between these fractions of its start. Adaptive steps follow the shape to the
+/// end of the fit, or to half the threshold.
+const FITTED: [f64; 2] = [1e-3, 1e-1];
+/// A curve that has shrunk to this fraction of its length has vanished.
+const SHRUNK: f64 = 1e-3;
+/// Largest error of an adaptive step in units of the tolerance: t_relax is then off by a tenth of it (docs/method.md).
+const ERROR_PER_TOLERANCE: f64 = 1.0 / 12.0;
+/// Minimum number of clock ticks in the first adaptive step.
+const FIRST_TICKS: f64 = 16.0;
+/// `--pull auto`: κ in units of the member's relaxation rate.
+const PULL_PER_RATE: f64 = 4.0;
+
+impl<'a> Trajectory<'a> {
+    /// Creates a member at its start, and serves the output times that are due there.
+    pub fn new(member: Member, spec: &Spec, precision: Precision, outputs: &'a Outputs) -> Trajectory<'a> {
+        let unit = unit_of(&member.nodes);
+        let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
+        let time_unit = unit.powi(4) / spec.mobility();
+        let flow = member.flow.clone().unwrap_or_else(|| spec.flow.typical().clone());
+        let parameters = parameters(spec, &flow, &nodes, [unit, time_unit], spec.tolerance_at(precision));
+        let mut launch = Run::new(State::from_nodes(&nodes), parameters);
+        launch.counters.stop_when_relaxed = spec.stops_when_relaxed().into();
+        launch.counters.order =
+            FIRST_ORDER.min(most_order(precision.epsilon())).min(spec.most_order.unwrap_or(FIRST_ORDER));
+        let turning = launch.report.progress.turning;
+        let watches = Watch::of(&spec.event, &launch.report.now, unit, precision);
+        let start = Observables::new(&launch.report.now, turning, unit);
+        let limit = spec.threshold(start.excess);
+        let course = Course::of(start.excess, turning, limit, precision);
+        set_thresholds(&mut launch, course, start.excess, limit, precision);
+        let (time, out_of_range) = begin_time(&mut launch, spec, time_unit, precision);
+        let clock = time.unit(time_unit);
+        launch.parameters.clock_end = spec.final_time() / clock;
+        launch.parameters.growth = spec
+            .growth(&flow, start.area)
+            .map_or(0.0, |growth| (growth / clock).min(*schedule::range(precision).end()));
+        let status = match course {
+            Course::Round if spec.stops_when_relaxed() => Some(Status::Relaxed),
+            _ if beyond(&parameters, precision) => Some(Status::Nonfinite),
+            _ => out_of_range,
+        };
+        let mut trajectory = Trajectory {
+            member,
+            unit,
+            time_unit,
+            t_end: spec.final_time(),
+            time,
+            outputs,
+            served: 0,
+            counters: launch.counters,
+            report: launch.report,
+            launch,
+            start,
+            rows: Rows::default(),
+            frames: Vec::new(),
+            sweeps: [0; 2],
+            course,
+            crossed: None,
+            watches,
+            portrait: false,
+        };
+        trajectory.counters.status = status.map_or(0, |status| status as u32);
+        let state = std::mem::replace(&mut trajectory.launch.state, State::zeros(0));
+        trajectory.look(&state);
+        // At the start one row and one snapshot are due.
+        trajectory.serve(Some(&state), usize::MAX);
+        trajectory.launch.state = state;
+        trajectory
+    }
+}
+
+impl Course {
+    /// The course of a curve with this excess and turning number, which is relaxed at an excess of `limit`.
+    fn of(excess: f64, turning: f64, limit: f64, precision: Precision) -> Course {
+        match limit {
+            _ if excess <= ROUND => Course::Round,
+            _ if turning.abs() != 1.0 => Course::Immersed,
+            limit if excess <= limit => Course::Round,
+            limit if limit < resolution(precision) => Course::Unresolved,
+            _ => Course::Followed,
+        }
+    }
+}
+
+/// Sets the thresholds of the excess between `excess` and `limit`, and the length at which the curve has vanished.
+fn set_thresholds(launch: &mut Run<f64>, course: Course, excess: f64, limit: f64, precision: Precision) {
+    let (resolution, parameters) = (resolution(precision), &mut launch.parameters);
+    let reachable = course != Course::Immersed && excess > ROUND;
+    let threshold = |excess: f64| if reachable && excess >= resolution { excess } else { NO_THRESHOLD };
+    parameters.relax_at = if course == Course::Followed { limit } else { NO_THRESHOLD };
+    parameters.half_at = threshold(0.5 * excess);
+    parameters.follow_to = (FITTED[0] * excess).min(0.5 * limit).max(resolution);
+    parameters.fit_from = threshold(FITTED[1] * excess);
+    parameters.fit_to = (FITTED[0] * excess).max(resolution);
+    parameters.least_length = SHRUNK * launch.report.now.length;
+}
+
+/// How the member's time advances, and its status if it ends at once because no clock of the precision holds its time.
+fn begin_time(launch: &mut Run<f64>, spec: &Spec, time_unit: f64, precision: Precision) -> (Time, Option<Status>) {
+    let tolerance = match spec.pace() {
+        Pace::Fixed(tau) => {
+            let tau = match tau {
+                Tau::Step(tau) => tau,
+                Tau::Auto => launch.parameters.tau * time_unit,
+            };
+            return (Time::Fixed(Clock::new(tau, spec.final_time())), None);
+        }
+        Pace::Adaptive(tolerance) => tolerance,
+    };
+    let (times, end) = (schedule::times(precision), spec.final_time() / time_unit);
+    let status = match end {
+        end if end < *times.start() => Some(Status::Nonfinite),
+        end if end > *times.end() => Some(Status::Stalled),
+        _ => None,
+    };
+    let end = end.clamp(*times.start(), *times.end());
+    let ticks = Ticks::new(end, precision);
+    let parameters = &mut launch.parameters;
+    parameters.adaptive = ERROR_PER_TOLERANCE * tolerance;
+    (parameters.time_unit, parameters.time_tick) = (ticks.unit, ticks.tick);
+    (parameters.end_high, parameters.end_low) = ticks.split(end);
+    let shortest = launch.state.curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
+    launch.report.progress.next = (FIRST_STEP * shortest.powi(4)).max(FIRST_TICKS * ticks.tick);
+    (Time::Adaptive(ticks), status)
+}
+
+/// The largest power of two not above the radius of the circle of the same length.
+fn unit_of(nodes: &[DVec2]) -> f64 {
+    (polygon::length(nodes) / std::f64::consts::TAU).log2().floor().exp2()
+}
+
+/// Whether the law, a rate or the fixed step of a member is outside the range of a precision: too large, or a step too
+/// short.
+fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
+    let range = schedule::range(precision);
+    let law = [p.c1, p.c2, p.c3, p.c4, p.c5, p.c6, p.c7, p.c8, p.length_penalty];
+    let rates = [p.redistribution * p.omega, p.pull, p.tau];
+    let too_large = law.into_iter().chain(rates).any(|number| number.is_nan() || number.abs() > *range.end());
+    too_large || (p.tau != 0.0 && p.tau < *range.start())
+}
+
+/// The parameters of a member in the units `unit` of length and `time` of time, except thresholds and times.
+fn parameters(spec: &Spec, flow: &Flow, nodes: &[DVec2], [unit, time]: [f64; 2], tolerance: f64) -> Parameters<f64> {
+    let rate = relaxation_rate(radius(nodes));
+    let of_flow = Parameters::of_flow(flow, 1.0);
+    // b(k) has the dimension of 1/length³.
+    let law = |j: i32, c: f64| c * unit.powi(3 - j);
+    Parameters {
+        c1: law(1, of_flow.c1),
+        c2: law(2, of_flow.c2),
+        c3: law(3, of_flow.c3),
+        c4: law(4, of_flow.c4),
+        c5: law(5, of_flow.c5),
+        c6: law(6, of_flow.c6),
+        c7: law(7, of_flow.c7),
+        c8: law(8, of_flow.c8),
+        tau: match spec.pace() {
+            Pace::Fixed(Tau::Step(tau)) => tau / time,
+            Pace::Fixed(Tau::Auto) => own_tau(rate),
+            Pace::Adaptive(_) => 0.0,
+        },
+        omega: match spec.omega() {
+            Omega::Rate(rate) => rate * time,
+            Omega::Auto => own_omega(rate),
+        },
+        redistribution: f64::from(u8::from(!spec.no_redistribution)),
+        pull: match spec.pull {
+            Pull::Rate(rate) => rate * time,
+            Pull::Auto => (PULL_PER_RATE * rate).min(strongest_pull(rate, nodes.len())),
+        },
+        tolerance,
+        sor: match spec.sor {
+            Sor::Factor(factor) => factor,
+            Sor::Auto => 0.0,
+        },
+        length_penalty: of_flow.length_penalty * unit * unit,
+        polygon_ratio: polygon::regular_ratio(nodes.len()),
+        ..of_flow
+    }
+}

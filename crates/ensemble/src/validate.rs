@@ -1,0 +1,667 @@
+//! Range checks of a [`Spec`]: each number alone, then the combinations that make no sense.
+//!
+//! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that needs
+//! the file of the shape. Only the resolution of the highest mode is checked here.
+
+use super::event::{Event, MAX_EVENTS};
+use super::spec::{
+    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, Precision, Pull,
+    Sor, Spec, Store, Tau, final_times,
+};
+use curvelax_base::{
+    error::{Error, Result},
+    text::{count, number},
+};
+use curvelax_flow::solver::{Facts, ring::MIN_POINTS};
+
+/// More members than this are a typing error.
+const MAX_CURVES: u64 = 1_000_000_000;
+const MAX_POINTS: usize = 1_000_000;
+/// A member with more steps than this would need more than a year.
+pub(super) const MAX_STEPS: f64 = 1e9;
+/// Final times whose smallest part in a table, and whose sum over all members, can still be represented.
+const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
+/// Mobilities with which times, fourth powers of lengths over them, stay finite.
+const MOBILITIES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+/// Keys that are chosen for an uncertainty.
+const CHOSEN: [&str; 3] = ["points", "tau", "adaptive"];
+/// Uncertainties of a median that members by the million, at a thousand nodes, can reach.
+const ACCURACIES: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
+/// The rows of a resident member stay in memory until it ends.
+const MAX_SERIES_ROWS: f64 = 1e6;
+const MAX_SNAPSHOTS: usize = 10_000;
+/// The same for snapshots, at four numbers a row.
+const MAX_SNAPSHOT_ROWS: usize = 100_000_000;
+/// The lengths approach their mean explicitly, by a factor 1 - ωτ per step.
+pub(super) const MAX_OMEGA_TAU: f64 = 1.0;
+/// Above this local error a step says nothing about the curve.
+const LOOSEST_ADAPTIVE: f64 = 1.0;
+/// A sweep residual above this no longer says that a system is solved.
+const LOOSEST_TOLERANCE: f64 = 0.1;
+const MAX_SWEEPS: u32 = 100_000_000;
+const MAX_THREADS: usize = 1024;
+
+impl Spec {
+    /// Checks all ranges and combinations, and returns the spec with its lists sorted and without duplicates.
+    pub fn validate(mut self) -> Result<Spec> {
+        self.sweep.check(&Spec::keys())?;
+        self.check_counts()?;
+        self.check_accuracy()?;
+        self.check_mobility()?;
+        self.check_times()?;
+        self.check_method()?;
+        self.check_drawn()?;
+        self.check_relaxation()?;
+        self.check_combinations()?;
+        self.check_events()?;
+        self.fill_defaults();
+        self.tidy_snapshots()?;
+        self.tidy_only()?;
+        self.check_shard()?;
+        Ok(self)
+    }
+
+    /// Fills in the choices left open, so that a printed spec shows them.
+    fn fill_defaults(&mut self) {
+        if let Pace::Fixed(tau) = self.pace() {
+            self.tau = Some(tau);
+        }
+        // Whether steps adapt may differ between cells, and with it the default.
+        if !["tau", "adaptive"].into_iter().any(|key| self.sweep.has(key)) {
+            self.omega = Some(self.omega());
+        }
+        self.t_end.get_or_insert(DEFAULT_T_END.into());
+        if self.stops_when_relaxed() {
+            self.stop_when_relaxed = Some(true);
+        }
+        if self.relax_at.is_none() {
+            self.relax_to.get_or_insert(DEFAULT_RELAX_TO);
+        }
+    }
+
+    fn check_counts(&self) -> Result<()> {
+        let members = self.all_members();
+        if self.curves > 0 && self.curves <= MAX_CURVES && members > MAX_CURVES {
+            let cells = count(self.sweep.cells(), "cell");
+            let outlines = self.outlines.map_or(String::new(), |outlines| format!(" of {outlines} outlines"));
+            let problem = format!("{cells}{outlines} make {members} members, too many");
+            return Err(Error::value("curves", self.curves, &problem, &format!("at most {MAX_CURVES} in all")));
+        }
+        if !(1..=MAX_CURVES).contains(&self.curves) {
+            let problem = if self.curves == 0 { "an ensemble needs a member" } else { "too many members" };
+            return Err(Error::value("curves", self.curves, problem, &format!("use 1 to {MAX_CURVES}")));
+        }
+        if !(MIN_POINTS..=MAX_POINTS).contains(&self.points) {
+            let problem = if self.points < MIN_POINTS {
+                "a ring of fewer than 6 nodes cannot be coloured"
+            } else {
+                "too many nodes"
+            };
+            let allowed = format!("use {MIN_POINTS} to {MAX_POINTS}");
+            return Err(Error::value("points", self.points, problem, &allowed));
+        }
+        if let Some(threads) = self.threads
+            && !(1..=MAX_THREADS).contains(&threads)
+        {
+            let problem = if threads == 0 { "no thread to run on" } else { "too many threads" };
+            return Err(Error::value("threads", threads, problem, &format!("use 1 to {MAX_THREADS}")));
+        }
+        Ok(())
+    }
+
+    fn check_accuracy(&self) -> Result<()> {
+        match self.accuracy {
+            Some(goal) if !self.refine => {
+                let problem = "the error of discretisation is known only with --refine";
+                Err(Error::value("accuracy", number(goal), problem, "add --accurate, or --refine"))
+            }
+            Some(goal) if CHOSEN.into_iter().any(|key| self.sweep.has(key)) => {
+                let problem = "it chooses n and the steps, and a sweep of points, tau or adaptive does, too";
+                Err(Error::value("accuracy", number(goal), problem, "leave out one of the two"))
+            }
+            Some(goal) if self.only.is_some() => {
+                let problem = "the members are chosen by it, and --only chooses them, too";
+                Err(Error::value("accuracy", number(goal), problem, "leave out one of the two"))
+            }
+            Some(goal) if !ACCURACIES.contains(&goal) => {
+                let (low, high) = (number(*ACCURACIES.start()), number(*ACCURACIES.end()));
+                let problem = "not a relative uncertainty that can be reached";
+                Err(Error::value("accuracy", number(goal), problem, &format!("use a number from {low} to {high}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_mobility(&self) -> Result<()> {
+        let Some(mobility) = self.mobility else { return Ok(()) };
+        positive("mobility", mobility, "a mobility in length^4/time", "1")?;
+        match MOBILITIES.contains(&mobility) {
+            true => Ok(()),
+            false => {
+                let allowed = format!("use a number from {:e} to {:e}", MOBILITIES.start(), MOBILITIES.end());
+                Err(Error::value("mobility", number(mobility), "times in this unit are not finite", &allowed))
+            }
+        }
+    }
+
+    fn check_times(&self) -> Result<()> {
+        self.check_final_times()?;
+        match self.pace() {
+            Pace::Fixed(tau) => self.check_fixed(tau)?,
+            Pace::Adaptive(tolerance) => self.check_adaptive(tolerance)?,
+        }
+        let Some(series) = self.series else { return Ok(()) };
+        positive("series", series, "an interval of time", "0.01")?;
+        let Some(t_end) = self.known_end() else { return Ok(()) };
+        let rows = t_end / series;
+        if rows > MAX_SERIES_ROWS {
+            let allowed = format!("at most {MAX_SERIES_ROWS:e} rows: use a longer interval");
+            return Err(Error::value("series", number(series), &format!("about {rows:.1e} rows per member"), &allowed));
+        }
+        Ok(())
+    }
+
+    /// The final time of the spec of a cell, if it is a number.
+    fn known_end(&self) -> Option<f64> {
+        match self.t_end {
+            None | Some(FinalTime::At(_)) => Some(self.final_time()),
+            Some(FinalTime::Auto | FinalTime::OfCells(_)) => None,
+        }
+    }
+
+    fn check_final_times(&self) -> Result<()> {
+        let swept = self.sweep.axes().iter().find(|axis| axis.key == "t-end");
+        let times = match &self.t_end {
+            Some(FinalTime::OfCells(times)) if times.len() as u64 != self.sweep.cells() || swept.is_some() => {
+                return Err(final_times(times.len(), self.sweep.cells()));
+            }
+            Some(FinalTime::OfCells(times)) => times.clone(),
+            _ => self.known_end().into_iter().collect(),
+        };
+        for t in times {
+            positive("t-end", t, "a final time", "2")?;
+            if !TIMES.contains(&t) {
+                let allowed = format!("use a time from {:e} to {:e}", TIMES.start(), TIMES.end());
+                return Err(Error::value("t-end", number(t), "parts or sums of it are not finite", &allowed));
+            }
+        }
+        match swept.is_some_and(|axis| axis.values.iter().any(|value| value.as_str() == Some("auto"))) {
+            true => {
+                let message = "auto is a time for each cell already; give numbers, or --t-end auto without the sweep";
+                Err(Error::Request(format!("--sweep t-end=auto: {message}")))
+            }
+            false => Ok(()),
+        }
+    }
+
+    fn check_fixed(&self, tau: Tau) -> Result<()> {
+        let Tau::Step(tau) = tau else { return Ok(()) };
+        positive("tau", tau, "a time step", "0.001")?;
+        let Some(end) = self.known_end() else { return Ok(()) };
+        let t_end = number(end);
+        if tau > end {
+            let problem = format!("the step is longer than the whole run of {t_end}");
+            let allowed = format!("use a step of at most {t_end} or auto, or a later --t-end");
+            return Err(Error::value("tau", number(tau), &problem, &allowed));
+        }
+        let steps = end / tau;
+        if steps > MAX_STEPS {
+            let problem = format!("about {steps:.1e} steps of {} to --t-end {t_end}", number(tau));
+            let allowed = format!("at most {MAX_STEPS:e} steps: use a larger --tau or an earlier --t-end");
+            return Err(Error::value("tau", number(tau), &problem, &allowed));
+        }
+        Ok(())
+    }
+
+    fn check_adaptive(&self, tolerance: f64) -> Result<()> {
+        if let Some(tau) = self.tau {
+            let problem = format!("steps are either fixed or adaptive, and --adaptive {} is given", number(tolerance));
+            return Err(Error::value("tau", tau, &problem, "leave out one of the two"));
+        }
+        if !(tolerance > 0.0 && tolerance <= LOOSEST_ADAPTIVE) {
+            let allowed = format!("use a number above 0, up to {LOOSEST_ADAPTIVE}, for example {DEFAULT_ADAPTIVE}");
+            return Err(Error::value("adaptive", number(tolerance), "not a local error tolerance", &allowed));
+        }
+        let tightest = tightest_adaptive(self.precision.unwrap_or(Precision::F64));
+        if tolerance < tightest {
+            let problem = "the rounding of the precision is larger";
+            return Err(Error::value("adaptive", number(tolerance), problem, &format!("use {tightest:e} or more")));
+        }
+        Ok(())
+    }
+
+    fn check_omega(&self) -> Result<()> {
+        let Omega::Rate(omega) = self.omega() else { return Ok(()) };
+        if !(omega.is_finite() && omega >= 0.0) {
+            let allowed = "use 0, a positive number such as 1, or auto";
+            return Err(Error::value("omega", number(omega), "not a redistribution speed", allowed));
+        }
+        if self.no_redistribution {
+            return Ok(());
+        }
+        match self.pace() {
+            Pace::Fixed(Tau::Step(tau)) if omega * tau > MAX_OMEGA_TAU => {
+                let allowed = format!("it is a rate: use --omega {} or less", number(1.0 / tau));
+                Err(Error::value("omega", number(omega), &overshooting(omega, tau), &allowed))
+            }
+            Pace::Adaptive(_) => match self.known_end() {
+                Some(t_end) if omega * t_end > MAX_STEPS => {
+                    let problem =
+                        format!("adaptive steps are at most about 1/omega long, and --t-end is {}", number(t_end));
+                    let allowed = format!("use --omega {} or less, or an earlier --t-end", number(MAX_STEPS / t_end));
+                    Err(Error::value("omega", number(omega), &problem, &allowed))
+                }
+                _ => Ok(()),
+            },
+            Pace::Fixed(_) => Ok(()),
+        }
+    }
+
+    fn check_pull(&self) -> Result<()> {
+        let Pull::Rate(rate) = self.pull else { return Ok(()) };
+        if !(rate.is_finite() && rate >= 0.0) {
+            let allowed = "use 0 for the paper's scheme, a positive number, or auto";
+            return Err(Error::value("pull", number(rate), "not a rate", allowed));
+        }
+        Ok(())
+    }
+
+    fn check_method(&self) -> Result<()> {
+        self.check_omega()?;
+        self.check_pull()?;
+        if let Some(tolerance) = self.tolerance
+            && !(tolerance > 0.0 && tolerance <= LOOSEST_TOLERANCE)
+        {
+            let allowed = format!("use a number above 0, up to {LOOSEST_TOLERANCE}, for example 1e-5");
+            return Err(Error::value("tolerance", number(tolerance), "not a residual tolerance", &allowed));
+        }
+        if let Sor::Factor(factor) = self.sor
+            && !(factor > 0.0 && factor < 2.0)
+        {
+            let problem = "sweeps do not converge with this over-relaxation";
+            let allowed = "use a number between 0 and 2, both excluded, or auto; 1 is plain Gauss-Seidel";
+            return Err(Error::value("sor", number(factor), problem, allowed));
+        }
+        if !(1..=MAX_SWEEPS).contains(&self.max_sweeps) {
+            let problem = if self.max_sweeps == 0 { "no sweep to solve with" } else { "too many sweeps" };
+            return Err(Error::value("max-sweeps", self.max_sweeps, problem, &format!("use 1 to {MAX_SWEEPS}")));
+        }
+        let resolved = self.points / 4;
+        if let Some(mode) = self.highest_mode()
+            && mode as usize > resolved
+        {
+            let problem = format!("{} nodes resolve no mode above {resolved}", self.points);
+            let allowed = format!("use --points {} or more, or lower modes", 4 * u64::from(mode));
+            return Err(Error::value("shape", &self.shape, &problem, &allowed));
+        }
+        if self.amplitude != 0.0.into() && self.modes.high as usize > resolved {
+            let modes = String::from(self.modes);
+            let problem = format!("{} nodes resolve no mode above {resolved}", self.points);
+            let allowed = format!("use --points {} or more, or lower modes", 4 * u64::from(self.modes.high));
+            return Err(Error::value("modes", modes, &problem, &allowed));
+        }
+        Ok(())
+    }
+
+    fn check_relaxation(&self) -> Result<()> {
+        match (self.relax_to, self.relax_at) {
+            (Some(_), Some(excess)) => {
+                let problem = "a member is relaxed at a fraction of its excess or at an excess";
+                Err(Error::value("relax-at", number(excess), problem, "leave out --relax-to or --relax-at"))
+            }
+            (Some(fraction), None) if !(fraction > 0.0 && fraction < 1.0) => {
+                let allowed = "use a number between 0 and 1, both excluded, for example 0.01";
+                Err(Error::value("relax-to", number(fraction), "not a fraction of the initial excess", allowed))
+            }
+            (None, Some(excess)) => positive("relax-at", excess, "an excess", "0.01"),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_combinations(&self) -> Result<()> {
+        let lexicographic = self.order == Order::Lexicographic;
+        self.check_sweeps()?;
+        if self.store == Store::Zarr && self.snapshots.is_empty() {
+            let allowed = "add --snapshots T1,T2,..., or leave out --store";
+            return Err(Error::value("store", "zarr", "there are no snapshots to store", allowed));
+        }
+        if self.backend == BackendChoice::Gpu {
+            let cpu = "use --backend cpu";
+            if lexicographic {
+                let problem = "a GPU sweeps colour by colour only";
+                return Err(Error::value("order", "lexicographic", problem, cpu));
+            }
+        }
+        match &self.adapter {
+            Some(name) if self.backend == BackendChoice::Cpu => {
+                let allowed = "leave out --adapter, or use --backend gpu";
+                Err(Error::value("adapter", name, "the CPU back end uses no adapter", allowed))
+            }
+            Some(name) if name.trim().is_empty() => {
+                Err(Error::value("adapter", "''", "an empty name", "see `curvelax adapters` for the names"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses options that the solver does not have: the direct one makes no sweeps, and multigrid has its own.
+    fn check_sweeps(&self) -> Result<()> {
+        let default = Spec::default();
+        let asked = [
+            (self.order != default.order).then(|| ("order", "lexicographic".to_string())),
+            self.tolerance.map(|tolerance| ("tolerance", number(tolerance))),
+            (self.sor != default.sor).then(|| match self.sor {
+                Sor::Factor(factor) => ("sor", number(factor)),
+                Sor::Auto => ("sor", "auto".to_string()),
+            }),
+            (self.max_sweeps != default.max_sweeps).then(|| ("max-sweeps", self.max_sweeps.to_string())),
+        ];
+        let Facts { refuses, refuses_because: problem, .. } = *self.solver().facts();
+        match asked.into_iter().flatten().find(|(key, _)| refuses.contains(key)) {
+            None => Ok(()),
+            Some((key, value)) => {
+                let allowed = format!("leave out --{key}, or use --solver gauss-seidel");
+                Err(Error::value(key, value, problem, &allowed))
+            }
+        }
+    }
+
+    fn check_events(&self) -> Result<()> {
+        let (events, count) = (&self.event, self.event.len());
+        if count > MAX_EVENTS {
+            let value = format!("({count} events)");
+            return Err(Error::value("event", value, "too many events", &format!("at most {MAX_EVENTS}")));
+        }
+        let twice = |(i, event): (usize, &Event)| events[..i].iter().any(|other| other.name == event.name);
+        match events.iter().enumerate().find(|at| twice(*at)) {
+            Some((_, event)) => Err(Error::value("event", event, "another event has this name", "use another name")),
+            None => Ok(()),
+        }
+    }
+
+    fn tidy_snapshots(&mut self) -> Result<()> {
+        let t_end = self.known_end().unwrap_or(*TIMES.end());
+        if let Some(&t) = self.snapshots.iter().find(|t| !(**t >= 0.0 && **t <= t_end)) {
+            let allowed = match self.known_end() {
+                Some(t_end) => format!("use times from 0 to --t-end {}", number(t_end)),
+                None => "use times from 0 on".into(),
+            };
+            return Err(Error::value("snapshots", number(t), "not a time of the run", &allowed));
+        }
+        self.snapshots.iter_mut().for_each(|t| *t += 0.0); // -0 becomes 0
+        self.snapshots.sort_by(f64::total_cmp);
+        self.snapshots.dedup();
+        if self.snapshots.len() > MAX_SNAPSHOTS {
+            let problem = "too many times";
+            return Err(Error::value(
+                "snapshots",
+                format!("({} times)", self.snapshots.len()),
+                problem,
+                &format!("at most {MAX_SNAPSHOTS}"),
+            ));
+        }
+        let rows = self.snapshots.len().saturating_mul(self.points);
+        if rows > MAX_SNAPSHOT_ROWS {
+            let problem = format!("{rows} rows per member");
+            let allowed = format!("at most {MAX_SNAPSHOT_ROWS}: use fewer times, or fewer --points");
+            return Err(Error::value("snapshots", format!("({} times)", self.snapshots.len()), &problem, &allowed));
+        }
+        Ok(())
+    }
+
+    fn tidy_only(&mut self) -> Result<()> {
+        let members = self.all_members();
+        let Some(only) = &mut self.only else { return Ok(()) };
+        if only.is_empty() {
+            return Err(Error::value("only", "[]", "no member to run", "name at least one, or leave the key out"));
+        }
+        if let Some(member) = only.iter().find(|member| **member >= members) {
+            let problem = format!("no such member among {members}");
+            return Err(Error::value("only", member, &problem, &format!("use members from 0 to {}", members - 1)));
+        }
+        only.sort_unstable();
+        only.dedup();
+        Ok(())
+    }
+
+    fn check_shard(&self) -> Result<()> {
+        match self.shard {
+            Some(shard) if self.member_count() == 0 => {
+                let members = self.only.as_ref().map_or(self.all_members(), |only| only.len() as u64);
+                let problem = format!("none of the {members} members to run belongs to it");
+                Err(Error::value("shard", shard, &problem, "use fewer shards, or leave this one out"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The smallest tolerance of adaptive steps whose errors are not all rounding.
+pub(super) fn tightest_adaptive(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 1e-5,
+        Precision::F64 => 1e-8,
+    }
+}
+
+/// The problem of a redistribution that is too fast for fixed steps.
+pub(super) fn overshooting(omega: f64, tau: f64) -> String {
+    format!("omega tau = {}, and the redistribution overshoots above {MAX_OMEGA_TAU}", number(omega * tau))
+}
+
+fn positive(key: &str, value: f64, what: &str, example: &str) -> Result<()> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    let allowed = format!("use a finite number above 0, for example {example}");
+    Err(Error::value(key, number(value), &format!("not {what}"), &allowed))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// TOML text that validation must refuse, and the beginning of the message.
+    const REFUSED: &[(&str, &str)] = &[
+        ("curves = 0", "--curves 0: "),
+        ("curves = 1000000001", "--curves 1000000001: "),
+        ("points = 0", "--points 0: a ring of fewer than 6 nodes cannot be coloured; use 6 to 1000000"),
+        ("points = 5", "--points 5: "),
+        ("points = 1000001", "--points 1000001: "),
+        ("threads = 0", "--threads 0: "),
+        ("threads = 1025", "--threads 1025: "),
+        ("tau = 0", "--tau 0: "),
+        ("tau = -1", "--tau -1: not a time step; use a finite number above 0, for example 0.001"),
+        ("tau = nan", "--tau NaN: "),
+        ("tau = inf", "--tau inf: "),
+        ("tau = 1e-300", "--tau 1e-300: about 2.0e300 steps"),
+        ("tau = 2.5", "--tau 2.5: the step is longer than the whole run of 2"),
+        ("t-end = 0", "--t-end 0: "),
+        ("t-end = -2", "--t-end -2: "),
+        ("t-end = nan", "--t-end NaN: "),
+        ("t-end = inf", "--t-end inf: "),
+        ("t-end = 9e-301", "--t-end 9e-301: parts or sums of it are not finite; use a time from 1e-300 to 1e300"),
+        ("t-end = 2e300", "--t-end 2e300: parts or sums of it are not finite; use a time from 1e-300 to 1e300"),
+        ("t-end = 1e300", "--tau 0.001: about 1.0e303 steps"),
+        ("t-end = 1.1e6", "--tau 0.001: about 1.1e9 steps"),
+        ("omega = -0.5", "--omega -0.5: "),
+        ("omega = nan", "--omega NaN: "),
+        ("omega = inf", "--omega inf: "),
+        ("omega = 2000", "--omega 2000: omega tau = 2, and the redistribution overshoots above 1"),
+        ("tau = 1.5", "--omega 1: omega tau = 1.5"),
+        ("shape = 'flower:26:0.1'", "--shape flower:26:0.1: 100 nodes resolve no mode above 25; use --points 104"),
+        ("tolerance = 0", "--tolerance 0: "),
+        ("tolerance = -1e-3", "--tolerance -0.001: "),
+        ("tolerance = 0.2", "--tolerance 0.2: "),
+        ("tolerance = nan", "--tolerance NaN: "),
+        ("tolerance = inf", "--tolerance inf: "),
+        ("sor = 0", "--sor 0: "),
+        ("sor = 2", "--sor 2: "),
+        ("sor = -1", "--sor -1: "),
+        ("sor = nan", "--sor NaN: "),
+        ("max-sweeps = 0", "--max-sweeps 0: "),
+        ("max-sweeps = 100000001", "--max-sweeps 100000001: "),
+        ("relax-to = 0", "--relax-to 0: "),
+        ("relax-to = 1", "--relax-to 1: "),
+        ("relax-to = -0.1", "--relax-to -0.1: "),
+        ("relax-to = nan", "--relax-to NaN: "),
+        ("series = 0", "--series 0: "),
+        ("series = -1", "--series -1: "),
+        ("series = nan", "--series NaN: "),
+        ("series = inf", "--series inf: "),
+        ("series = 1e-9", "--series 1e-9: about 2.0e9 rows"),
+        ("series = 1e-6", "--series 1e-6: about 2.0e6 rows"),
+        ("snapshots = [0, 3]", "--snapshots 3: not a time of the run; use times from 0 to --t-end 2"),
+        ("snapshots = [-1]", "--snapshots -1: "),
+        ("snapshots = [nan]", "--snapshots NaN: "),
+        ("snapshots = [inf]", "--snapshots inf: "),
+        ("store = 'zarr'", "--store zarr: there are no snapshots to store; add --snapshots T1,T2,..."),
+        ("store = 'zarr'\nsnapshots = []", "--store zarr: "),
+        ("only = []", "--only []: "),
+        ("only = [256]", "--only 256: no such member among 256; use members from 0 to 255"),
+        ("only = [18446744073709551615]", "--only 18446744073709551615: "),
+        ("modes = '2..=26'", "--modes 2..=26: 100 nodes resolve no mode above 25; use --points 104"),
+        ("points = 31", "--modes 2..=8: 31 nodes resolve no mode above 7"),
+        ("order = 'lexicographic'\nbackend = 'gpu'", "--order lexicographic: "),
+        ("order = 'lexicographic'\nsolver = 'direct'", "--order lexicographic: the direct solver makes no sweeps; "),
+        ("order = 'lexicographic'\nadaptive = 0.001", "--order lexicographic: the direct solver makes no sweeps; "),
+        ("tolerance = 1e-4\nadaptive = 0.001", "--tolerance 0.0001: the direct solver makes no sweeps; "),
+        ("sor = 1.5\nsolver = 'direct'", "--sor 1.5: the direct solver makes no sweeps; "),
+        ("max-sweeps = 9\nsolver = 'direct'", "--max-sweeps 9: the direct solver makes no sweeps; "),
+        ("amplitude = 'normal(0.05,0.02)'", "--amplitude normal(0.05,0.02): 0.62 % of the members would be refused"),
+        ("shape = 'flower:choice(2,26):0.1'", "--shape flower:choice(2,26):0.1: 100 nodes resolve no mode above 25"),
+        ("adaptive = 0", "--adaptive 0: not a local error tolerance; use a number above 0, up to 1"),
+        ("adaptive = -1", "--adaptive -1: "),
+        ("adaptive = nan", "--adaptive NaN: "),
+        ("adaptive = 1.001", "--adaptive 1.001: "),
+        ("adaptive = 9e-9", "--adaptive 9e-9: the rounding of the precision is larger; use 1e-8"),
+        ("adaptive = 9e-6\nprecision = 'f32'", "--adaptive 9e-6: the rounding of the precision is larger; use 1e-5"),
+        ("adaptive = 0.001\ntau = 0.001", "--tau 0.001: steps are either fixed or adaptive"),
+        ("adaptive = 0.001\nomega = 1e9", "--omega 1000000000: adaptive steps are at most about 1/omega long"),
+        ("mobility = 0", "--mobility 0: not a mobility in length^4/time; use a finite number above 0, for example 1"),
+        ("mobility = -1", "--mobility -1: "),
+        ("mobility = nan", "--mobility NaN: "),
+        ("mobility = inf", "--mobility inf: "),
+        ("mobility = 1e101", "--mobility 1e101: times in this unit are not finite; use a number from 1e-100 to 1e100"),
+        ("pull = -1", "--pull -1: not a rate"),
+        ("pull = nan", "--pull NaN: "),
+        ("pull = inf", "--pull inf: "),
+        ("relax-at = 0", "--relax-at 0: "),
+        ("relax-at = nan", "--relax-at NaN: "),
+        ("relax-at = 0.1\nrelax-to = 0.1", "--relax-at 0.1: a member is relaxed at a fraction"),
+        ("adapter = 'llvmpipe'\nbackend = 'cpu'", "--adapter llvmpipe: "),
+        ("adapter = ' '", "--adapter '': "),
+        ("event = ['a = area <= 1', 'a = area <= 2']", "--event a = area <= 2: another event has this name"),
+    ];
+
+    /// TOML text at the edge of what is allowed.
+    const ACCEPTED: &[&str] = &[
+        "",
+        "curves = 1",
+        "curves = 1000000000",
+        "points = 6\namplitude = 0",
+        "points = 32",
+        "points = 1000000",
+        "seed = 0",
+        "seed = 18446744073709551615",
+        "tau = 1",
+        "tau = 2\nno-redistribution = true",
+        "t-end = 0.001",
+        "tau = 0.001\nt-end = 999999",
+        "omega = 0",
+        "omega = 1000",
+        "omega = 1e300\nno-redistribution = true",
+        "shape = 'flower:25:0.1'",
+        "tolerance = 0.1",
+        "tolerance = 1e-300",
+        "sor = 1.99",
+        "max-sweeps = 1",
+        "relax-to = 0.999",
+        "series = 5",
+        "snapshots = [0, 2]",
+        "snapshots = []",
+        "snapshots = [0]\nstore = 'zarr'",
+        "store = 'csv'",
+        "threads = 1024",
+        "order = 'lexicographic'",
+        "order = 'lexicographic'\nbackend = 'cpu'",
+        "solver = 'direct'\nbackend = 'cpu'",
+        "adaptive = 1",
+        "adaptive = 1e-8",
+        "adaptive = 1e-5\nprecision = 'f32'",
+        "adaptive = 0.001\nsolver = 'gauss-seidel'\ntolerance = 1e-6\nmax-sweeps = 9",
+        "pull = 0",
+        "pull = 'auto'",
+        "relax-at = 3",
+        "adapter = 'llvmpipe'",
+        "event = []",
+        "event = ['a = area <= 1', 'b = area <= 1']",
+    ];
+
+    #[test]
+    fn every_value_out_of_range_is_refused_by_name() {
+        for (text, start) in REFUSED {
+            let error = Spec::from_toml(text).unwrap().validate().expect_err(text);
+            assert_eq!(error.exit_code(), 2);
+            let message = error.to_string();
+            assert!(message.starts_with(start), "{text}: {message}");
+            assert!(message.contains("; ") && !message.contains('\n'), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn the_edges_of_every_range_are_allowed() {
+        for text in ACCEPTED {
+            Spec::from_toml(text).unwrap().validate().unwrap_or_else(|e| panic!("{text}: {e}"));
+        }
+    }
+
+    #[test]
+    fn every_number_has_a_case() {
+        let numbers = [
+            "curves",
+            "points",
+            "tau",
+            "t-end",
+            "omega",
+            "tolerance",
+            "sor",
+            "max-sweeps",
+            "relax-to",
+            "relax-at",
+            "adaptive",
+            "pull",
+            "mobility",
+        ];
+        for key in numbers.into_iter().chain(["series", "snapshots", "only", "threads"]) {
+            assert!(REFUSED.iter().any(|(_, start)| start.starts_with(&format!("--{key} "))), "{key}");
+        }
+    }
+
+    #[test]
+    fn lists_are_sorted_and_free_of_repetitions() {
+        let spec = Spec::from_toml("snapshots = [1, 0, 1.0, -0.0]\nonly = [7, 3, 7]").unwrap().validate().unwrap();
+        assert_eq!(spec.snapshots, [0.0, 1.0]);
+        assert!(spec.snapshots[0].is_sign_positive());
+        assert_eq!(spec.only, Some(vec![3, 7]));
+    }
+
+    #[test]
+    fn too_many_events_are_refused() {
+        let of = |count: usize| (0..count).map(|i| format!("e{i} = area <= {i}").parse().unwrap()).collect();
+        assert!(Spec { event: of(MAX_EVENTS), ..Spec::default() }.validate().is_ok());
+        let message = Spec { event: of(MAX_EVENTS + 1), ..Spec::default() }.validate().unwrap_err().to_string();
+        assert_eq!(message, "--event (33 events): too many events; at most 32");
+    }
+
+    #[test]
+    fn too_many_snapshots_are_refused() {
+        let snapshots: Vec<f64> = (0..=MAX_SNAPSHOTS).map(|i| i as f64 * 1e-4).collect();
+        let message = Spec { snapshots, ..Spec::default() }.validate().unwrap_err().to_string();
+        assert!(message.starts_with("--snapshots (10001 times): "), "{message}");
+        let rows = |points| Spec { snapshots: (0..1000).map(|i| i as f64 * 1e-3).collect(), points, ..Spec::default() };
+        assert_eq!(rows(100_000).validate().unwrap().snapshots.len(), 1000);
+        let message = rows(100_001).validate().unwrap_err().to_string();
+        assert!(message.starts_with("--snapshots (1000 times): 100001000 rows per member; at most"), "{message}");
+    }
+}

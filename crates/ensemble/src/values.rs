@@ -1,0 +1,334 @@
+//! The values of a member: those of the spec, with a number drawn for each distribution.
+//!
+//! They are a pure function of the spec and the member. The numbers of each key have draws of their own, so that the flow
+//! of a member is the same whether or not its shape is drawn, too; only the coordinates of `--design sobol` are counted
+//! through, in the order shape, flow, amplitude, decay.
+
+use std::borrow::Cow;
+
+use super::{
+    Spec,
+    drawn::{Drawable, Drawn, Refused, corners},
+};
+use curvelax_base::{
+    error::{Error, Result, echo},
+    random::{Design, Distribution, DrawAddress, MAX_SOBOL},
+};
+use curvelax_curve::{RadialLaw, Shape};
+use curvelax_flow::flow::Flow;
+
+/// Members whose values, besides the tails of each distribution, stand for all where a bound for all is needed. They are
+/// the first ones of the first cell, whichever run.
+const PROBED: u64 = 32;
+/// Shares of the distributions below and above which a bound looks.
+const TAILS: [f64; 2] = [1e-5, 1.0 - 1e-5];
+/// Bits of the places of a key.
+const PLACE_BITS: u32 = 16;
+
+/// What may differ between the members of a cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MemberValues<'a> {
+    /// The curve that is perturbed.
+    pub shape: Cow<'a, Shape>,
+    /// The law of motion.
+    pub flow: Cow<'a, Flow>,
+    /// σ of the perturbation.
+    pub amplitude: f64,
+    /// p of the perturbation.
+    pub decay: f64,
+}
+
+impl Spec {
+    /// The values of all members; where each has its own, those at the medians of the distributions.
+    pub fn typical(&self) -> MemberValues<'_> {
+        MemberValues {
+            shape: Cow::Borrowed(self.shape.typical()),
+            flow: Cow::Borrowed(self.flow.typical()),
+            amplitude: *self.amplitude.typical(),
+            decay: *self.decay.typical(),
+        }
+    }
+
+    /// The values that are drawn for `member`, an index over all cells; with common random numbers, over one.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for values that cannot be, which a [valid](Spec::validate) spec does not have.
+    pub fn values(&self, member: u64) -> Result<MemberValues<'_>> {
+        self.values_at(|place| self.design.uniform(&DrawAddress { member, ..place }))
+    }
+
+    /// Those of a member with this index in a study, in its cell.
+    ///
+    /// # Errors
+    /// As [`Spec::values`].
+    pub fn values_of(&self, member: u64, cell: u64) -> Result<MemberValues<'_>> {
+        self.values(self.drawn_as(member, cell))
+    }
+
+    /// The index of the random numbers of the member with this index in a study, in its cell.
+    pub(super) fn drawn_as(&self, member: u64, cell: u64) -> u64 {
+        if self.common_random_numbers { member - cell * self.members_per_cell() } else { member }
+    }
+
+    /// The numbers that are drawn for `member`, as for [`Spec::values`], each with its name: that of its key, and its
+    /// rank from 1 where the key is a shape or a flow.
+    pub fn drawn_numbers(&self, member: u64) -> Vec<(String, f64)> {
+        let numbers = self.numbers(|place| self.design.uniform(&DrawAddress { member, ..place }));
+        drawn_names(self.drawn_counts()).into_iter().zip(numbers.into_iter().flatten()).collect()
+    }
+
+    /// How many numbers are drawn for the keys shape, flow, amplitude and decay.
+    pub(super) fn drawn_counts(&self) -> [usize; 4] {
+        self.distributions().map(<[Distribution]>::len)
+    }
+
+    /// Whether curves are perturbed, at least those of some members.
+    pub fn is_perturbed(&self) -> bool {
+        self.amplitude.is_drawn() || *self.amplitude.typical() != 0.0
+    }
+
+    /// Whether members have values of their own.
+    pub fn has_drawn_values(&self) -> bool {
+        self.distributions().iter().any(|of_key| !of_key.is_empty())
+    }
+
+    /// Whether several members are made of one of many outlines.
+    pub fn has_copies_of_outlines(&self) -> bool {
+        self.outlines.is_some() && self.curves > 1
+    }
+
+    /// Whether its members differ at all, without a sweep.
+    pub fn has_different_members(&self) -> bool {
+        self.has_drawn_values() || *self.amplitude.typical() != 0.0 || self.outlines.is_some_and(|count| count > 1)
+    }
+
+    /// Values in the midst and in the tails of what is drawn, for bounds; the first are the [typical](Spec::typical)
+    /// ones. They depend neither on the cell nor on the members that run.
+    pub(super) fn probes(&self) -> Vec<MemberValues<'_>> {
+        if !self.has_drawn_values() {
+            return vec![self.typical()];
+        }
+        let places: u32 = self.distributions().iter().map(|of_key| of_key.len() as u32).sum();
+        let tail = |place: u32, u: f64| self.values_at(|at| if at.coordinate == place { u } else { 0.5 });
+        let tails = (0..places).flat_map(|place| TAILS.map(|u| tail(place, u)));
+        let members = (0..PROBED.min(self.members_per_cell())).map(|member| self.values(member));
+        let probe = |values: Result<_>| values.unwrap_or_else(|_| self.typical());
+        [self.typical()].into_iter().chain(tails.chain(members).map(probe)).collect()
+    }
+
+    /// Checks what the values of each key cannot say alone: the number of coordinates, the law of the perturbation, and
+    /// whether the nodes resolve the modes of a shape.
+    ///
+    /// # Errors
+    /// [`Error::Request`] with the share of the members that would be refused.
+    pub(super) fn check_drawn(&self) -> Result<()> {
+        let places: usize = self.distributions().iter().map(|of_key| of_key.len()).sum();
+        if self.design == Design::Sobol && places > MAX_SOBOL {
+            let problem = format!("{places} distributions; the sequence has {MAX_SOBOL} coordinates");
+            return Err(Error::value("design", "sobol", &problem, "use random or lhs, or fewer distributions"));
+        }
+        // Cells are checked on their own.
+        if ["amplitude", "modes", "decay"].into_iter().any(|key| self.sweep.has(key)) {
+            return Ok(());
+        }
+        let [_, _, amplitude, decay] = self.distributions();
+        let of: Vec<&Distribution> = amplitude.iter().chain(decay).collect();
+        let law = |numbers: &[f64]| {
+            let (first, second) = numbers.split_at(amplitude.len());
+            let [amplitude, decay] = [self.amplitude.at(first), self.decay.at(second)];
+            amplitude
+                .and_then(|amplitude| Ok((amplitude, decay?)))
+                .map_err(Error::Request)
+                .and_then(|(amplitude, decay)| RadialLaw::new(amplitude, self.modes, decay))
+                .err()
+                .map(|error| error.to_string())
+        };
+        if !of.is_empty()
+            && let Some(refused) = Refused::of(&of, law)
+        {
+            let [key, value] = match amplitude.is_empty() {
+                false => ["amplitude", &self.amplitude.to_string()],
+                true => ["decay", &self.decay.to_string()],
+            };
+            return Err(Error::Request(format!("--{key} {}: {refused}", echo(value))));
+        }
+        Ok(())
+    }
+
+    /// The highest mode of a shape made of modes, whichever member's.
+    pub(super) fn highest_mode(&self) -> Option<u32> {
+        // Modes are whole numbers, so only a choice can give them.
+        let corners = corners(&self.shape.distributions().iter().collect::<Vec<_>>());
+        let shapes = corners.filter_map(|numbers| self.shape.at(&numbers).ok());
+        shapes.filter_map(|shape| shape.highest_mode()).max()
+    }
+
+    /// The distributions of each key.
+    pub(super) fn distributions(&self) -> [&[Distribution]; 4] {
+        let Spec { shape, flow, amplitude, decay, .. } = self;
+        [shape.distributions(), flow.distributions(), amplitude.distributions(), decay.distributions()]
+    }
+
+    fn values_at(&self, uniform: impl Fn(DrawAddress) -> f64) -> Result<MemberValues<'_>> {
+        let [shape, flow, amplitude, decay] = self.numbers(uniform);
+        Ok(MemberValues {
+            shape: own("shape", &self.shape, &shape)?,
+            flow: own("flow", &self.flow, &flow)?,
+            amplitude: *own("amplitude", &self.amplitude, &amplitude)?,
+            decay: *own("decay", &self.decay, &decay)?,
+        })
+    }
+
+    /// The numbers of each key, from the uniform ones of their places.
+    fn numbers(&self, uniform: impl Fn(DrawAddress) -> f64) -> [Vec<f64>; 4] {
+        let (seed, members) = (self.seed, self.members_per_cell());
+        let (mut key, mut coordinate) = (0, 0);
+        self.distributions().map(|of_key| {
+            let number = |(rank, of): (u32, &Distribution)| {
+                let place = key << PLACE_BITS | rank;
+                let u = uniform(DrawAddress { seed, members, member: 0, place, coordinate: coordinate + rank });
+                of.quantile(u)
+            };
+            let numbers: Vec<f64> = (0..).zip(of_key).map(number).collect();
+            (key, coordinate) = (key + 1, coordinate + of_key.len() as u32);
+            numbers
+        })
+    }
+}
+
+/// The names of the numbers that are drawn, so many for each of the keys shape, flow, amplitude and decay.
+pub(super) fn drawn_names(counts: [usize; 4]) -> Vec<String> {
+    let keys = ["shape", "flow", "amplitude", "decay"];
+    let name = |key: usize, rank: usize| if key < 2 { format!("{}_{}", keys[key], rank + 1) } else { keys[key].into() };
+    counts.into_iter().enumerate().flat_map(|(key, count)| (0..count).map(move |rank| name(key, rank))).collect()
+}
+
+/// The value of a key with these numbers.
+fn own<'a, T: Drawable>(key: &str, drawn: &'a Drawn<T>, numbers: &[f64]) -> Result<Cow<'a, T>> {
+    if !drawn.is_drawn() {
+        return Ok(Cow::Borrowed(drawn.typical()));
+    }
+    let refused = |message: String| Error::Request(format!("--{key} {}: {message}", echo(drawn)));
+    drawn.at(numbers).map(Cow::Owned).map_err(refused)
+}
+
+/// What linear theory says about a member of a spec.
+impl Spec {
+    /// Returns the time `growth` of [`Flow::growth`] for a member of area `area` under its own flow.
+    pub fn growth(&self, flow: &Flow, area: f64) -> Option<f64> {
+        flow.growth(area).map(|growth| growth / self.mobility())
+    }
+
+    /// The lowest mode, 2 or more, of a member with these values: it decays last.
+    pub(super) fn slowest_mode(&self, values: &MemberValues) -> Option<u32> {
+        let drawn = (values.amplitude > 0.0).then(|| self.modes.low.max(2));
+        values.shape.lowest_mode().into_iter().chain(drawn).min()
+    }
+
+    /// The rate at which, by linear theory, the excess of a member of area `area` falls once only the slowest mode is
+    /// left: the lowest one of the shape and the perturbation. It is in 1/time, or an exponent: see
+    /// [`Flow::excess_rate`].
+    pub fn rate_in_theory(&self, values: &MemberValues, area: f64) -> Option<f64> {
+        let rate = values.flow.excess_rate(self.slowest_mode(values)?, area)?;
+        Some(if values.flow.growth(area).is_some() { rate } else { self.mobility() * rate })
+    }
+
+    /// The mean excess that the perturbation of a circle has in each mode from 2 on: ½ (m²-1) a_m².
+    pub(super) fn perturbed_excess(&self, values: &MemberValues) -> Vec<f64> {
+        let (low, high) = (self.modes.low, if values.amplitude == 0.0 { 1 } else { self.modes.high });
+        let part = |m: u32| {
+            let (deviation, of) = (values.amplitude * f64::from(m).powf(-values.decay), f64::from(m));
+            if m < low { 0.0 } else { 0.5 * (of * of - 1.0) * deviation * deviation }
+        };
+        (2..=high).map(part).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spec(text: &str) -> Spec {
+        Spec::from_toml(text).unwrap()
+    }
+
+    const ALL: &str = "shape = 'ellipse:uniform(1.2..3),loguniform(0.5..1)'\nflow = 'elastic:lognormal(0.5,0.2)'\n\
+                       amplitude = 'uniform(0.01..0.1)'\ndecay = 'choice(1,1.5,2)'";
+
+    #[test]
+    fn without_distributions_the_values_are_those_of_the_spec_and_cost_no_copy() {
+        let spec = Spec::default();
+        let values = spec.values(7).unwrap();
+        assert_eq!(values, spec.typical());
+        assert!(matches!(values.shape, Cow::Borrowed(_)) && matches!(values.flow, Cow::Borrowed(_)));
+        assert!(!spec.has_drawn_values() && spec.drawn_numbers(7).is_empty() && spec.probes().len() == 1);
+    }
+
+    #[test]
+    fn the_numbers_of_a_member_have_names_and_are_in_its_values() {
+        let spec = spec(ALL);
+        let numbers = spec.drawn_numbers(3);
+        let names: Vec<&str> = numbers.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["shape_1", "shape_2", "flow_1", "amplitude", "decay"]);
+        let values = spec.values(3).unwrap();
+        assert_eq!(*values.shape, Shape::Ellipse { a: numbers[0].1, b: numbers[1].1 });
+        assert_eq!(*values.flow, Flow::Elastic(numbers[2].1));
+        assert_eq!([values.amplitude, values.decay], [numbers[3].1, numbers[4].1]);
+        assert_eq!(*spec.typical().shape, Shape::Ellipse { a: 2.1, b: 0.5_f64.sqrt() });
+    }
+
+    #[test]
+    fn a_number_is_the_same_draw_whatever_else_is_drawn() {
+        let (all, alone) = (spec(ALL), spec("flow = 'elastic:lognormal(0.5,0.2)'\namplitude = 'uniform(0.01..0.1)'"));
+        for member in 0..9 {
+            let [one, other] = [&all, &alone].map(|spec| spec.values(member).unwrap());
+            assert_eq!((one.flow, one.amplitude), (other.flow, other.amplitude));
+        }
+        assert_ne!(all.values(0).unwrap(), all.values(1).unwrap());
+        assert_ne!(all.values(0).unwrap(), Spec { seed: 2, ..all.clone() }.values(0).unwrap());
+    }
+
+    #[test]
+    fn the_draws_of_values_are_not_those_of_the_perturbation() {
+        use curvelax_base::random::Stream;
+        let spec = spec("amplitude = 'uniform(0..0.1)'");
+        let drawn: Vec<f64> = (0..50).map(|member| 10.0 * spec.values(member).unwrap().amplitude).collect();
+        for attempt in 0..20 {
+            for draw in 0..20 {
+                let words = |member: u64| Stream::new(1, member, attempt).uniforms(draw);
+                assert!((0..50).all(|member| words(member).iter().all(|u| (u - drawn[member as usize]).abs() > 1e-12)));
+            }
+        }
+    }
+
+    #[test]
+    fn the_law_of_the_perturbation_is_refused_with_the_share_of_members_that_break_it() {
+        for (text, start) in [
+            (
+                "amplitude = 'normal(0.05,0.025)'",
+                "--amplitude normal(0.05,0.025): 2.3 % of the members would be refused (--amplitude -",
+            ),
+            ("amplitude = 'uniform(0..1)'", "--amplitude uniform(0..1): "),
+            ("decay = 'uniform(0..40)'", "--decay uniform(0..40): 50 % of the members would be refused (--decay "),
+            ("amplitude = 0.3\ndecay = 'uniform(-1..1)'", "--decay uniform(-1..1): "),
+        ] {
+            let error = spec(text).validate().unwrap_err();
+            assert!(error.exit_code() == 2 && error.to_string().starts_with(start), "{text}: {error}");
+        }
+        let modes: Vec<String> = (2..=24).map(|mode| format!("{mode}:uniform(0..0.01)")).collect();
+        let many = spec(&format!("design = 'sobol'\nshape = 'flower:{}'", modes.join(",")));
+        assert!(many.validate().unwrap_err().to_string().starts_with("--design sobol: 23 distributions; "));
+    }
+
+    #[test]
+    fn probes_reach_into_the_tails() {
+        let spec = spec("shape = 'circle:lognormal(1,1)'");
+        let probes = spec.probes();
+        let radii = probes.iter().map(|values| match *values.shape {
+            Shape::Circle { radius } => radius,
+            _ => f64::NAN,
+        });
+        let (low, high) = radii.fold((f64::INFINITY, 0.0_f64), |(low, high), r| (low.min(r), high.max(r)));
+        assert!(low < 0.05 && high > 20.0, "{low} {high}");
+    }
+}

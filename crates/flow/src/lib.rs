@@ -1,0 +1,14 @@
+//! The semi-implicit Lagrangian scheme of K. Mikula and D. Ševčovič, *Numerical aspects of evolution of plane curves
+//! satisfying the fourth order geometric equation*: one member, in any number type and in lanes, without files or threads.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`number`] | the number type of the scheme, alone and in lanes |
+//! | [`flow`] | the law b(k) |
+//! | [`solver`] | periodic pentadiagonal systems: rows, sweeps, direct solution |
+//! | [`scheme`] | the step, one file per stage, named as in `shaders/` |
+
+pub mod flow;
+pub mod number;
+pub mod scheme;
+pub mod solver;

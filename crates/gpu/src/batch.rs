@@ -1,0 +1,219 @@
+//! A batch of slots: its buffers, the host's [`Mirror`] of the small ones, and at most one dispatch in progress.
+
+use std::{
+    sync::mpsc::{Receiver, channel},
+    time::Duration,
+};
+
+use super::{
+    abandoned,
+    adapter::{OpenGpu, Waited},
+    clock::Moment,
+};
+use curvelax_backend::gpu::{
+    Budget,
+    mirror::{Binding, Caps, Mirror},
+};
+use curvelax_base::error::Result;
+use curvelax_flow::{number::Real, scheme::run::Run, solver::Blocks};
+
+/// Slots side by side in one dispatch.
+pub(super) struct Batch<T> {
+    buffers: Buffers,
+    bindings: wgpu::BindGroup,
+    mirror: Mirror<T>,
+    flight: Option<Flight>,
+}
+
+/// A dispatch in progress.
+struct Flight {
+    since: Moment,
+    back: Reading,
+}
+
+/// A copy to the host in progress.
+pub(super) struct Reading {
+    submission: wgpu::SubmissionIndex,
+    staging: wgpu::Buffer,
+    bytes: u64,
+    mapped: Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
+}
+
+/// The buffers, in the order of their bindings, and one for reading back.
+struct Buffers {
+    bound: Vec<wgpu::Buffer>,
+    staging: wgpu::Buffer,
+}
+
+impl<T: Real> Batch<T> {
+    /// Allocates room for `slots` members.
+    pub fn new(device: &OpenGpu, pipeline: &wgpu::ComputePipeline, blocks: Blocks, slots: usize, traced: bool) -> Self {
+        let buffers = Buffers::new::<T>(&device.device, blocks, slots, traced);
+        Batch {
+            bindings: buffers.bind(&device.device, pipeline),
+            buffers,
+            mirror: Mirror::new(blocks, slots),
+            flight: None,
+        }
+    }
+
+    /// Returns the bytes of its buffers.
+    pub fn bytes(&self) -> u64 {
+        let Buffers { bound, staging } = &self.buffers;
+        bound.iter().chain([staging]).map(wgpu::Buffer::size).sum()
+    }
+
+    pub fn mirror(&self) -> &Mirror<T> {
+        &self.mirror
+    }
+
+    pub fn mirror_mut(&mut self) -> &mut Mirror<T> {
+        &mut self.mirror
+    }
+
+    /// Returns where the state of `slot` is stored.
+    pub fn state_at(&self, slot: usize) -> (&wgpu::Buffer, u64, u64) {
+        let (offset, bytes) = self.mirror.state_at(slot);
+        (self.buffers.at(Binding::States), offset, bytes)
+    }
+
+    pub fn trace(&self) -> Option<&wgpu::Buffer> {
+        self.buffers.bound.get(Binding::Trace as usize)
+    }
+
+    pub fn load(&mut self, device: &OpenGpu, slot: usize, run: &Run<T>) {
+        let rows = self.mirror.load(slot, run);
+        let (states, offset, _) = self.state_at(slot);
+        device.queue.write_buffer(states, offset, bytemuck::cast_slice(&rows));
+    }
+
+    /// Dispatches the members that are due, if any.
+    pub fn start(&mut self, device: &OpenGpu, pipeline: &wgpu::ComputePipeline, budget: Budget, caps: Caps) {
+        let due = self.mirror.look();
+        if due == 0 {
+            return;
+        }
+        let Batch { mirror, buffers, .. } = self;
+        mirror.upload(budget, caps, |binding, offset, bytes| {
+            device.queue.write_buffer(buffers.at(binding), offset, bytes);
+        });
+        let mut encoder = device.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &self.bindings, &[]);
+        pass.dispatch_workgroups(due, 1, 1);
+        drop(pass);
+        let reads = [Binding::Counters, Binding::Reports].map(|binding| buffers.at(binding));
+        let reads = reads.map(|buffer| (buffer, 0, buffer.size()));
+        let back = Reading::submit(device, encoder, &buffers.staging, &reads);
+        self.flight = Some(Flight { since: device.now(), back });
+    }
+
+    /// Returns when the dispatch in progress was started.
+    pub fn since(&self) -> Option<Moment> {
+        self.flight.as_ref().map(|flight| flight.since)
+    }
+
+    /// Waits for the dispatch, but no longer than `most`. Returns whether nothing is left to wait for, even because of
+    /// a fault, which `finish` reports.
+    pub fn is_back(&self, device: &OpenGpu, most: Duration) -> bool {
+        let Some(Flight { back, .. }) = &self.flight else { return true };
+        !matches!(device.wait(&back.submission, most), Ok(Waited::OnItsWay))
+    }
+
+    /// Waits for the dispatch while it has time `left`, and reads its records; returns when it was started.
+    pub fn finish(&mut self, device: &OpenGpu, left: impl Fn(Moment) -> Duration) -> Result<Option<Moment>> {
+        let Some(Flight { since, back }) = self.flight.take() else {
+            self.mirror.forget_sweeps();
+            return Ok(None);
+        };
+        let bytes = back.wait(device, since, left)?;
+        let idle = |slot| device.error(&format!("a dispatch did nothing for the member in slot {slot}"));
+        self.mirror.take(&bytes).map_err(idle)?;
+        Ok(Some(since))
+    }
+}
+
+impl Reading {
+    /// Runs `encoder`, then copies `bytes` of each buffer to the host through `staging`.
+    pub fn submit(
+        device: &OpenGpu,
+        mut encoder: wgpu::CommandEncoder,
+        staging: &wgpu::Buffer,
+        reads: &[(&wgpu::Buffer, u64, u64)],
+    ) -> Reading {
+        let mut at = 0;
+        for (buffer, offset, bytes) in reads {
+            encoder.copy_buffer_to_buffer(buffer, *offset, staging, at, *bytes);
+            at += bytes;
+        }
+        let submission = device.queue.submit([encoder.finish()]);
+        let (send, mapped) = channel();
+        staging.slice(..at).map_async(wgpu::MapMode::Read, move |result| drop(send.send(result)));
+        Reading { submission, staging: staging.clone(), bytes: at, mapped }
+    }
+
+    /// Waits for the copy, in progress `since` then, while there is time `left`.
+    pub fn wait(self, device: &OpenGpu, since: Moment, left: impl Fn(Moment) -> Duration) -> Result<Vec<u8>> {
+        while device.wait(&self.submission, left(since))? == Waited::OnItsWay {
+            if left(since).is_zero() {
+                let seconds = since.elapsed().as_secs_f64();
+                // To release a device, wgpu waits until it is idle.
+                abandoned::abandon(device.clone());
+                return Err(device.error(&format!("a dispatch did not end in {seconds:.3} s and is given up")));
+            }
+        }
+        let failed = |what: String| device.error(&what);
+        match self.mapped.try_recv() {
+            Ok(Ok(())) => {}
+            other => return Err(failed(format!("results could not be read back ({other:?})"))),
+        }
+        let slice = self.staging.slice(..self.bytes);
+        let view = slice.get_mapped_range().map_err(|e| failed(format!("results could not be mapped ({e})")))?;
+        let bytes = view.to_vec();
+        drop(view);
+        self.staging.unmap();
+        Ok(bytes)
+    }
+}
+
+/// A buffer that the host can read.
+pub(super) fn staging(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
+    let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
+    device.create_buffer(&wgpu::BufferDescriptor { label: Some("staging"), size, usage, mapped_at_creation: false })
+}
+
+impl Buffers {
+    fn new<T: Real>(device: &wgpu::Device, blocks: Blocks, slots: usize, traced: bool) -> Buffers {
+        let buffer = |binding: Binding| {
+            let kind = match binding {
+                Binding::Dispatch => wgpu::BufferUsages::UNIFORM,
+                _ => wgpu::BufferUsages::STORAGE,
+            };
+            let usage = kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
+            let (label, size) = (Some(binding.name()), binding.bytes::<T>(blocks, slots) as u64);
+            device.create_buffer(&wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false })
+        };
+        let bindings = Binding::ALL.into_iter().filter(|binding| traced || *binding != Binding::Trace);
+        let bound: Vec<wgpu::Buffer> = bindings.map(buffer).collect();
+        let back = [Binding::Counters, Binding::Reports].map(|binding| bound[binding as usize].size());
+        Buffers { staging: staging(device, back.into_iter().sum()), bound }
+    }
+
+    fn at(&self, binding: Binding) -> &wgpu::Buffer {
+        &self.bound[binding as usize]
+    }
+
+    fn bind(&self, device: &wgpu::Device, pipeline: &wgpu::ComputePipeline) -> wgpu::BindGroup {
+        let entries: Vec<_> = (0..)
+            .zip(&self.bound)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        let layout = pipeline.get_bind_group_layout(0);
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("evolve"),
+            layout: &layout,
+            entries: &entries,
+        })
+    }
+}

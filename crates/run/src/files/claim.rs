@@ -1,0 +1,201 @@
+//! A folder into which one command at a time writes.
+//!
+//! Two locks ensure this. The lock on the folder itself cannot be removed or replaced while it is held. The lock on the
+//! file `.curvelax.lock` is for file systems that lock files only; there the file must not be replaced. Both end with
+//! their process.
+
+use std::{
+    fs::{File, TryLockError},
+    io,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use super::{
+    disk::remove,
+    place::{Place, lies_at},
+};
+use curvelax_base::{
+    error::{Error, Result},
+    input,
+};
+
+/// Locked while a run writes. Only the lock counts, which ends with its process, not the file.
+pub const LOCK: &str = ".curvelax.lock";
+
+/// A folder that this process holds; released when dropped.
+#[derive(Debug)]
+pub struct Claim {
+    /// Where it was found.
+    path: PathBuf,
+    /// The folder that was opened there; nothing if the system opens no folders.
+    folder: Option<Arc<File>>,
+    /// Whether the folder itself is locked.
+    whole: bool,
+    place: Place,
+    lock: File,
+}
+
+impl Claim {
+    /// Claims the folder at `path`; none if another process holds it.
+    pub fn take(path: &Path) -> io::Result<Option<Claim>> {
+        loop {
+            let folder = if cfg!(unix) { Some(Arc::new(File::open(path)?)) } else { None };
+            let whole = match folder.as_ref().map(|folder| folder.try_lock()) {
+                Some(Err(TryLockError::WouldBlock)) => return Ok(None),
+                Some(Ok(())) => true,
+                Some(Err(TryLockError::Error(_))) | None => false,
+            };
+            let place = match &folder {
+                Some(folder) => Place::opened(path, Arc::clone(folder)),
+                None => Place::named(path),
+            };
+            let lock = lock(&place).map_err(|e| io::Error::new(e.kind(), format!("{LOCK}: {e}")))?;
+            let Some(lock) = lock else { return Ok(None) };
+            let claim = Claim { path: path.into(), folder, whole, place, lock };
+            // The previous holder may have removed the folder or the file after they were opened here.
+            if claim.is_there()? && claim.has_its_file()? {
+                return Ok(Some(claim));
+            }
+        }
+    }
+
+    /// The folder.
+    pub fn place(&self) -> &Place {
+        &self.place
+    }
+
+    /// Uses the absolute path from now on.
+    pub fn make_absolute(&mut self) -> Result<()> {
+        self.path = std::path::absolute(&self.path).map_err(Error::io("cannot find", &self.path))?;
+        self.place = match &self.folder {
+            Some(folder) => Place::opened(&self.path, Arc::clone(folder)),
+            None => Place::named(&self.path),
+        };
+        Ok(())
+    }
+
+    /// Checks that the folder is still held, and still where it was found.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] if it is not.
+    pub fn check(&self) -> Result<()> {
+        let path = self.path.display();
+        let cannot = Error::io("cannot find", &self.path);
+        let held = || if self.whole { Ok(true) } else { self.has_its_file() };
+        match self.is_there().and_then(|there| Ok((there, held()?))) {
+            Err(e) => Err(cannot(e)),
+            Ok((true, true)) => Ok(()),
+            Ok((false, _)) => Err(Error::Lost(format!(
+                "{path}: the folder was moved, removed or replaced during the run, and what is there now was not \
+                 touched; the checkpoint went with the old one, where curvelax resume continues"
+            ))),
+            Ok((true, false)) => Err(Error::Lost(format!(
+                "{path}: its lock {LOCK} was removed or replaced during the run, so another run may be writing \
+                 there; curvelax resume continues from the last checkpoint"
+            ))),
+        }
+    }
+
+    /// Whether the folder that is held is the one at its path.
+    fn is_there(&self) -> io::Result<bool> {
+        self.folder.as_ref().map_or(Ok(true), |folder| lies_at(folder, &self.path))
+    }
+
+    fn has_its_file(&self) -> io::Result<bool> {
+        lies_at(&self.lock, self.place.join(LOCK).at())
+    }
+
+    /// Whether the folder is still the one at its path, as far as this can be known.
+    pub fn stays(&self) -> bool {
+        self.is_there().unwrap_or(false)
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        // Removed while locked: after unlocking it could already be another run's.
+        if self.has_its_file().unwrap_or(false) {
+            let _ = remove(self.place.join(LOCK).at());
+        }
+    }
+}
+
+/// Locks the file in `folder`, creating it if needed; none if another process holds it.
+fn lock(folder: &Place) -> io::Result<Option<File>> {
+    let path = folder.join(LOCK);
+    if path.at().is_symlink() {
+        remove(path.at())?;
+    }
+    let file = input::open_as(path.at(), File::options().write(true).create(true).truncate(false))?;
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Ok(None),
+        Err(TryLockError::Error(e)) if !has_no_locks(&e) => Err(e),
+        _ => Ok(Some(file)),
+    }
+}
+
+/// Whether another process holds the folder at `path` or is writing there.
+pub fn is_held(path: &Path) -> bool {
+    let locked =
+        |file: io::Result<File>| file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)));
+    locked(input::open(&path.join(LOCK))) || (cfg!(unix) && locked(File::open(path)))
+}
+
+/// Whether the file system reports that it has no locks, which does not prevent a run: NFS without its lock daemon
+/// calls that `ENOLCK`.
+fn has_no_locks(error: &io::Error) -> bool {
+    const ENOLCK: i32 = if cfg!(target_os = "linux") { 37 } else { 77 };
+    error.kind() == io::ErrorKind::Unsupported || (cfg!(unix) && error.raw_os_error() == Some(ENOLCK))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_folder_that_is_replaced_is_lost_and_its_successor_is_not_touched() {
+        let home = tempfile::tempdir().unwrap();
+        let [out, moved] = ["out", "moved"].map(|name| home.path().join(name));
+        fs::create_dir(&out).unwrap();
+        let first = Claim::take(&out).unwrap().unwrap();
+        first.check().unwrap();
+        assert!(Claim::take(&out).unwrap().is_none() && is_held(&out));
+        fs::rename(&out, &moved).unwrap();
+        let error = first.check().unwrap_err();
+        assert!(
+            matches!(&error, Error::Lost(_)) && error.to_string().contains("was moved, removed or replaced"),
+            "{error}"
+        );
+        fs::create_dir(&out).unwrap();
+        let second = Claim::take(&out).unwrap().unwrap();
+        assert!(matches!(first.check(), Err(Error::Lost(_))) && !first.stays());
+        second.check().unwrap();
+        drop(first);
+        assert_eq!((names(&out), names(&moved)), (vec![LOCK.into()], vec![]));
+        fs::remove_dir_all(&out).unwrap();
+        assert!(matches!(second.check(), Err(Error::Lost(_))));
+    }
+
+    #[test]
+    fn without_its_file_a_folder_is_held_by_its_own_lock_alone() {
+        let home = tempfile::tempdir().unwrap();
+        let mut claim = Claim::take(home.path()).unwrap().unwrap();
+        fs::remove_file(home.path().join(LOCK)).unwrap();
+        claim.check().unwrap();
+        assert!(Claim::take(home.path()).unwrap().is_none() && is_held(home.path()));
+        // As on file systems that lock files only.
+        claim.whole = false;
+        fs::write(home.path().join(LOCK), "").unwrap();
+        let error = claim.check().unwrap_err().to_string();
+        assert!(error.contains("its lock .curvelax.lock was removed or replaced"), "{error}");
+        drop(claim);
+        assert_eq!(names(home.path()), [LOCK], "it is another's");
+    }
+}

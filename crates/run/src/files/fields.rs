@@ -1,0 +1,113 @@
+//! The fields of a line of a table: taken from left to right, checked, refused by line and column.
+
+use std::{path::Path, str::FromStr};
+
+use csv::StringRecord;
+
+use super::names::REMEDY;
+use curvelax_base::error::{Error, Result, shortened};
+use curvelax_ensemble::Status;
+
+/// Characters of foreign text in a message.
+const SHOWN: usize = 200;
+
+/// The fields of a line, read from left to right.
+pub struct Fields<'a> {
+    path: &'a Path,
+    names: &'a [String],
+    line: &'a StringRecord,
+    taken: usize,
+}
+
+impl<'a> Fields<'a> {
+    /// The fields of `line` in the file at `path`, under these headings.
+    pub(super) fn new(path: &'a Path, names: &'a [String], line: &'a StringRecord) -> Fields<'a> {
+        Fields { path, names, line, taken: 0 }
+    }
+}
+
+impl Fields<'_> {
+    /// The next field, as a word.
+    pub fn word(&mut self) -> &str {
+        self.taken += 1;
+        &self.line[self.taken - 1]
+    }
+
+    /// A whole number.
+    pub fn whole<T: FromStr>(&mut self) -> Result<T> {
+        let value = self.word().parse();
+        value.map_err(|_| self.unexpected("a whole number"))
+    }
+
+    /// A whole number; none if unknown.
+    pub fn whole_or_none(&mut self) -> Result<Option<u64>> {
+        match self.word() {
+            "" => Ok(None),
+            word => match word.parse() {
+                Ok(number) => Ok(Some(number)),
+                Err(_) => Err(self.unexpected("a whole number or nothing")),
+            },
+        }
+    }
+
+    /// The name of a status.
+    pub fn status(&mut self) -> Result<Status> {
+        let word = self.word();
+        let status = Status::ALL.into_iter().find(|status| status.name() == word);
+        status.ok_or_else(|| self.unexpected(&Status::ALL.map(Status::name).join(", ")))
+    }
+
+    /// A float; none if unknown.
+    pub fn number(&mut self) -> Result<Option<f64>> {
+        match self.word() {
+            "" => Ok(None),
+            word => match word.parse().ok().filter(|value: &f64| value.is_finite()) {
+                None => Err(self.unexpected("a number or nothing")),
+                known => Ok(known),
+            },
+        }
+    }
+
+    /// A float; NaN if unknown.
+    pub fn known(&mut self) -> Result<f64> {
+        Ok(self.number()?.unwrap_or(f64::NAN))
+    }
+
+    /// A time that may be unknown.
+    pub fn event(&mut self) -> Result<Option<f64>> {
+        match self.number()? {
+            Some(t) if t < 0.0 => Err(self.unexpected("a time or nothing")),
+            t => Ok(t),
+        }
+    }
+
+    /// A time.
+    pub fn time(&mut self) -> Result<f64> {
+        self.event()?.ok_or_else(|| self.unexpected("a time"))
+    }
+
+    /// The error that the last field read is not what was expected.
+    pub fn unexpected(&self, expected: &str) -> Error {
+        self.refused(self.taken - 1, expected)
+    }
+
+    /// The error that the field of the column `name` is not what was expected.
+    pub fn unexpected_in(&self, name: &str, expected: &str) -> Error {
+        self.refused(self.names.iter().position(|own| own == name).unwrap_or(0), expected)
+    }
+
+    fn refused(&self, field: usize, expected: &str) -> Error {
+        Error::Request(format!(
+            "{}, line {}, column {}: expected {expected}, found `{}`; {REMEDY}",
+            self.path.display(),
+            number_of(self.line),
+            self.names[field],
+            shortened(&self.line[field], SHOWN)
+        ))
+    }
+}
+
+/// The number of a line in its file.
+pub(super) fn number_of(line: &StringRecord) -> u64 {
+    line.position().map_or(0, csv::Position::line)
+}

@@ -1,0 +1,609 @@
+//! The CSV files: one header, floats that read back exactly, empty fields for unknown values, sorted by member.
+//!
+//! A float that is not finite is unknown. There are no clock times: equal runs give equal bytes.
+//!
+//! A column is a line of `columns!`. [`Table::row`] writes its field and [`TableReader`](super::TableReader) reads it; how
+//! is in `column.rs`, by kind.
+
+use std::marker::PhantomData;
+
+use csv::{Writer, WriterBuilder};
+
+use super::{
+    column::{Field, TableRow, columns},
+    part_file::{Mark, PartFile},
+    place::Place,
+};
+use curvelax_base::error::{Error, Result};
+use curvelax_ensemble::{LevelRow, Outcome, SeriesRow, Snapshot};
+use curvelax_study::results::{explained::ExplainedRow, tally::MeanExcess};
+use curvelax_study::truth::{ConvergenceRow, WorkRow};
+
+/// Bytes gathered before they are written.
+const BUFFER: usize = 1 << 16;
+
+columns! { Outcome:
+    member: whole = member, "index of the member, from 0";
+    cell: whole = cell, "index of its cell, from 0";
+    status: status = status, "how the member ended";
+    t_end: time = t_end, "time of the last accepted state";
+    steps: whole = steps, "accepted steps";
+    rejected: whole = rejected, "adaptive steps that were refused";
+    sweeps_k: whole = sweeps_k, "sweeps on the curvature systems, 0 with the direct solver";
+    sweeps_x: whole = sweeps_x, "sweeps on the position systems";
+    t_relax: event = t_relax, "first time at which the excess reaches `relax-to` times its start, or `relax-at`, interpolated inside the step";
+    t_half: event = t_half, "first time at which the excess reaches half its start";
+    rate: optional = rate, "slope of -ln excess against time while the excess falls from a tenth to a thousandth of its start; for Willmore flow against ln(1 + 2t/R₀⁴); empty below 8 points";
+    rate_r2: optional = rate_r2, "share of the variance of ln excess that the line explains";
+    length_start: number = start.length, "length of the initial polygon";
+    length_end: number = end.length, "length of the last polygon";
+    area_start: number = start.area, "signed area of the initial polygon, positive counter-clockwise";
+    area_end: number = end.area, "signed area of the last polygon";
+    excess_start: number = start.excess, "L²/(4πA) - (n/π)·tan(π/n) of the initial polygon, 0 on a regular one";
+    excess_end: number = end.excess, "the same of the last polygon";
+    energy_start: number = start.energy, "∮(½k² + λ) ds at the start; λ is 0 unless the flow is elastic";
+    energy_end: number = end.energy, "the same at the end";
+    k_min: number = end.k_min, "smallest curvature of the last state";
+    k_max: number = end.k_max, "largest curvature of the last state";
+    turning: signed = end.turning, "turning number of the last polygon";
+    mesh_ratio: number = end.mesh_ratio, "longest over shortest edge of the last polygon";
+    metric_drift: number = end.metric_drift, "max |r_i - |e_i||/|e_i| of the last state: how far the scheme's own lengths have left those of the polygon";
+    self_crossing: event = self_crossing, "time at which the polygon was first seen to cross itself, which does not stop the member";
+    solves: whole = solves, "steps of the scheme that were computed, each a solve for k and one for x and y: 1 for a fixed step, 1 + 2 + … + J for an adaptive one of order J, also if it was refused";
+    t_limit: event = t_limit, "with `--refine`: t_relax in the limit of many nodes and short steps";
+    t_error: optional = t_error, "half-width of the 95 % interval of t_limit";
+    order: optional = order, "observed order of t_relax in 1/n, 2 for a smooth curve; empty where differences do not fall";
+    label: word = label, "name of its outline; empty if it has none";
+    group: word = group, "value of the property `--group-by` of its outline";
+}
+
+columns! { LevelRow:
+    member: whole = member, "index of the member";
+    level: whole = level, "1: n/2 nodes; 2: n/√2; 3: n";
+    cell: whole = cell, "index of its cell";
+    points: whole = points, "nodes";
+    adaptive: optional = adaptive, "tolerance of the steps: a tenth of that of the run, 1e-4 beside fixed steps";
+    status: status = status, "how the member ended";
+    t_relax: event = t_relax, "as in `summary.csv`";
+    solves: whole = solves, "as in `summary.csv`";
+}
+
+/// A row of `rates.csv`: the fitted rate of a member, and that of linear theory.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RateRow {
+    member: u64,
+    cell: u64,
+    rate: Option<f64>,
+    rate_r2: Option<f64>,
+    rate_theory: Option<f64>,
+    rate_ratio: Option<f64>,
+}
+
+columns! { RateRow:
+    member: whole = member, "index of the member";
+    cell: whole = cell, "index of its cell";
+    rate: optional = rate, "as in `summary.csv`";
+    rate_r2: optional = rate_r2, "as in `summary.csv`";
+    rate_theory: optional = rate_theory, "rate of the slowest mode by linear theory, 24/R⁴ for mode 2 and surface diffusion, for elastic flow at the radius while the rate is fitted; empty where there is none";
+    rate_ratio: optional = rate_ratio, "rate / rate_theory";
+}
+
+/// A row of `events.csv`: the time of an event of a member, or until when it was not seen.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EventRow {
+    /// Index of the member.
+    pub member: u64,
+    /// Index of its cell.
+    pub cell: u64,
+    /// Name of the event.
+    pub event: String,
+    /// When it happened, or when the member ended.
+    pub t: f64,
+    /// 1 if it had not happened by then.
+    pub censored: u64,
+}
+
+columns! { EventRow:
+    member: whole = member, "index of the member";
+    cell: whole = cell, "index of its cell";
+    event: word = event, "name of the event";
+    t: time = t, "first time at which its condition holds, found inside the step; of a censored one, when the member ended";
+    censored: whole = censored, "0: it happened at t; 1: it had not happened by then";
+}
+
+/// A row of `event_levels.csv`: the time of an event of a member at a level.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EventLevelRow {
+    /// Index of the member.
+    pub member: u64,
+    /// Number of the level.
+    pub level: u64,
+    /// Index of the cell.
+    pub cell: u64,
+    /// Name of the event.
+    pub event: String,
+    /// When it happened.
+    pub t: Option<f64>,
+}
+
+columns! { EventLevelRow:
+    member: whole = member, "index of the member";
+    level: whole = level, "as in `levels.csv`";
+    cell: whole = cell, "index of its cell";
+    event: word = event, "name of the event";
+    t: event = t, "first time at which its condition holds; empty if it was not seen";
+}
+
+columns! { SeriesRow:
+    member: whole = member, "index of the member";
+    t: time = t, "time";
+    length: number = at.length, "length of the polygon";
+    area: number = at.area, "signed area of the polygon";
+    excess: number = at.excess, "L²/(4πA) - (n/π)·tan(π/n)";
+    energy: number = at.energy, "∮(½k² + λ) ds";
+    k_min: number = at.k_min, "smallest curvature";
+    k_max: number = at.k_max, "largest curvature";
+    mesh_ratio: number = at.mesh_ratio, "longest over shortest edge";
+    metric_drift: number = at.metric_drift, "max |r_i - |e_i||/|e_i|";
+}
+
+/// A row of `snapshots.csv`: a node of a member at a time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NodeRow {
+    member: u64,
+    t: f64,
+    i: u64,
+    x: f64,
+    y: f64,
+    k: f64,
+    r: f64,
+}
+
+columns! { NodeRow:
+    member: whole = member, "index of the member";
+    t: time = t, "time";
+    i: whole = i, "node, from 1 to n";
+    x: number = x, "x coordinate of the node";
+    y: number = y, "y coordinate of the node";
+    k: number = k, "signed curvature of the segment that ends at the node";
+    r: number = r, "length of the segment that ends at the node, as the scheme evolves it";
+}
+
+columns! { MeanExcess:
+    cell: whole = cell, "index of the cell";
+    t: time = t, "time, one of 33 that are dense at the start";
+    members: whole = members, "members of the cell that reached t";
+    mean: optional = mean, "their mean excess";
+    sd: optional = sd, "its standard deviation";
+    q05: optional = q05, "its 5 % quantile, to 1 %";
+    median: optional = median, "its median, to 1 %";
+    q95: optional = q95, "its 95 % quantile, to 1 %";
+}
+
+columns! { ExplainedRow:
+    cell: whole = cell, "index of the cell";
+    time: word = time, "what is explained: t_relax or t_half";
+    feature: word = feature, "a column of `members.csv`, best first; or together: a regression on the chosen ones";
+    members: whole = members, "members that reached the time";
+    censored: whole = censored, "members that ended before";
+    spearman: optional = spearman, "rank correlation of feature and time";
+    r2: optional = r2, "share of the variance of the time that a straight line explains; of the regression cross-validated";
+    chosen: rank = chosen, "place of the feature in the regression, from 1, empty if it is not in it; of the regression how many it has";
+    logarithm: word = logarithm, "what entered by its logarithm: time, or both time and feature; times over more than a factor of 30 do";
+}
+
+/// A row of `convergence.csv`: the error of a run against an exact solution.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ErrorRow {
+    problem: String,
+    varied: String,
+    n: u64,
+    tau: Option<f64>,
+    tolerance: Option<f64>,
+    error: Option<f64>,
+    order: Option<f64>,
+}
+
+columns! { ErrorRow:
+    problem: word = problem, "name of the problem";
+    varied: word = varied, "what is refined: n, tau or tolerance";
+    n: whole = n, "nodes";
+    tau: optional = tau, "time step; empty where steps adapt";
+    tolerance: optional = tolerance, "local error tolerance of adaptive steps";
+    error: optional = error, "measured / exact - 1; empty where the run ended early";
+    order: optional = order, "observed order against the row before";
+}
+
+/// A row of `work_precision.csv`: the error of relaxation times by one method, and what it costs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CostRow {
+    solver: String,
+    tau: Option<f64>,
+    tolerance: Option<f64>,
+    most_order: u64,
+    error: Option<f64>,
+    solves: f64,
+    sweeps: f64,
+    seconds: f64,
+}
+
+columns! { CostRow:
+    solver: word = solver, "solver of the systems";
+    tau: optional = tau, "time step; empty where steps adapt";
+    tolerance: optional = tolerance, "local error tolerance of adaptive steps";
+    most_order: whole = most_order, "highest order of the steps; 1 for fixed ones";
+    error: optional = error, "median of |t_relax / reference - 1|; empty unless all members relaxed";
+    solves: number = solves, "steps of the paper per member, mean";
+    sweeps: number = sweeps, "sweeps per member, mean";
+    seconds: number = seconds, "seconds per member with all threads at work, median of several runs";
+}
+
+/// A table that grows row by row.
+pub struct Table<R> {
+    // Flushes when dropped.
+    writer: Writer<PartFile>,
+    kind: PhantomData<fn(R)>,
+}
+
+/// `summary.csv`: one row per member.
+pub type SummaryTable = Table<Outcome>;
+/// `levels.csv`: one row per member and level.
+pub type LevelTable = Table<LevelRow>;
+/// `event_levels.csv`: the events of each member at each level.
+pub type EventLevelTable = Table<EventLevelRow>;
+/// `events.csv`: the events of each member.
+pub type EventTable = Table<EventRow>;
+/// `rates.csv`: the fitted rate of each member that has one.
+pub type RateTable = Table<RateRow>;
+/// `series.csv`: the observables of each member over time.
+pub type SeriesTable = Table<SeriesRow>;
+/// `snapshots.csv`: the nodes of each member at given times.
+pub type SnapshotTable = Table<NodeRow>;
+
+impl<R> Table<R> {
+    /// Begins a table with these headings, or continues after the rows in `file`.
+    pub(super) fn with_header<'a>(file: PartFile, names: impl Iterator<Item = &'a str>) -> Result<Self> {
+        let begins = file.is_empty();
+        let writer = WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
+        let mut table = Table { writer, kind: PhantomData };
+        if begins {
+            table.write(names.map(Field::Word))?;
+        }
+        Ok(table)
+    }
+
+    /// Returns its length and checksum, once it is on disk.
+    pub fn mark(&mut self) -> Result<Mark> {
+        self.writer.flush().map_err(Error::io("cannot write", self.writer.get_ref().target()))?;
+        self.writer.get_ref().mark()
+    }
+
+    /// Sets whether to keep its rows if the run fails.
+    pub fn keep(&self, keep: bool) {
+        self.writer.get_ref().keep(keep);
+    }
+
+    /// The place of its rows, under a temporary name.
+    pub fn part(&self) -> &Place {
+        self.writer.get_ref().part()
+    }
+
+    /// Completes the table on disk, ready for its final name.
+    pub fn ready(self) -> Result<PartFile> {
+        let target = self.writer.get_ref().target().to_path_buf();
+        let file = self.writer.into_inner().map_err(|e| Error::io("cannot write", &target)(e.into_error()))?;
+        file.sync()?;
+        Ok(file)
+    }
+
+    /// Writes the fields of a row.
+    pub(super) fn write<'a>(&mut self, fields: impl Iterator<Item = Field<'a>>) -> Result<()> {
+        let row: Vec<Field<'_>> = fields.collect();
+        self.writer.serialize(row).map_err(|e| Error::io("cannot write", self.writer.get_ref().target())(e.into()))
+    }
+}
+
+impl<R: TableRow> Table<R> {
+    /// Begins a table with its header, or continues after the rows in `file`.
+    pub fn new(file: PartFile) -> Result<Self> {
+        Table::with_header(file, R::COLUMNS.iter().map(|column| column.name))
+    }
+
+    /// Writes a row.
+    pub fn row(&mut self, record: &R) -> Result<()> {
+        self.write(R::COLUMNS.iter().map(|column| (column.write)(record)))
+    }
+
+    /// Writes a whole table into `file`, ready for its final name.
+    pub fn of(file: PartFile, rows: &[R]) -> Result<PartFile> {
+        let mut table = Table::new(file)?;
+        rows.iter().try_for_each(|row| table.row(row))?;
+        table.ready()
+    }
+}
+
+impl RateRow {
+    /// The row of a member, if it has a rate.
+    pub fn of(member: &Outcome) -> Option<RateRow> {
+        let Outcome { member, cell, rate, rate_r2, rate_theory, .. } = *member;
+        let rate_ratio = rate_theory.map(|theory| rate.unwrap_or_default() / theory);
+        rate.map(|_| RateRow { member, cell, rate, rate_r2, rate_theory, rate_ratio })
+    }
+}
+
+impl EventRow {
+    /// The rows of a member with the events of these names.
+    pub fn of<'a>(member: &'a Outcome, names: &'a [String]) -> impl Iterator<Item = EventRow> + 'a {
+        let Outcome { member, cell, t_end, events, .. } = member;
+        names.iter().zip(events).map(|(event, seen)| EventRow {
+            member: *member,
+            cell: *cell,
+            event: event.clone(),
+            t: seen.unwrap_or(*t_end),
+            censored: u64::from(seen.is_none()),
+        })
+    }
+}
+
+impl EventLevelRow {
+    /// The rows of a member at a level, with the events of these names.
+    pub fn of<'a>(of: &'a LevelRow, names: &'a [String]) -> impl Iterator<Item = EventLevelRow> + 'a {
+        let LevelRow { member, level, cell, events, .. } = of;
+        let row = |(event, t): (&String, &Option<f64>)| EventLevelRow {
+            member: *member,
+            level: *level,
+            cell: *cell,
+            event: event.clone(),
+            t: *t,
+        };
+        names.iter().zip(events).map(row)
+    }
+}
+
+impl SnapshotTable {
+    /// Writes one row per node, i = 1…n.
+    pub fn snapshot(&mut self, snapshot: &Snapshot) -> Result<()> {
+        let Snapshot { member, t, x, y, k, r } = snapshot;
+        let nodes = x.iter().zip(y).zip(k).zip(r);
+        for (i, (((x, y), k), r)) in (1_u64..).zip(nodes) {
+            self.row(&NodeRow { member: *member, t: *t, i, x: *x, y: *y, k: *k, r: *r })?;
+        }
+        Ok(())
+    }
+}
+
+impl ErrorRow {
+    /// The row of a run; either τ or the tolerance of adaptive steps is empty.
+    pub fn of(run: &ConvergenceRow) -> ErrorRow {
+        let ConvergenceRow { problem, varied, at, error, order, .. } = run;
+        ErrorRow {
+            problem: problem.clone(),
+            varied: varied.name().to_string(),
+            n: at.n as u64,
+            tau: at.tolerance.is_none().then_some(at.tau),
+            tolerance: at.tolerance,
+            error: *error,
+            order: *order,
+        }
+    }
+}
+
+impl CostRow {
+    /// The row of a method; either τ or the tolerance of adaptive steps is empty.
+    pub fn of(row: &WorkRow) -> CostRow {
+        let (tau, tolerance) = row.stepping.settings();
+        CostRow {
+            solver: row.solver.name().to_string(),
+            tau,
+            tolerance,
+            most_order: row.stepping.order().into(),
+            error: row.error,
+            solves: row.solves,
+            sweeps: row.sweeps,
+            seconds: row.seconds,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::files::OutputFolder;
+    use curvelax_ensemble::{Observables, Status};
+
+    fn outcome(start: Observables, end: Observables) -> Outcome {
+        Outcome {
+            member: 3,
+            status: Status::Relaxed,
+            t_end: 0.5,
+            steps: 500,
+            rejected: 7,
+            sweeps_k: 1234,
+            sweeps_x: 987,
+            t_relax: Some(0.1 + 0.2),
+            rate: Some(6.5),
+            start,
+            end,
+            self_crossing: Some(0.25),
+            solves: 600,
+            t_limit: Some(0.5),
+            t_error: Some(0.125),
+            ..Outcome::default()
+        }
+    }
+
+    fn observables() -> Observables {
+        Observables {
+            length: 9.688448220547675,
+            area: 6.5,
+            excess: 1e-300,
+            energy: -0.0,
+            k_min: f64::MIN_POSITIVE / 8.0,
+            k_max: f64::MAX,
+            mesh_ratio: 1.0,
+            metric_drift: 1.0 / 3.0,
+            turning: -1,
+        }
+    }
+
+    /// The text of the file that `fill` writes.
+    fn written(name: &str, fill: impl FnOnce(PartFile) -> Result<PartFile>) -> String {
+        let home = tempfile::tempdir().unwrap();
+        let folder = OutputFolder::open(home.path(), true).unwrap();
+        let file = fill(folder.file(name).unwrap()).unwrap();
+        fs::read_to_string(file.part().at()).unwrap()
+    }
+
+    fn summary(rows: &[Outcome]) -> String {
+        written("summary.csv", |file| {
+            let mut table = SummaryTable::new(file)?;
+            rows.iter().try_for_each(|row| table.row(row))?;
+            table.ready()
+        })
+    }
+
+    #[test]
+    fn the_summary_has_these_bytes() {
+        let end = Observables { length: 8.5, area: 6.0, turning: 1, excess: f64::NAN, ..Default::default() };
+        let text = summary(&[outcome(Observables { length: 9.0, energy: f64::INFINITY, ..Default::default() }, end)]);
+        assert_eq!(
+            text,
+            "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
+             length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
+             mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order,label,group\n\
+             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,,,\n"
+        );
+    }
+
+    #[test]
+    fn an_empty_table_is_a_header() {
+        assert_eq!(summary(&[]).lines().count(), 1);
+    }
+
+    #[test]
+    fn events_have_these_bytes() {
+        let at = Observables::default();
+        let member = Outcome { events: vec![Some(0.1 + 0.2), None], ..outcome(at, at) };
+        let names = ["convex".to_string(), "slow".to_string()];
+        let text = written("events.csv", |file| Table::of(file, &EventRow::of(&member, &names).collect::<Vec<_>>()));
+        assert_eq!(text, "member,cell,event,t,censored\n3,0,convex,0.30000000000000004,0\n3,0,slow,0.5,1\n");
+    }
+
+    #[test]
+    fn rates_and_mean_excess_have_these_bytes() {
+        let text = written("rates.csv", |file| {
+            let mut table = RateTable::new(file)?;
+            let at = Observables::default();
+            for rate_theory in [None, Some(6.0)] {
+                let member = Outcome { rate: Some(6.0), rate_r2: Some(0.5), rate_theory, ..outcome(at, at) };
+                table.row(&RateRow::of(&member).unwrap())?;
+            }
+            assert_eq!(RateRow::of(&Outcome { rate: None, ..outcome(at, at) }), None);
+            table.ready()
+        });
+        assert_eq!(text, "member,cell,rate,rate_r2,rate_theory,rate_ratio\n3,0,6.0,0.5,,\n3,0,6.0,0.5,6.0,1.0\n");
+        let quantiles = MeanExcess { q05: Some(0.25), median: Some(0.375), q95: Some(0.5), ..MeanExcess::default() };
+        let two = MeanExcess { members: 2, mean: Some(0.375), sd: Some(0.1767766952966369), ..quantiles };
+        let one = MeanExcess { t: 0.5, members: 1, mean: Some(0.5), sd: None, q05: None, ..two };
+        let text = written("mean_excess.csv", |file| Table::of(file, &[two, one]));
+        assert_eq!(
+            text,
+            "cell,t,members,mean,sd,q05,median,q95\n0,0.0,2,0.375,0.1767766952966369,0.25,0.375,0.5\n0,0.5,1,0.5,,,0.375,0.5\n"
+        );
+    }
+
+    #[test]
+    fn series_and_snapshots_have_these_bytes() {
+        let text = written("series.csv", |file| {
+            let mut table = SeriesTable::new(file)?;
+            table.row(&SeriesRow { member: 1, t: 0.01, at: Observables { k_max: f64::NAN, ..observables() } })?;
+            table.ready()
+        });
+        assert_eq!(
+            text,
+            "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift\n\
+             1,0.01,9.688448220547675,6.5,1e-300,-0.0,2.781342323134e-309,,1.0,0.3333333333333333\n"
+        );
+        let text = written("snapshots.csv", |file| {
+            let mut table = SnapshotTable::new(file)?;
+            let (x, y) = (vec![1.0, 2.0], vec![3.0, 4.0]);
+            table.snapshot(&Snapshot { member: 1, t: 0.25, x, y, k: vec![5.0, 6.0], r: vec![7.0, 8.0] })?;
+            table.ready()
+        });
+        assert_eq!(text, "member,t,i,x,y,k,r\n1,0.25,1,1.0,3.0,5.0,7.0\n1,0.25,2,2.0,4.0,6.0,8.0\n");
+    }
+
+    #[test]
+    fn a_table_of_convergence_has_these_bytes() {
+        let row = |error, order| ConvergenceRow {
+            problem: "lemniscate".into(),
+            varied: curvelax_study::truth::Varied::Step,
+            at: curvelax_study::truth::Resolution { n: 100, tau: 0.25, tolerance: None },
+            status: Status::Unfinished,
+            error,
+            order,
+        };
+        let text = written("convergence.csv", |file| {
+            Table::of(file, &[row(Some(-0.1), Some(1.5)), row(None, None)].map(|row| ErrorRow::of(&row)))
+        });
+        assert_eq!(
+            text,
+            "problem,varied,n,tau,tolerance,error,order\nlemniscate,tau,100,0.25,,-0.1,1.5\nlemniscate,tau,100,0.25,,,\n"
+        );
+    }
+
+    #[test]
+    fn floats_read_back_to_the_same_bits() {
+        let text = summary(&[outcome(observables(), observables())]);
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let columns = reader.headers().unwrap().clone();
+        let row = reader.records().next().unwrap().unwrap();
+        let bits = |column: &str| {
+            let field = columns.iter().zip(&row).find(|(name, _)| *name == column).unwrap().1;
+            field.parse::<f64>().unwrap().to_bits()
+        };
+        let at = observables();
+        for (column, value) in [
+            ("t_relax", 0.1 + 0.2),
+            ("length_start", at.length),
+            ("area_end", at.area),
+            ("excess_start", at.excess),
+            ("energy_end", at.energy),
+            ("k_min", at.k_min),
+            ("k_max", at.k_max),
+            ("mesh_ratio", at.mesh_ratio),
+            ("metric_drift", at.metric_drift),
+        ] {
+            assert_eq!(bits(column), value.to_bits(), "{column}");
+        }
+    }
+
+    #[test]
+    fn a_table_goes_on_after_its_mark_and_is_kept_as_it_is_told() {
+        let home = tempfile::tempdir().unwrap();
+        let text = |name: &str| fs::read_to_string(home.path().join(name)).unwrap();
+        let one = outcome(observables(), observables());
+        let folder = OutputFolder::open(home.path(), true).unwrap();
+        let mut table = SummaryTable::new(folder.file("summary.csv").unwrap()).unwrap();
+        let lone = SeriesTable::new(folder.file("series.csv").unwrap()).unwrap();
+        table.row(&one).unwrap();
+        let mark = table.mark().unwrap();
+        table.row(&Outcome { member: 4, ..one.clone() }).unwrap();
+        table.keep(true);
+        drop((table, lone));
+        assert_eq!(fs::read_dir(home.path()).unwrap().count(), 2, "the lock and one table");
+        assert_eq!(text(".summary.csv.part").lines().count(), 3);
+
+        folder.check(&mark).unwrap();
+        let mut again = SummaryTable::new(folder.file_again(&mark).unwrap()).unwrap();
+        again.row(&Outcome { member: 5, ..one.clone() }).unwrap();
+        let straight = summary(&[one.clone(), Outcome { member: 5, ..one }]);
+        let mark = again.mark().unwrap();
+        assert_eq!((mark.length, mark.crc), (straight.len() as u64, crc32c::crc32c(straight.as_bytes())));
+        again.keep(false);
+        drop((again, folder));
+        assert_eq!(fs::read_dir(home.path()).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,52 @@
+//! The columns of the tables of a run, for documents and for programs that read them.
+
+use crate::files::{
+    TableRow, members, names,
+    tables::{EventLevelRow, EventRow, NodeRow, RateRow},
+};
+use curvelax_base::error::Result;
+use curvelax_ensemble::{Feature, LevelRow, Outcome, SeriesRow, Spec};
+use curvelax_study::results::{
+    cells::{CellColumn, EnsembleStatistics},
+    explained::ExplainedRow,
+    tally::MeanExcess,
+};
+
+/// Heading of a column, what its fields hold, and what they mean.
+pub type ColumnText = [String; 3];
+
+/// The columns of the table `name` of a run of `spec` with these statistics; none if it is no such table.
+///
+/// # Errors
+/// Those of the spec, whose cells have features of their own.
+pub fn columns(name: &str, spec: &Spec, statistics: &EnsembleStatistics) -> Result<Vec<ColumnText>> {
+    let of_cells = |columns: Vec<CellColumn>| {
+        columns.into_iter().map(|column| [column.name, column.holds.to_owned(), column.meaning]).collect()
+    };
+    Ok(match name {
+        names::SUMMARY => of::<Outcome>(),
+        names::MEMBERS => {
+            let indices = members::OWN.map(|(name, holds, meaning)| [name, holds, meaning].map(str::to_owned));
+            let of_feature = |Feature { name, meaning, is_flag }: Feature| {
+                [name, if is_flag { "integer" } else { "float" }.to_owned(), meaning]
+            };
+            indices.into_iter().chain(spec.all_features()?.into_iter().map(of_feature)).collect()
+        }
+        names::ENSEMBLE => of_cells(statistics.columns(spec)),
+        names::GROUPS => of_cells(statistics.group_columns()),
+        names::EVENTS => of::<EventRow>(),
+        names::EVENT_STATISTICS => of_cells(statistics.event_columns()),
+        names::EXPLAINED => of::<ExplainedRow>(),
+        names::RATES => of::<RateRow>(),
+        names::LEVELS => of::<LevelRow>(),
+        names::EVENT_LEVELS => of::<EventLevelRow>(),
+        names::MEAN_EXCESS => of::<MeanExcess>(),
+        names::SERIES => of::<SeriesRow>(),
+        names::SNAPSHOTS => of::<NodeRow>(),
+        _ => Vec::new(),
+    })
+}
+
+fn of<R: TableRow>() -> Vec<ColumnText> {
+    R::COLUMNS.iter().map(|column| [column.name, column.holds, column.meaning].map(str::to_owned)).collect()
+}

@@ -1,0 +1,128 @@
+//! The end of a run: statistics, pictures and provenance, and all files under their final names.
+
+use std::time::Duration;
+
+use super::{document::Document, overview::Overview, pictures::FinishedRun, reader};
+use crate::files::{
+    folder::OutputFolder,
+    names,
+    part_file::PartFile,
+    part_folder::PartFolder,
+    place::Place,
+    portraits::{self, Film},
+    tables::Table,
+};
+use curvelax_base::error::{Error, Result};
+use curvelax_ensemble::Spec;
+use curvelax_study::{
+    placement::Platform,
+    results::{RunVerdict, cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
+};
+
+/// Output on stdout for a completed run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A table and some lines for people.
+    Overview,
+    /// One document for programs.
+    Json,
+}
+
+/// Name of the pictures in the overview.
+const PLOTS: &str = "plots/*.svg";
+
+/// A run whose members have all ended.
+pub struct Complete<'a> {
+    /// The resolved spec.
+    pub spec: &'a Spec,
+    /// Where it was computed.
+    pub platform: &'a Platform,
+    /// The results.
+    pub tally: Tally,
+    /// The first members.
+    pub films: &'a [Film],
+    /// Warnings given to the user, one sentence each.
+    pub warnings: &'a [String],
+    /// When it began, since 1970.
+    pub started: Duration,
+    /// How long it took.
+    pub wall: Duration,
+}
+
+/// The names of a run's files as the overview lists them, of those that `is_there`.
+pub fn listed(is_there: impl Fn(&str) -> bool) -> Vec<&'static str> {
+    let tables = names::TABLES.into_iter().filter(|name| is_there(name));
+    let shard = Some(names::SHARD).filter(|name| is_there(name));
+    tables.chain([names::REPORT, PLOTS, names::RUN]).chain(shard).collect()
+}
+
+/// The place of the file `name`, under its temporary name.
+fn own<'a>(files: &'a [PartFile], name: &str) -> Result<&'a Place> {
+    let file = files.iter().find(|file| file.name() == name);
+    file.map(PartFile::part).ok_or_else(|| Error::Failed(format!("{name} was not written")))
+}
+
+impl Complete<'_> {
+    /// Gives all files their final names, once all are on disk, and returns the text for stdout and the verdict. `files` and `store`
+    /// hold the results of the members; `shard` is [what a merge needs besides them](super::shard).
+    ///
+    /// # Errors
+    /// If only the pictures cannot be written, the tables are published all the same, and the error says so.
+    pub fn publish(
+        self,
+        folder: &OutputFolder,
+        mut files: Vec<PartFile>,
+        store: Option<PartFolder>,
+        shard: Option<&[u8]>,
+        form: Form,
+    ) -> Result<(String, RunVerdict)> {
+        let Complete { spec, platform, mut tally, films, warnings, started, wall } = self;
+        let statistics = &EnsembleStatistics::new(spec, &mut tally)?;
+        let tally = &tally;
+        // Rows come first: they are saved even if the disk fills up.
+        files.push(folder.write(names::ENSEMBLE, statistics.to_csv(spec)?)?);
+        if let Some(groups) = statistics.groups_to_csv()? {
+            files.push(folder.write(names::GROUPS, groups)?);
+        }
+        if !spec.event.is_empty() {
+            files.push(folder.write(names::EVENT_STATISTICS, statistics.events_to_csv(spec)?)?);
+        }
+        let excess = &tally.mean_excess(spec)?;
+        files.push(Table::of(folder.file(names::MEAN_EXCESS)?, excess)?);
+        let [summary, members] = [names::SUMMARY, names::MEMBERS].map(|name| own(&files, name));
+        let explained = &reader::explained(summary?, members?, spec)?;
+        files.push(Table::of(folder.file(names::EXPLAINED)?, &explained.rows)?);
+        if let Some(shard) = shard {
+            files.push(folder.write(names::SHARD, shard)?);
+        }
+        let mut written: Vec<String> = files.iter().map(|file| file.name().to_string()).collect();
+        written.extend(store.iter().map(|_| names::STORE.to_string()));
+        let names = listed(|name| written.iter().any(|own| own == name));
+        let provenance = &Provenance::new(spec, platform, tally, warnings, started, wall);
+        let run = folder.write(names::RUN, provenance.to_json()?)?;
+        let study = FinishedRun { provenance, tally, statistics, excess, explained, films };
+        let mut drawn = Vec::new();
+        let done = (|| {
+            drawn.push(folder.write(names::PORTRAITS, portraits::to_json(films)?)?);
+            for (name, text) in study.pictures()? {
+                drawn.push(folder.write(name, text)?);
+            }
+            Ok(())
+        })();
+        if done.is_err() {
+            // Everything except the data from which pictures are drawn.
+            drawn.truncate(1);
+        }
+        folder.publish(files.into_iter().chain(drawn).collect(), store, run)?;
+        done.map_err(|error: Error| {
+            let folder = folder.path().display();
+            Error::Failed(format!("{error}; the tables in {folder} are complete, some pictures are missing"))
+        })?;
+        let (folder, files) = (folder.path(), &names[..]);
+        let text = match form {
+            Form::Overview => Overview { spec, platform, tally, statistics, wall, folder, files }.to_string(),
+            Form::Json => Document::new(provenance, spec, statistics, folder, files).to_json()?,
+        };
+        Ok((text, RunVerdict::new(provenance, Some(statistics))))
+    }
+}

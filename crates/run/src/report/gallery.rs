@@ -1,0 +1,315 @@
+//! `plots/curves.svg`: the first members at the start, during the run and at the end, to one scale if they can be seen
+//! at it.
+
+use glam::DVec2;
+
+use crate::files::portraits::Film;
+use curvelax_curve::polygon;
+use curvelax_draw::svg::{Svg, closed_path, coordinate, dots};
+use curvelax_ensemble::study::PORTRAITS;
+
+/// Maximum number of members drawn.
+pub const MAX_PANELS: usize = PORTRAITS;
+
+/// Maximum characters of the name of a member.
+const MAX_NAME: usize = 24;
+const COLUMNS: usize = 4;
+/// Width and maximum height of a panel in pixels, and the free space inside it.
+const SIDE: f64 = 200.0;
+const MIN_HEIGHT: f64 = 100.0;
+const PADDING: f64 = 14.0;
+const CAPTION: f64 = 44.0;
+const GAP: f64 = 14.0;
+const MARGIN: f64 = 24.0;
+const HEAD: f64 = 48.0;
+const FOOT: f64 = 40.0;
+/// Sizes that differ by more than this factor are drawn each to its own scale.
+const MIXED: f64 = 6.0;
+/// A picture this wide has room for the heading.
+const MIN_COLUMNS: usize = 2;
+/// Intermediate states: those with about this fraction of the way to the end left. The excess, which goes with the
+/// square, has then fallen to a half and to a tenth.
+const LEFT: [f64; 2] = [0.71, 0.32];
+/// A state outside this range looks like the start or the end.
+const APART: std::ops::RangeInclusive<f64> = 0.12..=0.88;
+/// Nodes closer than this, in pixels, look like a line and are not marked.
+const MIN_SPACING: f64 = 2.5;
+
+/// The style of a gallery and of a movie.
+pub(super) const STYLE: &str = "
+.back { fill: #ffffff }
+.frame { fill: none; stroke: #e3e6ea }
+text { font-family: sans-serif; font-size: 12px; fill: #24292f }
+.head { font-size: 15px; font-weight: bold }
+.note { fill: #656d76 }
+.middle { text-anchor: middle }
+.end { text-anchor: end }
+.before { fill: none; stroke: #8c959f; stroke-width: 1 }
+.way { stroke-width: 1 }
+.after { stroke-width: 1.6; stroke-linejoin: round; fill-opacity: 0.08 }
+.nodes { fill: none; stroke-width: 3.2; stroke-linecap: round }
+.scale { fill: none; stroke: #24292f; stroke-width: 1.2 }
+.relaxed path { stroke: #0b6bb5; fill: #0b6bb5 } .relaxed .word { fill: #0b6bb5 }
+.unfinished path { stroke: #b35900; fill: #b35900 } .unfinished .word { fill: #b35900 }
+.singular path { stroke: #c4262e; fill: #c4262e } .singular .word { fill: #c4262e }
+.nonfinite path { stroke: #8a3ab9; fill: #8a3ab9 } .nonfinite .word { fill: #8a3ab9 }
+.stalled path { stroke: #5a6b00; fill: #5a6b00 } .stalled .word { fill: #5a6b00 }
+.panel .before { fill: none; stroke: #8c959f }
+.panel .way { fill: none; stroke-opacity: 0.5 }
+.panel .nodes { fill: none }
+@media screen and (prefers-color-scheme: dark) {
+.back { fill: #15191e }
+.frame { stroke: #2d343c }
+text { fill: #e6edf3 }
+.note { fill: #9aa4af }
+.scale { stroke: #e6edf3 }
+.relaxed path { stroke: #58b0f5; fill: #58b0f5 } .relaxed .word { fill: #58b0f5 }
+.unfinished path { stroke: #f0a04b; fill: #f0a04b } .unfinished .word { fill: #f0a04b }
+.singular path { stroke: #ff7b76; fill: #ff7b76 } .singular .word { fill: #ff7b76 }
+.nonfinite path { stroke: #cf9bf0; fill: #cf9bf0 } .nonfinite .word { fill: #cf9bf0 }
+.stalled path { stroke: #b9cc4a; fill: #b9cc4a } .stalled .word { fill: #b9cc4a }
+.panel .before { fill: none; stroke: #7d8792 }
+.panel .nodes { fill: none }
+}
+";
+
+/// The gallery of the first [`MAX_PANELS`] of `films`, as the text of an SVG file.
+pub fn draw(films: &[Film]) -> String {
+    let panels: Vec<MemberPanel> = films.iter().take(MAX_PANELS).map(MemberPanel::new).collect();
+    let columns = panels.len().clamp(MIN_COLUMNS, COLUMNS);
+    let rows = panels.len().div_ceil(columns).max(1);
+    let layout = PanelLayout::new(&panels);
+    let frame = layout.frame;
+    let pitch = frame + DVec2::new(GAP, CAPTION);
+    let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
+    let height = HEAD + rows as f64 * pitch.y + FOOT;
+
+    let mut svg = Svg::new(width, height, STYLE, "Members before, during and after relaxation");
+    svg.rectangle("back", DVec2::ZERO, DVec2::new(width, height), 0.0);
+    svg.text("head", DVec2::new(MARGIN, 30.0), "Before, during and after");
+    svg.text("note end", DVec2::new(width - MARGIN, 30.0), "grey: start, light: on the way, colour: end");
+    for (i, panel) in panels.iter().enumerate() {
+        let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
+        draw_panel(&mut svg, panel, DVec2::new(MARGIN, HEAD) + place * pitch, &layout);
+    }
+    let foot = DVec2::new(MARGIN, height - 20.0);
+    match layout.common {
+        Some(largest) => draw_scale(&mut svg, foot, layout.scale(largest)),
+        None => svg.text("note", foot + DVec2::new(0.0, 4.0), OWN_SCALES),
+    }
+    svg.finish()
+}
+
+/// One member of the gallery.
+struct MemberPanel<'a> {
+    film: &'a Film,
+    /// Its nodes at the start, during the run and at the end; none if nothing can be drawn.
+    states: Vec<Vec<DVec2>>,
+}
+
+impl MemberPanel<'_> {
+    fn new(film: &Film) -> MemberPanel<'_> {
+        let frames = film.frames();
+        let states = shown(&frames).into_iter().map(|i| frames[i].clone()).collect();
+        MemberPanel { film, states }
+    }
+
+    /// Lower left and upper right corner of all states.
+    fn bounds(&self) -> Option<(DVec2, DVec2)> {
+        polygon::bounds(self.states.iter().flatten().copied())
+    }
+}
+
+/// The indices of the first of `frames`, of intermediate ones that look different, and of the last.
+fn shown(frames: &[Vec<DVec2>]) -> Vec<usize> {
+    let (Some(start), Some(end)) = (frames.first(), frames.last()) else { return Vec::new() };
+    let to_end = |nodes: &[DVec2]| nodes.iter().zip(end).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    let left: Vec<f64> = frames.iter().map(|nodes| to_end(nodes) / to_end(start)).collect();
+    let between = || (1..frames.len().saturating_sub(1)).filter(|i| APART.contains(&left[*i]));
+    let nearest = |share: f64| between().min_by(|i, j| (left[*i] - share).abs().total_cmp(&(left[*j] - share).abs()));
+    let way = LEFT.into_iter().filter_map(nearest);
+    let mut shown: Vec<usize> = [0].into_iter().chain(way).chain([frames.len() - 1]).collect();
+    shown.sort_unstable();
+    shown.dedup();
+    shown
+}
+
+fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelLayout) {
+    let frame = layout.frame;
+    let middle = corner + 0.5 * frame;
+    let Film { status, t_relax, points, .. } = panel.film;
+    svg.open(&format!("panel {}", status.name()));
+    svg.rectangle("frame", corner, frame, 6.0);
+    let mut name = panel.film.name(MAX_NAME);
+    if let Some((low, high)) = panel.bounds() {
+        let own = (high - low).max_element();
+        let scale = layout.scale(own);
+        if layout.common.is_none() {
+            name += &format!(", {} across", rounded(own));
+        }
+        // y grows downwards in SVG.
+        let place = |p: &DVec2| middle + (*p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
+        let last = panel.states.len() - 1;
+        for (i, nodes) in panel.states.iter().enumerate() {
+            let nodes: Vec<DVec2> = nodes.iter().map(place).collect();
+            let class = if i == last { "after" } else { ["before", "way"][usize::from(i > 0)] };
+            svg.path(class, &closed_path(&nodes));
+            if i == last && nodes.len() == *points && mean_spacing(&nodes) >= MIN_SPACING {
+                svg.path("nodes", &dots(&nodes));
+            }
+        }
+    }
+    let below = DVec2::new(middle.x, corner.y + frame.y + 16.0);
+    let caption = match t_relax {
+        Some(t) => format!("{} at t = {}", status.name(), rounded(*t)),
+        None => status.name().into(),
+    };
+    svg.text("middle", below, &name);
+    svg.text("middle word", below + DVec2::new(0.0, 15.0), &caption);
+    svg.close();
+}
+
+/// A bar of a round length: 1, 2 or 5 times a power of ten, at most half a panel long.
+fn draw_scale(svg: &mut Svg, left: DVec2, scale: f64) {
+    let most = 0.5 * SIDE / scale;
+    let power = 10_f64.powi(most.log10().floor() as i32);
+    let length = [5.0, 2.0, 1.0].map(|digit| digit * power).into_iter().find(|l| *l <= most).unwrap_or(power);
+    let [x, y, end] = [left.x, left.y, left.x + length * scale].map(coordinate);
+    let [top, bottom] = [left.y - 4.0, left.y + 4.0].map(coordinate);
+    svg.path("scale", &format!("M{x} {top}V{bottom}M{x} {y}H{end}M{end} {top}V{bottom}"));
+    let label = DVec2::new(left.x + length * scale + 8.0, left.y + 4.0);
+    svg.text("note", label, &format!("length {}", rounded(length)));
+}
+
+/// The layout common to all panels.
+struct PanelLayout {
+    /// The extent that fills a panel; if there is none, each member fills its own.
+    common: Option<f64>,
+    /// Size of a panel.
+    frame: DVec2,
+}
+
+/// What is said where each member has its own scale.
+pub(super) const OWN_SCALES: &str = "each to its own scale";
+
+/// The largest of these extents, if all can be seen at one scale.
+pub(super) fn common_extent(extents: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+    let largest = extents.clone().fold(0.0, f64::max);
+    let smallest = extents.filter(|extent| *extent > 0.0).fold(largest, f64::min);
+    (largest <= MIXED * smallest).then_some(largest)
+}
+
+impl PanelLayout {
+    /// Fits `panels` into frames that are no higher than the tallest panel needs.
+    fn new(panels: &[MemberPanel]) -> PanelLayout {
+        let extents: Vec<DVec2> = panels.iter().filter_map(MemberPanel::bounds).map(|(low, high)| high - low).collect();
+        let common = common_extent(extents.iter().map(|extent| extent.max_element()));
+        let layout = PanelLayout { common, frame: DVec2::new(SIDE, SIDE) };
+        let heights = extents.iter().map(|extent| extent.y * layout.scale(extent.max_element()));
+        let height = (heights.fold(0.0, f64::max) + 2.0 * PADDING).clamp(MIN_HEIGHT, SIDE);
+        PanelLayout { frame: DVec2::new(SIDE, height), ..layout }
+    }
+
+    /// Pixels per unit of length, for a member of this extent.
+    fn scale(&self, own: f64) -> f64 {
+        let extent = self.common.unwrap_or(own);
+        if extent > 0.0 && extent.is_finite() { (SIDE - 2.0 * PADDING) / extent } else { 1.0 }
+    }
+}
+
+fn mean_spacing(points: &[DVec2]) -> f64 {
+    let length: f64 = points.iter().zip(points.iter().cycle().skip(1)).map(|(a, b)| a.distance(*b)).sum();
+    length / points.len().max(1) as f64
+}
+
+/// `value` to three significant digits.
+fn rounded(value: f64) -> String {
+    let short: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    if short == 0.0 || (1e-3..1e6).contains(&short.abs()) { short.to_string() } else { format!("{short:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::portraits::tests::film;
+    use curvelax_ensemble::Status;
+
+    /// Perturbed ellipses of different sizes that end as circles or part of the way there.
+    fn films(count: u64, n: usize) -> Vec<Film> {
+        let one = |member: u64| {
+            let status = match member {
+                4 => Status::Unfinished,
+                6 => Status::Singular,
+                9 => Status::Stalled,
+                11 => Status::Nonfinite,
+                _ => Status::Relaxed,
+            };
+            film(member, n, status, (status == Status::Relaxed).then_some(0.4 + 0.0123456 * member as f64))
+        };
+        (0..count).map(one).collect()
+    }
+
+    #[test]
+    fn a_gallery_has_a_panel_for_each_of_the_first_twelve() {
+        for (count, shown) in [(0, 0), (1, 1), (5, 5), (12, 12), (30, 12)] {
+            let text = draw(&films(count, 60));
+            assert_eq!(text.matches("class=\"frame\"").count(), shown);
+            assert_eq!(text.matches("class=\"after\"").count(), shown);
+            assert_eq!(text.matches("class=\"way\"").count(), 2 * shown);
+            assert_eq!(text, draw(&films(count, 60)));
+            // To look at: CURVELAX_GALLERY=FOLDER cargo test gallery
+            if let Some(folder) = std::env::var_os("CURVELAX_GALLERY") {
+                let path = std::path::Path::new(&folder).join(format!("gallery{count}.svg"));
+                std::fs::write(path, &text).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn states_on_the_way_differ_from_both_ends() {
+        let circle = |r: f64| (0..9).map(|i| r * DVec2::from_angle(0.7 * f64::from(i))).collect::<Vec<_>>();
+        let of = |sizes: &[f64]| shown(&sizes.iter().map(|r| circle(*r)).collect::<Vec<_>>());
+        assert_eq!(of(&[2.0, 1.99, 1.7, 1.6, 1.3, 1.1, 1.01, 1.0]), [0, 2, 4, 7]);
+        assert_eq!(of(&[2.0, 1.95, 1.5, 1.05, 1.0]), [0, 2, 4]);
+        assert_eq!(of(&[2.0, 1.99, 1.01, 1.0]), [0, 3]);
+        assert_eq!(of(&[1.0, 1.0, 1.0]), [0, 2]);
+        assert_eq!((of(&[1.0]), of(&[])), (vec![0], vec![]));
+    }
+
+    #[test]
+    fn one_scale_fits_the_largest_member() {
+        let films = films(3, 60);
+        let mut panels: Vec<MemberPanel> = films.iter().map(MemberPanel::new).collect();
+        panels[1].states[0].iter_mut().for_each(|p| *p *= 3.0);
+        let slack = |panels: &[MemberPanel], i: usize| {
+            let layout = PanelLayout::new(panels);
+            let (low, high) = panels[i].bounds().unwrap();
+            layout.frame - (high - low) * layout.scale((high - low).max_element()) - 2.0 * PADDING
+        };
+        let (large, small) = (slack(&panels, 1), slack(&panels, 0));
+        assert!(large.x.abs() < 1e-9 && large.y.abs() < 1e-9 && small.x > 0.3 * SIDE, "{large} {small}");
+        // Where the others would be specks, each fills its panel.
+        panels[1].states[0].iter_mut().for_each(|p| *p *= 10.0);
+        assert!((0..3).all(|i| slack(&panels, i).x.abs() < 1e-9));
+    }
+
+    #[test]
+    fn members_of_very_different_sizes_have_their_own_scales_and_say_so() {
+        assert_eq!(common_extent([1.0, 6.0, 2.0].into_iter()), Some(6.0));
+        assert_eq!(common_extent([1.0, 6.1, 2.0].into_iter()), None);
+        assert_eq!(common_extent([0.0, 2.0].into_iter()), Some(2.0));
+        assert_eq!(common_extent(std::iter::empty()), Some(0.0));
+    }
+
+    #[test]
+    fn many_nodes_are_drawn_as_a_line() {
+        let text = draw(&films(1, 5000));
+        assert!(!text.contains("class=\"nodes\""));
+        assert!(text.len() < 50_000, "{}", text.len());
+    }
+
+    #[test]
+    fn numbers_in_captions_are_short() {
+        assert_eq!([0.123456, 2.0, 1234.5, 1e-7].map(rounded), ["0.123", "2", "1230", "1e-7"]);
+    }
+}

@@ -1,0 +1,457 @@
+//! Merges shards into the files that one run of all members would have written.
+//!
+//! Rows are copied unchanged, in the order of the members, with only one block of each shard in memory. Data that are
+//! not in the rows are added up exactly. Statistics and pictures are then those of any [`Complete`] run.
+
+use std::{
+    cmp::Reverse,
+    collections::{BTreeMap, BTreeSet, BinaryHeap},
+    fs::File,
+    io::{BufWriter, Read, Seek, SeekFrom, Write},
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use super::{
+    Form,
+    complete::Complete,
+    growing::Growing,
+    reader,
+    shard::{FinishedShard, Found},
+};
+use crate::files::{
+    folder::OutputFolder,
+    names,
+    part_file::{Mark, PartFile},
+    part_folder::PartFolder,
+    portraits::Film,
+    zarr::{SnapshotStore, StoredMembers},
+};
+use curvelax_base::{
+    error::{Error, Result, without_controls},
+    input::{self, MAX_LINE},
+    text::listed,
+};
+use curvelax_ensemble::{Shard, Spec};
+use curvelax_study::results::{RunVerdict, tally::Aside};
+
+/// Bytes read at once, from all shards together and at least from one.
+const BLOCKS: usize = 64 << 20;
+const MIN_BLOCK: usize = MAX_LINE;
+const MAX_BLOCK: usize = 1 << 20;
+
+/// Maximum number of shards listed in a message.
+const NAMED: usize = 8;
+
+/// Keys that may differ between shards: where and how it was computed, which the platform records, and which shard it
+/// is.
+const OWN_KEYS: [&str; 4] = ["shard", "threads", "backend", "adapter"];
+
+/// Shards of one study.
+pub struct Shards {
+    /// Those that are complete, by number.
+    parts: BTreeMap<u64, FinishedShard>,
+    /// Information on the others.
+    unfinished: Vec<(Option<u64>, PathBuf, String)>,
+    /// The spec of the whole study.
+    spec: Spec,
+    /// N.
+    count: u64,
+}
+
+impl Shards {
+    /// Sorts the shards that were found.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if two shards are not of the same study, or one is there twice.
+    pub fn new(found: Vec<Found>) -> Result<Shards> {
+        let of = |found: &Found| match found {
+            Found::Done(part) => Some((part.path.clone(), part.spec.clone())),
+            Found::Unfinished { path, spec, .. } => Some((path.clone(), *spec.clone()?)),
+        };
+        let Some((first, own)) = found.iter().find_map(of) else {
+            let folders: Vec<String> = found.iter().map(unfinished).collect();
+            let message = format!("no folder says which study it is a shard of: {}", listed(&folders, NAMED, "; "));
+            return Err(Error::Request(message));
+        };
+        let Some(shard) = own.shard else {
+            return Err(Error::Request(format!("{}: the run there is not a shard", first.display())));
+        };
+        let mut shards = Shards {
+            parts: BTreeMap::new(),
+            unfinished: Vec::new(),
+            spec: Spec { shard: None, ..own.clone() },
+            count: shard.count(),
+        };
+        let mut places: BTreeMap<u64, PathBuf> = BTreeMap::new();
+        for one in found {
+            let told = of(&one);
+            let index = match &told {
+                Some((path, spec)) => Some(same_study((path, spec), (&first, &own))?),
+                None => None,
+            };
+            match one {
+                Found::Done(part) => {
+                    if let Some(other) = places.insert(part.shard.index(), part.path.clone()) {
+                        let (one, other) = (part.path.display(), other.display());
+                        let message = format!("{one}: shard {} is duplicated in {other}; give one of them", part.shard);
+                        return Err(Error::Request(message));
+                    }
+                    shards.parts.insert(part.shard.index(), *part);
+                }
+                Found::Unfinished { path, why, .. } => shards.unfinished.push((index, path, why)),
+            }
+        }
+        shards.check_places()?;
+        Ok(shards)
+    }
+
+    /// Digits agree only if shards were computed in the same way.
+    fn check_places(&self) -> Result<()> {
+        let mut parts = self.parts.values();
+        let Some(first) = parts.next() else { return Ok(()) };
+        for part in parts {
+            let [one, own] = [part, first].map(|part| &part.record.head.origin);
+            let differs = |what: String| {
+                let (one, own) = (part.path.display(), first.path.display());
+                Err(Error::Request(format!("{one} and {own} are not of one study: {what}; run one of them again")))
+            };
+            if !one.platform.computes_like(&own.platform) {
+                let [one, own] = [one, own].map(|origin| without_controls(&origin.platform.name()));
+                return differs(format!("one was computed on {one} and the other on {own}, where digits differ"));
+            }
+            let sums = |of: &[(PathBuf, u32)]| of.iter().map(|(_, crc)| *crc).collect::<BTreeSet<_>>();
+            if sums(&one.outlines) != sums(&own.outlines) {
+                return differs("their outlines differ".into());
+            }
+            if part.record.points != first.record.points {
+                return differs(format!("members have {} and {} nodes", part.record.points, first.record.points));
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of shards of the study; those without members do not count.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The shards that are not complete, as ranges of their numbers: at most one more than there are folders, however
+    /// many shards the study has.
+    pub fn missing(&self) -> Vec<RangeInclusive<u64>> {
+        self.all_but(self.parts.keys().copied())
+    }
+
+    /// The shards with members, except `others`, which ascend.
+    fn all_but(&self, others: impl Iterator<Item = u64>) -> Vec<RangeInclusive<u64>> {
+        match &self.spec.only {
+            Some(only) => {
+                let mut own: BTreeSet<u64> = only.iter().map(|member| member % self.count).collect();
+                for index in others {
+                    own.remove(&index);
+                }
+                let own: Vec<u64> = own.into_iter().collect();
+                own.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..=run[run.len() - 1]).collect()
+            }
+            None => {
+                let end = self.count.min(self.spec.all_members());
+                let mut next = 0;
+                let mut gaps = Vec::new();
+                for taken in others.take_while(|index| *index < end).chain([end]) {
+                    if next < taken {
+                        gaps.push(next..=taken - 1);
+                    }
+                    next = taken + 1;
+                }
+                gaps
+            }
+        }
+    }
+
+    /// A line for each incomplete shard, with its number and what there is instead; a single line for all those of
+    /// which nothing is known.
+    pub fn told(&self) -> Vec<String> {
+        let line = |(index, path, why): &(Option<u64>, PathBuf, String)| match index {
+            Some(index) if self.parts.contains_key(index) => None,
+            Some(index) => Some(format!("shard {index}/{}: {}: {why}", self.count, path.display())),
+            None => Some(format!("{}: {why}", path.display())),
+        };
+        let mut lines: Vec<String> = self.unfinished.iter().filter_map(line).collect();
+        let begun = self.unfinished.iter().filter_map(|(index, ..)| *index);
+        let known: BTreeSet<u64> = begun.chain(self.parts.keys().copied()).collect();
+        let nowhere = self.all_but(known.into_iter());
+        if !nowhere.is_empty() {
+            let shards = if total(&nowhere) == 1 { "shard" } else { "shards" };
+            lines.push(format!("{shards} {} of {}: not among the folders", listed_ranges(&nowhere), self.count));
+        }
+        lines
+    }
+
+    /// Merges them in `folder`, and returns the text for stdout and the verdict.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if a shard is missing or has changed since it was completed; `folder` is then left empty.
+    pub fn merge(self, folder: &OutputFolder, form: Form) -> Result<(String, RunVerdict)> {
+        self.check_complete()?;
+        let Shards { parts, spec, .. } = self;
+        let spec = &spec;
+        let parts: Vec<FinishedShard> = parts.into_values().collect();
+        let mut files = Vec::new();
+        for name in Growing::names(spec) {
+            files.push(join(&parts, name, folder)?);
+        }
+        let store = match Growing::has_store(spec) {
+            true => Some(join_stores(&parts, spec, folder)?),
+            false => None,
+        };
+        let (mut aside, mut films, mut warnings) = (Aside::default(), Vec::<Film>::new(), Vec::<String>::new());
+        for FinishedShard { record, .. } in &parts {
+            aside.merge(&record.head.aside);
+            films.extend(record.head.films.iter().cloned());
+            warnings.extend(record.warnings.iter().cloned());
+        }
+        films.sort_by_key(|film| film.member);
+        let mut seen = BTreeSet::new();
+        warnings.retain(|warning| seen.insert(warning.clone()));
+        let own = |name: &str| files.iter().find(|file| file.name() == name).map(PartFile::part);
+        let none = || Error::Failed("a table of the shards was not merged".into());
+        let levels = reader::levels((own(names::LEVELS).ok_or_else(none)?, own(names::EVENT_LEVELS)), spec)?;
+        let rows = (own(names::SUMMARY).ok_or_else(none)?, own(names::EVENTS));
+        let tally = reader::rows(rows, spec, &levels, aside)?;
+        if tally.members() != spec.member_count() {
+            let (found, all) = (tally.members(), spec.member_count());
+            return Err(Error::Request(format!("the shards have {found} members, and their spec has {all}")));
+        }
+        warnings.extend(tally.warnings());
+        let heads = || parts.iter().map(|part| &part.record.head);
+        let complete = Complete {
+            spec,
+            platform: &parts[0].record.head.origin.platform,
+            tally,
+            films: &films,
+            warnings: &warnings,
+            started: heads().map(|head| head.origin.started).min().unwrap_or_default(),
+            wall: heads().fold(Duration::ZERO, |all, head| all.saturating_add(head.wall)),
+        };
+        complete.publish(folder, files, store, None, form)
+    }
+
+    /// # Errors
+    /// [`Error::Request`] naming the missing shards.
+    pub fn check_complete(&self) -> Result<()> {
+        let missing = self.missing();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let there = self.parts.len();
+        Err(Error::Request(format!(
+            "{there} of {} shards are done; {}; `curvelax merge --missing` prints what submits them",
+            there as u64 + total(&missing),
+            listed(&self.told(), NAMED, "; ")
+        )))
+    }
+}
+
+/// The number of the shard in `one`, if it is of the same study as `own`.
+fn same_study(one: (&PathBuf, &Spec), own: (&PathBuf, &Spec)) -> Result<u64> {
+    let refuse = |what: String| {
+        let (one, own) = (one.0.display(), own.0.display());
+        Err(Error::Request(format!("{one} is of another study than {own}: {what}")))
+    };
+    let (one, own) = (one.1, own.1);
+    if let Some((key, here, there)) = one.difference(own, &OWN_KEYS) {
+        return refuse(format!("{key} is {here}, and {there} there"));
+    }
+    match (one.shard, own.shard) {
+        (Some(shard), Some(own)) if shard.count() == own.count() => Ok(shard.index()),
+        (Some(shard), Some(own)) => refuse(format!("it says shard {shard}, but {own} is there")),
+        _ => refuse("it is not a shard".into()),
+    }
+}
+
+fn unfinished(found: &Found) -> String {
+    match found {
+        Found::Done(part) => part.path.display().to_string(),
+        Found::Unfinished { path, why, .. } => format!("{}: {why}", path.display()),
+    }
+}
+
+/// Ascending ranges in Slurm's notation: `0,3,5-9`.
+pub fn listed_ranges(ranges: &[RangeInclusive<u64>]) -> String {
+    let text = |range: &RangeInclusive<u64>| match (range.start(), range.end()) {
+        (first, last) if first == last => first.to_string(),
+        (first, last) => format!("{first}-{last}"),
+    };
+    ranges.iter().map(text).collect::<Vec<_>>().join(",")
+}
+
+/// How many numbers are in them.
+fn total(ranges: &[RangeInclusive<u64>]) -> u64 {
+    ranges.iter().map(|range| range.end() - range.start() + 1).sum()
+}
+
+/// The rows of a table of one shard. It is reopened for every block, so that any number of shards can be merged.
+struct ShardRows {
+    path: PathBuf,
+    shard: Shard,
+    mark: Mark,
+    /// Bytes read, and their CRC-32C.
+    read: Mark,
+    block: usize,
+    buffer: Vec<u8>,
+    /// Position and length of the next line.
+    at: usize,
+    line: usize,
+}
+
+impl ShardRows {
+    fn new(part: &FinishedShard, name: &str, block: usize) -> Result<ShardRows> {
+        let path = part.path.join(name);
+        let mark = part.record.head.tables.iter().find(|mark| mark.name == name).cloned();
+        let missing = || Error::Request(format!("{}: the shard does not list it", path.display()));
+        let mark = mark.ok_or_else(missing)?;
+        let read = Mark { name: String::new(), length: 0, crc: 0 };
+        Ok(ShardRows { path, shard: part.shard, mark, read, block, buffer: Vec::new(), at: 0, line: 0 })
+    }
+
+    fn changed(&self, what: &str) -> Error {
+        Error::Request(format!(
+            "{}: {what}: it is not the file that the shard wrote; copy it again, or run the shard again",
+            self.path.display()
+        ))
+    }
+
+    /// Goes to the next line; none at the end of the file, when its checksum has been verified.
+    fn next(&mut self) -> Result<Option<&[u8]>> {
+        self.at += self.line;
+        loop {
+            if let Some(end) = self.buffer[self.at..].iter().position(|byte| *byte == b'\n') {
+                self.line = end + 1;
+                return Ok(Some(&self.buffer[self.at..self.at + self.line]));
+            }
+            if self.read.length == self.mark.length {
+                break;
+            }
+            if self.buffer.len() - self.at > MAX_LINE {
+                return Err(self.changed(&format!("a line of more than {MAX_LINE} bytes")));
+            }
+            self.fill()?;
+        }
+        self.line = 0;
+        match () {
+            _ if self.at < self.buffer.len() => Err(self.changed("its last line is cut off")),
+            _ if self.read.crc != self.mark.crc => Err(self.changed("its checksum differs")),
+            _ => Ok(None),
+        }
+    }
+
+    fn fill(&mut self) -> Result<()> {
+        self.buffer.drain(..self.at);
+        self.at = 0;
+        let more = (self.mark.length - self.read.length).min(self.block as u64);
+        let kept = self.buffer.len();
+        let read = input::open(&self.path).and_then(|mut file: File| {
+            file.seek(SeekFrom::Start(self.read.length))?;
+            file.take(more).read_to_end(&mut self.buffer)
+        });
+        let count = read.map_err(|e| Error::Request(format!("cannot read {}: {e}", self.path.display())))?;
+        if (count as u64) < more {
+            return Err(self.changed(&format!("it ends after {} bytes", self.read.length + count as u64)));
+        }
+        self.read.length += more;
+        self.read.crc = crc32c::crc32c_append(self.read.crc, &self.buffer[kept..]);
+        Ok(())
+    }
+
+    /// What the next line is sorted by: its member, after the level in a table that has levels.
+    fn key(&mut self) -> Result<Option<(u64, u64)>> {
+        let (shard, has_levels) = (self.shard, [names::LEVELS, names::EVENT_LEVELS].contains(&&*self.mark.name));
+        let key = match self.next()? {
+            None => return Ok(None),
+            Some(line) => {
+                let mut fields = line.split(|byte| *byte == b',');
+                let mut number = || std::str::from_utf8(fields.next()?).ok()?.parse::<u64>().ok();
+                let member = number();
+                let level = if has_levels { number() } else { Some(0) };
+                level.zip(member)
+            }
+        };
+        match key.filter(|(_, member)| shard.has(*member)) {
+            Some(key) => Ok(Some(key)),
+            None => Err(self.changed(&format!("a row that is of no member of shard {shard}"))),
+        }
+    }
+
+    fn line(&self) -> &[u8] {
+        &self.buffer[self.at..self.at + self.line]
+    }
+}
+
+/// Merges the table `name` of all parts, in the order of the members.
+fn join(parts: &[FinishedShard], name: &str, folder: &OutputFolder) -> Result<PartFile> {
+    let file = folder.file(name)?;
+    let target = file.target().to_path_buf();
+    let mut out = BufWriter::with_capacity(MAX_BLOCK, file);
+    join_rows(parts, name, &mut out, &target)?;
+    let file = out.into_inner().map_err(|e| Error::io("cannot write", &target)(e.into_error()))?;
+    file.sync()?;
+    Ok(file)
+}
+
+/// Writes the table `name` of all parts, in the order of the members, to `out`, which messages call `target`.
+///
+/// # Errors
+/// [`Error::Request`] naming a file that differs from what its shard wrote.
+pub fn join_rows(parts: &[FinishedShard], name: &str, out: &mut impl Write, target: &Path) -> Result<()> {
+    let cannot = |e| Error::io("cannot write", target)(e);
+    let block = (BLOCKS / parts.len().max(1)).clamp(MIN_BLOCK, MAX_BLOCK);
+    let mut all = parts.iter().map(|part| ShardRows::new(part, name, block)).collect::<Result<Vec<_>>>()?;
+    let mut header: Option<Vec<u8>> = None;
+    for rows in &mut all {
+        let own = rows.next()?.map(<[u8]>::to_vec);
+        match (&header, own) {
+            (None, Some(own)) => {
+                out.write_all(&own).map_err(cannot)?;
+                header = Some(own);
+            }
+            (Some(header), Some(own)) if *header == own => {}
+            _ => return Err(rows.changed("its columns differ")),
+        }
+    }
+    let mut next = BinaryHeap::new();
+    for (i, rows) in all.iter_mut().enumerate() {
+        next.extend(rows.key()?.map(|key| Reverse((key, i))));
+    }
+    while let Some(Reverse((key, i))) = next.pop() {
+        let rows = &mut all[i];
+        out.write_all(rows.line()).map_err(cannot)?;
+        match rows.key()? {
+            Some(after) if after < key => {
+                return Err(rows.changed(&format!("member {} after {}", after.1, key.1)));
+            }
+            after => next.extend(after.map(|after| Reverse((after, i)))),
+        }
+    }
+    Ok(())
+}
+
+/// Merges the arrays of all parts, in the order of the members.
+fn join_stores(parts: &[FinishedShard], spec: &Spec, folder: &OutputFolder) -> Result<PartFolder> {
+    let points = parts[0].record.points;
+    let mut stored = BTreeMap::new();
+    for part in parts {
+        let path = part.path.join(names::STORE);
+        let missing = || Error::Request(format!("{}: the shard does not list it", path.display()));
+        let mark = part.record.head.store.as_ref().ok_or_else(missing)?;
+        stored.insert(part.shard.index(), StoredMembers::open(&path, &part.spec, points, mark)?);
+    }
+    let count = parts[0].shard.count();
+    let mut store = SnapshotStore::begin(folder.store(names::STORE)?, spec, points)?;
+    for member in spec.members() {
+        let missing = || Error::Request(format!("no shard has member {member}"));
+        store.copy(stored.get_mut(&(member % count)).ok_or_else(missing)?)?;
+    }
+    stored.values().try_for_each(StoredMembers::check)?;
+    store.ready()
+}

@@ -1,0 +1,556 @@
+//! The output of a run for people and programs: tables, plots and provenance in a folder, and an overview.
+//!
+//! A [`RunReport`] is opened before the work starts, so that no work is lost to a folder that cannot be written. It is
+//! the [`Sink`] of the simulation: rows stream to disk, and only a few numbers per member stay in memory.
+
+pub mod checkpoint;
+pub mod columns;
+pub mod complete;
+pub mod document;
+pub mod envelope;
+pub mod fingerprint;
+pub mod gallery;
+pub mod growing;
+pub mod merge;
+pub mod movie;
+pub mod outlines;
+pub mod overview;
+pub mod page;
+pub mod pictures;
+pub mod progress;
+pub mod reader;
+pub mod shard;
+pub mod stop;
+
+use std::{
+    collections::BTreeMap,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+pub use complete::Form;
+pub use progress::Progress;
+pub use stop::{Cause, Stop};
+
+use crate::files::{OutputFolder, portraits::Film};
+use checkpoint::{Head, Origin, Saved};
+use complete::Complete;
+use curvelax_base::{
+    error::{Error, Result},
+    text::{duration, plural, quoted},
+};
+use curvelax_ensemble::{Ended, Extent, LevelRow, LevelTimes, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish};
+use curvelax_study::{
+    placement::Platform,
+    results::{RunVerdict, tally::Tally},
+};
+use growing::Growing;
+
+/// Checkpoints use at most one part in `SHARE_OF_STATES` of the time of a run.
+const SHARE_OF_STATES: u32 = 20;
+
+/// How a report works; the results do not depend on it.
+pub struct Manner {
+    /// Where the progress is shown.
+    pub progress: Progress,
+    /// Time between two checkpoints.
+    pub every: Duration,
+    /// The means to stop the run.
+    pub stop: Stop,
+    /// Time after which a run that was asked to stop is ended even if it has not reached a point where all its work can be
+    /// saved.
+    pub patience: Duration,
+}
+
+/// Everything written about a run.
+// The tables come before the folder: dropped first, they leave it empty for its clean-up.
+pub struct RunReport {
+    growing: Growing,
+    folder: OutputFolder,
+    origin: Origin,
+    /// Nodes per member.
+    points: usize,
+    tally: Tally,
+    /// The first members.
+    films: Vec<Film>,
+    /// Relaxation times at the levels, by the rows of an earlier session.
+    levels: LevelTimes,
+    /// Members of the study.
+    members: u64,
+    /// Members of each stage.
+    stages: Vec<u64>,
+    /// Index of the stage.
+    stage: u64,
+    progress: Progress,
+    clock: Instant,
+    /// Wall time before the interruption.
+    earlier: Duration,
+    every: Duration,
+    stop: Stop,
+    patience: Duration,
+    /// When the last checkpoint was complete, and how long it took.
+    kept: (Instant, Duration),
+    /// Whether the checkpoint contains any work.
+    has_begun: bool,
+}
+
+impl RunReport {
+    /// Opens the tables of a study, and saves the first checkpoint, from which a killed run resumes.
+    pub fn begin(folder: OutputFolder, study: &Study, origin: Origin, manner: Manner) -> Result<RunReport> {
+        let growing = Growing::begin(&folder, study.spec(), study.points())?;
+        let mut report = RunReport::new(folder, growing, study, origin, manner);
+        let first = Standing { resident: Some(BTreeMap::new()), ..Standing::default() };
+        match outlines::save(&report.folder, &study.outlines()).and_then(|()| report.checkpoint(&first)) {
+            Ok(()) => Ok(report),
+            Err(error) => {
+                let error = report.explain(error);
+                report.give_up();
+                Err(error)
+            }
+        }
+    }
+
+    /// Resumes the report of an interrupted run; returns the progress of the run.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if its files are not those of the study.
+    pub fn resume(folder: OutputFolder, study: &Study, kept: Saved, manner: Manner) -> Result<(RunReport, Standing)> {
+        let Saved { head, standing, note } = kept;
+        let Head { origin, wall, stage, tables, store, rows, aside, films } = head;
+        let growing = Growing::resume(&folder, study.spec(), study.points(), &tables, store.as_ref(), rows.as_ref())?;
+        if note.is_some() {
+            folder.forget_last_state()?;
+        }
+        let levels = reader::levels(growing.levels(), study.spec())?;
+        let tally = reader::rows(growing.rows(), study.spec(), &levels, aside)?;
+        let mut report = RunReport::new(folder, growing, study, origin, manner);
+        (report.films, report.earlier, report.stage) = (films, wall, stage);
+        (report.tally, report.levels, report.has_begun) = (tally, levels, true);
+        Ok((report, standing))
+    }
+
+    fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, manner: Manner) -> RunReport {
+        let Manner { progress, every, stop, patience } = manner;
+        stop.set_begun();
+        RunReport {
+            growing,
+            folder,
+            origin,
+            points: study.points(),
+            tally: Tally::of(study.spec(), &LevelTimes::default()),
+            films: Vec::new(),
+            levels: LevelTimes::default(),
+            members: study.member_count(),
+            stages: study.stages().iter().map(|stage| stage.members).collect(),
+            stage: 0,
+            progress,
+            clock: Instant::now(),
+            earlier: Duration::ZERO,
+            every,
+            stop,
+            patience,
+            kept: (Instant::now(), Duration::ZERO),
+            has_begun: false,
+        }
+    }
+
+    /// Begins stage number `stage`; all members of earlier ones have ended.
+    pub fn begin_stage(&mut self, stage: usize) {
+        self.stage = stage as u64;
+    }
+
+    /// Members of the stages before the current one.
+    fn before(&self) -> u64 {
+        self.stages.iter().take(self.stage as usize).sum()
+    }
+
+    /// Moves out the times of the levels that an earlier session left.
+    pub fn take_levels(&mut self) -> LevelTimes {
+        std::mem::take(&mut self.levels)
+    }
+
+    /// The output folder.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Where the run is computed.
+    pub fn platform(&self) -> &Platform {
+        &self.origin.platform
+    }
+
+    /// Where it was computed before, one sentence each.
+    pub fn moves(&self) -> &[String] {
+        &self.origin.moves
+    }
+
+    /// Index of the current stage, from 0.
+    pub fn stage(&self) -> usize {
+        self.stage as usize
+    }
+
+    /// Rows that are written, of members and of levels.
+    pub fn rows(&self) -> u64 {
+        self.tally.members() + self.tally.levels
+    }
+
+    /// Members whose rows are written.
+    pub fn members(&self) -> u64 {
+        self.tally.members()
+    }
+
+    /// Replaces `error` by its cause if the folder was taken away.
+    pub fn explain(&self, error: Error) -> Error {
+        self.folder.explain(error)
+    }
+
+    /// Ends a run that failed. Its checkpoint and its rows are kept, or removed if they contain no work. Returns
+    /// whether the run can be resumed.
+    pub fn give_up(mut self) -> bool {
+        // A folder that was taken away is not touched any more.
+        let wanted = self.has_begun || self.stop.asked().is_some() || self.folder.check_claim().is_err();
+        // A checkpoint that cannot be removed needs its rows.
+        let stays = wanted || self.folder.forget_states().is_err();
+        self.growing.keep(stays);
+        stays
+    }
+
+    /// Leaves a run that failed to another session, which continues from its last checkpoint, even if that is the
+    /// first one.
+    pub fn leave(mut self) {
+        self.growing.keep(true);
+    }
+
+    /// The means to stop the run.
+    pub fn stop(&self) -> &Stop {
+        &self.stop
+    }
+
+    /// Returns the head of a checkpoint, once everything is on disk.
+    fn head(&mut self) -> Result<Head> {
+        let (tables, store, rows) = self.growing.mark()?;
+        Ok(Head {
+            origin: self.origin.clone(),
+            wall: self.wall(),
+            stage: self.stage,
+            tables,
+            store,
+            rows,
+            aside: self.tally.aside(),
+            films: self.films.clone(),
+        })
+    }
+
+    fn wall(&self) -> Duration {
+        self.earlier.saturating_add(self.clock.elapsed())
+    }
+
+    fn so_far(&self) -> String {
+        let (rows, all) = (self.tally.members(), plural(self.members, "member"));
+        format!(
+            " after {} with {rows} of {} {all} in the table; curvelax resume {} continues",
+            duration(self.wall().as_secs_f64()),
+            self.members,
+            quoted(self.folder.path()),
+        )
+    }
+
+    /// What the user should know about the results so far.
+    pub fn warnings(&self) -> Vec<String> {
+        self.tally.warnings()
+    }
+
+    /// Gives all files their final names with [`Complete::publish`]; `early` are the warnings given before.
+    pub fn finish(mut self, spec: &Spec, early: &[String], form: Form) -> Result<(String, RunVerdict)> {
+        // All rows are written: a run killed from now on only needs to draw its pictures again.
+        let next = self.rows() - self.before();
+        self.checkpoint(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;
+        let shard = match spec.shard {
+            Some(_) => Some(shard::to_bytes(&Head { rows: None, ..self.head()? }, self.points, early)?),
+            None => None,
+        };
+        // Dropped in reverse order: the folder last, after its files.
+        let RunReport { folder, tally, films, progress, origin, clock, earlier, growing, .. } = self;
+        progress.finish();
+        let wall = earlier.saturating_add(clock.elapsed());
+        let (files, store, spill) = growing.ready()?;
+        let Origin { platform, started, .. } = &origin;
+        let warnings = &[early, &tally.warnings()].concat();
+        let complete = Complete { spec, platform, tally, films: &films, warnings, started: *started, wall };
+        let published = complete.publish(&folder, files, store, shard.as_deref(), form);
+        let done = published.and_then(|published| folder.forget_states().map(|()| published));
+        if done.is_ok() {
+            // No checkpoint refers to it any more.
+            spill.iter().for_each(|spill| spill.keep(false));
+        }
+        done.map_err(|error| folder.explain(error))
+    }
+}
+
+impl Sink for RunReport {
+    fn level(&mut self, row: &LevelRow) -> Result<()> {
+        self.growing.add_level(row)?;
+        self.tally.levels += 1;
+        self.has_begun = true;
+        Ok(())
+    }
+
+    fn member(&mut self, ended: &Ended) -> Result<()> {
+        let Ended { outcome, portrait, mollified, unresolved, excess, .. } = ended;
+        // The tally may refuse it, so it comes first: rows that are written can always be read back.
+        self.tally.add(outcome)?;
+        self.growing.add(ended)?;
+        self.has_begun = true;
+        self.tally.add_excess(outcome.cell, excess);
+        self.tally.add_aside(mollified, *unresolved);
+        self.films.extend(portrait.as_ref().map(|portrait| Film::new(outcome, portrait)));
+        Ok(())
+    }
+
+    fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
+        self.growing.spill(&self.folder, series, snapshots).map(Some)
+    }
+
+    fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
+        let (before, all) = (self.before(), self.stages.iter().sum::<u64>());
+        let share = (before as f64 + share * total as f64) / all.max(1) as f64;
+        self.progress.show(before + done, all, share);
+        match self.stop.asked() {
+            Some((cause, when)) if when.elapsed() > self.patience => Err(cause.error(&self.so_far())),
+            _ => Ok(()),
+        }
+    }
+
+    fn wish(&mut self) -> Wish {
+        let (since, took) = self.kept;
+        match self.stop.asked() {
+            Some((cause, _)) => Wish::Stop(cause.error(&self.so_far())),
+            None if since.elapsed() >= self.every.max(SHARE_OF_STATES * took) => Wish::Checkpoint,
+            None => Wish::Continue,
+        }
+    }
+
+    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
+        let begun = Instant::now();
+        let head = self.head()?;
+        let known;
+        let resident = match &standing.resident {
+            Some(resident) => resident,
+            None => {
+                known = checkpoint::on_their_way(&self.folder, self.stage, standing);
+                &known
+            }
+        };
+        self.folder.keep_state(&checkpoint::to_bytes(&head, standing, resident)?)?;
+        self.growing.keep(true);
+        self.has_begun |= !standing.early.is_empty() || !resident.is_empty();
+        self.kept = (Instant::now(), begun.elapsed());
+        self.stop.set_kept();
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, path::Path};
+
+    use glam::DVec2;
+
+    use super::*;
+    use crate::files::names;
+    use curvelax_ensemble::{Features, Mollified, Observables, Portrait, Rows, Status, spec::Store};
+    use curvelax_study::samples::{outcome, platform};
+
+    fn files(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = entries.collect();
+        names.sort();
+        names
+    }
+
+    const PATIENCE: Duration = Duration::from_millis(300);
+
+    fn manner(stop: &Stop) -> Manner {
+        Manner { progress: Progress::Quiet, every: Duration::from_secs(1000), stop: stop.clone(), patience: PATIENCE }
+    }
+
+    fn begun(out: &Path, spec: &Spec, stop: &Stop) -> RunReport {
+        let study = Study::new(spec.clone()).unwrap();
+        let origin = Origin::new(&study, platform()).unwrap();
+        RunReport::begin(OutputFolder::open(out, true).unwrap(), &study, origin, manner(stop)).unwrap()
+    }
+
+    /// Nodes of the members in these tests.
+    const POINTS: usize = 6;
+
+    /// The result of a member.
+    fn ended(member: u64, portrait: Option<Portrait>) -> Ended {
+        let of = |value| vec![value; POINTS];
+        Ended {
+            outcome: outcome(member, Status::Relaxed, Some(0.5)),
+            features: Features(vec![0.5; 26]),
+            excess: vec![0.2, 0.1],
+            rows: Rows {
+                spilled: Vec::new(),
+                series: vec![SeriesRow { member, t: 0.0, at: Observables::default() }],
+                snapshots: vec![Snapshot { member, t: 0.0, x: of(1.0), y: of(2.0), k: of(3.0), r: of(4.0) }],
+            },
+            portrait,
+            mollified: Mollified::default(),
+            unresolved: false,
+        }
+    }
+
+    /// A report in `out` that has received one member.
+    fn report(out: &Path, spec: &Spec, portrait: Option<Portrait>) -> RunReport {
+        let mut report = begun(out, spec, &Stop::default());
+        report.member(&ended(0, portrait)).unwrap();
+        report
+    }
+
+    #[test]
+    fn a_finished_report_leaves_the_files_asked_for_and_no_others() {
+        let home = tempfile::tempdir().unwrap();
+        let out = home.path().join("out");
+        let triangle = vec![DVec2::ZERO, DVec2::X, DVec2::Y];
+        let portrait = Portrait { before: triangle.clone(), frames: Vec::new(), after: triangle };
+
+        let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
+        let (overview, _) = report(&out, &all, Some(portrait)).finish(&all, &[], Form::Overview).unwrap();
+        let tables = ["ensemble.csv", "explained.csv", "levels.csv", "mean_excess.csv", "members.csv"];
+        let always = [&tables[..], &["plots", "rates.csv", "report.html", "run.json"]].concat();
+        assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());
+        let charts = [
+            "distribution.svg",
+            "excess.svg",
+            "features.svg",
+            "mesh.svg",
+            "portraits.json",
+            "rate.svg",
+            "relaxation.svg",
+        ];
+        let plots = [&charts[..], &["survival.svg"]].concat();
+        assert_eq!(files(&out.join("plots")), [&["curves.svg"], &plots[..]].concat());
+        for (name, rows) in [(names::SUMMARY, 1), (names::MEMBERS, 1), (names::SERIES, 1), (names::SNAPSHOTS, POINTS)] {
+            assert_eq!(fs::read_to_string(out.join(name)).unwrap().lines().count(), 1 + rows, "{name}");
+        }
+        assert!(
+            overview.contains(
+                "summary.csv, members.csv, ensemble.csv, explained.csv, rates.csv, levels.csv, mean_excess.csv, series.csv, \
+                 snapshots.csv, report.html, plots/*.svg"
+            ),
+            "{overview}"
+        );
+
+        let few = Spec::default();
+        report(&out, &few, None).finish(&few, &["a warning".into()], Form::Overview).unwrap();
+        assert_eq!(files(&out), [&always[..], &["summary.csv"]].concat());
+        assert_eq!(files(&out.join("plots")), plots);
+        assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
+    }
+
+    #[test]
+    fn a_run_that_is_asked_to_stop_says_so_and_waits_only_so_long() {
+        let home = tempfile::tempdir().unwrap();
+        let (spec, stop) = (Spec::default(), Stop::default());
+        let mut running = begun(&home.path().join("out"), &spec, &stop);
+        running.member(&ended(0, None)).unwrap();
+        assert!(matches!(running.wish(), Wish::Continue) && running.progress(1, 256, 0.1).is_ok());
+        let before = Instant::now();
+        stop.ask(Cause::MaxTime);
+        stop.ask(Cause::Interrupt);
+        let Wish::Stop(error) = running.wish() else { panic!("it goes on") };
+        assert_eq!(error.exit_code(), 75, "the first cause counts");
+        assert!(error.to_string().starts_with("stopped by --max-time after "), "{error}");
+        assert!(error.to_string().contains("with 1 of 256 members in the table; curvelax resume "), "{error}");
+        // If this thread had to wait long, its patience may be over.
+        let goes_on = running.progress(1, 256, 0.1).is_ok();
+        assert!((goes_on || before.elapsed() > PATIENCE) && !stop.is_kept());
+        running.checkpoint(&Standing { next: 1, ..Standing::default() }).unwrap();
+        assert!(stop.is_kept());
+        std::thread::sleep(PATIENCE);
+        assert_eq!(running.progress(1, 256, 0.1).unwrap_err().exit_code(), 75);
+        assert_eq!(Cause::Interrupt.error("").exit_code(), 130);
+    }
+
+    #[test]
+    fn a_state_is_wished_for_when_its_time_has_come() {
+        let home = tempfile::tempdir().unwrap();
+        let (spec, stop) = (Spec::default(), Stop::default());
+        let mut running = begun(&home.path().join("out"), &spec, &stop);
+        let hour = Duration::from_secs(3600);
+        running.every = hour;
+        running.kept = (Instant::now(), Duration::ZERO);
+        assert!(matches!(running.wish(), Wish::Continue));
+        running.every = Duration::ZERO;
+        assert!(matches!(running.wish(), Wish::Checkpoint));
+        // A checkpoint that took long is not saved again soon.
+        running.kept.1 = hour;
+        assert!(matches!(running.wish(), Wish::Continue));
+    }
+
+    #[test]
+    fn a_report_goes_on_from_its_state_to_the_same_bytes() {
+        let home = tempfile::tempdir().unwrap();
+        let csv = Spec {
+            curves: 3,
+            points: POINTS,
+            amplitude: 0.0.into(),
+            series: Some(0.1),
+            snapshots: vec![0.0],
+            ..Spec::default()
+        };
+        let zarr = Spec { store: Store::Zarr, ..csv.clone() };
+        for (name, spec) in [("csv", csv), ("zarr", zarr)] {
+            let [straight, broken] = ["straight", "broken"].map(|way| home.path().join(name).join(way));
+            let mut whole = begun(&straight, &spec, &Stop::default());
+            (0..3).for_each(|member| whole.member(&ended(member, None)).unwrap());
+            whole.finish(&spec, &[], Form::Overview).unwrap();
+
+            let mut first = begun(&broken, &spec, &Stop::default());
+            first.member(&ended(0, None)).unwrap();
+            let early = BTreeMap::from([(2, ended(2, None))]);
+            first.checkpoint(&Standing { next: 1, early, resident: Some(BTreeMap::new()) }).unwrap();
+            // Not in the checkpoint: to be cut off.
+            first.member(&ended(1, None)).unwrap();
+            assert!(first.give_up(), "there is something to go on with");
+            let folder = OutputFolder::open_again(&broken).unwrap();
+            let kept = checkpoint::find(&folder).unwrap().unwrap();
+            assert_eq!(kept.note, None);
+            let study = Study::new(spec.clone()).unwrap();
+            let (mut second, standing) = RunReport::resume(folder, &study, kept, manner(&Stop::default())).unwrap();
+            assert_eq!((standing.next, second.members()), (1, 1));
+            second.member(&ended(1, None)).unwrap();
+            second.member(&standing.early[&2]).unwrap();
+            second.finish(&spec, &[], Form::Overview).unwrap();
+            let tables: Vec<String> = files(&straight).into_iter().filter(|name| name.ends_with("csv")).collect();
+            assert_eq!(files(&straight), files(&broken));
+            for name in tables {
+                let text = |folder: &Path| fs::read_to_string(folder.join(&name)).unwrap();
+                assert_eq!(text(&straight), text(&broken), "{name}");
+            }
+            if name == "zarr" {
+                for chunk in ["x/c.0.0.0", "k/c.0.0.0", "status/c.0", "zarr.json"] {
+                    let bytes = |folder: &Path| fs::read(folder.join(names::STORE).join(chunk)).unwrap();
+                    assert_eq!(bytes(&straight), bytes(&broken), "{chunk}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_run_that_fails_keeps_its_state_unless_there_is_nothing_in_it() {
+        let home = tempfile::tempdir().unwrap();
+        let out = home.path().join("out");
+        assert!(!begun(&out, &Spec::default(), &Stop::default()).give_up());
+        assert_eq!(files(home.path()), [""; 0]);
+        assert!(report(&out, &Spec::default(), None).give_up());
+        let parts = ["levels", "members", "rates", "summary"].map(|name| format!(".{name}.csv.part"));
+        assert_eq!(files(&out), [&[".curvelax.state".to_owned()], &parts[..]].concat());
+        // Nothing has ended, but the run was asked to stop, which is not a failure.
+        let stop = Stop::default();
+        let running = begun(&home.path().join("stopped"), &Spec::default(), &stop);
+        stop.ask(Cause::Terminate);
+        assert!(running.give_up());
+    }
+}

@@ -1,0 +1,358 @@
+//! `report.html`: a run at a glance, in one file that needs no network.
+//!
+//! The first screen says what was run, how many members relaxed, how long they took and what went wrong. Pictures,
+//! tables, the spec and the provenance follow. All text is escaped, a content security policy forbids every request and
+//! every script except that of the slider, and equal pages have equal bytes. For a run of any size, a page holds a few
+//! members, the pictures and the first rows of each table.
+
+mod player;
+mod scope;
+
+use std::fmt::Write;
+
+pub use player::{MAX_MEMBERS, MovingMember, spread};
+
+use curvelax_base::text::{count, grouped};
+use curvelax_draw::svg::escape;
+use player::{Player, colour};
+use scope::Sheets;
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+/// Its digest, by which the content security policy allows this script only. A test computes it.
+const SCRIPT_DIGEST: &str = "sha256-775RypILJTOY0aphVAygxJe5VXjKB+pvwd32GxoMr5M=";
+
+/// Longer tables are truncated, and say so.
+const MAX_ROWS: usize = 200;
+/// Tables with at most this many rows, and more columns than [`NARROW`], are turned: they fit a phone then.
+const FEW_ROWS: usize = 3;
+const NARROW: usize = 8;
+
+/// The content of a page.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Page<'a> {
+    /// Heading, and title of the window.
+    pub title: &'a str,
+    /// A sentence or two on what was run.
+    pub what: &'a str,
+    /// Members by status, such as `("relaxed", 412)`.
+    pub statuses: Vec<(&'a str, u64)>,
+    /// The numbers to read first: how long relaxation took.
+    pub headline: Vec<Headline>,
+    /// What the reader should know, one sentence each.
+    pub warnings: &'a [String],
+    /// A few members to watch; the first [`MAX_MEMBERS`] are shown.
+    pub members: Vec<MovingMember>,
+    /// The pictures.
+    pub plots: Vec<PageFigure>,
+    /// The tables.
+    pub tables: Vec<PageTable>,
+    /// The resolved spec as TOML.
+    pub spec: &'a str,
+    /// How and when it was made: name and value.
+    pub provenance: Vec<(String, String)>,
+}
+
+/// A prominent number.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Headline {
+    /// Its name: `median t_relax`.
+    pub label: String,
+    /// The number as people write it, with its unit.
+    pub value: String,
+    /// Its interval, or another note; may be empty.
+    pub note: String,
+}
+
+/// A picture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PageFigure {
+    /// Its title for screen readers; the picture shows it, too.
+    pub title: String,
+    /// A sentence below it; may be empty.
+    pub caption: String,
+    /// The text of an SVG file by this program: it is not escaped.
+    pub svg: String,
+}
+
+/// A table.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PageTable {
+    /// What it holds.
+    pub caption: String,
+    /// Names of the columns.
+    pub header: Vec<String>,
+    /// Cells as shown. Columns of numbers are aligned at the right.
+    pub rows: Vec<Vec<String>>,
+    /// The file with all rows and digits, in the folder of the page; may be empty.
+    pub source: String,
+}
+
+impl Page<'_> {
+    /// The text of the file.
+    pub fn html(&self) -> String {
+        let player = Player::new(&self.members);
+        let script = player.as_ref().filter(|player| player.moves()).map(|player| script(&player.data()));
+        let mut sheets = Sheets::default();
+        let plots: String = self.plots.iter().map(|figure| figure.html(&mut sheets)).collect();
+        let tables: String = self.tables.iter().map(PageTable::html).collect();
+        let spec = if self.spec.is_empty() {
+            String::new()
+        } else {
+            format!("<pre><code>{}</code></pre>\n", escape(self.spec))
+        };
+        let facts = self.facts();
+        let sections = [
+            (
+                "plots",
+                "Plots",
+                if plots.is_empty() { plots } else { format!("<div class=\"plots\">\n{plots}</div>\n") },
+            ),
+            ("tables", "Tables", tables),
+            ("spec", "Spec", spec),
+            ("provenance", "Provenance", facts),
+        ];
+        let sections: Vec<_> = sections.into_iter().filter(|(.., content)| !content.is_empty()).collect();
+
+        let mut html = head(self.title, script.is_some(), &sheets.text());
+        html += &format!("<header>\n<h1>{}</h1>\n", escape(self.title));
+        html += &paragraph("what", self.what);
+        let links = sections.iter().map(|(id, name, _)| format!("<li><a href=\"#{id}\">{name}</a></li>\n"));
+        html += &format!(
+            "<nav aria-label=\"Sections\">\n<ul>\n{}</ul>\n</nav>\n</header>\n<main>\n",
+            links.collect::<String>()
+        );
+        html += &self.first_screen(player.as_ref());
+        for (id, name, content) in &sections {
+            html += &format!("<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{name}</h2>\n{content}</section>\n");
+        }
+        html + "</main>\n" + &script.unwrap_or_default() + "</body>\n</html>\n"
+    }
+
+    fn first_screen(&self, player: Option<&Player>) -> String {
+        let alone = if player.is_none() { " alone" } else { "" };
+        let mut html = format!("<div class=\"first{alone}\">\n<div>\n");
+        html += &section("How many relaxed", "", &self.counts());
+        if !self.headline.is_empty() {
+            let tiles: String = self.headline.iter().map(Headline::html).collect();
+            html += &section("How long it took", "", &format!("<dl class=\"headline\">\n{tiles}</dl>\n"));
+        }
+        html += &section("What went wrong", "wrong", &self.wrong());
+        html += "</div>\n";
+        if let Some(player) = player {
+            html += &format!("<div>\n{}</div>\n", section("Members on their way", "", &player.html()));
+        }
+        html + "</div>\n"
+    }
+
+    /// Number of members with this status.
+    fn with(&self, status: &str) -> u64 {
+        self.statuses.iter().filter(|(name, _)| *name == status).map(|(_, count)| count).sum()
+    }
+
+    fn all(&self) -> u64 {
+        self.statuses.iter().map(|(_, count)| count).sum()
+    }
+
+    fn counts(&self) -> String {
+        let (relaxed, all) = (self.with("relaxed"), self.all());
+        if all == 0 {
+            return paragraph("relaxed-count", "There are no members.");
+        }
+        let mut html = format!(
+            "<p class=\"relaxed-count\"><strong>{}</strong> of {} relaxed ({})</p>\n",
+            grouped(relaxed),
+            count(all, "member"),
+            share(relaxed, all)
+        );
+        let shown = || self.statuses.iter().filter(|(_, count)| *count > 0);
+        let bars = shown()
+            .map(|(name, count)| format!("<span class=\"{}\" style=\"flex-grow: {count}\"></span>", colour(name)));
+        html += &format!(
+            "<div class=\"statuses\" aria-hidden=\"true\">{}</div>\n<ul class=\"key\">\n",
+            bars.collect::<String>()
+        );
+        for (name, count) in shown() {
+            let (colour, share) = (colour(name), share(*count, all));
+            html += &format!("<li><i class=\"{colour}\"></i>{} {} ({share})</li>\n", escape(name), grouped(*count));
+        }
+        html + "</ul>\n"
+    }
+
+    fn wrong(&self) -> String {
+        if !self.warnings.is_empty() {
+            let items = self.warnings.iter().map(|warning| format!("<li>{}</li>\n", escape(warning)));
+            return format!("<ul>\n{}</ul>\n", items.collect::<String>());
+        }
+        let (unfinished, relaxed) = (self.with("unfinished"), self.with("relaxed"));
+        let bad = self.all() - unfinished - relaxed;
+        paragraph(
+            "",
+            &match (bad, unfinished) {
+                (0, 0) if relaxed > 0 => "Nothing: every member relaxed, and there are no warnings.".into(),
+                (0, 0) => "Nothing: there are no warnings.".into(),
+                (0, _) => format!(
+                    "Nothing: no member failed, and there are no warnings. {} had not relaxed when time was up, and \
+                 count as censored.",
+                    count(unfinished, "member")
+                ),
+                _ => format!("{} failed: see the statuses.", count(bad, "member")),
+            },
+        )
+    }
+
+    fn facts(&self) -> String {
+        if self.provenance.is_empty() {
+            return String::new();
+        }
+        let fact = |(name, value): &(String, String)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value));
+        format!("<dl class=\"facts\">\n{}</dl>\n", self.provenance.iter().map(fact).collect::<String>())
+    }
+}
+
+impl Headline {
+    fn html(&self) -> String {
+        let [label, value, note] = [&self.label, &self.value, &self.note].map(|text| escape(text));
+        let note = if note.is_empty() { note } else { format!("<dd class=\"note\">{note}</dd>") };
+        format!("<div><dt>{label}</dt><dd class=\"value\">{value}</dd>{note}</div>\n")
+    }
+}
+
+impl PageFigure {
+    fn html(&self, sheets: &mut Sheets) -> String {
+        let caption = escape(&self.caption);
+        let caption = if caption.is_empty() { caption } else { format!("<figcaption>{caption}</figcaption>\n") };
+        let svg = sheets.inlined(&self.svg);
+        format!(
+            "<figure>\n<h3 class=\"unseen\">{}</h3>\n<div class=\"scroll\">\n{svg}</div>\n{caption}</figure>\n",
+            escape(&self.title)
+        )
+    }
+}
+
+impl PageTable {
+    fn html(&self) -> String {
+        match self.rows.len() <= FEW_ROWS && self.header.len() > NARROW {
+            true => self.turned(),
+            false => self.upright(),
+        }
+    }
+
+    /// A row for each column, and a column for each row.
+    fn turned(&self) -> String {
+        let caption = escape(&self.caption);
+        let mut html = begin_table(&caption);
+        html += "<tbody>\n";
+        for (j, name) in self.header.iter().enumerate() {
+            let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escape(name));
+            for row in &self.rows {
+                // Writing into a string cannot fail.
+                let _ = write!(html, "<td class=\"number\">{}</td>", escape(row.get(j).map_or("", String::as_str)));
+            }
+            html += "</tr>\n";
+        }
+        html + "</tbody>\n</table>\n" + &self.link() + "</div>\n"
+    }
+
+    /// Where all rows are, with all digits.
+    fn link(&self) -> String {
+        let source = escape(&self.source);
+        let cut = match self.rows.len() > MAX_ROWS {
+            true => format!("The first {MAX_ROWS} of {} rows. ", grouped(self.rows.len() as u64)),
+            false => String::new(),
+        };
+        match source.is_empty() && cut.is_empty() {
+            true => String::new(),
+            false if source.is_empty() => format!("<p class=\"small\">{}</p>\n", cut.trim_end()),
+            false => format!("<p class=\"small\">{cut}All numbers: <a href=\"{source}\">{source}</a></p>\n"),
+        }
+    }
+
+    fn upright(&self) -> String {
+        let caption = escape(&self.caption);
+        let columns = self.header.len();
+        let cell = |row: &[String], j: usize| escape(row.get(j).map_or("", String::as_str));
+        let is_number = |text: &str| text.is_empty() || text.replace('\u{2212}', "-").parse::<f64>().is_ok();
+        let numbers: Vec<bool> =
+            (0..columns).map(|j| self.rows.iter().all(|row| row.get(j).is_none_or(|text| is_number(text)))).collect();
+        let class = |j: usize| if numbers[j] { " class=\"number\"" } else { "" };
+
+        let mut html = begin_table(&caption);
+        html += "<thead><tr>";
+        for j in 0..columns {
+            let _ = write!(html, "<th scope=\"col\"{}>{}</th>", class(j), cell(&self.header, j));
+        }
+        html += "</tr></thead>\n<tbody>\n";
+        for row in self.rows.iter().take(MAX_ROWS) {
+            html += "<tr>";
+            for j in 0..columns {
+                let (class, cell) = (class(j), cell(row, j));
+                // Writing into a string cannot fail.
+                let _ = match j {
+                    0 => write!(html, "<th scope=\"row\"{class}>{cell}</th>"),
+                    _ => write!(html, "<td{class}>{cell}</td>"),
+                };
+            }
+            html += "</tr>\n";
+        }
+        html + "</tbody>\n</table>\n" + &self.link() + "</div>\n"
+    }
+}
+
+fn begin_table(caption: &str) -> String {
+    format!(
+        "<div class=\"table\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n<table>\n\
+         <caption>{caption}</caption>\n"
+    )
+}
+
+/// Everything up to the body.
+fn head(title: &str, script: bool, sheets: &str) -> String {
+    let script = if script { format!("'{SCRIPT_DIGEST}'") } else { "'none'".into() };
+    let title = escape(title);
+    // The empty icon keeps browsers from requesting one.
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
+         script-src {script}; img-src data:; base-uri 'none'; form-action 'none'\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n<title>{title}</title>\n\
+         <link rel=\"icon\" href=\"data:,\">\n<style>\n{STYLE}{sheets}</style>\n</head>\n<body>\n"
+    )
+}
+
+/// The script and its data.
+fn script(data: &str) -> String {
+    format!("<script type=\"application/json\" id=\"trajectories\">\n{data}\n</script>\n<script>{}</script>\n", code())
+}
+
+/// The script as browsers see it: they drop carriage returns before they compute its digest.
+fn code() -> String {
+    SCRIPT.replace('\r', "")
+}
+
+fn section(heading: &str, class: &str, content: &str) -> String {
+    let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
+    format!("<section{class}>\n<h2>{heading}</h2>\n{content}</section>\n")
+}
+
+fn paragraph(class: &str, text: &str) -> String {
+    match (class, text) {
+        (_, "") => String::new(),
+        ("", text) => format!("<p>{}</p>\n", escape(text)),
+        (class, text) => format!("<p class=\"{class}\">{}</p>\n", escape(text)),
+    }
+}
+
+/// A percentage; 0 means none and 100 means all.
+fn share(part: u64, all: u64) -> String {
+    let percent = 100.0 * part as f64 / all.max(1) as f64;
+    match part {
+        _ if part > 0 && percent < 0.05 => "< 0.1 %".into(),
+        _ if part < all && percent >= 99.95 => "> 99.9 %".into(),
+        _ => format!("{percent:.1} %"),
+    }
+}
+
+#[cfg(test)]
+mod tests;

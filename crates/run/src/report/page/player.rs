@@ -1,0 +1,372 @@
+//! A few moving members: their nodes at some times, small enough to be part of a page.
+//!
+//! All members share one scale if they can be seen at it. A coordinate is an integer below 4096, written as two digits of base64. The script
+//! `page.js` reads them and moves the nodes on straight lines from one time to the next.
+
+use std::{fmt::Write as _, io};
+
+use glam::DVec2;
+use serde::Serialize;
+use serde_json::{Serializer, ser::Formatter};
+
+use crate::{files::portraits::DIGITS, report::gallery::common_extent};
+use curvelax_base::text::significant;
+use curvelax_curve::polygon;
+use curvelax_draw::{
+    axis::{Scale, tick_step},
+    svg::escape,
+};
+
+/// Maximum number of members shown.
+pub const MAX_MEMBERS: usize = 6;
+/// Maximum times, and nodes, of a member: more would not fit into a small page, and show no more.
+const MAX_TIMES: usize = 61;
+const MAX_NODES: usize = 200;
+/// Maximum positions of the slider.
+const MAX_MARKS: usize = 121;
+/// Maximum number of nodes that are marked.
+const MAX_DOTS: usize = 120;
+/// The largest coordinate, and the free space round a curve.
+const LARGEST: f64 = 4095.0;
+const PADDING: f64 = 200.0;
+/// Minimum height of a panel, as a fraction of its width.
+const MIN_HEIGHT: f64 = 0.5;
+
+/// A member at several times.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MovingMember {
+    /// What it is and how it ended: `member 3: relaxed at t = 0.41`.
+    pub label: String,
+    /// Its status, which sets its colour.
+    pub status: &'static str,
+    /// Ascending times, in length⁴.
+    pub times: Vec<f64>,
+    /// Its nodes at each time; their number is always the same.
+    pub nodes: Vec<Vec<DVec2>>,
+}
+
+impl MovingMember {
+    /// The times that can be shown, thinned, and the nodes at each.
+    fn frames(&self) -> Vec<(f64, Vec<DVec2>)> {
+        let count = self.nodes.first().map_or(0, Vec::len);
+        let usable = |(t, nodes): &(&f64, &Vec<DVec2>)| {
+            let known = |p: &DVec2| Scale::Linear.holds(p.x) && Scale::Linear.holds(p.y);
+            t.is_finite() && nodes.len() == count && count > 0 && nodes.iter().all(known)
+        };
+        let frames: Vec<(&f64, &Vec<DVec2>)> = self.times.iter().zip(&self.nodes).filter(usable).collect();
+        let stride = count.div_ceil(MAX_NODES).max(1);
+        let node = |nodes: &Vec<DVec2>| nodes.iter().copied().step_by(stride).collect();
+        spread(frames.len(), MAX_TIMES).map(|i| (*frames[i].0, node(frames[i].1))).collect()
+    }
+}
+
+/// Members that can be shown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Player {
+    members: Vec<PlayedMember>,
+    /// Units of length in one unit of the coordinates, if it is the same for all.
+    unit: Option<f64>,
+    /// Height of a panel, in coordinates.
+    height: f64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct PlayedMember {
+    label: String,
+    status: &'static str,
+    times: Vec<f64>,
+    /// Coordinates x, y, x, y, … at each time.
+    frames: Vec<Vec<u16>>,
+}
+
+/// The data of the script.
+#[derive(Serialize)]
+struct PlayerData {
+    marks: Vec<f64>,
+    members: Vec<MemberData>,
+}
+
+/// The data of a member; a frame is a string of digits.
+#[derive(Serialize)]
+struct MemberData {
+    times: Vec<f64>,
+    frames: Vec<String>,
+}
+
+/// JSON with a line for each member and each of its frames, so that no line of the page gets too long. Numbers are as
+/// short as elsewhere on the page: `0` instead of `0.0`.
+#[derive(Default)]
+struct LineBreaks {
+    /// Number of open objects.
+    depth: usize,
+    /// A comma was written, and the next item in the list is not known yet.
+    after_comma: bool,
+}
+
+impl LineBreaks {
+    fn break_line<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        match std::mem::take(&mut self.after_comma) {
+            true => writer.write_all(b"\n"),
+            false => Ok(()),
+        }
+    }
+}
+
+impl Formatter for LineBreaks {
+    fn write_f64<W: io::Write + ?Sized>(&mut self, writer: &mut W, value: f64) -> io::Result<()> {
+        self.after_comma = false;
+        write!(writer, "{value}")
+    }
+
+    fn begin_array_value<W: io::Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        self.after_comma = !first;
+        if first { Ok(()) } else { writer.write_all(b",") }
+    }
+
+    fn begin_string<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.break_line(writer)?;
+        writer.write_all(b"\"")
+    }
+
+    fn begin_object<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.depth += 1;
+        self.break_line(writer)?;
+        writer.write_all(b"{")
+    }
+
+    fn end_object<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.depth -= 1;
+        writer.write_all(b"}")
+    }
+
+    fn begin_object_key<W: io::Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        match (first, self.depth) {
+            (true, _) => Ok(()),
+            (false, 1) => writer.write_all(b",\n"),
+            (false, _) => writer.write_all(b","),
+        }
+    }
+}
+
+impl Player {
+    /// Uses the first of `trajectories` that have a time to show; none if none has.
+    pub fn new(trajectories: &[MovingMember]) -> Option<Player> {
+        let shown = trajectories.iter().map(|trajectory| (trajectory, trajectory.frames()));
+        let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MAX_MEMBERS).collect();
+        let boxes: Vec<(DVec2, DVec2)> = shown.iter().filter_map(|(_, frames)| bounds(frames)).collect();
+        let extents = boxes.iter().map(|(low, high)| *high - *low);
+        let unit_of = |extent: f64| if extent > 0.0 { extent / (LARGEST - 2.0 * PADDING) } else { 1.0 };
+        let common = common_extent(extents.clone().map(|extent| extent.max_element()));
+        let own_unit = |extent: DVec2| unit_of(common.unwrap_or(extent.max_element()));
+        let tallest = extents.map(|extent| extent.y / own_unit(extent)).reduce(f64::max)?;
+        let height = (tallest + 2.0 * PADDING).clamp(MIN_HEIGHT * LARGEST, LARGEST).round();
+        let members = shown.into_iter().zip(boxes).map(|((trajectory, frames), (low, high))| {
+            let unit = own_unit(high - low);
+            // y grows downwards in SVG.
+            let place =
+                |p: DVec2| (p - 0.5 * (low + high)) * DVec2::new(1.0, -1.0) / unit + 0.5 * DVec2::new(LARGEST, height);
+            let whole = |nodes: &[DVec2]| {
+                nodes.iter().flat_map(|p| place(*p).to_array()).map(|v| v.round().clamp(0.0, LARGEST) as u16).collect()
+            };
+            let (times, frames) = frames.iter().map(|(t, nodes)| (*t, whole(nodes))).unzip();
+            let size = match common {
+                Some(_) => String::new(),
+                None => format!(", {} across", significant((high - low).max_element(), 2)),
+            };
+            PlayedMember { label: format!("{}{size}", trajectory.label), status: trajectory.status, times, frames }
+        });
+        Some(Player { members: members.collect(), unit: common.map(unit_of), height })
+    }
+
+    /// Whether anything moves.
+    pub fn moves(&self) -> bool {
+        self.members.iter().any(|member| member.times.len() > 1)
+    }
+
+    /// Its part of the page. Without the script it shows the members at their first time.
+    pub fn html(&self) -> String {
+        let mut html = String::from("<div class=\"members\">\n");
+        for PlayedMember { label, status, frames, times } in &self.members {
+            let (start, label) = (path(&frames[0]), escape(label));
+            let dots = if frames[0].len() <= 2 * MAX_DOTS { dots(&frames[0]) } else { String::new() };
+            let (height, colour) = (self.height, colour(status));
+            // Writing into a string cannot fail.
+            let _ = writeln!(
+                html,
+                "<figure style=\"--now: var(--{colour})\">\
+                 <svg viewBox=\"0 0 {LARGEST} {height}\" role=\"img\" aria-label=\"{label}\">\
+                 <path class=\"start\" d=\"{start}\"/><path class=\"now\" d=\"{start}\"/>\
+                 <path class=\"nodes\" d=\"{dots}\"/>{}</svg><figcaption>{label}</figcaption></figure>",
+                self.scale_bar()
+            );
+            debug_assert_eq!(frames.len(), times.len());
+        }
+        html += "</div>\n";
+        if self.moves() {
+            html += "<div class=\"controls\" id=\"controls\" hidden>\n\
+                <button type=\"button\" id=\"play\">Play</button>\n\
+                <input type=\"range\" id=\"time\" min=\"0\" max=\"200\" value=\"0\" aria-label=\"Time\">\n\
+                <span id=\"clock\" aria-hidden=\"true\"></span>\n</div>\n";
+        }
+        let grey = if self.moves() { "Grey: at the start. " } else { "" };
+        let scale = match self.bar() {
+            Some((length, _)) => format!("All to one scale; the bar has length {}.", significant(length, 1)),
+            None => "Each to its own scale.".into(),
+        };
+        html += &format!("<p class=\"small\">{grey}{scale}</p>\n");
+        html
+    }
+
+    /// The data of the script: numbers and digits of base64 only.
+    pub fn data(&self) -> String {
+        let member = |PlayedMember { times, frames, .. }: &PlayedMember| MemberData {
+            times: times.clone(),
+            frames: frames.iter().map(|frame| digits(frame)).collect(),
+        };
+        let data = PlayerData { marks: self.marks(), members: self.members.iter().map(member).collect() };
+        let mut bytes = Vec::new();
+        let written = data.serialize(&mut Serializer::with_formatter(&mut bytes, LineBreaks::default()));
+        written.expect("numbers and strings are JSON, and memory takes them");
+        String::from_utf8(bytes).expect("JSON is UTF-8")
+    }
+
+    /// Times at equal distances along the slider; if there are many, it moves slowly.
+    fn marks(&self) -> Vec<f64> {
+        let mut all: Vec<f64> = self.members.iter().flat_map(|member| member.times.iter().copied()).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        spread(all.len(), MAX_MARKS).map(|i| all[i]).collect()
+    }
+
+    /// A round length, and the same in coordinates, if all have one scale.
+    fn bar(&self) -> Option<(f64, f64)> {
+        let unit = self.unit?;
+        let length = tick_step(0.15 * LARGEST * unit);
+        Some((length, length / unit))
+    }
+
+    fn scale_bar(&self) -> String {
+        let y = self.height - 0.4 * PADDING;
+        let bar = |(_, length): (f64, f64)| format!("<path class=\"bar\" d=\"M{PADDING} {y}h{}\"/>", length.round());
+        self.bar().map_or(String::new(), bar)
+    }
+}
+
+/// At most `most` indices below `count`, including the first and the last.
+pub fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
+    let shown = count.min(most);
+    (0..shown).map(move |i| if shown > 1 { i * (count - 1) / (shown - 1) } else { 0 })
+}
+
+fn bounds(frames: &[(f64, Vec<DVec2>)]) -> Option<(DVec2, DVec2)> {
+    polygon::bounds(frames.iter().flat_map(|(_, nodes)| nodes.iter().copied()))
+}
+
+fn path(frame: &[u16]) -> String {
+    let steps = frame.chunks_exact(2).map(|at| format!("{} {}", at[0], at[1]));
+    format!("M{}Z", steps.collect::<Vec<_>>().join("L"))
+}
+
+fn dots(frame: &[u16]) -> String {
+    frame.chunks_exact(2).map(|at| format!("M{} {}h0", at[0], at[1])).collect()
+}
+
+/// Two digits per coordinate.
+fn digits(frame: &[u16]) -> String {
+    frame.iter().flat_map(|v| [v >> 6, v & 63]).map(|digit| char::from(DIGITS[usize::from(digit)])).collect()
+}
+
+/// The class of a status.
+pub(super) fn colour(status: &str) -> &str {
+    let known = ["relaxed", "unfinished", "singular", "nonfinite", "stalled"];
+    known.into_iter().find(|name| *name == status).unwrap_or("other")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+
+    /// An ellipse that becomes a circle, of this size.
+    fn ellipse(size: f64, times: usize, n: usize) -> MovingMember {
+        let nodes = |t: f64| {
+            let a = 1.0 + (-t).exp();
+            (0..n).map(|i| size * DVec2::new(a, 1.0 / a) * DVec2::from_angle(TAU * i as f64 / n as f64)).collect()
+        };
+        let times: Vec<f64> = (0..times).map(|i| 0.1 * i as f64).collect();
+        MovingMember {
+            label: "member <0>".into(),
+            status: "relaxed",
+            nodes: times.iter().map(|t| nodes(*t)).collect(),
+            times,
+        }
+    }
+
+    #[test]
+    fn coordinates_keep_a_thousandth_of_the_picture() {
+        let ellipse = ellipse(1e6, 5, 40);
+        let player = Player::new(std::slice::from_ref(&ellipse)).unwrap();
+        let member = &player.members[0];
+        for (frame, nodes) in member.frames.iter().zip(&ellipse.nodes) {
+            for (at, node) in frame.chunks_exact(2).zip(nodes) {
+                let back = (DVec2::new(f64::from(at[0]), player.height - f64::from(at[1]))
+                    - 0.5 * DVec2::new(LARGEST, player.height))
+                    * player.unit.unwrap();
+                assert!(back.distance(*node) < 1e-3 * 4e6, "{back} {node}");
+            }
+        }
+        assert_eq!(digits(&[0, 63, 64, 4095]), "AAA/BA//");
+    }
+
+    #[test]
+    fn a_player_stays_small() {
+        let player = Player::new(&vec![ellipse(1.0, 1000, 5000); 20]).unwrap();
+        assert_eq!(player.members.len(), MAX_MEMBERS);
+        assert_eq!(player.members[0].frames.len(), MAX_TIMES);
+        assert_eq!(player.members[0].times.last(), Some(&(0.1 * 999.0)));
+        let bytes = player.html().len() + player.data().len();
+        assert!(bytes < 350_000, "{bytes}");
+    }
+
+    #[test]
+    fn what_cannot_be_shown_is_left_out() {
+        let mut broken = ellipse(1.0, 3, 12);
+        broken.nodes[1][4].x = f64::NAN;
+        let player = Player::new(&[MovingMember::default(), broken]).unwrap();
+        assert_eq!(player.members.len(), 1);
+        assert_eq!(player.members[0].times, [0.0, 0.2]);
+        assert_eq!(Player::new(&[MovingMember::default()]), None);
+        assert_eq!(Player::new(&[]), None);
+        let nodes = vec![vec![DVec2::ONE; 6]];
+        let point = MovingMember { times: vec![0.0], nodes, ..MovingMember::default() };
+        let html = Player::new(&[point]).unwrap().html();
+        assert!(!html.contains("NaN") && !html.contains("inf") && !html.contains("type=\"range\""), "{html}");
+    }
+
+    #[test]
+    fn labels_are_escaped_and_the_data_hold_none() {
+        let player = Player::new(&[ellipse(1.0, 3, 12)]).unwrap();
+        assert!(player.html().contains("member &lt;0&gt;") && !player.html().contains("<0>"));
+        assert!(!player.data().contains('<') && !player.data().contains("member <"));
+    }
+
+    #[test]
+    fn the_data_are_json_with_short_numbers_and_short_lines() {
+        let nodes = |x: f64| vec![DVec2::new(x, 0.0), DVec2::new(-x, 1.0), DVec2::new(0.0, 2.0)];
+        let times = vec![0.0, 1e-7, 0.1, 1e21];
+        let nodes: Vec<_> = [1.0, 0.5, 0.25, 0.125].map(nodes).into();
+        let one = MovingMember { label: "one".into(), status: "relaxed", times, nodes };
+        let two = MovingMember { label: "two".into(), times: vec![0.0], nodes: one.nodes[..1].to_vec(), ..one.clone() };
+        let data = Player::new(&[one, two]).unwrap().data();
+        let parts = [
+            "{\"marks\":[0,0.0000001,0.1,1000000000000000000000],",
+            "\"members\":[{\"times\":[0,0.0000001,0.1,1000000000000000000000],\"frames\":[\"8383DIgAgADI\",",
+            "\"ub83RkgAgADI\",",
+            "\"nN83YygAgADI\",",
+            "\"jm83cZgAgADI\"]},",
+            "{\"times\":[0],\"frames\":[\"8383DIgAgADI\"]}]}",
+        ];
+        assert_eq!(data, parts.join("\n"));
+    }
+}

@@ -1,0 +1,479 @@
+//! A completed run, read back from its folder for `plot`.
+//!
+//! Tables are read row by row, and each row is checked against the spec and the rows before it.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::files::{
+    TableReader, TableRow,
+    members::MemberReader,
+    names::{self, REMEDY},
+    place::Place,
+    portraits::{self, Film},
+    tables::{EventLevelRow, EventRow},
+};
+use curvelax_base::{
+    error::{Error, Result, plainly, shortened},
+    input,
+    text::quoted,
+};
+use curvelax_ensemble::{LevelRow, LevelTimes, Outcome, Spec, theory};
+use curvelax_study::results::{
+    explained::{Explained, Explaining, FeaturedMember},
+    provenance::{FORMAT, Provenance, by_status},
+    tally::{Aside, MeanExcess, Tally},
+};
+
+/// Relative distance behind the end at which a time is still rounding, in f32.
+const LATE: f64 = 1e-6;
+/// Characters of foreign text in a message.
+const SHOWN: usize = 200;
+
+/// A run as read from its folder.
+pub struct Finished {
+    /// How it was made.
+    pub provenance: Provenance,
+    /// The results.
+    pub tally: Tally,
+    /// The mean excess in time.
+    pub excess: Vec<MeanExcess>,
+    /// What explains the times.
+    pub explained: Explained,
+    /// The first members; none if the run could not save them.
+    pub films: Vec<Film>,
+}
+
+impl Finished {
+    /// Reads the run in `folder`.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for a folder without a completed run, and for files of different runs.
+    pub fn read(folder: &Path) -> Result<Finished> {
+        let provenance = provenance(folder)?;
+        let tally = tally(folder, &provenance)?;
+        let films = films(folder)?;
+        let excess = mean_excess(folder, &provenance)?;
+        let [summary, members] = [names::SUMMARY, names::MEMBERS].map(|name| Place::named(&folder.join(name)));
+        let explained = explained(&summary, &members, &provenance.spec)?;
+        Ok(Finished { provenance, tally, excess, explained, films })
+    }
+}
+
+/// Reads the portraits of the first members; none if the run could not save them.
+///
+/// # Errors
+/// Those of [`Finished::read`].
+pub fn films(folder: &Path) -> Result<Vec<Film>> {
+    let path = folder.join(names::PORTRAITS);
+    if path.exists() { portraits::read(&path) } else { Ok(Vec::new()) }
+}
+
+/// The keys that decide whether the rest can be understood.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct RunHead {
+    curvelax: serde_json::Value,
+    format: serde_json::Value,
+}
+
+/// Reads `run.json`.
+///
+/// # Errors
+/// Those of [`Finished::read`].
+pub fn provenance(folder: &Path) -> Result<Provenance> {
+    let path = folder.join(names::RUN);
+    let refuse = |problem: String| Err(Error::Request(format!("{}{problem}", path.display())));
+    if !folder.is_dir() {
+        return Err(Error::Request(format!("{}: no such folder; give that of a run", folder.display())));
+    }
+    if !path.exists() {
+        let begun = folder.join(format!(".{}.part", names::SUMMARY)).exists();
+        let problem = if begun {
+            format!("the run there has not finished; curvelax resume {} continues it", quoted(folder))
+        } else {
+            "no run there; give its folder".into()
+        };
+        return Err(Error::Request(format!("{}: {problem} (no {})", folder.display(), names::RUN)));
+    }
+    let text = input::text(&path, input::MAX_RUN);
+    let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
+    let no_json = |e: serde_json::Error| format!(": {}; {REMEDY}", shortened(&plainly(&e.to_string()), SHOWN));
+    let RunHead { curvelax, format } = match serde_json::from_str(&text) {
+        Ok(head) => head,
+        Err(e) => return refuse(no_json(e)),
+    };
+    let Some(version) = curvelax.as_str() else {
+        return refuse(": not written by curvelax: expected its version under `curvelax`, found none".into());
+    };
+    match format.as_u64() {
+        Some(1..=FORMAT) => {}
+        Some(format) => {
+            let (version, own) = (shortened(version, SHOWN), curvelax_base::VERSION);
+            return refuse(format!(
+                ": expected format {FORMAT} at most, found {format}, of curvelax {version}; this is {own}: use a newer \
+                 one"
+            ));
+        }
+        None => return refuse(format!(": expected a number under `format`, found none; {REMEDY}")),
+    }
+    // From the text, not from the value, so that an error names its line.
+    let provenance: Provenance = match serde_json::from_str(&text) {
+        Ok(provenance) => provenance,
+        Err(e) => return refuse(no_json(e)),
+    };
+    match provenance.spec.clone().validate() {
+        Ok(_) => Ok(provenance),
+        Err(e) => refuse(format!(", spec: {e}; {REMEDY}")),
+    }
+}
+
+/// Adds up the tables in `folder`, as the run did member by member.
+///
+/// # Errors
+/// Those of [`Finished::read`].
+pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
+    let spec = &provenance.spec;
+    let place = |name: &str| Place::named(&folder.join(name));
+    let has_events = !spec.event.is_empty();
+    let of_events = has_events.then(|| place(names::EVENT_LEVELS));
+    let levels = levels((&place(names::LEVELS), of_events.as_ref()), spec)?;
+    expected(folder, names::LEVELS, "rows", provenance.levels, levels.rows())?;
+    let mut tally = Tally::of(spec, &levels);
+    (tally.mollified, tally.below_rounding) = (provenance.mollified, provenance.below_rounding);
+    let mut rows = Summary::open(folder, spec, &levels)?;
+    rows.try_for_each(|outcome| tally.add(&outcome?))?;
+    let summary = |what: &str, told: u64, found: u64| expected(folder, names::SUMMARY, what, told, found);
+    summary("rows", provenance.members, tally.members())?;
+    for (status, count) in by_status(&tally) {
+        let told = provenance.members_by_status.get(&status).copied().unwrap_or(0);
+        summary(&format!("{status} members"), told, count)?;
+    }
+    summary("steps", provenance.steps, tally.steps)?;
+    rows.end()?;
+    Ok(tally)
+}
+
+/// Reads the times at the levels of a run of `spec`: the place of its rows, and that of those of its events.
+///
+/// # Errors
+/// [`Error::Request`] for rows that are not of such a run.
+pub fn levels((place, of_events): (&Place, Option<&Place>), spec: &Spec) -> Result<LevelTimes> {
+    let (mut table, mut levels) = (TableReader::<LevelRow>::open(place)?, LevelTimes::default());
+    let mut events = of_events.map(|place| EventTimes::<EventLevelRow>::open(place, spec)).transpose()?;
+    while let Some((mut row, fields)) = table.read()? {
+        let LevelRow { member, cell, .. } = row;
+        if member >= spec.all_members() || cell != member / spec.members_per_cell() {
+            let problem = format!("the cell of a member below {}", spec.all_members());
+            return Err(fields.unexpected_in("cell", &problem));
+        }
+        if let Some(events) = &mut events {
+            row.events = events.next((member, row.level), |_| true)?;
+        }
+        levels.add(&row).map_err(|expected| fields.unexpected_in("level", &expected))?;
+    }
+    events.as_mut().map_or(Ok(()), EventTimes::end)?;
+    Ok(levels)
+}
+
+/// Adds up the rows of a resumed run, and those of its events, with those of its levels, and `aside`.
+///
+/// # Errors
+/// [`Error::Request`] for rows that are not of a run of `spec`.
+pub fn rows(place: (&Place, Option<&Place>), spec: &Spec, levels: &LevelTimes, aside: Aside) -> Result<Tally> {
+    let mut tally = Tally::of(spec, levels);
+    let mut rows = Summary::of(place, spec, levels)?;
+    rows.try_for_each(|outcome| tally.add(&outcome?))?;
+    rows.end()?;
+    tally.set_aside(aside);
+    Ok(tally)
+}
+
+/// Checks a count against `run.json`.
+fn expected(folder: &Path, name: &str, what: &str, expected: u64, found: u64) -> Result<()> {
+    if expected == found {
+        return Ok(());
+    }
+    let (path, told) = (folder.join(name), names::RUN);
+    Err(Error::Request(format!("{}: expected {expected} {what} by {told}, found {found}; {REMEDY}", path.display())))
+}
+
+/// The rows of a `summary.csv`, in order of ascending members.
+pub struct Summary<'a> {
+    levels: &'a LevelTimes,
+    table: TableReader<Outcome>,
+    /// Those of their events.
+    events: Option<EventTimes<EventRow>>,
+    last: Option<u64>,
+    spec: Spec,
+    /// The last cell and its spec.
+    spec_of: Option<(u64, Spec)>,
+}
+
+impl<'a> Summary<'a> {
+    /// Opens the table in `folder`, of a run of `spec`.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if it does not exist, has other columns, or is truncated.
+    pub fn open(folder: &Path, spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
+        let place = |name: &str| Place::named(&folder.join(name));
+        let events = (!spec.event.is_empty()).then(|| place(names::EVENTS));
+        Summary::of((&place(names::SUMMARY), events.as_ref()), spec, levels)
+    }
+
+    fn of((place, events): (&Place, Option<&Place>), spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
+        let events = events.map(|place| EventTimes::open(place, spec)).transpose()?;
+        Ok(Summary { levels, table: TableReader::open(place)?, events, last: None, spec: spec.clone(), spec_of: None })
+    }
+
+    /// Checks that there are no events of further members.
+    fn end(mut self) -> Result<()> {
+        self.events.as_mut().map_or(Ok(()), EventTimes::end)
+    }
+
+    fn read(&mut self) -> Result<Option<Outcome>> {
+        let Some((mut outcome, fields)) = self.table.read()? else { return Ok(None) };
+        let Outcome { member, cell, .. } = outcome;
+        if let Some(last) = self.last.filter(|last| member <= *last) {
+            return Err(fields.unexpected_in("member", &format!("a member after {last}: members ascend, each once")));
+        }
+        let all = self.spec.all_members();
+        if member >= all {
+            return Err(fields.unexpected_in("member", &format!("a member below {all}")));
+        }
+        self.last = Some(member);
+        let own = member / self.spec.members_per_cell();
+        if cell != own {
+            return Err(fields.unexpected_in("cell", &format!("{own}, the cell of member {member}")));
+        }
+        if self.spec_of.as_ref().is_none_or(|(of, _)| *of != cell) {
+            self.spec_of = Some((cell, self.spec.of_cell(cell)?));
+        }
+        let t_end = self.spec_of.as_ref().map_or(f64::INFINITY, |(_, spec)| spec.final_time());
+        if outcome.t_relax.is_some_and(|t| t > t_end * (1.0 + LATE)) {
+            return Err(fields.unexpected_in("t_relax", &format!("a time up to {t_end}, the end of the run")));
+        }
+        if let Some(events) = &mut self.events {
+            let end = outcome.t_end;
+            outcome.events =
+                events.next((member, 0), |row| if row.censored == 0 { row.t <= end } else { row.t == end })?;
+        }
+        // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
+        outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| {
+            let values = spec.values_of(member, cell).ok()?;
+            theory::rate_of(spec, &values, &outcome)
+        });
+        let told = (outcome.t_limit, outcome.t_error);
+        if let Some((_, spec)) = &self.spec_of {
+            self.levels.judge(spec, &mut outcome);
+        }
+        if (outcome.t_limit, outcome.t_error) != told {
+            let (limit, file) = (outcome.t_limit.map_or("nothing".into(), |t| t.to_string()), names::LEVELS);
+            return Err(fields.unexpected_in("t_limit", &format!("{limit}, as {file} has it")));
+        }
+        Ok(Some(outcome))
+    }
+}
+
+/// A row of a table of events.
+trait EventTime: TableRow + Default {
+    /// Its member and level, 0 if it has none.
+    fn of(&self) -> (u64, u64);
+    /// Its event.
+    fn event(&self) -> &str;
+    /// When that happened.
+    fn time(&self) -> Option<f64>;
+}
+
+impl EventTime for EventRow {
+    fn of(&self) -> (u64, u64) {
+        (self.member, 0)
+    }
+
+    fn event(&self) -> &str {
+        &self.event
+    }
+
+    fn time(&self) -> Option<f64> {
+        (self.censored == 0).then_some(self.t)
+    }
+}
+
+impl EventTime for EventLevelRow {
+    fn of(&self) -> (u64, u64) {
+        (self.member, self.level)
+    }
+
+    fn event(&self) -> &str {
+        &self.event
+    }
+
+    fn time(&self) -> Option<f64> {
+        self.t
+    }
+}
+
+/// A table of events, read along with that of the members.
+struct EventTimes<R> {
+    path: PathBuf,
+    table: TableReader<R>,
+    names: Vec<String>,
+}
+
+impl<R: EventTime> EventTimes<R> {
+    fn open(place: &Place, spec: &Spec) -> Result<EventTimes<R>> {
+        let names = spec.event.iter().map(|event| event.name.clone()).collect();
+        Ok(EventTimes { path: place.shown().to_path_buf(), table: TableReader::open(place)?, names })
+    }
+
+    /// The times of the events of the next member, which must be that of `place` and of which all rows must `fit`.
+    fn next(&mut self, place: (u64, u64), fits: impl Fn(&R) -> bool) -> Result<Vec<Option<f64>>> {
+        let mut times = Vec::with_capacity(self.names.len());
+        for name in &self.names {
+            let Some((row, fields)) = self.table.read()? else {
+                let (path, member) = (self.path.display(), place.0);
+                let problem = format!("expected the events of member {member}, found the end of the file");
+                return Err(Error::Request(format!("{path}: {problem}; {REMEDY}")));
+            };
+            if row.of() != place {
+                return Err(fields.unexpected_in("member", &format!("member {}, as the other table has it", place.0)));
+            }
+            if row.event() != name {
+                return Err(fields.unexpected_in("event", name));
+            }
+            if !fits(&row) {
+                return Err(
+                    fields.unexpected_in("t", "a time up to the end of the member, or that end if censored is 1")
+                );
+            }
+            times.push(row.time());
+        }
+        Ok(times)
+    }
+
+    /// Checks that there are no more rows.
+    fn end(&mut self) -> Result<()> {
+        match self.table.read()? {
+            None => Ok(()),
+            Some((_, fields)) => Err(fields.unexpected_in("member", "the end of the file")),
+        }
+    }
+}
+
+impl Iterator for Summary<'_> {
+    type Item = Result<Outcome>;
+
+    fn next(&mut self) -> Option<Result<Outcome>> {
+        self.read().transpose()
+    }
+}
+
+/// Finds what explains the times in a `summary.csv` by the features in a `members.csv`, of a run of `spec`. Both are
+/// read as far as members enter.
+///
+/// # Errors
+/// [`Error::Request`] for rows that are not of the same members, each once.
+pub fn explained(summary: &Place, members: &Place, spec: &Spec) -> Result<Explained> {
+    let (mut outcomes, mut table) = (TableReader::<Outcome>::open(summary)?, MemberReader::open(members, spec)?);
+    let count = table.features().len();
+    let mut explaining = Explaining::new(table.features(), spec.sweep.cells());
+    while let Some((Outcome { member, cell, t_relax, t_half, t_end, .. }, _)) = outcomes.read()? {
+        let Some((own, of, mut fields)) = table.read()? else {
+            let problem = format!("expected a row of member {member}, found the end");
+            return Err(Error::Request(format!("{}: {problem}; {REMEDY}", members.shown().display())));
+        };
+        for (name, told, found) in [("member", member, own), ("cell", cell, of)] {
+            if told != found {
+                return Err(fields.unexpected_in(name, &format!("{told}, as in {}", names::SUMMARY)));
+            }
+        }
+        if explaining.wants(cell) {
+            let numbers = (0..count).map(|_| fields.known()).collect::<Result<_>>()?;
+            let place = member.saturating_sub(cell.saturating_mul(spec.curves));
+            explaining.add(FeaturedMember { member, cell, place, numbers, times: [t_relax, t_half], t_end });
+        } else if explaining.is_full() {
+            return Ok(explaining.finish());
+        }
+    }
+    match table.read()? {
+        Some((.., fields)) => {
+            Err(fields.unexpected_in("member", &format!("no more members, as in {}", names::SUMMARY)))
+        }
+        None => Ok(explaining.finish()),
+    }
+}
+
+/// Reads `mean_excess.csv`.
+///
+/// # Errors
+/// Those of [`Finished::read`].
+pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExcess>> {
+    let mut table = TableReader::<MeanExcess>::open(&Place::named(&folder.join(names::MEAN_EXCESS)))?;
+    let (mut rows, mut count, mut last): (Vec<MeanExcess>, u64, _) = (Vec::new(), 0, None);
+    while let Some((row, fields)) = table.read()? {
+        let at = (row.cell, row.t);
+        if let Some((cell, t)) = last.filter(|last| at <= *last) {
+            return Err(fields.unexpected_in("t", &format!("a time after {t} of cell {cell}")));
+        }
+        last = Some(at);
+        count += 1;
+        // Surplus rows are only counted.
+        rows.extend((count <= provenance.excess_rows).then_some(row));
+    }
+    expected(folder, names::MEAN_EXCESS, "rows", provenance.excess_rows, count)?;
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::{OutputFolder, tables::SummaryTable};
+    use curvelax_ensemble::{Observables, Status};
+    use curvelax_study::samples::outcome;
+
+    #[test]
+    fn the_run_that_the_fuzzer_changes_is_one_of_this_version() {
+        let home = tempfile::tempdir().unwrap();
+        let base = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/base");
+        std::fs::create_dir(home.path().join("plots")).unwrap();
+        let tables = [names::SUMMARY, names::MEMBERS, names::LEVELS, names::MEAN_EXCESS];
+        for name in tables.into_iter().chain([names::RUN, names::PORTRAITS]) {
+            let own = Path::new(name).file_name().unwrap();
+            std::fs::copy(base.join(own), home.path().join(name)).unwrap();
+        }
+        let run = Finished::read(home.path()).unwrap();
+        assert!(run.tally.members() > 0 && !run.films.is_empty());
+    }
+
+    #[test]
+    fn a_row_reads_back_to_the_outcome_that_was_written() {
+        let home = tempfile::tempdir().unwrap();
+        let mut written = outcome(3, Status::Stalled, Some(0.1 + 0.2));
+        (written.cell, written.rejected, written.self_crossing, written.t_half) = (1, 7, Some(1.0 / 3.0), Some(1e-300));
+        (written.rate, written.rate_r2) = (Some(-0.5), Some(0.25));
+        written.start = Observables { length: 9.1, area: -6.5, excess: 0.3, energy: 2.0, ..Observables::default() };
+        written.end = Observables {
+            length: 8.1,
+            area: 6.1,
+            excess: -0.0,
+            energy: 1.0 / 7.0,
+            k_min: -3.0,
+            k_max: f64::MAX,
+            mesh_ratio: 1.5,
+            metric_drift: 0.01,
+            turning: -1,
+        };
+        let folder = OutputFolder::open(home.path(), true).unwrap();
+        let mut table = SummaryTable::new(folder.file(names::SUMMARY).unwrap()).unwrap();
+        table.row(&written).unwrap();
+        folder.publish_all(vec![table.ready().unwrap()]).unwrap();
+        let mut spec = Spec { curves: 2, ..Spec::default() };
+        spec.sweep.set("omega=1,2".parse().unwrap());
+        written.rate_theory = spec.rate_in_theory(&spec.typical(), -6.5);
+        let read: Vec<Outcome> =
+            Summary::open(home.path(), &spec, &LevelTimes::default()).unwrap().map(Result::unwrap).collect();
+        assert_eq!(read, [written.clone()]);
+        assert_eq!(read[0].end.excess.to_bits(), written.end.excess.to_bits());
+    }
+}

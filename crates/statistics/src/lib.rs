@@ -1,0 +1,82 @@
+//! Statistics of relaxation times, some of them unobserved: pure functions from numbers to numbers.
+//!
+//! # Theory
+//!
+//! A member that has not relaxed at the end of its run still carries information: its time is *larger* than the run was
+//! long. Such a time is right-censored. Leaving it out, or replacing it by the end of the run, biases every mean and
+//! quantile downwards. The product-limit estimate of E. L. Kaplan and P. Meier (*J. Am. Stat. Assoc.* 53, 1958, 457)
+//! uses this information,
+//!
+//! ```text
+//! S(t) = Π_{t_i ≤ t} (1 - d_i/n_i),    var S(t) ≈ S(t)² Σ_{t_i ≤ t} d_i/(n_i (n_i - d_i))
+//! ```
+//!
+//! with d_i events at the time t_i among the n_i members still at risk, and M. Greenwood's variance (1926). Quantiles
+//! are read off S, and the median is the middle of the times at which S is ½; the mean is the area under it, and if S does not come down to 0, only the area up to the largest
+//! time: a lower bound. The log-rank test (N. Mantel, *Cancer Chemother. Rep.* 50, 1966, 163) compares the events of
+//! each group with those expected if all groups had one S. The interval of the median is B. Efron's bootstrap (*J. Am.
+//! Stat. Assoc.* 76, 1981, 312): members are drawn with replacement together with their censoring.
+//! [`PairedDifferences`] of two groups whose members share their random numbers are tested by F. Wilcoxon's signed ranks.
+//!
+//! All of this requires that censoring says nothing about the hidden time. This holds for the end of the run, but not
+//! for a member that became singular; the caller must decide, and report, how to treat such members.
+//!
+//! # Practice
+//!
+//! A [`Sample`] is checked and sorted once; [`KaplanMeier`], [`Bootstrap`] and [`log_rank`] read it and cannot fail. A
+//! [`Description`] is for complete data, [`Line`] and [`PowerLaw`] for one quantity against another. Unknown values are
+//! `None`, never NaN and never infinite, and [`Caveat`] says why. Times may be in any one unit; means, deviations and
+//! quantiles have the same unit, variances of S have none.
+
+//!
+//! # Example
+//!
+//! ```
+//! use curvelax_statistics::{Bootstrap, KaplanMeier, Observation, Sample};
+//!
+//! let relaxed = [0.8, 0.5, 1.1, 0.9].map(|t| Observation::new(Some(t), 2.0));
+//! let unfinished = Observation::new(None, 2.0);
+//! let sample = Sample::new(relaxed.into_iter().chain([unfinished]))?;
+//! let curve = KaplanMeier::new(&sample);
+//! assert_eq!((curve.median(), curve.quantile(0.95)), (Some(0.9), None));
+//! assert_eq!(curve.mean().unwrap().restricted_to, Some(2.0));
+//! println!("{}", curve.caveat().unwrap());
+//! let interval = Bootstrap::default().median(&sample).unwrap();
+//! assert!(interval.lower <= curve.median());
+//! # Ok::<(), curvelax_base::Error>(())
+//! ```
+
+mod bootstrap;
+mod describe;
+mod draws;
+mod exact;
+mod explain;
+mod fit;
+mod limit;
+mod log_rank;
+mod paired;
+mod sample;
+mod special;
+mod spread;
+mod sum;
+mod survival;
+
+pub use bootstrap::{Bootstrap, Interval};
+pub use describe::Description;
+pub use exact::{ExactSum, Moments};
+pub use explain::{FOLDS, Regression, correlation, spearman};
+pub use fit::{GoodnessOfFit, Line, PowerLaw};
+pub use limit::{Limit, Times};
+pub use log_rank::{GroupEvents, LogRank, log_rank};
+pub use paired::{PairedDifferences, SignedRank};
+pub use sample::{Observation, Observations, Sample};
+pub use spread::Spread;
+pub use survival::{Caveat, KaplanMeier, Mean, Step};
+
+/// Standard errors in half a 95 % interval of a normal estimate.
+pub const HALF_INTERVAL: f64 = 1.96;
+
+/// The value if it is finite.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}

@@ -1,0 +1,274 @@
+//! Differences of pairs: their median with an exact interval, and the signed-rank test that they are centred on 0.
+//!
+//! F. Wilcoxon (*Biometrics Bull.* 1, 1945, 80) ranks the differences that are not 0 by size; W⁺ is the sum of the
+//! ranks of the positive ones. If the differences are symmetric about 0, each rank is in W⁺ with probability ½:
+//!
+//! ```text
+//! E W⁺ = ½ Σ r_i,    var W⁺ = ¼ Σ r_i²
+//! ```
+//!
+//! Equal sizes share the mean of their ranks. Up to [`MOST_EXACT`] differences the distribution is counted, ties
+//! included, since twice a rank is a whole number. For more it is normal, with a continuity correction of ½.
+
+use super::{
+    finite,
+    special::{LEAST, normal_tails},
+};
+use curvelax_base::error::{Error, Result};
+
+/// Maximum number of differences for which all signs are counted: 2⁵⁰ is exact in f64.
+const MOST_EXACT: usize = 50;
+/// Probability on each side of a 95 % interval.
+const TAIL: f64 = 0.025;
+
+/// Differences of pairs, sorted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PairedDifferences {
+    sorted: Vec<f64>,
+    test: Option<SignedRank>,
+}
+
+/// Result of the signed-rank test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SignedRank {
+    /// Number of differences that are not 0; the others are left out.
+    pub ranked: usize,
+    /// W⁺.
+    pub statistic: f64,
+    /// Probability of a W⁺ at least as far from its mean, on both sides; never 0, but the smallest normal number.
+    pub p_value: f64,
+    /// Whether `p_value` is exact.
+    pub exact: bool,
+}
+
+impl PairedDifferences {
+    /// Tests and sorts differences in any order.
+    ///
+    /// An error names the first that is not finite.
+    pub fn new(mut differences: Vec<f64>) -> Result<PairedDifferences> {
+        if let Some(i) = differences.iter().position(|difference| !difference.is_finite()) {
+            return Err(Error::Failed(format!(
+                "statistics of pairs: difference {i} (from 0) of {} is {}; only finite ones can be ranked: leave the \
+                 pair out",
+                differences.len(),
+                differences[i]
+            )));
+        }
+        differences.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let zeros = differences.partition_point(|difference| *difference == 0.0);
+        let alike = differences.iter().all(|difference| *difference == differences[0]);
+        let test = if alike { None } else { signed_rank(&differences[zeros..]) };
+        differences.sort_unstable_by(f64::total_cmp);
+        Ok(PairedDifferences { sorted: differences, test })
+    }
+
+    /// Returns the number of pairs.
+    pub fn count(&self) -> usize {
+        self.sorted.len()
+    }
+
+    /// Returns the number of pairs without a difference.
+    pub fn zeros(&self) -> usize {
+        self.sorted.iter().filter(|difference| **difference == 0.0).count()
+    }
+
+    /// Returns the median: the middle difference, or the mean of the two in the middle.
+    pub fn median(&self) -> Option<f64> {
+        super::describe::quantile(&self.sorted, 0.5)
+    }
+
+    /// Returns the 95 % interval of the median, whatever the distribution: the differences of rank k and n + 1 - k,
+    /// with the largest k for which at most 2.5 % of the draws from a fair coin have fewer than k heads in n tosses.
+    /// `None` below 6 pairs, for which no interval is that sure, and if all differences are equal, which are no draws.
+    pub fn interval(&self) -> Option<(f64, f64)> {
+        let k = rank_of_interval(self.count())?;
+        self.test?;
+        Some((self.sorted[k - 1], self.sorted[self.count() - k]))
+    }
+
+    /// Returns the signed-rank test; `None` if all differences are equal: copies of one pair are not several.
+    pub fn test(&self) -> Option<SignedRank> {
+        self.test
+    }
+}
+
+/// The test of differences that are not 0, sorted by size.
+fn signed_rank(by_size: &[f64]) -> Option<SignedRank> {
+    if by_size.is_empty() {
+        return None;
+    }
+    // Twice the ranks, which are whole.
+    let (mut positive, mut squares, mut before) = (0.0, 0.0, 0.0);
+    let mut doubled = Vec::new();
+    for tied in by_size.chunk_by(|a, b| a.abs() == b.abs()) {
+        let count = tied.len() as f64;
+        let rank = 2.0 * before + count + 1.0;
+        before += count;
+        squares += count * rank * rank;
+        positive += rank * tied.iter().filter(|difference| **difference > 0.0).count() as f64;
+        if by_size.len() <= MOST_EXACT {
+            doubled.extend(tied.iter().map(|_| rank as usize));
+        }
+    }
+    let exact = by_size.len() <= MOST_EXACT;
+    let p_value = if exact {
+        counted(&doubled, positive as usize)
+    } else {
+        let all = before * (before + 1.0);
+        // Of twice W⁺: the mean is half the sum of all, the deviation half the root of the squares.
+        let surplus = ((positive - 0.5 * all).abs() - 1.0).max(0.0);
+        normal_tails(surplus / (0.25 * squares).sqrt())
+    };
+    Some(SignedRank { ranked: by_size.len(), statistic: 0.5 * positive, p_value: p_value.clamp(LEAST, 1.0), exact })
+}
+
+/// The probability that a sum of `numbers`, each taken with probability ½, is as far from its mean as `found`.
+fn counted(numbers: &[usize], found: usize) -> f64 {
+    let all: usize = numbers.iter().sum();
+    let mut ways = vec![0.0; all + 1];
+    ways[0] = 1.0;
+    let mut reached = 0;
+    for number in numbers {
+        for sum in (0..=reached).rev() {
+            ways[sum + number] += ways[sum];
+        }
+        reached += number;
+    }
+    // The distribution is symmetric, so the smaller tail has twice its probability on both sides.
+    let tail: f64 = ways[..=found.min(all - found)].iter().sum();
+    2.0 * tail * (-(numbers.len() as f64)).exp2()
+}
+
+/// The largest k with P(X < k) ≤ 2.5 % for X binomial with n and ½; `None` if not even 1 has it.
+fn rank_of_interval(n: usize) -> Option<usize> {
+    let size = n as f64;
+    // Nothing is left nine standard deviations below the mean.
+    let mut k = (0.5 * size - 4.5 * size.sqrt()).floor().max(0.0);
+    let mut term = (libm::lgamma(size + 1.0)
+        - libm::lgamma(k + 1.0)
+        - libm::lgamma(size - k + 1.0)
+        - size * std::f64::consts::LN_2)
+        .exp();
+    let mut below = term;
+    while below <= TAIL {
+        term *= (size - k) / (k + 1.0);
+        below += term;
+        k += 1.0;
+    }
+    finite(k).map(|k| k as usize).filter(|k| *k > 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(differences: &[f64]) -> PairedDifferences {
+        PairedDifferences::new(differences.to_vec()).unwrap()
+    }
+
+    /// The probability by trying all signs, with W⁺ as it is defined.
+    fn by_all_signs(differences: &[f64]) -> f64 {
+        let known: Vec<f64> = differences.iter().copied().filter(|d| *d != 0.0).collect();
+        let rank = |d: f64| {
+            let less = known.iter().filter(|other| other.abs() < d.abs()).count() as f64;
+            let tied = known.iter().filter(|other| other.abs() == d.abs()).count() as f64;
+            less + 0.5 * (tied + 1.0)
+        };
+        let mean = 0.5 * known.iter().map(|d| rank(*d)).sum::<f64>();
+        let far = |positive: &dyn Fn(usize) -> bool| {
+            let sum: f64 = known.iter().enumerate().filter(|(i, _)| positive(*i)).map(|(_, d)| rank(*d)).sum();
+            (sum - mean).abs()
+        };
+        let found = far(&|i| known[i] > 0.0);
+        let signs = 1_u32 << known.len();
+        let as_far = (0..signs).filter(|signs| far(&|i| signs >> i & 1 == 1) >= found - 1e-9).count();
+        as_far as f64 / f64::from(signs)
+    }
+
+    #[test]
+    fn a_small_p_value_is_the_share_of_all_signs() {
+        let samples: [&[f64]; 7] = [
+            &[1.0, -2.0],
+            &[0.3, -0.1, 0.25, 0.7, -0.02, 0.9],
+            &[1.0, 1.0, -1.0, 2.0, 2.0, -3.0, 0.0],
+            &[-5.0, -4.0, -3.0, -2.0, -1.0],
+            &[0.0, 0.0, 1.0, 2.0, -3.0, 4.0, 5.0, 6.0, 7.0, -8.0, 9.0],
+            &[1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0],
+            &[1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, 8.5, 9.5, 10.5, 11.5, -0.5],
+        ];
+        for differences in samples {
+            let test = of(differences).test().unwrap();
+            let expected = by_all_signs(differences);
+            assert!(
+                test.exact && (test.p_value / expected - 1.0).abs() < 1e-12,
+                "{differences:?}: {test:?} {expected}"
+            );
+        }
+        assert_ne!(of(samples[1]).test(), of(&samples[1][1..]).test(), "blind");
+    }
+
+    #[test]
+    fn the_normal_distribution_takes_over_smoothly() {
+        for share in [3, 4, 5, 7] {
+            let differences = |n: i32| -> Vec<f64> {
+                (1..=n).map(|i| f64::from(i) * if i % share == 0 { -1.0 } else { 1.0 }).collect()
+            };
+            let exact = of(&differences(50)).test().unwrap();
+            let by_size: Vec<f64> = differences(51);
+            let normal = of(&by_size).test().unwrap();
+            assert!(exact.exact && !normal.exact);
+            let counted = {
+                let positive: f64 = by_size.iter().filter(|d| **d > 0.0).sum();
+                super::counted(&(1..=51).map(|rank| 2 * rank).collect::<Vec<_>>(), 2 * positive as usize)
+            };
+            let apart = (normal.p_value.ln() - counted.ln()).abs();
+            assert!(apart < 0.02 + 0.1 * counted.ln().abs(), "{share}: {normal:?}, not {counted}");
+        }
+    }
+
+    #[test]
+    fn ties_narrow_the_distribution() {
+        // By hand: 60 differences of one size have the rank 30.5 each, so W⁺ is 30.5 times a binomial number.
+        let differences: Vec<f64> = (0..60).map(|i| if i < 20 { -1.0 } else { 1.0 }).collect();
+        let test = of(&differences).test().unwrap();
+        let deviation = 30.5 * 15.0_f64.sqrt();
+        assert_eq!((test.statistic, test.ranked), (40.0 * 30.5, 60));
+        assert!((test.p_value / normal_tails((10.0 * 30.5 - 0.5) / deviation) - 1.0).abs() < 1e-12, "{test:?}");
+    }
+
+    #[test]
+    fn differences_of_one_sign_are_seen() {
+        let differences: Vec<f64> =
+            (0..512).map(|i| 1e-6 * (1.0 + f64::from(i % 17)) * (1.0 + 1e-3 * f64::from(i))).collect();
+        let found = of(&differences);
+        assert!(found.test().unwrap().p_value < 1e-80, "{:?}", found.test());
+        let mixed: Vec<f64> = differences.iter().zip([1.0, -1.0].iter().cycle()).map(|(d, sign)| d * sign).collect();
+        assert!(of(&mixed).test().unwrap().p_value > 0.1, "{:?}", of(&mixed).test());
+    }
+
+    #[test]
+    fn the_interval_of_the_median_has_the_ranks_of_the_tables() {
+        // n and k of the sign test at 95 %, as in W. J. Conover, Practical Nonparametric Statistics.
+        for (n, k) in [(6, 1), (8, 1), (9, 2), (12, 3), (20, 6), (25, 8), (50, 18), (100, 40)] {
+            assert_eq!(rank_of_interval(n), Some(k), "{n}");
+        }
+        assert_eq!([0, 1, 5].map(rank_of_interval), [None; 3]);
+        for n in [10_000_usize, 5_000_000] {
+            let normal = 0.5 * n as f64 - 0.5 * 1.959964 * (n as f64).sqrt();
+            assert!((rank_of_interval(n).unwrap() as f64 - normal).abs() < 2.0, "{n}");
+        }
+        let ten = of(&[10.0, 2.0, 3.0, 1.0, 5.0, 4.0, 7.0, 9.0, 8.0, 6.0]);
+        assert_eq!((ten.median(), ten.interval()), (Some(5.5), Some((2.0, 9.0))));
+    }
+
+    #[test]
+    fn copies_and_nothing_are_not_tested() {
+        for (differences, median) in [(&[][..], None), (&[0.0; 9][..], Some(0.0)), (&[0.25; 99][..], Some(0.25))] {
+            let found = of(differences);
+            assert_eq!((found.median(), found.interval(), found.test()), (median, None, None), "{differences:?}");
+        }
+        assert_eq!((of(&[0.0, 1.0, 0.0]).zeros(), of(&[0.0, 1.0, 0.0]).test().unwrap().p_value), (2, 1.0));
+        let message = PairedDifferences::new(vec![1.0, f64::NAN]).unwrap_err().to_string();
+        assert!(message.contains("difference 1 (from 0) of 2 is NaN"), "{message}");
+    }
+}

@@ -1,0 +1,105 @@
+//! The ensemble used for conformance tests: no two members alike, every flow, with and without redistribution.
+
+use curvelax_base::error::Result;
+use curvelax_curve::polygon;
+use curvelax_ensemble::{Family, Spec, schedule::Ticks};
+use curvelax_flow::{
+    flow::Flow,
+    number::Precision,
+    scheme::{
+        Parameters, State,
+        extrapolation::most_order,
+        run::{FIRST_ORDER, Run},
+    },
+};
+
+/// Laws of the members: every named flow, and a polynomial.
+pub const LAWS: usize = 4;
+
+/// One member in this many keeps its nodes.
+const UNDISTRIBUTED: usize = 5;
+// Otherwise one law would only be compared without redistribution.
+const _: () = assert!(!LAWS.is_multiple_of(UNDISTRIBUTED));
+
+/// Members of the comparison: a prime number, so that no size divides it.
+pub const MEMBERS: usize = 11;
+
+/// τ of member 0, the largest: the paper's 10⁻³ at n = 100, and the same `τ/h⁴`, so the same number of sweeps,
+/// at every n above 47.
+fn tau(n: usize) -> f64 {
+    1e-3 * (100.0 / n as f64).powi(4).min(20.0)
+}
+
+/// Creates `count` different members of `n` nodes, each with its own curve, flow, τ, ω and κ, to run `steps` steps.
+pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec<Run<f64>>> {
+    let amplitude = if n < 20 { 0.02 } else { 0.05 };
+    let spec = Spec { points: n, amplitude: amplitude.into(), seed: 20, ..Spec::default() };
+    let family = Family::new(&spec)?;
+    let flows: [Flow; LAWS] = [
+        Flow::SurfaceDiffusion,
+        Flow::Willmore,
+        Flow::Elastic(0.3),
+        Flow::Polynomial(vec![0.1, -0.2, 0.05, 0.0, -0.01]),
+    ];
+    (0..count)
+        .map(|j| {
+            let nodes = family.member(j as u64)?.nodes;
+            let flow = &flows[j % LAWS];
+            let excess = polygon::excess(&nodes);
+            let parameters = Parameters {
+                omega: 1.0 + j as f64,
+                redistribution: if j % UNDISTRIBUTED == 3 { 0.0 } else { 1.0 },
+                // One member in three is pulled.
+                pull: if j % 3 == 1 { 50.0 } else { 0.0 },
+                tolerance,
+                // One member in seven chooses its own factor.
+                sor: if j % 7 == 5 { 0.0 } else { 1.0 + 0.07 * (j % 10) as f64 },
+                polygon_ratio: polygon::regular_ratio(n),
+                relax_at: 0.9 * excess,
+                half_at: 0.95 * excess,
+                // Even with few steps, a member leaves points for the fit.
+                fit_from: excess,
+                fit_to: 1e-3 * excess,
+                clock_end: f64::from(steps),
+                growth: if flow.growth(1.0).is_some() { 50.0 } else { 0.0 },
+                ..Parameters::of_flow(flow, tau(n) * (1.0 - 0.05 * j as f64))
+            };
+            let mut run = Run::new(State::from_nodes(&nodes), parameters);
+            run.counters.goal = steps;
+            Ok(run)
+        })
+        .collect()
+}
+
+/// Creates the same members with adaptive steps of `tolerance`, to the time of `steps` of their own fixed steps, for a
+/// run in `precision`.
+pub fn adaptive_members(
+    n: usize,
+    count: usize,
+    steps: u32,
+    tolerance: f64,
+    precision: Precision,
+) -> Result<Vec<Run<f64>>> {
+    let mut runs = members(n, count, steps, SWEEPS)?;
+    for (j, run) in runs.iter_mut().enumerate() {
+        let (p, progress) = (&mut run.parameters, &mut run.report.progress);
+        let end = p.tau * f64::from(steps);
+        let ticks = Ticks::new(end, precision);
+        p.adaptive = tolerance;
+        p.follow_to = 1e-3 * run.report.now.excess;
+        p.clock_end = end;
+        p.growth *= p.tau;
+        (p.time_unit, p.time_tick) = (ticks.unit, ticks.tick);
+        (p.end_high, p.end_low) = ticks.split(end);
+        (p.goal_high, p.goal_low) = (p.end_high, p.end_low);
+        // One member in four begins with a step that is far too long and is refused.
+        progress.next = if j % 4 == 2 { end } else { 0.05 * p.tau };
+        run.counters.goal = u32::MAX;
+        run.counters.order = FIRST_ORDER.min(most_order(precision.epsilon()));
+    }
+    Ok(runs)
+}
+
+/// Tolerance of the sweeps in adaptive runs: so small that they go to their rounding limit, since combinations of rows
+/// amplify what sweeps leave.
+const SWEEPS: f64 = 1e-13;

@@ -1,0 +1,62 @@
+//! The results of members on a device.
+
+use super::setup::{MAX_SWEEPS, blocks};
+use curvelax_backend::{Backend, gpu::Variant};
+use curvelax_base::error::Result;
+use curvelax_flow::scheme::evolve::Evolves;
+use curvelax_flow::{
+    scheme::{
+        State,
+        member::{Counters, Report},
+        run::Run,
+    },
+    solver::Solver,
+};
+use curvelax_gpu as gpu;
+use curvelax_gpu::kernel::Budget;
+
+/// The result of a member on the GPU.
+#[derive(Clone, Debug)]
+pub struct Left {
+    /// Its last accepted state.
+    pub state: State<f64>,
+    /// Its counters; the sweeps are those of the last dispatch.
+    pub counters: Counters,
+    /// Its report.
+    pub report: Report<f64>,
+}
+
+/// Runs `launches` to their goals on the GPU.
+pub fn on_gpu<T: Evolves>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    launches: &[Run<f64>],
+    budget: Budget,
+) -> Result<Vec<Left>> {
+    let adaptive = launches.iter().any(|launch| launch.parameters.adaptive > 0.0);
+    let watched = launches.iter().any(|launch| launch.parameters.branches().watched);
+    let variant = Variant { adaptive, watched, ..adapter.capacity().variant(blocks(n)?, solver) };
+    on_gpu_by::<T>(adapter, variant, n, launches, budget)
+}
+
+/// Like [`on_gpu`], with a given kernel.
+pub fn on_gpu_by<T: Evolves>(
+    adapter: &gpu::Gpu,
+    variant: Variant,
+    n: usize,
+    launches: &[Run<f64>],
+    budget: Budget,
+) -> Result<Vec<Left>> {
+    let kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, launches.len(), MAX_SWEEPS, variant)?;
+    let mut kernel = kernel.with_budget(budget);
+    for (slot, launch) in launches.iter().enumerate() {
+        kernel.load(slot, launch)?;
+    }
+    while (0..launches.len()).any(|slot| kernel.counters(slot).is_running()) {
+        kernel.advance()?;
+    }
+    let left =
+        |slot| Ok(Left { state: kernel.state(slot)?, counters: kernel.counters(slot), report: kernel.report(slot) });
+    (0..launches.len()).map(left).collect()
+}

@@ -1,0 +1,243 @@
+//! The results of whole runs.
+
+use super::{
+    device::{Left, on_gpu},
+    row::{ConformanceRow, OnCpu, OnGpu},
+    scales::Scales,
+    setup::{Tamper, method, tampered},
+    twin::twin,
+};
+use crate::conformance::{
+    bounds::{Bound, DECAY, FIELDS, PACE, REPORT, growth},
+    cases::{MEMBERS, adaptive_members, members},
+};
+use curvelax_base::error::{Error, Result};
+use curvelax_flow::scheme::evolve::Evolves;
+use curvelax_flow::{
+    scheme::{
+        Curve, dense, extrapolation,
+        member::{Counters, Decay, NEVER, Progress, Report},
+        run::Run,
+        step::Method,
+    },
+    solver::Solver,
+};
+use curvelax_gpu as gpu;
+use curvelax_gpu::kernel::Budget;
+
+/// Tolerance of adaptive steps in the comparison.
+pub(super) const ADAPTIVE: f64 = 1e-3;
+
+/// Fixed steps of a member that take as long as its adaptive run in the comparison.
+pub const ADAPTIVE_STEPS: u32 = 40;
+
+/// Compares the curves after `steps` steps, in dispatches of `budget`.
+pub fn runs<T: Evolves>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    steps: u32,
+    budget: Budget,
+    tamper: Option<Tamper>,
+) -> Result<Vec<ConformanceRow>> {
+    let launches = members(n, MEMBERS, steps, T::PRECISION.tolerance())?;
+    ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
+}
+
+/// Compares the curves after adaptive steps to the same time, in dispatches of `budget`.
+///
+/// Rounding changes a step length by its change of the error estimate, relative to the tolerance; a changed length
+/// changes the curve by the tolerance times that. So rounding changes the curve no more than with fixed steps of the
+/// longest length taken, five of them per step, and the bounds are the same. Bounds of quantities inside the run are in
+/// [`PACE`].
+pub fn adaptive<T: Evolves>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    budget: Budget,
+    tamper: Option<Tamper>,
+) -> Result<Vec<ConformanceRow>> {
+    let launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?;
+    ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
+}
+
+/// Compares both sides of `launches` at their ends.
+fn ends_agree<T: Evolves>(
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    launches: Vec<Run<f64>>,
+    budget: Budget,
+    tamper: Option<Tamper>,
+) -> Result<Vec<ConformanceRow>> {
+    let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
+    compare_ends::<T>(adapter.is_hardware(), &method(solver), n, &launches, &ours)
+}
+
+/// Compares a device's results of `launches` with those of the twin by `method`, within the bounds for hardware or
+/// software.
+pub(in crate::conformance) fn compare_ends<T: Evolves>(
+    hardware: bool,
+    method: &Method,
+    n: usize,
+    launches: &[Run<f64>],
+    ours: &[Left],
+) -> Result<Vec<ConformanceRow>> {
+    let steps = ours.iter().map(|left| left.counters.steps).max().unwrap_or(0);
+    let adaptive = launches.iter().all(|launch| launch.parameters.adaptive > 0.0);
+    let quantities: Vec<Bound> = FIELDS.iter().chain(&REPORT).copied().collect();
+    let inside: &[Bound] = if adaptive { &PACE } else { &[] };
+    let begin = |bound| ConformanceRow { adaptive, ..ConformanceRow::begin::<T>(bound, method.solver, n, steps) };
+    let mut rows: Vec<ConformanceRow> = quantities.iter().chain(&DECAY).chain(inside).map(begin).collect();
+    for (member, (launch, left)) in launches.iter().zip(ours).enumerate() {
+        let twin = twin::<T>(launch, method, n)?;
+        same_events(left, &twin.left).map_err(|differ| {
+            let place = format!("{} n = {n}, member {member}", T::NAME);
+            Error::Failed(format!("{place}: {differ}"))
+        })?;
+        let mut at = launch.clone();
+        at.parameters.tau = at.parameters.tau.max(twin.longest);
+        let scales = Scales::of(&at)?;
+        let grown = growth(twin.left.counters.steps);
+        let amplified = if adaptive { extrapolation::roundings(twin.order) } else { 1.0 };
+        let roundings = grown * amplified;
+        let limit = |bound: &Bound, scale: f64| bound.factor(hardware) * T::EPSILON * scale * roundings;
+        let (of_curve, rest) = rows.split_at_mut(quantities.len());
+        let (of_decay, inside) = rest.split_at_mut(DECAY.len());
+        curves_agree(of_curve, member, &quantities, &scales, limit, OnGpu(left), OnCpu(&twin.left));
+        // The effect of a changed step length inside the run; none with fixed steps.
+        let estimate = T::EPSILON * roundings * scales.stiffness() / launch.parameters.adaptive;
+        let change = if adaptive { estimate * twin.steepest } else { 0.0 };
+        let factors = DECAY.map(|bound| bound.factor(hardware));
+        let rounding = T::EPSILON * roundings + change;
+        decays_agree(of_decay, member, launch, factors, rounding, OnGpu(&left.report), OnCpu(&twin.left.report));
+        if adaptive {
+            let roundings = [T::EPSILON * roundings, estimate];
+            let factors = PACE.map(|bound| bound.factor(hardware));
+            insides_agree(inside, member, &scales, factors, roundings, OnGpu(left), OnCpu(&twin.left));
+        }
+    }
+    Ok(rows)
+}
+
+/// Checks that both sides ended alike, after equally many steps and with their events in the same ones; else returns
+/// the difference.
+fn same_events(ours: &Left, theirs: &Left) -> Result<(), String> {
+    let end = |Left { counters, report, .. }: &Left| {
+        let Counters { status, steps, rejected, half_step, relax_step, fit_points, noted, .. } = *counters;
+        let Progress { time_high, time_low, .. } = report.progress;
+        format!(
+            "status {status} after {steps} steps and {rejected} refused at t = {time_high:e} + {time_low:e}, events in \
+             steps {half_step} and {relax_step}, {fit_points} points and {noted} times noted"
+        )
+    };
+    let (on_gpu, on_cpu) = (end(ours), end(theirs));
+    match on_gpu == on_cpu {
+        true => Ok(()),
+        false => Err(format!("{on_gpu} on the GPU, {on_cpu} on the CPU")),
+    }
+}
+
+/// Compares the last curve and its report, see [`FIELDS`] and [`REPORT`]; `limit` is the bound at a scale.
+fn curves_agree(
+    rows: &mut [ConformanceRow],
+    member: usize,
+    quantities: &[Bound],
+    scales: &Scales,
+    limit: impl Fn(&Bound, f64) -> f64,
+    OnGpu(ours): OnGpu<&Left>,
+    OnCpu(theirs): OnCpu<&Left>,
+) {
+    let (our_report, their_report) = (reported(&ours.report), reported(&theirs.report));
+    let ours = ours.state.curve.fields().into_iter().map(|field| field.nodes()).chain(our_report.chunks(1));
+    let theirs = theirs.state.curve.fields().into_iter().map(|field| field.nodes()).chain(their_report.chunks(1));
+    for ((row, bound), (ours, theirs)) in rows.iter_mut().zip(quantities).zip(ours.zip(theirs)) {
+        let scale = scales.get(bound.scale);
+        row.add(member, scale, limit(bound, scale), OnGpu(ours), OnCpu(theirs));
+    }
+}
+
+fn middle_of(left: &Left) -> Curve<f64> {
+    dense::inside(&left.state, &left.report.progress, 0.5)
+}
+
+/// Compares the recorded decay of a member, see [`DECAY`]; `rounding` is that of an excess.
+fn decays_agree(
+    rows: &mut [ConformanceRow],
+    member: usize,
+    launch: &Run<f64>,
+    factors: [f64; 2],
+    rounding: f64,
+    ours: OnGpu<&Report<f64>>,
+    theirs: OnCpu<&Report<f64>>,
+) {
+    let (OnGpu(ours), OnCpu(theirs)) = (ours, theirs);
+    let [way, rate] = rows else { panic!("{} rows of DECAY", rows.len()) };
+    way.add(member, 1.0, factors[0] * rounding, OnGpu(&ours.excess_at), OnCpu(&theirs.excess_at));
+    let slope = |decay: &Decay<f64>| if decay.xx > 0.0 { decay.xy / decay.xx } else { 0.0 };
+    let (least, span) = (theirs.now.excess.max(launch.parameters.fit_to), theirs.decay.x);
+    let scale = if span > 0.0 { 1.0 / (least * span) } else { 0.0 };
+    rate.add(
+        member,
+        scale,
+        factors[1] * rounding * scale,
+        OnGpu(&[slope(&ours.decay)]),
+        OnCpu(&[slope(&theirs.decay)]),
+    );
+}
+
+/// Compares what a member's run leaves in addition to its end, see [`PACE`]. `rounding` is the effect of rounding
+/// relative to a scale, `estimate` its relative effect on a step length.
+fn insides_agree(
+    rows: &mut [ConformanceRow],
+    member: usize,
+    scales: &Scales,
+    factors: [f64; 6],
+    [rounding, estimate]: [f64; 2],
+    ours: OnGpu<&Left>,
+    theirs: OnCpu<&Left>,
+) {
+    let (OnGpu(ours), OnCpu(theirs)) = (ours, theirs);
+    let [start, middle, reports, last, next, events] = rows else { panic!("{} rows of PACE", rows.len()) };
+    let (a, b) = (&ours.report, &theirs.report);
+    // The bound of a quantity that changes by `change` in a step.
+    let inside = |scale: f64, change: f64| rounding * scale + estimate * change;
+    let largest = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let bounds = FIELDS.map(|bound| scales.get(bound.scale));
+    let starts = [&ours.state.before, &theirs.state.before].map(Curve::clone);
+    let middles = [ours, theirs].map(middle_of);
+    for (row, factor, [a, b]) in [(start, factors[0], starts), (middle, factors[1], middles)] {
+        let fields = a.fields().into_iter().zip(b.fields()).zip(theirs.state.curve.fields()).zip(bounds);
+        for (((a, b), end), scale) in fields {
+            let bound = factor * inside(scale, largest(end.nodes(), b.nodes()));
+            row.add(member, scale, bound, OnGpu(a.nodes()), OnCpu(b.nodes()));
+        }
+    }
+    let (before, end) = ([a, b].map(|report| report.before.to_numbers()), theirs.report.now.to_numbers());
+    for (j, bound) in REPORT.iter().take(end.len()).enumerate() {
+        let ([a, b], scale) = (&before, scales.get(bound.scale));
+        let bound = factors[2] * inside(scale, (b[j] - end[j]).abs());
+        reports.add(member, scale, bound, OnGpu(&a[j..=j]), OnCpu(&b[j..=j]));
+    }
+    let (a, b) = (&a.progress, &b.progress);
+    // The last step reaches the final time, so its length has the total error of those before it.
+    let longest = scales.parameters.tau;
+    last.add(member, longest, factors[3] * estimate * longest, OnGpu(&[a.taken]), OnCpu(&[b.taken]));
+    next.add(member, b.next, factors[4] * estimate * b.next, OnGpu(&[a.next]), OnCpu(&[b.next]));
+    let half = |p: &Progress<f64>| p.half_high + (p.half_low + p.half_fraction * p.half_length);
+    let relaxed = |p: &Progress<f64>| p.relax_high + (p.relax_low + p.relax_fraction * p.relax_length);
+    if theirs.counters.half_step != NEVER && theirs.counters.relax_step != NEVER {
+        // The rounding of an excess over its rate of decay, and the effect of the place inside its step.
+        let p = &scales.parameters;
+        let rate = (p.half_at - p.relax_at) / (relaxed(b) - half(b));
+        let bound = factors[5] * (rounding / rate + estimate * b.half_length.max(b.relax_length));
+        events.add(member, b.relax_length, bound, OnGpu(&[half(a), relaxed(a)]), OnCpu(&[half(b), relaxed(b)]));
+    }
+}
+
+/// The compared values of a report, in the order of [`REPORT`].
+fn reported(report: &Report<f64>) -> Vec<f64> {
+    let mut numbers = report.now.to_numbers();
+    numbers.extend([report.progress.turning, report.progress.travel]);
+    numbers
+}

@@ -1,0 +1,67 @@
+//! A self-test by known answers: before a run begins on a device, a few members make two steps there and on the CPU.
+//!
+//! It tests what the run will use: its kernel, its number of nodes, its slots. The bounds are those of the other
+//! comparisons.
+
+use super::{
+    adaptive_members,
+    cases::LAWS,
+    compare::{ConformanceRow, Left, compare_ends},
+    members,
+};
+use curvelax_backend::Backend;
+use curvelax_base::error::{Error, Result};
+use curvelax_flow::scheme::evolve::Evolves;
+use curvelax_flow::scheme::step::Method;
+
+/// One for each law of [`members`]; with and without redistribution and pull.
+const MEMBERS: usize = LAWS;
+/// Fixed steps; adaptive runs cover the same time.
+const STEPS: u32 = 2;
+/// Tolerance of adaptive steps.
+const ADAPTIVE: f64 = 1e-3;
+
+/// Makes two steps with members of `n` nodes, or adaptive ones over the same time, and compares the results with those
+/// of `method` on the CPU. The slots must be free, and are free again afterwards.
+///
+/// # Errors
+/// [`Error::Device`] with the quantity, its error and its bound; errors of `backend`.
+pub fn self_test<T: Evolves>(
+    backend: &mut dyn Backend,
+    device: &str,
+    hardware: bool,
+    method: &Method,
+    n: usize,
+    adaptive: bool,
+) -> Result<()> {
+    let count = MEMBERS.min(backend.slots());
+    let launches = match adaptive {
+        false => members(n, count, STEPS, T::PRECISION.tolerance())?,
+        true => adaptive_members(n, count, STEPS, ADAPTIVE, T::PRECISION)?,
+    };
+    // In all batches.
+    let slots: Vec<usize> = (0..count).map(|member| member * backend.slots() / count).collect();
+    for (slot, launch) in slots.iter().zip(&launches) {
+        backend.load(*slot, launch)?;
+    }
+    while slots.iter().any(|slot| backend.counters(*slot).is_running()) {
+        backend.advance()?;
+    }
+    let mut left = Vec::with_capacity(count);
+    for slot in slots {
+        left.push(Left { state: backend.state(slot)?, counters: backend.counters(slot), report: backend.report(slot) });
+        backend.clear(slot);
+    }
+    let wrong = |what: String| {
+        let remedy = "see `curvelax check`, or use --backend cpu";
+        Error::Device(format!("GPU {device} computes wrongly: {what}; {remedy}"))
+    };
+    let rows = compare_ends::<T>(hardware, method, n, &launches, &left).map_err(|error| wrong(error.to_string()))?;
+    match rows.iter().filter(|row| !row.is_empty()).find(|row| !row.passes()) {
+        None => Ok(()),
+        Some(ConformanceRow { quantity, error, bound, at: (member, node), .. }) => Err(wrong(format!(
+            "{quantity} of member {member}, node {node}, of {n} in {}, is off by {error:.1e}, bound {bound:.1e}",
+            T::NAME
+        ))),
+    }
+}

@@ -1,0 +1,447 @@
+//! `ensemble.csv`: the statistics of relaxation times and decay rates, one row per cell.
+//!
+//! A member whose time is unknown is censored where it ended: at the final time if it is unfinished, or at its last
+//! good state if it ended badly. The row counts these members.
+
+use std::mem;
+
+use super::{
+    comparison::CellComparison,
+    discretisation::{CellLimits, DiscretisationError},
+    scaling::{CellMedian, Scaling},
+    tally::{CellTally, EventTally, Rate, Tally},
+    times::{Numbers, QUANTILES, Statistic, TimeStatistics, places},
+};
+use csv::WriterBuilder;
+use curvelax_base::error::{Error, Result};
+use curvelax_ensemble::{Spec, Status};
+use curvelax_statistics::{Bootstrap, Description, Mean, Sample};
+
+/// Relaxation times of one cell.
+pub struct CellStatistics {
+    /// Index of the cell.
+    pub cell: u64,
+    /// Its swept values, in the order of the keys.
+    pub values: Vec<String>,
+    /// Members, by status.
+    pub counts: [u64; Status::ALL.len()],
+    /// The relaxation times.
+    pub times: TimeStatistics,
+    /// Decay rates.
+    pub rates: Rates,
+    /// The error of discretisation, if it is known of some members.
+    pub discretisation: Option<DiscretisationError>,
+    /// The limits, if members have them.
+    pub limits: Option<CellLimits>,
+    /// The events of the spec, in their order.
+    pub events: Vec<EventStatistics>,
+}
+
+/// An event in one cell.
+pub struct EventStatistics {
+    /// Its times.
+    pub times: TimeStatistics,
+    /// Their error of discretisation, if it is known of some members.
+    pub discretisation: Option<DiscretisationError>,
+    /// Members that were stopped when they relaxed, before the event. If there are any, censoring depends on how slow a
+    /// member is, and nothing is estimated.
+    pub stopped: u64,
+}
+
+/// Fitted decay rates of the members of one cell that have one: complete data.
+pub struct Rates {
+    /// The numbers for the table.
+    pub numbers: Numbers,
+    /// Data for the chart: the rates, or their ratios to theory.
+    pub drawn: Description,
+}
+
+impl Rates {
+    /// Summarises `rates`; the chart shows their ratios to theory if they are `relative`.
+    fn new(bootstrap: &Bootstrap, rates: &[Rate], relative: bool) -> Result<Rates> {
+        let theory = Description::new(rates.iter().filter_map(Rate::theory))?.median();
+        let fitted = Description::new(rates.iter().map(|rate| rate.fitted))?;
+        let moments = [
+            Statistic { name: "mean", value: fitted.mean(), meaning: "mean" },
+            Statistic { name: "sd", value: fitted.standard_deviation(), meaning: "standard deviation" },
+            Statistic { name: "se", value: fitted.standard_error(), meaning: "standard error of the mean" },
+        ];
+        let quantiles = QUANTILES.map(|(share, ..)| fitted.quantile(share));
+        let places = places(quantiles, bootstrap.median_of(&fitted));
+        let (known, mut named) = (fitted.count(), moments.into_iter().chain(places).collect::<Vec<_>>());
+        // Each is as large as all times of the cell: one at a time.
+        let kept = (!relative).then_some(fitted);
+        let ratio = Description::new(rates.iter().filter_map(Rate::ratio))?;
+        named.push(Statistic { name: "theory", value: theory, meaning: "median of the rates of linear theory" });
+        named.push(Statistic { name: "ratio", value: ratio.median(), meaning: "median of rate over linear theory" });
+        Ok(Rates { numbers: Numbers { known, named }, drawn: kept.unwrap_or(ratio) })
+    }
+}
+
+/// A column of `ensemble.csv`.
+pub struct CellColumn {
+    /// The heading.
+    pub name: String,
+    /// What a field holds.
+    pub holds: &'static str,
+    /// What it means.
+    pub meaning: String,
+}
+
+/// Relaxation times of the outlines of one group in a cell.
+pub struct GroupStatistics {
+    /// The value of the property.
+    pub group: String,
+    /// Their times.
+    pub times: CellStatistics,
+}
+
+/// Relaxation times of all cells, and how they compare.
+pub struct EnsembleStatistics {
+    /// Each cell.
+    pub cells: Vec<CellStatistics>,
+    /// How the cells compare.
+    pub comparison: CellComparison,
+    /// Each group of outlines, cell by cell, if they are grouped.
+    pub groups: Vec<GroupStatistics>,
+    /// How the groups of each cell compare.
+    pub group_comparisons: Vec<CellComparison>,
+    /// The medians as a power of the swept value, if a single scale is swept.
+    pub scaling: Option<Scaling>,
+    /// Medians are compared in the limit, if all cells that have a median have that of limits.
+    pub of_limits: bool,
+    /// Rates are drawn relative to theory, if all members with a rate have a theoretical one.
+    pub relative: bool,
+}
+
+impl EnsembleStatistics {
+    /// The relative uncertainty of the median limit, in the cell where it is largest; infinite if one has none.
+    pub fn uncertainty(&self) -> f64 {
+        let cells = self.cells.iter().map(|cell| cell.limits.as_ref().and_then(CellLimits::uncertainty));
+        cells.map(|reached| reached.unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
+    }
+}
+
+impl CellStatistics {
+    /// Moves times and rates out of `tally`.
+    fn new(spec: &Spec, cell: u64, tally: &mut CellTally, relative: bool) -> Result<CellStatistics> {
+        let bootstrap = Bootstrap { seed: spec.seed.wrapping_add(cell), ..Bootstrap::default() };
+        let times = TimeStatistics::new(mem::take(&mut tally.times), &bootstrap);
+        let (values, counts) = (spec.sweep.labels(cell), tally.counts);
+        let rates = Rates::new(&bootstrap, &mem::take(&mut tally.rates), relative)?;
+        let (judged, copies) =
+            (mem::take(&mut tally.judged), !spec.has_different_members() && !spec.sweep.has("amplitude"));
+        let discretisation = DiscretisationError::of(&judged)?;
+        let limits = CellLimits::of(&Sample::from(mem::take(&mut tally.limits)), &judged, &bootstrap, copies)?;
+        let mut of_events = mem::take(&mut tally.events).into_iter();
+        let events = spec.event.iter().map(|_| {
+            let EventTally { times, judged, stopped, .. } = of_events.next().unwrap_or_default();
+            let discretisation = DiscretisationError::of(&judged)?;
+            let times = match stopped {
+                0 => TimeStatistics::new(times, &bootstrap),
+                _ => TimeStatistics::unknown(times),
+            };
+            Ok(EventStatistics { times, discretisation, stopped })
+        });
+        let events = events.collect::<Result<_>>()?;
+        Ok(CellStatistics { cell, values, counts, times, rates, discretisation, limits, events })
+    }
+
+    /// Number of members that ended.
+    pub fn members(&self) -> u64 {
+        self.counts.iter().sum()
+    }
+
+    /// The numbers on the error of discretisation, for the table.
+    pub fn errors(&self) -> Numbers {
+        errors(self.discretisation.as_ref(), OF_T_RELAX)
+    }
+
+    /// The numbers on the limits, for the table.
+    pub fn limit(&self) -> Numbers {
+        let limits = self.limits.as_ref();
+        let of = |number: fn(Mean) -> Option<f64>| limits.and_then(|limits| limits.mean).and_then(number);
+        let interval = limits.and_then(|limits| limits.interval);
+        let low = "lower end of the 95 % interval of the median, for sampling and discretisation together";
+        let high = "upper end of the 95 % interval of the median, for sampling and discretisation together";
+        let named = vec![
+            Statistic { name: "mean", value: of(|mean| Some(mean.value)), meaning: "mean, by Kaplan–Meier" },
+            Statistic { name: "sd", value: of(|mean| mean.standard_deviation), meaning: "standard deviation" },
+            Statistic { name: "se", value: of(|mean| mean.standard_error), meaning: "standard error of the mean" },
+            Statistic { name: "median", value: limits.and_then(|limits| limits.median), meaning: "median" },
+            Statistic { name: "median_low", value: interval.map(|(low, _)| low), meaning: low },
+            Statistic { name: "median_high", value: interval.map(|(_, high)| high), meaning: high },
+            Statistic { name: "error", value: limits.and_then(|limits| limits.error), meaning: "median of t_error" },
+        ];
+        Numbers { known: limits.map_or(0, |limits| limits.known), named }
+    }
+
+    /// The quantities in the table, with their numbers.
+    fn quantities(&self) -> [(&'static str, Numbers); 4] {
+        let (times, rates) = (self.times.numbers(), self.rates.numbers.clone());
+        [("t_relax", times), ("rate", rates), ("discretisation", self.errors()), ("t_limit", self.limit())]
+    }
+
+    /// Time by which half of the members have relaxed.
+    pub fn median(&self) -> Option<f64> {
+        self.times.median()
+    }
+
+    /// The median with its interval, that of the limits if they are asked for.
+    pub fn judged_median(&self, of_limits: bool) -> Option<(f64, Option<(f64, f64)>)> {
+        match &self.limits {
+            Some(limits) if of_limits => limits.median.map(|median| (median, limits.interval)),
+            _ => self.median().map(|median| (median, self.bounds())),
+        }
+    }
+
+    /// Whether all its members relaxed at one time, as copies of one curve do.
+    pub fn has_copies(&self) -> bool {
+        let mut seen = self.times.sample.observations();
+        seen.next().is_some_and(|first| first.happened && seen.all(|other| other == first))
+    }
+
+    /// The interval of the median, if both its ends are known.
+    pub fn bounds(&self) -> Option<(f64, f64)> {
+        self.times.bounds()
+    }
+}
+
+impl EventStatistics {
+    /// The numbers on its error of discretisation, for the table.
+    pub fn errors(&self) -> Numbers {
+        errors(self.discretisation.as_ref(), OF_EVENT)
+    }
+}
+
+/// What the mean error of discretisation of a time means.
+const OF_T_RELAX: &str =
+    "relative error of t_relax that n and the steps leave, negative if it is too early: mean of these";
+const OF_EVENT: &str =
+    "relative error of the time that n and the steps leave, negative if it is too early: mean of these";
+
+/// The numbers on an error of discretisation.
+fn errors(of: Option<&DiscretisationError>, mean: &'static str) -> Numbers {
+    let number = |number: fn(&DiscretisationError) -> f64| of.map(number);
+    let named = vec![
+        Statistic { name: "mean", value: number(|of| of.mean), meaning: mean },
+        Statistic { name: "error", value: number(|of| of.error), meaning: "half-width of its 95 % interval" },
+    ];
+    Numbers { known: of.map_or(0, |of| of.members), named }
+}
+
+impl EnsembleStatistics {
+    /// Computes the statistics of a run of `spec`. Times and rates are moved out of `tally`, which keeps the counts.
+    ///
+    /// Those of 10⁷ members are 240 MB, so they are sorted in place.
+    pub fn new(spec: &Spec, tally: &mut Tally) -> Result<EnsembleStatistics> {
+        let relative = tally.cells.iter().flat_map(|cell| &cell.rates).all(|rate| rate.theory().is_some());
+        // Sorting takes the times out of the order of the members.
+        let same_outlines = spec.outlines.is_some() && !spec.sweep.has("shape");
+        let paired = match () {
+            () if spec.has_copies_of_outlines() => Some(CellComparison::of_copies(spec.sweep.cells())),
+            () if spec.common_random_numbers || same_outlines => Some(CellComparison::paired(spec, tally)?),
+            () => None,
+        };
+        let mut none = CellTally::default();
+        let cells = (0..spec.sweep.cells())
+            .map(|cell| {
+                let of_cell = tally.cells.get_mut(cell as usize).unwrap_or(&mut none);
+                CellStatistics::new(spec, cell, of_cell, relative)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let samples: Vec<&Sample> = cells.iter().map(|cell| &cell.times.sample).collect();
+        let comparison = match paired {
+            Some(paired) => paired,
+            None => CellComparison::independent(spec, &samples)?,
+        };
+        let of_limits = spec.refine && cells.iter().all(|cell| cell.median().is_none() || cell.limits.is_some());
+        let medians = cells.iter().map(|cell| {
+            let (value, bounds) = cell.judged_median(of_limits).unzip();
+            CellMedian { cell: cell.cell, value, bounds: bounds.flatten(), has_copies: cell.has_copies() }
+        });
+        let scaling = Scaling::of(&spec.sweep, &medians.collect::<Vec<_>>());
+        let groups = mem::take(&mut tally.groups).into_iter().map(|((cell, group), mut of_group)| {
+            let times = CellStatistics::new(spec, cell, &mut of_group, relative)?;
+            Ok(GroupStatistics { group, times })
+        });
+        let mut groups: Vec<GroupStatistics> = groups.collect::<Result<_>>()?;
+        // Numbers ascend as numbers.
+        if let Some(numbers) = groups.iter().map(|of| of.group.parse::<f64>().ok()).collect::<Option<Vec<_>>>() {
+            let mut order: Vec<_> = numbers.into_iter().zip(groups).collect();
+            order.sort_by(|(a, one), (b, other)| one.times.cell.cmp(&other.times.cell).then(a.total_cmp(b)));
+            groups = order.into_iter().map(|(_, of)| of).collect();
+        }
+        let group_comparisons = groups.chunk_by(|one, other| one.times.cell == other.times.cell).map(|of_cell| {
+            let samples: Vec<&Sample> = of_cell.iter().map(|group| &group.times.times.sample).collect();
+            match spec.has_copies_of_outlines() {
+                true => CellComparison::of_copies(samples.len() as u64),
+                false => {
+                    CellComparison::of_groups(&samples, &of_cell.iter().map(|group| &*group.group).collect::<Vec<_>>())
+                }
+            }
+        });
+        let group_comparisons = group_comparisons.collect();
+        Ok(EnsembleStatistics { cells, comparison, groups, group_comparisons, scaling, relative, of_limits })
+    }
+
+    /// The time whose medians are compared.
+    pub fn time(&self) -> &'static str {
+        if self.of_limits { "t_limit" } else { "t_relax" }
+    }
+
+    /// The columns of `ensemble.csv`.
+    pub fn columns(&self, spec: &Spec) -> Vec<CellColumn> {
+        let keys = spec.sweep.axes().iter();
+        let keys = keys.map(|axis| column(axis.key.clone(), "swept value", format!("--{} of the cell", axis.key)));
+        self.columns_after(keys.collect())
+    }
+
+    /// The columns of `groups.csv`.
+    pub fn group_columns(&self) -> Vec<CellColumn> {
+        let group = column("group".into(), "word", "value of the property `--group-by`".into());
+        self.columns_after(vec![group])
+    }
+
+    /// The index of the cell, `keys`, and the numbers.
+    fn columns_after(&self, keys: Vec<CellColumn>) -> Vec<CellColumn> {
+        let statuses = Status::ALL.into_iter().map(Status::name);
+        let statuses = statuses.map(|name| column(name.into(), "integer", format!("members that ended {name}")));
+        let numbers = self.cells.first().into_iter().flat_map(CellStatistics::quantities);
+        let numbers = numbers.flat_map(|(quantity, numbers)| {
+            let known = column(format!("{quantity}_known"), "integer", format!("members with a {quantity}"));
+            let named = numbers.named.into_iter().map(move |Statistic { name, meaning, .. }| {
+                column(format!("{quantity}_{name}"), "float", format!("{quantity}: {meaning}"))
+            });
+            [known].into_iter().chain(named)
+        });
+        let mut all = vec![column("cell".into(), "integer", "index of the cell, from 0".into())];
+        all.extend(keys);
+        all.push(column("members".into(), "integer", "members that ended".into()));
+        all.extend(statuses.chain(numbers));
+        all
+    }
+
+    /// The columns of `event_statistics.csv`.
+    pub fn event_columns(&self) -> Vec<CellColumn> {
+        let column =
+            |name: &str, holds, meaning: &str| CellColumn { name: name.into(), holds, meaning: meaning.into() };
+        let mut all = vec![
+            column("cell", "integer", "index of the cell, from 0"),
+            column("event", "word", "name of the event"),
+            column("members", "integer", "members that ended"),
+            column("known", "integer", "members of which the event was seen"),
+        ];
+        let some = self.cells.iter().flat_map(|cell| &cell.events).next();
+        let named = |numbers: Option<Numbers>| numbers.map_or(Vec::new(), |numbers| numbers.named);
+        let (times, errors) = (named(some.map(|of| of.times.numbers())), named(some.map(EventStatistics::errors)));
+        all.extend(times.iter().map(|of| column(of.name, "float", of.meaning)));
+        all.push(column("discretisation_known", "integer", "members of which that is known"));
+        all.extend(errors.iter().map(|of| column(&format!("discretisation_{}", of.name), "float", of.meaning)));
+        all
+    }
+
+    /// The text of `event_statistics.csv`: the events of each cell, in the order of the spec.
+    pub fn events_to_csv(&self, spec: &Spec) -> Result<String> {
+        let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write event_statistics.csv: {e}"));
+        let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+        writer.write_record(self.event_columns().into_iter().map(|column| column.name)).map_err(|e| failed(&e))?;
+        for (cell, (event, of)) in
+            self.cells.iter().flat_map(|cell| spec.event.iter().zip(&cell.events).map(move |of| (cell, of)))
+        {
+            let values = |of: Numbers| of.named.into_iter().map(|number| number.value).collect::<Vec<_>>();
+            let (times, errors) = (of.times.numbers(), of.errors());
+            let (known, judged) = (times.known, errors.known);
+            let row = (cell.cell, &event.name, of.times.sample.len(), known, values(times), judged, values(errors));
+            writer.serialize(row).map_err(|e| failed(&e))?;
+        }
+        let bytes = writer.into_inner().map_err(|e| failed(&e))?;
+        String::from_utf8(bytes).map_err(|e| failed(&e))
+    }
+
+    /// The text of `ensemble.csv`.
+    pub fn to_csv(&self, spec: &Spec) -> Result<String> {
+        table(self.columns(spec), self.cells.iter().map(|cell| (&cell.values[..], cell)))
+    }
+
+    /// The text of `groups.csv`, if outlines are grouped.
+    pub fn groups_to_csv(&self) -> Result<Option<String>> {
+        let rows = self.groups.iter().map(|group| (std::slice::from_ref(&group.group), &group.times));
+        (!self.groups.is_empty()).then(|| table(self.group_columns(), rows)).transpose()
+    }
+}
+
+fn column(name: String, holds: &'static str, meaning: String) -> CellColumn {
+    CellColumn { name, holds, meaning }
+}
+
+/// A table of these columns, with a row for each cell or group after its values.
+fn table<'a>(
+    columns: Vec<CellColumn>,
+    rows: impl Iterator<Item = (&'a [String], &'a CellStatistics)>,
+) -> Result<String> {
+    let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write statistics as CSV: {e}"));
+    let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+    writer.write_record(columns.into_iter().map(|column| column.name)).map_err(|e| failed(&e))?;
+    for (values, of) in rows {
+        let numbers = of.quantities().map(|(_, Numbers { known, named })| {
+            (known, named.into_iter().map(|number| number.value).collect::<Vec<_>>())
+        });
+        writer.serialize((of.cell, values, of.members(), of.counts, numbers)).map_err(|e| failed(&e))?;
+    }
+    let bytes = writer.into_inner().map_err(|e| failed(&e))?;
+    String::from_utf8(bytes).map_err(|e| failed(&e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::outcome;
+
+    fn statistics(sweep: &str, members: &[(u64, Option<f64>)]) -> (Spec, EnsembleStatistics) {
+        let mut spec = Spec { curves: 2, ..Spec::default() };
+        if !sweep.is_empty() {
+            spec.sweep.set(sweep.parse().unwrap());
+        }
+        let mut tally = Tally::default();
+        for (cell, t_relax) in members {
+            let status = if t_relax.is_some() { Status::Relaxed } else { Status::Unfinished };
+            tally.add(&curvelax_ensemble::Outcome { cell: *cell, ..outcome(0, status, *t_relax) }).unwrap();
+        }
+        let statistics = EnsembleStatistics::new(&spec, &mut tally).unwrap();
+        (spec, statistics)
+    }
+
+    #[test]
+    fn a_table_looks_like_this() {
+        let members = [(0, Some(0.5)), (0, Some(1.5)), (1, Some(1.0)), (1, None)];
+        let (spec, statistics) = statistics("shape=ellipse:2,1;circle:1", &members);
+        let text = statistics.to_csv(&spec).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines[0],
+            "cell,shape,members,relaxed,unfinished,singular,nonfinite,stalled,t_relax_known,t_relax_mean,t_relax_sd,\
+             t_relax_se,t_relax_restricted_to,t_relax_q05,t_relax_q25,t_relax_median,t_relax_q75,t_relax_q95,\
+             t_relax_median_low,t_relax_median_high,rate_known,rate_mean,rate_sd,rate_se,rate_q05,rate_q25,\
+             rate_median,rate_q75,rate_q95,rate_median_low,rate_median_high,rate_theory,rate_ratio,discretisation_known,\
+             discretisation_mean,discretisation_error,t_limit_known,t_limit_mean,t_limit_sd,t_limit_se,t_limit_median,\
+             t_limit_median_low,t_limit_median_high,t_limit_error"
+        );
+        assert!(lines[1].starts_with("0,\"ellipse:2,1\",2,2,0,0,0,0,2,1.0,0.7071"), "{}", lines[1]);
+        assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
+        assert!(lines[2].contains(",2.0,1.0,1.0,1.0,,,"), "the mean is restricted, the tail unknown: {}", lines[2]);
+        assert!(statistics.comparison.refusal().is_some(), "{:?}", statistics.comparison);
+        assert_eq!(statistics.scaling, None);
+    }
+
+    #[test]
+    fn cells_without_times_have_empty_fields_and_no_nan() {
+        let (spec, statistics) = statistics("omega=1,2,3", &[(0, None), (0, None), (2, Some(0.0))]);
+        let text = statistics.to_csv(&spec).unwrap();
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+        let (lines, gap): (Vec<&str>, _) = (text.lines().skip(1).collect(), ",".repeat(12));
+        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0{gap}0{gap},0,,,0{}", ",".repeat(7)));
+        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0{gap}0{gap},0,,,0{}", ",".repeat(7)));
+        assert!(lines[2].starts_with("2,3,1,1,0,0,0,0,1,0.0,,,,0.0,"), "{}", lines[2]);
+    }
+}

@@ -1,0 +1,574 @@
+//! Running totals over members, for the overview and `run.json`; the members themselves are not stored.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use curvelax_base::error::Result;
+use curvelax_base::text::{plural, significant};
+use curvelax_ensemble::{
+    LevelTimes, Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN, schedule::grid, sweep::Sweep,
+};
+use curvelax_statistics::{Limit, Observation, Observations, Spread};
+
+/// Counts and sums over the members that ended.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    /// By cell.
+    pub cells: Vec<CellTally>,
+    /// By cell and group, if outlines are grouped.
+    pub groups: BTreeMap<(u64, String), CellTally>,
+    /// Total steps of all members.
+    pub steps: u64,
+    /// Total steps of the paper's scheme that were computed, also in refused adaptive steps.
+    pub solves: u64,
+    /// Total sweeps on curvature systems.
+    pub sweeps_k: u64,
+    /// Total sweeps on position systems.
+    pub sweeps_x: u64,
+    /// Names of the events of the spec.
+    pub events: Vec<String>,
+    /// For each of them, the members in which it holds from the start.
+    pub at_start: Vec<u64>,
+    /// Whether members are to have limits.
+    pub refined: bool,
+    /// Whether members end when they are relaxed.
+    pub stops: bool,
+    /// What distinguishes the cells.
+    sweep: Sweep,
+    /// Rows of the levels.
+    pub levels: u64,
+    /// Members whose corners were rounded off before the run.
+    pub mollified: MollifiedMembers,
+    /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
+    drifted: (u64, f64),
+    /// Members whose relaxation time is unknown because their threshold is below the rounding of the precision.
+    pub below_rounding: u64,
+    /// Longest over shortest edge of each member at its end, for a picture.
+    pub mesh_ratios: Vec<f32>,
+    /// Metric drift of each member at its end, for a picture.
+    pub metric_drifts: Vec<f32>,
+}
+
+/// Decay rate of a member.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate {
+    /// As fitted, in length⁻⁴.
+    pub fitted: f64,
+    /// NaN if theory predicts none.
+    theory: f64,
+}
+
+impl Rate {
+    /// The prediction of linear theory, if there is one.
+    pub fn theory(&self) -> Option<f64> {
+        Some(self.theory).filter(|theory| theory.is_finite())
+    }
+
+    /// Ratio to theory, if it is a number: areas at the ends of the range of floats, which a table may contain, have
+    /// none.
+    pub fn ratio(&self) -> Option<f64> {
+        self.theory().map(|theory| self.fitted / theory).filter(|ratio| ratio.is_finite())
+    }
+}
+
+/// Totals over the members of one cell.
+#[derive(Clone, Debug, Default)]
+pub struct CellTally {
+    /// Members, by status in the order of [`Status::ALL`].
+    pub counts: [u64; Status::ALL.len()],
+    /// Times at which members relaxed, or up to which they had not.
+    pub times: Observations,
+    /// Members that have not relaxed, by status.
+    pub others: [u64; Status::ALL.len()],
+    /// Simple curves whose final time came before they relaxed.
+    late: u64,
+    /// Sum of the initial areas.
+    pub area: f64,
+    /// Rates of the members that have one.
+    pub rates: Vec<Rate>,
+    /// Excess at the times of [`grid`], over the members that reached them.
+    pub excess: Vec<Spread>,
+    /// Limits of the times, of the members that have one; censored like the times for the others.
+    pub limits: Observations,
+    /// What the levels tell of the members that ran at them.
+    pub judged: Vec<Limit>,
+    /// By event, in the order of the spec.
+    pub events: Vec<EventTally>,
+}
+
+/// Totals over the members of one cell, for one event.
+#[derive(Clone, Debug, Default)]
+pub struct EventTally {
+    /// Times at which it happened, or up to which it had not.
+    pub times: Observations,
+    /// What the levels tell of these times, for the members that ran at them.
+    pub judged: Vec<Limit>,
+    /// Members that were stopped when they relaxed, before the event.
+    pub stopped: u64,
+    /// Members in which it happened.
+    reached: u64,
+}
+
+impl CellTally {
+    fn add(&mut self, outcome: &Outcome, refined: bool, stops: bool) -> Result<()> {
+        let CellTally { counts, times, others, late, area, rates, limits, judged, events, .. } = self;
+        times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
+        if refined {
+            // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
+            let end = outcome.t_limit.map_or(outcome.t_relax.unwrap_or(outcome.t_end), |_| outcome.t_end);
+            limits.push(Observation::new(outcome.t_limit, end))?;
+        }
+        judged.extend(outcome.judged);
+        events.resize_with(outcome.events.len().max(events.len()), EventTally::default);
+        for (i, (own, t)) in events.iter_mut().zip(&outcome.events).enumerate() {
+            own.times.push(Observation::new(*t, outcome.t_end))?;
+            own.reached += u64::from(t.is_some());
+            own.stopped += u64::from(stops && t.is_none() && outcome.status == Status::Relaxed);
+            own.judged.extend(outcome.judged_events.get(i).copied().flatten());
+        }
+        *late += u64::from(outcome.status == Status::Unfinished && outcome.end.turning.abs() == 1);
+        *area += outcome.start.area.abs();
+        rates.extend(outcome.rate.map(|fitted| Rate { fitted, theory: outcome.rate_theory.unwrap_or(f64::NAN) }));
+        for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
+            for (count, status) in counts.iter_mut().zip(Status::ALL) {
+                *count += u64::from(counted && status == outcome.status);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The rank of relaxed members in [`Status::ALL`].
+const RELAXED: usize = 0;
+/// Maximum number of cells that a warning names.
+const NAMED_CELLS: usize = 5;
+
+/// The part of a [`Tally`] that cannot be recomputed from `summary.csv`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Aside {
+    mollified: MollifiedMembers,
+    drifted: (u64, f64),
+    below_rounding: u64,
+    /// By cell.
+    excess: Vec<Vec<Spread>>,
+}
+
+impl Aside {
+    /// Adds the data of other members.
+    pub fn merge(&mut self, other: &Aside) {
+        let Aside { mollified, drifted, below_rounding, excess } = other;
+        self.mollified.merge(mollified);
+        self.drifted = (self.drifted.0.saturating_add(drifted.0), self.drifted.1.max(drifted.1));
+        self.below_rounding = self.below_rounding.saturating_add(*below_rounding);
+        self.excess.resize_with(self.excess.len().max(excess.len()), Vec::new);
+        for (own, other) in self.excess.iter_mut().zip(excess) {
+            own.resize_with(own.len().max(other.len()), Spread::default);
+            own.iter_mut().zip(other).for_each(|(own, other)| own.merge(other));
+        }
+    }
+}
+
+/// A row of `mean_excess.csv`: the excess of the members of a cell that reached a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MeanExcess {
+    /// Index of the cell.
+    pub cell: u64,
+    /// The time.
+    pub t: f64,
+    /// Number of members that reached it.
+    pub members: u64,
+    /// Their mean excess.
+    pub mean: Option<f64>,
+    /// Its standard deviation.
+    pub sd: Option<f64>,
+    /// Its 5 % quantile, to 1 %, as the next ones.
+    pub q05: Option<f64>,
+    /// Its median.
+    pub median: Option<f64>,
+    /// Its 95 % quantile.
+    pub q95: Option<f64>,
+}
+
+impl MeanExcess {
+    fn new(cell: u64, t: f64, of: &Spread) -> MeanExcess {
+        let (moments, [q05, median, q95]) = (of.moments(), [0.05, 0.5, 0.95].map(|share| of.quantile(share)));
+        let (members, mean, sd) = (moments.count(), moments.mean(), moments.deviation());
+        MeanExcess { cell, t, members, mean, sd, q05, median, q95 }
+    }
+}
+
+/// Metric drift above which the scheme's lengths are too far from the polygon's for times to mean much.
+pub const DISTRUSTED_DRIFT: f64 = 0.1;
+
+/// How corners of members were rounded off (`ensemble/mollifier.rs`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MollifiedMembers {
+    /// Members that were changed.
+    pub members: u64,
+    /// Maximum rounds for one member.
+    pub most_rounds: u32,
+    /// Largest relative change of area, before it was put back.
+    pub largest_area_change: f64,
+    /// Members that are not resolved, for one of the next three reasons.
+    pub unresolved: u64,
+    /// Members that cross themselves at the start, though their outline does not.
+    pub crossed: u64,
+    /// Members that start with a turn of more than 1.5 rad at a node.
+    pub sharp: u64,
+    /// Members whose area changed by more than a tenth.
+    pub distorted: u64,
+}
+
+impl MollifiedMembers {
+    /// Adds one member.
+    fn add(&mut self, mollified: &Mollified) {
+        self.members += u64::from(mollified.rounds > 0);
+        self.most_rounds = self.most_rounds.max(mollified.rounds);
+        self.largest_area_change = self.largest_area_change.max(mollified.area_change.abs());
+        let faults = [mollified.crossed, mollified.sharp, mollified.distorted()];
+        self.unresolved += u64::from(faults.contains(&true));
+        for (count, fault) in [&mut self.crossed, &mut self.sharp, &mut self.distorted].into_iter().zip(faults) {
+            *count += u64::from(fault);
+        }
+    }
+
+    /// Adds other members.
+    fn merge(&mut self, other: &MollifiedMembers) {
+        let MollifiedMembers { members, most_rounds, largest_area_change, unresolved, crossed, sharp, distorted } =
+            other;
+        self.members = self.members.saturating_add(*members);
+        self.most_rounds = self.most_rounds.max(*most_rounds);
+        self.largest_area_change = self.largest_area_change.max(*largest_area_change);
+        self.unresolved = self.unresolved.saturating_add(*unresolved);
+        self.crossed = self.crossed.saturating_add(*crossed);
+        self.sharp = self.sharp.saturating_add(*sharp);
+        self.distorted = self.distorted.saturating_add(*distorted);
+    }
+
+    /// What was done to their outlines, after "were"; `None` if nothing was.
+    pub fn told(&self) -> Option<String> {
+        let MollifiedMembers { members, most_rounds, largest_area_change, crossed, distorted, .. } = *self;
+        // Of those two kinds some are left with another area.
+        let put_back = if crossed + distorted == 0 { " and put back" } else { "" };
+        (members > 0).then(|| {
+            format!(
+                "rounded off in {members} {}, in at most {most_rounds} {}, which changed the area by at most {} %{put_back}",
+                plural(members, "member"),
+                plural(most_rounds.into(), "round"),
+                significant(100.0 * largest_area_change, 2)
+            )
+        })
+    }
+
+    /// What the user should know, if anything.
+    fn warning(&self, all: u64) -> Option<String> {
+        let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = self;
+        (*unresolved > 0).then(|| {
+            let parts = [
+                (crossed, "with crossings that the outline has not".to_owned()),
+                (sharp, format!("with a turn left above {MAX_VERTEX_TURN} rad")),
+                (distorted, format!("with an area changed by more than {} %", 100.0 * Mollified::DISTORTED)),
+            ];
+            let parts = parts.into_iter().filter(|(count, _)| **count > 0);
+            let parts: Vec<String> = parts.map(|(count, what)| format!("{count} {what}")).collect();
+            format!(
+                "{unresolved} of {all} {} started from an outline with parts thinner than the spacing of the nodes: {}; \
+                 use more --points or a simpler outline",
+                plural(all, "member"),
+                parts.join(", ")
+            )
+        })
+    }
+}
+
+impl Tally {
+    /// That of a run of `spec` before its members, after these times at its levels.
+    pub fn of(spec: &Spec, levels: &LevelTimes) -> Tally {
+        let events: Vec<String> = spec.event.iter().map(|event| event.name.clone()).collect();
+        let at_start = vec![0; events.len()];
+        let stops = spec.stops_when_relaxed();
+        let sweep = spec.sweep.clone();
+        Tally { refined: spec.refine, stops, sweep, levels: levels.rows(), events, at_start, ..Tally::default() }
+    }
+
+    /// Adds a member.
+    ///
+    /// # Errors
+    /// For an invalid time.
+    pub fn add(&mut self, outcome: &Outcome) -> Result<()> {
+        let (cell, refined) = (outcome.cell as usize, self.refined);
+        if self.cells.len() <= cell {
+            self.cells.resize_with(cell + 1, CellTally::default);
+        }
+        self.cells[cell].add(outcome, refined, self.stops)?;
+        if !outcome.group.is_empty() {
+            self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, refined, self.stops)?;
+        }
+        self.at_start.iter_mut().zip(&outcome.events).for_each(|(count, t)| *count += u64::from(*t == Some(0.0)));
+        self.mesh_ratios.push(outcome.end.mesh_ratio as f32);
+        self.metric_drifts.push(outcome.end.metric_drift as f32);
+        let drift = outcome.end.metric_drift;
+        self.drifted.0 += u64::from(drift > DISTRUSTED_DRIFT);
+        self.drifted.1 = self.drifted.1.max(drift);
+        // A table read from disk may contain anything.
+        self.steps = self.steps.saturating_add(outcome.steps);
+        self.solves = self.solves.saturating_add(outcome.solves);
+        self.sweeps_k = self.sweeps_k.saturating_add(outcome.sweeps_k);
+        self.sweeps_x = self.sweeps_x.saturating_add(outcome.sweeps_x);
+        Ok(())
+    }
+
+    /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`].
+    pub fn distrusted(&self) -> u64 {
+        self.drifted.0
+    }
+
+    /// Adds the excess of a member of `cell`, at the times of [`grid`] that it reached.
+    pub fn add_excess(&mut self, cell: u64, excess: &[f64]) {
+        let Some(tally) = self.cells.get_mut(cell as usize) else { return };
+        tally.excess.resize_with(tally.excess.len().max(excess.len()), Spread::default);
+        tally.excess.iter_mut().zip(excess).for_each(|(spread, excess)| spread.add(*excess));
+    }
+
+    /// Adds data that are not in a row of the summary.
+    pub fn add_aside(&mut self, mollified: &Mollified, unresolved: bool) {
+        self.mollified.add(mollified);
+        self.below_rounding += u64::from(unresolved);
+    }
+
+    /// Returns the data that are not in rows.
+    pub fn aside(&self) -> Aside {
+        let Tally { mollified, drifted, below_rounding, .. } = *self;
+        Aside {
+            mollified,
+            drifted,
+            below_rounding,
+            excess: self.cells.iter().map(|cell| cell.excess.clone()).collect(),
+        }
+    }
+
+    /// Sets the data that are not in rows, after all rows were added.
+    pub fn set_aside(&mut self, aside: Aside) {
+        let Aside { mollified, drifted, below_rounding, excess } = aside;
+        (self.mollified, self.drifted, self.below_rounding) = (mollified, drifted, below_rounding);
+        self.cells.iter_mut().zip(excess).for_each(|(cell, excess)| cell.excess = excess);
+    }
+
+    /// Returns the rows of `mean_excess.csv`.
+    ///
+    /// # Errors
+    /// [`Error::Request`](curvelax_base::error::Error::Request) if the values of a cell do not fit `spec`.
+    pub fn mean_excess(&self, spec: &Spec) -> Result<Vec<MeanExcess>> {
+        let mut rows = Vec::new();
+        for (cell, CellTally { excess, .. }) in (0..).zip(&self.cells) {
+            let t_end = spec.of_cell(cell)?.final_time();
+            let row = |(t, of): (f64, &Spread)| MeanExcess::new(cell, t, of);
+            rows.extend(grid(t_end).zip(excess).map(row));
+        }
+        Ok(rows)
+    }
+
+    /// What the user should know about the results, one sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings: Vec<String> = self.mollified.warning(self.members()).into_iter().collect();
+        let members = format!("{} {}", self.members(), plural(self.members(), "member"));
+        let failed = self.failed();
+        if failed > 0 {
+            let stalled = self.counts().any(|(status, count)| status == Status::Stalled && count > 0);
+            // Members that creep are stalled, too, without a sweep.
+            let swept = self.sweeps_k > 0 || self.sweeps_x > 0;
+            let direct = if stalled && swept { "where sweeps stalled, --solver direct helps; " } else { "" };
+            warnings.push(format!(
+                "{failed} of {members} failed (see `status`); {direct}unless the flow itself becomes singular, a smaller \
+                 --tau or --adaptive, or more --points, helps"
+            ));
+        }
+        warnings.extend(self.late());
+        if self.below_rounding > 0 {
+            warnings.push(format!(
+                "{} of {members} started so nearly round that rounding hides the threshold: t_relax cannot be \
+                 determined; use --precision f64, or a larger --relax-to or --relax-at",
+                self.below_rounding
+            ));
+        }
+        let judged = || self.cells.iter().flat_map(|cell| &cell.judged);
+        let early = judged().filter(|limit| !limit.asymptotic).count();
+        if self.refined && early > 0 {
+            warnings.push(format!(
+                "t_limit of {early} of {} {} is the time at n nodes: their times do not converge yet in n; use more \
+                 --points",
+                judged().count(),
+                plural(judged().count() as u64, "member")
+            ));
+        }
+        for (name, at_start) in self.events.iter().zip(&self.at_start).filter(|(_, at_start)| **at_start > 0) {
+            warnings
+                .push(format!("the event {name} holds from the start in {at_start} of {members}: its time is 0 there"));
+        }
+        for (i, name) in self.events.iter().enumerate() {
+            let some = self.cells.iter().filter_map(|cell| cell.events.get(i)).filter(|of| of.reached > 0);
+            let stopped: u64 = some.map(|of| of.stopped).sum();
+            if stopped > 0 {
+                warnings.push(format!(
+                    "{stopped} of {members} were stopped when they relaxed, before the event {name}: the slow ones were \
+                     seen for longer, so it has no statistics; use --stop-when-relaxed=false, and a number as --t-end"
+                ));
+            }
+        }
+        let (drifted, worst) = self.drifted;
+        if drifted > 0 {
+            warnings.push(format!(
+                "{drifted} of {members} ended with a metric drift above {DISTRUSTED_DRIFT} (worst {worst:.2}): \
+                 their times and areas are unreliable; use --pull auto, a smaller --tau or --adaptive, or \
+                 more --points"
+            ));
+        }
+        warnings
+    }
+
+    /// The warning about cells in which no member relaxed, because the final time came first.
+    fn late(&self) -> Option<String> {
+        let is_late = |cell: &CellTally| cell.late > 0 && cell.counts[RELAXED] == 0;
+        let late: Vec<u64> = (0..).zip(&self.cells).filter(|(_, cell)| is_late(cell)).map(|(rank, _)| rank).collect();
+        let longer = if self.stops { "a longer --t-end" } else { "a longer --t-end or --t-end auto" };
+        let remedy = format!("use {longer}, or a larger --relax-to or --relax-at");
+        if late.is_empty() {
+            return None;
+        }
+        if self.cells.len() == 1 {
+            return Some(format!("no member relaxed before its final time; {remedy}"));
+        }
+        let mut named: Vec<String> = late.iter().take(NAMED_CELLS).map(|rank| self.sweep.name(*rank)).collect();
+        if late.len() > NAMED_CELLS {
+            named.push(format!("{} more", late.len() - NAMED_CELLS));
+        }
+        let (cells, all) = (late.len(), self.cells.len());
+        Some(format!(
+            "no member relaxed before its final time in {cells} of {all} cells ({}); {remedy}",
+            named.join("; ")
+        ))
+    }
+
+    /// Number of members that ended neither relaxed nor unfinished.
+    pub fn failed(&self) -> u64 {
+        self.counts().filter(|(status, _)| status.is_failure()).map(|(_, count)| count).sum()
+    }
+
+    /// Number of members that ended.
+    pub fn members(&self) -> u64 {
+        self.counts().map(|(_, count)| count).sum()
+    }
+
+    /// Each status with its number of members, in the order of [`Status::ALL`].
+    pub fn counts(&self) -> impl Iterator<Item = (Status, u64)> {
+        let of = |rank: usize| self.cells.iter().map(|cell| cell.counts[rank]).sum();
+        Status::ALL.into_iter().enumerate().map(move |(rank, status)| (status, of(rank)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::outcome;
+
+    fn tally(times: &[f64], censored: u64) -> Tally {
+        let mut tally = Tally::default();
+        times.iter().for_each(|t| tally.add(&outcome(0, Status::Relaxed, Some(*t))).unwrap());
+        (0..censored).for_each(|_| tally.add(&outcome(0, Status::Unfinished, None)).unwrap());
+        tally
+    }
+
+    #[test]
+    fn totals_count_every_member_once() {
+        let tally = tally(&[1.0, 2.0], 3);
+        assert_eq!((tally.members(), tally.steps, tally.sweeps_k, tally.sweeps_x), (5, 50, 100, 25));
+        let counts: Vec<u64> = tally.counts().map(|(_, count)| count).collect();
+        assert_eq!(counts, [2, 3, 0, 0, 0]);
+    }
+
+    #[test]
+    fn only_members_that_sweep_are_advised_to_solve_directly() {
+        let advice = |status, sweeps_k, sweeps_x| {
+            let mut tally = Tally::default();
+            tally.add(&Outcome { sweeps_k, sweeps_x, ..outcome(0, status, None) }).unwrap();
+            tally.warnings().concat().contains("--solver direct")
+        };
+        assert!(advice(Status::Stalled, 20, 0));
+        assert!(!advice(Status::Stalled, 0, 0) && !advice(Status::Singular, 20, 0));
+    }
+
+    #[test]
+    fn outlines_that_the_nodes_do_not_resolve_are_warned_of() {
+        let mut tally = tally(&[1.0, 2.0, 3.0, 4.0], 0);
+        let well = Mollified { rounds: 7, area_change: -0.05, ..Mollified::default() };
+        assert_eq!(tally.mollified.told(), None);
+        tally.add_aside(&well, false);
+        assert_eq!((tally.warnings(), tally.mollified.members), (vec![], 1));
+        let told = "rounded off in 1 member, in at most 7 rounds, which changed the area by at most 5.0 %";
+        assert_eq!(tally.mollified.told(), Some(format!("{told} and put back")));
+        tally.add_aside(&Mollified { crossed: true, sharp: true, ..well }, false);
+        tally.add_aside(&Mollified { area_change: -0.2, ..well }, false);
+        assert!(tally.mollified.told().is_some_and(|told| told.ends_with("by at most 20 %")));
+        let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = tally.mollified;
+        assert_eq!((unresolved, crossed, sharp, distorted), (2, 1, 1, 1));
+        let warnings = tally.warnings();
+        assert!(warnings[0].starts_with("2 of 4 members started from an outline with parts thinner"), "{warnings:?}");
+        let parts =
+            "1 with crossings that the outline has not, 1 with a turn left above 1.5 rad, 1 with an area changed";
+        assert!(warnings[0].contains(parts) && warnings[0].contains("more than 10 %; use more --points"));
+        tally.mollified.crossed = 0;
+        assert!(!tally.warnings()[0].contains("crossings"));
+    }
+
+    #[test]
+    fn cells_in_which_no_member_relaxed_are_named_with_the_remedy() {
+        let late = |cell: u64| {
+            let mut late = outcome(cell, Status::Unfinished, None);
+            (late.cell, late.end.turning) = (cell, -1);
+            late
+        };
+        let mut alone = Tally::default();
+        alone.add(&late(0)).unwrap();
+        let remedy = "use a longer --t-end or --t-end auto, or a larger --relax-to or --relax-at";
+        assert_eq!(alone.warnings(), [format!("no member relaxed before its final time; {remedy}")]);
+        alone.add(&outcome(1, Status::Relaxed, Some(0.5))).unwrap();
+        assert_eq!(alone.warnings(), [""; 0]);
+
+        let spec = Spec::from_toml("[sweep]\namplitude = [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08]").unwrap();
+        let mut study = Tally::of(&Spec { stop_when_relaxed: Some(true), ..spec }, &LevelTimes::default());
+        study.add(&outcome(0, Status::Relaxed, Some(0.5))).unwrap();
+        (1..8).for_each(|cell| study.add(&late(cell)).unwrap());
+        let cells = "amplitude = 0.02; amplitude = 0.03; amplitude = 0.04; amplitude = 0.05; amplitude = 0.06; 2 more";
+        let remedy = "use a longer --t-end, or a larger --relax-to or --relax-at";
+        assert_eq!(
+            study.warnings(),
+            [format!("no member relaxed before its final time in 7 of 8 cells ({cells}); {remedy}")]
+        );
+        // A figure of eight does not relax, however long it is given.
+        let mut eight = late(0);
+        eight.end.turning = 0;
+        let mut immersed = Tally::default();
+        immersed.add(&eight).unwrap();
+        assert_eq!(immersed.warnings(), [""; 0]);
+    }
+
+    #[test]
+    fn bad_ends_and_drift_are_warned_of_and_nothing_else_is() {
+        let mut tally = Tally::default();
+        tally.add(&outcome(0, Status::Relaxed, Some(0.5))).unwrap();
+        tally.add(&outcome(1, Status::Unfinished, None)).unwrap();
+        assert_eq!(tally.warnings(), [""; 0]);
+        tally.add(&outcome(2, Status::Stalled, None)).unwrap();
+        let mut drifted = outcome(3, Status::Relaxed, Some(0.5));
+        drifted.end.metric_drift = 0.25;
+        tally.add(&drifted).unwrap();
+        let warnings = tally.warnings();
+        assert!(warnings[0].starts_with("1 of 4 members failed"), "{warnings:?}");
+        assert!(
+            warnings[1].contains("1 of 4 members ended with a metric drift above 0.1 (worst 0.25)"),
+            "{warnings:?}"
+        );
+        assert_eq!(warnings.len(), 2);
+    }
+}

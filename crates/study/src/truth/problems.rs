@@ -1,0 +1,342 @@
+//! The single table of problems: each with its exact solution, the measured quantity, its error bound, and the result
+//! of a known mistake, whose error must exceed the bound.
+
+use std::f64::consts::TAU;
+
+use glam::DVec2;
+
+use super::{Measure, circle_mode};
+use curvelax_base::error::{Error, Result, did_you_mean};
+use curvelax_curve::{BaseCurve, Sampling};
+use curvelax_ensemble::spec::Precision;
+use curvelax_flow::flow::Flow;
+
+/// Length of the lemniscate of half-width 1: 4·∫₀¹ dx/√(1-x⁴).
+const LEMNISCATE: f64 = 5.244_115_108_584_239;
+
+/// How finely a problem is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resolution {
+    /// Nodes.
+    pub n: usize,
+    /// Time step τ.
+    pub tau: f64,
+    /// Local error tolerance of adaptive steps, which replace τ.
+    pub tolerance: Option<f64>,
+}
+
+/// Time at which the lemniscate of half-width 1 vanishes under surface diffusion: `a(t) = (1 - 24t)^(1/4)`.
+pub const LEMNISCATE_LIFE: f64 = 1.0 / 24.0;
+
+/// Length of the 2:1 ellipse at t = 0.1 under surface diffusion: an independent spectral solution, to all digits.
+const ELLIPSE_LENGTH: f64 = 9.357_700_6;
+
+/// A curve at the start of a problem, as a function of `u ∈ [0, 1]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StartCurve {
+    /// A circle traversed `turns` times.
+    Circle {
+        /// Radius R.
+        radius: f64,
+        /// Turning number.
+        turns: u32,
+    },
+    /// `r = 1 + a·cos mθ` with a small a that depends on the precision.
+    Mode(u32),
+    /// `(2 cos 2πu, sin 2πu)`.
+    Ellipse,
+    /// `(cos v, sin v cos v)/(1 + sin² v)`, v = 2πu: of half-width 1 and turning number 0.
+    Lemniscate,
+}
+
+/// A problem with an exact solution.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// Its name on the command line.
+    pub name: String,
+    /// The law of motion.
+    pub flow: Flow,
+    /// The start.
+    pub curve: StartCurve,
+    /// Final time.
+    pub t_end: f64,
+    /// The quantity measured at the final time.
+    pub measure: Measure,
+    /// Its exact value.
+    pub exact: f64,
+    /// The value that a mistake would give: the negative control.
+    pub mistaken: f64,
+    /// The mistake.
+    pub mistake: &'static str,
+    /// Bound on the error relative to `exact`.
+    pub bound: ErrorBound,
+    /// Nodes at which it is tested: enough to detect the mistake.
+    pub n: usize,
+    /// Steps with which it is tested.
+    pub steps: u32,
+}
+
+/// Largest relative error, as a sum: `space·(100/n)² + time·(100/steps) + rounding`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorBound {
+    /// Error at n = 100 with a vanishing step.
+    pub space: f64,
+    /// Error of 100 steps with a vanishing spacing.
+    pub time: f64,
+    /// Error of f32, and of sweeps that end at its tolerance.
+    pub single: f64,
+}
+
+impl ErrorBound {
+    /// Returns the bound at n nodes after `steps` steps.
+    fn at(&self, n: usize, steps: f64, precision: Precision) -> f64 {
+        let rounding = if precision == Precision::F32 { self.single } else { 1e-9 };
+        self.space * (100.0 / n as f64).powi(2) + self.time * 100.0 / steps + rounding
+    }
+}
+
+impl Problem {
+    /// Returns the problem of this name.
+    ///
+    /// # Errors
+    /// [`Error::Request`] with the nearest name if there is none.
+    pub fn named(name: &str) -> Result<Problem> {
+        let mut all = problems();
+        match all.iter().position(|problem| problem.name == name) {
+            Some(index) => Ok(all.swap_remove(index)),
+            None => {
+                let names: Vec<&str> = all.iter().map(|problem| problem.name.as_str()).collect();
+                let meant = did_you_mean(name, names.iter().copied());
+                let problem = format!("there is no such problem{meant}");
+                Err(Error::value("problem", name, &problem, &format!("there are {}", names.join(", "))))
+            }
+        }
+    }
+
+    /// Returns the resolution at which it is tested.
+    pub fn resolution(&self) -> Resolution {
+        self.in_steps(self.n, self.steps)
+    }
+
+    /// Returns the resolution of n nodes and `steps` equal steps.
+    pub fn in_steps(&self, n: usize, steps: u32) -> Resolution {
+        Resolution { n, tau: self.t_end / f64::from(steps), tolerance: None }
+    }
+
+    /// Returns the resolution of n nodes and adaptive steps.
+    pub fn to_tolerance(&self, n: usize, tolerance: f64) -> Resolution {
+        Resolution { n, tau: self.t_end, tolerance: Some(tolerance) }
+    }
+
+    /// Returns the bound on the error relative to `exact` at a resolution of fixed τ.
+    pub fn bound_at(&self, at: Resolution, precision: Precision) -> f64 {
+        self.bound.at(at.n, self.t_end / at.tau, precision)
+    }
+}
+
+impl StartCurve {
+    /// Relative amplitude of a small mode. The terms neglected by linear theory are of its square, rounding is of its
+    /// inverse.
+    fn amplitude(precision: Precision) -> f64 {
+        if precision == Precision::F32 { 1e-2 } else { 1e-4 }
+    }
+
+    /// Returns the curve for a run in `precision`.
+    pub fn resolve(self, precision: Precision) -> BaseCurve {
+        match self {
+            StartCurve::Circle { radius, turns } => {
+                let whole = TAU * f64::from(turns);
+                BaseCurve::from_formula(move |u| radius * DVec2::from_angle(whole * u))
+            }
+            StartCurve::Mode(m) => {
+                let a = StartCurve::amplitude(precision);
+                let radius = move |theta: f64| 1.0 + a * (f64::from(m) * theta).cos();
+                BaseCurve::from_formula(move |u| radius(TAU * u) * DVec2::from_angle(TAU * u))
+            }
+            StartCurve::Ellipse => BaseCurve::from_formula(|u| DVec2::new(2.0, 1.0) * DVec2::from_angle(TAU * u)),
+            StartCurve::Lemniscate => BaseCurve::from_formula(|u| {
+                let (sin, cos) = (TAU * u).sin_cos();
+                DVec2::new(cos, sin * cos) / (1.0 + sin * sin)
+            }),
+        }
+    }
+
+    /// Returns the spacing of the nodes: for a circle and its modes equal in the angle, for the others along the curve.
+    pub fn sampling(self) -> Sampling {
+        match self {
+            StartCurve::Circle { .. } | StartCurve::Mode(_) => Sampling::Parameter,
+            StartCurve::Ellipse | StartCurve::Lemniscate => Sampling::Arclength,
+        }
+    }
+}
+
+/// Returns all problems.
+pub fn problems() -> Vec<Problem> {
+    let mut all = circles();
+    all.extend((2..=6).flat_map(modes));
+    all.extend([ellipse_area(), ellipse_length(), lemniscate()]);
+    all
+}
+
+/// Circles, once and twice round: the second has twice the turning number and must move like the first.
+fn circles() -> Vec<Problem> {
+    let grown = 3.0_f64.powf(0.25);
+    let circle = |name: &str, flow: Flow, turns: u32, space: f64| Problem {
+        name: name.into(),
+        flow,
+        curve: StartCurve::Circle { radius: 1.0, turns },
+        t_end: 1.0,
+        measure: Measure::Radius,
+        exact: grown,
+        mistaken: 2.0_f64.powf(0.25),
+        mistake: "R⁴ grows by t",
+        bound: ErrorBound { space, time: 1.3e-3, single: 1e-4 },
+        n: 66,
+        steps: 200,
+    };
+    let at_rest = |problem: Problem| Problem {
+        exact: 1.0,
+        mistaken: grown,
+        mistake: "the circle grows as under Willmore flow",
+        bound: ErrorBound { time: 1e-6, ..problem.bound },
+        ..problem
+    };
+    vec![
+        circle("willmore-circle", Flow::Willmore, 1, 2.5e-4),
+        circle("willmore-double-circle", Flow::Willmore, 2, 1e-3),
+        at_rest(circle("elastic-circle", Flow::Elastic(0.5), 1, 5.6e-4)),
+        at_rest(circle("surface-diffusion-double-circle", Flow::SurfaceDiffusion, 2, 1.7e-3)),
+    ]
+}
+
+/// A small mode m of the unit circle under each kind of flow, until it has decayed to about 1/e.
+fn modes(m: u32) -> Vec<Problem> {
+    let m2 = f64::from(m * m);
+    let mode = |name: &str, flow: Flow, exact: &dyn Fn(f64) -> f64, mistaken: &dyn Fn(f64) -> f64, mistake| {
+        let t_end = 1.0 / flow.linear_rate(m, 1.0);
+        Problem {
+            name: format!("{name}-mode-{m}"),
+            flow,
+            curve: StartCurve::Mode(m),
+            t_end,
+            measure: Measure::Decay(m),
+            exact: exact(t_end),
+            mistaken: mistaken(t_end),
+            mistake,
+            // The implicit step is off by half a step's decay, and the fourth differences by O(m²h²).
+            bound: ErrorBound { space: 2.5e-3 + 8.7e-4 * m2, time: 6e-3, single: 4e-3 },
+            n: if m < 4 { 66 } else { 198 },
+            steps: 100,
+        }
+    };
+    let willmore = |t: f64| 0.5 * (m2 - 1.0) * (m2 - 1.5) * (1.0 + 2.0 * t).ln();
+    let polynomial = Flow::Polynomial(vec![3.0, -1.0, 0.2, 0.1]);
+    let along = polynomial.clone();
+    vec![
+        mode(
+            "surface-diffusion",
+            Flow::SurfaceDiffusion,
+            &|t| m2 * (m2 - 1.0) * t,
+            &|t| m2 * m2 * t,
+            "the rate m⁴ of a straight line",
+        ),
+        mode(
+            "willmore",
+            Flow::Willmore,
+            &willmore,
+            &|t| if m == 2 { willmore(t) + 0.25 * (1.0 + 2.0 * t).ln() } else { m2 / (m2 - 1.5) * willmore(t) },
+            if m == 2 { "the amplitude over R" } else { "b = 0 in the rate" },
+        ),
+        mode(
+            "elastic",
+            Flow::Elastic(0.5),
+            &|t| (m2 - 1.0).powi(2) * t,
+            &|t| m2 * (m2 - 1.0) * t,
+            "the rate m²(m²-1) of surface diffusion",
+        ),
+        mode("polynomial", polynomial, &|t| circle_mode(&along, 1.0, m, t).decay, &|t| m2 * (m2 - 1.0) * t, "b = 0"),
+    ]
+}
+
+/// Surface diffusion conserves the area.
+fn ellipse_area() -> Problem {
+    Problem {
+        name: "ellipse-area".into(),
+        flow: Flow::SurfaceDiffusion,
+        curve: StartCurve::Ellipse,
+        t_end: 0.1,
+        measure: Measure::Area,
+        exact: TAU,
+        mistaken: 1.06 * TAU,
+        mistake: "the drift of sweeps that end too early",
+        bound: ErrorBound { space: 8.5e-4, time: 1e-4, single: 1e-4 },
+        n: 66,
+        steps: 200,
+    }
+}
+
+/// The length of the same ellipse during the run.
+fn ellipse_length() -> Problem {
+    Problem {
+        name: "ellipse-length".into(),
+        measure: Measure::Length,
+        exact: ELLIPSE_LENGTH,
+        mistaken: TAU * 2.0_f64.sqrt(),
+        bound: ErrorBound { space: 8e-5, time: 4.2e-4, single: 1e-5 },
+        mistake: "the circle of the same area",
+        ..ellipse_area()
+    }
+}
+
+/// The lemniscate shrinks like `a(t) = (1 - 24t)^(1/4)`; here at 95 % of its life.
+fn lemniscate() -> Problem {
+    let left: f64 = 0.05;
+    let t_end = (1.0 - left) * LEMNISCATE_LIFE;
+    Problem {
+        name: "lemniscate".into(),
+        flow: Flow::SurfaceDiffusion,
+        curve: StartCurve::Lemniscate,
+        t_end,
+        measure: Measure::Length,
+        exact: LEMNISCATE * left.powf(0.25),
+        mistaken: LEMNISCATE * (1.0 - 20.0 * t_end).powf(0.25),
+        mistake: "extinct at a⁴/20",
+        bound: ErrorBound { space: 5.3e-3, time: 5e-2, single: 1e-3 },
+        n: 66,
+        steps: 200,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_name_is_answered_with_the_nearest() {
+        assert_eq!(Problem::named("lemniscate").unwrap().curve, StartCurve::Lemniscate);
+        let message = Problem::named("wilmore-circle").unwrap_err().to_string();
+        assert!(message.starts_with("--problem wilmore-circle: "), "{message}");
+        assert!(message.contains("did you mean `willmore-circle`?"), "{message}");
+    }
+
+    #[test]
+    fn names_are_unique() {
+        let names: Vec<String> = problems().into_iter().map(|problem| problem.name).collect();
+        for (i, name) in names.iter().enumerate() {
+            assert!(!names[..i].contains(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn the_curves_have_the_size_that_their_problems_say() {
+        let length = |curve: StartCurve| {
+            let curve = curve.resolve(Precision::F64);
+            let nodes: Vec<DVec2> = (0..20_000).map(|i| curve.point(f64::from(i) / 20_000.0)).collect();
+            curvelax_curve::polygon::length(&nodes)
+        };
+        assert!((length(StartCurve::Lemniscate) - LEMNISCATE).abs() < 1e-6);
+        assert!((length(StartCurve::Circle { radius: 0.5, turns: 2 }) - TAU).abs() < 1e-6);
+        assert!((length(StartCurve::Ellipse) - 9.688_448_220_547_675).abs() < 1e-6);
+        assert!((length(StartCurve::Mode(5)) - TAU).abs() < 1e-6);
+    }
+}

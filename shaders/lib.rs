@@ -1,0 +1,51 @@
+//! The WGSL of the kernels, compiled in. `README.md` describes the files.
+//!
+//! A kernel is a list of these files, one after the other; which ones, the back end decides.
+
+/// A file: its name and its text.
+pub type ShaderPart = (&'static str, &'static str);
+
+macro_rules! files {
+    ($($constant:ident $name:literal,)+) => {
+        $(
+            #[doc = concat!("`", $name, "`")]
+            pub const $constant: ShaderPart = ($name, include_str!($name));
+        )+
+        /// All files.
+        pub const ALL: &[ShaderPart] = &[$($constant),+];
+    };
+}
+
+files! {
+    COARSE "coarse.wgsl",
+    CURVATURE "curvature.wgsl",
+    CYCLE "cycle.wgsl",
+    DECAY "decay.wgsl",
+    DENSE "dense.wgsl",
+    DIRECT "direct.wgsl",
+    EVOLVE "evolve.wgsl",
+    EXCHANGE "exchange.wgsl",
+    EXCHANGE_SUBGROUP "exchange_subgroup.wgsl",
+    EXTRAPOLATION "extrapolation.wgsl",
+    FLOW "flow.wgsl",
+    GAUSS_SEIDEL "gauss_seidel.wgsl",
+    LEVELS "levels.wgsl",
+    MEMBER "member.wgsl",
+    MULTIGRID "multigrid.wgsl",
+    NUMBER "number.wgsl",
+    OBSERVE "observe.wgsl",
+    PACE "pace.wgsl",
+    POSITION "position.wgsl",
+    PULL "pull.wgsl",
+    REDISTRIBUTION "redistribution.wgsl",
+    RING "ring.wgsl",
+    START "start.wgsl",
+    STEP "step.wgsl",
+    SUMS "sums.wgsl",
+    SWEEPS "sweeps.wgsl",
+    SYSTEM "system.wgsl",
+    TERMS "terms.wgsl",
+    TRACE_OFF "trace_off.wgsl",
+    TRACE_ON "trace_on.wgsl",
+    TRANSFER "transfer.wgsl",
+}
