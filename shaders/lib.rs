@@ -17,9 +17,7 @@ macro_rules! files {
 }
 
 files! {
-    COARSE "coarse.wgsl",
     CURVATURE "curvature.wgsl",
-    CYCLE "cycle.wgsl",
     DECAY "decay.wgsl",
     DENSE "dense.wgsl",
     DIRECT "direct.wgsl",
@@ -29,9 +27,7 @@ files! {
     EXTRAPOLATION "extrapolation.wgsl",
     FLOW "flow.wgsl",
     GAUSS_SEIDEL "gauss_seidel.wgsl",
-    LEVELS "levels.wgsl",
     MEMBER "member.wgsl",
-    MULTIGRID "multigrid.wgsl",
     NUMBER "number.wgsl",
     OBSERVE "observe.wgsl",
     PACE "pace.wgsl",
@@ -44,8 +40,6 @@ files! {
     SUMS "sums.wgsl",
     SWEEPS "sweeps.wgsl",
     SYSTEM "system.wgsl",
-    TERMS "terms.wgsl",
     TRACE_OFF "trace_off.wgsl",
     TRACE_ON "trace_on.wgsl",
-    TRANSFER "transfer.wgsl",
 }

@@ -1,6 +1,6 @@
 // The ring of nodes, cut into blocks: which nodes or blocks are adjacent, and what a thread knows of its neighbours.
-// Twin of crates/flow/src/solver/ring.rs. All arithmetic on indices of nodes and blocks is here and, for the coarse rings of
-// multigrid, in levels.wgsl. Addresses in storage buffers are computed in member.wgsl and trace_on.wgsl.
+// Twin of crates/flow/src/solver/ring.rs. All arithmetic on indices of nodes and blocks is here.
+// Addresses in storage buffers are computed in member.wgsl and trace_on.wgsl.
 //
 // A thread owns one block of four or three consecutive nodes, stored in the components of a `vec`; a node's colour is
 // its place in the block. For a block of three the fourth component repeats the first node of the next block: it is
@@ -16,10 +16,6 @@ override FOURS: u32;
 override BLOCKS: u32;
 /// Threads: at least one per block, in whole subgroups.
 override THREADS: u32;
-/// Nodes of all coarser rings together, for multigrid.
-override COARSE: u32;
-/// Number of odd rings that have a coarser one, at least 1.
-override ODD_RINGS: u32;
 
 /// This thread, its block, and the first node of the block.
 var<private> lane: u32;
@@ -48,21 +44,6 @@ fn take_block(thread: u32) {
 /// Whether any block has three nodes.
 fn has_threes() -> bool {
     return FOURS < BLOCKS;
-}
-
-/// The node in component c of the block.
-fn node(c: u32) -> u32 {
-    return (first + c) % NODES;
-}
-
-/// The block of node i.
-fn block_of(i: u32) -> u32 {
-    return select((i - FOURS) / 3u, i / 4u, i < 4u * FOURS);
-}
-
-/// The colour of node i.
-fn colour_of(i: u32) -> u32 {
-    return select((i - FOURS) % 3u, i % 4u, i < 4u * FOURS);
 }
 
 /// The row of the block in a field, and in the field that is `by` fields after that of `row`.

@@ -1,4 +1,4 @@
-// Coloured Gauss–Seidel sweeps and their stopping criterion, shared by gauss_seidel.wgsl and multigrid.wgsl. Twin of
+// Coloured Gauss–Seidel sweeps and their stopping criterion, for gauss_seidel.wgsl. Twin of
 // crates/flow/src/solver/sweeps.rs.
 //
 // Rows, right-hand sides and unknowns stay in registers. Neighbours of a block of four need its first two nodes (its

@@ -51,7 +51,7 @@ pub struct BenchArgs {
     /// Windows into which this time is divided; the table shows their median, minimum and maximum [default: 5]
     #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true)]
     repeats: Option<usize>,
-    /// Solvers of the pentadiagonal systems [default: all; direct and multigrid with --adaptive]
+    /// Solvers of the pentadiagonal systems [default: all; direct with --adaptive]
     #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = flags::word::<Solver>(&Solver::NAMES), help_heading = flags::METHOD)]
     solver: Vec<Solver>,
     /// Adapt the steps to this local error; without TOL it is 0.001 [default: fixed steps]
@@ -167,8 +167,8 @@ fn cases(args: &BenchArgs) -> Result<Vec<(DeviceKind, Spec)>> {
         if given.is_empty() { all.to_vec() } else { given.to_vec() }
     }
     let base = Spec { adaptive: args.adaptive, threads: args.threads, ..Spec::default() };
-    // Fast ones first; with growing steps, without solvers that slow down with them.
-    let suits = |solver: &Solver| args.adaptive.is_none() || !solver.facts().slows_with_step;
+    // Fast ones first; with growing steps, without sweeps, which get more numerous.
+    let suits = |solver: &Solver| args.adaptive.is_none() || !solver.sweeps();
     let solvers = or(&args.solver, &Solver::ALL.into_iter().rev().filter(suits).collect::<Vec<_>>());
     let mut cases = Vec::new();
     for place in places(args)? {

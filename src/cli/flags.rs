@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::{Deserialize, de::value::StrDeserializer};
 
 use crate::{
@@ -18,6 +18,7 @@ use crate::{
     error::{Error, Result, echo},
     flow::Flow,
     random::Design,
+    solver::{MULTIGRID, Solver},
 };
 
 const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
@@ -205,8 +206,7 @@ pub struct SpecFlags {
         long, value_name = "KAPPA", value_parser = text_of::<Pull>, allow_hyphen_values = true, help_heading = METHOD
     )]
     pull: Option<Pull>,
-    /// Solver of the pentadiagonal systems. multigrid is gauss-seidel inside V-cycles; auto is gauss-seidel with --tau
-    /// and direct with --adaptive [default: auto]
+    /// Solver of the pentadiagonal systems. auto is gauss-seidel with --tau and direct with --adaptive [default: auto]
     #[arg(long, value_name = "SOLVER", value_parser = word::<SolverChoice>(&SolverChoice::NAMES), help_heading = METHOD)]
     solver: Option<SolverChoice>,
     /// Order in which a sweep visits the nodes [default: coloured]
@@ -416,7 +416,10 @@ pub(super) fn word<T>(names: &'static [&'static str]) -> impl TypedValueParser<V
 where
     T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
 {
-    PossibleValuesParser::new(names)
+    // Known, so that its own message is shown.
+    let gone = names.contains(&Solver::Direct.name()).then(|| PossibleValue::new(MULTIGRID).hide(true));
+    let known = names.iter().map(|&name| PossibleValue::new(name)).chain(gone);
+    PossibleValuesParser::new(known.collect::<Vec<_>>())
         .try_map(|name| T::deserialize(StrDeserializer::<serde::de::value::Error>::new(&name)))
 }
 
@@ -425,7 +428,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::{backend::DeviceKind, solver::Solver};
+    use crate::backend::DeviceKind;
     use clap::{Args, FromArgMatches};
 
     fn command() -> clap::Command {

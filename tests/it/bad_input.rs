@@ -111,8 +111,8 @@ fn combinations_without_sense_name_a_remedy() {
     for (arguments, parts) in [
         ("--order lexicographic --backend gpu", ["--order lexicographic: ", "use --backend cpu"]),
         ("--order lexicographic --solver direct", ["--order lexicographic: ", "leave out --order"]),
-        ("--order lexicographic --solver multigrid", ["multigrid sweeps by colours", "use --solver gauss-seidel"]),
-        ("--sor 1.5 --solver multigrid", ["--sor 1.5: ", "leave out --sor"]),
+        ("--solver multigrid", ["'multigrid' for '--solver ", "use direct"]),
+        ("--sweep solver=direct,multigrid", ["multigrid is gone, ", "use direct"]),
         ("--sor auto --solver direct", ["--sor auto: ", "leave out --sor"]),
         ("--adapter llvmpipe --backend cpu", ["--adapter llvmpipe: ", "leave out --adapter"]),
         (

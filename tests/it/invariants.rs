@@ -261,8 +261,6 @@ fn the_work_of_a_run_is_what_it_was() {
     let adaptive = Spec { omega: Some(Omega::Rate(1.0)), ..adaptive };
     let swept = Spec { solver: Solver::GaussSeidel.into(), ..adaptive.clone() };
     let automatic = Spec { sor: Sor::Auto, ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
-    let cycles = Spec { solver: Solver::Multigrid.into(), ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
-    let adaptive_cycles = Spec { solver: Solver::Multigrid.into(), ..adaptive.clone() };
     let stops =
         Spec { stop_when_relaxed: Some(true), t_end: Some(2.0.into()), ..spec(Flow::SurfaceDiffusion, 50, 1.7) };
     let mut changed = Vec::new();
@@ -277,8 +275,6 @@ fn the_work_of_a_run_is_what_it_was() {
         ("until relaxed", stops, [192, 12632, 11640]),
         ("direct", direct, [100, 0, 0]),
         ("over-relaxed as it chooses", automatic, [100, 53704, 49456]),
-        ("multigrid", cycles, [100, 714, 628]),
-        ("multigrid, adaptive", adaptive_cycles, [14, 2690, 2372]),
         ("adaptive", adaptive, [14, 0, 0]),
         ("adaptive, by sweeps", swept, [14, 242160, 239456]),
     ] {

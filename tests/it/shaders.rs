@@ -18,7 +18,6 @@ use curvelax::{
     solver::{
         Blocks, Solver,
         gauss_seidel::{AUTO_SCALE, SWEEPS_PER_CHECK},
-        multigrid,
     },
 };
 use naga::{
@@ -336,10 +335,6 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("NEGLIGIBLE", NEGLIGIBLE),
         ("SWEEPS_PER_CHECK", f64::from(SWEEPS_PER_CHECK)),
         ("AUTO_SCALE", AUTO_SCALE),
-        ("SWEEPS_PER_CYCLE", f64::from(multigrid::SWEEPS_PER_CYCLE)),
-        ("COARSE_SWEEPS", f64::from(multigrid::COARSE_SWEEPS)),
-        ("BALANCE", multigrid::BALANCE),
-        ("COARSEST", multigrid::COARSEST as f64),
         ("NEVER", f64::from(NEVER)),
         ("RUNNING", 0.0),
         ("RELAXED", f64::from(Status::Relaxed as u32)),

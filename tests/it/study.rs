@@ -56,10 +56,10 @@ fn members_of_all_cells_differ_unless_their_random_numbers_are_common() {
 
 #[test]
 fn what_cannot_run_side_by_side_runs_one_after_another() {
-    let sweep = "--common-random-numbers --sweep solver=direct,multigrid --sweep points=34,35";
+    let sweep = "--common-random-numbers --sweep solver=direct,gauss-seidel --sweep points=34,35";
     let study = run(&format!("{} {sweep}", BASE.replace("--points 34", "")));
     for (cell, flags) in
-        [(0, "--solver direct"), (1, "--solver direct --points 35"), (3, "--solver multigrid --points 35")]
+        [(0, "--solver direct"), (1, "--solver direct --points 35"), (3, "--solver gauss-seidel --points 35")]
     {
         let alone =
             run(&format!("{} {flags}", BASE.replace("--points 34", if cell == 0 { "--points 34" } else { "" })));

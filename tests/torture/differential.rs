@@ -39,7 +39,7 @@ const KEYS: [(&str, &[&str]); 20] = [
     ("omega", &["0", "1", "5"]),
     ("no-redistribution", &["true", "false"]),
     ("pull", &["0", "auto", "3"]),
-    ("solver", &["gauss-seidel", "multigrid", "direct"]),
+    ("solver", &["gauss-seidel", "direct"]),
     ("order", &["coloured", "lexicographic"]),
     ("tolerance", &["1e-3", "1e-5"]),
     ("sor", &["1", "auto", "1.2"]),
@@ -105,9 +105,6 @@ impl Drawn {
             }
         }
         if keys.iter().any(|key| OF_SWEEPS.contains(key)) {
-            set(&mut base, "solver", ["gauss-seidel", "multigrid"][random.below(2)]);
-        }
-        if keys.contains(&"order") {
             set(&mut base, "solver", "gauss-seidel");
         }
         // With a strong pull and no redistribution, so few nodes fall into disorder: the member stalls after thousands

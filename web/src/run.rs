@@ -95,7 +95,7 @@ impl Run {
         let method = Method {
             solver: spec.solver(),
             order: spec.order,
-            max_sweeps: spec.most_sweeps(),
+            max_sweeps: spec.max_sweeps,
             most_order: spec.most_order.unwrap_or(extrapolation::MOST_ORDER),
         };
         let (device, precision, hardware) = match place {

@@ -95,10 +95,9 @@ impl Serialize for SolverChoice {
 impl<'de> Deserialize<'de> for SolverChoice {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
         let name = String::deserialize(deserializer)?;
-        match SolverChoice::NAMES.iter().position(|own| *own == name) {
-            Some(0) => Ok(SolverChoice::Auto),
-            Some(i) => Ok(SolverChoice::Only(Solver::ALL[i - 1])),
-            None => Err(de::Error::unknown_variant(&name, &SolverChoice::NAMES)),
+        match name == SolverChoice::NAMES[0] {
+            true => Ok(SolverChoice::Auto),
+            false => Solver::named(&name, &SolverChoice::NAMES).map(SolverChoice::Only),
         }
     }
 }
@@ -611,11 +610,6 @@ impl Spec {
     /// The excess at which a member that starts with `excess` counts as relaxed.
     pub fn threshold(&self, excess: f64) -> f64 {
         self.relax_at.unwrap_or(self.relax_to.unwrap_or(DEFAULT_RELAX_TO) * excess)
-    }
-
-    /// The maximum sweeps per solve in use.
-    pub fn most_sweeps(&self) -> u32 {
-        self.max_sweeps.min(self.solver().facts().max_sweeps)
     }
 
     /// The residual tolerance in use at `precision`.

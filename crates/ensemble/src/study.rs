@@ -285,8 +285,8 @@ pub struct Cell {
     first: u64,
 }
 
-const LONG_SWEEPS: &str = "plain sweeps need more iterations the longer the step, and adaptive steps grow: a solve \
-                           may need tens of thousands, where --solver multigrid needs a few hundred and direct none";
+const LONG_SWEEPS: &str = "sweeps need more iterations the longer the step, and adaptive steps grow: a solve \
+                           may need tens of thousands; --solver direct needs none";
 
 const TOO_WIDE: &str = "standard errors and intervals are those of independent members, too wide for --design sobol and \
                         lhs: the spread over several seeds is the error of such a run";
@@ -350,7 +350,7 @@ impl Cell {
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.family.warnings().to_vec();
         let Cohort { solver, adaptive, .. } = self.cohort();
-        if adaptive && solver.facts().slows_with_step {
+        if adaptive && solver.sweeps() {
             warnings.push(LONG_SWEEPS.into());
         }
         if !self.spec.design.is_random() && self.spec.has_drawn_values() {
@@ -504,10 +504,10 @@ mod tests {
 
     #[test]
     fn sweeps_that_take_long_are_warned_of_in_their_cells_alone() {
-        let spec = swept(&["solver=gauss-seidel,multigrid,direct", "adaptive=0.01"], Spec::default());
+        let spec = swept(&["solver=gauss-seidel,direct", "adaptive=0.01"], Spec::default());
         let cells = Study::new(spec).unwrap().into_cells();
         let warned: Vec<bool> = cells.iter().map(|cell| cell.warnings() == [LONG_SWEEPS]).collect();
-        assert_eq!(warned, [true, false, false]);
+        assert_eq!(warned, [true, false]);
         let fixed = Spec { solver: Solver::GaussSeidel.into(), ..Spec::default() }.validate().unwrap();
         let family = Family::new(&fixed).unwrap();
         assert!(Cell::only(fixed, family).warnings().is_empty());

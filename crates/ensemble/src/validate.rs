@@ -344,7 +344,7 @@ impl Spec {
         }
     }
 
-    /// Refuses options that the solver does not have: the direct one makes no sweeps, and multigrid has its own.
+    /// Refuses options that the solver does not have: the direct one makes no sweeps.
     fn check_sweeps(&self) -> Result<()> {
         let default = Spec::default();
         let asked = [

@@ -390,7 +390,7 @@ impl Choice {
         let method = Method {
             solver: spec.solver(),
             order: spec.order,
-            max_sweeps: spec.most_sweeps(),
+            max_sweeps: spec.max_sweeps,
             most_order: spec.most_order.unwrap_or(MOST_ORDER),
         };
         let opened = match &self.device {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::shader::Variant;
-use curvelax_flow::solver::{Blocks, Solver};
+use curvelax_flow::solver::{Blocks, Solver, gauss_seidel::SWEEPS_PER_CHECK};
 
 /// Target time of a dispatch: short enough for every watchdog, long enough to hide its overhead of some 0.1 ms.
 const DISPATCH_TIME: Duration = Duration::from_millis(40);
@@ -23,7 +23,7 @@ const SOFTWARE_ITERATIONS: u32 = 50_000;
 
 impl Budget {
     /// The maximum budget of a dispatch, on hardware or on a software GPU.
-    pub fn most(hardware: bool, blocks: Blocks, Variant { solver, adaptive, .. }: Variant) -> Budget {
+    pub fn most(hardware: bool, blocks: Blocks, Variant { adaptive, .. }: Variant) -> Budget {
         if hardware {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
@@ -31,13 +31,9 @@ impl Budget {
         // the end of an adaptive one, which may come after any of its parts, as often again.
         let walk = blocks.count() as u32 + 1;
         let walks = if adaptive { 20 } else { 10 };
-        // The rings below the finest one are walked over in every cycle, and built twice in each of the paper's steps.
-        let kernel = &solver.facts().kernel;
-        let build = walks / 5 * kernel.iterations_per_solve;
-        let (sweeps, look) = (kernel.sweeps_per_look, kernel.iterations_per_look);
         Budget {
-            steps: (SOFTWARE_ITERATIONS / 2 / (walks * walk + build)).max(1),
-            sweeps: (SOFTWARE_ITERATIONS / 2 / (look + walk) * sweeps).max(sweeps),
+            steps: (SOFTWARE_ITERATIONS / 2 / (walks * walk)).max(1),
+            sweeps: (SOFTWARE_ITERATIONS / 2 / (SWEEPS_PER_CHECK + walk) * SWEEPS_PER_CHECK).max(SWEEPS_PER_CHECK),
         }
     }
 

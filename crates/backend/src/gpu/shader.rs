@@ -2,10 +2,7 @@
 
 use curvelax_flow::{
     number::Real,
-    solver::{
-        Blocks, Solver,
-        multigrid::{coarse_nodes, odd_rings},
-    },
+    solver::{Blocks, Solver},
 };
 use curvelax_shaders::{self as shaders, ShaderPart};
 
@@ -82,15 +79,6 @@ const TRACE_ON: [ShaderPart; 1] = [shaders::TRACE_ON];
 fn of_solver(solver: Solver) -> &'static [ShaderPart] {
     match solver {
         Solver::GaussSeidel => &[shaders::SWEEPS, shaders::GAUSS_SEIDEL],
-        Solver::Multigrid => &[
-            shaders::SWEEPS,
-            shaders::TERMS,
-            shaders::LEVELS,
-            shaders::COARSE,
-            shaders::TRANSFER,
-            shaders::CYCLE,
-            shaders::MULTIGRID,
-        ],
         Solver::Direct => &[shaders::DIRECT],
     }
 }
@@ -145,28 +133,26 @@ pub fn lanes_in_use(blocks: Blocks, subgroup: u32) -> f64 {
 }
 
 /// Returns the `override` constants that size the kernel.
-pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
+pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 4] {
     [
         ("NODES", blocks.n as f64),
         ("FOURS", blocks.fours as f64),
         ("BLOCKS", blocks.count() as f64),
         ("THREADS", threads(blocks, subgroup) as f64),
-        ("COARSE", coarse_nodes(blocks.n) as f64),
-        ("ODD_RINGS", odd_rings(blocks.n).max(1) as f64),
     ]
 }
 
 /// Numbers and integers of a `Plan` in the kernel.
 const PLAN: (usize, usize) = (2, 4);
 
-/// Returns the bytes of workgroup memory of the kernel: rows of four numbers per block, the solver's own needs, the plan of
-/// an attempt, a decision and the member.
+/// Returns the bytes of workgroup memory of the kernel: rows of four numbers per block, the plan of an
+/// attempt, a decision and the member.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
 pub fn workgroup_bytes<T: Real>(blocks: Blocks, variant: Variant) -> usize {
     let kernel = &variant.solver.facts().kernel;
     let rows = if variant.subgroup { 1 } else { kernel.rows_per_block };
-    (4 * rows * blocks.count() + (kernel.numbers)(blocks.n) + PLAN.0) * size_of::<T>() + (PLAN.1 + 2) * size_of::<u32>()
+    (4 * rows * blocks.count() + PLAN.0) * size_of::<T>() + (PLAN.1 + 2) * size_of::<u32>()
 }
 
 #[cfg(test)]

@@ -346,7 +346,7 @@ pub fn draw_all() -> Vec<(String, String)> {
         WorkCurve { label: format!("order up to {order}"), points: (1..5).map(point).collect() }
     };
     let panels = |label: &str| WorkPanels { label: label.into(), curves: (1..7).map(way).collect() };
-    add("work", work(vec![panels("direct"), panels("multigrid"), panels("gauss-seidel")]));
+    add("work", work(vec![panels("direct"), panels("gauss-seidel")]));
     add("work-none", work(vec![]));
     let unknown_cost = WorkCurve { label: "one".into(), points: vec![(0.0, [1.0, 2.0]), (1e-3, [f64::NAN, 2.0])] };
     add("work-unknown", work(vec![WorkPanels { label: "direct".into(), curves: vec![unknown_cost] }]));

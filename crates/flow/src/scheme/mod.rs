@@ -39,7 +39,6 @@ pub mod start;
 pub mod state;
 pub mod status;
 pub mod step;
-pub mod terms;
 
 pub use branches::Branches;
 pub use member::Parameters;

@@ -1,5 +1,5 @@
-//! Coloured Gauss–Seidel sweeps and their stopping criterion, shared by [`gauss_seidel`](super::gauss_seidel) and
-//! [`multigrid`](super::multigrid). Twin of `shaders/sweeps.wgsl`: same order, same arithmetic.
+//! Coloured Gauss–Seidel sweeps and their stopping criterion, for [`gauss_seidel`](super::gauss_seidel). Twin of
+//! `shaders/sweeps.wgsl`: same order, same arithmetic.
 
 use std::ops::Range;
 

@@ -133,7 +133,7 @@ pub struct ConvergenceRow {
 
 /// Returns the studies of `problem` by `solver`.
 pub fn studies(problem: &Problem, solver: Solver) -> Vec<ConvergenceStudy> {
-    let nodes: &[u32] = if solver.facts().slows_with_step { &SWEPT_NODES } else { &NODES };
+    let nodes: &[u32] = if solver.sweeps() { &SWEPT_NODES } else { &NODES };
     let by_nodes = |&n: &u32| problem.in_steps(n as usize, n * n / 25);
     vec![
         ConvergenceStudy { varied: Varied::Nodes, at: nodes.iter().map(by_nodes).collect() },

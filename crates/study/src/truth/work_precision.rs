@@ -30,7 +30,7 @@ const SWEPT: Effort = Effort { members: 8, repeats: 3, tolerances: &[1e-2, DEFAU
 
 impl Effort {
     fn of(solver: Solver) -> &'static Effort {
-        if solver.facts().slows_with_step { &SWEPT } else { &FULL }
+        if solver.sweeps() { &SWEPT } else { &FULL }
     }
 }
 
