@@ -52,7 +52,7 @@ pub struct BenchArgs {
     #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true)]
     repeats: Option<usize>,
     /// Solvers of the pentadiagonal systems [default: all; direct with --adaptive]
-    #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = flags::word::<Solver>(&Solver::NAMES), help_heading = flags::METHOD)]
+    #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = flags::solver::<Solver>(&Solver::NAMES), help_heading = flags::METHOD)]
     solver: Vec<Solver>,
     /// Adapt the steps to this local error; without TOL it is 0.001 [default: fixed steps]
     #[arg(

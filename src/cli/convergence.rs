@@ -47,7 +47,7 @@ pub struct ConvergenceArgs {
     #[arg(long, conflicts_with = "problem")]
     work_precision: bool,
     /// Solver of the pentadiagonal systems; sweeps take longer [default: direct; with --work-precision all]
-    #[arg(long, value_name = "SOLVER", value_parser = flags::word::<SolverChoice>(&SolverChoice::NAMES), help_heading = flags::METHOD)]
+    #[arg(long, value_name = "SOLVER", value_parser = flags::solver::<SolverChoice>(&SolverChoice::NAMES), help_heading = flags::METHOD)]
     solver: Option<SolverChoice>,
     /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]
     #[arg(long, value_name = "WHERE", value_parser = flags::word::<BackendChoice>(flags::BACKENDS), help_heading = flags::MACHINE)]

@@ -18,7 +18,7 @@ use crate::{
     error::{Error, Result, echo},
     flow::Flow,
     random::Design,
-    solver::{MULTIGRID, Solver},
+    solver::MULTIGRID,
 };
 
 const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
@@ -207,7 +207,7 @@ pub struct SpecFlags {
     )]
     pull: Option<Pull>,
     /// Solver of the pentadiagonal systems. auto is gauss-seidel with --tau and direct with --adaptive [default: auto]
-    #[arg(long, value_name = "SOLVER", value_parser = word::<SolverChoice>(&SolverChoice::NAMES), help_heading = METHOD)]
+    #[arg(long, value_name = "SOLVER", value_parser = solver::<SolverChoice>(&SolverChoice::NAMES), help_heading = METHOD)]
     solver: Option<SolverChoice>,
     /// Order in which a sweep visits the nodes [default: coloured]
     #[arg(long, value_name = "ORDER", value_parser = word::<Order>(ORDERS), help_heading = METHOD)]
@@ -416,10 +416,25 @@ pub(super) fn word<T>(names: &'static [&'static str]) -> impl TypedValueParser<V
 where
     T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
 {
-    // Known, so that its own message is shown.
-    let gone = names.contains(&Solver::Direct.name()).then(|| PossibleValue::new(MULTIGRID).hide(true));
-    let known = names.iter().map(|&name| PossibleValue::new(name)).chain(gone);
-    PossibleValuesParser::new(known.collect::<Vec<_>>())
+    word_or_gone(names, &[])
+}
+
+/// The same for a solver. The name of one that is gone has a message of its own.
+pub(super) fn solver<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+where
+    T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
+{
+    word_or_gone(names, &[MULTIGRID])
+}
+
+/// One of `names`; those that are `gone` are not shown, and reach the type, which refuses them.
+fn word_or_gone<T>(names: &'static [&'static str], gone: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+where
+    T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
+{
+    let shown = names.iter().map(|&name| PossibleValue::new(name));
+    let hidden = gone.iter().map(|&name| PossibleValue::new(name).hide(true));
+    PossibleValuesParser::new(shown.chain(hidden).collect::<Vec<_>>())
         .try_map(|name| T::deserialize(StrDeserializer::<serde::de::value::Error>::new(&name)))
 }
 
@@ -428,7 +443,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::backend::DeviceKind;
+    use crate::{backend::DeviceKind, solver::Solver};
     use clap::{Args, FromArgMatches};
 
     fn command() -> clap::Command {

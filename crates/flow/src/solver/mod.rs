@@ -45,6 +45,9 @@ macro_rules! by_solver {
 
 pub use by_solver;
 
+/// The name of a solver that there was.
+pub const MULTIGRID: &str = "multigrid";
+
 impl Solver {
     /// All solvers.
     pub const ALL: [Solver; 2] = [Solver::GaussSeidel, Solver::Direct];
@@ -70,16 +73,6 @@ impl Solver {
         self.facts().name
     }
 
-    /// Returns whether it sweeps until a tolerance is met.
-    pub const fn sweeps(self) -> bool {
-        self.facts().sweeps
-    }
-}
-
-/// The name of a solver that there was.
-pub const MULTIGRID: &str = "multigrid";
-
-impl Solver {
     /// Returns the solver called `name`.
     ///
     /// # Errors
@@ -94,6 +87,11 @@ impl Solver {
             )),
             None => Err(E::unknown_variant(name, known)),
         }
+    }
+
+    /// Returns whether it sweeps until a tolerance is met.
+    pub const fn sweeps(self) -> bool {
+        self.facts().sweeps
     }
 }
 
