@@ -308,7 +308,11 @@ fn what_is_no_finished_run_of_this_program_is_refused() {
         fs::remove_file(json(out)).unwrap();
         fs::rename(out.join("summary.csv"), out.join(".summary.csv.part")).unwrap();
     };
-    refused(&done, unfinished, "out: the run there has not finished; curvelax resume out continues it");
+    refused(
+        &done,
+        unfinished,
+        "out: the run there has not finished; wait for it or, if it was interrupted, continue it by curvelax resume out",
+    );
     refused(
         &done,
         |out| fs::write(json(out), "{\"name\": \"other\"}").unwrap(),

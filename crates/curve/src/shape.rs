@@ -194,6 +194,7 @@ fn check_size(what: &str, value: f64) -> Result<(), String> {
     if SIZES.contains(&value) {
         return Ok(());
     }
+    let value = number(value);
     Err(format!("the {what} {value} is out of range; allowed are {:e} to {:e}", SIZES.start(), SIZES.end()))
 }
 
@@ -382,7 +383,7 @@ mod tests {
             ("lemniscate:0", "0"),
             ("lemniscate:-1", "-1"),
             ("lemniscate:nan", "NaN"),
-            ("circle:1e101", "1000000"),
+            ("circle:1e101", "the radius 1e101 is"),
             ("flower:0:0.1", "mode 0"),
             ("flower:1001:0.1", "mode 1001"),
             ("flower:2:0.5,3:-0.5", "add up to 1"),

@@ -11,7 +11,10 @@ use wkt::{
 
 use super::piece::{NoOutline, Piece, closed, outer_ring, outer_rings};
 use crate::outline::{Places, RingPoints, Source};
-use curvelax_base::error::{Result, shortened};
+use curvelax_base::{
+    error::{Result, shortened},
+    text,
+};
 
 /// Maximum characters of foreign text in a message.
 const SHOWN: usize = 40;
@@ -70,9 +73,9 @@ fn without_srid(content: &str) -> (bool, &str) {
     }
 }
 
-fn rings(text: &str) -> Result<Vec<Vec<DVec2>>, NoOutline> {
-    let letters = text.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(text.len());
-    let word = text[..letters].to_ascii_uppercase();
+fn rings(content: &str) -> Result<Vec<Vec<DVec2>>, NoOutline> {
+    let letters = content.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(content.len());
+    let word = content[..letters].to_ascii_uppercase();
     let known = word.trim_end_matches(['Z', 'M']);
     if !TYPES.contains(&known) {
         return Err(NoOutline::new(
@@ -80,8 +83,9 @@ fn rings(text: &str) -> Result<Vec<Vec<DVec2>>, NoOutline> {
             "write a geometry a line, such as POLYGON ((0 0, 1 0, 1 1, 0 0))",
         ));
     }
-    check_brackets(text)?;
-    let geometry: Wkt<f64> = text.parse().map_err(|e: &str| {
+    check_brackets(content)?;
+    check_points(content)?;
+    let geometry: Wkt<f64> = content.parse().map_err(|e: &str| {
         NoOutline::new(format!("is not well-known text: {e}"), "write it as POLYGON ((0 0, 1 0, 1 1, 0 0))")
     })?;
     match geometry {
@@ -109,6 +113,23 @@ fn check_brackets(text: &str) -> Result<(), NoOutline> {
     match depth {
         0 => Ok(()),
         _ => Err(wrong("lacks a closing bracket")),
+    }
+}
+
+/// Refuses points with fewer numbers than x and y or more than x, y, z and m, for which the parser misses a bracket.
+fn check_points(content: &str) -> Result<(), NoOutline> {
+    let rings = content.split_once('(').map_or("", |(_, rings)| rings);
+    let points = rings.split(['(', ')', ',']).filter(|point| !point.trim().eq_ignore_ascii_case("EMPTY"));
+    let mut lengths = points.map(|point| point.split_whitespace().count());
+    match lengths.find(|length| !matches!(length, 0 | 2..=4)) {
+        None => Ok(()),
+        Some(length) => {
+            let numbers = text::count(length as u64, "number");
+            Err(NoOutline::new(
+                format!("has a point of {numbers}"),
+                "give each point x and y, and separate points by commas",
+            ))
+        }
     }
 }
 

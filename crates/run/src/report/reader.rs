@@ -91,7 +91,10 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
     if !path.exists() {
         let begun = folder.join(format!(".{}.part", names::SUMMARY)).exists();
         let problem = if begun {
-            format!("the run there has not finished; curvelax resume {} continues it", quoted(folder))
+            format!(
+                "the run there has not finished; wait for it or, if it was interrupted, continue it by curvelax resume {}",
+                quoted(folder)
+            )
         } else {
             "no run there; give its folder".into()
         };
