@@ -12,7 +12,7 @@ use curvelax::{
     bench::{self, Bench},
     ensemble::{
         Spec,
-        spec::{BackendChoice, Precision},
+        request::spec::{BackendChoice, Precision},
     },
     solver::Solver,
 };

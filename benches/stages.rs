@@ -3,7 +3,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use curvelax::scheme::evolve::Evolves;
 use curvelax::{
-    ensemble::{Family, Spec, spec::Precision},
+    ensemble::{Family, Spec, request::spec::Precision},
     schedule::Outputs,
     scheme::{
         Curve, Increments, Parameters, State, Workspace,

@@ -5,7 +5,7 @@
 use std::{convert::Infallible, sync::LazyLock};
 
 use curvelax::{
-    ensemble::{Family, Member, Spec, spec::Precision},
+    ensemble::{Family, Member, Spec, request::spec::Precision},
     report::{
         checkpoint::{LAYOUT, from_bytes, to_bytes},
         envelope::sealed,

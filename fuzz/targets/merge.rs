@@ -15,7 +15,7 @@ use std::{
 
 use curvelax::{
     backend::DeviceKind,
-    ensemble::{Shard, Spec, spec::Precision},
+    ensemble::{Shard, Spec, request::spec::Precision},
     files::{names, part_file::Mark},
     placement::Platform,
     report::{

@@ -8,8 +8,8 @@ use curvelax::{
     curve::{BaseCurve, Modes, Outline, RadialFactor, Sampler, Sampling, Shape},
     ensemble::{
         Family, Spec,
-        spec::{Pull, Sor},
-        sweep::SweepAxis,
+        request::spec::{Pull, Sor},
+        request::sweep::SweepAxis,
     },
     flow::Flow,
 };

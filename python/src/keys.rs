@@ -6,8 +6,8 @@ use curvelax::{
     Error,
     ensemble::{
         Spec,
-        spec::DEFAULT_ADAPTIVE,
-        sweep::{EXCLUSIVE, check_not_given},
+        request::spec::DEFAULT_ADAPTIVE,
+        request::sweep::{EXCLUSIVE, check_not_given},
     },
 };
 use pyo3::{

@@ -7,7 +7,7 @@ use crate::{
     backend::gpu::Gpu,
     ensemble::{
         Spec,
-        spec::{BackendChoice, Precision},
+        request::spec::{BackendChoice, Precision},
     },
     error::Result,
     placement::{self, MAX_POINTS_F32},

@@ -10,7 +10,7 @@ use crate::{
     bench::{self, Bench, BenchSample},
     ensemble::{
         Spec,
-        spec::{Precision, Solver},
+        request::spec::{Precision, Solver},
     },
     error::{Error, Result},
     placement::no_adapter,

@@ -7,7 +7,7 @@ use crate::{
     draw::charts::{WorkCurve, WorkDiagram, WorkPanels},
     ensemble::{
         Spec,
-        spec::{BackendChoice, Precision, Solver, SolverChoice},
+        request::spec::{BackendChoice, Precision, Solver, SolverChoice},
     },
     error::{Error, Result},
     files::{

@@ -12,8 +12,10 @@ use crate::{
     curve::{Modes, Perturbation, Sampling, Shape},
     ensemble::{
         Drawn, Event, Shard, Spec,
-        spec::{BackendChoice, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau, Units},
-        sweep::{self, SweepAxis},
+        request::spec::{
+            BackendChoice, FinalTime, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau, Units,
+        },
+        request::sweep::{self, SweepAxis},
     },
     error::{Error, Result, echo},
     flow::Flow,

@@ -8,7 +8,7 @@ use super::{
     manner::MannerFlags,
 };
 use crate::{
-    ensemble::spec::BackendChoice,
+    ensemble::request::spec::BackendChoice,
     error::Result,
     session::{self, ResumePlace},
 };

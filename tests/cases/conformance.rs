@@ -18,7 +18,7 @@ use curvelax::{
         compare::{Left, adaptive, events, on_gpu, on_gpu_by, runs, stages},
         members,
     },
-    ensemble::{Cell, Ended, Family, Sink, Spec, Status, spec::Precision},
+    ensemble::{Cell, Ended, Family, Sink, Spec, Status, request::spec::Precision},
     placement::MAX_POINTS_F32,
     scheme::{
         State,

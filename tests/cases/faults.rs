@@ -20,7 +20,7 @@ use curvelax::{
     conformance::{adaptive_members, members, self_test},
     ensemble::{
         Cell, Ended, Family, Spec, Status,
-        spec::{BackendChoice, Precision},
+        request::spec::{BackendChoice, Precision},
     },
     placement,
     scheme::{

@@ -13,7 +13,7 @@ use curvelax::{
     },
     ensemble::{
         Cell, Ended, Family, Paused, Sink, Spec, Standing, Wish,
-        spec::{FinalTime, Precision, Pull, Solver, Tau},
+        request::spec::{FinalTime, Precision, Pull, Solver, Tau},
     },
     scheme::step::Method,
     simulate::resume,

@@ -9,7 +9,7 @@ use curvelax::{
     backend::gpu::Gpu,
     ensemble::{
         Spec, Status,
-        spec::{BackendChoice, Precision, Solver},
+        request::spec::{BackendChoice, Precision, Solver},
     },
     flow::Flow,
     scheme::{Parameters, State, Workspace, curvature::Curvature, position::Position, redistribution, step},

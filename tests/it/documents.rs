@@ -8,7 +8,7 @@ use std::{
 
 use curvelax::{
     backend::gpu::shader::{Variant, workgroup_bytes},
-    ensemble::{Spec, event::MAX_EVENTS},
+    ensemble::{Spec, request::event::MAX_EVENTS},
     files::{
         TableRow, names,
         tables::{CostRow, ErrorRow},

@@ -3,7 +3,7 @@
 use std::{fs, path::Path, process::Output};
 
 use curvelax::{
-    ensemble::{Ended, Spec, spec::Solver},
+    ensemble::{Ended, Spec, request::spec::Solver},
     figures::{FIGURES, Figure, POINTS},
     report::progress::Progress,
 };

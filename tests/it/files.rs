@@ -2,7 +2,7 @@
 
 use curvelax::{
     backend::cpu::CpuBackend,
-    ensemble::{Cell, Ended, Family, Spec, spec::Precision},
+    ensemble::{Cell, Ended, Family, Spec, request::spec::Precision},
     simulate::simulate,
     solver::Blocks,
 };

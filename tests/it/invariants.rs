@@ -10,7 +10,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, Shape, polygon},
     ensemble::{
         Cell, Ended, Family, Outcome, Sink, Spec, Status,
-        spec::{BackendChoice, Omega, Precision, Pull, Solver, SolverChoice, Sor, Tau},
+        request::spec::{BackendChoice, Omega, Precision, Pull, Solver, SolverChoice, Sor, Tau},
     },
     flow::Flow,
     placement::{self, MAX_POINTS_F32},

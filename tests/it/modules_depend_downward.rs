@@ -14,7 +14,7 @@ use syn::{
 };
 
 /// Crates and modules; each may use only those above it. A name stands for what has no longer one; `program` for `src`.
-const LAYERS: [&str; 37] = [
+const LAYERS: [&str; 42] = [
     "shaders",
     "base/error",
     "base/guard",
@@ -32,10 +32,15 @@ const LAYERS: [&str; 37] = [
     "gpu",
     "curve",
     "statistics",
-    "ensemble",
+    "ensemble/request",
+    "ensemble/theory",
+    "ensemble/member",
+    "ensemble/outcome",
+    "ensemble/study",
     "ensemble/schedule",
     "ensemble/trajectory",
     "ensemble/simulate",
+    "ensemble",
     "study/conformance",
     "study/placement",
     "study/relax",
@@ -272,7 +277,7 @@ fn arrows_upward_and_circles_are_found() {
         }
         faults(&sources)
     };
-    let up = ["statistics/fit uses ensemble/spec, which is above it"];
+    let up = ["statistics/fit uses ensemble/request/spec, which is above it"];
     assert_eq!(with(&[("statistics/fit", "use curvelax_ensemble::Spec;")]), up);
     assert_eq!(with(&[("statistics/fit", "fn f() -> Option<curvelax_ensemble::Spec> { None }")]), up);
     assert_eq!(with(&[("statistics/fit", "#[cfg(test)] mod more { use curvelax_ensemble::Spec; }")]), [""; 0]);

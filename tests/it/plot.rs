@@ -311,7 +311,7 @@ fn what_is_no_finished_run_of_this_program_is_refused() {
     refused(
         &done,
         unfinished,
-        "out: the run there has not finished; wait for it or, if it was interrupted, continue it by curvelax resume out",
+        "out: the run there has not finished; if it is not running, curvelax resume out continues it",
     );
     refused(
         &done,

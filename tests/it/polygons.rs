@@ -3,7 +3,7 @@
 use crate::common::polygons::{self, CORNERS, Family};
 use curvelax::{
     curve::{Shape, crossing, polygon},
-    ensemble::{Family as Ensemble, Member, Mollified, Spec, mollifier::MAX_VERTEX_TURN},
+    ensemble::{Family as Ensemble, Member, Mollified, Spec, member::mollifier::MAX_VERTEX_TURN},
 };
 use glam::DVec2;
 

@@ -6,7 +6,7 @@ use curvelax::{
     Error,
     ensemble::{
         Ended, Spec, Study,
-        spec::{BackendChoice, FinalTime, Pull},
+        request::spec::{BackendChoice, FinalTime, Pull},
     },
     relax,
 };

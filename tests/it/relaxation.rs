@@ -10,7 +10,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, crossing, polygon},
     ensemble::{
         Cell, Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
-        spec::{BackendChoice, Omega, Precision, Pull, Sor, Tau},
+        request::spec::{BackendChoice, Omega, Precision, Pull, Sor, Tau},
     },
     flow::Flow,
     placement,

@@ -7,7 +7,7 @@ use curvelax::{
     Error, Result,
     ensemble::{
         Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish,
-        spec::{BackendChoice, Store},
+        request::spec::{BackendChoice, Store},
     },
     files::OutputFolder,
     placement,

@@ -7,7 +7,7 @@ use curvelax::{
         Backend,
         cpu::{CpuBackend, Vectorised, Vectors},
     },
-    ensemble::{Cell, Ended, Spec, Status, Study, spec::Solver},
+    ensemble::{Cell, Ended, Spec, Status, Study, request::spec::Solver},
     scheme::{
         Parameters, State,
         member::{Counters, Report},

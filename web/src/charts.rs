@@ -1,7 +1,7 @@
 //! The charts: those of the program's report, with a curve for the CPU and one for the GPU.
 
 use curvelax_draw::charts::{Decay, DecayCurve, DecayLaw, Survival, SurvivalCurve, Theory};
-use curvelax_ensemble::{Spec, theory};
+use curvelax_ensemble::{Spec, outcome::linear_rate};
 use curvelax_statistics::{HALF_INTERVAL, KaplanMeier, Observation, Sample, Step};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -71,7 +71,7 @@ fn slope(spec: &Spec, area: f64, curve: &DecayCurve) -> Option<Theory> {
     let first = curve.mean.first()?;
     let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
     let (t, mean) = (curve.t[tenth], curve.mean[tenth]);
-    let rate = spec.rate_in_theory(&values, area).or_else(|| theory::rate_at(spec, &values, area, t))?;
+    let rate = spec.rate_in_theory(&values, area).or_else(|| linear_rate::rate_at(spec, &values, area, t))?;
     let law = match spec.growth(&values.flow, area) {
         Some(time) => DecayLaw::Algebraic { start: mean * (1.0 + t / time).powf(rate), time, power: rate },
         None => DecayLaw::Exponential { start: mean * (rate * t).exp(), rate },

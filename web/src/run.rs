@@ -10,9 +10,9 @@ use curvelax_backend::{
 use curvelax_curve::polygon;
 use curvelax_ensemble::{
     Cell, Ended, Sink, Standing, Study,
+    request::spec::Precision,
     schedule::grid,
     simulate::{Roster, Simulation},
-    spec::Precision,
     trajectory::Placing,
 };
 use curvelax_flow::{

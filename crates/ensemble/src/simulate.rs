@@ -13,9 +13,9 @@ use std::{
 
 use crate::{
     Cell, Ended, Paused, Rows, Sink, Standing, Wish,
+    outcome::linear_rate,
+    request::spec::Precision,
     schedule::{Outputs, grid},
-    spec::Precision,
-    theory,
     trajectory::Trajectory,
 };
 use curvelax_backend::Backend;
@@ -290,7 +290,7 @@ impl Pool<'_> {
         ended.outcome.rate_theory = at.ok().and_then(|at| {
             let cell = &cells[at];
             let values = cell.spec.values_of(ended.outcome.member, cell.index).ok()?;
-            theory::rate_of(&cell.spec, &values, &ended.outcome)
+            linear_rate::rate_of(&cell.spec, &values, &ended.outcome)
         });
         ended
     }

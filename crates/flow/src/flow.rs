@@ -75,7 +75,7 @@ impl Flow {
 
     /// Rate at which the excess of a nearly round curve of area `area` falls in mode `m`, by linear theory, in 1/time:
     /// `24/R⁴` for m = 2 and surface diffusion; for Willmore flow the exponent of `1 + 2t/R₀⁴`. `None` if the
-    /// radius of a circle changes in another way: see `ensemble/theory.rs` for elastic flow.
+    /// radius of a circle changes in another way: see `crates/ensemble/src/outcome/linear_rate.rs` for elastic flow.
     pub fn excess_rate(&self, m: u32, area: f64) -> Option<f64> {
         let radius = (area.abs() / PI).sqrt();
         match self {

@@ -16,8 +16,8 @@ use curvelax_curve::Sampling;
 use curvelax_draw::plot::{Plot, PlotPanel, PlottedCurve, short};
 use curvelax_ensemble::{
     Cell, Ended, Family, Sink, Spec,
+    request::spec::{BackendChoice, Precision, Solver},
     simulate::simulate,
-    spec::{BackendChoice, Precision, Solver},
 };
 use curvelax_study::placement;
 

@@ -15,7 +15,7 @@ use curvelax_base::{
     error::{Error, Result},
     text::{number, plural, rounded},
 };
-use curvelax_ensemble::{Ended, LevelTimes, Sink, Spec, Study, spec::BackendChoice};
+use curvelax_ensemble::{Ended, LevelTimes, Sink, Spec, Study, request::spec::BackendChoice};
 
 /// Share of the goal for discretisation, and that for sampling which is aimed at: the rest is for what a round of fewer
 /// members does not know.

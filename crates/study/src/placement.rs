@@ -13,7 +13,7 @@ use curvelax_backend::{
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
     Cell, Spec, Study,
-    spec::{BackendChoice, Precision},
+    request::spec::{BackendChoice, Precision},
     study::Stage,
 };
 use curvelax_flow::{

@@ -8,9 +8,9 @@ use super::{
 };
 use crate::{
     Member, Observables, Rows, Spec, Status,
-    rates::{own_omega, own_tau, radius, relaxation_rate, strongest_pull},
+    request::spec::{Omega, Pace, Precision, Pull, Sor, Tau},
     schedule::{self, Clock, Outputs, Ticks},
-    spec::{Omega, Pace, Precision, Pull, Sor, Tau},
+    theory::rates::{own_omega, own_tau, radius, relaxation_rate, strongest_pull},
 };
 use curvelax_curve::polygon;
 use curvelax_flow::{

@@ -2,7 +2,7 @@
 
 use crate::{
     Event,
-    event::{Condition, Observable},
+    request::event::{Condition, Observable},
 };
 use curvelax_flow::{
     number::{BIG, Precision},

@@ -203,7 +203,7 @@ impl Pilot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use curvelax_ensemble::{Spec, spec::BackendChoice};
+    use curvelax_ensemble::{Spec, request::spec::BackendChoice};
     use curvelax_study::placement::{choose_all, settle};
 
     fn estimated(spec: Spec, stopped: &dyn Fn() -> Option<Error>) -> Result<Estimate> {

@@ -12,10 +12,11 @@ use std::{
 use curvelax_backend::Backend;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
-    Cell, Ended, Extent, SeriesRow, Sink, Snapshot, rows,
+    Cell, Ended, Extent, SeriesRow, Sink, Snapshot,
+    outcome::rows,
+    request::spec::{Pace, Precision, Tau},
     schedule::Clock,
     simulate::simulate,
-    spec::{Pace, Precision, Tau},
 };
 use curvelax_flow::scheme::{
     Parameters, State,

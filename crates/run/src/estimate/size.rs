@@ -3,8 +3,8 @@
 use crate::report::gallery::MAX_PANELS;
 use curvelax_ensemble::{
     Cell, Portrait,
+    request::spec::Store,
     simulate::{MAX_HELD, states_at_once},
-    spec::Store,
 };
 use curvelax_flow::scheme::{member, state::STATE_FIELDS};
 use curvelax_study::results::{

@@ -15,7 +15,7 @@ use crate::files::{
     zarr::{self, SnapshotStore},
 };
 use curvelax_base::error::{Error, Result};
-use curvelax_ensemble::{Ended, Extent, LevelRow, SeriesRow, Snapshot, Spec, spec::Store};
+use curvelax_ensemble::{Ended, Extent, LevelRow, SeriesRow, Snapshot, Spec, request::spec::Store};
 
 /// The growing files of a spec.
 pub struct Growing {

@@ -358,7 +358,7 @@ mod tests {
 
     use super::*;
     use crate::files::names;
-    use curvelax_ensemble::{Features, Mollified, Observables, Portrait, Rows, Status, spec::Store};
+    use curvelax_ensemble::{Features, Mollified, Observables, Portrait, Rows, Status, request::spec::Store};
     use curvelax_study::samples::{outcome, platform};
 
     fn files(folder: &Path) -> Vec<String> {

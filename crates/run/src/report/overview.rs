@@ -10,7 +10,7 @@ use curvelax_base::{
 use curvelax_curve::Perturbation;
 use curvelax_ensemble::{
     Drawn, Event, Spec,
-    spec::{Pace, Tau, Units},
+    request::spec::{Pace, Tau, Units},
 };
 use curvelax_statistics::{GoodnessOfFit, LogRank, PowerLaw};
 use curvelax_study::{

@@ -21,7 +21,7 @@ use curvelax_draw::{
     },
     style::SERIES,
 };
-use curvelax_ensemble::{Event, Spec, Status, sweep::SweepAxis, theory};
+use curvelax_ensemble::{Event, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
 use curvelax_flow::flow::Flow;
 use curvelax_statistics::{HALF_INTERVAL, KaplanMeier, Sample};
 use curvelax_study::results::{
@@ -803,7 +803,7 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
     let first = curve.mean.first()?;
     let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
     let (t, mean) = (curve.t[tenth], curve.mean[tenth]);
-    let rate = spec.rate_in_theory(&values, area).or_else(|| theory::rate_at(spec, &values, area, t))?;
+    let rate = spec.rate_in_theory(&values, area).or_else(|| linear_rate::rate_at(spec, &values, area, t))?;
     // 24 instead of 24.0.
     let brief = |rate: f64| match rate.round() {
         whole if (rate - whole).abs() < 1e-6 * rate && rate < 1e4 => format!("{whole}"),

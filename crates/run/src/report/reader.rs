@@ -19,7 +19,7 @@ use curvelax_base::{
     input,
     text::quoted,
 };
-use curvelax_ensemble::{LevelRow, LevelTimes, Outcome, Spec, theory};
+use curvelax_ensemble::{LevelRow, LevelTimes, Outcome, Spec, outcome::linear_rate};
 use curvelax_study::results::{
     explained::{Explained, Explaining, FeaturedMember},
     provenance::{FORMAT, Provenance, by_status},
@@ -92,7 +92,7 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
         let begun = folder.join(format!(".{}.part", names::SUMMARY)).exists();
         let problem = if begun {
             format!(
-                "the run there has not finished; wait for it or, if it was interrupted, continue it by curvelax resume {}",
+                "the run there has not finished; if it is not running, curvelax resume {} continues it",
                 quoted(folder)
             )
         } else {
@@ -265,7 +265,7 @@ impl<'a> Summary<'a> {
         // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
         outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| {
             let values = spec.values_of(member, cell).ok()?;
-            theory::rate_of(spec, &values, &outcome)
+            linear_rate::rate_of(spec, &values, &outcome)
         });
         let told = (outcome.t_limit, outcome.t_error);
         if let Some((_, spec)) = &self.spec_of {

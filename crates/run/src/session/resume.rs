@@ -15,7 +15,7 @@ use curvelax_base::{
     error::{Error, Result},
     text::quoted,
 };
-use curvelax_ensemble::{Outlines, Spec, Standing, Study, spec::BackendChoice};
+use curvelax_ensemble::{Outlines, Spec, Standing, Study, request::spec::BackendChoice};
 
 /// Resumes the run in the folder at `path`. `None` means that it is finished.
 ///

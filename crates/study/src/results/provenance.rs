@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::tally::{MollifiedMembers, Tally};
 use crate::placement::Platform;
 use curvelax_base::error::{Error, Result};
-use curvelax_ensemble::{Spec, spec::Precision};
+use curvelax_ensemble::{Spec, request::spec::Precision};
 
 /// Programs that read a run check this first: it grows when an older reader would misunderstand the files.
 pub const FORMAT: u64 = 1;

@@ -8,7 +8,7 @@
 //! A scale is a quantity that is doubled: the amplitude, the size of a shape, the coefficients of a flow. Numerical
 //! settings such as n or the tolerance are none. There the median tends to a limit, not to 0 or infinity.
 
-use curvelax_ensemble::sweep::{Sweep, SweepAxis};
+use curvelax_ensemble::request::sweep::{Sweep, SweepAxis};
 use curvelax_statistics::{HALF_INTERVAL, PowerLaw};
 
 /// Probability of χ² below which a power law is rejected.

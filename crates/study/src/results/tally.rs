@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use curvelax_base::error::Result;
 use curvelax_base::text::{plural, significant};
 use curvelax_ensemble::{
-    LevelTimes, Mollified, Outcome, Spec, Status, mollifier::MAX_VERTEX_TURN, schedule::grid, sweep::Sweep,
+    LevelTimes, Mollified, Outcome, Spec, Status, member::mollifier::MAX_VERTEX_TURN, request::sweep::Sweep,
+    schedule::grid,
 };
 use curvelax_statistics::{Limit, Observation, Observations, Spread};
 

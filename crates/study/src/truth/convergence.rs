@@ -5,8 +5,8 @@ use crate::placement;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
     Cell, Ended, Family, Outcome, Sink, Spec, Status,
+    request::spec::{Precision, Solver},
     simulate::simulate,
-    spec::{Precision, Solver},
 };
 
 /// The solution of a problem.

@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::{Measure, circle_mode};
 use curvelax_base::error::{Error, Result, did_you_mean};
 use curvelax_curve::{BaseCurve, Sampling};
-use curvelax_ensemble::spec::Precision;
+use curvelax_ensemble::request::spec::Precision;
 use curvelax_flow::flow::Flow;
 
 /// Length of the lemniscate of half-width 1: 4·∫₀¹ dx/√(1-x⁴).

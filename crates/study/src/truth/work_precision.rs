@@ -9,8 +9,8 @@ use crate::placement;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
     Cell, Ended, Family, Sink, Spec,
+    request::spec::{BackendChoice, DEFAULT_ADAPTIVE, FinalTime, Omega, Precision, Pull, Solver},
     simulate::simulate,
-    spec::{BackendChoice, DEFAULT_ADAPTIVE, FinalTime, Omega, Precision, Pull, Solver},
 };
 use curvelax_flow::scheme::extrapolation::{LEAST_ORDER, MOST_ORDER, most_order};
 use curvelax_statistics::Description;

@@ -9,8 +9,8 @@ use crate::files::{OutputFolder, names, tables::SnapshotTable};
 use curvelax_backend::{Backend, cpu::CpuBackend};
 use curvelax_ensemble::{
     Cell, Ended, Family, Snapshot, Spec, Status,
+    request::spec::{Precision, Store},
     simulate::simulate,
-    spec::{Precision, Store},
 };
 use curvelax_flow::{
     scheme::step::Method,

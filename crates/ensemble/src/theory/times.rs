@@ -1,12 +1,12 @@
 //! The times and rates of a cell against the size of its curve: the cap of `--t-end auto`, what is refused, and what is
 //! warned about.
 
-use super::{
+use crate::{
     MemberValues, Spec,
-    horizon::CurveScale,
-    rates::{own_omega, own_tau, strongest_pull},
-    spec::{FinalTime, Omega, Pace, Pull, Tau},
-    validate::{MAX_OMEGA_TAU, MAX_STEPS, overshooting},
+    request::spec::{FinalTime, Omega, Pace, Pull, Tau},
+    request::validate::{MAX_OMEGA_TAU, MAX_STEPS, overshooting},
+    theory::horizon::CurveScale,
+    theory::rates::{own_omega, own_tau, strongest_pull},
 };
 use curvelax_base::{
     error::{Error, Result},

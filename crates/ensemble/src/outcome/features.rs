@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Member, Observables, Spec, member::FEATURE_MODES, values::drawn_names};
+use crate::{Member, Observables, Spec, member::FEATURE_MODES, request::drawn_names};
 use curvelax_base::error::Result;
 use curvelax_curve::{DESCRIPTORS, Modes, descriptors, polygon};
 

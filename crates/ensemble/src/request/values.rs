@@ -6,9 +6,9 @@
 
 use std::borrow::Cow;
 
-use super::{
+use crate::{
     Spec,
-    drawn::{Drawable, Drawn, Refused, corners},
+    request::drawn::{Drawable, Drawn, Refused, corners},
 };
 use curvelax_base::{
     error::{Error, Result, echo},
@@ -66,7 +66,7 @@ impl Spec {
     }
 
     /// The index of the random numbers of the member with this index in a study, in its cell.
-    pub(super) fn drawn_as(&self, member: u64, cell: u64) -> u64 {
+    pub(crate) fn drawn_as(&self, member: u64, cell: u64) -> u64 {
         if self.common_random_numbers { member - cell * self.members_per_cell() } else { member }
     }
 
@@ -78,7 +78,7 @@ impl Spec {
     }
 
     /// How many numbers are drawn for the keys shape, flow, amplitude and decay.
-    pub(super) fn drawn_counts(&self) -> [usize; 4] {
+    pub(crate) fn drawn_counts(&self) -> [usize; 4] {
         self.distributions().map(<[Distribution]>::len)
     }
 
@@ -104,7 +104,7 @@ impl Spec {
 
     /// Values in the midst and in the tails of what is drawn, for bounds; the first are the [typical](Spec::typical)
     /// ones. They depend neither on the cell nor on the members that run.
-    pub(super) fn probes(&self) -> Vec<MemberValues<'_>> {
+    pub(crate) fn probes(&self) -> Vec<MemberValues<'_>> {
         if !self.has_drawn_values() {
             return vec![self.typical()];
         }
@@ -121,7 +121,7 @@ impl Spec {
     ///
     /// # Errors
     /// [`Error::Request`] with the share of the members that would be refused.
-    pub(super) fn check_drawn(&self) -> Result<()> {
+    pub(crate) fn check_drawn(&self) -> Result<()> {
         let places: usize = self.distributions().iter().map(|of_key| of_key.len()).sum();
         if self.design == Design::Sobol && places > MAX_SOBOL {
             let problem = format!("{places} distributions; the sequence has {MAX_SOBOL} coordinates");
@@ -156,7 +156,7 @@ impl Spec {
     }
 
     /// The highest mode of a shape made of modes, whichever member's.
-    pub(super) fn highest_mode(&self) -> Option<u32> {
+    pub(crate) fn highest_mode(&self) -> Option<u32> {
         // Modes are whole numbers, so only a choice can give them.
         let corners = corners(&self.shape.distributions().iter().collect::<Vec<_>>());
         let shapes = corners.filter_map(|numbers| self.shape.at(&numbers).ok());
@@ -164,7 +164,7 @@ impl Spec {
     }
 
     /// The distributions of each key.
-    pub(super) fn distributions(&self) -> [&[Distribution]; 4] {
+    pub(crate) fn distributions(&self) -> [&[Distribution]; 4] {
         let Spec { shape, flow, amplitude, decay, .. } = self;
         [shape.distributions(), flow.distributions(), amplitude.distributions(), decay.distributions()]
     }
@@ -197,7 +197,7 @@ impl Spec {
 }
 
 /// The names of the numbers that are drawn, so many for each of the keys shape, flow, amplitude and decay.
-pub(super) fn drawn_names(counts: [usize; 4]) -> Vec<String> {
+pub(crate) fn drawn_names(counts: [usize; 4]) -> Vec<String> {
     let keys = ["shape", "flow", "amplitude", "decay"];
     let name = |key: usize, rank: usize| if key < 2 { format!("{}_{}", keys[key], rank + 1) } else { keys[key].into() };
     counts.into_iter().enumerate().flat_map(|(key, count)| (0..count).map(move |rank| name(key, rank))).collect()
@@ -220,7 +220,7 @@ impl Spec {
     }
 
     /// The lowest mode, 2 or more, of a member with these values: it decays last.
-    pub(super) fn slowest_mode(&self, values: &MemberValues) -> Option<u32> {
+    pub(crate) fn slowest_mode(&self, values: &MemberValues) -> Option<u32> {
         let drawn = (values.amplitude > 0.0).then(|| self.modes.low.max(2));
         values.shape.lowest_mode().into_iter().chain(drawn).min()
     }
@@ -234,7 +234,7 @@ impl Spec {
     }
 
     /// The mean excess that the perturbation of a circle has in each mode from 2 on: ½ (m²-1) a_m².
-    pub(super) fn perturbed_excess(&self, values: &MemberValues) -> Vec<f64> {
+    pub(crate) fn perturbed_excess(&self, values: &MemberValues) -> Vec<f64> {
         let (low, high) = (self.modes.low, if values.amplitude == 0.0 { 1 } else { self.modes.high });
         let part = |m: u32| {
             let (deviation, of) = (values.amplitude * f64::from(m).powf(-values.decay), f64::from(m));

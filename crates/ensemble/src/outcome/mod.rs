@@ -1,11 +1,25 @@
 //! The result of a member: its status, its times, and its observables at the start and the end.
 
+mod ended;
+mod features;
+pub mod levels;
+pub mod linear_rate;
+pub mod rows;
+mod sink;
+mod standing;
+
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 pub use curvelax_flow::scheme::Status;
 use curvelax_flow::scheme::member::Observed;
 use curvelax_statistics::Limit;
+pub use ended::Ended;
+pub use features::{Feature, Features};
+pub use levels::{LevelRow, LevelTimes, RefinementLevel};
+pub use rows::{Extent, Rows};
+pub use sink::{Sink, Wish};
+pub use standing::{Paused, Standing};
 
 /// Scalar observables of one curve at one time (f64 whatever the precision of the run).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -94,9 +108,9 @@ pub struct Outcome {
     pub label: String,
     /// Group of its outline; empty without `--group-by`.
     pub group: String,
-    /// First times of the [events](super::Event) of the spec, in their order.
+    /// First times of the [events](crate::Event) of the spec, in their order.
     pub events: Vec<Option<f64>>,
-    /// What the [levels](super::LevelTimes) tell of the relaxation time, if the member ran at them.
+    /// What the [levels](crate::LevelTimes) tell of the relaxation time, if the member ran at them.
     #[serde(skip)]
     pub judged: Option<Limit>,
     /// The same of the times of the events, in their order.

@@ -10,12 +10,12 @@ use serde::{
     de::{self, IgnoredAny},
 };
 
-use super::{
-    drawn::Drawn,
-    event::Event,
-    seed,
-    shard::Shard,
-    sweep::{self, Sweep},
+use crate::{
+    request::drawn::Drawn,
+    request::event::Event,
+    request::seed,
+    request::shard::Shard,
+    request::sweep::{self, Sweep},
 };
 use curvelax_backend::DeviceKind;
 use curvelax_base::{
@@ -27,7 +27,7 @@ use curvelax_base::{
 use curvelax_curve::{Modes, Perturbation, Sampling, Shape};
 use curvelax_flow::flow::Flow;
 
-pub use super::units::Units;
+pub use crate::request::units::Units;
 pub use curvelax_flow::{
     number::Precision,
     solver::{Order, Solver},
@@ -525,7 +525,7 @@ impl Spec {
     }
 
     /// The first `count` members that would run without shards.
-    pub(super) fn first_members(&self, count: u64) -> Vec<u64> {
+    pub(crate) fn first_members(&self, count: u64) -> Vec<u64> {
         match &self.only {
             Some(only) => only.iter().copied().take(usize::try_from(count).unwrap_or(usize::MAX)).collect(),
             None => (0..count.min(self.all_members())).collect(),
@@ -576,7 +576,7 @@ impl Spec {
     }
 
     /// Whether it gives no number as a time or a rate: all of them may then be chosen by the size of the curve.
-    pub(super) fn gives_no_times(&self) -> bool {
+    pub(crate) fn gives_no_times(&self) -> bool {
         let Spec { tau, t_end, omega, pull, series, snapshots, .. } = self;
         let times = matches!(tau, Some(Tau::Step(_))) || !matches!(t_end, None | Some(FinalTime::Auto));
         let rates = matches!(omega, Some(Omega::Rate(_))) || matches!(pull, Pull::Rate(rate) if *rate != 0.0);
@@ -619,7 +619,7 @@ impl Spec {
 }
 
 /// The error for a list of final times that does not fit the sweep.
-pub(super) fn final_times(times: usize, cells: u64) -> Error {
+pub(crate) fn final_times(times: usize, cells: u64) -> Error {
     let problem =
         format!("a list has one time for each cell, and there {} {cells}", if cells == 1 { "is" } else { "are" });
     Error::value("t-end", format!("({times} times)"), &problem, "give one time, auto, or one for each cell")

@@ -1,6 +1,6 @@
 //! Where a run sends the results of its members, and what it asks between two dispatches.
 
-use super::{Ended, Extent, LevelRow, Rows, SeriesRow, Snapshot, Standing};
+use crate::{Ended, Extent, LevelRow, Rows, SeriesRow, Snapshot, Standing};
 use curvelax_base::error::{Error, Result};
 
 /// What a sink wants from a run between two dispatches.
@@ -18,7 +18,7 @@ pub enum Wish {
 pub trait Sink {
     /// A member has ended; called exactly once per member, in member order.
     fn member(&mut self, ended: &Ended) -> Result<()>;
-    /// A member has ended at a [level](super::RefinementLevel): before the members themselves, level by level in member order.
+    /// A member has ended at a [level](crate::RefinementLevel): before the members themselves, level by level in member order.
     fn level(&mut self, _row: &LevelRow) -> Result<()> {
         Ok(())
     }

@@ -100,7 +100,7 @@ impl SweepAxis {
 }
 
 /// A value as text for tables and messages.
-pub(super) fn label(value: &Value) -> String {
+pub(crate) fn label(value: &Value) -> String {
     match value {
         Value::String(word) => word.clone(),
         // 1e-12, not 0.000000000001; both read back exactly.
@@ -225,7 +225,7 @@ impl Sweep {
     }
 
     /// Adds a cell to an error about its request, if anything is swept.
-    pub(super) fn in_cell(&self, error: Error, index: u64) -> Error {
+    pub(crate) fn in_cell(&self, error: Error, index: u64) -> Error {
         match error {
             // A message about a value of the sweep names it already.
             Error::Request(message) if !self.is_empty() && !message.starts_with("--sweep ") => {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{Ended, Rows};
+use crate::{Ended, Rows};
 use curvelax_flow::scheme::member::{Counters, Report};
 
 /// The members of a run by rank, from 0: the order in which they are handed to the sink.

@@ -55,7 +55,7 @@ impl Shard {
     }
 
     /// The same members, counted from member `first` of the study.
-    pub(super) fn from(self, first: u64) -> Shard {
+    pub(crate) fn from(self, first: u64) -> Shard {
         Shard { index: (self.index + self.count - first % self.count) % self.count, ..self }
     }
 }

@@ -286,7 +286,7 @@ fn numbers(distributions: &[&Distribution], design: Design, point: u64) -> Vec<f
 }
 
 /// All corners of the support, if they are not too many.
-pub(super) fn corners(distributions: &[&Distribution]) -> impl Iterator<Item = Vec<f64>> + use<> {
+pub(crate) fn corners(distributions: &[&Distribution]) -> impl Iterator<Item = Vec<f64>> + use<> {
     let extremes: Vec<Vec<f64>> = distributions.iter().map(|of| of.extremes()).collect();
     let all = extremes.iter().map(Vec::len).fold(1_usize, usize::saturating_mul);
     let step = all.div_ceil(MAX_CORNERS).max(1);

@@ -2,7 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
-use super::{Drawn, Spec, member::OutlineSet};
+use crate::{Drawn, Spec, member::OutlineSet};
 use curvelax_base::{
     error::{Error, Result, echo, shortened},
     text::count,
@@ -26,7 +26,7 @@ impl Outlines {
     ///
     /// # Errors
     /// [`Error::Request`] for everything that [`Shape::outlines_from`] refuses.
-    pub(super) fn read(spec: &Spec, base: &Path, known: &Outlines) -> Result<Outlines> {
+    pub(crate) fn read(spec: &Spec, base: &Path, known: &Outlines) -> Result<Outlines> {
         let swept = spec.sweep.axes().iter().filter(|axis| axis.key == "shape").flat_map(|axis| &axis.values);
         // Other values are refused with their cell, later.
         let swept: Vec<Drawn<Shape>> = swept.filter_map(|value| value.as_str()?.parse().ok()).collect();
@@ -54,7 +54,7 @@ impl Outlines {
     }
 
     /// Those of all these shapes.
-    pub(super) fn of_shapes<'a>(sets: impl Iterator<Item = (&'a Shape, &'a Arc<OutlineSet>)>) -> Outlines {
+    pub(crate) fn of_shapes<'a>(sets: impl Iterator<Item = (&'a Shape, &'a Arc<OutlineSet>)>) -> Outlines {
         let mut outlines = Outlines::default();
         for (shape, set) in sets {
             if outlines.of(shape).is_none() {
@@ -92,7 +92,7 @@ impl Outlines {
     }
 
     /// Those of a shape, if it is read from files.
-    pub(super) fn of(&self, shape: &Shape) -> Option<&Arc<OutlineSet>> {
+    pub(crate) fn of(&self, shape: &Shape) -> Option<&Arc<OutlineSet>> {
         self.sets.iter().find(|(known, _)| known == shape).map(|(_, set)| set)
     }
 
@@ -102,7 +102,7 @@ impl Outlines {
     /// # Errors
     /// [`Error::Request`] for cells with unequal numbers of outlines, for another number than `spec` has, and for keys that
     /// mean nothing with outlines, or only with them.
-    pub(super) fn settle(&self, mut spec: Spec) -> Result<Spec> {
+    pub(crate) fn settle(&self, mut spec: Spec) -> Result<Spec> {
         let several = |(shape, set): &&(Shape, Arc<OutlineSet>)| matches!(shape, Shape::Files(_)) || set.all.len() > 1;
         let Some((first, set)) = self.sets.iter().find(several) else {
             if let Some(asked) = spec.outlines.filter(|asked| *asked != 1) {

@@ -7,10 +7,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{
+use crate::{
     Outcome, Spec, Status,
-    spec::{BackendChoice, DEFAULT_RELAX_TO, FinalTime, Order, Pace, Precision, SolverChoice, Sor, Store},
-    validate::tightest_adaptive,
+    request::spec::{BackendChoice, DEFAULT_RELAX_TO, FinalTime, Order, Pace, Precision, SolverChoice, Sor, Store},
+    request::validate::tightest_adaptive,
 };
 use curvelax_base::error::Result;
 use curvelax_flow::solver::Solver;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Features, Mollified, Outcome, Portrait, Rows};
+use crate::{Features, Mollified, Outcome, Portrait, Rows};
 
 /// Everything a member leaves behind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -12,7 +12,7 @@
 //! ([`Flow::linear_rate`]). R starts as that of the circle of the initial area. The excess is matched where it is known,
 //! at t_relax or t_half, and the rate is the slope of the least-squares line through the window of the fit.
 
-use super::{MemberValues, Outcome, Spec};
+use crate::{MemberValues, Outcome, Spec};
 use curvelax_flow::flow::Flow;
 
 /// Steps of the classical Runge–Kutta method in which excess or R² change by a factor of about e. The rate is then

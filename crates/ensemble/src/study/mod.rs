@@ -1,12 +1,15 @@
 //! A study: the cells of a spec, each an ensemble whose members run side by side.
 
+mod judged;
+
+pub use judged::Judged;
+
 use std::{borrow::Cow, ops::Range, path::Path, sync::Arc};
 
-use super::{
-    Family, Member, RefinementLevel, Spec,
-    outlines::Outlines,
-    spec::{FinalTime, Pace, Store, Tau},
-    times,
+use crate::{
+    Family, Member, Outlines, RefinementLevel, Spec,
+    request::spec::{FinalTime, Pace, Store, Tau},
+    theory::times,
 };
 use curvelax_base::error::{Error, Result};
 use curvelax_curve::{BaseCurve, Sampler, Sampling};

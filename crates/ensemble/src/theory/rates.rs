@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
-use super::spec::{DEFAULT_OMEGA, DEFAULT_TAU};
+use crate::request::spec::{DEFAULT_OMEGA, DEFAULT_TAU};
 use curvelax_curve::polygon;
 
 /// The radius R that the rates below go by: of the circle of equal area, or of equal length if the curve is not simple,

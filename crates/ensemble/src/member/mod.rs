@@ -5,6 +5,12 @@
 //! Batch, order, thread and the other members therefore do not matter, and mode m gets the same number whichever other
 //! modes are requested. The number of nodes does not matter either: member j is the same curve at n = 100 and 200.
 
+pub mod mollifier;
+mod read_outlines;
+
+pub use mollifier::Mollified;
+pub use read_outlines::Outlines;
+
 use std::{
     borrow::Cow,
     collections::BTreeSet,
@@ -16,7 +22,9 @@ use std::{
 
 use glam::DVec2;
 
-use super::{MemberValues, Mollified, Spec, horizon::CurveScale, mollifier::mollify};
+use mollifier::mollify;
+
+use crate::{MemberValues, Spec, theory::horizon::CurveScale};
 use curvelax_base::random::Stream;
 use curvelax_base::{
     error::{Error, Result},
@@ -104,13 +112,13 @@ enum Curves {
 const NO_GROUP: &str = "(none)";
 
 /// The outlines of a shape, with the sizes of those that stand for all: measured once for all cells and levels.
-pub(super) struct OutlineSet {
-    pub(super) all: Vec<Labelled>,
+pub(crate) struct OutlineSet {
+    pub(crate) all: Vec<Labelled>,
     scales: Arc<[CurveScale]>,
 }
 
 impl OutlineSet {
-    pub(super) fn new(all: Vec<Labelled>) -> Result<OutlineSet> {
+    pub(crate) fn new(all: Vec<Labelled>) -> Result<OutlineSet> {
         // The only one is measured with the nodes that it gets.
         let scales = if all.len() > 1 { scales_of(&all)? } else { Arc::default() };
         Ok(OutlineSet { all, scales })
@@ -135,13 +143,13 @@ impl Family {
     }
 
     /// Does the same as [`Family::new`], for a shape that is a formula.
-    pub(super) fn of_shape(spec: &Spec) -> Result<Family> {
+    pub(crate) fn of_shape(spec: &Spec) -> Result<Family> {
         let curves = if spec.shape.is_drawn() { Curves::Drawn } else { Curves::One };
         Family::of_curve(spec, spec.shape.typical().resolve()?, curves)
     }
 
     /// Does the same as [`Family::new`], with `outlines`, at least one, in place of the shape.
-    pub(super) fn of_outlines(spec: &Spec, outlines: Arc<OutlineSet>) -> Result<Family> {
+    pub(crate) fn of_outlines(spec: &Spec, outlines: Arc<OutlineSet>) -> Result<Family> {
         let none = || Error::value("shape", &spec.shape, "there is no outline", "give one");
         let first = Arc::clone(&outlines.all.first().ok_or_else(none)?.outline);
         Family::of_curve(spec, BaseCurve::from_outline(first), Curves::Outlines(outlines))
@@ -264,7 +272,7 @@ impl Family {
     }
 
     /// The same with their sizes.
-    pub(super) fn outline_set(&self) -> Option<&Arc<OutlineSet>> {
+    pub(crate) fn outline_set(&self) -> Option<&Arc<OutlineSet>> {
         match &self.curves {
             Curves::Outlines(set) => Some(set),
             _ => None,
@@ -279,7 +287,7 @@ impl Family {
 
     /// The size of the curve without perturbation; if members have curves of their own, of the curve of each of
     /// [`Spec::probes`], or of outlines that stand for all; the typical one first.
-    pub(super) fn scales(&self) -> &[CurveScale] {
+    pub(crate) fn scales(&self) -> &[CurveScale] {
         &self.scales
     }
 

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{SeriesRow, Snapshot};
+use crate::{SeriesRow, Snapshot};
 
-/// Where a sink has stored rows: the answer of [`Sink::spill`](super::Sink::spill).
+/// Where a sink has stored rows: the answer of [`Sink::spill`](crate::Sink::spill).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Extent {
     /// First byte.

@@ -3,8 +3,8 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that needs
 //! the file of the shape. Only the resolution of the highest mode is checked here.
 
-use super::event::{Event, MAX_EVENTS};
-use super::spec::{
+use crate::request::event::{Event, MAX_EVENTS};
+use crate::request::spec::{
     BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, Precision, Pull,
     Sor, Spec, Store, Tau, final_times,
 };
@@ -18,7 +18,7 @@ use curvelax_flow::solver::{Facts, ring::MIN_POINTS};
 const MAX_CURVES: u64 = 1_000_000_000;
 const MAX_POINTS: usize = 1_000_000;
 /// A member with more steps than this would need more than a year.
-pub(super) const MAX_STEPS: f64 = 1e9;
+pub(crate) const MAX_STEPS: f64 = 1e9;
 /// Final times whose smallest part in a table, and whose sum over all members, can still be represented.
 const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
 /// Mobilities with which times, fourth powers of lengths over them, stay finite.
@@ -33,7 +33,7 @@ const MAX_SNAPSHOTS: usize = 10_000;
 /// The same for snapshots, at four numbers a row.
 const MAX_SNAPSHOT_ROWS: usize = 100_000_000;
 /// The lengths approach their mean explicitly, by a factor 1 - ωτ per step.
-pub(super) const MAX_OMEGA_TAU: f64 = 1.0;
+pub(crate) const MAX_OMEGA_TAU: f64 = 1.0;
 /// Above this local error a step says nothing about the curve.
 const LOOSEST_ADAPTIVE: f64 = 1.0;
 /// A sweep residual above this no longer says that a system is solved.
@@ -437,7 +437,7 @@ impl Spec {
 }
 
 /// The smallest tolerance of adaptive steps whose errors are not all rounding.
-pub(super) fn tightest_adaptive(precision: Precision) -> f64 {
+pub(crate) fn tightest_adaptive(precision: Precision) -> f64 {
     match precision {
         Precision::F32 => 1e-5,
         Precision::F64 => 1e-8,
@@ -445,7 +445,7 @@ pub(super) fn tightest_adaptive(precision: Precision) -> f64 {
 }
 
 /// The problem of a redistribution that is too fast for fixed steps.
-pub(super) fn overshooting(omega: f64, tau: f64) -> String {
+pub(crate) fn overshooting(omega: f64, tau: f64) -> String {
     format!("omega tau = {}, and the redistribution overshoots above {MAX_OMEGA_TAU}", number(omega * tau))
 }
 

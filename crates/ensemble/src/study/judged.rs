@@ -1,8 +1,8 @@
 //! Between a run and its sink: members of a level become rows, and those of the study get what the levels tell of them.
 
-use super::{
+use crate::{
     Cell, Ended, Extent, LevelRow, LevelTimes, Outcome, SeriesRow, Sink, Snapshot, Spec, Standing, Wish,
-    levels::RefinementLevel,
+    outcome::levels::RefinementLevel,
 };
 use curvelax_base::error::{Error, Result};
 
