@@ -71,6 +71,7 @@ enum Command {
 /// end the process.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = parse(arguments).unwrap_or_else(|error| error.exit());
+    signals::outlive_full_files();
     let done = match cli.command {
         Command::Run(args) => run::run(*args),
         Command::Resume(args) => resume::resume(args),

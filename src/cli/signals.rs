@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-pub use system::exit;
+pub use system::{exit, outlive_full_files};
 
 use super::note;
 use crate::{
@@ -107,8 +107,6 @@ mod system {
     pub type Closing = Handle;
 
     pub fn ears() -> Result<(Ears, Closing)> {
-        // So that a file that grows too large gives an ordinary error.
-        let _ = flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
         let ignored = ignored();
         let heard = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
         let signals = Signals::new(heard).map_err(|e| {
@@ -139,6 +137,11 @@ mod system {
         let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
         let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
         mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+    }
+
+    /// Makes a file that grows too large an ordinary error.
+    pub fn outlive_full_files() {
+        let _ = flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
     }
 
     /// Exits without the C library's clean-up, which active drivers do not tolerate.
@@ -173,6 +176,8 @@ mod system {
             let _ = self.0.send(());
         }
     }
+
+    pub fn outlive_full_files() {}
 
     pub fn exit(code: u8) {
         std::process::exit(code.into());

@@ -102,3 +102,19 @@ fn a_run_that_cannot_finish_leaves_the_earlier_results() {
         assert!(fs::read(name).is_ok_and(|now| now == text), "{}", name.display());
     }
 }
+
+#[test]
+fn pictures_and_merges_on_a_full_disk_end_with_a_message() {
+    let home = TempDir::new().unwrap();
+    for shard in 0..2 {
+        let output = curvelax(home.path(), "unlimited", &format!("--curves 4 --shard {shard}/2 --out shard-{shard}"));
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    done(home.path(), "merge shard-0 shard-1 --out all --quiet");
+    for command in ["plot all", "plot all --out pictures", "animate all", "merge shard-0 shard-1 --out again"] {
+        let output = limited(home.path(), "4", command);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{command}: {message}");
+        assert!(message.contains("cannot write "), "{command}: {message}");
+    }
+}

@@ -45,6 +45,7 @@ use super::{
 };
 use curvelax_base::{
     error::{Error, Result, echo_path, shortened},
+    guard::guarded,
     input::{self, MAX_OUTLINE},
     text::count,
 };
@@ -362,7 +363,14 @@ pub fn glob(base: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
         MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: true };
     let wrong = |e: ::glob::PatternError| refuse(&format!("{} in the pattern", shortened(e.msg, 100)), REMEDY);
     let mut paths = Vec::new();
-    for path in glob_with(whole, options).map_err(wrong)? {
+    // It panics at names that are not UTF-8.
+    let found = guarded(|| glob_with(whole, options).map(Iterator::collect::<Vec<_>>)).map_err(|_| {
+        refuse(
+            "a file or folder in reach of the pattern has a name that is not UTF-8",
+            "rename it, or use a narrower pattern",
+        )
+    })?;
+    for path in found.map_err(wrong)? {
         let path = path.map_err(|e| {
             let (at, e) = (echo_path(e.path()), e.error());
             refuse(&format!("cannot read {at}: {e}"), "make it readable, or use a narrower pattern")

@@ -9,6 +9,7 @@
 //! column called ring, id, part or label. Its rings are never joined.
 
 use std::{
+    borrow::Cow,
     collections::{HashMap, HashSet},
     ops::Range,
 };
@@ -73,13 +74,19 @@ impl Separator {
             quoted ^= c == '"';
             c == self.character() && !quoted
         };
-        let fields = line.split(separates).map(|field| field.trim().trim_matches('"').trim());
+        let fields = line.split(separates).map(|field| without_quotes(field).trim());
         match self {
             // Columns may be aligned by several.
-            Separator::Spaces => line.split_whitespace().map(|field| field.trim_matches('"')).collect(),
+            Separator::Spaces => line.split_whitespace().map(without_quotes).collect(),
             _ => fields.collect(),
         }
     }
+}
+
+/// A field without the quotes around it; those inside are still doubled.
+fn without_quotes(field: &str) -> &str {
+    let field = field.trim();
+    field.strip_prefix('"').and_then(|field| field.strip_suffix('"')).unwrap_or(field)
 }
 
 /// A number as it is written.
@@ -166,6 +173,9 @@ impl Columns {
 /// What a table with coordinates of both kinds is told.
 pub(super) const X_AND_Y: &str = "the columns x and y are the coordinates, not those of longitude and latitude";
 
+/// What a table that is not UTF-8 is told.
+const LATIN: &str = "the file is not UTF-8 and was read as Latin-1";
+
 /// What ends an outline before a point.
 #[derive(Clone, Copy, PartialEq)]
 enum Break {
@@ -187,6 +197,7 @@ struct PointTable {
     thousands: Option<(usize, String)>,
     has_decimal_commas: bool,
     has_decimal_points: bool,
+    is_latin: bool,
 }
 
 /// Reads the outlines of a table.
@@ -216,7 +227,8 @@ pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>>
         };
         let places = Places { part, unit: "line", numbers: table.lines[span.clone()].to_vec() };
         let ring = RingPoints::new(table.points[span].to_vec(), places);
-        let notes = if columns.has_both { vec![X_AND_Y] } else { Vec::new() };
+        let notes = [(columns.has_both, X_AND_Y), (table.is_latin && index == 0, LATIN)];
+        let notes = notes.into_iter().filter_map(|(applies, note)| applies.then_some(note)).collect();
         Ok(Piece { name, properties, in_degrees: columns.in_degrees, notes, ..Piece::new(index + 1, ring) })
     };
     Ok(spans.into_iter().enumerate().map(piece).collect())
@@ -234,11 +246,22 @@ impl PointTable {
         }
     }
 
-    /// The columns that name the ring of a point. A column that differs at every point numbers the points instead.
+    /// The columns that name the ring of a point. A column that numbers the points, of the file or of each of its rings,
+    /// is none of them.
     fn ring_columns<'a>(&'a self, columns: &'a Columns) -> impl Iterator<Item = usize> + 'a {
         let names_rings = |(name, _): &(String, usize)| is_ring_column(name);
-        let numbers_points = |values: &[u32]| values.len() > 1 && values.windows(2).all(|pair| pair[0] != pair[1]);
-        (0..columns.others.len()).filter(move |i| names_rings(&columns.others[*i]) && !numbers_points(&self.others[*i]))
+        (0..columns.others.len())
+            .filter(move |i| names_rings(&columns.others[*i]) && !self.numbers_points(&self.others[*i]))
+    }
+
+    /// Whether values, as indices into `words`, are all different, or numbers that rise over three points at least before
+    /// they begin again.
+    fn numbers_points(&self, values: &[u32]) -> bool {
+        if values.len() > 1 && values.iter().collect::<HashSet<_>>().len() == values.len() {
+            return true;
+        }
+        let numbers: Option<Vec<f64>> = values.iter().map(|value| self.words[*value as usize].parse().ok()).collect();
+        numbers.is_some_and(|numbers| numbers.chunk_by(|one, next| one < next).all(|run| run.len() >= 3))
     }
 
     /// The indices at which outlines begin.
@@ -314,8 +337,13 @@ impl Reader<'_> {
                 let problem = format!("a line of {size}");
                 return Err(self.source.refusal(&place(line), &problem, &remedy));
             }
-            // Other columns may be in any encoding.
-            let content = String::from_utf8_lossy(content);
+            let content = match str::from_utf8(content) {
+                Ok(content) => Cow::Borrowed(content),
+                Err(_) => {
+                    table.is_latin = true;
+                    Cow::Owned(content.iter().copied().map(char::from).collect())
+                }
+            };
             // A tab at the beginning follows an empty column.
             let content = content.trim_matches([' ', '\r']);
             if content.trim_start().starts_with('#') {
@@ -377,11 +405,11 @@ impl Reader<'_> {
         table.points.push(point);
         table.lines.push(line);
         for ((_, column), values) in columns.others.iter().zip(&mut table.others) {
-            let word = fields.get(*column).copied().unwrap_or_default();
-            let index = known.get(word).copied().unwrap_or_else(|| {
+            let word = fields.get(*column).copied().unwrap_or_default().replace("\"\"", "\"");
+            let index = known.get(&word).copied().unwrap_or_else(|| {
                 let index = table.words.len() as u32;
-                table.words.push(word.to_owned());
-                known.insert(word.to_owned(), index);
+                table.words.push(word.clone());
+                known.insert(word, index);
                 index
             });
             values.push(index);

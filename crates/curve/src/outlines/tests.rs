@@ -604,3 +604,46 @@ fn thread_time() -> std::time::Duration {
         BEGUN.elapsed()
     }
 }
+
+#[test]
+fn labels_that_change_at_every_point_are_refused_and_numbers_of_points_are_not_labels() {
+    let table = |labels: &[&str]| {
+        let rows = labels.iter().enumerate().map(|(i, label)| {
+            let angle = i as f64;
+            format!("{},{},{label}\n", angle.cos(), angle.sin())
+        });
+        format!("x,y,label\n{}", rows.collect::<String>())
+    };
+    assert_refused("t.csv", table(&["A", "B", "A", "B", "A", "B"]), &["the outline `A` appears again"]);
+    assert_refused("t.csv", table(&["1", "2", "1", "2", "1", "2"]), &["the outline `1` appears again"]);
+    for numbers in [["0", "1", "2", "3", "4", "5"], ["1", "2", "3", "1", "2", "3"], ["a", "b", "c", "d", "e", "f"]] {
+        assert_eq!(read("t.csv", table(&numbers)).len(), 1, "{numbers:?}");
+    }
+}
+
+#[test]
+fn labels_in_latin_1_and_with_quotes_are_read_as_they_are_meant() {
+    let ring = |label: &[u8], at: u8| {
+        let rows =
+            [(0, 0), (1, 0), (0, 1)].map(|(x, y)| [format!("{},{y},", x + at).as_bytes(), label, b"\n"].concat());
+        rows.concat()
+    };
+    let latin = read("t.csv", [&b"x,y,label\n"[..], &ring(b"\xe9", 0), &ring(b"\xe8", 9)].concat());
+    assert_eq!(labels(&latin), ["é", "è"]);
+    assert!(latin[0].outline.warnings()[0].contains("the file is not UTF-8 and was read as Latin-1"));
+    assert_eq!(latin[1].outline.warnings(), [""; 0]);
+    let quoted = read("t.csv", [&b"x,y,label\n"[..], &ring(b"\"5\"\" sieve\"", 0), &ring(b"\"a,b\"", 9)].concat());
+    assert_eq!(labels(&quoted), ["5\" sieve", "a,b"]);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_name_that_is_not_utf_8_is_no_panic() {
+    use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
+    let home = tempfile::tempdir().unwrap();
+    for name in [&b"a.csv"[..], b"b\xe9.csv"] {
+        fs::write(home.path().join(OsStr::from_bytes(name)), "0,0\n1,0\n0,1\n").unwrap();
+    }
+    let message = glob(home.path(), "*.csv").unwrap_err().to_string();
+    assert!(message.contains("has a name that is not UTF-8; rename it"), "{message}");
+}

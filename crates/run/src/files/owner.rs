@@ -121,16 +121,19 @@ impl Existing {
             return refuse(&problem, "use another folder, or move away what is not of a run");
         }
         if [STATE, STATE_OLD].iter().any(|state| is_there(&place.join(state))) {
-            let resume = format!("curvelax resume {} continues it, --force starts over", quoted(path));
-            return refuse("a run was interrupted here", &resume);
+            let resume =
+                format!("if it is not running, curvelax resume {} continues it, --force starts over", quoted(path));
+            return refuse("a run was begun here and has not finished", &resume);
         }
         match self {
             Existing::Filled => match names.iter().find(|name| is_there(&place.join(name))) {
                 None => Ok(()),
-                Some(name) => refuse(
-                    &format!("{name} exists, but there is no run to resume"),
-                    "use another folder, or add --force instead of --resume to replace the files",
-                ),
+                Some(name) => {
+                    let own = foreign(place).is_ok_and(|found| found.is_empty());
+                    let force = if own { ", or add --force instead of --resume to replace the files" } else { "" };
+                    let problem = format!("{name} exists, but there is no run to resume");
+                    refuse(&problem, &format!("use another folder{force}"))
+                }
             },
             _ if is_only_begun(place, names).unwrap_or(false) => Ok(()),
             _ => refuse("already exists", "name a new folder, or add --force to replace the files of an earlier run"),

@@ -82,7 +82,11 @@ mod tests {
         folder.keep_state(b"4").unwrap();
         assert_eq!(state_of(&folder), ["4", "2"]);
         let error = OutputFolder::open(home.path(), false).unwrap_err().to_string();
-        assert!(error.contains("a run was interrupted here; curvelax resume ") && error.contains("--force"), "{error}");
+        assert!(
+            error.contains("a run was begun here and has not finished; if it is not running, curvelax resume ")
+                && error.contains("--force"),
+            "{error}"
+        );
         folder.keep_outlines(b"outlines").unwrap();
         folder.forget_states().unwrap();
         drop(folder);

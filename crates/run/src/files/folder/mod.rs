@@ -157,8 +157,12 @@ impl OutputFolder {
 
     /// Checks that files can be created here.
     fn probe(&self) -> io::Result<()> {
-        let probe = self.place.join(PROBE);
-        create(probe.at()).and_then(|_| fs::remove_file(probe.at()))
+        let plots = self.place.join(PLOTS);
+        let folders = [Some(&self.place), plots.at().is_dir().then_some(&plots)];
+        folders.into_iter().flatten().map(|folder| folder.join(PROBE)).try_for_each(|probe| {
+            create(probe.at())?;
+            fs::remove_file(probe.at())
+        })
     }
 
     /// Where it was found.

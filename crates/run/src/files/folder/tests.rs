@@ -67,3 +67,19 @@ fn one_run_at_a_time_writes_into_a_folder() {
     drop(OutputFolder::open(&out, true).unwrap());
     assert_eq!(names(&out), [""; 0]);
 }
+
+#[test]
+fn pictures_that_cannot_be_replaced_are_found_before_anything_is_lost() {
+    let home = tempfile::tempdir().unwrap();
+    let out = home.path().join("out");
+    // In the way of every new file, also for root.
+    fs::create_dir_all(out.join("plots/.curvelax.part")).unwrap();
+    fs::write(out.join(RUN), OLD).unwrap();
+    let error = OutputFolder::open(&out, true).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.to_string().contains("cannot be written"), "{error}");
+    assert_eq!(fs::read_to_string(out.join(RUN)).unwrap(), OLD);
+    fs::remove_dir(out.join("plots/.curvelax.part")).unwrap();
+    drop(OutputFolder::open(&out, true).unwrap());
+    assert_eq!(names(&out), ["plots", RUN]);
+}
