@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use curvelax::{
     curve::{BaseCurve, Outline},
-    ensemble::{Spec, Study, spec::Pull},
+    ensemble::{Spec, Study, request::spec::Pull},
     relax,
 };
 use glam::DVec2;

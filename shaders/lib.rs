@@ -25,7 +25,7 @@ files! {
     EXCHANGE "exchange.wgsl",
     EXCHANGE_SUBGROUP "exchange_subgroup.wgsl",
     EXTRAPOLATION "extrapolation.wgsl",
-    FLOW "flow.wgsl",
+    FORCES "forces.wgsl",
     GAUSS_SEIDEL "gauss_seidel.wgsl",
     MEMBER "member.wgsl",
     NUMBER "number.wgsl",

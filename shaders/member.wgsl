@@ -3,14 +3,13 @@
 /// Parameters of a member: the law, the step, sweeps, thresholds, adaptive steps and their times, levels
 /// at which it pauses.
 struct Parameters {
-    c1: real, c2: real, c3: real, c4: real, c5: real, c6: real, c7: real, c8: real,
+    law: array<real, 16>,
     tau: real,
     omega: real,
     redistribution: real,
     pull: real,
     tolerance: real,
     sor: real,
-    length_penalty: real,
     polygon_ratio: real,
     relax_at: real,
     half_at: real,

@@ -111,7 +111,7 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     let fy = plus1(wy) - here(wy);
     let edge = sqrt(ex * ex + ey * ey);
     let cross = minus1(wx) * here(wy) - here(wx) * minus1(wy);
-    let energy = (real(0.5) * (kh * kh) + vec(all_parameters[member].length_penalty)) * rh;
+    let energy = energy_density(kh) * rh;
     let part = vec(block_sum(edge), block_sum(cross), block_sum(energy), block_sum(winding(ex, ey, fx, fy)));
     let shortest = -bounded_abs(edge);
     let extremes_of_block = vec(

@@ -1,4 +1,4 @@
-// Velocity, tangential redistribution and the new lengths. Twin of crates/flow/src/scheme/redistribution.rs.
+// Tangential redistribution and the new lengths. Twin of crates/flow/src/scheme/redistribution.rs.
 
 /// r k beta of the old state.
 var<private> rkb: vec;
@@ -41,12 +41,6 @@ fn redistribute(moves: bool) -> real {
     r_new = lone_window(r * exponential(growth));
     reciprocals(r_new);
     return length;
-}
-
-/// beta for the old curvatures, with their window `wk`.
-fn velocity(k: vec, wk: Window) -> vec {
-    read_law();
-    return b(k) - ((plus1(wk) - k) * here(iq) - (k - minus1(wk)) * minus1(iq)) * here(ir);
 }
 
 /// alpha by a running sum that restarts from the sum of whole blocks.

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use curvelax::{
     backend::gpu::{Variant, kernel, shader},
     ensemble::Status,
+    flow::{LAW, LENGTH_PENALTY},
     number::{BIG, LN_HALVINGS, LN_TERMS, Real},
     scheme::{
         decay, dense, extrapolation,
@@ -141,7 +142,10 @@ fn layouts_agree<T: Real>() {
         let expected: Vec<_> = (0..).zip(fields).map(|(i, field)| (field.to_string(), i * step)).collect();
         assert_eq!(found[name], (expected, fields.len() as u32 * step), "{name} in {}", T::NAME);
     };
-    expect("Parameters", Parameters::<T>::FIELDS, number);
+    // The first field is an array.
+    let starts = (0..).map(|i: u32| if i == 0 { 0 } else { (LAW as u32 + i - 1) * number });
+    let fields = Parameters::<T>::FIELDS.iter().map(|field| field.to_string()).zip(starts).collect();
+    assert_eq!(found["Parameters"], (fields, Parameters::<T>::LEN as u32 * number), "Parameters in {}", T::NAME);
     expect("Observed", Observed::<T>::FIELDS, number);
     expect("Progress", Progress::<T>::FIELDS, number);
     expect("Decay", Decay::<T>::FIELDS, number);
@@ -169,7 +173,7 @@ fn the_structs_shared_with_the_host_have_its_layout() {
     assert_eq!(size_of::<Counters>(), 4 * Counters::FIELDS.len());
     assert_eq!(offset_of!(Counters, goal), 24);
     assert_eq!(offset_of!(Counters, solve_sweeps), 4 * 13);
-    assert_eq!(offset_of!(Parameters<f64>, tau), 8 * 8);
+    assert_eq!(offset_of!(Parameters<f64>, tau), 8 * LAW);
     assert_eq!(size_of::<Report<f32>>(), 4 * Report::<f32>::LEN);
 }
 
@@ -343,6 +347,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("STALLED", f64::from(Status::Stalled as u32)),
         ("FOUR_PI", 4.0 * std::f64::consts::PI),
         ("HALF_OVER_PI", 0.5 / std::f64::consts::PI),
+        ("LENGTH_PENALTY", LENGTH_PENALTY as f64),
         ("TRACE_FIELDS", shader::TRACE_FIELDS as f64),
         ("CURVE", 0.0),
     ];

@@ -166,7 +166,7 @@ impl NaturalScale {
         match self {
             NaturalScale::Velocity => {
                 let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
-                k() / (shortest * shortest) + p.law(p.branches()).b(k()).abs()
+                k() / (shortest * shortest) + p.law(p.branches().degree).b(k()).abs()
             }
             NaturalScale::Tangential => work.motion.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
             NaturalScale::Length => longest(),
@@ -178,7 +178,7 @@ impl NaturalScale {
             NaturalScale::Area => length * length / (4.0 * std::f64::consts::PI),
             NaturalScale::Energy => {
                 curve.k.nodes().iter().zip(curve.r.nodes()).map(|(k, r)| k * k * r).sum::<f64>()
-                    + p.length_penalty * length
+                    + p.length_penalty() * length
             }
             NaturalScale::Mesh => {
                 let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);

@@ -11,8 +11,12 @@ use serde::{Deserialize, Serialize};
 
 use curvelax_base::error::{did_you_mean, echo};
 
-/// Highest power of `k` in `b(k)`; the size of the coefficient array shared with the kernel.
+/// Highest power of `k` in `b(k)`; the coefficients are the first numbers of [`Flow::law`].
 pub const MAX_DEGREE: usize = 8;
+/// Numbers of a law in the parameters that the kernel gets.
+pub const LAW: usize = 16;
+/// The place of λ among them, after the coefficients.
+pub const LENGTH_PENALTY: usize = MAX_DEGREE;
 
 /// A fourth-order geometric flow, named as on the command line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,6 +53,18 @@ impl Flow {
     /// Returns the length penalty λ of the reported energy `∮(½k² + λ) ds`; 0 unless the flow is elastic.
     pub fn length_penalty(&self) -> f64 {
         if let Flow::Elastic(lambda) = self { *lambda } else { 0.0 }
+    }
+
+    /// Returns the numbers by which [forces](crate::scheme::forces) know the law, for lengths in units of `unit` and times
+    /// in units of its fourth power: `c₁ … c_8`, of dimension length^(j-3), and λ of the energy, of dimension 1/length².
+    /// The rest is 0.
+    pub fn law(&self, unit: f64) -> [f64; LAW] {
+        let mut law = [0.0; LAW];
+        for (j, (to, c)) in (1..).zip(law.iter_mut().zip(self.coefficients())) {
+            *to = c * f64::powi(unit, 3 - j);
+        }
+        law[LENGTH_PENALTY] = self.length_penalty() * unit * unit;
+        law
     }
 
     /// Evaluates `b(k)`.

@@ -80,7 +80,7 @@ impl Binding {
         let numbers = |count: usize| slots * count * size_of::<T>();
         match self {
             Binding::Dispatch => size_of::<Dispatch>(),
-            Binding::Parameters => numbers(Parameters::<T>::FIELDS.len()),
+            Binding::Parameters => numbers(Parameters::<T>::LEN),
             Binding::Counters => slots * size_of::<Counters>(),
             Binding::Reports => numbers(Report::<T>::LEN),
             Binding::States => numbers(state_numbers(blocks)),
@@ -118,7 +118,7 @@ impl<T: Real> Mirror<T> {
     pub fn new(blocks: Blocks, slots: usize) -> Self {
         Mirror {
             blocks,
-            parameters: vec![T::of(0.0); slots * Parameters::<T>::FIELDS.len()],
+            parameters: vec![T::of(0.0); slots * Parameters::<T>::LEN],
             counters: vec![Counters::default(); slots],
             reports: vec![Report::default(); slots],
             changed: vec![true; slots],
@@ -165,7 +165,7 @@ impl<T: Real> Mirror<T> {
 
     /// Changes the parameters of a member.
     pub fn set_parameters(&mut self, slot: usize, parameters: &Parameters<T>) {
-        let fields = Parameters::<T>::FIELDS.len();
+        let fields = Parameters::<T>::LEN;
         self.parameters[slot * fields..(slot + 1) * fields].copy_from_slice(&parameters.to_numbers());
         self.changed[slot] = true;
     }
@@ -196,7 +196,7 @@ impl<T: Real> Mirror<T> {
         let end = self.changed.iter().rposition(|changed| *changed).map_or(first, |last| last + 1);
         self.changed[first..end].fill(false);
         let reports: Vec<T> = self.reports[first..end].iter().flat_map(Report::to_numbers).collect();
-        let fields = Parameters::<T>::FIELDS.len();
+        let fields = Parameters::<T>::LEN;
         let from = |binding: Binding| (binding.bytes::<T>(self.blocks, first)) as u64;
         let parameters = bytemuck::cast_slice(&self.parameters[first * fields..end * fields]);
         write(Binding::Parameters, from(Binding::Parameters), parameters);

@@ -55,7 +55,7 @@ const COMMON: [ShaderPart; 18] = [
     shaders::RING,
     shaders::SUMS,
     shaders::MEMBER,
-    shaders::FLOW,
+    shaders::FORCES,
     shaders::REDISTRIBUTION,
     shaders::SYSTEM,
     shaders::CURVATURE,

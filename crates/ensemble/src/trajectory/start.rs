@@ -159,27 +159,16 @@ fn unit_of(nodes: &[DVec2]) -> f64 {
 /// short.
 fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
     let range = schedule::range(precision);
-    let law = [p.c1, p.c2, p.c3, p.c4, p.c5, p.c6, p.c7, p.c8, p.length_penalty];
     let rates = [p.redistribution * p.omega, p.pull, p.tau];
-    let too_large = law.into_iter().chain(rates).any(|number| number.is_nan() || number.abs() > *range.end());
+    let too_large = p.law.into_iter().chain(rates).any(|number| number.is_nan() || number.abs() > *range.end());
     too_large || (p.tau != 0.0 && p.tau < *range.start())
 }
 
 /// The parameters of a member in the units `unit` of length and `time` of time, except thresholds and times.
 fn parameters(spec: &Spec, flow: &Flow, nodes: &[DVec2], [unit, time]: [f64; 2], tolerance: f64) -> Parameters<f64> {
     let rate = relaxation_rate(radius(nodes));
-    let of_flow = Parameters::of_flow(flow, 1.0);
-    // b(k) has the dimension of 1/length³.
-    let law = |j: i32, c: f64| c * unit.powi(3 - j);
     Parameters {
-        c1: law(1, of_flow.c1),
-        c2: law(2, of_flow.c2),
-        c3: law(3, of_flow.c3),
-        c4: law(4, of_flow.c4),
-        c5: law(5, of_flow.c5),
-        c6: law(6, of_flow.c6),
-        c7: law(7, of_flow.c7),
-        c8: law(8, of_flow.c8),
+        law: flow.law(unit),
         tau: match spec.pace() {
             Pace::Fixed(Tau::Step(tau)) => tau / time,
             Pace::Fixed(Tau::Auto) => own_tau(rate),
@@ -199,8 +188,7 @@ fn parameters(spec: &Spec, flow: &Flow, nodes: &[DVec2], [unit, time]: [f64; 2],
             Sor::Factor(factor) => factor,
             Sor::Auto => 0.0,
         },
-        length_penalty: of_flow.length_penalty * unit * unit,
         polygon_ratio: polygon::regular_ratio(nodes.len()),
-        ..of_flow
+        ..Parameters::of_flow(flow, 1.0)
     }
 }

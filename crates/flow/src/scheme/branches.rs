@@ -5,7 +5,7 @@
 //! parameters of single members, compared by [`Group`](super::evolve::Group), and passed to the stages: no stage asks a
 //! number of several lanes which branch to take.
 
-use super::Parameters;
+use super::{Parameters, forces};
 use crate::number::Real;
 
 /// The branches of one member, or of a group of members that share them.
@@ -28,13 +28,12 @@ impl<T: Real> Parameters<T> {
     pub fn branches(&self) -> Branches {
         let zero = T::of(0.0);
         let positive = |value: T| !value.le(zero);
-        let highest = self.coefficients().iter().rposition(|c| *c != zero);
         Branches {
             adaptive: positive(self.adaptive),
             redistributed: T::of(0.5).le(self.redistribution),
             pulled: positive(self.pull),
             watched: T::of(0.5).le(self.watched),
-            degree: highest.map_or(0, |j| j + 1),
+            degree: forces::degree(self),
         }
     }
 }

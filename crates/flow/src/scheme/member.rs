@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    flow::{Flow, MAX_DEGREE},
+    flow::{Flow, LAW},
     number::{BIG, Number, Real},
 };
 
@@ -15,33 +15,48 @@ pub const PARTS: usize = 32;
 /// Times between the parts.
 pub const TIMES: usize = PARTS - 1;
 
-/// A struct of numbers of one type, convertible to and from an array in declaration order.
+/// A struct of numbers of one type, arrays first, convertible to and from one array in declaration order.
 macro_rules! numbers {
-    ($(#[$outer:meta])* $name:ident { $($(#[$inner:meta])* $field:ident),+ $(,)? }) => {
+    ($(#[$outer:meta])* $name:ident $([$($(#[$about:meta])* $array:ident: $size:expr),+])? {
+        $($(#[$inner:meta])* $field:ident),+ $(,)?
+    }) => {
         $(#[$outer])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
         #[repr(C)]
-        pub struct $name<N> { $($(#[$inner])* pub $field: N),+ }
+        pub struct $name<N> {
+            $($($(#[$about])* pub $array: [N; $size],)+)?
+            $($(#[$inner])* pub $field: N),+
+        }
 
         impl<N: Copy> $name<N> {
             /// Field names in memory order.
-            pub const FIELDS: &'static [&'static str] = &[$(stringify!($field)),+];
+            pub const FIELDS: &'static [&'static str] = &[$($(stringify!($array),)+)? $(stringify!($field)),+];
+            /// Numbers of all fields.
+            pub const LEN: usize = Self::FIELDS.len() $($(+ $size - { let _ = stringify!($array); 1 })+)?;
 
-            /// Returns the fields in memory order.
+            /// Returns the numbers of the fields in memory order.
             pub fn to_numbers(&self) -> Vec<N> {
-                vec![$(self.$field),+]
+                let mut all = Vec::with_capacity(Self::LEN);
+                $($(all.extend(self.$array);)+)?
+                all.extend([$(self.$field),+]);
+                all
             }
 
-            /// Creates the struct from the fields in memory order; `numbers` has one entry per field.
+            /// Creates the struct from the numbers of its fields in memory order, [`Self::LEN`] of them.
             pub fn from_numbers(numbers: &[N]) -> Self {
-                let [$($field),+] = *numbers else { panic!("{} numbers for {}", numbers.len(), stringify!($name)) };
-                $name { $($field),+ }
+                let rest = numbers;
+                $($(let ($array, rest) = rest.split_first_chunk().expect(stringify!($array));)+)?
+                let [$($field),+] = *rest else { panic!("{} numbers for {}", numbers.len(), stringify!($name)) };
+                $name { $($($array: *$array,)+)? $($field),+ }
             }
         }
 
         impl<N: Number> $name<N> {
             /// Sets one lane of every field.
             pub fn set_lane(&mut self, lane: usize, values: &$name<N::Real>) {
+                $($(for (to, from) in self.$array.iter_mut().zip(values.$array) {
+                    to.set_lane(lane, from);
+                })+)?
                 $(self.$field.set_lane(lane, values.$field);)+
             }
         }
@@ -50,23 +65,10 @@ macro_rules! numbers {
 
 numbers! {
     /// Parameters of one member.
-    Parameters {
-        /// c₁ of `b(k) = c₁k + … + c₈k⁸`.
-        c1,
-        /// c₂.
-        c2,
-        /// c₃.
-        c3,
-        /// c₄.
-        c4,
-        /// c₅.
-        c5,
-        /// c₆.
-        c6,
-        /// c₇.
-        c7,
-        /// c₈.
-        c8,
+    Parameters [
+        /// The numbers of the law; see [`Flow::law`].
+        law: LAW
+    ] {
         /// Length τ of a fixed step, or of the current step if steps are adaptive.
         tau,
         /// ω of the redistribution, in 1/time.
@@ -79,8 +81,6 @@ numbers! {
         tolerance,
         /// Over-relaxation factor of the sweeps; 0 to choose it by the stiffness of each system.
         sor,
-        /// λ of the energy `∮(½k² + λ) ds`.
-        length_penalty,
         /// Isoperimetric ratio of the regular n-gon, `(n/π)·tan(π/n)`.
         polygon_ratio,
         /// Excess at which the member is relaxed.
@@ -299,22 +299,13 @@ impl Parameters<f64> {
     /// Returns the law of `flow` with fixed steps `tau`, the paper's ω = 1, redistribution and plain sweeps to 1e-5; no
     /// pull and no thresholds.
     pub fn of_flow(flow: &Flow, tau: f64) -> Parameters<f64> {
-        let [c1, c2, c3, c4, c5, c6, c7, c8] = flow.coefficients();
         Parameters {
-            c1,
-            c2,
-            c3,
-            c4,
-            c5,
-            c6,
-            c7,
-            c8,
+            law: flow.law(1.0),
             tau,
             omega: 1.0,
             redistribution: 1.0,
             tolerance: 1e-5,
             sor: 1.0,
-            length_penalty: flow.length_penalty(),
             polygon_ratio: 1.0,
             look_at: BIG,
             time_unit: 1.0,
@@ -412,12 +403,4 @@ impl Counters {
         "noted",
         "passed",
     ];
-}
-
-impl<N: Number> Parameters<N> {
-    /// c₁ … c₈.
-    #[inline(always)]
-    pub(super) fn coefficients(&self) -> [N; MAX_DEGREE] {
-        [self.c1, self.c2, self.c3, self.c4, self.c5, self.c6, self.c7, self.c8]
-    }
 }

@@ -27,7 +27,7 @@ pub mod decay;
 pub mod dense;
 pub mod evolve;
 pub mod extrapolation;
-pub mod flow;
+pub mod forces;
 pub mod member;
 pub mod observe;
 pub mod pace;

@@ -124,7 +124,7 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> C
     for i in 0..curve.len() {
         let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
         let k = curve.k[i];
-        let energy = (half * (k * k) + p.length_penalty) * curve.r[i];
+        let energy = p.energy_density(k) * curve.r[i];
         sums.add(i, [edge(curve, i)[2], xm * y - x * ym, energy, winding(curve, i)]);
     }
     let [length, area, energy, turning] = sums.totals();

@@ -5,7 +5,7 @@
 //! decay rates that do not converge (`docs/method.md`). `𝓒 = q_i/τ - (𝓐+𝓑+𝓓+𝓔)`, so the residual of the old
 //! state is `-Σ_j off_ij (x_j - x_i)`.
 
-use super::{Branches, Curve, Parameters, flow::Law, state::Motion};
+use super::{Branches, Curve, Parameters, forces::Law, state::Motion};
 use crate::{
     number::Number,
     solver::{Equation, Equations},
@@ -32,7 +32,7 @@ impl<'a, N: Number> Position<'a, N> {
         p: &Parameters<N>,
         branches: Branches,
     ) -> Self {
-        Position { old, new, motion, law: p.law(branches), tau: p.tau, rate: p.tau.recip() }
+        Position { old, new, motion, law: p.law(branches.degree), tau: p.tau, rate: p.tau.recip() }
     }
 }
 

@@ -1,14 +1,15 @@
-//! Velocity, tangential redistribution and the new lengths. Twin of `shaders/redistribution.wgsl`.
+//! Tangential redistribution and the new lengths. Twin of `shaders/redistribution.wgsl`.
 //!
 //! From the old state, with `q_i = (r_i + r_{i+1})/2`:
 //!
-//! - `β_i = -(1/r_i)·((k_{i+1}-k_i)/q_i - (k_i-k_{i-1})/q_{i-1}) + b(k_i)`, the paper's eq. (1);
+//! - `β_i = -(1/r_i)·((k_{i+1}-k_i)/q_i - (k_i-k_{i-1})/q_{i-1}) + b(k_i)`, the paper's eq. (1), by
+//!   [`forces`];
 //! - `α_i = α_{i-1} + r_i k_i β_i - r_i B + ω(M - r_i)`, eq. (5), with `B = Σ r k β / L`, `M = L/n`,
 //!   `α_0 = α_n = 0`;
 //! - `r_i ← r_i·exp(τ(-B + ω(M/r_i - 1)))`, eq. (3) for `η = ln r`; without redistribution α = 0 and
 //!   `r_i ← r_i·exp(-τ k_i β_i)`.
 
-use super::{Branches, Curve, Parameters, state::Motion};
+use super::{Branches, Curve, Parameters, forces, state::Motion};
 use crate::{
     number::Number,
     solver::{Blocks, Ring, Sums},
@@ -26,14 +27,10 @@ pub fn redistribute<N: Number>(
 ) -> N {
     let n = N::of(old.len() as f64);
     reciprocals(&old.r, motion);
-    let law = p.law(branches);
-    for i in 0..old.len() {
-        motion.b[i] = law.b(old.k[i]);
-    }
-    motion.b.close();
+    forces::fill(old, p, branches.degree, motion);
     let mut sums = Sums::new(blocks);
     for i in 0..old.len() {
-        let beta = velocity(motion, old.k.window(i), i);
+        let beta = forces::velocity(motion, old.k.window(i), i);
         let rkb = old.r[i] * old.k[i] * beta;
         motion.beta[i] = beta;
         motion.rkb[i] = rkb;
@@ -57,13 +54,6 @@ pub fn redistribute<N: Number>(
     r.close();
     reciprocals(r, motion);
     length
-}
-
-/// `β_i` of the curve whose reciprocal lengths and `b(k)` are in `motion`.
-#[inline(always)]
-fn velocity<N: Number>(motion: &Motion<N>, [_, km, k, kp, _]: [N; 5], i: usize) -> N {
-    let [_, iqm, iq, _, _] = motion.iq.window(i);
-    motion.b[i] - ((kp - k) * iq - (k - km) * iqm) * motion.ir[i]
 }
 
 /// Computes α by a running sum that restarts from the sum of whole blocks, like the kernel's prefix sum.

@@ -1,5 +1,8 @@
-// The law b(k) = c1 k + ... + c8 k^8 and phi(k) = k^2 - b(k)/k, by Horner's rule without division. Twin of
-// crates/flow/src/scheme/flow.rs.
+// The forces on a curve: beta, and b(k) = c1 k + ... + c8 k^8 and phi(k) = k^2 - b(k)/k by Horner's rule without division;
+// the density of the energy. Twin of crates/flow/src/scheme/forces.rs.
+
+/// The place of the length penalty in the law, after the coefficients.
+const LENGTH_PENALTY = 8u;
 
 struct Law { c1: real, c2: real, c3: real, c4: real, c5: real, c6: real, c7: real, c8: real }
 
@@ -8,8 +11,8 @@ var<private> law: Law;
 
 /// Reads the coefficients, once for k and once for the positions, so that no solve holds them in registers.
 fn read_law() {
-    let p = &all_parameters[member];
-    law = Law(p.c1, p.c2, p.c3, p.c4, p.c5, p.c6, p.c7, p.c8);
+    let p = &all_parameters[member].law;
+    law = Law(p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7]);
 }
 
 fn b(curvature: vec) -> vec {
@@ -29,4 +32,15 @@ fn b_over_k(curvature: vec) -> vec {
     sum = sum * curvature + vec(law.c3);
     sum = sum * curvature + vec(law.c2);
     return sum * curvature + vec(law.c1);
+}
+
+/// beta for the old curvatures, with their window `wk`.
+fn velocity(k: vec, wk: Window) -> vec {
+    read_law();
+    return b(k) - ((plus1(wk) - k) * here(iq) - (k - minus1(wk)) * minus1(iq)) * here(ir);
+}
+
+/// The energy of a unit of length.
+fn energy_density(k: vec) -> vec {
+    return real(0.5) * (k * k) + vec(all_parameters[member].law[LENGTH_PENALTY]);
 }
