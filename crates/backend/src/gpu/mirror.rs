@@ -165,8 +165,8 @@ impl<T: Real> Mirror<T> {
 
     /// Changes the parameters of a member.
     pub fn set_parameters(&mut self, slot: usize, parameters: &Parameters<T>) {
-        let fields = Parameters::<T>::LEN;
-        self.parameters[slot * fields..(slot + 1) * fields].copy_from_slice(&parameters.to_numbers());
+        let length = Parameters::<T>::LEN;
+        self.parameters[slot * length..(slot + 1) * length].copy_from_slice(&parameters.to_numbers());
         self.changed[slot] = true;
     }
 
@@ -196,9 +196,9 @@ impl<T: Real> Mirror<T> {
         let end = self.changed.iter().rposition(|changed| *changed).map_or(first, |last| last + 1);
         self.changed[first..end].fill(false);
         let reports: Vec<T> = self.reports[first..end].iter().flat_map(Report::to_numbers).collect();
-        let fields = Parameters::<T>::LEN;
+        let length = Parameters::<T>::LEN;
         let from = |binding: Binding| (binding.bytes::<T>(self.blocks, first)) as u64;
-        let parameters = bytemuck::cast_slice(&self.parameters[first * fields..end * fields]);
+        let parameters = bytemuck::cast_slice(&self.parameters[first * length..end * length]);
         write(Binding::Parameters, from(Binding::Parameters), parameters);
         write(Binding::Counters, from(Binding::Counters), bytemuck::cast_slice(&self.counters[first..end]));
         write(Binding::Reports, from(Binding::Reports), bytemuck::cast_slice(&reports));

@@ -205,7 +205,8 @@ pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>>
     let (table, columns) = Reader { source }.table(bytes)?;
     table.check_commas(source)?;
     let columns = columns.unwrap_or(Columns::unnamed(Separator::Comma));
-    let starts = table.starts(source, &columns)?;
+    let ring_columns = table.ring_columns(&columns);
+    let starts = table.starts(source, &ring_columns)?;
     let ends = starts.iter().skip(1).copied().chain([table.points.len()]);
     let spans: Vec<_> = starts.iter().copied().zip(ends).map(|(start, end)| start..end).collect();
     let several = spans.len() > 1;
@@ -217,7 +218,7 @@ pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>>
                 properties.insert(name.clone(), property(&table.words[*first as usize]));
             }
         }
-        let names = table.ring_columns(&columns).filter_map(|column| properties.get(&columns.others[column].0));
+        let names = ring_columns.iter().filter_map(|column| properties.get(&columns.others[*column].0));
         let names: Vec<&str> = names.map(String::as_str).filter(|name| !name.is_empty()).collect();
         let name = label(&names.join("/"));
         let part = match &name {
@@ -248,16 +249,19 @@ impl PointTable {
 
     /// The columns that name the ring of a point. A column that numbers the points, of the file or of each of its rings,
     /// is none of them.
-    fn ring_columns<'a>(&'a self, columns: &'a Columns) -> impl Iterator<Item = usize> + 'a {
-        let names_rings = |(name, _): &(String, usize)| is_ring_column(name);
-        (0..columns.others.len())
-            .filter(move |i| names_rings(&columns.others[*i]) && !self.numbers_points(&self.others[*i]))
+    fn ring_columns(&self, columns: &Columns) -> Vec<usize> {
+        let names_rings = |i: &usize| is_ring_column(&columns.others[*i].0) && !self.numbers_points(&self.others[*i]);
+        (0..columns.others.len()).filter(names_rings).collect()
     }
 
     /// Whether values, as indices into `words`, are all different, or numbers that rise over three points at least before
     /// they begin again.
     fn numbers_points(&self, values: &[u32]) -> bool {
-        if values.len() > 1 && values.iter().collect::<HashSet<_>>().len() == values.len() {
+        // Where rings are named, this ends it at once.
+        if values.len() < 2 || values.windows(2).any(|pair| pair[0] == pair[1]) {
+            return false;
+        }
+        if values.iter().collect::<HashSet<_>>().len() == values.len() {
             return true;
         }
         let numbers: Option<Vec<f64>> = values.iter().map(|value| self.words[*value as usize].parse().ok()).collect();
@@ -265,12 +269,12 @@ impl PointTable {
     }
 
     /// The indices at which outlines begin.
-    fn starts(&self, source: Source, columns: &Columns) -> Result<Vec<usize>> {
+    fn starts(&self, source: Source, ring_columns: &[usize]) -> Result<Vec<usize>> {
         let n = self.points.len();
         if n == 0 {
             return Ok(vec![0]);
         }
-        let keys: Vec<&[u32]> = self.ring_columns(columns).map(|i| &self.others[i][..]).collect();
+        let keys: Vec<&[u32]> = ring_columns.iter().map(|i| &self.others[*i][..]).collect();
         let new_key = |i: &usize| keys.iter().any(|key| key[*i] != key[*i - 1]);
         let inside = |kind: Break| self.breaks.iter().filter(move |(at, one)| *one == kind && (1..n).contains(at));
         let mut starts: Vec<usize> = inside(Break::Missing).map(|(at, _)| *at).chain((1..n).filter(new_key)).collect();
