@@ -101,7 +101,13 @@ impl Host for Notebook {
                 shared.ask(|py| shared.progress.call1(py, (done, total, share)).map(drop));
             }
         };
-        Manner { progress: Progress::Told(Box::new(told)), every: EVERY, stop, patience: PATIENCE }
+        Manner {
+            since: Instant::now(),
+            progress: Progress::Told(Box::new(told)),
+            every: EVERY,
+            stop,
+            patience: PATIENCE,
+        }
     }
 
     fn go_on(&self) -> curvelax::Result<()> {

@@ -50,7 +50,7 @@ mod _curvelax {
 
     use curvelax::{
         files::{Existing, OutputFolder, names},
-        session::{self, Completed, Host, ResumePlace, Work},
+        session::{self, Completed, Host, Plan, ResumePlace},
     };
     use pyo3::{
         prelude::*,
@@ -107,9 +107,9 @@ mod _curvelax {
             let spec = keys.spec()?;
             let manner = host.manner()?;
             OutputFolder::check_place(&out, existing)?;
-            let work = Work::new(session::planned(spec, Some(&manner), &host)?)?;
-            work.study.note().into_iter().for_each(|note| host.say(&format!("note: {note}")));
-            session::begin(work, &out, existing, manner, &host)
+            let placed = Plan::new(spec, Some(&manner), &host)?.place()?;
+            placed.study.note().into_iter().for_each(|note| host.say(&format!("note: {note}")));
+            session::begin(placed, &out, existing, manner, &host)
         });
         let completed = done.map_err(|error| raise(py, error, host.raised()))?;
         tell_verdict(&host, &completed);

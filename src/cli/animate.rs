@@ -11,7 +11,7 @@ use crate::{
         movie::{Cut, HOLD, MOST_SECONDS, Movie, SECONDS, WIDTH, WIDTHS},
         reader,
     },
-    text::{count, number},
+    text::{bytes, count, number},
 };
 
 const EXAMPLES: &str = "\
@@ -102,8 +102,8 @@ pub fn animate(args: AnimateArgs) -> Result<()> {
         return Ok(());
     }
     let shown = count(movie.members() as u64, "member");
-    let (seconds, size) = (number(cut.seconds + HOLD), content.len().div_ceil(1000));
-    print(&format!("results    {}: {shown}, {seconds} s, {frames}{size} kB\n", path.display()))
+    let (seconds, size) = (number(cut.seconds + HOLD), bytes(content.len() as u64));
+    print(&format!("results    {}: {shown}, {seconds} s, {frames}{size}\n", path.display()))
 }
 
 /// Checks the numbers.

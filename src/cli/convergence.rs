@@ -2,11 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{flags, note, print};
+use super::{
+    flags, note, print,
+    referee::{RefereeFlags, referee},
+};
 use crate::{
     draw::charts::{WorkCurve, WorkDiagram, WorkPanels},
     ensemble::{
-        Spec,
+        Spec, Study,
         request::spec::{BackendChoice, Precision, Solver, SolverChoice},
     },
     error::{Error, Result},
@@ -25,6 +28,8 @@ Examples:
   curvelax convergence --problem willmore-circle --problem lemniscate --out convergence
   curvelax convergence --backend gpu --precision f32
   curvelax convergence --work-precision --out work
+  curvelax convergence --referee --shape flower:3:0.2 --flow willmore
+  curvelax convergence --referee --curves 100 --seed 2 --out referee
 
 An error is measured/exact - 1. In n, with tau proportional to 1/n^2, the order should be 2. In tau, at a fixed n, it
 should be 1. In the length of adaptive steps, proportional to the root of their tolerance, it should be 2. The last two are
@@ -34,7 +39,12 @@ by rounding only.
 --work-precision runs members of the default ensemble with fixed steps and with adaptive steps of every order, at
 several lengths and tolerances, until they are relaxed. Its error is the median of |t_relax/reference - 1|, where the
 reference has the same nodes and a tolerance of 1e-8: the error of the steps alone. It takes some seconds with --solver
-direct, and minutes with plain sweeps.";
+direct, and minutes with plain sweeps.
+
+--referee solves the same flow by tangent angle and length, with Fourier coefficients and steps of order 8, twice, until
+both solutions agree to 1e-6. It refuses curves with corners and curves that become singular. For one curve the table has
+t_relax at n = 50, 100 and 200 (adaptive steps, 1e-5), whose error should fall at order 2, and t_limit; with --curves it has
+the t_limit of every member. The error of t_limit is also told in bars, its half-width t_error.";
 
 /// Solve problems with exact solutions; print errors and observed orders as a table.
 #[derive(clap::Args)]
@@ -46,6 +56,8 @@ pub struct ConvergenceArgs {
     /// Instead, measure what an error of the relaxation time costs, in solves and in seconds
     #[arg(long, conflicts_with = "problem")]
     work_precision: bool,
+    #[command(flatten)]
+    referee: RefereeFlags,
     /// Solver of the pentadiagonal systems; sweeps take longer [default: direct; with --work-precision all]
     #[arg(long, value_name = "SOLVER", value_parser = flags::solver::<SolverChoice>(&SolverChoice::NAMES), help_heading = flags::METHOD)]
     solver: Option<SolverChoice>,
@@ -58,7 +70,7 @@ pub struct ConvergenceArgs {
     /// Number type [default: f64 where the device has it]
     #[arg(long, value_name = "TYPE", value_parser = flags::word::<Precision>(flags::PRECISIONS), help_heading = flags::MACHINE)]
     precision: Option<Precision>,
-    /// Folder for convergence.csv, or work_precision.csv and .svg, which must not exist yet [default: no file]
+    /// Folder for convergence.csv, work_precision.csv and .svg, or referee.csv, which must not exist yet [default: no file]
     #[arg(long, value_name = "DIR", help_heading = flags::OUTPUT)]
     out: Option<PathBuf>,
     /// Write into an existing DIR, replacing these files in it
@@ -83,15 +95,24 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
         precision: args.precision,
         ..Spec::default()
     };
-    let mut method = spec.validate()?;
+    let (refereed, one) = (args.referee.is_given(), args.referee.is_one());
+    let spec = if refereed { args.referee.spec(spec) } else { spec };
+    let mut method = if refereed { checked(spec)? } else { spec.validate()? };
     let choice = placement::choose(&method, method.points)?;
     // Chosen once: adapters are looked for only now, and all runs have the same precision.
     choice.settle(&mut method);
-    let names = if args.work_precision { vec![names::WORK, names::WORK_PICTURE] } else { vec![names::CONVERGENCE] };
+    let names = match (args.work_precision, refereed) {
+        (true, _) => vec![names::WORK, names::WORK_PICTURE],
+        (_, true) => vec![names::REFEREE],
+        _ => vec![names::CONVERGENCE],
+    };
     let folder = args.out.map(|out| open(&out, args.force, names)).transpose()?;
     if !args.quiet {
         note(&if args.work_precision { choice.place() } else { choice.sentence(&method) });
         choice.warning().iter().for_each(|warning| note(&format!("warning: {warning}")));
+    }
+    if refereed {
+        return referee(&method, one, folder, args.quiet);
     }
     if args.work_precision {
         let solvers = solver.map_or(Solver::ALL.to_vec(), |_| vec![method.solver()]);
@@ -118,6 +139,12 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
             rows.len()
         ))),
     }
+}
+
+/// Checks a spec whose times follow its curves as they are made.
+fn checked(spec: Spec) -> Result<Spec> {
+    let study = Study::new(spec)?;
+    Ok(study.spec().clone())
 }
 
 fn open(out: &Path, force: bool, names: Vec<&str>) -> Result<OutputFolder> {

@@ -1,20 +1,39 @@
 //! `curvelax run --dry-run`: the predicted cost of a run, as a table or as JSON; nothing is written.
 
+use super::{manner::MannerFlags, print, print_json};
 use crate::{
     ensemble::Spec,
+    error::Result,
     estimate::{Estimate, Pilot},
-    report::overview::machine,
+    report::{Stop, overview::machine},
+    session::{Host, PlacedStudy},
     text::{bytes, duration, plural},
 };
 
+/// Estimates the run of `placed` by pilots that `stop` ends, and prints the estimate as `host` was asked to.
+///
+/// # Errors
+/// Those of the run itself, and that of the stop.
+pub fn dry_run(placed: PlacedStudy, stop: &Stop, host: &MannerFlags) -> Result<()> {
+    placed.warnings().iter().for_each(|warning| host.say(&format!("warning: {warning}")));
+    let PlacedStudy { study, choices, .. } = placed;
+    let stopped = || Some(stop.asked()?.0.error(" in the pilot: nothing is saved"));
+    let estimate = Estimate::new(&study, choices, host.checkpoint_every(), &stopped)?;
+    match (host.json, host.quiet) {
+        (true, _) => print_json(&estimate),
+        (false, false) => print(&table(&estimate, &study.cells()[0].spec)),
+        (false, true) => Ok(()),
+    }
+}
+
 /// The table.
-pub fn table(estimate: &Estimate, spec: &Spec) -> String {
-    let Estimate { members, cells, slots, level_members, pilot, .. } = estimate;
+fn table(estimate: &Estimate, spec: &Spec) -> String {
+    let Estimate { members, cells, slots, pilot, .. } = estimate;
     let unknown = |what: &str| format!("not known: the pilot was over before {what}");
     let which = plural(*members, "member");
     let rows = [
         ("members", format!("{members} in {cells} {}", plural(*cells as u64, "cell"))),
-        ("levels", levels(*level_members)),
+        ("levels", levels(estimate)),
         ("back end", format!("{}; solver {}", machine(&estimate.platform), spec.solver().name())),
         ("resident", format!("{} {which} at once", (*slots as u64).min(*members))),
         ("memory", format!("about {}", bytes(estimate.memory_bytes))),
@@ -44,10 +63,13 @@ fn started(Pilot { members, ended, failed, seconds, .. }: &Pilot) -> String {
 }
 
 /// The members that run besides, for the error of discretisation.
-fn levels(members: u64) -> String {
-    match members {
+fn levels(Estimate { level_members, finer_members, most_points, .. }: &Estimate) -> String {
+    let finer = finer_members.filter(|finer| *finer > 0).map_or(String::new(), |finer| {
+        format!("; about {finer} {} more nodes, up to n = {most_points}", if finer == 1 { "needs" } else { "need" })
+    });
+    match *level_members {
         0 => "none: the error of discretisation will not be known".into(),
-        _ => format!("{members} {} besides at other resolutions", plural(members, "member")),
+        members => format!("{members} {} besides at other resolutions{finer}", plural(members, "member")),
     }
 }
 
@@ -74,6 +96,8 @@ mod tests {
             platform,
             slots: 128,
             level_members: 32,
+            finer_members: None,
+            most_points: 100,
             memory_bytes: 17_400_000,
             disk_bytes: 1_340_000_000,
             steps_per_member: Some(1999.6),
@@ -96,6 +120,9 @@ time       about 31.9 s after start-up
 pilot      130 of 130 started members ended in 1.40 s
 ";
         assert_eq!(table(&estimate, &Spec::default()), expected);
+        let finer = Estimate { finer_members: Some(12), most_points: 1600, ..estimate.clone() };
+        let told = "levels     32 members besides at other resolutions; about 12 need more nodes, up to n = 1600\n";
+        assert!(table(&finer, &Spec::default()).contains(told));
         let little = Estimate { steps_per_member: None, dispatches: None, seconds: None, ..estimate };
         assert_eq!(table(&little, &Spec::default()).matches("not known: the pilot was over before a").count(), 3);
     }

@@ -24,7 +24,7 @@ use crate::{
 };
 
 const SAMPLINGS: &[&str] = &["parameter", "arclength", "points"];
-const PERTURBATIONS: &[&str] = &["amplitude-phase", "gaussian"];
+pub(super) const PERTURBATIONS: &[&str] = &["amplitude-phase", "gaussian"];
 const DESIGNS: &[&str] = &["random", "sobol", "lhs"];
 const ORDERS: &[&str] = &["coloured", "lexicographic"];
 pub(super) const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
@@ -190,15 +190,17 @@ pub struct SpecFlags {
     #[arg(long, help_heading = EVOLUTION)]
     accurate: bool,
     /// Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n → ∞:
-    /// columns t_limit, t_error and order of summary.csv [default: false]
+    /// columns t_limit, t_error, order and points of summary.csv. Members whose times do not converge there also run with
+    /// √2 n, 2n, … up to 1600 nodes [default: false]
     #[arg(
         long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
         hide_possible_values = true, help_heading = EVOLUTION
     )]
     refine: Option<bool>,
     /// Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for sampling and
-    /// discretisation together, is within X times the median. --curves, --points and --adaptive are what it begins with.
-    /// A run that misses it exits with code 3. Needs --refine [default: off]
+    /// discretisation together, is within X times the median. The number of outlines is given: for them n and the tolerance
+    /// are chosen so that each t_error is within X times t_limit. --curves, --points and --adaptive are what it begins with.
+    /// If X cannot be reached, the run has the best that was, and exits with code 3. Needs --refine [default: off]
     #[arg(long, value_name = "X", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
     accuracy: Option<f64>,
 
@@ -409,7 +411,7 @@ pub(super) fn duration(text: &str) -> Result<Duration, String> {
     }
 }
 
-fn text_of<T: std::str::FromStr<Err = String>>(text: &str) -> Result<T, String> {
+pub(super) fn text_of<T: std::str::FromStr<Err = String>>(text: &str) -> Result<T, String> {
     text.parse()
 }
 

@@ -1,6 +1,9 @@
 //! How a run goes about its work, for `run` and `resume`: flags that change no result.
 
-use std::{path::Path, time::Duration};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use super::{flags, note, print, signals};
 use crate::{
@@ -51,12 +54,20 @@ impl MannerFlags {
         check_name(self.json, out)
     }
 
-    /// Says about the finished run in `out` what was said at its end: its results as JSON, if they are asked for, and
-    /// whether it holds what was asked for.
+    /// Reports the end of the run in `out`: the one that was just completed, or one that was finished before.
     ///
     /// # Errors
     /// As [`RunVerdict::check`], and those of reading the run.
-    pub fn finished(&self, out: &Path) -> Result<()> {
+    pub fn ended(&self, completed: Option<Completed>, out: &Path) -> Result<()> {
+        match completed {
+            Some(completed) => self.completed(completed),
+            None => self.finished(out),
+        }
+    }
+
+    /// Says about the finished run in `out` what was said at its end: its results as JSON, if they are asked for, and
+    /// whether it holds what was asked for.
+    fn finished(&self, out: &Path) -> Result<()> {
         let provenance = reader::provenance(out)?;
         let verdict = match self.json || RunVerdict::needs_statistics(&provenance) {
             false => RunVerdict::new(&provenance, None),
@@ -74,10 +85,7 @@ impl MannerFlags {
     }
 
     /// Prints the results of a run that was just completed.
-    ///
-    /// # Errors
-    /// As [`RunVerdict::check`].
-    pub fn completed(&self, Completed { text, verdict, out }: Completed) -> Result<()> {
+    fn completed(&self, Completed { text, verdict, out }: Completed) -> Result<()> {
         if self.json || !self.quiet {
             print(&text)?;
         }
@@ -109,7 +117,8 @@ impl Host for MannerFlags {
     }
 
     fn manner_with(&self, stop: Stop) -> Manner {
-        Manner { progress: Progress::new(self.quiet), every: self.checkpoint_every, stop, patience: PATIENCE }
+        let (since, progress, every) = (Instant::now(), Progress::new(self.quiet), self.checkpoint_every);
+        Manner { since, progress, every, stop, patience: PATIENCE }
     }
 }
 

@@ -16,6 +16,7 @@ mod man;
 mod manner;
 mod merge;
 mod plot;
+mod referee;
 mod resume;
 mod run;
 mod signals;

@@ -49,8 +49,5 @@ pub fn resume(args: ResumeArgs) -> Result<()> {
     let ResumeArgs { run, backend, adapter, threads, manner } = args;
     manner.check_name(&run)?;
     let place = ResumePlace { backend, adapter, threads, why: None };
-    match session::resume(&run, place, &manner)? {
-        Some(completed) => manner.completed(completed),
-        None => manner.finished(&run),
-    }
+    manner.ended(session::resume(&run, place, &manner)?, &run)
 }

@@ -1,14 +1,13 @@
-//! `curvelax run`: arguments → spec → members → files.
+//! `curvelax run`: request → plan → study and placement → session → report.
 
 use std::path::PathBuf;
 
-use super::{dry_run, flags, manner::MannerFlags, print, print_json};
+use super::{dry_run, flags, manner::MannerFlags, print};
 use crate::{
     ensemble::Spec,
     error::{Error, Result},
-    estimate::Estimate,
     files::{Existing, OutputFolder},
-    session::{self, Host, Work},
+    session::{self, Host, Plan},
 };
 
 const EXAMPLES: &str = "\
@@ -60,51 +59,39 @@ pub struct RunArgs {
 
 /// Runs the command.
 pub fn run(args: RunArgs) -> Result<()> {
-    let spec = resolve(args.spec, args.flags)?;
-    let asked = spec.backend;
-    let runs = !(args.print_spec || args.dry_run);
+    let RunArgs { spec, flags, out, force, resume, manner: host, dry_run, print_spec } = args;
+    let request = request(spec, flags)?;
+    let asked = request.backend;
     // Rounds and pilots take time, too.
-    let manner = if spec.accuracy.is_some() || args.dry_run { Some(args.manner.manner()?) } else { None };
+    let manner = if request.accuracy.is_some() || dry_run { Some(host.manner()?) } else { None };
     // A name that cannot be used is told before the rounds, which may take minutes.
-    if let (true, Some(out)) = (runs && !args.resume, &args.out) {
-        OutputFolder::check_place(out, args.force)?;
+    if let (false, Some(out)) = (print_spec || dry_run || resume, &out) {
+        OutputFolder::check_place(out, force)?;
     }
-    let spec = session::planned(spec, manner.as_ref(), &args.manner)?;
-    let work = Work::new(spec)?;
-    if args.print_spec {
-        return print(&work.study.spec().to_toml()?);
+    let placed = Plan::new(request, manner.as_ref(), &host)?.place()?;
+    if print_spec {
+        return print(&placed.study.spec().to_toml()?);
     }
-    let flags = args.manner;
-    work.study.note().into_iter().for_each(|note| flags.say(&format!("note: {note}")));
-    if args.dry_run {
-        work.warnings().iter().for_each(|warning| flags.say(&format!("warning: {warning}")));
-        let stopped = || {
-            let (cause, _) = manner.as_ref()?.stop.asked()?;
-            Some(cause.error(" in the pilot: nothing is saved"))
-        };
-        let estimate = Estimate::new(&work.study, work.choices, flags.checkpoint_every(), &stopped)?;
-        return match (flags.json, flags.quiet) {
-            (true, _) => print_json(&estimate),
-            (false, false) => print(&dry_run::table(&estimate, &work.study.cells()[0].spec)),
-            (false, true) => Ok(()),
-        };
+    placed.study.note().into_iter().for_each(|note| host.say(&format!("note: {note}")));
+    if let (true, Some(manner)) = (dry_run, &manner) {
+        return dry_run::dry_run(placed, &manner.stop, &host);
     }
-    let out = args.out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
-    flags.check_name(&out)?;
-    let begun = if args.resume { session::begun(&out)? } else { None };
-    if let Some(begun) = begun {
-        return match session::resume_like(begun, &work.study, asked, &flags)? {
-            Some(completed) => flags.completed(completed),
-            None => flags.finished(&out),
-        };
-    }
-    let manner = manner.map_or_else(|| flags.manner(), Ok)?;
-    let existing = if args.resume { Existing::Filled } else { args.force.into() };
-    flags.completed(session::begin(work, &out, existing, manner, &flags)?)
+    let out = out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
+    host.check_name(&out)?;
+    let begun = if resume { session::begun(&out)? } else { None };
+    let completed = match begun {
+        Some(begun) => session::resume_like(begun, &placed.study, asked, &host)?,
+        None => {
+            let manner = manner.map_or_else(|| host.manner(), Ok)?;
+            let existing = if resume { Existing::Filled } else { force.into() };
+            Some(session::begin(placed, &out, existing, manner, &host)?)
+        }
+    };
+    host.ended(completed, &out)
 }
 
 /// The spec file, overlaid with the flags.
-fn resolve(file: Option<PathBuf>, flags: flags::SpecFlags) -> Result<Spec> {
+fn request(file: Option<PathBuf>, flags: flags::SpecFlags) -> Result<Spec> {
     let mut spec = file.map_or_else(|| Spec::from_toml("").map_err(Error::Request), |path| Spec::read(&path))?;
     flags.check_sweeps()?;
     flags.overlay(&mut spec);

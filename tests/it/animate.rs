@@ -86,6 +86,9 @@ fn a_gif_shows_all_members_from_start_to_end() {
     let done = run(RUN);
     let said = animated(done.home.path(), &format!("out {SECOND}"));
     assert!(said.starts_with("results    out/movie.gif: 5 members, 2 s, 21 frames, "), "{said}");
+    let size = fs::metadata(done.path().join("movie.gif")).unwrap().len();
+    // As other sizes are told.
+    assert!(said.ends_with(&format!(", {:.0} KB\n", size as f64 / 1024.0)), "{said}");
     let shown = Shown::read(&done.path().join("movie.gif"));
     let delays: Vec<u16> = shown.frames.iter().map(|(delay, _)| *delay).collect();
     assert_eq!((shown.width, delays.len(), delays.iter().sum::<u16>()), (800, FRAMES, 200));

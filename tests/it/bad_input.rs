@@ -206,6 +206,7 @@ fn a_file_of_outlines_that_is_not_there_is_told_with_the_path_looked_for() {
             "files:no*.csv",
             &[&format!("no file matches in {folder}; check folder and extension"), "'files:outlines/*.csv'"],
         ),
+        ("files:none/*.csv", &[&format!("there is no folder none in {folder}; check its name")]),
         ("files:folder.csv/", &["it is a folder; write 'files:folder.csv/*.csv'"]),
     ] {
         let output = curvelax(home.path(), &["run", "--shape", shape, "--out", "new/out"]);
@@ -686,6 +687,7 @@ fn force_refuses_a_folder_that_holds_what_is_not_of_a_run() {
         (&["notes.txt"][..], "notes.txt"),
         (&["plots/mine.svg", "data/a.csv"], "data, plots/mine.svg"),
         (&["f", "e", "d", "c", "b", "a"], "a, b, c, d, and 2 more"),
+        (&["series.csv"], "series.csv"),
         (&[".DS_Store"], ""),
     ] {
         for name in files {

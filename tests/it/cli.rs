@@ -128,7 +128,8 @@ fn a_run_that_missed_its_accuracy_says_so_also_when_it_is_found_finished() {
         let output = curvelax(home.path(), "resume out --quiet");
         let message = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(code), "{message}");
-        let missed = message.starts_with("error: --accuracy 0.001: 0.") && message.contains(" was reached; use more");
+        let missed =
+            message.starts_with("error: --accuracy 0.001: 0.") && message.contains("was reached; sampling alone needs");
         assert_eq!(missed, code == 3, "{message}");
     }
 }

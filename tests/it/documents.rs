@@ -11,7 +11,7 @@ use curvelax::{
     ensemble::{Spec, request::event::MAX_EVENTS},
     files::{
         TableRow, names,
-        tables::{CostRow, ErrorRow},
+        tables::{CostRow, ErrorRow, TruthRow},
     },
     report,
     results::{cells::EnsembleStatistics, tally::Tally},
@@ -153,6 +153,7 @@ fn columns() -> String {
         of_run(names::SERIES, "member and time, with `--series`"),
         of_run(names::SNAPSHOTS, "member, time and node, with `--snapshots`"),
         table_of::<ErrorRow>(names::CONVERGENCE, "run of a problem, from `curvelax convergence --out`"),
+        table_of::<TruthRow>(names::REFEREE, "time of a member, from `curvelax convergence --referee --out`"),
         table_of::<CostRow>(names::WORK, "method, from `curvelax convergence --work-precision --out`"),
     ]
     .concat()

@@ -46,6 +46,15 @@ fn what_is_no_interrupted_run_is_refused_or_left_alone() {
     let small = "run --backend cpu --curves 2 --points 34 --t-end 0.01 --out done --quiet";
     said(&curvelax(home.path(), small), 0);
     let before = contents(&home.path().join("done"));
+    // --force would refuse its tables.
+    fs::create_dir(home.path().join("tables")).unwrap();
+    fs::write(home.path().join("tables/summary.csv"), "a\n").unwrap();
+    refused(
+        home.path(),
+        "tables",
+        "",
+        &["tables: no run was started here; start one with curvelax run in another folder"],
+    );
     let message = said(&curvelax(home.path(), "resume done"), 0);
     assert_eq!(message, "note: the run in done is finished: nothing is left to do\n");
     assert!(contents(&home.path().join("done")) == before);

@@ -243,18 +243,39 @@ fn outlines_of_very_different_sizes_all_relax_in_their_own_times() {
 }
 
 #[test]
+fn an_accuracy_is_asked_of_each_outline() {
+    let home = home();
+    let home = home.path();
+    let shape = "run --shape file:grains.geojson --accurate --points 64 --backend cpu --quiet";
+    let errors = |out: &str| -> Vec<f64> {
+        let number = |row: &BTreeMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
+        let rows = rows(&home.join(out).join("summary.csv"));
+        rows.iter().map(|row| number(row, "t_error") / number(row, "t_limit")).collect()
+    };
+    done(home, &format!("{shape} --out before"));
+    let (before, goal) = (errors("before"), 0.02);
+    assert!(before.iter().any(|error| *error > goal), "{before:?}");
+    done(home, &format!("{shape} --accuracy {goal} --out reached"));
+    let reached = errors("reached");
+    assert!(reached.len() == GRAINS && reached.iter().all(|error| *error <= goal), "{reached:?}");
+    // Their number is given, and n was chosen.
+    let run: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(home.join("reached/run.json")).unwrap()).unwrap();
+    assert!(run["spec"]["points"].as_u64().is_some_and(|points| points > 64), "{}", run["spec"]);
+}
+
+#[test]
 fn wrong_requests_are_one_clear_message_before_any_work() {
     let home = home();
     let home = home.path();
     fs::write(home.join("csv/triangle.txt"), "0,0\n1,0\n0,1\n").unwrap();
     for (arguments, parts) in [
-        ("--shape files:none/*.csv", &["no file matches in "][..]),
+        ("--shape files:none/*.csv", &["there is no folder none in "][..]),
         ("--shape files:csv/*.csv --group-by phase", &["--group-by phase: no outline has such a property", "file"]),
         ("--shape file:grains.geojson --group-by phse", &["they have name, phase, file"]),
         ("--group-by phase", &["the shape is one curve"]),
         ("--outlines 3", &["--outlines 3: the shape ellipse:2,1 is one curve"]),
         ("--shape file:grains.geojson --outlines 6", &["--outlines 6: file:grains.geojson has 7 outlines"]),
-        ("--shape file:grains.geojson --accurate --accuracy 0.01", &["outlines are as many as they are"]),
         ("--shape file:grains.geojson --curves 0", &["--curves 0"]),
         ("--shape file:grains.geojson --curves 200000000", &["--curves 200000000: ", "1400000000 members"]),
         ("--shape files:csv/* --sampling points", &["`grain-0` has 48 points, `triangle` 3"]),

@@ -192,6 +192,24 @@ fn events_that_are_not_those_of_the_run_are_refused_with_their_place() {
         fs::write(events(out), text + "6,1,convex,0.1,0\n").unwrap();
     };
     refused(&done, more, "out/events.csv, line 14, column member: expected the end of the file, found `6`");
+    // Where the other table lacks a row, it is that one that is named.
+    let without = |out: &Path, name: &str, row: usize| {
+        let text = fs::read_to_string(out.join(name)).unwrap();
+        let kept = text.lines().enumerate().filter(|(line, _)| *line != row);
+        fs::write(out.join(name), kept.map(|(_, row)| format!("{row}\n")).collect::<String>()).unwrap();
+    };
+    let lacking =
+        "out/summary.csv: expected another row of member 2, which out/events.csv has, found member 3; restore";
+    refused(&done, |out| without(out, "summary.csv", 3), lacking);
+    let done = run(&format!("{} --refine", RUN.replace("--points 32", "--points 64")));
+    let rows = done.text("levels.csv").lines().count();
+    for (row, found) in [(2, "member "), (rows - 1, "the end of the file; restore")] {
+        let member = done.text("levels.csv").lines().nth(row).unwrap().split(',').next().unwrap().to_string();
+        let lacking = format!(
+            "out/levels.csv: expected another row of member {member}, which out/event_levels.csv has, found {found}"
+        );
+        refused(&done, |out| without(out, "levels.csv", row), &lacking);
+    }
 }
 
 #[test]
@@ -226,8 +244,8 @@ fn a_summary_that_is_not_whole_is_refused_with_its_place() {
         |out| replace(&summary(out), "member,cell,status", "member,cell,state"),
         "out/summary.csv, line 1, column status: expected the heading `status`, found `state`",
     );
-    refused(&done, |out| replace(&summary(out), ",self_crossing", ""), "line 1: expected 32 fields, found 31");
-    refused(&done, |out| replace(&summary(out), "\n2,0,", "\n2,0,0,"), "line 4: expected 32 fields, found 33");
+    refused(&done, |out| replace(&summary(out), ",self_crossing", ""), "line 1: expected 33 fields, found 32");
+    refused(&done, |out| replace(&summary(out), "\n2,0,", "\n2,0,0,"), "line 4: expected 33 fields, found 34");
     refused(
         &done,
         |out| field(&summary(out), 3, 13, "long"),
@@ -325,7 +343,16 @@ fn what_is_no_finished_run_of_this_program_is_refused() {
         |out| replace(&json(out), "\"format\": 1", "\"format\": 2"),
         "out/run.json: expected format 1 at most, found 2",
     );
-    refused(&done, |out| replace(&json(out), "  \"format\": 1,\n", ""), "expected a number under `format`");
+    refused(
+        &done,
+        |out| replace(&json(out), "  \"format\": 1,\n", ""),
+        "a whole number from 1 under `format`, found none",
+    );
+    refused(
+        &done,
+        |out| replace(&json(out), "\"format\": 1", "\"format\": \"x\""),
+        "a whole number from 1 under `format`, found \"x\"",
+    );
     refused(&done, |out| replace(&json(out), "\"points\": 32", "\"points\": 1"), "out/run.json, spec: --points 1: ");
     refused(
         &done,

@@ -1,7 +1,12 @@
 //! Rows that wait for their members to end: on disk if they are many, and in the tables with the same bytes as in a run
 //! that was never interrupted.
 
-use std::{collections::BTreeMap, fs, path::Path, time::Duration};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use curvelax::{
     Error, Result,
@@ -67,6 +72,7 @@ impl Sink for Impatient<'_> {
 
 fn manner() -> Manner {
     Manner {
+        since: Instant::now(),
         progress: Progress::Quiet,
         every: Duration::from_secs(1000),
         stop: Stop::default(),

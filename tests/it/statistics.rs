@@ -6,7 +6,7 @@
 use std::{fs, path::PathBuf};
 
 use curvelax::statistics::{
-    Bootstrap, Description, Interval, KaplanMeier, Line, Observation, PowerLaw, Sample, log_rank,
+    Description, Interval, KaplanMeier, Line, Observation, PowerLaw, Sample, interval, log_rank,
 };
 use proptest::{prelude::*, test_runner::RngSeed};
 use toml::{Table, Value};
@@ -275,49 +275,18 @@ fn fits_agree_with_scipy() {
     }
 }
 
-/// Whether the ends of an interval are quantiles of `(time, share of medians at or below it)`, up to chance.
-fn is_within_chance(interval: Interval, bootstrap: Bootstrap, shares: &[(f64, f64)]) -> bool {
-    let outside = 0.5 * (1.0 - bootstrap.level);
-    // Five standard errors of a share from n resamples.
-    let chance = 5.0 * (outside * (1.0 - outside) / f64::from(bootstrap.resamples)).sqrt();
-    let fits = |end: Option<f64>, p: f64| {
-        let at = end.map_or(shares.len(), |end| shares.partition_point(|(time, _)| *time < end));
-        let below = at.checked_sub(1).map_or(0.0, |before| shares[before].1);
-        let here = shares.get(at).map_or(1.0, |share| share.1);
-        below < p + chance && here > p - chance
-    };
-    fits(interval.lower, outside) && fits(interval.upper, 1.0 - outside)
-}
-
 #[test]
-fn the_bootstrap_finds_the_intervals_of_resamples_drawn_member_by_member() {
-    let (reference, rows) = (reference(), rows("leukaemia"));
-    let shares = |name: &str| -> Vec<(f64, f64)> {
-        let pairs = reference["bootstrap"][name].as_array().unwrap().iter();
-        pairs.map(|pair| (number(&pair[0]), number(&pair[1]))).collect()
-    };
-    for (name, other, group) in [("drug", "both", Some(0)), ("both", "drug", None)] {
-        for level in [0.3, 0.5, 0.8, 0.9, 0.95, 0.99] {
-            let bootstrap = Bootstrap { resamples: 20_000, level, seed: 7 };
-            let interval = bootstrap.median(&sample(&rows, group)).unwrap();
-            assert!(is_within_chance(interval, bootstrap, &shares(name)), "{name} {level}: {interval:?}");
-            assert!(!is_within_chance(interval, bootstrap, &shares(other)), "{name} {level}: blind");
-        }
-    }
-}
-
-#[test]
-fn the_bootstrap_depends_on_its_seed_and_not_on_threads() {
-    let sample = sample(&rows("thousand"), None);
-    let interval = |seed, threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Bootstrap { seed, ..Bootstrap::default() }.median(&sample)).unwrap()
-    };
-    let first = interval(1, 1);
-    assert!([2, 3, 7].iter().all(|threads| interval(1, *threads) == first));
-    assert!((2..5).any(|seed| interval(seed, 2) != first));
-    let median = KaplanMeier::new(&sample).median().unwrap();
-    assert!(first.lower.unwrap() < median && median < first.upper.unwrap());
+fn the_intervals_of_the_textbook_example_are_those_of_ranks_and_of_the_beta_product() {
+    let rows = rows("leukaemia");
+    let median = |rows: &[Row], group| interval::of_sample(&sample(rows, Some(group)), 0.5).unwrap();
+    // Of 21 weeks under placebo, the 6th and the 16th: 27 896 of the 2^21 tosses of 21 coins have at most 5 heads.
+    let placebo = median(&rows, 1);
+    assert_eq!(placebo.bounds(), Some((4.0, 12.0)));
+    assert!((placebo.coverage - (1.0 - 2.0 * 27_896.0 / 2_097_152.0)).abs() < 1e-12, "{placebo:?}");
+    // Under 6-mercaptopurine the median is at 23 weeks, and may be at any later one.
+    let drug = median(&rows, 0);
+    assert_eq!((drug.lower, drug.upper, drug.coverage), (Some(11.0), None, 0.95));
+    assert_ne!(median(&overlooked(rows), 0), drug, "blind");
 }
 
 /// Any sample, with many ties.
@@ -387,11 +356,16 @@ proptest! {
         }
         prop_assert_eq!(curve.mean().is_none(), sample.events() == 0);
         prop_assert_eq!(curve.caveat().is_none(), sample.events() > 1 && before == 0.0);
-        let interval = Bootstrap { resamples: 40, ..Bootstrap::default() }.median(&sample);
-        prop_assert_eq!(interval.is_some(), sample.len() > 1 && sample.events() > 0);
-        if let Some(Interval { lower, upper, unreached }) = interval {
-            prop_assert!(lower.unwrap_or(f64::MAX) <= upper.unwrap_or(f64::MAX));
-            prop_assert!(unreached < 40 || lower.is_none());
+        for p in LEVELS {
+            let found = interval::of_sample(&sample, p);
+            prop_assert!(found.is_some() || sample.len() < 2 || p != 0.5);
+            if let Some(Interval { lower, upper, coverage, range_of }) = found {
+                prop_assert!(lower.unwrap_or(f64::MIN) <= upper.unwrap_or(f64::MAX));
+                prop_assert!((0.0..=1.0).contains(&coverage) && (coverage < 0.95) == range_of.is_some());
+                if let Some(t) = curve.quantile(p) {
+                    prop_assert!(lower.is_none_or(|lower| lower <= t) && upper.is_none_or(|upper| t <= upper));
+                }
+            }
         }
     }
 

@@ -13,7 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 TABLES = ["summary.csv", "members.csv", "levels.csv", "ensemble.csv", "explained.csv", "events.csv",
           "event_statistics.csv", "event_levels.csv", "rates.csv", "mean_excess.csv", "series.csv", "snapshots.csv"]
 INTEGERS = {
-    "summary.csv": ["member", "cell", "steps", "rejected", "sweeps_k", "sweeps_x", "turning", "solves"],
+    "summary.csv": ["member", "cell", "steps", "rejected", "sweeps_k", "sweeps_x", "turning", "solves",
+                    "points"],
     "ensemble.csv": ["cell", "members", "relaxed", "unfinished", "singular", "nonfinite", "stalled", "t_relax_known",
                      "rate_known", "discretisation_known", "t_limit_known"],
     "members.csv": ["member", "cell", "convex"],

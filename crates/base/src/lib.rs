@@ -1,9 +1,10 @@
 //! What every crate of curvelax uses: errors that name what, where, the numbers and the remedy; files opened for reading;
-//! numbers as text; random numbers addressed by key; threads and guards against panics of other crates.
+//! numbers as text, and intervals that say what they cover; random numbers addressed by key; threads and guards against panics of other crates.
 
 pub mod error;
 pub mod guard;
 pub mod input;
+pub mod interval;
 pub mod random;
 pub mod text;
 pub mod threads;

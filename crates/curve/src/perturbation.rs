@@ -20,7 +20,10 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::MAX_MODE;
-use curvelax_base::error::{Error, echo};
+use curvelax_base::{
+    error::{Error, echo},
+    text::number,
+};
 
 /// Minimum radial factor of an accepted draw. A larger bound would reject curves that relax well; a smaller one would
 /// admit necks that no number of nodes resolves.
@@ -121,18 +124,23 @@ impl RadialLaw {
     /// radial factor, `sqrt(½ Σ σ² m^-2p)`, exceeds 0.3.
     pub fn new(amplitude: f64, modes: Modes, decay: f64) -> Result<RadialLaw, Error> {
         if !(0.0..=0.5).contains(&amplitude) {
-            return Err(Error::value("amplitude", amplitude, "out of range", "allowed are 0 to 0.5, 0 for none"));
+            return Err(Error::value(
+                "amplitude",
+                number(amplitude),
+                "out of range",
+                "allowed are 0 to 0.5, 0 for none",
+            ));
         }
         modes.check().map_err(|message| Error::Request(format!("--modes {message}")))?;
         if !(-4.0..=20.0).contains(&decay) {
-            return Err(Error::value("decay", decay, "out of range", "allowed are -4 to 20"));
+            return Err(Error::value("decay", number(decay), "out of range", "allowed are -4 to 20"));
         }
         let law = RadialLaw { amplitude, modes, decay };
         let deviation = law.radial_deviation();
         if deviation > MAX_DEVIATION {
             let problem = format!("with --modes {modes} --decay {decay} the radius deviates by {deviation:.3}");
             let allowed = format!("at most {MAX_DEVIATION}: lower --amplitude, raise --decay or use fewer modes");
-            return Err(Error::value("amplitude", amplitude, &problem, &allowed));
+            return Err(Error::value("amplitude", number(amplitude), &problem, &allowed));
         }
         Ok(law)
     }

@@ -93,6 +93,12 @@ pub fn turning_number(points: &[DVec2]) -> i32 {
     edges(points).zip(next).map(crossing).sum()
 }
 
+/// Returns the largest angle by which the direction turns at a node, in radians, from 0 to π.
+pub fn largest_turn(points: &[DVec2]) -> f64 {
+    let next = edges(points).chain(edges(points)).skip(1);
+    edges(points).zip(next).map(|(d, e)| d.angle_to(e).abs()).fold(0.0, f64::max)
+}
+
 /// Returns the ratio of the longest to the shortest edge; infinite if an edge has no length.
 pub fn mesh_ratio(points: &[DVec2]) -> f64 {
     let (shortest, longest) = edges(points)

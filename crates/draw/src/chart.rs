@@ -11,7 +11,7 @@ use super::{
     svg::{Svg, coordinate, dots},
     width::{SIZE, TITLE, shortened, width, wrapped},
 };
-use curvelax_base::text::significant;
+use curvelax_base::{interval::Interval, text::significant};
 
 /// Width of every chart, in pixels.
 pub const WIDTH: f64 = 680.0;
@@ -39,16 +39,16 @@ const BAR: f64 = 14.0;
 pub struct EstimatedNumber {
     /// The number.
     pub value: f64,
-    /// Its confidence interval, 95 % by convention; `None` if unknown.
-    pub interval: Option<(f64, f64)>,
+    /// Its interval; `None` if unknown.
+    pub interval: Option<Interval>,
 }
 
 impl EstimatedNumber {
-    /// `0.412 (95 %: 0.401 to 0.420)`.
+    /// `0.412 (95 %: 0.401 to 0.420)`, `0.412 (range of 4, covers 87.5 %: 0.3 to 0.5)`.
     pub fn shown(&self) -> String {
         let value = significant(self.value, 3);
         match self.interval {
-            Some((low, high)) => format!("{value} (95 %: {} to {})", significant(low, 3), significant(high, 3)),
+            Some(interval) => format!("{value} ({})", interval.told_shortly(|end| significant(end, 3))),
             None => value,
         }
     }

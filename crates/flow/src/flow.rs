@@ -9,7 +9,10 @@ use std::{f64::consts::PI, fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
-use curvelax_base::error::{did_you_mean, echo};
+use curvelax_base::{
+    error::{did_you_mean, echo},
+    text::number,
+};
 
 /// Highest power of `k` in `b(k)`; the coefficients are the first numbers of [`Flow::law`].
 pub const MAX_DEGREE: usize = 8;
@@ -109,9 +112,9 @@ impl fmt::Display for Flow {
         match self {
             Flow::SurfaceDiffusion => write!(f, "surface-diffusion"),
             Flow::Willmore => write!(f, "willmore"),
-            Flow::Elastic(lambda) => write!(f, "elastic:{lambda}"),
+            Flow::Elastic(lambda) => write!(f, "elastic:{}", number(*lambda)),
             Flow::Polynomial(c) => {
-                let list: Vec<String> = c.iter().map(f64::to_string).collect();
+                let list: Vec<String> = c.iter().copied().map(number).collect();
                 write!(f, "poly:{}", list.join(","))
             }
         }
@@ -172,7 +175,8 @@ mod tests {
 
     #[test]
     fn a_flow_prints_as_it_is_parsed() {
-        for text in ["surface-diffusion", "willmore", "elastic:0.25", "poly:1,-2.5,0,3"] {
+        for text in ["surface-diffusion", "willmore", "elastic:0.25", "elastic:1e300", "poly:1,-2.5,0,3", "poly:1e-300"]
+        {
             assert_eq!(text.parse::<Flow>().unwrap().to_string(), text);
         }
     }

@@ -8,6 +8,7 @@ use curvelax_backend::DeviceKind;
 use crate::Gpu;
 
 /// A device that advances members, not yet opened.
+#[derive(Clone)]
 pub enum Device {
     /// The cores of this machine.
     Cpu,

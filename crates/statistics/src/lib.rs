@@ -14,8 +14,8 @@
 //! with d_i events at the time t_i among the n_i members still at risk, and M. Greenwood's variance (1926). Quantiles
 //! are read off S, and the median is the middle of the times at which S is ½; the mean is the area under it, and if S does not come down to 0, only the area up to the largest
 //! time: a lower bound. The log-rank test (N. Mantel, *Cancer Chemother. Rep.* 50, 1966, 163) compares the events of
-//! each group with those expected if all groups had one S. The interval of the median is B. Efron's bootstrap (*J. Am.
-//! Stat. Assoc.* 76, 1981, 312): members are drawn with replacement together with their censoring.
+//! each group with those expected if all groups had one S. The intervals of quantiles are those of the sign test, and of the
+//! beta product where members are censored: they cover at least 95 % for any distribution, or say what they cover.
 //! [`PairedDifferences`] of two groups whose members share their random numbers are tested by F. Wilcoxon's signed ranks.
 //!
 //! All of this requires that censoring says nothing about the hidden time. This holds for the end of the run, but not
@@ -23,7 +23,7 @@
 //!
 //! # Practice
 //!
-//! A [`Sample`] is checked and sorted once; [`KaplanMeier`], [`Bootstrap`] and [`log_rank`] read it and cannot fail. A
+//! A [`Sample`] is checked and sorted once; [`KaplanMeier`], [`interval`] and [`log_rank`] read it and cannot fail. A
 //! [`Description`] is for complete data, [`Line`] and [`PowerLaw`] for one quantity against another. Unknown values are
 //! `None`, never NaN and never infinite, and [`Caveat`] says why. Times may be in any one unit; means, deviations and
 //! quantiles have the same unit, variances of S have none.
@@ -32,7 +32,7 @@
 //! # Example
 //!
 //! ```
-//! use curvelax_statistics::{Bootstrap, KaplanMeier, Observation, Sample};
+//! use curvelax_statistics::{KaplanMeier, Observation, Sample, interval};
 //!
 //! let relaxed = [0.8, 0.5, 1.1, 0.9].map(|t| Observation::new(Some(t), 2.0));
 //! let unfinished = Observation::new(None, 2.0);
@@ -41,17 +41,16 @@
 //! assert_eq!((curve.median(), curve.quantile(0.95)), (Some(0.9), None));
 //! assert_eq!(curve.mean().unwrap().restricted_to, Some(2.0));
 //! println!("{}", curve.caveat().unwrap());
-//! let interval = Bootstrap::default().median(&sample).unwrap();
-//! assert!(interval.lower <= curve.median());
+//! let interval = interval::of_sample(&sample, 0.5).unwrap();
+//! assert_eq!((interval.lower, interval.upper), (Some(0.5), None));
 //! # Ok::<(), curvelax_base::Error>(())
 //! ```
 
-mod bootstrap;
 mod describe;
-mod draws;
 mod exact;
 mod explain;
 mod fit;
+pub mod interval;
 mod limit;
 mod log_rank;
 mod paired;
@@ -61,7 +60,7 @@ mod spread;
 mod sum;
 mod survival;
 
-pub use bootstrap::{Bootstrap, Interval};
+pub use curvelax_base::interval::Interval;
 pub use describe::Description;
 pub use exact::{ExactSum, Moments};
 pub use explain::{FOLDS, Regression, correlation, spearman};

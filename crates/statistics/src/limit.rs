@@ -1,44 +1,66 @@
 //! The limit of a time as the resolution grows without bound, and its error.
 //!
-//! Where n is large enough, t(n) = t + c n⁻² + d n⁻⁴ + …, and three resolutions give t. How far that is from what the two
-//! finest give with c alone bounds its error, and the steps in time leave a part that goes with their tolerance. The
-//! constants below were fitted to ensembles of curves and flows at n = 64 to 200 with limits known from n = 300 to 600
-//! (`docs/method.md#limit`).
+//! With h = 1/n, t(n) = t + a h² + b h⁴ + c h⁶ + …, and three resolutions remove a and b. What is left goes with c, which
+//! they do not show. Two things tell its size: the terms in h² and h⁴ at the finest resolution, and the factor by which
+//! terms fall. That is the square of the angle by which the tangent turns at a node, θ: for a smooth curve it goes with h,
+//! and where θ is not small, n nodes do not resolve the curve, whatever the differences of the times say. By the first the
+//! term in h⁶ is about `θ²·|term in h⁴|`, by the second `θ⁴·|term in h²|`; their sum cannot vanish by chance.
+//!
+//! The steps in time leave a part that goes with their tolerance over the amplitude of the shape at that time, which is
+//! the root of its excess. The constants were fitted to ensembles of curves and flows whose limits are known from more
+//! nodes and steps (`docs/method.md#limit`).
 
 use serde::{Deserialize, Serialize};
 
-/// Share of the difference of the two extrapolations in the error.
-const OF_SPACE: f64 = 0.5;
-/// Share of what ten times more exact steps change, and the least error of steps in units of their tolerance, relative to
-/// the time: the change may be small by chance.
-const OF_STEPS: f64 = 0.5;
-const OF_TOLERANCE: f64 = 0.3;
-/// Observed orders between which differences fall as they should.
-const ORDERS: std::ops::RangeInclusive<f64> = 1.97..=2.2;
-/// Relative differences between the coarsest and the finest resolution: below the first they are as small as the errors
-/// of the steps, and have no order; above the second, three terms are too few.
+/// Largest turn of the tangent at a node, in radians, at which terms are believed to fall.
+pub const MAX_TURN: f64 = 0.5;
+/// Orders between which differences must fall.
+const ORDERS: std::ops::RangeInclusive<f64> = 1.7..=2.6;
+/// Relative difference between resolutions below which they are as small as the errors of the steps, and have no order.
 const SMALL: f64 = 5e-5;
-const LARGE: f64 = 0.05;
-/// The error where differences do not fall as they should, in multiples of the largest of them.
-const NOT_ASYMPTOTIC: f64 = 4.0;
+/// The error of space in units of the estimate of the term in h⁶.
+const OF_SPACE: f64 = 1.25;
+/// The same where terms do not fall yet, in units of `θ·|term in h⁴| + θ²·|term in h²|` with θ ≤ 1.
+const OF_OPEN: f64 = 1.0;
+/// Orders by which differences fall somehow where nodes are too few; and the error of what has no such order, in units of
+/// the largest difference.
+const LOOSE_ORDERS: std::ops::RangeInclusive<f64> = 1.0..=4.0;
+const OF_DIFFERENCES: f64 = 1.5;
+/// By how much an error falls at least from one level to the next, which has √2 times the nodes: as h⁶, and where terms do not
+/// fall yet as h⁴.
+const FALL: f64 = 8.0;
+const OPEN_FALL: f64 = 4.0;
+/// Share of what ten times more exact steps change, and the error of steps in units of their tolerance over the root of the
+/// excess, relative to the time: the change may be small by chance.
+const OF_STEPS: f64 = 0.07;
+const OF_TOLERANCE: f64 = 0.005;
 /// Orders that are looked for.
 const ALL_ORDERS: std::ops::Range<f64> = 0.05..8.0;
 /// Halvings of that range: to the last bit.
 const HALVINGS: usize = 60;
 
+/// Relative error above which a time that is not asymptotic is worth more nodes.
+const WIDE: f64 = 1e-3;
+
 /// One time, computed at several resolutions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Times {
     /// As it is to be judged.
     pub own: f64,
-    /// With more exact steps, at growing numbers of nodes; the last are those of `own`.
-    pub levels: [f64; 3],
+    /// With more exact steps, at growing numbers of nodes, at least three.
+    pub levels: Vec<f64>,
     /// These numbers.
-    pub points: [usize; 3],
+    pub points: Vec<usize>,
+    /// Which of them is that of `own`.
+    pub own_level: usize,
     /// Tolerance of these steps.
     pub tolerance: f64,
     /// Whether the steps of `own` are adaptive, with a tolerance ten times as large.
     pub is_adaptive: bool,
+    /// Largest angle by which the tangent of the initial curve turns at a node of the finest level, in radians.
+    pub turn: f64,
+    /// The excess at that time, or a smaller one.
+    pub excess: f64,
 }
 
 /// What the time tends to.
@@ -50,28 +72,73 @@ pub struct Limit {
     pub error: f64,
     /// Observed order in 1/n, if the differences have one.
     pub order: Option<f64>,
-    /// Whether the differences fall as they should; if not, `t` is the time at the finest resolution, and the error is
-    /// larger than they are.
+    /// Whether the nodes resolve the curve and the differences fall as they should; if not, the term in h² alone is removed,
+    /// and the error is a bound.
     pub asymptotic: bool,
     /// Relative error of the time that is judged, with its sign.
     pub relative: f64,
 }
 
 impl Limit {
-    /// Estimates the limit.
+    /// Estimates the limit from the three finest levels; those below them must not have promised less.
     ///
     /// ```
     /// use curvelax_statistics::{Limit, Times};
     ///
     /// let points = [50, 71, 100];
-    /// let levels = points.map(|n| 0.8 + 40.0 / f64::from(n).powi(2));
-    /// let points = points.map(|n| n as usize);
-    /// let limit = Limit::of(&Times { own: 0.805, levels, points, tolerance: 1e-4, is_adaptive: true });
+    /// let levels = points.map(|n| 0.8 + 40.0 / f64::from(n).powi(2)).to_vec();
+    /// let points = points.map(|n| n as usize).to_vec();
+    /// let (own, own_level, tolerance, is_adaptive) = (0.805, 2, 1e-4, true);
+    /// let times = Times { own, levels, points, own_level, tolerance, is_adaptive, turn: 0.2, excess: 2e-3 };
+    /// let limit = Limit::of(&times);
     /// assert!((limit.t - 0.8).abs() < 1e-12 && limit.error < 1e-3 && limit.asymptotic);
     /// assert!((limit.order.unwrap() - 2.0).abs() < 1e-9 && (limit.relative - 0.00625).abs() < 1e-12);
     /// ```
+    ///
+    /// # Panics
+    /// With fewer than three levels.
     pub fn of(times: &Times) -> Limit {
-        let Times { own, levels: [half, between, full], points, tolerance, is_adaptive } = *times;
+        let Times { own, ref levels, ref points, own_level, tolerance, is_adaptive, turn, excess } = *times;
+        let finest = points[points.len() - 1];
+        let three = |from: usize| {
+            let points = [0, 1, 2].map(|i| points[from + i]);
+            OfSpace::of([0, 1, 2].map(|i| levels[from + i]), points, turn * finest as f64 / points[2] as f64)
+        };
+        let mut of_space = (0..levels.len() - 2).rev().map(three);
+        let OfSpace { t, error, order, asymptotic } = of_space.next().expect("three levels");
+        let fall = if asymptotic { FALL } else { OPEN_FALL };
+        // What is small at the finest levels alone may be so by chance.
+        let scales = std::iter::successors(Some(1.0 / fall), |scale| Some(scale / fall));
+        let error = of_space.zip(scales).map(|(coarser, scale)| scale * coarser.error).fold(error, f64::max);
+        let full = levels[levels.len() - 1];
+        let steps = if is_adaptive { (own - levels[own_level]).abs() } else { 0.0 };
+        let error = error + OF_STEPS * steps + OF_TOLERANCE * tolerance * full / excess.sqrt();
+        Limit { t, error, order, asymptotic, relative: own / t - 1.0 }
+    }
+
+    /// Whether the time is worth levels of more nodes: its differences do not fall as they should, and it is not known to
+    /// a thousandth.
+    pub fn needs_more(&self) -> bool {
+        !self.asymptotic && self.relative_error() > WIDE
+    }
+
+    /// Its half-width relative to the limit.
+    pub fn relative_error(&self) -> f64 {
+        self.error / self.t
+    }
+}
+
+/// What three levels tell of a limit.
+struct OfSpace {
+    t: f64,
+    error: f64,
+    order: Option<f64>,
+    asymptotic: bool,
+}
+
+impl OfSpace {
+    /// Extrapolates from three levels, the finest last, where the tangent turns by `turn` at a node.
+    fn of([half, between, full]: [f64; 3], points: [usize; 3], turn: f64) -> OfSpace {
         // (n/n')²: how much larger the leading error is.
         let [p, q] = [points[0], points[1]].map(|n| (points[2] as f64 / n as f64).powi(2));
         let two = full - (between - full) / (q - 1.0);
@@ -80,23 +147,25 @@ impl Limit {
             + full * p * q / ((p - 1.0) * (q - 1.0));
         let order = order([half, between, full], points);
         let farthest = [half - between, between - full, half - full].map(f64::abs).into_iter().fold(0.0, f64::max);
-        let is_ordered = order.is_some_and(|order| ORDERS.contains(&order)) || farthest < SMALL * full;
-        let asymptotic = is_ordered && (half - full).abs() <= LARGE * full;
-        let steps = if is_adaptive { (own - full).abs() } else { 0.0 };
-        let (t, error) = match asymptotic {
-            true => {
-                let of_steps = (OF_STEPS * steps).max(OF_TOLERANCE * tolerance * full);
-                (three, OF_SPACE * (three - two).abs() + of_steps)
-            }
-            false => (full, NOT_ASYMPTOTIC * farthest + steps.max(tolerance * full)),
+        let terms = [(two - full).abs(), (three - two).abs()];
+        let falls_by = |orders: std::ops::RangeInclusive<f64>| order.is_some_and(|order| orders.contains(&order));
+        let is_resolved = turn <= MAX_TURN;
+        let asymptotic = is_resolved && (falls_by(ORDERS) || farthest < SMALL * full);
+        let (t, error) = if asymptotic {
+            let left = OF_SPACE * remainder(terms, turn.powi(2));
+            (three, if falls_by(ORDERS) { left } else { left.max(farthest) })
+        } else {
+            let bound = OF_OPEN * remainder(terms, turn.min(1.0));
+            let few_nodes_explain = !is_resolved && falls_by(LOOSE_ORDERS);
+            (two, if few_nodes_explain { bound } else { bound.max(OF_DIFFERENCES * farthest) })
         };
-        Limit { t, error, order, asymptotic, relative: own / t - 1.0 }
+        OfSpace { t, error, order, asymptotic }
     }
+}
 
-    /// Its half-width relative to the limit.
-    pub fn relative_error(&self) -> f64 {
-        self.error / self.t
-    }
+/// What follows the terms in h² and h⁴, each `fall` times the one before.
+fn remainder([second, fourth]: [f64; 2], fall: f64) -> f64 {
+    fall * (fourth + fall * second)
 }
 
 /// The p for which times at three numbers of nodes are t + c n^-p.
@@ -123,35 +192,103 @@ mod tests {
     const POINTS: [usize; 3] = [50, 71, 100];
 
     fn limit(at: impl Fn(f64) -> f64) -> Limit {
-        let levels = POINTS.map(|n| at(1.0 / n as f64));
-        Limit::of(&Times { own: levels[2], levels, points: POINTS, tolerance: 1e-4, is_adaptive: true })
+        on(&POINTS, 0.2, at)
+    }
+
+    /// With the third number of nodes as the own one, and a curve that turns by `turn` at a node there.
+    fn on(points: &[usize], turn: f64, at: impl Fn(f64) -> f64) -> Limit {
+        let levels: Vec<f64> = points.iter().map(|n| at(1.0 / *n as f64)).collect();
+        let turn = turn * points[2] as f64 / points[points.len() - 1] as f64;
+        let (own, points) = (levels[2], points.to_vec());
+        Limit::of(&Times { own, levels, points, own_level: 2, tolerance: 1e-4, is_adaptive: true, turn, excess: 2e-3 })
+    }
+
+    /// A time whose terms fall by the square of the angle at a node of `n` nodes.
+    fn falling(turn: f64) -> impl Fn(f64) -> f64 {
+        move |h: f64| {
+            let fall = (100.0 * turn * h).powi(2);
+            2.0 + 0.05 * fall * (1.0 + 0.2 * fall + 0.1 * fall.powi(2))
+        }
     }
 
     #[test]
     fn two_terms_are_removed_and_the_third_is_within_the_error() {
         let exact = limit(|h| 2.0 + 50.0 * h.powi(2) + 1e4 * h.powi(4));
         assert!((exact.t - 2.0).abs() < 1e-12 && exact.asymptotic, "{exact:?}");
-        let sixth = limit(|h| 2.0 + 50.0 * h.powi(2) + 1e4 * h.powi(4) + 1e6 * h.powi(6));
-        assert!((sixth.t - 2.0).abs() < sixth.error && (sixth.t - 2.0).abs() > 1e-6, "{sixth:?}");
+        for turn in [0.1, 0.2, 0.3, 0.4, 0.48] {
+            let limit = on(&POINTS, turn, falling(turn));
+            assert!(limit.asymptotic && (limit.t - 2.0).abs() < limit.error, "{turn}: {limit:?}");
+        }
+        // Terms that fall more slowly than the angle says.
+        let slow = on(&POINTS, 0.2, falling(0.45));
+        assert!((slow.t - 2.0).abs() > slow.error, "{slow:?}");
+    }
+
+    #[test]
+    fn the_error_does_not_vanish_where_the_fourth_power_does_by_chance() {
+        let turn = 0.4;
+        let sixth = |h: f64| 2.0 + 0.05 * (100.0 * turn * h).powi(2) + 0.005 * (100.0 * turn * h).powi(6);
+        // What makes the extrapolations with two and with three levels agree.
+        let limit = |fourth: f64| on(&POINTS, turn, move |h| sixth(h) + fourth * (100.0 * turn * h).powi(4));
+        let gap = |fourth: f64| limit(fourth).order.unwrap() - 2.0;
+        let (mut low, mut high) = (-0.02, 0.02);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if gap(middle) < 0.0 { low = middle } else { high = middle }
+        }
+        let chance = limit(low);
+        assert!((chance.order.unwrap() - 2.0).abs() < 1e-6 && (chance.t - 2.0).abs() < chance.error, "{chance:?}");
+        assert!((chance.t - 2.0).abs() > 1e-4, "{chance:?}");
+    }
+
+    #[test]
+    fn nodes_that_do_not_resolve_the_curve_are_never_believed() {
+        let exact = |h: f64| 2.0 + 50.0 * h.powi(2) + 1e4 * h.powi(4);
+        assert!(on(&POINTS, 0.49, exact).asymptotic && !on(&POINTS, 0.51, exact).asymptotic);
+        let coarse = on(&POINTS, 0.8, falling(0.8));
+        assert!(coarse.needs_more() && (coarse.t - 2.0).abs() < coarse.error, "{coarse:?}");
     }
 
     #[test]
     fn where_differences_do_not_fall_the_error_is_larger_than_they_are() {
         for at in [|h: f64| 2.0 + 0.5 * h, |h: f64| 2.0 + 40.0 * (h - 0.013).abs(), |h: f64| 2.0 + 3e3 * h.powi(3)] {
             let limit = limit(at);
-            assert!(!limit.asymptotic && limit.t == at(0.01), "{limit:?}");
-            assert!((limit.t - 2.0).abs() < limit.error, "{limit:?}");
+            assert!(!limit.asymptotic && (limit.t - 2.0).abs() < limit.error, "{limit:?}");
         }
         assert_eq!(limit(|h| 2.0 + 40.0 * (h - 0.013).abs()).order, None);
         assert!((limit(|h| 2.0 + 0.5 * h).order.unwrap() - 1.0).abs() < 1e-9);
-        // Half the nodes are far off.
-        assert!(!limit(|h| 2.0 + 500.0 * h.powi(2)).asymptotic);
+    }
+
+    #[test]
+    fn more_nodes_are_worth_it_until_differences_fall_or_are_small() {
+        let three = on(&POINTS, 0.8, falling(0.8));
+        assert!(three.needs_more() && !three.asymptotic, "{three:?}");
+        let five = on(&[50, 71, 100, 141, 200], 0.8, falling(0.8));
+        assert!(!five.needs_more() && five.asymptotic && (five.t - 2.0).abs() < five.error, "{five:?}");
+        // What is judged is the time at the own nodes.
+        assert!((five.relative - 0.5 * (falling(0.8)(0.01) - 2.0)).abs() < 1e-4, "{five:?}");
+        // A bound that is small enough needs none, either.
+        let rough = limit(|h| 2.0 + 0.02 * h);
+        assert!(!rough.asymptotic && !rough.needs_more(), "{rough:?}");
+        assert!(limit(|h| 2.0 + 0.5 * h).needs_more());
     }
 
     #[test]
     fn differences_as_small_as_the_errors_of_steps_need_no_order() {
         let noise = limit(|h| if h > 0.012 { 2.0 } else { 2.00001 });
         assert!(noise.asymptotic && noise.error < 1e-4 && noise.order.is_none(), "{noise:?}");
+    }
+
+    #[test]
+    fn the_error_of_steps_goes_with_the_amplitude_at_which_they_are_judged() {
+        let at = |excess: f64, tolerance: f64| {
+            let (levels, points) = (vec![2.0; 3], POINTS.to_vec());
+            let times =
+                Times { own: 2.0, levels, points, own_level: 2, tolerance, is_adaptive: true, turn: 0.1, excess };
+            Limit::of(&times).error
+        };
+        let (one, small, exact) = (at(1e-2, 1e-4), at(1e-4, 1e-4), at(1e-2, 1e-5));
+        assert!((small / one - 10.0).abs() < 1e-9 && (one / exact - 10.0).abs() < 1e-9, "{one} {small} {exact}");
     }
 
     #[test]

@@ -1,88 +1,258 @@
 //! `--accuracy`: the number of nodes, the tolerance and the number of members that reach a given uncertainty, found in
 //! rounds.
 //!
-//! A round runs the whole study, without its shards, in memory and on the CPU, so that the choice is the same on every
-//! machine. Its uncertainty has two parts: sampling falls like 1/√members, discretisation with n. The last choice is
-//! extrapolated from a round of at least an eighth as many members.
+//! A round runs the study, without its shards, in memory and on the CPU, so that the choice is the same on every machine.
+//! The uncertainty of a median has two parts: sampling falls like 1/√members, discretisation with n. First rounds find n
+//! and the tolerance, with limits of all members ([`Limit`](curvelax_statistics::Limit): its time and its error). Then
+//! rounds without levels, at a fifth of the work, find the number of members: their times are spread like the limits.
+//!
+//! The numbers of outlines are given. What is asked for is then the error of each member.
+//!
+//! The first round that is good enough ends the search. If none is, the best one is what the run repeats.
 
 use std::fmt;
 
 use crate::{
     relax::relax,
-    results::{EnsembleStatistics, cells::CellStatistics, tally::Tally},
+    results::{EnsembleStatistics, cells::CellStatistics, shortfall::needed, tally::Tally},
 };
 use curvelax_base::{
     error::{Error, Result},
-    text::{number, plural, rounded},
+    text::{count, rounded},
 };
 use curvelax_ensemble::{Ended, LevelTimes, Sink, Spec, Study, request::spec::BackendChoice};
 
-/// Share of the goal for discretisation, and that for sampling which is aimed at: the rest is for what a round of fewer
-/// members does not know.
-const DISCRETISATION: f64 = 0.2;
-const SAMPLING: f64 = 0.7;
-/// Members above which a goal is refused, and nodes.
+/// Share of the goal for discretisation, where sampling needs the rest.
+const DISCRETISATION: f64 = 0.1;
+/// What sampling leaves to the difference between times and their limits, in errors of discretisation, and at most in shares
+/// of the goal: in 14 ensembles of 330 to 3082 ellipses the interval of limits was wider by -0.1 to 3.4 of them.
+const SPARE: [f64; 2] = [3.0, 0.1];
+/// Members of a cell above which no round is run, and nodes.
 const MAX_MEMBERS: f64 = 1e6;
 const MAX_NODES: usize = 1600;
-/// Largest ratio of members to those of the round that they are extrapolated from, and of rounds to each other.
-const FARTHEST: f64 = 8.0;
-/// Largest share of members that may not converge yet.
-const UNRULY: f64 = 0.05;
 /// The error of a limit goes with this power of n.
 const ORDER: f64 = 4.0;
-/// Largest growth of n between rounds.
-const MAX_FINER: f64 = 2.0;
-/// Fewest members of a round, unless all are the same.
+/// Bounds of the growth of n between rounds, and of that of the members.
+const FINER: [f64; 2] = [std::f64::consts::SQRT_2, 2.0];
+const MORE: [f64; 2] = [1.05, 8.0];
+/// An estimated number of members is believed if it is within the first factor of those that gave it; else this share of it.
+const NEAR: f64 = 1.2;
+const CAUTION: f64 = 0.6;
+/// The least tolerance, in shares of what discretisation may have.
+const TOLERANCE: f64 = 2.0;
+/// Fewest members of a round, unless all are the same or their number is given.
 const MIN_MEMBERS: u64 = 16;
-/// Uncertainties below this are rounding.
-const ROUNDING: f64 = 1e-12;
-/// More rounds mean that the uncertainty does not fall.
-const MAX_ROUNDS: usize = 12;
+/// More nodes are of no use once they left more than this share of the error so many times.
+const LEFT: f64 = 0.8;
+const MAX_IDLE: usize = 2;
+/// Rounds in which the members of a cell may grow.
+const MAX_ROUNDS: usize = 24;
 
 /// A round: what was run, and the cell that is farthest from the goal.
 pub struct Round {
     /// Its number, from 1.
     number: usize,
-    /// Members of each cell.
+    /// Members of all cells.
     members: u64,
     /// Nodes.
     points: usize,
     /// Tolerance of the steps.
     tolerance: Option<f64>,
-    /// Median limit.
-    median: f64,
-    /// Half-width of its 95 % interval relative to it, from sampling alone.
-    sampling: f64,
-    /// Half-width for discretisation.
-    discretisation: f64,
-    /// Share of the members whose times do not yet converge.
-    unruly: f64,
+    /// What is known of the farthest cell; none if a cell has no interval.
+    found: Option<Uncertainty>,
 }
 
-impl Round {
-    /// Members for which sampling has its share of the goal.
-    fn needed(&self, goal: f64) -> f64 {
-        (self.members as f64 * (self.sampling / (SAMPLING * goal)).powi(2)).ceil()
+/// Relative half-widths of the intervals of the limits of a cell.
+#[derive(Clone, Copy)]
+enum Uncertainty {
+    /// Of each member, or of most.
+    Each(f64),
+    /// Of the median.
+    Median { all: f64, discretisation: f64 },
+    /// Of the median, by sampling.
+    Sampling(f64),
+}
+
+impl Uncertainty {
+    fn all(self) -> f64 {
+        match self {
+            Uncertainty::Each(all) | Uncertainty::Median { all, .. } | Uncertainty::Sampling(all) => all,
+        }
     }
 
-    /// Whether its median is that of the same members with fewer nodes, as far as their errors allow.
-    fn agrees_with(&self, coarse: &Round, goal: f64) -> bool {
-        let apart = (self.median / coarse.median - 1.0).abs();
-        apart <= (self.discretisation + coarse.discretisation).max(0.5 * DISCRETISATION * goal)
+    fn discretisation(self) -> f64 {
+        match self {
+            Uncertainty::Each(all) => all,
+            Uncertainty::Median { discretisation, .. } => discretisation,
+            Uncertainty::Sampling(_) => 0.0,
+        }
     }
 }
 
 impl fmt::Display for Round {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Round { number, members, points, tolerance, median, sampling, discretisation, .. } = self;
-        let [median, sampling, discretisation] = [*median, *sampling, *discretisation].map(|value| rounded(value, 3));
+        let Round { number, points, tolerance, found, .. } = self;
         let tolerance = tolerance.map_or(String::new(), |tolerance| format!(", tolerance {}", rounded(tolerance, 2)));
-        write!(
-            f,
-            "round {number}: {members} {} of n = {points}{tolerance}: median {median}, relative \
-             uncertainty {sampling} by sampling and {discretisation} by discretisation",
-            plural(*members, "member")
-        )
+        write!(f, "round {number}: {} of n = {points}{tolerance}: ", count(self.members, "member"))?;
+        let shown = |value: f64| rounded(value, 2);
+        match *found {
+            None => write!(f, "no interval is known"),
+            Some(Uncertainty::Each(all)) => write!(f, "relative error of each {}", shown(all)),
+            Some(Uncertainty::Median { all, discretisation }) => {
+                write!(f, "relative uncertainty {}, {} of it by discretisation", shown(all), shown(discretisation))
+            }
+            Some(Uncertainty::Sampling(all)) => write!(f, "relative uncertainty {} by sampling", shown(all)),
+        }
+    }
+}
+
+/// Returns `spec` with the nodes, tolerance and members that reach its goal, if it has one, or else that come nearest to
+/// it; `tell` hears of every round, and an error of `stopped` ends them. The numbers of `spec` are those of the first
+/// round, and the least that are chosen.
+///
+/// # Errors
+/// Those of the study, and that of `stopped`.
+pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Option<Error>) -> Result<Spec> {
+    let Some(goal) = spec.accuracy else { return Ok(spec) };
+    let mut spec = spec.validate()?;
+    let of_each = quiet(&spec, true)?.spec().outlines.is_some();
+    if !of_each && spec.has_different_members() {
+        spec.curves = spec.curves.max(MIN_MEMBERS);
+    }
+    let mut search = Search { goal, rounds: 0, tell: &mut tell, stopped: &stopped };
+    let (spec, cells) = search.nodes(spec)?;
+    if of_each { Ok(spec) } else { search.members(spec, &cells) }
+}
+
+/// A search for the goal.
+struct Search<'a> {
+    goal: f64,
+    rounds: usize,
+    tell: &'a mut dyn FnMut(&Round),
+    stopped: &'a dyn Fn() -> Option<Error>,
+}
+
+/// Statistics of a round.
+type Cells = Vec<CellStatistics>;
+
+impl Search<'_> {
+    /// The spec with as many nodes and as short steps as the goal needs, and its round; that with the smallest error if
+    /// none has them.
+    fn nodes(&mut self, mut spec: Spec) -> Result<(Spec, Cells)> {
+        let mut best: Option<(f64, Spec, Cells)> = None;
+        let mut idle = 0;
+        loop {
+            let (cells, found) = self.refined(&spec)?;
+            // Without an interval more nodes do not help, either.
+            let Some(found) = found else { return Ok(best.map_or((spec, cells), |(_, spec, cells)| (spec, cells))) };
+            if found.all() <= self.goal {
+                return Ok((spec, cells));
+            }
+            let (allowed, is_beyond) = match found {
+                Uncertainty::Each(_) => (self.goal, false),
+                _ => (DISCRETISATION * self.goal, self.is_beyond(&cells)),
+            };
+            let (error, points) = (found.discretisation(), spec.points);
+            let is_enough = error <= allowed || is_beyond;
+            let better = best.as_ref().is_none_or(|(best, ..)| error < *best);
+            idle = if best.as_ref().is_none_or(|(best, ..)| error < LEFT * best) { 0 } else { idle + 1 };
+            if better {
+                best = Some((error, spec.clone(), cells));
+            }
+            match best {
+                Some((_, best, cells)) if is_enough || idle >= MAX_IDLE || points >= MAX_NODES => {
+                    return Ok((best, cells));
+                }
+                _ => spec = finer(spec, error / allowed, allowed)?,
+            }
+        }
+    }
+
+    /// Whether sampling needs more members than are run.
+    fn is_beyond(&self, cells: &[CellStatistics]) -> bool {
+        self.needed(cells, &vec![0.0; cells.len()]).is_some_and(|needed| needed > MAX_MEMBERS)
+    }
+
+    /// Members of a cell for which sampling is at most what the discretisation of each cell leaves of the goal.
+    fn needed(&self, cells: &[CellStatistics], discretisation: &[f64]) -> Option<f64> {
+        let needed = cells.iter().zip(discretisation).map(|(cell, part)| needed(cell, self.left(*part)));
+        needed.collect::<Option<Vec<_>>>()?.into_iter().reduce(f64::max)
+    }
+
+    /// What is left of the goal for sampling, beside this part of discretisation.
+    fn left(&self, discretisation: f64) -> f64 {
+        let [errors, share] = SPARE;
+        self.goal - discretisation - (errors * discretisation).min(share * self.goal)
+    }
+
+    /// The spec with as many members as the goal needs, after the round of its limits.
+    fn members(&mut self, mut spec: Spec, refined: &[CellStatistics]) -> Result<Spec> {
+        let parts: Option<Vec<(f64, f64)>> = refined.iter().map(|cell| cell.uncertainty(false)).collect();
+        let Some(parts) = parts else { return Ok(spec) };
+        let discretisation: Vec<f64> = parts.iter().map(|(_, part)| *part).collect();
+        if parts.iter().all(|(all, _)| *all <= self.goal) || !spec.has_different_members() {
+            return Ok(spec);
+        }
+        let mut needed = self.needed(refined, &discretisation);
+        let mut sums = None;
+        for _ in 0..MAX_ROUNDS {
+            let Some(members) = needed.filter(|needed| *needed <= MAX_MEMBERS) else { break };
+            let [least, most] = MORE.map(|factor| (factor * spec.curves as f64).ceil());
+            let near = (NEAR * spec.curves as f64).max(CAUTION * members).ceil();
+            spec.curves = members.min(near).clamp(least, most) as u64;
+            let cells = self.sampled(&spec, &mut sums)?;
+            let is_enough = |(cell, part): (_, &f64)| half_width(cell).is_some_and(|width| width <= self.left(*part));
+            if cells.iter().zip(&discretisation).all(is_enough) {
+                break;
+            }
+            needed = self.needed(&cells, &discretisation);
+        }
+        Ok(spec)
+    }
+
+    /// A round with limits: its statistics, and the farthest cell.
+    fn refined(&mut self, spec: &Spec) -> Result<(Cells, Option<Uncertainty>)> {
+        let study = quiet(spec, true)?;
+        let statistics = self.run(&study, Tally::of(study.spec(), &LevelTimes::default()))?.0;
+        let cells = statistics.cells.iter().map(|cell| cell.uncertainty(statistics.of_each));
+        let farthest = |cells: Vec<(f64, f64)>| cells.into_iter().max_by(|one, other| one.0.total_cmp(&other.0));
+        let found = cells.collect::<Option<Vec<_>>>().and_then(farthest).map(|(all, discretisation)| {
+            if statistics.of_each { Uncertainty::Each(all) } else { Uncertainty::Median { all, discretisation } }
+        });
+        self.hear(spec, &study, found);
+        Ok((statistics.cells, found))
+    }
+
+    /// A round of times alone. Where a member does not depend on how many there are, those of the last round are in `sums`
+    /// and are not run again.
+    fn sampled(&mut self, spec: &Spec, sums: &mut Option<(u64, Tally)>) -> Result<Cells> {
+        let mut study = quiet(spec, false)?;
+        let is_alone = study.spec().sweep.cells() == 1 && study.spec().design.is_random();
+        let (from, tally) = sums.take().unwrap_or_else(|| (0, Tally::of(study.spec(), &LevelTimes::default())));
+        if from > 0 {
+            study = quiet(&Spec { only: Some((from..spec.curves).collect()), ..spec.clone() }, false)?;
+        }
+        let (statistics, tally) = self.run(&study, tally)?;
+        *sums = is_alone.then_some((spec.curves, tally));
+        let widths: Option<Vec<f64>> = statistics.cells.iter().map(half_width).collect();
+        let found = widths.and_then(|all| all.into_iter().reduce(f64::max)).map(Uncertainty::Sampling);
+        self.hear(spec, &study, found);
+        Ok(statistics.cells)
+    }
+
+    fn hear(&mut self, spec: &Spec, study: &Study, found: Option<Uncertainty>) {
+        self.rounds += 1;
+        let Spec { points, adaptive: tolerance, .. } = *spec;
+        let members = Spec { only: None, ..study.spec().clone() }.all_members();
+        (self.tell)(&Round { number: self.rounds, members, points, tolerance, found });
+    }
+
+    /// Adds the members of a study to `tally`.
+    fn run(&self, study: &Study, tally: Tally) -> Result<(EnsembleStatistics, Tally)> {
+        let mut sums = RoundSums { tally, stopped: self.stopped };
+        relax(study, &mut sums)?;
+        let tally = sums.tally.clone();
+        Ok((EnsembleStatistics::new(study.spec(), &mut sums.tally)?, tally))
     }
 }
 
@@ -102,141 +272,24 @@ impl Sink for RoundSums<'_> {
     }
 }
 
-/// Returns `spec` with the nodes, tolerance and members that reach its goal, if it has one; `tell` hears of every round,
-/// and an error of `stopped` ends them. The numbers of `spec` are those of the first round, and the least that are
-/// chosen.
-///
-/// # Errors
-/// [`Error::Request`] for a goal that needs more members or nodes than this program would run, or that cannot be judged,
-/// with what was reached; and that of `stopped`.
-pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Option<Error>) -> Result<Spec> {
-    let Some(goal) = spec.accuracy else { return Ok(spec) };
-    let mut spec = spec.validate()?;
-    if spec.has_different_members() {
-        spec.curves = spec.curves.max(MIN_MEMBERS);
-    }
-    let refuse = |problem: &str, remedy: &str| Err(Error::value("accuracy", number(goal), problem, remedy));
-    // The round with fewer nodes, whose error is to be confirmed by one with more.
-    let mut before: Option<(Spec, Round)> = None;
-    for count in 1..=MAX_ROUNDS {
-        let round = Round { number: count, ..round(&spec, &stopped)? };
-        tell(&round);
-        let reached = rounded(round.discretisation, 2);
-        if round.discretisation > DISCRETISATION * goal || round.unruly > UNRULY {
-            if spec.points >= MAX_NODES {
-                if round.unruly > UNRULY {
-                    let percent = rounded(100.0 * round.unruly, 2);
-                    let problem =
-                        format!("at n = {}, the times of {percent} % of the members do not converge", spec.points);
-                    return refuse(&problem, "begin with fewer --points, or use a smoother curve");
-                }
-                let problem = format!("at n = {} the uncertainty of discretisation is still {reached}", spec.points);
-                return refuse(&problem, "use a larger number");
-            }
-            (spec, before) = (finer(spec, &round, goal)?, None);
-            continue;
-        }
-        let confirmed = before.take().filter(|(_, coarse)| round.agrees_with(coarse, goal));
-        let Some((chosen, coarse)) = confirmed else {
-            let points = (spec.points as f64 * std::f64::consts::SQRT_2).round() as usize;
-            let next = Spec { points, ..spec.clone() }.validate()?;
-            before = Some((std::mem::replace(&mut spec, next), round));
-            continue;
-        };
-        return members(chosen, coarse, goal, |number, spec| {
-            let round = Round { number: count + number, ..self::round(spec, &stopped)? };
-            tell(&round);
-            Ok(round)
-        });
-    }
-    refuse(&format!("not reached in {MAX_ROUNDS} rounds"), "use a larger number, or more --points")
-}
-
-/// The spec with as many members as `goal` needs, where `judged` says how far its first ones reach. The need is estimated,
-/// so it is not believed far beyond the members that are judged: `judge` judges more of the same.
-fn members(
-    mut spec: Spec,
-    mut judged: Round,
-    goal: f64,
-    mut judge: impl FnMut(usize, &Spec) -> Result<Round>,
-) -> Result<Spec> {
-    for further in 1.. {
-        let (needed, farthest) = (judged.needed(goal), FARTHEST * judged.members as f64);
-        if needed > MAX_MEMBERS {
-            let problem = format!(
-                "it needs about {needed:.1e} members in each cell, and more than {MAX_MEMBERS:.0e} is too many"
-            );
-            let reached = rounded(judged.sampling + judged.discretisation, 2);
-            let remedy = format!("{reached} was reached with {}; use a larger number", judged.members);
-            return Err(Error::value("accuracy", number(goal), &problem, &remedy));
-        }
-        spec.curves = spec.curves.max(needed.min(farthest) as u64);
-        if needed <= farthest {
-            break;
-        }
-        judged = judge(further, &spec)?;
-    }
-    Ok(spec)
-}
-
-/// The spec with more nodes and shorter steps, so that discretisation comes down to its share of the goal.
-fn finer(spec: Spec, round: &Round, goal: f64) -> Result<Spec> {
-    let wanted = round.discretisation / (0.5 * DISCRETISATION * goal);
-    let factor = wanted.powf(1.0 / ORDER).clamp(std::f64::consts::SQRT_2, MAX_FINER);
-    let points = ((spec.points as f64 * factor).ceil() as usize).min(MAX_NODES);
-    let adaptive = spec.adaptive.map(|tolerance| (0.1 * tolerance).max(1e-6).min(tolerance));
-    Spec { points, adaptive, ..spec }.validate()
-}
-
-/// Runs the study, and returns the cell that is farthest from its limit.
-fn round(spec: &Spec, stopped: &dyn Fn() -> Option<Error>) -> Result<Round> {
+/// The study of a round, with limits if it is to be `refined`.
+fn quiet(spec: &Spec, refined: bool) -> Result<Study> {
     let here = Spec { backend: BackendChoice::Cpu, adapter: None, shard: None, accuracy: None, ..spec.clone() };
     let here = Spec { series: None, snapshots: Vec::new(), store: Spec::default().store, ..here };
-    let study = Study::new(here)?;
-    if study.spec().outlines.is_some() {
-        let goal = number(spec.accuracy.unwrap_or_default());
-        let problem = "it chooses the number of members, and outlines are as many as they are";
-        return Err(Error::value("accuracy", goal, problem, "use --accurate alone"));
-    }
-    let mut sums = RoundSums { tally: Tally::of(study.spec(), &LevelTimes::default()), stopped };
-    relax(&study, &mut sums)?;
-    let statistics = EnsembleStatistics::new(study.spec(), &mut sums.tally)?;
-    let rounds = statistics.cells.iter().map(|cell| of_cell(spec, cell)).collect::<Result<Vec<_>>>()?;
-    let width = |round: &Round| round.sampling + round.discretisation;
-    let worst = rounds.into_iter().max_by(|one, other| width(one).total_cmp(&width(other)));
-    worst.ok_or_else(|| Error::Failed("a study has no cell".into()))
+    Study::new(Spec { refine: refined, ..here })
 }
 
-fn of_cell(spec: &Spec, cell: &CellStatistics) -> Result<Round> {
-    let limits = cell.limits.as_ref();
-    let found = limits.and_then(|of| Some((of.median?, of.uncertainty()?, of.error?)));
-    let refuse = |problem: &str, remedy: &str| {
-        Err(Error::value("accuracy", number(spec.accuracy.unwrap_or_default()), problem, remedy))
-    };
-    if cell.median() == Some(0.0) {
-        return refuse(
-            "at least half of the members are relaxed at the start",
-            "use a larger --amplitude, or another --shape",
-        );
-    }
-    let Some((median, total, error)) = found else {
-        let problem = format!(
-            "{} of {} members relaxed, too few for a median with an interval",
-            cell.times.sample.events(),
-            spec.curves
-        );
-        return refuse(&problem, "use more --curves or a longer --t-end, or a curve that relaxes");
-    };
-    let discretisation = error / median;
-    let unruly = cell.discretisation.as_ref().map_or(0.0, |of| of.not_asymptotic as f64 / of.members.max(1) as f64);
-    Ok(Round {
-        number: 0,
-        members: spec.curves,
-        points: spec.points,
-        tolerance: spec.adaptive,
-        median,
-        sampling: Some(total - discretisation).filter(|sampling| *sampling > ROUNDING).unwrap_or(0.0),
-        discretisation,
-        unruly,
-    })
+/// Half-width of the interval of the median time of a cell, relative to it.
+fn half_width(cell: &CellStatistics) -> Option<f64> {
+    let (median, (low, high)) = (cell.median()?, cell.interval()?.bounds()?);
+    Some((high - median).max(median - low) / median).filter(|width| width.is_finite())
+}
+
+/// The spec with more nodes and shorter steps, so that an error that is so many times as large as `allowed` comes down to it.
+fn finer(spec: Spec, times: f64, allowed: f64) -> Result<Spec> {
+    let [least, most] = FINER;
+    let factor = (2.0 * times).powf(1.0 / ORDER).clamp(least, most);
+    let points = ((spec.points as f64 * factor).ceil() as usize).min(MAX_NODES);
+    let adaptive = spec.adaptive.map(|tolerance| (0.1 * tolerance).max(TOLERANCE * allowed).max(1e-6).min(tolerance));
+    Spec { points, adaptive, ..spec }.validate()
 }

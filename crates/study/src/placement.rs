@@ -94,7 +94,7 @@ pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
 
 /// Chooses back ends for the stages of a study: all on one device, that of its first own members, or with
 /// `--backend auto` on the CPU if that device cannot run all of them. A pilot is on the CPU: a few members do not fill a
-/// GPU.
+/// GPU. So are members that need more nodes than the device can hold.
 ///
 /// # Errors
 /// As [`choose`].
@@ -105,6 +105,9 @@ pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
     let there = |(stage, spec): (&Stage, &Spec)| {
         if stage.level.is_some() && study.has_pilot() {
             return cpu(spec, spec.points, "a pilot does not fill a GPU".into());
+        }
+        if stage.is_finer() {
+            return choice.with_nodes(spec, spec.points);
         }
         let mut spec = spec.clone();
         choice.settle_place(&mut spec);
@@ -321,6 +324,25 @@ impl Choice {
         }
     }
 
+    /// The same device for members of `n` nodes, or the CPU in f64 if it cannot hold them.
+    fn with_nodes(&self, spec: &Spec, n: usize) -> Result<Choice> {
+        let same = Spec { precision: Some(self.precision), ..spec.clone() };
+        let fits = match &self.device {
+            Device::Cpu => check_precision(&same, n, self.precision),
+            Device::Gpu(gpu) => fitting_precision(&same, n, gpu.name(), &gpu.capacity()).map(drop),
+        };
+        match fits {
+            Ok(()) => Ok(Choice {
+                device: self.device.clone(),
+                number: self.number.clone(),
+                or_cpu: self.or_cpu,
+                precision: self.precision,
+                reason: self.reason.clone(),
+            }),
+            Err(error) => cpu(&Spec { precision: None, ..spec.clone() }, n, error.to_string()),
+        }
+    }
+
     fn on_cpu(&self, reason: String) -> Choice {
         Choice { device: Device::Cpu, number: None, or_cpu: false, precision: self.precision, reason }
     }
@@ -353,11 +375,12 @@ impl Choice {
         self.open_watched(cohort, &OpeningWatch::default())
     }
 
-    /// Like [`open_for`](Choice::open_for), under the eyes of `watch`.
+    /// Like [`open_for`](Choice::open_for), under the eyes of `watch`, which hears what is opened.
     ///
     /// # Errors
     /// As [`open`](Choice::open), and that of the watch.
     pub fn open_watched(&self, cohort: &[Cell], watch: &OpeningWatch) -> Result<(Box<dyn Backend>, Platform)> {
+        (watch.tell)(&self.sentence(&cohort[0].spec));
         let curves = cohort.iter().map(|cell| cell.spec.member_count()).sum();
         let whole = Spec { curves, only: None, shard: None, ..cohort[0].spec.clone() };
         self.open_any(&whole, whole.points, watch)
@@ -413,7 +436,7 @@ impl Choice {
 
 /// Watches a device being opened.
 pub struct OpeningWatch<'a> {
-    /// Hears what is waited for, if that takes long.
+    /// Hears which back end is opened, and in a `note: …` what is waited for, if that takes long.
     pub tell: &'a dyn Fn(&str),
     /// Asked several times a second during the wait; an error ends it.
     pub go_on: &'a dyn Fn() -> Result<()>,
@@ -447,7 +470,7 @@ fn open_gpu<T: Vectorised>(
     let tested = Method { max_sweeps: MAX_SWEEPS, ..*method };
     let then =
         limit.map_or(String::new(), |limit| format!("; after {} s the CPU is used instead", limit.as_secs_f64()));
-    let waits = || (watch.tell)(&format!("GPU {} is still compiling the kernel{then}", gpu.name()));
+    let waits = || (watch.tell)(&format!("note: GPU {} is still compiling the kernel{then}", gpu.name()));
     gpu.compile::<T>(blocks, variant, limit, &waits, watch.go_on)?;
     let mut kernel = Kernel::<T>::new(gpu, blocks, members, tested.max_sweeps, variant)?;
     let device = format!("{} ({})", gpu.name(), gpu.driver());

@@ -33,7 +33,12 @@ pub fn relax(study: &Study, sink: &mut dyn Sink) -> Result<Platform> {
     let (first, platform) = first.open_for(&study.cells()[stages[own].range.clone()])?;
     let (mut first, mut levels) = (Some(first), LevelTimes::default());
     for (i, stage) in stages.iter().enumerate() {
-        let cells = study.cells_of(stage)?;
+        let cells = study.cells_of(stage, &levels)?;
+        // No member needs these nodes.
+        if cells.is_empty() {
+            choices.remove(0);
+            continue;
+        }
         let (mut backend, precision) = match first.take_if(|_| i == own) {
             Some(first) => (first, platform.precision),
             None => {

@@ -157,25 +157,6 @@ def fit(x, y):
     }
 
 
-def bootstrap(rng, rows, resamples=400_000):
-    """Medians of resamples drawn member by member: the share of them at or below each time, unreached ones left out."""
-    time, happened = np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
-    order = np.lexsort((~happened, time))
-    time, happened, n = time[order], happened[order], len(rows)
-    counts = np.zeros(n)
-    for start in range(0, resamples, 10_000):
-        drawn = rng.integers(0, n, (10_000, n)) + n * np.arange(10_000)[:, None]
-        drawn = np.bincount(drawn.ravel(), minlength=10_000 * n).reshape(10_000, n)
-        at_risk = n - np.cumsum(drawn, axis=1) + drawn
-        factor = np.where(happened & (drawn > 0), 1.0 - drawn / np.maximum(at_risk, 1), 1.0)
-        down = np.cumprod(factor, axis=1) <= 0.5 + 1e-12
-        first = np.where(down.any(axis=1), down.argmax(axis=1), n)
-        counts += np.bincount(first, minlength=n + 1)[:n]
-    reached = np.cumsum(counts) / resamples
-    times = np.unique(time)
-    return [[float(t), float(reached[np.searchsorted(time, t, side="right") - 1])] for t in times]
-
-
 def toml(table, path=()):
     """Lines of TOML. Python's repr of numbers and lists is TOML's, and None is left out."""
     plain = {k: v for k, v in table.items() if not isinstance(v, dict) and v is not None}
@@ -218,8 +199,6 @@ def main():
     for name, noise in {"tight": 0.05, "loose": 0.5}.items():
         x = np.geomspace(0.05, 3.0, 23)
         out["fits"][name] = fit(x, 0.7 * x**-1.3 * np.exp(noise * rng.standard_normal(23)))
-    drug = [r for r in sets["leukaemia"] if r[2] == 0]
-    out["bootstrap"] = {"drug": bootstrap(rng, drug), "both": bootstrap(rng, sets["leukaemia"])}
     (HERE / "reference.toml").write_text("\n".join(toml(out)) + "\n")
 
 

@@ -387,10 +387,22 @@ pub fn glob(base: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
             }
             let place = std::path::absolute(if base_text.is_empty() { Path::new(".") } else { base });
             let place = place.as_deref().map_or("the current folder".into(), echo_path);
+            if let Some(missing) = missing_folder(base, pattern) {
+                let inside = if missing.is_absolute() { String::new() } else { format!(" in {place}") };
+                let problem = format!("there is no folder {}{inside}", echo_path(missing));
+                return Err(refuse(&problem, "check its name, and the folder that you are in"));
+            }
             Err(refuse(&format!("no file matches in {place}"), &format!("check folder and extension; {REMEDY}")))
         }
         false => Ok(paths),
     }
+}
+
+/// The first folder of `pattern` that is not there, if it is named without wildcards.
+fn missing_folder<'a>(base: &Path, pattern: &'a str) -> Option<&'a Path> {
+    let folders = pattern.match_indices('/').map(|(end, _)| &pattern[..end]);
+    let named = folders.take_while(|folder| !folder.contains(['*', '?', '[']));
+    named.map(Path::new).find(|folder| !base.join(folder).exists() && !folder.as_os_str().is_empty())
 }
 
 /// Words that pandas reads as missing values unless it is told otherwise.

@@ -314,6 +314,7 @@ fn every_line_of_well_known_text_is_read() {
         ("POLYGON ((0 0, 1 0, 0 1))(0 0)", "goes on after its last bracket"),
         ("POLYGON (0 0, 1 0, 0 1)", "is not well-known text"),
         ("POLYGON ((0 0, 1, 0 1))", "has a point of 1 number;"),
+        ("POLYGON ((0 0, 1 x, 0 1, 0 0))", "has `x` where a number is expected;"),
         ("POLYGON ((0 0, 1 NaN, 0 1))", "is not well-known text"),
         ("POLYGON ((0,0 1,5 0,1))", "has a point of 1 number;"),
         ("POLYGON", "is not well-known text"),
@@ -537,6 +538,16 @@ fn a_pattern_gives_the_files_that_match_in_the_order_of_their_names() {
     let current = std::env::current_dir().unwrap();
     assert!(refusal(Path::new(""), "none*").contains(&format!("no file matches in {}; ", current.display())));
     assert!(refusal(&base, "folder*").contains("no file matches"));
+    let message = refusal(&base, "deep/none/*.csv");
+    assert!(
+        message.contains(": there is no folder deep/none in ") && message.contains("; check its name"),
+        "{message}"
+    );
+    assert!(refusal(&base, "deep/*/none/*.csv").contains(": no file matches in "));
+    let absolute = format!("{}/none/*.csv", Pattern::escape(base.to_str().unwrap()));
+    assert!(refusal(&base, &absolute).contains(": no file matches in "), "brackets are wildcards");
+    #[cfg(unix)]
+    assert!(refusal(&base, "/no-such-folder/*.csv").contains(": there is no folder /no-such-folder; check its name"));
     assert!(refusal(&base, "a***b").contains("in the pattern; write for example"), "{}", refusal(&base, "a***b"));
     let all = read_files(&base, &glob(&base, "**/*.csv").unwrap()).unwrap();
     assert_eq!(labels(&all), ["a", "b", "c", "d"]);

@@ -116,21 +116,23 @@ fn check_brackets(text: &str) -> Result<(), NoOutline> {
     }
 }
 
-/// Refuses points with fewer numbers than x and y or more than x, y, z and m, for which the parser misses a bracket.
+/// Refuses points with fewer numbers than x and y or more than x, y, z and m, and words that are no numbers, for which
+/// the parser misses a bracket.
 fn check_points(content: &str) -> Result<(), NoOutline> {
     let rings = content.split_once('(').map_or("", |(_, rings)| rings);
     let points = rings.split(['(', ')', ',']).filter(|point| !point.trim().eq_ignore_ascii_case("EMPTY"));
-    let mut lengths = points.map(|point| point.split_whitespace().count());
-    match lengths.find(|length| !matches!(length, 0 | 2..=4)) {
-        None => Ok(()),
-        Some(length) => {
-            let numbers = text::count(length as u64, "number");
-            Err(NoOutline::new(
-                format!("has a point of {numbers}"),
-                "give each point x and y, and separate points by commas",
-            ))
+    let wrong =
+        |problem: String| Err(NoOutline::new(problem, "give each point x and y, and separate points by commas"));
+    for point in points {
+        let length = point.split_whitespace().count();
+        if !matches!(length, 0 | 2..=4) {
+            return wrong(format!("has a point of {}", text::count(length as u64, "number")));
+        }
+        if let Some(word) = point.split_whitespace().find(|word| word.parse::<f64>().is_err()) {
+            return wrong(format!("has `{}` where a number is expected", shortened(word, SHOWN)));
         }
     }
+    Ok(())
 }
 
 fn lines(polygon: &Polygon<f64>) -> Vec<Vec<DVec2>> {

@@ -13,7 +13,10 @@ use crate::{
     trace,
     width::{SIZE, shortened, width},
 };
-use curvelax_base::text::{count, significant};
+use curvelax_base::{
+    interval::Interval,
+    text::{count, significant},
+};
 
 const HEIGHT: f64 = 300.0;
 /// Height of a named setting with one series, and the height each further series adds.
@@ -94,10 +97,15 @@ pub struct PowerLawLine {
 }
 
 impl DependencePoint {
+    /// The interval of its median.
+    fn interval(&self) -> Option<Interval> {
+        self.median.and_then(|median| median.interval)
+    }
+
     /// All its times that can be drawn.
     fn times(&self) -> impl Iterator<Item = f64> {
         let (value, interval) = self.median.map_or((None, None), |median| (Some(median.value), median.interval));
-        let bounds = interval.map_or([None; 2], |(low, high)| [Some(low), Some(high)]);
+        let bounds = interval.map_or([None; 2], |interval| [interval.lower, interval.upper]);
         let all = [value, self.quartiles.0, self.quartiles.1].into_iter().chain(bounds);
         all.flatten().filter(|t| Scale::Linear.holds(*t))
     }
@@ -130,8 +138,10 @@ impl DependencePoint {
             // Open to the end of the axis if the upper quartile was not reached.
             svg.path("thin", &line(low, high.unwrap_or(time.range().1)));
         }
-        if let Some((low, high)) = self.median.and_then(|median| median.interval).filter(|(l, h)| holds(l) && holds(h))
-        {
+        // Open to the ends of the axis.
+        let (start, end) = time.range();
+        let ends = self.interval().map(|of| (of.lower.unwrap_or(start), of.upper.unwrap_or(end)));
+        if let Some((low, high)) = ends.filter(|(low, high)| holds(low) && holds(high)) {
             svg.path("thick", &line(low, high));
         }
         if let Some(median) = self.median.map(|median| median.value).filter(holds) {
@@ -330,11 +340,12 @@ impl Dependence<'_> {
             self.levels().any(has).then(|| Entry::new(neutral, mark, label))
         };
         let median = any(&|level| level.median.is_some() && !several, LegendMark::Marker(0), "median");
-        let interval = any(
-            &|level| level.median.is_some_and(|m| m.interval.is_some()),
-            LegendMark::Thick,
-            "95 % interval of the median",
-        );
+        let has_range = |level: &DependencePoint| level.interval().is_some_and(|interval| interval.range_of.is_some());
+        let interval_of_medians = match self.levels().any(has_range) {
+            true => "interval of the median: 95 %, or the range of fewer than 6",
+            false => "95 % interval of the median",
+        };
+        let interval = any(&|level| level.interval().is_some(), LegendMark::Thick, interval_of_medians);
         let quartiles = any(&|level| level.quartiles.0.is_some(), LegendMark::Thin, "25 to 75 % of the members");
         let pointer = if self.named() { LegendMark::Right } else { LegendMark::Up };
         let beyond = any(&|level| level.median.is_none(), pointer, "median not reached");

@@ -13,7 +13,10 @@ use crate::{
     chart::{Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, nothing},
     trace,
 };
-use curvelax_base::text::{count, grouped};
+use curvelax_base::{
+    interval::Interval,
+    text::{count, grouped},
+};
 
 const HISTOGRAM: f64 = 190.0;
 const SHARE: f64 = 130.0;
@@ -93,7 +96,10 @@ impl RelaxationTimes<'_> {
         if let Some(median) = median {
             svg.open("ink");
             for panel in [&above, &below].into_iter().filter(|panel| panel.x.holds(median.value)) {
-                median.interval.iter().for_each(|bounds| interval(&mut svg, panel, *bounds));
+                if let Some(Interval { lower, upper, .. }) = median.interval {
+                    let (start, end) = panel.x.range();
+                    interval(&mut svg, panel, (lower.unwrap_or(start), upper.unwrap_or(end)));
+                }
                 guide(&mut svg, panel, median.value);
             }
             svg.close();
@@ -131,6 +137,6 @@ fn counts(relaxed: u64, members: u64, others: &[(&str, u64)]) -> String {
 }
 
 fn label(median: &EstimatedNumber) -> String {
-    let interval = if median.interval.is_some() { ", shaded: its 95 % interval" } else { "" };
+    let interval = if median.interval.is_some() { ", shaded" } else { "" };
     format!("median {}{interval}", median.shown())
 }

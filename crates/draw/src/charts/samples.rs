@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use crate::{axis::Scale, charts::*};
+use curvelax_base::interval::Interval;
 
 /// Numbers in (0, 1), equal on every machine: Halton numbers of base 2 or 3.
 fn spread(i: usize, base: usize) -> f64 {
@@ -57,7 +58,7 @@ pub fn decay(label: &str, value: Option<f64>, rate: f64, count: usize) -> DecayC
 }
 
 fn level(at: Setting, median: f64) -> DependencePoint {
-    let median = EstimatedNumber { value: median, interval: Some((0.95 * median, 1.06 * median)) };
+    let median = EstimatedNumber { value: median, interval: Some(Interval::between(0.95 * median, 1.06 * median)) };
     DependencePoint { at, median: Some(median), quartiles: (Some(0.8 * median.value), Some(1.3 * median.value)) }
 }
 
@@ -66,7 +67,7 @@ pub fn amplitudes(label: &str, factor: f64, count: usize) -> Series {
     let amplitude = |i: usize| 0.01 * 1.6_f64.powi(i as i32);
     let law = |x: f64| factor * x.powf(-0.31);
     let levels = (0..count).map(|i| level(Setting::Number(amplitude(i)), law(amplitude(i)) * (1.0 + 0.05 * normal(i))));
-    let exponent = EstimatedNumber { value: -0.312, interval: Some((-0.33, -0.294)) };
+    let exponent = EstimatedNumber { value: -0.312, interval: Some(Interval::between(-0.33, -0.294)) };
     let fit = Some(PowerLawLine { exponent, factor, rejected: false });
     Series { label: label.into(), value: Some(factor), levels: levels.collect(), fit }
 }
@@ -87,7 +88,8 @@ pub fn draw_all() -> Vec<(String, String)> {
     let some = [("unfinished", 88), ("stalled", 12), ("singular", 0)];
 
     let relaxation = |times: &[f64], others: &[(&str, u64)], median: Option<f64>| {
-        let median = median.map(|value| EstimatedNumber { value, interval: Some((0.97 * value, 1.04 * value)) });
+        let median = median
+            .map(|value| EstimatedNumber { value, interval: Some(Interval::between(0.97 * value, 1.04 * value)) });
         let members = times.len() as u64 + others.iter().map(|(_, count)| count).sum::<u64>();
         let cells = vec![CellValues { numbers: times.to_vec(), members, ..CellValues::default() }];
         RelaxationTimes { title: "Relaxation times", note: NOTE, key: "", cells, others, median }.draw()
@@ -260,7 +262,7 @@ pub fn draw_all() -> Vec<(String, String)> {
         "dependence-unreached",
         depend(vec![Series { levels: vec![level.clone(); 3], ..Series::default() }], "amplitude"),
     );
-    let median = Some(EstimatedNumber { value: 0.4, interval: Some((f64::NAN, f64::INFINITY)) });
+    let median = Some(EstimatedNumber { value: 0.4, interval: Some(Interval::between(f64::NAN, f64::INFINITY)) });
     let (at, fit) = (
         Setting::Number(0.0),
         Some(PowerLawLine {

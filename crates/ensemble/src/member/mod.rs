@@ -108,6 +108,15 @@ enum Curves {
     Outlines(Arc<OutlineSet>),
 }
 
+/// What a member is made from.
+struct MemberCurve {
+    /// Its curve, if it is not that of all.
+    own: Option<BaseCurve>,
+    factor: RadialFactor,
+    /// Its law of motion, if it is not that of all.
+    flow: Option<Flow>,
+}
+
 /// The group of outlines that do not have the property.
 const NO_GROUP: &str = "(none)";
 
@@ -312,16 +321,7 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if no draw leaves the radius positive.
     pub fn member(&self, index: u64) -> Result<Member> {
-        let values = self.values(index)?;
-        let factor = self.radial_factor(&self.law_of(values.as_ref())?, index)?;
-        let outline = self.outline(index);
-        let own = match (&self.curves, &values, outline) {
-            (Curves::Drawn, Some(values), _) => Some(values.shape.resolve()?),
-            (Curves::Outlines(set), _, Some(own)) if set.all.len() > 1 => {
-                Some(BaseCurve::from_outline(Arc::clone(&own.outline)))
-            }
-            _ => None,
-        };
+        let MemberCurve { own, factor, flow } = self.own_curve(index)?;
         let sampler = own.map(|curve| Sampler::new(curve, self.sampling, self.points())).transpose()?;
         let sampler = sampler.as_ref().unwrap_or(&self.sampler);
         let mut nodes = sampler.sample(&factor);
@@ -338,15 +338,39 @@ impl Family {
         nodes.iter_mut().for_each(|node| *node -= origin);
         let drawn = self.drawn(index).into_iter().map(|(_, number)| number).collect();
         let coefficients = self.feature_coefficients(&factor);
-        let flow = values.and_then(|values| match values.flow {
-            Cow::Owned(flow) => Some(flow),
-            Cow::Borrowed(_) => None,
-        });
+        let outline = self.outline(index);
         let label = outline.map_or(String::new(), |outline| outline.label.clone());
         let group = outline.zip(self.group_by.as_deref()).map_or(String::new(), |(outline, property)| {
             outline.property(property).filter(|value| !value.is_empty()).map_or(NO_GROUP.into(), Cow::into_owned)
         });
         Ok(Member { index, cell: 0, label, group, nodes, origin, mollified, flow, drawn, coefficients })
+    }
+
+    /// The curve of member `index` before it is sampled, perturbed, at any u, and its law of motion, if it has its own.
+    ///
+    /// # Errors
+    /// As [`Family::member`].
+    pub fn curve(&self, index: u64) -> Result<(impl Fn(f64) -> DVec2 + use<>, Option<Flow>)> {
+        let MemberCurve { own, factor, flow } = self.own_curve(index)?;
+        let curve = own.unwrap_or_else(|| self.sampler.curve().clone());
+        Ok((move |u| factor.apply(curve.centroid(), curve.point(u)), flow))
+    }
+
+    fn own_curve(&self, index: u64) -> Result<MemberCurve> {
+        let values = self.values(index)?;
+        let factor = self.radial_factor(&self.law_of(values.as_ref())?, index)?;
+        let own = match (&self.curves, &values, self.outline(index)) {
+            (Curves::Drawn, Some(values), _) => Some(values.shape.resolve()?),
+            (Curves::Outlines(set), _, Some(own)) if set.all.len() > 1 => {
+                Some(BaseCurve::from_outline(Arc::clone(&own.outline)))
+            }
+            _ => None,
+        };
+        let flow = values.and_then(|values| match values.flow {
+            Cow::Owned(flow) => Some(flow),
+            Cow::Borrowed(_) => None,
+        });
+        Ok(MemberCurve { own, factor, flow })
     }
 
     /// The first coefficients of a member's perturbation. Where others are perturbed, a member that is not has zeros.

@@ -2,6 +2,7 @@
 
 mod ended;
 mod features;
+mod level_times;
 pub mod levels;
 pub mod linear_rate;
 pub mod rows;
@@ -16,7 +17,8 @@ use curvelax_flow::scheme::member::Observed;
 use curvelax_statistics::Limit;
 pub use ended::Ended;
 pub use features::{Feature, Features};
-pub use levels::{LevelRow, LevelTimes, RefinementLevel};
+pub use level_times::LevelTimes;
+pub use levels::{LevelRow, RefinementLevel};
 pub use rows::{Extent, Rows};
 pub use sink::{Sink, Wish};
 pub use standing::{Paused, Standing};
@@ -92,6 +94,8 @@ pub struct Outcome {
     pub rate_r2: Option<f64>,
     /// Observables of the initial curve, computed in f64 from the sampled nodes.
     pub start: Observables,
+    /// Largest angle by which the tangent of the initial curve turns at a node, in radians.
+    pub turn: f64,
     /// Observables of the last accepted state.
     pub end: Observables,
     /// Time at which the polygon was first found to cross itself.
@@ -108,6 +112,8 @@ pub struct Outcome {
     pub label: String,
     /// Group of its outline; empty without `--group-by`.
     pub group: String,
+    /// Nodes of the finest level that `t_limit` rests on; without a limit its own.
+    pub points: u64,
     /// First times of the [events](crate::Event) of the spec, in their order.
     pub events: Vec<Option<f64>>,
     /// What the [levels](crate::LevelTimes) tell of the relaxation time, if the member ran at them.
@@ -116,6 +122,9 @@ pub struct Outcome {
     /// The same of the times of the events, in their order.
     #[serde(skip)]
     pub judged_events: Vec<Option<Limit>>,
+    /// Whether its limit rests on more nodes than its own.
+    #[serde(skip)]
+    pub is_finer: bool,
 }
 
 /// One row of `series.csv`.

@@ -1,19 +1,20 @@
 //! A study: the cells of a spec, each an ensemble whose members run side by side.
 
 mod judged;
+mod stage;
 
 pub use judged::Judged;
+pub use stage::{Cohort, Stage};
 
-use std::{borrow::Cow, ops::Range, path::Path, sync::Arc};
+use std::{borrow::Cow, path::Path, sync::Arc};
 
 use crate::{
-    Family, Member, Outlines, RefinementLevel, Spec,
-    request::spec::{FinalTime, Pace, Store, Tau},
+    Family, LevelTimes, Member, Outlines, RefinementLevel, Spec,
+    request::spec::{FinalTime, Store, Tau},
     theory::times,
 };
 use curvelax_base::error::{Error, Result};
 use curvelax_curve::{BaseCurve, Sampler, Sampling};
-use curvelax_flow::solver::{Order, Solver};
 
 /// Members of a study that leave a [portrait](crate::Portrait): the first ones of its cells.
 pub const PORTRAITS: usize = 12;
@@ -104,16 +105,24 @@ impl Study {
         &self.stages
     }
 
-    /// The cells of a stage.
+    /// The cells of a stage. Those of a [finer](Stage::is_finer) one have the members that need it by the times at the
+    /// `levels` before, and there is none without such a member.
     ///
     /// # Errors
     /// As [`Study::new`].
-    pub fn cells_of(&self, stage: &Stage) -> Result<Cow<'_, [Cell]>> {
+    pub fn cells_of(&self, stage: &Stage, levels: &LevelTimes) -> Result<Cow<'_, [Cell]>> {
         let own = &self.cells[stage.range.clone()];
         let Some(level) = stage.level else { return Ok(Cow::Borrowed(own)) };
         let mut cells: Vec<Cell> = Vec::new();
         for cell in own {
-            let Ok(spec) = cell.at(level) else { continue };
+            let Ok(mut spec) = cell.at(level) else { continue };
+            if level.is_finer() {
+                let only: Vec<u64> = cell.needing(level, levels).map(|member| member - cell.first).collect();
+                if only.is_empty() {
+                    continue;
+                }
+                spec.only = Some(only);
+            }
             let others = || [cell].into_iter().chain(cells.iter().rev());
             let family = match others().find(|other| same_curve(&other.spec, &spec)) {
                 Some(other) => Family::like(&other.family, &spec)?,
@@ -122,6 +131,13 @@ impl Study {
             cells.push(Cell { spec, family, ..*cell });
         }
         Ok(Cow::Owned(cells))
+    }
+
+    /// The members of a stage, after these times at the `levels` before it.
+    pub fn members_of(&self, stage: &Stage, levels: &LevelTimes) -> u64 {
+        let Some(level) = stage.level.filter(|_| stage.is_finer()) else { return stage.members };
+        let cells = self.cells[stage.range.clone()].iter().filter(|cell| cell.at(level).is_ok());
+        cells.map(|cell| cell.needing(level, levels).count() as u64).sum()
     }
 
     /// The first stage of its own members.
@@ -145,9 +161,16 @@ impl Study {
         cells.iter().map(spec).find(Result::is_ok).ok_or_else(none)?
     }
 
-    /// Members of all stages.
+    /// Members of all stages but the finer ones, of which nobody knows before.
     pub fn work(&self) -> u64 {
-        self.stages.iter().map(|stage| stage.members).sum()
+        self.stages.iter().filter(|stage| !stage.is_finer()).map(|stage| stage.members).sum()
+    }
+
+    /// Nodes of the finest level at which members may run, or of the members themselves if these have more.
+    pub fn most_points(&self) -> usize {
+        let finest =
+            |cell: &Cell| cell.finer().last().copied().unwrap_or(RefinementLevel::FULL).points(cell.spec.points);
+        self.cells.iter().map(finest).max().unwrap_or(0)
     }
 
     /// Nodes of a member; meaningful only if all have the same number.
@@ -219,51 +242,11 @@ impl Study {
         if spec.t_end == Some(FinalTime::Auto) && !spec.sweep.is_empty() {
             spec.t_end = Some(FinalTime::OfCells(cells.iter().map(|cell| cell.spec.final_time()).collect()));
         }
-        let stages = stages(&cells);
+        let stages = stage::stages(&cells);
         let mut study = Study { spec, cells, stages, by_size: Vec::new() };
         study.settle_spec(|_| ());
         Ok(study)
     }
-}
-
-/// A part of a study whose members run side by side.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Stage {
-    /// The level of its members, if they are not the study's own.
-    pub level: Option<RefinementLevel>,
-    /// Its cells in the study.
-    pub range: Range<usize>,
-    /// Its members.
-    pub members: u64,
-}
-
-/// All stages of a study of these cells. Where its members are computed changes none of them.
-fn stages(cells: &[Cell]) -> Vec<Stage> {
-    let mut stages = Vec::new();
-    for level in RefinementLevel::ALL {
-        let specs: Vec<_> = cells.iter().map(|cell| cell.at(level).ok()).collect();
-        stages.extend(stages_of(Some(level), &specs));
-    }
-    let own: Vec<_> = cells.iter().map(|cell| Some(cell.spec.clone())).collect();
-    stages.extend(stages_of(None, &own));
-    stages
-}
-
-/// The stages of cells with these specs, where they have one.
-fn stages_of(level: Option<RefinementLevel>, specs: &[Option<Spec>]) -> Vec<Stage> {
-    let mut stages: Vec<(Cohort, Stage)> = Vec::new();
-    for (i, spec) in specs.iter().enumerate() {
-        let Some(spec) = spec else { continue };
-        let (cohort, members) = (Cohort::of(spec), spec.member_count());
-        match stages.last_mut() {
-            Some((own, stage)) if *own == cohort => {
-                stage.range.end = i + 1;
-                stage.members += members;
-            }
-            _ => stages.push((cohort, Stage { level, range: i..i + 1, members })),
-        }
-    }
-    stages.into_iter().map(|(_, stage)| stage).filter(|stage| stage.level.is_none() || stage.members > 0).collect()
 }
 
 /// Whether two specs have one curve with the same nodes. Curves that are drawn are the same if everything is that a draw
@@ -299,15 +282,6 @@ const OF_THESE: &str = "standard errors and intervals take copies of one outline
 
 /// How many times more nodes are looked for where so few cannot be refined.
 const MOST_MORE: usize = 8;
-
-/// The properties that members must share to run side by side.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cohort {
-    points: usize,
-    solver: Solver,
-    order: Order,
-    adaptive: bool,
-}
 
 impl Cell {
     /// The only cell of a spec without a sweep.
@@ -371,12 +345,13 @@ impl Cell {
         if !self.spec.refine {
             return Ok(());
         }
-        let runs =
-            |spec: &Spec| RefinementLevel::ALL.into_iter().try_for_each(|level| self.resampled(spec, level).map(drop));
+        let runs = |spec: &Spec| {
+            RefinementLevel::FIRST.into_iter().try_for_each(|level| self.resampled(spec, level).map(drop))
+        };
         let Err(fault) = runs(&self.spec) else { return Ok(()) };
         let n = self.spec.points;
         let more = (n + 1..=MOST_MORE * n).find(|points| runs(&Spec { points: *points, ..self.spec.clone() }).is_ok());
-        let coarser = format!("n/2 = {} nodes are too few ({fault})", RefinementLevel::Half.points(n));
+        let coarser = format!("n/2 = {} nodes are too few ({fault})", RefinementLevel::HALF.points(n));
         Err(match more {
             Some(points) => Error::value(
                 "points",
@@ -388,6 +363,16 @@ impl Cell {
                 Error::Request(format!("--refine: members must also run with fewer nodes, which cannot be: {fault}"))
             }
         })
+    }
+
+    /// The levels with more nodes at which its members may run.
+    fn finer(&self) -> Vec<RefinementLevel> {
+        RefinementLevel::finer(self.spec.points).filter(|_| self.spec.refine).collect()
+    }
+
+    /// Its members that need a finer `level`, by their times at the `levels` before it.
+    fn needing<'a>(&'a self, level: RefinementLevel, levels: &'a LevelTimes) -> impl Iterator<Item = u64> + 'a {
+        self.members().filter(move |member| levels.needs(&self.spec, *member, level))
     }
 
     /// Its spec at a level.
@@ -405,7 +390,7 @@ impl Cell {
             return Err(Error::value("sampling", "points", problem, remedy));
         }
         // Of a member that cannot be halved no level is of use.
-        let half = RefinementLevel::Half.spec(own)?;
+        let half = RefinementLevel::HALF.spec(own)?;
         times::check(&half, self.family.scales(), half.points)?;
         let spec = level.spec(own)?;
         times::check(&spec, self.family.scales(), spec.points)?;
@@ -415,13 +400,6 @@ impl Cell {
     /// The properties that other cells must share to run side by side with it.
     pub fn cohort(&self) -> Cohort {
         Cohort::of(&self.spec)
-    }
-}
-
-impl Cohort {
-    fn of(spec: &Spec) -> Cohort {
-        let Spec { points, order, .. } = *spec;
-        Cohort { points, solver: spec.solver(), order, adaptive: matches!(spec.pace(), Pace::Adaptive(_)) }
     }
 }
 
@@ -480,6 +458,7 @@ fn cells(spec: &Spec, outlines: &Outlines) -> Result<Vec<Cell>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use curvelax_flow::solver::Solver;
 
     fn swept(axes: &[&str], base: Spec) -> Spec {
         let mut spec = base;

@@ -167,7 +167,7 @@ fn check_probe(spec: &Spec, values: &MemberValues, scale: &CurveScale, n: usize)
     match spec.pull {
         Pull::Rate(pull) if pull > most => {
             let problem = format!("so strong that it destroys the mesh of {n} nodes on this curve");
-            Err(Error::value("pull", pull, &problem, &format!("use {most:.3} or less, or auto")))
+            Err(Error::value("pull", number(pull), &problem, &format!("use {most:.3} or less, or auto")))
         }
         _ => Ok(()),
     }
@@ -232,6 +232,7 @@ mod tests {
     #[test]
     fn rates_and_times_that_do_not_suit_the_curve_are_refused() {
         for (text, start) in [
+            ("pull = 1e308", "--pull 1e308: so strong that it"),
             ("pull = 700", "--pull 700: so strong that it destroys the mesh of 100 nodes on this curve; use 600.939"),
             ("omega = 'auto'\ntau = 1.01", "--omega auto: omega tau = 1.01158"),
             ("omega = 2000\ntau = 'auto'", "--omega 2000: omega tau = 1.99"),

@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::{Course, Time, Trajectory, watch::ROUND};
 use crate::{Ended, Features, Observables, Outcome, Portrait, Status};
+use curvelax_curve::polygon;
 use curvelax_flow::scheme::{
     State,
     member::{self, Decay, NEVER},
@@ -78,11 +79,13 @@ impl Trajectory<'_> {
             rate_r2,
             rate_theory: None,
             start: self.start,
+            turn: polygon::largest_turn(&self.member.nodes),
             end: Observables::new(&self.report.now, progress.turning, unit),
             self_crossing: self.crossed,
             solves: self.counters.solves.into(),
             label: std::mem::take(&mut self.member.label),
             group: std::mem::take(&mut self.member.group),
+            points: self.member.nodes.len() as u64,
             events: self.watches.iter().map(|watch| watch.t).collect(),
             ..Outcome::default()
         };

@@ -5,6 +5,7 @@
 //! fixed amount of work goes: some two seconds of it on two cores. Sizes follow from what they find and from the spec; no
 //! clock has a part in them.
 
+mod finer;
 mod pilot;
 mod size;
 
@@ -12,9 +13,11 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use curvelax_backend::DeviceKind;
 use curvelax_base::error::{Error, Result};
-use curvelax_ensemble::{Study, study::Stage};
+use curvelax_ensemble::{LevelTimes, Spec, Study, study::Stage};
 use curvelax_study::placement::{Choice, Platform};
+use finer::FinerPilot;
 use pilot::{CohortSample, CohortWork, Limits, points, sample};
 use size::Residents;
 
@@ -43,6 +46,10 @@ pub struct Estimate {
     pub slots: usize,
     /// Members that run at other resolutions besides, for the error of discretisation.
     pub level_members: u64,
+    /// Of the members, about how many need more nodes than they have; `None` if it is not known.
+    pub finer_members: Option<u64>,
+    /// Most nodes that a member may have at a level.
+    pub most_points: usize,
     /// Peak resident size of the process.
     pub memory_bytes: u64,
     /// Size of the output folder at the end.
@@ -96,10 +103,16 @@ impl Estimate {
         let until = Instant::now() + PATIENCE;
         let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
         let (mut residents, mut in_pilots): (Vec<Residents>, u64) = (Vec::new(), 0);
-        let (mut own, mut levels) = (CohortWork::none(), CohortWork::none());
-        for (i, choice) in choices.into_iter().enumerate().filter(|(i, _)| chosen.contains(i)) {
+        let (mut own, mut levels, mut finer) = (CohortWork::none(), CohortWork::none(), FinerPilot::default());
+        let (finest, mut at_finest) = (finest(study), None);
+        let wanted = |i: &usize| chosen.contains(i) || finest == Some(*i);
+        for (i, choice) in choices.into_iter().enumerate().filter(|(i, _)| wanted(i)) {
             let stage = &stages[i];
-            let mut cells = study.cells_of(stage)?.into_owned();
+            if stage.is_finer() {
+                at_finest = Some(slots_at(&study.spec_of(stage)?, &choice)?);
+                continue;
+            }
+            let mut cells = study.cells_of(stage, &LevelTimes::default())?.into_owned();
             let (precision, in_software) = (choice.precision(), choice.is_software_gpu());
             let started = Instant::now();
             let (mut backend, platform) = choice.open_for(&cells)?;
@@ -110,8 +123,9 @@ impl Estimate {
                 (None, false) => WORK_ON_GPU,
             };
             let work = if stage.level.is_some() { LEVELS * work / level_count as f64 } else { work / own_count as f64 };
+            let keeps_members = stage.level.is_some() && study.spec().refine;
             let CohortSample { work, pilots, rows: [each, in_pilot], reads_back } =
-                sample(&mut cells, precision, backend.as_mut(), &Limits { work, until, stopped })?;
+                sample(&mut cells, precision, backend.as_mut(), &Limits { work, keeps_members, until, stopped })?;
             let slots = backend.slots();
             let of = |members: u64, rows: f64| Residents {
                 n: points(&cells),
@@ -121,8 +135,9 @@ impl Estimate {
             };
             let largest = pilots.iter().map(|seen| seen.members).max().unwrap_or(0);
             in_pilots = in_pilots.max(of(largest, in_pilot).in_pilot(reads_back));
-            if stage.level.is_some() {
+            if let Some(level) = stage.level {
                 levels.add(&work);
+                pilots.first().into_iter().for_each(|seen| finer.add(level, &cells[0].spec, seen));
                 continue;
             }
             opened = Some(platform);
@@ -137,23 +152,35 @@ impl Estimate {
             0.0 => 0.0,
             seen => all as f64 / seen,
         });
-        start_up *= stages.len() as f64 / chosen.len() as f64;
+        let certain = stages.iter().filter(|stage| !stage.is_finer()).count();
+        start_up *= certain as f64 / chosen.len() as f64;
+        let share = finer.share(study).filter(|_| certain < stages.len());
+        let finer_members = share.map(|[share, _]| share * members as f64);
         // A member of a level of which nothing is known costs what an own one does.
         let sum = |of: fn(&CohortWork) -> Option<f64>| {
             let all = scale * of(&own)?;
-            Some(all + of(&levels).map_or(all * level_members as f64 / members as f64, |work| scale_levels * work))
+            let at_levels = of(&levels).map_or(all * level_members as f64 / members as f64, |work| scale_levels * work);
+            let more = finer_members.map_or(0.0, |finer| finer::work(finer, at_levels / level_members.max(1) as f64));
+            Some(all + at_levels + more)
         };
         let seconds = sum(|work| work.seconds);
         // If none has ended yet, all may have one.
         let rated = if pilot.ended == 0 { 1.0 } else { pilot.rated as f64 / pilot.ended as f64 };
         let events = cells[0].spec.event.len() as u64;
-        let level_rows = level_members as f64 * (size::LEVEL_ROW + events as f64 * size::EVENT_ROW);
+        let at_levels = level_members as f64 + finer_members.unwrap_or(0.0) * finer::ROWS;
+        let level_rows = at_levels * (size::LEVEL_ROW + events as f64 * size::EVENT_ROW);
         let most = cells.iter().map(|cell| cell.family.points()).max().unwrap_or(0);
         // A run of unknown length may be long.
         let kept = seconds.is_none_or(|seconds| seconds > interval.as_secs_f64());
         let largest_cell = cells.iter().map(|cell| cell.spec.member_count()).max().unwrap_or(0);
         let timed = if pilot.ended == 0 { 1.0 } else { pilot.relaxed.max(pilot.rated) as f64 / pilot.ended as f64 };
         let explained = size::explaining(largest_cell, cells[0].spec.cell_features().len(), timed);
+        let (most_points, slots) = (study.most_points(), residents.iter().map(|stage| stage.slots).max().unwrap_or(0));
+        if let Some((n, slots)) = at_finest {
+            let slots = slots.or(residents.first().map(|own| own.slots)).unwrap_or(1);
+            let most = share.map_or(members as f64, |[_, most]| (most * members as f64).ceil());
+            residents.push(Residents { n, slots, count: slots.min(most as usize), rows: 0.0 });
+        }
         let memory = size::memory(size::program(in_pilots), members, rated, most, explained, &residents, kept);
         Ok(Estimate {
             members,
@@ -163,8 +190,10 @@ impl Estimate {
                 + level_members * size_of::<(u64, f64)>() as u64
                 + events * (members + level_members) * size_of::<f64>() as u64,
             platform,
-            slots: residents.iter().map(|stage| stage.slots).max().unwrap_or(0),
+            slots,
             level_members,
+            finer_members: finer_members.map(|finer| finer.ceil() as u64),
+            most_points,
             steps_per_member: own.steps.map(|steps| steps / own.members.max(1.0)),
             dispatches: sum(|work| work.dispatches).map(|dispatches| dispatches.ceil() as u64),
             start_up_seconds: start_up,
@@ -181,12 +210,29 @@ fn with_pilots(study: &Study) -> Vec<usize> {
     let points = |stage: &Stage| points(&study.cells()[stage.range.clone()]);
     let own = (0..stages.len()).filter(|i| stages[*i].level.is_none());
     let largest = own.max_by_key(|i| points(&stages[*i]));
+    // Nobody knows yet who runs at finer levels.
+    let certain: Vec<usize> = (0..stages.len()).filter(|i| !stages[*i].is_finer()).collect();
     // Counted backwards.
-    let spread = (0..stages.len()).rev().step_by(stages.len().div_ceil(MAX_PILOTS).max(1));
+    let spread = certain.iter().copied().rev().step_by(certain.len().div_ceil(MAX_PILOTS).max(1));
     let mut chosen: Vec<usize> = spread.chain(largest).collect();
     chosen.sort_unstable();
     chosen.dedup();
     chosen
+}
+
+/// The stage of most nodes among those at which nobody knows yet who runs.
+fn finest(study: &Study) -> Option<usize> {
+    let points = |i: &usize| study.spec_of(&study.stages()[*i]).map_or(0, |spec| spec.points);
+    (0..study.stages().len()).filter(|i| study.stages()[*i].is_finer()).max_by_key(points)
+}
+
+/// Nodes of the members of `spec`, and how many of them are resident at once; a GPU is not opened for that.
+fn slots_at(spec: &Spec, choice: &Choice) -> Result<(usize, Option<usize>)> {
+    let slots = match choice.device().kind() {
+        DeviceKind::Cpu => Some(choice.open(spec, spec.points)?.0.slots()),
+        DeviceKind::Gpu => None,
+    };
+    Ok((spec.points, slots))
 }
 
 impl Pilot {
@@ -203,7 +249,7 @@ impl Pilot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use curvelax_ensemble::{Spec, request::spec::BackendChoice};
+    use curvelax_ensemble::request::spec::BackendChoice;
     use curvelax_study::placement::{choose_all, settle};
 
     fn estimated(spec: Spec, stopped: &dyn Fn() -> Option<Error>) -> Result<Estimate> {

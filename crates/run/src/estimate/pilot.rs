@@ -12,7 +12,7 @@ use std::{
 use curvelax_backend::Backend;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
-    Cell, Ended, Extent, SeriesRow, Sink, Snapshot,
+    Cell, Ended, Extent, Outcome, SeriesRow, Sink, Snapshot,
     outcome::rows,
     request::spec::{Pace, Precision, Tau},
     schedule::Clock,
@@ -32,6 +32,8 @@ const UPDATES_PER_SOLVE: f64 = 10.0;
 pub struct Limits<'a> {
     /// Work of each pilot, in updates of nodes.
     pub work: f64,
+    /// Whether to keep the outcomes of the members.
+    pub keeps_members: bool,
     /// When pilots are given up: a step takes too long to wait for.
     pub until: Instant,
     /// The error with which the user ends them, if so.
@@ -87,6 +89,8 @@ pub struct Seen {
     pub seconds: f64,
     /// Work done, in updates of nodes.
     pub work: f64,
+    /// The members that ended, ascending, if they are asked for.
+    pub ended: Vec<Outcome>,
 }
 
 impl Seen {
@@ -105,6 +109,7 @@ impl Seen {
             dispatches: 0,
             seconds: 0.0,
             work: 0.0,
+            ended: Vec::new(),
         }
     }
 }
@@ -133,6 +138,7 @@ impl Sink for PilotSink<'_> {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         let seen = &mut self.seen;
         seen.left += 1;
+        seen.ended.extend(self.limits.keeps_members.then(|| ended.outcome.clone()));
         seen.failed += u64::from(ended.outcome.status.is_failure());
         seen.relaxed += u64::from(ended.outcome.t_relax.is_some());
         seen.rated += u64::from(ended.outcome.rate.is_some());
@@ -515,7 +521,8 @@ mod tests {
         let blocks = Blocks::new(points(cells)).unwrap();
         let backend = CpuBackend::<f64>::new(blocks, Method::coloured(cells[0].spec.solver(), 1_000_000), 2).unwrap();
         let mut backend = backend.for_display(16, Duration::from_micros(dispatch));
-        let limits = Limits { work, until: Instant::now() + Duration::from_secs(3600), stopped: &|| None };
+        let limits =
+            Limits { work, keeps_members: false, until: Instant::now() + Duration::from_secs(3600), stopped: &|| None };
         let sample = sample(cells, Precision::F64, &mut backend, &limits).unwrap();
         let seen = sample.pilots.last().unwrap().clone();
         (seen.members, seen.left, seen.steps, seen.share, seen.work)

@@ -9,7 +9,10 @@ use std::{
 use super::{
     claim::LOCK,
     disk::{IS_STORE, entries, is_real_folder},
-    names::{OUTLINES, OWN, PLOTS, PROBE, PYTHON_OUTLINES, RUN, STATE, STATE_OLD, STATE_PART, is_store, part},
+    names::{
+        EVENT_LEVELS, EVENT_STATISTICS, EVENTS, OUTLINES, OWN, PLOTS, PROBE, PYTHON_OUTLINES, RUN, SERIES, SNAPSHOTS,
+        STATE, STATE_OLD, STATE_PART, STORE, is_store, part,
+    },
     part_folder::SUCCESSOR,
 };
 use curvelax_base::input;
@@ -17,12 +20,16 @@ use curvelax_base::input;
 /// What is in `folder` and in its folders that is not of a run, by its path there, in order.
 ///
 /// Names alone do not tell: `summary.csv` or `run.json` may be anybody's. A checkpoint or the `run.json` of a run speaks for
-/// the files of these names; unfinished ones, which are hidden, speak for themselves. Other hidden files do not count: no
+/// the files of these names, without a checkpoint only for those that the spec in it asks for; unfinished ones, which are
+/// hidden, speak for themselves. Other hidden files do not count: no
 /// run touches them, and systems leave some in every folder that is looked at.
 pub fn foreign(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let there = |name: &&str| folder.join(name).symlink_metadata().is_ok();
-    let has_run = [STATE, STATE_OLD].iter().any(there) || is_of_run(&folder.join(RUN));
-    let finished = OWN.into_iter().chain(PYTHON_OUTLINES).filter(|_| has_run).map(PathBuf::from);
+    let (begun, run) = ([STATE, STATE_OLD].iter().any(there), folder.join(RUN));
+    let has_run = begun || is_of_run(&run);
+    let unasked = if begun { Vec::new() } else { unasked(&run) };
+    let finished = OWN.into_iter().chain(PYTHON_OUTLINES).filter(|name| has_run && !unasked.contains(name));
+    let finished = finished.map(PathBuf::from);
     let unfinished = OWN.into_iter().map(|name| part(Path::new(name)));
     let working = [LOCK, OUTLINES, PROBE, STATE, STATE_OLD, STATE_PART].map(PathBuf::from);
     let own: BTreeSet<PathBuf> = finished.chain(unfinished).chain(working).collect();
@@ -59,6 +66,23 @@ pub fn foreign(folder: &Path) -> io::Result<Vec<PathBuf>> {
 fn is_of_run(path: &Path) -> bool {
     const KEY: &[u8] = b"\"curvelax\"";
     input::bytes(path, input::MAX_RUN).is_ok_and(|bytes| bytes.windows(KEY.len()).any(|part| part == KEY))
+}
+
+/// The tables that the spec in a `run.json` does not ask for; none if it cannot be read.
+fn unasked(path: &Path) -> Vec<&'static str> {
+    let run = input::bytes(path, input::MAX_RUN).ok();
+    let run: Option<serde_json::Value> = run.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    let Some(spec) = run.as_ref().and_then(|run| run.get("spec")) else { return Vec::new() };
+    let lacks = |key| spec.get(key).is_none_or(|value| value.is_null() || value.as_array().is_some_and(Vec::is_empty));
+    let is_stored = spec.get("store").is_some_and(|store| store == "zarr");
+    let lacks_snapshots = lacks("snapshots");
+    let tables = [
+        (lacks("series"), &[SERIES][..]),
+        (lacks_snapshots || is_stored, &[SNAPSHOTS]),
+        (lacks_snapshots || !is_stored, &[STORE]),
+        (lacks("event"), &[EVENTS, EVENT_STATISTICS, EVENT_LEVELS]),
+    ];
+    tables.iter().filter(|(lacks, _)| *lacks).flat_map(|(_, names)| *names).copied().collect()
 }
 
 fn is_hidden(path: &Path) -> bool {
@@ -129,6 +153,20 @@ mod tests {
         }
         // Before its first checkpoint a run has unfinished files only.
         assert_eq!(found(&[".summary.csv.part", ".snapshots.zarr.part/x/zarr.json", STATE_PART]), [""; 0]);
+        // What the run did not ask for is not its own, whatever its name.
+        let home = tempfile::tempdir().unwrap();
+        for name in [SERIES, SNAPSHOTS, EVENTS, "summary.csv"] {
+            fs::write(home.path().join(name), "mine").unwrap();
+        }
+        fs::create_dir(home.path().join(STORE)).unwrap();
+        fs::write(home.path().join(STORE).join("zarr.json"), "mine").unwrap();
+        let of_spec = |spec: &str| {
+            fs::write(home.path().join(RUN), format!("{{\"curvelax\": \"0.1.0\", \"spec\": {{{spec}}}}}")).unwrap();
+            foreign(home.path()).unwrap().iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(of_spec("\"snapshots\": []"), "events.csv series.csv snapshots.csv snapshots.zarr");
+        assert_eq!(of_spec("\"series\": 0.1, \"snapshots\": [1], \"event\": [\"a = area <= 1\"]"), "snapshots.zarr");
+        assert_eq!(of_spec("\"series\": 0.1, \"snapshots\": [1], \"store\": \"zarr\""), "events.csv snapshots.csv");
         let home = tempfile::tempdir().unwrap();
         fs::write(home.path().join(RUN), "{\"engine\": \"another\"}").unwrap();
         assert_eq!(foreign(home.path()).unwrap(), [Path::new(RUN)]);

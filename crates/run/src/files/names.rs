@@ -32,6 +32,8 @@ pub const CONVERGENCE: &str = "convergence.csv";
 pub const WORK: &str = "work_precision.csv";
 /// The same as a picture.
 pub const WORK_PICTURE: &str = "work_precision.svg";
+/// Relaxation times beside those of an independent solver.
+pub const REFEREE: &str = "referee.csv";
 /// Statistics by cell.
 pub const ENSEMBLE: &str = "ensemble.csv";
 /// The same by group of outlines.

@@ -11,8 +11,8 @@ use super::{
     disk::{entries, is_own_store},
     foreign::foreign,
     names::{
-        CONVERGENCE, FIGURES, PLOTS, PROBE, RUN, SHARD, STATE, STATE_OLD, STATE_PART, WORK, WORK_PICTURE, is_store,
-        part,
+        CONVERGENCE, FIGURES, PLOTS, PROBE, REFEREE, RUN, SHARD, STATE, STATE_OLD, STATE_PART, WORK, WORK_PICTURE,
+        is_store, part,
     },
 };
 use curvelax_base::{
@@ -64,7 +64,7 @@ impl Owner {
     fn marks(self) -> &'static [&'static str] {
         match self {
             Owner::Run => &[RUN, SHARD, STATE, STATE_OLD],
-            Owner::Convergence => &[CONVERGENCE, WORK, WORK_PICTURE],
+            Owner::Convergence => &[CONVERGENCE, REFEREE, WORK, WORK_PICTURE],
             Owner::Figure => &FIGURES,
             // They may be left over from a run whose other files are lost.
             Owner::Pictures | Owner::PicturesOfRun | Owner::Movie => &[],

@@ -17,7 +17,7 @@ use super::{
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{LevelRow, Outcome, SeriesRow, Snapshot};
 use curvelax_study::results::{explained::ExplainedRow, tally::MeanExcess};
-use curvelax_study::truth::{ConvergenceRow, WorkRow};
+use curvelax_study::truth::{ConvergenceRow, RefereeRow, WorkRow};
 
 /// Bytes gathered before they are written.
 const BUFFER: usize = 1 << 16;
@@ -55,17 +55,20 @@ columns! { Outcome:
     order: optional = order, "observed order of t_relax in 1/n, 2 for a smooth curve; empty where differences do not fall";
     label: word = label, "name of its outline; empty if it has none";
     group: word = group, "value of the property `--group-by` of its outline";
+    points: whole = points, "nodes of the finest level that t_limit rests on; without t_limit those of the member";
 }
 
 columns! { LevelRow:
     member: whole = member, "index of the member";
-    level: whole = level, "1: n/2 nodes; 2: n/√2; 3: n";
+    level: whole = level, "1: n/2 nodes; 2: n/√2; 3: n; with `--refine`, of members that need more, 4: √2 n; 5: 2n; and so on up to 1600 nodes";
     cell: whole = cell, "index of its cell";
     points: whole = points, "nodes";
     adaptive: optional = adaptive, "tolerance of the steps: a tenth of that of the run, 1e-4 beside fixed steps";
     status: status = status, "how the member ended";
     t_relax: event = t_relax, "as in `summary.csv`";
     solves: whole = solves, "as in `summary.csv`";
+    turn: number = turn, "largest angle by which the tangent of the initial curve turns at a node, in rad: above 0.5 the nodes do not resolve it";
+    excess_start: number = excess_start, "as in `summary.csv`, at these nodes";
 }
 
 /// A row of `rates.csv`: the fitted rate of a member, and that of linear theory.
@@ -212,6 +215,34 @@ columns! { ErrorRow:
     tolerance: optional = tolerance, "local error tolerance of adaptive steps";
     error: optional = error, "measured / exact - 1; empty where the run ended early";
     order: optional = order, "observed order against the row before";
+}
+
+/// A row of `referee.csv`: a relaxation time of a member, and that of an independent solver.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TruthRow {
+    member: u64,
+    time: String,
+    points: u64,
+    t: Option<f64>,
+    t_error: Option<f64>,
+    order: Option<f64>,
+    referee: Option<f64>,
+    referee_error: Option<f64>,
+    error: Option<f64>,
+    bars: Option<f64>,
+}
+
+columns! { TruthRow:
+    member: whole = member, "index of the member";
+    time: word = time, "which time of `summary.csv` it is: t_relax or t_limit";
+    points: whole = points, "nodes";
+    t: event = t, "the time; empty if the member did not relax";
+    t_error: optional = t_error, "half-width of the 95 % interval of t_limit";
+    order: optional = order, "of t_relax: order of the error against the row before; of t_limit: as in `summary.csv`";
+    referee: event = referee, "the time by the referee; empty if it refused the curve";
+    referee_error: optional = referee_error, "its uncertainty: the difference from a solution with half the nodes and a wider tolerance";
+    error: optional = error, "t / referee - 1";
+    bars: optional = bars, "(t - referee) / t_error";
 }
 
 /// A row of `work_precision.csv`: the error of relaxation times by one method, and what it costs.
@@ -384,6 +415,25 @@ impl ErrorRow {
             tolerance: at.tolerance,
             error: *error,
             order: *order,
+        }
+    }
+}
+
+impl TruthRow {
+    /// The row of a comparison.
+    pub fn of(row: &RefereeRow) -> TruthRow {
+        let truth = row.truth.as_ref().ok();
+        TruthRow {
+            member: row.member,
+            time: row.time.name().to_string(),
+            points: row.points as u64,
+            t: row.t,
+            t_error: row.t_error,
+            order: row.order,
+            referee: truth.map(|truth| truth.t),
+            referee_error: truth.map(|truth| truth.error * truth.t),
+            error: row.error(),
+            bars: row.bars(),
         }
     }
 }

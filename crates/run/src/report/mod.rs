@@ -51,6 +51,8 @@ const SHARE_OF_STATES: u32 = 20;
 
 /// How a report works; the results do not depend on it.
 pub struct Manner {
+    /// When the run was asked for: what comes before its members takes time, too.
+    pub since: Instant,
     /// Where the progress is shown.
     pub progress: Progress,
     /// Time between two checkpoints.
@@ -77,7 +79,7 @@ pub struct RunReport {
     levels: LevelTimes,
     /// Members of the study.
     members: u64,
-    /// Members of each stage.
+    /// Members of each stage; of a finer one none before it begins.
     stages: Vec<u64>,
     /// Index of the stage.
     stage: u64,
@@ -124,13 +126,17 @@ impl RunReport {
         let levels = reader::levels(growing.levels(), study.spec())?;
         let tally = reader::rows(growing.rows(), study.spec(), &levels, aside)?;
         let mut report = RunReport::new(folder, growing, study, origin, manner);
+        // Which members were to run at finer levels follows from their rows.
+        let finer =
+            study.stages().iter().zip(&mut report.stages).take(stage as usize + 1).filter(|(of, _)| of.is_finer());
+        finer.for_each(|(of, members)| *members = study.members_of(of, &levels));
         (report.films, report.earlier, report.stage) = (films, wall, stage);
         (report.tally, report.levels, report.has_begun) = (tally, levels, true);
         Ok((report, standing))
     }
 
     fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, manner: Manner) -> RunReport {
-        let Manner { progress, every, stop, patience } = manner;
+        let Manner { since, progress, every, stop, patience } = manner;
         stop.set_begun();
         RunReport {
             growing,
@@ -141,10 +147,10 @@ impl RunReport {
             films: Vec::new(),
             levels: LevelTimes::default(),
             members: study.member_count(),
-            stages: study.stages().iter().map(|stage| stage.members).collect(),
+            stages: study.stages().iter().map(|stage| if stage.is_finer() { 0 } else { stage.members }).collect(),
             stage: 0,
             progress,
-            clock: Instant::now(),
+            clock: since,
             earlier: Duration::ZERO,
             every,
             stop,
@@ -154,13 +160,14 @@ impl RunReport {
         }
     }
 
-    /// Begins stage number `stage`; all members of earlier ones have ended.
-    pub fn begin_stage(&mut self, stage: usize) {
+    /// Begins stage number `stage`, of so many members; all members of earlier ones have ended.
+    pub fn begin_stage(&mut self, stage: usize, members: u64) {
         self.stage = stage as u64;
+        self.stages[stage] = members;
     }
 
     /// Members of the stages before the current one.
-    fn before(&self) -> u64 {
+    pub fn before(&self) -> u64 {
         self.stages.iter().take(self.stage as usize).sum()
     }
 
@@ -371,13 +378,29 @@ mod tests {
     const PATIENCE: Duration = Duration::from_millis(300);
 
     fn manner(stop: &Stop) -> Manner {
-        Manner { progress: Progress::Quiet, every: Duration::from_secs(1000), stop: stop.clone(), patience: PATIENCE }
+        let (since, every) = (Instant::now(), Duration::from_secs(1000));
+        Manner { since, progress: Progress::Quiet, every, stop: stop.clone(), patience: PATIENCE }
     }
 
     fn begun(out: &Path, spec: &Spec, stop: &Stop) -> RunReport {
         let study = Study::new(spec.clone()).unwrap();
         let origin = Origin::new(&study, platform()).unwrap();
         RunReport::begin(OutputFolder::open(out, true).unwrap(), &study, origin, manner(stop)).unwrap()
+    }
+
+    #[test]
+    fn the_wall_time_includes_what_came_before_the_members() {
+        let (home, hour) = (tempfile::tempdir().unwrap(), Duration::from_secs(3600));
+        let study = Study::new(Spec { curves: 2, ..Spec::default() }).unwrap();
+        let wall = |since: Instant, out: &str| {
+            let folder = OutputFolder::open(&home.path().join(out), true).unwrap();
+            let manner = Manner { since, ..manner(&Stop::default()) };
+            RunReport::begin(folder, &study, Origin::new(&study, platform()).unwrap(), manner).unwrap().wall()
+        };
+        let now = Instant::now();
+        // The clock may have begun less than an hour ago.
+        let before = now.checked_sub(hour).unwrap_or(now);
+        assert!(wall(before, "rounds") >= now - before && wall(Instant::now(), "none") < hour);
     }
 
     /// Nodes of the members in these tests.

@@ -20,6 +20,7 @@ use curvelax_study::{
         comparison::{CellDifference, LeftOut},
         discretisation::{CellLimits, DiscretisationError},
         scaling::Scaling,
+        shortfall::Shortfall,
         tally::Tally,
         times::TimeStatistics,
     },
@@ -61,6 +62,7 @@ impl fmt::Display for Overview<'_> {
             ("t_relax", self.relaxation()),
             ("t_limit", self.limit()),
             ("error", self.error()),
+            ("nodes", self.tally.nodes.told().unwrap_or_default()),
             ("accuracy", self.accuracy()),
             ("rate", self.rate()),
         ]
@@ -129,9 +131,12 @@ impl Overview<'_> {
     fn accuracy(&self) -> String {
         // A shard has some of the members that it takes.
         let Some(goal) = self.spec.accuracy.filter(|_| self.spec.shard.is_none()) else { return String::new() };
-        let worst = self.statistics.uncertainty();
-        let missed = if worst > goal { ": missed, use more --curves to begin with" } else { "" };
-        format!("{} asked for, {} reached{missed}", number(goal), rounded_beside(worst, goal))
+        if let Some(lack) = Shortfall::of(self.spec, self.statistics) {
+            return lack.told();
+        }
+        let of_each = if self.statistics.of_each { " for each member" } else { "" };
+        let reached = rounded_beside(self.statistics.uncertainty(), goal);
+        format!("{}{of_each} asked for, {reached} reached", number(goal))
     }
 
     /// The rates of a single ensemble; empty if no member has one.
@@ -329,13 +334,8 @@ fn events<'a>(spec: &'a Spec, cell: &'a CellStatistics) -> impl Iterator<Item = 
 fn times(of: &TimeStatistics) -> String {
     let (members, known) = (of.sample.len() as u64, of.sample.events() as u64);
     let Some(mean) = of.mean else { return format!("none of {members} {} reached it", plural(members, "member")) };
-    let median = match (of.median(), of.bounds()) {
-        (None, _) => "not reached by half of the members".to_string(),
-        (Some(median), Some((lower, upper))) => {
-            format!("{} (95 % interval {} to {})", significant(median), significant(lower), significant(upper))
-        }
-        (Some(median), _) => significant(median),
-    };
+    let median = of.median().map_or("not reached by half of the members".into(), significant);
+    let interval = of.interval().map_or(String::new(), |interval| format!(" ({})", interval.told(significant)));
     let error = mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
     let least = if mean.restricted_to.is_some() { "at least " } else { "" };
     let censored = match members - known {
@@ -343,7 +343,7 @@ fn times(of: &TimeStatistics) -> String {
         censored => format!("; {censored} censored"),
     };
     format!(
-        "median {median}, mean {least}{}{error} over {known} {} that reached it{censored}",
+        "median {median}{interval}, mean {least}{}{error} over {known} {} that reached it{censored}",
         significant(mean.value),
         plural(known, "member")
     )
@@ -351,9 +351,8 @@ fn times(of: &TimeStatistics) -> String {
 
 /// Median and mean of the limits of a cell.
 fn limit(of: &CellLimits) -> String {
-    let interval = of.interval.map_or(String::new(), |(low, high)| {
-        let (low, high) = (significant(low), significant(high));
-        format!(" (95 % interval {low} to {high}, for sampling and discretisation)")
+    let interval = of.interval.map_or(String::new(), |interval| {
+        format!(" ({}, for sampling and discretisation)", interval.told(significant))
     });
     let median = of.median.map_or("not reached by half of the members".into(), significant);
     let mean = of.mean.map_or(String::new(), |mean| {
@@ -370,28 +369,29 @@ fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     if cell.times.sample.events() == 0 {
         return String::new();
     }
-    let sampling = cell
-        .bounds()
-        .map_or(String::new(), |(low, high)| format!("sampling {} to {}, ", significant(low), significant(high)));
+    let bounds = cell.interval().and_then(|interval| interval.bounds());
+    let sampling =
+        bounds.map_or(String::new(), |(low, high)| format!("sampling {} to {}, ", significant(low), significant(high)));
     let Some(discretisation) = &cell.discretisation else {
         return format!("{sampling}discretisation not known: no member has times at n, n/√2 and n/2 nodes");
     };
     let DiscretisationError { members, mean, error, not_asymptotic } = *discretisation;
     let known = plural(members as u64, "member");
+    let remedy = if spec.refine { "t_error bounds them" } else { "use --refine, or more --points" };
     if !discretisation.converges() {
         return format!(
             "{sampling}discretisation not known: times of {not_asymptotic} of {members} {known} do not converge yet in n; \
-             use more --points"
+             {remedy}"
         );
     }
     let percent = |value: f64| rounded(100.0 * value, 2);
     let about =
         format!("{sampling}discretisation about {} % (± {} %, by {members} {known})", percent(mean), percent(error));
-    let half = cell.bounds().zip(cell.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
+    let half = bounds.zip(cell.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
     let larger = half.is_none_or(|half| mean.abs() > half);
     let advice = match () {
         () if not_asymptotic > 0 => {
-            format!("; times of {not_asymptotic} of them do not converge yet in n: use more --points")
+            format!("; times of {not_asymptotic} of them do not converge yet in n: {remedy}")
         }
         () if spec.refine => ": t_limit is free of it".into(),
         () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => ", the larger of the two: use --refine".into(),
@@ -526,7 +526,9 @@ results    out: summary.csv, run.json
         let about = "discretisation about -2 % (± 0.0098 %, by 4 members)";
         let some = told(&tally);
         assert!(
-            some.ends_with(&format!("{about}; times of 1 of them do not converge yet in n: use more --points")),
+            some.ends_with(&format!(
+                "{about}; times of 1 of them do not converge yet in n: use --refine, or more --points"
+            )),
             "{some}"
         );
         tally.cells[0].judged.iter_mut().for_each(|limit| limit.asymptotic = true);
@@ -534,6 +536,26 @@ results    out: summary.csv, run.json
         assert!(told(&tally).ends_with(about), "{}", told(&tally));
         tally.cells[0].judged.iter_mut().for_each(|limit| limit.relative = -0.2);
         assert!(told(&tally).ends_with(", the larger of the two: use --accurate"), "{}", told(&tally));
+    }
+
+    #[test]
+    fn members_that_needed_more_nodes_are_counted() {
+        let mut tally = Tally::default();
+        tally.refined = true;
+        let nodes = |tally: &Tally| {
+            let text = overview(tally);
+            text.lines().find_map(|line| line.strip_prefix("nodes      ").map(String::from))
+        };
+        let mut add = |member: u64, points: u64, asymptotic: bool| {
+            let judged = Some(Limit { t: 0.5, error: 1e-4, order: None, asymptotic, relative: 0.0 });
+            let outcome = outcome(member, Status::Relaxed, Some(0.5));
+            tally.add(&Outcome { judged, points, is_finer: points > 100, ..outcome }).unwrap();
+            nodes(&tally)
+        };
+        assert_eq!(add(0, 100, true), None);
+        assert_eq!(add(1, 100, false).as_deref(), Some("the errors of 1 of 2 members are bounds"));
+        assert_eq!(add(2, 283, true).as_deref(), Some("1 of 3 members at up to n = 283; the errors of 1 are bounds"));
+        assert_eq!(add(3, 141, true).as_deref(), Some("2 of 4 members at up to n = 283; the errors of 1 are bounds"));
     }
 
     #[test]

@@ -23,7 +23,7 @@ use curvelax_draw::{
 };
 use curvelax_ensemble::{Event, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
 use curvelax_flow::flow::Flow;
-use curvelax_statistics::{HALF_INTERVAL, KaplanMeier, Sample};
+use curvelax_statistics::{HALF_INTERVAL, Interval, KaplanMeier, Sample};
 use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
     comparison::{CellComparison, CellDifference},
@@ -321,7 +321,9 @@ impl FinishedRun<'_> {
             }
             let scaling = self.statistics.scaling.as_ref();
             let fit = scaling.and_then(|scaling| Some((scaling, scaling.law?))).map(|(scaling, law)| {
-                let around = |error: f64| (law.exponent - HALF_INTERVAL * error, law.exponent + HALF_INTERVAL * error);
+                let around = |error: f64| {
+                    Interval::between(law.exponent - HALF_INTERVAL * error, law.exponent + HALF_INTERVAL * error)
+                };
                 let exponent = EstimatedNumber { value: law.exponent, interval: law.exponent_error.map(around) };
                 PowerLawLine { exponent, factor: law.factor, rejected: scaling.is_rejected() }
             });
@@ -338,7 +340,7 @@ impl FinishedRun<'_> {
         let quantity = self.statistics.time();
         let svg = Dependence { title: &title, note: &note, quantity, key, other_key: &other_key, series, across, time };
         let svg = svg.draw();
-        let caption = "Median with its 95 % bootstrap interval (thick) and the middle half of the members (thin).";
+        let caption = "Median with its interval (thick), which covers 95 % or is the range of fewer than 6 members, and the middle half of the members (thin).";
         Some(chart(names::DEPENDENCE, &title, caption, svg))
     }
 
@@ -520,9 +522,10 @@ impl FinishedRun<'_> {
         };
         match &cells[..] {
             [cell] => {
-                let bounds =
-                    |(low, high)| format!("95 %: {} to {}", significant(low, DIGITS), significant(high, DIGITS));
-                add("median t_relax", cell.median(), cell.bounds().map_or(String::new(), bounds));
+                let told = |interval: Option<Interval>| {
+                    interval.map_or(String::new(), |of| of.told_shortly(|end| significant(end, DIGITS)))
+                };
+                add("median t_relax", cell.median(), told(cell.interval()));
                 let mean = cell.times.mean;
                 let error = mean.and_then(|mean| mean.standard_error);
                 let note = match mean.and_then(|mean| mean.restricted_to) {
@@ -531,7 +534,7 @@ impl FinishedRun<'_> {
                 };
                 add("mean t_relax", mean.map(|mean| mean.value), note);
                 if let Some(limits) = &cell.limits {
-                    add("median t_limit", limits.median, limits.interval.map_or(String::new(), bounds));
+                    add("median t_limit", limits.median, told(limits.interval));
                 }
                 if let Some(discretisation) = &cell.discretisation {
                     let DiscretisationError { members, mean, error, .. } = discretisation;
@@ -563,6 +566,8 @@ impl FinishedRun<'_> {
                 headline.extend(compared(comparison));
             }
         }
+        let finer = self.tally.nodes.counted();
+        headline.extend(finer.map(|(value, note)| Headline { label: "with more nodes".into(), value, note }));
         headline
     }
 
@@ -861,7 +866,7 @@ fn differing(cells: &[CellDifference]) -> String {
 }
 
 fn median(cell: &CellStatistics) -> Option<EstimatedNumber> {
-    cell.median().map(|value| EstimatedNumber { value, interval: cell.bounds() })
+    cell.median().map(|value| EstimatedNumber { value, interval: cell.interval() })
 }
 
 fn quartiles(cell: &CellStatistics) -> (Option<f64>, Option<f64>) {

@@ -119,7 +119,10 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
                  one"
             ));
         }
-        None => return refuse(format!(": expected a number under `format`, found none; {REMEDY}")),
+        None => {
+            let found = if format.is_null() { "none".into() } else { shortened(&format.to_string(), SHOWN) };
+            return refuse(format!(": expected a whole number from 1 under `format`, found {found}; {REMEDY}"));
+        }
     }
     // From the text, not from the value, so that an error names its line.
     let provenance: Provenance = match serde_json::from_str(&text) {
@@ -164,7 +167,8 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
 /// [`Error::Request`] for rows that are not of such a run.
 pub fn levels((place, of_events): (&Place, Option<&Place>), spec: &Spec) -> Result<LevelTimes> {
     let (mut table, mut levels) = (TableReader::<LevelRow>::open(place)?, LevelTimes::default());
-    let mut events = of_events.map(|place| EventTimes::<EventLevelRow>::open(place, spec)).transpose()?;
+    let mut events =
+        of_events.map(|of_events| EventTimes::<EventLevelRow>::open(of_events, place, spec)).transpose()?;
     while let Some((mut row, fields)) = table.read()? {
         let LevelRow { member, cell, .. } = row;
         if member >= spec.all_members() || cell != member / spec.members_per_cell() {
@@ -226,7 +230,7 @@ impl<'a> Summary<'a> {
     }
 
     fn of((place, events): (&Place, Option<&Place>), spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
-        let events = events.map(|place| EventTimes::open(place, spec)).transpose()?;
+        let events = events.map(|events| EventTimes::open(events, place, spec)).transpose()?;
         Ok(Summary { levels, table: TableReader::open(place)?, events, last: None, spec: spec.clone(), spec_of: None })
     }
 
@@ -267,13 +271,16 @@ impl<'a> Summary<'a> {
             let values = spec.values_of(member, cell).ok()?;
             linear_rate::rate_of(spec, &values, &outcome)
         });
-        let told = (outcome.t_limit, outcome.t_error);
+        let (told, points) = ((outcome.t_limit, outcome.t_error), outcome.points);
         if let Some((_, spec)) = &self.spec_of {
             self.levels.judge(spec, &mut outcome);
         }
         if (outcome.t_limit, outcome.t_error) != told {
             let (limit, file) = (outcome.t_limit.map_or("nothing".into(), |t| t.to_string()), names::LEVELS);
             return Err(fields.unexpected_in("t_limit", &format!("{limit}, as {file} has it")));
+        }
+        if outcome.points != points {
+            return Err(fields.unexpected_in("points", &format!("{}, as {} has it", outcome.points, names::LEVELS)));
         }
         Ok(Some(outcome))
     }
@@ -320,14 +327,33 @@ impl EventTime for EventLevelRow {
 /// A table of events, read along with that of the members.
 struct EventTimes<R> {
     path: PathBuf,
+    /// The table of the members.
+    beside: PathBuf,
+    /// The last member that it had, and the level.
+    last: Option<(u64, u64)>,
+    /// The number of members of the study.
+    members: u64,
     table: TableReader<R>,
     names: Vec<String>,
 }
 
 impl<R: EventTime> EventTimes<R> {
-    fn open(place: &Place, spec: &Spec) -> Result<EventTimes<R>> {
+    fn open(place: &Place, beside: &Place, spec: &Spec) -> Result<EventTimes<R>> {
         let names = spec.event.iter().map(|event| event.name.clone()).collect();
-        Ok(EventTimes { path: place.shown().to_path_buf(), table: TableReader::open(place)?, names })
+        let [path, beside] = [place, beside].map(|place| place.shown().to_path_buf());
+        let (table, members) = (TableReader::open(place)?, spec.all_members());
+        Ok(EventTimes { path, beside, last: None, members, table, names })
+    }
+
+    /// The error for a row of `of`, which is not due yet, if it is one that the table of the members lacks and has
+    /// `found` instead.
+    fn check_beside(&self, of: (u64, u64), found: &str) -> Result<()> {
+        if Some(of) <= self.last || of.0 >= self.members {
+            return Ok(());
+        }
+        let ([beside, own], member) = ([&self.beside, &self.path].map(|path| path.display()), of.0);
+        let problem = format!("expected another row of member {member}, which {own} has, found {found}");
+        Err(Error::Request(format!("{beside}: {problem}; {REMEDY}")))
     }
 
     /// The times of the events of the next member, which must be that of `place` and of which all rows must `fit`.
@@ -340,7 +366,11 @@ impl<R: EventTime> EventTimes<R> {
                 return Err(Error::Request(format!("{path}: {problem}; {REMEDY}")));
             };
             if row.of() != place {
-                return Err(fields.unexpected_in("member", &format!("member {}, as the other table has it", place.0)));
+                let wrong = fields.unexpected_in("member", &format!("member {}, as the other table has it", place.0));
+                if row.of() < place {
+                    self.check_beside(row.of(), &format!("member {}", place.0))?;
+                }
+                return Err(wrong);
             }
             if row.event() != name {
                 return Err(fields.unexpected_in("event", name));
@@ -352,6 +382,7 @@ impl<R: EventTime> EventTimes<R> {
             }
             times.push(row.time());
         }
+        self.last = Some(place);
         Ok(times)
     }
 
@@ -359,7 +390,11 @@ impl<R: EventTime> EventTimes<R> {
     fn end(&mut self) -> Result<()> {
         match self.table.read()? {
             None => Ok(()),
-            Some((_, fields)) => Err(fields.unexpected_in("member", "the end of the file")),
+            Some((row, fields)) => {
+                let wrong = fields.unexpected_in("member", "the end of the file");
+                self.check_beside(row.of(), "the end of the file")?;
+                Err(wrong)
+            }
         }
     }
 }

@@ -1,48 +1,31 @@
 //! From a spec to a finished folder of results: what the command line and the Python package share.
 //!
-//! [`planned`] chooses what `accuracy` leaves open, [`Work`] checks a spec and chooses where it is computed, and
-//! [`begin`] runs it. [`resume()`] continues an interrupted run.
+//! The way of a run: a request is a [`Spec`](curvelax_ensemble::Spec); a [`Plan`] makes the choices that it leaves to
+//! rounds; a [`PlacedStudy`] is the checked plan, with a back end for each stage; a session carries it out and reports.
+//! [`begin`] starts a run, [`resume()`] continues one, and both end here: a run that loses a GPU which nobody asked for is
+//! resumed on the CPU.
 
+mod host;
+mod placed;
+mod plan;
 mod resume;
-mod work;
+mod run;
 
 use std::path::{Path, PathBuf};
 
-pub use resume::{ResumePlace, begun, resume, resume_like};
-pub use work::Work;
+pub use host::Host;
+pub use placed::PlacedStudy;
+pub use plan::Plan;
+pub use resume::{Begun, ResumePlace, begun};
 
 use crate::{
     files::{Existing, OutputFolder},
-    report::{Form, Manner, RunReport, Stop, checkpoint::Origin},
+    report::Manner,
 };
-use curvelax_base::error::Result;
-use curvelax_ensemble::{Snapshot, Spec, Standing};
-use curvelax_study::{accuracy, results::RunVerdict};
-
-/// Who has a run carried out: a user at a command line, or a program.
-pub trait Host {
-    /// Hears a line about the run: `note: …`, `warning: …`, or what happens now.
-    fn say(&self, line: &str);
-    /// The form of the text at the end.
-    fn form(&self) -> Form;
-    /// Makes a run stoppable from now on.
-    ///
-    /// # Errors
-    /// If the system has no means for it.
-    fn manner(&self) -> Result<Manner>;
-    /// The manner of a run that `stop` stops.
-    fn manner_with(&self, stop: Stop) -> Manner;
-    /// Asked several times a second while a run is prepared; an error ends it.
-    ///
-    /// # Errors
-    /// [`Error::Interrupted`](curvelax_base::error::Error::Interrupted) or the like, if the host wants no run any more.
-    fn go_on(&self) -> Result<()> {
-        Ok(())
-    }
-    /// Sees snapshots of a member, in time order and before they are stored. Those that a resumed run has stored
-    /// earlier are not seen again.
-    fn see(&self, _snapshots: &[Snapshot]) {}
-}
+use curvelax_base::error::{Error, Result};
+use curvelax_ensemble::{Study, request::spec::BackendChoice};
+use curvelax_study::results::RunVerdict;
+use run::Session;
 
 /// A run that is complete.
 #[derive(Debug)]
@@ -55,31 +38,55 @@ pub struct Completed {
     pub out: PathBuf,
 }
 
-/// Replaces `accuracy` in `spec` by the nodes, tolerance and members that reach it, found in rounds that `manner` may
-/// stop.
-///
-/// # Errors
-/// [`Error::Request`](curvelax_base::error::Error::Request) if it cannot be reached, and
-/// [`Error::Interrupted`](curvelax_base::error::Error::Interrupted) or [`Error::Stopped`](curvelax_base::error::Error::Stopped) if asked to stop.
-pub fn planned(spec: Spec, manner: Option<&Manner>, host: &dyn Host) -> Result<Spec> {
-    let stopped = || {
-        if let Err(error) = host.go_on() {
-            return Some(error);
-        }
-        let (cause, _) = manner?.stop.asked()?;
-        Some(cause.error(" in the rounds of --accuracy, before the run began: nothing is saved"))
-    };
-    accuracy::plan(spec, |round| host.say(&round.to_string()), stopped)
-}
-
-/// Runs `work` in the folder at `out`.
+/// Runs `placed` in the folder at `out`.
 ///
 /// # Errors
 /// Those of the folder, the device and the run.
-pub fn begin(mut work: Work, out: &Path, existing: Existing, manner: Manner, host: &dyn Host) -> Result<Completed> {
+pub fn begin(
+    placed: PlacedStudy,
+    out: &Path,
+    existing: Existing,
+    manner: Manner,
+    host: &dyn Host,
+) -> Result<Completed> {
     let folder = OutputFolder::open(out, existing)?;
-    let platform = work.open(host)?;
-    let origin = Origin::new(&work.study, platform)?;
-    let report = RunReport::begin(folder, &work.study, origin, manner)?;
-    resume::carry_out(work, report, Standing::default(), host)
+    complete(Session::begin(placed, folder, manner, host)?, host)
+}
+
+/// Resumes the run in the folder at `path`. `None` means that it is finished.
+///
+/// # Errors
+/// [`Error::Request`] if there is no run, or if it would continue elsewhere without being asked to; and those of the
+/// run.
+pub fn resume(path: &Path, place: ResumePlace, host: &dyn Host) -> Result<Option<Completed>> {
+    let resumed = Begun::open(path)?.resume(place, host)?;
+    resumed.map(|session| complete(session, host)).transpose()
+}
+
+/// Resumes a run that was [begun], if it has the same spec. `None` means that it is finished.
+///
+/// # Errors
+/// [`Error::Request`] for a run of another spec, and those of [`resume()`].
+pub fn resume_like(begun: Begun, study: &Study, asked: BackendChoice, host: &dyn Host) -> Result<Option<Completed>> {
+    begun.check_same(study, asked)?;
+    let place = ResumePlace { threads: study.spec().threads, ..ResumePlace::default() };
+    begun.resume(place, host)?.map(|session| complete(session, host)).transpose()
+}
+
+/// Carries out `session`. If a GPU fails that `--backend auto` chose, the run continues on the CPU from its last
+/// checkpoint, as by `resume --backend cpu`.
+fn complete(session: Session, host: &dyn Host) -> Result<Completed> {
+    let falls_back = session.may_fall_back();
+    let (path, stop) = (session.folder().to_path_buf(), session.stop().clone());
+    match session.carry_out(host) {
+        Err(Error::Device(fault)) if falls_back => {
+            let why = format!("the GPU failed: {fault}");
+            host.say(&format!("note: on the CPU from here on: {why}"));
+            match Begun::open(&path)?.resume_on_cpu(why, host.manner_with(stop), host)? {
+                Some(session) => session.carry_out(host),
+                None => Err(Error::Device(fault)),
+            }
+        }
+        done => done,
+    }
 }

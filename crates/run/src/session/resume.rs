@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Completed, Host, Work};
+use super::{Host, PlacedStudy, Plan, run::Session};
 use crate::{
     files::{OutputFolder, names},
     report::{
-        Manner, RunReport,
-        checkpoint::{self, Head, Saved},
+        Manner,
+        checkpoint::{self, Head, Origin, Saved},
         outlines, reader,
     },
 };
@@ -15,84 +15,25 @@ use curvelax_base::{
     error::{Error, Result},
     text::quoted,
 };
-use curvelax_ensemble::{Outlines, Spec, Standing, Study, request::spec::BackendChoice};
+use curvelax_ensemble::{Outlines, Spec, Study, request::spec::BackendChoice};
+use curvelax_study::placement::Platform;
 
-/// Resumes the run in the folder at `path`. `None` means that it is finished.
-///
-/// # Errors
-/// [`Error::Request`] if there is no run, or if it would continue elsewhere without being asked to; and those of the
-/// run.
-pub fn resume(path: &Path, place: ResumePlace, host: &dyn Host) -> Result<Option<Completed>> {
-    let folder = OutputFolder::open_again(path)?;
-    let saved = checkpoint::find(&folder)?;
-    resume_in(folder, saved, place, host)
+/// A run that was begun.
+pub struct Begun {
+    folder: OutputFolder,
+    /// Its checkpoint, unless it is complete.
+    saved: Option<Saved>,
 }
 
-/// The run that was begun in the folder at `path`, if any: its folder, and its checkpoint unless it is complete.
+/// The run that was begun in the folder at `path`, if any.
 ///
 /// # Errors
-/// Those of [`resume()`].
-pub fn begun(path: &Path) -> Result<Option<(OutputFolder, Option<Saved>)>> {
+/// Those of [`resume()`](super::resume()).
+pub fn begun(path: &Path) -> Result<Option<Begun>> {
     let there = |name: &&str| path.join(name).exists();
-    if ![names::STATE, names::STATE_OLD, names::RUN].iter().any(there) {
-        return Ok(None);
-    }
-    let folder = OutputFolder::open_again(path)?;
-    let saved = checkpoint::find(&folder)?;
-    Ok(Some((folder, saved)))
-}
-
-/// Resumes a run that was [begun], if it has the same spec. `None` means that it is finished.
-///
-/// # Errors
-/// [`Error::Request`] for a run of another spec, and those of [`resume()`].
-pub fn resume_like(
-    (folder, saved): (OutputFolder, Option<Saved>),
-    study: &Study,
-    asked: BackendChoice,
-    host: &dyn Host,
-) -> Result<Option<Completed>> {
-    let (path, spec) = (folder.path().display().to_string(), study.spec());
-    let own = match &saved {
-        Some(saved) => Spec::from_toml(&saved.head.origin.spec).map_err(|e| state_spec(&e))?,
-        None => reader::provenance(folder.path())?.spec,
-    };
-    // Where it continues is checked separately, and the number of threads makes no difference.
-    if let Some((key, here, there)) = spec.difference(&own, &["backend", "adapter", "threads"]) {
-        return Err(Error::Request(format!(
-            "--resume: the run in {path} has another spec: {key} is {there} there and {here} here; use another folder"
-        )));
-    }
-    if let Some(Saved { head: Head { origin, .. }, .. }) = &saved {
-        // The outline of this name may be another one here.
-        origin.check_outlines(study)?;
-        let there = origin.platform.backend;
-        if asked != BackendChoice::Auto && asked != there.into() {
-            return Err(Error::Request(format!(
-                "--resume: the run in {path} is on the {there}; leave out --backend, or move it with curvelax resume \
-                 {} --backend",
-                quoted(folder.path())
-            )));
-        }
-    }
-    resume_in(folder, saved, ResumePlace { threads: spec.threads, ..ResumePlace::default() }, host)
-}
-
-/// Carries out `work`. If a GPU fails that `--backend auto` chose, the run continues on the CPU from its last checkpoint,
-/// as by `resume --backend cpu`.
-pub fn carry_out(work: Work, report: RunReport, standing: Standing, host: &dyn Host) -> Result<Completed> {
-    let falls_back = work.may_fall_back();
-    let (path, stop) = (report.folder().to_path_buf(), report.stop().clone());
-    match work.carry_out(report, standing, host) {
-        Err(Error::Device(fault)) if falls_back => {
-            let why = format!("the GPU failed: {fault}");
-            host.say(&format!("note: on the CPU from here on: {why}"));
-            let folder = OutputFolder::open_again(&path)?;
-            let Some(saved) = checkpoint::find(&folder)? else { return Err(Error::Device(fault)) };
-            let place = ResumePlace { backend: Some(BackendChoice::Cpu), why: Some(why), ..ResumePlace::default() };
-            continue_in(folder, saved, place, host.manner_with(stop), host)
-        }
-        done => done,
+    match [names::STATE, names::STATE_OLD, names::RUN].iter().any(there) {
+        true => Begun::open(path).map(Some),
+        false => Ok(None),
     }
 }
 
@@ -109,56 +50,109 @@ pub struct ResumePlace {
     pub why: Option<String>,
 }
 
-fn resume_in(
-    folder: OutputFolder,
-    saved: Option<Saved>,
-    place: ResumePlace,
-    host: &dyn Host,
-) -> Result<Option<Completed>> {
-    let Some(saved) = saved else {
-        folder.tidy()?;
-        host.say(&format!("note: the run in {} is finished: nothing is left to do", folder.path().display()));
-        return Ok(None);
-    };
-    // Before a device is looked for, which takes time.
-    let manner = host.manner()?;
-    continue_in(folder, saved, place, manner, host).map(Some)
+impl Begun {
+    /// The run in the folder at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Request`] if there is none.
+    pub(super) fn open(path: &Path) -> Result<Begun> {
+        let folder = OutputFolder::open_again(path)?;
+        let saved = checkpoint::find(&folder)?;
+        Ok(Begun { folder, saved })
+    }
+
+    /// Checks that the run is that of `study`, and on the back end that was asked for.
+    ///
+    /// # Errors
+    /// [`Error::Request`] with the first difference.
+    pub(super) fn check_same(&self, study: &Study, asked: BackendChoice) -> Result<()> {
+        let (path, spec) = (self.folder.path().display(), study.spec());
+        let own = match &self.saved {
+            Some(saved) => Spec::from_toml(&saved.head.origin.spec).map_err(|e| state_spec(&e))?,
+            None => reader::provenance(self.folder.path())?.spec,
+        };
+        // Where it continues is checked separately, and the number of threads makes no difference.
+        if let Some((key, here, there)) = spec.difference(&own, &["backend", "adapter", "threads"]) {
+            return Err(Error::Request(format!(
+                "--resume: the run in {path} has another spec: {key} is {there} there and {here} here; use another folder"
+            )));
+        }
+        if let Some(Saved { head: Head { origin, .. }, .. }) = &self.saved {
+            // The outline of this name may be another one here.
+            origin.check_outlines(study)?;
+            let there = origin.platform.backend;
+            if asked != BackendChoice::Auto && asked != there.into() {
+                return Err(Error::Request(format!(
+                    "--resume: the run in {path} is on the {there}; leave out --backend, or move it with curvelax resume \
+                     {} --backend",
+                    quoted(self.folder.path())
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// The session that continues the run; `None` if it is finished.
+    pub(super) fn resume(self, place: ResumePlace, host: &dyn Host) -> Result<Option<Session>> {
+        let Begun { folder, saved } = self;
+        let Some(saved) = saved else {
+            folder.tidy()?;
+            host.say(&format!("note: the run in {} is finished: nothing is left to do", folder.path().display()));
+            return Ok(None);
+        };
+        // Before a device is looked for, which takes time.
+        let manner = host.manner()?;
+        continued(folder, saved, place, manner, host).map(Some)
+    }
+
+    /// The session that continues the run on the CPU, because of `why`; `None` if it is finished.
+    pub(super) fn resume_on_cpu(self, why: String, manner: Manner, host: &dyn Host) -> Result<Option<Session>> {
+        let Begun { folder, saved: Some(saved) } = self else { return Ok(None) };
+        let place = ResumePlace { backend: Some(BackendChoice::Cpu), why: Some(why), ..ResumePlace::default() };
+        continued(folder, saved, place, manner, host).map(Some)
+    }
 }
 
-/// Continues the run in `folder` from a checkpoint.
-fn continue_in(
+/// The session that continues the run in `folder` from a checkpoint.
+fn continued(
     mut folder: OutputFolder,
     mut saved: Saved,
-    mut place: ResumePlace,
+    place: ResumePlace,
     manner: Manner,
     host: &dyn Host,
-) -> Result<Completed> {
+) -> Result<Session> {
     let path = folder.path().to_path_buf();
-    if let Some(fault) = &saved.note {
-        host.say(&format!("warning: {}: {fault}", path.display()));
-    }
+    let warn = |fault: &str| host.say(&format!("warning: {}: {fault}", path.display()));
+    saved.note.iter().for_each(|fault| warn(fault));
     let origin = &mut saved.head.origin;
     let base = PathBuf::from(&origin.base);
     let known = outlines::find(&folder, origin).unwrap_or_else(|fault| {
-        host.say(&format!("warning: {}: {fault}", path.display()));
+        warn(&fault);
         Outlines::default()
     });
     if known.is_empty() && !origin.outlines.is_empty() {
         folder.make_absolute()?;
         check_base(&base)?;
     }
-    let began = origin.platform.clone();
-    let elsewhere = place.backend.is_some() || place.adapter.is_some();
-    let (new_threads, why) = (place.threads.is_some(), place.why.take());
-    let work = spec(&origin.spec, place)
-        .and_then(|spec| Work::new_from(spec, &base, &known))
+    let placed = spec(&origin.spec, &place)
+        .and_then(|spec| Plan { spec, base, known }.place())
         .map_err(|error| origin.explain(error))?;
-    let work = if why.is_some() { work.because("the GPU failed") } else { work };
-    origin.check_outlines(&work.study)?;
-    let mut here = work.platform();
-    here.reason = why.unwrap_or_else(|| began.reason.clone());
+    let placed = if place.why.is_some() { placed.because("the GPU failed") } else { placed };
+    origin.check_outlines(&placed.study)?;
+    settle(origin, &placed, place)?;
+    Session::resume(placed, folder, saved, manner, host)
+}
+
+/// Writes to the origin of a run where it continues.
+///
+/// # Errors
+/// [`Error::Request`] if digits differ there and nobody asked for it.
+fn settle(origin: &mut Origin, placed: &PlacedStudy, place: ResumePlace) -> Result<()> {
+    let ResumePlace { backend, adapter, threads, why } = place;
+    let began = origin.platform.clone();
+    let here = Platform { reason: why.unwrap_or_else(|| began.reason.clone()), ..placed.platform() };
     if !here.computes_like(&began) {
-        if !elsewhere {
+        if backend.is_none() && adapter.is_none() {
             return Err(Error::Request(format!(
                 "the run began on {}; here it would continue on {}, where digits differ; add --backend {} to accept \
                  that",
@@ -168,25 +162,23 @@ fn continue_in(
             )));
         }
         origin.moves.push(format!("the run began on {} and continued on {}", began.name(), here.name()));
-        origin.spec = work.study.spec().to_toml()?;
+        origin.spec = placed.study.spec().to_toml()?;
         origin.platform = here;
-    } else if new_threads {
-        (origin.platform.threads, origin.spec) = (here.threads, work.study.spec().to_toml()?);
+    } else if threads.is_some() {
+        (origin.platform.threads, origin.spec) = (here.threads, placed.study.spec().to_toml()?);
     }
-    let (report, standing) = RunReport::resume(folder, &work.study, saved, manner)?;
-    host.say(&format!("resuming: {} of {} members are in the table", report.members(), work.study.member_count()));
-    carry_out(work, report, standing, host)
+    Ok(())
 }
 
 /// The spec of the checkpoint, with the changes by this command line.
-fn spec(text: &str, ResumePlace { backend, adapter, threads, .. }: ResumePlace) -> Result<Spec> {
+fn spec(text: &str, ResumePlace { backend, adapter, threads, .. }: &ResumePlace) -> Result<Spec> {
     let mut spec = Spec::from_toml(text).map_err(|e| state_spec(&e))?;
     if backend.is_some() || adapter.is_some() {
         spec.backend = backend.unwrap_or(BackendChoice::Gpu);
-        spec.adapter = adapter;
+        spec.adapter = adapter.clone();
     }
     if threads.is_some() {
-        spec.threads = threads;
+        spec.threads = *threads;
     }
     Ok(spec)
 }

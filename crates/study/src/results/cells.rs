@@ -10,12 +10,12 @@ use super::{
     discretisation::{CellLimits, DiscretisationError},
     scaling::{CellMedian, Scaling},
     tally::{CellTally, EventTally, Rate, Tally},
-    times::{Numbers, QUANTILES, Statistic, TimeStatistics, places},
+    times::{Numbers, QUANTILES, Statistic, TimeStatistics, covered, intervals, places},
 };
 use csv::WriterBuilder;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{Spec, Status};
-use curvelax_statistics::{Bootstrap, Description, Mean, Sample};
+use curvelax_statistics::{Description, Interval, Mean, Sample, interval};
 
 /// Relaxation times of one cell.
 pub struct CellStatistics {
@@ -58,7 +58,7 @@ pub struct Rates {
 
 impl Rates {
     /// Summarises `rates`; the chart shows their ratios to theory if they are `relative`.
-    fn new(bootstrap: &Bootstrap, rates: &[Rate], relative: bool) -> Result<Rates> {
+    fn new(rates: &[Rate], relative: bool) -> Result<Rates> {
         let theory = Description::new(rates.iter().filter_map(Rate::theory))?.median();
         let fitted = Description::new(rates.iter().map(|rate| rate.fitted))?;
         let moments = [
@@ -67,14 +67,16 @@ impl Rates {
             Statistic { name: "se", value: fitted.standard_error(), meaning: "standard error of the mean" },
         ];
         let quantiles = QUANTILES.map(|(share, ..)| fitted.quantile(share));
-        let places = places(quantiles, bootstrap.median_of(&fitted));
+        let of_quantiles = QUANTILES.map(|(share, ..)| interval::of_values(&fitted, share));
+        let (intervals, [_, _, of_median, ..]) = (intervals(&of_quantiles), of_quantiles);
+        let places = places(quantiles, of_median);
         let (known, mut named) = (fitted.count(), moments.into_iter().chain(places).collect::<Vec<_>>());
         // Each is as large as all times of the cell: one at a time.
         let kept = (!relative).then_some(fitted);
         let ratio = Description::new(rates.iter().filter_map(Rate::ratio))?;
         named.push(Statistic { name: "theory", value: theory, meaning: "median of the rates of linear theory" });
         named.push(Statistic { name: "ratio", value: ratio.median(), meaning: "median of rate over linear theory" });
-        Ok(Rates { numbers: Numbers { known, named }, drawn: kept.unwrap_or(ratio) })
+        Ok(Rates { numbers: Numbers { known, named, intervals }, drawn: kept.unwrap_or(ratio) })
     }
 }
 
@@ -110,35 +112,36 @@ pub struct EnsembleStatistics {
     pub scaling: Option<Scaling>,
     /// Medians are compared in the limit, if all cells that have a median have that of limits.
     pub of_limits: bool,
+    /// The uncertainty is that of each member, if they are outlines, and else that of the median.
+    pub of_each: bool,
     /// Rates are drawn relative to theory, if all members with a rate have a theoretical one.
     pub relative: bool,
 }
 
 impl EnsembleStatistics {
-    /// The relative uncertainty of the median limit, in the cell where it is largest; infinite if one has none.
+    /// The relative uncertainty of the limits in the cell where it is largest; infinite if one has none.
     pub fn uncertainty(&self) -> f64 {
-        let cells = self.cells.iter().map(|cell| cell.limits.as_ref().and_then(CellLimits::uncertainty));
-        cells.map(|reached| reached.unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
+        let cells = self.cells.iter().map(|cell| cell.uncertainty(self.of_each));
+        cells.map(|reached| reached.map_or(f64::INFINITY, |(all, _)| all)).fold(0.0, f64::max)
     }
 }
 
 impl CellStatistics {
     /// Moves times and rates out of `tally`.
     fn new(spec: &Spec, cell: u64, tally: &mut CellTally, relative: bool) -> Result<CellStatistics> {
-        let bootstrap = Bootstrap { seed: spec.seed.wrapping_add(cell), ..Bootstrap::default() };
-        let times = TimeStatistics::new(mem::take(&mut tally.times), &bootstrap);
+        let times = TimeStatistics::new(mem::take(&mut tally.times));
         let (values, counts) = (spec.sweep.labels(cell), tally.counts);
-        let rates = Rates::new(&bootstrap, &mem::take(&mut tally.rates), relative)?;
+        let rates = Rates::new(&mem::take(&mut tally.rates), relative)?;
         let (judged, copies) =
             (mem::take(&mut tally.judged), !spec.has_different_members() && !spec.sweep.has("amplitude"));
         let discretisation = DiscretisationError::of(&judged)?;
-        let limits = CellLimits::of(&Sample::from(mem::take(&mut tally.limits)), &judged, &bootstrap, copies)?;
+        let limits = CellLimits::of(&mem::take(&mut tally.limits), &judged, copies)?;
         let mut of_events = mem::take(&mut tally.events).into_iter();
         let events = spec.event.iter().map(|_| {
             let EventTally { times, judged, stopped, .. } = of_events.next().unwrap_or_default();
             let discretisation = DiscretisationError::of(&judged)?;
             let times = match stopped {
-                0 => TimeStatistics::new(times, &bootstrap),
+                0 => TimeStatistics::new(times),
                 _ => TimeStatistics::unknown(times),
             };
             Ok(EventStatistics { times, discretisation, stopped })
@@ -162,18 +165,20 @@ impl CellStatistics {
         let limits = self.limits.as_ref();
         let of = |number: fn(Mean) -> Option<f64>| limits.and_then(|limits| limits.mean).and_then(number);
         let interval = limits.and_then(|limits| limits.interval);
-        let low = "lower end of the 95 % interval of the median, for sampling and discretisation together";
-        let high = "upper end of the 95 % interval of the median, for sampling and discretisation together";
+        let low = "lower end of the 95 % interval of the median, for sampling and discretisation together; of fewer than 6 \
+                   that of their range; empty if there is none";
+        let high = "upper end of the 95 % interval of the median, for sampling and discretisation together; of fewer than 6 \
+                    that of their range; empty if there is none";
         let named = vec![
             Statistic { name: "mean", value: of(|mean| Some(mean.value)), meaning: "mean, by Kaplan–Meier" },
             Statistic { name: "sd", value: of(|mean| mean.standard_deviation), meaning: "standard deviation" },
             Statistic { name: "se", value: of(|mean| mean.standard_error), meaning: "standard error of the mean" },
             Statistic { name: "median", value: limits.and_then(|limits| limits.median), meaning: "median" },
-            Statistic { name: "median_low", value: interval.map(|(low, _)| low), meaning: low },
-            Statistic { name: "median_high", value: interval.map(|(_, high)| high), meaning: high },
+            Statistic { name: "median_low", value: interval.and_then(|interval| interval.lower), meaning: low },
+            Statistic { name: "median_high", value: interval.and_then(|interval| interval.upper), meaning: high },
             Statistic { name: "error", value: limits.and_then(|limits| limits.error), meaning: "median of t_error" },
         ];
-        Numbers { known: limits.map_or(0, |limits| limits.known), named }
+        Numbers { known: limits.map_or(0, |limits| limits.known), named, intervals: vec![covered(interval)] }
     }
 
     /// The quantities in the table, with their numbers.
@@ -188,10 +193,10 @@ impl CellStatistics {
     }
 
     /// The median with its interval, that of the limits if they are asked for.
-    pub fn judged_median(&self, of_limits: bool) -> Option<(f64, Option<(f64, f64)>)> {
+    pub fn judged_median(&self, of_limits: bool) -> Option<(f64, Option<Interval>)> {
         match &self.limits {
             Some(limits) if of_limits => limits.median.map(|median| (median, limits.interval)),
-            _ => self.median().map(|median| (median, self.bounds())),
+            _ => self.median().map(|median| (median, self.interval())),
         }
     }
 
@@ -201,9 +206,15 @@ impl CellStatistics {
         seen.next().is_some_and(|first| first.happened && seen.all(|other| other == first))
     }
 
-    /// The interval of the median, if both its ends are known.
-    pub fn bounds(&self) -> Option<(f64, f64)> {
-        self.times.bounds()
+    /// The interval of the median.
+    pub fn interval(&self) -> Option<Interval> {
+        self.times.interval()
+    }
+
+    /// The relative uncertainty of its limits: of each, or else of their median, with the part that is no sampling.
+    pub fn uncertainty(&self, of_each: bool) -> Option<(f64, f64)> {
+        let limits = self.limits.as_ref()?;
+        if of_each { limits.widest.map(|widest| (widest, widest)) } else { limits.uncertainty() }
     }
 }
 
@@ -227,7 +238,7 @@ fn errors(of: Option<&DiscretisationError>, mean: &'static str) -> Numbers {
         Statistic { name: "mean", value: number(|of| of.mean), meaning: mean },
         Statistic { name: "error", value: number(|of| of.error), meaning: "half-width of its 95 % interval" },
     ];
-    Numbers { known: of.map_or(0, |of| of.members), named }
+    Numbers { known: of.map_or(0, |of| of.members), named, intervals: Vec::new() }
 }
 
 impl EnsembleStatistics {
@@ -257,8 +268,8 @@ impl EnsembleStatistics {
         };
         let of_limits = spec.refine && cells.iter().all(|cell| cell.median().is_none() || cell.limits.is_some());
         let medians = cells.iter().map(|cell| {
-            let (value, bounds) = cell.judged_median(of_limits).unzip();
-            CellMedian { cell: cell.cell, value, bounds: bounds.flatten(), has_copies: cell.has_copies() }
+            let (value, interval) = cell.judged_median(of_limits).unzip();
+            CellMedian { cell: cell.cell, value, interval: interval.flatten(), has_copies: cell.has_copies() }
         });
         let scaling = Scaling::of(&spec.sweep, &medians.collect::<Vec<_>>());
         let groups = mem::take(&mut tally.groups).into_iter().map(|((cell, group), mut of_group)| {
@@ -282,7 +293,8 @@ impl EnsembleStatistics {
             }
         });
         let group_comparisons = group_comparisons.collect();
-        Ok(EnsembleStatistics { cells, comparison, groups, group_comparisons, scaling, relative, of_limits })
+        let of_each = spec.outlines.is_some();
+        Ok(EnsembleStatistics { cells, comparison, groups, group_comparisons, scaling, relative, of_limits, of_each })
     }
 
     /// The time whose medians are compared.
@@ -307,18 +319,20 @@ impl EnsembleStatistics {
     fn columns_after(&self, keys: Vec<CellColumn>) -> Vec<CellColumn> {
         let statuses = Status::ALL.into_iter().map(Status::name);
         let statuses = statuses.map(|name| column(name.into(), "integer", format!("members that ended {name}")));
-        let numbers = self.cells.first().into_iter().flat_map(CellStatistics::quantities);
-        let numbers = numbers.flat_map(|(quantity, numbers)| {
+        let quantities = || self.cells.first().into_iter().flat_map(CellStatistics::quantities);
+        let float = |quantity: &str, Statistic { name, meaning, .. }: &Statistic| {
+            column(format!("{quantity}_{name}"), "float", format!("{quantity}: {meaning}"))
+        };
+        let numbers = quantities().flat_map(|(quantity, numbers)| {
             let known = column(format!("{quantity}_known"), "integer", format!("members with a {quantity}"));
-            let named = numbers.named.into_iter().map(move |Statistic { name, meaning, .. }| {
-                column(format!("{quantity}_{name}"), "float", format!("{quantity}: {meaning}"))
-            });
-            [known].into_iter().chain(named)
+            [known].into_iter().chain(numbers.named.iter().map(|of| float(quantity, of)).collect::<Vec<_>>())
         });
+        let intervals = quantities()
+            .flat_map(|(quantity, numbers)| numbers.intervals.iter().map(|of| float(quantity, of)).collect::<Vec<_>>());
         let mut all = vec![column("cell".into(), "integer", "index of the cell, from 0".into())];
         all.extend(keys);
         all.push(column("members".into(), "integer", "members that ended".into()));
-        all.extend(statuses.chain(numbers));
+        all.extend(statuses.chain(numbers).chain(intervals));
         all
     }
 
@@ -333,11 +347,13 @@ impl EnsembleStatistics {
             column("known", "integer", "members of which the event was seen"),
         ];
         let some = self.cells.iter().flat_map(|cell| &cell.events).next();
-        let named = |numbers: Option<Numbers>| numbers.map_or(Vec::new(), |numbers| numbers.named);
-        let (times, errors) = (named(some.map(|of| of.times.numbers())), named(some.map(EventStatistics::errors)));
+        let named = |numbers: Option<Numbers>| numbers.map_or((vec![], vec![]), |of| (of.named, of.intervals));
+        let (times, intervals) = named(some.map(|of| of.times.numbers()));
+        let (errors, _) = named(some.map(EventStatistics::errors));
         all.extend(times.iter().map(|of| column(of.name, "float", of.meaning)));
         all.push(column("discretisation_known", "integer", "members of which that is known"));
         all.extend(errors.iter().map(|of| column(&format!("discretisation_{}", of.name), "float", of.meaning)));
+        all.extend(intervals.iter().map(|of| column(of.name, "float", of.meaning)));
         all
     }
 
@@ -349,10 +365,10 @@ impl EnsembleStatistics {
         for (cell, (event, of)) in
             self.cells.iter().flat_map(|cell| spec.event.iter().zip(&cell.events).map(move |of| (cell, of)))
         {
-            let values = |of: Numbers| of.named.into_iter().map(|number| number.value).collect::<Vec<_>>();
+            let values = |of: &[Statistic]| of.iter().map(|number| number.value).collect::<Vec<_>>();
             let (times, errors) = (of.times.numbers(), of.errors());
-            let (known, judged) = (times.known, errors.known);
-            let row = (cell.cell, &event.name, of.times.sample.len(), known, values(times), judged, values(errors));
+            let (seen, judged) = ((times.known, values(&times.named)), (errors.known, values(&errors.named)));
+            let row = (cell.cell, &event.name, of.times.sample.len(), seen, judged, values(&times.intervals));
             writer.serialize(row).map_err(|e| failed(&e))?;
         }
         let bytes = writer.into_inner().map_err(|e| failed(&e))?;
@@ -384,10 +400,11 @@ fn table<'a>(
     let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
     writer.write_record(columns.into_iter().map(|column| column.name)).map_err(|e| failed(&e))?;
     for (values, of) in rows {
-        let numbers = of.quantities().map(|(_, Numbers { known, named })| {
-            (known, named.into_iter().map(|number| number.value).collect::<Vec<_>>())
-        });
-        writer.serialize((of.cell, values, of.members(), of.counts, numbers)).map_err(|e| failed(&e))?;
+        let quantities = of.quantities();
+        let values_of = |of: &[Statistic]| of.iter().map(|number| number.value).collect::<Vec<_>>();
+        let numbers = quantities.each_ref().map(|(_, numbers)| (numbers.known, values_of(&numbers.named)));
+        let intervals = quantities.each_ref().map(|(_, numbers)| values_of(&numbers.intervals));
+        writer.serialize((of.cell, values, of.members(), of.counts, numbers, intervals)).map_err(|e| failed(&e))?;
     }
     let bytes = writer.into_inner().map_err(|e| failed(&e))?;
     String::from_utf8(bytes).map_err(|e| failed(&e))
@@ -425,7 +442,10 @@ mod tests {
              t_relax_median_low,t_relax_median_high,rate_known,rate_mean,rate_sd,rate_se,rate_q05,rate_q25,\
              rate_median,rate_q75,rate_q95,rate_median_low,rate_median_high,rate_theory,rate_ratio,discretisation_known,\
              discretisation_mean,discretisation_error,t_limit_known,t_limit_mean,t_limit_sd,t_limit_se,t_limit_median,\
-             t_limit_median_low,t_limit_median_high,t_limit_error"
+             t_limit_median_low,t_limit_median_high,t_limit_error,t_relax_median_coverage,t_relax_q05_low,\
+             t_relax_q05_high,t_relax_q25_low,t_relax_q25_high,t_relax_q75_low,t_relax_q75_high,t_relax_q95_low,\
+             t_relax_q95_high,rate_median_coverage,rate_q05_low,rate_q05_high,rate_q25_low,rate_q25_high,rate_q75_low,\
+             rate_q75_high,rate_q95_low,rate_q95_high,t_limit_median_coverage"
         );
         assert!(lines[1].starts_with("0,\"ellipse:2,1\",2,2,0,0,0,0,2,1.0,0.7071"), "{}", lines[1]);
         assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
@@ -440,8 +460,11 @@ mod tests {
         let text = statistics.to_csv(&spec).unwrap();
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         let (lines, gap): (Vec<&str>, _) = (text.lines().skip(1).collect(), ",".repeat(12));
-        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0{gap}0{gap},0,,,0{}", ",".repeat(7)));
-        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0{gap}0{gap},0,,,0{}", ",".repeat(7)));
+        // Of both it is known that they relax later than 2: so does the median with 75 %, the 95 % quantile with 99.75 %.
+        let later =
+            format!("{}2.0,,0{gap},0,,,0{}0.75{}2.0{}", ",".repeat(10), ",".repeat(8), ",".repeat(7), ",".repeat(11));
+        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0{later}"));
+        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0{gap}0{gap},0,,,0{}", ",".repeat(26)));
         assert!(lines[2].starts_with("2,3,1,1,0,0,0,0,1,0.0,,,,0.0,"), "{}", lines[2]);
     }
 }

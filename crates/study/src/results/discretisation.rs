@@ -1,7 +1,9 @@
 //! The error that n and the steps leave in the relaxation times of a cell, and what the times tend to.
 
 use curvelax_base::error::Result;
-use curvelax_statistics::{Bootstrap, Description, HALF_INTERVAL, Interval, KaplanMeier, Limit, Mean, Sample};
+use curvelax_statistics::{
+    Description, HALF_INTERVAL, Interval, KaplanMeier, Limit, Mean, Observation, Observations, Sample, interval,
+};
 
 /// What the levels tell of the relaxation times of a cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,39 +48,71 @@ pub struct CellLimits {
     pub mean: Option<Mean>,
     /// Their median.
     pub median: Option<f64>,
-    /// Its 95 % interval, for sampling and discretisation together.
-    pub interval: Option<(f64, f64)>,
+    /// Its interval, for sampling and discretisation together.
+    pub interval: Option<Interval>,
     /// Median of the half-widths of the members' own intervals.
     pub error: Option<f64>,
+    /// What the median is if all limits are at one end of their own intervals.
+    pub ends: Option<(f64, f64)>,
+    /// Relative half-width of the members' own intervals that [`MOST`] of them do not exceed.
+    pub widest: Option<f64>,
 }
 
+/// Share of the members whose own intervals are as narrow as [`CellLimits::widest`].
+pub const MOST: f64 = 0.95;
+
 impl CellLimits {
-    /// Summarises the limits; none if no member has one.
+    /// Summarises the limits, in the order of those that are `judged`; none if no member has one.
     ///
     /// `copies` says that all members are one curve.
-    pub fn of(sample: &Sample, judged: &[Limit], bootstrap: &Bootstrap, copies: bool) -> Result<Option<CellLimits>> {
+    pub fn of(limits: &Observations, judged: &[Limit], copies: bool) -> Result<Option<CellLimits>> {
+        let [at_low_end, sample, at_high_end] = [-1.0, 0.0, 1.0].map(|end| moved(limits, judged, end));
+        let (at_low_end, sample, at_high_end) = (at_low_end?, sample?, at_high_end?);
         if sample.events() == 0 {
             return Ok(None);
         }
-        let survival = KaplanMeier::new(sample);
-        let error = Description::new(judged.iter().map(|limit| limit.error))?.median();
-        // Errors of discretisation have one sign for all members: they do not average out.
-        let wider = |Interval { lower, upper, .. }| Some(((lower? - error?).max(0.0), upper? + error?));
-        // Copies of one curve have an interval, too: that of their own error.
-        let alone = || if copies && sample.len() == 1 { sample.last() } else { None };
-        let alone = || alone().zip(error).map(|(t, error)| ((t - error).max(0.0), t + error));
+        let median = |sample: &Sample| KaplanMeier::new(sample).median();
+        let ends = median(&at_low_end).zip(median(&at_high_end)).filter(|_| !judged.is_empty());
+        // Errors of discretisation have one sign for all members: they do not average out. So each end is that of limits
+        // that are all as far on its side as they may be.
+        let of_median = |sample: &Sample| interval::of_sample(sample, 0.5);
+        let sampled = || {
+            let [lower, upper] = [of_median(&at_low_end)?.lower, of_median(&at_high_end)?.upper];
+            Some(Interval { lower, upper, ..of_median(&sample)? })
+        };
+        // Copies of one curve have the interval of their own error.
+        let interval = match (copies, ends) {
+            (_, None) => None,
+            (true, Some((low, high))) => Some(Interval::between(low, high)),
+            (false, Some(_)) => sampled(),
+        };
+        let survival = KaplanMeier::new(&sample);
+        let relative = Description::new(judged.iter().map(Limit::relative_error))?;
+        let most = (MOST * judged.len() as f64).ceil() as usize;
         Ok(Some(CellLimits {
             known: sample.events(),
             mean: survival.mean(),
             median: survival.median(),
-            interval: bootstrap.median(sample).and_then(wider).or_else(alone),
-            error,
+            interval,
+            error: Description::new(judged.iter().map(|limit| limit.error))?.median(),
+            ends,
+            widest: most.checked_sub(1).and_then(|place| relative.sorted().get(place).copied()),
         }))
     }
 
-    /// Half-width of the interval of the median, relative to it.
-    pub fn uncertainty(&self) -> Option<f64> {
-        let (median, (lower, upper)) = (self.median?, self.interval?);
-        Some((upper - median).max(median - lower) / median)
+    /// Half-width of the interval of the median relative to it, and the part of it that is there without sampling.
+    pub fn uncertainty(&self) -> Option<(f64, f64)> {
+        let median = self.median.filter(|median| *median > 0.0)?;
+        let half = |(low, high): (f64, f64)| (high - median).max(median - low) / median;
+        Some((half(self.interval?.bounds()?), half(self.ends?)))
     }
+}
+
+/// The limits, each moved by its error times `share`.
+fn moved(limits: &Observations, judged: &[Limit], share: f64) -> Result<Sample> {
+    let mut errors = judged.iter().map(|limit| limit.error);
+    Sample::new(limits.iter().map(|seen| match seen.happened {
+        true => Observation { time: (seen.time + share * errors.next().unwrap_or_default()).max(0.0), ..seen },
+        false => seen,
+    }))
 }

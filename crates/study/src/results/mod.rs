@@ -6,6 +6,7 @@ pub mod discretisation;
 pub mod explained;
 pub mod provenance;
 pub mod scaling;
+pub mod shortfall;
 pub mod tally;
 pub mod times;
 pub mod verdict;

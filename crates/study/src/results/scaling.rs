@@ -1,15 +1,16 @@
 //! The median time as a power of the swept value, where that value is a scale.
 //!
-//! ln median is fitted as a line in ln value, each cell weighted by its own uncertainty: the width of the 95 % interval
-//! of ln median over 2·1.96. χ² is the sum of the squared distances in units of these uncertainties. If a power law
+//! ln median is fitted as a line in ln value, each cell weighted by its own uncertainty: the width of the interval of ln
+//! median over that of a normal number of deviation 1 with the same coverage, 2·1.96 for 95 %. χ² is the sum of the squared distances in units of these uncertainties. If a power law
 //! holds it is about the number of cells less 2; if it is so large that this has a probability below [`REJECTED`], no
 //! power law holds.
 //!
 //! A scale is a quantity that is doubled: the amplitude, the size of a shape, the coefficients of a flow. Numerical
 //! settings such as n or the tolerance are none. There the median tends to a limit, not to 0 or infinity.
 
+use curvelax_base::{interval::Interval, random::normal_quantile};
 use curvelax_ensemble::request::sweep::{Sweep, SweepAxis};
-use curvelax_statistics::{HALF_INTERVAL, PowerLaw};
+use curvelax_statistics::PowerLaw;
 
 /// Probability of χ² below which a power law is rejected.
 pub const REJECTED: f64 = 0.05;
@@ -23,8 +24,8 @@ pub struct CellMedian {
     pub cell: u64,
     /// The median; `None` if fewer than half of the members relaxed.
     pub value: Option<f64>,
-    /// Its 95 % interval, if both ends are known.
-    pub bounds: Option<(f64, f64)>,
+    /// Its interval.
+    pub interval: Option<Interval>,
     /// Whether all members are copies, so that there is no sampling error.
     pub has_copies: bool,
 }
@@ -92,8 +93,12 @@ fn point(cell: &CellMedian, value: f64) -> Result<(f64, f64, f64), &'static str>
     if cell.has_copies {
         return Ok((value, median, 0.0));
     }
-    match cell.bounds.ok_or("its median has no closed 95 % interval")? {
-        (low, high) if low > 0.0 => Ok((value, median, (high / low).ln() / (2.0 * HALF_INTERVAL))),
+    let interval = cell.interval.and_then(|interval| Some((interval.bounds()?, interval.coverage)));
+    match interval.ok_or("its median has no closed interval")? {
+        ((low, high), coverage) if low > 0.0 => {
+            let deviations = 2.0 * normal_quantile(0.5 * (1.0 + coverage));
+            Ok((value, median, (high / low).ln() / deviations))
+        }
         _ => Err("the interval of its median begins at 0"),
     }
 }

@@ -39,6 +39,8 @@ pub struct Tally {
     sweep: Sweep,
     /// Rows of the levels.
     pub levels: u64,
+    /// Of the members with limits, those whose times needed more nodes than they have.
+    pub nodes: FinerMembers,
     /// Members whose corners were rounded off before the run.
     pub mollified: MollifiedMembers,
     /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
@@ -283,6 +285,48 @@ impl MollifiedMembers {
     }
 }
 
+/// Members with limits that rest on more nodes than the members have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FinerMembers {
+    /// Members with limits.
+    judged: u64,
+    /// Those that needed more nodes, and the most that any of them did.
+    finer: u64,
+    most: u64,
+    /// Members whose differences do not fall as they should at their finest level: their errors are bounds.
+    bounds: u64,
+}
+
+impl FinerMembers {
+    fn add(&mut self, outcome: &Outcome) {
+        let Some(limit) = &outcome.judged else { return };
+        self.judged += 1;
+        self.bounds += u64::from(!limit.asymptotic);
+        if outcome.is_finer {
+            self.finer += 1;
+            self.most = self.most.max(outcome.points);
+        }
+    }
+
+    /// How many needed more nodes, of how many, and up to how many nodes; `None` if none did.
+    pub fn counted(&self) -> Option<(String, String)> {
+        let FinerMembers { judged, finer, most, .. } = *self;
+        (finer > 0).then(|| (format!("{finer} of {judged}"), format!("at up to n = {most}")))
+    }
+
+    /// How many needed more nodes, up to how many, and what of them is not known; `None` if n nodes were enough for all.
+    pub fn told(&self) -> Option<String> {
+        let FinerMembers { judged, finer, most, bounds } = *self;
+        let all = format!("{judged} {}", plural(judged, "member"));
+        let more = (finer > 0).then(|| format!("{finer} of {all} at up to n = {most}"));
+        let open = (bounds > 0).then(|| match finer {
+            0 => format!("the errors of {bounds} of {all} are bounds"),
+            _ => format!("the errors of {bounds} are bounds"),
+        });
+        (finer + bounds > 0).then(|| more.into_iter().chain(open).collect::<Vec<_>>().join("; "))
+    }
+}
+
 impl Tally {
     /// That of a run of `spec` before its members, after these times at its levels.
     pub fn of(spec: &Spec, levels: &LevelTimes) -> Tally {
@@ -305,6 +349,9 @@ impl Tally {
         self.cells[cell].add(outcome, refined, self.stops)?;
         if !outcome.group.is_empty() {
             self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, refined, self.stops)?;
+        }
+        if refined {
+            self.nodes.add(outcome);
         }
         self.at_start.iter_mut().zip(&outcome.events).for_each(|(count, t)| *count += u64::from(*t == Some(0.0)));
         self.mesh_ratios.push(outcome.end.mesh_ratio as f32);
@@ -394,13 +441,13 @@ impl Tally {
             ));
         }
         let judged = || self.cells.iter().flat_map(|cell| &cell.judged);
-        let early = judged().filter(|limit| !limit.asymptotic).count();
-        if self.refined && early > 0 {
+        let open = judged().filter(|limit| limit.needs_more()).count();
+        if self.refined && open > 0 {
+            let all = judged().count();
             warnings.push(format!(
-                "t_limit of {early} of {} {} is the time at n nodes: their times do not converge yet in n; use more \
-                 --points",
-                judged().count(),
-                plural(judged().count() as u64, "member")
+                "t_limit of {open} of {all} {} is the time at the finest level, and t_error a wide bound: their times do not \
+                 converge in n (see `points`)",
+                plural(all as u64, "member")
             ));
         }
         for (name, at_start) in self.events.iter().zip(&self.at_start).filter(|(_, at_start)| **at_start > 0) {

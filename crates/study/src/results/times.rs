@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-use curvelax_statistics::{Bootstrap, Interval, KaplanMeier, Mean, Observations, Sample};
+use curvelax_statistics::{Interval, KaplanMeier, Mean, Observations, Sample, interval};
 
 /// Fractions of the members whose times are in the table, with the names and meanings of the columns.
 pub const QUANTILES: [(f64, &str, &str); 5] = [
@@ -21,8 +21,8 @@ pub struct TimeStatistics {
     pub mean: Option<Mean>,
     /// Times by which each [fraction](QUANTILES) of the members has had the event.
     pub quantiles: [Option<f64>; QUANTILES.len()],
-    /// 95 % interval of the median.
-    pub interval: Option<Interval>,
+    /// Intervals of these.
+    pub intervals: [Option<Interval>; QUANTILES.len()],
 }
 
 /// The numbers in `ensemble.csv` on one quantity of a cell, in the order and with the names of its columns.
@@ -32,6 +32,8 @@ pub struct Numbers {
     pub known: usize,
     /// All other numbers.
     pub named: Vec<Statistic>,
+    /// What the intervals cover, and those of other quantiles than the median: columns at the end of the table.
+    pub intervals: Vec<Statistic>,
 }
 
 /// A number of a cell.
@@ -47,19 +49,20 @@ pub struct Statistic {
 
 impl TimeStatistics {
     /// Computes the statistics of some times.
-    pub fn new(times: Observations, bootstrap: &Bootstrap) -> TimeStatistics {
+    pub fn new(times: Observations) -> TimeStatistics {
         let sample = Sample::from(times);
         let survival = KaplanMeier::new(&sample);
         // The usual median, also of an even number.
         let quantile = |share| if share == 0.5 { survival.median() } else { survival.quantile(share) };
         let (mean, quantiles) = (survival.mean(), QUANTILES.map(|(share, ..)| quantile(share)));
-        let interval = bootstrap.median(&sample);
-        TimeStatistics { sample, mean, quantiles, interval }
+        let intervals = QUANTILES.map(|(share, ..)| interval::of_sample(&sample, share));
+        TimeStatistics { sample, mean, quantiles, intervals }
     }
 
     /// Those of times from which nothing can be estimated.
     pub fn unknown(times: Observations) -> TimeStatistics {
-        TimeStatistics { sample: Sample::from(times), mean: None, quantiles: [None; QUANTILES.len()], interval: None }
+        let (quantiles, intervals) = ([None; QUANTILES.len()], [None; QUANTILES.len()]);
+        TimeStatistics { sample: Sample::from(times), mean: None, quantiles, intervals }
     }
 
     /// The numbers for the table.
@@ -75,8 +78,13 @@ impl TimeStatistics {
             Statistic { name: "se", value: se, meaning: "standard error of the mean" },
             Statistic { name: "restricted_to", value: restricted_to, meaning: restricted },
         ];
-        let places = places(self.quantiles, self.interval);
-        Numbers { known: self.sample.events(), named: moments.into_iter().chain(places).collect() }
+        let named = moments.into_iter().chain(places(self.quantiles, self.interval())).collect();
+        Numbers { known: self.sample.events(), named, intervals: intervals(&self.intervals) }
+    }
+
+    /// The share of the members that have not had the event.
+    pub fn survival(&self) -> KaplanMeier<'_> {
+        KaplanMeier::new(&self.sample)
     }
 
     /// Time by which half of the members have had the event.
@@ -85,24 +93,27 @@ impl TimeStatistics {
         median
     }
 
-    /// The interval of the median, if both its ends are known.
-    pub fn bounds(&self) -> Option<(f64, f64)> {
-        self.interval.and_then(|Interval { lower, upper, .. }| Some((lower?, upper?)))
+    /// The interval of the median.
+    pub fn interval(&self) -> Option<Interval> {
+        let [_, _, median, ..] = self.intervals;
+        median
     }
 }
 
 impl Numbers {
     /// Returns the number called `name`, if known.
     pub fn get(&self, name: &str) -> Option<f64> {
-        self.named.iter().find(|statistic| statistic.name == name).and_then(|statistic| statistic.value)
+        let mut all = self.named.iter().chain(&self.intervals);
+        all.find(|statistic| statistic.name == name).and_then(|statistic| statistic.value)
     }
 }
 
 impl Serialize for Numbers {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(1 + self.named.len()))?;
+        let mut map = serializer.serialize_map(Some(1 + self.named.len() + self.intervals.len()))?;
         map.serialize_entry("known", &self.known)?;
-        self.named.iter().try_for_each(|Statistic { name, value, .. }| map.serialize_entry(name, value))?;
+        let mut all = self.named.iter().chain(&self.intervals);
+        all.try_for_each(|Statistic { name, value, .. }| map.serialize_entry(name, value))?;
         map.end()
     }
 }
@@ -112,11 +123,54 @@ pub(super) fn places(
     quantiles: [Option<f64>; QUANTILES.len()],
     interval: Option<Interval>,
 ) -> impl Iterator<Item = Statistic> {
-    let [lower, upper] = interval.map_or([None, None], |interval| [interval.lower, interval.upper]);
+    let [value, upper] = ends(interval);
+    let low = "lower end of the 95 % interval of the median, the least of fewer than 6; empty if there is none";
+    let high = "upper end of the 95 % interval of the median, the largest of fewer than 6; empty if there is none";
     let ends = [
-        Statistic { name: "median_low", value: lower, meaning: "lower end of the 95 % interval of the median" },
-        Statistic { name: "median_high", value: upper, meaning: "upper end of the 95 % interval of the median" },
+        Statistic { name: "median_low", value, meaning: low },
+        Statistic { name: "median_high", value: upper, meaning: high },
     ];
     let quantiles = QUANTILES.into_iter().zip(quantiles);
     quantiles.map(|((_, name, meaning), value)| Statistic { name, value, meaning }).chain(ends)
+}
+
+/// Names and meanings of the ends of the intervals of the [quantiles](QUANTILES) but the median.
+const ENDS: [[(&str, &str); 2]; QUANTILES.len()] = [
+    [
+        ("q05_low", "lower end of the 95 % interval of the 5 % quantile; empty if there is none"),
+        ("q05_high", "upper end of the 95 % interval of the 5 % quantile; empty if there is none"),
+    ],
+    [
+        ("q25_low", "lower end of the 95 % interval of the 25 % quantile; empty if there is none"),
+        ("q25_high", "upper end of the 95 % interval of the 25 % quantile; empty if there is none"),
+    ],
+    [("", ""); 2],
+    [
+        ("q75_low", "lower end of the 95 % interval of the 75 % quantile; empty if there is none"),
+        ("q75_high", "upper end of the 95 % interval of the 75 % quantile; empty if there is none"),
+    ],
+    [
+        ("q95_low", "lower end of the 95 % interval of the 95 % quantile; empty if there is none"),
+        ("q95_high", "upper end of the 95 % interval of the 95 % quantile; empty if there is none"),
+    ],
+];
+
+/// What the interval of the median covers, and the intervals of the other quantiles, as far as they cover 95 %.
+pub(super) fn intervals(of: &[Option<Interval>; QUANTILES.len()]) -> Vec<Statistic> {
+    let [_, _, median, ..] = of;
+    let named = ENDS.iter().zip(of).filter(|(names, _)| !names[0].0.is_empty()).flat_map(|(names, interval)| {
+        let values = ends(interval.filter(|interval| interval.range_of.is_none()));
+        names.iter().zip(values).map(|((name, meaning), value)| Statistic { name, value, meaning })
+    });
+    [covered(*median)].into_iter().chain(named).collect()
+}
+
+/// What the interval of the median covers.
+pub(super) fn covered(median: Option<Interval>) -> Statistic {
+    let meaning = "probability with which median_low and median_high hold the median, at least";
+    Statistic { name: "median_coverage", value: median.map(|interval| interval.coverage), meaning }
+}
+
+fn ends(of: Option<Interval>) -> [Option<f64>; 2] {
+    of.map_or([None, None], |interval| [interval.lower, interval.upper])
 }

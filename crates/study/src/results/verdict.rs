@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::{EnsembleStatistics, provenance::Provenance};
+use super::{EnsembleStatistics, provenance::Provenance, shortfall::Shortfall};
 use curvelax_base::{
     error::{Error, Result},
-    text::{number, plural, rounded_beside},
+    text::plural,
 };
 use curvelax_ensemble::Status;
 
@@ -15,8 +15,8 @@ pub struct RunVerdict {
     members: u64,
     /// Members that ended neither relaxed nor unfinished, by status.
     failed: Vec<(Status, u64)>,
-    /// The goal of `--accuracy`, and what was reached instead: infinite if a cell has no interval.
-    missed: Option<[f64; 2]>,
+    /// What it lacks of the goal of `--accuracy`.
+    missed: Option<Shortfall>,
     /// One of several shards: what all members have in common is judged when they are merged.
     is_part: bool,
 }
@@ -27,12 +27,10 @@ impl RunVerdict {
         let count = |status: Status| provenance.members_by_status.get(status.name()).copied().unwrap_or(0);
         let failures = Status::ALL.into_iter().filter(|status| status.is_failure());
         let failed = failures.map(|status| (status, count(status))).filter(|(_, count)| *count > 0).collect();
-        let reached = statistics.map(EnsembleStatistics::uncertainty);
-        let missed = provenance.spec.accuracy.zip(reached).filter(|(goal, reached)| reached > goal);
         RunVerdict {
             members: provenance.members,
             failed,
-            missed: missed.map(|(goal, reached)| [goal, reached]),
+            missed: statistics.and_then(|statistics| Shortfall::of(&provenance.spec, statistics)),
             is_part: provenance.spec.shard.is_some(),
         }
     }
@@ -48,7 +46,7 @@ impl RunVerdict {
     /// # Errors
     /// [`Error::Strict`] with what is missing.
     pub fn check(&self, strict: bool, summary: &Path) -> Result<()> {
-        let RunVerdict { members, ref failed, missed, is_part } = *self;
+        let RunVerdict { members, ref failed, ref missed, is_part } = *self;
         let count: u64 = failed.iter().map(|(_, count)| count).sum();
         let see = format!("see `status` in {}", summary.display());
         let all = format!("{members} {}", plural(members, "member"));
@@ -63,11 +61,7 @@ impl RunVerdict {
             return Err(Error::Strict(format!("every member failed ({} of {all}); {see}", statuses.join(", "))));
         }
         match missed {
-            Some([goal, reached]) if !is_part => Err(Error::Strict(format!(
-                "--accuracy {}: {} was reached; use more --curves to begin with",
-                number(goal),
-                rounded_beside(reached, goal)
-            ))),
+            Some(missed) if !is_part => Err(Error::Strict(missed.sentence())),
             _ => Ok(()),
         }
     }
@@ -107,15 +101,5 @@ mod tests {
         assert_eq!(said(&verdict(1, [2, 0, 1], None), false), None);
         assert!(said(&verdict(1, [2, 0, 1], None), true).unwrap().starts_with("--strict: 3 of 4 members"));
         assert_eq!(said(&verdict(0, [0, 0, 0], None), true), None);
-    }
-
-    #[test]
-    fn an_accuracy_that_was_missed_is_told_in_digits_that_show_it() {
-        let missed = RunVerdict { missed: Some([0.002, 0.002_01]), ..verdict(4, [0; 3], None) };
-        let text = "--accuracy 0.002: 0.00201 was reached; use more --curves to begin with";
-        assert_eq!(said(&missed, false).as_deref(), Some(text));
-        let none = RunVerdict { missed: Some([0.002, f64::INFINITY]), ..missed.clone() };
-        assert!(said(&none, false).unwrap().contains("no interval was reached"));
-        assert_eq!(said(&RunVerdict { is_part: true, ..missed }, false), None);
     }
 }

@@ -9,6 +9,7 @@ use std::{
 use super::OutputFolder;
 use crate::files::{
     disk::{checksum, create, names_of},
+    foreign::foreign,
     names::{OWN, PROBE, RUN, STATE, STATE_OLD, STORE, is_store},
     part_file::{Mark, PartFile},
     part_folder::PartFolder,
@@ -37,7 +38,12 @@ impl OutputFolder {
             begun |= path.join(name).try_exists().map_err(|e| refuse(format!("cannot find {name} in it ({e})")))?;
         }
         if !begun {
-            return Err(refuse("no run was started here; start one with curvelax run and --force".into()));
+            let is_free = foreign(path).is_ok_and(|found| found.is_empty());
+            let remedy = match is_free {
+                true => "start one with curvelax run and --force",
+                false => "start one with curvelax run in another folder, or restore the run.json of the files there",
+            };
+            return Err(refuse(format!("no run was started here; {remedy}")));
         }
         let mut folder = OutputFolder::of(path, OWN.map(String::from).into());
         if !folder.claim().map_err(cannot)? {

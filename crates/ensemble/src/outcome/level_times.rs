@@ -1,0 +1,161 @@
+//! The times of members at their [levels](super::levels): which members need more nodes, and what all of them tell.
+
+use super::levels::{LevelRow, RefinementLevel, tolerance};
+use crate::{Outcome, Spec, request::spec::Pace};
+use curvelax_base::error::Result;
+use curvelax_statistics::{Limit, Times};
+
+/// The relaxation times of members at all levels.
+#[derive(Clone, Debug, Default)]
+pub struct LevelTimes {
+    /// By level: members, ascending.
+    times: Vec<Vec<AtLevel>>,
+    /// By level: those of all events of one member after those of another, NaN likewise.
+    events: Vec<Vec<f64>>,
+}
+
+/// What is known of a member at a level.
+#[derive(Clone, Copy, Debug)]
+struct AtLevel {
+    member: u64,
+    /// Its relaxation time, NaN if it has none.
+    t: f64,
+    /// Largest turn of the tangent at a node of the initial curve.
+    turn: f64,
+    /// Excess of the initial curve.
+    excess: f64,
+}
+
+/// A time at consecutive levels, at each of which it is known.
+struct Ladder {
+    /// The levels, ascending.
+    levels: Vec<RefinementLevel>,
+    /// The time at each.
+    times: Vec<f64>,
+}
+
+impl Ladder {
+    /// The longest ladder that ends at `top`; empty if the time is not known there.
+    fn up_to(top: RefinementLevel, at: impl Fn(RefinementLevel) -> Option<f64>) -> Ladder {
+        let down = std::iter::successors(Some(top), |level| level.coarser());
+        let known = down.map_while(|level| Some((level, at(level)?)));
+        let (mut levels, mut times): (Vec<_>, Vec<_>) = known.unzip();
+        levels.reverse();
+        times.reverse();
+        Ladder { levels, times }
+    }
+
+    /// What it tells of the time `own` at the nodes of `spec`, with the curve at its finest level; nothing if it is too
+    /// short, does not have these nodes, or the time is 0.
+    fn limit(self, spec: &Spec, own: f64, finest: &AtLevel) -> Option<Limit> {
+        let Ladder { levels, times } = self;
+        let own_level = levels.iter().position(|level| *level == RefinementLevel::FULL)?;
+        // What holds at the start has no time to judge.
+        if levels.len() < RefinementLevel::FIRST.len() || !(own > 0.0 && times.iter().all(|t| *t > 0.0)) {
+            return None;
+        }
+        let points = levels.iter().map(|level| level.points(spec.points)).collect();
+        let is_adaptive = matches!(spec.pace(), Pace::Adaptive(_));
+        let (turn, excess) = (finest.turn, spec.threshold(finest.excess));
+        let tolerance = tolerance(spec);
+        Some(Limit::of(&Times { own, levels: times, points, own_level, tolerance, is_adaptive, turn, excess }))
+    }
+}
+
+impl LevelTimes {
+    /// Adds a row; members of a level ascend.
+    ///
+    /// # Errors
+    /// A message if there is no such level, or the member does not follow the one before.
+    pub fn add(&mut self, row: &LevelRow) -> Result<(), String> {
+        let none = || format!("a level from 1 to {}", RefinementLevel::MOST);
+        let rank = RefinementLevel::of_number(row.level).map(rank).ok_or_else(none)?;
+        let count = self.times.len().max(rank + 1);
+        self.times.resize_with(count, Vec::new);
+        self.events.resize_with(count, Vec::new);
+        let own = &mut self.times[rank];
+        if let Some(last) = own.last().filter(|last| last.member >= row.member) {
+            return Err(format!("a member after {}: members of a level ascend, each once", last.member));
+        }
+        let LevelRow { member, turn, excess_start: excess, .. } = *row;
+        own.push(AtLevel { member, t: row.t_relax.unwrap_or(f64::NAN), turn, excess });
+        self.events[rank].extend(row.events.iter().map(|t| t.unwrap_or(f64::NAN)));
+        Ok(())
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> u64 {
+        self.times.iter().map(|times| times.len() as u64).sum()
+    }
+
+    /// Whether `member` ran at them.
+    pub fn has(&self, member: u64) -> bool {
+        self.place(RefinementLevel::FULL, member).is_some()
+    }
+
+    /// Whether `member`, of a cell of `spec`, is to run at `level`, one of the finer ones, by its own times at those below:
+    /// it has a time at the last of them, and no limit yet, or one that [needs more](Limit::needs_more).
+    pub fn needs(&self, spec: &Spec, member: u64, level: RefinementLevel) -> bool {
+        let Some(top) = level.coarser() else { return false };
+        let ladder = Ladder::up_to(top, |level| self.time(level, member));
+        let Some(own) = self.time(RefinementLevel::FULL, member).filter(|own| *own > 0.0) else { return false };
+        let (false, Some(finest)) = (ladder.levels.is_empty(), self.at(top, member)) else { return false };
+        // The member has not run itself, so the error of its steps is not known; nodes do not take it away.
+        ladder.limit(spec, own, finest).is_none_or(|limit| limit.needs_more())
+    }
+
+    /// Completes the row of a member of a cell of `spec` that ran at its own resolution: the errors of its times, if it
+    /// ran at the levels, and with `--refine` the limit of its relaxation time.
+    pub fn judge(&self, spec: &Spec, outcome: &mut Outcome) {
+        let (member, count) = (outcome.member, outcome.events.len());
+        let limit = |ladder: Ladder, own| {
+            let finest = self.at(*ladder.levels.last()?, member)?;
+            ladder.limit(spec, own, finest)
+        };
+        let of_event = |(place, own): (usize, &Option<f64>)| {
+            let ladder = self.ladder(|level| self.event_time(level, member, [place, count]));
+            limit(ladder, (*own)?)
+        };
+        outcome.judged_events = outcome.events.iter().enumerate().map(of_event).collect();
+        let Some(own) = outcome.t_relax else { return };
+        let ladder = self.ladder(|level| self.time(level, member));
+        let finest = ladder.levels.last().copied();
+        let Some(limit) = limit(ladder, own) else { return };
+        outcome.judged = Some(limit);
+        if let (true, Some(finest)) = (spec.refine, finest) {
+            let Limit { t, error, order, .. } = limit;
+            (outcome.t_limit, outcome.t_error, outcome.order) = (Some(t), Some(error), order);
+            (outcome.points, outcome.is_finer) = (finest.points(spec.points) as u64, finest.is_finer());
+        }
+    }
+
+    /// The ladder that ends at the finest level at which a time is known.
+    fn ladder(&self, at: impl Fn(RefinementLevel) -> Option<f64>) -> Ladder {
+        let all = (1..=self.times.len() as u64).rev().filter_map(RefinementLevel::of_number);
+        let top = all.into_iter().find(|level| at(*level).is_some());
+        top.map_or(Ladder { levels: Vec::new(), times: Vec::new() }, |top| Ladder::up_to(top, at))
+    }
+
+    fn place(&self, level: RefinementLevel, member: u64) -> Option<usize> {
+        self.times.get(rank(level))?.binary_search_by_key(&member, |at| at.member).ok()
+    }
+
+    fn at(&self, level: RefinementLevel, member: u64) -> Option<&AtLevel> {
+        self.times.get(rank(level))?.get(self.place(level, member)?)
+    }
+
+    fn time(&self, level: RefinementLevel, member: u64) -> Option<f64> {
+        self.at(level, member).map(|at| at.t).filter(|t| t.is_finite())
+    }
+
+    /// The time of the event at `place` among `count` of a member.
+    fn event_time(&self, level: RefinementLevel, member: u64, [place, count]: [usize; 2]) -> Option<f64> {
+        let at = self.place(level, member)? * count + place;
+        self.events.get(rank(level))?.get(at).copied().filter(|t| t.is_finite())
+    }
+}
+
+/// The place of a level among all.
+fn rank(level: RefinementLevel) -> usize {
+    level.number() as usize - 1
+}

@@ -1,0 +1,75 @@
+//! The stages of a study: its members run side by side in parts, at one level after another and then as they are.
+
+use std::ops::Range;
+
+use super::Cell;
+use crate::{RefinementLevel, Spec, request::spec::Pace};
+use curvelax_flow::solver::{Order, Solver};
+
+/// A part of a study whose members run side by side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stage {
+    /// The level of its members, if they are not the study's own.
+    pub level: Option<RefinementLevel>,
+    /// Its cells in the study.
+    pub range: Range<usize>,
+    /// Its members; of a finer one the members of its cells, of which [some](super::Study::members_of) run.
+    pub members: u64,
+}
+
+impl Stage {
+    /// Whether only those members run that need more nodes than they have.
+    pub fn is_finer(&self) -> bool {
+        self.level.is_some_and(RefinementLevel::is_finer)
+    }
+}
+
+/// All stages of a study of these cells. Where its members are computed changes none of them.
+pub(super) fn stages(cells: &[Cell]) -> Vec<Stage> {
+    let mut stages = Vec::new();
+    for level in RefinementLevel::FIRST {
+        let specs: Vec<_> = cells.iter().map(|cell| cell.at(level).ok()).collect();
+        stages.extend(stages_of(Some(level), &specs));
+    }
+    // All cells have the same ones, some fewer.
+    for level in cells.iter().map(Cell::finer).max_by_key(Vec::len).unwrap_or_default() {
+        let at = |cell: &Cell| cell.finer().contains(&level).then(|| cell.at(level).ok()).flatten();
+        stages.extend(stages_of(Some(level), &cells.iter().map(at).collect::<Vec<_>>()));
+    }
+    let own: Vec<_> = cells.iter().map(|cell| Some(cell.spec.clone())).collect();
+    stages.extend(stages_of(None, &own));
+    stages
+}
+
+/// The stages of cells with these specs, where they have one.
+fn stages_of(level: Option<RefinementLevel>, specs: &[Option<Spec>]) -> Vec<Stage> {
+    let mut stages: Vec<(Cohort, Stage)> = Vec::new();
+    for (i, spec) in specs.iter().enumerate() {
+        let Some(spec) = spec else { continue };
+        let (cohort, members) = (Cohort::of(spec), spec.member_count());
+        match stages.last_mut() {
+            Some((own, stage)) if *own == cohort => {
+                stage.range.end = i + 1;
+                stage.members += members;
+            }
+            _ => stages.push((cohort, Stage { level, range: i..i + 1, members })),
+        }
+    }
+    stages.into_iter().map(|(_, stage)| stage).filter(|stage| stage.level.is_none() || stage.members > 0).collect()
+}
+
+/// The properties that members must share to run side by side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cohort {
+    points: usize,
+    pub(super) solver: Solver,
+    order: Order,
+    pub(super) adaptive: bool,
+}
+
+impl Cohort {
+    pub(super) fn of(spec: &Spec) -> Cohort {
+        let Spec { points, order, .. } = *spec;
+        Cohort { points, solver: spec.solver(), order, adaptive: matches!(spec.pace(), Pace::Adaptive(_)) }
+    }
+}

@@ -1,0 +1,85 @@
+//! A study and where it is computed.
+
+use super::{Host, Plan};
+use curvelax_backend::{Backend, DeviceKind};
+use curvelax_base::error::Result;
+use curvelax_ensemble::{Cell, Study};
+use curvelax_study::placement::{self, Choice, OpeningWatch, Platform};
+
+/// A plan that this machine can carry out: the study, with the back end of each stage.
+pub struct PlacedStudy {
+    /// What it was made from.
+    plan: Plan,
+    /// The resolved study, with everything that the choices decided.
+    pub study: Study,
+    /// The back ends of its stages, not yet opened.
+    pub choices: Vec<Choice>,
+}
+
+/// The back end of the first cells of a study itself.
+pub(super) enum FirstBackend {
+    /// Opened when its turn comes, which the host is told of.
+    Unopened,
+    /// The host was told of it. It opens again at no cost, and would only hold memory while the levels run.
+    Announced,
+    /// Open.
+    Open(Box<dyn Backend>),
+}
+
+impl PlacedStudy {
+    pub(super) fn new(plan: Plan, mut study: Study) -> Result<PlacedStudy> {
+        let choices = placement::choose_all(&study)?;
+        placement::settle(&mut study, &choices);
+        Ok(PlacedStudy { plan, study, choices })
+    }
+
+    /// Replaces the reason of the choices.
+    pub(super) fn because(self, reason: &str) -> PlacedStudy {
+        let choices = self.choices.into_iter().map(|choice| choice.because(reason.into())).collect();
+        PlacedStudy { choices, ..self }
+    }
+
+    /// Opens the back end of the first cells of the study itself. If the GPU that was chosen cannot be used, returns the
+    /// same plan on the CPU.
+    pub(super) fn open(self, host: &dyn Host) -> Result<(PlacedStudy, FirstBackend)> {
+        let (cells, choice) = self.first();
+        let (backend, platform) = open(cells, choice, host)?;
+        if choice.device().kind() != platform.backend {
+            host.say(&format!("note: on the CPU instead: {}", platform.reason));
+            let on_cpu = self.plan.on_cpu(self.study.outlines()).place()?;
+            return Ok((on_cpu.because(&platform.reason), FirstBackend::Announced));
+        }
+        let first = match platform.backend {
+            DeviceKind::Cpu => FirstBackend::Announced,
+            _ => FirstBackend::Open(backend),
+        };
+        Ok((self, first))
+    }
+
+    /// The first cells of the study itself, and their back end.
+    fn first(&self) -> (&[Cell], &Choice) {
+        let own = self.study.own_stage();
+        (&self.study.cells()[self.study.stages()[own].range.clone()], &self.choices[own])
+    }
+
+    /// Returns whether the CPU may take over if the GPU fails.
+    pub(super) fn may_fall_back(&self) -> bool {
+        self.first().1.may_fall_back()
+    }
+
+    /// What the user should know about the study and where it is computed.
+    pub fn warnings(&self) -> Vec<String> {
+        self.study.warnings().into_iter().chain(self.first().1.warning()).collect()
+    }
+
+    /// Where everything is computed, except perhaps the pilot.
+    pub(super) fn platform(&self) -> Platform {
+        let (cells, choice) = self.first();
+        choice.platform(&cells[0].spec)
+    }
+}
+
+/// Opens the back end chosen for a cohort, and tells the host.
+pub(super) fn open(cohort: &[Cell], choice: &Choice, host: &dyn Host) -> Result<(Box<dyn Backend>, Platform)> {
+    choice.open_watched(cohort, &OpeningWatch { tell: &|what| host.say(what), go_on: &|| host.go_on() })
+}

@@ -1,0 +1,188 @@
+//! A session: a study that is being carried out, from its beginning or from a checkpoint to its end or an interruption.
+
+use std::path::Path;
+
+use super::{
+    Completed, Host, PlacedStudy,
+    placed::{FirstBackend, open},
+};
+use crate::{
+    files::OutputFolder,
+    report::{
+        Manner, RunReport, Stop,
+        checkpoint::{Origin, Saved},
+    },
+};
+use curvelax_base::{
+    error::{Error, Result},
+    text::quoted,
+};
+use curvelax_ensemble::{Ended, Extent, Judged, LevelRow, SeriesRow, Sink, Snapshot, Standing, Study, Wish, simulate};
+use curvelax_study::placement::Choice;
+
+/// A study that is being carried out.
+pub struct Session {
+    placed: PlacedStudy,
+    first: FirstBackend,
+    report: RunReport,
+    /// The progress in the report's current stage.
+    standing: Standing,
+}
+
+impl Session {
+    /// Opens the back end of `placed`, and the report in `folder`.
+    pub fn begin(placed: PlacedStudy, folder: OutputFolder, manner: Manner, host: &dyn Host) -> Result<Session> {
+        let (placed, first) = placed.open(host)?;
+        let origin = Origin::new(&placed.study, placed.platform())?;
+        let report = RunReport::begin(folder, &placed.study, origin, manner)?;
+        Ok(Session { placed, first, report, standing: Standing::default() })
+    }
+
+    /// Opens the report in `folder` again, at the checkpoint `saved`.
+    pub fn resume(
+        placed: PlacedStudy,
+        folder: OutputFolder,
+        saved: Saved,
+        manner: Manner,
+        host: &dyn Host,
+    ) -> Result<Session> {
+        let (report, standing) = RunReport::resume(folder, &placed.study, saved, manner)?;
+        let (members, all) = (report.members(), placed.study.member_count());
+        host.say(&format!("resuming: {members} of {all} members are in the table"));
+        Ok(Session { placed, first: FirstBackend::Unopened, report, standing })
+    }
+
+    /// Returns whether the CPU may take over if the GPU fails.
+    pub fn may_fall_back(&self) -> bool {
+        self.placed.may_fall_back()
+    }
+
+    /// The output folder.
+    pub fn folder(&self) -> &Path {
+        self.report.folder()
+    }
+
+    /// The means to stop the session.
+    pub fn stop(&self) -> &Stop {
+        self.report.stop()
+    }
+
+    /// Runs the remaining work, and publishes all results. If a GPU fails from which the CPU may take over, the run is
+    /// always saved.
+    ///
+    /// # Errors
+    /// Those of the run, and [`Error::Request`] if the progress does not match the report.
+    pub fn carry_out(self, host: &dyn Host) -> Result<Completed> {
+        self.check_rows()?;
+        let early = [&self.placed.warnings()[..], self.report.moves()].concat();
+        early.iter().for_each(|warning| host.say(&format!("warning: {warning}")));
+        let (out, falls_back) = (self.folder().to_path_buf(), self.may_fall_back());
+        let Session { placed: PlacedStudy { study, choices, .. }, first, mut report, standing } = self;
+        if let Err(error) = advance(&study, choices, first, standing, &mut report, host) {
+            return Err(ended(report, error, falls_back, &out, host));
+        }
+        let late = report.warnings();
+        let (text, verdict) =
+            report.finish(study.spec(), &early, host.form()).inspect_err(|error| kept(&out, error, host))?;
+        late.iter().for_each(|warning| host.say(&format!("warning: {warning}")));
+        Ok(Completed { text, verdict, out })
+    }
+
+    /// Checks that the checkpoint counts as many members as have rows.
+    fn check_rows(&self) -> Result<()> {
+        let (told, rows) = (self.report.before().saturating_add(self.standing.next), self.report.rows());
+        if told == rows {
+            return Ok(());
+        }
+        let path = self.folder().display();
+        Err(Error::Request(format!("{path}: the checkpoint counts {told} members, but the table has {rows}")))
+    }
+}
+
+/// Closes the report of a run that ended with `error`, and returns its cause.
+fn ended(report: RunReport, error: Error, falls_back: bool, out: &Path, host: &dyn Host) -> Error {
+    let error = report.explain(error);
+    if falls_back && matches!(error, Error::Device(_)) {
+        report.leave();
+    } else if report.give_up() {
+        kept(out, &error, host);
+    }
+    error
+}
+
+/// Says how to resume a run that failed, unless the error does.
+fn kept(out: &Path, error: &Error, host: &dyn Host) {
+    if !matches!(error, Error::Stopped(_) | Error::Interrupted(_) | Error::Lost(_)) {
+        let on_cpu = if matches!(error, Error::Device(_)) { ", with --backend cpu on the CPU" } else { "" };
+        host.say(&format!("note: the run was saved: curvelax resume {} continues it{on_cpu}", quoted(out)));
+    }
+}
+
+/// Runs one stage after another, from `standing` in the report's current one; `first` is the back end of the study's own.
+fn advance(
+    study: &Study,
+    choices: Vec<Choice>,
+    first: FirstBackend,
+    mut standing: Standing,
+    report: &mut RunReport,
+    host: &dyn Host,
+) -> Result<()> {
+    let (own, mut first, mut levels) = (study.own_stage(), Some(first), report.take_levels());
+    for (i, (stage, choice)) in study.stages().iter().zip(choices).enumerate().skip(report.stage()) {
+        let cells = study.cells_of(stage, &levels)?;
+        // No member needs these nodes.
+        if cells.is_empty() {
+            continue;
+        }
+        // A run that has begun stays on its device.
+        let choice = choice.after(report.platform());
+        let precision = choice.precision();
+        let mut backend = match first.take_if(|_| i == own) {
+            Some(FirstBackend::Open(backend)) => backend,
+            Some(FirstBackend::Announced) => choice.open_for(&cells)?.0,
+            // Of levels nothing is said: they are where the study is, or a pilot.
+            _ if stage.level.is_some() => choice.open_for(&cells)?.0,
+            _ => open(&cells, &choice, host)?.0,
+        };
+        report.begin_stage(i, cells.iter().map(|cell| cell.spec.member_count()).sum());
+        let standing = std::mem::take(&mut standing);
+        let mut shown = Shown { report, host };
+        let mut sink = Judged { level: stage.level, cells: &cells, levels: &mut levels, sink: &mut shown };
+        simulate::resume(&cells, precision, backend.as_mut(), study.portraits(stage), standing, &mut sink)?;
+    }
+    Ok(())
+}
+
+/// The report of a run whose host sees the snapshots.
+struct Shown<'a> {
+    report: &'a mut RunReport,
+    host: &'a dyn Host,
+}
+
+impl Sink for Shown<'_> {
+    fn member(&mut self, ended: &Ended) -> Result<()> {
+        self.host.see(&ended.rows.snapshots);
+        self.report.member(ended)
+    }
+
+    fn level(&mut self, row: &LevelRow) -> Result<()> {
+        self.report.level(row)
+    }
+
+    fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
+        self.host.see(snapshots);
+        self.report.spill(series, snapshots)
+    }
+
+    fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
+        self.report.progress(done, total, share)
+    }
+
+    fn wish(&mut self) -> Wish {
+        self.report.wish()
+    }
+
+    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
+        self.report.checkpoint(standing)
+    }
+}
