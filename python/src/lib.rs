@@ -50,7 +50,7 @@ mod _curvelax {
 
     use curvelax::{
         files::{Existing, OutputFolder, names},
-        session::{self, Completed, Host, Plan, ResumePlace},
+        session::{self, Completed, Host, PlacedStudy, ResumePlace, RunPlan},
     };
     use pyo3::{
         prelude::*,
@@ -107,7 +107,7 @@ mod _curvelax {
             let spec = keys.spec()?;
             let manner = host.manner()?;
             OutputFolder::check_place(&out, existing)?;
-            let placed = Plan::new(spec, Some(&manner), &host)?.place()?;
+            let placed = PlacedStudy::of(RunPlan::new(spec, Some(&manner), &host)?)?;
             placed.study.note().into_iter().for_each(|note| host.say(&format!("note: {note}")));
             session::begin(placed, &out, existing, manner, &host)
         });

@@ -7,7 +7,7 @@ use crate::{
     ensemble::Spec,
     error::{Error, Result},
     files::{Existing, OutputFolder},
-    session::{self, Host, Plan},
+    session::{self, Host, PlacedStudy, RunPlan},
 };
 
 const EXAMPLES: &str = "\
@@ -68,7 +68,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     if let (false, Some(out)) = (print_spec || dry_run || resume, &out) {
         OutputFolder::check_place(out, force)?;
     }
-    let placed = Plan::new(request, manner.as_ref(), &host)?.place()?;
+    let placed = PlacedStudy::of(RunPlan::new(request, manner.as_ref(), &host)?)?;
     if print_spec {
         return print(&placed.study.spec().to_toml()?);
     }

@@ -11,7 +11,7 @@ use curvelax::{
     ensemble::Spec,
     files::Existing,
     report::{Cause, Form, Manner, Progress, Stop, checkpoint},
-    session::{Host, Plan, ResumePlace, begin, resume},
+    session::{Host, PlacedStudy, ResumePlace, RunPlan, begin, resume},
 };
 use tempfile::TempDir;
 
@@ -156,7 +156,7 @@ fn a_run_that_is_interrupted_at_finer_levels_ends_as_if_it_were_not() {
     let spec = Spec { curves: 60, ..Spec::from_toml(text).unwrap() };
     let manner = |host: &Patient| host.manner().unwrap();
     let run = |out: &str, host: Patient| {
-        let placed = Plan::new(spec.clone(), None, &host).and_then(Plan::place).unwrap();
+        let placed = RunPlan::new(spec.clone(), None, &host).and_then(PlacedStudy::of).unwrap();
         begin(placed, &home.path().join(out), Existing::Refused, manner(&host), &host)
     };
     run("whole", Patient(None)).unwrap();
@@ -164,7 +164,7 @@ fn a_run_that_is_interrupted_at_finer_levels_ends_as_if_it_were_not() {
     let all = whole.values().map(|own| own.len() as u64).sum::<u64>() + 60;
     assert!(all > 300, "{all}");
     let mut stages = BTreeSet::new();
-    for enough in [1, 175, 195, 240, all - 70] {
+    for enough in [1, 175, 190, 220, all - 70] {
         let out = format!("stopped-{enough}");
         let stopped = run(&out, Patient(Some(enough))).unwrap_err();
         assert_eq!(stopped.exit_code(), 75, "{stopped}");

@@ -26,7 +26,7 @@ pub fn significant(value: f64, digits: usize) -> String {
 /// Formats `value` as a person would type it, to read back exactly: 0.001, -1, 1e300.
 pub fn number(value: f64) -> String {
     let size = value.abs();
-    if value.is_finite() && size != 0.0 && !(1e-5..1e15).contains(&size) {
+    if value.is_finite() && size != 0.0 && !(1e-4..1e15).contains(&size) {
         format!("{value:e}")
     } else {
         value.to_string()

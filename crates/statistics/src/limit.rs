@@ -32,8 +32,8 @@ const FALL: f64 = 8.0;
 const OPEN_FALL: f64 = 4.0;
 /// Share of what ten times more exact steps change, and the error of steps in units of their tolerance over the root of the
 /// excess, relative to the time: the change may be small by chance.
-const OF_STEPS: f64 = 0.07;
-const OF_TOLERANCE: f64 = 0.005;
+const OF_STEPS: f64 = 0.1;
+const OF_TOLERANCE: f64 = 0.006;
 /// Orders that are looked for.
 const ALL_ORDERS: std::ops::Range<f64> = 0.05..8.0;
 /// Halvings of that range: to the last bit.

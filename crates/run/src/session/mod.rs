@@ -1,6 +1,6 @@
 //! From a spec to a finished folder of results: what the command line and the Python package share.
 //!
-//! The way of a run: a request is a [`Spec`](curvelax_ensemble::Spec); a [`Plan`] makes the choices that it leaves to
+//! The way of a run: a request is a [`Spec`](curvelax_ensemble::Spec); a [`RunPlan`] makes the choices that it leaves to
 //! rounds; a [`PlacedStudy`] is the checked plan, with a back end for each stage; a session carries it out and reports.
 //! [`begin`] starts a run, [`resume()`] continues one, and both end here: a run that loses a GPU which nobody asked for is
 //! resumed on the CPU.
@@ -11,12 +11,13 @@ mod plan;
 mod resume;
 mod run;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 pub use host::Host;
 pub use placed::PlacedStudy;
-pub use plan::Plan;
+pub use plan::RunPlan;
 pub use resume::{Begun, ResumePlace, begun};
+pub use run::Completed;
 
 use crate::{
     files::{Existing, OutputFolder},
@@ -24,19 +25,7 @@ use crate::{
 };
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{Study, request::spec::BackendChoice};
-use curvelax_study::results::RunVerdict;
 use run::Session;
-
-/// A run that is complete.
-#[derive(Debug)]
-pub struct Completed {
-    /// The results in the host's form.
-    pub text: String,
-    /// How it ended as a whole.
-    pub verdict: RunVerdict,
-    /// Folder of the results.
-    pub out: PathBuf,
-}
 
 /// Runs `placed` in the folder at `out`.
 ///

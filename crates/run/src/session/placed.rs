@@ -1,6 +1,6 @@
 //! A study and where it is computed.
 
-use super::{Host, Plan};
+use super::{host::Host, plan::RunPlan};
 use curvelax_backend::{Backend, DeviceKind};
 use curvelax_base::error::Result;
 use curvelax_ensemble::{Cell, Study};
@@ -9,7 +9,7 @@ use curvelax_study::placement::{self, Choice, OpeningWatch, Platform};
 /// A plan that this machine can carry out: the study, with the back end of each stage.
 pub struct PlacedStudy {
     /// What it was made from.
-    plan: Plan,
+    plan: RunPlan,
     /// The resolved study, with everything that the choices decided.
     pub study: Study,
     /// The back ends of its stages, not yet opened.
@@ -27,7 +27,12 @@ pub(super) enum FirstBackend {
 }
 
 impl PlacedStudy {
-    pub(super) fn new(plan: Plan, mut study: Study) -> Result<PlacedStudy> {
+    /// Checks everything that can be wrong with `plan` on this machine, and chooses where it is computed.
+    ///
+    /// # Errors
+    /// [`Error::Request`](curvelax_base::error::Error::Request) for what is wrong.
+    pub fn of(plan: RunPlan) -> Result<PlacedStudy> {
+        let mut study = Study::new_from(plan.spec.clone(), &plan.base, &plan.known)?;
         let choices = placement::choose_all(&study)?;
         placement::settle(&mut study, &choices);
         Ok(PlacedStudy { plan, study, choices })
@@ -46,7 +51,7 @@ impl PlacedStudy {
         let (backend, platform) = open(cells, choice, host)?;
         if choice.device().kind() != platform.backend {
             host.say(&format!("note: on the CPU instead: {}", platform.reason));
-            let on_cpu = self.plan.on_cpu(self.study.outlines()).place()?;
+            let on_cpu = PlacedStudy::of(self.plan.on_cpu(self.study.outlines()))?;
             return Ok((on_cpu.because(&platform.reason), FirstBackend::Announced));
         }
         let first = match platform.backend {

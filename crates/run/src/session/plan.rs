@@ -2,15 +2,15 @@
 
 use std::path::PathBuf;
 
-use super::{Host, PlacedStudy};
+use super::host::Host;
 use crate::report::Manner;
 use curvelax_base::error::Result;
-use curvelax_ensemble::{Outlines, Spec, Study, request::spec::BackendChoice};
+use curvelax_ensemble::{Outlines, Spec, request::spec::BackendChoice};
 use curvelax_study::accuracy;
 
 /// What is to run, not yet checked against this machine.
 #[derive(Clone)]
-pub struct Plan {
+pub struct RunPlan {
     pub(super) spec: Spec,
     /// The directory to which paths in the spec are relative; empty for the current one.
     pub(super) base: PathBuf,
@@ -18,7 +18,7 @@ pub struct Plan {
     pub(super) known: Outlines,
 }
 
-impl Plan {
+impl RunPlan {
     /// Plans `request`: replaces `accuracy` by the nodes, tolerance and members that reach it, found in rounds that
     /// `manner` may stop.
     ///
@@ -26,7 +26,7 @@ impl Plan {
     /// [`Error::Request`](curvelax_base::error::Error::Request) if it cannot be reached, and
     /// [`Error::Interrupted`](curvelax_base::error::Error::Interrupted) or
     /// [`Error::Stopped`](curvelax_base::error::Error::Stopped) if asked to stop.
-    pub fn new(request: Spec, manner: Option<&Manner>, host: &dyn Host) -> Result<Plan> {
+    pub fn new(request: Spec, manner: Option<&Manner>, host: &dyn Host) -> Result<RunPlan> {
         let stopped = || {
             if let Err(error) = host.go_on() {
                 return Some(error);
@@ -35,21 +35,12 @@ impl Plan {
             Some(cause.error(" in the rounds of --accuracy, before the run began: nothing is saved"))
         };
         let spec = accuracy::plan(request, |round| host.say(&round.to_string()), stopped)?;
-        Ok(Plan { spec, base: PathBuf::new(), known: Outlines::default() })
-    }
-
-    /// Checks everything that can be wrong with the plan on this machine, and chooses where it is computed.
-    ///
-    /// # Errors
-    /// [`Error::Request`](curvelax_base::error::Error::Request) for what is wrong.
-    pub fn place(self) -> Result<PlacedStudy> {
-        let study = Study::new_from(self.spec.clone(), &self.base, &self.known)?;
-        PlacedStudy::new(self, study)
+        Ok(RunPlan { spec, base: PathBuf::new(), known: Outlines::default() })
     }
 
     /// The same plan for the CPU, whose precision and tolerance may differ.
-    pub fn on_cpu(self, known: Outlines) -> Plan {
+    pub fn on_cpu(self, known: Outlines) -> RunPlan {
         let spec = Spec { backend: BackendChoice::Cpu, adapter: None, ..self.spec };
-        Plan { spec, base: self.base, known }
+        RunPlan { spec, base: self.base, known }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Host, PlacedStudy, Plan, run::Session};
+use super::{host::Host, placed::PlacedStudy, plan::RunPlan, run::Session};
 use crate::{
     files::{OutputFolder, names},
     report::{
@@ -135,7 +135,7 @@ fn continued(
         check_base(&base)?;
     }
     let placed = spec(&origin.spec, &place)
-        .and_then(|spec| Plan { spec, base, known }.place())
+        .and_then(|spec| PlacedStudy::of(RunPlan { spec, base, known }))
         .map_err(|error| origin.explain(error))?;
     let placed = if place.why.is_some() { placed.because("the GPU failed") } else { placed };
     origin.check_outlines(&placed.study)?;

@@ -1,10 +1,10 @@
 //! A session: a study that is being carried out, from its beginning or from a checkpoint to its end or an interruption.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{
-    Completed, Host, PlacedStudy,
-    placed::{FirstBackend, open},
+    host::Host,
+    placed::{FirstBackend, PlacedStudy, open},
 };
 use crate::{
     files::OutputFolder,
@@ -18,7 +18,18 @@ use curvelax_base::{
     text::quoted,
 };
 use curvelax_ensemble::{Ended, Extent, Judged, LevelRow, SeriesRow, Sink, Snapshot, Standing, Study, Wish, simulate};
-use curvelax_study::placement::Choice;
+use curvelax_study::{placement::Choice, results::RunVerdict};
+
+/// A run that is complete.
+#[derive(Debug)]
+pub struct Completed {
+    /// The results in the host's form.
+    pub text: String,
+    /// How it ended as a whole.
+    pub verdict: RunVerdict,
+    /// Folder of the results.
+    pub out: PathBuf,
+}
 
 /// A study that is being carried out.
 pub struct Session {
