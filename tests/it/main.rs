@@ -9,6 +9,7 @@ mod bad_input;
 mod bench;
 mod cli;
 mod convergence;
+mod coverage;
 mod distributions;
 mod documents;
 mod ensemble;
