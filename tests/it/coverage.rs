@@ -1,7 +1,7 @@
 //! Whether `t_limit ± t_error` holds the true limit: of ensembles that were not used to find the rule, against the referee.
 //!
-//! `CURVELAX_FAMILIES=SEED tests/run --test it -- coverage --nocapture` draws other families and prints a line for each.
-//! With `CURVELAX_TESTS=all` they have 300 members instead of 10.
+//! `CURVELAX_FAMILIES=SEED,MEMBERS tests/run --test it -- coverage --nocapture` draws other families, with so many members
+//! each, and prints a line for each of them.
 
 use std::env;
 
@@ -12,8 +12,10 @@ use curvelax::{
 };
 
 const FAMILIES: u32 = 20;
-/// Seed of the families that every run has.
+/// Seed and members of the families that every run has; with `CURVELAX_TESTS=all` they have more.
 const SEED: u64 = 411;
+const MEMBERS: u64 = 10;
+const ALL_MEMBERS: u64 = 60;
 /// A limit may be off by so many of its half-widths.
 const WORST: f64 = 5.0;
 
@@ -97,8 +99,13 @@ impl Coverage {
 
 #[test]
 fn limits_of_families_that_the_rule_has_not_seen_are_within_their_bars() {
-    let seed = env::var("CURVELAX_FAMILIES").map_or(SEED, |seed| seed.parse().expect("a number"));
-    let members = if env::var("CURVELAX_TESTS").is_ok_and(|tests| tests == "all") { 300 } else { 10 };
+    let all = env::var("CURVELAX_TESTS").is_ok_and(|tests| tests == "all");
+    let (seed, members) = match env::var("CURVELAX_FAMILIES") {
+        Ok(given) => {
+            given.split_once(',').map(|(a, b)| (a.parse().unwrap(), b.parse().unwrap())).expect("SEED,MEMBERS")
+        }
+        Err(_) => (SEED, if all { ALL_MEMBERS } else { MEMBERS }),
+    };
     let families: Vec<Coverage> = (0..FAMILIES).map(|index| Coverage::of(&family(seed, index), members)).collect();
     families.iter().for_each(|family| eprintln!("{}", family.line));
     let known: usize = families.iter().map(|family| family.bars.len()).sum();
