@@ -19,9 +19,10 @@ fn curvature_equation() {
     let row_d = -(real(0.5) * alpha) - (middle + high + row_e);
     let rate = real(1.0) / tau;
     let row_c = (here(r_new) * rate - rkb) - (row_a + row_b + row_d + row_e);
-    let bk = b(k);
-    let forcing = (b(plus1(wk)) - bk) * iqh - (bk - b(minus1(wk))) * iqm;
-    let stiff = row_a * (minus2(wk) - k) + row_b * (minus1(wk) - k) + row_d * (plus1(wk) - k) + row_e * (plus2(wk) - k);
+    let rise = rises(Window(b(wk.low), b(wk.high)));
+    let forcing = rise.plus1 * iqh - rise.here * iqm;
+    let by = offsets(wk);
+    let stiff = row_a * by.minus2 + row_b * by.minus1 + row_d * by.plus1 + row_e * by.plus2;
     normalise(row_a, row_b, row_c, row_d, row_e, tau * irh);
     rhs_x = (forcing + rkb * k - stiff) * inverse;
 }

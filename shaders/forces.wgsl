@@ -37,7 +37,8 @@ fn b_over_k(curvature: vec) -> vec {
 /// beta for the old curvatures, with their window `wk`.
 fn velocity(k: vec, wk: Window) -> vec {
     read_law();
-    return b(k) - ((plus1(wk) - k) * here(iq) - (k - minus1(wk)) * minus1(iq)) * here(ir);
+    let rise = rises(wk);
+    return b(k) - (rise.plus1 * here(iq) - rise.here * minus1(iq)) * here(ir);
 }
 
 /// The energy of a unit of length.

@@ -36,6 +36,7 @@ files! {
     REDISTRIBUTION "redistribution.wgsl",
     RING "ring.wgsl",
     START "start.wgsl",
+    STATE "state.wgsl",
     STEP "step.wgsl",
     SUMS "sums.wgsl",
     SWEEPS "sweeps.wgsl",

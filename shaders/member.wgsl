@@ -149,25 +149,6 @@ struct Dispatch {
     groups: u32,
 }
 
-const STATE_FIELDS = 38u;
-/// Offsets of the curves in a state, four fields each: x, y, k, r. The increments of k, x and y follow the first one,
-/// and then what sweeps remember next to them.
-const CURVE = 0u;
-const INCREMENTS = 4u;
-const EARLIER = 7u;
-/// The first and second derivative of the curve at the end of the last adaptive step, in units of that step.
-const SLOPE = 10u;
-const BEND = 14u;
-/// The curve before the last step, and its derivatives. During an attempt: the change that it makes so far, and those
-/// at its end.
-const BEFORE = 18u;
-const SLOPE_BEFORE = 22u;
-const BEND_BEFORE = 26u;
-/// During an attempt: the curve at the end of the last part.
-const PART = 30u;
-/// During an attempt: its errors, of k and r, of its order and of the one below.
-const GAPS = 34u;
-
 @group(0) @binding(0) var<uniform> dispatch: Dispatch;
 @group(0) @binding(1) var<storage, read> all_parameters: array<Parameters>;
 @group(0) @binding(2) var<storage, read_write> all_counters: array<Counters>;
@@ -196,26 +177,4 @@ var<workgroup> resident: u32;
 fn find_member() {
     member = resident;
     first_row = row_in(member * STATE_FIELDS);
-}
-
-/// A field in this thread's block. Nobody else loads what its owner stores, so no barrier is needed. Only spare threads
-/// do, and may get anything: what they compute reaches no other thread.
-fn load_field(field: u32) -> vec {
-    return all_states[row_after(first_row, field)];
-}
-
-/// The last component of a block of three repeats its third node.
-fn store_field(field: u32, v: vec) {
-    if owns > 0u { all_states[row_after(first_row, field)] = vec(v.xyz, select(v.z, v.w, is_four)); }
-}
-
-fn copy_curve(to: u32, source: u32) {
-    for (var field = 0u; field < 4u; field++) { store_field(to + field, load_field(source + field)); }
-}
-
-fn store_fields(base: u32, xs: vec, ys: vec, ks: vec, rs: vec) {
-    store_field(base, xs);
-    store_field(base + 1u, ys);
-    store_field(base + 2u, ks);
-    store_field(base + 3u, rs);
 }

@@ -1,4 +1,5 @@
-// Sums and maxima of a curve, and what they determine. Twin of crates/flow/src/scheme/observe.rs.
+// Sums and maxima of a curve, and what they determine. Twin of crates/flow/src/scheme/observe.rs and
+// crates/flow/src/equilibrium.rs.
 
 /// |k| r at which a curve counts as unresolved.
 const MAX_TURN = 2.0;
@@ -19,12 +20,17 @@ var<private> extremes: vec;
 /// Largest curvature, minus the smallest, largest displacement of a node.
 var<private> others: vec;
 
+/// `L²/(4π|A|)`, least at equilibrium.
+fn quotient(length: real, area: real) -> real {
+    return length * length / (real(FOUR_PI) * abs(area));
+}
+
 /// How far the nodes of the new curve have moved.
 var<private> displacement: vec;
 
 fn displaced(x: vec, y: vec) {
-    let moved_x = here(new_x) - x;
-    let moved_y = here(new_y) - y;
+    let moved_x = change_from(x, here(new_x));
+    let moved_y = change_from(y, here(new_y));
     displacement = sqrt(moved_x * moved_x + moved_y * moved_y);
 }
 
@@ -45,9 +51,9 @@ fn is_singular(turning: real) -> bool {
     return !(resolved && apart && measured && extended && sums.w == turning);
 }
 
-/// `L²/(4π|A|)` minus that of the regular polygon.
+/// The distance from equilibrium: the quotient minus that of the regular polygon.
 fn excess(length: real, area: real) -> real {
-    return length * length / (real(FOUR_PI) * abs(area)) - all_parameters[member].polygon_ratio;
+    return quotient(length, area) - all_parameters[member].polygon_ratio;
 }
 
 /// The first and the second derivative of ln excess along an adaptive step, by those of the nodes of the new curve.
@@ -55,12 +61,12 @@ fn decline() -> vec2<real> {
     let slope = windows(load_field(SLOPE_BEFORE), load_field(SLOPE_BEFORE + 1u));
     settle();
     let bend = windows(load_field(BEND_BEFORE), load_field(BEND_BEFORE + 1u));
-    let ex = here(new_x) - minus1(new_x);
-    let ey = here(new_y) - minus1(new_y);
-    let fx = here(slope.a) - minus1(slope.a);
-    let fy = here(slope.b) - minus1(slope.b);
-    let gx = here(bend.a) - minus1(bend.a);
-    let gy = here(bend.b) - minus1(bend.b);
+    let ex = rises(new_x).here;
+    let ey = rises(new_y).here;
+    let fx = rises(slope.a).here;
+    let fy = rises(slope.b).here;
+    let gx = rises(bend.a).here;
+    let gy = rises(bend.b).here;
     let inverse = vec(1.0) / sqrt(ex * ex + ey * ey);
     let stretch = (ex * fx + ey * fy) * inverse;
     let bent = (fx * fx + fy * fy + (ex * gx + ey * gy) - stretch * stretch) * inverse;
@@ -78,7 +84,7 @@ fn decline() -> vec2<real> {
     let slope_of_ratio = real(2.0) * growth - widening;
     let bend_of_ratio = real(2.0) * (all.y / length - growth * growth)
         - (half * all.w / sums.y - widening * widening);
-    let ratio = length * length / (real(FOUR_PI) * abs(sums.y));
+    let ratio = quotient(length, sums.y);
     let over = ratio / (ratio - all_parameters[member].polygon_ratio);
     let falls = over * slope_of_ratio;
     return vec2(falls, over * (bend_of_ratio + slope_of_ratio * slope_of_ratio) - falls * falls);
@@ -105,19 +111,18 @@ fn winding(ex: vec, ey: vec, fx: vec, fy: vec) -> vec {
 
 /// Observes the curve given by the windows of x and y and the nodes of k and r; `moved` is how far its nodes moved.
 fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
-    let ex = here(wx) - minus1(wx);
-    let ey = here(wy) - minus1(wy);
-    let fx = plus1(wx) - here(wx);
-    let fy = plus1(wy) - here(wy);
-    let edge = sqrt(ex * ex + ey * ey);
+    let x = rises(wx);
+    let y = rises(wy);
+    let own = edge(x.here, y.here).length;
     let cross = minus1(wx) * here(wy) - here(wx) * minus1(wy);
     let energy = energy_density(kh) * rh;
-    let part = vec(block_sum(edge), block_sum(cross), block_sum(energy), block_sum(winding(ex, ey, fx, fy)));
-    let shortest = -bounded_abs(edge);
+    let turning = winding(x.here, y.here, x.plus1, y.plus1);
+    let part = vec(block_sum(own), block_sum(cross), block_sum(energy), block_sum(turning));
+    let shortest = -bounded_abs(own);
     let extremes_of_block = vec(
         block_max(bounded_abs(kh * rh)),
-        block_max(bounded_abs((rh - edge) / edge)),
-        block_max(bounded_abs(edge)),
+        block_max(bounded_abs((rh - own) / own)),
+        block_max(bounded_abs(own)),
         block_max_signed(shortest),
     );
     let others_of_block = vec(block_max_signed(kh), block_max_signed(-kh), block_max(bounded_abs(moved)), 0.0);

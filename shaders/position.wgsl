@@ -18,7 +18,7 @@ fn position_equation() {
     let low = irh * irh * (iqm + iqh);
     let high = irp * irp * (iqh + iqp);
     let mean_phi = real(0.5) * (phi(kh) + phi(kp));
-    let drift = real(0.5) * alpha - real(0.75) * ((kp * kp - kh * kh) * iqh);
+    let drift = real(0.5) * alpha - real(0.75) * (rise_of_square(wk) * iqh);
     let row_b = (mean_phi * irh + drift) - (middle + low + row_a);
     let row_d = (mean_phi * irp - drift) - (middle + high + row_e);
     let q = (here(r_new) + plus1(r_new)) * real(0.5);
@@ -32,6 +32,6 @@ fn position_equation() {
 }
 
 fn residual_of_old(a: vec, b: vec, d: vec, e: vec, w: Window) -> vec {
-    let at = here(w);
-    return -(a * (minus2(w) - at) + b * (minus1(w) - at) + d * (plus1(w) - at) + e * (plus2(w) - at));
+    let by = offsets(w);
+    return -(a * by.minus2 + b * by.minus1 + d * by.plus1 + e * by.plus2);
 }

@@ -1,22 +1,21 @@
 // The turn of the polygon, and the pull of k and r towards it. Twin of crates/flow/src/scheme/pull.rs.
 
+/// Twice the sine of half the angle from an edge to the next one.
+fn vertex_turn(e: Edge, f: Edge) -> vec {
+    return twice_sin_atan((e.x * f.y - e.y * f.x) / (e.length * f.length + (e.x * f.x + e.y * f.y)));
+}
+
 /// The turn of the polygon at both ends of a segment together, the length over which it turns, and the segment's own.
 struct Turn { angle: vec, span: vec, edge: vec }
 
 fn turn(wx: Window, wy: Window) -> Turn {
-    // Edges that end at nodes i-1, i, i+1.
-    let dx = minus1(wx) - minus2(wx);
-    let dy = minus1(wy) - minus2(wy);
-    let ex = here(wx) - minus1(wx);
-    let ey = here(wy) - minus1(wy);
-    let fx = plus1(wx) - here(wx);
-    let fy = plus1(wy) - here(wy);
-    let d = sqrt(dx * dx + dy * dy);
-    let e = sqrt(ex * ex + ey * ey);
-    let f = sqrt(fx * fx + fy * fy);
-    let before = twice_sin_atan((dx * ey - dy * ex) / (d * e + (dx * ex + dy * ey)));
-    let after = twice_sin_atan((ex * fy - ey * fx) / (e * f + (ex * fx + ey * fy)));
-    return Turn(before + after, real(0.5) * d + e + real(0.5) * f, e);
+    let x = rises(wx);
+    let y = rises(wy);
+    let before = edge(x.minus1, y.minus1);
+    let own = edge(x.here, y.here);
+    let after = edge(x.plus1, y.plus1);
+    let span = real(0.5) * before.length + own.length + real(0.5) * after.length;
+    return Turn(vertex_turn(before, own) + vertex_turn(own, after), span, own.length);
 }
 
 /// Pulls the new curvatures and lengths of a step.

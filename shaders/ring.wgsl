@@ -1,6 +1,7 @@
 // The ring of nodes, cut into blocks: which nodes or blocks are adjacent, and what a thread knows of its neighbours.
 // Twin of crates/flow/src/solver/ring.rs. All arithmetic on indices of nodes and blocks is here.
-// Addresses in storage buffers are computed in member.wgsl and trace_on.wgsl.
+// Addresses in storage buffers are computed in state.wgsl and trace_on.wgsl. The scheme sees positions and curvatures by
+// their differences only, and forms them only here.
 //
 // A thread owns one block of four or three consecutive nodes, stored in the components of a `vec`; a node's colour is
 // its place in the block. For a block of three the fourth component repeats the first node of the next block: it is
@@ -112,6 +113,28 @@ fn window(of_before: vec, own: vec, of_after: vec) -> Window {
     let tail = select(of_before.yz, of_before.zw, before_is_four);
     let high = select(vec(own.z, of_after.xyz), vec(own.zw, of_after.xy), is_four);
     return Window(vec(tail, own.xy), high);
+}
+
+/// By how much a field exceeds its value at i, at i-2, i-1, i+1, i+2.
+struct Offsets { minus2: vec, minus1: vec, plus1: vec, plus2: vec }
+
+fn offsets(w: Window) -> Offsets {
+    let at = here(w);
+    return Offsets(minus2(w) - at, minus1(w) - at, plus1(w) - at, plus2(w) - at);
+}
+
+/// How much a field at i-1, i, i+1, i+2 exceeds its value at the node before.
+struct Rises { minus1: vec, here: vec, plus1: vec, plus2: vec }
+
+fn rises(w: Window) -> Rises {
+    return Rises(minus1(w) - minus2(w), here(w) - minus1(w), plus1(w) - here(w), plus2(w) - plus1(w));
+}
+
+/// By how much the square of a field at i+1 exceeds the one at i.
+fn rise_of_square(w: Window) -> vec {
+    let at = here(w);
+    let next = plus1(w);
+    return next * next - at * at;
 }
 
 /// The window of a block between the tail of the block before and the front of the block after, two nodes each. The

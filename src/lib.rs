@@ -32,7 +32,7 @@
 //! |---|---|---|
 //! | `curvelax-shaders` | | the files of `shaders/`, compiled in |
 //! | `curvelax-base` | [`error`], [`random`] | errors with what, where, numbers and remedy; input files, text, random numbers by key, threads |
-//! | `curvelax-flow` | [`number`], [`flow`], [`solver`], [`scheme`] | the paper: the law b(k), periodic pentadiagonal systems, the step |
+//! | `curvelax-flow` | [`number`], [`flow`], [`equilibrium`], [`solver`], [`scheme`] | the paper: the law b(k) and what it relaxes to, periodic pentadiagonal systems, the step |
 //! | `curvelax-backend` | [`backend`] | slots in which members advance: the CPU, and the source of the kernel |
 //! | `curvelax-gpu` | [`backend::gpu`] | the kernel through wgpu |
 //! | `curvelax-curve` | [`curve`] | plane curves in f64: shapes, outlines, perturbation, sampling, measures |
@@ -63,7 +63,7 @@ pub use curvelax_base::{Error, Result, error, random};
 pub use curvelax_curve as curve;
 pub use curvelax_ensemble as ensemble;
 pub use curvelax_ensemble::simulate;
-pub use curvelax_flow::{flow, number, scheme, solver};
+pub use curvelax_flow::{equilibrium, flow, number, scheme, solver};
 pub use curvelax_statistics as statistics;
 pub use curvelax_study::{conformance, placement, relax, results, truth};
 

@@ -12,6 +12,7 @@ use curvelax::{
         Cell, Ended, Family, Outcome, Sink, Spec, Status,
         request::spec::{BackendChoice, Omega, Precision, Pull, Solver, SolverChoice, Sor, Tau},
     },
+    equilibrium::Equilibrium,
     flow::Flow,
     placement::{self, MAX_POINTS_F32},
     scheme::{
@@ -367,10 +368,10 @@ fn relaxed_ellipse<T: Evolves>(n: usize, method: &Method, tolerance: f64) -> (Ve
     let shape = Shape::Ellipse { a: 2.0, b: 1.0 }.into();
     let spec = Spec { shape, sampling: Sampling::Arclength, points: n, amplitude: 0.0.into(), ..Spec::default() };
     let nodes = Family::new(&spec).unwrap().member(0).unwrap().nodes;
-    let excess = polygon::excess(&nodes);
+    let excess = Equilibrium::Circle.excess(polygon::length(&nodes), polygon::signed_area(&nodes), n);
     let parameters = Parameters {
         tolerance,
-        polygon_ratio: polygon::regular_ratio(n),
+        polygon_ratio: Equilibrium::Circle.least_quotient(n),
         relax_at: 0.01 * excess,
         half_at: 0.5 * excess,
         ..Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3)

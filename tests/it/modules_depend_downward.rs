@@ -14,7 +14,7 @@ use syn::{
 };
 
 /// Crates and modules; each may use only those above it. A name stands for what has no longer one; `program` for `src`.
-const LAYERS: [&str; 42] = [
+const LAYERS: [&str; 43] = [
     "shaders",
     "base/error",
     "base/guard",
@@ -24,6 +24,7 @@ const LAYERS: [&str; 42] = [
     "base/random",
     "base",
     "flow/number",
+    "flow/equilibrium",
     "flow/flow",
     "flow/solver",
     "flow/scheme",

@@ -224,6 +224,36 @@ fn index_arithmetic(text: &str) -> Vec<&str> {
     text.lines().filter(|line| computes(line)).collect()
 }
 
+/// The lines of a shader that form differences of a field between nodes. A product of two fields is no difference.
+fn differences(text: &str) -> Vec<&str> {
+    const PLACES: [&str; 5] = ["minus2", "minus1", "here", "plus1", "plus2"];
+    let forms = |line: &str| {
+        let code = line.split("//").next().unwrap_or("");
+        code.match_indices(" - ").any(|(at, sign)| {
+            let (left, right) = (&code[..at], &code[at + sign.len()..]);
+            let start = left.rfind('(').map_or("", |open| &left[..open]);
+            let is_place = PLACES.iter().any(|place| start.ends_with(place) && left.ends_with(')'));
+            let factor = PLACES.iter().any(|place| start.ends_with(&format!("* {place}")));
+            let call = PLACES.iter().find_map(|place| right.strip_prefix(place)?.strip_prefix('('));
+            let multiplied = call.and_then(|rest| rest.split_once(')')).is_some_and(|(_, rest)| rest.starts_with(" *"));
+            is_place && !factor && call.is_some() && !multiplied
+        })
+    };
+    text.lines().filter(|line| forms(line)).collect()
+}
+
+#[test]
+fn differences_of_neighbours_are_formed_in_one_file() {
+    let sources = Sources::read();
+    for file in sources.shaders().filter(|file| *file != "ring.wgsl") {
+        assert_eq!(differences(&sources.0[&format!("shaders/{file}")]), [""; 0], "{file}");
+    }
+    // Negative controls.
+    assert!(!differences(&sources.0["shaders/ring.wgsl"]).is_empty());
+    assert_eq!(differences("let dx = here(wx) - minus1(wx);").len(), 1);
+    assert_eq!(differences("let cross = minus1(wx) * here(wy) - here(wx) * minus1(wy);"), [""; 0]);
+}
+
 #[test]
 fn indices_are_computed_in_one_file() {
     let sources = Sources::read();

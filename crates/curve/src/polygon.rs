@@ -1,10 +1,8 @@
-//! Measures of closed polygons: length, area, centroid, excess, turning number, mesh ratio.
+//! Measures of closed polygons: length, area, centroid, turning number, mesh ratio.
 //!
 //! A polygon is the slice of its n ≥ 1 vertices; the edge from the last back to the first closes it. All areas
 //! are signed, positive counter-clockwise. Sums are taken about the first vertex, not about the coordinate
 //! origin, so a small curve far away keeps its digits.
-
-use std::f64::consts::PI;
 
 use glam::DVec2;
 
@@ -55,25 +53,6 @@ pub fn area_centroid(points: &[DVec2]) -> DVec2 {
 /// Returns the lower left and upper right corner of the bounding box of the points, if there are any.
 pub fn bounds(points: impl IntoIterator<Item = DVec2>) -> Option<(DVec2, DVec2)> {
     points.into_iter().map(|p| (p, p)).reduce(|(low, high), (p, _)| (low.min(p), high.max(p)))
-}
-
-/// Returns the excess `L²/(4πA) - (n/π)·tan(π/n)`: 0 on the regular n-gon, the roundest of all n-gons, and > 0 on every
-/// other embedded counter-clockwise polygon. Dimensionless.
-///
-/// The isoperimetric quotient alone would leave a relaxed polygon 1 + π²/(3n²) above a circle's 1 for ever.
-pub fn excess(points: &[DVec2]) -> f64 {
-    excess_of(length(points), signed_area(points), points.len())
-}
-
-/// Returns the [`excess`] from a length, a signed area and the number of nodes n ≥ 3.
-pub fn excess_of(length: f64, area: f64, n: usize) -> f64 {
-    length * length / (4.0 * PI * area) - regular_ratio(n)
-}
-
-/// Returns the isoperimetric ratio `L²/(4πA) = (n/π)·tan(π/n)` of the regular n-gon.
-pub fn regular_ratio(n: usize) -> f64 {
-    let n = n as f64;
-    n / PI * (PI / n).tan()
 }
 
 /// Returns the turning number, the number of revolutions of the edge direction: +1 for an embedded counter-clockwise
@@ -127,7 +106,7 @@ pub fn turn_round(points: &mut [DVec2]) {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
+    use std::f64::consts::{PI, TAU};
 
     use super::*;
 
@@ -140,14 +119,13 @@ mod tests {
     }
 
     #[test]
-    fn a_regular_polygon_has_its_length_and_area_and_no_excess() {
+    fn a_regular_polygon_has_its_length_and_area() {
         for n in [3, 7, 100] {
             let polygon = sampled(n, |t| (5.0 + 2.0 * t.cos(), 2.0 * t.sin() - 3.0));
             let m = n as f64;
             assert_near(length(&polygon), 4.0 * m * (PI / m).sin(), 1e-13);
             assert_near(signed_area(&polygon), 2.0 * m * (TAU / m).sin(), 1e-13);
             assert_near(area_centroid(&polygon).distance(DVec2::new(5.0, -3.0)), 0.0, 1e-14);
-            assert_near(excess(&polygon), 0.0, 1e-13);
             assert_near(mesh_ratio(&polygon), 1.0, 1e-12);
             assert_eq!(turning_number(&polygon), 1);
         }
@@ -184,7 +162,6 @@ mod tests {
         let ellipse = sampled(20_000, |t| (2.0 * t.cos(), t.sin()));
         assert_near(length(&ellipse), 9.688_448_220_547_675, 1e-6);
         assert_near(signed_area(&ellipse), TAU, 1e-6);
-        assert_near(excess(&ellipse), 9.688_448_220_547_675_f64.powi(2) / (8.0 * PI * PI) - 1.0, 1e-6);
         assert_near(mesh_ratio(&ellipse), 2.0, 1e-6);
     }
 

@@ -14,6 +14,8 @@ use curvelax_base::{
     text::number,
 };
 
+use crate::equilibrium::Equilibrium;
+
 /// Highest power of `k` in `b(k)`; the coefficients are the first numbers of [`Flow::law`].
 pub const MAX_DEGREE: usize = 8;
 /// Numbers of a law in the parameters that the kernel gets.
@@ -70,6 +72,11 @@ impl Flow {
         law
     }
 
+    /// Returns the shape to which the flow relaxes closed curves, if it does.
+    pub fn equilibrium(&self) -> Equilibrium {
+        Equilibrium::Circle
+    }
+
     /// Evaluates `b(k)`.
     pub fn b(&self, k: f64) -> f64 {
         self.coefficients().iter().rev().fold(0.0, |sum, c| (sum + c) * k)
@@ -96,6 +103,7 @@ impl Flow {
     /// `24/R⁴` for m = 2 and surface diffusion; for Willmore flow the exponent of `1 + 2t/R₀⁴`. `None` if the
     /// radius of a circle changes in another way: see `crates/ensemble/src/outcome/linear_rate.rs` for elastic flow.
     pub fn excess_rate(&self, m: u32, area: f64) -> Option<f64> {
+        let Equilibrium::Circle = self.equilibrium();
         let radius = (area.abs() / PI).sqrt();
         match self {
             Flow::SurfaceDiffusion => Some(2.0 * self.linear_rate(m, radius)),

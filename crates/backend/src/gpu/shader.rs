@@ -50,11 +50,12 @@ impl Variant {
     }
 }
 
-const COMMON: [ShaderPart; 18] = [
+const COMMON: [ShaderPart; 19] = [
     shaders::NUMBER,
     shaders::RING,
     shaders::SUMS,
     shaders::MEMBER,
+    shaders::STATE,
     shaders::FORCES,
     shaders::REDISTRIBUTION,
     shaders::SYSTEM,

@@ -30,7 +30,7 @@ pub struct Observables {
     pub length: f64,
     /// Signed area `A` of the polygon `x`, positive counter-clockwise.
     pub area: f64,
-    /// `L²/(4πA) - (n/π)·tan(π/n)`: 0 on a regular polygon.
+    /// Distance from [equilibrium](curvelax_flow::equilibrium): `L²/(4πA) - (n/π)·tan(π/n)`, 0 on a regular polygon.
     pub excess: f64,
     /// `∮(½k² + λ) ds` from the scheme's `k` and `r`; λ = 0 unless the flow is elastic.
     pub energy: f64,

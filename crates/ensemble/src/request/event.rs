@@ -31,7 +31,7 @@ pub enum Observable {
     Length,
     /// Its signed area.
     Area,
-    /// Its isoperimetric excess over the regular polygon.
+    /// Its distance from [equilibrium](curvelax_flow::equilibrium).
     Excess,
     /// `∮(½k² + λ) ds`.
     Energy,

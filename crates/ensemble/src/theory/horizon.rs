@@ -22,7 +22,7 @@ use glam::{DMat2, DVec2};
 
 use super::rates;
 use curvelax_curve::polygon;
-use curvelax_flow::flow::Flow;
+use curvelax_flow::{equilibrium::Equilibrium, flow::Flow};
 
 /// The highest mode that is followed; higher ones vanish before they matter.
 const MODES: usize = 32;
@@ -57,7 +57,8 @@ impl CurveScale {
     pub fn of(nodes: &[DVec2]) -> CurveScale {
         let simple = polygon::turning_number(nodes).abs() == 1;
         let (radius, radius_of_length) = (rates::radius(nodes), polygon::length(nodes) / TAU);
-        let excess = if simple { polygon::excess(nodes).max(0.0) } else { 0.0 };
+        let (length, area) = (polygon::length(nodes), polygon::signed_area(nodes));
+        let excess = if simple { Equilibrium::Circle.excess(length, area, nodes.len()).max(0.0) } else { 0.0 };
         let mut parts = if simple { parts(nodes) } else { Vec::new() };
         let sum: f64 = parts.iter().sum();
         if sum > 0.0 {
@@ -82,6 +83,8 @@ impl CurveScale {
     /// The time after which the excess has fallen to `threshold`, with `more` excess in the modes from 2 on, by theory;
     /// `None` if by theory it never does, and for a curve that is not simple.
     pub fn relaxes_after(&self, flow: &Flow, more: &[f64], threshold: f64) -> Option<f64> {
+        // The modes are those of a circle.
+        let Equilibrium::Circle = flow.equilibrium();
         let count = self.parts.len().max(more.len());
         let part = |parts: &[f64], i: usize| parts.get(i).copied().unwrap_or(0.0);
         let mut parts: Vec<f64> = (0..count).map(|i| part(&self.parts, i) + part(more, i)).collect();

@@ -188,7 +188,7 @@ fn parameters(spec: &Spec, flow: &Flow, nodes: &[DVec2], [unit, time]: [f64; 2],
             Sor::Factor(factor) => factor,
             Sor::Auto => 0.0,
         },
-        polygon_ratio: polygon::regular_ratio(nodes.len()),
+        polygon_ratio: flow.equilibrium().least_quotient(nodes.len()),
         ..Parameters::of_flow(flow, 1.0)
     }
 }

@@ -32,11 +32,11 @@ impl<'a, N: Number> Curvature<'a, N> {
 impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
     #[inline(always)]
     fn equation(&self, i: usize) -> Equation<N, 1> {
-        let [kmm, km, k, kp, kpp] = self.old.k.window(i);
+        let [kmm, km, kp, kpp] = self.old.k.offsets(i);
         let [_, irm, ir, irp, _] = self.motion.ir.window(i);
         let [iqmm, iqm, iq, iqp, _] = self.motion.iq.window(i);
         let [_, alpha_m, alpha, _, _] = self.motion.alpha.window(i);
-        let [_, bm, b_of_k, bp, _] = self.motion.b.window(i);
+        let [_, rise_of_b, rise_of_bp, _] = self.motion.b.rises(i);
         let (r, rkb) = (self.new.r[i], self.motion.rkb[i]);
         let half = N::of(0.5);
         let a = iqm * irm * iqmm;
@@ -47,8 +47,8 @@ impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
         let b = half * alpha_m - (middle + low + a);
         let d = -(half * alpha) - (middle + high + e);
         let c = (r * self.rate - rkb) - (a + b + d + e);
-        let forcing = (bp - b_of_k) * iq - (b_of_k - bm) * iqm;
-        let stiff = a * (kmm - k) + b * (km - k) + d * (kp - k) + e * (kpp - k);
-        Equation { a, b, c, d, e, rhs: [forcing + rkb * k - stiff], time_over_length: self.tau * ir }
+        let forcing = rise_of_bp * iq - rise_of_b * iqm;
+        let stiff = a * kmm + b * km + d * kp + e * kpp;
+        Equation { a, b, c, d, e, rhs: [forcing + rkb * self.old.k[i] - stiff], time_over_length: self.tau * ir }
     }
 }

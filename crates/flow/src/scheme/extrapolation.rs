@@ -14,7 +14,11 @@
 //! Everything is accumulated as parts are made, as a change from the curve at the start, in what the state holds of the
 //! step before: nobody needs that any more.
 
-use super::{Curve, State, run::Run, state::Gaps};
+use super::{
+    Curve, State,
+    run::Run,
+    state::{self, Gaps, change_from},
+};
 use crate::number::{BIG, Number, Real};
 
 /// Lowest order of a step.
@@ -149,7 +153,7 @@ pub fn add_part<N: Number>(state: &mut State<N>, new: &Curve<N>, left: u32, shar
     let sums = before.fields_mut().into_iter().zip(slope_before.fields_mut()).zip(bend_before.fields_mut());
     for ((new, old), ((value, slope), bend)) in changes.zip(sums) {
         for i in 0..new.len() {
-            let change = N::select(busy, new[i] - old[i], N::of(0.0));
+            let change = N::select(busy, change_from(old[i], new[i]), N::of(0.0));
             bend[i] += shares.bend * change;
             if left < 2 {
                 slope[i] += shares.slope * change;
@@ -163,8 +167,8 @@ pub fn add_part<N: Number>(state: &mut State<N>, new: &Curve<N>, left: u32, shar
         return;
     }
     for i in 0..new.len() {
-        let change_k = N::select(busy, new.k[i] - curve.k[i], N::of(0.0));
-        let change_r = N::select(busy, new.r[i] - curve.r[i], N::of(0.0));
+        let change_k = N::select(busy, change_from(curve.k[i], new.k[i]), N::of(0.0));
+        let change_r = N::select(busy, change_from(curve.r[i], new.r[i]), N::of(0.0));
         gaps.k[i] += shares.gap * change_k;
         gaps.r[i] += shares.gap * change_r;
         gaps.lower_k[i] += shares.lower_gap * change_k;
@@ -178,10 +182,7 @@ pub fn finish_attempt<N: Number>(state: &mut State<N>, new: &mut Curve<N>) {
     let State { curve, before, slope_before, bend_before, .. } = state;
     let changes = before.fields().into_iter().zip(curve.fields());
     for (new, (change, old)) in new.fields_mut().into_iter().zip(changes) {
-        for i in 0..old.len() {
-            new[i] = old[i] + change[i];
-        }
-        new.close();
+        state::advance(old, change, new);
     }
     slope_before.close();
     bend_before.close();

@@ -65,11 +65,12 @@ pub fn fill<N: Number>(old: &Curve<N>, p: &Parameters<N>, degree: usize, motion:
     motion.b.close();
 }
 
-/// `β_i` of the curve whose reciprocal lengths and `b(k)` are in `motion`.
+/// `β_i` of the curve whose reciprocal lengths and `b(k)` are in `motion`, with the [rises](crate::solver::Ring::rises)
+/// of its curvature.
 #[inline(always)]
-pub fn velocity<N: Number>(motion: &Motion<N>, [_, km, k, kp, _]: [N; 5], i: usize) -> N {
+pub fn velocity<N: Number>(motion: &Motion<N>, [_, rise, next, _]: [N; 4], i: usize) -> N {
     let [_, iqm, iq, _, _] = motion.iq.window(i);
-    motion.b[i] - ((kp - k) * iq - (k - km) * iqm) * motion.ir[i]
+    motion.b[i] - (next * iq - rise * iqm) * motion.ir[i]
 }
 
 impl<N: Number> Parameters<N> {

@@ -81,7 +81,7 @@ numbers! {
         tolerance,
         /// Over-relaxation factor of the sweeps; 0 to choose it by the stiffness of each system.
         sor,
-        /// Isoperimetric ratio of the regular n-gon, `(n/π)·tan(π/n)`.
+        /// Isoperimetric quotient of n nodes at [equilibrium](crate::equilibrium), `(n/π)·tan(π/n)`.
         polygon_ratio,
         /// Excess at which the member is relaxed.
         relax_at,
@@ -159,7 +159,7 @@ numbers! {
         length,
         /// Signed area of the polygon.
         area,
-        /// Isoperimetric excess over the regular polygon.
+        /// Distance from [equilibrium](crate::equilibrium).
         excess,
         /// `∮(½k² + λ) ds`.
         energy,

@@ -3,8 +3,15 @@
 //!
 //! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r.
 
-use super::{Curve, Parameters, dense::LOOKS, member::Observed, pull, state::edge};
+use super::{
+    Curve, Parameters,
+    dense::LOOKS,
+    member::Observed,
+    pull,
+    state::{change_from, edge},
+};
 use crate::{
+    equilibrium::Equilibrium,
     number::{BIG, Mask, Number, Real},
     solver::{self, Blocks},
 };
@@ -22,6 +29,9 @@ pub const MAX_GAP: f64 = 0.5;
 /// Excess at the end of an adaptive step, as a multiple of a threshold, above which nobody looks for a dip below the
 /// threshold inside the step.
 pub const NEAR: f64 = 4.0;
+
+/// What all flows relax to.
+const EQUILIBRIUM: Equilibrium = Equilibrium::Circle;
 
 /// The four sums, in the order of the kernel's `vec4`.
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +95,7 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, blocks: Blocks) -> Glan
         slack = slack.max((r - e).bounded_abs() - N::of(MAX_DRIFT) * e);
         minus_shortest = minus_shortest.max(-e.bounded_abs());
         minus_k_min = minus_k_min.max(-k);
-        let (dx, dy) = (x - old.x[i], y - old.y[i]);
+        let (dx, dy) = (change_from(old.x[i], x), change_from(old.y[i], y));
         farthest = farthest.max((dx * dx + dy * dy).bounded_abs());
         sums.add(i, [e, xm * y - x * ym, winding(new, i)]);
     }
@@ -147,10 +157,10 @@ pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
     m
 }
 
-/// `L²/(4π|A|)` minus that of the regular polygon.
+/// The distance from equilibrium: `L²/(4π|A|)` minus that of the regular polygon.
 #[inline(always)]
 pub fn excess<N: Number>(length: N, area: N, p: &Parameters<N>) -> N {
-    length * length / (N::of(4.0 * std::f64::consts::PI) * area.abs()) - p.polygon_ratio
+    EQUILIBRIUM.quotient(length, area.abs()) - p.polygon_ratio
 }
 
 /// The first and the second derivative of ln excess along a step, by those of the nodes of the curve at its end.
@@ -171,7 +181,9 @@ pub fn decline<N: Number>(
         let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
         let ([_, um, u, ..], [_, vm, v, ..]) = (slope.x.window(i), slope.y.window(i));
         let ([_, sm, s, ..], [_, tm, t, ..]) = (bend.x.window(i), bend.y.window(i));
-        let ([ex, ey], [fx, fy], [gx, gy]) = ([x - xm, y - ym], [u - um, v - vm], [s - sm, t - tm]);
+        let ([_, ex, ..], [_, ey, ..]) = (curve.x.rises(i), curve.y.rises(i));
+        let ([_, fx, ..], [_, fy, ..]) = (slope.x.rises(i), slope.y.rises(i));
+        let ([_, gx, ..], [_, gy, ..]) = (bend.x.rises(i), bend.y.rises(i));
         let inverse = (ex * ex + ey * ey).sqrt().recip();
         let stretch = (ex * fx + ey * fy) * inverse;
         let bent = (fx * fx + fy * fy + (ex * gx + ey * gy) - stretch * stretch) * inverse;
@@ -184,7 +196,7 @@ pub fn decline<N: Number>(
     let (growth, widening) = (stretch / length, half * area_slope / area);
     let slope = two * growth - widening;
     let bend = two * (bent / length - growth * growth) - (half * area_bend / area - widening * widening);
-    let ratio = length * length / (N::of(4.0 * std::f64::consts::PI) * area.abs());
+    let ratio = EQUILIBRIUM.quotient(length, area.abs());
     let over = ratio / (ratio - p.polygon_ratio);
     let first = over * slope;
     [first, over * (bend + slope * slope) - first * first]
@@ -205,8 +217,7 @@ pub fn gap<N: Number>(curve: &Curve<N>) -> N {
 /// +1 (-1) if the edge vector turns from `e_i` to `e_{i+1}` across the positive x axis, the short way round.
 #[inline(always)]
 fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
-    let ([_, xm, x, xp, _], [_, ym, y, yp, _]) = (curve.x.window(i), curve.y.window(i));
-    let (ex, ey, fx, fy) = (x - xm, y - ym, xp - x, yp - y);
+    let ([_, ex, fx, _], [_, ey, fy, _]) = (curve.x.rises(i), curve.y.rises(i));
     let (zero, one) = (N::of(0.0), N::of(1.0));
     let side = ex * fy - fx * ey;
     // +1 upwards across the axis, which counts with the origin on the left; -1 downwards, with it on the right.

@@ -51,17 +51,17 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
         let low = ir * ir * (iqm + iq);
         let high = irp * irp * (iq + iqp);
         let phi = half * (self.law.phi(k) + self.law.phi(kp));
-        let drift = half * self.motion.alpha[i] - N::of(0.75) * ((kp * kp - k * k) * iq);
+        let drift = half * self.motion.alpha[i] - N::of(0.75) * (self.new.k.rise_of_square(i) * iq);
         let b = (phi * ir + drift) - (middle + low + a);
         let d = (phi * irp - drift) - (middle + high + e);
         let c = q * self.rate - (a + b + d + e);
         let off = [a, b, d, e];
-        let rhs = [residual_of_old(off, self.old.x.window(i)), residual_of_old(off, self.old.y.window(i))];
+        let rhs = [residual_of_old(off, self.old.x.offsets(i)), residual_of_old(off, self.old.y.offsets(i))];
         Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }
     }
 }
 
 #[inline(always)]
-fn residual_of_old<N: Number>([a, b, d, e]: [N; 4], [mm, m, x, p, pp]: [N; 5]) -> N {
-    -(a * (mm - x) + b * (m - x) + d * (p - x) + e * (pp - x))
+fn residual_of_old<N: Number>([a, b, d, e]: [N; 4], [mm, m, p, pp]: [N; 4]) -> N {
+    -(a * mm + b * m + d * p + e * pp)
 }

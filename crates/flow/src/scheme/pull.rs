@@ -11,6 +11,12 @@
 use super::{Branches, Curve, Parameters, state::edge};
 use crate::number::Number;
 
+/// Twice the sine of half the angle from edge `[x, y, length]` to the next one: the gap between the unit tangents.
+#[inline(always)]
+fn vertex_turn<N: Number>([ex, ey, e]: [N; 3], [fx, fy, f]: [N; 3]) -> N {
+    ((ex * fy - ey * fx) / (e * f + (ex * fx + ey * fy))).twice_sin_atan()
+}
+
 /// Returns the turn of the polygon at both ends of segment i together, and the length over which it turns.
 #[inline(always)]
 pub fn turn<N: Number>(curve: &Curve<N>, i: usize) -> [N; 2] {
@@ -18,12 +24,6 @@ pub fn turn<N: Number>(curve: &Curve<N>, i: usize) -> [N; 2] {
     let (before, own, after) = (edge(curve, (i + n - 1) % n), edge(curve, i), edge(curve, (i + 1) % n));
     let half = N::of(0.5);
     [vertex_turn(before, own) + vertex_turn(own, after), half * before[2] + own[2] + half * after[2]]
-}
-
-/// Twice the sine of half the angle from edge `[x, y, length]` to the next one: the gap between the unit tangents.
-#[inline(always)]
-fn vertex_turn<N: Number>([ex, ey, e]: [N; 3], [fx, fy, f]: [N; 3]) -> N {
-    ((ex * fy - ey * fx) / (e * f + (ex * fx + ey * fy))).twice_sin_atan()
 }
 
 /// Pulls the new k and r of a step towards `curve`'s polygon.

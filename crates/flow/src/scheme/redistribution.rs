@@ -30,7 +30,7 @@ pub fn redistribute<N: Number>(
     forces::fill(old, p, branches.degree, motion);
     let mut sums = Sums::new(blocks);
     for i in 0..old.len() {
-        let beta = forces::velocity(motion, old.k.window(i), i);
+        let beta = forces::velocity(motion, old.k.rises(i), i);
         let rkb = old.r[i] * old.k[i] * beta;
         motion.beta[i] = beta;
         motion.rkb[i] = rkb;

@@ -1,4 +1,6 @@
-//! The state of one curve, and the workspace of a step.
+//! The state of one curve, and the workspace of a step. Twin of `shaders/state.wgsl`.
+//!
+//! Increments are added to a curve, and changes of one formed, only here.
 
 use glam::DVec2;
 
@@ -326,10 +328,30 @@ impl<N: Number> Workspace<N> {
     }
 }
 
+/// Returns an entry of a curve after an increment.
+#[inline(always)]
+pub fn advanced<N: Number>(old: N, increment: N) -> N {
+    old + increment
+}
+
+/// Returns how an entry of a curve has changed.
+#[inline(always)]
+pub fn change_from<N: Number>(old: N, new: N) -> N {
+    new - old
+}
+
+/// Fills a field of a curve from that of an old one and the increments.
+#[inline(always)]
+pub fn advance<N: Number>(old: &Ring<N>, increment: &Ring<N>, new: &mut Ring<N>) {
+    for i in 0..old.len() {
+        new[i] = advanced(old[i], increment[i]);
+    }
+    new.close();
+}
+
 /// Returns the edge that ends at node i: `[Δx, Δy, |e|]`.
 #[inline(always)]
 pub fn edge<N: Number>(curve: &Curve<N>, i: usize) -> [N; 3] {
-    let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
-    let (dx, dy) = (x - xm, y - ym);
+    let ([_, dx, ..], [_, dy, ..]) = (curve.x.rises(i), curve.y.rises(i));
     [dx, dy, (dx * dx + dy * dy).sqrt()]
 }

@@ -2,11 +2,11 @@
 
 use super::{
     Branches, Curve, Increments, Parameters, Workspace, curvature::Curvature, extrapolation::MOST_ORDER,
-    position::Position, pull, redistribution,
+    position::Position, pull, redistribution, state,
 };
 use crate::{
     number::{Mask, Number, Real},
-    solver::{Order, Ring, Solver, Solves, by_solver, sweeps::Control},
+    solver::{Order, Solver, Solves, by_solver, sweeps::Control},
 };
 
 /// The settings that the members of a run share.
@@ -120,7 +120,7 @@ pub fn step_by<N: Number, S: Solves>(
         curvature.system.assemble(&equations);
     }
     let for_k = S::solve(&equations, [&mut increments.k], curvature, *blocks, &control, live);
-    add(&old.k, &increments.k, &mut new.k);
+    state::advance(&old.k, &increments.k, &mut new.k);
 
     let equations = Position::new(old, new, motion, p, branches);
     if *traced {
@@ -129,8 +129,8 @@ pub fn step_by<N: Number, S: Solves>(
     let control = Control { negligible: rounding * radius, ..control };
     let unknowns = [&mut increments.x, &mut increments.y];
     let for_x = S::solve(&equations, unknowns, position, *blocks, &control, live);
-    add(&old.x, &increments.x, &mut new.x);
-    add(&old.y, &increments.y, &mut new.y);
+    state::advance(&old.x, &increments.x, &mut new.x);
+    state::advance(&old.y, &increments.y, &mut new.y);
     pull::pull(new, p, branches);
 
     // The second solve counts only if the first one succeeded.
@@ -140,12 +140,4 @@ pub fn step_by<N: Number, S: Solves>(
         solved: for_k.converged.and(for_x.converged),
         finite: for_k.finite.and(for_x.finite.or(for_k.converged.not())),
     }
-}
-
-#[inline(always)]
-fn add<N: Number>(old: &Ring<N>, increment: &Ring<N>, new: &mut Ring<N>) {
-    for i in 0..old.len() {
-        new[i] = old[i] + increment[i];
-    }
-    new.close();
 }

@@ -270,9 +270,9 @@ impl FinishedRun<'_> {
         let note = format!("{}; over all members, as long as all of them run", self.what());
         let band = "5 to 95 % of the members";
         let svg = Decay { title, note: &note, band, key: &key, curves, theory, time: None }.draw();
-        let caption =
-            "How the excess, L²/(4πA) above that of a regular polygon, falls, and the slope that linear theory gives.";
-        Ok(Some(chart(names::EXCESS, title, caption, svg)))
+        let excess = self.spec().flow.typical().equilibrium().excess_in_words();
+        let caption = format!("How the excess, {excess}, falls, and the slope that linear theory gives.");
+        Ok(Some(chart(names::EXCESS, title, &caption, svg)))
     }
 
     fn rates(&self) -> Chart {

@@ -45,7 +45,7 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
         .map(|j| {
             let nodes = family.member(j as u64)?.nodes;
             let flow = &flows[j % LAWS];
-            let excess = polygon::excess(&nodes);
+            let excess = flow.equilibrium().excess(polygon::length(&nodes), polygon::signed_area(&nodes), n);
             let parameters = Parameters {
                 omega: 1.0 + j as f64,
                 redistribution: if j % UNDISTRIBUTED == 3 { 0.0 } else { 1.0 },
@@ -54,7 +54,7 @@ pub fn members(n: usize, count: usize, steps: u32, tolerance: f64) -> Result<Vec
                 tolerance,
                 // One member in seven chooses its own factor.
                 sor: if j % 7 == 5 { 0.0 } else { 1.0 + 0.07 * (j % 10) as f64 },
-                polygon_ratio: polygon::regular_ratio(n),
+                polygon_ratio: flow.equilibrium().least_quotient(n),
                 relax_at: 0.9 * excess,
                 half_at: 0.95 * excess,
                 // Even with few steps, a member leaves points for the fit.
