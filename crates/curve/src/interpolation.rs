@@ -27,6 +27,14 @@ const SAMPLES: usize = 8;
 const MOST_SAMPLES: usize = 200_000;
 
 impl Interpolation {
+    /// Names in flags and files.
+    pub const NAMES: [&str; 3] = ["auto", "spline", "polygon"];
+
+    /// Returns the word used on the command line.
+    pub fn name(self) -> &'static str {
+        Interpolation::NAMES[self as usize]
+    }
+
     /// The curve through the points of `outline`, with the number of its corners.
     pub fn curve(self, outline: &Arc<Outline>) -> (BaseCurve, usize) {
         let points = outline.vertices();
@@ -45,6 +53,17 @@ impl Interpolation {
             return polygon();
         }
         (BaseCurve::from_spline(Arc::clone(outline), spline, simple), corners)
+    }
+}
+
+impl Interpolation {
+    /// Whether the curve through the points of `outline` has corners.
+    pub fn has_corners(self, outline: &Outline) -> bool {
+        match self {
+            Interpolation::Polygon => true,
+            Interpolation::Spline => false,
+            Interpolation::Auto => self.curve(&Arc::new(outline.clone())).1 > 0,
+        }
     }
 }
 

@@ -126,7 +126,7 @@ impl Study {
             let others = || [cell].into_iter().chain(cells.iter().rev());
             let family = match others().find(|other| same_curve(&other.spec, &spec)) {
                 Some(other) => Family::like(&other.family, &spec)?,
-                None => Family::resampled(&cell.family, &spec)?,
+                None => Family::resampled(&cell.family, &spec, None)?,
             };
             cells.push(Cell { spec, family, ..*cell });
         }
@@ -254,7 +254,8 @@ impl Study {
 fn same_curve(one: &Spec, other: &Spec) -> bool {
     let drawn = |spec: &Spec| (spec.seed, spec.members_per_cell(), spec.design, spec.common_random_numbers);
     let same_draws = || drawn(one) == drawn(other) && one.distributions() == other.distributions();
-    let nodes = (one.points, one.sampling) == (other.points, other.sampling);
+    let nodes = |spec: &Spec| (spec.points, spec.sampling, spec.interpolation(), spec.rounding().to_bits());
+    let nodes = nodes(one) == nodes(other);
     nodes && one.shape == other.shape && (!one.shape.is_drawn() || same_draws())
 }
 
