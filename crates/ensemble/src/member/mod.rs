@@ -25,7 +25,7 @@ use std::{
 use glam::DVec2;
 
 use mollifier::mollify;
-use outline_curve::{OutlineCurves, Treatment};
+use outline_curve::{OutlineCurve, OutlineCurves, Treatment};
 
 use crate::{MemberValues, Spec, theory::horizon::CurveScale};
 use curvelax_base::random::Stream;
@@ -68,6 +68,9 @@ pub struct Member {
     pub origin: DVec2,
     /// How its corners were rounded off; only outlines sampled by arclength can need it.
     pub mollified: Mollified,
+    /// The excess of its outline before corners were rounded off, if they were: a share of the excess at the start is one of
+    /// this.
+    pub given_excess: Option<f64>,
     /// Its law of motion, if each member has its own; otherwise that of the spec.
     pub flow: Option<Flow>,
     /// The numbers that were drawn for it, in the order of [`Family::drawn`].
@@ -90,9 +93,9 @@ pub struct Family {
     /// Property of the outlines whose values are groups.
     group_by: Option<String>,
     sampling: Sampling,
-    /// How outlines become curves, and what was done to the one of all members.
+    /// How outlines become curves, and what the one of all members has become.
     treatment: Treatment,
-    treated: Treated,
+    outline_curve: OutlineCurve,
     /// Directions at which a draw is checked.
     directions: Arc<[DVec2]>,
     warnings: Vec<String>,
@@ -117,9 +120,7 @@ enum Curves {
 /// What a member is made from.
 struct MemberCurve {
     /// Its curve, if it is not that of all.
-    own: Option<BaseCurve>,
-    /// What was done to its outline.
-    treated: Treated,
+    own: Option<OutlineCurve>,
     factor: RadialFactor,
     /// Its law of motion, if it is not that of all.
     flow: Option<Flow>,
@@ -198,11 +199,12 @@ impl Family {
     fn of_curve(spec: &Spec, curve: BaseCurve, curves: Curves, variation: Option<Variation>) -> Result<Family> {
         let law = law(spec)?;
         let treatment = Treatment::of(spec, variation);
-        let (curve, treated) = match (&curves, curve.outline()) {
-            (_, None) => (curve, Treated::default()),
+        let outline_curve = match (&curves, curve.outline()) {
+            (_, None) => OutlineCurve::of(curve),
             (Curves::Outlines(curves), Some(_)) if *curves.treatment() == treatment => curves.curve(0),
             (_, Some(outline)) => treatment.curve(outline),
         };
+        let curve = outline_curve.curve.clone();
         let outline = curve.outline();
         if let (Sampling::Points, Some(own)) = (spec.sampling, outline.map(|outline| outline.vertices().len())) {
             check_own_points(spec.points, own)?;
@@ -259,7 +261,7 @@ impl Family {
             group_by: spec.group_by.clone(),
             sampling,
             treatment,
-            treated,
+            outline_curve,
             directions,
             warnings,
             has_corners,
@@ -352,15 +354,17 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if no draw leaves the radius positive.
     pub fn member(&self, index: u64) -> Result<Member> {
-        let MemberCurve { own, treated, factor, flow } = self.own_curve(index)?;
-        let sampler = own.map(|curve| Sampler::new(curve, self.sampling, self.points())).transpose()?;
+        let MemberCurve { own, factor, flow } = self.own_curve(index)?;
+        let sampler =
+            own.as_ref().map(|own| Sampler::new(own.curve.clone(), self.sampling, self.points())).transpose()?;
+        let own = own.as_ref().unwrap_or(&self.outline_curve);
         let sampler = sampler.as_ref().unwrap_or(&self.sampler);
         let mut nodes = sampler.sample(&factor);
         let mollified = match self.has_corners {
             true => mollify(&mut nodes, || sampler.area(&factor), sampler.curve().is_simple()),
             false => Mollified::default(),
         };
-        let mollified = Mollified { outline: treated, ..mollified };
+        let mollified = Mollified { outline: own.treated, ..mollified };
         let length = polygon::length(&nodes);
         // The area of loops that cancel is rounding only; its sign must not decide the orientation.
         if polygon::signed_area(&nodes) < -polygon::NO_AREA * length * length {
@@ -375,7 +379,8 @@ impl Family {
         let group = outline.zip(self.group_by.as_deref()).map_or(String::new(), |(outline, property)| {
             outline.property(property).filter(|value| !value.is_empty()).map_or(NO_GROUP.into(), Cow::into_owned)
         });
-        Ok(Member { index, cell: 0, label, group, nodes, origin, mollified, flow, drawn, coefficients })
+        let given_excess = own.given_excess(&factor);
+        Ok(Member { index, cell: 0, label, group, nodes, origin, mollified, given_excess, flow, drawn, coefficients })
     }
 
     /// The curve of member `index` before it is sampled, perturbed, at any u, and its law of motion, if it has its own.
@@ -384,26 +389,25 @@ impl Family {
     /// As [`Family::member`].
     pub fn curve(&self, index: u64) -> Result<(impl Fn(f64) -> DVec2 + use<>, Option<Flow>)> {
         let MemberCurve { own, factor, flow, .. } = self.own_curve(index)?;
-        let curve = own.unwrap_or_else(|| self.sampler.curve().clone());
+        let curve = own.map_or_else(|| self.sampler.curve().clone(), |own| own.curve);
         Ok((move |u| factor.apply(curve.centroid(), curve.point(u)), flow))
     }
 
     fn own_curve(&self, index: u64) -> Result<MemberCurve> {
         let values = self.values(index)?;
         let factor = self.radial_factor(&self.law_of(values.as_ref())?, index)?;
-        let (own, treated) = match (&self.curves, &values) {
-            (Curves::Drawn, Some(values)) => (Some(values.shape.resolve()?), Treated::default()),
+        let own = match (&self.curves, &values) {
+            (Curves::Drawn, Some(values)) => Some(OutlineCurve::of(values.shape.resolve()?)),
             (Curves::Outlines(curves), _) if curves.set.all.len() > 1 => {
-                let (own, treated) = curves.curve((index % curves.set.all.len() as u64) as usize);
-                (Some(own), treated)
+                Some(curves.curve((index % curves.set.all.len() as u64) as usize))
             }
-            _ => (None, self.treated),
+            _ => None,
         };
         let flow = values.and_then(|values| match values.flow {
             Cow::Owned(flow) => Some(flow),
             Cow::Borrowed(_) => None,
         });
-        Ok(MemberCurve { own, treated, factor, flow })
+        Ok(MemberCurve { own, factor, flow })
     }
 
     /// The first coefficients of a member's perturbation. Where others are perturbed, a member that is not has zeros.

@@ -8,8 +8,16 @@
 //! points near corners only: a smooth arc of radius r by the share `(radius/r)⁴`. The nodes are scaled about their centroid
 //! until they enclose the area of the outline again, and a spline through them is the curve. Outlines without corners are
 //! left as they are, however sharp a smooth tip may be: its shape is given by points.
+//!
+//! Equal steps of `-x_ssss` take area away at a corner, with the cube of its curvature. Each round gives that back where it was,
+//! spread over about twice the radius, as surface diffusion would not have taken it: what is left of rounding is then a few
+//! times smaller. The length is not given back. A share of the excess at the start, `--relax-to`, is therefore one of the
+//! excess of the outline before its corners are rounded: for a coast that is most of it.
 
-use std::sync::{Arc, OnceLock};
+use std::{
+    f64::consts::PI,
+    sync::{Arc, OnceLock},
+};
 
 use super::{
     OutlineSet,
@@ -36,6 +44,8 @@ const STRENGTH: f64 = 4.0;
 const SPREAD: f64 = 16.0 * KNOTS * KNOTS * KNOTS * KNOTS;
 /// Rounds before giving up.
 const MAX_ROUNDS: u32 = 200;
+/// Least samples by which the excess of an outline is measured.
+const SAMPLES: usize = 4096;
 /// Outlines of which the curves are kept: that of a rough one takes about 100 kB. Those of more are made for each member.
 const KEPT: usize = 256;
 
@@ -61,7 +71,7 @@ pub(crate) struct Treatment {
     variation: Option<Variation>,
 }
 
-/// What was done to an outline.
+/// What was done to an outline, for reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Treated {
     /// Points of the outline; 0 if the curve is not one.
@@ -72,6 +82,33 @@ pub struct Treated {
     pub rounded: bool,
     /// See there.
     pub area_change: f64,
+}
+
+/// What an outline has become.
+#[derive(Clone)]
+pub(super) struct OutlineCurve {
+    pub(super) curve: BaseCurve,
+    /// The curve before its corners were rounded off, if they were.
+    given: Option<BaseCurve>,
+    pub(super) treated: Treated,
+}
+
+impl OutlineCurve {
+    /// A curve that is no outline.
+    pub(super) fn of(curve: BaseCurve) -> OutlineCurve {
+        OutlineCurve { curve, given: None, treated: Treated::default() }
+    }
+
+    /// The excess before corners were rounded off, if they were, of the curve stretched by `factor`; none if it crosses
+    /// itself.
+    pub(super) fn given_excess(&self, factor: &RadialFactor) -> Option<f64> {
+        let given = self.given.as_ref().filter(|given| given.is_simple())?;
+        let centre = self.curve.centroid();
+        let mut points: Vec<DVec2> = given.subdivision(SAMPLES).map(|(_, p)| factor.apply(centre, p)).collect();
+        points.pop();
+        let (length, area) = (polygon::length(&points), polygon::signed_area(&points));
+        Some(length * length / (4.0 * PI * area) - 1.0).filter(|excess| *excess > 0.0)
+    }
 }
 
 impl Treatment {
@@ -87,7 +124,7 @@ impl Treatment {
     }
 
     /// The curve of an outline.
-    pub fn curve(&self, outline: &Arc<Outline>) -> (BaseCurve, Treated) {
+    pub(super) fn curve(&self, outline: &Arc<Outline>) -> OutlineCurve {
         let half = match self.variation {
             Some(Variation::HalfThePoints) => outline.halved().map(Arc::new),
             _ => None,
@@ -96,11 +133,11 @@ impl Treatment {
         let treated =
             Treated { points: outline.vertices().len() as u32, corners: corners as u32, ..Treated::default() };
         if corners == 0 || self.rounding == 0.0 {
-            return (curve, treated);
+            return OutlineCurve { treated, ..OutlineCurve::of(curve) };
         }
-        let twice = self.variation == Some(Variation::TwiceTheRadius);
-        let (curve, area_change) = rounded(&curve, outline, if twice { 2.0 } else { 1.0 } * self.rounding);
-        (curve, Treated { rounded: true, area_change, ..treated })
+        let factor = if self.variation == Some(Variation::TwiceTheRadius) { 2.0 } else { 1.0 };
+        let (round, area_change) = rounded(&curve, outline, factor * self.rounding);
+        OutlineCurve { curve: round, given: Some(curve), treated: Treated { rounded: true, area_change, ..treated } }
     }
 
     /// Whether the variation makes another curve of an outline.
@@ -151,7 +188,7 @@ fn with_local_area(before: &[DVec2], after: Vec<DVec2>) -> Vec<DVec2> {
 pub(super) struct OutlineCurves {
     pub(super) set: Arc<OutlineSet>,
     treatment: Treatment,
-    made: Vec<OnceLock<(BaseCurve, Treated)>>,
+    made: Vec<OnceLock<OutlineCurve>>,
 }
 
 impl OutlineCurves {
@@ -165,7 +202,7 @@ impl OutlineCurves {
     }
 
     /// The curve of outline `i`, which there is.
-    pub(super) fn curve(&self, i: usize) -> (BaseCurve, Treated) {
+    pub(super) fn curve(&self, i: usize) -> OutlineCurve {
         let make = || self.treatment.curve(&self.set.all[i].outline);
         self.made.get(i).map_or_else(make, |kept| kept.get_or_init(make).clone())
     }
