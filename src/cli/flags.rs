@@ -84,7 +84,7 @@ pub struct SpecFlags {
     )]
     interpolate: Option<Interpolation>,
     /// Smallest radius of curvature of an outline's corners, as a share of the outline's length, 0.0001 to 0.02; 0 leaves them
-    /// to the nodes [default: 0.0025]
+    /// to the nodes [default: 0.002]
     #[arg(long, value_name = "SHARE", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE)]
     rounding: Option<f64>,
     /// Size σ of the random perturbation, 0 for none; or a distribution, as for --shape [default: 0.05]

@@ -302,6 +302,11 @@ impl Family {
         Family::of_curve(spec, other.sampler.curve().clone(), curves, variation)
     }
 
+    /// Whether members are curves through points, rather than these themselves.
+    pub(crate) fn has_outlines(&self) -> bool {
+        self.sampler.outline().is_some() && self.sampling != Sampling::Points
+    }
+
     /// Whether the curve of member `index` has a variation, as outlines can have.
     pub(crate) fn has(&self, variation: Variation, index: u64) -> bool {
         let outline = self.outline(index).map(|one| &one.outline).or(self.sampler.outline());

@@ -31,8 +31,8 @@ use curvelax_curve::{
 };
 
 /// Smallest radius of curvature of a corner, as a share of the length of its outline, if none is given. Nodes resolve it from
-/// about 2/share on, 800, which is half of the most that a run adds by itself.
-pub const DEFAULT_ROUNDING: f64 = 0.0025;
+/// about 2/share on, 1000; a run adds up to 1600 by itself.
+pub const DEFAULT_ROUNDING: f64 = 0.002;
 /// Shares that can be asked for: below, nodes by the ten thousand would be needed; above, little would be left of an outline.
 pub const ROUNDINGS: std::ops::RangeInclusive<f64> = 1e-4..=0.02;
 
@@ -43,7 +43,7 @@ const STRENGTH: f64 = 4.0;
 /// The same of the step that spreads the area that a round took away: over about twice the radius.
 const SPREAD: f64 = 16.0 * KNOTS * KNOTS * KNOTS * KNOTS;
 /// Rounds before giving up.
-const MAX_ROUNDS: u32 = 200;
+const MAX_ROUNDS: u32 = 400;
 /// Least samples by which the excess of an outline is measured.
 const SAMPLES: usize = 4096;
 /// Outlines of which the curves are kept: that of a rough one takes about 100 kB. Those of more are made for each member.
