@@ -9,7 +9,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::{Deserialize, de::value::StrDeserializer};
 
 use crate::{
-    curve::{Modes, Perturbation, Sampling, Shape},
+    curve::{Interpolation, Modes, Perturbation, Sampling, Shape},
     ensemble::{
         Drawn, Event, Shard, Spec,
         request::spec::{
@@ -77,6 +77,16 @@ pub struct SpecFlags {
     /// Placement of the nodes on the curve [default: arclength]
     #[arg(long, value_name = "HOW", value_parser = word::<Sampling>(SAMPLINGS), help_heading = ENSEMBLE)]
     sampling: Option<Sampling>,
+    /// How the curve of an outline runs between its points: as a polygon, as a cubic spline, or (auto) as a spline with corners
+    /// where the direction turns by more than half a radian [default: auto]
+    #[arg(
+        long, value_name = "HOW", value_parser = word::<Interpolation>(&Interpolation::NAMES), help_heading = ENSEMBLE
+    )]
+    interpolate: Option<Interpolation>,
+    /// Smallest radius of curvature of an outline's corners, as a share of the outline's length, 0.0001 to 0.02; 0 leaves them
+    /// to the nodes [default: 0.002]
+    #[arg(long, value_name = "SHARE", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE)]
+    rounding: Option<f64>,
     /// Size σ of the random perturbation, 0 for none; or a distribution, as for --shape [default: 0.05]
     #[arg(
         long, value_name = "SIGMA", value_parser = text_of::<Drawn<f64>>, allow_hyphen_values = true, help_heading = ENSEMBLE
@@ -289,7 +299,7 @@ macro_rules! every_flag {
         $to! {
             curves points seed shape sampling amplitude modes decay perturbation design flow no_redistribution pull solver
             order sor max_sweeps backend snapshots store common_random_numbers refine event;
-            outlines group_by accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
+            outlines group_by interpolate rounding accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
         }
     };
 }

@@ -1,10 +1,10 @@
-//! A shape ready for evaluation: a closed formula or a polygon, as a map of `u ∈ [0, 1]`.
+//! A shape ready for evaluation: a closed formula, a polygon or a spline, as a map of `u ∈ [0, 1]`.
 
 use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::{Outline, polygon};
+use super::{Outline, Spline, polygon};
 
 /// Parameters at which a formula's area centroid is computed. The polygon's error is of second order: 1e-7 of the size
 /// here. The number is fixed, because the centroid is the centre of the perturbation and a member must be the same
@@ -23,6 +23,7 @@ pub struct BaseCurve {
 enum CurveKind {
     Formula(Arc<dyn Fn(f64) -> DVec2 + Send + Sync>),
     Polygon(Arc<Outline>),
+    Spline { outline: Arc<Outline>, spline: Arc<Spline>, simple: bool },
 }
 
 impl BaseCurve {
@@ -47,11 +48,29 @@ impl BaseCurve {
         BaseCurve { kind: CurveKind::Polygon(outline), centroid, cusps: Vec::new() }
     }
 
+    /// Creates a curve that was made from an outline; `simple` says that it does not cross itself.
+    pub fn from_spline(outline: Arc<Outline>, spline: Spline, simple: bool) -> BaseCurve {
+        let mut samples: Vec<DVec2> = spline.subdivision(CENTROID_SAMPLES).map(|(_, point)| point).collect();
+        samples.pop();
+        let centroid = polygon::area_centroid(&samples);
+        BaseCurve { kind: CurveKind::Spline { outline, spline: spline.into(), simple }, centroid, cusps: Vec::new() }
+    }
+
+    /// Returns whether it does not cross itself, as far as this is known: a formula counts as simple.
+    pub fn is_simple(&self) -> bool {
+        match &self.kind {
+            CurveKind::Formula(_) => true,
+            CurveKind::Polygon(outline) => outline.is_simple(),
+            CurveKind::Spline { simple, .. } => *simple,
+        }
+    }
+
     /// Returns the point at `u ∈ [0, 1]`.
     pub fn point(&self, u: f64) -> DVec2 {
         match &self.kind {
             CurveKind::Formula(formula) => formula(u),
             CurveKind::Polygon(outline) => outline.point(u),
+            CurveKind::Spline { spline, .. } => spline.point(u),
         }
     }
 
@@ -65,16 +84,16 @@ impl BaseCurve {
         &self.cusps
     }
 
-    /// Returns the polygon, if the curve is one.
+    /// Returns the outline that the curve was made from, if there is one.
     pub fn outline(&self) -> Option<&Arc<Outline>> {
         match &self.kind {
             CurveKind::Formula(_) => None,
-            CurveKind::Polygon(outline) => Some(outline),
+            CurveKind::Polygon(outline) | CurveKind::Spline { outline, .. } => Some(outline),
         }
     }
 
     /// Returns `(u, point)` once round, with the first point again at `u = 1`. There are at least `pieces` pieces, and
-    /// every vertex of a polygon is included, so that no corner is cut.
+    /// every vertex of a polygon and every point of a spline is included, so that no corner is cut.
     pub fn subdivision(&self, pieces: usize) -> Box<dyn Iterator<Item = (f64, DVec2)> + '_> {
         match &self.kind {
             CurveKind::Formula(formula) => {
@@ -82,6 +101,7 @@ impl BaseCurve {
                 Box::new((0..=pieces).map(at))
             }
             CurveKind::Polygon(outline) => Box::new(outline.subdivision(pieces)),
+            CurveKind::Spline { spline, .. } => Box::new(spline.subdivision(pieces)),
         }
     }
 }

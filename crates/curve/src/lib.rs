@@ -10,20 +10,24 @@
 mod base;
 mod crossing;
 mod descriptors;
+mod interpolation;
 mod outline;
 pub mod outlines;
 mod perturbation;
 pub mod polygon;
 mod sampling;
 mod shape;
+mod spline;
 
 pub use base::BaseCurve;
 pub use crossing::{Undecided, clearance, crossing, crossing_within};
 pub use descriptors::{DESCRIPTOR_COUNT, DESCRIPTORS, descriptors};
+pub use interpolation::Interpolation;
 pub use outline::{MAX_POINTS, Outline};
 pub use perturbation::{MIN_FACTOR, Modes, Perturbation, RadialFactor, RadialLaw, check_directions};
 pub use sampling::{Sampler, Sampling, resample};
 pub use shape::{FlowerMode, Shape};
+pub use spline::{MAX_SMOOTH_TURN, Spline};
 
 /// Highest mode of a flower or a perturbation. A mode needs at least four nodes, and runs use far fewer than 4000
 /// nodes; the cap bounds the cost of a curve before anything else is known about it.

@@ -33,6 +33,9 @@ const COINCIDENT: f64 = 1e-12;
 /// about 1e7.
 const MAX_COMPARISONS: u64 = 50_000_000;
 
+/// Fewest points of an outline whose half says something about it.
+const MIN_HALVED: usize = 12;
+
 /// A closed counter-clockwise polygon, traversed by arclength.
 #[derive(Clone, Debug)]
 pub struct Outline {
@@ -131,6 +134,19 @@ impl Outline {
     /// Returns what the user should know about the outline, one sentence each.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// Returns the outline through every second point, from the first; `None` if there are too few for that, or if they
+    /// do not enclose an area in the same sense.
+    pub fn halved(&self) -> Option<Outline> {
+        let points: Vec<DVec2> = self.vertices.iter().step_by(2).copied().collect();
+        let (area, length) = (polygon::signed_area(&points), polygon::length(&points));
+        let distinct = polygon::edges(&points).all(|edge| edge != DVec2::ZERO);
+        if self.vertices.len() < MIN_HALVED || !distinct || area <= polygon::NO_AREA * length * length {
+            return None;
+        }
+        let simple = self.simple && crossing_within(&points, MAX_COMPARISONS).is_ok_and(|found| found.is_none());
+        Some(Outline { simple, ..Outline::through(points) })
     }
 
     fn length(&self) -> f64 {
@@ -451,6 +467,24 @@ mod tests {
         assert_eq!(outline(&text).unwrap().vertices().len(), MAX_POINTS);
         text.push_str("0,0\n");
         assert_refused(&text, &["more than 1000000 points", "at most 1000000"]);
+    }
+
+    #[test]
+    fn half_of_an_outline_has_every_second_point() {
+        let ring = |n: i32| -> String {
+            let angle = |i: i32| std::f64::consts::TAU * f64::from(i) / f64::from(n);
+            (0..n).map(|i| format!("{:?},{:?}\n", angle(i).cos(), angle(i).sin())).collect()
+        };
+        for (n, half) in [(12, 6), (13, 7), (100, 50)] {
+            let (whole, halved) = (outline(&ring(n)).unwrap(), outline(&ring(n)).unwrap().halved().unwrap());
+            assert_eq!(halved.vertices().len(), half);
+            assert!(halved.vertices().iter().zip(whole.vertices().iter().step_by(2)).all(|(a, b)| a == b));
+            assert!(halved.is_simple());
+        }
+        assert!(outline(&ring(11)).unwrap().halved().is_none());
+        // Every second point of a comb is on its back.
+        let comb: String = (0..10).map(|i| format!("{i},{}\n", if i % 2 == 1 { 1 } else { 0 })).collect();
+        assert!(outline(&format!("{comb}9,-1e-13\n4,-1\n")).unwrap().halved().is_none());
     }
 
     #[test]

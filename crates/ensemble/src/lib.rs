@@ -10,7 +10,7 @@ pub mod study;
 mod theory;
 pub mod trajectory;
 
-pub use member::{Family, Member, Mollified, Outlines};
+pub use member::{Family, Member, Mollified, Outlines, Treated, Variation};
 pub use outcome::{
     Ended, Extent, Feature, Features, LevelRow, LevelTimes, Observables, Outcome, Paused, Portrait, RefinementLevel,
     Rows, SeriesRow, Sink, Snapshot, Standing, Status, Wish,

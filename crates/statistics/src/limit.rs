@@ -70,6 +70,8 @@ pub struct Limit {
     pub t: f64,
     /// Half-width of its 95 % interval.
     pub error: f64,
+    /// The part of it that no nodes or steps lessen; none of what [`Limit::of`] estimates.
+    pub fixed: f64,
     /// Observed order in 1/n, if the differences have one.
     pub order: Option<f64>,
     /// Whether the nodes resolve the curve and the differences fall as they should; if not, the term in h² alone is removed,
@@ -113,13 +115,13 @@ impl Limit {
         let full = levels[levels.len() - 1];
         let steps = if is_adaptive { (own - levels[own_level]).abs() } else { 0.0 };
         let error = error + OF_STEPS * steps + OF_TOLERANCE * tolerance * full / excess.sqrt();
-        Limit { t, error, order, asymptotic, relative: own / t - 1.0 }
+        Limit { t, error, fixed: 0.0, order, asymptotic, relative: own / t - 1.0 }
     }
 
     /// Whether the time is worth levels of more nodes: its differences do not fall as they should, and it is not known to
     /// a thousandth.
     pub fn needs_more(&self) -> bool {
-        !self.asymptotic && self.relative_error() > WIDE
+        !self.asymptotic && self.error - self.fixed > WIDE * self.t
     }
 
     /// Its half-width relative to the limit.

@@ -106,7 +106,7 @@ pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
         if stage.level.is_some() && study.has_pilot() {
             return cpu(spec, spec.points, "a pilot does not fill a GPU".into());
         }
-        if stage.is_finer() {
+        if stage.is_selective() {
             return choice.with_nodes(spec, spec.points);
         }
         let mut spec = spec.clone();

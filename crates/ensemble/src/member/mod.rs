@@ -6,9 +6,11 @@
 //! modes are requested. The number of nodes does not matter either: member j is the same curve at n = 100 and 200.
 
 pub mod mollifier;
+pub mod outline_curve;
 mod read_outlines;
 
 pub use mollifier::Mollified;
+pub use outline_curve::{Treated, Variation};
 pub use read_outlines::Outlines;
 
 use std::{
@@ -23,6 +25,7 @@ use std::{
 use glam::DVec2;
 
 use mollifier::mollify;
+use outline_curve::{OutlineCurve, OutlineCurves, Treatment};
 
 use crate::{MemberValues, Spec, theory::horizon::CurveScale};
 use curvelax_base::random::Stream;
@@ -65,6 +68,9 @@ pub struct Member {
     pub origin: DVec2,
     /// How its corners were rounded off; only outlines sampled by arclength can need it.
     pub mollified: Mollified,
+    /// The excess of its outline before corners were rounded off, if they were: a share of the excess at the start is one of
+    /// this.
+    pub given_excess: Option<f64>,
     /// Its law of motion, if each member has its own; otherwise that of the spec.
     pub flow: Option<Flow>,
     /// The numbers that were drawn for it, in the order of [`Family::drawn`].
@@ -87,6 +93,9 @@ pub struct Family {
     /// Property of the outlines whose values are groups.
     group_by: Option<String>,
     sampling: Sampling,
+    /// How outlines become curves, and what the one of all members has become.
+    treatment: Treatment,
+    outline_curve: OutlineCurve,
     /// Directions at which a draw is checked.
     directions: Arc<[DVec2]>,
     warnings: Vec<String>,
@@ -105,13 +114,13 @@ enum Curves {
     /// The shape with each member's own numbers.
     Drawn,
     /// Member j of outline j modulo their number.
-    Outlines(Arc<OutlineSet>),
+    Outlines(Arc<OutlineCurves>),
 }
 
 /// What a member is made from.
 struct MemberCurve {
     /// Its curve, if it is not that of all.
-    own: Option<BaseCurve>,
+    own: Option<OutlineCurve>,
     factor: RadialFactor,
     /// Its law of motion, if it is not that of all.
     flow: Option<Flow>,
@@ -154,14 +163,15 @@ impl Family {
     /// Does the same as [`Family::new`], for a shape that is a formula.
     pub(crate) fn of_shape(spec: &Spec) -> Result<Family> {
         let curves = if spec.shape.is_drawn() { Curves::Drawn } else { Curves::One };
-        Family::of_curve(spec, spec.shape.typical().resolve()?, curves)
+        Family::of_curve(spec, spec.shape.typical().resolve()?, curves, None)
     }
 
     /// Does the same as [`Family::new`], with `outlines`, at least one, in place of the shape.
     pub(crate) fn of_outlines(spec: &Spec, outlines: Arc<OutlineSet>) -> Result<Family> {
         let none = || Error::value("shape", &spec.shape, "there is no outline", "give one");
         let first = Arc::clone(&outlines.all.first().ok_or_else(none)?.outline);
-        Family::of_curve(spec, BaseCurve::from_outline(first), Curves::Outlines(outlines))
+        let curves = OutlineCurves::new(outlines, Treatment::of(spec, None));
+        Family::of_curve(spec, BaseCurve::from_outline(first), Curves::Outlines(curves.into()), None)
     }
 
     /// Does the same as [`Family::new`], with `curve` in place of the shape, for all members: for curves that no `--shape`
@@ -182,21 +192,28 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if one of the keys sampling, points, amplitude, modes and decay is wrong.
     pub fn of(spec: &Spec, curve: BaseCurve) -> Result<Family> {
-        Family::of_curve(spec, curve, Curves::One)
+        Family::of_curve(spec, curve, Curves::One, None)
     }
 
-    /// Does the same as [`Family::new`], with `curve` as the typical one.
-    fn of_curve(spec: &Spec, curve: BaseCurve, curves: Curves) -> Result<Family> {
+    /// Does the same as [`Family::new`], with `curve` as the typical one, or a variation of it.
+    fn of_curve(spec: &Spec, curve: BaseCurve, curves: Curves, variation: Option<Variation>) -> Result<Family> {
         let law = law(spec)?;
+        let treatment = Treatment::of(spec, variation);
+        let outline_curve = match (&curves, curve.outline()) {
+            (_, None) => OutlineCurve::of(curve),
+            (Curves::Outlines(curves), Some(_)) if *curves.treatment() == treatment => curves.curve(0),
+            (_, Some(outline)) => treatment.curve(outline),
+        };
+        let curve = outline_curve.curve.clone();
         let outline = curve.outline();
         if let (Sampling::Points, Some(own)) = (spec.sampling, outline.map(|outline| outline.vertices().len())) {
             check_own_points(spec.points, own)?;
             check_equal_points(curves.outlines())?;
         }
         let has_corners = outline.is_some() && spec.sampling == Sampling::Arclength && spec.points >= MIN_POINTS;
-        let simple = outline.is_some_and(|outline| outline.is_simple());
+        let simple = curve.is_simple();
         let mut warnings = match &curves {
-            Curves::Outlines(set) => outlines::warnings(&set.all),
+            Curves::Outlines(curves) => outlines::warnings(&curves.set.all),
             _ => outline.map_or(Vec::new(), |outline| outline.warnings().to_vec()),
         };
         warnings.extend(outlines::misread("label", curves.outlines().iter().map(|one| &*one.label)));
@@ -228,7 +245,7 @@ impl Family {
         }
         let scales = match &curves {
             Curves::Drawn => scales(spec)?,
-            Curves::Outlines(set) if set.all.len() > 1 => Arc::clone(&set.scales),
+            Curves::Outlines(curves) if curves.set.all.len() > 1 => Arc::clone(&curves.set.scales),
             _ => [CurveScale::of(&nodes)].into(),
         };
         let (sampler, directions) = (Arc::new(sampler), check_directions(spec.modes.high).into());
@@ -243,6 +260,8 @@ impl Family {
             curves,
             group_by: spec.group_by.clone(),
             sampling,
+            treatment,
+            outline_curve,
             directions,
             warnings,
             has_corners,
@@ -267,12 +286,31 @@ impl Family {
         Ok(Family { sampler, law, perturbation, seed, drawn, directions, scales, ..other.clone() })
     }
 
-    /// Does the same as [`Family::new`] for a spec with the same shape as `other`, and another number of points.
+    /// Does the same as [`Family::new`] for a spec with the same shape as `other`, and another number of points; or for
+    /// a variation of its curves.
     ///
     /// # Errors
     /// As [`Family::new`].
-    pub fn resampled(other: &Family, spec: &Spec) -> Result<Family> {
-        Family::of_curve(spec, other.sampler.curve().clone(), other.curves.clone())
+    pub fn resampled(other: &Family, spec: &Spec, variation: Option<Variation>) -> Result<Family> {
+        let treatment = Treatment::of(spec, variation);
+        let curves = match &other.curves {
+            Curves::Outlines(curves) if *curves.treatment() != treatment => {
+                Curves::Outlines(OutlineCurves::new(Arc::clone(&curves.set), treatment).into())
+            }
+            curves => curves.clone(),
+        };
+        Family::of_curve(spec, other.sampler.curve().clone(), curves, variation)
+    }
+
+    /// Whether members are curves through points, rather than these themselves.
+    pub(crate) fn has_outlines(&self) -> bool {
+        self.sampler.outline().is_some() && self.sampling != Sampling::Points
+    }
+
+    /// Whether the curve of member `index` has a variation, as outlines can have.
+    pub(crate) fn has(&self, variation: Variation, index: u64) -> bool {
+        let outline = self.outline(index).map(|one| &one.outline).or(self.sampler.outline());
+        outline.is_some_and(|outline| self.treatment.varies(outline, variation))
     }
 
     /// The outlines of the members, if they are read from files: that of member j is the one at j modulo their number.
@@ -283,7 +321,7 @@ impl Family {
     /// The same with their sizes.
     pub(crate) fn outline_set(&self) -> Option<&Arc<OutlineSet>> {
         match &self.curves {
-            Curves::Outlines(set) => Some(set),
+            Curves::Outlines(curves) => Some(&curves.set),
             _ => None,
         }
     }
@@ -322,13 +360,16 @@ impl Family {
     /// [`Error::Request`] if no draw leaves the radius positive.
     pub fn member(&self, index: u64) -> Result<Member> {
         let MemberCurve { own, factor, flow } = self.own_curve(index)?;
-        let sampler = own.map(|curve| Sampler::new(curve, self.sampling, self.points())).transpose()?;
+        let sampler =
+            own.as_ref().map(|own| Sampler::new(own.curve.clone(), self.sampling, self.points())).transpose()?;
+        let own = own.as_ref().unwrap_or(&self.outline_curve);
         let sampler = sampler.as_ref().unwrap_or(&self.sampler);
         let mut nodes = sampler.sample(&factor);
-        let mollified = match (self.has_corners, sampler.outline()) {
-            (true, Some(outline)) => mollify(&mut nodes, || sampler.area(&factor), outline.is_simple()),
-            _ => Mollified::default(),
+        let mollified = match self.has_corners {
+            true => mollify(&mut nodes, || sampler.area(&factor), sampler.curve().is_simple()),
+            false => Mollified::default(),
         };
+        let mollified = Mollified { outline: own.treated, ..mollified };
         let length = polygon::length(&nodes);
         // The area of loops that cancel is rounding only; its sign must not decide the orientation.
         if polygon::signed_area(&nodes) < -polygon::NO_AREA * length * length {
@@ -343,7 +384,8 @@ impl Family {
         let group = outline.zip(self.group_by.as_deref()).map_or(String::new(), |(outline, property)| {
             outline.property(property).filter(|value| !value.is_empty()).map_or(NO_GROUP.into(), Cow::into_owned)
         });
-        Ok(Member { index, cell: 0, label, group, nodes, origin, mollified, flow, drawn, coefficients })
+        let given_excess = own.given_excess(&factor);
+        Ok(Member { index, cell: 0, label, group, nodes, origin, mollified, given_excess, flow, drawn, coefficients })
     }
 
     /// The curve of member `index` before it is sampled, perturbed, at any u, and its law of motion, if it has its own.
@@ -351,18 +393,18 @@ impl Family {
     /// # Errors
     /// As [`Family::member`].
     pub fn curve(&self, index: u64) -> Result<(impl Fn(f64) -> DVec2 + use<>, Option<Flow>)> {
-        let MemberCurve { own, factor, flow } = self.own_curve(index)?;
-        let curve = own.unwrap_or_else(|| self.sampler.curve().clone());
+        let MemberCurve { own, factor, flow, .. } = self.own_curve(index)?;
+        let curve = own.map_or_else(|| self.sampler.curve().clone(), |own| own.curve);
         Ok((move |u| factor.apply(curve.centroid(), curve.point(u)), flow))
     }
 
     fn own_curve(&self, index: u64) -> Result<MemberCurve> {
         let values = self.values(index)?;
         let factor = self.radial_factor(&self.law_of(values.as_ref())?, index)?;
-        let own = match (&self.curves, &values, self.outline(index)) {
-            (Curves::Drawn, Some(values), _) => Some(values.shape.resolve()?),
-            (Curves::Outlines(set), _, Some(own)) if set.all.len() > 1 => {
-                Some(BaseCurve::from_outline(Arc::clone(&own.outline)))
+        let own = match (&self.curves, &values) {
+            (Curves::Drawn, Some(values)) => Some(OutlineCurve::of(values.shape.resolve()?)),
+            (Curves::Outlines(curves), _) if curves.set.all.len() > 1 => {
+                Some(curves.curve((index % curves.set.all.len() as u64) as usize))
             }
             _ => None,
         };
@@ -455,7 +497,7 @@ fn drawn(spec: &Spec) -> Option<Arc<Spec>> {
 impl Curves {
     fn outlines(&self) -> &[Labelled] {
         match self {
-            Curves::Outlines(set) => &set.all,
+            Curves::Outlines(curves) => &curves.set.all,
             _ => &[],
         }
     }

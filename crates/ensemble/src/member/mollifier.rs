@@ -1,6 +1,7 @@
-//! Corners that n nodes cannot resolve are rounded off before a run, as little as needed.
+//! Corners that n nodes cannot resolve are rounded off for these nodes before a run, as little as needed.
 //!
-//! A raw outline can turn by up to π at a node. The scheme's first steps then merge the nodes there, whatever τ is. An
+//! The curve of an outline has [rounded corners](super::outline_curve) that enough nodes resolve. Fewer nodes can turn by up
+//! to π there. The scheme's first steps then merge the nodes, whatever τ is. An
 //! outline sampled by arclength therefore goes through rounds of `(I + κ D⁴) x_new = x_old`, where `D⁴` is the periodic
 //! fourth difference in the node index (an implicit step of surface diffusion of duration `κ·spacing⁴`). After each
 //! round the nodes are spaced equally again. The rounds end when no node turns by more than [`MAX_VERTEX_TURN`].
@@ -20,6 +21,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
+use super::Treated;
 use curvelax_curve::{crossing, polygon, resample};
 use curvelax_flow::solver::{Ring, Row, System, direct};
 
@@ -41,6 +43,8 @@ pub struct Mollified {
     pub sharp: bool,
     /// The nodes cross themselves, though the outline does not.
     pub crossed: bool,
+    /// What was done to the outline before it was sampled.
+    pub outline: Treated,
 }
 
 impl Mollified {
@@ -61,7 +65,7 @@ pub fn mollify(nodes: &mut Vec<DVec2>, area: impl FnOnce() -> f64, simple: bool)
     let sharp = |nodes: &[DVec2]| sharpest_turn(nodes) > MAX_VERTEX_TURN;
     let mut done = Mollified { sharp: sharp(nodes), crossed: crosses(nodes), ..Mollified::default() };
     while (done.sharp || done.crossed) && done.rounds < MAX_ROUNDS {
-        let next = resample(&smoothed(nodes));
+        let next = resample(&smoothed(nodes, STRENGTH));
         let crossed = crosses(&next);
         if crossed && !done.crossed {
             break;
@@ -80,7 +84,7 @@ pub fn mollify(nodes: &mut Vec<DVec2>, area: impl FnOnce() -> f64, simple: bool)
 }
 
 /// Scales `nodes` about their centroid so that a relative change of their area is undone.
-fn put_back(area_change: f64, nodes: &mut [DVec2]) {
+pub(super) fn put_back(area_change: f64, nodes: &mut [DVec2]) {
     let (centre, factor) = (polygon::area_centroid(nodes), (1.0 + area_change).sqrt().recip());
     if factor.is_finite() {
         nodes.iter_mut().for_each(|node| *node = centre + (*node - centre) * factor);
@@ -88,17 +92,17 @@ fn put_back(area_change: f64, nodes: &mut [DVec2]) {
 }
 
 /// Largest turn of the polygon at a node, in rad.
-fn sharpest_turn(nodes: &[DVec2]) -> f64 {
+pub(super) fn sharpest_turn(nodes: &[DVec2]) -> f64 {
     let edges: Vec<DVec2> = polygon::edges(nodes).collect();
     let before = edges.iter().cycle().skip(edges.len() - 1);
     before.zip(&edges).map(|(a, b)| a.angle_to(*b).abs()).fold(0.0, f64::max)
 }
 
-/// One implicit step on the node index.
-fn smoothed(nodes: &[DVec2]) -> Vec<DVec2> {
+/// One implicit step on the node index with this κ.
+pub(super) fn smoothed(nodes: &[DVec2], strength: f64) -> Vec<DVec2> {
     let n = nodes.len();
-    let (outer, inner) = (STRENGTH, -4.0 * STRENGTH);
-    let diagonal = 1.0 + 6.0 * STRENGTH;
+    let (outer, inner) = (strength, -4.0 * strength);
+    let diagonal = 1.0 + 6.0 * strength;
     let row = Row { a: outer / diagonal, b: inner / diagonal, d: inner / diagonal, e: outer / diagonal, weight: 1.0 };
     let rhs = [nodes.iter().map(|p| p.x / diagonal).collect(), nodes.iter().map(|p| p.y / diagonal).collect()];
     let (mut x, mut y) = (Ring::zeros(n), Ring::zeros(n));

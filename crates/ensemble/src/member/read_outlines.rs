@@ -2,13 +2,14 @@
 
 use std::{path::Path, sync::Arc};
 
+use super::outline_curve::DEFAULT_ROUNDING;
 use crate::{Drawn, Spec, member::OutlineSet};
 use curvelax_base::{
     error::{Error, Result, echo, shortened},
-    text::count,
+    text::{count, number},
 };
 use curvelax_curve::{
-    Shape,
+    Sampling, Shape,
     outlines::{Labelled, SavedOutline},
 };
 
@@ -103,6 +104,7 @@ impl Outlines {
     /// [`Error::Request`] for cells with unequal numbers of outlines, for another number than `spec` has, and for keys that
     /// mean nothing with outlines, or only with them.
     pub(crate) fn settle(&self, mut spec: Spec) -> Result<Spec> {
+        self.settle_curves(&mut spec)?;
         let several = |(shape, set): &&(Shape, Arc<OutlineSet>)| matches!(shape, Shape::Files(_)) || set.all.len() > 1;
         let Some((first, set)) = self.sets.iter().find(several) else {
             if let Some(asked) = spec.outlines.filter(|asked| *asked != 1) {
@@ -147,6 +149,40 @@ impl Outlines {
             }
         }
         Ok(spec)
+    }
+}
+
+impl Outlines {
+    /// Fills in how outlines become curves, where there are any.
+    ///
+    /// # Errors
+    /// [`Error::Request`] for such a key where there are none, or where their points are the nodes.
+    fn settle_curves(&self, spec: &mut Spec) -> Result<()> {
+        let interpolate = spec.interpolate.map(|how| how.name().to_owned());
+        let given = [("interpolate", interpolate), ("rounding", spec.rounding.map(number))];
+        let swept = |key: &str| spec.sweep.has(key).then(|| "(swept)".to_owned());
+        let mut given = given.into_iter().filter_map(|(key, value)| Some((key, value.or_else(|| swept(key))?)));
+        let are_nodes = spec.sampling == Sampling::Points && !spec.sweep.has("sampling");
+        match given.next() {
+            Some((key, value)) if self.sets.is_empty() => {
+                let problem =
+                    format!("the shape {} is a formula, without points or corners to round", echo(&spec.shape));
+                return Err(Error::value(key, value, &problem, "leave it out, or give an outline"));
+            }
+            Some((key, value)) if are_nodes => {
+                let problem = "with --sampling points the nodes are the points, as they are";
+                return Err(Error::value(key, value, problem, "leave it out, or use --sampling arclength"));
+            }
+            _ if self.sets.is_empty() || are_nodes => return Ok(()),
+            _ => {}
+        }
+        if !spec.sweep.has("interpolate") {
+            spec.interpolate.get_or_insert_default();
+        }
+        if !spec.sweep.has("rounding") {
+            spec.rounding.get_or_insert(DEFAULT_ROUNDING);
+        }
+        Ok(())
     }
 }
 

@@ -1,7 +1,7 @@
 //! The times of members at their [levels](super::levels): which members need more nodes, and what all of them tell.
 
 use super::levels::{LevelRow, RefinementLevel, tolerance};
-use crate::{Outcome, Spec, request::spec::Pace};
+use crate::{Outcome, Spec, Variation, request::spec::Pace};
 use curvelax_base::error::Result;
 use curvelax_statistics::{Limit, Times};
 
@@ -68,7 +68,7 @@ impl LevelTimes {
     /// # Errors
     /// A message if there is no such level, or the member does not follow the one before.
     pub fn add(&mut self, row: &LevelRow) -> Result<(), String> {
-        let none = || format!("a level from 1 to {}", RefinementLevel::MOST);
+        let none = || format!("a level from 1 to {}, or 100 or 200 more of an outline", RefinementLevel::MOST);
         let rank = RefinementLevel::of_number(row.level).map(rank).ok_or_else(none)?;
         let count = self.times.len().max(rank + 1);
         self.times.resize_with(count, Vec::new);
@@ -95,7 +95,12 @@ impl LevelTimes {
 
     /// Whether `member`, of a cell of `spec`, is to run at `level`, one of the finer ones, by its own times at those below:
     /// it has a time at the last of them, and no limit yet, or one that [needs more](Limit::needs_more).
+    ///
+    /// At the level of a variation it is to run if it has its finest time there, whose limit that will be.
     pub fn needs(&self, spec: &Spec, member: u64, level: RefinementLevel) -> bool {
+        if let Some(variation) = level.variation() {
+            return self.finest(member).is_some_and(|finest| finest.varied(variation) == level);
+        }
         let Some(top) = level.coarser() else { return false };
         let ladder = Ladder::up_to(top, |level| self.time(level, member));
         let Some(own) = self.time(RefinementLevel::FULL, member).filter(|own| *own > 0.0) else { return false };
@@ -120,8 +125,11 @@ impl LevelTimes {
         let Some(own) = outcome.t_relax else { return };
         let ladder = self.ladder(|level| self.time(level, member));
         let finest = ladder.levels.last().copied();
-        let Some(limit) = limit(ladder, own) else { return };
+        let Some(mut limit) = limit(ladder, own) else { return };
+        limit.fixed = self.moved_by(member, Variation::TwiceTheRadius).unwrap_or_default();
+        limit.error += limit.fixed;
         outcome.judged = Some(limit);
+        outcome.t_data_error = self.moved_by(member, Variation::HalfThePoints);
         if let (true, Some(finest)) = (spec.refine, finest) {
             let Limit { t, error, order, .. } = limit;
             (outcome.t_limit, outcome.t_error, outcome.order) = (Some(t), Some(error), order);
@@ -129,9 +137,21 @@ impl LevelTimes {
         }
     }
 
+    /// The finest level at which the time of a member is known, if it is at its own nodes.
+    fn finest(&self, member: u64) -> Option<RefinementLevel> {
+        let levels = self.ladder(|level| self.time(level, member).filter(|t| *t > 0.0)).levels;
+        levels.last().copied().filter(|_| levels.contains(&RefinementLevel::FULL))
+    }
+
+    /// By how much a variation of its outline moves the time of a member, at its finest level; unknown if it did not run.
+    fn moved_by(&self, member: u64, variation: Variation) -> Option<f64> {
+        let finest = self.finest(member)?;
+        Some((self.time(finest.varied(variation), member)? - self.time(finest, member)?).abs())
+    }
+
     /// The ladder that ends at the finest level at which a time is known.
     fn ladder(&self, at: impl Fn(RefinementLevel) -> Option<f64>) -> Ladder {
-        let all = (1..=self.times.len() as u64).rev().filter_map(RefinementLevel::of_number);
+        let all = (1..=RefinementLevel::MOST).rev().filter_map(RefinementLevel::of_number);
         let top = all.into_iter().find(|level| at(*level).is_some());
         top.map_or(Ladder { levels: Vec::new(), times: Vec::new() }, |top| Ladder::up_to(top, at))
     }

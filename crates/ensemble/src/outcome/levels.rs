@@ -3,11 +3,12 @@
 //!
 //! The members of a level are those of a cell, with the same random numbers; they run before the cell does. With
 //! `--refine` all members run at the [first three](RefinementLevel::FIRST), those whose times do not converge there also at
-//! finer ones, and each gets its [limit](curvelax_statistics::Limit). Otherwise a few of them run at the first three, the
+//! finer ones, and each gets its [limit](curvelax_statistics::Limit). Of outlines, [variations](Variation) run at the finest
+//! level of each, too, which tell what rounding and points do to its time. Otherwise a few of them run at the first three, the
 //! pilot, and tell the error of a typical member.
 
 use crate::{
-    Outcome, Spec, Status,
+    Outcome, Spec, Status, Variation,
     request::spec::{BackendChoice, FinalTime, Order, Pace, Precision, SolverChoice, Sor, Store},
     request::validate::tightest_adaptive,
 };
@@ -29,52 +30,85 @@ const LATEST: f64 = 1e300;
 /// Tolerance of the steps of a level beside fixed ones.
 const EXACT: f64 = 1e-4;
 
-/// A resolution at which members run besides their own, by its number from 1: level l of n nodes has n·2^((l - 3)/2).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct RefinementLevel(u32);
+/// A resolution at which members run besides their own, by its step from 1: step l of n nodes has n·2^((l - 3)/2). Variations
+/// of outlines run at the same ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RefinementLevel {
+    step: u32,
+    variation: Option<Variation>,
+}
+
+/// Numbers of the levels of one variation, and of the members as they are.
+const NUMBERS: u64 = 100;
 
 impl RefinementLevel {
     /// Half the nodes.
-    pub const HALF: RefinementLevel = RefinementLevel(1);
+    pub const HALF: RefinementLevel = RefinementLevel::plain(1);
     /// As many nodes.
-    pub const FULL: RefinementLevel = RefinementLevel(3);
+    pub const FULL: RefinementLevel = RefinementLevel::plain(3);
     /// Those at which all members run that run at any, in this order.
-    pub const FIRST: [RefinementLevel; 3] = [RefinementLevel::HALF, RefinementLevel(2), RefinementLevel::FULL];
+    pub const FIRST: [RefinementLevel; 3] = [RefinementLevel::HALF, RefinementLevel::plain(2), RefinementLevel::FULL];
     /// No members have so few nodes that they have more levels.
     pub const MOST: u64 = 24;
 
+    const fn plain(step: u32) -> RefinementLevel {
+        RefinementLevel { step, variation: None }
+    }
+
+    /// The same nodes on a variation of the outline.
+    pub fn varied(self, variation: Variation) -> RefinementLevel {
+        RefinementLevel { variation: Some(variation), ..self }
+    }
+
+    /// The variation of the outline, if it is one.
+    pub fn variation(self) -> Option<Variation> {
+        self.variation
+    }
+
     /// The levels of members with `n` nodes that are finer than these, in the order in which they run.
     pub fn finer(n: usize) -> impl Iterator<Item = RefinementLevel> {
-        let all = (RefinementLevel::FULL.0 + 1..=RefinementLevel::MOST as u32).map(RefinementLevel);
+        let all = (RefinementLevel::FULL.step + 1..=RefinementLevel::MOST as u32).map(RefinementLevel::plain);
         all.take_while(move |level| level.points(n) <= MOST_POINTS)
     }
 
     /// The level with this number, if there is one.
     pub fn of_number(number: u64) -> Option<RefinementLevel> {
-        (1..=RefinementLevel::MOST).contains(&number).then_some(RefinementLevel(number as u32))
+        let variation = match number / NUMBERS {
+            0 => None,
+            above => Some(*Variation::ALL.get(usize::try_from(above).ok()? - 1)?),
+        };
+        let step = number % NUMBERS;
+        (1..=RefinementLevel::MOST).contains(&step).then_some(RefinementLevel { step: step as u32, variation })
     }
 
     /// Its number in `levels.csv`, from 1.
     pub fn number(self) -> u64 {
-        self.0.into()
+        let place = |variation: Variation| Variation::ALL.into_iter().take_while(|other| *other != variation).count();
+        let before = self.variation.map_or(0, |variation| place(variation) as u64 + 1);
+        before * NUMBERS + u64::from(self.step)
     }
 
     /// The level below it, if there is one.
     pub fn coarser(self) -> Option<RefinementLevel> {
-        RefinementLevel::of_number(self.number() - 1)
+        (self.step > 1).then(|| RefinementLevel { step: self.step - 1, ..self })
     }
 
-    /// Whether only those members run there that need more nodes.
+    /// Whether it has more nodes than the members.
     pub fn is_finer(self) -> bool {
-        self > RefinementLevel::FULL
+        self.step > RefinementLevel::FULL.step
+    }
+
+    /// Whether only those members run there that need it.
+    pub fn is_selective(self) -> bool {
+        self.is_finer() || self.variation.is_some()
     }
 
     /// Nodes, where a member has `n`.
     pub fn points(self, n: usize) -> usize {
-        if self == RefinementLevel::HALF {
+        if self.step == RefinementLevel::HALF.step {
             return n / 2;
         }
-        let halves = f64::from(self.0) - f64::from(RefinementLevel::FULL.0);
+        let halves = f64::from(self.step) - f64::from(RefinementLevel::FULL.step);
         (n as f64 * (0.5 * halves).exp2()).round() as usize
     }
 
@@ -194,5 +228,20 @@ mod tests {
             assert_eq!([half, between, full], [n / 2, (n as f64 / std::f64::consts::SQRT_2).round() as usize, n]);
         }
         assert!(points(6).len() < RefinementLevel::MOST as usize);
+    }
+
+    #[test]
+    fn every_level_has_a_number_of_its_own() {
+        let mut numbers = Vec::new();
+        for number in 0..1000 {
+            let Some(level) = RefinementLevel::of_number(number) else { continue };
+            assert_eq!(level.number(), number);
+            numbers.push(number);
+        }
+        let runs: Vec<u64> = [1..25, 101..125, 201..225].into_iter().flatten().collect();
+        assert_eq!(numbers, runs);
+        let varied = RefinementLevel::FULL.varied(Variation::TwiceTheRadius);
+        assert_eq!((varied.number(), varied.points(100), varied.is_finer()), (203, 100, false));
+        assert!(varied.is_selective() && !RefinementLevel::FULL.is_selective());
     }
 }

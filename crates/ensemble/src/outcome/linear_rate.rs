@@ -107,7 +107,9 @@ impl Decline<'_> {
     /// A time at which the excess is known, and its logarithm over that of the start.
     fn known_point(&self, spec: &Spec, outcome: &Outcome) -> (f64, f64) {
         let share = spec.threshold(outcome.start.excess) / outcome.start.excess;
-        let relaxed = outcome.t_relax.filter(|t| *t > 0.0 && share > 0.0 && share < 1.0).map(|t| (t, share.ln()));
+        // Of an outline the threshold may be a share of another excess.
+        let relaxed = outcome.t_relax.filter(|_| outcome.label.is_empty());
+        let relaxed = relaxed.filter(|t| *t > 0.0 && share > 0.0 && share < 1.0).map(|t| (t, share.ln()));
         relaxed.or(outcome.t_half.map(|t| (t, 0.5_f64.ln()))).unwrap_or((0.0, 0.0))
     }
 

@@ -114,6 +114,8 @@ pub struct Outcome {
     pub group: String,
     /// Nodes of the finest level that `t_limit` rests on; without a limit its own.
     pub points: u64,
+    /// By how much its time moves with half the points of its outline, with `--refine`.
+    pub t_data_error: Option<f64>,
     /// First times of the [events](crate::Event) of the spec, in their order.
     pub events: Vec<Option<f64>>,
     /// What the [levels](crate::LevelTimes) tell of the relaxation time, if the member ran at them.

@@ -11,6 +11,7 @@ use serde::{
 };
 
 use crate::{
+    member::outline_curve::DEFAULT_ROUNDING,
     request::drawn::Drawn,
     request::event::Event,
     request::seed,
@@ -24,7 +25,7 @@ use curvelax_base::{
     random::Design,
     text,
 };
-use curvelax_curve::{Modes, Perturbation, Sampling, Shape};
+use curvelax_curve::{Interpolation, Modes, Perturbation, Sampling, Shape};
 use curvelax_flow::flow::Flow;
 
 pub use crate::request::units::Units;
@@ -191,6 +192,12 @@ pub struct Spec {
     pub shape: Drawn<Shape>,
     /// How nodes are placed on it.
     pub sampling: Sampling,
+    /// How the curve runs between the points of an outline; a study of outlines fills it in.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interpolate: Option<Interpolation>,
+    /// Smallest radius of curvature of an outline's corners, as a share of its length, 0 to leave them; likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rounding: Option<f64>,
     /// σ of the random perturbation; 0 for none.
     pub amplitude: Drawn<f64>,
     /// Modes of the random perturbation.
@@ -350,6 +357,8 @@ impl Default for Spec {
             seed: 1,
             shape: Shape::Ellipse { a: 2.0, b: 1.0 }.into(),
             sampling: Sampling::Arclength,
+            interpolate: None,
+            rounding: None,
             amplitude: 0.05.into(),
             modes: Modes { low: 2, high: 8 },
             decay: 1.0.into(),
@@ -557,6 +566,16 @@ impl Spec {
     /// How time is cut into steps.
     pub fn pace(&self) -> Pace {
         self.adaptive.map_or(Pace::Fixed(self.tau.unwrap_or(DEFAULT_TAU.into())), Pace::Adaptive)
+    }
+
+    /// How the curve runs between the points of an outline.
+    pub fn interpolation(&self) -> Interpolation {
+        self.interpolate.unwrap_or_default()
+    }
+
+    /// Smallest radius of curvature of an outline's corners, as a share of its length.
+    pub fn rounding(&self) -> f64 {
+        self.rounding.unwrap_or(DEFAULT_ROUNDING)
     }
 
     /// B in use: the motion takes a time of 1/B where that of unit mobility takes 1.
@@ -928,6 +947,8 @@ mod tests {
         let optional = [
             "outlines",
             "group-by",
+            "interpolate",
+            "rounding",
             "mobility",
             "units",
             "tau",

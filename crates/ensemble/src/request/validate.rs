@@ -3,6 +3,7 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that needs
 //! the file of the shape. Only the resolution of the highest mode is checked here.
 
+use crate::member::outline_curve::ROUNDINGS;
 use crate::request::event::{Event, MAX_EVENTS};
 use crate::request::spec::{
     BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, Precision, Pull,
@@ -51,6 +52,7 @@ impl Spec {
         self.check_times()?;
         self.check_method()?;
         self.check_drawn()?;
+        self.check_rounding()?;
         self.check_relaxation()?;
         self.check_combinations()?;
         self.check_events()?;
@@ -301,6 +303,17 @@ impl Spec {
             return Err(Error::value("modes", modes, &problem, &allowed));
         }
         Ok(())
+    }
+
+    fn check_rounding(&self) -> Result<()> {
+        match self.rounding {
+            Some(share) if share != 0.0 && !ROUNDINGS.contains(&share) => {
+                let (low, high) = (number(*ROUNDINGS.start()), number(*ROUNDINGS.end()));
+                let allowed = format!("use a share from {low} to {high}, or 0 to leave corners");
+                Err(Error::value("rounding", number(share), "not a radius as a share of the length", &allowed))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn check_relaxation(&self) -> Result<()> {

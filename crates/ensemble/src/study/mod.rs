@@ -9,7 +9,7 @@ pub use stage::{Cohort, Stage};
 use std::{borrow::Cow, path::Path, sync::Arc};
 
 use crate::{
-    Family, LevelTimes, Member, Outlines, RefinementLevel, Spec,
+    Family, LevelTimes, Member, Outlines, RefinementLevel, Spec, Variation,
     request::spec::{FinalTime, Store, Tau},
     theory::times,
 };
@@ -105,7 +105,7 @@ impl Study {
         &self.stages
     }
 
-    /// The cells of a stage. Those of a [finer](Stage::is_finer) one have the members that need it by the times at the
+    /// The cells of a stage. Those of a [selective](Stage::is_selective) one have the members that need it by the times at the
     /// `levels` before, and there is none without such a member.
     ///
     /// # Errors
@@ -116,17 +116,19 @@ impl Study {
         let mut cells: Vec<Cell> = Vec::new();
         for cell in own {
             let Ok(mut spec) = cell.at(level) else { continue };
-            if level.is_finer() {
+            if level.is_selective() {
                 let only: Vec<u64> = cell.needing(level, levels).map(|member| member - cell.first).collect();
                 if only.is_empty() {
                     continue;
                 }
                 spec.only = Some(only);
             }
-            let others = || [cell].into_iter().chain(cells.iter().rev());
+            // The cell itself has no variation; the others here have the same one.
+            let own = level.variation().is_none().then_some(cell);
+            let others = || own.into_iter().chain(cells.iter().rev());
             let family = match others().find(|other| same_curve(&other.spec, &spec)) {
                 Some(other) => Family::like(&other.family, &spec)?,
-                None => Family::resampled(&cell.family, &spec)?,
+                None => Family::resampled(&cell.family, &spec, level.variation())?,
             };
             cells.push(Cell { spec, family, ..*cell });
         }
@@ -135,7 +137,7 @@ impl Study {
 
     /// The members of a stage, after these times at the `levels` before it.
     pub fn members_of(&self, stage: &Stage, levels: &LevelTimes) -> u64 {
-        let Some(level) = stage.level.filter(|_| stage.is_finer()) else { return stage.members };
+        let Some(level) = stage.level.filter(|_| stage.is_selective()) else { return stage.members };
         let cells = self.cells[stage.range.clone()].iter().filter(|cell| cell.at(level).is_ok());
         cells.map(|cell| cell.needing(level, levels).count() as u64).sum()
     }
@@ -163,7 +165,7 @@ impl Study {
 
     /// Members of all stages but the finer ones, of which nobody knows before.
     pub fn work(&self) -> u64 {
-        self.stages.iter().filter(|stage| !stage.is_finer()).map(|stage| stage.members).sum()
+        self.stages.iter().filter(|stage| !stage.is_selective()).map(|stage| stage.members).sum()
     }
 
     /// Nodes of the finest level at which members may run, or of the members themselves if these have more.
@@ -254,7 +256,8 @@ impl Study {
 fn same_curve(one: &Spec, other: &Spec) -> bool {
     let drawn = |spec: &Spec| (spec.seed, spec.members_per_cell(), spec.design, spec.common_random_numbers);
     let same_draws = || drawn(one) == drawn(other) && one.distributions() == other.distributions();
-    let nodes = (one.points, one.sampling) == (other.points, other.sampling);
+    let nodes = |spec: &Spec| (spec.points, spec.sampling, spec.interpolation(), spec.rounding().to_bits());
+    let nodes = nodes(one) == nodes(other);
     nodes && one.shape == other.shape && (!one.shape.is_drawn() || same_draws())
 }
 
@@ -370,9 +373,21 @@ impl Cell {
         RefinementLevel::finer(self.spec.points).filter(|_| self.spec.refine).collect()
     }
 
-    /// Its members that need a finer `level`, by their times at the `levels` before it.
+    /// The levels at which variations of its outlines may run.
+    fn varied(&self) -> Vec<RefinementLevel> {
+        if !self.spec.refine || !self.family.has_outlines() {
+            return Vec::new();
+        }
+        let plain = || [RefinementLevel::FULL].into_iter().chain(self.finer());
+        Variation::ALL.into_iter().flat_map(|variation| plain().map(move |level| level.varied(variation))).collect()
+    }
+
+    /// Its members that need a selective `level`, by their times at the `levels` before it.
     fn needing<'a>(&'a self, level: RefinementLevel, levels: &'a LevelTimes) -> impl Iterator<Item = u64> + 'a {
-        self.members().filter(move |member| levels.needs(&self.spec, *member, level))
+        let varies = move |member: u64| {
+            level.variation().is_none_or(|variation| self.family.has(variation, self.drawn_as(member)))
+        };
+        self.members().filter(move |member| levels.needs(&self.spec, *member, level) && varies(*member))
     }
 
     /// Its spec at a level.

@@ -13,14 +13,14 @@ pub struct Stage {
     pub level: Option<RefinementLevel>,
     /// Its cells in the study.
     pub range: Range<usize>,
-    /// Its members; of a finer one the members of its cells, of which [some](super::Study::members_of) run.
+    /// Its members; of a selective one the members of its cells, of which [some](super::Study::members_of) run.
     pub members: u64,
 }
 
 impl Stage {
-    /// Whether only those members run that need more nodes than they have.
-    pub fn is_finer(&self) -> bool {
-        self.level.is_some_and(RefinementLevel::is_finer)
+    /// Whether only those members run that need it: more nodes than they have, or variations of their outlines.
+    pub fn is_selective(&self) -> bool {
+        self.level.is_some_and(RefinementLevel::is_selective)
     }
 }
 
@@ -34,6 +34,11 @@ pub(super) fn stages(cells: &[Cell]) -> Vec<Stage> {
     // All cells have the same ones, some fewer.
     for level in cells.iter().map(Cell::finer).max_by_key(Vec::len).unwrap_or_default() {
         let at = |cell: &Cell| cell.finer().contains(&level).then(|| cell.at(level).ok()).flatten();
+        stages.extend(stages_of(Some(level), &cells.iter().map(at).collect::<Vec<_>>()));
+    }
+    // After them, when it is known which one is a member's finest.
+    for level in cells.iter().map(Cell::varied).max_by_key(Vec::len).unwrap_or_default() {
+        let at = |cell: &Cell| cell.varied().contains(&level).then(|| cell.at(level).ok()).flatten();
         stages.extend(stages_of(Some(level), &cells.iter().map(at).collect::<Vec<_>>()));
     }
     let own: Vec<_> = cells.iter().map(|cell| Some(cell.spec.clone())).collect();

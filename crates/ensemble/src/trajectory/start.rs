@@ -51,7 +51,7 @@ impl<'a> Trajectory<'a> {
         let turning = launch.report.progress.turning;
         let watches = Watch::of(&spec.event, &launch.report.now, unit, precision);
         let start = Observables::new(&launch.report.now, turning, unit);
-        let limit = spec.threshold(start.excess);
+        let limit = spec.threshold(member.given_excess.unwrap_or(start.excess));
         let course = Course::of(start.excess, turning, limit, precision);
         set_thresholds(&mut launch, course, start.excess, limit, precision);
         let (time, out_of_range) = begin_time(&mut launch, spec, time_unit, precision);

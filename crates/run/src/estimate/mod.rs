@@ -108,7 +108,7 @@ impl Estimate {
         let wanted = |i: &usize| chosen.contains(i) || finest == Some(*i);
         for (i, choice) in choices.into_iter().enumerate().filter(|(i, _)| wanted(i)) {
             let stage = &stages[i];
-            if stage.is_finer() {
+            if stage.is_selective() {
                 at_finest = Some(slots_at(&study.spec_of(stage)?, &choice)?);
                 continue;
             }
@@ -152,7 +152,7 @@ impl Estimate {
             0.0 => 0.0,
             seen => all as f64 / seen,
         });
-        let certain = stages.iter().filter(|stage| !stage.is_finer()).count();
+        let certain = stages.iter().filter(|stage| !stage.is_selective()).count();
         start_up *= certain as f64 / chosen.len() as f64;
         let share = finer.share(study).filter(|_| certain < stages.len());
         let finer_members = share.map(|[share, _]| share * members as f64);
@@ -211,7 +211,7 @@ fn with_pilots(study: &Study) -> Vec<usize> {
     let own = (0..stages.len()).filter(|i| stages[*i].level.is_none());
     let largest = own.max_by_key(|i| points(&stages[*i]));
     // Nobody knows yet who runs at finer levels.
-    let certain: Vec<usize> = (0..stages.len()).filter(|i| !stages[*i].is_finer()).collect();
+    let certain: Vec<usize> = (0..stages.len()).filter(|i| !stages[*i].is_selective()).collect();
     // Counted backwards.
     let spread = certain.iter().copied().rev().step_by(certain.len().div_ceil(MAX_PILOTS).max(1));
     let mut chosen: Vec<usize> = spread.chain(largest).collect();
@@ -223,7 +223,7 @@ fn with_pilots(study: &Study) -> Vec<usize> {
 /// The stage of most nodes among those at which nobody knows yet who runs.
 fn finest(study: &Study) -> Option<usize> {
     let points = |i: &usize| study.spec_of(&study.stages()[*i]).map_or(0, |spec| spec.points);
-    (0..study.stages().len()).filter(|i| study.stages()[*i].is_finer()).max_by_key(points)
+    (0..study.stages().len()).filter(|i| study.stages()[*i].is_selective()).max_by_key(points)
 }
 
 /// Nodes of the members of `spec`, and how many of them are resident at once; a GPU is not opened for that.

@@ -51,16 +51,17 @@ columns! { Outcome:
     self_crossing: event = self_crossing, "time at which the polygon was first seen to cross itself, which does not stop the member";
     solves: whole = solves, "steps of the scheme that were computed, each a solve for k and one for x and y: 1 for a fixed step, 1 + 2 + … + J for an adaptive one of order J, also if it was refused";
     t_limit: event = t_limit, "with `--refine`: t_relax in the limit of many nodes and short steps";
-    t_error: optional = t_error, "half-width of the 95 % interval of t_limit";
+    t_error: optional = t_error, "half-width of the 95 % interval of t_limit; of an outline with by how much the time moves with corners rounded to twice the radius";
     order: optional = order, "observed order of t_relax in 1/n, 2 for a smooth curve; empty where differences do not fall";
     label: word = label, "name of its outline; empty if it has none";
     group: word = group, "value of the property `--group-by` of its outline";
     points: whole = points, "nodes of the finest level that t_limit rests on; without t_limit those of the member";
+    t_data_error: optional = t_data_error, "with `--refine`, of outlines of 12 points or more: by how much the time moves at these nodes with every second point of the outline";
 }
 
 columns! { LevelRow:
     member: whole = member, "index of the member";
-    level: whole = level, "1: n/2 nodes; 2: n/√2; 3: n; with `--refine`, of members that need more, 4: √2 n; 5: 2n; and so on up to 1600 nodes";
+    level: whole = level, "1: n/2 nodes; 2: n/√2; 3: n; with `--refine`, of members that need more, 4: √2 n; 5: 2n; and so on up to 1600 nodes; of outlines 100 more, on its finest one: with every second point, and 200 more: with corners rounded to twice the radius";
     cell: whole = cell, "index of its cell";
     points: whole = points, "nodes";
     adaptive: optional = adaptive, "tolerance of the steps: a tenth of that of the run, 1e-4 beside fixed steps";

@@ -128,7 +128,7 @@ impl RunReport {
         let mut report = RunReport::new(folder, growing, study, origin, manner);
         // Which members were to run at finer levels follows from their rows.
         let finer =
-            study.stages().iter().zip(&mut report.stages).take(stage as usize + 1).filter(|(of, _)| of.is_finer());
+            study.stages().iter().zip(&mut report.stages).take(stage as usize + 1).filter(|(of, _)| of.is_selective());
         finer.for_each(|(of, members)| *members = study.members_of(of, &levels));
         (report.films, report.earlier, report.stage) = (films, wall, stage);
         (report.tally, report.levels, report.has_begun) = (tally, levels, true);
@@ -147,7 +147,7 @@ impl RunReport {
             films: Vec::new(),
             levels: LevelTimes::default(),
             members: study.member_count(),
-            stages: study.stages().iter().map(|stage| if stage.is_finer() { 0 } else { stage.members }).collect(),
+            stages: study.stages().iter().map(|stage| if stage.is_selective() { 0 } else { stage.members }).collect(),
             stage: 0,
             progress,
             clock: since,

@@ -58,6 +58,7 @@ impl fmt::Display for Overview<'_> {
         self.groups(f)?;
         for (label, text) in [
             ("ensemble", shortened(&describe(self.spec), usize::MAX)),
+            ("outlines", self.tally.mollified.outlines().unwrap_or_default()),
             ("corners", self.tally.mollified.told().unwrap_or_default()),
             ("t_relax", self.relaxation()),
             ("t_limit", self.limit()),

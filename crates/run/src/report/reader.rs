@@ -271,11 +271,11 @@ impl<'a> Summary<'a> {
             let values = spec.values_of(member, cell).ok()?;
             linear_rate::rate_of(spec, &values, &outcome)
         });
-        let (told, points) = ((outcome.t_limit, outcome.t_error), outcome.points);
+        let (told, points) = ((outcome.t_limit, outcome.t_error, outcome.t_data_error), outcome.points);
         if let Some((_, spec)) = &self.spec_of {
             self.levels.judge(spec, &mut outcome);
         }
-        if (outcome.t_limit, outcome.t_error) != told {
+        if (outcome.t_limit, outcome.t_error, outcome.t_data_error) != told {
             let (limit, file) = (outcome.t_limit.map_or("nothing".into(), |t| t.to_string()), names::LEVELS);
             return Err(fields.unexpected_in("t_limit", &format!("{limit}, as {file} has it")));
         }

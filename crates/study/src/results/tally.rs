@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use curvelax_base::error::Result;
 use curvelax_base::text::{plural, significant};
 use curvelax_ensemble::{
-    LevelTimes, Mollified, Outcome, Spec, Status, member::mollifier::MAX_VERTEX_TURN, request::sweep::Sweep,
+    LevelTimes, Mollified, Outcome, Spec, Status, Treated, member::mollifier::MAX_VERTEX_TURN, request::sweep::Sweep,
     schedule::grid,
 };
 use curvelax_statistics::{Limit, Observation, Observations, Spread};
@@ -47,6 +47,10 @@ pub struct Tally {
     drifted: (u64, f64),
     /// Members whose relaxation time is unknown because their threshold is below the rounding of the precision.
     pub below_rounding: u64,
+    /// Members of outlines whose points leave more than [`OPEN_BY_POINTS`] of the limit open, and the largest share.
+    coarse: (u64, f64),
+    /// Whether corners are those of outlines.
+    has_outlines: bool,
     /// Longest over shortest edge of each member at its end, for a picture.
     pub mesh_ratios: Vec<f32>,
     /// Metric drift of each member at its end, for a picture.
@@ -204,6 +208,9 @@ impl MeanExcess {
 /// Metric drift above which the scheme's lengths are too far from the polygon's for times to mean much.
 pub const DISTRUSTED_DRIFT: f64 = 0.1;
 
+/// Share of a limit that moves with half the points of an outline, above which these are too few.
+const OPEN_BY_POINTS: f64 = 0.01;
+
 /// How corners of members were rounded off (`ensemble/mollifier.rs`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MollifiedMembers {
@@ -221,6 +228,22 @@ pub struct MollifiedMembers {
     pub sharp: u64,
     /// Members whose area changed by more than a tenth.
     pub distorted: u64,
+    /// Members of outlines without corners, a spline each.
+    #[serde(default)]
+    pub splines: u64,
+    /// Members of outlines with corners among other points.
+    #[serde(default)]
+    pub cornered: u64,
+    /// Members of outlines all of whose points are corners.
+    #[serde(default)]
+    pub polygons: u64,
+    /// Members of outlines whose corners were rounded before nodes were placed, and the largest relative change of area by
+    /// that, before it was put back.
+    #[serde(default)]
+    pub rounded: u64,
+    /// See there.
+    #[serde(default)]
+    pub outline_area_change: f64,
 }
 
 impl MollifiedMembers {
@@ -234,12 +257,25 @@ impl MollifiedMembers {
         for (count, fault) in [&mut self.crossed, &mut self.sharp, &mut self.distorted].into_iter().zip(faults) {
             *count += u64::from(fault);
         }
+        let Treated { points, corners, rounded, area_change } = mollified.outline;
+        self.splines += u64::from(points > 0 && corners == 0);
+        self.cornered += u64::from(0 < corners && corners < points);
+        self.polygons += u64::from(points > 0 && corners >= points);
+        self.rounded += u64::from(rounded);
+        self.outline_area_change = self.outline_area_change.max(area_change.abs());
     }
 
     /// Adds other members.
     fn merge(&mut self, other: &MollifiedMembers) {
-        let MollifiedMembers { members, most_rounds, largest_area_change, unresolved, crossed, sharp, distorted } =
-            other;
+        let MollifiedMembers {
+            members, most_rounds, largest_area_change, unresolved, crossed, sharp, distorted, ..
+        } = other;
+        let MollifiedMembers { splines, cornered, polygons, rounded, outline_area_change, .. } = other;
+        self.splines = self.splines.saturating_add(*splines);
+        self.cornered = self.cornered.saturating_add(*cornered);
+        self.polygons = self.polygons.saturating_add(*polygons);
+        self.rounded = self.rounded.saturating_add(*rounded);
+        self.outline_area_change = self.outline_area_change.max(*outline_area_change);
         self.members = self.members.saturating_add(*members);
         self.most_rounds = self.most_rounds.max(*most_rounds);
         self.largest_area_change = self.largest_area_change.max(*largest_area_change);
@@ -249,7 +285,21 @@ impl MollifiedMembers {
         self.distorted = self.distorted.saturating_add(*distorted);
     }
 
-    /// What was done to their outlines, after "were"; `None` if nothing was.
+    /// What their outlines were taken as, and how corners were rounded; `None` if there are none.
+    pub fn outlines(&self) -> Option<String> {
+        let MollifiedMembers { splines, cornered, polygons, rounded, outline_area_change, .. } = *self;
+        let parts = [(splines, "spline"), (cornered, "spline with corners"), (polygons, "polygon")];
+        let parts = parts.into_iter().filter(|(count, _)| *count > 0);
+        let parts: Vec<String> = parts.map(|(count, what)| format!("{count} as a {what}")).collect();
+        let change = significant(100.0 * outline_area_change, 2);
+        let round = match rounded {
+            0 => String::new(),
+            _ => format!("; corners of {rounded} rounded, which changed the area by at most {change} % and put back"),
+        };
+        (!parts.is_empty()).then(|| format!("{}{round}", parts.join(", ")))
+    }
+
+    /// What was done for their nodes, after "were"; `None` if nothing was.
     pub fn told(&self) -> Option<String> {
         let MollifiedMembers { members, most_rounds, largest_area_change, crossed, distorted, .. } = *self;
         // Of those two kinds some are left with another area.
@@ -334,7 +384,17 @@ impl Tally {
         let at_start = vec![0; events.len()];
         let stops = spec.stops_when_relaxed();
         let sweep = spec.sweep.clone();
-        Tally { refined: spec.refine, stops, sweep, levels: levels.rows(), events, at_start, ..Tally::default() }
+        let has_outlines = spec.rounding.is_some() || spec.sweep.has("rounding");
+        Tally {
+            has_outlines,
+            refined: spec.refine,
+            stops,
+            sweep,
+            levels: levels.rows(),
+            events,
+            at_start,
+            ..Tally::default()
+        }
     }
 
     /// Adds a member.
@@ -356,6 +416,9 @@ impl Tally {
         self.at_start.iter_mut().zip(&outcome.events).for_each(|(count, t)| *count += u64::from(*t == Some(0.0)));
         self.mesh_ratios.push(outcome.end.mesh_ratio as f32);
         self.metric_drifts.push(outcome.end.metric_drift as f32);
+        if let Some(share) = outcome.t_data_error.zip(outcome.t_limit).map(|(moved, t)| moved / t) {
+            self.coarse = (self.coarse.0 + u64::from(share > OPEN_BY_POINTS), self.coarse.1.max(share));
+        }
         let drift = outcome.end.metric_drift;
         self.drifted.0 += u64::from(drift > DISTRUSTED_DRIFT);
         self.drifted.1 = self.drifted.1.max(drift);
@@ -446,8 +509,16 @@ impl Tally {
             let all = judged().count();
             warnings.push(format!(
                 "t_limit of {open} of {all} {} is the time at the finest level, and t_error a wide bound: their times do not \
-                 converge in n (see `points`)",
-                plural(all as u64, "member")
+                 converge in n (see `points`){}",
+                plural(all as u64, "member"),
+                if self.has_outlines { "; fewer nodes are enough with a larger --rounding" } else { "" }
+            ));
+        }
+        if let (coarse @ 1.., most) = self.coarse {
+            warnings.push(format!(
+                "the points of the outline leave the time of {coarse} of {members} open: half of them move it by up to {} % \
+                 (see `t_data_error`); give more points, or --interpolate spline if it is smooth between these",
+                significant(100.0 * most, 2)
             ));
         }
         for (name, at_start) in self.events.iter().zip(&self.at_start).filter(|(_, at_start)| **at_start > 0) {

@@ -1,0 +1,209 @@
+//! From the points of an outline to the curve that is perturbed and sampled: interpolation, and corners that are rounded off.
+//!
+//! Neither depends on the nodes of a member, so times at more and more nodes have a limit: that of this curve. What rounding
+//! and the points themselves do to a time is measured by other curves of the same outline, its [variations](Variation).
+//!
+//! Corners are rounded on many more nodes than members have, `KNOTS` on the radius that no corner is to be sharper than, by
+//! rounds of an implicit step of `x_t = -x_ssss` and equal spacing, as in [`mollifier`](super::mollifier). A step moves
+//! points near corners only: a smooth arc of radius r by the share `(radius/r)⁴`. The nodes are scaled about their centroid
+//! until they enclose the area of the outline again, and a spline through them is the curve. Outlines without corners are
+//! left as they are, however sharp a smooth tip may be: its shape is given by points.
+//!
+//! Equal steps of `-x_ssss` take area away at a corner, with the cube of its curvature. Each round gives that back where it was,
+//! spread over about twice the radius, as surface diffusion would not have taken it: what is left of rounding is then a few
+//! times smaller. The length is not given back. A share of the excess at the start, `--relax-to`, is therefore one of the
+//! excess of the outline before its corners are rounded: for a coast that is most of it.
+
+use std::{
+    f64::consts::PI,
+    sync::{Arc, OnceLock},
+};
+
+use super::{
+    OutlineSet,
+    mollifier::{put_back, sharpest_turn, smoothed},
+};
+use crate::Spec;
+use glam::DVec2;
+
+use curvelax_curve::{
+    BaseCurve, Interpolation, Outline, RadialFactor, Sampler, Sampling, Spline, crossing, polygon, resample,
+};
+
+/// Smallest radius of curvature of a corner, as a share of the length of its outline, if none is given. Nodes resolve it from
+/// about 2/share on, 1000; a run adds up to 1600 by itself.
+pub const DEFAULT_ROUNDING: f64 = 0.002;
+/// Shares that can be asked for: below, nodes by the ten thousand would be needed; above, little would be left of an outline.
+pub const ROUNDINGS: std::ops::RangeInclusive<f64> = 1e-4..=0.02;
+
+/// Nodes on the smallest radius.
+const KNOTS: f64 = 4.0;
+/// κ of one round, in units of the fourth power of the spacing of these nodes.
+const STRENGTH: f64 = 4.0;
+/// The same of the step that spreads the area that a round took away: over about twice the radius.
+const SPREAD: f64 = 16.0 * KNOTS * KNOTS * KNOTS * KNOTS;
+/// Rounds before giving up.
+const MAX_ROUNDS: u32 = 400;
+/// Least samples by which the excess of an outline is measured.
+const SAMPLES: usize = 4096;
+/// Outlines of which the curves are kept: that of a rough one takes about 100 kB. Those of more are made for each member.
+const KEPT: usize = 256;
+
+/// Another curve of the same outline, by which a time is judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Variation {
+    /// Through every second point.
+    HalfThePoints,
+    /// With corners rounded to twice the radius.
+    TwiceTheRadius,
+}
+
+impl Variation {
+    /// All of them.
+    pub const ALL: [Variation; 2] = [Variation::HalfThePoints, Variation::TwiceTheRadius];
+}
+
+/// How outlines become curves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Treatment {
+    interpolation: Interpolation,
+    rounding: f64,
+    variation: Option<Variation>,
+}
+
+/// What was done to an outline, for reports.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Treated {
+    /// Points of the outline; 0 if the curve is not one.
+    pub points: u32,
+    /// Those of them that are corners.
+    pub corners: u32,
+    /// Whether corners were rounded off, and relative change of the area by that, before it was put back.
+    pub rounded: bool,
+    /// See there.
+    pub area_change: f64,
+}
+
+/// What an outline has become.
+#[derive(Clone)]
+pub(super) struct OutlineCurve {
+    pub(super) curve: BaseCurve,
+    /// The curve before its corners were rounded off, if they were.
+    given: Option<BaseCurve>,
+    pub(super) treated: Treated,
+}
+
+impl OutlineCurve {
+    /// A curve that is no outline.
+    pub(super) fn of(curve: BaseCurve) -> OutlineCurve {
+        OutlineCurve { curve, given: None, treated: Treated::default() }
+    }
+
+    /// The excess before corners were rounded off, if they were, of the curve stretched by `factor`; none if it crosses
+    /// itself.
+    pub(super) fn given_excess(&self, factor: &RadialFactor) -> Option<f64> {
+        let given = self.given.as_ref().filter(|given| given.is_simple())?;
+        let centre = self.curve.centroid();
+        let mut points: Vec<DVec2> = given.subdivision(SAMPLES).map(|(_, p)| factor.apply(centre, p)).collect();
+        points.pop();
+        let (length, area) = (polygon::length(&points), polygon::signed_area(&points));
+        Some(length * length / (4.0 * PI * area) - 1.0).filter(|excess| *excess > 0.0)
+    }
+}
+
+impl Treatment {
+    /// That of the outlines of a spec.
+    pub fn of(spec: &Spec, variation: Option<Variation>) -> Treatment {
+        // The points are the nodes.
+        let as_it_is = spec.sampling == Sampling::Points;
+        Treatment {
+            interpolation: if as_it_is { Interpolation::Polygon } else { spec.interpolation() },
+            rounding: if as_it_is { 0.0 } else { spec.rounding() },
+            variation,
+        }
+    }
+
+    /// The curve of an outline.
+    pub(super) fn curve(&self, outline: &Arc<Outline>) -> OutlineCurve {
+        let half = match self.variation {
+            Some(Variation::HalfThePoints) => outline.halved().map(Arc::new),
+            _ => None,
+        };
+        let (curve, corners) = self.interpolation.curve(half.as_ref().unwrap_or(outline));
+        let treated =
+            Treated { points: outline.vertices().len() as u32, corners: corners as u32, ..Treated::default() };
+        if corners == 0 || self.rounding == 0.0 {
+            return OutlineCurve { treated, ..OutlineCurve::of(curve) };
+        }
+        let factor = if self.variation == Some(Variation::TwiceTheRadius) { 2.0 } else { 1.0 };
+        let (round, area_change) = rounded(&curve, outline, factor * self.rounding);
+        OutlineCurve { curve: round, given: Some(curve), treated: Treated { rounded: true, area_change, ..treated } }
+    }
+
+    /// Whether the variation makes another curve of an outline.
+    pub fn varies(&self, outline: &Outline, variation: Variation) -> bool {
+        match variation {
+            Variation::HalfThePoints => outline.halved().is_some(),
+            Variation::TwiceTheRadius => self.rounding > 0.0 && self.interpolation.has_corners(outline),
+        }
+    }
+}
+
+/// The curve with corners rounded to a radius of at least `share` of its length, and the relative change of area that was put
+/// back. Rounds end before the first crossing.
+fn rounded(curve: &BaseCurve, outline: &Arc<Outline>, share: f64) -> (BaseCurve, f64) {
+    let knots = (KNOTS / share).ceil() as usize;
+    let Ok(sampler) = Sampler::new(curve.clone(), Sampling::Arclength, knots) else { return (curve.clone(), 0.0) };
+    let (none, simple) = (RadialFactor::default(), curve.is_simple());
+    let mut nodes = sampler.sample(&none);
+    let mut rounds = 0;
+    while sharpest_turn(&nodes) > 1.0 / KNOTS && rounds < MAX_ROUNDS {
+        let next = resample(&with_local_area(&nodes, smoothed(&nodes, STRENGTH)));
+        if simple && crossing(&next).is_some() {
+            break;
+        }
+        nodes = next;
+        rounds += 1;
+    }
+    let area_change = polygon::signed_area(&nodes) / sampler.area(&none) - 1.0;
+    if simple || area_change.abs() < super::Mollified::DISTORTED {
+        put_back(area_change, &mut nodes);
+    }
+    let spline = Spline::new(&nodes, &vec![false; nodes.len()]);
+    (BaseCurve::from_spline(Arc::clone(outline), spline, simple), area_change)
+}
+
+/// The nodes `after` a step, moved along their normals so that the area that the step took away comes back where it did.
+fn with_local_area(before: &[DVec2], after: Vec<DVec2>) -> Vec<DVec2> {
+    let n = after.len();
+    // Outward, as long as the part of the curve that belongs to a node.
+    let normal = |i: usize| -0.5 * (after[(i + 1) % n] - after[(i + n - 1) % n]).perp();
+    let lost: Vec<DVec2> = (0..n).map(|i| DVec2::new((before[i] - after[i]).dot(normal(i)), 0.0)).collect();
+    let spread = smoothed(&lost, SPREAD);
+    let moved = |i: usize| after[i] + normal(i) * (spread[i].x / normal(i).length_squared().max(f64::MIN_POSITIVE));
+    (0..n).map(moved).collect()
+}
+
+/// The curves of the outlines of a set, each made when it is first needed.
+pub(super) struct OutlineCurves {
+    pub(super) set: Arc<OutlineSet>,
+    treatment: Treatment,
+    made: Vec<OnceLock<OutlineCurve>>,
+}
+
+impl OutlineCurves {
+    pub(super) fn new(set: Arc<OutlineSet>, treatment: Treatment) -> OutlineCurves {
+        let kept = if set.all.len() <= KEPT { set.all.len() } else { 0 };
+        OutlineCurves { set, treatment, made: (0..kept).map(|_| OnceLock::new()).collect() }
+    }
+
+    pub(super) fn treatment(&self) -> &Treatment {
+        &self.treatment
+    }
+
+    /// The curve of outline `i`, which there is.
+    pub(super) fn curve(&self, i: usize) -> OutlineCurve {
+        let make = || self.treatment.curve(&self.set.all[i].outline);
+        self.made.get(i).map_or_else(make, |kept| kept.get_or_init(make).clone())
+    }
+}
