@@ -313,3 +313,50 @@ fn labels_that_other_programs_misread_are_written_as_they_are_with_one_warning_e
         self::rows(&home.path().join("out/summary.csv")).iter().map(|row| row["label"].clone()).collect();
     assert_eq!(labels, names);
 }
+
+/// The 1.5:1 ellipse by `n` points.
+fn ellipse(n: usize) -> String {
+    let point = |i: usize| TAU * i as f64 / n as f64;
+    (0..n).map(|i| format!("{:?},{:?}\n", 1.5 * point(i).cos(), point(i).sin())).collect()
+}
+
+#[test]
+fn a_smooth_outline_by_few_points_has_the_time_of_the_curve() {
+    let home = TempDir::new().unwrap();
+    let home = home.path();
+    let run = "run --accurate --backend cpu --curves 1 --amplitude 0 --quiet";
+    let row = |out: &str| rows(&home.join(out).join("summary.csv")).remove(0);
+    let number = |row: &BTreeMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
+    done(home, &format!("{run} --shape ellipse:1.5,1 --points 200 --out truth"));
+    let (truth, row_of_truth) = (number(&row("truth"), "t_limit"), row("truth"));
+    assert_eq!(row_of_truth["t_data_error"], "");
+    for (points, bound) in [(40, 1e-3), (60, 3e-4), (100, 1e-4)] {
+        fs::write(home.join("ellipse.csv"), ellipse(points)).unwrap();
+        let output = curvelax(home, &format!("{run} --shape file:ellipse.csv --out by-points --force"));
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(0) && !said.contains("warning"), "{said}");
+        let own = row("by-points");
+        let error = (number(&own, "t_limit") - truth).abs();
+        assert!(error < bound * truth && error < number(&own, "t_error"), "{points}: {error:e}");
+        assert!(number(&own, "t_data_error") < bound * truth, "{points}: {own:?}");
+        // The control: the polygon is another curve, and says so.
+        done(home, &format!("{run} --shape file:ellipse.csv --interpolate polygon --out straight --force"));
+        let straight = row("straight");
+        assert!((number(&straight, "t_limit") - truth).abs() > bound * truth, "{points}: {straight:?}");
+        assert!(number(&straight, "t_data_error") > bound * truth, "{points}: {straight:?}");
+    }
+}
+
+#[test]
+fn keys_of_outlines_are_refused_where_there_is_none() {
+    let home = home();
+    let home = home.path();
+    for (arguments, parts) in [
+        ("--interpolate spline", &["--interpolate spline: the shape ellipse:2,1 is a formula"][..]),
+        ("--sweep rounding=0.001,0.002", &["--rounding (swept): the shape ellipse:2,1 is a formula"]),
+        ("--shape files:csv/*.csv --rounding 1", &["--rounding 1: not a radius", "0.0001 to 0.02"]),
+        ("--shape files:csv/*.csv --sampling points --rounding 0.002", &["the nodes are the points"]),
+    ] {
+        refused(home, arguments, parts);
+    }
+}

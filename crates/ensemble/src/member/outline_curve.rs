@@ -42,6 +42,8 @@ const KNOTS: f64 = 4.0;
 const STRENGTH: f64 = 4.0;
 /// The same of the step that spreads the area that a round took away: over about twice the radius.
 const SPREAD: f64 = 16.0 * KNOTS * KNOTS * KNOTS * KNOTS;
+/// Samples between two nodes by which the area of the spline is measured.
+const FINE: usize = 8;
 /// Rounds before giving up.
 const MAX_ROUNDS: u32 = 400;
 /// Least samples by which the excess of an outline is measured.
@@ -165,12 +167,19 @@ fn rounded(curve: &BaseCurve, outline: &Arc<Outline>, share: f64) -> (BaseCurve,
         nodes = next;
         rounds += 1;
     }
-    let area_change = polygon::signed_area(&nodes) / sampler.area(&none) - 1.0;
-    if simple || area_change.abs() < super::Mollified::DISTORTED {
-        put_back(area_change, &mut nodes);
+    let through = |nodes: &[DVec2]| {
+        let spline = Spline::new(nodes, &vec![false; nodes.len()]);
+        BaseCurve::from_spline(Arc::clone(outline), spline, simple)
+    };
+    // The spline encloses more than the polygon through its nodes.
+    let curve = through(&nodes);
+    let samples: Vec<DVec2> = curve.subdivision(FINE * knots).map(|(_, point)| point).collect();
+    let area_change = polygon::signed_area(&samples) / sampler.area(&none) - 1.0;
+    if !simple && area_change.abs() >= super::Mollified::DISTORTED {
+        return (curve, area_change);
     }
-    let spline = Spline::new(&nodes, &vec![false; nodes.len()]);
-    (BaseCurve::from_spline(Arc::clone(outline), spline, simple), area_change)
+    put_back(area_change, &mut nodes);
+    (through(&nodes), area_change)
 }
 
 /// The nodes `after` a step, moved along their normals so that the area that the step took away comes back where it did.
@@ -205,5 +214,66 @@ impl OutlineCurves {
     pub(super) fn curve(&self, i: usize) -> OutlineCurve {
         let make = || self.treatment.curve(&self.set.all[i].outline);
         self.made.get(i).map_or_else(make, |kept| kept.get_or_init(make).clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn treatment(text: &str) -> Treatment {
+        Treatment::of(&Spec::from_toml(text).unwrap(), None)
+    }
+
+    /// A five-pointed star.
+    fn star() -> Arc<Outline> {
+        let corner = |j: usize| DVec2::from_angle(PI * j as f64 / 5.0) * if j.is_multiple_of(2) { 1.0 } else { 0.3 };
+        Outline::from_points(&(0..10).map(corner).collect::<Vec<_>>()).unwrap().into()
+    }
+
+    /// Smallest radius of the circles through three of `n` nodes in a row, over the length.
+    fn smallest_radius(curve: &BaseCurve, n: usize) -> f64 {
+        let sampler = Sampler::new(curve.clone(), Sampling::Arclength, n).unwrap();
+        1.0 / (n as f64 * sharpest_turn(&sampler.sample(&RadialFactor::default())))
+    }
+
+    #[test]
+    fn corners_get_the_radius_that_is_asked_for_and_the_outline_keeps_its_area() {
+        for share in [0.002, 0.005, 0.01] {
+            let made = treatment(&format!("rounding = {share}")).curve(&star());
+            let radius = smallest_radius(&made.curve, 8000);
+            assert!(radius > 0.8 * share && radius < 2.0 * share, "{share}: {radius}");
+            let sampler = Sampler::new(made.curve.clone(), Sampling::Arclength, 8000).unwrap();
+            let area = sampler.area(&RadialFactor::default()) / polygon::signed_area(star().vertices());
+            assert!((area - 1.0).abs() < 1e-4, "{share}: {area}");
+            assert!(made.treated.rounded && made.treated.corners == 10 && made.treated.points == 10);
+        }
+        // The control.
+        let sharp = treatment("rounding = 0").curve(&star());
+        assert!(smallest_radius(&sharp.curve, 8000) < 1e-4 && !sharp.treated.rounded);
+    }
+
+    #[test]
+    fn the_excess_before_rounding_is_that_of_the_outline() {
+        let none = RadialFactor::default();
+        let vertices = star().vertices().to_vec();
+        let (length, area) = (polygon::length(&vertices), polygon::signed_area(&vertices));
+        let exact = length * length / (4.0 * PI * area) - 1.0;
+        for share in [0.002, 0.01] {
+            let found = treatment(&format!("rounding = {share}")).curve(&star()).given_excess(&none).unwrap();
+            assert!((found / exact - 1.0).abs() < 1e-9, "{found} {exact}");
+        }
+        assert_eq!(treatment("rounding = 0").curve(&star()).given_excess(&none), None);
+    }
+
+    #[test]
+    fn variations_are_those_of_outlines_that_they_change() {
+        let ring: Vec<DVec2> = (0..40).map(|i| DVec2::from_angle(PI * f64::from(i) / 20.0)).collect();
+        let ring = Outline::from_points(&ring).unwrap();
+        let varied = |text: &str, outline: &Outline| Variation::ALL.map(|of| treatment(text).varies(outline, of));
+        assert_eq!(varied("", &ring), [true, false]);
+        assert_eq!(varied("interpolate = 'polygon'", &ring), [true, true]);
+        assert_eq!(varied("", &star()), [false, true]);
+        assert_eq!(varied("rounding = 0", &star()), [false, false]);
     }
 }

@@ -515,8 +515,14 @@ results    out: summary.csv, run.json
     fn errors_look_like_this() {
         let mut tally = Tally::default();
         for (member, t) in (0..40_u32).map(|member| (u64::from(member), 0.5 + 0.01 * f64::from(member))) {
-            let judged =
-                Limit { t: 1.02 * t, error: 1e-4 * t, order: Some(2.0), asymptotic: member > 0, relative: -0.02 };
+            let judged = Limit {
+                t: 1.02 * t,
+                error: 1e-4 * t,
+                fixed: 0.0,
+                order: Some(2.0),
+                asymptotic: member > 0,
+                relative: -0.02,
+            };
             let judged = (member < 4).then_some(judged);
             tally.add(&Outcome { judged, ..outcome(member, Status::Relaxed, Some(t)) }).unwrap();
         }
@@ -548,7 +554,7 @@ results    out: summary.csv, run.json
             text.lines().find_map(|line| line.strip_prefix("nodes      ").map(String::from))
         };
         let mut add = |member: u64, points: u64, asymptotic: bool| {
-            let judged = Some(Limit { t: 0.5, error: 1e-4, order: None, asymptotic, relative: 0.0 });
+            let judged = Some(Limit { t: 0.5, error: 1e-4, fixed: 0.0, order: None, asymptotic, relative: 0.0 });
             let outcome = outcome(member, Status::Relaxed, Some(0.5));
             tally.add(&Outcome { judged, points, is_finer: points > 100, ..outcome }).unwrap();
             nodes(&tally)

@@ -96,7 +96,7 @@ mod tests {
         let mut tally = Tally::of(&spec, &LevelTimes::default());
         for member in 0..64_u32 {
             let t = 1.0 + spread * (f64::from(member) / 31.5 - 1.0);
-            let limit = Limit { t, error, order: None, asymptotic: true, relative: 0.0 };
+            let limit = Limit { t, error, fixed: 0.0, order: None, asymptotic: true, relative: 0.0 };
             let (t_limit, judged) = (Some(t), Some(limit));
             let ended = Outcome { t_limit, judged, ..outcome(member.into(), Status::Relaxed, Some(t)) };
             tally.add(&ended).unwrap();
