@@ -105,7 +105,7 @@ fn advance(order: u32, begun: Course, moves: bool) -> Advanced {
     course.phase = 0u;
     course.solve_sweeps = 0u;
     if ADAPTIVE && solved { finish_attempt(); }
-    var gaps = vec(0.0);
+    var gaps = LargestGaps();
     var looks = Looks();
     if solved {
         if ADAPTIVE && WATCHED { looks = look_inside(); }

@@ -3,6 +3,8 @@
 
 const LEAST_ORDER = 2u;
 const SHARED_PARTS = 3u;
+/// Weight of an error of the nodes over one of the curvature, both relative.
+const NODE_WEIGHT = 20.0;
 
 /// The steps of the paper that a step of order `order` makes.
 fn parts(order: u32) -> u32 { return order * (order + 1u) / 2u; }
@@ -37,7 +39,7 @@ fn shares_of(row: u32, left: u32, order: u32) -> Shares {
 /// Prepares the combinations of an attempt: nothing has changed yet.
 fn begin_attempt() {
     for (var field = BEFORE; field < PART; field++) { store_field(field, vec(0.0)); }
-    for (var field = GAPS; field < STATE_FIELDS; field++) { store_field(field, vec(0.0)); }
+    for (var field = GAPS; field < select(NODE_GAPS, STATE_FIELDS, GEOMETRIC); field++) { store_field(field, vec(0.0)); }
 }
 
 /// The row to which a part belongs, and the parts of the row after it.
@@ -80,6 +82,11 @@ fn add_part(left: u32, shares: Shares) {
     store_field(GAPS + 1u, load_field(GAPS + 1u) + shares.gap * change_r);
     store_field(GAPS + 2u, load_field(GAPS + 2u) + shares.lower_gap * change_k);
     store_field(GAPS + 3u, load_field(GAPS + 3u) + shares.lower_gap * change_r);
+    if !GEOMETRIC { return; }
+    store_field(NODE_GAPS, load_field(NODE_GAPS) + shares.gap * change_x);
+    store_field(NODE_GAPS + 1u, load_field(NODE_GAPS + 1u) + shares.gap * change_y);
+    store_field(NODE_GAPS + 2u, load_field(NODE_GAPS + 2u) + shares.lower_gap * change_x);
+    store_field(NODE_GAPS + 3u, load_field(NODE_GAPS + 3u) + shares.lower_gap * change_y);
 }
 
 fn add_share(base: u32, share: real, change_x: vec, change_y: vec, change_k: vec, change_r: vec) {
@@ -101,22 +108,34 @@ fn finish_attempt() {
     new_r = advanced(load_field(CURVE + 3u), load_field(BEFORE + 3u));
 }
 
-/// The largest differences between orders, of k and r, of the order of the attempt and of the one below.
-fn gaps_of_attempt() -> vec {
+/// The largest differences between orders, of k and r, of the order of the attempt and of the one below; of x and y, of
+/// both orders.
+struct LargestGaps { fields: vec, nodes: vec }
+
+fn gaps_of_attempt() -> LargestGaps {
     let ir = vec(1.0) / new_r;
-    return ring_maxima(vec(
+    let fields = ring_maxima(vec(
         block_max(bounded_abs(load_field(GAPS))), block_max(bounded_abs(load_field(GAPS + 1u) * ir)),
         block_max(bounded_abs(load_field(GAPS + 2u))), block_max(bounded_abs(load_field(GAPS + 3u) * ir)),
     ));
+    if !GEOMETRIC { return LargestGaps(fields, vec(0.0)); }
+    settle();
+    let own = max(bounded_abs(load_field(NODE_GAPS)), bounded_abs(load_field(NODE_GAPS + 1u)));
+    let lower = max(bounded_abs(load_field(NODE_GAPS + 2u)), bounded_abs(load_field(NODE_GAPS + 3u)));
+    return LargestGaps(fields, ring_maxima(vec(block_max(own), block_max(lower), 0.0, 0.0)));
 }
 
 /// The errors of order J-1 and J-2, of the new curve, which is observed.
-fn errors_of_attempt(m: vec) -> vec2<real> {
+fn errors_of_attempt(largest: LargestGaps) -> vec2<real> {
+    let m = largest.fields;
     let size = max(others.x, others.y);
     let spread = min(others.x + others.y, size);
     let scale = select(sqrt(size * spread), size, all_reports[member].report.now.excess <= all_parameters[member].follow_to);
     let relative = bounded_abs(m / scale);
-    return vec2(max(relative.x, m.y), max(relative.z, m.w));
+    let errors = vec2(max(relative.x, m.y), max(relative.z, m.w));
+    if !GEOMETRIC { return errors; }
+    let unit = sums.x * (scale / size) * real(HALF_OVER_PI / NODE_WEIGHT);
+    return max(errors, bounded_abs(largest.nodes / unit).xy);
 }
 
 /// Makes what an accepted attempt has combined the state of the member.

@@ -41,6 +41,31 @@ fn velocity(k: vec, wk: Window) -> vec {
     return b(k) - (rise.plus1 * here(iq) - rise.here * minus1(iq)) * here(ir);
 }
 
+/// The curvature at the node between two edges: `2 sin(θ/2)` of the angle θ there over half the length of both.
+fn bent(before: Edge, after: Edge) -> vec {
+    return vertex_turn(before, after) / (real(0.5) * (before.length + after.length));
+}
+
+struct Force { x: vec, y: vec }
+
+/// `q (βN + αT)` at the nodes of the old polygon: the second difference of its own curvature and b along the inward
+/// normal to the chord between the neighbours, and alpha along the chord.
+fn of_polygon(wx: Window, wy: Window) -> Force {
+    let x = rises(wx);
+    let y = rises(wy);
+    let e = edge(x.here, y.here);
+    let f = edge(x.plus1, y.plus1);
+    let own = bent(e, f);
+    let rise = own - bent(edge(x.minus1, y.minus1), e);
+    let next = bent(f, edge(x.plus2, y.plus2)) - own;
+    let along_x = e.x + f.x;
+    let along_y = e.y + f.y;
+    let inward = real(0.5) * (e.length + f.length) * b(own) - (next / f.length - rise / e.length);
+    let across = inward / sqrt(along_x * along_x + along_y * along_y);
+    let sliding = real(0.5) * alpha;
+    return Force(sliding * along_x - across * along_y, sliding * along_y + across * along_x);
+}
+
 /// The energy of a unit of length.
 fn energy_density(k: vec) -> vec {
     return real(0.5) * (k * k) + vec(all_parameters[member].law[LENGTH_PENALTY]);

@@ -8,6 +8,7 @@ struct Parameters {
     omega: real,
     redistribution: real,
     pull: real,
+    geometric: real,
     tolerance: real,
     sor: real,
     polygon_ratio: real,

@@ -27,6 +27,12 @@ fn position_equation() {
     normalise(row_a, row_b, row_c, row_d, row_e, tau * iqh);
     settle();
     let old = windows(load_field(curve), load_field(curve + 1u));
+    if GEOMETRIC {
+        let force = of_polygon(old.a, old.b);
+        rhs_x = force.x * inverse;
+        rhs_y = force.y * inverse;
+        return;
+    }
     rhs_x = residual_of_old(row_a, row_b, row_d, row_e, old.a) * inverse;
     rhs_y = residual_of_old(row_a, row_b, row_d, row_e, old.b) * inverse;
 }

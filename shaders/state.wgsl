@@ -1,7 +1,7 @@
 // The state of a member: its fields, loaded and stored. Twin of crates/flow/src/scheme/state.rs.
 // Increments are added to a curve, and changes of one formed, only here.
 
-const STATE_FIELDS = 38u;
+const STATE_FIELDS = 42u;
 /// Offsets of the curves in a state, four fields each: x, y, k, r. The increments of k, x and y follow the first one,
 /// and then what sweeps remember next to them.
 const CURVE = 0u;
@@ -17,8 +17,9 @@ const SLOPE_BEFORE = 22u;
 const BEND_BEFORE = 26u;
 /// During an attempt: the curve at the end of the last part.
 const PART = 30u;
-/// During an attempt: its errors, of k and r, of its order and of the one below.
+/// During an attempt: its errors, of k and r, of its order and of the one below; then those of x and y.
 const GAPS = 34u;
+const NODE_GAPS = 38u;
 
 /// Entries of a curve after an increment.
 fn advanced(old: vec, increment: vec) -> vec {

@@ -3,7 +3,10 @@
 use super::{flags, note, print};
 use crate::{
     curve::{Modes, Perturbation, Shape},
-    ensemble::{Drawn, Spec},
+    ensemble::{
+        Drawn, Spec,
+        request::spec::{Form, Pull},
+    },
     error::{Error, Result},
     files::{
         OutputFolder, names,
@@ -57,6 +60,12 @@ pub struct RefereeFlags {
     /// Excess at which it is, instead [default: off]
     #[arg(long, value_name = "EXCESS", value_parser = flags::real, requires = "referee", help_heading = REFEREE)]
     relax_at: Option<f64>,
+    /// What moves the nodes, as for `curvelax run` [default: as with --accurate]
+    #[arg(long, value_name = "FORM", value_parser = flags::word::<Form>(flags::FORMS), requires = "referee", help_heading = REFEREE)]
+    form: Option<Form>,
+    /// Rate κ of the metric pull, as for `curvelax run` [default: auto]
+    #[arg(long, value_name = "KAPPA", value_parser = flags::text_of::<Pull>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
+    pull: Option<Pull>,
 }
 
 const REFEREE: &str = "Referee";
@@ -91,6 +100,8 @@ impl RefereeFlags {
             ..method
         };
         spec.make_accurate(&[]);
+        spec.form = self.form.unwrap_or(spec.form);
+        spec.pull = self.pull.unwrap_or(spec.pull);
         spec
     }
 }

@@ -251,7 +251,7 @@ fn a_wrong_cell_of_a_table_of_outlines_is_named_by_row_and_column() {
 fn an_overlong_value_is_echoed_by_its_beginning() {
     let long = "a".repeat(10_000);
     let of = |template: &str| template.replace("LONG", &long);
-    let flags = "curves points seed shape outlines sampling amplitude modes decay perturbation design sweep flow mobility \
+    let flags = "curves points seed shape outlines sampling amplitude modes decay perturbation design sweep flow mobility form \
                  units tau adaptive t-end omega pull solver order tolerance sor max-sweeps backend precision relax-to \
                  relax-at only shard accuracy event series snapshots store";
     let mut all: Vec<Vec<String>> =

@@ -323,6 +323,8 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("BEND_BEFORE", (NEEDED_FIELDS + 2 * CURVE_FIELDS) as f64),
         ("PART", LASTING_FIELDS as f64),
         ("GAPS", (LASTING_FIELDS + CURVE_FIELDS) as f64),
+        ("NODE_GAPS", (LASTING_FIELDS + 2 * CURVE_FIELDS) as f64),
+        ("NODE_WEIGHT", extrapolation::NODE_WEIGHT),
         ("LEAST_ORDER", f64::from(extrapolation::LEAST_ORDER)),
         ("SHARED_PARTS", f64::from(extrapolation::SHARED_PARTS)),
         ("AFTER_FAILURE", pace::AFTER_FAILURE),

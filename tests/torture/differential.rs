@@ -39,6 +39,7 @@ const KEYS: [(&str, &[&str]); 20] = [
     ("omega", &["0", "1", "5"]),
     ("no-redistribution", &["true", "false"]),
     ("pull", &["0", "auto", "3"]),
+    ("form", &["paper", "geometric", "auto"]),
     ("solver", &["gauss-seidel", "direct"]),
     ("order", &["coloured", "lexicographic"]),
     ("tolerance", &["1e-3", "1e-5"]),

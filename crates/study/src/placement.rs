@@ -465,7 +465,8 @@ fn open_gpu<T: Vectorised>(
     let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
     let adaptive = spec.adaptive.is_some();
     let watched = !spec.event.is_empty();
-    let variant = Variant { adaptive, watched, ..gpu.capacity().variant(blocks, spec.solver()) };
+    let geometric = spec.is_geometric();
+    let variant = Variant { adaptive, watched, geometric, ..gpu.capacity().variant(blocks, spec.solver()) };
     // The self-test has its own cap: with the run's, a solve may end before it converges, and then roundings decide.
     let tested = Method { max_sweeps: MAX_SWEEPS, ..*method };
     let then =
@@ -474,7 +475,7 @@ fn open_gpu<T: Vectorised>(
     gpu.compile::<T>(blocks, variant, limit, &waits, watch.go_on)?;
     let mut kernel = Kernel::<T>::new(gpu, blocks, members, tested.max_sweeps, variant)?;
     let device = format!("{} ({})", gpu.name(), gpu.driver());
-    self_test::<T>(&mut kernel, &device, gpu.is_hardware(), &tested, blocks.n, adaptive)?;
+    self_test::<T>(&mut kernel, &device, gpu.is_hardware(), &tested, blocks.n, adaptive, geometric)?;
     Ok(Box::new(kernel.with_caps(method.max_sweeps, method.most_order)))
 }
 

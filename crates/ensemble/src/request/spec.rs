@@ -103,6 +103,26 @@ impl<'de> Deserialize<'de> for SolverChoice {
     }
 }
 
+/// What moves the nodes: the right-hand side of the position equation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Form {
+    /// The scheme's own curvatures and lengths, as in the paper.
+    #[default]
+    Paper,
+    /// The force of the polygon itself; curvatures and lengths only make the matrix.
+    Geometric,
+    /// The one that is right for every curve: the paper's.
+    Auto,
+}
+
+impl Form {
+    /// Whether it is the default.
+    fn is_default(&self) -> bool {
+        *self == Form::default()
+    }
+}
+
 /// The fixed time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tau {
@@ -238,6 +258,9 @@ pub struct Spec {
     pub no_redistribution: bool,
     /// κ of the metric pull.
     pub pull: Pull,
+    /// What moves the nodes.
+    #[serde(skip_serializing_if = "Form::is_default")]
+    pub form: Form,
     /// Solver of the pentadiagonal systems.
     pub solver: SolverChoice,
     /// Order in which a sweep visits the nodes.
@@ -374,6 +397,7 @@ impl Default for Spec {
             omega: None,
             no_redistribution: false,
             pull: Pull::Rate(0.0),
+            form: Form::default(),
             solver: SolverChoice::Auto,
             order: Order::Coloured,
             tolerance: None,
@@ -624,6 +648,12 @@ impl Spec {
             (SolverChoice::Auto, Pace::Fixed(_)) => Solver::GaussSeidel,
             (SolverChoice::Auto, Pace::Adaptive(_)) => Solver::Direct,
         }
+    }
+
+    /// Whether the force of the polygon moves the nodes. `auto` is the paper's form: the other one fails where nodes do not
+    /// resolve the curve, and intervals of limits were calibrated with this one.
+    pub fn is_geometric(&self) -> bool {
+        self.form == Form::Geometric
     }
 
     /// The excess at which a member that starts with `excess` counts as relaxed.
@@ -966,9 +996,11 @@ mod tests {
             "refine",
             "accuracy",
         ];
-        let optional =
-            [&optional[..], &["perturbation", "design", "only", "shard", "threads", "common-random-numbers", "sweep"]]
-                .concat();
+        let optional = [
+            &optional[..],
+            &["perturbation", "design", "form", "only", "shard", "threads", "common-random-numbers", "sweep"],
+        ]
+        .concat();
         for key in &optional {
             assert!(keys.iter().any(|known| known == key), "{key}");
         }

@@ -70,11 +70,13 @@ pub struct Cohort {
     pub(super) solver: Solver,
     order: Order,
     pub(super) adaptive: bool,
+    geometric: bool,
 }
 
 impl Cohort {
     pub(super) fn of(spec: &Spec) -> Cohort {
         let Spec { points, order, .. } = *spec;
-        Cohort { points, solver: spec.solver(), order, adaptive: matches!(spec.pace(), Pace::Adaptive(_)) }
+        let (adaptive, geometric) = (matches!(spec.pace(), Pace::Adaptive(_)), spec.is_geometric());
+        Cohort { points, solver: spec.solver(), order, adaptive, geometric }
     }
 }

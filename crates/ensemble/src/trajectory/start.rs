@@ -183,6 +183,7 @@ fn parameters(spec: &Spec, flow: &Flow, nodes: &[DVec2], [unit, time]: [f64; 2],
             Pull::Rate(rate) => rate * time,
             Pull::Auto => (PULL_PER_RATE * rate).min(strongest_pull(rate, nodes.len())),
         },
+        geometric: f64::from(u8::from(spec.is_geometric())),
         tolerance,
         sor: match spec.sor {
             Sor::Factor(factor) => factor,

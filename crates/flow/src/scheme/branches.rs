@@ -17,6 +17,8 @@ pub struct Branches {
     pub redistributed: bool,
     /// k and r are pulled towards the polygon's own.
     pub pulled: bool,
+    /// The nodes are moved by the force of the polygon.
+    pub geometric: bool,
     /// It pauses where an observable reaches a level.
     pub watched: bool,
     /// Degree of `b(k)`.
@@ -32,6 +34,7 @@ impl<T: Real> Parameters<T> {
             adaptive: positive(self.adaptive),
             redistributed: T::of(0.5).le(self.redistribution),
             pulled: positive(self.pull),
+            geometric: T::of(0.5).le(self.geometric),
             watched: T::of(0.5).le(self.watched),
             degree: forces::degree(self),
         }
@@ -51,12 +54,22 @@ mod tests {
             p.branches()
         };
         let paper = branches("surface-diffusion", |_| {});
-        assert_eq!(paper, Branches { adaptive: false, redistributed: true, pulled: false, watched: false, degree: 0 });
+        let none = Branches {
+            adaptive: false,
+            redistributed: true,
+            pulled: false,
+            geometric: false,
+            watched: false,
+            degree: 0,
+        };
+        assert_eq!(paper, none);
         let adaptive = branches("surface-diffusion", |p| p.adaptive = 1e-3);
         assert_eq!(adaptive, Branches { adaptive: true, ..paper });
         let free = branches("surface-diffusion", |p| p.redistribution = 0.0);
         assert_eq!(free, Branches { redistributed: false, ..paper });
         assert_eq!(branches("surface-diffusion", |p| p.pull = 2.0), Branches { pulled: true, ..paper });
+        let geometric = branches("surface-diffusion", |p| p.geometric = 1.0);
+        assert_eq!(geometric, Branches { geometric: true, ..paper });
         assert_eq!(branches("surface-diffusion", |p| p.watched = 1.0), Branches { watched: true, ..paper });
         assert_eq!(branches("poly:0,-1,0,-0.0", |_| {}), Branches { degree: 2, ..paper });
         assert_eq!(branches("willmore", |_| {}), Branches { degree: 3, ..paper });

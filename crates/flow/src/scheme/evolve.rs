@@ -206,10 +206,12 @@ impl<N: Number> Team<N> {
         let (mut errors, mut decline) = ([N::of(0.0); 2], [N::of(0.0); 2]);
         if branches.adaptive {
             extrapolation::finish_attempt(state, &mut work.new);
-            let followed = self.excess.le(parameters.follow_to).not();
-            errors = extrapolation::errors_of_attempt(&state.gaps, &work.new, followed);
         }
         let seen = observe::glance(&state.curve, &work.new, work.blocks);
+        if branches.adaptive {
+            let followed = self.excess.le(parameters.follow_to).not();
+            errors = extrapolation::errors_of_attempt(&state.gaps, &work.new, seen.length, followed, branches);
+        }
         let sizes = [seen.length, seen.area];
         if branches.adaptive {
             let (slope, bend) = (&state.slope_before, &state.bend_before);
@@ -254,7 +256,7 @@ impl<N: Number> Team<N> {
         let mut all = Stepped { sweeps_k: none, sweeps_x: none, solved: live, finite: live };
         let mut ok = live;
         if branches.adaptive {
-            extrapolation::begin_attempt(state);
+            extrapolation::begin_attempt(state, branches);
         }
         for row in 1..=most {
             let busy = ok.and(N::of(f64::from(row)).le(orders));
@@ -276,7 +278,8 @@ impl<N: Number> Team<N> {
                 if branches.adaptive && ok.any() {
                     let left = row - part;
                     if left < SHARED_PARTS {
-                        extrapolation::add_part(state, &work.new, left, &shares.in_lanes(runs, row, left), busy);
+                        let shares = shares.in_lanes(runs, row, left);
+                        extrapolation::add_part(state, &work.new, left, &shares, busy, branches);
                     }
                     std::mem::swap(&mut state.part, &mut work.new);
                 }

@@ -15,11 +15,14 @@
 //! step before: nobody needs that any more.
 
 use super::{
-    Curve, State,
+    Branches, Curve, State,
     run::Run,
-    state::{self, Gaps, change_from},
+    state::{self, CURVE_FIELDS, GAP_FIELDS, Gaps, change_from},
 };
-use crate::number::{BIG, Number, Real};
+use crate::{
+    number::{BIG, Number, Real},
+    solver::Ring,
+};
 
 /// Lowest order of a step.
 pub const LEAST_ORDER: u32 = 2;
@@ -27,6 +30,10 @@ pub const LEAST_ORDER: u32 = 2;
 pub const MOST_ORDER: u32 = 6;
 /// Highest order in f32: weights grow with the order, and with them the rounding of the parts.
 pub const MOST_ORDER_F32: u32 = 4;
+
+/// Weight of an error of the nodes over one of the curvature, both relative. A mode m of the curve has m²-1 times as much of it
+/// in the curvature.
+pub const NODE_WEIGHT: f64 = 20.0;
 
 /// The last parts of a row, which go into the combinations.
 pub const SHARED_PARTS: u32 = 3;
@@ -135,19 +142,31 @@ impl<T: Real> AllShares<T> {
 
 /// Prepares the combinations of an attempt: nothing has changed yet.
 #[inline(always)]
-pub fn begin_attempt<N: Number>(state: &mut State<N>) {
+pub fn begin_attempt<N: Number>(state: &mut State<N>, branches: Branches) {
     let State { before, slope_before, bend_before, gaps, .. } = state;
     let curves = [before, slope_before, bend_before].into_iter().flat_map(Curve::fields_mut);
-    for field in curves.chain(gaps.fields_mut()) {
+    for field in curves.chain(gaps.fields_mut().into_iter().take(gap_fields(branches))) {
         for i in 0..field.len() {
             field[i] = N::of(0.0);
         }
     }
 }
 
+/// The errors that matter: those of x and y only if the polygon leads.
+fn gap_fields(branches: Branches) -> usize {
+    if branches.geometric { GAP_FIELDS } else { CURVE_FIELDS }
+}
+
 /// Adds the curve `new` at the end of a part, `left` parts before the end of its row, in the lanes of `busy`.
 #[inline(always)]
-pub fn add_part<N: Number>(state: &mut State<N>, new: &Curve<N>, left: u32, shares: &Shares<N>, busy: N::Mask) {
+pub fn add_part<N: Number>(
+    state: &mut State<N>,
+    new: &Curve<N>,
+    left: u32,
+    shares: &Shares<N>,
+    busy: N::Mask,
+    branches: Branches,
+) {
     let State { curve, before, slope_before, bend_before, gaps, .. } = state;
     let changes = new.fields().into_iter().zip(curve.fields());
     let sums = before.fields_mut().into_iter().zip(slope_before.fields_mut()).zip(bend_before.fields_mut());
@@ -174,6 +193,16 @@ pub fn add_part<N: Number>(state: &mut State<N>, new: &Curve<N>, left: u32, shar
         gaps.lower_k[i] += shares.lower_gap * change_k;
         gaps.lower_r[i] += shares.lower_gap * change_r;
     }
+    if branches.geometric {
+        let changes = [(&new.x, &curve.x), (&new.y, &curve.y)];
+        for ((new, old), (gap, lower)) in changes.into_iter().zip(gaps.nodes.iter_mut().zip(&mut gaps.lower_nodes)) {
+            for i in 0..new.len() {
+                let change = N::select(busy, change_from(old[i], new[i]), N::of(0.0));
+                gap[i] += shares.gap * change;
+                lower[i] += shares.lower_gap * change;
+            }
+        }
+    }
 }
 
 /// Puts the curve at the end of the step into `new`.
@@ -193,8 +222,16 @@ pub fn finish_attempt<N: Number>(state: &mut State<N>, new: &mut Curve<N>) {
 /// The error in k is relative to the largest |k|. While the shape is followed, i.e. until the excess is negligible, it
 /// is relative to the geometric mean of the largest |k| and the spread of k: a curve close to a circle must not lose its
 /// modes in a tolerance measured by the circle.
+///
+/// In the geometric form the error of the nodes counts, too: relative to the radius and in the same proportion.
 #[inline(always)]
-pub fn errors_of_attempt<N: Number>(gaps: &Gaps<N>, new: &Curve<N>, followed: N::Mask) -> [N; 2] {
+pub fn errors_of_attempt<N: Number>(
+    gaps: &Gaps<N>,
+    new: &Curve<N>,
+    length: N,
+    followed: N::Mask,
+    branches: Branches,
+) -> [N; 2] {
     let low = N::of(-2.0 * BIG);
     let (mut gap_k, mut gap_r, mut lower_k, mut lower_r) = (N::of(0.0), N::of(0.0), N::of(0.0), N::of(0.0));
     let (mut k_max, mut minus_k_min) = (low, low);
@@ -210,7 +247,19 @@ pub fn errors_of_attempt<N: Number>(gaps: &Gaps<N>, new: &Curve<N>, followed: N:
     let size = k_max.max(minus_k_min);
     let spread = (k_max + minus_k_min).min(size);
     let scale = N::select(followed, (size * spread).sqrt(), size);
-    [(gap_k / scale).bounded_abs().max(gap_r), (lower_k / scale).bounded_abs().max(lower_r)]
+    let errors = [(gap_k / scale).bounded_abs().max(gap_r), (lower_k / scale).bounded_abs().max(lower_r)];
+    if !branches.geometric {
+        return errors;
+    }
+    let unit = length * (scale / size) * N::of(0.5 / std::f64::consts::PI / NODE_WEIGHT);
+    let largest = |of: &[Ring<N>; 2]| {
+        let mut largest = N::of(0.0);
+        for i in 0..new.len() {
+            largest = largest.max(of[0][i].bounded_abs().max(of[1][i].bounded_abs()));
+        }
+        (largest / unit).bounded_abs()
+    };
+    [errors[0].max(largest(&gaps.nodes)), errors[1].max(largest(&gaps.lower_nodes))]
 }
 
 #[cfg(test)]

@@ -3,7 +3,10 @@
 //!
 //! Nothing else reads the law of a member: a law of another kind is a change here and in [`Flow`](crate::flow::Flow).
 
-use super::{Curve, Parameters, state::Motion};
+use super::{
+    Curve, Parameters, pull,
+    state::{Motion, edge},
+};
 use crate::{
     flow::{LENGTH_PENALTY, MAX_DEGREE},
     number::{Number, Real},
@@ -73,6 +76,43 @@ pub fn velocity<N: Number>(motion: &Motion<N>, [_, rise, next, _]: [N; 4], i: us
     motion.b[i] - (next * iq - rise * iqm) * motion.ir[i]
 }
 
+/// Fills the lengths of the polygon's edges and its own curvature at the nodes, `2 sin(θ/2)` of the angle θ there over
+/// half the length of both edges: in the geometric form, what forces the curve.
+#[inline(always)]
+pub fn measure<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
+    for i in 0..old.len() {
+        motion.edge[i] = edge(old, i)[2];
+    }
+    motion.edge.close();
+    for i in 0..old.len() {
+        let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises(i), old.y.rises(i));
+        let [_, _, e, f, _] = motion.edge.window(i);
+        motion.bent[i] = bent([ex, ey, e], [fx, fy, f]);
+    }
+    motion.bent.close();
+}
+
+/// The curvature at the node between two edges `[x, y, length]`.
+#[inline(always)]
+fn bent<N: Number>(before: [N; 3], after: [N; 3]) -> N {
+    pull::vertex_turn(before, after) / (N::of(0.5) * (before[2] + after[2]))
+}
+
+/// `q (βN + αT)` at node i of the polygon that was measured: the second difference of its own curvature and `b` along the
+/// inward normal to the chord between its neighbours, and α along the chord.
+#[inline(always)]
+pub fn of_polygon<N: Number>(old: &Curve<N>, motion: &Motion<N>, law: &Law<N>, i: usize) -> [N; 2] {
+    let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises(i), old.y.rises(i));
+    let [_, _, e, f, _] = motion.edge.window(i);
+    let [_, rise, next, _] = motion.bent.rises(i);
+    let half = N::of(0.5);
+    let along = [ex + fx, ey + fy];
+    let inward = half * (e + f) * law.b(motion.bent[i]) - (next / f - rise / e);
+    let across = inward / (along[0] * along[0] + along[1] * along[1]).sqrt();
+    let sliding = half * motion.alpha[i];
+    [sliding * along[0] - across * along[1], sliding * along[1] + across * along[0]]
+}
+
 impl<N: Number> Parameters<N> {
     /// λ of the energy.
     #[inline(always)]
@@ -84,5 +124,72 @@ impl<N: Number> Parameters<N> {
     #[inline(always)]
     pub fn energy_density(&self, k: N) -> N {
         N::of(0.5) * (k * k) + self.length_penalty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        flow::Flow,
+        scheme::{State, Workspace, step},
+        solver::{Blocks, Solver},
+    };
+    use glam::DVec2;
+    use std::f64::consts::TAU;
+
+    fn wavy(n: usize, amplitude: f64) -> Vec<DVec2> {
+        let node = |i: usize| {
+            let at = TAU * i as f64 / n as f64;
+            DVec2::from_angle(at) * (1.0 + amplitude * (2.0 * at).cos())
+        };
+        (1..=n).map(node).collect()
+    }
+
+    /// The polygon after so many fixed steps in the geometric form, with the lengths on the way.
+    fn stepped(nodes: &[DVec2], flow: &Flow, tau: f64, steps: usize) -> (State<f64>, Vec<f64>) {
+        let p = Parameters { geometric: 1.0, ..Parameters::of_flow(flow, tau) };
+        let mut state = State::from_nodes(nodes);
+        let mut work = Workspace::new(Blocks::new(nodes.len()).unwrap());
+        let mut lengths = Vec::new();
+        for _ in 0..steps {
+            let State { curve, increments, .. } = &mut state;
+            step::step(curve, increments, &p, &step::Method::coloured(Solver::Direct, 1), &mut work);
+            std::mem::swap(curve, &mut work.new);
+            lengths.push((0..nodes.len()).map(|i| edge(curve, i)[2]).sum());
+        }
+        (state, lengths)
+    }
+
+    #[test]
+    fn a_regular_polygon_rests_in_the_geometric_form() {
+        for n in [6, 35, 100] {
+            let start = wavy(n, 0.0);
+            let (state, _) = stepped(&start, &Flow::SurfaceDiffusion, 1e-2, 20);
+            let moved = state.curve.positions().zip(&start).map(|(now, then)| now.distance(*then)).fold(0.0, f64::max);
+            assert!(moved < 1e-10, "{n}: {moved:e}");
+        }
+    }
+
+    #[test]
+    fn the_length_falls_in_every_step_of_the_geometric_form() {
+        let (_, lengths) = stepped(&wavy(60, 0.2), &Flow::SurfaceDiffusion, 1e-3, 100);
+        assert!(lengths.windows(2).all(|pair| pair[1] < pair[0]), "{lengths:?}");
+    }
+
+    #[test]
+    fn a_mode_decays_at_its_rate_with_order_two_in_the_geometric_form() {
+        let error = |n: usize| {
+            let (amplitude, tau, steps) = (1e-4, 1e-5, 1000);
+            let (state, _) = stepped(&wavy(n, amplitude), &Flow::SurfaceDiffusion, tau, steps);
+            let sum: f64 = (1..=n)
+                .zip(state.curve.positions())
+                .map(|(i, node)| node.length() * (2.0 * TAU * i as f64 / n as f64).cos())
+                .sum();
+            let rate = (amplitude / (2.0 * sum / n as f64)).ln() / (tau * steps as f64);
+            rate / 12.0 - 1.0
+        };
+        let order = (error(20) / error(40)).log2();
+        assert!((1.8..2.2).contains(&order), "{order}: {:e} {:e}", error(20), error(40));
     }
 }

@@ -77,6 +77,8 @@ numbers! {
         redistribution,
         /// κ of the metric pull, in 1/time.
         pull,
+        /// 1 if the force of the polygon moves the nodes, 0 for the paper's position equation.
+        geometric,
         /// Tolerance of the sweeps.
         tolerance,
         /// Over-relaxation factor of the sweeps; 0 to choose it by the stiffness of each system.

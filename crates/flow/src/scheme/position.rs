@@ -5,7 +5,11 @@
 //! decay rates that do not converge (`docs/method.md`). `𝓒 = q_i/τ - (𝓐+𝓑+𝓓+𝓔)`, so the residual of the old
 //! state is `-Σ_j off_ij (x_j - x_i)`.
 
-use super::{Branches, Curve, Parameters, forces::Law, state::Motion};
+use super::{
+    Branches, Curve, Parameters,
+    forces::{self, Law},
+    state::Motion,
+};
 use crate::{
     number::Number,
     solver::{Equation, Equations},
@@ -17,6 +21,7 @@ pub struct Position<'a, N> {
     pub(super) new: &'a Curve<N>,
     pub(super) motion: &'a Motion<N>,
     pub(super) law: Law<N>,
+    geometric: bool,
     tau: N,
     /// 1/τ.
     pub(super) rate: N,
@@ -32,7 +37,8 @@ impl<'a, N: Number> Position<'a, N> {
         p: &Parameters<N>,
         branches: Branches,
     ) -> Self {
-        Position { old, new, motion, law: p.law(branches.degree), tau: p.tau, rate: p.tau.recip() }
+        let (law, geometric) = (p.law(branches.degree), branches.geometric);
+        Position { old, new, motion, law, geometric, tau: p.tau, rate: p.tau.recip() }
     }
 }
 
@@ -56,7 +62,10 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
         let d = (phi * irp - drift) - (middle + high + e);
         let c = q * self.rate - (a + b + d + e);
         let off = [a, b, d, e];
-        let rhs = [residual_of_old(off, self.old.x.offsets(i)), residual_of_old(off, self.old.y.offsets(i))];
+        let rhs = match self.geometric {
+            true => forces::of_polygon(self.old, self.motion, &self.law, i),
+            false => [residual_of_old(off, self.old.x.offsets(i)), residual_of_old(off, self.old.y.offsets(i))],
+        };
         Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }
     }
 }

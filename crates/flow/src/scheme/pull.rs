@@ -13,7 +13,7 @@ use crate::number::Number;
 
 /// Twice the sine of half the angle from edge `[x, y, length]` to the next one: the gap between the unit tangents.
 #[inline(always)]
-fn vertex_turn<N: Number>([ex, ey, e]: [N; 3], [fx, fy, f]: [N; 3]) -> N {
+pub fn vertex_turn<N: Number>([ex, ey, e]: [N; 3], [fx, fy, f]: [N; 3]) -> N {
     ((ex * fy - ey * fx) / (e * f + (ex * fx + ey * fy))).twice_sin_atan()
 }
 

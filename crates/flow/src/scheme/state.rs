@@ -11,10 +11,12 @@ use crate::{
 
 /// Fields of a curve.
 pub const CURVE_FIELDS: usize = 4;
+/// Fields of the errors of an attempt.
+pub const GAP_FIELDS: usize = 8;
 /// Fields of the increments of a state, and of the earlier ones.
 pub const INCREMENT_FIELDS: usize = 6;
 /// Fields of a state, in the order of [`State::fields`].
-pub const STATE_FIELDS: usize = 8 * CURVE_FIELDS + INCREMENT_FIELDS;
+pub const STATE_FIELDS: usize = 9 * CURVE_FIELDS + INCREMENT_FIELDS;
 /// Fields of a state that the next step reads, which come first: the curve, the increments and the earlier ones, and
 /// how the curve moves.
 pub const NEEDED_FIELDS: usize = 3 * CURVE_FIELDS + INCREMENT_FIELDS;
@@ -45,7 +47,7 @@ pub struct Increments<N> {
     pub y: Ring<N>,
 }
 
-/// The errors of an adaptive attempt so far, as changes of k and of r.
+/// The errors of an adaptive attempt so far, as changes of k and r; of the geometric form, of x and y, too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gaps<N> {
     /// Of order J-1, in k.
@@ -56,6 +58,10 @@ pub struct Gaps<N> {
     pub lower_k: Ring<N>,
     /// Of order J-2, in r.
     pub lower_r: Ring<N>,
+    /// Of order J-1, in x and y.
+    pub nodes: [Ring<N>; 2],
+    /// Of order J-2, in x and y.
+    pub lower_nodes: [Ring<N>; 2],
 }
 
 /// A curve in progress: the state of a member between two steps.
@@ -169,17 +175,20 @@ impl<N: Number> Gaps<N> {
     /// Creates errors of zero.
     pub fn zeros(n: usize) -> Gaps<N> {
         let ring = || Ring::zeros(n);
-        Gaps { k: ring(), r: ring(), lower_k: ring(), lower_r: ring() }
+        let nodes = || [ring(), ring()];
+        Gaps { k: ring(), r: ring(), lower_k: ring(), lower_r: ring(), nodes: nodes(), lower_nodes: nodes() }
     }
 
     /// Returns the fields in the order in which the device stores them.
-    pub fn fields(&self) -> [&Ring<N>; CURVE_FIELDS] {
-        [&self.k, &self.r, &self.lower_k, &self.lower_r]
+    pub fn fields(&self) -> [&Ring<N>; GAP_FIELDS] {
+        let Gaps { k, r, lower_k, lower_r, nodes: [x, y], lower_nodes: [lower_x, lower_y] } = self;
+        [k, r, lower_k, lower_r, x, y, lower_x, lower_y]
     }
 
     /// Returns the fields in the same order, mutably.
-    pub fn fields_mut(&mut self) -> [&mut Ring<N>; CURVE_FIELDS] {
-        [&mut self.k, &mut self.r, &mut self.lower_k, &mut self.lower_r]
+    pub fn fields_mut(&mut self) -> [&mut Ring<N>; GAP_FIELDS] {
+        let Gaps { k, r, lower_k, lower_r, nodes: [x, y], lower_nodes: [lower_x, lower_y] } = self;
+        [k, r, lower_k, lower_r, x, y, lower_x, lower_y]
     }
 }
 
@@ -278,6 +287,10 @@ pub struct Motion<N> {
     pub ir: Ring<N>,
     /// 1/q.
     pub iq: Ring<N>,
+    /// Lengths of the old polygon's edges, of the geometric form.
+    pub edge: Ring<N>,
+    /// The old polygon's own curvature at its nodes, of the geometric form.
+    pub bent: Ring<N>,
 }
 
 /// Intermediate results of a step from the old curve to the new one.
@@ -310,7 +323,7 @@ impl<N: Number> Workspace<N> {
 
     /// Returns the numbers that it holds per node.
     pub const fn numbers<S: Solves>() -> usize {
-        10 + S::FACTS.numbers_per_node
+        12 + S::FACTS.numbers_per_node
     }
 
     fn with(blocks: Blocks, curvature: Memory<N, 1>, position: Memory<N, 2>) -> Workspace<N> {
@@ -319,7 +332,16 @@ impl<N: Number> Workspace<N> {
         let nodes = || vec![N::default(); n];
         Workspace {
             blocks,
-            motion: Motion { b: ring(), beta: nodes(), rkb: nodes(), alpha: ring(), ir: ring(), iq: ring() },
+            motion: Motion {
+                b: ring(),
+                beta: nodes(),
+                rkb: nodes(),
+                alpha: ring(),
+                ir: ring(),
+                iq: ring(),
+                edge: ring(),
+                bent: ring(),
+            },
             new: Curve::zeros(n),
             curvature,
             position,

@@ -1,7 +1,7 @@
 //! One step of the paper's scheme, from an old curve to the new one in the workspace. Twin of `shaders/step.wgsl`.
 
 use super::{
-    Branches, Curve, Increments, Parameters, Workspace, curvature::Curvature, extrapolation::MOST_ORDER,
+    Branches, Curve, Increments, Parameters, Workspace, curvature::Curvature, extrapolation::MOST_ORDER, forces,
     position::Position, pull, redistribution, state,
 };
 use crate::{
@@ -122,6 +122,9 @@ pub fn step_by<N: Number, S: Solves>(
     let for_k = S::solve(&equations, [&mut increments.k], curvature, *blocks, &control, live);
     state::advance(&old.k, &increments.k, &mut new.k);
 
+    if branches.geometric {
+        forces::measure(old, motion);
+    }
     let equations = Position::new(old, new, motion, p, branches);
     if *traced {
         position.system.assemble(&equations);

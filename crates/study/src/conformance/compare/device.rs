@@ -36,7 +36,8 @@ pub fn on_gpu<T: Evolves>(
 ) -> Result<Vec<Left>> {
     let adaptive = launches.iter().any(|launch| launch.parameters.adaptive > 0.0);
     let watched = launches.iter().any(|launch| launch.parameters.branches().watched);
-    let variant = Variant { adaptive, watched, ..adapter.capacity().variant(blocks(n)?, solver) };
+    let geometric = launches.iter().any(|launch| launch.parameters.branches().geometric);
+    let variant = Variant { adaptive, watched, geometric, ..adapter.capacity().variant(blocks(n)?, solver) };
     on_gpu_by::<T>(adapter, variant, n, launches, budget)
 }
 
