@@ -253,7 +253,7 @@ fn an_accuracy_is_asked_of_each_outline() {
         rows.iter().map(|row| number(row, "t_error") / number(row, "t_limit")).collect()
     };
     done(home, &format!("{shape} --out before"));
-    let (before, goal) = (errors("before"), 0.003);
+    let (before, goal) = (errors("before"), 5e-5);
     assert!(before.iter().any(|error| *error > goal), "{before:?}");
     done(home, &format!("{shape} --accuracy {goal} --out reached"));
     let reached = errors("reached");

@@ -2,7 +2,7 @@
 
 use crate::common::polygons::{self, CORNERS, Family};
 use curvelax::{
-    curve::{Shape, crossing, polygon},
+    curve::{Interpolation, Shape, crossing, polygon},
     ensemble::{Family as Ensemble, Member, Mollified, Spec, member::mollifier::MAX_VERTEX_TURN},
 };
 use glam::DVec2;
@@ -36,7 +36,10 @@ fn nodes(outline: &[DVec2], n: usize) -> (Vec<DVec2>, Mollified) {
 }
 
 fn member(shape: Shape, points: usize, amplitude: f64, index: u64) -> Member {
-    Ensemble::new(&Spec { shape: shape.into(), points, amplitude: amplitude.into(), ..Spec::default() })
+    // What is rounded for the nodes alone.
+    let (interpolate, rounding) = (Some(Interpolation::Polygon), Some(0.0));
+    let (shape, amplitude) = (shape.into(), amplitude.into());
+    Ensemble::new(&Spec { shape, interpolate, rounding, points, amplitude, ..Spec::default() })
         .unwrap()
         .member(index)
         .unwrap()
