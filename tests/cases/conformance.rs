@@ -15,8 +15,8 @@ use curvelax::{
     backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
         ConformanceRow, Tamper, adaptive_members,
-        compare::{Left, adaptive, events, on_gpu, on_gpu_by, runs, stages},
-        members,
+        compare::{Left, MAX_SWEEPS, MEMBERS, adaptive, events, on_gpu, on_gpu_by, runs, stages},
+        members, self_test,
     },
     ensemble::{Cell, Ended, Family, Sink, Spec, Status, request::spec::Precision},
     placement::MAX_POINTS_F32,
@@ -113,6 +113,9 @@ fn cases<T: Evolves>(index: usize, trials: &mut Vec<Trial>) {
             add(format!("the curve agrees after adaptive steps, n = {n}"), adaptive_agree::<T>, n);
         }
         for n in sizes(&ADAPTIVE_SIZES, &[101]) {
+            add(format!("the curve agrees in the geometric form, n = {n}"), geometric_agrees::<T>, n);
+        }
+        for n in sizes(&ADAPTIVE_SIZES, &[101]) {
             add(format!("events are at the same times, n = {n}"), events_agree::<T>, n);
         }
         add("a moved node fails the comparison of events".into(), a_moved_node_fails_events::<T>, 101);
@@ -169,6 +172,23 @@ fn line(row: &ConformanceRow) -> String {
         "{precision} {solver:?} n={n} steps={steps} {quantity}: error {error:.2e}, bound {bound:.2e} ({share:.3}), scale \
          {scale:.2e}, member {member}, node {node}"
     )
+}
+
+/// After fixed and adaptive steps, by the bounds of the paper's form; which is another one.
+fn geometric_agrees<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    let blocks = Blocks::new(n).ok_or("n")?;
+    let method = Method::coloured(solver, MAX_SWEEPS);
+    for adaptive in [false, true] {
+        let variant = Variant { adaptive, geometric: true, ..gpu.capacity().variant(blocks, solver) };
+        let mut kernel = Kernel::<T>::new(gpu, blocks, MEMBERS, MAX_SWEEPS, variant)?;
+        let mut test =
+            |geometric| self_test::<T>(&mut kernel, gpu.name(), gpu.is_hardware(), &method, n, adaptive, geometric);
+        test(true)?;
+        if test(false).is_ok() {
+            return Err("the geometric kernel passes for the paper's".into());
+        }
+    }
+    Ok(())
 }
 
 fn stages_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {

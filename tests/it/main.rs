@@ -20,6 +20,7 @@ mod figures;
 mod files;
 mod finer;
 mod folder;
+mod form;
 mod interrupted;
 mod invariants;
 mod modules_depend_downward;
