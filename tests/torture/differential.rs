@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Every key that can be swept, with values for it. Values that contain commas are why `;` separates them.
-const KEYS: [(&str, &[&str]); 20] = [
+const KEYS: [(&str, &[&str]); 21] = [
     ("points", &["13", "16", "24", "37"]),
     ("seed", &["1", "2", "77"]),
     (
