@@ -1,10 +1,5 @@
 // The turn of the polygon, and the pull of k and r towards it. Twin of crates/flow/src/scheme/pull.rs.
 
-/// Twice the sine of half the angle from an edge to the next one.
-fn vertex_turn(e: Edge, f: Edge) -> vec {
-    return twice_sin_atan((e.x * f.y - e.y * f.x) / (e.length * f.length + (e.x * f.x + e.y * f.y)));
-}
-
 /// The turn of the polygon at both ends of a segment together, the length over which it turns, and the segment's own.
 struct Turn { angle: vec, span: vec, edge: vec }
 

@@ -59,3 +59,8 @@ struct Edge { x: vec, y: vec, length: vec }
 fn edge(x: vec, y: vec) -> Edge {
     return Edge(x, y, sqrt(x * x + y * y));
 }
+
+/// Twice the sine of half the angle from an edge to the next one.
+fn vertex_turn(e: Edge, f: Edge) -> vec {
+    return twice_sin_atan((e.x * f.y - e.y * f.x) / (e.length * f.length + (e.x * f.x + e.y * f.y)));
+}

@@ -13,7 +13,7 @@ use crate::{
     ensemble::{
         Drawn, Event, Shard, Spec,
         request::spec::{
-            BackendChoice, FinalTime, Form, Omega, Order, Precision, Pull, SolverChoice, Sor, Store, Tau, Units,
+            BackendChoice, FinalTime, Omega, Order, PositionForm, Precision, Pull, SolverChoice, Sor, Store, Tau, Units,
         },
         request::sweep::{self, SweepAxis},
     },
@@ -223,8 +223,8 @@ pub struct SpecFlags {
     pull: Option<Pull>,
     /// What moves the nodes: paper uses the scheme's own curvatures and lengths, geometric the force of the polygon itself.
     /// That halves the error of smooth, well resolved curves, and fails for others; auto is paper [default: paper]
-    #[arg(long, value_name = "FORM", value_parser = word::<Form>(FORMS), help_heading = METHOD)]
-    form: Option<Form>,
+    #[arg(long, value_name = "FORM", value_parser = word::<PositionForm>(FORMS), help_heading = METHOD)]
+    form: Option<PositionForm>,
     /// Solver of the pentadiagonal systems. auto is gauss-seidel with --tau and direct with --adaptive [default: auto]
     #[arg(long, value_name = "SOLVER", value_parser = solver::<SolverChoice>(&SolverChoice::NAMES), help_heading = METHOD)]
     solver: Option<SolverChoice>,
@@ -532,7 +532,7 @@ mod tests {
     fn every_flag_replaces_its_key() {
         let spec = parse(
             "--curves 3 --outlines 4 --group-by kind --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --perturbation gaussian --design lhs --flow willmore --mobility 2 --units um,h \
-             --tau 1e-6 --t-end 1 --omega 0 --no-redistribution --pull 3 --form auto --solver direct --order lexicographic \
+             --tau 1e-6 --t-end 1 --interpolate spline --rounding 0.01 --omega 0 --no-redistribution --pull 3 --form auto --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \
              --refine --accuracy 0.01 --event convex=k_min>=0 --series 0.1 --snapshots 0,1 --store zarr --only 1,2 --shard 0/2 --threads 2 --common-random-numbers \
@@ -587,7 +587,7 @@ mod tests {
         assert_eq!(words::<Solver>(), Solver::NAMES);
         assert_eq!(words::<SolverChoice>(), SolverChoice::NAMES);
         assert_eq!(words::<Perturbation>(), PERTURBATIONS);
-        assert_eq!(words::<Form>(), FORMS);
+        assert_eq!(words::<PositionForm>(), FORMS);
         assert_eq!(words::<Design>(), DESIGNS);
         assert_eq!(words::<Order>(), ORDERS);
         assert_eq!(words::<BackendChoice>(), BACKENDS);

@@ -5,7 +5,7 @@ use crate::{
     curve::{Modes, Perturbation, Shape},
     ensemble::{
         Drawn, Spec,
-        request::spec::{Form, Pull},
+        request::spec::{PositionForm, Pull},
     },
     error::{Error, Result},
     files::{
@@ -61,8 +61,8 @@ pub struct RefereeFlags {
     #[arg(long, value_name = "EXCESS", value_parser = flags::real, requires = "referee", help_heading = REFEREE)]
     relax_at: Option<f64>,
     /// What moves the nodes, as for `curvelax run` [default: as with --accurate]
-    #[arg(long, value_name = "FORM", value_parser = flags::word::<Form>(flags::FORMS), requires = "referee", help_heading = REFEREE)]
-    form: Option<Form>,
+    #[arg(long, value_name = "FORM", value_parser = flags::word::<PositionForm>(flags::FORMS), requires = "referee", help_heading = REFEREE)]
+    form: Option<PositionForm>,
     /// Rate κ of the metric pull, as for `curvelax run` [default: auto]
     #[arg(long, value_name = "KAPPA", value_parser = flags::text_of::<Pull>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
     pull: Option<Pull>,

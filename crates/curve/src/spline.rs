@@ -33,7 +33,7 @@ const GAUSS: [(f64, f64); 5] = [
 /// A closed curve of cubics through points.
 #[derive(Clone, Debug)]
 pub struct Spline {
-    pieces: Vec<Piece>,
+    pieces: Vec<CubicPiece>,
     /// Length from point 0 to each point, and finally the total length.
     reached: Vec<f64>,
     corners: usize,
@@ -41,13 +41,13 @@ pub struct Spline {
 
 /// A cubic from `start` to `end`; `bends` are the second derivatives at its ends times a sixth of the squared chord.
 #[derive(Clone, Copy, Debug)]
-struct Piece {
+struct CubicPiece {
     start: DVec2,
     end: DVec2,
     bends: [DVec2; 2],
 }
 
-impl Piece {
+impl CubicPiece {
     /// The point at the share `t` of its parameter.
     fn point(&self, t: f64) -> DVec2 {
         let (s, [first, last]) = (1.0 - t, self.bends);
@@ -86,11 +86,11 @@ impl Spline {
         let row = |i: usize| {
             let (before, next) = ((i + n - 1) % n, (i + 1) % n);
             if is_corner[i] {
-                return Row { outer: [0.0; 2], diagonal: 1.0, right: DVec2::ZERO };
+                return SplineRow { outer: [0.0; 2], diagonal: 1.0, right: DVec2::ZERO };
             }
             let [a, c] = [chords[before], chords[i]];
             let mut row =
-                Row { outer: [a, c], diagonal: 2.0 * (a + c), right: 6.0 * (edges[i] / c - edges[before] / a) };
+                SplineRow { outer: [a, c], diagonal: 2.0 * (a + c), right: 6.0 * (edges[i] / c - edges[before] / a) };
             for (outer, end) in row.outer.iter_mut().zip([before, next]) {
                 if is_corner[end] {
                     row.diagonal += std::mem::take(outer);
@@ -108,9 +108,9 @@ impl Spline {
                 [false, false] => [second[i], second[next]],
             };
             let share = chords[i] * (chords[i] / 6.0);
-            Piece { start: points[i], end: points[next], bends: bends.map(|bend| bend * share) }
+            CubicPiece { start: points[i], end: points[next], bends: bends.map(|bend| bend * share) }
         };
-        let pieces: Vec<Piece> = (0..n).map(piece).collect();
+        let pieces: Vec<CubicPiece> = (0..n).map(piece).collect();
         let mut reached = vec![0.0];
         reached.extend(pieces.iter().scan(0.0, |sum, piece| {
             *sum += piece.length();
@@ -154,7 +154,7 @@ impl Spline {
     /// pieces`.
     pub(super) fn subdivision(&self, pieces: usize) -> impl Iterator<Item = (f64, DVec2)> {
         let length = self.length();
-        let along = move |(i, piece): (usize, &Piece)| {
+        let along = move |(i, piece): (usize, &CubicPiece)| {
             let (piece, start, end) = (*piece, self.reached[i], self.reached[i + 1]);
             let parts = ((end - start) / length * pieces as f64).ceil().max(1.0);
             (0..parts as usize).map(move |j| {
@@ -168,7 +168,7 @@ impl Spline {
 
 /// An equation `outer[0]·M_{i-1} + diagonal·M_i + outer[1]·M_{i+1} = right`, with a dominant diagonal.
 #[derive(Clone, Copy)]
-struct Row {
+struct SplineRow {
     outer: [f64; 2],
     diagonal: f64,
     right: DVec2,
@@ -176,7 +176,7 @@ struct Row {
 
 /// Solves a closed ring of at least three equations: elimination of a chain, with the coupling across its ends as a
 /// correction of rank one (Sherman and Morrison).
-fn solve(rows: &[Row]) -> Vec<DVec2> {
+fn solve(rows: &[SplineRow]) -> Vec<DVec2> {
     let n = rows.len();
     let (before_first, after_last) = (rows[0].outer[0], rows[n - 1].outer[1]);
     let shift = -rows[0].diagonal;
@@ -232,8 +232,8 @@ mod tests {
 
     #[test]
     fn the_equations_are_solved_whatever_the_ring() {
-        let rows: Vec<Row> = (0..7)
-            .map(|i| Row {
+        let rows: Vec<SplineRow> = (0..7)
+            .map(|i| SplineRow {
                 outer: [0.3 + 0.1 * f64::from(i), 1.0 - 0.1 * f64::from(i)],
                 diagonal: 2.7 + 0.2 * f64::from(i),
                 right: DVec2::new(f64::from(i), 1.0 - f64::from(i * i)),
@@ -274,7 +274,7 @@ mod tests {
             assert_eq!(piece.start, *point);
             assert!(piece.point(1.0).distance(next.start) < 1e-15);
             let [before, after] = [piece.velocity(1.0), next.velocity(0.0)];
-            let chord = |p: &Piece| p.start.distance(p.end);
+            let chord = |p: &CubicPiece| p.start.distance(p.end);
             assert!((before / chord(&piece)).distance(after / chord(&next)) < 1e-13, "{i}");
             assert!(spline.point(spline.reached[i] / spline.length()).distance(*point) < 1e-13, "{i}");
         }

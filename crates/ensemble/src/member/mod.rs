@@ -9,8 +9,8 @@ pub mod mollifier;
 pub mod outline_curve;
 mod read_outlines;
 
-pub use mollifier::Mollified;
-pub use outline_curve::{Treated, Variation};
+pub use mollifier::{Mollified, Treated};
+pub use outline_curve::Variation;
 pub use read_outlines::Outlines;
 
 use std::{

@@ -21,7 +21,6 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::Treated;
 use curvelax_curve::{crossing, polygon, resample};
 use curvelax_flow::solver::{Ring, Row, System, direct};
 
@@ -31,6 +30,19 @@ pub const MAX_VERTEX_TURN: f64 = 1.5;
 const STRENGTH: f64 = 0.1;
 /// Rounds before giving up. A curve that still turns has no side that n nodes resolve; its status will say so.
 const MAX_ROUNDS: u32 = 100;
+
+/// What was done to an outline, for reports.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Treated {
+    /// Points of the outline; 0 if the curve is not one.
+    pub points: u32,
+    /// Those of them that are corners.
+    pub corners: u32,
+    /// Whether corners were rounded off, and relative change of the area by that, before it was put back.
+    pub rounded: bool,
+    /// See there.
+    pub area_change: f64,
+}
 
 /// How rounding off changed a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -21,7 +21,7 @@ use std::{
 
 use super::{
     OutlineSet,
-    mollifier::{put_back, sharpest_turn, smoothed},
+    mollifier::{Mollified, Treated, put_back, sharpest_turn, smoothed},
 };
 use crate::Spec;
 use glam::DVec2;
@@ -29,12 +29,6 @@ use glam::DVec2;
 use curvelax_curve::{
     BaseCurve, Interpolation, Outline, RadialFactor, Sampler, Sampling, Spline, crossing, polygon, resample,
 };
-
-/// Smallest radius of curvature of a corner, as a share of the length of its outline, if none is given. Nodes resolve it from
-/// about 2/share on, 1000; a run adds up to 1600 by itself.
-pub const DEFAULT_ROUNDING: f64 = 0.002;
-/// Shares that can be asked for: below, nodes by the ten thousand would be needed; above, little would be left of an outline.
-pub const ROUNDINGS: std::ops::RangeInclusive<f64> = 1e-4..=0.02;
 
 /// Nodes on the smallest radius.
 const KNOTS: f64 = 4.0;
@@ -71,19 +65,6 @@ pub(crate) struct Treatment {
     interpolation: Interpolation,
     rounding: f64,
     variation: Option<Variation>,
-}
-
-/// What was done to an outline, for reports.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Treated {
-    /// Points of the outline; 0 if the curve is not one.
-    pub points: u32,
-    /// Those of them that are corners.
-    pub corners: u32,
-    /// Whether corners were rounded off, and relative change of the area by that, before it was put back.
-    pub rounded: bool,
-    /// See there.
-    pub area_change: f64,
 }
 
 /// What an outline has become.
@@ -175,7 +156,7 @@ fn rounded(curve: &BaseCurve, outline: &Arc<Outline>, share: f64) -> (BaseCurve,
     let curve = through(&nodes);
     let samples: Vec<DVec2> = curve.subdivision(FINE * knots).map(|(_, point)| point).collect();
     let area_change = polygon::signed_area(&samples) / sampler.area(&none) - 1.0;
-    if !simple && area_change.abs() >= super::Mollified::DISTORTED {
+    if !simple && area_change.abs() >= Mollified::DISTORTED {
         return (curve, area_change);
     }
     put_back(area_change, &mut nodes);

@@ -2,7 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
-use super::outline_curve::DEFAULT_ROUNDING;
+use crate::request::spec::DEFAULT_ROUNDING;
 use crate::{Drawn, Spec, member::OutlineSet};
 use curvelax_base::{
     error::{Error, Result, echo, shortened},

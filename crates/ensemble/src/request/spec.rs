@@ -11,7 +11,6 @@ use serde::{
 };
 
 use crate::{
-    member::outline_curve::DEFAULT_ROUNDING,
     request::drawn::Drawn,
     request::event::Event,
     request::seed,
@@ -106,7 +105,7 @@ impl<'de> Deserialize<'de> for SolverChoice {
 /// What moves the nodes: the right-hand side of the position equation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Form {
+pub enum PositionForm {
     /// The scheme's own curvatures and lengths, as in the paper.
     #[default]
     Paper,
@@ -116,10 +115,10 @@ pub enum Form {
     Auto,
 }
 
-impl Form {
+impl PositionForm {
     /// Whether it is the default.
     fn is_default(&self) -> bool {
-        *self == Form::default()
+        *self == PositionForm::default()
     }
 }
 
@@ -259,8 +258,8 @@ pub struct Spec {
     /// κ of the metric pull.
     pub pull: Pull,
     /// What moves the nodes.
-    #[serde(skip_serializing_if = "Form::is_default")]
-    pub form: Form,
+    #[serde(skip_serializing_if = "PositionForm::is_default")]
+    pub form: PositionForm,
     /// Solver of the pentadiagonal systems.
     pub solver: SolverChoice,
     /// Order in which a sweep visits the nodes.
@@ -365,6 +364,11 @@ const TIMED: [&str; 4] = ["tau", "t-end", "omega", "pull"];
 pub const DEFAULT_T_END: f64 = 2.0;
 /// The paper's ω.
 pub const DEFAULT_OMEGA: f64 = 1.0;
+/// Smallest radius of curvature of a corner, as a share of the length of its outline, if none is given. Nodes resolve it from
+/// about 2/share on, 1000; a run adds up to 1600 by itself.
+pub const DEFAULT_ROUNDING: f64 = 0.002;
+/// Shares that can be asked for: below, nodes by the ten thousand would be needed; above, little would be left of an outline.
+pub const ROUNDINGS: std::ops::RangeInclusive<f64> = 1e-4..=0.02;
 /// Tolerance of `--adaptive` without a value.
 pub const DEFAULT_ADAPTIVE: f64 = 1e-3;
 /// Fraction of the initial excess at which a member is relaxed.
@@ -397,7 +401,7 @@ impl Default for Spec {
             omega: None,
             no_redistribution: false,
             pull: Pull::Rate(0.0),
-            form: Form::default(),
+            form: PositionForm::default(),
             solver: SolverChoice::Auto,
             order: Order::Coloured,
             tolerance: None,
@@ -653,7 +657,7 @@ impl Spec {
     /// Whether the force of the polygon moves the nodes. `auto` is the paper's form: the other one fails where nodes do not
     /// resolve the curve, and intervals of limits were calibrated with this one.
     pub fn is_geometric(&self) -> bool {
-        self.form == Form::Geometric
+        self.form == PositionForm::Geometric
     }
 
     /// The excess at which a member that starts with `excess` counts as relaxed.

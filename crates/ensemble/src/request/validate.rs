@@ -3,11 +3,10 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that needs
 //! the file of the shape. Only the resolution of the highest mode is checked here.
 
-use crate::member::outline_curve::ROUNDINGS;
 use crate::request::event::{Event, MAX_EVENTS};
 use crate::request::spec::{
     BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, Precision, Pull,
-    Sor, Spec, Store, Tau, final_times,
+    ROUNDINGS, Sor, Spec, Store, Tau, final_times,
 };
 use curvelax_base::{
     error::{Error, Result},

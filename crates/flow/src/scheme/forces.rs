@@ -4,8 +4,8 @@
 //! Nothing else reads the law of a member: a law of another kind is a change here and in [`Flow`](crate::flow::Flow).
 
 use super::{
-    Curve, Parameters, pull,
-    state::{Motion, edge},
+    Curve, Parameters,
+    state::{Motion, edge, vertex_turn},
 };
 use crate::{
     flow::{LENGTH_PENALTY, MAX_DEGREE},
@@ -95,7 +95,7 @@ pub fn measure<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
 /// The curvature at the node between two edges `[x, y, length]`.
 #[inline(always)]
 fn bent<N: Number>(before: [N; 3], after: [N; 3]) -> N {
-    pull::vertex_turn(before, after) / (N::of(0.5) * (before[2] + after[2]))
+    vertex_turn(before, after) / (N::of(0.5) * (before[2] + after[2]))
 }
 
 /// `q (βN + αT)` at node i of the polygon that was measured: the second difference of its own curvature and `b` along the

@@ -8,14 +8,11 @@
 //! and the position equation leaves it at rest. With θ itself, k is larger by θ²/24 and circles grow for ever.
 //! κ = 0 is the paper's scheme.
 
-use super::{Branches, Curve, Parameters, state::edge};
+use super::{
+    Branches, Curve, Parameters,
+    state::{edge, vertex_turn},
+};
 use crate::number::Number;
-
-/// Twice the sine of half the angle from edge `[x, y, length]` to the next one: the gap between the unit tangents.
-#[inline(always)]
-pub fn vertex_turn<N: Number>([ex, ey, e]: [N; 3], [fx, fy, f]: [N; 3]) -> N {
-    ((ex * fy - ey * fx) / (e * f + (ex * fx + ey * fy))).twice_sin_atan()
-}
 
 /// Returns the turn of the polygon at both ends of segment i together, and the length over which it turns.
 #[inline(always)]

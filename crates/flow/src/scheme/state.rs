@@ -377,3 +377,9 @@ pub fn edge<N: Number>(curve: &Curve<N>, i: usize) -> [N; 3] {
     let ([_, dx, ..], [_, dy, ..]) = (curve.x.rises(i), curve.y.rises(i));
     [dx, dy, (dx * dx + dy * dy).sqrt()]
 }
+
+/// Twice the sine of half the angle from edge `[x, y, length]` to the next one: the gap between the unit tangents.
+#[inline(always)]
+pub fn vertex_turn<N: Number>([ex, ey, e]: [N; 3], [fx, fy, f]: [N; 3]) -> N {
+    ((ex * fy - ey * fx) / (e * f + (ex * fx + ey * fy))).twice_sin_atan()
+}

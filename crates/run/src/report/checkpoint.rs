@@ -321,7 +321,7 @@ mod tests {
             ["Aside", "MollifiedMembers", "Moments", "ExactSum", "Ended", "Outcome", "Status", "Observables"],
             ["Rows", "Extent", "SeriesRow", "Snapshot", "Portrait", "Mollified", "DVec2", "Paused"],
             ["Counters", "Report", "Observed", "Progress", "Decay", "StoreMark", "ArrayMark", "Features"],
-            ["Spread", "", "", "", "", "", "", ""],
+            ["Spread", "Treated", "", "", "", "", "", ""],
         ];
         let expected: BTreeSet<&str> = expected.into_iter().flatten().filter(|name| !name.is_empty()).collect();
         assert_eq!(named, expected);
