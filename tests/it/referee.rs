@@ -174,7 +174,11 @@ fn the_referee_solves_for_the_members_of_a_run() {
     let mut spec = spec("ellipse:uniform(1.2..2),1", "willmore", 0.05);
     spec.mobility = Some(2.0);
     let mut rows: Vec<RefereeRow> = Vec::new();
-    limits(&spec, |some| Ok(rows.extend_from_slice(some))).unwrap();
+    limits(&spec, |some| {
+        rows.extend_from_slice(some);
+        Ok(())
+    })
+    .unwrap();
     assert_eq!(rows.iter().map(|row| row.member).collect::<Vec<_>>(), (0..8).collect::<Vec<_>>());
     for (i, row) in rows.iter().enumerate() {
         assert!(row.bars().unwrap().abs() <= 1.0, "{row:?}");

@@ -19,13 +19,13 @@ use std::{
     f64::consts::{FRAC_1_SQRT_2, TAU},
     iter::repeat,
     path::Path,
-    sync::Arc,
+    sync::{Arc, OnceLock},
 };
 
 use glam::DVec2;
 
 use mollifier::mollify;
-use outline_curve::{OutlineCurve, OutlineCurves, Treatment};
+use outline_curve::{OutlineCurve, Treatment};
 
 use crate::{MemberValues, Spec, theory::horizon::CurveScale};
 use curvelax_base::random::Stream;
@@ -140,6 +140,33 @@ impl OutlineSet {
         // The only one is measured with the nodes that it gets.
         let scales = if all.len() > 1 { scales_of(&all)? } else { Arc::default() };
         Ok(OutlineSet { all, scales })
+    }
+}
+
+/// Outlines of which the curves are kept: that of a rough one takes about 100 kB. Those of more are made for each member.
+const KEPT: usize = 256;
+
+/// The curves of the outlines of a set, each made when it is first needed.
+struct OutlineCurves {
+    set: Arc<OutlineSet>,
+    treatment: Treatment,
+    made: Vec<OnceLock<OutlineCurve>>,
+}
+
+impl OutlineCurves {
+    fn new(set: Arc<OutlineSet>, treatment: Treatment) -> OutlineCurves {
+        let kept = if set.all.len() <= KEPT { set.all.len() } else { 0 };
+        OutlineCurves { set, treatment, made: (0..kept).map(|_| OnceLock::new()).collect() }
+    }
+
+    fn treatment(&self) -> &Treatment {
+        &self.treatment
+    }
+
+    /// The curve of outline `i`, which there is.
+    fn curve(&self, i: usize) -> OutlineCurve {
+        let make = || self.treatment.curve(&self.set.all[i].outline);
+        self.made.get(i).map_or_else(make, |kept| kept.get_or_init(make).clone())
     }
 }
 

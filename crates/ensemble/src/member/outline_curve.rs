@@ -14,15 +14,9 @@
 //! times smaller. The length is not given back. A share of the excess at the start, `--relax-to`, is therefore one of the
 //! excess of the outline before its corners are rounded: for a coast that is most of it.
 
-use std::{
-    f64::consts::PI,
-    sync::{Arc, OnceLock},
-};
+use std::{f64::consts::PI, sync::Arc};
 
-use super::{
-    OutlineSet,
-    mollifier::{Mollified, Treated, put_back, sharpest_turn, smoothed},
-};
+use super::mollifier::{Mollified, Treated, put_back, sharpest_turn, smoothed};
 use crate::Spec;
 use glam::DVec2;
 
@@ -42,8 +36,6 @@ const FINE: usize = 8;
 const MAX_ROUNDS: u32 = 400;
 /// Least samples by which the excess of an outline is measured.
 const SAMPLES: usize = 4096;
-/// Outlines of which the curves are kept: that of a rough one takes about 100 kB. Those of more are made for each member.
-const KEPT: usize = 256;
 
 /// Another curve of the same outline, by which a time is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -172,30 +164,6 @@ fn with_local_area(before: &[DVec2], after: Vec<DVec2>) -> Vec<DVec2> {
     let spread = smoothed(&lost, SPREAD);
     let moved = |i: usize| after[i] + normal(i) * (spread[i].x / normal(i).length_squared().max(f64::MIN_POSITIVE));
     (0..n).map(moved).collect()
-}
-
-/// The curves of the outlines of a set, each made when it is first needed.
-pub(super) struct OutlineCurves {
-    pub(super) set: Arc<OutlineSet>,
-    treatment: Treatment,
-    made: Vec<OnceLock<OutlineCurve>>,
-}
-
-impl OutlineCurves {
-    pub(super) fn new(set: Arc<OutlineSet>, treatment: Treatment) -> OutlineCurves {
-        let kept = if set.all.len() <= KEPT { set.all.len() } else { 0 };
-        OutlineCurves { set, treatment, made: (0..kept).map(|_| OnceLock::new()).collect() }
-    }
-
-    pub(super) fn treatment(&self) -> &Treatment {
-        &self.treatment
-    }
-
-    /// The curve of outline `i`, which there is.
-    pub(super) fn curve(&self, i: usize) -> OutlineCurve {
-        let make = || self.treatment.curve(&self.set.all[i].outline);
-        self.made.get(i).map_or_else(make, |kept| kept.get_or_init(make).clone())
-    }
 }
 
 #[cfg(test)]
