@@ -192,7 +192,10 @@ fn conclude(h: real, errors: vec2<real>, declines: vec2<real>, apart: real) {
     }
     record_events(taken, apart);
     follow(taken);
-    if ADAPTIVE { lengthen(stride(), errors, declines); }
+    if ADAPTIVE {
+        lengthen(stride(), errors, declines);
+        aim_at_relaxation();
+    }
     accepted();
 }
 
@@ -267,6 +270,19 @@ fn lengthen(by: Stride, errors: vec2<real>, declines: vec2<real>) {
     report.progress.bend = declines.y;
     pass_time(by);
     counters.refused = 0u;
+}
+
+/// Shortens the next step to one that ends where the excess falls to the relaxation threshold.
+fn aim_at_relaxation() {
+    let report = &all_reports[member].report;
+    let relax_at = all_parameters[member].relax_at;
+    let excess = report.now.excess;
+    let resolved = real(RESOLVED * EPSILON) <= excess;
+    if all_counters[member].relax_step == NEVER && resolved && !(excess <= relax_at) && !(relax_at <= real(0.0)) {
+        let fall = ln_ratio(excess, relax_at);
+        let ahead = aim(fall, report.progress.slope, report.progress.bend, report.progress.taken);
+        report.progress.next = min(report.progress.next, ahead);
+    }
 }
 
 /// Counts an accepted step.

@@ -11,6 +11,7 @@ const FALLS = 0.8;
 const RISES = 0.9;
 const MIN_STEP = 1e-12;
 const MIN_TO_SINGULAR = 1e-3;
+const BEHIND = 0.03125;
 
 /// A step to attempt: its length, the high and the low part of that, and whether it reaches the final time.
 struct Stride { length: real, high: real, low: real, last: bool }
@@ -67,6 +68,15 @@ fn growth(error: real, order: u32, most: real) -> real {
     let ratio = most / max(error, real(1e-12) * most);
     let root = exponential(vec(ln_ratio(1.0, ratio) / real(order))).x;
     return min(max(real(SAFETY) * root, real(MIN_GROWTH)), real(MAX_GROWTH));
+}
+
+/// The length of a step that ends shortly behind the place where ln excess has fallen by `-fall`, or BIG. Slope and bend
+/// of ln excess are in units of `taken`.
+fn aim(fall: real, slope: real, bend: real, taken: real) -> real {
+    if !(slope <= real(0.0)) { return real(BIG); }
+    // Where the parabola turns round before it, as if it touched.
+    let square = max(slope * slope + real(2.0) * bend * fall, real(0.0));
+    return real(1.0 + BEHIND) * (real(2.0) * fall / (slope - sqrt(square))) * taken;
 }
 
 /// A length and an order.

@@ -278,6 +278,31 @@ fn rows_at_given_times_do_not_depend_on_where_steps_fell_and_change_no_step() {
     }
 }
 
+/// Members of a flower that relax within some 15 steps: the place of the threshold inside the last one is what counts.
+#[test]
+fn a_time_to_relax_is_as_exact_as_the_steps_that_lead_to_it() {
+    let spec = Spec {
+        flow: Flow::Elastic(0.36).into(),
+        amplitude: 0.093.into(),
+        curves: 12,
+        seed: 41_838,
+        pull: Pull::Auto,
+        t_end: Some(0.2.into()),
+        ..adaptive("flower:5:0.027,5:0.039", 193)
+    };
+    let times = |tolerance: f64| -> Vec<f64> {
+        let all = run(&Spec { adaptive: Some(tolerance), stop_when_relaxed: Some(true), ..spec.clone() });
+        all.iter().map(|member| member.outcome.t_relax.unwrap()).collect()
+    };
+    let exact = times(1e-6);
+    let worst = |times: &[f64]| times.iter().zip(&exact).map(|(t, exact)| (t / exact - 1.0).abs()).fold(0.0, f64::max);
+    let [coarse, fine] = [1e-2, 1e-4].map(|tolerance| worst(&times(tolerance)));
+    println!("off by {coarse:.1e} and {fine:.1e}");
+    assert!(fine < 5e-6, "{fine}");
+    // The control.
+    assert!(coarse > 5e-6, "{coarse}");
+}
+
 /// The clock of a run to `t_end` in numbers of type T.
 fn clock<T: Evolves>(t_end: f64, next: f64) -> (Ticks, Progress<T>, Parameters<T>) {
     let ticks = Ticks::new(t_end, T::PRECISION);

@@ -1,10 +1,12 @@
 //! The limit of a time as the resolution grows without bound, and its error.
 //!
 //! With h = 1/n, t(n) = t + a h² + b h⁴ + c h⁶ + …, and three resolutions remove a and b. What is left goes with c, which
-//! they do not show. Two things tell its size: the terms in h² and h⁴ at the finest resolution, and the factor by which
-//! terms fall. That is the square of the angle by which the tangent turns at a node, θ: for a smooth curve it goes with h,
-//! and where θ is not small, n nodes do not resolve the curve, whatever the differences of the times say. By the first the
-//! term in h⁶ is about `θ²·|term in h⁴|`, by the second `θ⁴·|term in h²|`; their sum cannot vanish by chance.
+//! they do not show. Two things tell its size: the terms in h² and h⁴ at the finest resolution, and the factor ρ by which
+//! terms fall. That is about the square of the angle by which the tangent turns at a node, θ: for a smooth curve it goes
+//! with h, and where θ is not small, n nodes do not resolve the curve, whatever the differences of the times say. A weak
+//! mode of many waves turns little and falls more slowly; its terms in h² and h⁴ show it. ρ is therefore the larger of θ²
+//! and a multiple of the ratio of the two terms. From the term in h⁴ what is left is about `ρ·|term in h⁴|`, from that in
+//! h² it is `ρ²·|term in h²|`; their sum cannot vanish by chance.
 //!
 //! The steps in time leave a part that goes with their tolerance over the amplitude of the shape at that time, which is
 //! the root of its excess. The constants were fitted to ensembles of curves and flows whose limits are known from more
@@ -19,9 +21,11 @@ const ORDERS: std::ops::RangeInclusive<f64> = 1.7..=2.6;
 /// Relative difference between resolutions below which they are as small as the errors of the steps, and have no order.
 const SMALL: f64 = 5e-5;
 /// The error of space in units of the estimate of the term in h⁶.
-const OF_SPACE: f64 = 1.25;
-/// The same where terms do not fall yet, in units of `θ·|term in h⁴| + θ²·|term in h²|` with θ ≤ 1.
+const OF_SPACE: f64 = 0.5;
+/// The same where terms do not fall yet, with θ ≤ 1 in place of θ².
 const OF_OPEN: f64 = 1.0;
+/// The factor by which terms fall in units of that from the one in h² to the one in h⁴.
+const OF_FALL: f64 = 1.5;
 /// Orders by which differences fall somehow where nodes are too few; and the error of what has no such order, in units of
 /// the largest difference.
 const LOOSE_ORDERS: std::ops::RangeInclusive<f64> = 1.0..=4.0;
@@ -33,7 +37,7 @@ const OPEN_FALL: f64 = 4.0;
 /// Share of what ten times more exact steps change, and the error of steps in units of their tolerance over the root of the
 /// excess, relative to the time: the change may be small by chance.
 const OF_STEPS: f64 = 0.1;
-const OF_TOLERANCE: f64 = 0.006;
+const OF_TOLERANCE: f64 = 0.003;
 /// Orders that are looked for.
 const ALL_ORDERS: std::ops::Range<f64> = 0.05..8.0;
 /// Halvings of that range: to the last bit.
@@ -165,8 +169,9 @@ impl OfSpace {
     }
 }
 
-/// What follows the terms in h² and h⁴, each `fall` times the one before.
+/// What follows the terms in h² and h⁴, each `fall` times the one before, or what these two show if they fall more slowly.
 fn remainder([second, fourth]: [f64; 2], fall: f64) -> f64 {
+    let fall = if OF_FALL * fourth > fall * second { (OF_FALL * fourth / second).min(1.0) } else { fall };
     fall * (fourth + fall * second)
 }
 

@@ -6,7 +6,7 @@
 
 use super::{
     Branches, Parameters, State, Status, Workspace, decay,
-    dense::{Arc, Fall, LOOKS, Taken},
+    dense::{Arc, Fall, LOOKS, RESOLVED, Taken},
     extrapolation::{self, AllShares, SHARED_PARTS},
     member::{Counters, NEVER, Observed},
     observe::{self, Glance},
@@ -17,7 +17,7 @@ use super::{
     step::{self, Method, Stepped, Steps},
 };
 use crate::{
-    number::{Mask, Number, Real},
+    number::{Mask, Number, Real, ln_ratio},
     solver::{Blocks, Solves, by_solver},
 };
 
@@ -344,6 +344,7 @@ impl<N: Number> Team<N> {
                 decay::follow(run, &taken);
                 if let Some(allowed) = allowed {
                     lengthen(run, stride, errors, decline, allowed);
+                    aim_at_relaxation(run, taken.after);
                 }
                 accepted(run, taken.after, &attempt.seen, lane, adaptive);
                 run.counters.passed = passed.lane(lane).into();
@@ -533,6 +534,17 @@ fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, errors: [T; 2], [slope
     (progress.slope, progress.bend) = (slope, bend);
     pace::pass_time(progress, stride, parameters);
     counters.refused = 0;
+}
+
+/// Shortens the next step to one that ends where the excess, now `excess`, falls to the relaxation threshold.
+fn aim_at_relaxation<T: Real>(run: &mut Run<T>, excess: T) {
+    let Run { parameters: p, counters, report, .. } = run;
+    let progress = &mut report.progress;
+    let resolved = T::of(RESOLVED * T::EPSILON).le(excess);
+    if counters.relax_step == NEVER && resolved && !excess.le(p.relax_at) && !p.relax_at.le(T::of(0.0)) {
+        let fall = ln_ratio(excess, p.relax_at);
+        progress.next = progress.next.min(pace::aim(fall, progress.slope, progress.bend, progress.taken));
+    }
 }
 
 /// Counts an accepted step, and decides whether the member continues.

@@ -10,7 +10,7 @@ use super::{
     extrapolation::{LEAST_ORDER, parts},
     member::Progress,
 };
-use crate::number::{Real, ln_ratio};
+use crate::number::{BIG, Real, ln_ratio};
 
 /// Fraction taken of the step length that is predicted to meet the tolerance.
 pub const SAFETY: f64 = 0.9;
@@ -35,6 +35,9 @@ pub const MIN_STEP: f64 = 1e-12;
 /// Like [`MIN_STEP`], for a step that is accurate but ends in a singular curve: shorter ones only creep towards the
 /// bound that it passed, until rounding holds them there.
 pub const MIN_TO_SINGULAR: f64 = 1e-3;
+
+/// How far behind the predicted place of an event a step ends, as a share of the way there.
+pub const BEHIND: f64 = 1.0 / 32.0;
 
 /// A step to attempt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,6 +112,18 @@ pub fn growth<T: Real>(error: T, order: u32, allowed: T) -> T {
     (T::of(SAFETY) * root).max(T::of(MIN_GROWTH)).min(T::of(MAX_GROWTH))
 }
 
+/// Returns the length of a step that ends shortly behind the place where ln excess has fallen by `-fall`, or BIG: the
+/// ends of a step are more exact than what lies inside. Slope and bend of ln excess are in units of `taken`.
+pub fn aim<T: Real>(fall: T, slope: T, bend: T, taken: T) -> T {
+    let two = T::of(2.0);
+    if !slope.le(T::of(0.0)) {
+        return T::of(BIG);
+    }
+    // Where the parabola turns round before it, as if it touched.
+    let square = (slope * slope + two * bend * fall).max(T::of(0.0));
+    T::of(1.0 + BEHIND) * (two * fall / (slope - square.sqrt())) * taken
+}
+
 /// Returns the work of a step of order `order` and of this ratio to the last one, for the same progress.
 fn work<T: Real>(order: u32, ratio: T) -> T {
     T::of(f64::from(parts(order))) / ratio
@@ -140,4 +155,23 @@ pub fn choose<T: Real>(length: T, order: u32, errors: [T; 2], most_growth: T, al
 pub fn least_step<T: Real>(length: T, n: T, share: f64, p: &Parameters<T>) -> T {
     let edge = length / n;
     (T::of(share) * (edge * edge) * (edge * edge)).max(p.time_tick)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_ends_shortly_behind_where_the_excess_falls_to_a_threshold() {
+        let behind = 1.0 + BEHIND;
+        // Along a line; along a parabola that falls by 1.5 at 1, ever faster or ever more slowly.
+        for (slope, bend) in [(-1.5, 0.0), (-1.0, -1.0), (-2.0, 1.0)] {
+            assert_eq!(aim(-1.5, slope, bend, 0.25), 0.25 * behind, "{slope} {bend}");
+        }
+        // It turns round before it: as if it touched.
+        assert_eq!(aim(-3.0, -2.0, 1.0, 0.25), 0.75 * behind);
+        for wild in [[0.5, 0.0], [f64::NAN, 0.0]] {
+            assert_eq!(aim(-1.5, wild[0], wild[1], 0.25), BIG, "{wild:?}");
+        }
+    }
 }
