@@ -63,13 +63,17 @@ fn started(Pilot { members, ended, failed, seconds, .. }: &Pilot) -> String {
 }
 
 /// The members that run besides, for the error of discretisation.
-fn levels(Estimate { level_members, finer_members, most_points, .. }: &Estimate) -> String {
+fn levels(Estimate { level_members, finer_members, varied_members, most_points, .. }: &Estimate) -> String {
     let finer = finer_members.filter(|finer| *finer > 0).map_or(String::new(), |finer| {
         format!("; about {finer} {} more nodes, up to n = {most_points}", if finer == 1 { "needs" } else { "need" })
     });
+    let varied = match varied_members {
+        0 => String::new(),
+        members => format!("; {members} on other curves through their outlines"),
+    };
     match *level_members {
         0 => "none: the error of discretisation will not be known".into(),
-        members => format!("{members} {} besides at other resolutions{finer}", plural(members, "member")),
+        members => format!("{members} {} besides at other resolutions{finer}{varied}", plural(members, "member")),
     }
 }
 
@@ -97,6 +101,7 @@ mod tests {
             slots: 128,
             level_members: 32,
             finer_members: None,
+            varied_members: 0,
             most_points: 100,
             memory_bytes: 17_400_000,
             disk_bytes: 1_340_000_000,
@@ -123,6 +128,8 @@ pilot      130 of 130 started members ended in 1.40 s
         let finer = Estimate { finer_members: Some(12), most_points: 1600, ..estimate.clone() };
         let told = "levels     32 members besides at other resolutions; about 12 need more nodes, up to n = 1600\n";
         assert!(table(&finer, &Spec::default()).contains(told));
+        let varied = Estimate { varied_members: 8, ..finer };
+        assert!(table(&varied, &Spec::default()).contains("n = 1600; 8 on other curves through their outlines\n"));
         let little = Estimate { steps_per_member: None, dispatches: None, seconds: None, ..estimate };
         assert_eq!(table(&little, &Spec::default()).matches("not known: the pilot was over before a").count(), 3);
     }

@@ -360,3 +360,54 @@ fn keys_of_outlines_are_refused_where_there_is_none() {
         refused(home, arguments, parts);
     }
 }
+
+/// A star of five points, whose tips and dents are corners.
+fn star() -> String {
+    let radius = |i: usize| if i % 2 == 0 { 1.0 } else { 0.55 };
+    let point = |i: usize| (TAU * i as f64 / 10.0).sin_cos();
+    (0..10).map(|i| format!("{:?},{:?}\n", radius(i) * point(i).1, radius(i) * point(i).0)).collect()
+}
+
+#[test]
+fn the_overview_says_what_outlines_were_taken_as_and_the_dry_run_counts_their_other_curves() {
+    let home = TempDir::new().unwrap();
+    let home = home.path();
+    fs::write(home.join("round.csv"), ellipse(60)).unwrap();
+    fs::write(home.join("star.csv"), star()).unwrap();
+    let run = "run --accurate --backend cpu --points 64 --shape files:*.csv";
+    let line = |flags: &str| {
+        let told = done(home, &format!("{run} {flags} --out out --force"));
+        told.lines().find_map(|line| Some(line.strip_prefix("outlines   ")?.to_owned())).unwrap()
+    };
+    let told = line("");
+    assert!(told.starts_with("1 as a spline, 1 as a polygon; corners of 1 rounded, which changed the area by"), "{told}");
+    assert_eq!(line("--interpolate polygon --rounding 0"), "2 as a polygon");
+    // The ellipse by half the points, and the star with twice the radius: levels 103 and 203 and their like.
+    let varied = |flags: &str| {
+        let estimate = done(home, &format!("{run} {flags} --dry-run --json"));
+        serde_json::from_str::<serde_json::Value>(&estimate).unwrap()["varied_members"].as_u64().unwrap()
+    };
+    assert_eq!([varied(""), varied("--rounding 0"), varied("--refine=false")], [2, 1, 0]);
+    done(home, &format!("{run} --out out --force"));
+    let rows = rows(&home.join("out/levels.csv"));
+    assert_eq!(rows.iter().filter(|row| row["level"].parse::<u64>().unwrap() > 100).count(), 2);
+}
+
+#[test]
+fn outlines_have_their_times_and_errors_on_a_gpu_too() {
+    let home = TempDir::new().unwrap();
+    let home = home.path();
+    fs::write(home.join("round.csv"), ellipse(60)).unwrap();
+    fs::write(home.join("star.csv"), star()).unwrap();
+    let rows_on = |backend: &str| {
+        done(home, &format!("run --accurate --points 64 --shape files:*.csv --backend {backend} --quiet --out {backend}"));
+        rows(&home.join(backend).join("summary.csv"))
+    };
+    for (cpu, gpu) in rows_on("cpu").iter().zip(&rows_on("gpu")) {
+        for column in ["t_limit", "t_error", "t_data_error"] {
+            let [cpu, gpu] = [cpu, gpu].map(|row| row[column].parse::<f64>().unwrap());
+            assert!((cpu - gpu).abs() <= 1e-6 * cpu, "{column}: {cpu} {gpu}");
+        }
+        assert_eq!(cpu["points"], gpu["points"]);
+    }
+}

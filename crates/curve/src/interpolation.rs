@@ -56,17 +56,6 @@ impl Interpolation {
     }
 }
 
-impl Interpolation {
-    /// Whether the curve through the points of `outline` has corners.
-    pub fn has_corners(self, outline: &Outline) -> bool {
-        match self {
-            Interpolation::Polygon => true,
-            Interpolation::Spline => false,
-            Interpolation::Auto => self.curve(&Arc::new(outline.clone())).1 > 0,
-        }
-    }
-}
-
 /// Whether samples of a spline through `points` points cross themselves.
 fn crosses(spline: &Spline, points: usize) -> bool {
     let pieces = points * SAMPLES;

@@ -168,6 +168,12 @@ impl OutlineCurves {
         let make = || self.treatment.curve(&self.set.all[i].outline);
         self.made.get(i).map_or_else(make, |kept| kept.get_or_init(make).clone())
     }
+
+    /// Corners of that curve, which is not made for it.
+    fn corners(&self, i: usize) -> u32 {
+        let made = self.made.get(i).and_then(OnceLock::get);
+        made.map_or_else(|| self.treatment.corners(&self.set.all[i].outline), |curve| curve.treated.corners)
+    }
 }
 
 /// Nodes of a curve that is only measured.
@@ -336,8 +342,22 @@ impl Family {
 
     /// Whether the curve of member `index` has a variation, as outlines can have.
     pub(crate) fn has(&self, variation: Variation, index: u64) -> bool {
-        let outline = self.outline(index).map(|one| &one.outline).or(self.sampler.outline());
-        outline.is_some_and(|outline| self.treatment.varies(outline, variation))
+        match &self.curves {
+            Curves::Outlines(curves) if curves.set.all.len() > 1 => {
+                let i = (index % curves.set.all.len() as u64) as usize;
+                self.treatment.varies(&curves.set.all[i].outline, curves.corners(i), variation)
+            }
+            _ => self.sampler.outline().is_some_and(|outline| {
+                self.treatment.varies(outline, self.outline_curve.treated.corners, variation)
+            }),
+        }
+    }
+
+    /// Variations of the curve of a member, on average.
+    pub(crate) fn variations(&self) -> f64 {
+        let outlines = self.outlines().len().max(1) as u64;
+        let of = |index: u64| Variation::ALL.into_iter().filter(|variation| self.has(*variation, index)).count();
+        (0..outlines).map(|index| of(index) as f64).sum::<f64>() / outlines as f64
     }
 
     /// The outlines of the members, if they are read from files: that of member j is the one at j modulo their number.

@@ -115,11 +115,16 @@ impl Treatment {
         OutlineCurve { curve: round, given: Some(curve), treated: Treated { rounded: true, area_change, ..treated } }
     }
 
-    /// Whether the variation makes another curve of an outline.
-    pub fn varies(&self, outline: &Outline, variation: Variation) -> bool {
+    /// Corners of the curve of an outline before they are rounded off.
+    pub(super) fn corners(&self, outline: &Arc<Outline>) -> u32 {
+        self.interpolation.curve(outline).1 as u32
+    }
+
+    /// Whether the variation makes another curve of an outline whose curve has so many `corners`.
+    pub fn varies(&self, outline: &Outline, corners: u32, variation: Variation) -> bool {
         match variation {
             Variation::HalfThePoints => outline.halved().is_some(),
-            Variation::TwiceTheRadius => self.rounding > 0.0 && self.interpolation.has_corners(outline),
+            Variation::TwiceTheRadius => self.rounding > 0.0 && corners > 0,
         }
     }
 }
@@ -218,8 +223,11 @@ mod tests {
     #[test]
     fn variations_are_those_of_outlines_that_they_change() {
         let ring: Vec<DVec2> = (0..40).map(|i| DVec2::from_angle(PI * f64::from(i) / 20.0)).collect();
-        let ring = Outline::from_points(&ring).unwrap();
-        let varied = |text: &str, outline: &Outline| Variation::ALL.map(|of| treatment(text).varies(outline, of));
+        let ring = Arc::new(Outline::from_points(&ring).unwrap());
+        let varied = |text: &str, outline: &Arc<Outline>| {
+            let treatment = treatment(text);
+            Variation::ALL.map(|of| treatment.varies(outline, treatment.corners(outline), of))
+        };
         assert_eq!(varied("", &ring), [true, false]);
         assert_eq!(varied("interpolate = 'polygon'", &ring), [true, true]);
         assert_eq!(varied("", &star()), [false, true]);

@@ -168,6 +168,12 @@ impl Study {
         self.stages.iter().filter(|stage| !stage.is_selective()).map(|stage| stage.members).sum()
     }
 
+    /// Members that may run on variations of their outlines, each once for every variation.
+    pub fn varied_members(&self) -> f64 {
+        let of = |cell: &Cell| cell.family.variations() * cell.spec.member_count() as f64;
+        if self.spec.refine { self.cells.iter().map(of).sum() } else { 0.0 }
+    }
+
     /// Nodes of the finest level at which members may run, or of the members themselves if these have more.
     pub fn most_points(&self) -> usize {
         let finest =

@@ -49,3 +49,9 @@ impl FinerPilot {
 pub fn work(members: f64, of_level: f64) -> f64 {
     members * LADDER * OF_LEVELS * of_level
 }
+
+/// The work of so many members on variations, each at the finest level of its member, from the mean of a member of a
+/// level. The finest level of the `share` of members that need more nodes is half of the work of all of theirs.
+pub fn varied_work(members: f64, share: f64, of_level: f64) -> f64 {
+    members * OF_LEVELS * of_level * (1.0 + share * (0.5 * LADDER - 1.0))
+}

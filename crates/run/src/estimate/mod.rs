@@ -48,6 +48,8 @@ pub struct Estimate {
     pub level_members: u64,
     /// Of the members, about how many need more nodes than they have; `None` if it is not known.
     pub finer_members: Option<u64>,
+    /// Of outlines, members that may run besides on variations of their curves, each once for every variation.
+    pub varied_members: u64,
     /// Most nodes that a member may have at a level.
     pub most_points: usize,
     /// Peak resident size of the process.
@@ -156,18 +158,20 @@ impl Estimate {
         start_up *= certain as f64 / chosen.len() as f64;
         let share = finer.share(study).filter(|_| certain < stages.len());
         let finer_members = share.map(|[share, _]| share * members as f64);
+        let varied = study.varied_members();
         // A member of a level of which nothing is known costs what an own one does.
         let sum = |of: fn(&CohortWork) -> Option<f64>| {
             let all = scale * of(&own)?;
             let at_levels = of(&levels).map_or(all * level_members as f64 / members as f64, |work| scale_levels * work);
-            let more = finer_members.map_or(0.0, |finer| finer::work(finer, at_levels / level_members.max(1) as f64));
-            Some(all + at_levels + more)
+            let of_level = at_levels / level_members.max(1) as f64;
+            let more = finer_members.map_or(0.0, |finer| finer::work(finer, of_level));
+            Some(all + at_levels + more + finer::varied_work(varied, share.map_or(0.0, |[share, _]| share), of_level))
         };
         let seconds = sum(|work| work.seconds);
         // If none has ended yet, all may have one.
         let rated = if pilot.ended == 0 { 1.0 } else { pilot.rated as f64 / pilot.ended as f64 };
         let events = cells[0].spec.event.len() as u64;
-        let at_levels = level_members as f64 + finer_members.unwrap_or(0.0) * finer::ROWS;
+        let at_levels = level_members as f64 + finer_members.unwrap_or(0.0) * finer::ROWS + varied;
         let level_rows = at_levels * (size::LEVEL_ROW + events as f64 * size::EVENT_ROW);
         let most = cells.iter().map(|cell| cell.family.points()).max().unwrap_or(0);
         // A run of unknown length may be long.
@@ -193,6 +197,7 @@ impl Estimate {
             slots,
             level_members,
             finer_members: finer_members.map(|finer| finer.ceil() as u64),
+            varied_members: varied.ceil() as u64,
             most_points,
             steps_per_member: own.steps.map(|steps| steps / own.members.max(1.0)),
             dispatches: sum(|work| work.dispatches).map(|dispatches| dispatches.ceil() as u64),

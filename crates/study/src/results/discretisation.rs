@@ -56,6 +56,8 @@ pub struct CellLimits {
     pub ends: Option<(f64, f64)>,
     /// Relative half-width of the members' own intervals that [`MOST`] of them do not exceed.
     pub widest: Option<f64>,
+    /// The part of it that no nodes lessen: what rounding the corners of an outline does.
+    pub fixed: Option<f64>,
 }
 
 /// Share of the members whose own intervals are as narrow as [`CellLimits::widest`].
@@ -87,8 +89,9 @@ impl CellLimits {
             (false, Some(_)) => sampled(),
         };
         let survival = KaplanMeier::new(&sample);
-        let relative = Description::new(judged.iter().map(Limit::relative_error))?;
-        let most = (MOST * judged.len() as f64).ceil() as usize;
+        let mut by_error: Vec<&Limit> = judged.iter().collect();
+        by_error.sort_by(|one, other| one.relative_error().total_cmp(&other.relative_error()));
+        let widest = ((MOST * judged.len() as f64).ceil() as usize).checked_sub(1).map(|place| by_error[place]);
         Ok(Some(CellLimits {
             known: sample.events(),
             mean: survival.mean(),
@@ -96,7 +99,8 @@ impl CellLimits {
             interval,
             error: Description::new(judged.iter().map(|limit| limit.error))?.median(),
             ends,
-            widest: most.checked_sub(1).and_then(|place| relative.sorted().get(place).copied()),
+            widest: widest.map(Limit::relative_error),
+            fixed: widest.map(|limit| limit.fixed / limit.t),
         }))
     }
 

@@ -55,6 +55,10 @@ fn why(spec: &Spec, cell: &CellStatistics, goal: f64, of_each: bool) -> String {
             cell.limits.as_ref().map_or(0, |limits| limits.known),
             count(cell.members(), "member")
         ),
+        Some((all, _)) if of_each && 2.0 * rounding(cell) > all => format!(
+            "{} of it is what rounding corners does: use a smaller --rounding, or a larger number",
+            rounded(rounding(cell), 2)
+        ),
         Some(_) if of_each => {
             format!(
                 "t_error tells which members are not known that well at n = {points}: use more --points, or a larger number"
@@ -72,6 +76,11 @@ fn why(spec: &Spec, cell: &CellStatistics, goal: f64, of_each: bool) -> String {
             None => "use more --curves to begin with".into(),
         },
     }
+}
+
+/// The part of the widest errors of its members that the rounding of corners has, relative to their limits.
+fn rounding(cell: &CellStatistics) -> f64 {
+    cell.limits.as_ref().and_then(|limits| limits.fixed).unwrap_or_default()
 }
 
 /// Members for which the interval of the median time would be within `sampling` times the median: the share of the
@@ -92,11 +101,16 @@ mod tests {
 
     /// What 64 members lack, whose limits are evenly spread over ± `spread` about 1, each with this error.
     fn lacks(goal: f64, spread: f64, error: f64, outlines: Option<u64>) -> Option<String> {
+        lacks_with(goal, spread, [error, 0.0], outlines)
+    }
+
+    /// The same where so much of the error is of rounded corners.
+    fn lacks_with(goal: f64, spread: f64, [error, fixed]: [f64; 2], outlines: Option<u64>) -> Option<String> {
         let spec = Spec { accuracy: Some(goal), refine: true, outlines, ..Spec::default() };
         let mut tally = Tally::of(&spec, &LevelTimes::default());
         for member in 0..64_u32 {
             let t = 1.0 + spread * (f64::from(member) / 31.5 - 1.0);
-            let limit = Limit { t, error, fixed: 0.0, order: None, asymptotic: true, relative: 0.0 };
+            let limit = Limit { t, error, fixed, order: None, asymptotic: true, relative: 0.0 };
             let (t_limit, judged) = (Some(t), Some(limit));
             let ended = Outcome { t_limit, judged, ..outcome(member.into(), Status::Relaxed, Some(t)) };
             tally.add(&ended).unwrap();
@@ -120,6 +134,15 @@ mod tests {
         assert_eq!(lacks(0.02, 0.1, 1e-3, Some(64)), None);
         let each = "--accuracy 0.02: 0.033 was reached; t_error tells which members are not known that well at n = 100";
         assert!(lacks(0.02, 0.1, 0.03, Some(64)).unwrap().starts_with(each), "{:?}", lacks(0.02, 0.1, 0.03, Some(64)));
+    }
+
+    #[test]
+    fn errors_that_no_nodes_lessen_name_the_radius_of_corners() {
+        let of_rounding = "--accuracy 0.02: 0.033 was reached; 0.022 of it is what rounding corners does: use a smaller";
+        let told = lacks_with(0.02, 0.1, [0.03, 0.02], Some(64)).unwrap();
+        assert!(told.starts_with(of_rounding), "{told}");
+        // The control: a small part of it.
+        assert!(!lacks_with(0.02, 0.1, [0.03, 0.01], Some(64)).unwrap().contains("rounding"));
     }
 
     #[test]
