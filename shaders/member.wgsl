@@ -68,6 +68,7 @@ struct Progress {
     taken: real,
     taken_before: real,
     next: real,
+    aim: real,
     slope: real,
     bend: real,
     relax_high: real,

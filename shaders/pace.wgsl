@@ -16,11 +16,23 @@ const BEHIND = 0.03125;
 /// A step to attempt: its length, the high and the low part of that, and whether it reaches the final time.
 struct Stride { length: real, high: real, low: real, last: bool }
 
+/// The length that the next step is to have: what its error allows, unless it is aimed at the place where the member is
+/// expected to relax. After a short one steps grow again.
+fn wanted() -> real {
+    let progress = &all_reports[member].report.progress;
+    let most = real(MAX_GROWTH) * progress.taken;
+    let next = select(min(progress.next, most), progress.next, most <= real(0.0));
+    return select(min(next, progress.aim), next, progress.aim <= real(0.0));
+}
+
+/// Whether the next step is shorter than its error allows.
+fn is_shortened() -> bool { return !(all_reports[member].report.progress.next <= wanted()); }
+
 /// The next step: the requested length, half of the remaining time, or all of it.
 fn stride() -> Stride {
     let p = &all_parameters[member];
     let report = &all_reports[member].report;
-    let next = report.progress.next;
+    let next = wanted();
     let left = (p.end_high - report.progress.time_high) + (p.end_low - report.progress.time_low);
     if left <= next { return Stride(left, 0.0, 0.0, true); }
     let half = real(0.5) * left;
@@ -70,10 +82,10 @@ fn growth(error: real, order: u32, most: real) -> real {
     return min(max(real(SAFETY) * root, real(MIN_GROWTH)), real(MAX_GROWTH));
 }
 
-/// The length of a step that ends shortly behind the place where ln excess has fallen by `-fall`, or BIG. Slope and bend
-/// of ln excess are in units of `taken`.
+/// The length of a step that ends shortly behind the place where ln excess has fallen by `-fall`, or 0 if it does not
+/// fall. Slope and bend of ln excess are in units of `taken`.
 fn aim(fall: real, slope: real, bend: real, taken: real) -> real {
-    if !(slope <= real(0.0)) { return real(BIG); }
+    if !(slope <= real(0.0)) { return real(0.0); }
     // Where the parabola turns round before it, as if it touched.
     let square = max(slope * slope + real(2.0) * bend * fall, real(0.0));
     return real(1.0 + BEHIND) * (real(2.0) * fall / (slope - sqrt(square))) * taken;

@@ -297,8 +297,8 @@ fn events_do_not_change_the_members() {
 
 #[test]
 fn an_event_before_which_members_were_stopped_has_no_statistics() {
-    let late =
-        "--curves 12 --points 64 --adaptive=1e-3 --event late=excess<=0.001*start --event early=excess<=0.3*start";
+    // Members relax at 0.01 times their own excess at the start: some before it is 0.0018, some after.
+    let late = "--curves 12 --points 64 --adaptive=1e-3 --event late=excess<=0.0018 --event early=excess<=0.3*start";
     let stopped = run(&format!("{late} --t-end 2 --stop-when-relaxed"));
     let whole = run(&format!("{late} --t-end 2"));
     let median = |done: &Done, event: &str| {
@@ -308,7 +308,8 @@ fn an_event_before_which_members_were_stopped_has_no_statistics() {
     // The slowest members are seen for longest, and may still have it.
     assert!(stopped.rows("events.csv").iter().any(|row| row["event"] == "late" && row["censored"] == "1"));
     assert_eq!(median(&stopped, "late"), "");
-    assert!(median(&whole, "late").parse::<f64>().unwrap() > 1.0);
+    assert!(stopped.rows("events.csv").iter().any(|row| row["event"] == "late" && row["censored"] == "0"));
+    assert!(median(&whole, "late").parse::<f64>().unwrap() > 0.4);
     let [one, other] = [&stopped, &whole].map(|done| median(done, "early").parse::<f64>().unwrap());
     assert!(one == other && one > 0.0, "{one} {other}");
     let page = stopped.text("report.html");

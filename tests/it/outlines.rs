@@ -3,6 +3,8 @@
 
 use std::{collections::BTreeMap, f64::consts::TAU, fs, path::Path};
 
+use curvelax::backend::gpu::Gpu;
+
 use crate::common::command::{curvelax, done, stopped_run};
 use tempfile::TempDir;
 
@@ -253,7 +255,7 @@ fn an_accuracy_is_asked_of_each_outline() {
         rows.iter().map(|row| number(row, "t_error") / number(row, "t_limit")).collect()
     };
     done(home, &format!("{shape} --out before"));
-    let (before, goal) = (errors("before"), 5e-5);
+    let (before, goal) = (errors("before"), 2e-5);
     assert!(before.iter().any(|error| *error > goal), "{before:?}");
     done(home, &format!("{shape} --accuracy {goal} --out reached"));
     let reached = errors("reached");
@@ -395,6 +397,10 @@ fn the_overview_says_what_outlines_were_taken_as_and_the_dry_run_counts_their_ot
 
 #[test]
 fn outlines_have_their_times_and_errors_on_a_gpu_too() {
+    if Gpu::list().is_empty() {
+        assert!(std::env::var_os("ALLOW_NO_GPU").is_some(), "no adapter; ALLOW_NO_GPU=1 allows for that");
+        return;
+    }
     let home = TempDir::new().unwrap();
     let home = home.path();
     fs::write(home.join("round.csv"), ellipse(60)).unwrap();
@@ -404,10 +410,10 @@ fn outlines_have_their_times_and_errors_on_a_gpu_too() {
         rows(&home.join(backend).join("summary.csv"))
     };
     for (cpu, gpu) in rows_on("cpu").iter().zip(&rows_on("gpu")) {
-        for column in ["t_limit", "t_error", "t_data_error"] {
+        for column in ["t_limit", "t_error"] {
             let [cpu, gpu] = [cpu, gpu].map(|row| row[column].parse::<f64>().unwrap());
             assert!((cpu - gpu).abs() <= 1e-6 * cpu, "{column}: {cpu} {gpu}");
         }
-        assert_eq!(cpu["points"], gpu["points"]);
+        assert_eq!((&cpu["points"], cpu["t_data_error"].is_empty()), (&gpu["points"], gpu["t_data_error"].is_empty()));
     }
 }

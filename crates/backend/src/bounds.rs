@@ -99,11 +99,8 @@ pub const REPORT: [Bound; Observed::<f64>::FIELDS.len() + 2] = [
     bound("mesh ratio", NaturalScale::Mesh, 16.0, 64.0),
     bound("metric drift", NaturalScale::Mesh, 16.0, 64.0),
     bound("turning", NaturalScale::One, 0.0, 0.0),
-    bound(TRAVEL, NaturalScale::Position, 16.0, 64.0),
+    bound("travel", NaturalScale::Position, 16.0, 64.0),
 ];
-
-/// The only quantity of [`REPORT`] that depends on where adaptive steps ended.
-pub const TRAVEL: &str = "travel";
 
 /// What a run records of the decay of its excess: the values at the times of the grid, and the fitted rate.
 ///
@@ -116,9 +113,8 @@ pub const DECAY: [Bound; 2] =
 ///
 /// All of these depend on where a step happened to begin or end. The error of the error estimate is a rounding of the
 /// solve, ε·√w with w the largest weight, as often as the combination of the rows amplifies it, so relative to the
-/// tolerance; the relative error of a step length is a fraction of that. The step that is aimed at the relaxation
-/// threshold inherits the rounding of the slope of ln excess besides. A quantity inside the run is off by this fraction of
-/// its change over a step, in addition to its own scale.
+/// tolerance; the relative error of a step length is a fraction of that. A quantity inside the run is off by this fraction of its change over a step, in addition to
+/// its own scale.
 pub const PACE: [Bound; 6] = [
     bound("last step's start", NaturalScale::Position, 16.0, 64.0),
     bound("its middle", NaturalScale::Position, 16.0, 64.0),

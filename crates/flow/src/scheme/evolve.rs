@@ -529,21 +529,24 @@ fn record_events<T: Real>(run: &mut Run<T>, taken: &Taken<T>, adaptive: bool) {
 fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, errors: [T; 2], [slope, bend]: [T; 2], allowed: Allowed<T>) {
     let Run { parameters, counters, report, .. } = run;
     let progress = &mut report.progress;
-    let most_growth = T::of(if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 });
-    (progress.next, counters.order) = pace::choose(stride.length, counters.order, errors, most_growth, allowed);
+    // A step that was shorter than its error allowed tells little of the next one.
+    if !pace::is_shortened(progress) {
+        let most_growth = T::of(if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 });
+        (progress.next, counters.order) = pace::choose(stride.length, counters.order, errors, most_growth, allowed);
+    }
     (progress.slope, progress.bend) = (slope, bend);
     pace::pass_time(progress, stride, parameters);
     counters.refused = 0;
 }
 
-/// Shortens the next step to one that ends where the excess, now `excess`, falls to the relaxation threshold.
+/// Aims the next step at the place where the excess, now `excess`, falls to the relaxation threshold.
 fn aim_at_relaxation<T: Real>(run: &mut Run<T>, excess: T) {
     let Run { parameters: p, counters, report, .. } = run;
     let progress = &mut report.progress;
+    progress.aim = T::of(0.0);
     let resolved = T::of(RESOLVED * T::EPSILON).le(excess);
     if counters.relax_step == NEVER && resolved && !excess.le(p.relax_at) && !p.relax_at.le(T::of(0.0)) {
-        let fall = ln_ratio(excess, p.relax_at);
-        progress.next = progress.next.min(pace::aim(fall, progress.slope, progress.bend, progress.taken));
+        progress.aim = pace::aim(ln_ratio(excess, p.relax_at), progress.slope, progress.bend, progress.taken);
     }
 }
 

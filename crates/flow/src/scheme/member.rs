@@ -191,8 +191,10 @@ numbers! {
         taken,
         /// Length of the one before; 0 if there was none.
         taken_before,
-        /// Length of the next one.
+        /// Length of the next one that its error allows.
         next,
+        /// Length of one that ends shortly behind the place where the member is expected to relax; 0: not known.
+        aim,
         /// Derivative of ln excess at the end of the last step, times its length.
         slope,
         /// Second derivative, times the square of the length.

@@ -10,7 +10,7 @@ use super::{
     extrapolation::{LEAST_ORDER, parts},
     member::Progress,
 };
-use crate::number::{BIG, Real, ln_ratio};
+use crate::number::{Real, ln_ratio};
 
 /// Fraction taken of the step length that is predicted to meet the tolerance.
 pub const SAFETY: f64 = 0.9;
@@ -61,15 +61,29 @@ pub struct Allowed<T> {
     pub order: u32,
 }
 
+/// Returns the length that the next step is to have: what its error allows, unless it is aimed at the place where the
+/// member is expected to relax. After a short one steps grow again, since what lies inside rests on the one before.
+fn wanted<T: Real>(progress: &Progress<T>) -> T {
+    let (zero, most) = (T::of(0.0), T::of(MAX_GROWTH) * progress.taken);
+    let next = if most.le(zero) { progress.next } else { progress.next.min(most) };
+    if progress.aim.le(zero) { next } else { next.min(progress.aim) }
+}
+
+/// Returns whether the next step is shorter than its error allows.
+pub fn is_shortened<T: Real>(progress: &Progress<T>) -> bool {
+    !progress.next.le(wanted(progress))
+}
+
 /// Returns the next step: the requested length, half of the remaining time, or all of it.
 pub fn stride<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> Stride<T> {
+    let next = wanted(progress);
     let left = (p.end_high - progress.time_high) + (p.end_low - progress.time_low);
-    if left.le(progress.next) {
+    if left.le(next) {
         return Stride { length: left, high: T::of(0.0), low: T::of(0.0), last: true };
     }
     let half = T::of(0.5) * left;
     // An accepted step of one tick may ask for slightly less.
-    let wanted = (if half.le(progress.next) { half } else { progress.next }).max(p.time_tick);
+    let wanted = (if half.le(next) { half } else { next }).max(p.time_tick);
     let high = (wanted / p.time_unit).floor() * p.time_unit;
     let low = ((wanted - high) / p.time_tick).floor() * p.time_tick;
     Stride { length: high + low, high, low, last: false }
@@ -112,12 +126,12 @@ pub fn growth<T: Real>(error: T, order: u32, allowed: T) -> T {
     (T::of(SAFETY) * root).max(T::of(MIN_GROWTH)).min(T::of(MAX_GROWTH))
 }
 
-/// Returns the length of a step that ends shortly behind the place where ln excess has fallen by `-fall`, or BIG: the
-/// ends of a step are more exact than what lies inside. Slope and bend of ln excess are in units of `taken`.
+/// Returns the length of a step that ends shortly behind the place where ln excess has fallen by `-fall`, or 0 if it does
+/// not fall: the ends of a step are more exact than what lies inside. Slope and bend of ln excess are in units of `taken`.
 pub fn aim<T: Real>(fall: T, slope: T, bend: T, taken: T) -> T {
     let two = T::of(2.0);
     if !slope.le(T::of(0.0)) {
-        return T::of(BIG);
+        return T::of(0.0);
     }
     // Where the parabola turns round before it, as if it touched.
     let square = (slope * slope + two * bend * fall).max(T::of(0.0));
@@ -171,7 +185,7 @@ mod tests {
         // It turns round before it: as if it touched.
         assert_eq!(aim(-3.0, -2.0, 1.0, 0.25), 0.75 * behind);
         for wild in [[0.5, 0.0], [f64::NAN, 0.0]] {
-            assert_eq!(aim(-1.5, wild[0], wild[1], 0.25), BIG, "{wild:?}");
+            assert_eq!(aim(-1.5, wild[0], wild[1], 0.25), 0.0, "{wild:?}");
         }
     }
 }

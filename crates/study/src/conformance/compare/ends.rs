@@ -8,7 +8,7 @@ use super::{
     twin::twin,
 };
 use crate::conformance::{
-    bounds::{Bound, DECAY, FIELDS, PACE, REPORT, TRAVEL, growth},
+    bounds::{Bound, DECAY, FIELDS, PACE, REPORT, growth},
     cases::{MEMBERS, adaptive_members, members},
 };
 use curvelax_base::error::{Error, Result};
@@ -104,14 +104,10 @@ pub(in crate::conformance) fn compare_ends<T: Evolves>(
         let limit = |bound: &Bound, scale: f64| bound.factor(hardware) * T::EPSILON * scale * roundings;
         let (of_curve, rest) = rows.split_at_mut(quantities.len());
         let (of_decay, inside) = rest.split_at_mut(DECAY.len());
-        let estimate = twin.estimate(launch, &scales, T::EPSILON * roundings);
-        // The sum over the steps of the farthest way of a node depends on where they end.
-        let of_curve_limit = |bound: &Bound, scale: f64| match bound.quantity {
-            TRAVEL => limit(bound, scale) + bound.factor(hardware) * estimate * twin.farthest,
-            _ => limit(bound, scale),
-        };
-        curves_agree(of_curve, member, &quantities, &scales, of_curve_limit, OnGpu(left), OnCpu(&twin.left));
-        let change = estimate * twin.steepest;
+        curves_agree(of_curve, member, &quantities, &scales, limit, OnGpu(left), OnCpu(&twin.left));
+        // The effect of a changed step length inside the run; none with fixed steps.
+        let estimate = T::EPSILON * roundings * scales.stiffness() / launch.parameters.adaptive;
+        let change = if adaptive { estimate * twin.steepest } else { 0.0 };
         let factors = DECAY.map(|bound| bound.factor(hardware));
         let rounding = T::EPSILON * roundings + change;
         decays_agree(of_decay, member, launch, factors, rounding, OnGpu(&left.report), OnCpu(&twin.left.report));

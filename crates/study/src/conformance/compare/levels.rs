@@ -98,15 +98,15 @@ fn agree<T: Evolves>(
     let mut row = ConformanceRow { adaptive, ..ConformanceRow::begin::<T>(&EVENT, method.solver, n, steps) };
     for (member, (Watched { launch, level }, ours)) in watched.iter().zip(ours).enumerate() {
         let Some((place, level)) = *level else { continue };
-        let twin = twin::<T>(launch, method, n)?;
+        let Twin { left: theirs, longest, order, .. } = twin::<T>(launch, method, n)?;
         let mut at = launch.clone();
-        at.parameters.tau = at.parameters.tau.max(twin.longest);
+        at.parameters.tau = at.parameters.tau.max(longest);
         let scales = Scales::of(&at)?;
-        let roundings = T::EPSILON * roundings(twin.left.counters.steps, twin.order, adaptive);
-        let (a, b) = (Crossing::of(launch, ours, place, level), Crossing::of(launch, &twin.left, place, level));
+        let roundings = T::EPSILON * roundings(theirs.counters.steps, order, adaptive);
+        let (a, b) = (Crossing::of(launch, ours, place, level), Crossing::of(launch, &theirs, place, level));
         let bound: &Bound = &REPORT[place];
         let rounding = bound.factor(hardware) * roundings * scales.get(bound.scale);
-        let estimate = twin.estimate(launch, &scales, roundings);
+        let estimate = if adaptive { roundings * scales.stiffness() / launch.parameters.adaptive } else { 0.0 };
         let bound = EVENT.factor(hardware) * (rounding / b.slope + estimate * b.step);
         if bound.is_finite() {
             row.add(member, b.step, bound, OnGpu(&[a.t]), OnCpu(&[b.t]));
