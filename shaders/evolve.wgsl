@@ -263,7 +263,7 @@ fn lengthen(by: Stride, errors: vec2<real>, declines: vec2<real>) {
     let report = &all_reports[member].report;
     let counters = &all_counters[member];
     // A step that was shorter than its error allowed tells little of the next one.
-    if !is_shortened() {
+    if !is_aimed() {
         let most_growth = select(real(1.0), real(MAX_GROWTH), counters.refused == 0u);
         let next = choose(by.length, counters.order, errors, most_growth, allowed(by.length, report.before.length));
         report.progress.next = next.length;
@@ -275,13 +275,13 @@ fn lengthen(by: Stride, errors: vec2<real>, declines: vec2<real>) {
     counters.refused = 0u;
 }
 
-/// Aims the next step at the place where the excess falls to the relaxation threshold.
+/// Aims the next step at the place where the excess falls to the relaxation threshold, if its slope is more than rounding.
 fn aim_at_relaxation() {
     let report = &all_reports[member].report;
     let relax_at = all_parameters[member].relax_at;
     let excess = report.now.excess;
     report.progress.aim = 0.0;
-    let resolved = real(RESOLVED * EPSILON) <= excess;
+    let resolved = real(RESOLVED * EPSILON) <= abs(excess * report.progress.slope);
     if all_counters[member].relax_step == NEVER && resolved && !(excess <= relax_at) && !(relax_at <= real(0.0)) {
         let fall = ln_ratio(excess, relax_at);
         report.progress.aim = aim(fall, report.progress.slope, report.progress.bend, report.progress.taken);

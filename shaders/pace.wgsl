@@ -12,27 +12,22 @@ const RISES = 0.9;
 const MIN_STEP = 1e-12;
 const MIN_TO_SINGULAR = 1e-3;
 const BEHIND = 0.03125;
+const NEAREST_AIM = 0.125;
 
 /// A step to attempt: its length, the high and the low part of that, and whether it reaches the final time.
 struct Stride { length: real, high: real, low: real, last: bool }
 
-/// The length that the next step is to have: what its error allows, unless it is aimed at the place where the member is
-/// expected to relax. After a short one steps grow again.
-fn wanted() -> real {
+/// Whether the next step ends where the member is expected to relax, unless that is near its start.
+fn is_aimed() -> bool {
     let progress = &all_reports[member].report.progress;
-    let most = real(MAX_GROWTH) * progress.taken;
-    let next = select(min(progress.next, most), progress.next, most <= real(0.0));
-    return select(min(next, progress.aim), next, progress.aim <= real(0.0));
+    return real(NEAREST_AIM) * progress.next <= progress.aim && !(progress.next <= progress.aim);
 }
-
-/// Whether the next step is shorter than its error allows.
-fn is_shortened() -> bool { return !(all_reports[member].report.progress.next <= wanted()); }
 
 /// The next step: the requested length, half of the remaining time, or all of it.
 fn stride() -> Stride {
     let p = &all_parameters[member];
     let report = &all_reports[member].report;
-    let next = wanted();
+    let next = select(report.progress.next, report.progress.aim, is_aimed());
     let left = (p.end_high - report.progress.time_high) + (p.end_low - report.progress.time_low);
     if left <= next { return Stride(left, 0.0, 0.0, true); }
     let half = real(0.5) * left;

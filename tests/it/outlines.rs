@@ -382,7 +382,10 @@ fn the_overview_says_what_outlines_were_taken_as_and_the_dry_run_counts_their_ot
         told.lines().find_map(|line| Some(line.strip_prefix("outlines   ")?.to_owned())).unwrap()
     };
     let told = line("");
-    assert!(told.starts_with("1 as a spline, 1 as a polygon; corners of 1 rounded, which changed the area by"), "{told}");
+    assert!(
+        told.starts_with("1 as a spline, 1 as a polygon; corners of 1 rounded, which changed the area by"),
+        "{told}"
+    );
     assert_eq!(line("--interpolate polygon --rounding 0"), "2 as a polygon");
     // The ellipse by half the points, and the star with twice the radius: levels 103 and 203 and their like.
     let varied = |flags: &str| {
@@ -406,7 +409,10 @@ fn outlines_have_their_times_and_errors_on_a_gpu_too() {
     fs::write(home.join("round.csv"), ellipse(60)).unwrap();
     fs::write(home.join("star.csv"), star()).unwrap();
     let rows_on = |backend: &str| {
-        done(home, &format!("run --accurate --points 64 --shape files:*.csv --backend {backend} --quiet --out {backend}"));
+        done(
+            home,
+            &format!("run --accurate --points 64 --shape files:*.csv --backend {backend} --quiet --out {backend}"),
+        );
         rows(&home.join(backend).join("summary.csv"))
     };
     for (cpu, gpu) in rows_on("cpu").iter().zip(&rows_on("gpu")) {

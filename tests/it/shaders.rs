@@ -307,6 +307,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("SAFETY", pace::SAFETY),
         ("MAX_GROWTH", pace::MAX_GROWTH),
         ("BEHIND", pace::BEHIND),
+        ("NEAREST_AIM", pace::NEAREST_AIM),
         ("MIN_GROWTH", pace::MIN_GROWTH),
         ("MIN_STEP", pace::MIN_STEP),
         ("MIN_TO_SINGULAR", pace::MIN_TO_SINGULAR),

@@ -347,9 +347,10 @@ impl Family {
                 let i = (index % curves.set.all.len() as u64) as usize;
                 self.treatment.varies(&curves.set.all[i].outline, curves.corners(i), variation)
             }
-            _ => self.sampler.outline().is_some_and(|outline| {
-                self.treatment.varies(outline, self.outline_curve.treated.corners, variation)
-            }),
+            _ => self
+                .sampler
+                .outline()
+                .is_some_and(|outline| self.treatment.varies(outline, self.outline_curve.treated.corners, variation)),
         }
     }
 

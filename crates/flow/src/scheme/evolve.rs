@@ -530,7 +530,7 @@ fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, errors: [T; 2], [slope
     let Run { parameters, counters, report, .. } = run;
     let progress = &mut report.progress;
     // A step that was shorter than its error allowed tells little of the next one.
-    if !pace::is_shortened(progress) {
+    if !pace::is_aimed(progress) {
         let most_growth = T::of(if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 });
         (progress.next, counters.order) = pace::choose(stride.length, counters.order, errors, most_growth, allowed);
     }
@@ -539,12 +539,13 @@ fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, errors: [T; 2], [slope
     counters.refused = 0;
 }
 
-/// Aims the next step at the place where the excess, now `excess`, falls to the relaxation threshold.
+/// Aims the next step at the place where the excess, now `excess`, falls to the relaxation threshold, if its slope is more
+/// than rounding.
 fn aim_at_relaxation<T: Real>(run: &mut Run<T>, excess: T) {
     let Run { parameters: p, counters, report, .. } = run;
     let progress = &mut report.progress;
     progress.aim = T::of(0.0);
-    let resolved = T::of(RESOLVED * T::EPSILON).le(excess);
+    let resolved = T::of(RESOLVED * T::EPSILON).le((excess * progress.slope).abs());
     if counters.relax_step == NEVER && resolved && !excess.le(p.relax_at) && !p.relax_at.le(T::of(0.0)) {
         progress.aim = pace::aim(ln_ratio(excess, p.relax_at), progress.slope, progress.bend, progress.taken);
     }

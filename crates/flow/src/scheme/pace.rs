@@ -38,6 +38,8 @@ pub const MIN_TO_SINGULAR: f64 = 1e-3;
 
 /// How far behind the predicted place of an event a step ends, as a share of the way there.
 pub const BEHIND: f64 = 1.0 / 32.0;
+/// Nearest place that a step is aimed at, as a share of the length that its error allows.
+pub const NEAREST_AIM: f64 = 0.125;
 
 /// A step to attempt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,22 +63,16 @@ pub struct Allowed<T> {
     pub order: u32,
 }
 
-/// Returns the length that the next step is to have: what its error allows, unless it is aimed at the place where the
-/// member is expected to relax. After a short one steps grow again, since what lies inside rests on the one before.
-fn wanted<T: Real>(progress: &Progress<T>) -> T {
-    let (zero, most) = (T::of(0.0), T::of(MAX_GROWTH) * progress.taken);
-    let next = if most.le(zero) { progress.next } else { progress.next.min(most) };
-    if progress.aim.le(zero) { next } else { next.min(progress.aim) }
-}
-
-/// Returns whether the next step is shorter than its error allows.
-pub fn is_shortened<T: Real>(progress: &Progress<T>) -> bool {
-    !progress.next.le(wanted(progress))
+/// Returns whether the next step ends where the member is expected to relax. A place near its start is left there: what
+/// lies near an end is as exact as the end, and a short step would tell nothing of the next one but rounding.
+pub fn is_aimed<T: Real>(progress: &Progress<T>) -> bool {
+    let Progress { next, aim, .. } = *progress;
+    (T::of(NEAREST_AIM) * next).le(aim) && !next.le(aim)
 }
 
 /// Returns the next step: the requested length, half of the remaining time, or all of it.
 pub fn stride<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> Stride<T> {
-    let next = wanted(progress);
+    let next = if is_aimed(progress) { progress.aim } else { progress.next };
     let left = (p.end_high - progress.time_high) + (p.end_low - progress.time_low);
     if left.le(next) {
         return Stride { length: left, high: T::of(0.0), low: T::of(0.0), last: true };

@@ -138,7 +138,8 @@ mod tests {
 
     #[test]
     fn errors_that_no_nodes_lessen_name_the_radius_of_corners() {
-        let of_rounding = "--accuracy 0.02: 0.033 was reached; 0.022 of it is what rounding corners does: use a smaller";
+        let of_rounding =
+            "--accuracy 0.02: 0.033 was reached; 0.022 of it is what rounding corners does: use a smaller";
         let told = lacks_with(0.02, 0.1, [0.03, 0.02], Some(64)).unwrap();
         assert!(told.starts_with(of_rounding), "{told}");
         // The control: a small part of it.

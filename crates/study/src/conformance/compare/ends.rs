@@ -113,7 +113,8 @@ pub(in crate::conformance) fn compare_ends<T: Evolves>(
         decays_agree(of_decay, member, launch, factors, rounding, OnGpu(&left.report), OnCpu(&twin.left.report));
         if adaptive {
             let roundings = [T::EPSILON * roundings, estimate];
-            let factors = PACE.map(|bound| bound.factor(hardware));
+            let mut factors = PACE.map(|bound| bound.factor(hardware));
+            factors[4] *= twin.leverage;
             insides_agree(inside, member, &scales, factors, roundings, OnGpu(left), OnCpu(&twin.left));
         }
     }

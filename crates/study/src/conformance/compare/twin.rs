@@ -5,6 +5,7 @@ use curvelax_base::error::Result;
 use curvelax_flow::scheme::{
     evolve::{Evolves, Team, evolve},
     extrapolation::LEAST_ORDER,
+    pace,
     run::Run,
     step::Method,
 };
@@ -18,20 +19,38 @@ pub(super) struct Twin {
     pub(super) steepest: f64,
     /// The highest order of a step.
     pub(super) order: u32,
+    /// How much more the length of the next step depends on the error of the one that it was chosen after than where
+    /// that error is the tolerance.
+    pub(super) leverage: f64,
 }
 
 /// Runs the twin of `launch` to its goal.
 pub(super) fn twin<T: Evolves>(launch: &Run<f64>, method: &Method, n: usize) -> Result<Twin> {
     let mut run: Run<T> = launch.convert();
     let (mut longest, mut steepest, mut order) = (0.0_f64, 0.0_f64, LEAST_ORDER);
-    let mut work = Team::new(blocks(n)?);
+    let (mut work, mut leverage) = (Team::new(blocks(n)?), 1.0);
     while run.counters.is_running() {
         let before = run.report.now.excess.to_f64();
-        order = order.max(run.counters.order);
+        let (own_order, is_aimed) = (run.counters.order, pace::is_aimed(&run.report.progress));
+        order = order.max(own_order);
         evolve(&mut run, method, &mut work, 1);
         steepest = steepest.max((run.report.now.excess.to_f64() - before).abs());
         longest = longest.max(run.report.progress.taken.to_f64());
+        let growth = (run.report.progress.next / run.report.progress.taken).to_f64();
+        if !is_aimed && run.counters.refused == 0 {
+            leverage = leverage_of(growth, own_order);
+        }
     }
     let left = Left { state: run.state.convert(), counters: run.counters, report: run.report.convert() };
-    Ok(Twin { left, longest, steepest, order })
+    Ok(Twin { left, longest, steepest, order, leverage })
+}
+
+/// The leverage of the error of a step of this order after which the next one is `growth` times as long: that length goes
+/// with the error to the power -1/order, and does not depend on it at the largest growth.
+fn leverage_of(growth: f64, order: u32) -> f64 {
+    if growth >= pace::MAX_GROWTH {
+        1.0
+    } else {
+        ((growth / pace::SAFETY).powi(order as i32) / f64::from(order)).max(1.0)
+    }
 }
