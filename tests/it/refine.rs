@@ -217,19 +217,19 @@ fn uncertainty(ensemble: &Path) -> f64 {
 fn members_are_as_many_as_sampling_needs() {
     let home = TempDir::new().unwrap();
     let goal = 0.004;
-    let chosen = format!("run --accurate --accuracy {goal} --curves 64 --backend cpu --quiet --out chosen");
-    assert_eq!(curvelax(home.path(), &chosen), (Some(0), String::new()));
-    let ensemble = home.path().join("chosen/ensemble.csv");
-    let (reached, members) = (uncertainty(&ensemble), field(&ensemble, "members").parse::<f64>().unwrap());
-    assert!(members > 64.0 && reached <= goal, "{members}: {reached}");
-    // Members go with the inverse square of what they reach.
-    let needed = members * (reached / goal).powi(2);
-    assert!(members <= 1.3 * needed, "{members}, needed {needed}");
-    // The control: with fewer the goal is missed.
-    let fewer = (members / 1.5) as u64;
-    let less = format!("run --accurate --curves {fewer} --backend cpu --quiet --out fewer");
-    assert_eq!(curvelax(home.path(), &less).0, Some(0));
-    assert!(uncertainty(&home.path().join("fewer/ensemble.csv")) > goal, "{fewer} of {members}");
+    for seed in [1, 5] {
+        let run = format!("run --accurate --backend cpu --seed {seed} --quiet --force");
+        let ensemble = |out: &str| home.path().join(out).join("ensemble.csv");
+        let chosen = format!("{run} --accuracy {goal} --curves 64 --out chosen");
+        assert_eq!(curvelax(home.path(), &chosen), (Some(0), String::new()));
+        let (reached, members) =
+            (uncertainty(&ensemble("chosen")), field(&ensemble("chosen"), "members").parse::<f64>().unwrap());
+        assert!(members > 64.0 && reached <= goal, "{members}: {reached}");
+        // With 1.3 times fewer the goal is missed. What an interval promises of fewer members is too noisy to tell.
+        let fewer = (members / 1.3) as u64;
+        assert_eq!(curvelax(home.path(), &format!("{run} --curves {fewer} --out fewer")).0, Some(0));
+        assert!(uncertainty(&ensemble("fewer")) > goal, "seed {seed}: {fewer} of {members}");
+    }
 }
 
 #[test]

@@ -104,7 +104,7 @@ impl Estimate {
         let [own_count, level_count] = [false, true].map(count_of);
         let until = Instant::now() + PATIENCE;
         let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
-        let (mut residents, mut in_pilots): (Vec<Residents>, u64) = (Vec::new(), 0);
+        let (mut residents, mut in_pilots, mut held_rows): (Vec<Residents>, u64, bool) = (Vec::new(), 0, false);
         let (mut own, mut levels, mut finer) = (CohortWork::none(), CohortWork::none(), FinerPilot::default());
         let (finest, mut at_finest) = (finest(study), None);
         let wanted = |i: &usize| chosen.contains(i) || finest == Some(*i);
@@ -136,7 +136,11 @@ impl Estimate {
                 rows,
             };
             let largest = pilots.iter().map(|seen| seen.members).max().unwrap_or(0);
-            in_pilots = in_pilots.max(of(largest, in_pilot).in_pilot(reads_back));
+            let in_pilot = of(largest, in_pilot);
+            in_pilots = in_pilots.max(in_pilot.in_pilot(reads_back));
+            // A driver and states that are read back take more than rows.
+            let other = reads_back || platform.backend != DeviceKind::Cpu;
+            held_rows |= in_pilot.rows() > size::MANY_ROWS && !other;
             if let Some(level) = stage.level {
                 levels.add(&work);
                 pilots.first().into_iter().for_each(|seen| finer.add(level, &cells[0].spec, seen));
@@ -185,7 +189,8 @@ impl Estimate {
             let most = share.map_or(members as f64, |[_, most]| (most * members as f64).ceil());
             residents.push(Residents { n, slots, count: slots.min(most as usize), rows: 0.0 });
         }
-        let memory = size::memory(size::program(in_pilots), members, rated, most, explained, &residents, kept);
+        let memory =
+            size::memory(size::program(in_pilots, held_rows), members, rated, most, explained, &residents, kept);
         Ok(Estimate {
             members,
             cells: cells.len(),

@@ -14,6 +14,8 @@ use curvelax_study::results::{
 
 /// Memory of the idle program, in bytes.
 const PROGRAM_BYTES: u64 = 10_000_000;
+/// Bytes of rows that show in the peak of a pilot.
+pub const MANY_ROWS: u64 = 4_000_000;
 /// Numbers per node of a resident member: its state on the back end, and its initial nodes on the host.
 const POOL_NUMBERS: usize = STATE_FIELDS + 4;
 /// The same while a checkpoint is saved: the paused member, and its bytes.
@@ -92,8 +94,8 @@ impl Residents {
         numbers(POOL_NUMBERS * self.n * members)
     }
 
-    /// Above [`MAX_HELD`] for the whole pool, rows go to disk.
-    fn rows(&self) -> u64 {
+    /// Bytes of the rows in memory. Above [`MAX_HELD`] for the whole pool, rows go to disk.
+    pub fn rows(&self) -> u64 {
         (self.rows * self.count as f64).min(MAX_HELD as f64) as u64
     }
 
@@ -163,9 +165,10 @@ pub fn explaining(members_of_cell: u64, features: usize, timed: f64) -> u64 {
     (members_of_cell.min(CONSIDERED as u64) as f64 * each) as u64
 }
 
-/// Peak resident size of this process without the members of its largest pilot.
-pub fn program(in_pilots: u64) -> u64 {
-    peak_resident().map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(in_pilots))
+/// Peak resident size of this process without the members of its largest pilot. It is not asked of a pilot that `held`
+/// many rows: how many of them at once depends on the lengths of its steps.
+pub fn program(in_pilots: u64, held: bool) -> u64 {
+    peak_resident().filter(|_| !held).map_or(PROGRAM_BYTES, |peak| peak.saturating_sub(in_pilots))
 }
 
 /// Maximum resident size of this process so far, in bytes, if the system reports it.
