@@ -172,7 +172,7 @@ fn a_run_that_is_interrupted_at_finer_levels_ends_as_if_it_were_not() {
         stages.insert(checkpoint::read(&out_path.join(".curvelax.state")).ok().unwrap().0.stage);
         // Once more a little later, and to the end.
         let again = resume(&out_path, ResumePlace::default(), &Patient(Some(enough + 15)));
-        assert!(again.err().is_none_or(|error| error.exit_code() == 75));
+        again.err().into_iter().for_each(|error| assert_eq!(error.exit_code(), 75, "{out}: {error}"));
         if out_path.join(".curvelax.state").exists() {
             resume(&out_path, ResumePlace::default(), &Patient(None)).unwrap();
         }
