@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use tempfile::TempDir;
 
-use crate::common::command::curvelax;
+use crate::common::command::{curvelax, stopped_run};
 
 /// A sweep over all forms.
 const FORMS: &str = "--backend cpu --curves 5 --points 34 --adaptive --t-end 0.2 --common-random-numbers \
@@ -52,4 +52,18 @@ fn a_form_is_printed_as_it_was_given_and_another_word_is_refused() {
     let wrong = curvelax(home.path(), "run --form geometrc --out new");
     assert_eq!(wrong.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&wrong.stderr).contains("'geometric'") && !home.path().join("new").exists());
+}
+
+#[test]
+fn a_stopped_run_with_the_force_of_the_polygon_resumes_to_the_same_tables() {
+    let home = TempDir::new().unwrap();
+    let long = "run --backend cpu --form geometric --curves 3 --points 34 --tau 2.5e-6 --t-end 1 --solver direct";
+    run(home.path(), &format!("{long} --out whole"));
+    stopped_run(home.path(), long, "part");
+    run(home.path(), "resume part");
+    let table = |folder: &str| fs::read_to_string(home.path().join(folder).join("summary.csv")).unwrap();
+    assert_eq!(table("whole"), table("part"));
+    // The control: the paper's form gives other curves.
+    run(home.path(), &format!("{} --out paper", long.replace("geometric", "paper")));
+    assert_ne!(ends(&table("whole")), ends(&table("paper")));
 }
