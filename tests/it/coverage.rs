@@ -106,8 +106,12 @@ fn limits_of_families_that_the_rule_has_not_seen_are_within_their_bars() {
         }
         Err(_) => (SEED, if all { ALL_MEMBERS } else { MEMBERS }),
     };
-    let families: Vec<Coverage> = (0..FAMILIES).map(|index| Coverage::of(&family(seed, index), members)).collect();
-    families.iter().for_each(|family| eprintln!("{}", family.line));
+    let told = |family: Coverage| {
+        eprintln!("{}", family.line);
+        family
+    };
+    let families: Vec<Coverage> =
+        (0..FAMILIES).map(|index| told(Coverage::of(&family(seed, index), members))).collect();
     let known: usize = families.iter().map(|family| family.bars.len()).sum();
     assert!(known as u64 * 10 > 9 * u64::from(FAMILIES) * members, "the referee has {known} members only");
     for family in &families {

@@ -55,8 +55,8 @@ const ROUNDING: f64 = 1e-12;
 /// First step, in τ, and bounds on the growth of the next.
 const FIRST: f64 = 1e-6;
 const GROWTH: [f64; 2] = [0.2, 4.0];
-/// Steps after which a curve does not reach what is asked for.
-const MAX_STEPS: usize = 5000;
+/// Steps times nodes after which a curve does not reach what is asked for. One that does takes some 60 steps.
+const MAX_WORK: usize = 1 << 21;
 /// Coefficients of ϑ below this are rounding.
 const VANISHED: f64 = 1e-13;
 /// Root mean square of ϑ below which a curve is a circle.
@@ -360,8 +360,10 @@ impl SpectralRun {
         if before <= 0.0 {
             return Ok(());
         }
-        for _ in 0..MAX_STEPS {
+        let mut work = 0;
+        while work < MAX_WORK {
             self.trim();
+            work += self.grid.len();
             self.set_velocity();
             let old = self.form.clone();
             let next = self.accepted(&mut length)?;
@@ -371,7 +373,7 @@ impl SpectralRun {
             }
             (before, length) = (after, next);
         }
-        Err(format!("not reached in {MAX_STEPS} steps"))
+        Err("not reached: the curve takes too many steps, as if it came to rest before".into())
     }
 
     /// Makes a step of at most `length`, which becomes its length, and returns that of the next.
