@@ -191,6 +191,22 @@ fn the_referee_solves_for_the_members_of_a_run() {
     assert_eq!(Some(alone), rows[5].truth.clone().ok());
 }
 
+/// The first step of this member is far too long for it. Its end is not a number, and was once taken for exact.
+#[test]
+fn a_step_that_ends_in_no_number_is_made_again() {
+    let rough = Spec {
+        points: 89,
+        decay: 0.0.into(),
+        seed: 320_384,
+        curves: 100,
+        ..spec("ellipse:3.673,1", "poly:0.63,0.10", 0.064)
+    };
+    let study = Study::new(rough).unwrap();
+    let truth = relaxation_truth(&study.cells()[0], 21).unwrap();
+    // By the scheme on 503 nodes.
+    assert!(is_near(truth.t, 1.1927314, 1e-5) && !is_near(truth.t, 1.1928, 1e-5), "{truth:?}");
+}
+
 #[test]
 fn the_command_prints_and_writes_what_it_compared() {
     let home = TempDir::new().unwrap();

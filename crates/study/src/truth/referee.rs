@@ -385,8 +385,7 @@ impl SpectralRun {
             if error <= self.tolerance {
                 return Ok(*length * factor);
             }
-            // What is not a number is refused, too.
-            *length *= if factor < 1.0 { factor } else { GROWTH[0] };
+            *length *= factor;
             if *length < FIRST * FIRST {
                 return Err("its steps become ever shorter: the curve becomes singular".into());
             }
@@ -444,8 +443,13 @@ impl SpectralRun {
         }
         self.velocity = first;
         self.form = sum;
+        // A maximum passes over what is not a number.
+        let is_finite = self.form.bend.iter().all(|c| c.is_finite()) && self.form.rest.iter().all(|v| v.is_finite());
+        if !is_finite {
+            return f64::INFINITY;
+        }
         let bend = gap.size() / self.form.size().max(LEAST_BEND);
-        bend.max(gap.rest[SIZE].abs()).max(gap.rest[TIME].abs() / self.form.rest[TIME])
+        bend.max(gap.rest[SIZE].abs()).max((gap.rest[TIME] / self.form.rest[TIME]).abs())
     }
 
     /// An exponential Euler step h: `c ← e^{-m⁴h} c + (1 - e^{-m⁴h})/m⁴ · v`, with the decays `e^{-m⁴h} - 1`.
