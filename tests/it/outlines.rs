@@ -365,7 +365,7 @@ fn keys_of_outlines_are_refused_where_there_is_none() {
 
 /// A star of five points, whose tips and dents are corners.
 fn star() -> String {
-    let radius = |i: usize| if i % 2 == 0 { 1.0 } else { 0.55 };
+    let radius = |i: usize| if i.is_multiple_of(2) { 1.0 } else { 0.55 };
     let point = |i: usize| (TAU * i as f64 / 10.0).sin_cos();
     (0..10).map(|i| format!("{:?},{:?}\n", radius(i) * point(i).1, radius(i) * point(i).0)).collect()
 }
