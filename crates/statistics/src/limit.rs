@@ -21,7 +21,7 @@ const ORDERS: std::ops::RangeInclusive<f64> = 1.7..=2.6;
 /// Relative difference between resolutions below which they are as small as the errors of the steps, and have no order.
 const SMALL: f64 = 5e-5;
 /// The error of space in units of the estimate of the term in h⁶.
-const OF_SPACE: f64 = 1.0;
+const OF_SPACE: f64 = 1.25;
 /// The same where terms do not fall yet, with θ ≤ 1 in place of θ².
 const OF_OPEN: f64 = 1.25;
 /// The factor by which terms fall in units of that from the one in h² to the one in h⁴.
@@ -30,14 +30,14 @@ const OF_FALL: f64 = 1.5;
 /// the largest difference.
 const LOOSE_ORDERS: std::ops::RangeInclusive<f64> = 1.0..=4.0;
 const OF_DIFFERENCES: f64 = 1.5;
-/// By how much an error falls at most from one level to the next, which has √2 times the nodes. As h⁶ it falls by 8, and by
-/// more where the coarser levels do not resolve the curve, whose errors are bounds. Where terms do not fall yet, as h⁴.
-const FALL: f64 = 32.0;
+/// By how much an error may fall from one level to the next, which has √2 times the nodes. Errors fall as h⁶, by 8; those of
+/// levels that do not resolve the curve are bounds, and fall faster. Where terms do not fall yet, as h⁴.
+const FALL: f64 = 16.0;
 const OPEN_FALL: f64 = 4.0;
 /// Share of what ten times more exact steps change, and the error of steps in units of their tolerance over the root of the
 /// excess, relative to the time: the change may be small by chance.
 const OF_STEPS: f64 = 0.1;
-const OF_TOLERANCE: f64 = 0.0045;
+const OF_TOLERANCE: f64 = 0.005;
 /// Orders that are looked for.
 const ALL_ORDERS: std::ops::Range<f64> = 0.05..8.0;
 /// Halvings of that range: to the last bit.
@@ -118,8 +118,7 @@ impl Limit {
         let error = of_space.zip(scales).map(|(coarser, scale)| scale * coarser.error).fold(error, f64::max);
         let full = levels[levels.len() - 1];
         let steps = if is_adaptive { (own - levels[own_level]).abs() } else { 0.0 };
-        // Their signs have nothing to do with each other.
-        let error = error.hypot(OF_STEPS * steps).hypot(OF_TOLERANCE * tolerance * full / excess.sqrt());
+        let error = error + OF_STEPS * steps + OF_TOLERANCE * tolerance * full / excess.sqrt();
         Limit { t, error, fixed: 0.0, order, asymptotic, relative: own / t - 1.0 }
     }
 
