@@ -1,4 +1,5 @@
-//! The documents: flags and columns as in the program, a README of at most a thousand words, and links that work.
+//! The documents: flags and columns as in the program, a README of at most a thousand words that shows what the program
+//! prints, and links that work.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -229,6 +230,38 @@ fn the_readme_has_at_most_a_thousand_words() {
         words <= MAX_WORDS,
         "README.md has {words} words, and may have {MAX_WORDS}: move what is too much to docs/"
     );
+}
+
+/// The commands of a page that run something, each with what it is said to print, but for what differs between machines.
+fn printed(page: &str) -> Vec<(&str, Vec<&str>)> {
+    let mut runs: Vec<(&str, Vec<&str>)> = Vec::new();
+    for line in page.lines().filter_map(|line| line.strip_prefix("    ")) {
+        match line.strip_prefix("cargo run --release -- run ") {
+            Some(arguments) => runs.push((arguments, Vec::new())),
+            None if ["…", "ran on", "wall time", "results"].iter().any(|start| line.starts_with(start)) => {}
+            None => runs.last_mut().into_iter().for_each(|(_, lines)| lines.push(line)),
+        }
+    }
+    runs
+}
+
+#[test]
+fn the_readme_shows_what_the_program_prints() {
+    let page = read(&root().join("README.md"));
+    let (begin, end) = (page.find("## Install").unwrap(), page.find("To study a parameter").unwrap());
+    // What follows the command of the tests is not printed by a run.
+    let page = page[begin..end].replace("\n    tests/run\n", "");
+    let runs = printed(&page);
+    assert_eq!(runs.iter().map(|(_, lines)| lines.len()).collect::<Vec<_>>(), [5, 1]);
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, lines) in runs {
+        let output =
+            program(folder.path()).arg("run").args(arguments.split(' ')).args(["--backend", "cpu"]).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        for line in lines {
+            assert!(text.lines().any(|printed| printed == line), "{arguments} does not print\n{line}\nbut\n{text}");
+        }
+    }
 }
 
 /// The Markdown files that users read.
