@@ -318,6 +318,10 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
         // More rows than may be in memory, and members of very many nodes.
         "--curves 12 --points 32 --adaptive=0.1 --t-end 1 --series 1e-5".to_string(),
         "--curves 12 --points 500 --adaptive=0.1 --t-end 0.01 --snapshots SNAPSHOTS --store zarr".to_string(),
+        "--curves 12 --points 1000 --adaptive=0.1 --t-end 0.01 --snapshots SNAPSHOTS --store zarr".to_string(),
+        // Pictures of members of so many nodes that not all of them are drawn.
+        "--curves 12 --points 500 --adaptive=0.1 --t-end 0.01".to_string(),
+        "--curves 12 --points 1000 --adaptive=0.1 --t-end 0.01".to_string(),
         "--curves 1 --points 100000 --adaptive --t-end 1e-15".to_string(),
         "--curves 7 --points 50000 --adaptive --t-end 1e-15".to_string(),
     ];

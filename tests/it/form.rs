@@ -1,6 +1,6 @@
 //! `--form`: the paper's position equation or the force of the polygon, from outside.
 
-use std::{fs, path::Path};
+use std::{collections::BTreeMap, fs, path::Path};
 
 use tempfile::TempDir;
 
@@ -52,6 +52,19 @@ fn a_form_is_printed_as_it_was_given_and_another_word_is_refused() {
     let wrong = curvelax(home.path(), "run --form geometrc --out new");
     assert_eq!(wrong.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&wrong.stderr).contains("'geometric'") && !home.path().join("new").exists());
+}
+
+/// Steps of this curve stay near the limit of an explicit step. It made 109 610 of them before it was given up.
+#[test]
+fn a_member_that_creeps_is_given_up_after_the_steps_that_its_tolerance_allows() {
+    let home = TempDir::new().unwrap();
+    let creeping = "run --backend cpu --form geometric --shape nonconvex --amplitude 0 --curves 1 --points 128 --adaptive=1e-3 \
+                    --pull 0 --refine=false";
+    run(home.path(), &format!("{creeping} --out out"));
+    let mut table = csv::Reader::from_path(home.path().join("out/summary.csv")).unwrap();
+    let row: BTreeMap<String, String> = table.deserialize().next().unwrap().unwrap();
+    let [steps, end] = ["steps", "t_end"].map(|column| row[column].parse::<f64>().unwrap());
+    assert!((10_400.0..12_000.0).contains(&steps) && end < 2.0, "{row:?}");
 }
 
 #[test]

@@ -334,3 +334,17 @@ fn proposed_commands_are_those_of_any_folder_in_a_shell() {
     let resumed = signalled_when(&mut line, "TERM", |said| said.contains("resuming: "));
     assert!(said(&resumed, 75).contains("resuming: "), "{word}");
 }
+
+#[test]
+fn a_resumed_run_says_why_it_is_on_its_back_end_as_the_run_did() {
+    let home = TempDir::new().unwrap();
+    let device = |said: &str| said.lines().find(|line| line.starts_with("back end: ")).map(str::to_owned).unwrap();
+    for (flags, asked) in [("", false), ("--backend cpu", true)] {
+        let first = device(&said(&stopped_run(home.path(), &format!("run {LONG} {flags}"), "out"), 75));
+        let mut again = command(home.path(), "resume out");
+        let again = device(&said(&signalled_when(&mut again, "TERM", |said| said.contains("back end: ")), 75));
+        assert_eq!(first.contains("asked for"), asked, "{first}");
+        assert_eq!(first, again);
+        fs::remove_dir_all(home.path().join("out")).unwrap();
+    }
+}

@@ -33,9 +33,9 @@ const FASTEST: f64 = 0.1;
 /// The first adaptive step in the same unit. A smooth curve could take a longer one. A rough curve would refuse it, and
 /// what comes of a step that is far too long depends on roundings.
 const FIRST_STEP: f64 = 3.0;
-/// Maximum number of adaptive steps to a tolerance of 1; it scales with the inverse root of the tolerance, and a member
-/// that exceeds it is stalled. Curves that relax take some 3 to 30; one that creeps, because only tiny steps can be
-/// solved, would never end.
+/// Maximum number of adaptive steps to an error of 1; it scales with the inverse fourth root of the error, and a member
+/// that exceeds it is stalled. Curves that relax take some 1 to 50, and nonconvex ones that the force of the polygon moves
+/// up to 300; one that creeps, because only tiny steps can be solved, would not end in reasonable time.
 const MAX_STEPS: f64 = 1000.0;
 /// Further steps per time 1/ω: a curve at rest takes one or two, since lengths approach their mean explicitly.
 const MAX_STEPS_AT_REST: f64 = 4.0;
@@ -204,7 +204,7 @@ impl Trajectory<'_> {
             Time::Adaptive(_) => {
                 let p = &self.launch.parameters;
                 let turnovers = p.redistribution * p.omega * (p.end_high + p.end_low);
-                (MAX_STEPS / p.adaptive.sqrt() + MAX_STEPS_AT_REST * turnovers).ceil() as u32
+                (MAX_STEPS / p.adaptive.sqrt().sqrt() + MAX_STEPS_AT_REST * turnovers).ceil() as u32
             }
         }
     }

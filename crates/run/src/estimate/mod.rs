@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::files::zarr;
 use curvelax_backend::DeviceKind;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{LevelTimes, Spec, Study, study::Stage};
@@ -99,6 +100,7 @@ impl Estimate {
     ) -> Result<Estimate> {
         let (stages, cells) = (study.stages(), study.cells());
         let members = study.member_count();
+        let chunks = zarr::bytes_held(study.spec(), study.cells()[0].family.points());
         let chosen = with_pilots(study);
         let count_of = |levels: bool| chosen.iter().filter(|i| stages[**i].level.is_some() == levels).count().max(1);
         let [own_count, level_count] = [false, true].map(count_of);
@@ -134,6 +136,7 @@ impl Estimate {
                 slots,
                 count: members.min(slots as u64) as usize,
                 rows,
+                chunks: if stage.level.is_none() { chunks } else { 0 },
             };
             let largest = pilots.iter().map(|seen| seen.members).max().unwrap_or(0);
             let in_pilot = of(largest, in_pilot);
@@ -187,7 +190,7 @@ impl Estimate {
         if let Some((n, slots)) = at_finest {
             let slots = slots.or(residents.first().map(|own| own.slots)).unwrap_or(1);
             let most = share.map_or(members as f64, |[_, most]| (most * members as f64).ceil());
-            residents.push(Residents { n, slots, count: slots.min(most as usize), rows: 0.0 });
+            residents.push(Residents { n, slots, count: slots.min(most as usize), rows: 0.0, chunks: 0 });
         }
         let memory =
             size::memory(size::program(in_pilots, held_rows), members, rated, most, explained, &residents, kept);

@@ -20,8 +20,9 @@ pub const MANY_ROWS: u64 = 4_000_000;
 const POOL_NUMBERS: usize = STATE_FIELDS + 4;
 /// The same while a checkpoint is saved: the paused member, and its bytes.
 const KEPT_NUMBERS: usize = 2 * STATE_FIELDS;
-/// Bytes per node of the page and its pictures, up to the maximum number of nodes drawn.
-const PAGE_BYTES: usize = 25_000;
+/// Bytes per node that is drawn of the page and its pictures: the digits of the portraits, twice, and of the gallery, three
+/// times. 26 kB a node were measured in all at 100 to 600 nodes, of which [`PORTRAIT_COPIES`] are 19.
+const PAGE_BYTES: usize = 7_000;
 /// Copies of the nodes of the members drawn.
 const PORTRAIT_COPIES: usize = 3;
 /// Copies of the numbers of the members whose times are explained. Measured.
@@ -87,6 +88,8 @@ pub struct Residents {
     pub count: usize,
     /// Bytes of the rows of one of them.
     pub rows: f64,
+    /// Bytes of the chunks of the store that are being filled.
+    pub chunks: u64,
 }
 
 impl Residents {
@@ -119,7 +122,7 @@ impl Residents {
             true => numbers(KEPT_NUMBERS * self.n * full) + self.read_back(full),
             false => self.read_back(drawn.min(full)),
         };
-        self.pool(full) + passing + self.rows() + spilling
+        self.pool(full) + passing + self.rows() + spilling + self.chunks
     }
 }
 
@@ -145,7 +148,7 @@ pub fn memory(
     kept: bool,
 ) -> u64 {
     let drawn = usize::try_from(members).unwrap_or(usize::MAX).min(MAX_PANELS);
-    let shown = n.min(Portrait::MAX_NODES);
+    let shown = n.div_ceil(Portrait::stride(n));
     let portraits = numbers(2 * shown * (member::PARTS + 1) * drawn);
     let page = (PAGE_BYTES * shown * drawn / MAX_PANELS) as u64;
     let rated = (rated * members as f64) as u64;

@@ -118,6 +118,10 @@ impl Drop for Claim {
         if self.has_its_file().unwrap_or(false) {
             let _ = remove(self.place.join(LOCK).at());
         }
+        // Closing would not do: a program that this process is starting has copies of both until it runs.
+        for held in self.folder.as_deref().into_iter().chain([&self.lock]) {
+            let _ = held.unlock();
+        }
     }
 }
 
@@ -181,6 +185,16 @@ mod tests {
         assert_eq!((names(&out), names(&moved)), (vec![LOCK.into()], vec![]));
         fs::remove_dir_all(&out).unwrap();
         assert!(matches!(second.check(), Err(Error::Lost(_))));
+    }
+
+    #[test]
+    fn a_folder_is_free_at_once_although_a_program_that_is_being_started_has_copies_of_its_locks() {
+        let home = tempfile::tempdir().unwrap();
+        let claim = Claim::take(home.path()).unwrap().unwrap();
+        let copies = [claim.folder.as_ref().unwrap(), &claim.lock].map(|held| held.try_clone().unwrap());
+        drop(claim);
+        assert!(!is_held(home.path()) && Claim::take(home.path()).unwrap().is_some());
+        drop(copies);
     }
 
     #[test]

@@ -137,7 +137,12 @@ fn continued(
     let placed = spec(&origin.spec, &place)
         .and_then(|spec| PlacedStudy::of(RunPlan { spec, base, known }))
         .map_err(|error| origin.explain(error))?;
-    let placed = if place.why.is_some() { placed.because("the GPU failed") } else { placed };
+    let placed = match &place {
+        ResumePlace { why: Some(_), .. } => placed.because("the GPU failed"),
+        // The spec of a run names its back end even if nobody did.
+        ResumePlace { backend: None, adapter: None, .. } => placed.because(&origin.platform.reason),
+        _ => placed,
+    };
     origin.check_outlines(&placed.study)?;
     settle(origin, &placed, place)?;
     Session::resume(placed, folder, saved, manner, host)

@@ -76,6 +76,8 @@ impl Array {
         while !bytes.is_empty() {
             let room = (self.chunk_bytes - self.chunk.len()).min(self.run_left as usize);
             let (now, later) = bytes.split_at(room.min(bytes.len()));
+            // All at once, since a chunk that grew by doubling would hold up to twice its bytes.
+            self.chunk.reserve_exact(self.chunk_bytes - self.chunk.len());
             self.chunk.extend_from_slice(now);
             self.run_left -= now.len() as u64;
             if self.run_left == 0 || self.chunk.len() == self.chunk_bytes {

@@ -2,9 +2,12 @@
 
 use serde_json::{Value, json};
 
-use super::{array::Array, chunks::DataType};
+use super::{
+    array::Array,
+    chunks::{CHUNK_BYTES, DataType},
+};
 use curvelax_base::error::Result;
-use curvelax_ensemble::{Spec, Status, schedule::Outputs};
+use curvelax_ensemble::{Spec, Status, request::spec::Store, schedule::Outputs};
 
 /// The array with the status of each member.
 pub(super) const STATUS: &str = "status";
@@ -51,6 +54,14 @@ pub(super) fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) ->
         }),
         status: vector(STATUS, DataType::Int8, members, flags),
     }
+}
+
+/// Bytes of the chunks that are being filled while a store of `spec` with `points` nodes grows, 0 without one.
+pub fn bytes_held(spec: &Spec, points: usize) -> u64 {
+    if spec.store != Store::Zarr || spec.snapshots.is_empty() {
+        return 0;
+    }
+    arrays(spec, points, &times(spec), CHUNK_BYTES).fields.iter().map(|array| array.chunk_bytes as u64).sum()
 }
 
 /// The attributes of all arrays together.

@@ -16,7 +16,7 @@ mod store;
 #[cfg(test)]
 mod tests;
 
-pub use layout::{attributes, times};
+pub use layout::{attributes, bytes_held, times};
 pub use mark::StoreMark;
 pub use reading::StoredMembers;
 pub use store::SnapshotStore;
