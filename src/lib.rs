@@ -89,6 +89,8 @@ pub use curvelax_draw as draw;
 #[doc(hidden)]
 pub use curvelax_ensemble::{schedule, trajectory};
 #[doc(hidden)]
-pub use curvelax_run::{estimate, figures, files, report, session};
+pub use curvelax_files as files;
+#[doc(hidden)]
+pub use curvelax_run::{estimate, figures, report, session};
 
 use curvelax_base::text;

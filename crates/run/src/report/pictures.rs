@@ -7,7 +7,6 @@ use super::{
     overview::{describe, place},
     page::{Headline, MAX_MEMBERS, MovingMember, Page, PageFigure, PageTable, spread},
 };
-use crate::files::{names, portraits::Film};
 use curvelax_base::{
     error::{Result, shortened},
     random::normal_quantile,
@@ -22,6 +21,7 @@ use curvelax_draw::{
     style::SERIES,
 };
 use curvelax_ensemble::{Event, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
+use curvelax_files::{names, portraits::Film};
 use curvelax_flow::flow::Flow;
 use curvelax_statistics::{HALF_INTERVAL, Interval, KaplanMeier, Sample};
 use curvelax_study::results::{
@@ -886,9 +886,9 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::files::portraits::tests::film;
     use curvelax_draw::svg::dots;
     use curvelax_ensemble::{Outcome, schedule::grid};
+    use curvelax_files::samples::film;
     use curvelax_study::{
         results::tally::Tally,
         samples::{outcome, platform},

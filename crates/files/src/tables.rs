@@ -461,7 +461,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::files::OutputFolder;
+    use crate::OutputFolder;
     use curvelax_ensemble::{Observables, Status};
 
     fn outcome(start: Observables, end: Observables) -> Outcome {
