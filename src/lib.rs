@@ -40,7 +40,8 @@
 //! | `curvelax-ensemble` | [`ensemble`], [`simulate`] | the spec, its members, their trajectories and results |
 //! | `curvelax-study` | [`placement`], [`relax`](fn@relax), [`conformance`], [`truth`], [`results`] | from a spec to results, on the device that suits it; exact solutions; what results say |
 //! | `curvelax-draw` | | SVG, axes and charts from plain numbers |
-//! | `curvelax-run` | | from a spec to a finished folder: tables, checkpoints, reports |
+//! | `curvelax-files` | | the folder of a run: tables, stores, checkpoints, shards, and their readers |
+//! | `curvelax-run` | | from a spec to a finished folder: sessions, reports, merges, estimates |
 //!
 //! # Example
 //!
