@@ -104,12 +104,13 @@ impl Film {
         let known = |text: &String| text.bytes().all(|digit| DIGITS.contains(&digit));
         let equal = |text: &String| text.len().is_multiple_of(4) && text.len() == self.nodes[0].len();
         let place = self.corner.iter().all(|v| is_drawable(*v));
+        let unit = self.unit > 0.0 && is_drawable(self.unit);
         match () {
             _ if self.times.len() != self.nodes.len() => Some("as many times as states"),
             _ if !self.times.is_sorted_by(|a, b| a < b) => Some("ascending times"),
             _ if !self.nodes.iter().all(known) => Some("digits of base64"),
             _ if !self.nodes.iter().all(equal) => Some("equally many nodes at all times"),
-            _ if !place || !(self.unit > 0.0 && is_drawable(self.unit)) => Some("a corner and a positive unit"),
+            _ if !place || !unit => Some("a corner and a positive unit"),
             _ => None,
         }
     }
