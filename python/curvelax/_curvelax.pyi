@@ -43,8 +43,18 @@ class FinishedRun:
     def columns(self) -> dict[str, list[tuple[str, str, str]]]:
         """Heading, type and meaning of the columns of each table."""
 
-    def survival(self) -> list[tuple[int, list[NDArray[np.float64]], float | None]]:
-        """For each cell: times, members at risk, share not relaxed, and its 95 % band; the largest time known."""
+    def time_names(self) -> list[str]:
+        """The times of which there are statistics; the one that is shown comes first, events last."""
+
+    def survival(self, time: str) -> list[tuple[int, tuple[list[NDArray[np.float64]], float | None]]]:
+        """For each cell: times, members at risk, share without it, and its 95 % band; the largest time known."""
+
+    @staticmethod
+    def survival_of(times: list[float], happened: list[bool]) -> tuple[list[NDArray[np.float64]], float | None]:
+        """The same of any times, of which those that did not happen are censored."""
+
+    def time_unit(self) -> str | None:
+        """The unit of times, if it has a name."""
 
     def times(self) -> list[float]:
         """Times of the snapshots."""

@@ -16,8 +16,10 @@ from ._errors import RequestError
 
 if TYPE_CHECKING:
     import matplotlib.axes
+    import numpy as np
     import pandas as pd
     import xarray as xr
+    from numpy.typing import NDArray
 
 # What gives a run a table that it does not have.
 NEEDS = {
@@ -164,10 +166,36 @@ class Study:
         """First times of the events of the spec, one row per member and event."""
         return self.table("events")
 
-    @functools.cached_property
-    def explained(self) -> pd.DataFrame:
-        """How much of the variance of the times each feature explains."""
-        return self.table("explained")
+    def explained(self, time: str | None = None) -> pd.DataFrame:
+        """How much of the variance of a time each feature explains, cell by cell, best first.
+
+        ``time`` is ``"t_limit"``, which is the default where the run has it, ``"t_relax"``, ``"t_half"`` or the name of an
+        event. ``table("explained")`` has all of them.
+        """
+        rows = self.table("explained")
+        return rows[rows.time == self._time(time)].reset_index(drop=True)
+
+    def _time(self, time: str | None) -> str:
+        """The name of a time, by default of the one that the report shows."""
+        known = self._run.time_names()
+        if time is None:
+            return known[0]
+        if time not in known:
+            remedy = f"; {NEEDS['levels']}" if time == "t_limit" else ""
+            raise RequestError(f"time {time!r}: the run has none of this name; use one of {', '.join(known)}{remedy}")
+        return time
+
+    def _survival(self, time: str) -> list[tuple[int, list[NDArray[np.float64]], float | None]]:
+        """The survival curve of each cell, and the largest time up to which it is known."""
+        if time != "t_half":
+            return [(cell, numbers, last) for cell, (numbers, last) in self._run.survival(time)]
+        curves = []
+        for cell in self.ensemble.cell:
+            own = self.summary[self.summary.cell == cell]
+            happened = own.t_half.notna()
+            numbers, last = self._run.survival_of(own.t_half.fillna(own.t_end).tolist(), happened.tolist())
+            curves.append((int(cell), numbers, last))
+        return curves
 
     @functools.cached_property
     def series(self) -> pd.DataFrame:
@@ -196,44 +224,53 @@ class Study:
             data.set_close(lambda: self)
         return data
 
-    def survival(self) -> pd.DataFrame:
-        """The members that have not relaxed yet, by cell (Kaplan and Meier).
+    def survival(self, time: str | None = None) -> pd.DataFrame:
+        """The members that have not reached a time yet, by cell (Kaplan and Meier).
 
-        Columns: ``cell``; ``time``, 0 and the times at which members relaxed; ``at_risk``, members at risk just before;
-        ``survival``, the share that has not relaxed after it; ``lower`` and ``upper``, its 95 % band (Greenwood).
+        ``time`` is ``"t_limit"``, which is the default where the run has it, ``"t_relax"``, ``"t_half"`` or the name of an
+        event, whose times are limits where the run has them. ``attrs["time"]`` of the frame is its name.
+
+        Columns: ``cell``; ``time``, 0 and the times at which members reached it; ``at_risk``, members at risk just before;
+        ``survival``, the share that has not reached it after that; ``lower`` and ``upper``, its 95 % band (Greenwood).
         """
         import pandas as pd
 
         parts = []
-        for cell, numbers, _ in self._run.survival():
+        name = self._time(time)
+        for cell, numbers, _ in self._survival(name):
             names = ["time", "at_risk", "survival", "lower", "upper"]
             part = pd.DataFrame(dict(zip(names, numbers, strict=True)))
             part.insert(0, "cell", cell)
             parts.append(part.astype({"at_risk": "int64"}))
-        return pd.concat(parts, ignore_index=True)
+        curves = pd.concat(parts, ignore_index=True)
+        curves.attrs["time"] = name
+        return curves
 
-    def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes:
-        """Draws the survival curve of each cell with its 95 % band into ``ax``, or new axes. Needs matplotlib."""
+    def plot(self, ax: matplotlib.axes.Axes | None = None, *, time: str | None = None) -> matplotlib.axes.Axes:
+        """Draws the survival curve of each cell with its 95 % band into ``ax``, or new axes. Needs matplotlib.
+
+        ``time`` is as in :meth:`survival`.
+        """
         import matplotlib.pyplot as plt
 
         ax = ax or plt.subplots()[1]
         labels = self._labels()
-        for cell, (times, _, *shares), last in self._run.survival():
+        name = self._time(time)
+        for cell, (times, _, *shares), last in self._survival(name):
             # To the last time of a member that did not relax.
-            time = [*times, times[-1] if last is None else last]
+            steps = [*times, times[-1] if last is None else last]
             survival, lower, upper = ([*share, share[-1]] for share in shares)
-            (line,) = ax.step(time, survival, where="post", label=labels.get(cell))
-            ax.fill_between(time, lower, upper, step="post", alpha=0.2, color=line.get_color(), linewidth=0)
-        ax.set(xlabel=f"time ({self._time_unit()})", ylabel="members not yet relaxed")
+            (line,) = ax.step(steps, survival, where="post", label=labels.get(cell))
+            ax.fill_between(steps, lower, upper, step="post", alpha=0.2, color=line.get_color(), linewidth=0)
+        ylabel = "members not yet relaxed" if name in ("t_limit", "t_relax") else f"members without {name}"
+        ax.set(xlabel=f"{name} ({self._time_unit()})", ylabel=ylabel)
         ax.set_ylim(0, 1.02)
         if len(labels) > 1:
             ax.legend(title=", ".join(self.spec["sweep"]))
         return ax
 
     def _time_unit(self) -> str:
-        if "units" in self.spec:
-            return self.spec["units"].split(",")[1].strip()
-        return "unit of the mobility" if "mobility" in self.spec else "length⁴"
+        return self._run.time_unit() or ("time of B" if "mobility" in self.spec else "length⁴")
 
     def _labels(self) -> dict[int, str]:
         """The values of the swept keys, by cell."""

@@ -5,13 +5,33 @@ use std::path::PathBuf;
 use curvelax::{
     files::{columns::columns, names, reader::Finished, zarr},
     report::pictures,
-    results::{EnsembleStatistics, cells::CellStatistics},
-    statistics::{KaplanMeier, Step},
+    results::EnsembleStatistics,
+    statistics::{KaplanMeier, Observation, Sample, Step},
 };
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{raise, unforked};
+
+/// A survival curve: the times at which it falls after time 0, the members at risk before, the share without the event
+/// after, and its 95 % band; and the largest time up to which it is known.
+type Curve<'py> = ([Bound<'py, PyArray1<f64>>; 5], Option<f64>);
+
+/// The survival curve of some times.
+fn curve<'py>(py: Python<'py>, sample: &Sample) -> Curve<'py> {
+    let estimate = KaplanMeier::new(sample);
+    let array = |start: f64, of: &dyn Fn(Step) -> f64| {
+        PyArray1::from_iter(py, [start].into_iter().chain(estimate.steps().map(of)))
+    };
+    let numbers = [
+        array(0.0, &|step| step.time),
+        array(estimate.members() as f64, &|step| step.at_risk as f64),
+        array(1.0, &|step| step.survival),
+        array(1.0, &|step| step.band().0),
+        array(1.0, &|step| step.band().1),
+    ];
+    (numbers, estimate.last())
+}
 
 /// A finished run as read from its folder.
 #[pyclass(frozen)]
@@ -46,25 +66,53 @@ impl FinishedRun {
         Ok(all)
     }
 
-    /// The survival curve of each cell: the times at which it falls after time 0, the members at risk before, the share
-    /// not relaxed after, and its 95 % band; and the largest time up to which it is known.
-    #[expect(clippy::type_complexity, reason = "a tuple in Python")]
-    fn survival<'py>(&self, py: Python<'py>) -> Vec<(u64, [Bound<'py, PyArray1<f64>>; 5], Option<f64>)> {
-        let curve = |cell: &CellStatistics| {
-            let estimate = KaplanMeier::new(&cell.times.sample);
-            let array = |start: f64, of: &dyn Fn(Step) -> f64| {
-                PyArray1::from_iter(py, [start].into_iter().chain(estimate.steps().map(of)))
+    /// The times of which there are statistics: the one that is shown comes first, events last.
+    fn time_names(&self) -> Vec<String> {
+        let shown = self.statistics.time();
+        let others = ["t_relax", "t_half"].into_iter().filter(|name| *name != shown);
+        let events = self.run.provenance.spec.event.iter().map(|event| event.name.clone());
+        [shown].into_iter().chain(others).map(String::from).chain(events).collect()
+    }
+
+    /// The survival curve of each cell for t_limit, t_relax or an event, which is in the limit if it has one.
+    ///
+    /// # Errors
+    /// `RequestError` for an event before which members were stopped.
+    fn survival<'py>(&self, py: Python<'py>, time: &str) -> PyResult<Vec<(u64, Curve<'py>)>> {
+        let cells = &self.statistics.cells;
+        let event = self.run.provenance.spec.event.iter().position(|event| event.name == time);
+        let stopped: u64 = event.map_or(0, |event| cells.iter().map(|cell| cell.events[event].stopped).sum());
+        if stopped > 0 {
+            let problem = format!(
+                "time {time:?}: {stopped} members stopped when they relaxed, before this event, so it has no statistics; \
+                 run with stop_when_relaxed=False and a number as t_end"
+            );
+            return Err(raise(py, curvelax::Error::Request(problem), None));
+        }
+        let curves = cells.iter().map(|cell| {
+            let sample = match event {
+                Some(event) => &cell.events[event].judged().sample,
+                None => &cell.judged(time == "t_limit").sample,
             };
-            let numbers = [
-                array(0.0, &|step| step.time),
-                array(estimate.members() as f64, &|step| step.at_risk as f64),
-                array(1.0, &|step| step.survival),
-                array(1.0, &|step| step.band().0),
-                array(1.0, &|step| step.band().1),
-            ];
-            (cell.cell, numbers, estimate.last())
-        };
-        self.statistics.cells.iter().map(curve).collect()
+            (cell.cell, curve(py, sample))
+        });
+        Ok(curves.collect())
+    }
+
+    /// The survival curve of `times`, of which only some `happened`; the others are censored.
+    ///
+    /// # Errors
+    /// `RunError` for a time that is negative or not finite.
+    #[staticmethod]
+    fn survival_of(py: Python<'_>, times: Vec<f64>, happened: Vec<bool>) -> PyResult<Curve<'_>> {
+        let seen = times.into_iter().zip(happened).map(|(time, happened)| Observation { time, happened });
+        let sample = Sample::new(seen).map_err(|error| raise(py, error, None))?;
+        Ok(curve(py, &sample))
+    }
+
+    /// The unit of times, if it has a name.
+    fn time_unit(&self) -> Option<String> {
+        self.run.provenance.spec.units.as_ref().map(|units| units.shown().time)
     }
 
     /// The times of its snapshots.

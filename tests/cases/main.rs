@@ -8,6 +8,7 @@ mod compilers;
 mod conformance;
 mod faults;
 mod hostile;
+mod legible;
 mod resume;
 mod truth;
 
@@ -30,7 +31,7 @@ fn main() -> ExitCode {
     // Many trials wait: for a program, a compiler, or the two minutes after which a GPU is given up. These are first.
     arguments.test_threads.get_or_insert(2 + available_parallelism().map_or(1, usize::from));
     type Trials = fn() -> Vec<Trial>;
-    let modules: [(&str, Trials); 7] = [
+    let modules: [(&str, Trials); 8] = [
         ("hostile", hostile::trials),
         ("conformance", conformance::trials),
         ("faults", faults::trials),
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
         ("truth", truth::trials),
         ("compilers", compilers::trials),
         ("browser", browser::trials),
+        ("legible", legible::trials),
     ];
     let kinds = modules.into_iter().flat_map(|(kind, trials)| trials().into_iter().map(move |t| t.with_kind(kind)));
     let conclusion = libtest_mimic::run(&arguments, kinds.collect());

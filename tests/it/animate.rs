@@ -122,7 +122,7 @@ fn an_svg_is_xml_with_a_moving_path_for_each_member() {
     let text = fs::read_to_string(done.home.path().join("new/movie.svg")).unwrap();
     assert_eq!(text.matches("<path class=\"moving\"").count(), 4);
     assert_eq!(text.matches("<path class=\"before\"").count(), 4);
-    assert!(text.contains("width=\"500\"") && text.contains(" h</text>") && text.contains(" um</text>"), "{text}");
+    assert!(text.contains("width=\"500\"") && text.contains(" h</text>") && text.contains(" µm</text>"), "{text}");
     assert!(!text.contains("<script"));
     for member in ["member 0", "member 9", "amplitude = 0.05", "amplitude = 0.1"] {
         assert!(text.contains(&format!(">{member}</text>")), "{member}");

@@ -316,3 +316,40 @@ fn an_event_before_which_members_were_stopped_has_no_statistics() {
     assert!(page.contains("were stopped when they relaxed, before the event late"));
     assert!(!whole.text("report.html").contains("were stopped when they relaxed"));
 }
+
+#[test]
+fn events_have_a_limit_for_each_member_with_refine() {
+    let arguments =
+        "--curves 8 --points 64 --adaptive=1e-3 --t-end 1 --event half=excess<=0.5*start --event late=excess<=1e-9";
+    let (refined, plain) = (run(&format!("{arguments} --refine")), run(arguments));
+    let (rows, summary) = (refined.rows("events.csv"), refined.summary());
+    for (row, member) in rows.iter().filter(|row| row["event"] == "half").zip(&summary) {
+        let (t, limit, error) = (number(row, "t"), number(row, "t_limit"), number(row, "t_error"));
+        assert!(limit != t && (limit / t - 1.0).abs() < 0.05 && error > 0.0 && error < 0.1 * t, "{row:?}");
+        // Half the excess is one event: t_half by another name, at the nodes of the run. Inside a step, each is found by its
+        // own interpolation.
+        assert!((t / number(member, "t_half") - 1.0).abs() < 1e-5, "{row:?} {member:?}");
+    }
+    assert!(rows.iter().filter(|row| row["event"] == "late").all(|row| row["t_limit"].is_empty()));
+    assert!(plain.rows("events.csv").iter().all(|row| row["t_limit"].is_empty() && row["t_error"].is_empty()));
+    let statistics = &refined.rows("event_statistics.csv")[0];
+    let mut limits: Vec<f64> =
+        rows.iter().filter(|row| row["event"] == "half").map(|row| number(row, "t_limit")).collect();
+    limits.sort_by(f64::total_cmp);
+    assert_eq!((number(statistics, "t_limit_known"), number(statistics, "t_limit_median")), {
+        (8.0, 0.5 * limits[3] + 0.5 * limits[4])
+    });
+    assert!(refined.rows("explained.csv").iter().any(|row| row["time"] == "half"));
+
+    // What was changed by hand does not pass for what the levels say.
+    let path = refined.path().join("events.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    let limit = &rows[0]["t_limit"];
+    fs::write(&path, text.replace(limit.as_str(), "0.5")).unwrap();
+    let output = crate::common::command::curvelax(refined.home.path(), "plot out");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.code() == Some(2) && said.contains("the limit") && said.contains("event half of member 0"),
+        "{said}"
+    );
+}

@@ -154,11 +154,11 @@ fn groups_are_the_ensembles_of_their_members() {
         }
     }
     assert_ne!(groups[1]["t_relax_median"], groups[2]["t_relax_median"]);
-    assert!(said.contains("phase alpha: t_relax median ") && said.contains("\ngroups "), "{said}");
+    assert!(said.contains("phase alpha: t_limit median ") && said.contains("\ngroups "), "{said}");
     let svg = fs::read_to_string(home.join("all/plots/groups.svg")).unwrap();
     assert!(svg.contains("alpha") && svg.contains("by phase"));
     let page = fs::read_to_string(home.join("all/report.html")).unwrap();
-    assert!(page.contains("<caption>By phase; ") && page.contains("beta"));
+    assert!(page.contains("<p class=\"title\">By phase: t_limit; ") && page.contains("beta"));
     // Pictures are drawn again without the files of the outlines.
     fs::remove_file(home.join("grains.geojson")).unwrap();
     let before = content(&home.join("all"));

@@ -45,7 +45,8 @@ fn pictures(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn pictures_come_back_byte_for_byte() {
     for (arguments, count) in [
         ("--curves 7 --points 40 --adaptive=1e-3 --t-end 1", 9),
-        ("--curves 1 --points 32 --t-end 0.01", 9),
+        ("--curves 1 --points 32 --t-end 0.01", 4),
+        ("--curves 2 --points 32 --t-end 0.01", 9),
         (RUN, 11),
         ("--curves 5 --points 32 --tau 1e-3 --t-end 0.3 --series 0.013", 9),
         ("--curves 9 --points 32 --adaptive=1e-3 --t-end 0.3 --series 0.1 --only 2,5,7 --snapshots 0,0.1", 9),
@@ -189,7 +190,7 @@ fn events_that_are_not_those_of_the_run_are_refused_with_their_place() {
     }
     let more = |out: &Path| {
         let text = fs::read_to_string(events(out)).unwrap();
-        fs::write(events(out), text + "6,1,convex,0.1,0\n").unwrap();
+        fs::write(events(out), text + "6,1,convex,0.1,0,,\n").unwrap();
     };
     refused(&done, more, "out/events.csv, line 14, column member: expected the end of the file, found `6`");
     // Where the other table lacks a row, it is that one that is named.

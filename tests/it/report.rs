@@ -51,7 +51,7 @@ fn none_of(text: &str) -> Vec<&str> {
 fn runs_of_one_member_of_none_in_a_cell_and_of_none_that_relaxed_leave_no_number_that_is_none() {
     let none_relaxed = "no member relaxed before its final time";
     for (arguments, said) in [
-        ("--curves 1 --points 40 --adaptive=1e-3", "The only member relaxed."),
+        ("--curves 1 --points 40 --adaptive=1e-3", "<strong>1</strong> of 1 member relaxed"),
         ("--curves 1 --points 40 --adaptive=1e-3 --t-end 0.01 --series 0.01", none_relaxed),
         ("--curves 5 --points 40 --adaptive=1e-3 --t-end 0.01 --series 0.002", none_relaxed),
         ("--curves 2 --points 40 --adaptive=1e-3 --t-end 0.1 --sweep omega=1,2 --only 1 --series 0.01", none_relaxed),
@@ -114,6 +114,146 @@ fn the_mean_excess_is_drawn_with_its_slope() {
     let study = run(&format!("{RUN} --sweep amplitude=0.02,0.1"));
     let svg = study.text("plots/excess.svg");
     assert!(svg.contains("amplitude = 0.1") && !svg.contains("exp("), "{svg}");
+}
+
+/// The number with so many significant digits, as the page and the overview have it.
+fn shown(value: &str, digits: i32) -> String {
+    let value: f64 = value.parse().unwrap();
+    format!("{value:.*}", (digits - 1 - value.log10().floor() as i32) as usize)
+}
+
+#[test]
+fn one_time_is_shown_everywhere_the_limit_where_there_is_one() {
+    let run_of = |more: &str| run(&format!("--curves 24 --points 64 --adaptive=1e-3 --t-end 2 {more}"));
+    let (refined, plain) = (run_of("--refine"), run_of(""));
+    for (done, time, other) in [(&refined, "t_limit", "t_relax"), (&plain, "t_relax", "t_limit")] {
+        let ensemble = &done.rows("ensemble.csv")[0];
+        let page = done.text("report.html");
+        assert!(page.contains(&format!("<dt>median {time}</dt><dd class=\"value\">{}</dd>", {
+            shown(&ensemble[&format!("{time}_median")], 4)
+        })));
+        for name in ["relaxation", "distribution", "survival", "features"] {
+            let svg = done.text(&format!("plots/{name}.svg"));
+            assert!(svg.contains(&format!("{time} (length⁴)")) && !svg.contains(other), "{name}: {svg}");
+        }
+        assert!(page.contains(&format!("statistics of {time} (Kaplan-Meier)")));
+        let member = &done.summary()[0];
+        let told = if time == "t_limit" { ", t_limit = " } else { " at t = " };
+        assert!(page.contains(&format!("member 0: relaxed{told}{}", &shown(&member[time], 4)[..4])), "{member:?}");
+        let explained = done.rows("explained.csv");
+        assert_eq!(explained[0]["time"], time);
+    }
+    // The raw times are there, behind.
+    let raw = shown(&refined.rows("ensemble.csv")[0]["t_relax_median"], 4);
+    assert!(
+        refined.text("report.html").contains(&format!("<dt>raw median t_relax</dt><dd class=\"value\">{raw}</dd>"))
+    );
+}
+
+#[test]
+fn few_outlines_are_listed_by_name_and_have_no_statistics() {
+    let square = "0,0\n1,0\n1,1\n0,1\n";
+    let bar = "0,0\n3,0\n3,1\n0,1\n";
+    let done = run_with(&[("bar.csv", bar), ("square.csv", square)], "--shape files:*.csv --points 40 --accurate");
+    let (page, summary) = (done.text("report.html"), done.summary());
+    assert!(page.contains("<h1>bar, square under surface-diffusion</h1>"));
+    assert_eq!(plots(&done), ["curves.svg", "members.svg", "portraits.json"]);
+    for row in &summary {
+        let entry = format!("<dt>{}</dt><dd class=\"value\">t_limit = {}", row["label"], &row["t_limit"][..5]);
+        assert!(page.contains(&entry), "{entry}");
+    }
+    for word in ["median", "not known", "Kaplan-Meier", "quantile"] {
+        assert!(!page.contains(word), "{word}");
+    }
+    let text = String::from_utf8(
+        crate::common::command::curvelax(done.home.path(), {
+            "run --shape files:*.csv --points 40 --accurate --backend cpu --out again"
+        })
+        .stdout,
+    )
+    .unwrap();
+    for row in &summary {
+        let line = text.lines().find(|line| line.contains(&row["label"])).unwrap();
+        assert!(line.contains(&row["t_limit"][..5]) && line.contains(" ± ") && line.ends_with("relaxed"), "{text}");
+    }
+    assert!(!text.contains("median") && !text.contains("not known"), "{text}");
+    // The control: many members have statistics.
+    let many = run_with(
+        &[("bar.csv", bar), ("square.csv", square)],
+        "--shape files:*.csv --curves 11 --modes 2..=3 \
+                        --amplitude 0.05 --points 40 --adaptive=1e-3 --t-end 1",
+    );
+    assert!(many.text("report.html").contains("median t_relax") && plots(&many).contains(&"survival.svg".into()));
+}
+
+#[test]
+fn cells_of_one_member_are_listed_by_what_varies() {
+    let done = run("--curves 1 --amplitude 0 --points 40 --adaptive=1e-3 --t-end 2 --stop-when-relaxed \
+                    --sweep shape=ellipse:2,1;circle:1;ellipse:3,1 --event half=excess<=0.5*start");
+    let page = done.text("report.html");
+    for name in ["shape = ellipse:2,1", "shape = circle:1", "shape = ellipse:3,1"] {
+        assert!(page.contains(&format!("<dt>{name}</dt>")), "{name}");
+    }
+    assert!(page.contains("<th scope=\"col\" class=\"number\">half</th>"), "{page}");
+}
+
+#[test]
+fn cells_are_told_apart_by_what_varies_in_one_legend() {
+    let done = run(&format!("{RUN} --sweep amplitude=0.02,0.1 --sweep flow=surface-diffusion,willmore"));
+    let page = done.text("report.html");
+    let legend = page.split("<ul class=\"legend\"").nth(1).unwrap().split("</ul>").next().unwrap();
+    assert_eq!(legend.matches("<li>").count(), 4);
+    for name in ["amplitude = 0.02", "amplitude = 0.1", "flow = surface-diffusion", "flow = willmore"] {
+        assert!(legend.contains(&format!("{name}</li>")), "{legend}");
+    }
+    let survival = done.text("plots/survival.svg");
+    // A file has a legend of its own, with two entries for each key, and a curve for each cell.
+    for class in ["s0 d0", "s1 d0", "faint d0", "faint d1", "s0 d1", "s1 d1"] {
+        assert!(survival.contains(&format!("<g class=\"{class}\">")), "{class}: {survival}");
+    }
+    assert!(survival.contains(">flow = willmore</text>") && page.matches(">flow = willmore</text>").count() < 5);
+    let distribution = done.text("plots/distribution.svg");
+    assert!(distribution.contains(">0.1, willmore</text>") && distribution.contains(">amplitude, flow</text>"));
+    assert!(page.contains("member 0 (0.02, surface-diffusion)"), "{page}");
+}
+
+#[test]
+fn captions_speak_of_what_is_drawn() {
+    let page = |more: &str| run(&format!("--points 40 --adaptive=1e-3 {more}")).text("report.html");
+    let (all, some) = (page("--curves 7 --t-end 1"), page("--curves 7 --t-end 0.82"));
+    let many = page("--curves 2 --t-end 1 --sweep amplitude=0.01,0.02,0.03,0.04,0.05");
+    let band = "Greenwood's 95 % band";
+    assert!(all.contains(band) && some.contains(band) && !many.contains(band));
+    let stroke = "a stroke marks";
+    assert!(!all.contains(stroke) && some.contains(stroke), "censored members are marked");
+    let slope = "the slope that linear theory gives";
+    assert!(all.contains(slope) && !many.contains(slope));
+}
+
+#[test]
+fn units_are_everywhere_and_micrometres_are_written_with_their_sign() {
+    let units = "--curves 7 --points 40 --adaptive=1e-3 --t-end auto --mobility 2.5e-3 --units um,h";
+    let done = run(units);
+    let (page, curves) = (done.text("report.html"), done.text("plots/curves.svg"));
+    for part in ["B = 0.0025 µm⁴/h", "Times are in h.", " h</dd>", "data-unit=\" h\"", "the bar has length 1 µm"] {
+        assert!(page.contains(part), "{part}");
+    }
+    let spec = page.split("<pre>").nth(1).unwrap().split("</pre>").next().unwrap();
+    assert!(!page.replace(spec, "").contains(" um") && !page.contains("length⁴"), "um is for keyboards");
+    assert!(curves.contains(" µm</text>") && curves.contains(" h</text>"), "{curves}");
+    let plain = run("--curves 7 --points 40 --adaptive=1e-3 --t-end 1").text("report.html");
+    assert!(plain.contains("Times are in length⁴, the length being that of the coordinates."));
+    let unnamed = run(&units.replace(" --units um,h", "")).text("report.html");
+    assert!(unnamed.contains("t_relax (time of B)") && !unnamed.contains("length⁴"));
+}
+
+#[test]
+fn long_tables_are_folded() {
+    let done = run("--curves 24 --points 40 --adaptive=1e-3 --t-end 1 --sweep omega=1,2");
+    let page = done.text("report.html");
+    let folded = page.split("<details>").nth(1).unwrap();
+    assert!(folded.starts_with("\n<summary>What explains the times"), "{folded}");
+    assert_eq!(page.matches("<details>").count(), 1, "short tables are open");
 }
 
 #[test]

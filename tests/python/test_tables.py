@@ -21,7 +21,7 @@ INTEGERS = {
     "explained.csv": ["cell", "members", "censored"],
     "levels.csv": ["member", "level", "cell", "points", "solves"],
     "events.csv": ["member", "cell", "censored"],
-    "event_statistics.csv": ["cell", "members", "known", "discretisation_known"],
+    "event_statistics.csv": ["cell", "members", "known", "discretisation_known", "t_limit_known"],
     "event_levels.csv": ["member", "level", "cell"],
     "rates.csv": ["member", "cell"],
     "mean_excess.csv": ["cell", "members"],

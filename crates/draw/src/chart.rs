@@ -13,8 +13,8 @@ use super::{
 };
 use curvelax_base::{interval::Interval, text::significant};
 
-/// Width of every chart, in pixels.
-pub const WIDTH: f64 = 680.0;
+/// Width of every chart, in pixels: the narrower, the larger its text where a phone shrinks it.
+pub const WIDTH: f64 = 560.0;
 /// Margin at the left and right of a chart.
 pub const MARGIN: f64 = 20.0;
 /// Space below a panel for tick labels and the name of the axis.
@@ -298,7 +298,8 @@ impl Panel<'_> {
             grid += &format!("M{} {top}V{bottom}", coordinate(x));
             marks += &format!("M{} {bottom}v-{TICK}", coordinate(x));
             if self.labels_x {
-                svg.text("x tick middle", DVec2::new(x, self.end().y + 16.0), label);
+                let inside = x.min(WIDTH - 0.5 * width(label, SIZE) - 1.0);
+                svg.text("x tick middle", DVec2::new(inside, self.end().y + 16.0), label);
             }
         }
         svg.path("grid", &grid);
@@ -342,7 +343,7 @@ impl Panel<'_> {
     }
 }
 
-/// A picture that says why there is nothing to draw.
+/// A picture that says why there is nothing to draw, recognised by [`reason`].
 pub fn nothing(title: &str, sentences: Vec<String>, reason: &str) -> String {
     let (mut svg, top) = Heading { title, sentences, legend: Vec::new() }.begin(180.0);
     let axis = Axis::new("", "", Scale::Linear, (0.0, 1.0));
@@ -354,13 +355,84 @@ pub fn nothing(title: &str, sentences: Vec<String>, reason: &str) -> String {
         y: &axis,
         labels_x: false,
     };
+    svg.open(NOTHING);
     panel.say(&mut svg, reason);
+    svg.close();
     svg.finish()
+}
+
+/// Class of the sentence in the place of a picture.
+const NOTHING: &str = "nothing";
+
+/// Why there is nothing to draw, of a picture that only says so, as text of XML.
+pub fn reason(svg: &str) -> Option<String> {
+    let (_, group) = svg.split_once(&format!("<g class=\"{NOTHING}\">"))?;
+    let lines = group.split("</text>").filter_map(|line| line.rsplit_once('>')).map(|(_, words)| words);
+    Some(lines.filter(|words| !words.trim().is_empty()).collect::<Vec<_>>().join(" "))
+}
+
+/// The sample of an entry of a legend by itself, as the text of an SVG file.
+pub fn sample(entry: &Entry) -> String {
+    let (width, height) = (SAMPLE, 12.0);
+    let mut svg = Svg::new(width, height, &style::chart(), "");
+    entry.draw(&mut svg, DVec2::new(0.0, 0.5 * height));
+    svg.finish()
+}
+
+/// What distinguishes the curves of a chart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CellKey {
+    /// Name of the quantity, for the colour bar that replaces the legend if there are many.
+    pub name: String,
+    /// Two quantities, of which colours show one and dashes or panels the other.
+    pub crossed: Option<Crossed>,
+    /// Another legend names the curves, as one for all charts of a page does.
+    pub is_told: bool,
+}
+
+impl From<&str> for CellKey {
+    fn from(name: &str) -> CellKey {
+        CellKey { name: name.into(), ..CellKey::default() }
+    }
+}
+
+/// Curves that two quantities distinguish.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Crossed {
+    /// Entries of the legend for the quantity that colours show.
+    pub colours: Vec<String>,
+    /// Those for the other.
+    pub patterns: Vec<String>,
+    /// For each curve, its place in both.
+    pub places: Vec<(usize, usize)>,
+}
+
+impl Crossed {
+    /// Whether each value has a colour or a pattern of its own, and all curves can be drawn.
+    fn fits(&self) -> bool {
+        self.colours.len() <= style::SERIES && self.has_patterns() && self.places.len() <= MAX_CURVES
+    }
+
+    fn has_patterns(&self) -> bool {
+        self.patterns.len() <= style::SERIES
+    }
+
+    /// The entries of the legend.
+    pub fn entries(&self) -> Vec<Entry> {
+        let entry = |(class, label): (String, &String)| Entry::new(&class, LegendMark::Series, label);
+        let colours = self.colours.iter().enumerate().map(|(i, label)| (format!("s{i} d0"), label));
+        let patterns = self.patterns.iter().enumerate().map(|(i, label)| (format!("faint d{i}"), label));
+        match self.fits() {
+            true => colours.chain(patterns).map(entry).collect(),
+            false => patterns.filter(|_| self.has_patterns()).map(entry).collect(),
+        }
+    }
 }
 
 /// Colours of curves: a few are distinct, many form an ordered scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Colours {
+    key: CellKey,
     /// Which curves are drawn, and the class of each.
     pub shown: Vec<(usize, String)>,
     /// The scale of the colours, if they are ordered.
@@ -370,20 +442,26 @@ pub struct Colours {
 impl Colours {
     /// Colours for one curve per value of `key`. If a value is unknown, or there is none, curves are numbered from 0
     /// and ordered by that.
-    pub fn of(values: &[Option<f64>], key: &str) -> Colours {
-        let count = values.len();
+    pub fn of(values: &[Option<f64>], cells: &CellKey) -> Colours {
+        let (count, key) = (values.len(), cells.clone());
+        // Nothing else is drawn where the curves are not those of the quantities.
+        let crossed = cells.crossed.as_ref().filter(|crossed| crossed.places.len() == count);
+        if let Some(crossed) = crossed.filter(|crossed| crossed.fits()) {
+            let class = |(i, (colour, pattern)): (usize, &(usize, usize))| (i, format!("s{colour} d{pattern}"));
+            return Colours { key, shown: crossed.places.iter().enumerate().map(class).collect(), bar: None };
+        }
         if count <= style::SERIES {
-            return Colours { shown: (0..count).map(|i| (i, format!("s{i}"))).collect(), bar: None };
+            return Colours { key, shown: (0..count).map(|i| (i, format!("s{i}"))).collect(), bar: None };
         }
         let known = |value: &f64| Scale::Linear.holds(*value);
         let given: Option<Vec<f64>> = values.iter().map(|value| value.filter(known)).collect();
-        let key = if given.is_some() { key } else { "cell" };
+        let name = if given.is_some() { &cells.name[..] } else { "cell" };
         let values = given.unwrap_or_else(|| (0..count).map(|i| i as f64).collect());
         let scale = Scale::of(values.iter().copied());
         let ends = range(values.iter().copied()).filter(|(low, high)| low < high);
         let axis = match ends {
-            Some(ends) => Axis::new(key, "", scale, ends),
-            None => Axis::over(key, "", scale, values.iter().copied()),
+            Some(ends) => Axis::new(name, "", scale, ends),
+            None => Axis::over(name, "", scale, values.iter().copied()),
         };
         let mut order: Vec<usize> = (0..count).collect();
         order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -391,15 +469,28 @@ impl Colours {
         let picked = (0..most).map(|i| order[i * (count - 1) / (most - 1)]);
         let class = |i: usize| {
             let step = (axis.share(values[i]) * style::RAMP as f64) as usize;
-            (i, format!("r{}", step.min(style::RAMP - 1)))
+            let pattern = crossed.filter(|crossed| crossed.has_patterns()).map(|crossed| crossed.places[i].1);
+            let dashes = pattern.map_or(String::new(), |pattern| format!(" d{pattern}"));
+            (i, format!("r{}{dashes}", step.min(style::RAMP - 1)))
         };
-        Colours { shown: picked.map(class).collect(), bar: Some(axis) }
+        Colours { key, shown: picked.map(class).collect(), bar: Some(axis) }
     }
 
-    /// Legend entries of distinct curves, named by `label`.
+    /// Legend entries of distinct curves, named by `label`; none where another legend has them.
     pub fn legend<'a>(&self, label: impl Fn(usize) -> &'a str) -> impl Iterator<Item = Entry> {
-        let told_apart = self.shown.iter().filter(|_| self.bar.is_none());
-        told_apart.map(move |(i, class)| Entry::new(class, LegendMark::Series, label(*i)))
+        let named = |(i, class): &(usize, String)| Entry::new(class, LegendMark::Series, label(*i));
+        let entries: Vec<Entry> = match &self.key.crossed {
+            _ if self.key.is_told => Vec::new(),
+            Some(crossed) if crossed.places.len() >= self.shown.len() => crossed.entries(),
+            _ if self.bar.is_none() => self.shown.iter().map(named).collect(),
+            _ => Vec::new(),
+        };
+        entries.into_iter()
+    }
+
+    /// Whether another legend names the curves.
+    pub fn is_told(&self) -> bool {
+        self.key.is_told
     }
 
     /// The marker of the curve drawn at this rank: ordered colours need no shapes.

@@ -21,6 +21,7 @@ pub fn width(text: &str, size: f64) -> f64 {
     let advance = |c: char| match c {
         ' '..='~' => f64::from(ADVANCE[c as usize - 32]) / 100.0,
         '⁰'..='⁹' | '¹' | '²' | '³' | '·' => 0.41,
+        '⁺' | '⁻' => 0.53,
         '\u{a0}'..='\u{10ff}' => 0.7,
         '\u{2010}'..='\u{22ff}' => 0.86,
         // East Asian scripts and pictographs.
@@ -66,6 +67,30 @@ pub fn shortened(text: &str, size: f64, most: f64) -> String {
     short.trim_end().to_owned() + "…"
 }
 
+/// Each of `texts` in at most `most` pixels, unless two that differ would then be equal: what all have in common at their
+/// beginning goes first, and if that is not enough, they keep their width.
+pub fn told_apart(texts: &[String], size: f64, most: f64) -> Vec<String> {
+    let are_distinct = |short: &[String]| {
+        let equal = |i: usize, j: usize| short[i] == short[j] && texts[i] != texts[j];
+        (0..texts.len()).all(|i| (0..i).all(|j| !equal(i, j)))
+    };
+    let cut: Vec<String> = texts.iter().map(|text| shortened(text, size, most)).collect();
+    if are_distinct(&cut) {
+        return cut;
+    }
+    let common = common_beginning(texts);
+    let ends = texts.iter().map(|text| format!("…{}", text.chars().skip(common).collect::<String>()));
+    let ends: Vec<String> = ends.map(|text| shortened(&text, size, most)).collect();
+    if are_distinct(&ends) { ends } else { texts.to_vec() }
+}
+
+/// Characters at the beginning of all texts.
+fn common_beginning(texts: &[String]) -> usize {
+    let Some(first) = texts.first() else { return 0 };
+    let shared = |other: &String| first.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    texts.iter().map(shared).min().unwrap_or(0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,6 +102,22 @@ mod tests {
         assert_eq!(lines[..2], ["one two", "three"]);
         assert_eq!(lines[2..].concat(), "incomprehensibilities");
         assert_eq!(wrapped("  ", SIZE, 60.0), [""; 0]);
+    }
+
+    #[test]
+    fn texts_that_differ_stay_different() {
+        let texts = |all: &[&str]| all.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
+        let flows = texts(&["amplitude = 0.02, flow = willmore", "amplitude = 0.02, flow = elastic:0.5"]);
+        let (cut, told) = (shortened(&flows[0], SIZE, 150.0), told_apart(&flows, SIZE, 150.0));
+        assert_eq!(cut, shortened(&flows[1], SIZE, 150.0), "the control: their beginnings are equal");
+        assert_eq!(told, ["…willmore", "…elastic:0.5"]);
+        assert_eq!(told_apart(&texts(&["0.02", "0.1"]), SIZE, 150.0), ["0.02", "0.1"]);
+        let alike = texts(&["a long name that differs at its end: 1", "b long name that differs at its end: 2"]);
+        assert_eq!(told_apart(&alike, SIZE, 60.0).len(), 2);
+        let both = texts(&["x, a long name that differs at its end: 1", "x, a long name that differs at its end: 1"]);
+        assert_eq!(told_apart(&both, SIZE, 60.0)[0], told_apart(&both, SIZE, 60.0)[1], "equal ones may be equal");
+        let hard = texts(&["a1 and much that is the same 1", "a1 and much that is the same 2", "b1"]);
+        assert_eq!(told_apart(&hard, SIZE, 40.0), hard);
     }
 
     #[test]

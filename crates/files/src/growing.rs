@@ -32,6 +32,8 @@ pub struct Growing {
     spill: Option<Spill>,
     /// Some of them lack the last member.
     torn: bool,
+    /// Whether events have limits.
+    refined: bool,
 }
 
 impl Growing {
@@ -119,6 +121,7 @@ impl Growing {
             store,
             spill: None,
             torn: false,
+            refined: spec.refine,
         })
     }
 
@@ -150,7 +153,7 @@ impl Growing {
         self.summary.row(outcome)?;
         self.members.row(outcome, features)?;
         if let Some((table, _, names)) = &mut self.events {
-            EventRow::of(outcome, names).try_for_each(|row| table.row(&row))?;
+            EventRow::of(outcome, names, self.refined).try_for_each(|row| table.row(&row))?;
         }
         RateRow::of(outcome).iter().try_for_each(|row| self.rates.row(row))?;
         self.torn = false;

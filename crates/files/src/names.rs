@@ -40,6 +40,8 @@ pub const ENSEMBLE: &str = "ensemble.csv";
 pub const GROUPS: &str = "groups.csv";
 /// How the run was made.
 pub const RUN: &str = "run.json";
+/// Times of members that are known by name.
+pub const MEMBER_TIMES: &str = "plots/members.svg";
 /// The first members at the start, during the run and at the end.
 pub const CURVES: &str = "plots/curves.svg";
 /// The nodes of the same members, from which pictures are drawn.
@@ -82,7 +84,7 @@ pub const FIGURES: [&str; 8] =
 pub const ROWS: &str = "curvelax.rows";
 
 /// All files that a run may write, or that are made from one without naming a place; the one that vouches for the others comes first.
-pub const OWN: [&str; 31] = [
+pub const OWN: [&str; 32] = [
     RUN,
     SHARD,
     SUMMARY,
@@ -101,6 +103,7 @@ pub const OWN: [&str; 31] = [
     STORE,
     PORTRAITS,
     CURVES,
+    MEMBER_TIMES,
     RELAXATION,
     DISTRIBUTION,
     RATE,
@@ -138,8 +141,9 @@ pub const TABLES: [&str; 14] = [
 ];
 
 /// The files that are drawn from the others.
-pub const PICTURES: [&str; 12] = [
+pub const PICTURES: [&str; 13] = [
     REPORT,
+    MEMBER_TIMES,
     RELAXATION,
     DISTRIBUTION,
     SURVIVAL,

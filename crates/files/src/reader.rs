@@ -2,7 +2,10 @@
 //!
 //! Tables are read row by row, and each row is checked against the spec and the rows before it.
 
-use std::path::{Path, PathBuf};
+use std::{
+    iter,
+    path::{Path, PathBuf},
+};
 
 use serde::Deserialize;
 
@@ -20,8 +23,9 @@ use curvelax_base::{
     text::quoted,
 };
 use curvelax_ensemble::{LevelRow, LevelTimes, Outcome, Spec, outcome::linear_rate};
+use curvelax_statistics::Limit;
 use curvelax_study::results::{
-    explained::{Explained, Explaining, FeaturedMember},
+    explained::{Explained, Explaining, FeaturedMember, TIMES},
     provenance::{FORMAT, Provenance, by_status},
     tally::{Aside, MeanExcess, Tally},
 };
@@ -56,7 +60,9 @@ impl Finished {
         let films = films(folder)?;
         let excess = mean_excess(folder, &provenance)?;
         let [summary, members] = [names::SUMMARY, names::MEMBERS].map(|name| Place::named(&folder.join(name)));
-        let explained = explained(&summary, &members, &provenance.spec)?;
+        let spec = &provenance.spec;
+        let events = (!spec.event.is_empty()).then(|| Place::named(&folder.join(names::EVENTS)));
+        let explained = explained((&summary, events.as_ref()), &members, spec, tally.has_limits())?;
         Ok(Finished { provenance, tally, excess, explained, films })
     }
 }
@@ -176,7 +182,7 @@ pub fn levels((place, of_events): (&Place, Option<&Place>), spec: &Spec) -> Resu
             return Err(fields.unexpected_in("cell", &problem));
         }
         if let Some(events) = &mut events {
-            row.events = events.next((member, row.level), |_| true)?;
+            row.events = events.next((member, row.level), |_| true)?.iter().map(EventTime::time).collect();
         }
         levels.add(&row).map_err(|expected| fields.unexpected_in("level", &expected))?;
     }
@@ -261,10 +267,13 @@ impl<'a> Summary<'a> {
         if outcome.t_relax.is_some_and(|t| t > t_end * (1.0 + LATE)) {
             return Err(fields.unexpected_in("t_relax", &format!("a time up to {t_end}, the end of the run")));
         }
+        let mut limits = Vec::new();
         if let Some(events) = &mut self.events {
             let end = outcome.t_end;
-            outcome.events =
-                events.next((member, 0), |row| if row.censored == 0 { row.t <= end } else { row.t == end })?;
+            let fits = |row: &EventRow| if row.censored == 0 { row.t <= end } else { row.t == end };
+            let rows = events.next((member, 0), fits)?;
+            outcome.events = rows.iter().map(EventTime::time).collect();
+            limits = rows.iter().map(|row| row.t_limit.zip(row.t_error)).collect();
         }
         // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
         outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| {
@@ -278,6 +287,21 @@ impl<'a> Summary<'a> {
         if (outcome.t_limit, outcome.t_error, outcome.t_data_error) != told {
             let (limit, file) = (outcome.t_limit.map_or("nothing".into(), |t| t.to_string()), names::LEVELS);
             return Err(fields.unexpected_in("t_limit", &format!("{limit}, as {file} has it")));
+        }
+        let refined = self.spec.refine;
+        let judged = |limit: &Option<Limit>| limit.filter(|_| refined).map(|limit| (limit.t, limit.error));
+        let judged = outcome.judged_events.iter().map(judged).chain(iter::repeat(None));
+        if let (Some(events), Some((place, (told, found)))) =
+            (&self.events, limits.iter().zip(judged).enumerate().find(|(_, (told, found))| **told != *found))
+        {
+            let shown =
+                |limit: Option<(f64, f64)>| limit.map_or("nothing".into(), |(t, error)| format!("{t} ± {error}"));
+            let (path, name, file) = (events.path.display(), &events.names[place], names::EVENT_LEVELS);
+            return Err(Error::Request(format!(
+                "{path}: expected the limit {} of the event {name} of member {member}, as {file} has it, found {}; {REMEDY}",
+                shown(found),
+                shown(*told)
+            )));
         }
         if outcome.points != points {
             return Err(fields.unexpected_in("points", &format!("{}, as {} has it", outcome.points, names::LEVELS)));
@@ -356,9 +380,9 @@ impl<R: EventTime> EventTimes<R> {
         Err(Error::Request(format!("{beside}: {problem}; {REMEDY}")))
     }
 
-    /// The times of the events of the next member, which must be that of `place` and of which all rows must `fit`.
-    fn next(&mut self, place: (u64, u64), fits: impl Fn(&R) -> bool) -> Result<Vec<Option<f64>>> {
-        let mut times = Vec::with_capacity(self.names.len());
+    /// The rows of the events of the next member, which must be that of `place` and of which all must `fit`.
+    fn next(&mut self, place: (u64, u64), fits: impl Fn(&R) -> bool) -> Result<Vec<R>> {
+        let mut rows = Vec::with_capacity(self.names.len());
         for name in &self.names {
             let Some((row, fields)) = self.table.read()? else {
                 let (path, member) = (self.path.display(), place.0);
@@ -380,10 +404,10 @@ impl<R: EventTime> EventTimes<R> {
                     fields.unexpected_in("t", "a time up to the end of the member, or that end if censored is 1")
                 );
             }
-            times.push(row.time());
+            rows.push(row);
         }
         self.last = Some(place);
-        Ok(times)
+        Ok(rows)
     }
 
     /// Checks that there are no more rows.
@@ -407,16 +431,24 @@ impl Iterator for Summary<'_> {
     }
 }
 
-/// Finds what explains the times in a `summary.csv` by the features in a `members.csv`, of a run of `spec`. Both are
-/// read as far as members enter.
+/// Finds what explains the times in a `summary.csv`, and those of its events, by the features in a `members.csv`, of a
+/// run of `spec`; with limits first, if there are any. All are read as far as members enter.
 ///
 /// # Errors
 /// [`Error::Request`] for rows that are not of the same members, each once.
-pub fn explained(summary: &Place, members: &Place, spec: &Spec) -> Result<Explained> {
+pub fn explained(
+    (summary, events): (&Place, Option<&Place>),
+    members: &Place,
+    spec: &Spec,
+    of_limits: bool,
+) -> Result<Explained> {
     let (mut outcomes, mut table) = (TableReader::<Outcome>::open(summary)?, MemberReader::open(members, spec)?);
+    let mut events = events.map(|place| EventTimes::<EventRow>::open(place, summary, spec)).transpose()?;
     let count = table.features().len();
-    let mut explaining = Explaining::new(table.features(), spec.sweep.cells());
-    while let Some((Outcome { member, cell, t_relax, t_half, t_end, .. }, _)) = outcomes.read()? {
+    let names = spec.event.iter().map(|event| event.name.clone());
+    let times = of_limits.then_some("t_limit").into_iter().chain(TIMES).map(String::from);
+    let mut explaining = Explaining::new(table.features(), times.chain(names), spec.sweep.cells());
+    while let Some((Outcome { member, cell, t_relax, t_half, t_limit, t_end, .. }, _)) = outcomes.read()? {
         let Some((own, of, mut fields)) = table.read()? else {
             let problem = format!("expected a row of member {member}, found the end");
             return Err(Error::Request(format!("{}: {problem}; {REMEDY}", members.shown().display())));
@@ -426,10 +458,17 @@ pub fn explained(summary: &Place, members: &Place, spec: &Spec) -> Result<Explai
                 return Err(fields.unexpected_in(name, &format!("{told}, as in {}", names::SUMMARY)));
             }
         }
+        let of_events = match &mut events {
+            Some(events) => events.next((member, 0), |_| true)?,
+            None => Vec::new(),
+        };
         if explaining.wants(cell) {
+            // An event has its limit where there is one, as everywhere.
+            let of_events = of_events.iter().map(|row| row.t_limit.or(row.time()));
+            let times = of_limits.then_some(t_limit).into_iter().chain([t_relax, t_half]).chain(of_events).collect();
             let numbers = (0..count).map(|_| fields.known()).collect::<Result<_>>()?;
             let place = member.saturating_sub(cell.saturating_mul(spec.curves));
-            explaining.add(FeaturedMember { member, cell, place, numbers, times: [t_relax, t_half], t_end });
+            explaining.add(FeaturedMember { member, cell, place, numbers, times, t_end });
         } else if explaining.is_full() {
             return Ok(explaining.finish());
         }

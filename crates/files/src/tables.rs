@@ -105,6 +105,10 @@ pub struct EventRow {
     pub t: f64,
     /// 1 if it had not happened by then.
     pub censored: u64,
+    /// Its limit, with `--refine`.
+    pub t_limit: Option<f64>,
+    /// Half-width of the 95 % interval of that.
+    pub t_error: Option<f64>,
 }
 
 columns! { EventRow:
@@ -113,6 +117,8 @@ columns! { EventRow:
     event: word = event, "name of the event";
     t: time = t, "first time at which its condition holds, found inside the step; of a censored one, when the member ended";
     censored: whole = censored, "0: it happened at t; 1: it had not happened by then";
+    t_limit: event = t_limit, "with `--refine`: t in the limit of many nodes and short steps";
+    t_error: event = t_error, "half-width of the 95 % interval of t_limit";
 }
 
 /// A row of `event_levels.csv`: the time of an event of a member at a level.
@@ -186,7 +192,7 @@ columns! { MeanExcess:
 
 columns! { ExplainedRow:
     cell: whole = cell, "index of the cell";
-    time: word = time, "what is explained: t_relax or t_half";
+    time: word = time, "what is explained: t_limit with `--refine`, t_relax, t_half, or the name of an event";
     feature: word = feature, "a column of `members.csv`, best first; or together: a regression on the chosen ones";
     members: whole = members, "members that reached the time";
     censored: whole = censored, "members that ended before";
@@ -364,16 +370,22 @@ impl RateRow {
 }
 
 impl EventRow {
-    /// The rows of a member with the events of these names.
-    pub fn of<'a>(member: &'a Outcome, names: &'a [String]) -> impl Iterator<Item = EventRow> + 'a {
-        let Outcome { member, cell, t_end, events, .. } = member;
-        names.iter().zip(events).map(|(event, seen)| EventRow {
-            member: *member,
-            cell: *cell,
-            event: event.clone(),
-            t: seen.unwrap_or(*t_end),
-            censored: u64::from(seen.is_none()),
-        })
+    /// The rows of a member with the events of these names, with limits if it is `refined`.
+    pub fn of<'a>(member: &'a Outcome, names: &'a [String], refined: bool) -> impl Iterator<Item = EventRow> + 'a {
+        let Outcome { member, cell, t_end, events, judged_events, .. } = member;
+        let row = move |(i, (event, seen)): (usize, (&String, &Option<f64>))| {
+            let limit = judged_events.get(i).copied().flatten().filter(|_| refined);
+            EventRow {
+                member: *member,
+                cell: *cell,
+                event: event.clone(),
+                t: seen.unwrap_or(*t_end),
+                censored: u64::from(seen.is_none()),
+                t_limit: limit.map(|limit| limit.t),
+                t_error: limit.map(|limit| limit.error),
+            }
+        };
+        names.iter().zip(events).enumerate().map(row)
     }
 }
 
@@ -463,6 +475,7 @@ mod tests {
     use super::*;
     use crate::OutputFolder;
     use curvelax_ensemble::{Observables, Status};
+    use curvelax_statistics::Limit;
 
     fn outcome(start: Observables, end: Observables) -> Outcome {
         Outcome {
@@ -536,10 +549,17 @@ mod tests {
     #[test]
     fn events_have_these_bytes() {
         let at = Observables::default();
-        let member = Outcome { events: vec![Some(0.1 + 0.2), None], ..outcome(at, at) };
+        let limit = Limit { t: 0.25, error: 0.5, fixed: 0.0, order: None, asymptotic: true, relative: 0.0 };
+        let (events, judged_events) = (vec![Some(0.1 + 0.2), None], vec![Some(limit), None]);
+        let member = Outcome { events, judged_events, ..outcome(at, at) };
         let names = ["convex".to_string(), "slow".to_string()];
-        let text = written("events.csv", |file| Table::of(file, &EventRow::of(&member, &names).collect::<Vec<_>>()));
-        assert_eq!(text, "member,cell,event,t,censored\n3,0,convex,0.30000000000000004,0\n3,0,slow,0.5,1\n");
+        assert!(EventRow::of(&member, &names, false).all(|row| row.t_limit.is_none() && row.t_error.is_none()));
+        let text =
+            written("events.csv", |file| Table::of(file, &EventRow::of(&member, &names, true).collect::<Vec<_>>()));
+        assert_eq!(
+            text,
+            "member,cell,event,t,censored,t_limit,t_error\n3,0,convex,0.30000000000000004,0,0.25,0.5\n3,0,slow,0.5,1,,\n"
+        );
     }
 
     #[test]

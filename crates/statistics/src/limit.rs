@@ -30,9 +30,9 @@ const OF_FALL: f64 = 1.5;
 /// the largest difference.
 const LOOSE_ORDERS: std::ops::RangeInclusive<f64> = 1.0..=4.0;
 const OF_DIFFERENCES: f64 = 1.5;
-/// By how much an error falls at least from one level to the next, which has √2 times the nodes: as h⁶, and where terms do not
-/// fall yet as h⁴.
-const FALL: f64 = 8.0;
+/// By how much an error may fall from one level to the next, which has √2 times the nodes. Errors fall as h⁶, by 8; those of
+/// levels that do not resolve the curve are bounds, and fall faster. Where terms do not fall yet, as h⁴.
+const FALL: f64 = 16.0;
 const OPEN_FALL: f64 = 4.0;
 /// Share of what ten times more exact steps change, and the error of steps in units of their tolerance over the root of the
 /// excess, relative to the time: the change may be small by chance.

@@ -210,6 +210,28 @@ class Package(unittest.TestCase):
         self.assertTrue(np.allclose(curve.survival, np.arange(9, -1, -1) / 9, atol=1e-15))
         self.assertTrue(((curve.lower <= curve.survival) & (curve.survival <= curve.upper)).all())
 
+    def test_one_time_is_shown_and_others_can_be_asked_for(self):
+        keys = {**SMALL, "points": 64, "events": {"half": "excess <= 0.5 * start"}}
+        raw, refined = curvelax.run(**keys), curvelax.run(**keys, refine=True)
+        for study, time in ((raw, "t_relax"), (refined, "t_limit")):
+            own = study.survival()
+            self.assertEqual((own.attrs["time"], own.time.tolist()[1:]), (time, sorted(study.summary[time])))
+            self.assertTrue((study.explained().time == time).all())
+            self.assertTrue(study.plot().get_xlabel().startswith(f"{time} ("))
+            self.assertIn(f"median {time}", repr(study))
+        for time in ("t_relax", "t_half"):
+            self.assertEqual(refined.survival(time=time).time.tolist()[1:], sorted(refined.summary[time]))
+            self.assertTrue((refined.explained(time=time).time == time).all())
+        events = refined.events.t_limit
+        self.assertEqual(refined.survival(time="half").time.tolist()[1:], sorted(events))
+        self.assertTrue((events != refined.events.t).all() and (refined.events.t_error > 0).all())
+        self.assertIn("without half", refined.plot(time="half").get_ylabel())
+        for time in ("t_limit", "halb"):
+            with self.assertRaises(curvelax.RequestError) as caught:
+                raw.survival(time=time)
+            self.assertIn("use one of t_relax, t_half, half", str(caught.exception))
+            self.assertEqual("refine=True" in str(caught.exception), time == "t_limit")
+
     def test_plot_draws_a_curve_for_each_cell(self):
         import matplotlib
 
@@ -225,7 +247,7 @@ class Package(unittest.TestCase):
         study = curvelax.run(**SMALL, sweep={"t_end": [0.1, 5]}, units="um,h", mobility=1)
         first = study.plot().get_lines()[0]
         self.assertEqual((first.get_xdata().tolist(), first.get_ydata().tolist()), ([0, 0.1], [1, 1]))
-        self.assertEqual(study.plot().get_xlabel(), "time (h)")
+        self.assertEqual(study.plot().get_xlabel(), "t_relax (h)")
 
     def test_a_study_shows_itself(self):
         self.assertIn("9 relaxed", repr(self.study))

@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::{MAX_BANDS, TIME, only_panel};
 use crate::{
     axis::{Axis, Scale},
-    chart::{Colours, Entry, FOOT, Heading, LegendMark, Panel, drawable, nothing},
+    chart::{CellKey, Colours, Entry, FOOT, Heading, LegendMark, Panel, drawable, nothing},
     trace,
 };
 
@@ -28,7 +28,7 @@ pub struct Decay<'a> {
     pub band: &'a str,
     /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
     /// many.
-    pub key: &'a str,
+    pub key: CellKey,
     /// The curves, in the order of the legend.
     pub curves: Vec<DecayCurve>,
     /// Theoretical lines to compare with.
@@ -124,7 +124,7 @@ impl Decay<'_> {
     pub fn draw(&self) -> String {
         let Decay { title, note, curves, theory, .. } = self;
         let values: Vec<Option<f64>> = curves.iter().map(|curve| curve.value).collect();
-        let colours = Colours::of(&values, self.key);
+        let colours = Colours::of(&values, &self.key);
         let sentences = vec![(*note).into(), colours.sentence(curves.len())];
         let times = || curves.iter().flat_map(|curve| curve.t.iter().copied());
         let scale = self.time.filter(|scale| times().any(|t| scale.holds(t))).unwrap_or(Scale::Linear);
@@ -142,7 +142,7 @@ impl Decay<'_> {
             }
             _ => {}
         }
-        let bands = curves.len() <= MAX_BANDS && curves.iter().any(|curve| curve.band.is_some());
+        let bands = self.has_bands();
         let heading = Heading { title, sentences, legend: self.legend(&colours, bands) };
         let (mut svg, top) = heading.begin(8.0 + HEIGHT + FOOT);
 
@@ -178,6 +178,11 @@ impl Decay<'_> {
         let near = move |bound: &f64| *bound > BELOW * least && *bound < largest / BELOW;
         let shown = means().filter(|mean| *mean >= least).chain(bounds.filter(near));
         Axis::over("mean excess", "", Scale::Log, shown)
+    }
+
+    /// Whether bands are drawn.
+    pub fn has_bands(&self) -> bool {
+        self.curves.len() <= MAX_BANDS && self.curves.iter().any(|curve| curve.band.is_some())
     }
 
     fn legend(&self, colours: &Colours, bands: bool) -> Vec<Entry> {

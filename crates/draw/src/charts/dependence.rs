@@ -6,8 +6,8 @@ use super::TIME;
 use crate::{
     axis::{Axis, Scale, range},
     chart::{
-        Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, draw_marker, drawable,
-        nothing, triangle_right, triangle_up,
+        CellKey, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, draw_marker,
+        drawable, nothing, triangle_right, triangle_up,
     },
     svg::{Svg, coordinate},
     trace,
@@ -43,7 +43,7 @@ pub struct Dependence<'a> {
     pub key: &'a str,
     /// Name of the quantity that distinguishes the series, for the colour bar that replaces the legend if there are
     /// many.
-    pub other_key: &'a str,
+    pub other_key: CellKey,
     /// One series, or one per setting of the other keys.
     pub series: Vec<Series>,
     /// Scale of a numeric key; by default that of [`Scale::of`], or logarithmic if there is a power law.
@@ -183,7 +183,7 @@ impl Dependence<'_> {
     /// The text of an SVG file.
     pub fn draw(&self) -> String {
         let values: Vec<Option<f64>> = self.series.iter().map(|series| series.value).collect();
-        let colours = Colours::of(&values, self.other_key);
+        let colours = Colours::of(&values, &self.other_key);
         let mut sentences = vec![self.note.into(), colours.sentence(self.series.len()), self.missing()];
         if !self.levels().any(|level| level.times().next().is_some()) {
             let reason = match self.levels().count() {

@@ -8,9 +8,9 @@ use glam::DVec2;
 use super::TIME;
 use crate::{
     axis::{Axis, Scale},
-    chart::{Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH, nothing},
+    chart::{CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH, nothing},
     svg::{Svg, coordinate, dots},
-    width::{SIZE, shortened, width},
+    width::{SIZE, shortened, told_apart, width},
 };
 use curvelax_base::text::significant;
 
@@ -33,8 +33,10 @@ pub struct TimeDistribution<'a> {
     pub note: &'a str,
     /// The time.
     pub quantity: &'a str,
-    /// Name of the quantity that distinguishes the cells.
-    pub key: &'a str,
+    /// What distinguishes the cells.
+    pub key: CellKey,
+    /// What their names are, above these.
+    pub keys: &'a str,
     /// The cells.
     pub cells: Vec<CellQuantiles>,
 }
@@ -92,7 +94,7 @@ impl CellQuantiles {
 impl TimeDistribution<'_> {
     /// The text of an SVG file.
     pub fn draw(&self) -> String {
-        let TimeDistribution { title, note, quantity, key, cells } = self;
+        let TimeDistribution { title, note, quantity, key, keys, cells } = self;
         let values: Vec<Option<f64>> = cells.iter().map(|cell| cell.value).collect();
         let colours = Colours::of(&values, key);
         let sentences = vec![(*note).into(), colours.sentence(cells.len())];
@@ -103,17 +105,27 @@ impl TimeDistribution<'_> {
         let rows = colours.shown.len();
         let boxes = ROW * rows as f64 + 8.0;
         let heading = Heading { title, sentences, legend: self.legend() };
-        let (mut svg, top) = heading.begin(8.0 + boxes + FOOT + HEADING + HEIGHT + FOOT);
+        let of: [fn(f64) -> f64; 2] = [|t| t, f64::ln];
+        let all = of.map(|of| cells.iter().map(|cell| cell.standardised(of)).collect::<Vec<_>>());
+        let groups = self.groups(&colours);
+        // Where no quartiles are known, there is nothing to compare with a law.
+        let compared = all.iter().any(|all| !all.iter().all(Vec::is_empty));
+        let pitch = HEADING + HEIGHT + FOOT;
+        let laws = if compared { groups.len() as f64 * pitch } else { 0.0 };
+        let above = if rows > 1 { 24.0 } else { 8.0 };
+        let (mut svg, top) = heading.begin(above + boxes + FOOT + laws);
 
-        let names = colours.shown.iter().map(|(i, _)| shortened(&cells[*i].label, SIZE, NAME));
-        let names: Vec<String> = if rows > 1 { names.collect() } else { vec![String::new(); rows] };
-        let left = MARGIN + 8.0 + names.iter().map(|name| width(name, SIZE)).fold(0.0, f64::max);
+        let names: Vec<String> = colours.shown.iter().map(|(i, _)| cells[*i].label.clone()).collect();
+        let names = if rows > 1 { told_apart(&names, SIZE, NAME) } else { vec![String::new(); rows] };
+        let keys = if rows > 1 { *keys } else { "" };
+        let left = MARGIN + 8.0 + names.iter().map(|name| width(name, SIZE)).fold(width(keys, SIZE), f64::max);
         let scale = Scale::of(times());
         let across = Axis::over(quantity, TIME, scale, times());
         let nothing = Axis::new("", "", Scale::Linear, (0.0, 1.0));
-        let (corner, size) = (DVec2::new(left, top + 8.0), DVec2::new(WIDTH - left - MARGIN, boxes));
+        let (corner, size) = (DVec2::new(left, top + above), DVec2::new(WIDTH - left - MARGIN, boxes));
         let panel = Panel { heading: "", corner, size, x: &across, y: &nothing, labels_x: true };
         panel.draw_x(&mut svg);
+        svg.text_unless_empty("note end", DVec2::new(left - 6.0, corner.y - 8.0), keys);
         for (row, (name, (cell, class))) in names.iter().zip(&colours.shown).enumerate() {
             let y = corner.y + 4.0 + ROW * (row as f64 + 0.5);
             svg.text_unless_empty("y tick end", DVec2::new(left - 6.0, y + 4.0), name);
@@ -123,38 +135,67 @@ impl TimeDistribution<'_> {
         }
         panel.draw_frame(&mut svg);
 
-        let below = corner.y + boxes + FOOT + HEADING;
-        let of: [fn(f64) -> f64; 2] = [|t| t, f64::ln];
-        let all = of.map(|of| cells.iter().map(|cell| cell.standardised(of)).collect::<Vec<_>>());
-        let points = || all.iter().flatten().flatten();
-        let normal = Axis::over("standard normal quantile", "", Scale::Linear, points().map(|(z, _)| *z));
-        let axis = |of: &Vec<Vec<(f64, f64)>>| {
-            Axis::over("standardised quantile", "", Scale::Linear, of.iter().flatten().map(|(_, y)| *y))
+        if compared {
+            let below = corner.y + boxes + FOOT;
+            for (i, (name, cells)) in groups.iter().enumerate() {
+                self.draw_laws(&mut svg, below + i as f64 * pitch + HEADING, name, cells, &all);
+            }
+        }
+        svg.finish()
+    }
+
+    /// The cells side by side in one pair of panels, with its name: those of one value of the quantity that colours do not
+    /// show.
+    fn groups<'a>(&'a self, colours: &'a Colours) -> Vec<(&'a str, Vec<&'a (usize, String)>)> {
+        let Some(crossed) = &self.key.crossed else { return vec![("", colours.shown.iter().collect())] };
+        let of = |pattern: usize| {
+            colours.shown.iter().filter(move |(i, _)| crossed.places.get(*i).is_some_and(|place| place.1 == pattern))
         };
-        let own = [axis(&all[0]), axis(&all[1])];
-        let left = own.iter().map(|axis| Panel::left(axis, HEIGHT)).fold(0.0, f64::max);
+        let all = crossed.patterns.iter().enumerate().map(|(i, name)| (&name[..], of(i).collect::<Vec<_>>()));
+        all.filter(|(_, cells)| !cells.is_empty()).collect()
+    }
+
+    /// Quantiles of some cells against those of the two laws.
+    fn draw_laws(
+        &self,
+        svg: &mut Svg,
+        top: f64,
+        name: &str,
+        cells: &[&(usize, String)],
+        all: &[Vec<Vec<(f64, f64)>>; 2],
+    ) {
+        let own = |all: &Vec<Vec<(f64, f64)>>| -> Vec<(f64, f64)> {
+            cells.iter().flat_map(|(cell, _)| all[*cell].iter().copied()).collect()
+        };
+        let points: Vec<(f64, f64)> = all.iter().flat_map(own).collect();
+        let normal = Axis::over("standard normal quantile", "", Scale::Linear, points.iter().map(|(z, _)| *z));
+        let axis = |all: &Vec<Vec<(f64, f64)>>| {
+            Axis::over("standardised quantile", "", Scale::Linear, own(all).into_iter().map(|(_, y)| y))
+        };
+        let upwards = [axis(&all[0]), axis(&all[1])];
+        let left = upwards.iter().map(|axis| Panel::left(axis, HEIGHT)).fold(0.0, f64::max);
         let side = 0.5 * (WIDTH - MARGIN - GAP);
-        for (i, ((law, all), own)) in ["normal", "lognormal"].iter().zip(&all).zip(&own).enumerate() {
-            let corner = DVec2::new(left + i as f64 * (side + GAP), below);
-            let heading = format!("against a {law} law");
+        for (i, ((law, all), own_axis)) in ["normal", "lognormal"].iter().zip(all).zip(&upwards).enumerate() {
+            let corner = DVec2::new(left + i as f64 * (side + GAP), top);
             let size = DVec2::new(side - left, HEIGHT);
-            let panel = Panel { heading: &heading, corner, size, x: &normal, y: own, labels_x: true };
-            if all.iter().all(Vec::is_empty) {
-                panel.say(&mut svg, "The quartiles are not known, or equal.");
+            let law = format!("against a {law} law");
+            let heading = shortened(if name.is_empty() { &law } else { name }, SIZE, size.x);
+            let panel = Panel { heading: &heading, corner, size, x: &normal, y: own_axis, labels_x: true };
+            if own(all).is_empty() {
+                panel.say(svg, "The quartiles are not known, or equal.");
                 continue;
             }
-            panel.draw_x(&mut svg);
-            panel.draw_y(&mut svg);
-            self.diagonal(&mut svg, &panel);
-            for (cell, class) in &colours.shown {
+            panel.draw_x(svg);
+            panel.draw_y(svg);
+            self.diagonal(svg, &panel);
+            for (cell, class) in cells {
                 let places: Vec<DVec2> = all[*cell].iter().map(|(z, y)| panel.place(*z, *y)).collect();
                 svg.open(class);
                 svg.path("points", &dots(&places));
                 svg.close();
             }
-            panel.draw_frame(&mut svg);
+            panel.draw_frame(svg);
         }
-        svg.finish()
     }
 
     /// The line on which quantiles of the law lie.

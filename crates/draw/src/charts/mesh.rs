@@ -101,8 +101,10 @@ impl MeshMeasure {
 
 fn middle_and_most(sorted: &[f64]) -> String {
     let Some(last) = sorted.len().checked_sub(1) else { return String::new() };
-    let [middle, most] = [last / 2, last].map(|i| significant(sorted[i], 3));
-    format!("median {middle}, largest {most}")
+    // Four digits of a ratio near 1; two of a drift, whose zeros or power of ten take room.
+    let shown = |value: f64| significant(value, if value.abs() < 0.1 { 2 } else { 4 });
+    let [middle, most] = [last / 2, last].map(|i| shown(sorted[i]));
+    format!("median {middle}, max {most}")
 }
 
 impl MeshQuality<'_> {

@@ -8,6 +8,7 @@ pub mod bins;
 pub mod decay;
 pub mod dependence;
 pub mod distribution;
+pub mod members;
 pub mod mesh;
 pub mod rates;
 pub mod relaxation;
@@ -19,6 +20,7 @@ pub use bins::CellValues;
 pub use decay::{Decay, DecayCurve, DecayLaw, Theory};
 pub use dependence::{Dependence, DependencePoint, PowerLawLine, Series, Setting};
 pub use distribution::{CellQuantiles, TimeDistribution};
+pub use members::{MemberDot, MemberTimes};
 pub use mesh::MeshQuality;
 pub use rates::FittedRates;
 pub use relaxation::RelaxationTimes;
@@ -26,7 +28,7 @@ pub use scatter::{Scatter, ScatterPanel, ScatterPoint};
 pub use survival::{Survival, SurvivalCurve};
 pub use work::{WorkCurve, WorkDiagram, WorkPanels};
 
-pub use super::chart::EstimatedNumber;
+pub use super::chart::{CellKey, Crossed, EstimatedNumber};
 
 use glam::DVec2;
 

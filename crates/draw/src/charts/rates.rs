@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     axis::{Axis, Scale},
-    chart::{Colours, Entry, FOOT, Heading, LegendMark, nothing},
+    chart::{CellKey, Colours, Entry, FOOT, Heading, LegendMark, nothing},
 };
 use curvelax_base::text::{count, significant};
 
@@ -21,7 +21,7 @@ pub struct FittedRates<'a> {
     pub note: &'a str,
     /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
     /// many.
-    pub key: &'a str,
+    pub key: CellKey,
     /// Rates relative to theory; or rates in `unit`, if there is no theory; cell by cell.
     pub cells: Vec<CellValues>,
     /// Whether they are relative to theory.
@@ -53,7 +53,7 @@ impl FittedRates<'_> {
             _ => String::new(),
         };
         let values: Vec<Option<f64>> = cells.iter().map(|cell| cell.value).collect();
-        let colours = Colours::of(&values, key);
+        let colours = Colours::of(&values, &key);
         let positive = cells.iter().filter_map(|cell| cell.numbers.first()).all(|rate| *rate > 0.0);
         let scale = if positive { CellValues::scale(&cells) } else { Scale::Linear };
         let bins = Bins::shared(&cells, scale);

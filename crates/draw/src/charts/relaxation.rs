@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     axis::{Axis, Scale},
-    chart::{Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, nothing},
+    chart::{CellKey, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, nothing},
     trace,
 };
 use curvelax_base::{
@@ -29,10 +29,11 @@ pub struct RelaxationTimes<'a> {
     pub title: &'a str,
     /// A sentence below it, or nothing.
     pub note: &'a str,
-    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
-    /// many.
-    pub key: &'a str,
-    /// t_relax of the members that relaxed, in length⁴, cell by cell.
+    /// The time, t_relax or its limit.
+    pub quantity: &'a str,
+    /// What distinguishes the cells.
+    pub key: CellKey,
+    /// The times of the members that relaxed, in length⁴, cell by cell.
     pub cells: Vec<CellValues>,
     /// The members without t_relax, counted by their status.
     pub others: &'a [(&'a str, u64)],
@@ -43,13 +44,13 @@ pub struct RelaxationTimes<'a> {
 impl RelaxationTimes<'_> {
     /// The text of an SVG file.
     pub fn draw(self) -> String {
-        let RelaxationTimes { title, note, key, mut cells, others, median } = self;
+        let RelaxationTimes { title, note, quantity, key, mut cells, others, median } = self;
         let members = cells.iter().map(|cell| cell.members).sum();
         CellValues::sort(&mut cells);
         let relaxed = cells.iter().map(|cell| cell.numbers.len() as u64).sum();
         let values: Vec<Option<f64>> = cells.iter().map(|cell| cell.value).collect();
-        let colours = Colours::of(&values, key);
-        let sentences = vec![counts(relaxed, members, others), note.into(), colours.sentence(cells.len())];
+        let colours = Colours::of(&values, &key);
+        let sentences = vec![counts(quantity, relaxed, members, others), note.into(), colours.sentence(cells.len())];
         if relaxed == 0 {
             return nothing(title, sentences, "No member relaxed, so there are no relaxation times to count.");
         }
@@ -61,7 +62,7 @@ impl RelaxationTimes<'_> {
 
         let scale = CellValues::scale(&cells);
         let bins = Bins::shared(&cells, scale);
-        let across = bins[0].axis("t_relax", TIME, scale);
+        let across = bins[0].axis(quantity, TIME, scale);
         let counted = Axis::counts("members", bins.iter().map(Bins::most).max().unwrap_or(0));
         let share = Axis::new("share relaxed", "", Scale::Linear, (0.0, 1.05));
         let left = Panel::left(&counted, HISTOGRAM).max(Panel::left(&share, SHARE));
@@ -85,6 +86,15 @@ impl RelaxationTimes<'_> {
             panel.draw_x(&mut svg);
             panel.draw_y(&mut svg);
         }
+        // Behind the bars, whose heights it would hide.
+        let shaded = median.and_then(|median| median.interval);
+        for panel in [&above, &below] {
+            let Some(Interval { lower, upper, .. }) = shaded else { continue };
+            let (start, end) = panel.x.range();
+            svg.open("ink");
+            interval(&mut svg, panel, (lower.unwrap_or(start), upper.unwrap_or(end)));
+            svg.close();
+        }
         Bins::draw_all(&bins, &colours, &mut svg, &above);
         let least = trace::tolerance(if cells.len() > 1 { 2 * colours.shown.len() } else { 1 }, SHARE);
         for (i, class) in &colours.shown {
@@ -96,10 +106,6 @@ impl RelaxationTimes<'_> {
         if let Some(median) = median {
             svg.open("ink");
             for panel in [&above, &below].into_iter().filter(|panel| panel.x.holds(median.value)) {
-                if let Some(Interval { lower, upper, .. }) = median.interval {
-                    let (start, end) = panel.x.range();
-                    interval(&mut svg, panel, (lower.unwrap_or(start), upper.unwrap_or(end)));
-                }
                 guide(&mut svg, panel, median.value);
             }
             svg.close();
@@ -120,7 +126,7 @@ fn steps(cell: &CellValues, panel: &Panel, least: f64) -> Vec<DVec2> {
     trace::steps(iter::once(start).chain(places).chain([end]), least)
 }
 
-fn counts(relaxed: u64, members: u64, others: &[(&str, u64)]) -> String {
+fn counts(quantity: &str, relaxed: u64, members: u64, others: &[(&str, u64)]) -> String {
     let rest = members - relaxed;
     if rest == 0 {
         return match relaxed {
@@ -133,7 +139,7 @@ fn counts(relaxed: u64, members: u64, others: &[(&str, u64)]) -> String {
     let named: Vec<String> = named.map(|(status, count)| format!("{} {status}", grouped(*count))).collect();
     let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
     let others = if rest == 1 { "one has".into() } else { format!("{} have", grouped(rest)) };
-    format!("{} of {} relaxed; {others} no t_relax{named}.", grouped(relaxed), count(members, "member"))
+    format!("{} of {} relaxed; {others} no {quantity}{named}.", grouped(relaxed), count(members, "member"))
 }
 
 fn label(median: &EstimatedNumber) -> String {

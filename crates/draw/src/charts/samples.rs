@@ -92,7 +92,8 @@ pub fn draw_all() -> Vec<(String, String)> {
             .map(|value| EstimatedNumber { value, interval: Some(Interval::between(0.97 * value, 1.04 * value)) });
         let members = times.len() as u64 + others.iter().map(|(_, count)| count).sum::<u64>();
         let cells = vec![CellValues { numbers: times.to_vec(), members, ..CellValues::default() }];
-        RelaxationTimes { title: "Relaxation times", note: NOTE, key: "", cells, others, median }.draw()
+        let (title, quantity, key) = ("Relaxation times", "t_relax", CellKey::default());
+        RelaxationTimes { title, note: NOTE, quantity, key, cells, others, median }.draw()
     };
     add("relaxation", relaxation(&times(412, 0.4, 0.2), &some, Some(0.42)));
     add("relaxation-wide", relaxation(&times(5000, 1e-6, 1.5), &[], Some(1e-6)));
@@ -106,7 +107,8 @@ pub fn draw_all() -> Vec<(String, String)> {
 
     let rates = |rates: &[f64], relative: bool, without: u64| {
         let cells = vec![CellValues { numbers: rates.to_vec(), members: rates.len() as u64, ..CellValues::default() }];
-        FittedRates { title: "Rates of decay", note: NOTE, key: "", cells, relative, unit: "length⁻⁴", without }.draw()
+        let (title, key, unit) = ("Rates of decay", CellKey::default(), "length⁻⁴");
+        FittedRates { title, note: NOTE, key, cells, relative, unit, without }.draw()
     };
     add("rates", rates(&times(412, 1.0, 0.01), true, 3));
     add("rates-absolute", rates(&times(412, 24.0, 0.5), false, 0));
@@ -126,13 +128,24 @@ pub fn draw_all() -> Vec<(String, String)> {
         (0..count).map(cell).collect()
     };
     for (count, members) in [(2, 512), (8, 256), (20, 100), (300, 1000)] {
-        let (note, key, cells) = (NOTE, "amplitude", by_cell(count, members));
+        let (note, cells) = (NOTE, by_cell(count, members));
+        let key = || CellKey::from("amplitude");
         let others = [("unfinished", 7 * count as u64)];
         let title = "Relaxation times";
-        let svg = RelaxationTimes { title, note, key, cells: cells.clone(), others: &others, median: None }.draw();
+        let svg = RelaxationTimes {
+            title,
+            note,
+            quantity: "t_relax",
+            key: key(),
+            cells: cells.clone(),
+            others: &others,
+            median: None,
+        }
+        .draw();
         add(&format!("relaxation-cells-{count}"), svg);
         let (title, unit) = ("Rates of decay", "length⁻⁴");
-        let svg = FittedRates { title, note, key, cells, relative: true, unit, without: 7 * count as u64 }.draw();
+        let svg =
+            FittedRates { title, note, key: key(), cells, relative: true, unit, without: 7 * count as u64 }.draw();
         add(&format!("rates-cells-{count}"), svg);
     }
 
@@ -140,7 +153,7 @@ pub fn draw_all() -> Vec<(String, String)> {
         Survival {
             title: "Share that has not relaxed",
             note: NOTE,
-            key: "amplitude",
+            key: "amplitude".into(),
             curves,
             time,
             ..Survival::default()
@@ -181,7 +194,7 @@ pub fn draw_all() -> Vec<(String, String)> {
             title: "Mean excess in time",
             note: NOTE,
             band: "5 to 95 % of the members",
-            key: "amplitude",
+            key: "amplitude".into(),
             curves,
             theory,
             time,
@@ -218,7 +231,7 @@ pub fn draw_all() -> Vec<(String, String)> {
             note: NOTE,
             quantity: "t_relax",
             key,
-            other_key: "aspect",
+            other_key: "aspect".into(),
             series,
             across: None,
             time: None,
@@ -303,7 +316,7 @@ pub fn draw_all() -> Vec<(String, String)> {
         };
         let cells = (0..cells).map(|i| (format!("amplitude = 0.{i}"), Some(0.1 * i as f64))).collect();
         let (title, notes) = ("What explains the relaxation time", vec![NOTE.into()]);
-        let (key, panels, reason) = ("amplitude", (0..panels).map(panel).collect(), "Nothing is claimed.");
+        let (key, panels, reason) = ("amplitude".into(), (0..panels).map(panel).collect(), "Nothing is claimed.");
         Scatter { title, notes, quantity: "t_relax", key, cells, panels, reason }
     };
     add("scatter", scatter(256, 1, 4).draw());
@@ -328,7 +341,7 @@ pub fn draw_all() -> Vec<(String, String)> {
             }
         };
         let (title, cells) = ("Distribution of the relaxation times", (0..count).map(cell).collect());
-        TimeDistribution { title, note: NOTE, quantity: "t_relax", key: "amplitude", cells }
+        TimeDistribution { title, note: NOTE, quantity: "t_relax", key: "amplitude".into(), keys: "amplitude", cells }
     };
     add("distribution", quantiles(1, 1.0).draw());
     add("distribution-cells-5", quantiles(5, 1.0).draw());
@@ -338,6 +351,49 @@ pub fn draw_all() -> Vec<(String, String)> {
     let mut unknown_place = quantiles(2, 1.0);
     unknown_place.cells[1].places = [Some(f64::INFINITY), Some(-1.0), Some(0.0), Some(f64::NAN), None];
     add("distribution-unknown", unknown_place.draw());
+
+    let crossed = || {
+        let [colours, patterns] = [["0.01", "0.1", "0.2"].as_slice(), ["surface-diffusion", "willmore"].as_slice()]
+            .map(|labels| labels.iter().map(|label| (*label).to_owned()).collect());
+        Crossed { colours, patterns, places: (0..6).map(|i| (i / 2, i % 2)).collect() }
+    };
+    for (name, is_told) in [("crossed", false), ("crossed-told", true)] {
+        let key = || CellKey { name: "amplitude".into(), crossed: Some(crossed()), is_told };
+        let mut boxes = quantiles(6, 1.0);
+        boxes.key = key();
+        add(&format!("distribution-{name}"), boxes.draw());
+        let mut dots = scatter(250, 6, 2);
+        dots.key = key();
+        add(&format!("scatter-{name}"), dots.draw());
+        let (title, note, curves) = ("Share that has not relaxed", NOTE, cells(6, 100));
+        add(&format!("survival-{name}"), Survival { title, note, key: key(), curves, ..Survival::default() }.draw());
+    }
+    let wide = Crossed { colours: (0..12).map(|i| i.to_string()).collect(), ..crossed() };
+    let wide = Crossed { places: (0..24).map(|i| (i / 2, i % 2)).collect(), ..wide };
+    let key = CellKey { name: "amplitude".into(), crossed: Some(wide), is_told: false };
+    let (title, note, curves) = ("Share that has not relaxed", NOTE, cells(24, 100));
+    add("survival-crossed-24", Survival { title, note, key, curves, ..Survival::default() }.draw());
+
+    let few = |members: Vec<MemberDot>| {
+        let (title, note, quantity, names) = ("Relaxation times", NOTE, "t_limit", "outline");
+        MemberTimes { title, note, quantity, names, members }.draw()
+    };
+    let dot =
+        |name: &str, t: f64, error: Option<f64>, happened: bool| MemberDot { name: name.into(), t, error, happened };
+    add(
+        "members",
+        few(vec![
+            dot("iceland", 0.158, Some(3e-4), true),
+            dot("jamaica", 0.12, Some(0.01), true),
+            dot("a name that is long enough to be cut off somewhere near its end, madagascar", 0.2, None, true),
+            dot("sri-lanka", 0.3, None, false),
+        ]),
+    );
+    add("members-one", few(vec![dot("all", 0.4, Some(1e-3), true)]));
+    add("members-zero", few(vec![dot("all", 0.0, None, true), dot("other", 0.0, Some(0.0), true)]));
+    add("members-wide", few((0..20).map(|i| dot(&i.to_string(), 10_f64.powi(i - 9), Some(0.5), i % 3 > 0)).collect()));
+    add("members-unknown", few(unknown.iter().map(|t| dot("one", *t, Some(*t), true)).collect()));
+    add("members-none", few(vec![]));
 
     let work = |rows: Vec<WorkPanels>| {
         let title = "What an error of the relaxation time costs";
@@ -358,8 +414,17 @@ pub fn draw_all() -> Vec<(String, String)> {
     let curves = vec![SurvivalCurve { label: hostile.into(), ..cells(1, 20).remove(0) }; 2];
     add(
         "hostile",
-        Survival { title: hostile, note: hostile, key: hostile, share: hostile, none: hostile, curves, time: None }
-            .draw(),
+        Survival {
+            title: hostile,
+            note: hostile,
+            quantity: hostile,
+            key: hostile.into(),
+            share: hostile,
+            none: hostile,
+            curves,
+            time: None,
+        }
+        .draw(),
     );
     pictures
 }

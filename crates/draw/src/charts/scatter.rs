@@ -7,7 +7,10 @@ use glam::DVec2;
 use super::TIME;
 use crate::{
     axis::{Axis, Scale},
-    chart::{Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH, drawable, nothing, triangle_up},
+    chart::{
+        CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH, drawable, nothing,
+        triangle_up,
+    },
     svg::{Svg, dots},
     width::{SIZE, shortened},
 };
@@ -27,9 +30,8 @@ pub struct Scatter<'a> {
     pub notes: Vec<String>,
     /// The time.
     pub quantity: &'a str,
-    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
-    /// many.
-    pub key: &'a str,
+    /// What distinguishes the cells.
+    pub key: CellKey,
     /// The cells, each with its entry in the legend and its value, if it has one.
     pub cells: Vec<(String, Option<f64>)>,
     /// The features, best first.
@@ -87,7 +89,7 @@ impl Scatter<'_> {
             return nothing(self.title, sentences, self.reason);
         }
         let values: Vec<Option<f64>> = self.cells.iter().map(|(_, value)| *value).collect();
-        let colours = Colours::of(&values, self.key);
+        let colours = Colours::of(&values, &self.key);
         sentences.push(colours.sentence(self.cells.len()));
         let hidden = self.panels.iter().flat_map(|panel| &panel.points).filter(|point| !point.is_drawable()).count();
         if hidden > 0 {
@@ -137,12 +139,22 @@ impl Scatter<'_> {
 
     fn legend(&self, colours: &Colours) -> Vec<Entry> {
         let several = self.cells.len() > 1 && colours.bar.is_none();
-        let cells = colours.shown.iter().filter(|_| several);
-        let cells = cells.map(|(i, class)| Entry::new(class, LegendMark::Points, &self.cells[*i].0));
+        // Panels show what colours do not.
+        let cells: Vec<Entry> = match &self.key.crossed {
+            _ if !several || colours.is_told() => Vec::new(),
+            Some(crossed) => {
+                let entry = |(i, label): (usize, &String)| Entry::new(&format!("s{i}"), LegendMark::Points, label);
+                crossed.colours.iter().enumerate().map(entry).collect()
+            }
+            None => {
+                let entry = |(i, class): &(usize, String)| Entry::new(class, LegendMark::Points, &self.cells[*i].0);
+                colours.shown.iter().map(entry).collect()
+            }
+        };
         let censored = self.panels.iter().any(|panel| panel.points.iter().any(|point| !point.happened));
         let class = if several { "faint" } else { "s0" };
         let text = format!("ended without {}, at its last time", self.quantity);
         let censored = censored.then(|| Entry::new(class, LegendMark::HollowUp, &text));
-        cells.chain(censored).collect()
+        cells.into_iter().chain(censored).collect()
     }
 }

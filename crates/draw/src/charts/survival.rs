@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{MAX_BANDS, TIME, only_panel};
 use crate::{
     axis::{Axis, Scale},
-    chart::{Colours, Entry, FOOT, Heading, LegendMark, Panel, nothing, stroke},
+    chart::{CellKey, Colours, Entry, FOOT, Heading, LegendMark, Panel, nothing, stroke},
     trace,
 };
 
@@ -26,9 +26,10 @@ pub struct Survival<'a> {
     pub title: &'a str,
     /// A sentence below it, or nothing.
     pub note: &'a str,
-    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
-    /// many.
-    pub key: &'a str,
+    /// The time.
+    pub quantity: &'a str,
+    /// What distinguishes the cells.
+    pub key: CellKey,
     /// What the height of a curve is.
     pub share: &'a str,
     /// The sentence in the place of the curves if there are none.
@@ -43,7 +44,8 @@ pub struct Survival<'a> {
 impl Default for Survival<'_> {
     fn default() -> Self {
         let (share, none) = ("share not relaxed", "There are no members, so there is nothing to survive.");
-        Survival { title: "", note: "", key: "", share, none, curves: Vec::new(), time: None }
+        let (key, curves) = (CellKey::default(), Vec::new());
+        Survival { title: "", note: "", quantity: "t", key, share, none, curves, time: None }
     }
 }
 
@@ -142,20 +144,19 @@ impl Survival<'_> {
     pub fn draw(&self) -> String {
         let Survival { title, note, curves, .. } = self;
         let values: Vec<Option<f64>> = curves.iter().map(|curve| curve.value).collect();
-        let colours = Colours::of(&values, self.key);
+        let colours = Colours::of(&values, &self.key);
         let sentences = vec![(*note).into(), colours.sentence(curves.len())];
         if curves.iter().all(|curve| curve.end(Scale::Linear).is_none()) {
             return nothing(title, sentences, self.none);
         }
-        let bands = curves.len() <= MAX_BANDS && curves.iter().any(|curve| curve.band.is_some());
-        let censored = curves.iter().any(|curve| !curve.censored.is_empty());
+        let (bands, censored) = (self.has_bands(), self.has_strokes());
         let heading = Heading { title, sentences, legend: self.legend(&colours, bands, censored) };
         let (mut svg, top) = heading.begin(8.0 + HEIGHT + FOOT);
 
         let times = || curves.iter().flat_map(SurvivalCurve::times);
         let scale = self.time.unwrap_or_else(|| Scale::of(curves.iter().flat_map(SurvivalCurve::quartiles)));
         let scale = if times().any(|t| scale.holds(t)) { scale } else { Scale::Linear };
-        let across = Axis::over("t", TIME, scale, times()).with_zero();
+        let across = Axis::over(self.quantity, TIME, scale, times()).with_zero();
         let upwards = Axis::new(self.share, "", Scale::Linear, (0.0, 1.02));
         let panel = only_panel([&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);
@@ -175,6 +176,16 @@ impl Survival<'_> {
         }
         colours.draw_bar(&mut svg, &panel);
         svg.finish()
+    }
+
+    /// Whether bands are drawn.
+    pub fn has_bands(&self) -> bool {
+        self.curves.len() <= MAX_BANDS && self.curves.iter().any(|curve| curve.band.is_some())
+    }
+
+    /// Whether strokes mark censored members.
+    pub fn has_strokes(&self) -> bool {
+        self.curves.iter().any(|curve| !curve.censored.is_empty())
     }
 
     fn legend(&self, colours: &Colours, bands: bool, censored: bool) -> Vec<Entry> {

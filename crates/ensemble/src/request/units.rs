@@ -20,9 +20,20 @@ pub struct Units {
 }
 
 impl Units {
+    /// The same units in signs, for people: micrometres are entered as `um`.
+    pub fn shown(&self) -> Units {
+        let sign = |name: &str| match name {
+            "um" => "µm".to_owned(),
+            "us" => "µs".to_owned(),
+            name => name.to_owned(),
+        };
+        Units { length: sign(&self.length), time: sign(&self.time) }
+    }
+
     /// Puts the unit of time into the words of a picture or a page, which names it by the power of a length.
     pub fn name(&self, words: &str) -> String {
-        words.replace("length⁻⁴", &format!("1/{}", self.time)).replace("length⁴", &self.time)
+        let time = self.shown().time;
+        words.replace("length⁻⁴", &format!("1/{time}")).replace("length⁴", &time)
     }
 
     /// The attribute `units` of an array whose unit is made of `length` alone.
@@ -71,6 +82,12 @@ impl FromStr for Units {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn people_read_signs() {
+        let shown = |text: &str| text.parse::<Units>().unwrap().shown().to_string();
+        assert_eq!([shown("um,us"), shown("nm,h"), shown("umbra,bus")], ["µm,µs", "nm,h", "umbra,bus"]);
+    }
 
     #[test]
     fn units_stand_where_powers_of_the_length_stood() {

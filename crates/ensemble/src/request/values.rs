@@ -17,6 +17,8 @@ use curvelax_base::{
 use curvelax_curve::{RadialLaw, Shape};
 use curvelax_flow::flow::Flow;
 
+/// Most members that are shown one by one.
+const MAX_NAMED: u64 = 20;
 /// Members whose values, besides the tails of each distribution, stand for all where a bound for all is needed. They are
 /// the first ones of the first cell, whichever run.
 const PROBED: u64 = 32;
@@ -95,6 +97,13 @@ impl Spec {
     /// Whether several members are made of one of many outlines.
     pub fn has_copies_of_outlines(&self) -> bool {
         self.outlines.is_some() && self.curves > 1
+    }
+
+    /// Whether its members are shown one by one: there are few, and each is an outline or a cell of its own. They are then
+    /// no sample of anything, and have no statistics.
+    pub fn names_members(&self) -> bool {
+        let is_one_each = self.members_per_cell() == 1 || self.outlines.is_some() && self.curves == 1;
+        is_one_each && (1..=MAX_NAMED).contains(&self.member_count())
     }
 
     /// Whether its members differ at all, without a sweep.

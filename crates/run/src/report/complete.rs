@@ -91,7 +91,8 @@ impl Complete<'_> {
         let excess = &tally.mean_excess(spec)?;
         files.push(Table::of(folder.file(names::MEAN_EXCESS)?, excess)?);
         let [summary, members] = [names::SUMMARY, names::MEMBERS].map(|name| own(&files, name));
-        let explained = &reader::explained(summary?, members?, spec)?;
+        let events = if spec.event.is_empty() { None } else { Some(own(&files, names::EVENTS)?) };
+        let explained = &reader::explained((summary?, events), members?, spec, statistics.of_limits)?;
         files.push(Table::of(folder.file(names::EXPLAINED)?, &explained.rows)?);
         if let Some(shard) = shard {
             files.push(folder.write(names::SHARD, shard)?);

@@ -4,7 +4,10 @@
 use glam::DVec2;
 
 use curvelax_curve::polygon;
-use curvelax_draw::svg::{Svg, closed_path, coordinate, dots};
+use curvelax_draw::{
+    svg::{Svg, closed_path, coordinate, dots},
+    width::shortened,
+};
 use curvelax_ensemble::study::PORTRAITS;
 use curvelax_files::portraits::Film;
 
@@ -15,10 +18,14 @@ pub const MAX_PANELS: usize = PORTRAITS;
 const MAX_NAME: usize = 24;
 const COLUMNS: usize = 4;
 /// Width and maximum height of a panel in pixels, and the free space inside it.
-const SIDE: f64 = 200.0;
+pub(super) const SIDE: f64 = 200.0;
+/// Size of text.
+pub(super) const SIZE: f64 = 12.0;
 const MIN_HEIGHT: f64 = 100.0;
 const PADDING: f64 = 14.0;
 const CAPTION: f64 = 44.0;
+/// Distance of two lines of it.
+const LINE: f64 = 15.0;
 const GAP: f64 = 14.0;
 const MARGIN: f64 = 24.0;
 const HEAD: f64 = 48.0;
@@ -73,14 +80,32 @@ text { fill: #e6edf3 }
 }
 ";
 
+/// What is written below the panels.
+#[derive(Clone, Debug, Default)]
+pub struct Wording {
+    /// The unit of lengths, after a space; may be empty.
+    pub unit: String,
+    /// What distinguishes the cell of each member; empty if nothing does.
+    pub cells: Vec<String>,
+    /// How and when each member ended.
+    pub ends: Vec<String>,
+}
+
+impl Wording {
+    fn has_cells(&self) -> bool {
+        self.cells.iter().any(|cell| !cell.is_empty())
+    }
+}
+
 /// The gallery of the first [`MAX_PANELS`] of `films`, as the text of an SVG file.
-pub fn draw(films: &[Film]) -> String {
+pub fn draw(films: &[Film], wording: &Wording) -> String {
     let panels: Vec<MemberPanel> = films.iter().take(MAX_PANELS).map(MemberPanel::new).collect();
     let columns = panels.len().clamp(MIN_COLUMNS, COLUMNS);
     let rows = panels.len().div_ceil(columns).max(1);
     let layout = PanelLayout::new(&panels);
     let frame = layout.frame;
-    let pitch = frame + DVec2::new(GAP, CAPTION);
+    let caption = CAPTION + if wording.has_cells() { LINE } else { 0.0 };
+    let pitch = frame + DVec2::new(GAP, caption);
     let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
     let height = HEAD + rows as f64 * pitch.y + FOOT;
 
@@ -90,11 +115,14 @@ pub fn draw(films: &[Film]) -> String {
     svg.text("note end", DVec2::new(width - MARGIN, 30.0), "grey: start, light: on the way, colour: end");
     for (i, panel) in panels.iter().enumerate() {
         let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
-        draw_panel(&mut svg, panel, DVec2::new(MARGIN, HEAD) + place * pitch, &layout);
+        let corner = DVec2::new(MARGIN, HEAD) + place * pitch;
+        let end = wording.ends.get(i).map_or(panel.film.status.name(), String::as_str);
+        let cell = wording.cells.get(i).map_or("", String::as_str);
+        draw_panel(&mut svg, panel, corner, &layout, [&wording.unit, cell, end]);
     }
     let foot = DVec2::new(MARGIN, height - 20.0);
     match layout.common {
-        Some(largest) => draw_scale(&mut svg, foot, layout.scale(largest)),
+        Some(largest) => draw_scale(&mut svg, foot, layout.scale(largest), &wording.unit),
         None => svg.text("note", foot + DVec2::new(0.0, 4.0), OWN_SCALES),
     }
     svg.finish()
@@ -134,10 +162,10 @@ fn shown(frames: &[Vec<DVec2>]) -> Vec<usize> {
     shown
 }
 
-fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelLayout) {
+fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelLayout, [unit, cell, end]: [&str; 3]) {
     let frame = layout.frame;
     let middle = corner + 0.5 * frame;
-    let Film { status, t_relax, points, .. } = panel.film;
+    let Film { status, points, .. } = panel.film;
     svg.open(&format!("panel {}", status.name()));
     svg.rectangle("frame", corner, frame, 6.0);
     let mut name = panel.film.name(MAX_NAME);
@@ -145,7 +173,7 @@ fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelL
         let own = (high - low).max_element();
         let scale = layout.scale(own);
         if layout.common.is_none() {
-            name += &format!(", {} across", rounded(own));
+            name += &format!(", {}{unit} across", rounded(own));
         }
         // y grows downwards in SVG.
         let place = |p: &DVec2| middle + (*p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
@@ -160,17 +188,15 @@ fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelL
         }
     }
     let below = DVec2::new(middle.x, corner.y + frame.y + 16.0);
-    let caption = match t_relax {
-        Some(t) => format!("{} at t = {}", status.name(), rounded(*t)),
-        None => status.name().into(),
-    };
-    svg.text("middle", below, &name);
-    svg.text("middle word", below + DVec2::new(0.0, 15.0), &caption);
+    svg.text("middle", below, &shortened(&name, SIZE, SIDE));
+    svg.text_unless_empty("middle", below + DVec2::new(0.0, LINE), cell);
+    let lines = if cell.is_empty() { 1.0 } else { 2.0 };
+    svg.text("middle word", below + DVec2::new(0.0, lines * LINE), end);
     svg.close();
 }
 
 /// A bar of a round length: 1, 2 or 5 times a power of ten, at most half a panel long.
-fn draw_scale(svg: &mut Svg, left: DVec2, scale: f64) {
+fn draw_scale(svg: &mut Svg, left: DVec2, scale: f64, unit: &str) {
     let most = 0.5 * SIDE / scale;
     let power = 10_f64.powi(most.log10().floor() as i32);
     let length = [5.0, 2.0, 1.0].map(|digit| digit * power).into_iter().find(|l| *l <= most).unwrap_or(power);
@@ -178,7 +204,9 @@ fn draw_scale(svg: &mut Svg, left: DVec2, scale: f64) {
     let [top, bottom] = [left.y - 4.0, left.y + 4.0].map(coordinate);
     svg.path("scale", &format!("M{x} {top}V{bottom}M{x} {y}H{end}M{end} {top}V{bottom}"));
     let label = DVec2::new(left.x + length * scale + 8.0, left.y + 4.0);
-    svg.text("note", label, &format!("length {}", rounded(length)));
+    let shown = rounded(length);
+    let named = if unit.is_empty() { format!("length {shown}") } else { format!("{shown}{unit}") };
+    svg.text("note", label, &named);
 }
 
 /// The layout common to all panels.
@@ -252,11 +280,11 @@ mod tests {
     #[test]
     fn a_gallery_has_a_panel_for_each_of_the_first_twelve() {
         for (count, shown) in [(0, 0), (1, 1), (5, 5), (12, 12), (30, 12)] {
-            let text = draw(&films(count, 60));
+            let text = draw(&films(count, 60), &Wording::default());
             assert_eq!(text.matches("class=\"frame\"").count(), shown);
             assert_eq!(text.matches("class=\"after\"").count(), shown);
             assert_eq!(text.matches("class=\"way\"").count(), 2 * shown);
-            assert_eq!(text, draw(&films(count, 60)));
+            assert_eq!(text, draw(&films(count, 60), &Wording::default()));
             // To look at: CURVELAX_GALLERY=FOLDER cargo test gallery
             if let Some(folder) = std::env::var_os("CURVELAX_GALLERY") {
                 let path = std::path::Path::new(&folder).join(format!("gallery{count}.svg"));
@@ -303,7 +331,7 @@ mod tests {
 
     #[test]
     fn many_nodes_are_drawn_as_a_line() {
-        let text = draw(&films(1, 5000));
+        let text = draw(&films(1, 5000), &Wording::default());
         assert!(!text.contains("class=\"nodes\""));
         assert!(text.len() < 50_000, "{}", text.len());
     }

@@ -18,10 +18,10 @@ use curvelax_study::{
     results::{
         cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics, Rates},
         comparison::{CellDifference, LeftOut},
-        discretisation::{CellLimits, DiscretisationError},
+        discretisation::DiscretisationError,
         scaling::Scaling,
         shortfall::Shortfall,
-        tally::Tally,
+        tally::{MemberTime, Tally},
         times::TimeStatistics,
     },
 };
@@ -54,14 +54,17 @@ impl fmt::Display for Overview<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         self.statuses(f)?;
         writeln!(f)?;
-        self.cells(f)?;
+        match self.spec.names_members() {
+            true => self.members(f)?,
+            false => self.cells(f)?,
+        }
         self.groups(f)?;
         for (label, text) in [
             ("ensemble", shortened(&describe(self.spec), usize::MAX)),
             ("outlines", self.tally.mollified.outlines().unwrap_or_default()),
             ("corners", self.tally.mollified.told().unwrap_or_default()),
-            ("t_relax", self.relaxation()),
-            ("t_limit", self.limit()),
+            (self.statistics.time(), self.relaxation()),
+            ("t_relax", self.raw()),
             ("error", self.error()),
             ("nodes", self.tally.nodes.told().unwrap_or_default()),
             ("accuracy", self.accuracy()),
@@ -97,35 +100,57 @@ impl Overview<'_> {
         writeln!(f, "{:<11}{members:>10}", "all")
     }
 
-    fn relaxation(&self) -> String {
+    /// The only cell, unless members are listed one by one.
+    fn only_cell(&self) -> Option<&CellStatistics> {
         match &self.statistics.cells[..] {
-            [cell] => times(&cell.times),
-            _ => String::new(),
+            [cell] if !self.spec.names_members() => Some(cell),
+            _ => None,
         }
+    }
+
+    fn relaxation(&self) -> String {
+        let unit = unit(self.spec);
+        self.only_cell()
+            .map_or(String::new(), |cell| unit + &times(self.statistics.times(cell), self.statistics.of_limits))
+    }
+
+    /// What stands behind the limits of a single ensemble.
+    fn raw(&self) -> String {
+        let cell = self.only_cell().filter(|_| self.statistics.of_limits);
+        cell.map_or(String::new(), |cell| raw(&cell.times, self.spec))
     }
 
     /// A line for each event of a single ensemble.
     fn events(&self) -> Vec<String> {
-        match &self.statistics.cells[..] {
-            [cell] => events(self.spec, cell).collect(),
-            _ => Vec::new(),
-        }
+        self.only_cell().map_or(Vec::new(), |cell| events(self.spec, cell).collect())
     }
 
-    /// The limit of the times of a single ensemble; empty without `--refine`.
-    fn limit(&self) -> String {
-        match &self.statistics.cells[..] {
-            [CellStatistics { limits: Some(limits), .. }] => limit(limits),
-            _ => String::new(),
+    /// Each member with its time, where they are few and known by name.
+    fn members(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let names: Vec<String> = self.tally.named.iter().map(|member| member_name(self.spec, member)).collect();
+        let times: Vec<String> = self.tally.named.iter().map(member_time).collect();
+        let unit = self.spec.units.as_ref().map_or(String::new(), |units| format!(" ({})", units.shown().time));
+        let (time, error) = (self.statistics.time(), if self.statistics.of_limits { " ± t_error" } else { "" });
+        let title = format!("{time}{error}{unit}");
+        let wide = |all: &[String], title: &str| {
+            all.iter().map(|text| text.chars().count()).fold(title.chars().count(), usize::max)
+        };
+        let (label, columns) = (wide(&names, "label"), wide(&times, &title));
+        writeln!(f, "{:<11}{:<label$}  {title:<columns$}  status", "member", "label")?;
+        for ((member, name), time) in self.tally.named.iter().zip(&names).zip(&times) {
+            write!(f, "{:<11}{name:<label$}  {time:<columns$}  {}", member.member, member.status.name())?;
+            for (event, t) in self.spec.event.iter().zip(&member.events) {
+                write!(f, "  {} {}", event.name, t.map_or("not seen".into(), significant))?;
+            }
+            writeln!(f)?;
         }
+        self.pairs(f)?;
+        writeln!(f)
     }
 
     /// The uncertainty of the median of a single ensemble, by its sources.
     fn error(&self) -> String {
-        match &self.statistics.cells[..] {
-            [cell] => errors(cell, self.spec),
-            _ => String::new(),
-        }
+        self.only_cell().map_or(String::new(), |cell| errors(cell, self.spec))
     }
 
     /// What `--accuracy` asked for, and what was reached in the cell that is farthest from it.
@@ -142,9 +167,7 @@ impl Overview<'_> {
 
     /// The rates of a single ensemble; empty if no member has one.
     fn rate(&self) -> String {
-        let [CellStatistics { rates: Rates { numbers, .. }, .. }] = &self.statistics.cells[..] else {
-            return String::new();
-        };
+        let Some(CellStatistics { rates: Rates { numbers, .. }, .. }) = self.only_cell() else { return String::new() };
         let Some(median) = numbers.get("median") else { return String::new() };
         let theory = numbers.get("ratio");
         let theory = theory.map_or(String::new(), |ratio| format!(", {} times that of theory", significant(ratio)));
@@ -159,9 +182,11 @@ impl Overview<'_> {
             return Ok(());
         }
         for cell in cells.iter().take(MAX_CELLS) {
-            writeln!(f, "{:<11}{}: t_relax {}", cell.cell, self.spec.sweep.name(cell.cell), times(&cell.times))?;
-            if let Some(limits) = &cell.limits {
-                writeln!(f, "{:<11}t_limit {}", "", limit(limits))?;
+            let (name, time) = (self.spec.sweep.name(cell.cell), self.statistics.time());
+            let of_cell = times(self.statistics.times(cell), self.statistics.of_limits);
+            writeln!(f, "{:<11}{name}: {time} {}{of_cell}", cell.cell, unit(self.spec))?;
+            if self.statistics.of_limits {
+                writeln!(f, "{:<11}t_relax {}", "", raw(&cell.times, self.spec))?;
             }
             let errors = errors(cell, self.spec);
             if !errors.is_empty() {
@@ -180,20 +205,24 @@ impl Overview<'_> {
         if let Some(why) = comparison.refusal() {
             writeln!(f, "{:<11}not compared: {why}", "cells")?;
         }
-        for (i, difference) in comparison.paired_cells().unwrap_or_default().iter().take(MAX_CELLS).enumerate() {
-            if i == 0 {
-                writeln!(
-                    f,
-                    "{:<11}t_relax less that of the same member of cell 0 (Wilcoxon's signed ranks):",
-                    "pairs"
-                )?;
-            }
-            writeln!(f, "{:<11}{}", difference.cell, paired(difference))?;
-        }
+        self.pairs(f)?;
         for text in scaling.iter().flat_map(|of| law(of, self.statistics.time())) {
             writeln!(f, "{:<11}{text}", "law")?;
         }
         writeln!(f)
+    }
+
+    /// How each cell differs from the first, if members are paired.
+    fn pairs(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let comparison = &self.statistics.comparison;
+        for (i, difference) in comparison.paired_cells().unwrap_or_default().iter().take(MAX_CELLS).enumerate() {
+            if i == 0 {
+                let time = self.statistics.time();
+                writeln!(f, "{:<11}{time} less that of the same member of cell 0 (Wilcoxon's signed ranks):", "pairs")?;
+            }
+            writeln!(f, "{:<11}{}", difference.cell, paired(difference))?;
+        }
+        Ok(())
     }
 
     /// One line per group of outlines, and how the groups of each cell compare.
@@ -203,7 +232,9 @@ impl Overview<'_> {
         let cell = |rank: u64| if cells.len() < 2 { String::new() } else { format!(", cell {rank}") };
         for GroupStatistics { group, times: of } in groups.iter().take(MAX_CELLS) {
             let name = shortened(group, MAX_GROUP);
-            writeln!(f, "{:<11}{property} {name}{}: t_relax {}", "group", cell(of.cell), times(&of.times))?;
+            let (time, of_limits) = (self.statistics.time(), self.statistics.of_limits);
+            let (cell, times) = (cell(of.cell), times(self.statistics.times(of), of_limits));
+            writeln!(f, "{:<11}{property} {name}{cell}: {time} {}{times}", "group", unit(self.spec))?;
         }
         match groups.len().saturating_sub(MAX_CELLS) {
             0 => {}
@@ -294,7 +325,10 @@ fn mobility(spec: &Spec) -> String {
     match (&spec.units, spec.mobility) {
         (None, None) => String::new(),
         (None, Some(mobility)) => format!("B = {}", number(mobility)),
-        (Some(Units { length, time }), _) => format!("B = {} {length}^4/{time}", number(spec.mobility())),
+        (Some(units), _) => {
+            let Units { length, time } = units.shown();
+            format!("B = {} {length}⁴/{time}", number(spec.mobility()))
+        }
     }
 }
 
@@ -321,7 +355,11 @@ fn events<'a>(spec: &'a Spec, cell: &'a CellStatistics) -> impl Iterator<Item = 
             format!("; discretisation about {mean} % (± {half} %)")
         });
         match (of.stopped, of.times.sample.events()) {
-            (0, _) | (_, 0) => format!("{}: {}{error}", event.name, times(&of.times)),
+            (0, _) | (_, 0) => {
+                let limit = if of.limits.is_some() { "limit " } else { "" };
+                let unit = unit(spec);
+                format!("{}: {limit}{unit}{}{error}", event.name, times(of.judged(), of.limits.is_some()))
+            }
             (stopped, known) => {
                 let stopped = count(stopped, "member");
                 format!("{}: reached by {known}; no statistics, as {stopped} stopped when relaxed", event.name)
@@ -331,12 +369,57 @@ fn events<'a>(spec: &'a Spec, cell: &'a CellStatistics) -> impl Iterator<Item = 
     spec.event.iter().zip(&cell.events).map(line)
 }
 
-/// Median and mean of the times of a cell, and how reliable they are.
-fn times(of: &TimeStatistics) -> String {
+/// The unit of times, in front of them; empty if none was named.
+fn unit(spec: &Spec) -> String {
+    spec.units.as_ref().map_or(String::new(), |units| format!("in {}: ", units.shown().time))
+}
+
+/// What stands behind limits: the times at the nodes of the run.
+fn raw(of: &TimeStatistics, spec: &Spec) -> String {
+    let Some(mean) = of.mean else { return String::new() };
+    let median = of.median().map_or("not reached by half of the members".into(), significant);
+    format!("raw, at n = {}: median {median}, mean {}", spec.points, significant(mean.value))
+}
+
+/// The name of a member: that of its outline, and what distinguishes its cell.
+pub fn member_name(spec: &Spec, member: &MemberTime) -> String {
+    let label = (!member.label.is_empty()).then(|| shortened(&member.label, MAX_GROUP));
+    let cell = (!spec.sweep.is_empty()).then(|| spec.sweep.name(member.cell));
+    let name = label.into_iter().chain(cell).collect::<Vec<_>>().join(", ");
+    if name.is_empty() { format!("member {}", member.member) } else { name }
+}
+
+/// The time of a member with its error, or until when it had not relaxed.
+pub fn member_time(member: &MemberTime) -> String {
+    match member.shown() {
+        Some((t, Some(error))) => {
+            let (t, error) = beside(t, error);
+            format!("{t} ± {error}")
+        }
+        Some((t, None)) => significant(t),
+        None => format!("> {}", significant(member.t_end)),
+    }
+}
+
+/// A number and its error: the error to two digits, the number to its last one, if that is possible without a power of ten.
+fn beside(t: f64, error: f64) -> (String, String) {
+    let digits = 1 - error.log10().floor() as i32;
+    match error > 0.0 && (1e-4..1e6).contains(&t.abs()) && (0..=12).contains(&digits) {
+        true => {
+            let digits = digits as usize;
+            (format!("{t:.digits$}"), format!("{error:.digits$}"))
+        }
+        false => (significant(t), rounded(error, 2)),
+    }
+}
+
+/// Median and mean of the times of a cell, and how reliable they are; limits have intervals for more than sampling.
+fn times(of: &TimeStatistics, of_limits: bool) -> String {
     let (members, known) = (of.sample.len() as u64, of.sample.events() as u64);
     let Some(mean) = of.mean else { return format!("none of {members} {} reached it", plural(members, "member")) };
     let median = of.median().map_or("not reached by half of the members".into(), significant);
-    let interval = of.interval().map_or(String::new(), |interval| format!(" ({})", interval.told(significant)));
+    let both = if of_limits { ", for sampling and discretisation" } else { "" };
+    let interval = of.interval().map_or(String::new(), |interval| format!(" ({}{both})", interval.told(significant)));
     let error = mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
     let least = if mean.restricted_to.is_some() { "at least " } else { "" };
     let censored = match members - known {
@@ -350,35 +433,32 @@ fn times(of: &TimeStatistics) -> String {
     )
 }
 
-/// Median and mean of the limits of a cell.
-fn limit(of: &CellLimits) -> String {
-    let interval = of.interval.map_or(String::new(), |interval| {
-        format!(" ({}, for sampling and discretisation)", interval.told(significant))
-    });
-    let median = of.median.map_or("not reached by half of the members".into(), significant);
-    let mean = of.mean.map_or(String::new(), |mean| {
-        let least = if mean.restricted_to.is_some() { "at least " } else { "" };
-        let error =
-            mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
-        format!(", mean {least}{}{error}", significant(mean.value))
-    });
-    format!("median {median}{interval}{mean}")
-}
-
 /// What sampling and discretisation do to the median of a cell, and what to do about the larger one.
 fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     if cell.times.sample.events() == 0 {
         return String::new();
     }
     let bounds = cell.interval().and_then(|interval| interval.bounds());
-    let sampling =
-        bounds.map_or(String::new(), |(low, high)| format!("sampling {} to {}, ", significant(low), significant(high)));
+    // The interval of the limits says it already, together with what follows.
+    let sampling = bounds.filter(|_| cell.limits.is_none());
+    let sampling = sampling
+        .map_or(String::new(), |(low, high)| format!("sampling {} to {}, ", significant(low), significant(high)));
     let Some(discretisation) = &cell.discretisation else {
+        if cell.limits.is_some() {
+            return String::new();
+        }
         return format!("{sampling}discretisation not known: no member has times at n, n/√2 and n/2 nodes");
     };
     let DiscretisationError { members, mean, error, not_asymptotic } = *discretisation;
     let known = plural(members as u64, "member");
     let remedy = if spec.refine { "t_error bounds them" } else { "use --refine, or more --points" };
+    let bound = cell.limits.as_ref().and_then(|limits| limits.error);
+    if let (false, Some(bound)) = (discretisation.converges(), bound) {
+        return format!(
+            "{sampling}t_error {} (median), a bound: times of {not_asymptotic} of {members} {known} do not converge yet in n",
+            significant(bound)
+        );
+    }
     if !discretisation.converges() {
         return format!(
             "{sampling}discretisation not known: times of {not_asymptotic} of {members} {known} do not converge yet in n; \

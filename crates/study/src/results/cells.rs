@@ -43,6 +43,8 @@ pub struct EventStatistics {
     pub times: TimeStatistics,
     /// Their error of discretisation, if it is known of some members.
     pub discretisation: Option<DiscretisationError>,
+    /// Their limits, if members have them and none was stopped before the event.
+    pub limits: Option<CellLimits>,
     /// Members that were stopped when they relaxed, before the event. If there are any, censoring depends on how slow a
     /// member is, and nothing is estimated.
     pub stopped: u64,
@@ -110,7 +112,7 @@ pub struct EnsembleStatistics {
     pub group_comparisons: Vec<CellComparison>,
     /// The medians as a power of the swept value, if a single scale is swept.
     pub scaling: Option<Scaling>,
-    /// Medians are compared in the limit, if all cells that have a median have that of limits.
+    /// Times are shown and compared in the limit: members have limits in each cell in which any relaxed.
     pub of_limits: bool,
     /// The uncertainty is that of each member, if they are outlines, and else that of the median.
     pub of_each: bool,
@@ -138,13 +140,13 @@ impl CellStatistics {
         let limits = CellLimits::of(&mem::take(&mut tally.limits), &judged, copies)?;
         let mut of_events = mem::take(&mut tally.events).into_iter();
         let events = spec.event.iter().map(|_| {
-            let EventTally { times, judged, stopped, .. } = of_events.next().unwrap_or_default();
+            let EventTally { times, limits, judged, stopped, .. } = of_events.next().unwrap_or_default();
             let discretisation = DiscretisationError::of(&judged)?;
-            let times = match stopped {
-                0 => TimeStatistics::new(times),
-                _ => TimeStatistics::unknown(times),
+            let (times, limits) = match stopped {
+                0 => (TimeStatistics::new(times), CellLimits::of(&limits, &judged, copies)?),
+                _ => (TimeStatistics::unknown(times), None),
             };
-            Ok(EventStatistics { times, discretisation, stopped })
+            Ok(EventStatistics { times, discretisation, limits, stopped })
         });
         let events = events.collect::<Result<_>>()?;
         Ok(CellStatistics { cell, values, counts, times, rates, discretisation, limits, events })
@@ -162,29 +164,18 @@ impl CellStatistics {
 
     /// The numbers on the limits, for the table.
     pub fn limit(&self) -> Numbers {
-        let limits = self.limits.as_ref();
-        let of = |number: fn(Mean) -> Option<f64>| limits.and_then(|limits| limits.mean).and_then(number);
-        let interval = limits.and_then(|limits| limits.interval);
-        let low = "lower end of the 95 % interval of the median, for sampling and discretisation together; of fewer than 6 \
-                   that of their range; empty if there is none";
-        let high = "upper end of the 95 % interval of the median, for sampling and discretisation together; of fewer than 6 \
-                    that of their range; empty if there is none";
-        let named = vec![
-            Statistic { name: "mean", value: of(|mean| Some(mean.value)), meaning: "mean, by Kaplan–Meier" },
-            Statistic { name: "sd", value: of(|mean| mean.standard_deviation), meaning: "standard deviation" },
-            Statistic { name: "se", value: of(|mean| mean.standard_error), meaning: "standard error of the mean" },
-            Statistic { name: "median", value: limits.and_then(|limits| limits.median), meaning: "median" },
-            Statistic { name: "median_low", value: interval.and_then(|interval| interval.lower), meaning: low },
-            Statistic { name: "median_high", value: interval.and_then(|interval| interval.upper), meaning: high },
-            Statistic { name: "error", value: limits.and_then(|limits| limits.error), meaning: "median of t_error" },
-        ];
-        Numbers { known: limits.map_or(0, |limits| limits.known), named, intervals: vec![covered(interval)] }
+        limit(self.limits.as_ref())
     }
 
     /// The quantities in the table, with their numbers.
     fn quantities(&self) -> [(&'static str, Numbers); 4] {
         let (times, rates) = (self.times.numbers(), self.rates.numbers.clone());
         [("t_relax", times), ("rate", rates), ("discretisation", self.errors()), ("t_limit", self.limit())]
+    }
+
+    /// The times that are shown: the limits, if they are asked for.
+    pub fn judged(&self, of_limits: bool) -> &TimeStatistics {
+        self.limits.as_ref().filter(|_| of_limits).map_or(&self.times, |limits| &limits.times)
     }
 
     /// Time by which half of the members have relaxed.
@@ -194,10 +185,8 @@ impl CellStatistics {
 
     /// The median with its interval, that of the limits if they are asked for.
     pub fn judged_median(&self, of_limits: bool) -> Option<(f64, Option<Interval>)> {
-        match &self.limits {
-            Some(limits) if of_limits => limits.median.map(|median| (median, limits.interval)),
-            _ => self.median().map(|median| (median, self.interval())),
-        }
+        let times = self.judged(of_limits);
+        times.median().map(|median| (median, times.interval()))
     }
 
     /// Whether all its members relaxed at one time, as copies of one curve do.
@@ -223,6 +212,37 @@ impl EventStatistics {
     pub fn errors(&self) -> Numbers {
         errors(self.discretisation.as_ref(), OF_EVENT)
     }
+
+    /// The numbers on its limits, for the table.
+    pub fn limit(&self) -> Numbers {
+        limit(self.limits.as_ref())
+    }
+
+    /// The times that are shown: the limits, if there are any.
+    pub fn judged(&self) -> &TimeStatistics {
+        self.limits.as_ref().map_or(&self.times, |limits| &limits.times)
+    }
+}
+
+/// The numbers on limits, for the table.
+fn limit(limits: Option<&CellLimits>) -> Numbers {
+    let times = limits.map(|limits| &limits.times);
+    let of = |number: fn(Mean) -> Option<f64>| times.and_then(|times| times.mean).and_then(number);
+    let interval = times.and_then(TimeStatistics::interval);
+    let low = "lower end of the 95 % interval of the median, for sampling and discretisation together; of fewer than 6 \
+               that of their range; empty if there is none";
+    let high = "upper end of the 95 % interval of the median, for sampling and discretisation together; of fewer than 6 \
+                that of their range; empty if there is none";
+    let named = vec![
+        Statistic { name: "mean", value: of(|mean| Some(mean.value)), meaning: "mean, by Kaplan–Meier" },
+        Statistic { name: "sd", value: of(|mean| mean.standard_deviation), meaning: "standard deviation" },
+        Statistic { name: "se", value: of(|mean| mean.standard_error), meaning: "standard error of the mean" },
+        Statistic { name: "median", value: times.and_then(TimeStatistics::median), meaning: "median" },
+        Statistic { name: "median_low", value: interval.and_then(|interval| interval.lower), meaning: low },
+        Statistic { name: "median_high", value: interval.and_then(|interval| interval.upper), meaning: high },
+        Statistic { name: "error", value: limits.and_then(|limits| limits.error), meaning: "median of t_error" },
+    ];
+    Numbers { known: times.map_or(0, |times| times.sample.events()), named, intervals: vec![covered(interval)] }
 }
 
 /// What the mean error of discretisation of a time means.
@@ -247,11 +267,12 @@ impl EnsembleStatistics {
     /// Those of 10⁷ members are 240 MB, so they are sorted in place.
     pub fn new(spec: &Spec, tally: &mut Tally) -> Result<EnsembleStatistics> {
         let relative = tally.cells.iter().flat_map(|cell| &cell.rates).all(|rate| rate.theory().is_some());
+        let of_limits = tally.has_limits();
         // Sorting takes the times out of the order of the members.
         let same_outlines = spec.outlines.is_some() && !spec.sweep.has("shape");
         let paired = match () {
             () if spec.has_copies_of_outlines() => Some(CellComparison::of_copies(spec.sweep.cells())),
-            () if spec.common_random_numbers || same_outlines => Some(CellComparison::paired(spec, tally)?),
+            () if spec.common_random_numbers || same_outlines => Some(CellComparison::paired(spec, tally, of_limits)?),
             () => None,
         };
         let mut none = CellTally::default();
@@ -261,12 +282,11 @@ impl EnsembleStatistics {
                 CellStatistics::new(spec, cell, of_cell, relative)
             })
             .collect::<Result<Vec<_>>>()?;
-        let samples: Vec<&Sample> = cells.iter().map(|cell| &cell.times.sample).collect();
+        let samples: Vec<&Sample> = cells.iter().map(|cell| &cell.judged(of_limits).sample).collect();
         let comparison = match paired {
             Some(paired) => paired,
             None => CellComparison::independent(spec, &samples)?,
         };
-        let of_limits = spec.refine && cells.iter().all(|cell| cell.median().is_none() || cell.limits.is_some());
         let medians = cells.iter().map(|cell| {
             let (value, interval) = cell.judged_median(of_limits).unzip();
             CellMedian { cell: cell.cell, value, interval: interval.flatten(), has_copies: cell.has_copies() }
@@ -284,7 +304,7 @@ impl EnsembleStatistics {
             groups = order.into_iter().map(|(_, of)| of).collect();
         }
         let group_comparisons = groups.chunk_by(|one, other| one.times.cell == other.times.cell).map(|of_cell| {
-            let samples: Vec<&Sample> = of_cell.iter().map(|group| &group.times.times.sample).collect();
+            let samples: Vec<&Sample> = of_cell.iter().map(|group| &group.times.judged(of_limits).sample).collect();
             match spec.has_copies_of_outlines() {
                 true => CellComparison::of_copies(samples.len() as u64),
                 false => {
@@ -297,7 +317,12 @@ impl EnsembleStatistics {
         Ok(EnsembleStatistics { cells, comparison, groups, group_comparisons, scaling, relative, of_limits, of_each })
     }
 
-    /// The time whose medians are compared.
+    /// The times of a cell or a group that are shown.
+    pub fn times<'a>(&self, of: &'a CellStatistics) -> &'a TimeStatistics {
+        of.judged(self.of_limits)
+    }
+
+    /// The time that is shown and compared.
     pub fn time(&self) -> &'static str {
         if self.of_limits { "t_limit" } else { "t_relax" }
     }
@@ -350,10 +375,18 @@ impl EnsembleStatistics {
         let named = |numbers: Option<Numbers>| numbers.map_or((vec![], vec![]), |of| (of.named, of.intervals));
         let (times, intervals) = named(some.map(|of| of.times.numbers()));
         let (errors, _) = named(some.map(EventStatistics::errors));
+        let (limits, of_limits) = named(some.map(EventStatistics::limit));
         all.extend(times.iter().map(|of| column(of.name, "float", of.meaning)));
         all.push(column("discretisation_known", "integer", "members of which that is known"));
         all.extend(errors.iter().map(|of| column(&format!("discretisation_{}", of.name), "float", of.meaning)));
         all.extend(intervals.iter().map(|of| column(of.name, "float", of.meaning)));
+        all.push(column(
+            "t_limit_known",
+            "integer",
+            "members of which the limit of the time is known, with `--refine`",
+        ));
+        let limits = limits.iter().chain(&of_limits);
+        all.extend(limits.map(|of| column(&format!("t_limit_{}", of.name), "float", of.meaning)));
         all
     }
 
@@ -368,7 +401,9 @@ impl EnsembleStatistics {
             let values = |of: &[Statistic]| of.iter().map(|number| number.value).collect::<Vec<_>>();
             let (times, errors) = (of.times.numbers(), of.errors());
             let (seen, judged) = ((times.known, values(&times.named)), (errors.known, values(&errors.named)));
-            let row = (cell.cell, &event.name, of.times.sample.len(), seen, judged, values(&times.intervals));
+            let limit = of.limit();
+            let limits = (limit.known, values(&limit.named), values(&limit.intervals));
+            let row = (cell.cell, &event.name, of.times.sample.len(), seen, judged, values(&times.intervals), limits);
             writer.serialize(row).map_err(|e| failed(&e))?;
         }
         let bytes = writer.into_inner().map_err(|e| failed(&e))?;

@@ -32,7 +32,7 @@ pub enum CellComparison {
     Refused(String),
 }
 
-/// Differences of t_relax between the members of a cell and those of the first cell with the same random numbers.
+/// Differences of the times between the members of a cell and those of the first cell with the same random numbers.
 ///
 /// A pair counts if both relaxed. The others are left out, since their difference is unknown; they are counted by
 /// what is known of its sign.
@@ -127,18 +127,21 @@ fn ranks(spec: &Spec, cell: u64) -> Box<dyn Iterator<Item = u64> + '_> {
 }
 
 impl CellComparison {
-    /// Compares the cells of a study of `spec` whose members share their random numbers. Times are still in `tally`, in
-    /// the order of the members.
+    /// Compares the cells of a study of `spec` whose members share their random numbers. Times, or limits, are still in
+    /// `tally`, in the order of the members.
     ///
     /// # Errors
     /// If a time is not finite.
-    pub fn paired(spec: &Spec, tally: &Tally) -> Result<CellComparison> {
+    pub fn paired(spec: &Spec, tally: &Tally, of_limits: bool) -> Result<CellComparison> {
         let count = spec.sweep.cells();
         if count < 2 {
             return Ok(CellComparison::Single);
         }
         let none = CellTally::default();
-        let times = |cell: u64| &tally.cells.get(cell as usize).unwrap_or(&none).times;
+        let times = |cell: u64| {
+            let CellTally { times, limits, .. } = tally.cells.get(cell as usize).unwrap_or(&none);
+            if of_limits { limits } else { times }
+        };
         if let Some(cell) = (0..count).find(|cell| ranks(spec, *cell).count() != times(*cell).len()) {
             return Ok(CellComparison::Refused(format!(
                 "cell {cell} has {} members of {}; pairs are made of all members",
@@ -288,7 +291,7 @@ mod tests {
             };
             tally.add(&Outcome { cell, ..outcome }).unwrap();
         }
-        CellComparison::paired(&spec, &tally).unwrap()
+        CellComparison::paired(&spec, &tally, false).unwrap()
     }
 
     #[test]
@@ -325,7 +328,7 @@ mod tests {
         spec.common_random_numbers = true;
         let mut tally = Tally::default();
         tally.add(&outcome(0, Status::Relaxed, Some(1.0))).unwrap();
-        let refused = CellComparison::paired(&spec, &tally).unwrap();
+        let refused = CellComparison::paired(&spec, &tally, false).unwrap();
         assert_eq!(refused.refusal(), Some("cell 0 has 1 members of 3; pairs are made of all members"));
     }
 

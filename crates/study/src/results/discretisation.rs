@@ -1,8 +1,9 @@
 //! The error that n and the steps leave in the relaxation times of a cell, and what the times tend to.
 
+use super::times::{QUANTILES, TimeStatistics};
 use curvelax_base::error::Result;
 use curvelax_statistics::{
-    Description, HALF_INTERVAL, Interval, KaplanMeier, Limit, Mean, Observation, Observations, Sample, interval,
+    Description, HALF_INTERVAL, Interval, KaplanMeier, Limit, Observation, Observations, Sample, interval,
 };
 
 /// What the levels tell of the relaxation times of a cell.
@@ -39,17 +40,10 @@ impl DiscretisationError {
     }
 }
 
-/// The limits of the relaxation times of a cell.
-#[derive(Clone, Debug, PartialEq)]
+/// The limits of the times of a cell.
 pub struct CellLimits {
-    /// Members that have one.
-    pub known: usize,
-    /// Their mean, as that of the times.
-    pub mean: Option<Mean>,
-    /// Their median.
-    pub median: Option<f64>,
-    /// Its interval, for sampling and discretisation together.
-    pub interval: Option<Interval>,
+    /// Their statistics, as those of the times; intervals are for sampling and discretisation together.
+    pub times: TimeStatistics,
     /// Median of the half-widths of the members' own intervals.
     pub error: Option<f64>,
     /// What the median is if all limits are at one end of their own intervals.
@@ -77,26 +71,23 @@ impl CellLimits {
         let ends = median(&at_low_end).zip(median(&at_high_end)).filter(|_| !judged.is_empty());
         // Errors of discretisation have one sign for all members: they do not average out. So each end is that of limits
         // that are all as far on its side as they may be.
-        let of_median = |sample: &Sample| interval::of_sample(sample, 0.5);
-        let sampled = || {
-            let [lower, upper] = [of_median(&at_low_end)?.lower, of_median(&at_high_end)?.upper];
-            Some(Interval { lower, upper, ..of_median(&sample)? })
+        let sampled = |share: f64| {
+            let of = |sample: &Sample| interval::of_sample(sample, share);
+            let [lower, upper] = [of(&at_low_end)?.lower, of(&at_high_end)?.upper];
+            Some(Interval { lower, upper, ..of(&sample)? })
         };
         // Copies of one curve have the interval of their own error.
-        let interval = match (copies, ends) {
+        let interval = |share: f64| match (copies, ends) {
             (_, None) => None,
             (true, Some((low, high))) => Some(Interval::between(low, high)),
-            (false, Some(_)) => sampled(),
+            (false, Some(_)) => sampled(share),
         };
-        let survival = KaplanMeier::new(&sample);
+        let intervals = QUANTILES.map(|(share, ..)| interval(share));
         let mut by_error: Vec<&Limit> = judged.iter().collect();
         by_error.sort_by(|one, other| one.relative_error().total_cmp(&other.relative_error()));
         let widest = ((MOST * judged.len() as f64).ceil() as usize).checked_sub(1).map(|place| by_error[place]);
         Ok(Some(CellLimits {
-            known: sample.events(),
-            mean: survival.mean(),
-            median: survival.median(),
-            interval,
+            times: TimeStatistics { intervals, ..TimeStatistics::of(sample) },
             error: Description::new(judged.iter().map(|limit| limit.error))?.median(),
             ends,
             widest: widest.map(Limit::relative_error),
@@ -106,9 +97,9 @@ impl CellLimits {
 
     /// Half-width of the interval of the median relative to it, and the part of it that is there without sampling.
     pub fn uncertainty(&self) -> Option<(f64, f64)> {
-        let median = self.median.filter(|median| *median > 0.0)?;
+        let median = self.times.median().filter(|median| *median > 0.0)?;
         let half = |(low, high): (f64, f64)| (high - median).max(median - low) / median;
-        Some((half(self.interval?.bounds()?), half(self.ends?)))
+        Some((half(self.times.interval()?.bounds()?), half(self.ends?)))
     }
 }
 

@@ -28,7 +28,7 @@ pub const DRAWN: usize = 256;
 /// More cells are not drawn.
 const DRAWN_CELLS: u64 = 24;
 
-/// The times that are explained.
+/// The times that are explained in every run; limits and events come besides.
 pub const TIMES: [&str; 2] = ["t_relax", "t_half"];
 /// Name of the regression among the features.
 pub const TOGETHER: &str = "together";
@@ -67,8 +67,8 @@ pub struct FeaturedMember {
     pub place: u64,
     /// A number for each feature; NaN if unknown.
     pub numbers: Vec<f64>,
-    /// Each of [`TIMES`], if it was reached.
-    pub times: [Option<f64>; TIMES.len()],
+    /// Each of the [times](Explained::times), if it was reached.
+    pub times: Vec<Option<f64>>,
     /// When it ended.
     pub t_end: f64,
 }
@@ -76,6 +76,8 @@ pub struct FeaturedMember {
 /// What explains the times of all cells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Explained {
+    /// Names of the times that are explained; the first is the one that is shown.
+    pub times: Vec<String>,
     /// By cell, time and R².
     pub rows: Vec<ExplainedRow>,
     /// Names of the features.
@@ -94,10 +96,11 @@ pub struct Explaining {
 }
 
 impl Explaining {
-    /// Begins, for members with these features in so many cells.
-    pub fn new(features: &[Feature], cells: u64) -> Explaining {
+    /// Begins, for members with these features and times in so many cells.
+    pub fn new(features: &[Feature], times: impl Iterator<Item = String>, cells: u64) -> Explaining {
         let features = features.iter().map(|feature| feature.name.clone()).collect();
-        Explaining { explained: Explained { features, ..Explained::default() }, cells, members: Vec::new() }
+        let explained = Explained { features, times: times.collect(), ..Explained::default() };
+        Explaining { explained, cells, members: Vec::new() }
     }
 
     /// Whether a further member of this cell enters.
@@ -121,10 +124,10 @@ impl Explaining {
     /// Returns what explains the times of the members that were added.
     pub fn finish(mut self) -> Explained {
         self.end_cell();
-        let Explained { rows, features, .. } = &self.explained;
+        let Explained { rows, features, times, .. } = &self.explained;
         // Sums over cells: a cell without the feature adds nothing.
         let sum = |name: &String| {
-            let own = rows.iter().filter(|row| row.time == TIMES[0] && row.feature == *name);
+            let own = rows.iter().filter(|row| times.first() == Some(&row.time) && row.feature == *name);
             own.filter_map(|row| row.r2).sum::<f64>()
         };
         let sums: Vec<f64> = features.iter().map(sum).collect();
@@ -136,8 +139,8 @@ impl Explaining {
 
     fn end_cell(&mut self) {
         let members = std::mem::take(&mut self.members);
-        for time in 0..TIMES.len() {
-            self.explained.rows.extend(rows(&members, time, &self.explained.features));
+        for (time, name) in self.explained.times.iter().enumerate() {
+            self.explained.rows.extend(rows(&members, (time, name), &self.explained.features));
         }
         let most = (DRAWN as u64 / self.cells.clamp(1, DRAWN_CELLS)) as usize;
         let step = members.len().div_ceil(most).max(1);
@@ -146,14 +149,14 @@ impl Explaining {
 }
 
 /// The rows of a time of the members of a cell.
-fn rows(members: &[FeaturedMember], time: usize, names: &[String]) -> Vec<ExplainedRow> {
+fn rows(members: &[FeaturedMember], (time, time_name): (usize, &str), names: &[String]) -> Vec<ExplainedRow> {
     let known: Vec<&FeaturedMember> = members.iter().filter(|member| member.times[time].is_some()).collect();
     let censored = members.len() - known.len();
     let cell = members.first().map_or(0, |first| first.cell);
     let claims = known.len() >= LEAST_MEMBERS && censored as f64 <= MOST_CENSORED * members.len() as f64;
     let row = |feature: &str| ExplainedRow {
         cell,
-        time: TIMES[time].into(),
+        time: time_name.into(),
         feature: feature.into(),
         members: known.len() as u64,
         censored: censored as u64,
@@ -226,11 +229,15 @@ mod tests {
                 cell,
                 place: i,
                 numbers: vec![b, a, 7.0, unknown],
-                times: [t, t.map(|t| 0.5 * t)],
+                times: vec![t, t.map(|t| 0.5 * t)],
                 t_end: 2.0,
             }
         };
         (0..count).map(member).collect()
+    }
+
+    fn times() -> impl Iterator<Item = String> {
+        TIMES.map(String::from).into_iter()
     }
 
     pub fn features() -> Vec<Feature> {
@@ -239,7 +246,7 @@ mod tests {
     }
 
     fn explained(members: impl IntoIterator<Item = FeaturedMember>, cells: u64) -> Explained {
-        let mut explaining = Explaining::new(&features(), cells);
+        let mut explaining = Explaining::new(&features(), times(), cells);
         members.into_iter().for_each(|member| explaining.add(member));
         explaining.finish()
     }
@@ -280,7 +287,13 @@ mod tests {
             let size = (0.1 * i as f64).exp();
             let (wave, t) = ((i as f64 * i as f64).sin(), size.powi(4));
             let numbers = vec![wave, size, 1.0 + 0.1 * wave, f64::from(u8::from(i.is_multiple_of(2)))];
-            FeaturedMember { member: i, place: i, numbers, times: [Some(t), Some(2.0 + wave)], ..Default::default() }
+            FeaturedMember {
+                member: i,
+                place: i,
+                numbers,
+                times: vec![Some(t), Some(2.0 + wave)],
+                ..Default::default()
+            }
         };
         let found = explained((0..60).map(member), 1);
         let [best, others @ ..] = &found.rows[..4] else { panic!("{found:?}") };
@@ -301,12 +314,15 @@ mod tests {
         assert_eq!(found.rows[6..], alone.rows);
         let many = explained(members(0, 1000, 0), 1);
         assert_eq!(many.drawn.len(), 250);
-        let mut explaining = Explaining::new(&features(), 1);
+        let mut explaining = Explaining::new(&features(), times(), 1);
         members(0, 3, 0).into_iter().for_each(|member| explaining.add(member));
         explaining.members.resize(CONSIDERED, FeaturedMember::default());
         assert!(!explaining.wants(0) && explaining.wants(1) && explaining.is_full());
         explaining.cells = 2;
         assert!(!explaining.is_full());
-        assert_eq!(explained([], 1), Explained { features: found.features, ..Explained::default() });
+        assert_eq!(
+            explained([], 1),
+            Explained { features: found.features, times: found.times, ..Explained::default() }
+        );
     }
 }

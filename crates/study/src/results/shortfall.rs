@@ -52,7 +52,7 @@ fn why(spec: &Spec, cell: &CellStatistics, goal: f64, of_each: bool) -> String {
         None => format!(
             "{} of {} have a limit, too few for a median with an interval: use more --curves or a longer --t-end, or a \
              curve that relaxes",
-            cell.limits.as_ref().map_or(0, |limits| limits.known),
+            cell.limits.as_ref().map_or(0, |limits| limits.times.sample.events()),
             count(cell.members(), "member")
         ),
         Some((all, _)) if of_each && 2.0 * rounding(cell) > all => format!(

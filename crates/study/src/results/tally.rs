@@ -55,6 +55,50 @@ pub struct Tally {
     pub mesh_ratios: Vec<f32>,
     /// Metric drift of each member at its end, for a picture.
     pub metric_drifts: Vec<f32>,
+    /// The first members of each cell, ascending.
+    pub named: Vec<MemberTime>,
+}
+
+/// Members of each cell that are known by name, and over all cells: enough for all that are shown.
+const NAMED: u64 = 20;
+const MAX_NAMED: usize = 2000;
+
+/// The time of a member that may be shown by itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MemberTime {
+    /// Index of the member.
+    pub member: u64,
+    /// Index of its cell.
+    pub cell: u64,
+    /// Name of its outline; empty if it has none.
+    pub label: String,
+    /// How it ended.
+    pub status: Status,
+    /// When it ended.
+    pub t_end: f64,
+    /// Its relaxation time.
+    pub t_relax: Option<f64>,
+    /// Its limit.
+    pub t_limit: Option<f64>,
+    /// Half-width of the 95 % interval of that.
+    pub t_error: Option<f64>,
+    /// The times of the events, or their limits, in the order of the spec.
+    pub events: Vec<Option<f64>>,
+}
+
+impl MemberTime {
+    fn new(outcome: &Outcome, refined: bool) -> MemberTime {
+        let Outcome { member, cell, status, t_end, t_relax, t_limit, t_error, .. } = *outcome;
+        let limit = |i: usize| outcome.judged_events.get(i).copied().flatten().filter(|_| refined);
+        let event = |(i, t): (usize, &Option<f64>)| limit(i).map(|limit| limit.t).or(*t);
+        let events = outcome.events.iter().enumerate().map(event).collect();
+        MemberTime { member, cell, label: outcome.label.clone(), status, t_end, t_relax, t_limit, t_error, events }
+    }
+
+    /// The time that is shown: the limit, if there is one, with its error.
+    pub fn shown(&self) -> Option<(f64, Option<f64>)> {
+        self.t_limit.map(|t| (t, self.t_error)).or(self.t_relax.map(|t| (t, None)))
+    }
 }
 
 /// Decay rate of a member.
@@ -109,6 +153,8 @@ pub struct CellTally {
 pub struct EventTally {
     /// Times at which it happened, or up to which it had not.
     pub times: Observations,
+    /// Their limits, of the members that have one; censored like the times for the others.
+    pub limits: Observations,
     /// What the levels tell of these times, for the members that ran at them.
     pub judged: Vec<Limit>,
     /// Members that were stopped when they relaxed, before the event.
@@ -121,10 +167,13 @@ impl CellTally {
     fn add(&mut self, outcome: &Outcome, refined: bool, stops: bool) -> Result<()> {
         let CellTally { counts, times, others, late, area, rates, limits, judged, events, .. } = self;
         times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
+        // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
+        let limited = |limit: Option<f64>, t: Option<f64>| match limit {
+            Some(_) => Observation::new(limit, outcome.t_end),
+            None => Observation::new(None, t.unwrap_or(outcome.t_end)),
+        };
         if refined {
-            // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
-            let end = outcome.t_limit.map_or(outcome.t_relax.unwrap_or(outcome.t_end), |_| outcome.t_end);
-            limits.push(Observation::new(outcome.t_limit, end))?;
+            limits.push(limited(outcome.t_limit, outcome.t_relax))?;
         }
         judged.extend(outcome.judged);
         events.resize_with(outcome.events.len().max(events.len()), EventTally::default);
@@ -132,7 +181,11 @@ impl CellTally {
             own.times.push(Observation::new(*t, outcome.t_end))?;
             own.reached += u64::from(t.is_some());
             own.stopped += u64::from(stops && t.is_none() && outcome.status == Status::Relaxed);
-            own.judged.extend(outcome.judged_events.get(i).copied().flatten());
+            let judged = outcome.judged_events.get(i).copied().flatten();
+            if refined {
+                own.limits.push(limited(judged.map(|limit| limit.t), *t))?;
+            }
+            own.judged.extend(judged);
         }
         *late += u64::from(outcome.status == Status::Unfinished && outcome.end.turning.abs() == 1);
         *area += outcome.start.area.abs();
@@ -406,6 +459,9 @@ impl Tally {
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
+        if self.named.len() < MAX_NAMED && self.cells[cell].counts.iter().sum::<u64>() < NAMED {
+            self.named.push(MemberTime::new(outcome, refined));
+        }
         self.cells[cell].add(outcome, refined, self.stops)?;
         if !outcome.group.is_empty() {
             self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, refined, self.stops)?;
@@ -428,6 +484,18 @@ impl Tally {
         self.sweeps_k = self.sweeps_k.saturating_add(outcome.sweeps_k);
         self.sweeps_x = self.sweeps_x.saturating_add(outcome.sweeps_x);
         Ok(())
+    }
+
+    /// Whether members have limits, in each cell in which any relaxed.
+    pub fn has_limits(&self) -> bool {
+        let any = |of: &Observations| of.iter().any(|seen| seen.happened);
+        self.cells.iter().any(|cell| any(&cell.limits))
+            && self.cells.iter().all(|cell| any(&cell.limits) || !any(&cell.times))
+    }
+
+    /// The time of `member`, if it is known by name.
+    pub fn named(&self, member: u64) -> Option<&MemberTime> {
+        self.named.binary_search_by_key(&member, |own| own.member).ok().map(|at| &self.named[at])
     }
 
     /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`].

@@ -50,7 +50,11 @@ pub struct Statistic {
 impl TimeStatistics {
     /// Computes the statistics of some times.
     pub fn new(times: Observations) -> TimeStatistics {
-        let sample = Sample::from(times);
+        TimeStatistics::of(Sample::from(times))
+    }
+
+    /// Computes the statistics of sorted times.
+    pub fn of(sample: Sample) -> TimeStatistics {
         let survival = KaplanMeier::new(&sample);
         // The usual median, also of an even number.
         let quantile = |share| if share == 0.5 { survival.median() } else { survival.quantile(share) };

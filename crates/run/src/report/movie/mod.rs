@@ -122,7 +122,7 @@ impl Movie {
         let tallest = extents.map(|extent| extent.y * own_scale(extent)).fold(0.0, f64::max);
         let height = (tallest + 2.0 * PADDING).clamp(MIN_HEIGHT.min(side), side).ceil();
         let frame = DVec2::new(side, height);
-        let length_unit = spec.units.as_ref().map_or(String::new(), |units| format!(" {}", units.length));
+        let length_unit = spec.units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().length));
         let names = |film: &Film, extent: DVec2| {
             let own = match common {
                 Some(_) => film.name(MAX_NAME),
@@ -168,7 +168,7 @@ impl Movie {
             size: DVec2::new(width, HEAD + rows as f64 * pitch.y + FOOT),
             frame,
             bar,
-            unit: spec.units.as_ref().map_or(String::new(), |units| units.time.clone()),
+            unit: spec.units.as_ref().map_or(String::new(), |units| units.shown().time),
         })
     }
 

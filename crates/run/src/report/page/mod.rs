@@ -13,19 +13,24 @@ use std::fmt::Write;
 pub use player::{MAX_MEMBERS, MovingMember, spread};
 
 use curvelax_base::text::{count, grouped};
-use curvelax_draw::svg::escape;
+use curvelax_draw::{
+    chart::{Entry, reason, sample},
+    svg::escape,
+};
 use player::{Player, colour};
 use scope::Sheets;
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 /// Its digest, by which the content security policy allows this script only. A test computes it.
-const SCRIPT_DIGEST: &str = "sha256-775RypILJTOY0aphVAygxJe5VXjKB+pvwd32GxoMr5M=";
+const SCRIPT_DIGEST: &str = "sha256-B/ZEN33YyEKOZo9D6ZjnLHn5zRCP2hIGl5Yx/5KDcVQ=";
 
 /// Longer tables are truncated, and say so.
 const MAX_ROWS: usize = 200;
 /// Tables with at most this many rows, and more columns than [`NARROW`], are turned: they fit a phone then.
 const FEW_ROWS: usize = 3;
+/// Tables with more rows are folded.
+const UNFOLDED: usize = 12;
 const NARROW: usize = 8;
 
 /// The content of a page.
@@ -39,10 +44,16 @@ pub struct Page<'a> {
     pub statuses: Vec<(&'a str, u64)>,
     /// The numbers to read first: how long relaxation took.
     pub headline: Vec<Headline>,
+    /// They are those of members, in a list.
+    pub is_list: bool,
     /// What the reader should know, one sentence each.
     pub warnings: &'a [String],
     /// A few members to watch; the first [`MAX_MEMBERS`] are shown.
     pub members: Vec<MovingMember>,
+    /// Units of length and time, each after a space; may be empty.
+    pub units: [String; 2],
+    /// The legend of all pictures.
+    pub legend: &'a [Entry],
     /// The pictures.
     pub plots: Vec<PageFigure>,
     /// The tables.
@@ -91,10 +102,10 @@ pub struct PageTable {
 impl Page<'_> {
     /// The text of the file.
     pub fn html(&self) -> String {
-        let player = Player::new(&self.members);
+        let player = Player::new(&self.members, &self.units);
         let script = player.as_ref().filter(|player| player.moves()).map(|player| script(&player.data()));
         let mut sheets = Sheets::default();
-        let plots: String = self.plots.iter().map(|figure| figure.html(&mut sheets)).collect();
+        let plots = self.pictures(&mut sheets);
         let tables: String = self.tables.iter().map(PageTable::html).collect();
         let spec = if self.spec.is_empty() {
             String::new()
@@ -103,11 +114,7 @@ impl Page<'_> {
         };
         let facts = self.facts();
         let sections = [
-            (
-                "plots",
-                "Plots",
-                if plots.is_empty() { plots } else { format!("<div class=\"plots\">\n{plots}</div>\n") },
-            ),
+            ("plots", "Plots", plots),
             ("tables", "Tables", tables),
             ("spec", "Spec", spec),
             ("provenance", "Provenance", facts),
@@ -135,7 +142,8 @@ impl Page<'_> {
         html += &section("How many relaxed", "", &self.counts());
         if !self.headline.is_empty() {
             let tiles: String = self.headline.iter().map(Headline::html).collect();
-            html += &section("How long it took", "", &format!("<dl class=\"headline\">\n{tiles}</dl>\n"));
+            let class = if self.is_list { "headline list" } else { "headline" };
+            html += &section("How long it took", "", &format!("<dl class=\"{class}\">\n{tiles}</dl>\n"));
         }
         html += &section("What went wrong", "wrong", &self.wrong());
         html += "</div>\n";
@@ -143,6 +151,32 @@ impl Page<'_> {
             html += &format!("<div>\n{}</div>\n", section("Members on their way", "", &player.html()));
         }
         html + "</div>\n"
+    }
+
+    /// The pictures, below their legend. Of those in which there is nothing to draw, only the reasons are left.
+    fn pictures(&self, sheets: &mut Sheets) -> String {
+        let (empty, drawn): (Vec<_>, Vec<_>) = self.plots.iter().partition(|figure| reason(&figure.svg).is_some());
+        let figures: String = drawn.iter().map(|figure| figure.html(sheets)).collect();
+        let figures = if figures.is_empty() { figures } else { format!("<div class=\"plots\">\n{figures}</div>\n") };
+        let why = |figure: &&PageFigure| {
+            let reason = reason(&figure.svg).unwrap_or_default();
+            format!("<li>{}: {reason}</li>\n", escape(&figure.title))
+        };
+        let without: String = empty.iter().map(why).collect();
+        let without = match without.is_empty() {
+            true => without,
+            false => format!("<div class=\"small\">Nothing to draw:\n<ul>\n{without}</ul></div>\n"),
+        };
+        let entry = |entry: &Entry| {
+            let sample = sheets.inlined(&sample(entry)).replacen(" role=\"img\"", " aria-hidden=\"true\"", 1);
+            format!("<li>{sample}{}</li>\n", escape(&entry.label))
+        };
+        let entries: String = self.legend.iter().map(entry).collect();
+        let legend = match entries.is_empty() || drawn.is_empty() {
+            true => String::new(),
+            false => format!("<ul class=\"legend\" aria-label=\"Legend of all plots\">\n{entries}</ul>\n"),
+        };
+        legend + &figures + &without
     }
 
     /// Number of members with this status.
@@ -223,26 +257,48 @@ impl PageFigure {
         let caption = escape(&self.caption);
         let caption = if caption.is_empty() { caption } else { format!("<figcaption>{caption}</figcaption>\n") };
         let svg = sheets.inlined(&self.svg);
-        format!(
-            "<figure>\n<h3 class=\"unseen\">{}</h3>\n<div class=\"scroll\">\n{svg}</div>\n{caption}</figure>\n",
-            escape(&self.title)
-        )
+        format!("<figure>\n<h3 class=\"unseen\">{}</h3>\n{svg}{caption}</figure>\n", escape(&self.title))
     }
 }
 
 impl PageTable {
+    /// The same table without columns in which nothing is known, or no member was counted.
+    #[must_use]
+    pub fn without_empty_columns(self) -> PageTable {
+        let PageTable { caption, header, rows, source } = self;
+        let statuses = ["unfinished", "singular", "nonfinite", "stalled"];
+        let is_kept = |j: usize| {
+            let nothing = |text: &str| text.is_empty() || text == "0" && statuses.contains(&&*header[j]);
+            rows.is_empty() || !rows.iter().all(|row| row.get(j).is_none_or(|text| nothing(text)))
+        };
+        let kept: Vec<bool> = (0..header.len()).map(is_kept).collect();
+        let of = |cells: Vec<String>| {
+            cells.into_iter().zip(&kept).filter(|(_, kept)| **kept).map(|(text, _)| text).collect()
+        };
+        PageTable { caption, rows: rows.into_iter().map(of).collect(), source, header: of(header) }
+    }
+
     fn html(&self) -> String {
-        match self.rows.len() <= FEW_ROWS && self.header.len() > NARROW {
+        let table = match self.rows.len() <= FEW_ROWS && self.header.len() > NARROW {
             true => self.turned(),
             false => self.upright(),
+        };
+        match self.rows.len() > UNFOLDED {
+            true => {
+                let (caption, rows) = (escape(&self.caption), grouped(self.rows.len() as u64));
+                format!("<details>\n<summary>{caption} ({rows} rows)</summary>\n{table}</details>\n")
+            }
+            false => table,
         }
     }
 
     /// A row for each column, and a column for each row.
     fn turned(&self) -> String {
         let caption = escape(&self.caption);
-        let mut html = begin_table(&caption);
-        html += "<tbody>\n";
+        let mut html = format!(
+            "<div class=\"table turned\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n\
+             <p class=\"title\">{caption}</p>\n<table>\n<tbody>\n"
+        );
         for (j, name) in self.header.iter().enumerate() {
             let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escape(name));
             for row in &self.rows {

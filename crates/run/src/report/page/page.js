@@ -46,7 +46,7 @@
         return marks[i] + (at - i) * (marks[i + 1] - marks[i]);
     };
     const show = (t) => {
-        const text = `t = ${Number(t.toPrecision(3))}`;
+        const text = `t = ${Number(t.toPrecision(3))}${clock.dataset.unit}`;
         clock.textContent = text;
         slider.setAttribute("aria-valuetext", text);
         members.forEach((member) => draw(member, t));

@@ -69,6 +69,8 @@ pub struct Player {
     unit: Option<f64>,
     /// Height of a panel, in coordinates.
     height: f64,
+    /// Units of length and time, each after a space; may be empty.
+    units: [String; 2],
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -151,7 +153,7 @@ impl Formatter for LineBreaks {
 
 impl Player {
     /// Uses the first of `trajectories` that have a time to show; none if none has.
-    pub fn new(trajectories: &[MovingMember]) -> Option<Player> {
+    pub fn new(trajectories: &[MovingMember], units: &[String; 2]) -> Option<Player> {
         let shown = trajectories.iter().map(|trajectory| (trajectory, trajectory.frames()));
         let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MAX_MEMBERS).collect();
         let boxes: Vec<(DVec2, DVec2)> = shown.iter().filter_map(|(_, frames)| bounds(frames)).collect();
@@ -172,11 +174,11 @@ impl Player {
             let (times, frames) = frames.iter().map(|(t, nodes)| (*t, whole(nodes))).unzip();
             let size = match common {
                 Some(_) => String::new(),
-                None => format!(", {} across", significant((high - low).max_element(), 2)),
+                None => format!(", {}{} across", significant((high - low).max_element(), 2), units[0]),
             };
             PlayedMember { label: format!("{}{size}", trajectory.label), status: trajectory.status, times, frames }
         });
-        Some(Player { members: members.collect(), unit: common.map(unit_of), height })
+        Some(Player { members: members.collect(), unit: common.map(unit_of), height, units: units.clone() })
     }
 
     /// Whether anything moves.
@@ -204,14 +206,20 @@ impl Player {
         }
         html += "</div>\n";
         if self.moves() {
-            html += "<div class=\"controls\" id=\"controls\" hidden>\n\
-                <button type=\"button\" id=\"play\">Play</button>\n\
-                <input type=\"range\" id=\"time\" min=\"0\" max=\"200\" value=\"0\" aria-label=\"Time\">\n\
-                <span id=\"clock\" aria-hidden=\"true\"></span>\n</div>\n";
+            let unit = escape(&self.units[1]);
+            html += &format!(
+                "<div class=\"controls\" id=\"controls\" hidden>\n\
+                 <button type=\"button\" id=\"play\">Play</button>\n\
+                 <input type=\"range\" id=\"time\" min=\"0\" max=\"200\" value=\"0\" aria-label=\"Time\">\n\
+                 <span id=\"clock\" data-unit=\"{unit}\" aria-hidden=\"true\"></span>\n</div>\n"
+            );
         }
         let grey = if self.moves() { "Grey: at the start. " } else { "" };
         let scale = match self.bar() {
-            Some((length, _)) => format!("All to one scale; the bar has length {}.", significant(length, 1)),
+            Some((length, _)) => {
+                let (length, unit) = (significant(length, 1), escape(&self.units[0]));
+                format!("All to one scale; the bar has length {length}{unit}.")
+            }
             None => "Each to its own scale.".into(),
         };
         html += &format!("<p class=\"small\">{grey}{scale}</p>\n");
@@ -307,7 +315,7 @@ mod tests {
     #[test]
     fn coordinates_keep_a_thousandth_of_the_picture() {
         let ellipse = ellipse(1e6, 5, 40);
-        let player = Player::new(std::slice::from_ref(&ellipse)).unwrap();
+        let player = Player::new(std::slice::from_ref(&ellipse), &Default::default()).unwrap();
         let member = &player.members[0];
         for (frame, nodes) in member.frames.iter().zip(&ellipse.nodes) {
             for (at, node) in frame.chunks_exact(2).zip(nodes) {
@@ -322,7 +330,7 @@ mod tests {
 
     #[test]
     fn a_player_stays_small() {
-        let player = Player::new(&vec![ellipse(1.0, 1000, 5000); 20]).unwrap();
+        let player = Player::new(&vec![ellipse(1.0, 1000, 5000); 20], &Default::default()).unwrap();
         assert_eq!(player.members.len(), MAX_MEMBERS);
         assert_eq!(player.members[0].frames.len(), MAX_TIMES);
         assert_eq!(player.members[0].times.last(), Some(&(0.1 * 999.0)));
@@ -334,20 +342,20 @@ mod tests {
     fn what_cannot_be_shown_is_left_out() {
         let mut broken = ellipse(1.0, 3, 12);
         broken.nodes[1][4].x = f64::NAN;
-        let player = Player::new(&[MovingMember::default(), broken]).unwrap();
+        let player = Player::new(&[MovingMember::default(), broken], &Default::default()).unwrap();
         assert_eq!(player.members.len(), 1);
         assert_eq!(player.members[0].times, [0.0, 0.2]);
-        assert_eq!(Player::new(&[MovingMember::default()]), None);
-        assert_eq!(Player::new(&[]), None);
+        assert_eq!(Player::new(&[MovingMember::default()], &Default::default()), None);
+        assert_eq!(Player::new(&[], &Default::default()), None);
         let nodes = vec![vec![DVec2::ONE; 6]];
         let point = MovingMember { times: vec![0.0], nodes, ..MovingMember::default() };
-        let html = Player::new(&[point]).unwrap().html();
+        let html = Player::new(&[point], &Default::default()).unwrap().html();
         assert!(!html.contains("NaN") && !html.contains("inf") && !html.contains("type=\"range\""), "{html}");
     }
 
     #[test]
     fn labels_are_escaped_and_the_data_hold_none() {
-        let player = Player::new(&[ellipse(1.0, 3, 12)]).unwrap();
+        let player = Player::new(&[ellipse(1.0, 3, 12)], &Default::default()).unwrap();
         assert!(player.html().contains("member &lt;0&gt;") && !player.html().contains("<0>"));
         assert!(!player.data().contains('<') && !player.data().contains("member <"));
     }
@@ -359,7 +367,7 @@ mod tests {
         let nodes: Vec<_> = [1.0, 0.5, 0.25, 0.125].map(nodes).into();
         let one = MovingMember { label: "one".into(), status: "relaxed", times, nodes };
         let two = MovingMember { label: "two".into(), times: vec![0.0], nodes: one.nodes[..1].to_vec(), ..one.clone() };
-        let data = Player::new(&[one, two]).unwrap().data();
+        let data = Player::new(&[one, two], &Default::default()).unwrap().data();
         let parts = [
             "{\"marks\":[0,0.0000001,0.1,1000000000000000000000],",
             "\"members\":[{\"times\":[0,0.0000001,0.1,1000000000000000000000],\"frames\":[\"8383DIgAgADI\",",

@@ -1,0 +1,125 @@
+//! The times of a few members, each by its name: a dot with a bar for its error.
+
+use glam::DVec2;
+
+use super::TIME;
+use crate::{
+    axis::{Axis, Scale},
+    chart::{Entry, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, nothing, triangle_right},
+    svg::{Svg, coordinate, dots},
+    trace,
+    width::{SIZE, told_apart, width},
+};
+
+/// Height of a row, and of the ends of a bar.
+const ROW: f64 = 24.0;
+const CAP: f64 = 4.0;
+/// Maximum width of a name.
+const NAME: f64 = 260.0;
+
+/// The times of a few members.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MemberTimes<'a> {
+    /// First line.
+    pub title: &'a str,
+    /// A sentence below it.
+    pub note: &'a str,
+    /// The time.
+    pub quantity: &'a str,
+    /// What the names are.
+    pub names: &'a str,
+    /// The members, from top to bottom.
+    pub members: Vec<MemberDot>,
+}
+
+/// A member.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MemberDot {
+    /// Its name.
+    pub name: String,
+    /// Its time, or when it ended without reaching it.
+    pub t: f64,
+    /// Half-width of the interval of that.
+    pub error: Option<f64>,
+    /// It reached the time.
+    pub happened: bool,
+}
+
+impl MemberDot {
+    /// The ends of its bar, or the time alone.
+    fn ends(&self) -> [f64; 2] {
+        let error = self.error.unwrap_or(0.0);
+        [self.t - error, self.t + error]
+    }
+
+    /// Whether its time can be drawn.
+    fn is_drawable(&self, scale: Scale) -> bool {
+        scale.holds(self.t)
+    }
+
+    fn draw(&self, svg: &mut Svg, panel: &Panel, y: f64) {
+        let (low, high) = panel.x.range();
+        let [left, right] = self.ends().map(|t| panel.across(t.clamp(low, high)));
+        let (at, middle) = (DVec2::new(panel.across(self.t), y), coordinate(y));
+        if right > left && self.error.is_some() {
+            let ends = [left, right].map(|x| format!("M{} {}v{}", coordinate(x), coordinate(y - CAP), 2.0 * CAP));
+            svg.path("thin", &format!("M{} {middle}H{}{}", coordinate(left), coordinate(right), ends.concat()));
+        }
+        match self.happened {
+            true => svg.path("dots", &dots(&[at])),
+            false => svg.path("hollow", &triangle_right(at)),
+        }
+    }
+}
+
+impl MemberTimes<'_> {
+    /// The text of an SVG file.
+    pub fn draw(&self) -> String {
+        let MemberTimes { title, note, quantity, names, members } = self;
+        let sentences = vec![(*note).into()];
+        let reached = || members.iter().filter(|member| member.happened).map(|member| member.t);
+        let scale = Scale::of(members.iter().map(|member| member.t));
+        if !members.iter().any(|member| member.is_drawable(scale)) {
+            return nothing(title, sentences, "No member has a time.");
+        }
+        let height = ROW * members.len() as f64;
+        let heading = Heading { title, sentences, legend: self.legend() };
+        let (mut svg, top) = heading.begin(24.0 + height + FOOT);
+        let all: Vec<String> = members.iter().map(|member| member.name.clone()).collect();
+        let shown = told_apart(&all, SIZE, NAME);
+        let left = MARGIN + 8.0 + shown.iter().map(|name| width(name, SIZE)).fold(width(names, SIZE), f64::max);
+        let times = members.iter().flat_map(MemberDot::ends).chain(members.iter().map(|member| member.t));
+        let across = Axis::over(quantity, TIME, scale, times);
+        // From 0 where all times are far from equal: the eye then compares lengths.
+        let range = reached().fold((f64::INFINITY, 0.0_f64), |(low, high), t| (low.min(t), high.max(t)));
+        let across = if range.0 < 0.7 * range.1 { across.with_zero() } else { across };
+        let rows = Axis::new("", "", Scale::Linear, (0.0, members.len() as f64));
+        let (corner, size) = (DVec2::new(left, top + 24.0), DVec2::new(WIDTH - left - MARGIN, height));
+        let panel = Panel { heading: "", corner, size, x: &across, y: &rows, labels_x: true };
+        panel.draw_x(&mut svg);
+        svg.text_unless_empty("note end", DVec2::new(left - 8.0, corner.y - 8.0), names);
+        svg.open("s0");
+        for (i, (member, name)) in members.iter().zip(&shown).enumerate() {
+            let y = corner.y + ROW * (i as f64 + 0.5);
+            svg.text_unless_empty("y tick end", DVec2::new(left - 8.0, y + 4.0), name);
+            let line = [DVec2::new(left, y), DVec2::new(panel.end().x, y)];
+            svg.path("grid", &trace::path(&line));
+            if member.is_drawable(scale) {
+                member.draw(&mut svg, &panel, y);
+            }
+        }
+        svg.close();
+        panel.draw_frame(&mut svg);
+        svg.finish()
+    }
+
+    fn legend(&self) -> Vec<Entry> {
+        let any = |has: &dyn Fn(&MemberDot) -> bool, mark: LegendMark, label: &str| {
+            self.members.iter().any(has).then(|| Entry::new("s0", mark, label))
+        };
+        let time = any(&|member| member.happened, LegendMark::Marker(0), self.quantity);
+        let bar = any(&|member| member.error.is_some(), LegendMark::Thin, "95 % interval");
+        let ended = any(&|member| !member.happened, LegendMark::Right, &format!("ended without {}", self.quantity));
+        time.into_iter().chain(bar).chain(ended).collect()
+    }
+}

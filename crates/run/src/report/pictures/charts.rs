@@ -1,0 +1,509 @@
+//! The charts of a run, from its statistics.
+
+use super::{Chart, FinishedRun, cells::CellGroup, figure, tables::claims};
+use crate::report::{overview::member_name, page::spread};
+use curvelax_base::{error::Result, random::normal_quantile, text::significant};
+use curvelax_draw::{
+    charts::{
+        CellKey, CellQuantiles, CellValues, Crossed, Decay, DecayCurve, DecayLaw, Dependence, DependencePoint,
+        EstimatedNumber, FittedRates, MemberDot, MemberTimes, MeshQuality, PowerLawLine, RelaxationTimes, Scatter,
+        ScatterPanel, ScatterPoint, Series, Setting, Survival, SurvivalCurve, Theory, TimeDistribution,
+    },
+    style::SERIES,
+};
+use curvelax_ensemble::{Event, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
+use curvelax_files::names;
+use curvelax_flow::flow::Flow;
+use curvelax_statistics::{HALF_INTERVAL, Interval, KaplanMeier, Sample};
+use curvelax_study::results::{
+    cells::{CellStatistics, EnsembleStatistics, GroupStatistics},
+    explained::{Explained, ExplainedRow, FeaturedMember, TOGETHER},
+    scaling::Scaling,
+    tally::{CellTally, DISTRUSTED_DRIFT, MemberTime},
+    times::TimeStatistics,
+};
+
+/// Curves that can be told apart by colour and dashes.
+const DISTINCT: usize = SERIES;
+/// Conditions of events in a note.
+const MAX_CONDITIONS: usize = 8;
+/// Maximum quantiles of a cell that are drawn against those of a law.
+const MOST_QUANTILES: usize = 99;
+/// Maximum panels of a time against features.
+const MAX_PANELS: usize = 8;
+/// Rank of the colour of text among those of series.
+const INK: usize = 4;
+
+impl FinishedRun<'_> {
+    /// The charts of this run, in reading order; if cells are told apart by the legend of a page, without their own. Few
+    /// members that are known by name have their times, and no statistics.
+    ///
+    /// # Errors
+    /// [`Error::Request`](curvelax_base::error::Error::Request) if the values of a cell do not fit the spec.
+    pub fn charts(&self, is_told: bool) -> Result<Vec<Chart>> {
+        let key = &self.cell_key(is_told);
+        if self.spec().names_members() {
+            // A mean over outlines of unlike sizes would mean nothing.
+            let excess = if self.spec().members_per_cell() == 1 { self.excess(key)? } else { None };
+            return Ok([self.members()].into_iter().chain(excess).chain(self.dependence()).collect());
+        }
+        let mut charts = vec![self.relaxation(key), self.distribution(key), self.survival(key)];
+        charts.extend(self.groups());
+        charts.extend(self.events());
+        charts.extend(self.excess(key)?);
+        charts.push(self.rates(key));
+        charts.extend(self.dependence());
+        charts.push(self.features(key));
+        charts.push(self.mesh());
+        Ok(charts)
+    }
+
+    fn relaxation(&self, key: &CellKey) -> Chart {
+        let cells = &self.statistics.cells;
+        let numbers = self.numbers();
+        let times = cells.iter().enumerate().map(|(rank, cell)| CellValues {
+            label: self.label(cell.cell),
+            value: numbers.as_ref().map(|numbers| numbers[rank]),
+            numbers: happened(&self.statistics.times(cell).sample, true).collect(),
+            members: self.statistics.times(cell).sample.len() as u64,
+        });
+        let others = Status::ALL.iter().enumerate().map(|(rank, status)| {
+            let without = self.tally.cells.iter().map(|cell| cell.others[rank]).sum();
+            (status.name(), without)
+        });
+        let others: Vec<(&str, u64)> = others.filter(|(_, without)| *without > 0).collect();
+        let median = if let [cell] = &cells[..] { median(self.statistics.times(cell)) } else { None };
+        let (title, quantity) = ("Relaxation times", self.statistics.time());
+        let (note, key, cells) = (&self.what_and_error(), key.clone(), times.collect());
+        let svg = RelaxationTimes { title, note, quantity, key, cells, others: &others, median }.draw();
+        let by_cell = if self.statistics.cells.len() > 1 { ", cell by cell" } else { "" };
+        let caption =
+            format!("How many members relaxed when, and which share of all had relaxed by then{by_cell}: {quantity}.");
+        chart(names::RELAXATION, title, &caption, svg)
+    }
+
+    /// The times of each cell as a box, and their quantiles against those of two laws.
+    fn distribution(&self, key: &CellKey) -> Chart {
+        let numbers = self.numbers();
+        let cells = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
+            let survival = KaplanMeier::new(&self.statistics.times(cell).sample);
+            let known = self.statistics.times(cell).sample.len().min(MOST_QUANTILES);
+            let shares = || (0..known).map(|i| (i as f64 + 0.5) / known as f64);
+            let quantiles = survival.quantiles(shares());
+            CellQuantiles {
+                label: self.short_label(cell.cell),
+                value: numbers.as_ref().map(|numbers| numbers[rank]),
+                places: self.statistics.times(cell).quantiles,
+                quantiles: shares().map(normal_quantile).zip(quantiles).collect(),
+            }
+        });
+        let title = "Distribution of the relaxation times";
+        let (note, key, keys, cells) = (&self.what_and_error(), key.clone(), &self.keys(), cells.collect());
+        let svg = TimeDistribution { title, note, quantity: self.statistics.time(), key, keys, cells }.draw();
+        let caption = "Above: the median, the middle half and the middle nine tenths of the members. Below: quantiles \
+                       against those of a normal law, left, and of a lognormal one, right.";
+        chart(names::DISTRIBUTION, title, caption, svg)
+    }
+
+    fn survival(&self, key: &CellKey) -> Chart {
+        let numbers = self.numbers();
+        let curves = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
+            let value = numbers.as_ref().map(|numbers| numbers[rank]);
+            survival_curve(self.label(cell.cell), value, &self.statistics.times(cell).sample)
+        });
+        let title = "Members not yet relaxed";
+        let survival = Survival {
+            title,
+            note: &self.what_and_error(),
+            quantity: self.statistics.time(),
+            key: key.clone(),
+            curves: curves.collect(),
+            ..Survival::default()
+        };
+        chart(names::SURVIVAL, title, &survival_caption(&survival, "it relaxed"), survival.draw())
+    }
+
+    /// The members not yet relaxed, by group of their outlines.
+    fn groups(&self) -> Option<Chart> {
+        let (key, all) = (self.spec().group_by.as_deref()?, &self.statistics.groups);
+        let mut groups: Vec<&GroupStatistics> = all.iter().collect();
+        if groups.len() > DISTINCT {
+            let median = |of: &GroupStatistics| self.statistics.times(&of.times).median().unwrap_or(f64::INFINITY);
+            groups.sort_by(|one, other| median(one).total_cmp(&median(other)));
+            groups = spread(groups.len(), DISTINCT).map(|i| groups[i]).collect();
+        }
+        let curve = |GroupStatistics { group, times }: &GroupStatistics| {
+            survival_curve(self.label_in(group, times.cell), None, &self.statistics.times(times).sample)
+        };
+        let curves: Vec<SurvivalCurve> = groups.iter().map(|group| curve(group)).collect();
+        let title = format!("Members not yet relaxed, by {key}");
+        let some = match curves.len() < all.len() {
+            true => format!("; {} of {} groups, spread over the order of their medians", curves.len(), all.len()),
+            false => String::new(),
+        };
+        let note = &format!("{}{some}", self.what_and_error());
+        if curves.is_empty() {
+            return None;
+        }
+        let (quantity, key) = (self.statistics.time(), CellKey::from(key));
+        let survival = Survival { title: &title, note, quantity, key, curves, ..Survival::default() };
+        let caption = survival_caption(&survival, "it relaxed");
+        Some(chart(names::GROUP_SURVIVAL, &title, &caption, survival.draw()))
+    }
+
+    /// The name of a group or an event of a cell in a legend.
+    fn label_in(&self, name: &str, cell: u64) -> String {
+        if self.keys().is_empty() { name.into() } else { format!("{name}, {}", self.label(cell)) }
+    }
+
+    /// A survival curve for each event of each cell, if there are events.
+    fn events(&self) -> Option<Chart> {
+        let spec = self.spec();
+        let curves = self.statistics.cells.iter().flat_map(|cell| {
+            let events = spec.event.iter().zip(&cell.events).filter(|(_, of)| of.stopped == 0);
+            events.map(|(event, of)| survival_curve(self.label_in(&event.name, cell.cell), None, &of.judged().sample))
+        });
+        let mut curves: Vec<SurvivalCurve> = curves.collect();
+        let all = curves.len();
+        curves.truncate(DISTINCT);
+        let some = if all > DISTINCT { format!("; the first {DISTINCT} of {all} curves") } else { String::new() };
+        let shown = spec.event.iter().take(MAX_CONDITIONS).map(Event::to_string);
+        let mut conditions = shown.collect::<Vec<_>>().join("; ");
+        if spec.event.len() > MAX_CONDITIONS {
+            conditions += &format!("; {} more", spec.event.len() - MAX_CONDITIONS);
+        }
+        let (title, note) = ("Events", format!("{conditions}; {}{some}", self.what()));
+        let (share, none) = ("share without the event", "There are no members, so there are no events.");
+        if spec.event.is_empty() {
+            return None;
+        }
+        let quantity = if self.statistics.of_limits { "t, in the limit" } else { "t" };
+        let survival = Survival { title, note: &note, quantity, key: "event".into(), share, none, curves, time: None };
+        let caption = format!(
+            "Share of the members in which an event has not happened yet. {}",
+            survival_caption(&survival, "that")
+        );
+        Some(chart(names::EVENT_SURVIVAL, title, &caption, survival.draw()))
+    }
+
+    /// The mean excess, for as long as all members of a cell are running.
+    fn excess(&self, key: &CellKey) -> Result<Option<Chart>> {
+        let numbers = self.numbers();
+        let curve = |(rank, cell): (usize, &CellTally)| {
+            let all: u64 = cell.counts.iter().sum();
+            // Rows are sorted by cell.
+            let first = self.excess.partition_point(|row| row.cell < rank as u64);
+            let rows = self.excess[first..].iter().take_while(|row| row.cell == rank as u64 && row.members == all);
+            let rows = rows.map_while(|row| Some((row.t, row.mean?, [row.q05?, row.q95?])));
+            let rows: Vec<(f64, f64, [f64; 2])> = rows.collect();
+            let bound = |i: usize| rows.iter().map(|(.., bounds)| bounds[i]).collect();
+            DecayCurve {
+                label: self.label(rank as u64),
+                value: numbers.as_ref().map(|numbers| numbers[rank]),
+                t: rows.iter().map(|(t, ..)| *t).collect(),
+                mean: rows.iter().map(|(_, mean, _)| *mean).collect(),
+                band: Some((bound(0), bound(1))),
+            }
+        };
+        let curves: Vec<DecayCurve> = self.tally.cells.iter().enumerate().map(curve).collect();
+        if curves.iter().all(|curve| curve.t.len() < 2) {
+            return Ok(None);
+        }
+        // One theoretical line helps, many do not.
+        let theory = match (&self.tally.cells[..], &curves[..]) {
+            ([cell], [curve]) => law(&self.spec().of_cell(0)?, cell, curve),
+            _ => None,
+        };
+        let slope = if theory.is_some() { ", and the slope that linear theory gives" } else { "" };
+        let theory = theory.into_iter().collect();
+        let each = self.spec().members_per_cell() == 1;
+        let (title, over) = match each {
+            true => ("Excess", "as long as the member runs"),
+            false => ("Mean excess", "over all members, as long as all of them run"),
+        };
+        let note = format!("{}; {over}", self.what());
+        let band = "5 to 95 % of the members";
+        let decay = Decay { title, note: &note, band, key: key.clone(), curves, theory, time: None };
+        let excess = self.spec().flow.typical().equilibrium().excess_in_words();
+        let of_band = if decay.has_bands() { format!(" Band: {band}.") } else { String::new() };
+        let caption = format!("How the excess, {excess}, falls{slope}.{of_band}");
+        Ok(Some(chart(names::EXCESS, title, &caption, decay.draw())))
+    }
+
+    fn rates(&self, key: &CellKey) -> Chart {
+        let EnsembleStatistics { cells, relative, .. } = self.statistics;
+        let numbers = self.numbers();
+        let rates = cells.iter().enumerate().map(|(rank, cell)| CellValues {
+            label: self.label(cell.cell),
+            value: numbers.as_ref().map(|numbers| numbers[rank]),
+            numbers: cell.rates.drawn.sorted().into(),
+            members: cell.members(),
+        });
+        let rates: Vec<CellValues> = rates.collect();
+        let title = "Rates of decay";
+        let without = self.tally.members() - rates.iter().map(|cell| cell.numbers.len() as u64).sum::<u64>();
+        let (relative, unit) = (*relative, "length⁻⁴");
+        let (note, key, cells) = (&self.what(), key.clone(), rates);
+        let svg = FittedRates { title, note, key, cells, relative, unit, without }.draw();
+        let over = if relative { ", over the rate that linear theory gives the slowest mode" } else { "" };
+        let caption = format!(
+            "Slope of the line through ln excess, while that falls from a tenth to a thousandth of its start{over}."
+        );
+        chart(names::RATE, title, &caption, svg)
+    }
+
+    /// The time against one swept key, with a series for each combination of the others: against the one that colours
+    /// show, or that changes fastest.
+    fn dependence(&self) -> Option<Chart> {
+        let axes = self.spec().sweep.axes();
+        let across = self.two_axes().map_or(axes.len().checked_sub(1)?, |[colour, _]| colour);
+        let axis = &axes[across];
+        let labels = axis.labels();
+        let place = |cell: &CellStatistics| labels.iter().position(|label| *label == cell.values[across]);
+        let others = |cell: &CellStatistics| -> Vec<String> {
+            cell.values.iter().enumerate().filter(|(i, _)| *i != across).map(|(_, value)| value.clone()).collect()
+        };
+        let mut groups: Vec<(Vec<String>, Vec<&CellStatistics>)> = Vec::new();
+        for cell in &self.statistics.cells {
+            let own = others(cell);
+            match groups.iter_mut().find(|(values, _)| *values == own) {
+                Some((_, cells)) => cells.push(cell),
+                None => groups.push((own, vec![cell])),
+            }
+        }
+        let keys: Vec<&SweepAxis> =
+            axes.iter().enumerate().filter(|(i, _)| *i != across).map(|(_, axis)| axis).collect();
+        let numbers = axis.numbers();
+        let level = |cell: &&CellStatistics| DependencePoint {
+            at: match (&numbers, place(cell)) {
+                (Some(numbers), Some(place)) => Setting::Number(numbers[place]),
+                _ => Setting::Name(cell.values[across].clone()),
+            },
+            median: median(self.statistics.times(cell)),
+            quartiles: quartiles(self.statistics.times(cell)),
+        };
+        let series = groups.iter().map(|(values, cells)| {
+            let mut levels: Vec<DependencePoint> = cells.iter().map(level).collect();
+            if numbers.is_some() {
+                let place = |level: &DependencePoint| if let Setting::Number(x) = level.at { x } else { 0.0 };
+                levels.sort_by(|a, b| place(a).total_cmp(&place(b)));
+            }
+            let told_apart = keys.iter().zip(values).filter(|(key, _)| key.values.len() > 1);
+            let named = told_apart.map(|(key, value)| format!("{} = {value}", key.key));
+            let label = named.collect::<Vec<_>>().join(", ");
+            let value = if let [key] = keys[..] { value_of(key, values) } else { None };
+            Series { label, value, levels, fit: self.power_law() }
+        });
+        let series: Vec<Series> = series.collect();
+        let title = format!("Relaxation time against {}", axis.key);
+        let name = keys.iter().map(|key| key.key.as_str()).collect::<Vec<_>>().join(", ");
+        // Colours are those of the key across: the series have dashes and markers.
+        let crossed = self.two_axes().map(|_| Crossed {
+            colours: Vec::new(),
+            patterns: series.iter().map(|series| series.label.clone()).collect(),
+            places: (0..series.len()).map(|i| (INK, i)).collect(),
+        });
+        let other_key = CellKey { name, crossed, is_told: false };
+        let left_out = self.statistics.scaling.as_ref().map(Scaling::told).filter(|told| !told.is_empty());
+        let left_out = left_out.map_or(String::new(), |told| format!(". Not in the fit: {told}"));
+        let note = format!("{}{left_out}", self.what_and_error());
+        let (key, across, time) = (&axis.key[..], None, None);
+        let quantity = self.statistics.time();
+        let chart_of = Dependence { title: &title, note: &note, quantity, key, other_key, series, across, time };
+        let each = self.spec().members_per_cell() == 1;
+        let caption = match each {
+            true => format!("{quantity} of each member."),
+            false => {
+                "Median with its interval (thick), which covers 95 % or is the range of fewer than 6 members, and the \
+                      middle half of the members (thin)."
+                    .into()
+            }
+        };
+        Some(chart(names::DEPENDENCE, &title, &caption, chart_of.draw()))
+    }
+
+    /// The line of the power law of the medians, if one was fitted.
+    fn power_law(&self) -> Option<PowerLawLine> {
+        let scaling = self.statistics.scaling.as_ref()?;
+        let law = scaling.law?;
+        let around =
+            |error: f64| Interval::between(law.exponent - HALF_INTERVAL * error, law.exponent + HALF_INTERVAL * error);
+        let exponent = EstimatedNumber { value: law.exponent, interval: law.exponent_error.map(around) };
+        Some(PowerLawLine { exponent, factor: law.factor, rejected: scaling.is_rejected() })
+    }
+
+    /// The time against the features that explain it best. Flows and shapes have a panel each; cells that differ in a
+    /// number have a colour each, and no R² over all of them.
+    fn features(&self, key: &CellKey) -> Chart {
+        let Explained { rows, features, pictured, drawn, times } = self.explained;
+        let quantity = times.first().map_or("t_relax", String::as_str);
+        let numbers = self.numbers();
+        let cells = self.statistics.cells.iter().enumerate();
+        let cells = cells.map(|(rank, cell)| (self.label(cell.cell), numbers.as_ref().map(|numbers| numbers[rank])));
+        let (groups, count) = (self.panel_groups(), self.panel_groups().len());
+        let panel = |i: usize, group: &CellGroup| {
+            let own = |member: &&FeaturedMember| group.cells.contains(&(member.cell as usize));
+            let known = drawn.iter().filter(own).filter(|member| member.numbers[i].is_finite());
+            let point = |member: &FeaturedMember| {
+                let t = member.times.first().copied().flatten();
+                ScatterPoint {
+                    cell: member.cell as usize,
+                    member: member.member,
+                    x: member.numbers[i],
+                    t: t.unwrap_or(member.t_end),
+                    happened: t.is_some(),
+                }
+            };
+            let of_cell = |cell: usize| {
+                rows.iter().find(|row| row.cell == cell as u64 && row.time == quantity && row.feature == features[i])
+            };
+            let told = if let [cell] = group.cells[..] { of_cell(cell).map(explains) } else { None };
+            let name = (!group.name.is_empty()).then(|| group.name.clone());
+            let heading = name.into_iter().chain(told).collect::<Vec<_>>().join(": ");
+            ScatterPanel { feature: features[i].clone(), heading, points: known.map(point).collect() }
+        };
+        let shown = (MAX_PANELS / count.max(1)).clamp(1, pictured.len().max(1));
+        let pairs =
+            pictured.iter().take(shown).flat_map(|i| groups.iter().take(MAX_PANELS).map(move |group| (*i, group)));
+        let panels: Vec<ScatterPanel> = pairs.map(|(i, group)| panel(i, group)).collect();
+        let title = "What explains the relaxation time";
+        let members = self.tally.members();
+        let some = match drawn.len() as u64 {
+            drawn if drawn < members => format!("{drawn} of {members} members are drawn, spread over all."),
+            _ => String::new(),
+        };
+        let left_out = match count.saturating_sub(MAX_PANELS) {
+            0 => String::new(),
+            _ => format!("The first {MAX_PANELS} of {count} values of {} are drawn.", self.keys()),
+        };
+        let reason = match rows.is_empty() {
+            true => "The members of a cell do not differ in any feature.".into(),
+            false => format!("Nothing is said about a time {}.", claims()),
+        };
+        let is_told = |row: &&ExplainedRow| row.time == quantity && row.feature == TOGETHER;
+        let told: Vec<bool> = rows.iter().filter(is_told).map(|row| row.r2.is_some()).collect();
+        let silent = match told.iter().filter(|told| !**told).count() {
+            0 => String::new(),
+            silent => format!("{silent} of {} cells have no R²: too few members relaxed.", told.len()),
+        };
+        let notes = vec![self.what(), some, left_out, silent];
+        let (key, cells, reason) = (key.clone(), cells.collect(), &*reason);
+        let svg = Scatter { title, notes, quantity, key, cells, panels, reason }.draw();
+        let caption = format!("The features of members.csv whose straight line explains most of {quantity}.");
+        chart(names::FEATURES, title, &caption, svg)
+    }
+
+    /// The times of members that are known by name.
+    fn members(&self) -> Chart {
+        let dot = |member: &MemberTime| {
+            let (t, error) = member.shown().unwrap_or((member.t_end, None));
+            let name = member_name(self.spec(), member);
+            MemberDot { name, t, error, happened: member.shown().is_some() }
+        };
+        let members: Vec<MemberDot> = self.tally.named.iter().map(dot).collect();
+        let has = |of: &dyn Fn(&MemberDot) -> bool| members.iter().any(of);
+        let bar = if has(&|member| member.error.is_some()) { " Bar: its 95 % interval." } else { "" };
+        let open = if has(&|member| !member.happened) { " Hollow: the member ended before." } else { "" };
+        let (title, quantity) = ("Relaxation times", self.statistics.time());
+        let caption = format!("Dot: {quantity} of a member.{bar}{open}");
+        let svg = MemberTimes { title, note: &self.what(), quantity, names: "", members }.draw();
+        chart(names::MEMBER_TIMES, title, &caption, svg)
+    }
+
+    fn mesh(&self) -> Chart {
+        let title = "Mesh quality at the end";
+        let quality = MeshQuality {
+            title,
+            note: &self.what(),
+            mesh_ratio: &self.tally.mesh_ratios,
+            metric_drift: &self.tally.metric_drifts,
+            distrusted: Some((DISTRUSTED_DRIFT, self.tally.distrusted())),
+        };
+        let caption = "Longest over shortest edge, and how far the scheme's lengths have left the polygon's.";
+        chart(names::MESH, title, caption, quality.draw())
+    }
+}
+
+fn chart(name: &'static str, title: &str, caption: &str, svg: String) -> Chart {
+    Chart { name, figure: figure(title, caption, svg) }
+}
+
+/// What a survival curve is, as far as it is drawn; a stroke is a member that ended before `what`.
+fn survival_caption(drawn: &Survival, what: &str) -> String {
+    let band = if drawn.has_bands() { " with Greenwood's 95 % band" } else { "" };
+    let stroke = match drawn.has_strokes() {
+        true => format!("; a stroke marks a member that ended before {what}"),
+        false => String::new(),
+    };
+    format!("Kaplan-Meier estimate{band}{stroke}.")
+}
+
+/// How much a feature explains in a cell.
+fn explains(row: &ExplainedRow) -> String {
+    let shown = |value: Option<f64>| value.map_or("not known".into(), |value| significant(value, 3));
+    format!("R² {}, Spearman {}", shown(row.r2), shown(row.spearman))
+}
+
+/// Times at which an event happened in members, or at which they ended without it.
+fn happened(sample: &Sample, happened: bool) -> impl Iterator<Item = f64> + '_ {
+    sample.observations().filter(move |seen| seen.happened == happened).map(|seen| seen.time)
+}
+
+/// The survival curve of some times, with its band.
+fn survival_curve(label: String, value: Option<f64>, sample: &Sample) -> SurvivalCurve {
+    let mut curve = SurvivalCurve { label, value, ..SurvivalCurve::default() };
+    for step in KaplanMeier::new(sample).steps() {
+        curve.add_step(step.time, step.survival, step.band());
+    }
+    happened(sample, false).for_each(|t| curve.add_censored(t));
+    curve
+}
+
+/// The law by which, in linear theory, the excess of a curve of the members' mean area decreases, through the point
+/// where the mean has fallen to a tenth. There is none where each member has a shape or a flow of its own.
+fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
+    if spec.shape.is_drawn() || spec.flow.is_drawn() {
+        return None;
+    }
+    let values = spec.typical();
+    let members: u64 = cell.counts.iter().sum();
+    let area = cell.area / members as f64;
+    let first = curve.mean.first()?;
+    let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
+    let (t, mean) = (curve.t[tenth], curve.mean[tenth]);
+    let rate = spec.rate_in_theory(&values, area).or_else(|| linear_rate::rate_at(spec, &values, area, t))?;
+    // 24 instead of 24.0.
+    let brief = |rate: f64| match rate.round() {
+        whole if (rate - whole).abs() < 1e-6 * rate && rate < 1e4 => format!("{whole}"),
+        _ => significant(rate, 3),
+    };
+    Some(match (spec.growth(&values.flow, area), &*values.flow) {
+        (Some(time), _) => Theory {
+            label: format!("(1 + 2t/R⁴)^−{}", brief(rate)),
+            law: DecayLaw::Algebraic { start: mean * (1.0 + t / time).powf(rate), time, power: rate },
+        },
+        (None, flow) => {
+            let fourth_power = (area / std::f64::consts::PI).powi(2);
+            let label = match flow {
+                Flow::SurfaceDiffusion => format!("exp(−{} t/R⁴)", brief(rate * fourth_power)),
+                // The radius still changes, and the rate with it.
+                _ => format!("exp(−{} t), for the radius at t = {}", brief(rate), significant(t, 2)),
+            };
+            Theory { label, law: DecayLaw::Exponential { start: mean * (rate * t).exp(), rate } }
+        }
+    })
+}
+
+fn median(of: &TimeStatistics) -> Option<EstimatedNumber> {
+    of.median().map(|value| EstimatedNumber { value, interval: of.interval() })
+}
+
+fn quartiles(of: &TimeStatistics) -> (Option<f64>, Option<f64>) {
+    let [_, lower, _, upper, _] = of.quantiles;
+    (lower, upper)
+}
+
+/// The value among `values` of a key with numeric values.
+fn value_of(axis: &SweepAxis, values: &[String]) -> Option<f64> {
+    axis.numbers().and_then(|_| values.first()?.parse().ok())
+}

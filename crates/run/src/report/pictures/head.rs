@@ -1,0 +1,246 @@
+//! What a page says first: title, what was run, and the numbers to read first.
+
+use super::{DIGITS, FinishedRun, MAX_NAME, PageHead};
+use crate::report::{
+    overview::{describe, member_name, member_time},
+    page::Headline,
+};
+use curvelax_base::{
+    error::shortened,
+    text::{count, p_value, significant},
+};
+use curvelax_ensemble::{Spec, request::sweep::SweepAxis};
+use curvelax_statistics::Interval;
+use curvelax_study::results::{
+    cells::{CellStatistics, EnsembleStatistics},
+    comparison::{CellComparison, CellDifference},
+    discretisation::DiscretisationError,
+    scaling::Scaling,
+    tally::MemberTime,
+};
+
+/// Maximum characters of names in a title.
+const MAX_TITLE: usize = 90;
+
+impl FinishedRun<'_> {
+    /// What the page says first.
+    pub fn head(&self) -> PageHead {
+        let corners = self.tally.mollified.told().map_or(String::new(), |told| format!(" Corners were {told}."));
+        PageHead {
+            title: self.title(),
+            what: format!(
+                "{}, {}.{corners} {}",
+                count(self.tally.members(), "member"),
+                self.what(),
+                self.about_times()
+            ),
+            statuses: self.tally.counts().map(|(status, count)| (status.name(), count)).collect(),
+            headline: self.headline(),
+        }
+    }
+
+    /// What times are, and their unit.
+    fn about_times(&self) -> String {
+        let unit = match (&self.spec().units, self.spec().mobility) {
+            (Some(units), _) => format!("in {}", units.shown().time),
+            (None, Some(_)) => "in the unit of time of B".into(),
+            (None, None) => "in length⁴, the length being that of the coordinates".into(),
+        };
+        match self.statistics.of_limits {
+            true => format!("Times are limits for many nodes and short steps, {unit}; t_relax is raw."),
+            false => format!("Times are {unit}."),
+        }
+    }
+
+    /// The unit behind a time, if it has a name.
+    pub(super) fn time_unit(&self) -> String {
+        self.spec().units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().time))
+    }
+
+    /// The unit behind a length, if it has a name.
+    pub(super) fn length_unit(&self) -> String {
+        self.spec().units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().length))
+    }
+
+    /// What ran, for the window and the heading: shape, flow and the swept keys.
+    fn title(&self) -> String {
+        let Spec { shape, flow, sweep, .. } = self.spec();
+        let shape = match () {
+            () if self.spec().names_members() && self.spec().outlines.is_some() => self.outline_names(),
+            () if sweep.has("shape") => "curves".into(),
+            () => shortened(&shape.to_string(), MAX_NAME),
+        };
+        let flow = if sweep.has("flow") { String::new() } else { format!(" under {flow}") };
+        let keys = self.keys();
+        let keys = if keys.is_empty() { keys } else { format!(", by {keys}") };
+        format!("{shape}{flow}{keys}")
+    }
+
+    /// The labels of the outlines, as many as a title takes.
+    fn outline_names(&self) -> String {
+        let mut labels: Vec<&str> = self.tally.named.iter().map(|member| &member.label[..]).collect();
+        labels.dedup();
+        let cell = self.spec().members_per_cell() as usize;
+        labels.truncate(cell.max(1));
+        let fits =
+            |count: &usize| labels[..*count].iter().map(|label| label.chars().count() + 2).sum::<usize>() <= MAX_TITLE;
+        match (1..=labels.len()).rfind(fits) {
+            Some(all) if all == labels.len() => labels.join(", "),
+            Some(some) => format!("{} and {} more", labels[..some].join(", "), labels.len() - some),
+            None => count(labels.len() as u64, "outline"),
+        }
+    }
+
+    pub(super) fn what(&self) -> String {
+        let swept = self.spec().sweep.axes().iter().map(SweepAxis::title);
+        [describe(self.spec())].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
+    }
+
+    /// The same, with the error of discretisation of the times in the picture.
+    pub(super) fn what_and_error(&self) -> String {
+        // Limits are free of it.
+        if self.statistics.of_limits {
+            return self.what();
+        }
+        let errors = self.statistics.cells.iter().filter_map(|cell| cell.discretisation.as_ref());
+        let percent: Vec<f64> = errors.filter(|error| error.converges()).map(|error| 100.0 * error.mean).collect();
+        let [low, high] = [f64::min, f64::max].map(|of| percent.iter().copied().reduce(of).unwrap_or_default());
+        let [low, high] = [low, high].map(|value| significant(value, 2));
+        let range = match percent[..] {
+            [] => return self.what(),
+            [_] => low,
+            _ if low == high => low,
+            _ => format!("{low} to {high}"),
+        };
+        format!("{}; discretisation about {range} %", self.what())
+    }
+
+    fn headline(&self) -> Vec<Headline> {
+        let EnsembleStatistics { cells, comparison, scaling, .. } = self.statistics;
+        let mut headline = Vec::new();
+        if self.spec().names_members() {
+            return self.tally.named.iter().map(|member| self.of_member(member)).collect();
+        }
+        match &cells[..] {
+            [cell] => headline.extend(self.of_cell(cell)),
+            _ => {
+                let of_limits = self.statistics.of_limits;
+                let medians = cells.iter().filter_map(|cell| cell.judged_median(of_limits));
+                let medians: Vec<f64> = medians.map(|(median, _)| median).collect();
+                let range = [f64::min, f64::max].map(|of| medians.iter().copied().reduce(of));
+                let shown = match range {
+                    [Some(low), Some(high)] => {
+                        format!("{} to {}{}", significant(low, 3), significant(high, 3), self.time_unit())
+                    }
+                    _ => "not reached".into(),
+                };
+                let note = format!("over {} cells", cells.len());
+                headline.push(Headline { label: format!("median {}", self.statistics.time()), value: shown, note });
+                headline.extend(scaling.as_ref().and_then(power));
+                headline.extend(compared(comparison));
+            }
+        }
+        let finer = self.tally.nodes.counted();
+        headline.extend(finer.map(|(value, note)| Headline { label: "with more nodes".into(), value, note }));
+        headline
+    }
+
+    /// A member that is known by name.
+    fn of_member(&self, member: &MemberTime) -> Headline {
+        let value = format!("{}{}", member_time(member), self.time_unit());
+        let time = if member.t_limit.is_some() { "t_limit" } else { "t_relax" };
+        let (label, status) = (member_name(self.spec(), member), member.status.name());
+        Headline { label, value: format!("{time} = {value}").replace("= >", ">"), note: status.into() }
+    }
+
+    /// The only cell.
+    fn of_cell(&self, cell: &CellStatistics) -> Vec<Headline> {
+        let (time, times, unit) = (self.statistics.time(), self.statistics.times(cell), self.time_unit());
+        let shown =
+            |value: Option<f64>| value.map_or("not reached".into(), |t| format!("{}{unit}", significant(t, DIGITS)));
+        let tile =
+            |label: &str, value: Option<f64>, note: String| Headline { label: label.into(), value: shown(value), note };
+        let told = |interval: Interval| interval.told_shortly(|end| significant(end, DIGITS));
+        let error = times.mean.and_then(|mean| mean.standard_error);
+        let note = match times.mean.and_then(|mean| mean.restricted_to) {
+            Some(_) => "a lower bound: some members had not relaxed at the end".into(),
+            None => error.map_or(String::new(), |error| format!("standard error {}", significant(error, 2))),
+        };
+        let mut headline = vec![
+            tile(&format!("median {time}"), times.median(), times.interval().map_or(String::new(), told)),
+            tile(&format!("mean {time}"), times.mean.map(|mean| mean.value), note),
+        ];
+        if let [Some(low), .., Some(high)] = times.quantiles {
+            let value = format!("{} to {}{unit}", significant(low, 3), significant(high, 3));
+            headline.push(Headline { label: "nine in ten".into(), value, note: format!("{time}, 5 to 95 %") });
+        }
+        headline.extend(if self.statistics.of_limits { self.behind(cell) } else { discretisation(cell) });
+        headline
+    }
+
+    /// What stands behind the limits of a cell.
+    fn behind(&self, cell: &CellStatistics) -> Vec<Headline> {
+        let (unit, open) = (self.time_unit(), cell.discretisation.as_ref().map_or(0, |error| error.not_asymptotic));
+        let error = cell.limits.as_ref().and_then(|limits| limits.error).map(|error| Headline {
+            label: "median t_error".into(),
+            value: format!("{}{unit}", significant(error, 2)),
+            note: match open {
+                0 => "of each t_limit, 95 %".into(),
+                _ => format!("a bound for {}: times do not converge yet in n", count(open as u64, "member")),
+            },
+        });
+        let raw = cell.median().map(|median| Headline {
+            label: "raw median t_relax".into(),
+            value: format!("{}{unit}", significant(median, DIGITS)),
+            note: format!("at n = {}", self.spec().points),
+        });
+        error.into_iter().chain(raw).collect()
+    }
+}
+
+/// The error of discretisation of times without limits.
+fn discretisation(cell: &CellStatistics) -> Vec<Headline> {
+    let Some(discretisation) = &cell.discretisation else { return Vec::new() };
+    let DiscretisationError { members, mean, error, .. } = discretisation;
+    let [mean, error] = [mean, error].map(|value| significant(100.0 * value, 2));
+    let known = count(*members as u64, "member");
+    let (value, note) = match discretisation.converges() {
+        true => (format!("{mean} %"), format!("of t_relax, ± {error} %, by {known}")),
+        false => ("not known".into(), format!("most times of {known} do not converge yet in n")),
+    };
+    vec![Headline { label: "discretisation".into(), value, note }]
+}
+
+/// The power law of the medians, in the headline.
+fn power(of: &Scaling) -> Option<Headline> {
+    let law = of.law?;
+    let error = law.exponent_error.map(|e| format!("standard error {}", significant(e, 2)));
+    let fit = law.goodness.map(|goodness| match of.is_rejected() {
+        true => format!("but χ² rejects a power law, {}", p_value(goodness.p_value)),
+        false => format!("χ² allows it, {}", p_value(goodness.p_value)),
+    });
+    let note = error.into_iter().chain(fit).collect::<Vec<_>>().join("; ");
+    Some(Headline { label: format!("power of {}", of.scale), value: significant(law.exponent, 3), note })
+}
+
+/// Whether the cells differ, in the headline.
+fn compared(comparison: &CellComparison) -> Option<Headline> {
+    let of = |value: String, note: String| Some(Headline { label: "one distribution?".into(), value, note });
+    match comparison {
+        CellComparison::Single => None,
+        CellComparison::LogRank(test) => of(p_value(test.p_value), "log-rank test over all cells".into()),
+        CellComparison::Paired(cells) => of(differing(cells), "signed ranks of each cell against the first".into()),
+        CellComparison::Refused(why) => of("not tested".into(), why.clone()),
+    }
+}
+
+/// How many cells differ from the first with a probability of 5 % that any of them does by chance (Bonferroni).
+fn differing(cells: &[CellDifference]) -> String {
+    let most = 0.05 / cells.len() as f64;
+    let differ = cells.iter().filter(|cell| cell.test.is_some_and(|test| test.p_value < most)).count();
+    match cells {
+        [CellDifference { test: Some(test), .. }] => p_value(test.p_value),
+        [_] => "not tested".into(),
+        _ => format!("{differ} of {} differ", cells.len()),
+    }
+}

@@ -1,0 +1,180 @@
+//! What people look at: the charts of a run and its page, made from its statistics.
+
+mod cells;
+mod charts;
+mod head;
+mod tables;
+
+use super::{
+    gallery::{self, Wording},
+    overview::place,
+    page::{Headline, MAX_MEMBERS, MovingMember, Page, PageFigure, spread},
+};
+use curvelax_base::{error::Result, text::significant};
+use curvelax_draw::{chart, width::told_apart};
+use curvelax_ensemble::Spec;
+use curvelax_files::{names, portraits::Film};
+use curvelax_study::results::{
+    cells::EnsembleStatistics,
+    explained::Explained,
+    provenance::Provenance,
+    tally::{MeanExcess, Tally},
+};
+
+/// Maximum characters of the name of a member.
+const MAX_NAME: usize = 60;
+/// Digits of a number for reading.
+const DIGITS: usize = 4;
+
+/// A finished run.
+pub struct FinishedRun<'a> {
+    /// The spec, with the place and time of the run.
+    pub provenance: &'a Provenance,
+    /// The results, except those moved to the statistics.
+    pub tally: &'a Tally,
+    /// Statistics of times and rates.
+    pub statistics: &'a EnsembleStatistics,
+    /// The mean excess in time.
+    pub excess: &'a [MeanExcess],
+    /// What explains the times.
+    pub explained: &'a Explained,
+    /// The first members.
+    pub films: &'a [Film],
+}
+
+/// What a page says first: the fields of [`Page`] of the same names.
+pub struct PageHead {
+    /// Heading.
+    pub title: String,
+    /// What was run.
+    pub what: String,
+    /// Members by status.
+    pub statuses: Vec<(&'static str, u64)>,
+    /// The numbers to read first.
+    pub headline: Vec<Headline>,
+}
+
+/// A picture, and its place in the folder of the run.
+pub struct Chart {
+    /// The file.
+    pub name: &'static str,
+    /// The picture, with its text.
+    pub figure: PageFigure,
+}
+
+impl FinishedRun<'_> {
+    /// The files that are drawn: name and text.
+    pub fn pictures(&self) -> Result<Vec<(&'static str, String)>> {
+        let charts = self.charts(false)?;
+        let legend = self.legend();
+        // A page has one legend for all charts, a file its own.
+        let on_page = if legend.is_empty() { None } else { Some(self.charts(true)?) };
+        let gallery = (!self.films.is_empty()).then(|| gallery::draw(self.films, &self.wording()));
+        let page = self.page(on_page.as_ref().unwrap_or(&charts), &legend, gallery.as_deref())?;
+        let charts = charts.into_iter().map(|chart| (chart.name, chart.figure.svg));
+        let gallery = gallery.map(|svg| (names::CURVES, svg));
+        let all = charts.chain(gallery).chain([(names::REPORT, page)]);
+        Ok(all.map(|(name, text)| (name, self.with_unit(text))).collect())
+    }
+
+    /// `text` with the unit of times that this run has.
+    fn with_unit(&self, text: String) -> String {
+        match (&self.spec().units, self.spec().mobility) {
+            (Some(units), _) => units.name(&text),
+            (None, Some(_)) => text.replace("length⁻⁴", "1/time of B").replace("length⁴", "time of B"),
+            (None, None) => text,
+        }
+    }
+
+    fn spec(&self) -> &Spec {
+        &self.provenance.spec
+    }
+
+    /// The text of `report.html`; `gallery` is the picture of the first members.
+    fn page(&self, charts: &[Chart], legend: &[chart::Entry], gallery: Option<&str>) -> Result<String> {
+        // Equal results give equal bytes, on any number of threads.
+        let spec = Spec { threads: None, ..self.spec().clone() }.to_toml()?;
+        let first = gallery.map(|svg| {
+            let title = "The first members before, on their way and after";
+            let caption = "Grey: the start. Light: on the way. Colour: the last state, by status.";
+            figure(title, caption, svg.into())
+        });
+        let PageHead { title, what, statuses, headline } = self.head();
+        let page = Page {
+            title: &title,
+            what: &what,
+            statuses,
+            is_list: self.spec().names_members(),
+            headline,
+            warnings: &self.provenance.warnings,
+            members: self.trajectories(),
+            units: [self.length_unit(), self.time_unit()],
+            legend,
+            plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
+            tables: self.tables(),
+            spec: &spec,
+            provenance: self.provenance(),
+        };
+        Ok(page.html())
+    }
+
+    /// When a member relaxed, behind its status: in the limit, if that is known.
+    fn relaxed_at(&self, film: &Film) -> String {
+        let unit = self.time_unit();
+        let raw = film.t_relax.map(|t| format!(" at t = {}{unit}", significant(t, 3)));
+        let limit = self.tally.named(film.member).and_then(|member| member.t_limit);
+        limit.map(|t| format!(", t_limit = {}{unit}", significant(t, 4))).or(raw).unwrap_or_default()
+    }
+
+    /// What is written below the portraits.
+    fn wording(&self) -> Wording {
+        let cell = |film: &Film| self.short_label(film.member / self.spec().members_per_cell());
+        let cells: Vec<String> = self.films.iter().map(cell).collect();
+        let cells = told_apart(&cells, gallery::SIZE, gallery::SIDE);
+        let end = |film: &Film| format!("{}{}", film.status.name(), self.relaxed_at(film));
+        let ends = self.films.iter().map(end);
+        Wording { unit: self.length_unit(), cells, ends: ends.collect() }
+    }
+
+    /// The members to watch: the first ones, or some of all cells.
+    fn trajectories(&self) -> Vec<MovingMember> {
+        let sweep = &self.spec().sweep;
+        let trajectory = |film: &Film| {
+            let cell = self.short_label(film.member / self.spec().members_per_cell());
+            let cell = if cell.is_empty() { cell } else { format!(" ({cell})") };
+            let (name, status) = (film.name(MAX_NAME), film.status.name());
+            let label = format!("{name}{cell}: {status}{}", self.relaxed_at(film));
+            MovingMember { label, status, times: film.times.clone(), nodes: film.frames() }
+        };
+        let shown = if sweep.is_empty() { self.films.len() } else { MAX_MEMBERS };
+        spread(self.films.len(), shown).map(|i| trajectory(&self.films[i])).collect()
+    }
+
+    fn provenance(&self) -> Vec<(String, String)> {
+        let Tally { steps, solves, sweeps_k, sweeps_x, .. } = self.tally;
+        let steps = if solves == steps { format!("{steps} steps") } else { format!("{steps} steps, {solves} solves") };
+        let work = match sweeps_k + sweeps_x {
+            0 => steps,
+            _ => format!("{steps}, {sweeps_k} sweeps for k and {sweeps_x} for x, y"),
+        };
+        [
+            ("curvelax", self.provenance.curvelax.clone()),
+            // No clock times, and nothing else that does not affect digits.
+            ("ran on", place(&self.provenance.platform)),
+            ("driver", self.provenance.platform.driver.clone().unwrap_or_default()),
+            ("work", work),
+            ("seed", self.spec().seed.to_string()),
+        ]
+        .into_iter()
+        .filter(|(_, value)| !value.is_empty())
+        .map(|(name, value)| (name.to_string(), value))
+        .collect()
+    }
+}
+
+fn figure(title: &str, caption: &str, svg: String) -> PageFigure {
+    PageFigure { title: title.into(), caption: caption.into(), svg }
+}
+
+#[cfg(test)]
+mod tests;
