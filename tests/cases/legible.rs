@@ -91,7 +91,8 @@ addEventListener("load", () => {
 
 /// The tests; without a browser they are ignored.
 pub fn trials() -> Vec<Trial> {
-    let tests: [(&str, fn(&Path)); 2] = [
+    type Test = fn(&Path);
+    let tests: [(&str, Test); 2] = [
         ("pages_can_be_read_at_a_desk_and_on_a_phone", pages_can_be_read),
         ("each_fault_of_a_page_is_found", faults_are_found),
     ];
