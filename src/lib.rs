@@ -40,7 +40,8 @@
 //! | `curvelax-ensemble` | [`ensemble`], [`simulate`] | the spec, its members, their trajectories and results |
 //! | `curvelax-study` | [`placement`], [`relax`](fn@relax), [`conformance`], [`truth`], [`results`] | from a spec to results, on the device that suits it; exact solutions; what results say |
 //! | `curvelax-draw` | | SVG, axes and charts from plain numbers |
-//! | `curvelax-run` | | from a spec to a finished folder: tables, checkpoints, reports |
+//! | `curvelax-files` | | the folder of a run: tables, stores, checkpoints, shards, and their readers |
+//! | `curvelax-run` | | from a spec to a finished folder: sessions, reports, merges, estimates |
 //!
 //! # Example
 //!
@@ -89,6 +90,8 @@ pub use curvelax_draw as draw;
 #[doc(hidden)]
 pub use curvelax_ensemble::{schedule, trajectory};
 #[doc(hidden)]
-pub use curvelax_run::{estimate, figures, files, report, session};
+pub use curvelax_files as files;
+#[doc(hidden)]
+pub use curvelax_run::{estimate, figures, report, session};
 
 use curvelax_base::text;

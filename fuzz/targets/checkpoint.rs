@@ -6,7 +6,7 @@ use std::{convert::Infallible, sync::LazyLock};
 
 use curvelax::{
     ensemble::{Family, Member, Spec, request::spec::Precision},
-    report::{
+    files::state::{
         checkpoint::{LAYOUT, from_bytes, to_bytes},
         envelope::sealed,
     },

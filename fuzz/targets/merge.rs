@@ -16,14 +16,17 @@ use std::{
 use curvelax::{
     backend::DeviceKind,
     ensemble::{Shard, Spec, request::spec::Precision},
-    files::{names, part_file::Mark},
-    placement::Platform,
-    report::{
-        checkpoint::{Head, Origin},
-        envelope::sealed,
-        merge::{Shards, join_rows},
-        shard::{FinishedShard, Found, LAYOUT, Record, from_bytes, look, to_bytes},
+    files::{
+        names,
+        part_file::Mark,
+        state::{
+            checkpoint::{Head, Origin},
+            envelope::sealed,
+            shard::{FinishedShard, Found, LAYOUT, Record, from_bytes, look, to_bytes},
+        },
     },
+    placement::Platform,
+    report::merge::{Shards, join_rows},
     results::tally::Aside,
 };
 use libfuzzer_sys::fuzz_target;

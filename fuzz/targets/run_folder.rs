@@ -12,8 +12,8 @@ use std::{
 };
 
 use curvelax::{
-    files::names,
-    report::{pictures::FinishedRun, reader::Finished},
+    files::{names, reader::Finished},
+    report::pictures::FinishedRun,
     results::EnsembleStatistics,
 };
 use libfuzzer_sys::fuzz_target;

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use curvelax::{
-    files::{names, zarr},
-    report::{columns::columns, pictures, reader::Finished},
+    files::{columns::columns, names, reader::Finished, zarr},
+    report::pictures,
     results::EnsembleStatistics,
     statistics::{KaplanMeier, Observation, Sample, Step},
 };

@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 use super::print;
 use crate::{
     error::{Error, Result},
-    files::{OutputFolder, Owner, names},
+    files::{OutputFolder, Owner, names, reader},
     report::{
         gallery::MAX_PANELS,
         movie::{Cut, HOLD, MOST_SECONDS, Movie, SECONDS, WIDTH, WIDTHS},
-        reader,
     },
     text::{bytes, count, number},
 };

@@ -8,13 +8,11 @@ use std::{
 use super::{flags, note, print, signals};
 use crate::{
     error::{Error, Result},
-    files::names,
-    report::{
-        Form, Manner, Progress, Stop,
-        complete::listed,
-        document::Document,
+    files::{
+        names,
         reader::{self, Finished},
     },
+    report::{Form, Manner, Progress, Stop, complete::listed, document::Document},
     results::{EnsembleStatistics, RunVerdict},
     session::{Completed, Host},
 };

@@ -8,11 +8,10 @@ use std::{
 use super::{flags, manner::check_name, print};
 use crate::{
     error::{Error, Result},
-    files::{OutputFolder, names},
+    files::{OutputFolder, names, state::shard},
     report::{
         Form,
         merge::{Shards, listed_ranges},
-        shard,
     },
     text::{plural, quoted},
 };

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use super::{note, print};
 use crate::{
     error::Result,
-    files::{OutputFolder, Owner, names},
-    report::{
-        pictures::FinishedRun,
+    files::{
+        OutputFolder, Owner, names,
         reader::{self, Finished},
     },
+    report::pictures::FinishedRun,
     results::EnsembleStatistics,
 };
 

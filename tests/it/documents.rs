@@ -11,10 +11,9 @@ use curvelax::{
     backend::gpu::shader::{Variant, workgroup_bytes},
     ensemble::{Spec, request::event::MAX_EVENTS},
     files::{
-        TableRow, names,
+        TableRow, columns, names,
         tables::{CostRow, ErrorRow, TruthRow},
     },
-    report,
     results::{cells::EnsembleStatistics, tally::Tally},
     solver::{Blocks, Solver},
 };
@@ -138,7 +137,7 @@ fn columns() -> String {
     let drawn = Spec::from_toml("shape = 'ellipse:uniform(1.5..2.5),1'\nmodes = '2..=3'").unwrap();
     let of_run = |name: &str, rows: &str| {
         let spec = if name == names::MEMBERS { &drawn } else { &spec };
-        table(name, rows, report::columns::columns(name, spec, &cells).unwrap().into_iter())
+        table(name, rows, columns::columns(name, spec, &cells).unwrap().into_iter())
     };
     [
         of_run(names::SUMMARY, "member"),

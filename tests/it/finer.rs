@@ -9,8 +9,8 @@ use std::{
 
 use curvelax::{
     ensemble::Spec,
-    files::Existing,
-    report::{Cause, Form, Manner, Progress, Stop, checkpoint},
+    files::{Existing, state::checkpoint},
+    report::{Cause, Form, Manner, Progress, Stop},
     session::{Host, PlacedStudy, ResumePlace, RunPlan, begin, resume},
 };
 use tempfile::TempDir;

@@ -209,10 +209,10 @@ mod unix {
         stopped(home.path());
         // As if it had begun on another machine: the platform is in the checkpoint, which has a checksum.
         let state = home.path().join("out/.curvelax.state");
-        let (mut head, standing) = curvelax::report::checkpoint::from_bytes(&fs::read(&state).unwrap()).unwrap();
+        let (mut head, standing) = curvelax::files::state::checkpoint::from_bytes(&fs::read(&state).unwrap()).unwrap();
         head.origin.platform.driver = Some("another".into());
         let resident = standing.resident.clone().unwrap();
-        fs::write(&state, curvelax::report::checkpoint::to_bytes(&head, &standing, &resident).unwrap()).unwrap();
+        fs::write(&state, curvelax::files::state::checkpoint::to_bytes(&head, &standing, &resident).unwrap()).unwrap();
         let words = ["the run began on cpu another", "continue on cpu", "add --backend cpu"];
         refused(home.path(), "out", "", &words);
         let message = said(&curvelax(home.path(), "resume out --backend cpu"), 0);

@@ -14,12 +14,12 @@ use curvelax::{
         Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish,
         request::spec::{BackendChoice, Store},
     },
-    files::OutputFolder,
-    placement,
-    report::{
-        Form, Manner, Progress, RunReport, Stop,
-        checkpoint::{self, Origin},
+    files::{
+        OutputFolder,
+        state::checkpoint::{self, Origin},
     },
+    placement,
+    report::{Form, Manner, Progress, RunReport, Stop},
     simulate::resume,
 };
 

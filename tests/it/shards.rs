@@ -9,7 +9,7 @@ use std::{
 
 use curvelax::{
     backend::gpu::Gpu,
-    report::{envelope, shard},
+    files::state::{envelope, shard},
 };
 use serde_json::Value;
 use tempfile::TempDir;

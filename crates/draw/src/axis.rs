@@ -1,11 +1,8 @@
 //! Axes: from values to positions, and ticks whose labels are round and do not touch.
 
 use super::width::{SIZE, width};
-use curvelax_base::text::power_of_ten;
+use curvelax_base::{drawable::is_drawable, text::power_of_ten};
 
-/// Values larger than this, or smaller than its inverse, are not drawn (0 is): their differences may over- or
-/// underflow.
-const LARGEST: f64 = 1e100;
 /// Free space beyond the values, as a share of their range.
 const PADDING: f64 = 0.04;
 /// Values are treated as equal if their range, relative to their size, is smaller: their labels would be equal.
@@ -40,8 +37,8 @@ impl Scale {
     /// Whether `value` can be shown on such an axis.
     pub fn holds(self, value: f64) -> bool {
         match self {
-            Scale::Linear => value == 0.0 || Scale::Log.holds(value.abs()),
-            Scale::Log => value > 1.0 / LARGEST && value < LARGEST,
+            Scale::Linear => is_drawable(value),
+            Scale::Log => value > 0.0 && is_drawable(value),
         }
     }
 

@@ -2,18 +2,19 @@
 
 use std::time::Duration;
 
-use super::{document::Document, overview::Overview, pictures::FinishedRun, reader};
-use crate::files::{
+use super::{document::Document, overview::Overview, pictures::FinishedRun};
+use curvelax_base::error::{Error, Result};
+use curvelax_ensemble::Spec;
+use curvelax_files::{
     folder::OutputFolder,
     names,
     part_file::PartFile,
     part_folder::PartFolder,
     place::Place,
     portraits::{self, Film},
+    reader,
     tables::Table,
 };
-use curvelax_base::error::{Error, Result};
-use curvelax_ensemble::Spec;
 use curvelax_study::{
     placement::Platform,
     results::{RunVerdict, cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
@@ -64,7 +65,7 @@ fn own<'a>(files: &'a [PartFile], name: &str) -> Result<&'a Place> {
 
 impl Complete<'_> {
     /// Gives all files their final names, once all are on disk, and returns the text for stdout and the verdict. `files` and `store`
-    /// hold the results of the members; `shard` is [what a merge needs besides them](super::shard).
+    /// hold the results of the members; `shard` is [what a merge needs besides them](curvelax_files::state::shard).
     ///
     /// # Errors
     /// If only the pictures cannot be written, the tables are published all the same, and the error says so.

@@ -3,13 +3,13 @@
 
 use glam::DVec2;
 
-use crate::files::portraits::Film;
 use curvelax_curve::polygon;
 use curvelax_draw::{
     svg::{Svg, closed_path, coordinate, dots},
     width::shortened,
 };
 use curvelax_ensemble::study::PORTRAITS;
+use curvelax_files::portraits::Film;
 
 /// Maximum number of members drawn.
 pub const MAX_PANELS: usize = PORTRAITS;
@@ -259,8 +259,8 @@ fn rounded(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::portraits::tests::film;
     use curvelax_ensemble::Status;
+    use curvelax_files::samples::film;
 
     /// Perturbed ellipses of different sizes that end as circles or part of the way there.
     fn films(count: u64, n: usize) -> Vec<Film> {

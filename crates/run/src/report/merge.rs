@@ -13,27 +13,24 @@ use std::{
     time::Duration,
 };
 
-use super::{
-    Form,
-    complete::Complete,
-    growing::Growing,
-    reader,
-    shard::{FinishedShard, Found},
-};
-use crate::files::{
-    folder::OutputFolder,
-    names,
-    part_file::{Mark, PartFile},
-    part_folder::PartFolder,
-    portraits::Film,
-    zarr::{SnapshotStore, StoredMembers},
-};
+use super::{Form, complete::Complete};
 use curvelax_base::{
     error::{Error, Result, without_controls},
     input::{self, MAX_LINE},
     text::listed,
 };
 use curvelax_ensemble::{Shard, Spec};
+use curvelax_files::{
+    folder::OutputFolder,
+    growing::Growing,
+    names,
+    part_file::{Mark, PartFile},
+    part_folder::PartFolder,
+    portraits::Film,
+    reader,
+    state::shard::{FinishedShard, Found},
+    zarr::{SnapshotStore, StoredMembers},
+};
 use curvelax_study::results::{RunVerdict, tally::Aside};
 
 /// Bytes read at once, from all shards together and at least from one.

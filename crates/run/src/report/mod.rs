@@ -3,23 +3,15 @@
 //! A [`RunReport`] is opened before the work starts, so that no work is lost to a folder that cannot be written. It is
 //! the [`Sink`] of the simulation: rows stream to disk, and only a few numbers per member stay in memory.
 
-pub mod checkpoint;
-pub mod columns;
 pub mod complete;
 pub mod document;
-pub mod envelope;
-pub mod fingerprint;
 pub mod gallery;
-pub mod growing;
 pub mod merge;
 pub mod movie;
-pub mod outlines;
 pub mod overview;
 pub mod page;
 pub mod pictures;
 pub mod progress;
-pub mod reader;
-pub mod shard;
 pub mod stop;
 
 use std::{
@@ -32,19 +24,26 @@ pub use complete::Form;
 pub use progress::Progress;
 pub use stop::{Cause, Stop};
 
-use crate::files::{OutputFolder, portraits::Film};
-use checkpoint::{Head, Origin, Saved};
 use complete::Complete;
 use curvelax_base::{
     error::{Error, Result},
     text::{duration, plural, quoted},
 };
 use curvelax_ensemble::{Ended, Extent, LevelRow, LevelTimes, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish};
+use curvelax_files::{
+    OutputFolder,
+    growing::Growing,
+    portraits::Film,
+    reader,
+    state::{
+        checkpoint::{self, Head, Origin, Saved},
+        outlines, shard,
+    },
+};
 use curvelax_study::{
     placement::Platform,
     results::{RunVerdict, tally::Tally},
 };
-use growing::Growing;
 
 /// Checkpoints use at most one part in `SHARE_OF_STATES` of the time of a run.
 const SHARE_OF_STATES: u32 = 20;
@@ -364,8 +363,8 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::files::names;
     use curvelax_ensemble::{Features, Mollified, Observables, Portrait, Rows, Status, request::spec::Store};
+    use curvelax_files::names;
     use curvelax_study::samples::{outcome, platform};
 
     fn files(folder: &Path) -> Vec<String> {

@@ -2,7 +2,6 @@
 
 use std::{fmt, path::Path, time::Duration};
 
-use crate::files::names::{ENSEMBLE, GROUPS};
 use curvelax_base::{
     error::shortened,
     text::{count, duration, number, p_value, plural, rounded, rounded_beside},
@@ -12,6 +11,7 @@ use curvelax_ensemble::{
     Drawn, Event, Spec,
     request::spec::{Pace, Tau, Units},
 };
+use curvelax_files::names::{ENSEMBLE, GROUPS};
 use curvelax_statistics::{GoodnessOfFit, LogRank, PowerLaw};
 use curvelax_study::{
     placement::Platform,
@@ -552,8 +552,8 @@ fn significant(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::names;
     use curvelax_ensemble::{Outcome, Status};
+    use curvelax_files::names;
     use curvelax_statistics::{Limit, SignedRank};
     use curvelax_study::samples::{outcome, platform};
 

@@ -19,12 +19,10 @@ pub use plan::RunPlan;
 pub use resume::{Begun, ResumePlace, begun};
 pub use run::Completed;
 
-use crate::{
-    files::{Existing, OutputFolder},
-    report::Manner,
-};
+use crate::report::Manner;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{Study, request::spec::BackendChoice};
+use curvelax_files::{Existing, OutputFolder};
 use run::Session;
 
 /// Runs `placed` in the folder at `out`.

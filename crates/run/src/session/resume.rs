@@ -3,19 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use super::{host::Host, placed::PlacedStudy, plan::RunPlan, run::Session};
-use crate::{
-    files::{OutputFolder, names},
-    report::{
-        Manner,
-        checkpoint::{self, Head, Origin, Saved},
-        outlines, reader,
-    },
-};
+use crate::report::Manner;
 use curvelax_base::{
     error::{Error, Result},
     text::quoted,
 };
 use curvelax_ensemble::{Outlines, Spec, Study, request::spec::BackendChoice};
+use curvelax_files::{
+    OutputFolder, names, reader,
+    state::{
+        checkpoint::{self, Head, Origin, Saved},
+        outlines,
+    },
+};
 use curvelax_study::placement::Platform;
 
 /// A run that was begun.

@@ -6,18 +6,16 @@ use super::{
     host::Host,
     placed::{FirstBackend, PlacedStudy, open},
 };
-use crate::{
-    files::OutputFolder,
-    report::{
-        Manner, RunReport, Stop,
-        checkpoint::{Origin, Saved},
-    },
-};
+use crate::report::{Manner, RunReport, Stop};
 use curvelax_base::{
     error::{Error, Result},
     text::quoted,
 };
 use curvelax_ensemble::{Ended, Extent, Judged, LevelRow, SeriesRow, Sink, Snapshot, Standing, Study, Wish, simulate};
+use curvelax_files::{
+    OutputFolder,
+    state::checkpoint::{Origin, Saved},
+};
 use curvelax_study::{placement::Choice, results::RunVerdict};
 
 /// A run that is complete.

@@ -16,11 +16,11 @@ use std::fmt::Write;
 use glam::DVec2;
 
 use super::{gallery::common_extent, page::spread};
-use crate::files::portraits::Film;
 use curvelax_base::text::rounded;
 use curvelax_curve::polygon;
 use curvelax_draw::axis::tick_step;
 use curvelax_ensemble::Spec;
+use curvelax_files::portraits::Film;
 use moved::MovedMember;
 use pace::MoviePace;
 
@@ -234,8 +234,8 @@ fn drawable(film: &Film) -> Vec<Vec<DVec2>> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::files::portraits::tests::film;
     use curvelax_ensemble::Status;
+    use curvelax_files::samples::film;
 
     const CUT: Cut = Cut { seconds: 1.0, width: 800, members: 12 };
 

@@ -9,13 +9,14 @@ use glam::DVec2;
 use serde::Serialize;
 use serde_json::{Serializer, ser::Formatter};
 
-use crate::{files::portraits::DIGITS, report::gallery::common_extent};
+use crate::report::gallery::common_extent;
 use curvelax_base::text::significant;
 use curvelax_curve::polygon;
 use curvelax_draw::{
     axis::{Scale, tick_step},
     svg::escape,
 };
+use curvelax_files::portraits::DIGITS;
 
 /// Maximum number of members shown.
 pub const MAX_MEMBERS: usize = 6;

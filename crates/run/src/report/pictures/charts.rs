@@ -1,10 +1,7 @@
 //! The charts of a run, from its statistics.
 
 use super::{Chart, FinishedRun, cells::CellGroup, figure, tables::claims};
-use crate::{
-    files::names,
-    report::{overview::member_name, page::spread},
-};
+use crate::report::{overview::member_name, page::spread};
 use curvelax_base::{error::Result, random::normal_quantile, text::significant};
 use curvelax_draw::{
     charts::{
@@ -15,6 +12,7 @@ use curvelax_draw::{
     style::SERIES,
 };
 use curvelax_ensemble::{Event, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
+use curvelax_files::names;
 use curvelax_flow::flow::Flow;
 use curvelax_statistics::{HALF_INTERVAL, Interval, KaplanMeier, Sample};
 use curvelax_study::results::{

@@ -10,10 +10,10 @@ use super::{
     overview::place,
     page::{Headline, MAX_MEMBERS, MovingMember, Page, PageFigure, spread},
 };
-use crate::files::{names, portraits::Film};
 use curvelax_base::{error::Result, text::significant};
 use curvelax_draw::{chart, width::told_apart};
 use curvelax_ensemble::Spec;
+use curvelax_files::{names, portraits::Film};
 use curvelax_study::results::{
     cells::EnsembleStatistics,
     explained::Explained,

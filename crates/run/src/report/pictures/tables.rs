@@ -1,12 +1,10 @@
 //! The tables of a page.
 
 use super::{DIGITS, FinishedRun};
-use crate::{
-    files::names,
-    report::{overview::member_name, page::PageTable},
-};
+use crate::report::{overview::member_name, page::PageTable};
 use curvelax_base::text::{p_value, significant};
 use curvelax_ensemble::{Event, Spec, Status};
+use curvelax_files::names;
 use curvelax_study::results::{
     cells::{CellStatistics, EventStatistics},
     comparison::CellDifference,

@@ -5,9 +5,9 @@ use std::time::Duration;
 use glam::DVec2;
 
 use super::*;
-use crate::files::portraits::tests::film;
 use curvelax_draw::svg::dots;
 use curvelax_ensemble::{Outcome, Status, schedule::grid};
+use curvelax_files::samples::film;
 use curvelax_study::{
     results::tally::Tally,
     samples::{outcome, platform},

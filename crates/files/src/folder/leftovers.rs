@@ -3,7 +3,7 @@
 use std::{io, path::Path};
 
 use super::OutputFolder;
-use crate::files::{
+use crate::{
     disk::{is_own_store, is_real_folder, remove_any},
     names::{OUTLINES, PLOTS, PROBE, STATE, STATE_OLD, STATE_PART, is_store},
     place::Place,
@@ -70,7 +70,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::files::{
+    use crate::{
         folder::tests::{OLD, names},
         names::{CURVES, RUN, SUMMARY},
     };

@@ -12,7 +12,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::files::disk;
+use crate::disk;
 use curvelax_base::{input, text};
 
 const MAGIC: [u8; 16] = *b"curvelax state\r\n";

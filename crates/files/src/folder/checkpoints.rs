@@ -3,7 +3,7 @@
 use std::{fs, io::Write};
 
 use super::OutputFolder;
-use crate::files::{
+use crate::{
     disk::{create, remove, sync_folder},
     names::{OUTLINES, STATE, STATE_OLD, STATE_PART},
 };
@@ -62,7 +62,7 @@ impl OutputFolder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::folder::tests::names;
+    use crate::folder::tests::names;
 
     fn state_of(folder: &OutputFolder) -> Vec<String> {
         let text = |name| fs::read_to_string(folder.path().join(name)).ok();

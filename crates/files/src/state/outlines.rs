@@ -9,7 +9,7 @@ use super::{
     envelope::{Fault, body, bytes, opened, sealed_body},
     fingerprint::fingerprint,
 };
-use crate::files::{folder::OutputFolder, names::OUTLINES};
+use crate::{folder::OutputFolder, names::OUTLINES};
 use curvelax_base::error::{Error, Result};
 use curvelax_curve::outlines::SavedOutline;
 use curvelax_ensemble::Outlines;
@@ -56,7 +56,7 @@ fn read(folder: &OutputFolder, origin: &Origin) -> Result<Outlines, Fault> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::fingerprint::layout;
+    use crate::state::fingerprint::layout;
 
     #[test]
     fn the_layout_has_every_part_of_an_outline() {

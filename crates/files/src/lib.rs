@@ -4,10 +4,12 @@
 
 pub mod claim;
 mod column;
+pub mod columns;
 pub mod disk;
 mod fields;
 pub mod folder;
 mod foreign;
+pub mod growing;
 pub mod members;
 pub mod names;
 pub mod owner;
@@ -15,7 +17,11 @@ pub mod part_file;
 pub mod part_folder;
 pub mod place;
 pub mod portraits;
+pub mod reader;
+#[doc(hidden)]
+pub mod samples;
 pub mod spill;
+pub mod state;
 mod table_reader;
 pub mod tables;
 pub mod zarr;

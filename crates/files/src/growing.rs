@@ -1,6 +1,6 @@
 //! The files that grow as members end: tables, and the store of snapshots.
 
-use crate::files::{
+use crate::{
     folder::OutputFolder,
     members::MemberTable,
     names,

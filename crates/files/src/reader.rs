@@ -9,7 +9,7 @@ use std::{
 
 use serde::Deserialize;
 
-use crate::files::{
+use crate::{
     TableReader, TableRow,
     members::MemberReader,
     names::{self, REMEDY},
@@ -505,7 +505,7 @@ pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExc
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::{OutputFolder, tables::SummaryTable};
+    use crate::{OutputFolder, tables::SummaryTable};
     use curvelax_ensemble::{Observables, Status};
     use curvelax_study::samples::outcome;
 

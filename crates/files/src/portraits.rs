@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 
 use super::names::{self, REMEDY};
 use curvelax_base::{
+    drawable::is_drawable,
     error::{Error, Result, plainly, shortened},
     input,
 };
-use curvelax_draw::axis::Scale;
 use curvelax_ensemble::{Outcome, Portrait, Status};
 
 /// The digits of base64, two to a coordinate.
@@ -64,7 +64,7 @@ impl Film {
         // A member that ended at once has one time only.
         let end = (outcome.t_end > 0.0).then_some((outcome.t_end, &after_kept));
         let all = [(0.0, &before_kept)].into_iter().chain(inside).chain(end);
-        let held = |nodes: &[DVec2]| nodes.iter().all(|p| p.to_array().iter().all(|v| Scale::Linear.holds(*v)));
+        let held = |nodes: &[DVec2]| nodes.iter().all(|p| p.to_array().iter().all(|v| is_drawable(*v)));
         let shown: Vec<(f64, &Vec<DVec2>)> = all.filter(|(_, nodes)| held(nodes)).collect();
 
         let places = || shown.iter().flat_map(|(_, nodes)| nodes.iter().copied());
@@ -103,13 +103,14 @@ impl Film {
     pub fn fault(&self) -> Option<&'static str> {
         let known = |text: &String| text.bytes().all(|digit| DIGITS.contains(&digit));
         let equal = |text: &String| text.len().is_multiple_of(4) && text.len() == self.nodes[0].len();
-        let place = self.corner.iter().all(|v| Scale::Linear.holds(*v));
+        let place = self.corner.iter().all(|v| is_drawable(*v));
+        let unit = self.unit > 0.0 && is_drawable(self.unit);
         match () {
             _ if self.times.len() != self.nodes.len() => Some("as many times as states"),
             _ if !self.times.is_sorted_by(|a, b| a < b) => Some("ascending times"),
             _ if !self.nodes.iter().all(known) => Some("digits of base64"),
             _ if !self.nodes.iter().all(equal) => Some("equally many nodes at all times"),
-            _ if !place || !Scale::Log.holds(self.unit) => Some("a corner and a positive unit"),
+            _ if !place || !unit => Some("a corner and a positive unit"),
             _ => None,
         }
     }
@@ -159,28 +160,10 @@ fn value(digit: u8) -> u8 {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
-    use std::f64::consts::TAU;
-
+mod tests {
     use super::*;
+    use crate::samples::film;
     use curvelax_study::samples::outcome;
-
-    /// A perturbed ellipse of n nodes that ends as a circle, or part of the way there if it has not relaxed.
-    pub fn film(member: u64, n: usize, status: Status, t_relax: Option<f64>) -> Film {
-        let size = 1.0 + 0.1 * (member % 3) as f64;
-        let nodes = |t: f64| -> Vec<DVec2> {
-            let rest = (-2.0 * t).exp();
-            let node = |u: f64| {
-                let wave = 1.0 + rest * 0.15 * ((3.0 + (member % 4) as f64) * u + member as f64).cos();
-                DVec2::new((1.0 + rest) * u.cos(), u.sin() * (1.0 + 0.4 * (1.0 - rest))) * wave * size
-            };
-            (0..n).map(|i| node(TAU * i as f64 / n as f64)).collect()
-        };
-        let end = Outcome { t_end: if t_relax.is_some() { 2.0 } else { 0.5 }, ..outcome(member, status, t_relax) };
-        let kept = |t: f64| nodes(t).into_iter().step_by(Portrait::stride(n)).collect();
-        let frames = (1..30).map(|i| 0.1 * f64::from(i)).map(|t| (t, kept(t))).collect();
-        Film::new(&end, &Portrait { before: nodes(0.0), frames, after: nodes(end.t_end) })
-    }
 
     #[test]
     fn nodes_read_back_to_a_thousandth_and_films_to_the_same_bits() {

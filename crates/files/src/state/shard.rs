@@ -1,4 +1,4 @@
-//! `shard.state`: the data that a [merge](super::merge) needs from a shard besides its tables.
+//! `shard.state`: the data that a merge needs from a shard besides its tables.
 //!
 //! It is [sealed](super::envelope) like a checkpoint, and has the length and the checksum of every table of the shard,
 //! so that an incomplete copy is detected.
@@ -15,10 +15,10 @@ use super::{
     checkpoint::{self, Head},
     envelope::{self, Fault, opened, sealed_body},
     fingerprint::fingerprint,
-    growing::Growing,
 };
-use crate::files::{
+use crate::{
     claim,
+    growing::Growing,
     names::{RUN, SHARD, STATE, STATE_OLD},
     part_file::Mark,
 };

@@ -9,7 +9,7 @@ use super::{
     chunks::{CHUNK_BYTES, key},
     layout::{FIELDS, STATUS},
 };
-use crate::files::{disk::checksum, place::Place};
+use crate::{disk::checksum, place::Place};
 use curvelax_base::{error::Result, input};
 
 /// The extent of a growing store, as recorded in a checkpoint.
@@ -106,7 +106,7 @@ impl ArrayMark {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::{
+    use crate::{
         OutputFolder, names,
         zarr::{
             SnapshotStore,

@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::OutputFolder;
-use crate::files::{
+use crate::{
     disk::{checksum, create, names_of},
     foreign::foreign,
     names::{OWN, PROBE, RUN, STATE, STATE_OLD, STORE, is_store},
@@ -139,7 +139,7 @@ mod tests {
     use std::io::Write;
 
     use super::*;
-    use crate::files::{
+    use crate::{
         claim::LOCK,
         folder::tests::names,
         names::{SERIES, SUMMARY},

@@ -140,7 +140,7 @@ fn sweep(folder: &Path, below: bool) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::{
+    use crate::{
         OutputFolder,
         folder::tests::OLD,
         names::{RUN, STORE},

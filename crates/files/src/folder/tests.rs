@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use super::OutputFolder;
-use crate::files::{
+use crate::{
     claim::LOCK,
     names::{RUN, SUMMARY},
 };

@@ -115,7 +115,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::files::{
+    use crate::{
         OutputFolder, names,
         zarr::{
             SnapshotStore,

@@ -16,7 +16,7 @@ use super::{
     envelope::{Fault, body, bytes, opened, sealed_body},
     fingerprint::fingerprint,
 };
-use crate::files::{
+use crate::{
     folder::OutputFolder,
     names::{self, STATE, STATE_OLD},
     part_file::Mark,
@@ -208,7 +208,7 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Saved>> {
     }
     match faults.is_empty() {
         // Nothing is left to do for a complete run.
-        true if path.join(names::RUN).is_file() => super::reader::provenance(path).map(|_| None),
+        true if path.join(names::RUN).is_file() => crate::reader::provenance(path).map(|_| None),
         true => refuse("no interrupted run: it had not started; curvelax run with --force starts it".into()),
         false => refuse(format!(
             "no checkpoint to continue from: {}; start over with curvelax run and --force",
@@ -222,7 +222,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::report::{envelope::sealed, fingerprint::layout};
+    use crate::state::{envelope::sealed, fingerprint::layout};
     use curvelax_ensemble::{Extent, Features, Mollified, Rows, SeriesRow, Snapshot, Status};
     use curvelax_flow::scheme::member::{Counters, Report};
     use curvelax_study::samples::{outcome, platform};

@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::OutputFolder;
-use crate::files::{
+use crate::{
     disk::{create, is_real_folder},
     names::{OWN, RUN, STORE},
     part_file::{Mark, PartFile},
@@ -78,7 +78,7 @@ impl OutputFolder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::{
+    use crate::{
         claim::LOCK,
         folder::tests::{OLD, names},
         names::{CURVES, SERIES, SUMMARY},

@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use serde_json::Value;
 
 use super::SnapshotStore;
-use crate::files::{OutputFolder, names, tables::SnapshotTable};
+use crate::{OutputFolder, names, tables::SnapshotTable};
 use curvelax_backend::{Backend, cpu::CpuBackend};
 use curvelax_ensemble::{
     Cell, Ended, Family, Snapshot, Spec, Status,

@@ -1,6 +1,6 @@
 //! The columns of the tables of a run, for documents and for programs that read them.
 
-use crate::files::{
+use crate::{
     TableRow, members, names,
     tables::{EventLevelRow, EventRow, NodeRow, RateRow},
 };

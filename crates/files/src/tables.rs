@@ -473,7 +473,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::files::OutputFolder;
+    use crate::OutputFolder;
     use curvelax_ensemble::{Observables, Status};
     use curvelax_statistics::Limit;
 

@@ -103,7 +103,7 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::files::zarr::tests::{members, spec, stored};
+    use crate::zarr::tests::{members, spec, stored};
 
     #[test]
     fn the_metadata_hold_the_spec_and_repeat_that_of_each_array() {

@@ -9,7 +9,7 @@ use super::{
     mark::StoreMark,
     reading::StoredMembers,
 };
-use crate::files::part_folder::PartFolder;
+use crate::part_folder::PartFolder;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{Snapshot, Spec, Status};
 use curvelax_study::results::provenance::json as json_text;
@@ -163,7 +163,7 @@ mod tests {
     use std::{fs, path::Path};
 
     use super::*;
-    use crate::files::{
+    use crate::{
         OutputFolder, names,
         place::Place,
         zarr::tests::{add, members, spec},

@@ -72,7 +72,7 @@ pub const REPORT: &str = "report.html";
 /// The first members in motion, from `curvelax animate`.
 pub const MOVIE: &str = "movie.gif";
 
-/// What a merge needs from a shard besides its tables, see [`shard`](crate::report::shard).
+/// What a merge needs from a shard besides its tables, see [`shard`](crate::state::shard).
 pub const SHARD: &str = "shard.state";
 
 /// The files of `curvelax figure`.
@@ -163,14 +163,14 @@ pub const REMEDY: &str = "restore the file, or run again";
 /// The folder of the plots.
 pub const PLOTS: &str = "plots";
 
-/// The checkpoint, see [`checkpoint`](crate::report::checkpoint).
+/// The checkpoint, see [`checkpoint`](crate::state::checkpoint).
 pub const STATE: &str = ".curvelax.state";
 /// The previous checkpoint, in case the last one is damaged.
 pub const STATE_OLD: &str = ".curvelax.state.old";
 /// The next checkpoint, while it is being written.
 pub const STATE_PART: &str = ".curvelax.state.part";
 
-/// What was read of outlines, for as long as there is a checkpoint, see [`outlines`](crate::report::outlines).
+/// What was read of outlines, for as long as there is a checkpoint, see [`outlines`](crate::state::outlines).
 pub const OUTLINES: &str = ".curvelax.outlines";
 
 /// Tests whether a folder can be written, and holds the replacement of another file.

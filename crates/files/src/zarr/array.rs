@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::chunks::{DataType, chunk_shape, key};
-use crate::files::part_folder::PartFolder;
+use crate::part_folder::PartFolder;
 use curvelax_base::error::Result;
 
 /// An array that is written from its first element to its last.

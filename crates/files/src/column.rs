@@ -44,15 +44,15 @@ pub enum Field<'a> {
 /// modules below.
 macro_rules! columns {
     ($record:ty: $($name:ident: $kind:ident = $($field:ident).+, $meaning:literal;)+) => {
-        impl $crate::files::column::TableRow for $record {
-            const COLUMNS: &'static [$crate::files::column::Column<Self>] = &[$(
-                $crate::files::column::Column {
+        impl $crate::column::TableRow for $record {
+            const COLUMNS: &'static [$crate::column::Column<Self>] = &[$(
+                $crate::column::Column {
                     name: stringify!($name),
-                    holds: $crate::files::column::$kind::HOLDS,
+                    holds: $crate::column::$kind::HOLDS,
                     meaning: $meaning,
-                    write: |record| $crate::files::column::$kind::write(&record.$($field).+),
+                    write: |record| $crate::column::$kind::write(&record.$($field).+),
                     read: |record, fields| {
-                        record.$($field).+ = $crate::files::column::$kind::read(fields)?;
+                        record.$($field).+ = $crate::column::$kind::read(fields)?;
                         Ok(())
                     },
                 },
