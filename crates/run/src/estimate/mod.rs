@@ -13,10 +13,10 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::files::zarr;
 use curvelax_backend::DeviceKind;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{LevelTimes, Spec, Study, study::Stage};
+use curvelax_files::zarr;
 use curvelax_study::placement::{Choice, Platform};
 use finer::FinerPilot;
 use pilot::{CohortSample, CohortWork, Limits, points, sample};
