@@ -2,10 +2,7 @@
 //!
 //! Tables are read row by row, and each row is checked against the spec and the rows before it.
 
-use std::{
-    iter,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
@@ -23,7 +20,6 @@ use curvelax_base::{
     text::quoted,
 };
 use curvelax_ensemble::{LevelRow, LevelTimes, Outcome, Spec, outcome::linear_rate};
-use curvelax_statistics::Limit;
 use curvelax_study::results::{
     explained::{Explained, Explaining, FeaturedMember, TIMES},
     provenance::{FORMAT, Provenance, by_status},
@@ -289,10 +285,9 @@ impl<'a> Summary<'a> {
             return Err(fields.unexpected_in("t_limit", &format!("{limit}, as {file} has it")));
         }
         let refined = self.spec.refine;
-        let judged = |limit: &Option<Limit>| limit.filter(|_| refined).map(|limit| (limit.t, limit.error));
-        let judged = outcome.judged_events.iter().map(judged).chain(iter::repeat(None));
-        if let (Some(events), Some((place, (told, found)))) =
-            (&self.events, limits.iter().zip(judged).enumerate().find(|(_, (told, found))| **told != *found))
+        let judged = |place| outcome.limit_of_event(place).filter(|_| refined).map(|limit| (limit.t, limit.error));
+        let mut pairs = limits.into_iter().enumerate().map(|(place, told)| (place, told, judged(place)));
+        if let (Some(events), Some((place, told, found))) = (&self.events, pairs.find(|(_, told, found)| told != found))
         {
             let shown =
                 |limit: Option<(f64, f64)>| limit.map_or("nothing".into(), |(t, error)| format!("{t} ± {error}"));
@@ -300,7 +295,7 @@ impl<'a> Summary<'a> {
             return Err(Error::Request(format!(
                 "{path}: expected the limit {} of the event {name} of member {member}, as {file} has it, found {}; {REMEDY}",
                 shown(found),
-                shown(*told)
+                shown(told)
             )));
         }
         if outcome.points != points {

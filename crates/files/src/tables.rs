@@ -372,20 +372,19 @@ impl RateRow {
 impl EventRow {
     /// The rows of a member with the events of these names, with limits if it is `refined`.
     pub fn of<'a>(member: &'a Outcome, names: &'a [String], refined: bool) -> impl Iterator<Item = EventRow> + 'a {
-        let Outcome { member, cell, t_end, events, judged_events, .. } = member;
         let row = move |(i, (event, seen)): (usize, (&String, &Option<f64>))| {
-            let limit = judged_events.get(i).copied().flatten().filter(|_| refined);
+            let limit = member.limit_of_event(i).filter(|_| refined);
             EventRow {
-                member: *member,
-                cell: *cell,
+                member: member.member,
+                cell: member.cell,
                 event: event.clone(),
-                t: seen.unwrap_or(*t_end),
+                t: seen.unwrap_or(member.t_end),
                 censored: u64::from(seen.is_none()),
                 t_limit: limit.map(|limit| limit.t),
                 t_error: limit.map(|limit| limit.error),
             }
         };
-        names.iter().zip(events).enumerate().map(row)
+        names.iter().zip(&member.events).enumerate().map(row)
     }
 }
 

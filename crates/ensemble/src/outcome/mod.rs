@@ -129,6 +129,13 @@ pub struct Outcome {
     pub is_finer: bool,
 }
 
+impl Outcome {
+    /// The limit of the time of the event at `place` of the spec, if the member ran at the levels.
+    pub fn limit_of_event(&self, place: usize) -> Option<Limit> {
+        self.judged_events.get(place).copied().flatten()
+    }
+}
+
 /// One row of `series.csv`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeriesRow {

@@ -17,8 +17,8 @@ use curvelax_base::{
 use curvelax_curve::{RadialLaw, Shape};
 use curvelax_flow::flow::Flow;
 
-/// Most members that are shown one by one.
-const MAX_NAMED: u64 = 20;
+/// Maximum number of members that are shown one by one.
+pub const MAX_NAMED: u64 = 20;
 /// Members whose values, besides the tails of each distribution, stand for all where a bound for all is needed. They are
 /// the first ones of the first cell, whichever run.
 const PROBED: u64 = 32;

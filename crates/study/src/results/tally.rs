@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 use curvelax_base::error::Result;
 use curvelax_base::text::{plural, significant};
 use curvelax_ensemble::{
-    LevelTimes, Mollified, Outcome, Spec, Status, Treated, member::mollifier::MAX_VERTEX_TURN, request::sweep::Sweep,
+    LevelTimes, Mollified, Outcome, Spec, Status, Treated,
+    member::mollifier::MAX_VERTEX_TURN,
+    request::{MAX_NAMED, sweep::Sweep},
     schedule::grid,
 };
 use curvelax_statistics::{Limit, Observation, Observations, Spread};
@@ -59,9 +61,8 @@ pub struct Tally {
     pub named: Vec<MemberTime>,
 }
 
-/// Members of each cell that are known by name, and over all cells: enough for all that are shown.
-const NAMED: u64 = 20;
-const MAX_NAMED: usize = 2000;
+/// Members that are known by name over all cells; of each cell they are as many as may be shown one by one.
+const MAX_KNOWN: usize = 2000;
 
 /// The time of a member that may be shown by itself.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -89,7 +90,7 @@ pub struct MemberTime {
 impl MemberTime {
     fn new(outcome: &Outcome, refined: bool) -> MemberTime {
         let Outcome { member, cell, status, t_end, t_relax, t_limit, t_error, .. } = *outcome;
-        let limit = |i: usize| outcome.judged_events.get(i).copied().flatten().filter(|_| refined);
+        let limit = |i: usize| outcome.limit_of_event(i).filter(|_| refined);
         let event = |(i, t): (usize, &Option<f64>)| limit(i).map(|limit| limit.t).or(*t);
         let events = outcome.events.iter().enumerate().map(event).collect();
         MemberTime { member, cell, label: outcome.label.clone(), status, t_end, t_relax, t_limit, t_error, events }
@@ -181,7 +182,7 @@ impl CellTally {
             own.times.push(Observation::new(*t, outcome.t_end))?;
             own.reached += u64::from(t.is_some());
             own.stopped += u64::from(stops && t.is_none() && outcome.status == Status::Relaxed);
-            let judged = outcome.judged_events.get(i).copied().flatten();
+            let judged = outcome.limit_of_event(i);
             if refined {
                 own.limits.push(limited(judged.map(|limit| limit.t), *t))?;
             }
@@ -459,7 +460,7 @@ impl Tally {
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
-        if self.named.len() < MAX_NAMED && self.cells[cell].counts.iter().sum::<u64>() < NAMED {
+        if self.named.len() < MAX_KNOWN && self.cells[cell].counts.iter().sum::<u64>() < MAX_NAMED {
             self.named.push(MemberTime::new(outcome, refined));
         }
         self.cells[cell].add(outcome, refined, self.stops)?;
