@@ -148,8 +148,26 @@ class Study:
 
     @functools.cached_property
     def summary(self) -> pd.DataFrame:
-        """One row per member: status, ``t_relax``, rate, length, area, excess, …"""
-        return self.table("summary")
+        """One row per member: the values of swept keys, status, ``t_relax``, rate, length, area, excess, …"""
+        summary = self.table("summary")
+        swept = self._swept(summary)
+        for place, name in enumerate(swept, start=summary.columns.get_loc("cell") + 1):
+            summary.insert(place, name, swept[name])
+        return summary
+
+    def _swept(self, rows: pd.DataFrame) -> pd.DataFrame:
+        """The values of the swept keys for rows with a column ``cell``, without those that the rows have themselves."""
+        names = [key for key in self.spec.get("sweep", {}) if key not in rows.columns]
+        return self.ensemble.set_index("cell").loc[rows.cell, names].set_axis(rows.index)
+
+    def frame(self) -> pd.DataFrame:
+        """One row per member, with all that is known of it: swept values, what was drawn, features, label, results.
+
+        The columns of :attr:`summary`, then those of :attr:`members`, each once: :meth:`describe` says what they mean.
+        """
+        members = self.members
+        new = [name for name in members.columns if name == "member" or name not in self.summary.columns]
+        return self.summary.merge(members[new], on="member", how="left", validate="one_to_one")
 
     @functools.cached_property
     def ensemble(self) -> pd.DataFrame:
@@ -206,7 +224,8 @@ class Study:
     def snapshots(self) -> xr.Dataset:
         """Nodes of the members at the times of ``snapshots``: x, y, k and r of member × time × node.
 
-        They come from memory where they fit, otherwise from the files of the run, from ``snapshots.zarr`` lazily. A member
+        Cell, status and the values of swept keys are coordinates along ``member``; long names, units and the meanings of
+        the flags are attributes, by the CF conventions. The nodes come from memory where they fit, otherwise from the files of the run, from ``snapshots.zarr`` lazily. A member
         that ended earlier is NaN. Needs xarray.
 
         Raises
@@ -219,6 +238,10 @@ class Study:
         from . import _arrays
 
         data = _arrays.snapshots(self._run, self._seen, self.folder, self.table)
+        rows = self.table("summary").set_index("member").loc[data["member"].to_numpy()]
+        for key, values in self._swept(rows).items():
+            values = values.to_numpy(dtype=None if values.dtype.kind in "iuf" else "object")
+            data = data.assign_coords({key: ("member", values, {"long_name": f"{key}, a swept key"})})
         if self._finalizer is not None and (self.folder / "snapshots.zarr").exists():
             # Arrays that are read later need the folder, which goes with its study.
             data.set_close(lambda: self)
