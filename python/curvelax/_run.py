@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import os
 import sys
 import tempfile
@@ -13,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _curvelax
-from ._errors import CurvelaxWarning, Interrupted, RequestError
+from ._errors import CurvelaxError, CurvelaxWarning, Interrupted, RequestError
 from ._study import Study, remove
+from ._words import in_python
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -102,11 +104,13 @@ def run(
             keys["shape"] = _outlines.save(outlines, written)
             existing = "filled" if free else existing
         with _bar(progress) as show:
-            overview, seen = _curvelax.run(spec, keys, folder, existing, show, _say)
+            overview, seen = _curvelax.run(spec, keys, folder, existing, show, functools.partial(_say, written=written))
     except BaseException as error:
         _leave(folder, existed, written, kept)
         if isinstance(error, KeyboardInterrupt):
             raise _interrupted(error, folder) from None
+        if written is not None and isinstance(error, CurvelaxError):
+            error.args = (_without(str(error), written),)
         raise
     if kept is not None:
         kept.unlink()
@@ -194,11 +198,20 @@ def _interrupted(error: KeyboardInterrupt, folder: Path) -> Interrupted:
     return error
 
 
-def _say(line: str) -> None:
+def _say(line: str, written: Path | None = None) -> None:
     """What the program says on stderr: warnings as such; the rest can be read in the overview."""
     kind, _, text = line.partition(": ")
     if kind == "warning":
-        warnings.warn(text, CurvelaxWarning, stacklevel=3)
+        warnings.warn(in_python(_without(text, written)), CurvelaxWarning, stacklevel=3)
+
+
+def _without(text: str, written: Path | None) -> str:
+    """The text without the file into which this package wrote the outlines."""
+    if written is None:
+        return text
+    for words in (f"shape file:{written}", f"shape {written}", f"file:{written}", str(written)):
+        text = text.replace(words, "shape")
+    return text
 
 
 @contextlib.contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import html
+import importlib.util
 import json
 import os
 import shutil
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import _curvelax, _frames
 from ._errors import RequestError
+from ._words import in_python
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -108,7 +110,7 @@ class Study:
     @property
     def warnings(self) -> list[str]:
         """What one should know about the results, one sentence each."""
-        return self.record["warnings"]
+        return [in_python(warning) for warning in self.record["warnings"]]
 
     @property
     def tables(self) -> list[str]:
@@ -131,6 +133,30 @@ class Study:
             remedy = NEEDS.get(name, "the run has none")
             raise RequestError(f"table {name!r}: {self.folder} has no {path.name}: {remedy}")
         return _frames.read(path, own, frames)
+
+    def to_parquet(self, out: str | os.PathLike[str]) -> list[Path]:
+        """Writes every table as ``NAME.parquet`` into the folder ``out``; returns the paths. Needs pyarrow or polars.
+
+        The values and types are those of :meth:`table`. An existing file of this name is replaced.
+
+        Raises
+        ------
+        RequestError
+            If neither of both libraries is installed.
+        """
+        has = {name: importlib.util.find_spec(name) is not None for name in ("pyarrow", "polars")}
+        if not any(has.values()):
+            raise RequestError("to_parquet: needs pyarrow or polars: pip install pyarrow")
+        folder = Path(out)
+        folder.mkdir(parents=True, exist_ok=True)
+        paths = []
+        for name in self.tables:
+            paths.append(folder / f"{name}.parquet")
+            if has["pyarrow"]:
+                self.table(name).to_parquet(paths[-1], engine="pyarrow", index=False)
+            else:
+                self.table(name, frames="polars").write_parquet(paths[-1])
+        return paths
 
     def _columns(self, name: str) -> list[tuple[str, str, str]]:
         columns = self._run.columns()
@@ -225,8 +251,8 @@ class Study:
         """Nodes of the members at the times of ``snapshots``: x, y, k and r of member × time × node.
 
         Cell, status and the values of swept keys are coordinates along ``member``; long names, units and the meanings of
-        the flags are attributes, by the CF conventions. The nodes come from memory where they fit, otherwise from the files of the run, from ``snapshots.zarr`` lazily. A member
-        that ended earlier is NaN. Needs xarray.
+        the flags are attributes, by the CF conventions. The nodes come from memory where they fit, otherwise from the files
+        of the run, from ``snapshots.zarr`` lazily. A member that ended earlier is NaN. Needs xarray.
 
         Raises
         ------

@@ -163,7 +163,8 @@ fn value(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if scalar.is_instance_of::<PyFloat>() {
         let number: f64 = scalar.extract()?;
         // `curves=1e3` is a count. Keys of real numbers take whole ones, too.
-        let is_whole = number.fract() == 0.0 && number.abs() < MAX_WHOLE && !(number == 0.0 && number.is_sign_negative());
+        let is_whole =
+            number.fract() == 0.0 && number.abs() < MAX_WHOLE && !(number == 0.0 && number.is_sign_negative());
         return Ok(if is_whole { Value::Integer(number as i64) } else { Value::Float(number) });
     }
     if scalar.is_instance_of::<PyString>() {

@@ -214,7 +214,11 @@ fn python_keys() -> String {
         let value = value.trim_matches(['[', ']', '=']).trim_start_matches('<').trim_end_matches('>');
         let kind = python_type(value, words);
         // The flag is given once for each event, the keyword has all of them.
-        let names = if name == "--event" { vec!["event".to_owned(), "events".into()] } else { vec![name[2..].replace('-', "_")] };
+        let names = if name == "--event" {
+            vec!["event".to_owned(), "events".into()]
+        } else {
+            vec![name[2..].replace('-', "_")]
+        };
         for name in names {
             let kind = if name == "events" { "Mapping[str, str]" } else { &kind };
             let default = default.map_or(String::new(), |default| format!(" By default {default}."));
