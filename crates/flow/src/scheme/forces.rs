@@ -4,7 +4,7 @@
 //! Nothing else reads the law of a member: a law of another kind is a change here and in [`Flow`](crate::flow::Flow).
 
 use super::{
-    Curve, Parameters,
+    Branches, Curve, Parameters,
     state::{Motion, edge, vertex_turn},
 };
 use crate::{
@@ -12,27 +12,36 @@ use crate::{
     number::{Number, Real},
 };
 
-impl<N: Number> Parameters<N> {
-    /// Returns the law, whose `b(k)` has this degree.
-    #[inline(always)]
-    pub fn law(&self, degree: usize) -> Law<N> {
-        let mut coefficients = [N::of(0.0); MAX_DEGREE];
-        coefficients.copy_from_slice(&self.law[..MAX_DEGREE]);
-        Law { coefficients, degree }
+/// Properties of a law that decide which instructions are run: members side by side have them in common.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Kind {
+    /// Degree of `b(k)`.
+    pub degree: usize,
+}
+
+impl<T: Real> Parameters<T> {
+    /// Returns the kind of the law, on which the [branches](super::Branches) of a member depend.
+    pub fn kind_of_law(&self) -> Kind {
+        let zero = T::of(0.0);
+        Kind { degree: self.law[..MAX_DEGREE].iter().rposition(|c| *c != zero).map_or(0, |j| j + 1) }
     }
 }
 
-/// Returns the degree of `b(k)`, on which the [branches](super::Branches) of a member depend.
-pub fn degree<T: Real>(p: &Parameters<T>) -> usize {
-    let zero = T::of(0.0);
-    p.law[..MAX_DEGREE].iter().rposition(|c| *c != zero).map_or(0, |j| j + 1)
+impl<N: Number> Parameters<N> {
+    /// Returns the law, which is of this kind.
+    #[inline(always)]
+    pub fn law(&self, kind: Kind) -> Law<N> {
+        let mut coefficients = [N::of(0.0); MAX_DEGREE];
+        coefficients.copy_from_slice(&self.law[..MAX_DEGREE]);
+        Law { coefficients, kind }
+    }
 }
 
 /// `b(k) = c₁k + c₂k² + …`, up to its degree.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Law<N> {
     coefficients: [N; MAX_DEGREE],
-    degree: usize,
+    kind: Kind,
 }
 
 impl<N: Number> Law<N> {
@@ -51,17 +60,18 @@ impl<N: Number> Law<N> {
     #[inline(always)]
     fn b_over_k(&self, k: N) -> N {
         let mut sum = N::of(0.0);
-        for c in self.coefficients[..self.degree].iter().rev() {
+        for c in self.coefficients[..self.kind.degree].iter().rev() {
             sum = sum * k + *c;
         }
         sum
     }
 }
 
-/// Fills `b(k)` of `motion` from the curve.
+/// Fills the law and `b(k)` of `motion` from the curve, whose reciprocal lengths are there.
 #[inline(always)]
-pub fn fill<N: Number>(old: &Curve<N>, p: &Parameters<N>, degree: usize, motion: &mut Motion<N>) {
-    let law = p.law(degree);
+pub fn fill<N: Number>(old: &Curve<N>, p: &Parameters<N>, branches: Branches, motion: &mut Motion<N>) {
+    let law = p.law(branches.law);
+    motion.law = law;
     for i in 0..old.len() {
         motion.b[i] = law.b(old.k[i]);
     }
@@ -101,13 +111,13 @@ fn bent<N: Number>(before: [N; 3], after: [N; 3]) -> N {
 /// `q (βN + αT)` at node i of the polygon that was measured: the second difference of its own curvature and `b` along the
 /// inward normal to the chord between its neighbours, and α along the chord.
 #[inline(always)]
-pub fn of_polygon<N: Number>(old: &Curve<N>, motion: &Motion<N>, law: &Law<N>, i: usize) -> [N; 2] {
+pub fn of_polygon<N: Number>(old: &Curve<N>, motion: &Motion<N>, i: usize) -> [N; 2] {
     let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises(i), old.y.rises(i));
     let [_, _, e, f, _] = motion.edge.window(i);
     let [_, rise, next, _] = motion.bent.rises(i);
     let half = N::of(0.5);
     let along = [ex + fx, ey + fy];
-    let inward = half * (e + f) * law.b(motion.bent[i]) - (next / f - rise / e);
+    let inward = half * (e + f) * motion.law.b(motion.bent[i]) - (next / f - rise / e);
     let across = inward / (along[0] * along[0] + along[1] * along[1]).sqrt();
     let sliding = half * motion.alpha[i];
     [sliding * along[0] - across * along[1], sliding * along[1] + across * along[0]]

@@ -9,6 +9,8 @@ use crate::{
     solver::{Blocks, Memory, Ring, Solves},
 };
 
+use super::forces::Law;
+
 /// Fields of a curve.
 pub const CURVE_FIELDS: usize = 4;
 /// Fields of the errors of an attempt.
@@ -275,6 +277,8 @@ impl<T: Real> State<T> {
 /// The motion of the old curve, and the reciprocals of its lengths, then of the new ones.
 #[derive(Clone, Debug)]
 pub struct Motion<N> {
+    /// The law of this step.
+    pub law: Law<N>,
     /// `b(k)`.
     pub b: Ring<N>,
     /// Normal velocity β.
@@ -333,6 +337,7 @@ impl<N: Number> Workspace<N> {
         Workspace {
             blocks,
             motion: Motion {
+                law: Law::default(),
                 b: ring(),
                 beta: nodes(),
                 rkb: nodes(),
