@@ -95,7 +95,7 @@ pub fn measure<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
     }
     motion.edge.close();
     for i in 0..old.len() {
-        let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises(i), old.y.rises(i));
+        let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises_of_places(i), old.y.rises_of_places(i));
         let [_, _, e, f, _] = motion.edge.window(i);
         motion.bent[i] = bent([ex, ey, e], [fx, fy, f]);
     }
@@ -112,7 +112,7 @@ fn bent<N: Number>(before: [N; 3], after: [N; 3]) -> N {
 /// inward normal to the chord between its neighbours, and α along the chord.
 #[inline(always)]
 pub fn of_polygon<N: Number>(old: &Curve<N>, motion: &Motion<N>, i: usize) -> [N; 2] {
-    let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises(i), old.y.rises(i));
+    let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises_of_places(i), old.y.rises_of_places(i));
     let [_, _, e, f, _] = motion.edge.window(i);
     let [_, rise, next, _] = motion.bent.rises(i);
     let half = N::of(0.5);

@@ -58,7 +58,10 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
         let off = [a, b, d, e];
         let rhs = match self.geometric {
             true => forces::of_polygon(self.old, self.motion, i),
-            false => [residual_of_old(off, self.old.x.offsets(i)), residual_of_old(off, self.old.y.offsets(i))],
+            false => [
+                residual_of_old(off, self.old.x.offsets_of_places(i)),
+                residual_of_old(off, self.old.y.offsets_of_places(i)),
+            ],
         };
         Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }
     }
