@@ -1,5 +1,5 @@
 // The forces on a curve: beta, and b(k) = c1 k + ... + c8 k^8 and phi(k) = k^2 - b(k)/k by Horner's rule without division;
-// the density of the energy. Twin of crates/flow/src/scheme/forces.rs.
+// the density of the energy. Twin of crates/flow/src/scheme/law.rs and crates/flow/src/scheme/forces.rs.
 
 /// The place of the length penalty in the law, after the coefficients.
 const LENGTH_PENALTY = 8u;

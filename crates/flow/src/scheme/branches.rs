@@ -5,7 +5,7 @@
 //! parameters of single members, compared by [`Group`](super::evolve::Group), and passed to the stages: no stage asks a
 //! number of several lanes which branch to take.
 
-use super::{Parameters, forces::Kind};
+use super::{Parameters, law::Kind};
 use crate::number::Real;
 
 /// The branches of one member, or of a group of members that share them.

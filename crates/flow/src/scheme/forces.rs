@@ -1,76 +1,20 @@
-//! The forces on a curve: the normal velocity `β = -∂²_s k + b(k)`, `φ(k) = k² - b(k)/k` of the position equation, and the
-//! density of the energy. Twin of `shaders/forces.wgsl`.
+//! The forces on a curve: the normal velocity `β = -∂²_s k + b(k)`, the force of the polygon, and the density of the energy.
+//! Twin of `shaders/forces.wgsl`.
 //!
-//! Nothing else reads the law of a member: a law of another kind is a change here and in [`Flow`](crate::flow::Flow).
+//! Nothing else reads the law of a member: another law is a change here, in [`law`](super::law) and in
+//! [`Flow`](crate::flow::Flow).
 
 use super::{
-    Branches, Curve, Parameters,
+    Curve, Parameters,
+    law::Kind,
     state::{Motion, edge, vertex_turn},
 };
-use crate::{
-    flow::{LENGTH_PENALTY, MAX_DEGREE},
-    number::{Number, Real},
-};
-
-/// Properties of a law that decide which instructions are run: members side by side have them in common.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Kind {
-    /// Degree of `b(k)`.
-    pub degree: usize,
-}
-
-impl<T: Real> Parameters<T> {
-    /// Returns the kind of the law, on which the [branches](super::Branches) of a member depend.
-    pub fn kind_of_law(&self) -> Kind {
-        let zero = T::of(0.0);
-        Kind { degree: self.law[..MAX_DEGREE].iter().rposition(|c| *c != zero).map_or(0, |j| j + 1) }
-    }
-}
-
-impl<N: Number> Parameters<N> {
-    /// Returns the law, which is of this kind.
-    #[inline(always)]
-    pub fn law(&self, kind: Kind) -> Law<N> {
-        let mut coefficients = [N::of(0.0); MAX_DEGREE];
-        coefficients.copy_from_slice(&self.law[..MAX_DEGREE]);
-        Law { coefficients, kind }
-    }
-}
-
-/// `b(k) = c₁k + c₂k² + …`, up to its degree.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Law<N> {
-    coefficients: [N; MAX_DEGREE],
-    kind: Kind,
-}
-
-impl<N: Number> Law<N> {
-    /// `b(k)` by Horner's rule.
-    #[inline(always)]
-    pub fn b(&self, k: N) -> N {
-        self.b_over_k(k) * k
-    }
-
-    /// `φ(k) = k² - b(k)/k`, without division.
-    #[inline(always)]
-    pub fn phi(&self, k: N) -> N {
-        k * k - self.b_over_k(k)
-    }
-
-    #[inline(always)]
-    fn b_over_k(&self, k: N) -> N {
-        let mut sum = N::of(0.0);
-        for c in self.coefficients[..self.kind.degree].iter().rev() {
-            sum = sum * k + *c;
-        }
-        sum
-    }
-}
+use crate::{flow::LENGTH_PENALTY, number::Number};
 
 /// Fills the law and `b(k)` of `motion` from the curve, whose reciprocal lengths are there.
 #[inline(always)]
-pub fn fill<N: Number>(old: &Curve<N>, p: &Parameters<N>, branches: Branches, motion: &mut Motion<N>) {
-    let law = p.law(branches.law);
+pub fn fill<N: Number>(old: &Curve<N>, p: &Parameters<N>, kind: Kind, motion: &mut Motion<N>) {
+    let law = p.law(kind);
     motion.law = law;
     for i in 0..old.len() {
         motion.b[i] = law.b(old.k[i]);

@@ -4,12 +4,11 @@
 
 use glam::DVec2;
 
+use super::law::Law;
 use crate::{
     number::{Number, Real, place},
     solver::{Blocks, Memory, Ring, Solves},
 };
-
-use super::forces::Law;
 
 /// Fields of a curve.
 pub const CURVE_FIELDS: usize = 4;
