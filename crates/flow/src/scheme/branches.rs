@@ -60,7 +60,7 @@ mod tests {
             pulled: false,
             geometric: false,
             watched: false,
-            law: Kind { degree: 0 },
+            law: Kind::default(),
         };
         assert_eq!(paper, none);
         let adaptive = branches("surface-diffusion", |p| p.adaptive = 1e-3);
@@ -71,7 +71,9 @@ mod tests {
         let geometric = branches("surface-diffusion", |p| p.geometric = 1.0);
         assert_eq!(geometric, Branches { geometric: true, ..paper });
         assert_eq!(branches("surface-diffusion", |p| p.watched = 1.0), Branches { watched: true, ..paper });
-        assert_eq!(branches("poly:0,-1,0,-0.0", |_| {}), Branches { law: Kind { degree: 2 }, ..paper });
-        assert_eq!(branches("willmore", |_| {}), Branches { law: Kind { degree: 3 }, ..paper });
+        for (flow, degree) in [("surface-diffusion", 0), ("poly:0,-1,0,-0.0", 2), ("willmore", 3)] {
+            let of_flow = branches(flow, |_| {});
+            assert_eq!((of_flow.law.degree, Branches { law: paper.law, ..of_flow }), (degree, paper), "{flow}");
+        }
     }
 }
