@@ -28,6 +28,7 @@ import polars as pl
 import xarray as xr
 
 import curvelax
+import reference
 from common import CURVELAX, run
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -704,6 +705,12 @@ class Package(unittest.TestCase):
         self.assertGreater(best.spearman.iloc[0], 0.9)
         self.assertLess(abs(particle.area_start.corr(particle.t_limit, method="spearman")), 0.3)
         self.assertTrue((names["share"].median() < 0.01).all())
+
+    def test_the_reference_is_that_of_the_package(self):
+        page = reference.PAGE.read_text(encoding="utf-8")
+        self.assertEqual(page, reference.page(), "python tests/python/reference.py rewrites it")
+        for name in curvelax.__all__:
+            self.assertIn(f"## `curvelax.{name}", page)
 
     def test_types_are_told_to_checkers(self):
         own = resources.files("curvelax")
