@@ -275,4 +275,12 @@ fn tables_that_disagree_are_refused() {
     fs::write(&levels, text.replacen(",0.8", ",0.9", 1)).unwrap();
     let (code, said) = curvelax(home.path(), "plot out");
     assert!(code == Some(2) && said.contains("column t_limit: expected") && said.contains("levels.csv"), "{said}");
+    // Only what differs is named.
+    fs::write(&levels, text).unwrap();
+    let summary = home.path().join("out/summary.csv");
+    let error = field(&summary, "t_error");
+    let text = fs::read_to_string(&summary).unwrap();
+    fs::write(&summary, text.replacen(&format!(",{error},"), ",1e-9,", 1)).unwrap();
+    let (code, said) = curvelax(home.path(), "plot out");
+    assert!(code == Some(2) && said.contains(&format!("column t_error: expected {error}, as levels.csv")), "{said}");
 }
