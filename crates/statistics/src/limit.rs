@@ -41,7 +41,7 @@ pub const FINER_STEPS: f64 = 10.0;
 /// The error of steps: as a share of what these change, and in units of their tolerance over the root of the excess, relative
 /// to the time, since the change may be small by chance.
 const OF_STEPS: f64 = 0.15;
-const OF_TOLERANCE: f64 = 0.005;
+const OF_TOLERANCE: f64 = 0.0035;
 /// Orders that are looked for.
 const ALL_ORDERS: std::ops::Range<f64> = 0.05..8.0;
 /// Halvings of that range: to the last bit.
@@ -49,7 +49,8 @@ const HALVINGS: usize = 60;
 
 /// Relative error above which a time that is not asymptotic is worth more nodes.
 const WIDE: f64 = 1e-3;
-/// Turn of the tangent at a node above which no bound of it is believed: three times may agree by chance.
+/// Turn of the tangent at a node above which no bound is believed, and above [`MAX_TURN`] none without an order: three times
+/// may agree by chance.
 const BLIND_TURN: f64 = 0.9;
 
 /// One time, computed at several resolutions.
@@ -132,7 +133,9 @@ impl Limit {
     /// Whether the time is worth levels of more nodes, where the tangent of the curve turns by `turn` at a node of the
     /// finest: its differences do not fall as they should, and it is not known to a thousandth, or only seems to be.
     pub fn needs_more(&self, turn: f64) -> bool {
-        !self.asymptotic && (turn > BLIND_TURN || self.error - self.fixed > WIDE * self.t)
+        let falls = self.order.is_some_and(|order| LOOSE_ORDERS.contains(&order));
+        let is_believed = turn <= MAX_TURN || turn <= BLIND_TURN && falls;
+        !self.asymptotic && !(is_believed && self.error - self.fixed <= WIDE * self.t)
     }
 
     /// Its half-width relative to the limit.
@@ -293,6 +296,13 @@ mod tests {
         let times = Times { own, levels, points, own_level: 2, tolerance, is_adaptive, turn: 1.36, excess };
         let chance = Limit::of(&times);
         assert!(chance.relative_error() < WIDE && chance.needs_more(1.36) && !chance.needs_more(0.89), "{chance:?}");
+        // A time that passes its largest value between levels has no order.
+        let levels = vec![1.000672, 1.001219, 1.001099];
+        let (points, tolerance, excess) = (vec![40, 57, 80], 1e-4, 0.012);
+        let times =
+            Times { own: levels[2], levels, points, own_level: 2, tolerance, is_adaptive: true, turn: 0.65, excess };
+        let turned = Limit::of(&times);
+        assert!(turned.order.is_none() && turned.needs_more(0.65) && !turned.asymptotic, "{turned:?}");
     }
 
     #[test]
