@@ -130,12 +130,17 @@ impl Limit {
         Limit { t, error, fixed: 0.0, order, asymptotic, relative: own / t - 1.0 }
     }
 
+    /// Whether its differences do not fall as they should, and it is not known to a thousandth.
+    pub fn is_open(&self) -> bool {
+        !self.asymptotic && self.error - self.fixed > WIDE * self.t
+    }
+
     /// Whether the time is worth levels of more nodes, where the tangent of the curve turns by `turn` at a node of the
-    /// finest: its differences do not fall as they should, and it is not known to a thousandth, or only seems to be.
+    /// finest: it is [open](Limit::is_open), or its bound is not to be believed.
     pub fn needs_more(&self, turn: f64) -> bool {
         let falls = self.order.is_some_and(|order| LOOSE_ORDERS.contains(&order));
         let is_believed = turn <= MAX_TURN || turn <= BLIND_TURN && falls;
-        !self.asymptotic && !(is_believed && self.error - self.fixed <= WIDE * self.t)
+        self.is_open() || !self.asymptotic && !is_believed
     }
 
     /// Its half-width relative to the limit.
