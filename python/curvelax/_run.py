@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import os
 import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _curvelax
-from ._errors import CurvelaxWarning, Interrupted, RequestError
+from ._errors import CurvelaxError, CurvelaxWarning, Interrupted, RequestError
 from ._study import Study, remove
+from ._words import in_python
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._keys import Keys
 
 Progress = Callable[[int, int, float], object]
 
@@ -26,7 +33,7 @@ def run(
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
     progress: bool | Progress | None = None,
-    **keys: Any,
+    **keys: Unpack[Keys],
 ) -> Study:
     """Relaxes an ensemble of curves.
 
@@ -40,13 +47,17 @@ def run(
     force
         Write into an existing folder, replacing the earlier run in it. A folder that holds anything else is refused.
     progress
-        Whether to show a bar, by tqdm; by default in notebooks and terminals, if tqdm is installed. A function is called
-        with the members that have ended, all members, and the share of the work that is done.
+        Whether to show how far the run is; by default in notebooks and terminals. With tqdm it is a bar of tqdm. A function
+        is called with the members that have ended, all members, and the share of the work that is done.
     **keys
         Keys of the spec, with ``_`` for ``-``: ``curves=1000``, ``flow="willmore"``, ``t_end="auto"``,
         ``sweep={"amplitude": [0.05, 0.1]}``. ``accurate=True`` is ``--accurate``, and ``events={"half": "excess <= 0.5 *
         start"}`` names events. ``shape`` may be an array of points (N, 2), several of these in a list, or a dict from labels
-        to these; lengths are in your unit, times in its fourth power.
+        to these; lengths are in your unit, times in its fourth power. Contours of OpenCV, (N, 1, 2), are such arrays.
+        Contours of ``skimage.measure.find_contours`` are, too, but with rows and columns in the place of x and y, which
+        mirrors the outline and changes no time: give ``contour[:, ::-1]`` to see it as the image shows it. Polygons of
+        Shapely and all other objects with ``__geo_interface__`` are outlines; of a GeoSeries or GeoDataFrame the index is
+        the labels and its columns serve ``group_by``.
 
     Returns
     -------
@@ -83,21 +94,23 @@ def run(
             # Here, for the program is to start without numpy.
             from . import _outlines
 
-            outlines = _outlines.labelled(shape)
+            name, outlines = _outlines.packed(shape)
             _curvelax.check_place(folder, existing)
             # Where there is no run, the outlines will be the only file.
             free = not force or _is_free(folder)
-            written = folder / _outlines.NAME
+            written = folder / name
             if written.exists():
                 kept = written.rename(written.with_suffix(".before"))
             keys["shape"] = _outlines.save(outlines, written)
             existing = "filled" if free else existing
         with _bar(progress) as show:
-            overview, seen = _curvelax.run(spec, keys, folder, existing, show, _say)
+            overview, seen = _curvelax.run(spec, keys, folder, existing, show, functools.partial(_say, written=written))
     except BaseException as error:
         _leave(folder, existed, written, kept)
         if isinstance(error, KeyboardInterrupt):
             raise _interrupted(error, folder) from None
+        if written is not None and isinstance(error, CurvelaxError):
+            error.args = (_without(str(error), written),)
         raise
     if kept is not None:
         kept.unlink()
@@ -185,11 +198,20 @@ def _interrupted(error: KeyboardInterrupt, folder: Path) -> Interrupted:
     return error
 
 
-def _say(line: str) -> None:
+def _say(line: str, written: Path | None = None) -> None:
     """What the program says on stderr: warnings as such; the rest can be read in the overview."""
     kind, _, text = line.partition(": ")
     if kind == "warning":
-        warnings.warn(text, CurvelaxWarning, stacklevel=3)
+        warnings.warn(in_python(_without(text, written)), CurvelaxWarning, stacklevel=3)
+
+
+def _without(text: str, written: Path | None) -> str:
+    """The text without the file into which this package wrote the outlines."""
+    if written is None:
+        return text
+    for words in (f"shape file:{written}", f"shape {written}", f"file:{written}", str(written)):
+        text = text.replace(words, "shape")
+    return text
 
 
 @contextlib.contextmanager
@@ -207,15 +229,14 @@ def _bar(progress: bool | Progress | None) -> Iterator[Progress]:
         if last[0] < last[1] or last[2] < 1.0:
             progress(last[1], last[1], 1.0)
         return
-    wanted = progress if progress is not None else _is_watched()
+    if not (progress if progress is not None else _is_watched()):
+        yield lambda *_: None
+        return
     try:
         from tqdm.auto import tqdm
     except ImportError:
-        if progress:
-            raise RequestError("progress: a bar needs tqdm: pip install tqdm, or give a function") from None
-        wanted = False
-    if not wanted:
-        yield lambda *_: None
+        with _line() as show:
+            yield show
         return
     bar_format = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}]"
     with tqdm(total=1.0, bar_format=bar_format, leave=False) as bar:
@@ -227,7 +248,40 @@ def _bar(progress: bool | Progress | None) -> Iterator[Progress]:
         yield show
 
 
+@contextlib.contextmanager
+def _line() -> Iterator[Progress]:
+    """A line that is written anew, for notebooks and terminals without tqdm. It is gone at the end."""
+    handle, width = None, 0
+    if _is_notebook():
+        from IPython.display import HTML, display
+
+        handle = display(HTML(""), display_id=True)
+
+    def show(done: int, total: int, share: float) -> None:
+        nonlocal width
+        words = f"{100 * share:3.0f} % {done} of {total} members"
+        if handle is not None:
+            handle.update(HTML(f'<progress max="1" value="{share:.3f}"></progress> {words}'))
+        elif sys.stderr is not None:
+            width = len(words)
+            sys.stderr.write(f"\r{words}")
+            sys.stderr.flush()
+
+    try:
+        yield show
+    finally:
+        if handle is not None:
+            handle.update(HTML(""))
+        elif width > 0 and sys.stderr is not None:
+            sys.stderr.write("\r" + " " * width + "\r")
+            sys.stderr.flush()
+
+
+def _is_notebook() -> bool:
+    """Whether IPython shows what is displayed."""
+    return "IPython" in sys.modules and sys.modules["IPython"].get_ipython() is not None
+
+
 def _is_watched() -> bool:
     """Whether somebody may look at a bar: in a notebook, or at a terminal."""
-    notebook = "IPython" in sys.modules and sys.modules["IPython"].get_ipython() is not None
-    return notebook or (sys.stderr is not None and sys.stderr.isatty())
+    return _is_notebook() or (sys.stderr is not None and sys.stderr.isatty())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import html
+import importlib.util
 import json
 import os
 import shutil
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import _curvelax, _frames
 from ._errors import RequestError
+from ._words import in_python
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -108,7 +110,7 @@ class Study:
     @property
     def warnings(self) -> list[str]:
         """What one should know about the results, one sentence each."""
-        return self.record["warnings"]
+        return [in_python(warning) for warning in self.record["warnings"]]
 
     @property
     def tables(self) -> list[str]:
@@ -132,6 +134,30 @@ class Study:
             raise RequestError(f"table {name!r}: {self.folder} has no {path.name}: {remedy}")
         return _frames.read(path, own, frames)
 
+    def to_parquet(self, out: str | os.PathLike[str]) -> list[Path]:
+        """Writes every table as ``NAME.parquet`` into the folder ``out``; returns the paths. Needs pyarrow or polars.
+
+        The values and types are those of :meth:`table`. An existing file of this name is replaced.
+
+        Raises
+        ------
+        RequestError
+            If neither of both libraries is installed.
+        """
+        has = {name: importlib.util.find_spec(name) is not None for name in ("pyarrow", "polars")}
+        if not any(has.values()):
+            raise RequestError("to_parquet: needs pyarrow or polars: pip install pyarrow")
+        folder = Path(out)
+        folder.mkdir(parents=True, exist_ok=True)
+        paths = []
+        for name in self.tables:
+            paths.append(folder / f"{name}.parquet")
+            if has["pyarrow"]:
+                self.table(name).to_parquet(paths[-1], engine="pyarrow", index=False)
+            else:
+                self.table(name, frames="polars").write_parquet(paths[-1])
+        return paths
+
     def _columns(self, name: str) -> list[tuple[str, str, str]]:
         columns = self._run.columns()
         if f"{name}.csv" not in columns:
@@ -148,8 +174,26 @@ class Study:
 
     @functools.cached_property
     def summary(self) -> pd.DataFrame:
-        """One row per member: status, ``t_relax``, rate, length, area, excess, …"""
-        return self.table("summary")
+        """One row per member: the values of swept keys, status, ``t_relax``, rate, length, area, excess, …"""
+        summary = self.table("summary")
+        swept = self._swept(summary)
+        for place, name in enumerate(swept, start=summary.columns.get_loc("cell") + 1):
+            summary.insert(place, name, swept[name])
+        return summary
+
+    def _swept(self, rows: pd.DataFrame) -> pd.DataFrame:
+        """The values of the swept keys for rows with a column ``cell``, without those that the rows have themselves."""
+        names = [key for key in self.spec.get("sweep", {}) if key not in rows.columns]
+        return self.ensemble.set_index("cell").loc[rows.cell, names].set_axis(rows.index)
+
+    def frame(self) -> pd.DataFrame:
+        """One row per member, with all that is known of it: swept values, what was drawn, features, label, results.
+
+        The columns of :attr:`summary`, then those of :attr:`members`, each once: :meth:`describe` says what they mean.
+        """
+        members = self.members
+        new = [name for name in members.columns if name == "member" or name not in self.summary.columns]
+        return self.summary.merge(members[new], on="member", how="left", validate="one_to_one")
 
     @functools.cached_property
     def ensemble(self) -> pd.DataFrame:
@@ -206,8 +250,9 @@ class Study:
     def snapshots(self) -> xr.Dataset:
         """Nodes of the members at the times of ``snapshots``: x, y, k and r of member × time × node.
 
-        They come from memory where they fit, otherwise from the files of the run, from ``snapshots.zarr`` lazily. A member
-        that ended earlier is NaN. Needs xarray.
+        Cell, status and the values of swept keys are coordinates along ``member``; long names, units and the meanings of
+        the flags are attributes, by the CF conventions. The nodes come from memory where they fit, otherwise from the files
+        of the run, from ``snapshots.zarr`` lazily. A member that ended earlier is NaN. Needs xarray.
 
         Raises
         ------
@@ -219,6 +264,10 @@ class Study:
         from . import _arrays
 
         data = _arrays.snapshots(self._run, self._seen, self.folder, self.table)
+        rows = self.table("summary").set_index("member").loc[data["member"].to_numpy()]
+        for key, values in self._swept(rows).items():
+            values = values.to_numpy(dtype=None if values.dtype.kind in "iuf" else "object")
+            data = data.assign_coords({key: ("member", values, {"long_name": f"{key}, a swept key"})})
         if self._finalizer is not None and (self.folder / "snapshots.zarr").exists():
             # Arrays that are read later need the folder, which goes with its study.
             data.set_close(lambda: self)

@@ -21,6 +21,9 @@ use crate::raise;
 /// Maximum characters of a wrong key and value that a message echoes.
 const ECHOED: usize = 200;
 
+/// From here on a float no longer holds every whole number.
+const MAX_WHOLE: f64 = 9_007_199_254_740_992.0;
+
 /// Deepest list in a list.
 const DEEPEST: usize = 4;
 
@@ -158,7 +161,11 @@ fn value(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
         return scalar.extract::<i64>().map(Value::Integer).or_else(|_| Ok(Value::String(scalar.str()?.extract()?)));
     }
     if scalar.is_instance_of::<PyFloat>() {
-        return Ok(Value::Float(scalar.extract()?));
+        let number: f64 = scalar.extract()?;
+        // `curves=1e3` is a count. Keys of real numbers take whole ones, too.
+        let is_whole =
+            number.fract() == 0.0 && number.abs() < MAX_WHOLE && !(number == 0.0 && number.is_sign_negative());
+        return Ok(if is_whole { Value::Integer(number as i64) } else { Value::Float(number) });
     }
     if scalar.is_instance_of::<PyString>() {
         return Ok(Value::String(scalar.extract()?));

@@ -15,7 +15,8 @@ use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*};
 fn raise(py: Python<'_>, error: curvelax::Error, raised: Option<PyErr>) -> PyErr {
     let of_code = |name: &str| -> PyResult<PyErr> {
         let class = py.import("curvelax._errors")?.getattr(name)?;
-        Ok(PyErr::from_value(class.call1((error.to_string(),))?))
+        let words = py.import("curvelax._words")?.call_method1("in_python", (error.to_string(),))?;
+        Ok(PyErr::from_value(class.call1((words,))?))
     };
     let name = match error {
         curvelax::Error::Request(_) => "RequestError",

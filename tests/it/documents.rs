@@ -27,6 +27,9 @@ const BEGIN: &str = "<!-- Generated from the program: UPDATE_DOCS=1 cargo test -
 const END: &str = "<!-- The end of what is generated. -->\n";
 const REMEDY: &str = "UPDATE_DOCS=1 cargo test --test it documents rewrites it";
 
+/// The keys of a spec as the types of keywords.
+const KEYS: &str = "python/curvelax/_keys.py";
+
 const MAX_WORDS: usize = 1000;
 
 fn root() -> &'static Path {
@@ -166,6 +169,90 @@ fn the_page_of_files_has_the_columns_of_the_program() {
         assert!(columns.contains(line), "{line} is not in the page: {columns}");
     }
     generated(FILES, &columns);
+}
+
+/// The type of a key in Python, by the name of its value in the help text.
+fn python_type(value: &str, words: Option<&str>) -> String {
+    if let Some(words) = words {
+        return format!("Literal[\"{}\"]", words.replace(", ", "\", \""));
+    }
+    let own = match value {
+        "COUNT" | "N" | "SEED" => "int",
+        "" | "BOOL" => "bool",
+        "B" | "FRACTION" | "EXCESS" | "SHARE" | "DT" | "X" => "float",
+        "TAU" | "OMEGA" | "KAPPA" | "FACTOR" => "float | Literal[\"auto\"]",
+        "TOL" => "float | bool",
+        "T" => "float | Literal[\"auto\"] | Sequence[float]",
+        "SIGMA" | "P" => "float | str",
+        "T1,T2,..." => "Sequence[float]",
+        "J1,J2,..." => "Sequence[int]",
+        "SHAPE" => "Any",
+        "KEY=V1,V2,..." => "Mapping[str, Sequence[Any]]",
+        "NAME=CONDITION" => "str | Sequence[str]",
+        "FLOW" | "LO..=HI" | "PROPERTY" | "NAME" | "LENGTH,TIME" | "I/N" => "str",
+        other => panic!("a key has a value {other}, of which the type in Python is not known: name it here"),
+    };
+    own.to_owned()
+}
+
+/// The keys of a spec for editors and type checkers: one keyword for each flag of `run` up to `--out`.
+fn python_keys() -> String {
+    let help = help(Some("run"));
+    let all = entries(&help);
+    let keys = all.iter().take_while(|entry| !entry.name.starts_with("--out ")).filter(|e| e.name.starts_with("--"));
+    let mut file = format!(
+        "\"\"\"The keys of a spec as keywords of :func:`curvelax.run`, for editors and type checkers.\"\"\"\n\n\
+         # {}\n\nfrom __future__ import annotations\n\nfrom collections.abc import Mapping, Sequence\n\
+         from typing import Any, Literal, TypedDict\n\n\nclass Keys(TypedDict, total=False):\n    \
+         \"\"\"What ``curvelax.run`` takes; flags of ``curvelax run`` with ``_`` for ``-``.\"\"\"\n",
+        BEGIN.trim_start_matches("<!-- ").trim_end_matches(" -->\n")
+    );
+    for entry in keys {
+        let (text, words) = noted(entry.text, "possible values");
+        let (text, default) = noted(text, "default");
+        let (name, value) = entry.name.split_once([' ', '[']).unwrap_or((entry.name, ""));
+        let value = value.trim_matches(['[', ']', '=']).trim_start_matches('<').trim_end_matches('>');
+        let kind = python_type(value, words);
+        // The flag is given once for each event, the keyword has all of them.
+        let names = if name == "--event" {
+            vec!["event".to_owned(), "events".into()]
+        } else {
+            vec![name[2..].replace('-', "_")]
+        };
+        for name in names {
+            let kind = if name == "events" { "Mapping[str, str]" } else { &kind };
+            let default = default.map_or(String::new(), |default| format!(" By default {default}."));
+            let text = format!("{text}.{default}").replace("--", "").replace('\\', "\\\\");
+            file += &format!("\n    {name}: {kind}\n    {}\n", wrapped(&format!("\"\"\"{text}\"\"\""), "    "));
+        }
+    }
+    file
+}
+
+/// `text` in lines of at most 118 columns, of which all but the first begin with `indent`.
+fn wrapped(text: &str, indent: &str) -> String {
+    let (mut lines, mut line) = (Vec::new(), String::new());
+    for word in text.split(' ') {
+        if !line.is_empty() && line.chars().count() + word.chars().count() + 1 + indent.len() > 118 {
+            lines.push(std::mem::take(&mut line));
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line += word;
+    }
+    lines.push(line);
+    lines.join(&format!("\n{indent}"))
+}
+
+#[test]
+fn the_keys_of_python_are_those_of_the_program() {
+    let path = root().join(KEYS);
+    let keys = python_keys();
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        fs::write(&path, &keys).unwrap();
+    }
+    assert!(fs::read_to_string(&path).unwrap_or_default() == keys, "{KEYS} is not that of the program: {REMEDY}");
 }
 
 #[test]

@@ -28,6 +28,7 @@ import polars as pl
 import xarray as xr
 
 import curvelax
+import reference
 from common import CURVELAX, run
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -154,6 +155,47 @@ class Package(unittest.TestCase):
         self.assertEqual(self.study.summary.label.tolist(), [""] * 9)
         self.assertTrue(self.study.summary.t_limit.isna().all())
 
+    def test_a_frame_has_all_that_is_known_of_a_member_once(self):
+        sweep = {"amplitude": [0.02, 0.08], "flow": ["willmore", "surface-diffusion"]}
+        study = curvelax.run(**{**SMALL, "snapshots": [0, 0.01]}, sweep=sweep)
+        frame = study.frame()
+        self.assertEqual(len(frame), 12)
+        self.assertFalse(frame.columns.duplicated().any())
+        wanted = {"member", "cell", "amplitude", "flow", *study.table("summary"), *study.table("members")}
+        self.assertEqual(set(frame), wanted)
+        # Each value is that of its own member and cell, whatever their order.
+        cells, members = study.ensemble.set_index("cell"), study.members.set_index("member")
+        for _, row in frame.sample(frac=1, random_state=1).iterrows():
+            self.assertEqual([row.amplitude, row.flow], cells.loc[row.cell, ["amplitude", "flow"]].tolist())
+            self.assertEqual(row.cos_2, members.cos_2[row.member])
+        self.assertEqual(study.summary.columns[:4].tolist(), ["member", "cell", "amplitude", "flow"])
+        self.assertNotIn("amplitude", study.table("summary"))
+        # Swept numbers of nodes are a column already.
+        nodes = curvelax.run(**{**SMALL, "points": None}, sweep={"points": [32, 64]})
+        self.assertEqual(nodes.summary.points.tolist(), [32] * 3 + [64] * 3)
+        # And along the members of arrays, from memory and from files.
+        for data in (study.snapshots, curvelax.load(study.folder).snapshots):
+            self.assertEqual(data.amplitude.dims, ("member",))
+            self.assertEqual(data.amplitude.values.tolist(), study.summary.amplitude.tolist())
+            self.assertEqual(data.sel(member=data.flow == "willmore").sizes["member"], 6)
+            self.assertIn("swept", data.amplitude.attrs["long_name"])
+
+    def test_parquet_has_the_tables(self):
+        for library in ("pyarrow", "polars"):
+            missing = {"pyarrow", "polars"} - {library}
+            if importlib.util.find_spec(library) is None:
+                continue
+            find = importlib.util.find_spec
+            with unittest.mock.patch("importlib.util.find_spec", lambda name: None if name in missing else find(name)):
+                paths = self.study.to_parquet(self.at / f"parquet-{library}")
+            self.assertEqual([path.stem for path in paths], self.study.tables)
+            for path in paths:
+                self.assertTrue(pl.read_parquet(path).equals(self.study.table(path.stem, frames="polars")), path)
+        with unittest.mock.patch("importlib.util.find_spec", lambda name: None):
+            with self.assertRaises(curvelax.RequestError) as caught:
+                self.study.to_parquet(self.at / "none")
+        self.assertIn("pip install", str(caught.exception))
+
     def test_every_bit_of_a_float_is_there(self):
         summary = self.study.summary
         text = pd.read_csv(self.study.folder / "summary.csv", dtype=str)
@@ -277,6 +319,69 @@ class Package(unittest.TestCase):
         self.assertEqual(len(one.summary), 3)
         path = curvelax.run(shape=self.at / "one.csv", **SMALL)
         self.assertEqual(path.spec["shape"], f"file:{self.at / 'one.csv'}")
+
+    def test_geometries_are_outlines_with_their_labels_and_properties(self):
+        """As Shapely and GeoPandas give them, by the interface that they share."""
+
+        class Geometry:
+            def __init__(self, interface):
+                self.__geo_interface__ = interface
+
+        def polygon(*rings):
+            return {"type": "Polygon", "coordinates": [[*map(tuple, ring), tuple(ring[0])] for ring in rings]}
+
+        def times(shape, **keys):
+            study = curvelax.run(**{**SMALL, "curves": 1, "amplitude": 0, **keys}, shape=shape)
+            self.assertEqual(study.warnings, [])
+            return dict(zip(study.summary.label, study.summary.t_relax)), study
+
+        arrays = {"a": ellipse(2, 1), "b": ellipse(1.5, 1)}
+        wanted, _ = times(arrays)
+        geometries = {label: Geometry(polygon(points)) for label, points in arrays.items()}
+        with warnings.catch_warnings():
+            # Coordinates of a plane need no note, though they could be degrees.
+            warnings.simplefilter("error", curvelax.CurvelaxWarning)
+            found, _ = times(geometries)
+        self.assertEqual(found, wanted)
+        rings = {label: Geometry({**polygon(points), "type": "LinearRing"}) for label, points in arrays.items()}
+        for ring, points in zip(rings.values(), arrays.values()):
+            ring.__geo_interface__["coordinates"] = ring.__geo_interface__["coordinates"][0]
+        self.assertEqual(times(rings)[0], wanted)
+        features = [
+            {"type": "Feature", "id": label, "properties": {"kind": np.int64(i), "day": np.datetime64("2026-01-01")},
+             "geometry": polygon(points), "bbox": (0, 0, 1, 1)}
+            for i, (label, points) in enumerate(arrays.items())
+        ]
+        frame = Geometry({"type": "FeatureCollection", "features": features})
+        found, study = times(frame, group_by="kind")
+        self.assertEqual(found, wanted)
+        self.assertEqual(study.summary.group.tolist(), ["0", "1"])
+        # Degrees are projected, if a frame says that they are.
+        frame.crs = type("Crs", (), {"is_geographic": True})
+        with self.assertWarnsRegex(curvelax.CurvelaxWarning, r"^shape: feature 1 \(`a`\): lon,lat projected"):
+            far = curvelax.run(**{**SMALL, "curves": 1, "amplitude": 0}, shape=frame).summary.t_relax
+        self.assertGreater(far[0], 1e6)
+        # Many members of one outline, as for an array.
+        both = [curvelax.run(**SMALL, shape=shape).summary.t_relax.tolist() for shape in (ellipse(2, 1), geometries["a"])]
+        self.assertEqual(*both)
+        self.assertEqual(len(set(both[0])), 3)
+        for shape, words in [
+            (Geometry(polygon(ellipse(2, 1), ellipse(0.5, 0.5))), ["shape", "hole"]),
+            (Geometry({"type": "Point", "coordinates": (0, 0)}), ["shape", "Point"]),
+            (Geometry({"type": "LineString", "coordinates": [(0, 0), (1, 0), (1, 1)]}), ["shape: feature 1 is an open line"]),
+            ([geometries["a"], ellipse(2, 1)], ["shape['1']", "arrays and geometries"]),
+        ]:
+            message = self.refused(*words, shape=shape)
+            self.assertNotIn("/", message.replace("n/2", ""), "a path of a file that nobody wrote")
+
+    def test_contours_of_opencv_are_outlines(self):
+        contour = np.round(1000 * ellipse(2, 1, 200)).astype(np.int32)
+        keys = {**SMALL, "curves": 1, "amplitude": 0}
+        wanted = curvelax.run(**keys, shape=contour).summary
+        for shape in (contour[:, np.newaxis], [contour[:, np.newaxis]], (contour[:, np.newaxis],)):
+            self.assertEqual(curvelax.run(**keys, shape=shape).summary.t_relax.tolist(), wanted.t_relax.tolist())
+        # Three axes are otherwise several outlines.
+        self.assertEqual(len(curvelax.run(**keys, shape=np.stack([contour, 2 * contour])).summary), 2)
 
     def test_outlines_stay_with_their_run(self):
         out = self.at / "outlines"
@@ -462,6 +567,34 @@ class Package(unittest.TestCase):
         with self.assertRaises(ZeroDivisionError):
             curvelax.run(**{**SMALL, "curves": 100_000, "progress": fail})
 
+    def test_messages_name_keywords_and_not_flags(self):
+        self.assertRegex(self.refused(points=5), r"^points=5: .* use 6 to")
+        self.assertIn("use points=160 or more", self.refused(modes="2..=40", points=40))
+        self.assertIn("`t_end`", self.refused(curvs=3))
+        self.assertNotIn("`t-end`", self.refused(curvs=3))
+        with self.assertWarns(curvelax.CurvelaxWarning) as caught:
+            study = curvelax.run(**{**SMALL, "t_end": 0.01})
+        self.assertIn("use a longer t_end, or a larger relax_to", str(caught.warning))
+        self.assertEqual(study.warnings, [str(caught.warning)])
+        # Where the user's line is, not one of the package.
+        self.assertEqual(caught.filename, __file__)
+
+    def test_whole_floats_are_integers(self):
+        study = curvelax.run(**{**SMALL, "curves": 3.0, "points": np.float64(32), "t_end": 5.0})
+        self.assertEqual((study.spec["curves"], study.spec["points"], study.spec["t-end"]), (3, 32, 5.0))
+        self.assertIn("2.5", self.refused(curves=2.5))
+
+    def test_progress_without_tqdm_is_a_line(self):
+        shown = io.StringIO()
+        shown.isatty = lambda: True
+        with unittest.mock.patch.dict(sys.modules, {"tqdm.auto": None}), contextlib.redirect_stderr(shown):
+            curvelax.run(**{**SMALL, "progress": True, "curves": 2000})
+            curvelax.run(**{**SMALL, "progress": None, "curves": 2000})
+        lines = shown.getvalue().split("\r")
+        self.assertRegex(lines[1], r"^ *\d+ % \d+ of 2000 members$")
+        self.assertEqual((lines[-2].strip(), lines[-1]), ("", ""))
+        self.assertNotIn("\n", shown.getvalue())
+
     def test_an_interrupted_run_leaves_what_ended_and_is_resumed(self):
         out = self.at / "interrupted"
         # A job in the background ignores Ctrl-C.
@@ -480,7 +613,7 @@ class Package(unittest.TestCase):
             curvelax.run(**{**keys, "progress": interrupt}, out=out)
         self.assertIsInstance(caught.exception, curvelax.Interrupted)
         self.assertEqual(caught.exception.folder, out)
-        self.assertIn("stopped by Ctrl-C", str(caught.exception))
+        self.assertRegex(str(caught.exception), r"stopped by Ctrl-C after .* of 2000 members in the table; curvelax\.resume\('")
         # The interpreter lives, and so does its own Ctrl-C.
         with self.assertRaises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
@@ -529,11 +662,12 @@ class Package(unittest.TestCase):
                 os.chdir(before)
         self.assertGreater(found, 15)
 
-    def test_the_tutorial_runs_to_its_figure(self):
+    def names_of(self, page, figure):
+        """The names that the blocks of a page define; its figure is a picture."""
         import matplotlib
 
         matplotlib.use("Agg")
-        blocks = re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/tutorial.md").read_text(), re.DOTALL | re.MULTILINE)
+        blocks = re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.DOTALL | re.MULTILINE)
         self.assertGreater(len(blocks), 5)
         names = {}
         before = os.getcwd()
@@ -545,17 +679,38 @@ class Package(unittest.TestCase):
                     with contextlib.redirect_stdout(io.StringIO()) as told:
                         exec(block, names)  # noqa: S102
                     print(told.getvalue(), end="")
-                self.assertEqual(pathlib.Path("jamaica.png").read_bytes()[:4], b"\x89PNG")
+                self.assertEqual(pathlib.Path(figure).read_bytes()[:4], b"\x89PNG")
                 if "KEEP_FIGURE" in os.environ:
-                    shutil.copy("jamaica.png", os.environ["KEEP_FIGURE"])
+                    shutil.copy(figure, os.environ["KEEP_FIGURE"])
             finally:
                 os.chdir(before)
+        return names
+
+    def test_the_tutorial_runs_to_its_figure(self):
+        names = self.names_of("docs/tutorial.md", "jamaica.png")
         cells, coast = names["cells"], names["coast"]
         self.assertEqual(cells.relaxed.tolist(), [32, 32, 32])
         # What the text says of the bars.
         half = (cells.t_limit_median_high - cells.t_limit_median_low) / 2
         self.assertTrue((cells.t_limit_error < half).all())
         self.assertTrue((coast.t_error < 0.1 * coast.t_limit) and not names["best"].empty)
+
+    def test_the_study_of_an_image_runs_to_its_figure(self):
+        names = self.names_of("docs/segmentation.md", "coins.png")
+        particle, best = names["particle"], names["best"]
+        self.assertEqual((len(particle), set(particle.status)), (23, {"relaxed"}))
+        self.assertEqual(particle.index.tolist(), list(names["particles"]))
+        # What the text says: elongation explains most, size little, and the bars are small.
+        self.assertEqual(best.feature.iloc[0], "descriptor_2")
+        self.assertGreater(best.spearman.iloc[0], 0.9)
+        self.assertLess(abs(particle.area_start.corr(particle.t_limit, method="spearman")), 0.3)
+        self.assertTrue((names["share"].median() < 0.01).all())
+
+    def test_the_reference_is_that_of_the_package(self):
+        page = reference.PAGE.read_text(encoding="utf-8")
+        self.assertEqual(page, reference.page(), "python tests/python/reference.py rewrites it")
+        for name in curvelax.__all__:
+            self.assertIn(f"## `curvelax.{name}", page)
 
     def test_types_are_told_to_checkers(self):
         own = resources.files("curvelax")

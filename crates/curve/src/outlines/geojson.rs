@@ -3,7 +3,7 @@
 //! Every Polygon is an outline, every polygon of a MultiPolygon is one of its own, and so is a closed LineString. Holes
 //! are refused. Coordinates are longitude and latitude in degrees, as the RFC says, except in two cases: the member `crs`
 //! of the older GeoJSON 2008 is null or names another reference system, or coordinates of the file are no degrees. They
-//! are then taken as coordinates of the plane, and a note says so.
+//! are then taken as coordinates of the plane, and a note says so, except of null.
 
 use std::borrow::Cow;
 
@@ -77,17 +77,19 @@ pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>>
     let numbered = file.features.is_some();
     let read = |(index, text)| read(source, index + 1, text, bare, numbered);
     let mut pieces: Vec<Result<Piece>> = features.into_iter().enumerate().flat_map(read).collect();
-    let note = match &file.crs {
-        Some(crs) if !names_degrees(crs) => Some(OTHER_SYSTEM),
-        Some(_) => None,
+    let (in_degrees, note) = match &file.crs {
+        // Whoever writes null says that there is no system.
+        Some(Value::Null) => (false, None),
+        Some(crs) if !names_degrees(crs) => (false, Some(OTHER_SYSTEM)),
+        Some(_) => (true, None),
         None => {
             let all = pieces.iter().flatten().flat_map(|piece| &piece.ring.points);
             let are_degrees = |p: &DVec2| p.x.abs() <= 180.0 && p.y.abs() <= 90.0;
-            (!{ all }.all(are_degrees)).then_some(NOT_DEGREES)
+            if { all }.all(are_degrees) { (true, None) } else { (false, Some(NOT_DEGREES)) }
         }
     };
     for piece in pieces.iter_mut().flatten() {
-        piece.in_degrees = note.is_none();
+        piece.in_degrees = in_degrees;
         piece.notes.extend(note);
     }
     Ok(pieces)

@@ -178,10 +178,13 @@ fn coordinates_of_geojson_are_degrees_unless_the_file_says_or_shows_otherwise() 
             &["feature 1, point 1: (500.0, 0.0) is not a longitude"],
         );
     }
-    for crs in [named("urn:ogc:def:crs:EPSG::25832"), named("EPSG:14326"), Value::Null] {
+    for crs in [named("urn:ogc:def:crs:EPSG::25832"), named("EPSG:14326")] {
         let (warning, area) = said(&with_crs(crs, &near));
         assert!(warning.contains("by its `crs` the file has coordinates of the plane") && area == 0.5, "{warning}");
     }
+    let all = read("map.geojson", &with_crs(Value::Null, &near));
+    assert!(all[0].outline.warnings().is_empty(), "{:?}", all[0].outline.warnings());
+    assert_eq!(polygon::signed_area(all[0].outline.vertices()), 0.5);
 }
 
 #[test]

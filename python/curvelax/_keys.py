@@ -1,0 +1,194 @@
+"""The keys of a spec as keywords of :func:`curvelax.run`, for editors and type checkers."""
+
+# Generated from the program: UPDATE_DOCS=1 cargo test --test it documents
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, TypedDict
+
+
+class Keys(TypedDict, total=False):
+    """What ``curvelax.run`` takes; flags of ``curvelax run`` with ``_`` for ``-``."""
+
+    curves: int
+    """Members of the ensemble; of several outlines, copies of each, and one as it is if the flag is not given. By
+    default 256."""
+
+    points: int
+    """Nodes per member, n ≥ 6. By default 100."""
+
+    seed: int
+    """Seed of the random perturbations. By default 1."""
+
+    shape: Any
+    """Base curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],...; or outlines as
+    CSV, GeoJSON, WKT or NumPy arrays: file:PATH, or files:PATTERN such as 'files:outlines/*.csv'. Each of several
+    outlines is a member. Paths are relative to the current folder, also in a spec file. Any number may be a
+    distribution, drawn for each member: uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA)
+    with SIGMA the standard deviation of the logarithm, or choice(A,B,...). By default ellipse:2,1."""
+
+    outlines: int
+    """Refuse outlines of another number than this, which a run fills in. By default any number."""
+
+    group_by: str
+    """Compare the outlines by the values of this property of their features, column of their table, or `file`. By
+    default no groups."""
+
+    sampling: Literal["parameter", "arclength", "points"]
+    """Placement of the nodes on the curve. By default arclength."""
+
+    interpolate: Literal["auto", "spline", "polygon"]
+    """How the curve of an outline runs between its points: as a polygon, as a cubic spline, or (auto) as a spline
+    with corners where the direction turns by more than half a radian. By default auto."""
+
+    rounding: float
+    """Smallest radius of curvature of an outline's corners, as a share of the outline's length, 0.0001 to 0.02; 0
+    leaves them to the nodes. By default 0.002."""
+
+    amplitude: float | str
+    """Size σ of the random perturbation, 0 for none; or a distribution, as for shape. By default 0.05."""
+
+    modes: str
+    """Modes of the random perturbation. By default 2..=8."""
+
+    decay: float | str
+    """Power p: mode m has standard deviation σ m^-p; or a distribution, as for shape. By default 1."""
+
+    perturbation: Literal["amplitude-phase", "gaussian"]
+    """Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of cos
+    and sin with the same power. By default amplitude-phase."""
+
+    design: Literal["random", "sobol", "lhs"]
+    """How the members of a cell are spread over the distributions of shape, flow, amplitude and decay: each on its
+    own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay random. By default
+    random."""
+
+    sweep: Mapping[str, Sequence[Any]]
+    """Run a cell for each value of this key, and for each combination if several keys are swept. Separate values that
+    contain commas by semicolons: sweep 'shape=ellipse:2,1;circle:1'. By default none."""
+
+    common_random_numbers: bool
+    """Draw member j of every cell from the same random numbers. By default false."""
+
+    only: Sequence[int]
+    """Run only these members; each is bit-identical to its run in the whole ensemble. By default all."""
+
+    shard: str
+    """Run only the members j with j mod N = I, for `curvelax merge`; `slurm` reads I/N from the job array. By default
+    all."""
+
+    flow: str
+    """Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions, as for
+    shape. By default surface-diffusion."""
+
+    mobility: float
+    """Mobility B in length^4/time, for surface diffusion D_s gamma Omega^2 nu/(k_B T): times are then in the unit of
+    time that it has, in all flags and all results. By default 1."""
+
+    units: str
+    """Names of the units of length and time, such as um,h, for the report and the axes. By default none."""
+
+    tau: float | Literal["auto"]
+    """Fixed time step τ. auto is R^4/4000 for each member. By default 0.001."""
+
+    adaptive: float | bool
+    """Adapt the steps to this local error instead of using tau. Without TOL it is 0.001; write adaptive=TOL before
+    SPEC.toml. By default off."""
+
+    t_end: float | Literal["auto"] | Sequence[float]
+    """Final time. auto ends a member when it is relaxed, or at six times what theory expects of its cell's curve.
+    T1,T2,... is a time for each cell of a sweep. By default 2."""
+
+    omega: float | Literal["auto"]
+    """Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member. By default 1
+    with tau, auto with adaptive and tau auto."""
+
+    no_redistribution: bool
+    """Move nodes along the normal only. By default false."""
+
+    relax_to: float
+    """Count a member as relaxed at this fraction of its initial excess. By default 0.01."""
+
+    relax_at: float
+    """Count a member as relaxed at this excess, L^2/(4 pi A) minus that of the regular polygon, instead of relax-to.
+    Use it for rough outlines. By default off."""
+
+    stop_when_relaxed: bool
+    """End a member as soon as it is relaxed. By default false, true with t-end auto."""
+
+    accurate: bool
+    """What we recommend for numbers to publish: adaptive pull auto omega auto t-end auto stop-when-relaxed refine.
+    Each can still be set on its own. By default off."""
+
+    refine: bool
+    """Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n →
+    ∞: columns t_limit, t_error, order and points of summary.csv. Members whose times do not converge there also run
+    with √2 n, 2n, … up to 1600 nodes. By default false."""
+
+    accuracy: float
+    """Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for sampling
+    and discretisation together, is within X times the median. The number of outlines is given: for them n and the
+    tolerance are chosen so that each t_error is within X times t_limit. curves, points and adaptive are what it
+    begins with. If X cannot be reached, the run has the best that was, and exits with code 3. Needs refine. By
+    default off."""
+
+    pull: float | Literal["auto"]
+    """Rate κ, in 1/time, at which the scheme's k and r are pulled to the polygon's. auto is 4 x 24/R^4 for each
+    member; 0 is the paper's scheme. By default 0."""
+
+    form: Literal["paper", "geometric", "auto"]
+    """What moves the nodes: paper uses the scheme's own curvatures and lengths, geometric the force of the polygon
+    itself. That halves the error of smooth, well resolved curves, and fails for others; auto is paper. By default
+    paper."""
+
+    solver: Literal["auto", "gauss-seidel", "direct"]
+    """Solver of the pentadiagonal systems. auto is gauss-seidel with tau and direct with adaptive. By default
+    auto."""
+
+    order: Literal["coloured", "lexicographic"]
+    """Order in which a sweep visits the nodes. By default coloured."""
+
+    tolerance: float | bool
+    """Residual tolerance at which sweeps stop. By default 1e-3 in f32, 1e-5 in f64."""
+
+    sor: float | Literal["auto"]
+    """Over-relaxation of the sweeps of gauss-seidel. 1 is the paper's; auto follows the stiffness of each system. By
+    default 1."""
+
+    max_sweeps: int
+    """Maximum sweeps per system; a member that needs more has stalled. By default 200000."""
+
+    backend: Literal["auto", "gpu", "cpu"]
+    """Where to run; auto uses a hardware GPU if there is one, otherwise the CPU. By default auto."""
+
+    adapter: str
+    """GPU adapter to use: part of its name, or its number in `curvelax adapters`. By default the best."""
+
+    precision: Literal["f32", "f64"]
+    """Number type. By default f64 where the device has it."""
+
+    threads: int
+    """Threads of the CPU back end. By default all cores."""
+
+    event: str | Sequence[str]
+    """Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL. A
+    level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio and
+    metric_drift. For several events give it several times: event 'convex = k_min >= 0' event 'slow = excess <= 0.5 *
+    start'. By default none."""
+
+    events: Mapping[str, str]
+    """Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL. A
+    level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio and
+    metric_drift. For several events give it several times: event 'convex = k_min >= 0' event 'slow = excess <= 0.5 *
+    start'. By default none."""
+
+    series: float
+    """Write series.csv: one row per member every DT. By default off."""
+
+    snapshots: Sequence[float]
+    """Write snapshots.csv: all nodes at these times. By default off."""
+
+    store: Literal["csv", "zarr"]
+    """Format of the snapshots: the table snapshots.csv, or the arrays of snapshots.zarr, for xarray. By default
+    csv."""
