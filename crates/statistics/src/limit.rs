@@ -23,7 +23,7 @@ const ORDERS: std::ops::RangeInclusive<f64> = 1.7..=2.6;
 /// Relative difference between resolutions below which they are as small as the errors of the steps, and have no order.
 const SMALL: f64 = 5e-5;
 /// The error of space in units of the estimate of the term in h⁶.
-const OF_SPACE: f64 = 1.1;
+const OF_SPACE: f64 = 1.25;
 /// The same where terms do not fall yet, with θ ≤ 1 in place of θ².
 const OF_OPEN: f64 = 1.25;
 /// The factor by which terms fall in units of that from the one in h² to the one in h⁴.
@@ -41,7 +41,7 @@ pub const FINER_STEPS: f64 = 10.0;
 /// The error of steps: as a share of what these change, and in units of their tolerance over the root of the excess, relative
 /// to the time, since the change may be small by chance.
 const OF_STEPS: f64 = 0.15;
-const OF_TOLERANCE: f64 = 0.0035;
+const OF_TOLERANCE: f64 = 0.0045;
 /// Orders that are looked for.
 const ALL_ORDERS: std::ops::Range<f64> = 0.05..8.0;
 /// Halvings of that range: to the last bit.
@@ -51,7 +51,7 @@ const HALVINGS: usize = 60;
 const WIDE: f64 = 1e-3;
 /// Turn of the tangent at a node above which no bound is believed, and above [`MAX_TURN`] none without an order: three times
 /// may agree by chance.
-const BLIND_TURN: f64 = 0.9;
+const BLIND_TURN: f64 = 0.7;
 
 /// One time, computed at several resolutions.
 #[derive(Clone, Debug, PartialEq)]
@@ -300,7 +300,7 @@ mod tests {
         let (points, tolerance, excess, is_adaptive) = (vec![53, 75, 106], 1e-4, 0.012, true);
         let times = Times { own, levels, points, own_level: 2, tolerance, is_adaptive, turn: 1.36, excess };
         let chance = Limit::of(&times);
-        assert!(chance.relative_error() < WIDE && chance.needs_more(1.36) && !chance.needs_more(0.89), "{chance:?}");
+        assert!(chance.relative_error() < WIDE && chance.needs_more(1.36) && !chance.needs_more(0.69), "{chance:?}");
         // A time that passes its largest value between levels has no order.
         let levels = vec![1.000672, 1.001219, 1.001099];
         let (points, tolerance, excess) = (vec![40, 57, 80], 1e-4, 0.012);
