@@ -329,11 +329,7 @@ fn what_is_no_finished_run_of_this_program_is_refused() {
         fs::remove_file(json(out)).unwrap();
         fs::rename(out.join("summary.csv"), out.join(".summary.csv.part")).unwrap();
     };
-    refused(
-        &done,
-        unfinished,
-        "out: the run there has not finished; curvelax resume out continues it",
-    );
+    refused(&done, unfinished, "out: the run there has not finished; curvelax resume out continues it");
     // The same folder while a run writes there.
     let in_use = TempDir::new().unwrap();
     fs::create_dir(in_use.path().join("out")).unwrap();

@@ -301,7 +301,11 @@ fn shards_that_are_not_what_they_were_are_refused_by_name() {
     let run = String::from_utf8(copies("s/1/run.json")).unwrap();
     let began = &run[run.find("\"started\"").unwrap()..][..33];
     let later = run.replacen(began, "\"started\": \"1999-01-01T00:00:00Z\"", 1);
-    spoil("s/1/run.json", later.as_bytes(), &["of another run: begun at 1999-01-01T00:00:00Z, and that of shard.state"]);
+    spoil(
+        "s/1/run.json",
+        later.as_bytes(),
+        &["of another run: begun at 1999-01-01T00:00:00Z, and that of shard.state"],
+    );
 
     // Intact, but of another program, or from elsewhere.
     let record = shard::from_bytes(&state).unwrap();

@@ -335,7 +335,16 @@ mod tests {
         let at = |is_adaptive: bool| {
             let (levels, points) = (levels.clone(), POINTS.to_vec());
             let (own_level, tolerance, turn, excess) = (2, 1e-4, 0.1, 1e-2);
-            Limit::of(&Times { own: levels[2] + 0.009, levels, points, own_level, tolerance, is_adaptive, turn, excess })
+            Limit::of(&Times {
+                own: levels[2] + 0.009,
+                levels,
+                points,
+                own_level,
+                tolerance,
+                is_adaptive,
+                turn,
+                excess,
+            })
         };
         let [adaptive, other] = [true, false].map(at);
         assert!((adaptive.t - 2.0).abs() < 1e-12 && (other.t - 2.001).abs() < 1e-12, "{adaptive:?} {other:?}");
