@@ -159,7 +159,9 @@ fn taken_falls_to(taken: Taken, excess: real) -> bool {
 
 /// A field inside the step of an attempt, which ends at `end`, by the weights that `w` is.
 fn field_inside(w: Arc, field: u32, end: vec) -> vec {
-    return w.start.value * load_field(CURVE + field) + w.start.slope * load_field(SLOPE + field)
+    var begin = load_field(CURVE + field);
+    if is_of_places(field) { begin = coordinate(begin); }
+    return w.start.value * begin + w.start.slope * load_field(SLOPE + field)
         + w.start.bend * load_field(BEND + field) + w.end.value * end
         + w.end.slope * load_field(SLOPE_BEFORE + field) + w.end.bend * load_field(BEND_BEFORE + field);
 }

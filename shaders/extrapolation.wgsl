@@ -70,10 +70,10 @@ fn end_part(part: u32) {
 
 /// Adds the curve at the end of a part, `left` parts before the end of its row.
 fn add_part(left: u32, shares: Shares) {
-    let change_x = change_from(load_field(CURVE), here(new_x));
-    let change_y = change_from(load_field(CURVE + 1u), here(new_y));
-    let change_k = change_from(load_field(CURVE + 2u), new_k);
-    let change_r = change_from(load_field(CURVE + 3u), new_r);
+    let change_x = change_from(0u, load_field(CURVE), here(new_x));
+    let change_y = change_from(1u, load_field(CURVE + 1u), here(new_y));
+    let change_k = change_from(2u, load_field(CURVE + 2u), new_k);
+    let change_r = change_from(3u, load_field(CURVE + 3u), new_r);
     add_share(BEND_BEFORE, shares.bend, change_x, change_y, change_k, change_r);
     if left < 2u { add_share(SLOPE_BEFORE, shares.slope, change_x, change_y, change_k, change_r); }
     if left > 0u { return; }
@@ -100,12 +100,12 @@ fn add_share(base: u32, share: real, change_x: vec, change_y: vec, change_k: vec
 fn finish_attempt() {
     let x = load_field(CURVE);
     let y = load_field(CURVE + 1u);
-    let moved = windows(advanced(x, load_field(BEFORE)), advanced(y, load_field(BEFORE + 1u)));
-    new_x = moved.a;
-    new_y = moved.b;
+    let nodes = windows(advanced(0u, x, load_field(BEFORE)), advanced(1u, y, load_field(BEFORE + 1u)));
+    new_x = nodes.a;
+    new_y = nodes.b;
     displaced(x, y);
-    new_k = advanced(load_field(CURVE + 2u), load_field(BEFORE + 2u));
-    new_r = advanced(load_field(CURVE + 3u), load_field(BEFORE + 3u));
+    new_k = advanced(2u, load_field(CURVE + 2u), load_field(BEFORE + 2u));
+    new_r = advanced(3u, load_field(CURVE + 3u), load_field(BEFORE + 3u));
 }
 
 /// The largest differences between orders, of k and r, of the order of the attempt and of the one below; of x and y, of

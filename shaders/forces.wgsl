@@ -1,5 +1,5 @@
 // The forces on a curve: beta, and b(k) = c1 k + ... + c8 k^8 and phi(k) = k^2 - b(k)/k by Horner's rule without division;
-// the density of the energy. Twin of crates/flow/src/scheme/forces.rs.
+// the density of the energy. Twin of crates/flow/src/scheme/law.rs and crates/flow/src/scheme/forces.rs.
 
 /// The place of the length penalty in the law, after the coefficients.
 const LENGTH_PENALTY = 8u;
@@ -51,8 +51,8 @@ struct Force { x: vec, y: vec }
 /// `q (βN + αT)` at the nodes of the old polygon: the second difference of its own curvature and b along the inward
 /// normal to the chord between the neighbours, and alpha along the chord.
 fn of_polygon(wx: Window, wy: Window) -> Force {
-    let x = rises(wx);
-    let y = rises(wy);
+    let x = rises_of_places(wx);
+    let y = rises_of_places(wy);
     let e = edge(x.here, y.here);
     let f = edge(x.plus1, y.plus1);
     let own = bent(e, f);

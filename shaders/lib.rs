@@ -31,6 +31,7 @@ files! {
     NUMBER "number.wgsl",
     OBSERVE "observe.wgsl",
     PACE "pace.wgsl",
+    PLACE "place.wgsl",
     POSITION "position.wgsl",
     PULL "pull.wgsl",
     REDISTRIBUTION "redistribution.wgsl",

@@ -29,8 +29,8 @@ fn quotient(length: real, area: real) -> real {
 var<private> displacement: vec;
 
 fn displaced(x: vec, y: vec) {
-    let moved_x = change_from(x, here(new_x));
-    let moved_y = change_from(y, here(new_y));
+    let moved_x = apart(x, here(new_x));
+    let moved_y = apart(y, here(new_y));
     displacement = sqrt(moved_x * moved_x + moved_y * moved_y);
 }
 
@@ -51,6 +51,13 @@ fn is_singular(turning: real) -> bool {
     return !(resolved && apart && measured && extended && sums.w == turning);
 }
 
+/// Coordinates of the nodes i-1 and i.
+struct Corner { before_x: vec, x: vec, before_y: vec, y: vec }
+
+fn corner(wx: Window, wy: Window) -> Corner {
+    return Corner(coordinate(minus1(wx)), coordinate(here(wx)), coordinate(minus1(wy)), coordinate(here(wy)));
+}
+
 /// The distance from equilibrium: the quotient minus that of the regular polygon.
 fn excess(length: real, area: real) -> real {
     return quotient(length, area) - all_parameters[member].polygon_ratio;
@@ -61,8 +68,8 @@ fn decline() -> vec2<real> {
     let slope = windows(load_field(SLOPE_BEFORE), load_field(SLOPE_BEFORE + 1u));
     settle();
     let bend = windows(load_field(BEND_BEFORE), load_field(BEND_BEFORE + 1u));
-    let ex = rises(new_x).here;
-    let ey = rises(new_y).here;
+    let ex = rises_of_places(new_x).here;
+    let ey = rises_of_places(new_y).here;
     let fx = rises(slope.a).here;
     let fy = rises(slope.b).here;
     let gx = rises(bend.a).here;
@@ -70,10 +77,11 @@ fn decline() -> vec2<real> {
     let inverse = vec(1.0) / sqrt(ex * ex + ey * ey);
     let stretch = (ex * fx + ey * fy) * inverse;
     let bent = (fx * fx + fy * fy + (ex * gx + ey * gy) - stretch * stretch) * inverse;
-    let area = (minus1(slope.a) * here(new_y) - here(slope.a) * minus1(new_y))
-        + (minus1(new_x) * here(slope.b) - here(new_x) * minus1(slope.b));
-    let area_bend = (minus1(bend.a) * here(new_y) - here(bend.a) * minus1(new_y))
-        + (minus1(new_x) * here(bend.b) - here(new_x) * minus1(bend.b))
+    let at = corner(new_x, new_y);
+    let area = (minus1(slope.a) * at.y - here(slope.a) * at.before_y)
+        + (at.before_x * here(slope.b) - at.x * minus1(slope.b));
+    let area_bend = (minus1(bend.a) * at.y - here(bend.a) * at.before_y)
+        + (at.before_x * here(bend.b) - at.x * minus1(bend.b))
         + real(2.0) * (minus1(slope.a) * here(slope.b) - here(slope.a) * minus1(slope.b));
     let part = vec(block_sum(stretch), block_sum(bent), block_sum(area), block_sum(area_bend));
     let all = ring_sums(part);
@@ -111,10 +119,11 @@ fn winding(ex: vec, ey: vec, fx: vec, fy: vec) -> vec {
 
 /// Observes the curve given by the windows of x and y and the nodes of k and r; `moved` is how far its nodes moved.
 fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
-    let x = rises(wx);
-    let y = rises(wy);
+    let x = rises_of_places(wx);
+    let y = rises_of_places(wy);
     let own = edge(x.here, y.here).length;
-    let cross = minus1(wx) * here(wy) - here(wx) * minus1(wy);
+    let at = corner(wx, wy);
+    let cross = at.before_x * at.y - at.x * at.before_y;
     let energy = energy_density(kh) * rh;
     let turning = winding(x.here, y.here, x.plus1, y.plus1);
     let part = vec(block_sum(own), block_sum(cross), block_sum(energy), block_sum(turning));
@@ -197,7 +206,10 @@ fn look_inside() -> Looks {
     for (var look = 0u; look < 2u; look++) {
         let weights = arc_weights(select(real(LATE_LOOK), real(EARLY_LOOK), look == 0u), plan.length, plan.taken);
         settle();
-        let nodes = windows(field_inside(weights, 0u, here(new_x)), field_inside(weights, 1u, here(new_y)));
+        let nodes = windows(
+            placed(field_inside(weights, 0u, coordinate(here(new_x)))),
+            placed(field_inside(weights, 1u, coordinate(here(new_y)))),
+        );
         let ks = field_inside(weights, 2u, new_k);
         observe(nodes.a, nodes.b, ks, field_inside(weights, 3u, new_r), vec(0.0));
         if look == 0u { looks.early = observed(); } else { looks.late = observed(); }

@@ -38,6 +38,6 @@ fn position_equation() {
 }
 
 fn residual_of_old(a: vec, b: vec, d: vec, e: vec, w: Window) -> vec {
-    let by = offsets(w);
+    let by = offsets_of_places(w);
     return -(a * by.minus2 + b * by.minus1 + d * by.plus1 + e * by.plus2);
 }

@@ -4,8 +4,8 @@
 struct Turn { angle: vec, span: vec, edge: vec }
 
 fn turn(wx: Window, wy: Window) -> Turn {
-    let x = rises(wx);
-    let y = rises(wy);
+    let x = rises_of_places(wx);
+    let y = rises_of_places(wy);
     let before = edge(x.minus1, y.minus1);
     let own = edge(x.here, y.here);
     let after = edge(x.plus1, y.plus1);

@@ -130,6 +130,18 @@ fn rises(w: Window) -> Rises {
     return Rises(minus1(w) - minus2(w), here(w) - minus1(w), plus1(w) - here(w), plus2(w) - plus1(w));
 }
 
+/// The same for places.
+fn offsets_of_places(w: Window) -> Offsets {
+    let at = here(w);
+    return Offsets(apart(at, minus2(w)), apart(at, minus1(w)), apart(at, plus1(w)), apart(at, plus2(w)));
+}
+
+fn rises_of_places(w: Window) -> Rises {
+    return Rises(
+        apart(minus2(w), minus1(w)), apart(minus1(w), here(w)), apart(here(w), plus1(w)), apart(plus1(w), plus2(w)),
+    );
+}
+
 /// By how much the square of a field at i+1 exceeds the one at i.
 fn rise_of_square(w: Window) -> vec {
     let at = here(w);

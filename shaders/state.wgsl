@@ -21,13 +21,20 @@ const PART = 30u;
 const GAPS = 34u;
 const NODE_GAPS = 38u;
 
-/// Entries of a curve after an increment.
-fn advanced(old: vec, increment: vec) -> vec {
+/// Whether the entries of a field of a curve are places.
+fn is_of_places(field: u32) -> bool {
+    return field < 2u;
+}
+
+/// Entries of this field of a curve after an increment.
+fn advanced(field: u32, old: vec, increment: vec) -> vec {
+    if is_of_places(field) { return moved(old, increment); }
     return old + increment;
 }
 
-/// How entries of a curve have changed.
-fn change_from(old: vec, now: vec) -> vec {
+/// How entries of this field of a curve have changed.
+fn change_from(field: u32, old: vec, now: vec) -> vec {
+    if is_of_places(field) { return apart(old, now); }
     return now - old;
 }
 

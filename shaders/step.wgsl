@@ -75,9 +75,9 @@ fn step(begun: Course, moves: bool) -> Course {
     }
     let x = load_field(curve);
     let y = load_field(curve + 1u);
-    let moved = windows(advanced(x, u), advanced(y, v));
-    new_x = moved.a;
-    new_y = moved.b;
+    let nodes = windows(advanced(0u, x, u), advanced(1u, y, v));
+    new_x = nodes.a;
+    new_y = nodes.b;
     displaced(x, y);
     new_r = here(r_new);
     if all_parameters[member].pull > real(0.0) { pull(); }
@@ -101,7 +101,7 @@ fn end_curvature(made: u32) {
 
 fn begin_positions() {
     find_member();
-    new_k = advanced(load_field(curve + 2u), u);
+    new_k = advanced(2u, load_field(curve + 2u), u);
     // Lengths are exchanged again, so that their windows take no registers in the first solve.
     let exchanged = windows(new_k, here(r_new));
     k_window = exchanged.a;

@@ -26,7 +26,9 @@ class Keys(TypedDict, total=False):
     CSV, GeoJSON, WKT or NumPy arrays: file:PATH, or files:PATTERN such as 'files:outlines/*.csv'. Each of several
     outlines is a member. Paths are relative to the current folder, also in a spec file. Any number may be a
     distribution, drawn for each member: uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA)
-    with SIGMA the standard deviation of the logarithm, or choice(A,B,...). By default ellipse:2,1."""
+    with SIGMA the standard deviation of the logarithm, halfnormal(SD), gamma(SHAPE,SCALE), weibull(SHAPE,SCALE),
+    choice(A,B,...), empirical(A,B,...); each(A,B,...) and table(FILE,COLUMN) have a value for each member; LAW in
+    A..B cuts a law. By default ellipse:2,1."""
 
     outlines: int
     """Refuse outlines of another number than this, which a run fills in. By default any number."""

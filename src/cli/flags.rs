@@ -58,8 +58,10 @@ pub struct SpecFlags {
     seed: Option<u64>,
     /// Base curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],...; or outlines as CSV,
     /// GeoJSON, WKT or NumPy arrays: file:PATH, or files:PATTERN such as 'files:outlines/*.csv'. Each of several outlines is
-    /// a member. Paths are relative to the current folder, also in a spec file. Any number may be a distribution, drawn for each member: uniform(A..B), loguniform(A..B), normal(MEAN,SD),
-    /// lognormal(MEDIAN,SIGMA) with SIGMA the standard deviation of the logarithm, or choice(A,B,...) [default: ellipse:2,1]
+    /// a member. Paths are relative to the current folder, also in a spec file. Any number may be a distribution, drawn for each member:
+    /// uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA) with SIGMA the standard deviation of the
+    /// logarithm, halfnormal(SD), gamma(SHAPE,SCALE), weibull(SHAPE,SCALE), choice(A,B,...), empirical(A,B,...); each(A,B,...) and
+    /// table(FILE,COLUMN) have a value for each member; LAW in A..B cuts a law [default: ellipse:2,1]
     #[arg(
         long, value_name = "SHAPE", value_parser = text_of::<Drawn<Shape>>, allow_hyphen_values = true,
         help_heading = ENSEMBLE

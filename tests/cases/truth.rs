@@ -212,7 +212,7 @@ fn misprinted_step(Linear { state, work, p }: &mut Linear) {
     new.k.close();
 
     position.assemble(&Position::new(curve, new, motion, p, p.branches()));
-    let law = p.law(p.branches().degree);
+    let law = p.law(p.branches().law);
     for i in 0..curve.len() {
         let ([_, before, _, after, _], ir) = (new.k.window(i), motion.ir[i]);
         let change = 0.5 * (law.phi(before) - law.phi(after)) * ir;

@@ -41,9 +41,47 @@ fn rows(folder: &Path) -> BTreeMap<u64, String> {
 }
 
 #[test]
+fn a_column_of_a_table_is_a_value_for_each_member_of_each_cell() {
+    let home = TempDir::new().unwrap();
+    fs::write(home.path().join("sizes.csv"), "label,size\na,0.02\nb,0.1\nc,0.05\n").unwrap();
+    let run = |amplitude: &str, more: &str, out: &str| {
+        let flags =
+            "--curves 3 --points 32 --adaptive=0.01 --t-end 0.1 --backend cpu --quiet --sweep flow=willmore,elastic:1";
+        done(home.path(), &format!("run {flags} --amplitude {amplitude} {more} --out {out}"));
+        tables(&home.path().join(out))
+    };
+    let from_table = run("table(sizes.csv,size)", "", "table");
+    let values: Vec<f64> = {
+        let members = &from_table["members.csv"];
+        let place = members.lines().next().unwrap().split(',').position(|name| name == "amplitude").expect(members);
+        members.lines().skip(1).map(|row| row.split(',').nth(place).unwrap().parse().unwrap()).collect()
+    };
+    assert_eq!(values, [0.02, 0.1, 0.05, 0.02, 0.1, 0.05]);
+    // The run can be repeated without the table, and a design changes nothing of it.
+    fs::remove_file(home.path().join("sizes.csv")).unwrap();
+    assert_eq!(run("each(0.02,0.1,0.05)", "", "each"), from_table);
+    assert_eq!(run("each(0.02,0.1,0.05)", "--design lhs", "lhs")["summary.csv"], from_table["summary.csv"]);
+    assert_ne!(run("each(0.02,0.05,0.1)", "", "other")["summary.csv"], from_table["summary.csv"]);
+    // A cut law stays within.
+    fs::write(home.path().join("cut.toml"), "amplitude = 'lognormal(0.05,1) in 0.04..0.06'").unwrap();
+    done(
+        home.path(),
+        "run cut.toml --curves 50 --points 32 --adaptive=0.01 --t-end 0.01 --backend cpu --quiet --out cut",
+    );
+    let cut = tables(&home.path().join("cut"));
+    let place = cut["members.csv"].lines().next().unwrap().split(',').position(|name| name == "amplitude").unwrap();
+    let drawn = |row: &str| row.split(',').nth(place).unwrap().parse::<f64>().unwrap();
+    assert!(
+        cut["members.csv"].lines().skip(1).all(|row| (0.04..=0.06).contains(&drawn(row))),
+        "{}",
+        cut["members.csv"]
+    );
+}
+
+#[test]
 fn an_impossible_distribution_is_one_clear_message_before_any_work() {
     for (arguments, parts) in [
-        ("--shape ellipse:normal(1,0.5),1", &["2.3 % of the members", "half-axis -", "lognormal"][..]),
+        ("--shape ellipse:normal(1,0.5),1", &["2.3 % of the members", "half-axis -", "cut it: LAW in A..B"][..]),
         ("--shape circle:uniform(-1..3)", &["25 % of the members", "the radius -"]),
         ("--shape ellipse:normal(1,-0.5),1", &["the standard deviation must be above 0", "normal(MEAN,SD)"]),
         ("--shape ellipse:uniform(3..1),1", &["the range is empty"]),
@@ -55,6 +93,9 @@ fn an_impossible_distribution_is_one_clear_message_before_any_work() {
         ("--amplitude uniform(0.1..0.9)", &["of the members would be refused", "0 to 0.5"]),
         ("--decay uniform(0..40)", &["--decay uniform(0..40): 50 % of the members", "-4 to 20"]),
         ("--shape flower:choice(2,30):0.1", &["100 nodes resolve no mode above 25"]),
+        ("--amplitude each(0.1,0.2) --curves 3", &["--amplitude each(...): 2 values for 3 members", "use --curves 2"]),
+        ("--amplitude table(sizes.csv,radius)", &["sizes.csv"]),
+        ("--amplitude gamma(-1,2)", &["the shape must be 0.1 to 10000", "gamma(SHAPE,SCALE)"]),
         ("--design halton", &["'halton'", "random, sobol, lhs"]),
         ("--perturbation normal", &["'normal'", "gaussian"]),
         (

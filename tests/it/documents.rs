@@ -440,6 +440,31 @@ fn every_link_leads_somewhere() {
     assert!(wrong.is_empty(), "links that lead nowhere:\n{}", wrong.join("\n"));
 }
 
+/// The paths between backticks, without those with a name to fill in.
+fn paths(text: &str) -> BTreeSet<&str> {
+    let is_path = |word: &&str| {
+        let mut characters = word.chars();
+        word.contains('/') && characters.all(|c| c.is_ascii_alphanumeric() || "_-./".contains(c))
+    };
+    let to_fill_in = |word: &&str| word.contains("NAME") || word.contains("MODULE");
+    let built = |word: &&str| word.starts_with("target/");
+    text.split('`').skip(1).step_by(2).filter(is_path).filter(|word| !to_fill_in(word) && !built(word)).collect()
+}
+
+#[test]
+fn the_recipes_name_files_that_exist_and_every_crate() {
+    let text = read(&root().join("CONTRIBUTING.md"));
+    // The recipe of a solver names the lists in tests by their last folders.
+    let missing = |path: &&str| !root().join(path).exists() && !root().join("tests").join(path).exists();
+    let paths = paths(&text);
+    assert_eq!(paths.iter().copied().filter(|path| missing(path)).collect::<Vec<_>>(), [""; 0]);
+    assert!(missing(&"crates/flow/src/none.rs") && paths.len() > 50, "{paths:?}");
+    for entry in fs::read_dir(root().join("crates")).unwrap() {
+        let path = format!("crates/{}", entry.unwrap().file_name().to_string_lossy());
+        assert!(paths.contains(&*path), "CONTRIBUTING.md does not say what {path} is");
+    }
+}
+
 #[test]
 fn a_link_that_leads_nowhere_is_found() {
     let text = "# A title, `b`\n<a id=\"c\"></a>\n[1](#a-title-b) [2](#c) [3](there.md#d) [4](#e) `[5](#f)` [6](gone.md)\n\n    \

@@ -166,7 +166,7 @@ impl NaturalScale {
         match self {
             NaturalScale::Velocity => {
                 let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
-                k() / (shortest * shortest) + p.law(p.branches().degree).b(k()).abs()
+                k() / (shortest * shortest) + p.law(p.branches().law).b(k()).abs()
             }
             NaturalScale::Tangential => work.motion.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
             NaturalScale::Length => longest(),

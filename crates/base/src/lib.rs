@@ -3,6 +3,7 @@
 
 pub mod drawable;
 pub mod error;
+pub mod gamma;
 pub mod guard;
 pub mod input;
 pub mod interval;

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 mod lanes;
+pub mod place;
 
 pub use lanes::{Element, Instructions, WithLanes, with_lanes};
 

@@ -1,10 +1,12 @@
 //! Tails of the chi-square, the normal and the beta distribution.
 //!
-//! The first is an incomplete gamma function: series and continued fraction as in Abramowitz and Stegun 6.5.29 and
-//! 6.5.31, the latter by Lentz's method. The last is an incomplete beta function: the continued fraction 26.5.8, likewise.
+//! The first is an incomplete gamma function. The last is an incomplete beta function: the continued fraction 26.5.8 of
+//! Abramowitz and Stegun, by Lentz's method.
 //!
 //! A probability that is too small for a normal f64 is returned as [`LEAST`], so that none is ever 0: an event that was
 //! seen is not impossible.
+
+use curvelax_base::gamma;
 
 /// The smallest probability that is returned.
 pub const LEAST: f64 = f64::MIN_POSITIVE;
@@ -13,49 +15,12 @@ pub const LEAST: f64 = f64::MIN_POSITIVE;
 ///
 /// The relative error is below 1e-13 for up to 200 degrees of freedom, and grows in proportion beyond.
 pub fn chi_square_tail(x: f64, degrees_of_freedom: usize) -> f64 {
-    if x <= 0.0 { 1.0 } else { upper_gamma(degrees_of_freedom as f64 / 2.0, x / 2.0).max(LEAST) }
+    if x <= 0.0 { 1.0 } else { gamma::upper(degrees_of_freedom as f64 / 2.0, x / 2.0).max(LEAST) }
 }
 
 /// Returns P(|Z| > |z|) for Z standard normal, at least [`LEAST`].
 pub fn normal_tails(z: f64) -> f64 {
     libm::erfc(z.abs() / std::f64::consts::SQRT_2).max(LEAST)
-}
-
-/// Q(a, x) = Γ(a, x)/Γ(a) for a > 0, x > 0.
-fn upper_gamma(a: f64, x: f64) -> f64 {
-    let front = (a * x.ln() - x - libm::lgamma(a)).exp();
-    // Each converges fast on its side. On the left, Q is not small, so 1 - P loses no digits.
-    if x < a + 1.0 { 1.0 - front * lower_series(a, x) } else { front * upper_fraction(a, x) }
-}
-
-/// Σ_j x^j / (a (a+1) … (a+j))
-fn lower_series(a: f64, x: f64) -> f64 {
-    let (mut term, mut sum, mut next) = (1.0 / a, 1.0 / a, a);
-    while term > sum * (0.1 * f64::EPSILON) {
-        next += 1.0;
-        term *= x / next;
-        sum += term;
-    }
-    sum
-}
-
-/// 1/(x+1-a - 1(1-a)/(x+3-a - 2(2-a)/(x+5-a - …))); all denominators are positive for x ≥ a + 1.
-fn upper_fraction(a: f64, x: f64) -> f64 {
-    let mut b = x + 1.0 - a;
-    let (mut c, mut d) = (f64::INFINITY, 1.0 / b);
-    let mut fraction = d;
-    for j in 1..MAX_TERMS {
-        let j = f64::from(j);
-        let numerator = -j * (j - a);
-        b += 2.0;
-        d = 1.0 / (numerator * d + b);
-        c = b + numerator / c;
-        fraction *= c * d;
-        if (c * d - 1.0).abs() < f64::EPSILON {
-            break;
-        }
-    }
-    fraction
 }
 
 /// Returns P(X ≤ x) for X with the law Beta(a, b), a > 0, b > 0; for whole numbers that of at most b - 1 successes among

@@ -53,8 +53,9 @@ impl Variant {
     }
 }
 
-const COMMON: [ShaderPart; 19] = [
+const COMMON: [ShaderPart; 20] = [
     shaders::NUMBER,
+    shaders::PLACE,
     shaders::RING,
     shaders::SUMS,
     shaders::MEMBER,

@@ -133,8 +133,17 @@ impl DrawnText {
             let name = head.rsplit(|c: char| !c.is_alphanumeric() && c != '-' && c != '_').next().unwrap_or_default();
             let open = || format!("`{}` has no closing parenthesis", echo(format_args!("{name}({tail}")));
             let (arguments, after) = tail.split_once(')').ok_or_else(open)?;
-            distributions.push(Distribution::of(name, arguments)?);
+            let law = Distribution::of(name, arguments)?;
             before.push(head[..head.len() - name.len()].to_owned());
+            // A range has neither commas nor colons, which separate the numbers of a shape.
+            let cut = after
+                .strip_prefix(" in ")
+                .map(|after| after.split_at(after.find([',', ':', ';']).unwrap_or(after.len())));
+            let (law, after) = match cut {
+                Some((range, after)) => (law.within(range)?, after),
+                None => (law, after),
+            };
+            distributions.push(law);
             rest = after;
         }
         Ok(DrawnText { before, distributions, after: rest.to_owned() })
@@ -275,7 +284,7 @@ impl fmt::Display for Refused {
             Some(share) => write!(f, "{} % of the members", rounded(100.0 * share, 2))?,
             None => write!(f, "a few members, under {} %", rounded(100.0 / COUNTED as f64, 1))?,
         }
-        write!(f, " would be refused ({reason}); narrow the distribution, or use uniform, loguniform or lognormal")
+        write!(f, " would be refused ({reason}); narrow the distribution, or cut it: LAW in A..B")
     }
 }
 
@@ -303,7 +312,7 @@ pub(crate) fn corners(distributions: &[&Distribution]) -> impl Iterator<Item = V
 
 /// The share of draws that fail.
 fn exact_share(of: &Distribution, fails: impl Fn(f64) -> bool) -> f64 {
-    if let Distribution::Choice(values) = of {
+    if let Distribution::Choice(values) | Distribution::Each(values) = of {
         return values.iter().filter(|value| fails(**value)).count() as f64 / values.len() as f64;
     }
     // Distances from the nearer end, where a tail may be thin.
@@ -355,9 +364,12 @@ mod tests {
 
     #[test]
     fn a_template_prints_as_it_is_read_and_takes_its_numbers_exactly() {
-        for text in
-            ["ellipse:uniform(1.2..3),1", "flower:choice(2,3,5):uniform(0.1..0.2):0.5,7:0.1", "circle:lognormal(1,0.2)"]
-        {
+        for text in [
+            "ellipse:uniform(1.2..3),1",
+            "ellipse:normal(2,0.5) in 1.2..3,gamma(4,0.3) in 0.5..1.5",
+            "flower:choice(2,3,5):uniform(0.1..0.2):0.5,7:0.1",
+            "circle:lognormal(1,0.2)",
+        ] {
             let drawn = shape(text);
             assert!(drawn.is_drawn());
             assert_eq!(drawn.to_string(), text);
@@ -387,7 +399,10 @@ mod tests {
     fn an_impossible_shape_is_refused_with_the_share_of_members() {
         let refusal = |text: &str| text.parse::<Drawn<Shape>>().unwrap_err();
         for (text, parts) in [
-            ("ellipse:normal(1,0.5),1", ["2.3 % of the members would be refused (the half-axis -", "lognormal"]),
+            (
+                "ellipse:normal(1,0.5),1",
+                ["2.3 % of the members would be refused (the half-axis -", "cut it: LAW in A..B"],
+            ),
             ("ellipse:normal(1,0.5),normal(1,0.5)", ["4.5 % of the members", "half-axis"]),
             ("circle:uniform(-1..3)", ["25 % of the members", "the radius -"]),
             ("circle:choice(1,2,-1,4)", ["25 % of the members", "the radius -1 is out of range"]),
@@ -400,6 +415,8 @@ mod tests {
             let message = refusal(text);
             assert!(parts.iter().all(|part| message.contains(part)), "{text}: {message}");
         }
+        assert!("ellipse:normal(1,0.5) in 0.1..3,1".parse::<Drawn<Shape>>().is_ok());
+        assert!(refusal("ellipse:normal(1,0.5) in 0.1,1").contains("not a range of finite numbers; write LAW in A..B"));
         // The smallest number that can be drawn is six deviations below the mean.
         assert!("circle:normal(1,0.15)".parse::<Drawn<Shape>>().is_ok());
         assert!("circle:normal(1,0.17)".parse::<Drawn<Shape>>().is_err());

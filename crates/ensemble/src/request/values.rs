@@ -56,7 +56,7 @@ impl Spec {
     /// # Errors
     /// [`Error::Request`] for values that cannot be, which a [valid](Spec::validate) spec does not have.
     pub fn values(&self, member: u64) -> Result<MemberValues<'_>> {
-        self.values_at(|place| self.design.uniform(&DrawAddress { member, ..place }))
+        self.values_at(|of, place| self.uniform(of, member, place))
     }
 
     /// Those of a member with this index in a study, in its cell.
@@ -75,7 +75,7 @@ impl Spec {
     /// The numbers that are drawn for `member`, as for [`Spec::values`], each with its name: that of its key, and its
     /// rank from 1 where the key is a shape or a flow.
     pub fn drawn_numbers(&self, member: u64) -> Vec<(String, f64)> {
-        let numbers = self.numbers(|place| self.design.uniform(&DrawAddress { member, ..place }));
+        let numbers = self.numbers(|of, place| self.uniform(of, member, place));
         drawn_names(self.drawn_counts()).into_iter().zip(numbers.into_iter().flatten()).collect()
     }
 
@@ -118,7 +118,7 @@ impl Spec {
             return vec![self.typical()];
         }
         let places: u32 = self.distributions().iter().map(|of_key| of_key.len() as u32).sum();
-        let tail = |place: u32, u: f64| self.values_at(|at| if at.coordinate == place { u } else { 0.5 });
+        let tail = |place: u32, u: f64| self.values_at(|_, at| if at.coordinate == place { u } else { 0.5 });
         let tails = (0..places).flat_map(|place| TAILS.map(|u| tail(place, u)));
         let members = (0..PROBED.min(self.members_per_cell())).map(|member| self.values(member));
         let probe = |values: Result<_>| values.unwrap_or_else(|_| self.typical());
@@ -135,6 +135,17 @@ impl Spec {
         if self.design == Design::Sobol && places > MAX_SOBOL {
             let problem = format!("{places} distributions; the sequence has {MAX_SOBOL} coordinates");
             return Err(Error::value("design", "sobol", &problem, "use random or lhs, or fewer distributions"));
+        }
+        let keys = ["shape", "flow", "amplitude", "decay"].into_iter().zip(self.distributions());
+        for (key, listed) in
+            keys.flat_map(|(key, of_key)| of_key.iter().filter_map(move |of| Some((key, of.listed()?))))
+        {
+            let (count, members) = (listed.len() as u64, self.members_per_cell());
+            if count != members {
+                let problem = format!("{count} values for {members} members");
+                let remedy = format!("each member has one: use --curves {count}, or as many values");
+                return Err(Error::value(key, "each(...)", &problem, &remedy));
+            }
         }
         // Cells are checked on their own.
         if ["amplitude", "modes", "decay"].into_iter().any(|key| self.sweep.has(key)) {
@@ -178,7 +189,15 @@ impl Spec {
         [shape.distributions(), flow.distributions(), amplitude.distributions(), decay.distributions()]
     }
 
-    fn values_at(&self, uniform: impl Fn(DrawAddress) -> f64) -> Result<MemberValues<'_>> {
+    /// The uniform number of `member` at a place: drawn, or the one that gives it its own of listed values.
+    fn uniform(&self, of: &Distribution, member: u64, place: DrawAddress) -> f64 {
+        match of.listed() {
+            Some(_) => ((member % place.members) as f64 + 0.5) / place.members as f64,
+            None => self.design.uniform(&DrawAddress { member, ..place }),
+        }
+    }
+
+    fn values_at(&self, uniform: impl Fn(&Distribution, DrawAddress) -> f64) -> Result<MemberValues<'_>> {
         let [shape, flow, amplitude, decay] = self.numbers(uniform);
         Ok(MemberValues {
             shape: own("shape", &self.shape, &shape)?,
@@ -189,13 +208,13 @@ impl Spec {
     }
 
     /// The numbers of each key, from the uniform ones of their places.
-    fn numbers(&self, uniform: impl Fn(DrawAddress) -> f64) -> [Vec<f64>; 4] {
+    fn numbers(&self, uniform: impl Fn(&Distribution, DrawAddress) -> f64) -> [Vec<f64>; 4] {
         let (seed, members) = (self.seed, self.members_per_cell());
         let (mut key, mut coordinate) = (0, 0);
         self.distributions().map(|of_key| {
             let number = |(rank, of): (u32, &Distribution)| {
                 let place = key << PLACE_BITS | rank;
-                let u = uniform(DrawAddress { seed, members, member: 0, place, coordinate: coordinate + rank });
+                let u = uniform(of, DrawAddress { seed, members, member: 0, place, coordinate: coordinate + rank });
                 of.quantile(u)
             };
             let numbers: Vec<f64> = (0..).zip(of_key).map(number).collect();

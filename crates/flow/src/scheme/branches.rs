@@ -5,7 +5,7 @@
 //! parameters of single members, compared by [`Group`](super::evolve::Group), and passed to the stages: no stage asks a
 //! number of several lanes which branch to take.
 
-use super::{Parameters, forces};
+use super::{Parameters, law::Kind};
 use crate::number::Real;
 
 /// The branches of one member, or of a group of members that share them.
@@ -21,8 +21,8 @@ pub struct Branches {
     pub geometric: bool,
     /// It pauses where an observable reaches a level.
     pub watched: bool,
-    /// Degree of `b(k)`.
-    pub degree: usize,
+    /// What of the law decides which instructions are run.
+    pub law: Kind,
 }
 
 impl<T: Real> Parameters<T> {
@@ -36,7 +36,7 @@ impl<T: Real> Parameters<T> {
             pulled: positive(self.pull),
             geometric: T::of(0.5).le(self.geometric),
             watched: T::of(0.5).le(self.watched),
-            degree: forces::degree(self),
+            law: self.kind_of_law(),
         }
     }
 }
@@ -60,7 +60,7 @@ mod tests {
             pulled: false,
             geometric: false,
             watched: false,
-            degree: 0,
+            law: Kind::default(),
         };
         assert_eq!(paper, none);
         let adaptive = branches("surface-diffusion", |p| p.adaptive = 1e-3);
@@ -71,7 +71,9 @@ mod tests {
         let geometric = branches("surface-diffusion", |p| p.geometric = 1.0);
         assert_eq!(geometric, Branches { geometric: true, ..paper });
         assert_eq!(branches("surface-diffusion", |p| p.watched = 1.0), Branches { watched: true, ..paper });
-        assert_eq!(branches("poly:0,-1,0,-0.0", |_| {}), Branches { degree: 2, ..paper });
-        assert_eq!(branches("willmore", |_| {}), Branches { degree: 3, ..paper });
+        for (flow, degree) in [("surface-diffusion", 0), ("poly:0,-1,0,-0.0", 2), ("willmore", 3)] {
+            let of_flow = branches(flow, |_| {});
+            assert_eq!((of_flow.law.degree, Branches { law: paper.law, ..of_flow }), (degree, paper), "{flow}");
+        }
     }
 }

@@ -1,7 +1,10 @@
 //! What lies inside an adaptive step: a polynomial through both of its ends. Twin of `shaders/dense.wgsl`.
 
-use super::{Curve, State, member::Progress};
-use crate::number::{BIG, Number, Real, ln_ratio};
+use super::{Curve, State, member::Progress, state::is_of_places};
+use crate::number::{
+    BIG, Number, Real, ln_ratio,
+    place::{coordinate, placed},
+};
 
 /// Multiple of ε below which the derivatives of ln excess are mostly rounding: their weights amplify it a thousand times,
 /// and the excess is a small difference of numbers near 1. In f32 this is most of a run.
@@ -160,15 +163,18 @@ impl<N: Number> Arc<N> {
         let starts = curve.fields().into_iter().zip(slope.fields()).zip(bend.fields());
         // During an attempt the derivatives at its end are in the place of those before.
         let ends = new.fields().into_iter().zip(slope_before.fields()).zip(bend_before.fields());
-        for (to, (start, end)) in part.fields_mut().into_iter().zip(starts.zip(ends)) {
+        for (field, (to, (start, end))) in part.fields_mut().into_iter().zip(starts.zip(ends)).enumerate() {
+            let is_place = is_of_places(field);
             let (((x0, u0), s0), ((x1, u1), s1)) = (start, end);
             for i in 0..x0.len() {
-                to[i] = a.value * x0[i]
+                let [from, end] = if is_place { [coordinate(x0[i]), coordinate(x1[i])] } else { [x0[i], x1[i]] };
+                let inside = a.value * from
                     + a.slope * u0[i]
                     + a.bend * s0[i]
-                    + b.value * x1[i]
+                    + b.value * end
                     + b.slope * u1[i]
                     + b.bend * s1[i];
+                to[i] = if is_place { placed(inside) } else { inside };
             }
             to.close();
         }

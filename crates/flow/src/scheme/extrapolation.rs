@@ -170,9 +170,9 @@ pub fn add_part<N: Number>(
     let State { curve, before, slope_before, bend_before, gaps, .. } = state;
     let changes = new.fields().into_iter().zip(curve.fields());
     let sums = before.fields_mut().into_iter().zip(slope_before.fields_mut()).zip(bend_before.fields_mut());
-    for ((new, old), ((value, slope), bend)) in changes.zip(sums) {
+    for (field, ((new, old), ((value, slope), bend))) in changes.zip(sums).enumerate() {
         for i in 0..new.len() {
-            let change = N::select(busy, change_from(old[i], new[i]), N::of(0.0));
+            let change = N::select(busy, change_from(field, old[i], new[i]), N::of(0.0));
             bend[i] += shares.bend * change;
             if left < 2 {
                 slope[i] += shares.slope * change;
@@ -186,8 +186,8 @@ pub fn add_part<N: Number>(
         return;
     }
     for i in 0..new.len() {
-        let change_k = N::select(busy, change_from(curve.k[i], new.k[i]), N::of(0.0));
-        let change_r = N::select(busy, change_from(curve.r[i], new.r[i]), N::of(0.0));
+        let change_k = N::select(busy, change_from(2, curve.k[i], new.k[i]), N::of(0.0));
+        let change_r = N::select(busy, change_from(3, curve.r[i], new.r[i]), N::of(0.0));
         gaps.k[i] += shares.gap * change_k;
         gaps.r[i] += shares.gap * change_r;
         gaps.lower_k[i] += shares.lower_gap * change_k;
@@ -197,7 +197,7 @@ pub fn add_part<N: Number>(
         let changes = [(&new.x, &curve.x), (&new.y, &curve.y)];
         for ((new, old), (gap, lower)) in changes.into_iter().zip(gaps.nodes.iter_mut().zip(&mut gaps.lower_nodes)) {
             for i in 0..new.len() {
-                let change = N::select(busy, change_from(old[i], new[i]), N::of(0.0));
+                let change = N::select(busy, change_from(0, old[i], new[i]), N::of(0.0));
                 gap[i] += shares.gap * change;
                 lower[i] += shares.lower_gap * change;
             }
@@ -210,8 +210,8 @@ pub fn add_part<N: Number>(
 pub fn finish_attempt<N: Number>(state: &mut State<N>, new: &mut Curve<N>) {
     let State { curve, before, slope_before, bend_before, .. } = state;
     let changes = before.fields().into_iter().zip(curve.fields());
-    for (new, (change, old)) in new.fields_mut().into_iter().zip(changes) {
-        state::advance(old, change, new);
+    for (field, (new, (change, old))) in new.fields_mut().into_iter().zip(changes).enumerate() {
+        state::advance(field, old, change, new);
     }
     slope_before.close();
     bend_before.close();

@@ -1,67 +1,21 @@
-//! The forces on a curve: the normal velocity `β = -∂²_s k + b(k)`, `φ(k) = k² - b(k)/k` of the position equation, and the
-//! density of the energy. Twin of `shaders/forces.wgsl`.
+//! The forces on a curve: the normal velocity `β = -∂²_s k + b(k)`, the force of the polygon, and the density of the energy.
+//! Twin of `shaders/forces.wgsl`.
 //!
-//! Nothing else reads the law of a member: a law of another kind is a change here and in [`Flow`](crate::flow::Flow).
+//! Nothing else reads the law of a member: another law is a change here, in [`law`](super::law) and in
+//! [`Flow`](crate::flow::Flow).
 
 use super::{
     Curve, Parameters,
+    law::Kind,
     state::{Motion, edge, vertex_turn},
 };
-use crate::{
-    flow::{LENGTH_PENALTY, MAX_DEGREE},
-    number::{Number, Real},
-};
+use crate::{flow::LENGTH_PENALTY, number::Number};
 
-impl<N: Number> Parameters<N> {
-    /// Returns the law, whose `b(k)` has this degree.
-    #[inline(always)]
-    pub fn law(&self, degree: usize) -> Law<N> {
-        let mut coefficients = [N::of(0.0); MAX_DEGREE];
-        coefficients.copy_from_slice(&self.law[..MAX_DEGREE]);
-        Law { coefficients, degree }
-    }
-}
-
-/// Returns the degree of `b(k)`, on which the [branches](super::Branches) of a member depend.
-pub fn degree<T: Real>(p: &Parameters<T>) -> usize {
-    let zero = T::of(0.0);
-    p.law[..MAX_DEGREE].iter().rposition(|c| *c != zero).map_or(0, |j| j + 1)
-}
-
-/// `b(k) = c₁k + c₂k² + …`, up to its degree.
-#[derive(Clone, Copy, Debug)]
-pub struct Law<N> {
-    coefficients: [N; MAX_DEGREE],
-    degree: usize,
-}
-
-impl<N: Number> Law<N> {
-    /// `b(k)` by Horner's rule.
-    #[inline(always)]
-    pub fn b(&self, k: N) -> N {
-        self.b_over_k(k) * k
-    }
-
-    /// `φ(k) = k² - b(k)/k`, without division.
-    #[inline(always)]
-    pub fn phi(&self, k: N) -> N {
-        k * k - self.b_over_k(k)
-    }
-
-    #[inline(always)]
-    fn b_over_k(&self, k: N) -> N {
-        let mut sum = N::of(0.0);
-        for c in self.coefficients[..self.degree].iter().rev() {
-            sum = sum * k + *c;
-        }
-        sum
-    }
-}
-
-/// Fills `b(k)` of `motion` from the curve.
+/// Fills the law and `b(k)` of `motion` from the curve, whose reciprocal lengths are there.
 #[inline(always)]
-pub fn fill<N: Number>(old: &Curve<N>, p: &Parameters<N>, degree: usize, motion: &mut Motion<N>) {
-    let law = p.law(degree);
+pub fn fill<N: Number>(old: &Curve<N>, p: &Parameters<N>, kind: Kind, motion: &mut Motion<N>) {
+    let law = p.law(kind);
+    motion.law = law;
     for i in 0..old.len() {
         motion.b[i] = law.b(old.k[i]);
     }
@@ -85,7 +39,7 @@ pub fn measure<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
     }
     motion.edge.close();
     for i in 0..old.len() {
-        let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises(i), old.y.rises(i));
+        let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises_of_places(i), old.y.rises_of_places(i));
         let [_, _, e, f, _] = motion.edge.window(i);
         motion.bent[i] = bent([ex, ey, e], [fx, fy, f]);
     }
@@ -101,13 +55,13 @@ fn bent<N: Number>(before: [N; 3], after: [N; 3]) -> N {
 /// `q (βN + αT)` at node i of the polygon that was measured: the second difference of its own curvature and `b` along the
 /// inward normal to the chord between its neighbours, and α along the chord.
 #[inline(always)]
-pub fn of_polygon<N: Number>(old: &Curve<N>, motion: &Motion<N>, law: &Law<N>, i: usize) -> [N; 2] {
-    let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises(i), old.y.rises(i));
+pub fn of_polygon<N: Number>(old: &Curve<N>, motion: &Motion<N>, i: usize) -> [N; 2] {
+    let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises_of_places(i), old.y.rises_of_places(i));
     let [_, _, e, f, _] = motion.edge.window(i);
     let [_, rise, next, _] = motion.bent.rises(i);
     let half = N::of(0.5);
     let along = [ex + fx, ey + fy];
-    let inward = half * (e + f) * law.b(motion.bent[i]) - (next / f - rise / e);
+    let inward = half * (e + f) * motion.law.b(motion.bent[i]) - (next / f - rise / e);
     let across = inward / (along[0] * along[0] + along[1] * along[1]).sqrt();
     let sliding = half * motion.alpha[i];
     [sliding * along[0] - across * along[1], sliding * along[1] + across * along[0]]

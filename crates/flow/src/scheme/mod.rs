@@ -28,6 +28,7 @@ pub mod dense;
 pub mod evolve;
 pub mod extrapolation;
 pub mod forces;
+pub mod law;
 pub mod member;
 pub mod observe;
 pub mod pace;

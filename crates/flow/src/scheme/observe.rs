@@ -3,16 +3,13 @@
 //!
 //! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r.
 
-use super::{
-    Curve, Parameters,
-    dense::LOOKS,
-    member::Observed,
-    pull,
-    state::{change_from, edge},
-};
+use super::{Curve, Parameters, dense::LOOKS, member::Observed, pull, state::edge};
 use crate::{
     equilibrium::Equilibrium,
-    number::{BIG, Mask, Number, Real},
+    number::{
+        BIG, Mask, Number, Real,
+        place::{apart, coordinate},
+    },
     solver::{self, Blocks},
 };
 
@@ -89,15 +86,14 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, blocks: Blocks) -> Glan
     let (mut turn, mut slack, mut minus_shortest, mut minus_k_min, mut farthest) = (low, low, low, low, N::of(0.0));
     let mut sums = solver::Sums::new(blocks);
     for i in 0..new.len() {
-        let ([_, xm, x, ..], [_, ym, y, ..]) = (new.x.window(i), new.y.window(i));
         let (k, r, e) = (new.k[i], new.r[i], edge(new, i)[2]);
         turn = turn.max((k * r).bounded_abs());
         slack = slack.max((r - e).bounded_abs() - N::of(MAX_DRIFT) * e);
         minus_shortest = minus_shortest.max(-e.bounded_abs());
         minus_k_min = minus_k_min.max(-k);
-        let (dx, dy) = (change_from(old.x[i], x), change_from(old.y[i], y));
+        let (dx, dy) = (apart(old.x[i], new.x[i]), apart(old.y[i], new.y[i]));
         farthest = farthest.max((dx * dx + dy * dy).bounded_abs());
-        sums.add(i, [e, xm * y - x * ym, winding(new, i)]);
+        sums.add(i, [e, cross(new, i), winding(new, i)]);
     }
     let [length, area, turning] = sums.totals();
     let area = N::of(0.5) * area;
@@ -126,16 +122,29 @@ impl<N: Number> Glance<N> {
     }
 }
 
+/// Coordinates of the nodes i-1 and i: both x, then both y.
+#[inline(always)]
+fn corner<N: Number>(curve: &Curve<N>, i: usize) -> [N; 4] {
+    let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
+    [xm, x, ym, y].map(coordinate)
+}
+
+/// `x_{i-1} × x_i`.
+#[inline(always)]
+fn cross<N: Number>(curve: &Curve<N>, i: usize) -> N {
+    let [xm, x, ym, y] = corner(curve, i);
+    xm * y - x * ym
+}
+
 /// Computes the sums over the ring.
 #[inline(always)]
 pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> CurveSums<N> {
     let half = N::of(0.5);
     let mut sums = solver::Sums::new(blocks);
     for i in 0..curve.len() {
-        let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
         let k = curve.k[i];
         let energy = p.energy_density(k) * curve.r[i];
-        sums.add(i, [edge(curve, i)[2], xm * y - x * ym, energy, winding(curve, i)]);
+        sums.add(i, [edge(curve, i)[2], cross(curve, i), energy, winding(curve, i)]);
     }
     let [length, area, energy, turning] = sums.totals();
     CurveSums { length, area: half * area, energy, turning }
@@ -178,10 +187,10 @@ pub fn decline<N: Number>(
     let two = N::of(2.0);
     let mut sums = solver::Sums::new(blocks);
     for i in 0..curve.len() {
-        let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
+        let [xm, x, ym, y] = corner(curve, i);
         let ([_, um, u, ..], [_, vm, v, ..]) = (slope.x.window(i), slope.y.window(i));
         let ([_, sm, s, ..], [_, tm, t, ..]) = (bend.x.window(i), bend.y.window(i));
-        let ([_, ex, ..], [_, ey, ..]) = (curve.x.rises(i), curve.y.rises(i));
+        let ([_, ex, ..], [_, ey, ..]) = (curve.x.rises_of_places(i), curve.y.rises_of_places(i));
         let ([_, fx, ..], [_, fy, ..]) = (slope.x.rises(i), slope.y.rises(i));
         let ([_, gx, ..], [_, gy, ..]) = (bend.x.rises(i), bend.y.rises(i));
         let inverse = (ex * ex + ey * ey).sqrt().recip();
@@ -217,7 +226,7 @@ pub fn gap<N: Number>(curve: &Curve<N>) -> N {
 /// +1 (-1) if the edge vector turns from `e_i` to `e_{i+1}` across the positive x axis, the short way round.
 #[inline(always)]
 fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
-    let ([_, ex, fx, _], [_, ey, fy, _]) = (curve.x.rises(i), curve.y.rises(i));
+    let ([_, ex, fx, _], [_, ey, fy, _]) = (curve.x.rises_of_places(i), curve.y.rises_of_places(i));
     let (zero, one) = (N::of(0.0), N::of(1.0));
     let side = ex * fy - fx * ey;
     // +1 upwards across the axis, which counts with the origin on the left; -1 downwards, with it on the right.

@@ -5,11 +5,7 @@
 //! decay rates that do not converge (`docs/method.md`). `𝓒 = q_i/τ - (𝓐+𝓑+𝓓+𝓔)`, so the residual of the old
 //! state is `-Σ_j off_ij (x_j - x_i)`.
 
-use super::{
-    Branches, Curve, Parameters,
-    forces::{self, Law},
-    state::Motion,
-};
+use super::{Branches, Curve, Parameters, forces, state::Motion};
 use crate::{
     number::Number,
     solver::{Equation, Equations},
@@ -20,7 +16,6 @@ pub struct Position<'a, N> {
     old: &'a Curve<N>,
     pub(super) new: &'a Curve<N>,
     pub(super) motion: &'a Motion<N>,
-    pub(super) law: Law<N>,
     geometric: bool,
     tau: N,
     /// 1/τ.
@@ -37,8 +32,7 @@ impl<'a, N: Number> Position<'a, N> {
         p: &Parameters<N>,
         branches: Branches,
     ) -> Self {
-        let (law, geometric) = (p.law(branches.degree), branches.geometric);
-        Position { old, new, motion, law, geometric, tau: p.tau, rate: p.tau.recip() }
+        Position { old, new, motion, geometric: branches.geometric, tau: p.tau, rate: p.tau.recip() }
     }
 }
 
@@ -56,15 +50,18 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
         let middle = ir * iq * irp;
         let low = ir * ir * (iqm + iq);
         let high = irp * irp * (iq + iqp);
-        let phi = half * (self.law.phi(k) + self.law.phi(kp));
+        let phi = half * (self.motion.law.phi(k) + self.motion.law.phi(kp));
         let drift = half * self.motion.alpha[i] - N::of(0.75) * (self.new.k.rise_of_square(i) * iq);
         let b = (phi * ir + drift) - (middle + low + a);
         let d = (phi * irp - drift) - (middle + high + e);
         let c = q * self.rate - (a + b + d + e);
         let off = [a, b, d, e];
         let rhs = match self.geometric {
-            true => forces::of_polygon(self.old, self.motion, &self.law, i),
-            false => [residual_of_old(off, self.old.x.offsets(i)), residual_of_old(off, self.old.y.offsets(i))],
+            true => forces::of_polygon(self.old, self.motion, i),
+            false => [
+                residual_of_old(off, self.old.x.offsets_of_places(i)),
+                residual_of_old(off, self.old.y.offsets_of_places(i)),
+            ],
         };
         Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }
     }

@@ -27,7 +27,7 @@ pub fn redistribute<N: Number>(
 ) -> N {
     let n = N::of(old.len() as f64);
     reciprocals(&old.r, motion);
-    forces::fill(old, p, branches.degree, motion);
+    forces::fill(old, p, branches.law, motion);
     let mut sums = Sums::new(blocks);
     for i in 0..old.len() {
         let beta = forces::velocity(motion, old.k.rises(i), i);

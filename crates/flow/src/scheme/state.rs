@@ -4,8 +4,9 @@
 
 use glam::DVec2;
 
+use super::law::Law;
 use crate::{
-    number::{Number, Real},
+    number::{Number, Real, place},
     solver::{Blocks, Memory, Ring, Solves},
 };
 
@@ -20,6 +21,11 @@ pub const STATE_FIELDS: usize = 9 * CURVE_FIELDS + INCREMENT_FIELDS;
 /// Fields of a state that the next step reads, which come first: the curve, the increments and the earlier ones, and
 /// how the curve moves.
 pub const NEEDED_FIELDS: usize = 3 * CURVE_FIELDS + INCREMENT_FIELDS;
+/// Fields of a state whose entries are places: x and y of the curve, of the one before and of the part.
+const FIELDS_OF_PLACES: [usize; 6] = {
+    let (before, part) = (3 * CURVE_FIELDS + INCREMENT_FIELDS, 6 * CURVE_FIELDS + INCREMENT_FIELDS);
+    [0, 1, before, before + 1, part, part + 1]
+};
 /// Fields of a state that mean something between two attempts, which come first.
 pub const LASTING_FIELDS: usize = 6 * CURVE_FIELDS + INCREMENT_FIELDS;
 
@@ -139,7 +145,7 @@ impl<N: Number> Curve<N> {
 impl<T: Real> Curve<T> {
     /// Returns the nodes.
     pub fn positions(&self) -> impl Iterator<Item = DVec2> {
-        self.x.nodes().iter().zip(self.y.nodes()).map(|(x, y)| DVec2::new(x.to_f64(), y.to_f64()))
+        self.x.nodes().iter().zip(self.y.nodes()).map(|(x, y)| DVec2::new(place::to_f64(*x), place::to_f64(*y)))
     }
 
     /// Creates the initial curve through the polygon `nodes` (n ≥ 6): `r_i = |R_i|` and
@@ -156,8 +162,8 @@ impl<T: Real> Curve<T> {
         };
         let ring = |value: &dyn Fn(usize) -> f64| Ring::from_nodes((0..n).map(|i| T::of(value(i))));
         Curve {
-            x: ring(&|i| nodes[i].x),
-            y: ring(&|i| nodes[i].y),
+            x: Ring::from_nodes(nodes.iter().map(|node| place::of_f64(node.x))),
+            y: Ring::from_nodes(nodes.iter().map(|node| place::of_f64(node.y))),
             k: ring(&|i| (vertex_angle(i + n - 1) + vertex_angle(i)) / (2.0 * edge(i).length())),
             r: ring(&|i| edge(i).length()),
         }
@@ -265,8 +271,12 @@ impl<T: Real> State<T> {
     /// Converts the state to another precision, rounded to the nearest numbers.
     pub fn convert<U: Real>(&self) -> State<U> {
         let mut state = State::zeros(self.curve.len());
-        for (to, from) in state.fields_mut().zip(self.fields()) {
-            *to = Ring::from_nodes(from.nodes().iter().map(|v| U::of(v.to_f64())));
+        for (field, (to, from)) in state.fields_mut().zip(self.fields()).enumerate() {
+            let converted = |v: &T| match FIELDS_OF_PLACES.contains(&field) {
+                true => place::of_f64(place::to_f64(*v)),
+                false => U::of(v.to_f64()),
+            };
+            *to = Ring::from_nodes(from.nodes().iter().map(converted));
         }
         state
     }
@@ -275,6 +285,8 @@ impl<T: Real> State<T> {
 /// The motion of the old curve, and the reciprocals of its lengths, then of the new ones.
 #[derive(Clone, Debug)]
 pub struct Motion<N> {
+    /// The law of this step.
+    pub law: Law<N>,
     /// `b(k)`.
     pub b: Ring<N>,
     /// Normal velocity β.
@@ -333,6 +345,7 @@ impl<N: Number> Workspace<N> {
         Workspace {
             blocks,
             motion: Motion {
+                law: Law::default(),
                 b: ring(),
                 beta: nodes(),
                 rkb: nodes(),
@@ -350,23 +363,29 @@ impl<N: Number> Workspace<N> {
     }
 }
 
-/// Returns an entry of a curve after an increment.
+/// Whether the entries of a field of a curve are places.
 #[inline(always)]
-pub fn advanced<N: Number>(old: N, increment: N) -> N {
-    old + increment
+pub fn is_of_places(field: usize) -> bool {
+    field < 2
 }
 
-/// Returns how an entry of a curve has changed.
+/// Returns an entry of this field of a curve after an increment.
 #[inline(always)]
-pub fn change_from<N: Number>(old: N, new: N) -> N {
-    new - old
+pub fn advanced<N: Number>(field: usize, old: N, increment: N) -> N {
+    if is_of_places(field) { place::moved(old, increment) } else { old + increment }
 }
 
-/// Fills a field of a curve from that of an old one and the increments.
+/// Returns how an entry of this field of a curve has changed.
 #[inline(always)]
-pub fn advance<N: Number>(old: &Ring<N>, increment: &Ring<N>, new: &mut Ring<N>) {
+pub fn change_from<N: Number>(field: usize, old: N, new: N) -> N {
+    if is_of_places(field) { place::apart(old, new) } else { new - old }
+}
+
+/// Fills this field of a curve from that of an old one and the increments.
+#[inline(always)]
+pub fn advance<N: Number>(field: usize, old: &Ring<N>, increment: &Ring<N>, new: &mut Ring<N>) {
     for i in 0..old.len() {
-        new[i] = advanced(old[i], increment[i]);
+        new[i] = advanced(field, old[i], increment[i]);
     }
     new.close();
 }
@@ -374,7 +393,7 @@ pub fn advance<N: Number>(old: &Ring<N>, increment: &Ring<N>, new: &mut Ring<N>)
 /// Returns the edge that ends at node i: `[Δx, Δy, |e|]`.
 #[inline(always)]
 pub fn edge<N: Number>(curve: &Curve<N>, i: usize) -> [N; 3] {
-    let ([_, dx, ..], [_, dy, ..]) = (curve.x.rises(i), curve.y.rises(i));
+    let ([_, dx, ..], [_, dy, ..]) = (curve.x.rises_of_places(i), curve.y.rises_of_places(i));
     [dx, dy, (dx * dx + dy * dy).sqrt()]
 }
 

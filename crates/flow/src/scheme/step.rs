@@ -120,7 +120,7 @@ pub fn step_by<N: Number, S: Solves>(
         curvature.system.assemble(&equations);
     }
     let for_k = S::solve(&equations, [&mut increments.k], curvature, *blocks, &control, live);
-    state::advance(&old.k, &increments.k, &mut new.k);
+    state::advance(2, &old.k, &increments.k, &mut new.k);
 
     if branches.geometric {
         forces::measure(old, motion);
@@ -132,8 +132,8 @@ pub fn step_by<N: Number, S: Solves>(
     let control = Control { negligible: rounding * radius, ..control };
     let unknowns = [&mut increments.x, &mut increments.y];
     let for_x = S::solve(&equations, unknowns, position, *blocks, &control, live);
-    state::advance(&old.x, &increments.x, &mut new.x);
-    state::advance(&old.y, &increments.y, &mut new.y);
+    state::advance(0, &old.x, &increments.x, &mut new.x);
+    state::advance(1, &old.y, &increments.y, &mut new.y);
     pull::pull(new, p, branches);
 
     // The second solve counts only if the first one succeeded.

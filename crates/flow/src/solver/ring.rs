@@ -12,7 +12,7 @@
 
 use std::ops::{Index, IndexMut, Range};
 
-use crate::number::Number;
+use crate::number::{Number, place::apart};
 
 /// The largest block, and so the number of colours.
 pub const COLOURS: usize = 4;
@@ -175,6 +175,20 @@ impl<N: Number> Ring<N> {
     pub fn rises(&self, i: usize) -> [N; 4] {
         let [mm, m, x, p, pp] = self.window(i);
         [m - mm, x - m, p - x, pp - p]
+    }
+
+    /// Returns how far it is from the place i to those at `i-2, i-1, i+1, i+2`.
+    #[inline(always)]
+    pub fn offsets_of_places(&self, i: usize) -> [N; 4] {
+        let [mm, m, x, p, pp] = self.window(i);
+        [apart(x, mm), apart(x, m), apart(x, p), apart(x, pp)]
+    }
+
+    /// Returns how far it is to the places `i-1, i, i+1, i+2` from those before them.
+    #[inline(always)]
+    pub fn rises_of_places(&self, i: usize) -> [N; 4] {
+        let [mm, m, x, p, pp] = self.window(i);
+        [apart(mm, m), apart(m, x), apart(x, p), apart(p, pp)]
     }
 
     /// Returns by how much the square of the value at i+1 exceeds the one at i.
