@@ -230,7 +230,7 @@ fn unfinished(done: &Done) {
     refused(home, "out --out new/movie.gif", "out/plots/portraits.json: no members to show: the run could not save");
     fs::remove_file(done.path().join("run.json")).unwrap();
     fs::rename(done.path().join("summary.csv"), done.path().join(".summary.csv.part")).unwrap();
-    refused(home, "out", "out: the run there has not finished; if it is not running, curvelax resume out continues it");
+    refused(home, "out", "out: the run there has not finished; curvelax resume out continues it");
 }
 
 #[test]

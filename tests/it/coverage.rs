@@ -17,7 +17,7 @@ const SEED: u64 = 411;
 const MEMBERS: u64 = 10;
 const ALL_MEMBERS: u64 = 60;
 /// A limit may be off by so many of its half-widths.
-const WORST: f64 = 4.0;
+const WORST: f64 = 3.0;
 
 /// Draws the spec of a family: ellipses and flowers, all flows, weak and strong perturbations, few nodes and many.
 fn family(seed: u64, index: u32) -> String {

@@ -2,10 +2,12 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
+    fs::{self, File},
     path::{Path, PathBuf},
     process::Output,
 };
+
+use tempfile::TempDir;
 
 use crate::common::{
     command::curvelax,
@@ -327,11 +329,17 @@ fn what_is_no_finished_run_of_this_program_is_refused() {
         fs::remove_file(json(out)).unwrap();
         fs::rename(out.join("summary.csv"), out.join(".summary.csv.part")).unwrap();
     };
-    refused(
-        &done,
-        unfinished,
-        "out: the run there has not finished; if it is not running, curvelax resume out continues it",
-    );
+    refused(&done, unfinished, "out: the run there has not finished; curvelax resume out continues it");
+    // The same folder while a run writes there.
+    let in_use = TempDir::new().unwrap();
+    fs::create_dir(in_use.path().join("out")).unwrap();
+    fs::write(in_use.path().join("out/.summary.csv.part"), "").unwrap();
+    let lock = File::create(in_use.path().join("out/.curvelax.lock")).unwrap();
+    lock.try_lock().unwrap();
+    let said = curvelax(in_use.path(), "plot out");
+    let text = String::from_utf8_lossy(&said.stderr);
+    let expected = "error: out: a run in progress is writing here; wait until it has ended (no run.json)\n";
+    assert_eq!((said.status.code(), &*text), (Some(2), expected));
     refused(
         &done,
         |out| fs::write(json(out), "{\"name\": \"other\"}").unwrap(),

@@ -294,6 +294,19 @@ fn shards_that_are_not_what_they_were_are_refused_by_name() {
     refused(path, MERGE, &["s/1/rates.csv: cannot be found"]);
     fs::rename(path.join("rates"), path.join("s/1/rates.csv")).unwrap();
 
+    // Files that a merge makes anew, of another shard.
+    for name in ["run.json", "plots/portraits.json"] {
+        spoil(&format!("s/1/{name}"), &copies(&format!("s/2/{name}")), &["; copy the shard again, or run it again"]);
+    }
+    let run = String::from_utf8(copies("s/1/run.json")).unwrap();
+    let began = &run[run.find("\"started\"").unwrap()..][..33];
+    let later = run.replacen(began, "\"started\": \"1999-01-01T00:00:00Z\"", 1);
+    spoil(
+        "s/1/run.json",
+        later.as_bytes(),
+        &["of another run: begun at 1999-01-01T00:00:00Z, and that of shard.state"],
+    );
+
     // Intact, but of another program, or from elsewhere.
     let record = shard::from_bytes(&state).unwrap();
     let older = envelope::sealed(*shard::LAYOUT, |bytes| postcard::to_extend(&("0.0.1", &record), bytes)).unwrap();

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::{
-    TableReader, TableRow,
+    TableReader, TableRow, claim,
     members::MemberReader,
     names::{self, REMEDY},
     place::Place,
@@ -92,11 +92,10 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
     }
     if !path.exists() {
         let begun = folder.join(format!(".{}.part", names::SUMMARY)).exists();
-        let problem = if begun {
-            format!(
-                "the run there has not finished; if it is not running, curvelax resume {} continues it",
-                quoted(folder)
-            )
+        let problem = if claim::is_held(folder) {
+            "a run in progress is writing here; wait until it has ended".into()
+        } else if begun {
+            format!("the run there has not finished; curvelax resume {} continues it", quoted(folder))
         } else {
             "no run there; give its folder".into()
         };
@@ -276,13 +275,15 @@ impl<'a> Summary<'a> {
             let values = spec.values_of(member, cell).ok()?;
             linear_rate::rate_of(spec, &values, &outcome)
         });
-        let (told, points) = ((outcome.t_limit, outcome.t_error, outcome.t_data_error), outcome.points);
+        let judged =
+            |of: &Outcome| [("t_limit", of.t_limit), ("t_error", of.t_error), ("t_data_error", of.t_data_error)];
+        let (told, points) = (judged(&outcome), outcome.points);
         if let Some((_, spec)) = &self.spec_of {
             self.levels.judge(spec, &mut outcome);
         }
-        if (outcome.t_limit, outcome.t_error, outcome.t_data_error) != told {
-            let (limit, file) = (outcome.t_limit.map_or("nothing".into(), |t| t.to_string()), names::LEVELS);
-            return Err(fields.unexpected_in("t_limit", &format!("{limit}, as {file} has it")));
+        if let Some((found, _)) = judged(&outcome).into_iter().zip(told).find(|(found, told)| found != told) {
+            let (value, file) = (found.1.map_or("nothing".into(), |t| t.to_string()), names::LEVELS);
+            return Err(fields.unexpected_in(found.0, &format!("{value}, as {file} has it")));
         }
         let refined = self.spec.refine;
         let judged = |place| outcome.limit_of_event(place).filter(|_| refined).map(|limit| (limit.t, limit.error));

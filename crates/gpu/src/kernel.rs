@@ -19,7 +19,7 @@ use curvelax_backend::{
 };
 use curvelax_base::{
     error::{Error, Result},
-    text::plural,
+    text::{bytes, plural},
 };
 use curvelax_flow::{
     number::Real,
@@ -101,9 +101,9 @@ impl<T: Real> Kernel<T> {
         let batches: Vec<Batch<T>> = (0..batches).map(|_| batch()).collect();
         if let Some(fault) = device.fault() {
             let (members, n) = (batches.len() * slots, blocks.n);
-            let mebibytes = batches.iter().map(Batch::bytes).sum::<u64>().div_ceil(1 << 20);
+            let size = bytes(batches.iter().map(Batch::bytes).sum());
             let what = format!("{members} {} of {n} points", plural(members as u64, "member"));
-            return Err(device.error(&format!("no room for {what}, {mebibytes} MiB: {fault}")));
+            return Err(device.error(&format!("no room for {what}, {size}: {fault}")));
         }
         let ended = device.now();
         Ok(Kernel {

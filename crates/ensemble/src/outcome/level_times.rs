@@ -106,7 +106,7 @@ impl LevelTimes {
         let Some(own) = self.time(RefinementLevel::FULL, member).filter(|own| *own > 0.0) else { return false };
         let (false, Some(finest)) = (ladder.levels.is_empty(), self.at(top, member)) else { return false };
         // The member has not run itself, so the error of its steps is not known; nodes do not take it away.
-        ladder.limit(spec, own, finest).is_none_or(|limit| limit.needs_more())
+        ladder.limit(spec, own, finest).is_none_or(|limit| limit.needs_more(finest.turn))
     }
 
     /// Completes the row of a member of a cell of `spec` that ran at its own resolution: the errors of its times, if it

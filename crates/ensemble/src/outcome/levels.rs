@@ -14,6 +14,7 @@ use crate::{
 };
 use curvelax_base::error::Result;
 use curvelax_flow::solver::Solver;
+use curvelax_statistics::FINER_STEPS;
 
 /// Members of a cell in the pilot, and the share of a small cell that is.
 const PILOT: u64 = 16;
@@ -22,8 +23,6 @@ const PILOT_SHARE: u64 = 16;
 const MAX_PILOT_POINTS: usize = 10_000;
 /// Most nodes of a level finer than the member itself.
 const MOST_POINTS: usize = 1600;
-/// How much more exact the steps of a level are.
-const FINER: f64 = 10.0;
 /// How much later a level ends, and the latest time at all.
 const LONGER: f64 = 2.0;
 const LATEST: f64 = 1e300;
@@ -152,7 +151,7 @@ impl RefinementLevel {
 /// Tolerance of the steps at all levels of a cell of `spec`.
 pub(super) fn tolerance(spec: &Spec) -> f64 {
     match spec.pace() {
-        Pace::Adaptive(tolerance) => (tolerance / FINER).max(tightest_adaptive(Precision::F64)),
+        Pace::Adaptive(tolerance) => (tolerance / FINER_STEPS).max(tightest_adaptive(Precision::F64)),
         Pace::Fixed(_) => EXACT,
     }
 }

@@ -19,15 +19,19 @@ use super::{
 use crate::{
     claim,
     growing::Growing,
-    names::{RUN, SHARD, STATE, STATE_OLD},
+    names::{PORTRAITS, RUN, SHARD, STATE, STATE_OLD},
     part_file::Mark,
+    portraits, reader,
 };
 use curvelax_base::{
     error::{Error, Result, one_line, shortened},
     text::quoted,
 };
 use curvelax_ensemble::{Shard, Spec};
+use curvelax_study::results::provenance::rfc3339;
 
+/// Keys that a resumed run may change.
+const MOVED_KEYS: [&str; 3] = ["threads", "backend", "adapter"];
 /// Characters of a fault in a message.
 const SHOWN: usize = 200;
 
@@ -143,7 +147,28 @@ fn part(path: &Path) -> Result<FinishedShard> {
         return Err(faulty("it lists other files than its spec asks for"));
     }
     record.head.tables.iter().try_for_each(|mark| check_length(path, mark))?;
+    check_beside(path, &spec, &record.head)?;
     Ok(FinishedShard { path: path.to_path_buf(), shard, spec, record })
+}
+
+/// Checks that the files which a merge makes anew are those of the shard of `spec`, as far as they are there: their folder
+/// may be a mixture.
+fn check_beside(path: &Path, spec: &Spec, Head { origin, films, .. }: &Head) -> Result<()> {
+    if there(path, RUN)? {
+        let own = reader::provenance(path)?;
+        if let Some((key, here, there)) = own.spec.difference(spec, &MOVED_KEYS) {
+            return Err(faulty(path, RUN, &format!("of another run: {key} is {here}, and {there} in {SHARD}")));
+        }
+        let started = rfc3339(origin.started);
+        if own.started != started {
+            let fault = format!("of another run: begun at {}, and that of {SHARD} at {started}", own.started);
+            return Err(faulty(path, RUN, &fault));
+        }
+    }
+    if there(path, PORTRAITS)? && portraits::read(&path.join(PORTRAITS))? != *films {
+        return Err(faulty(path, PORTRAITS, &format!("other portraits than those in {SHARD}")));
+    }
+    Ok(())
 }
 
 /// Checks that the table in the folder at `path` has the length that the shard wrote.

@@ -573,7 +573,7 @@ impl Tally {
             ));
         }
         let judged = || self.cells.iter().flat_map(|cell| &cell.judged);
-        let open = judged().filter(|limit| limit.needs_more()).count();
+        let open = judged().filter(|limit| limit.is_open()).count();
         if self.refined && open > 0 {
             let all = judged().count();
             warnings.push(format!(
