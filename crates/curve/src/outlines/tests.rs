@@ -182,7 +182,7 @@ fn coordinates_of_geojson_are_degrees_unless_the_file_says_or_shows_otherwise() 
         let (warning, area) = said(&with_crs(crs, &near));
         assert!(warning.contains("by its `crs` the file has coordinates of the plane") && area == 0.5, "{warning}");
     }
-    let all = read("map.geojson", &with_crs(Value::Null, &near));
+    let all = read("map.geojson", with_crs(Value::Null, &near));
     assert!(all[0].outline.warnings().is_empty(), "{:?}", all[0].outline.warnings());
     assert_eq!(polygon::signed_area(all[0].outline.vertices()), 0.5);
 }
