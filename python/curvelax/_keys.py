@@ -48,13 +48,13 @@ class Keys(TypedDict, total=False):
     """Smallest radius of curvature of an outline's corners, as a share of the outline's length, 0.0001 to 0.02; 0
     leaves them to the nodes. By default 0.002."""
 
-    amplitude: float | str
+    amplitude: float | str | Any
     """Size σ of the random perturbation, 0 for none; or a distribution, as for shape. By default 0.05."""
 
     modes: str
     """Modes of the random perturbation. By default 2..=8."""
 
-    decay: float | str
+    decay: float | str | Any
     """Power p: mode m has standard deviation σ m^-p; or a distribution, as for shape. By default 1."""
 
     perturbation: Literal["amplitude-phase", "gaussian"]

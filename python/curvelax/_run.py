@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _curvelax
 from ._errors import CurvelaxError, CurvelaxWarning, Interrupted, RequestError
+from ._laws import spelled
 from ._study import Study, remove
 from ._words import in_python
 
@@ -57,7 +58,8 @@ def run(
         Contours of ``skimage.measure.find_contours`` are, too, but with rows and columns in the place of x and y, which
         mirrors the outline and changes no time: give ``contour[:, ::-1]`` to see it as the image shows it. Polygons of
         Shapely and all other objects with ``__geo_interface__`` are outlines; of a GeoSeries or GeoDataFrame the index is
-        the labels and its columns serve ``group_by``.
+        the labels and its columns serve ``group_by``. ``amplitude`` and ``decay`` take a law such as ``"gamma(2,0.02)"``, an
+        array with a value for each member, or a frozen distribution of ``scipy.stats``.
 
     Returns
     -------
@@ -80,6 +82,7 @@ def run(
     >>> len(study.summary)
     8
     """
+    keys = spelled(keys)
     shape, sweep = keys.get("shape"), keys.get("sweep")
     swept = sweep.get("shape") if isinstance(sweep, dict) else None
     if swept is not None and (shape is not None or any(map(_is_arrays, swept))):

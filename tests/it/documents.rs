@@ -183,7 +183,7 @@ fn python_type(value: &str, words: Option<&str>) -> String {
         "TAU" | "OMEGA" | "KAPPA" | "FACTOR" => "float | Literal[\"auto\"]",
         "TOL" => "float | bool",
         "T" => "float | Literal[\"auto\"] | Sequence[float]",
-        "SIGMA" | "P" => "float | str",
+        "SIGMA" | "P" => "float | str | Any",
         "T1,T2,..." => "Sequence[float]",
         "J1,J2,..." => "Sequence[int]",
         "SHAPE" => "Any",

@@ -14,13 +14,14 @@ use syn::{
 };
 
 /// Crates and modules; each may use only those above it. A name stands for what has no longer one; `program` for `src`.
-const LAYERS: [&str; 43] = [
+const LAYERS: [&str; 44] = [
     "shaders",
     "base/error",
     "base/guard",
     "base/threads",
     "base/text",
     "base/input",
+    "base/gamma",
     "base/random",
     "base",
     "flow/number",

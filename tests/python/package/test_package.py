@@ -383,6 +383,31 @@ class Package(unittest.TestCase):
         # Three axes are otherwise several outlines.
         self.assertEqual(len(curvelax.run(**keys, shape=np.stack([contour, 2 * contour])).summary), 2)
 
+    def test_numbers_of_members_are_arrays_and_laws_of_scipy(self):
+        keys = {**SMALL, "curves": None}
+        sizes = np.array([0.02, 0.1, 0.05, 0.03])
+        study = curvelax.run(**keys, amplitude=sizes)
+        self.assertEqual(study.members.amplitude.tolist(), sizes.tolist())
+        self.assertEqual(curvelax.run(**keys, amplitude=pd.Series(sizes)).members.amplitude.tolist(), sizes.tolist())
+        self.refused("3 values for 5 members", curves=5, amplitude=[0.1, 0.2, 0.3])
+        self.refused("amplitude", "empty", amplitude=[])
+        from scipy import stats
+
+        for law, text in [
+            (stats.uniform(0.01, 0.04), "uniform(0.01..0.05)"),
+            (stats.norm(0.1, scale=0.01), "normal(0.1,0.01)"),
+            (stats.lognorm(0.2, scale=0.05), "lognormal(0.05,0.2)"),
+            (stats.halfnorm(scale=0.02), "halfnormal(0.02)"),
+            (stats.gamma(40, scale=0.001), "gamma(40,0.001)"),
+            (stats.weibull_min(3, scale=0.05), "weibull(3,0.05)"),
+        ]:
+            self.assertEqual(curvelax.run(**SMALL, amplitude=law).spec["amplitude"], text)
+        # Any other by its quantiles.
+        law = stats.beta(2, 5, scale=0.3)
+        drawn = curvelax.run(**{**SMALL, "curves": 2000, "t_end": 1e-4, "stop_when_relaxed": None}, amplitude=law).members.amplitude
+        self.assertGreater(stats.kstest(drawn, law.cdf).pvalue, 1e-3)
+        self.assertLess(stats.kstest(drawn, stats.beta(2, 4, scale=0.3).cdf).pvalue, 1e-3)
+
     def test_outlines_stay_with_their_run(self):
         out = self.at / "outlines"
         study = curvelax.run(shape=[ellipse(2, 1), ellipse(1, 3)], out=out, **{**SMALL, "curves": 2})
