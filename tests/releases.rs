@@ -135,14 +135,22 @@ fn lacks(paper: &str, bibliography: &str) -> Vec<String> {
             lacks.push(format!("{key} in the front matter"));
         }
     }
-    for heading in ["# Summary", "# Statement of need", "# State of the field", "# References"] {
+    for heading in [
+        "# Summary",
+        "# Statement of need",
+        "# State of the field",
+        "# Software design",
+        "# Research impact statement",
+        "# AI usage disclosure",
+        "# References",
+    ] {
         if !body.lines().any(|line| line == heading) {
             lacks.push(format!("heading {heading}"));
         }
     }
     let words = body.split_whitespace().count();
-    if !(250..=1000).contains(&words) {
-        lacks.push(format!("250 to 1000 words: it has {words}"));
+    if !(750..=1750).contains(&words) {
+        lacks.push(format!("750 to 1750 words: it has {words}"));
     }
     let (cited, entries) = (cited(body), entries(bibliography));
     lacks.extend(cited.difference(&entries).map(|key| format!("entry of {key}")));
