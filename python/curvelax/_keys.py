@@ -12,7 +12,7 @@ class Keys(TypedDict, total=False):
     """What ``curvelax.run`` takes; flags of ``curvelax run`` with ``_`` for ``-``."""
 
     curves: int
-    """Members of the ensemble; of several outlines, copies of each, and one as it is if the flag is not given. By
+    """Number of members. Of outlines, the number of copies of each; without the flag, each runs once, unperturbed. By
     default 256."""
 
     points: int
@@ -22,16 +22,13 @@ class Keys(TypedDict, total=False):
     """Seed of the random perturbations. By default 1."""
 
     shape: Any
-    """Base curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],...; or outlines as
-    CSV, GeoJSON, WKT or NumPy arrays: file:PATH, or files:PATTERN such as 'files:outlines/*.csv'. Each of several
-    outlines is a member. Paths are relative to the current folder, also in a spec file. Any number may be a
-    distribution, drawn for each member: uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA)
-    with SIGMA the standard deviation of the logarithm, halfnormal(SD), gamma(SHAPE,SCALE), weibull(SHAPE,SCALE),
-    choice(A,B,...), empirical(A,B,...); each(A,B,...) and table(FILE,COLUMN) have a value for each member; LAW in
-    A..B cuts a law. By default ellipse:2,1."""
+    """Initial curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A or flower:M:A[:PHASE],...; or the
+    outlines in file:PATH or 'files:PATTERN' (CSV, GeoJSON, WKT, NumPy), each of which is a member. Paths are relative
+    to the current folder. Any number may be a distribution, such as uniform(1.2..3): see below. By default
+    ellipse:2,1."""
 
     outlines: int
-    """Refuse outlines of another number than this, which a run fills in. By default any number."""
+    """Expected number of outlines: another number is refused. The spec of a run records it. By default any number."""
 
     group_by: str
     """Compare the outlines by the values of this property of their features, column of their table, or `file`. By
@@ -49,13 +46,13 @@ class Keys(TypedDict, total=False):
     leaves them to the nodes. By default 0.002."""
 
     amplitude: float | str | Any
-    """Size σ of the random perturbation, 0 for none; or a distribution, as for shape. By default 0.05."""
+    """Size σ of the random perturbation, 0 for none; or a distribution. By default 0.05."""
 
     modes: str
     """Modes of the random perturbation. By default 2..=8."""
 
     decay: float | str | Any
-    """Power p: mode m has standard deviation σ m^-p; or a distribution, as for shape. By default 1."""
+    """Power p: mode m has standard deviation σ m^-p; or a distribution. By default 1."""
 
     perturbation: Literal["amplitude-phase", "gaussian"]
     """Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of cos
@@ -67,8 +64,8 @@ class Keys(TypedDict, total=False):
     random."""
 
     sweep: Mapping[str, Sequence[Any]]
-    """Run a cell for each value of this key, and for each combination if several keys are swept. Separate values that
-    contain commas by semicolons: sweep 'shape=ellipse:2,1;circle:1'. By default none."""
+    """Vary this key: a cell of members for each value, and for each combination if the flag is given for several
+    keys. Separate values that contain commas by semicolons: sweep 'shape=ellipse:2,1;circle:1'. By default none."""
 
     common_random_numbers: bool
     """Draw member j of every cell from the same random numbers. By default false."""
@@ -81,12 +78,12 @@ class Keys(TypedDict, total=False):
     all."""
 
     flow: str
-    """Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions, as for
-    shape. By default surface-diffusion."""
+    """Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions. By default
+    surface-diffusion."""
 
     mobility: float
-    """Mobility B in length^4/time, for surface diffusion D_s gamma Omega^2 nu/(k_B T): times are then in the unit of
-    time that it has, in all flags and all results. By default 1."""
+    """Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in
+    results, are then in its unit of time. By default 1."""
 
     units: str
     """Names of the units of length and time, such as um,h, for the report and the axes. By default none."""
@@ -99,8 +96,8 @@ class Keys(TypedDict, total=False):
     SPEC.toml. By default off."""
 
     t_end: float | Literal["auto"] | Sequence[float]
-    """Final time. auto ends a member when it is relaxed, or at six times what theory expects of its cell's curve.
-    T1,T2,... is a time for each cell of a sweep. By default 2."""
+    """Final time. auto: when the member is relaxed, at the latest at six times the relaxation time that linear theory
+    predicts for its cell. T1,T2,...: one for each cell of a sweep. By default 2."""
 
     omega: float | Literal["auto"]
     """Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member. By default 1
@@ -130,36 +127,36 @@ class Keys(TypedDict, total=False):
 
     accuracy: float
     """Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for sampling
-    and discretisation together, is within X times the median. The number of outlines is given: for them n and the
-    tolerance are chosen so that each t_error is within X times t_limit. curves, points and adaptive are what it
-    begins with. If X cannot be reached, the run has the best that was, and exits with code 3. Needs refine. By
-    default off."""
+    and discretisation together, is within X times the median. For outlines, whose number is given: n and the
+    tolerance so that each t_error is within X times t_limit. It starts from curves, points and adaptive. If X cannot
+    be reached, the run keeps its best result and exits with code 3. Needs refine. By default off."""
 
     pull: float | Literal["auto"]
-    """Rate κ, in 1/time, at which the scheme's k and r are pulled to the polygon's. auto is 4 x 24/R^4 for each
-    member; 0 is the paper's scheme. By default 0."""
+    """Rate κ, in 1/time, at which the curvatures k and segment lengths r that the scheme evolves relax to those of
+    the polygon. 0 is the paper's scheme; auto is 4 x 24/R^4 for each member. By default 0."""
 
     form: Literal["paper", "geometric", "auto"]
-    """What moves the nodes: paper uses the scheme's own curvatures and lengths, geometric the force of the polygon
-    itself. That halves the error of smooth, well resolved curves, and fails for others; auto is paper. By default
-    paper."""
+    """What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the force
+    of the polygon itself, which halves the error of smooth, well resolved curves and fails for others; auto: paper.
+    By default paper."""
 
     solver: Literal["auto", "gauss-seidel", "direct"]
     """Solver of the pentadiagonal systems. auto is gauss-seidel with tau and direct with adaptive. By default
     auto."""
 
     order: Literal["coloured", "lexicographic"]
-    """Order in which a sweep visits the nodes. By default coloured."""
+    """Order in which a Gauss-Seidel sweep visits the nodes. coloured: all nodes of one colour at once, as a GPU needs
+    it; lexicographic: one after another. By default coloured."""
 
     tolerance: float | bool
-    """Residual tolerance at which sweeps stop. By default 1e-3 in f32, 1e-5 in f64."""
+    """Residual tolerance at which Gauss-Seidel sweeps stop. By default 1e-3 in f32, 1e-5 in f64."""
 
     sor: float | Literal["auto"]
-    """Over-relaxation of the sweeps of gauss-seidel. 1 is the paper's; auto follows the stiffness of each system. By
+    """Over-relaxation factor of Gauss-Seidel sweeps. 1 is the paper's; auto follows the stiffness of each system. By
     default 1."""
 
     max_sweeps: int
-    """Maximum sweeps per system; a member that needs more has stalled. By default 200000."""
+    """Maximum Gauss-Seidel sweeps per system; a member that needs more ends as `stalled`. By default 200000."""
 
     backend: Literal["auto", "gpu", "cpu"]
     """Where to run; auto uses a hardware GPU if there is one, otherwise the CPU. By default auto."""
@@ -175,15 +172,17 @@ class Keys(TypedDict, total=False):
 
     event: str | Sequence[str]
     """Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL. A
-    level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio and
-    metric_drift. For several events give it several times: event 'convex = k_min >= 0' event 'slow = excess <= 0.5 *
-    start'. By default none."""
+    level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio
+    (longest over shortest segment) and metric_drift (how far r has drifted from the lengths of the segments). For
+    several events give it several times: event 'convex = k_min >= 0' event 'slow = excess <= 0.5 * start'. By default
+    none."""
 
     events: Mapping[str, str]
     """Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL. A
-    level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio and
-    metric_drift. For several events give it several times: event 'convex = k_min >= 0' event 'slow = excess <= 0.5 *
-    start'. By default none."""
+    level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio
+    (longest over shortest segment) and metric_drift (how far r has drifted from the lengths of the segments). For
+    several events give it several times: event 'convex = k_min >= 0' event 'slow = excess <= 0.5 * start'. By default
+    none."""
 
     series: float
     """Write series.csv: one row per member every DT. By default off."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from ._errors import RequestError
 
+
 def packed(shape: Any) -> tuple[str, bytes]:
     """The name and the content of the file that holds the outlines of ``shape``.
 
@@ -61,12 +62,9 @@ def _collection(shape: Any) -> dict[str, Any] | None:
     if hasattr(shape, "__geo_interface__"):
         features = _features(shape.__geo_interface__)
     else:
-        if isinstance(shape, Mapping):
-            items = {str(label): item for label, item in shape.items()}
-        elif isinstance(shape, (list, tuple)):
-            items = {str(index): item for index, item in enumerate(shape)}
-        else:
+        if not isinstance(shape, (Mapping, list, tuple)):
             return None
+        items = _by_label(shape)
         strangers = [label for label, item in items.items() if not hasattr(item, "__geo_interface__")]
         if len(strangers) == len(items):
             return None
@@ -117,20 +115,24 @@ def labelled(shape: Any) -> dict[str, np.ndarray]:
     """
     if is_one(shape):
         return {"outline": outline(shape, "shape")}
-    if isinstance(shape, Mapping):
-        named = {str(label): points for label, points in shape.items()}
-        if len(named) < len(shape):
-            raise RequestError("shape: two outlines have the same label")
-    elif isinstance(shape, (Sequence, np.ndarray)):
-        named = {str(index): points for index, points in enumerate(shape)}
-    else:
+    if not isinstance(shape, (Mapping, Sequence, np.ndarray)):
         raise RequestError(
             f"shape: a {type(shape).__name__} is no outline; give the name of a shape, a file, an array of points (N, 2), "
             "or several of these"
         )
+    named = _by_label(shape)
     if not named:
         raise RequestError("shape: there are no outlines; give at least one array of points (N, 2)")
     return {label: outline(points, f"shape[{label!r}]") for label, points in named.items()}
+
+
+def _by_label(shape: Mapping[Any, Any] | Sequence[Any] | np.ndarray) -> dict[str, Any]:
+    """The items of ``shape`` by their keys, or by their indices, as text."""
+    pairs = shape.items() if isinstance(shape, Mapping) else enumerate(shape)
+    named = {str(label): item for label, item in pairs}
+    if len(named) < len(shape):
+        raise RequestError("shape: two outlines have the same label")
+    return named
 
 
 def is_one(shape: Any) -> bool:

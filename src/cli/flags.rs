@@ -37,7 +37,7 @@ const STORES: &[&str] = &["csv", "zarr"];
 /// A value that begins with a hyphen is taken as a value, so that `--tau -1` is refused for its range.
 #[derive(clap::Args)]
 pub struct SpecFlags {
-    /// Members of the ensemble; of several outlines, copies of each, and one as it is if the flag is not given
+    /// Number of members. Of outlines, the number of copies of each; without the flag, each runs once, unperturbed
     /// [default: 256]
     #[arg(
         long, value_name = "COUNT", value_parser = whole::<u64>, allow_hyphen_values = true,
@@ -56,18 +56,15 @@ pub struct SpecFlags {
         help_heading = ENSEMBLE
     )]
     seed: Option<u64>,
-    /// Base curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A, flower:M:A[:PHASE],...; or outlines as CSV,
-    /// GeoJSON, WKT or NumPy arrays: file:PATH, or files:PATTERN such as 'files:outlines/*.csv'. Each of several outlines is
-    /// a member. Paths are relative to the current folder, also in a spec file. Any number may be a distribution, drawn for each member:
-    /// uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA) with SIGMA the standard deviation of the
-    /// logarithm, halfnormal(SD), gamma(SHAPE,SCALE), weibull(SHAPE,SCALE), choice(A,B,...), empirical(A,B,...); each(A,B,...) and
-    /// table(FILE,COLUMN) have a value for each member; LAW in A..B cuts a law [default: ellipse:2,1]
+    /// Initial curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A or flower:M:A[:PHASE],...; or the outlines in
+    /// file:PATH or 'files:PATTERN' (CSV, GeoJSON, WKT, NumPy), each of which is a member. Paths are relative to the current
+    /// folder. Any number may be a distribution, such as uniform(1.2..3): see below [default: ellipse:2,1]
     #[arg(
         long, value_name = "SHAPE", value_parser = text_of::<Drawn<Shape>>, allow_hyphen_values = true,
         help_heading = ENSEMBLE
     )]
     shape: Option<Drawn<Shape>>,
-    /// Refuse outlines of another number than this, which a run fills in [default: any number]
+    /// Expected number of outlines: another number is refused. The spec of a run records it [default: any number]
     #[arg(
         long, value_name = "COUNT", value_parser = whole::<u64>, allow_hyphen_values = true,
         help_heading = ENSEMBLE
@@ -90,7 +87,7 @@ pub struct SpecFlags {
     /// to the nodes [default: 0.002]
     #[arg(long, value_name = "SHARE", value_parser = real, allow_hyphen_values = true, help_heading = ENSEMBLE)]
     rounding: Option<f64>,
-    /// Size σ of the random perturbation, 0 for none; or a distribution, as for --shape [default: 0.05]
+    /// Size σ of the random perturbation, 0 for none; or a distribution [default: 0.05]
     #[arg(
         long, value_name = "SIGMA", value_parser = text_of::<Drawn<f64>>, allow_hyphen_values = true, help_heading = ENSEMBLE
     )]
@@ -101,7 +98,7 @@ pub struct SpecFlags {
         help_heading = ENSEMBLE
     )]
     modes: Option<Modes>,
-    /// Power p: mode m has standard deviation σ m^-p; or a distribution, as for --shape [default: 1]
+    /// Power p: mode m has standard deviation σ m^-p; or a distribution [default: 1]
     #[arg(
         long, value_name = "P", value_parser = text_of::<Drawn<f64>>, allow_hyphen_values = true,
         help_heading = ENSEMBLE
@@ -116,8 +113,8 @@ pub struct SpecFlags {
     /// [default: random]
     #[arg(long, value_name = "DESIGN", value_parser = word::<Design>(DESIGNS), help_heading = ENSEMBLE)]
     design: Option<Design>,
-    /// Run a cell for each value of this key, and for each combination if several keys are swept. Separate values that
-    /// contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1' [default: none]
+    /// Vary this key: a cell of members for each value, and for each combination if the flag is given for several keys.
+    /// Separate values that contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1' [default: none]
     #[arg(long, value_name = "KEY=V1,V2,...", value_parser = text_of::<SweepAxis>, help_heading = ENSEMBLE)]
     sweep: Vec<SweepAxis>,
     /// Draw member j of every cell from the same random numbers [default: false]
@@ -136,15 +133,15 @@ pub struct SpecFlags {
     #[arg(long, value_name = "I/N", value_parser = shard, allow_hyphen_values = true, help_heading = ENSEMBLE)]
     shard: Option<Shard>,
 
-    /// Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions, as for --shape
+    /// Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions
     /// [default: surface-diffusion]
     #[arg(
         long, value_name = "FLOW", value_parser = text_of::<Drawn<Flow>>, allow_hyphen_values = true,
         help_heading = EVOLUTION
     )]
     flow: Option<Drawn<Flow>>,
-    /// Mobility B in length^4/time, for surface diffusion D_s gamma Omega^2 nu/(k_B T): times are then in the unit of time
-    /// that it has, in all flags and all results [default: 1]
+    /// Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in results,
+    /// are then in its unit of time [default: 1]
     #[arg(long, value_name = "B", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
     mobility: Option<f64>,
     /// Names of the units of length and time, such as um,h, for the report and the axes [default: none]
@@ -162,8 +159,8 @@ pub struct SpecFlags {
         default_missing_value = "0.001", help_heading = EVOLUTION
     )]
     adaptive: Option<f64>,
-    /// Final time. auto ends a member when it is relaxed, or at six times what theory expects of its cell's curve.
-    /// T1,T2,... is a time for each cell of a sweep [default: 2]
+    /// Final time. auto: when the member is relaxed, at the latest at six times the relaxation time that linear theory
+    /// predicts for its cell. T1,T2,...: one for each cell of a sweep [default: 2]
     #[arg(long, value_name = "T", value_parser = text_of::<FinalTime>, allow_hyphen_values = true, help_heading = EVOLUTION)]
     t_end: Option<FinalTime>,
     /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member
@@ -211,38 +208,39 @@ pub struct SpecFlags {
     )]
     refine: Option<bool>,
     /// Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for sampling and
-    /// discretisation together, is within X times the median. The number of outlines is given: for them n and the tolerance
-    /// are chosen so that each t_error is within X times t_limit. --curves, --points and --adaptive are what it begins with.
-    /// If X cannot be reached, the run has the best that was, and exits with code 3. Needs --refine [default: off]
+    /// discretisation together, is within X times the median. For outlines, whose number is given: n and the tolerance so
+    /// that each t_error is within X times t_limit. It starts from --curves, --points and --adaptive. If X cannot be reached,
+    /// the run keeps its best result and exits with code 3. Needs --refine [default: off]
     #[arg(long, value_name = "X", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
     accuracy: Option<f64>,
 
-    /// Rate κ, in 1/time, at which the scheme's k and r are pulled to the polygon's. auto is 4 x 24/R^4 for each member;
-    /// 0 is the paper's scheme [default: 0]
+    /// Rate κ, in 1/time, at which the curvatures k and segment lengths r that the scheme evolves relax to those of the
+    /// polygon. 0 is the paper's scheme; auto is 4 x 24/R^4 for each member [default: 0]
     #[arg(
         long, value_name = "KAPPA", value_parser = text_of::<Pull>, allow_hyphen_values = true, help_heading = METHOD
     )]
     pull: Option<Pull>,
-    /// What moves the nodes: paper uses the scheme's own curvatures and lengths, geometric the force of the polygon itself.
-    /// That halves the error of smooth, well resolved curves, and fails for others; auto is paper [default: paper]
+    /// What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the force of the
+    /// polygon itself, which halves the error of smooth, well resolved curves and fails for others; auto: paper [default: paper]
     #[arg(long, value_name = "FORM", value_parser = word::<PositionForm>(FORMS), help_heading = METHOD)]
     form: Option<PositionForm>,
     /// Solver of the pentadiagonal systems. auto is gauss-seidel with --tau and direct with --adaptive [default: auto]
     #[arg(long, value_name = "SOLVER", value_parser = solver::<SolverChoice>(&SolverChoice::NAMES), help_heading = METHOD)]
     solver: Option<SolverChoice>,
-    /// Order in which a sweep visits the nodes [default: coloured]
+    /// Order in which a Gauss-Seidel sweep visits the nodes. coloured: all nodes of one colour at once, as a GPU needs it;
+    /// lexicographic: one after another [default: coloured]
     #[arg(long, value_name = "ORDER", value_parser = word::<Order>(ORDERS), help_heading = METHOD)]
     order: Option<Order>,
-    /// Residual tolerance at which sweeps stop [default: 1e-3 in f32, 1e-5 in f64]
+    /// Residual tolerance at which Gauss-Seidel sweeps stop [default: 1e-3 in f32, 1e-5 in f64]
     #[arg(long, value_name = "TOL", value_parser = real, allow_hyphen_values = true, help_heading = METHOD)]
     tolerance: Option<f64>,
-    /// Over-relaxation of the sweeps of gauss-seidel. 1 is the paper's; auto follows the stiffness of each system
+    /// Over-relaxation factor of Gauss-Seidel sweeps. 1 is the paper's; auto follows the stiffness of each system
     /// [default: 1]
     #[arg(
         long, value_name = "FACTOR", value_parser = text_of::<Sor>, allow_hyphen_values = true, help_heading = METHOD
     )]
     sor: Option<Sor>,
-    /// Maximum sweeps per system; a member that needs more has stalled [default: 200000]
+    /// Maximum Gauss-Seidel sweeps per system; a member that needs more ends as `stalled` [default: 200000]
     #[arg(
         long, value_name = "COUNT", value_parser = whole::<u32>, allow_hyphen_values = true,
         help_heading = METHOD
@@ -266,8 +264,8 @@ pub struct SpecFlags {
     threads: Option<usize>,
 
     /// Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL. A level
-    /// is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio and
-    /// metric_drift. For several events give it several times: --event 'convex = k_min >= 0' --event
+    /// is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio (longest over
+    /// shortest segment) and metric_drift (how far r has drifted from the lengths of the segments). For several events give it several times: --event 'convex = k_min >= 0' --event
     /// 'slow = excess <= 0.5 * start' [default: none]
     #[arg(
         long, value_name = "NAME=CONDITION", value_parser = text_of::<Event>, allow_hyphen_values = true,

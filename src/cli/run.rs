@@ -26,6 +26,14 @@ Examples:
       an eighth of the members, for curvelax merge; the same line resumes it after an interruption
   curvelax run spec.toml --dry-run
 
+Distributions, for numbers in --shape, --flow, --amplitude and --decay; each member has a number of its own:
+  uniform(A..B)  loguniform(A..B)  normal(MEAN,SD)  halfnormal(SD)  gamma(SHAPE,SCALE)  weibull(SHAPE,SCALE)
+  lognormal(MEDIAN,SIGMA)             SIGMA is the standard deviation of the natural logarithm
+  choice(A,B,...)  empirical(A,B,...)     one of these values; a number between two neighbours among them
+  each(A,B,...)  table(FILE,COLUMN)       a value for each member, in their order
+  LAW in A..B                             one of the laws down to lognormal, cut at bounds
+
+R in a default is the radius of the circle whose area is that of the member.
 The keys of SPEC.toml are the names of the flags; a flag overrides the file.";
 
 /// Simulate one ensemble.

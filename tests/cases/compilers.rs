@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 const HANGS: Duration = Duration::from_secs(6 * 3600);
 
 /// Builds every kernel and says on the console what becomes of it. Whatever ends the script early is said, too.
-const PAGE: &str = r#"<!doctype html><script>
+const PAGE: &str = r#"<!doctype html><meta charset="utf-8"><script>
 const say = (name, error) => console.log("VERDICT " + JSON.stringify({ name, error }));
 onerror = (message) => say("page", message);
 onunhandledrejection = ({ reason }) => say("page", String(reason));

@@ -106,7 +106,8 @@ fn faults(browser: &Path, page: &str, width: u32, dark: bool) -> Vec<String> {
     let path = home.path().join("frame.html");
     let inside = page.replace('&', "&amp;").replace('"', "&quot;");
     let frame = format!("<iframe width=\"{width}\" height=\"900\" style=\"border: 0\" srcdoc=\"{inside}\"></iframe>");
-    fs::write(&path, format!("<!doctype html><body><script>{MEASURE}</script>{frame}")).unwrap();
+    fs::write(&path, format!("<!doctype html><meta charset=\"utf-8\"><body><script>{MEASURE}</script>{frame}"))
+        .unwrap();
     let (mut command, _profile) = headless(browser);
     if dark {
         command.arg("--blink-settings=preferredColorScheme=0");

@@ -45,7 +45,7 @@ fn shows_a_page(browser: &Path) -> bool {
     let (number, home) = (MARK.split_once('-').unwrap().1, tempfile::tempdir().unwrap());
     let page = home.path().join("page.html");
     let script = format!("document.body.textContent = 'curvelax-' + ({number} + 1 - 1)");
-    fs::write(&page, format!("<!doctype html><body><script>{script}</script>")).unwrap();
+    fs::write(&page, format!("<!doctype html><meta charset=\"utf-8\"><body><script>{script}</script>")).unwrap();
     let (mut command, _profile) = headless(browser);
     command.args(["--disable-gpu", "--dump-dom"]).arg(format!("file://{}", page.display())).stderr(Stdio::null());
     command.output().is_ok_and(|output| String::from_utf8_lossy(&output.stdout).contains(MARK))

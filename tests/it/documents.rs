@@ -249,7 +249,7 @@ fn wrapped(text: &str, indent: &str) -> String {
 fn the_keys_of_python_are_those_of_the_program() {
     let path = root().join(KEYS);
     let keys = python_keys();
-    if std::env::var_os("UPDATE_DOCS").is_some() {
+    if env::var_os("UPDATE_DOCS").is_some() {
         fs::write(&path, &keys).unwrap();
     }
     assert!(fs::read_to_string(&path).unwrap_or_default() == keys, "{KEYS} is not that of the program: {REMEDY}");

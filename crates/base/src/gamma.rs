@@ -11,9 +11,25 @@ const HALVINGS: u32 = 80;
 ///
 /// The relative error is below 1e-13 for a up to 100, and grows in proportion beyond.
 pub fn upper(a: f64, x: f64) -> f64 {
+    both(a, x)[1]
+}
+
+/// Returns P(a, x) = 1 - Q(a, x) for a > 0; 0 at x ≤ 0.
+pub fn lower(a: f64, x: f64) -> f64 {
+    if x <= 0.0 { 0.0 } else { both(a, x)[0] }
+}
+
+/// P and Q. Series and fraction converge fast, each on its side, where the other function is not small: its difference
+/// from 1 loses no digits.
+fn both(a: f64, x: f64) -> [f64; 2] {
     let front = (a * x.ln() - x - libm::lgamma(a)).exp();
-    // Each converges fast on its side. On the left, Q is not small, so 1 - P loses no digits.
-    if x < a + 1.0 { 1.0 - front * lower_series(a, x) } else { front * upper_fraction(a, x) }
+    if x < a + 1.0 {
+        let lower = front * lower_series(a, x);
+        [lower, 1.0 - lower]
+    } else {
+        let upper = front * upper_fraction(a, x);
+        [1.0 - upper, upper]
+    }
 }
 
 /// Σ_j x^j / (a (a+1) … (a+j))
@@ -44,15 +60,6 @@ fn upper_fraction(a: f64, x: f64) -> f64 {
         }
     }
     fraction
-}
-
-/// Returns P(a, x) = 1 - Q(a, x) for a > 0; 0 at x ≤ 0.
-pub fn lower(a: f64, x: f64) -> f64 {
-    if x <= 0.0 {
-        return 0.0;
-    }
-    let front = (a * x.ln() - x - libm::lgamma(a)).exp();
-    if x < a + 1.0 { front * lower_series(a, x) } else { 1.0 - front * upper_fraction(a, x) }
 }
 
 /// Returns the x at which P(a, x) is `u`, for a > 0 and u in (0, 1).

@@ -52,7 +52,7 @@ pub const NAMES: [&str; 11] = [
 /// What each needs.
 const USAGE: &str = "uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA), halfnormal(SD), \
                      gamma(SHAPE,SCALE), weibull(SHAPE,SCALE), choice(A,B,...), each(A,B,...), empirical(A,B,...), \
-                     table(FILE,COLUMN)";
+                     table(FILE,COLUMN); continuous ones also as LAW in A..B";
 
 /// The law of one number.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,6 +118,8 @@ pub enum Distribution {
         low: f64,
         /// The largest.
         high: f64,
+        /// The shares of the law below the two.
+        shares: [f64; 2],
     },
 }
 
@@ -140,6 +142,7 @@ impl Distribution {
             if scale > 0.0 { Ok((centre, scale)) } else { Err(wrong(&format!("the {what} must be above 0"), usage)) }
         };
         match name {
+            _ if name != "table" && arguments.contains('(') => Err(wrong("a distribution inside another", USAGE)),
             "uniform" => range("uniform(A..B) with A < B").map(|(low, high)| Distribution::Uniform { low, high }),
             "loguniform" => match range("loguniform(A..B) with 0 < A < B")? {
                 (low, high) if low > 0.0 => Ok(Distribution::LogUniform { low, high }),
@@ -172,9 +175,12 @@ impl Distribution {
                 }
             }
             "choice" | "each" | "empirical" => {
-                let values: Option<Vec<f64>> = arguments.split(',').map(finite).collect();
+                let values = (1..).zip(arguments.split(',')).map(|(place, word)| {
+                    let problem = || format!("value {place}, `{}`, is not a finite number", echo(word.trim()));
+                    finite(word).ok_or_else(|| wrong(&problem(), &format!("{name}(A,B,...)")))
+                });
                 let max = if name == "choice" { MAX_CHOICES } else { MAX_VALUES };
-                let mut values = values.ok_or_else(|| wrong("not finite numbers", &format!("{name}(A,B,...)")))?;
+                let mut values = values.collect::<Result<Vec<f64>, String>>()?;
                 match name {
                     _ if values.len() > max => Err(format!("{name} of {} values; at most {max}", values.len())),
                     "choice" => Ok(Distribution::Choice(values)),
@@ -205,16 +211,17 @@ impl Distribution {
         let wrong = |problem: &str| format!("{self} in {}: {problem}; write LAW in A..B with A < B", echo(range));
         let end = |word: &str| word.trim().parse::<f64>().ok().filter(|end| end.is_finite());
         let ends = range.split_once("..").and_then(|(low, high)| Some((end(low)?, end(high)?)));
-        let (low, high) =
-            ends.filter(|(low, high)| low < high).ok_or_else(|| wrong("not a range of finite numbers"))?;
-        let [below, upto] = match [self.share_below(low), self.share_below(high)] {
-            [Some(below), Some(upto)] => [below, upto],
-            _ => return Err(wrong("only a continuous law can be cut")),
-        };
-        if upto - below < MIN_WITHIN {
-            return Err(wrong("the law has next to no numbers there"));
+        let shares = |(low, high)| Some([self.share_below(low)?, self.share_below(high)?]);
+        match ends {
+            _ if range.contains(" in ") => Err(wrong("a law is cut once")),
+            None => Err(wrong("not a range of finite numbers")),
+            Some((low, high)) if low >= high => Err(wrong("the range is empty")),
+            Some((low, high)) => match shares((low, high)) {
+                None => Err(wrong("only a continuous law can be cut")),
+                Some([below, upto]) if upto - below < MIN_WITHIN => Err(wrong("the law has next to no numbers there")),
+                Some(shares) => Ok(Distribution::Within { law: self.into(), low, high, shares }),
+            },
         }
-        Ok(Distribution::Within { law: self.into(), low, high })
     }
 
     /// The values of the members, if each has its own.
@@ -226,22 +233,18 @@ impl Distribution {
     fn share_below(&self, x: f64) -> Option<f64> {
         let normal = |z: f64| 0.5 * libm::erfc(-z / SQRT_2);
         let share = match self {
-            Distribution::Uniform { low, high } => ((x - low) / (high - low)).clamp(0.0, 1.0),
-            Distribution::LogUniform { low, high } => ((x / low).ln() / (high / low).ln()).clamp(0.0, 1.0),
-            Distribution::Normal { mean, sd } => normal((x - mean) / sd),
-            _ if x <= 0.0
-                && !matches!(self, Distribution::Choice(_) | Distribution::Each(_) | Distribution::Empirical(_)) =>
-            {
-                0.0
-            }
-            Distribution::LogNormal { median, sigma } => normal((x / median).ln() / sigma),
-            Distribution::HalfNormal { sd } => libm::erf(x / sd / SQRT_2),
-            Distribution::Gamma { shape, scale } => gamma::lower(*shape, x / scale),
-            Distribution::Weibull { shape, scale } => -(-(x / scale).powf(*shape)).exp_m1(),
             Distribution::Choice(_)
             | Distribution::Each(_)
             | Distribution::Empirical(_)
             | Distribution::Within { .. } => return None,
+            Distribution::Uniform { low, high } => ((x - low) / (high - low)).clamp(0.0, 1.0),
+            Distribution::LogUniform { low, high } => ((x / low).ln() / (high / low).ln()).clamp(0.0, 1.0),
+            Distribution::Normal { mean, sd } => normal((x - mean) / sd),
+            _ if x <= 0.0 => 0.0,
+            Distribution::LogNormal { median, sigma } => normal((x / median).ln() / sigma),
+            Distribution::HalfNormal { sd } => libm::erf(x / sd / SQRT_2),
+            Distribution::Gamma { shape, scale } => gamma::lower(*shape, x / scale),
+            Distribution::Weibull { shape, scale } => -(-(x / scale).powf(*shape)).exp_m1(),
         };
         Some(share)
     }
@@ -266,11 +269,9 @@ impl Distribution {
                 let share = rank - first as f64;
                 values[first] * (1.0 - share) + values[first + 1] * share
             }
-            Distribution::Within { law, low, high } => {
-                let [below, upto] = [*low, *high].map(|end| law.share_below(end).unwrap_or(0.5));
-                law.quantile((below * (1.0 - u) + upto * u).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON))
-                    .clamp(*low, *high)
-            }
+            Distribution::Within { law, low, high, shares: [below, upto] } => law
+                .quantile((below * (1.0 - u) + upto * u).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON))
+                .clamp(*low, *high),
         }
     }
 
@@ -301,7 +302,7 @@ impl fmt::Display for Distribution {
             Distribution::Choice(values) => write!(f, "choice({})", list(values)),
             Distribution::Each(values) => write!(f, "each({})", list(values)),
             Distribution::Empirical(values) => write!(f, "empirical({})", list(values)),
-            Distribution::Within { law, low, high } => write!(f, "{law} in {}..{}", number(*low), number(*high)),
+            Distribution::Within { law, low, high, .. } => write!(f, "{law} in {}..{}", number(*low), number(*high)),
         }
     }
 }
@@ -529,15 +530,17 @@ mod tests {
             ("normal(1,2,3)", "not two finite numbers"),
             ("lognormal(-1,0.2)", "the median must be above 0"),
             ("lognormal(1,-0.2)", "the standard deviation of the logarithm must be above 0"),
-            ("choice()", "not finite numbers"),
-            ("choice(1,nan)", "not finite numbers"),
+            ("choice()", "value 1, ``, is not a finite number"),
+            ("each(1,2,nan)", "value 3, `nan`, is not a finite number; write each(A,B,...)"),
+            ("normal(uniform(0..1),2)", "a distribution inside another"),
             ("unifrom(1..2)", "did you mean `uniform`?"),
             ("cauchy(1,2)", "unknown distribution `cauchy`; one of uniform(A..B)"),
             ("gamma(0,2)", "the shape must be 0.1 to 10000; write gamma(SHAPE,SCALE)"),
             ("weibull(1,-2)", "the scale must be above 0; write weibull(SHAPE,SCALE)"),
             ("halfnormal(0)", "not a number above 0; write halfnormal(SD)"),
             ("empirical(1,1)", "fewer than two different numbers"),
-            ("normal(0,1) in 2..1", "not a range of finite numbers; write LAW in A..B"),
+            ("normal(0,1) in 2..1", "the range is empty; write LAW in A..B"),
+            ("normal(0,1) in 2", "not a range of finite numbers; write LAW in A..B"),
             ("normal(0,1) in 9..10", "next to no numbers there"),
             ("choice(1,2) in 0..3", "only a continuous law can be cut"),
             ("normal(0,1) in 0..3 in 0..2", "only a continuous law can be cut"),

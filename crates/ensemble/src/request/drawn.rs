@@ -126,21 +126,44 @@ impl<T> From<T> for Drawn<T> {
     }
 }
 
+/// Where the parenthesis before `text` closes.
+fn matching(text: &str) -> Option<usize> {
+    let mut open = 1;
+    text.char_indices().find_map(|(place, c)| {
+        match c {
+            '(' => open += 1,
+            ')' => open -= 1,
+            _ => {}
+        }
+        (open == 0).then_some(place)
+    })
+}
+
+/// What follows the word `in` at the beginning of `text`, if that is its first word.
+fn range_of_cut(text: &str) -> Option<&str> {
+    let text = text.trim_start();
+    let (word, range) = text.split_at_checked(2)?;
+    (word.eq_ignore_ascii_case("in") && !range.starts_with(|c: char| c.is_alphabetic())).then(|| range.trim_start())
+}
+
 impl DrawnText {
     fn read(text: &str) -> Result<DrawnText, String> {
         let (mut before, mut distributions, mut rest) = (Vec::new(), Vec::new(), text);
         while let Some((head, tail)) = rest.split_once('(') {
+            let head = head.trim_end();
             let name = head.rsplit(|c: char| !c.is_alphanumeric() && c != '-' && c != '_').next().unwrap_or_default();
             let open = || format!("`{}` has no closing parenthesis", echo(format_args!("{name}({tail}")));
-            let (arguments, after) = tail.split_once(')').ok_or_else(open)?;
+            // All of a distribution that is wrongly inside another, for the message.
+            let close = matching(tail).or_else(|| tail.find(')')).ok_or_else(open)?;
+            let (arguments, after) = (&tail[..close], &tail[close + 1..]);
             let law = Distribution::of(name, arguments)?;
             before.push(head[..head.len() - name.len()].to_owned());
             // A range has neither commas nor colons, which separate the numbers of a shape.
-            let cut = after
-                .strip_prefix(" in ")
-                .map(|after| after.split_at(after.find([',', ':', ';']).unwrap_or(after.len())));
-            let (law, after) = match cut {
-                Some((range, after)) => (law.within(range)?, after),
+            let (law, after) = match range_of_cut(after) {
+                Some(range) => {
+                    let (range, after) = range.split_at(range.find([',', ':', ';']).unwrap_or(range.len()));
+                    (law.within(range)?, after)
+                }
                 None => (law, after),
             };
             distributions.push(law);
@@ -416,7 +439,20 @@ mod tests {
             assert!(parts.iter().all(|part| message.contains(part)), "{text}: {message}");
         }
         assert!("ellipse:normal(1,0.5) in 0.1..3,1".parse::<Drawn<Shape>>().is_ok());
-        assert!(refusal("ellipse:normal(1,0.5) in 0.1,1").contains("not a range of finite numbers; write LAW in A..B"));
+        for text in ["ellipse:normal(1,0.5) in 0.1,1", "ellipse:normal(1,0.5) in", "ellipse:normal(1,0.5) in 0..1..2,1"]
+        {
+            assert!(refusal(text).contains("not a range of finite numbers; write LAW in A..B"), "{text}");
+        }
+        for text in
+            ["circle:normal(1,0.2)in 0.1..3", "circle:normal (1,0.2)  IN 0.1..3 ", "circle: normal(1,0.2) in 0.1..3"]
+        {
+            let read = text.parse::<Drawn<Shape>>().map(|shape| shape.to_string().replace(' ', ""));
+            assert_eq!(read, Ok("circle:normal(1,0.2)in0.1..3".into()), "{text}");
+        }
+        assert!(refusal("circle:normal(1,0.2) in 0..3 in 0..2").contains("a law is cut once"));
+        assert!(
+            refusal("circle:normal(uniform(1..2),0.2)").contains("normal(uniform(1..2),0.2): a distribution inside")
+        );
         // The smallest number that can be drawn is six deviations below the mean.
         assert!("circle:normal(1,0.15)".parse::<Drawn<Shape>>().is_ok());
         assert!("circle:normal(1,0.17)".parse::<Drawn<Shape>>().is_err());

@@ -24,6 +24,8 @@ pub const MAX_NAMED: u64 = 20;
 const PROBED: u64 = 32;
 /// Shares of the distributions below and above which a bound looks.
 const TAILS: [f64; 2] = [1e-5, 1.0 - 1e-5];
+/// The keys whose values may be drawn.
+const KEYS: [&str; 4] = ["shape", "flow", "amplitude", "decay"];
 /// Bits of the places of a key.
 const PLACE_BITS: u32 = 16;
 
@@ -136,7 +138,7 @@ impl Spec {
             let problem = format!("{places} distributions; the sequence has {MAX_SOBOL} coordinates");
             return Err(Error::value("design", "sobol", &problem, "use random or lhs, or fewer distributions"));
         }
-        let keys = ["shape", "flow", "amplitude", "decay"].into_iter().zip(self.distributions());
+        let keys = KEYS.into_iter().zip(self.distributions());
         for (key, listed) in
             keys.flat_map(|(key, of_key)| of_key.iter().filter_map(move |of| Some((key, of.listed()?))))
         {
@@ -226,8 +228,7 @@ impl Spec {
 
 /// The names of the numbers that are drawn, so many for each of the keys shape, flow, amplitude and decay.
 pub(crate) fn drawn_names(counts: [usize; 4]) -> Vec<String> {
-    let keys = ["shape", "flow", "amplitude", "decay"];
-    let name = |key: usize, rank: usize| if key < 2 { format!("{}_{}", keys[key], rank + 1) } else { keys[key].into() };
+    let name = |key: usize, rank: usize| if key < 2 { format!("{}_{}", KEYS[key], rank + 1) } else { KEYS[key].into() };
     counts.into_iter().enumerate().flat_map(|(key, count)| (0..count).map(move |rank| name(key, rank))).collect()
 }
 

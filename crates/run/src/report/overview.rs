@@ -273,7 +273,7 @@ impl Overview<'_> {
         match sweeps_k + sweeps_x {
             0 => format!("{steps_each} per member{solves_each}, no sweeps"),
             _ => format!(
-                "{steps_each} per member{solves_each}, sweeps {} for k and {} for x, y",
+                "{steps_each} per member{solves_each}, Gauss-Seidel sweeps {} for k and {} for x, y",
                 each(*sweeps_k),
                 each(*sweeps_x)
             ),
@@ -441,8 +441,9 @@ fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     let bounds = cell.interval().and_then(|interval| interval.bounds());
     // The interval of the limits says it already, together with what follows.
     let sampling = bounds.filter(|_| cell.limits.is_none());
-    let sampling = sampling
-        .map_or(String::new(), |(low, high)| format!("sampling {} to {}, ", significant(low), significant(high)));
+    let half = bounds.zip(cell.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
+    let sampling =
+        sampling.and(half).map_or(String::new(), |half| format!("sampling ±{} %; ", rounded(100.0 * half, 2)));
     let Some(discretisation) = &cell.discretisation else {
         if cell.limits.is_some() {
             return String::new();
@@ -466,17 +467,16 @@ fn errors(cell: &CellStatistics, spec: &Spec) -> String {
         );
     }
     let percent = |value: f64| rounded(100.0 * value, 2);
-    let about =
-        format!("{sampling}discretisation about {} % (± {} %, by {members} {known})", percent(mean), percent(error));
-    let half = bounds.zip(cell.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
+    let [mean_told, error] = [mean, error].map(percent);
+    let about = format!("{sampling}discretisation {mean_told} % ± {error} % (estimated from {members} {known})");
     let larger = half.is_none_or(|half| mean.abs() > half);
     let advice = match () {
         () if not_asymptotic > 0 => {
             format!("; times of {not_asymptotic} of them do not converge yet in n: {remedy}")
         }
         () if spec.refine => ": t_limit is free of it".into(),
-        () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => ", the larger of the two: use --refine".into(),
-        () if larger => ", the larger of the two: use --accurate".into(),
+        () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => " dominates; add --refine to remove it".into(),
+        () if larger => " dominates; add --accurate to remove it".into(),
         () => String::new(),
     };
     format!("{about}{advice}")
@@ -583,7 +583,7 @@ all                 4
 ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
 t_relax    median 0.5000 (range of 4, 0.3000 or more, covers 93.8 %), mean at least 1.200 (standard error 0.4016) over 2 members that reached it; 2 censored
 error      discretisation not known: no member has times at n, n/√2 and n/2 nodes
-work       10 steps per member, sweeps 20 for k and 5 for x, y
+work       10 steps per member, Gauss-Seidel sweeps 20 for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s
 results    out: summary.csv, run.json
@@ -610,7 +610,7 @@ results    out: summary.csv, run.json
             let text = overview(tally);
             text.lines().find(|line| line.starts_with("error")).unwrap().to_string()
         };
-        let about = "discretisation about -2 % (± 0.0098 %, by 4 members)";
+        let about = "; discretisation -2 % ± 0.0098 % (estimated from 4 members)";
         let some = told(&tally);
         assert!(
             some.ends_with(&format!(
@@ -622,7 +622,7 @@ results    out: summary.csv, run.json
         // Sampling is the larger one here.
         assert!(told(&tally).ends_with(about), "{}", told(&tally));
         tally.cells[0].judged.iter_mut().for_each(|limit| limit.relative = -0.2);
-        assert!(told(&tally).ends_with(", the larger of the two: use --accurate"), "{}", told(&tally));
+        assert!(told(&tally).ends_with(" dominates; add --accurate to remove it"), "{}", told(&tally));
     }
 
     #[test]
