@@ -370,6 +370,8 @@ class Package(unittest.TestCase):
             (Geometry({"type": "Point", "coordinates": (0, 0)}), ["shape", "Point"]),
             (Geometry({"type": "LineString", "coordinates": [(0, 0), (1, 0), (1, 1)]}), ["shape: feature 1 is an open line"]),
             ([geometries["a"], ellipse(2, 1)], ["shape['1']", "arrays and geometries"]),
+            ({1: geometries["a"], "1": geometries["b"]}, ["two outlines have the same label"]),
+            ({1: ellipse(2, 1), "1": ellipse(3, 1)}, ["two outlines have the same label"]),
         ]:
             message = self.refused(*words, shape=shape)
             self.assertNotIn("/", message.replace("n/2", ""), "a path of a file that nobody wrote")
