@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use curvelax_base::{
     error::echo,
-    random::{Design, Distribution, DrawAddress, MAX_SOBOL, distribution::SMALLEST},
+    random::{Design, Distribution, DrawAddress},
     text::rounded,
 };
 use curvelax_curve::Shape;
@@ -114,9 +114,14 @@ impl<T: Drawable> Drawn<T> {
     /// The value with these numbers in the place of its distributions.
     ///
     /// # Errors
-    /// A message if there is no such value; a spec that was read has one for all numbers that can be drawn.
+    /// A message if there is no such value.
     pub fn at(&self, numbers: &[f64]) -> Result<T, String> {
         self.template.as_ref().map_or_else(|| Ok(self.typical.clone()), |template| T::read(&template.at(numbers)))
+    }
+
+    /// Why a member could be refused for its value.
+    pub(crate) fn refusal(&self) -> Option<String> {
+        refusal(&self.distributions().iter().collect::<Vec<_>>(), |numbers| self.at(numbers).err())
     }
 }
 
@@ -190,12 +195,12 @@ impl<T: Drawable> FromStr for Drawn<T> {
             return T::read(text).map(Drawn::from);
         }
         let template = DrawnText::read(text)?;
-        let of: Vec<&Distribution> = template.distributions.iter().collect();
-        if let Some(refused) = Refused::of(&of, |numbers| T::read(&template.at(numbers)).err()) {
-            return Err(refused.to_string());
-        }
-        let medians: Vec<f64> = of.iter().map(|of| of.quantile(0.5)).collect();
-        let typical = T::read(&template.at(&medians))?;
+        let medians: Vec<f64> = template.distributions.iter().map(|of| of.quantile(0.5)).collect();
+        let read = |numbers: &[f64]| T::read(&template.at(numbers));
+        let typical = read(&medians).map_err(|error| {
+            let error = read(&medians.iter().copied().map(short).collect::<Vec<_>>()).err().unwrap_or(error);
+            format!("{error}, at the medians of its distributions")
+        })?;
         Ok(Drawn { typical, template: Some(Arc::new(template)) })
     }
 }
@@ -257,64 +262,33 @@ impl<T: Drawable> de::Visitor<'_> for DrawnVisitor<T> {
     }
 }
 
-/// Points at which a value is tried before any is refused, and for the share of those that are.
+/// Points at which a value is tried, besides the corners of the support.
 const TRIED: u64 = 256;
-const COUNTED: u64 = 1 << 16;
-/// A share that counts as all.
-const NEARLY_ALL: f64 = 1.0 - 1e-6;
 /// Corners of the support that are tried.
 const MAX_CORNERS: usize = 4096;
-/// Parts of the interval in which the share of a single distribution is exact.
-const PARTS: u32 = 4096;
 
-/// What a distribution must not give.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Refused {
-    /// The share of members with such a value, as far as it is known.
-    pub share: Option<f64>,
-    /// What is wrong with one of them.
-    pub reason: String,
-}
-
-impl Refused {
-    /// Looks for numbers of the distributions that are `refused`, with the reason: inside their support and at all its
-    /// corners.
-    pub fn of(distributions: &[&Distribution], refused: impl Fn(&[f64]) -> Option<String>) -> Option<Refused> {
-        // Random points are made quickly, and every cell of a sweep reads its values.
-        let inside = (0..TRIED).map(|point| numbers(distributions, Design::Random, point));
-        let first = inside.chain(corners(distributions)).find(|numbers| refused(numbers).is_some())?;
-        // A message shows few digits, where they are as wrong.
-        let short: Vec<f64> = first.iter().map(|number| rounded(*number, 3).parse().unwrap_or(*number)).collect();
-        let reason = refused(&short).or_else(|| refused(&first))?;
-        let fails = |numbers: &[f64]| refused(numbers).is_some();
-        let share = match distributions {
-            [only] => exact_share(only, |number| fails(&[number])),
-            _ => {
-                let even = if distributions.len() > MAX_SOBOL { Design::Random } else { Design::Sobol };
-                let failed = (0..COUNTED).filter(|point| fails(&numbers(distributions, even, *point)));
-                failed.count() as f64 / COUNTED as f64
-            }
-        };
-        Some(Refused { share: Some(share).filter(|share| *share > 0.0), reason })
+/// Why a member could be refused, if the distributions can give numbers that are `refused`: inside their support, or at its
+/// corners.
+pub(crate) fn refusal(of: &[&Distribution], refused: impl Fn(&[f64]) -> Option<String>) -> Option<String> {
+    if of.is_empty() {
+        return None;
     }
+    let inside = (0..TRIED).map(|point| numbers(of, point));
+    inside.chain(corners(of)).find_map(|numbers| {
+        let reason = refused(&numbers)?;
+        Some(refused(&numbers.into_iter().map(short).collect::<Vec<_>>()).unwrap_or(reason))
+    })
 }
 
-impl fmt::Display for Refused {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let reason = &self.reason;
-        match self.share {
-            Some(share) if share > NEARLY_ALL => return write!(f, "every member would be refused ({reason})"),
-            Some(share) => write!(f, "{} % of the members", rounded(100.0 * share, 2))?,
-            None => write!(f, "a few members, under {} %", rounded(100.0 / COUNTED as f64, 1))?,
-        }
-        write!(f, " would be refused ({reason}); narrow the distribution, or cut it: LAW in A..B")
-    }
+/// A number of few digits, for a message.
+fn short(number: f64) -> f64 {
+    rounded(number, 3).parse().unwrap_or(number)
 }
 
-/// Point number `point` of a design in the support.
-fn numbers(distributions: &[&Distribution], design: Design, point: u64) -> Vec<f64> {
-    let at = |place: u32| DrawAddress { seed: 0, members: COUNTED, member: point, place, coordinate: place };
-    (0..).zip(distributions).map(|(place, of)| of.quantile(design.uniform(&at(place)))).collect()
+/// Random point number `point` in the support.
+fn numbers(distributions: &[&Distribution], point: u64) -> Vec<f64> {
+    let at = |place: u32| DrawAddress { seed: 0, members: TRIED, member: point, place, coordinate: place };
+    (0..).zip(distributions).map(|(place, of)| of.quantile(Design::Random.uniform(&at(place)))).collect()
 }
 
 /// All corners of the support, if they are not too many.
@@ -331,36 +305,6 @@ pub(crate) fn corners(distributions: &[&Distribution]) -> impl Iterator<Item = V
         };
         extremes.iter().map(number).collect()
     })
-}
-
-/// The share of draws that fail.
-fn exact_share(of: &Distribution, fails: impl Fn(f64) -> bool) -> f64 {
-    if let Distribution::Choice(values) | Distribution::Each(values) = of {
-        return values.iter().filter(|value| fails(**value)).count() as f64 / values.len() as f64;
-    }
-    // Distances from the nearer end, where a tail may be thin.
-    let below: Vec<f64> = {
-        let tail = std::iter::successors(Some(SMALLEST), |u| Some(2.0 * u)).take_while(|u| *u < 1.0 / f64::from(PARTS));
-        tail.chain((1..=PARTS / 2).map(|part| f64::from(part) / f64::from(PARTS))).collect()
-    };
-    let side = |upper: bool| {
-        let failed = |distance: f64| fails(of.quantile(if upper { 1.0 - distance } else { distance }));
-        let first = if failed(below[0]) { below[0] } else { 0.0 };
-        let parts = below.windows(2).map(|pair| match [failed(pair[0]), failed(pair[1])] {
-            [true, true] => pair[1] - pair[0],
-            [false, false] => 0.0,
-            [near, _] => {
-                let [mut low, mut high] = [pair[0], pair[1]];
-                for _ in 0..50 {
-                    let middle = 0.5 * (low + high);
-                    if failed(middle) == near { low = middle } else { high = middle }
-                }
-                if near { low - pair[0] } else { pair[1] - low }
-            }
-        });
-        first + parts.sum::<f64>()
-    };
-    side(false) + side(true)
 }
 
 #[cfg(test)]
@@ -419,25 +363,29 @@ mod tests {
     }
 
     #[test]
-    fn an_impossible_shape_is_refused_with_the_share_of_members() {
+    fn what_a_distribution_could_give_is_known_and_what_its_median_cannot_be_is_refused() {
         let refusal = |text: &str| text.parse::<Drawn<Shape>>().unwrap_err();
-        for (text, parts) in [
-            (
-                "ellipse:normal(1,0.5),1",
-                ["2.3 % of the members would be refused (the half-axis -", "cut it: LAW in A..B"],
-            ),
-            ("ellipse:normal(1,0.5),normal(1,0.5)", ["4.5 % of the members", "half-axis"]),
-            ("circle:uniform(-1..3)", ["25 % of the members", "the radius -"]),
-            ("circle:choice(1,2,-1,4)", ["25 % of the members", "the radius -1 is out of range"]),
-            // Six deviations: too rare to be seen, but not impossible.
-            ("circle:normal(3,0.5)", ["9.9e-8 % of the members", "the radius -"]),
-            ("flower:uniform(2..5):0.1", ["every member would be refused", "is not MODE"]),
-            ("flower:2:uniform(0..0.7),3:uniform(0..0.7)", ["16 % of the members", "add up to"]),
-            ("flower:choice(2,0.5):0.1", ["50 % of the members", "is not MODE"]),
+        for (text, part) in [
+            ("flower:uniform(2..5):0.1", "is not MODE"),
+            ("circle:uniform(-3..1)", "the radius -1 is out of range"),
+            ("flower:2:uniform(0..0.9),3:uniform(0.7..0.9)", "add up to"),
         ] {
             let message = refusal(text);
-            assert!(parts.iter().all(|part| message.contains(part)), "{text}: {message}");
+            assert!(message.contains(part) && message.ends_with(", at the medians of its distributions"), "{message}");
         }
+        for (text, part) in [
+            ("ellipse:normal(1,0.5),1", "the half-axis -"),
+            ("circle:choice(1,2,4,-1)", "the radius -1 is out of range"),
+            // Six deviations: too rare to be seen, but not impossible.
+            ("circle:normal(3,0.5)", "the radius -"),
+            ("flower:2:uniform(0..0.7),3:uniform(0..0.7)", "add up to"),
+        ] {
+            let possible = shape(text).refusal().expect(text);
+            assert!(possible.contains(part), "{text}: {possible}");
+        }
+        // The smallest number that can be drawn is six deviations below the mean.
+        assert_eq!(shape("circle:normal(1,0.15)").refusal(), None);
+        assert!(shape("circle:normal(1,0.17)").refusal().is_some());
         assert!("ellipse:normal(1,0.5) in 0.1..3,1".parse::<Drawn<Shape>>().is_ok());
         for text in ["ellipse:normal(1,0.5) in 0.1,1", "ellipse:normal(1,0.5) in", "ellipse:normal(1,0.5) in 0..1..2,1"]
         {
@@ -453,24 +401,7 @@ mod tests {
         assert!(
             refusal("circle:normal(uniform(1..2),0.2)").contains("normal(uniform(1..2),0.2): a distribution inside")
         );
-        // The smallest number that can be drawn is six deviations below the mean.
-        assert!("circle:normal(1,0.15)".parse::<Drawn<Shape>>().is_ok());
-        assert!("circle:normal(1,0.17)".parse::<Drawn<Shape>>().is_err());
         assert!("elastic:lognormal(0.5,0.2)".parse::<Drawn<Flow>>().is_ok());
         assert!("willmore:uniform(1..2)".parse::<Drawn<Flow>>().unwrap_err().contains("takes no argument"));
-    }
-
-    #[test]
-    fn the_share_of_one_distribution_is_exact() {
-        let law = Distribution::Normal { mean: 0.0, sd: 1.0 };
-        for z in [0.5, 2.0, 5.0] {
-            let tail = 0.5 * libm::erfc(z / std::f64::consts::SQRT_2);
-            let found = exact_share(&law, |x| x < -z);
-            assert!((found / tail - 1.0).abs() < 1e-2, "{z}: {found} {tail}");
-            let both = exact_share(&law, |x| x.abs() > z);
-            assert!((both / (2.0 * tail) - 1.0).abs() < 0.1, "{z}: {both} {tail}");
-        }
-        assert!((exact_share(&law, |x| x < 1.0) - 0.8413447460685429).abs() < 1e-8);
-        assert_eq!(exact_share(&law, |x| x.abs() > 6.1), 0.0, "beyond what is drawn");
     }
 }

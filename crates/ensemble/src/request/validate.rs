@@ -540,7 +540,6 @@ mod tests {
         ("tolerance = 1e-4\nadaptive = 0.001", "--tolerance 0.0001: the direct solver makes no sweeps; "),
         ("sor = 1.5\nsolver = 'direct'", "--sor 1.5: the direct solver makes no sweeps; "),
         ("max-sweeps = 9\nsolver = 'direct'", "--max-sweeps 9: the direct solver makes no sweeps; "),
-        ("amplitude = 'normal(0.05,0.02)'", "--amplitude normal(0.05,0.02): 0.62 % of the members would be refused"),
         ("shape = 'flower:choice(2,26):0.1'", "--shape flower:choice(2,26):0.1: 100 nodes resolve no mode above 25"),
         ("adaptive = 0", "--adaptive 0: not a local error tolerance; use a number above 0, up to 1"),
         ("adaptive = -1", "--adaptive -1: "),

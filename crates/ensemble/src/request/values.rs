@@ -4,11 +4,11 @@
 //! of a member is the same whether or not its shape is drawn, too; only the coordinates of `--design sobol` are counted
 //! through, in the order shape, flow, amplitude, decay.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, fmt};
 
 use crate::{
     Spec,
-    request::drawn::{Drawable, Drawn, Refused, corners},
+    request::drawn::{Drawable, Drawn, corners, refusal},
 };
 use curvelax_base::{
     error::{Error, Result, echo},
@@ -56,7 +56,7 @@ impl Spec {
     /// The values that are drawn for `member`, an index over all cells; with common random numbers, over one.
     ///
     /// # Errors
-    /// [`Error::Request`] for values that cannot be, which a [valid](Spec::validate) spec does not have.
+    /// [`Error::Request`] for values that cannot be, which no member of a [study](crate::Study) has.
     pub fn values(&self, member: u64) -> Result<MemberValues<'_>> {
         self.values_at(|of, place| self.uniform(of, member, place))
     }
@@ -127,11 +127,10 @@ impl Spec {
         [self.typical()].into_iter().chain(tails.chain(members).map(probe)).collect()
     }
 
-    /// Checks what the values of each key cannot say alone: the number of coordinates, the law of the perturbation, and
-    /// whether the nodes resolve the modes of a shape.
+    /// Checks what the values of each key cannot say alone: the number of coordinates, and that of listed values.
     ///
     /// # Errors
-    /// [`Error::Request`] with the share of the members that would be refused.
+    /// [`Error::Request`] with the numbers.
     pub(crate) fn check_drawn(&self) -> Result<()> {
         let places: usize = self.distributions().iter().map(|of_key| of_key.len()).sum();
         if self.design == Design::Sobol && places > MAX_SOBOL {
@@ -149,32 +148,39 @@ impl Spec {
                 return Err(Error::value(key, "each(...)", &problem, &remedy));
             }
         }
-        // Cells are checked on their own.
-        if ["amplitude", "modes", "decay"].into_iter().any(|key| self.sweep.has(key)) {
-            return Ok(());
-        }
-        let [_, _, amplitude, decay] = self.distributions();
-        let of: Vec<&Distribution> = amplitude.iter().chain(decay).collect();
-        let law = |numbers: &[f64]| {
-            let (first, second) = numbers.split_at(amplitude.len());
-            let [amplitude, decay] = [self.amplitude.at(first), self.decay.at(second)];
-            amplitude
-                .and_then(|amplitude| Ok((amplitude, decay?)))
-                .map_err(Error::Request)
-                .and_then(|(amplitude, decay)| RadialLaw::new(amplitude, self.modes, decay))
-                .err()
-                .map(|error| error.to_string())
-        };
-        if !of.is_empty()
-            && let Some(refused) = Refused::of(&of, law)
-        {
-            let [key, value] = match amplitude.is_empty() {
-                false => ["amplitude", &self.amplitude.to_string()],
-                true => ["decay", &self.decay.to_string()],
-            };
-            return Err(Error::Request(format!("--{key} {}: {refused}", echo(value))));
-        }
         Ok(())
+    }
+
+    /// Why the values of a member could be refused, if its distributions can give such values: with the flag.
+    pub(crate) fn refusal(&self) -> Option<String> {
+        let told = |key: &str, drawn: &dyn fmt::Display, reason| format!("--{key} {}: {reason}", echo(drawn));
+        let of_shape = || Some(told("shape", &self.shape, self.shape.refusal()?));
+        let of_flow = || Some(told("flow", &self.flow, self.flow.refusal()?));
+        let of_law = || {
+            let [_, _, amplitude, decay] = self.distributions();
+            let of: Vec<&Distribution> = amplitude.iter().chain(decay).collect();
+            let reason = refusal(&of, |numbers| {
+                let (first, second) = numbers.split_at(amplitude.len());
+                let law = |amplitude, decay| RadialLaw::new(amplitude, self.modes, decay).err();
+                match (self.amplitude.at(first), self.decay.at(second)) {
+                    (Ok(amplitude), Ok(decay)) => law(amplitude, decay).map(|error| error.to_string()),
+                    (Err(message), _) | (_, Err(message)) => Some(message),
+                }
+            });
+            let drawn: (&str, &dyn fmt::Display) =
+                if amplitude.is_empty() { ("decay", &self.decay) } else { ("amplitude", &self.amplitude) };
+            Some(told(drawn.0, drawn.1, reason?))
+        };
+        of_shape().or_else(of_flow).or_else(of_law)
+    }
+
+    /// Checks the values of `member`, as for [`Spec::values`].
+    ///
+    /// # Errors
+    /// [`Error::Request`] for values that cannot be.
+    pub(crate) fn check_values(&self, member: u64) -> Result<()> {
+        let values = self.values(member)?;
+        RadialLaw::new(values.amplitude, self.modes, values.decay).map(drop)
     }
 
     /// The highest mode of a shape made of modes, whichever member's.
@@ -331,19 +337,21 @@ mod tests {
     }
 
     #[test]
-    fn the_law_of_the_perturbation_is_refused_with_the_share_of_members_that_break_it() {
+    fn a_law_of_the_perturbation_that_some_members_could_break_is_known() {
         for (text, start) in [
-            (
-                "amplitude = 'normal(0.05,0.025)'",
-                "--amplitude normal(0.05,0.025): 2.3 % of the members would be refused (--amplitude -",
-            ),
+            ("amplitude = 'normal(0.05,0.025)'", "--amplitude normal(0.05,0.025): --amplitude -"),
             ("amplitude = 'uniform(0..1)'", "--amplitude uniform(0..1): "),
-            ("decay = 'uniform(0..40)'", "--decay uniform(0..40): 50 % of the members would be refused (--decay "),
+            ("decay = 'uniform(0..40)'", "--decay uniform(0..40): --decay "),
             ("amplitude = 0.3\ndecay = 'uniform(-1..1)'", "--decay uniform(-1..1): "),
         ] {
-            let error = spec(text).validate().unwrap_err();
-            assert!(error.exit_code() == 2 && error.to_string().starts_with(start), "{text}: {error}");
+            let possible = spec(text).validate().unwrap().refusal().expect(text);
+            assert!(possible.starts_with(start), "{text}: {possible}");
         }
+        assert_eq!(spec(ALL).refusal(), None);
+    }
+
+    #[test]
+    fn a_sequence_has_so_many_coordinates() {
         let modes: Vec<String> = (2..=24).map(|mode| format!("{mode}:uniform(0..0.01)")).collect();
         let many = spec(&format!("design = 'sobol'\nshape = 'flower:{}'", modes.join(",")));
         assert!(many.validate().unwrap_err().to_string().starts_with("--design sobol: 23 distributions; "));

@@ -245,6 +245,7 @@ impl Study {
         for cell in &mut cells {
             let own = cell.settled();
             cell.spec = own.map_err(|error| spec.sweep.in_cell(error, cell.index))?;
+            cell.check_draws().map_err(|error| spec.sweep.in_cell(error, cell.index))?;
             cell.check_refinement().map_err(|error| spec.sweep.in_cell(error, cell.index))?;
         }
         if spec.t_end == Some(FinalTime::Auto) && !spec.sweep.is_empty() {
@@ -288,6 +289,8 @@ const TOO_WIDE: &str = "standard errors and intervals are those of independent m
 
 const OF_THESE: &str = "standard errors and intervals take copies of one outline for independent members: they hold for these \
                         outlines, not for a population of which they are a sample";
+
+const NARROW: &str = "narrow the distribution, or cut it: LAW in A..B";
 
 /// How many times more nodes are looked for where so few cannot be refined.
 const MOST_MORE: usize = 8;
@@ -347,6 +350,21 @@ impl Cell {
         }
         warnings.extend(times::warnings(&self.spec, self.family.scales()));
         warnings
+    }
+
+    /// Checks that no member was drawn with values that cannot be.
+    fn check_draws(&self) -> Result<()> {
+        let Some(possible) = self.spec.refusal() else { return Ok(()) };
+        if self.spec.accuracy.is_some() {
+            let any = format!("{possible}: --accuracy adds members until one may be drawn so; {NARROW}");
+            return Err(Error::Request(any));
+        }
+        let of_member = |member| self.spec.check_values(self.drawn_as(member)).err().map(|error| (member, error));
+        let mut refused = self.members().filter_map(of_member);
+        let Some((member, error)) = refused.next() else { return Ok(()) };
+        let (more, all) = (refused.count(), self.spec.member_count());
+        let more = if more == 0 { String::new() } else { format!(" and {more} more") };
+        Err(Error::Request(format!("{error}, for member {member}{more} of {all}; {NARROW}")))
     }
 
     /// Checks that its members have limits, if these are asked for.
