@@ -193,3 +193,6 @@ class Keys(TypedDict, total=False):
     store: Literal["csv", "zarr"]
     """Format of the snapshots: the table snapshots.csv, or the arrays of snapshots.zarr, for xarray. By default
     csv."""
+
+    tables: Literal["csv", "parquet"]
+    """Format of the tables: CSV, or Parquet next to the CSV files, which the other commands read. By default csv."""

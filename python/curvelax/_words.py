@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 # What a flag may have for its value in a message, besides numbers.
-WORDS = {"auto", "cpu", "gpu", "f32", "f64", "direct", "gauss-seidel", "geometric", "paper", "csv", "zarr", "spline", "polygon"}
+WORDS = {"auto", "cpu", "gpu", "f32", "f64", "direct", "gauss-seidel", "geometric", "paper", "csv", "parquet", "zarr", "spline", "polygon"}
 
 
 def in_python(message: str) -> str:

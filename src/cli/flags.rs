@@ -13,7 +13,8 @@ use crate::{
     ensemble::{
         Drawn, Event, Shard, Spec,
         request::spec::{
-            BackendChoice, FinalTime, Omega, Order, PositionForm, Precision, Pull, SolverChoice, Sor, Store, Tau, Units,
+            BackendChoice, FinalTime, Omega, Order, PositionForm, Precision, Pull, SolverChoice, Sor, Store, Tables,
+            Tau, Units,
         },
         request::sweep::{self, SweepAxis},
     },
@@ -31,6 +32,7 @@ const ORDERS: &[&str] = &["coloured", "lexicographic"];
 pub(super) const BACKENDS: &[&str] = &["auto", "gpu", "cpu"];
 pub(super) const PRECISIONS: &[&str] = &["f32", "f64"];
 const STORES: &[&str] = &["csv", "zarr"];
+const TABLES: &[&str] = &["csv", "parquet"];
 
 /// One flag for each key of [`Spec`], none given unless the user gave it.
 ///
@@ -285,6 +287,9 @@ pub struct SpecFlags {
     /// [default: csv]
     #[arg(long, value_name = "HOW", value_parser = word::<Store>(STORES), help_heading = OUTPUT)]
     store: Option<Store>,
+    /// Format of the tables: CSV, or Parquet next to the CSV files, which the other commands read [default: csv]
+    #[arg(long, value_name = "HOW", value_parser = word::<Tables>(TABLES), help_heading = OUTPUT)]
+    tables: Option<Tables>,
 }
 
 /// The number of shards, if not all are in the array.
@@ -303,7 +308,7 @@ macro_rules! every_flag {
     ($to:ident) => {
         $to! {
             curves points seed shape sampling amplitude modes decay perturbation design flow no_redistribution pull form solver
-            order sor max_sweeps backend snapshots store common_random_numbers refine event;
+            order sor max_sweeps backend snapshots store tables common_random_numbers refine event;
             outlines group_by interpolate rounding accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
         }
     };
@@ -535,7 +540,7 @@ mod tests {
              --tau 1e-6 --t-end 1 --interpolate spline --rounding 0.01 --omega 0 --no-redistribution --pull 3 --form auto --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \
-             --refine --accuracy 0.01 --event convex=k_min>=0 --series 0.1 --snapshots 0,1 --store zarr --only 1,2 --shard 0/2 --threads 2 --common-random-numbers \
+             --refine --accuracy 0.01 --event convex=k_min>=0 --series 0.1 --snapshots 0,1 --store zarr --tables parquet --only 1,2 --shard 0/2 --threads 2 --common-random-numbers \
              --sweep phase=1,2"
                 .split_whitespace()
                 .collect::<Vec<_>>()
@@ -594,6 +599,7 @@ mod tests {
         assert_eq!(words::<DeviceKind>(), DeviceKind::NAMES);
         assert_eq!(words::<Precision>(), PRECISIONS);
         assert_eq!(words::<Store>(), STORES);
+        assert_eq!(words::<Tables>(), TABLES);
         for name in SAMPLINGS {
             let sampling: Sampling = serde_json::from_value((*name).into()).unwrap();
             assert_eq!(serde_json::to_value(sampling).unwrap(), *name);

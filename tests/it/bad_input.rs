@@ -100,6 +100,7 @@ fn a_value_that_cannot_be_read_is_named_with_its_flag() {
         ("--event", "convex", "write NAME = OBSERVABLE <= LEVEL"),
         ("--event", "t_relax = excess <= 1", "choose another name"),
         ("--store", "zar", "similar value exists: 'zarr'"),
+        ("--tables", "parqet", "similar value exists: 'parquet'"),
     ] {
         let message = refused(&[flag, value], &[]);
         assert_says(&message, &[&format!("invalid value '{value}' for '{flag} "), reason]);
@@ -141,6 +142,7 @@ fn a_wrong_sweep_names_its_key_and_cell() {
         (&["amplitud=1"][..], ["--sweep amplitud: ", "did you mean `amplitude`?"]),
         (&["curves=1,2"], ["--sweep curves: ", "run once for each value"]),
         (&["store=csv,zarr"], ["--sweep store: ", "run once for each value"]),
+        (&["tables=csv,parquet"], ["--sweep tables: ", "run once for each value"]),
         (&["amplitude="], ["--sweep amplitude: no values", "amplitude=v1,v2"]),
         (&["amplitude"], ["has no `=`", "key=v1,v2"]),
         (&["amplitude=0.1,word"], ["--sweep amplitude=word: ", "expected a number, or a distribution"]),
@@ -253,7 +255,7 @@ fn an_overlong_value_is_echoed_by_its_beginning() {
     let of = |template: &str| template.replace("LONG", &long);
     let flags = "curves points seed shape outlines sampling amplitude modes decay perturbation design sweep flow mobility form \
                  units tau adaptive t-end omega pull solver order tolerance sor max-sweeps backend precision relax-to \
-                 relax-at only shard accuracy event series snapshots store";
+                 relax-at only shard accuracy event series snapshots store tables";
     let mut all: Vec<Vec<String>> =
         flags.split_whitespace().map(|flag| vec![format!("--{flag}"), long.clone()]).collect();
     for arguments in [

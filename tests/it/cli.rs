@@ -249,6 +249,7 @@ fn the_disk_space_of_a_run_is_foretold_within_a_quarter() {
         "--curves 120 --points 100 --snapshots 0,0.1,0.2,0.3,0.4,0.5 --store zarr",
         "--curves 3 --points 64 --sweep amplitude=0.01,0.02,0.03,0.04,0.05",
         "--curves 400 --points 34 --stop-when-relaxed --series 0.02 --precision f32",
+        "--curves 300 --points 34 --series 0.02 --tables parquet",
     ]
     .into_iter()
     .enumerate()

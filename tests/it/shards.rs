@@ -112,9 +112,9 @@ fn cells_with_common_random_numbers_are_paired_alike_in_one_run_in_shards_and_wh
 #[test]
 fn merged_shards_are_the_files_of_one_run() {
     let home = TempDir::new().unwrap();
-    for store in ["csv", "zarr"] {
+    for (store, tables) in [("csv", "parquet"), ("zarr", "csv")] {
         // A store needs one number of nodes, and has chunks of many members.
-        let study = format!("{STUDY} --store {store}");
+        let study = format!("{STUDY} --store {store} --tables {tables}");
         done(home.path(), &format!("run {study} --out {store}"));
         let one = home.path().join(store);
         for count in [1, 3, 8, 64] {

@@ -22,11 +22,11 @@ def run(flags, out):
 
 
 class Runs:
-    """The same run with its snapshots as a table and as arrays."""
+    """The same run with its snapshots as a table, and all tables as Parquet, too; and with its snapshots as arrays."""
 
     def __init__(self):
         self.home = tempfile.TemporaryDirectory()
-        self.csv = run(FLAGS, Path(self.home.name) / "csv")
+        self.csv = run(FLAGS + " --tables parquet", Path(self.home.name) / "csv")
         self.zarr = run(FLAGS + " --store zarr", Path(self.home.name) / "zarr")
 
     def close(self):

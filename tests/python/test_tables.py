@@ -1,4 +1,4 @@
-"""summary.csv, ensemble.csv and series.csv as pandas and polars read them: types, and every value to the last bit."""
+"""The tables as pandas and polars read them, from CSV and from Parquet: types, and every value to the last bit."""
 
 import math
 import unittest
@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import polars as pl
 
-from common import Runs, columns
+from common import Runs, columns, rows
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = ["summary.csv", "members.csv", "levels.csv", "ensemble.csv", "explained.csv", "events.csv",
@@ -30,6 +30,9 @@ INTEGERS = {
 }
 TEXT = {"summary.csv": ["status"], "levels.csv": ["status"], "explained.csv": ["time", "feature"], "events.csv": ["event"],
         "event_statistics.csv": ["event"], "event_levels.csv": ["event"]}
+# What only Parquet tells: integers and words of which some are empty.
+OPTIONAL_INTEGERS = {"explained.csv": ["chosen"]}
+OPTIONAL_TEXT = {"summary.csv": ["label", "group"], "members.csv": ["label"], "explained.csv": ["logarithm"]}
 
 
 def same(found, expected):
@@ -115,10 +118,45 @@ class Tables(unittest.TestCase):
         # The control: without these lines polars takes some columns for text.
         self.assertGreater(some, 0)
 
+    def from_csv(self, table):
+        """The columns of a table as its Parquet file should have them; an empty number is None."""
+        records = rows(self.runs.csv / table)
+        with open(self.runs.csv / table) as file:
+            names = file.readline().rstrip("\n").split(",")
+        read = {"integer": int, "float": float}
+        for name in names:
+            kind = "integer" if name in OPTIONAL_INTEGERS.get(table, []) else self.kinds(table, name)
+            kind = "text" if name in OPTIONAL_TEXT.get(table, []) else kind
+            fields = [record[name] for record in records]
+            yield name, kind, fields if kind == "text" else [read[kind](field) if field else None for field in fields]
+
+    def test_parquet_has_the_types_and_values_of_the_tables(self):
+        nulls = 0
+        for table in TABLES:
+            path = (self.runs.csv / table).with_suffix(".parquet")
+            by_polars = pl.read_parquet(path)
+            by_pandas = pd.read_parquet(path, dtype_backend="numpy_nullable")
+            expected = list(self.from_csv(table))
+            self.assertEqual(by_polars.columns, [name for name, _, _ in expected])
+            self.assertEqual(list(by_pandas), by_polars.columns)
+            for name, kind, values in expected:
+                types = {"integer": pl.Int64, "float": pl.Float64, "text": pl.String}
+                self.assertEqual(by_polars[name].dtype, types[kind], f"{table}: {name}")
+                self.assertTrue(same(by_polars[name].to_list(), values), f"{table}: {name}")
+                types = {"integer": "Int64", "float": "Float64", "text": "string"}
+                self.assertEqual(by_pandas[name].dtype, types[kind], f"{table}: {name}")
+                read = [None if value is pd.NA else value for value in by_pandas[name].tolist()]
+                self.assertTrue(same(read, values), f"{table}: {name}")
+                nulls += sum(value is None for value in values)
+        self.assertGreater(nulls, 100)
+        self.assertEqual(len(list(self.runs.csv.glob("*.parquet"))), len(TABLES))
+        self.assertEqual(list(self.runs.zarr.glob("*.parquet")), [], "which did not ask for them")
+
     def test_the_comparison_sees_one_bit_one_type_and_one_gap(self):
         values = [0.1, math.nan, 3.0]
         self.assertTrue(same(values, [0.1, math.nan, 3.0]))
-        for other in ([math.nextafter(0.1, 1), math.nan, 3.0], [0.1, 0.0, 3.0], [0.1, math.nan, 3], values[:2]):
+        others = [math.nextafter(0.1, 1), math.nan, 3.0], [0.1, 0.0, 3.0], [0.1, math.nan, 3], [0.1, None, 3.0], values[:2]
+        for other in others:
             self.assertFalse(same(values, other), other)
 
     def test_members_find_their_cell(self):

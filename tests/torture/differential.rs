@@ -132,6 +132,7 @@ impl Drawn {
         sometimes(" --series 0.061", 2);
         sometimes(" --snapshots 0,0.02,0.15", 2);
         sometimes(" --store zarr", 4);
+        sometimes(" --tables parquet", 4);
         sometimes(" --max-sweeps 40", 6);
         sometimes(" --refine", 6);
         let common = random.below(3) == 0;

@@ -40,12 +40,23 @@ impl Fields<'_> {
     }
 
     /// A whole number; none if unknown.
-    pub fn whole_or_none(&mut self) -> Result<Option<u64>> {
+    pub fn whole_or_none<T: FromStr>(&mut self) -> Result<Option<T>> {
         match self.word() {
             "" => Ok(None),
             word => match word.parse() {
                 Ok(number) => Ok(Some(number)),
                 Err(_) => Err(self.unexpected("a whole number or nothing")),
+            },
+        }
+    }
+
+    /// `true` or `false`; none if unknown.
+    pub fn truth_or_none(&mut self) -> Result<Option<bool>> {
+        match self.word() {
+            "" => Ok(None),
+            word => match word.parse() {
+                Ok(truth) => Ok(Some(truth)),
+                Err(_) => Err(self.unexpected("true, false or nothing")),
             },
         }
     }

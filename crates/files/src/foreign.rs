@@ -10,8 +10,8 @@ use super::{
     claim::LOCK,
     disk::{IS_STORE, entries, is_real_folder},
     names::{
-        EVENT_LEVELS, EVENT_STATISTICS, EVENTS, OUTLINES, OWN, PLOTS, PROBE, PYTHON_OUTLINES, RUN, SERIES, SNAPSHOTS,
-        STATE, STATE_OLD, STATE_PART, STORE, is_store, part,
+        EVENT_LEVELS, EVENT_STATISTICS, EVENTS, OUTLINES, PARQUET, PLOTS, PROBE, PYTHON_OUTLINES, RUN, SERIES,
+        SNAPSHOTS, STATE, STATE_OLD, STATE_PART, STORE, as_parquet, is_store, own, part,
     },
     part_folder::SUCCESSOR,
 };
@@ -28,16 +28,16 @@ pub fn foreign(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let (begun, run) = ([STATE, STATE_OLD].iter().any(there), folder.join(RUN));
     let has_run = begun || is_of_run(&run);
     let unasked = if begun { Vec::new() } else { unasked(&run) };
-    let finished = OWN.into_iter().chain(PYTHON_OUTLINES).filter(|name| has_run && !unasked.contains(name));
+    let finished = own().chain(PYTHON_OUTLINES).filter(|name| has_run && !unasked.contains(name));
     let finished = finished.map(PathBuf::from);
-    let unfinished = OWN.into_iter().map(|name| part(Path::new(name)));
+    let unfinished = own().map(|name| part(Path::new(name)));
     let working = [LOCK, OUTLINES, PROBE, STATE, STATE_OLD, STATE_PART].map(PathBuf::from);
-    let own: BTreeSet<PathBuf> = finished.chain(unfinished).chain(working).collect();
+    let known: BTreeSet<PathBuf> = finished.chain(unfinished).chain(working).collect();
     let mut found = Vec::new();
     let mut look = |path: &Path| {
         let name = path.strip_prefix(folder).unwrap_or(path);
         let is_empty = || is_real_folder(path) && entries(path).is_ok_and(|entries| entries.is_empty());
-        if !own.contains(name) && !is_hidden(name) && !is_empty() {
+        if !known.contains(name) && !is_hidden(name) && !is_empty() {
             found.push(name.to_path_buf());
         }
     };
@@ -53,7 +53,7 @@ pub fn foreign(folder: &Path) -> io::Result<Vec<PathBuf>> {
             }
         }
     }
-    for store in stores.iter().filter(|store| own.contains(store.strip_prefix(folder).unwrap_or(store))) {
+    for store in stores.iter().filter(|store| known.contains(store.strip_prefix(folder).unwrap_or(store))) {
         found.extend(
             foreign_in_store(store)?.iter().map(|path| path.strip_prefix(folder).unwrap_or(path).to_path_buf()),
         );
@@ -82,7 +82,10 @@ fn unasked(path: &Path) -> Vec<&'static str> {
         (lacks_snapshots || !is_stored, &[STORE]),
         (lacks("event"), &[EVENTS, EVENT_STATISTICS, EVENT_LEVELS]),
     ];
-    tables.iter().filter(|(lacks, _)| *lacks).flat_map(|(_, names)| *names).copied().collect()
+    let tables = tables.iter().filter(|(lacks, _)| *lacks).flat_map(|(_, names)| *names).copied();
+    let lacks_parquet = spec.get("tables").is_none_or(|tables| tables != "parquet");
+    let parquet = PARQUET.into_iter().filter(|_| lacks_parquet);
+    tables.flat_map(|name| [Some(name), as_parquet(name)]).flatten().chain(parquet).collect()
 }
 
 fn is_hidden(path: &Path) -> bool {
@@ -155,7 +158,7 @@ mod tests {
         assert_eq!(found(&[".summary.csv.part", ".snapshots.zarr.part/x/zarr.json", STATE_PART]), [""; 0]);
         // What the run did not ask for is not its own, whatever its name.
         let home = tempfile::tempdir().unwrap();
-        for name in [SERIES, SNAPSHOTS, EVENTS, "summary.csv"] {
+        for name in [SERIES, SNAPSHOTS, EVENTS, "series.parquet", "summary.csv", "summary.parquet"] {
             fs::write(home.path().join(name), "mine").unwrap();
         }
         fs::create_dir(home.path().join(STORE)).unwrap();
@@ -164,9 +167,12 @@ mod tests {
             fs::write(home.path().join(RUN), format!("{{\"curvelax\": \"0.1.0\", \"spec\": {{{spec}}}}}")).unwrap();
             foreign(home.path()).unwrap().iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(" ")
         };
-        assert_eq!(of_spec("\"snapshots\": []"), "events.csv series.csv snapshots.csv snapshots.zarr");
-        assert_eq!(of_spec("\"series\": 0.1, \"snapshots\": [1], \"event\": [\"a = area <= 1\"]"), "snapshots.zarr");
-        assert_eq!(of_spec("\"series\": 0.1, \"snapshots\": [1], \"store\": \"zarr\""), "events.csv snapshots.csv");
+        let tables = "events.csv series.csv series.parquet snapshots.csv snapshots.zarr";
+        assert_eq!(of_spec("\"snapshots\": []"), format!("{tables} summary.parquet"));
+        assert_eq!(of_spec("\"tables\": \"parquet\""), tables);
+        let all = "\"tables\": \"parquet\", \"series\": 0.1, \"snapshots\": [1]";
+        assert_eq!(of_spec(&format!("{all}, \"event\": [\"a = area <= 1\"]")), "snapshots.zarr");
+        assert_eq!(of_spec(&format!("{all}, \"store\": \"zarr\"")), "events.csv snapshots.csv");
         let home = tempfile::tempdir().unwrap();
         fs::write(home.path().join(RUN), "{\"engine\": \"another\"}").unwrap();
         assert_eq!(foreign(home.path()).unwrap(), [Path::new(RUN)]);

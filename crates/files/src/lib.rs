@@ -13,6 +13,7 @@ pub mod growing;
 pub mod members;
 pub mod names;
 pub mod owner;
+pub mod parquet;
 pub mod part_file;
 pub mod part_folder;
 pub mod place;

@@ -83,8 +83,13 @@ pub const FIGURES: [&str; 8] =
 /// `.curvelax.rows.part` during a run.
 pub const ROWS: &str = "curvelax.rows";
 
-/// All files that a run may write, or that are made from one without naming a place; the one that vouches for the others comes first.
-pub const OWN: [&str; 32] = [
+/// All files that a run may write, or that are made from one without naming a place; the one that vouches for the others
+/// comes first.
+pub fn own() -> impl Iterator<Item = &'static str> {
+    OWN.into_iter().chain(PARQUET)
+}
+
+const OWN: [&str; 32] = [
     RUN,
     SHARD,
     SUMMARY,
@@ -140,6 +145,29 @@ pub const TABLES: [&str; 14] = [
     STORE,
 ];
 
+/// The tables as Parquet, in the same order.
+pub const PARQUET: [&str; 13] = [
+    "summary.parquet",
+    "members.parquet",
+    "ensemble.parquet",
+    "groups.parquet",
+    "explained.parquet",
+    "events.parquet",
+    "event_statistics.parquet",
+    "rates.parquet",
+    "levels.parquet",
+    "event_levels.parquet",
+    "mean_excess.parquet",
+    "series.parquet",
+    "snapshots.parquet",
+];
+
+/// The name of the table `name` as Parquet; none for the store.
+pub fn as_parquet(name: &str) -> Option<&'static str> {
+    let place = TABLES.iter().position(|table| *table == name)?;
+    PARQUET.get(place).copied()
+}
+
 /// The files that are drawn from the others.
 pub const PICTURES: [&str; 13] = [
     REPORT,
@@ -185,4 +213,17 @@ pub fn part(name: &Path) -> PathBuf {
 /// Whether a folder, and not a file, has this name.
 pub fn is_store(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().trim_end_matches(".part").ends_with(STORE))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_table_has_the_same_name_as_parquet() {
+        for name in TABLES.into_iter().filter(|name| *name != STORE) {
+            assert_eq!(as_parquet(name).map(str::to_owned), Some(name.replace(".csv", ".parquet")));
+        }
+        assert_eq!([STORE, RUN].map(as_parquet), [None, None]);
+    }
 }

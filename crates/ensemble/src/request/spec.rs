@@ -188,6 +188,22 @@ pub enum Store {
     Zarr,
 }
 
+/// How tables are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tables {
+    /// As CSV, from which a run is resumed, merged and drawn again.
+    Csv,
+    /// At the end of the run as Parquet, too.
+    Parquet,
+}
+
+impl Tables {
+    fn is_csv(&self) -> bool {
+        *self == Tables::Csv
+    }
+}
+
 /// A complete description of an ensemble and of the method that relaxes it.
 ///
 /// `Default` is the paper's first example as an ensemble: 256 perturbed 2:1 ellipses under surface diffusion.
@@ -306,6 +322,9 @@ pub struct Spec {
     pub snapshots: Vec<f64>,
     /// How snapshots are stored.
     pub store: Store,
+    /// How tables are written.
+    #[serde(skip_serializing_if = "Tables::is_csv")]
+    pub tables: Tables,
     /// Run only these members.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
     pub only: Option<Vec<u64>>,
@@ -419,6 +438,7 @@ impl Default for Spec {
             series: None,
             snapshots: Vec::new(),
             store: Store::Csv,
+            tables: Tables::Csv,
             only: None,
             shard: None,
             threads: None,
@@ -930,6 +950,7 @@ mod tests {
             series: Some(0.01),
             snapshots: vec![0.0, 1.0 / 3.0],
             store: Store::Zarr,
+            tables: Tables::Parquet,
             only: Some(vec![0, 200]),
             shard: Some(Shard::new(1, 3).unwrap()),
             ..Spec::default()
@@ -996,6 +1017,7 @@ mod tests {
             "adapter",
             "precision",
             "series",
+            "tables",
             "event",
             "refine",
             "accuracy",

@@ -14,7 +14,7 @@ use toml::Value;
 use curvelax_base::error::{Error, Result, did_you_mean, echo, shortened};
 
 /// Keys that all members of a run have in common.
-const COMMON: [&str; 20] = [
+const COMMON: [&str; 21] = [
     "curves",
     "outlines",
     "group-by",
@@ -26,6 +26,7 @@ const COMMON: [&str; 20] = [
     "series",
     "snapshots",
     "store",
+    "tables",
     "only",
     "shard",
     "sweep",

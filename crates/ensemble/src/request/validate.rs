@@ -593,6 +593,7 @@ mod tests {
         "snapshots = []",
         "snapshots = [0]\nstore = 'zarr'",
         "store = 'csv'",
+        "tables = 'parquet'",
         "threads = 1024",
         "order = 'lexicographic'",
         "order = 'lexicographic'\nbackend = 'cpu'",

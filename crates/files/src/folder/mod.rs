@@ -15,7 +15,7 @@ use std::{
 use super::{
     claim::Claim,
     disk::{create, parent, sync_names},
-    names::{OWN, PLOTS, PROBE, part},
+    names::{PLOTS, PROBE, own, part},
     owner::{Existing, Owner},
     place::Place,
 };
@@ -49,7 +49,7 @@ pub struct OutputFolder {
 impl OutputFolder {
     /// Opens the folder of a run, as [`OutputFolder::open_for`].
     pub fn open(path: &Path, existing: impl Into<Existing>) -> Result<OutputFolder> {
-        OutputFolder::open_for(path, existing, Owner::Run, OWN.map(String::from).into())
+        OutputFolder::open_for(path, existing, Owner::Run, own().map(String::from).collect())
     }
 
     /// Checks that [`OutputFolder::open`] may succeed, and touches nothing.
@@ -57,7 +57,7 @@ impl OutputFolder {
     /// # Errors
     /// Those of [`OutputFolder::open`] that can be told from outside.
     pub fn check_place(path: &Path, existing: impl Into<Existing>) -> Result<()> {
-        check_place(path, existing.into(), Owner::Run, &OWN.map(String::from))
+        check_place(path, existing.into(), Owner::Run, &own().map(String::from).collect::<Vec<_>>())
     }
 
     /// Creates the folder and its parents, for `owner` to write the files `names` into. An existing folder is refused

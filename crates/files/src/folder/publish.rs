@@ -9,7 +9,7 @@ use std::{
 use super::OutputFolder;
 use crate::{
     disk::{create, is_real_folder},
-    names::{OWN, RUN, STORE},
+    names::{RUN, STORE, own},
     part_file::{Mark, PartFile},
     part_folder::PartFolder,
 };
@@ -62,7 +62,8 @@ impl OutputFolder {
         self.remove_own(RUN)?;
         files.into_iter().try_for_each(PartFile::finish)?;
         store.map_or(Ok(()), PartFolder::finish)?;
-        OWN.iter().filter(|name| !written.iter().any(|own| own == *name)).try_for_each(|name| self.remove_own(name))?;
+        let earlier = own().filter(|name| !written.iter().any(|own| own == name));
+        earlier.into_iter().try_for_each(|name| self.remove_own(name))?;
         run.finish()?;
         self.check_claim()
     }

@@ -10,7 +10,7 @@ use super::OutputFolder;
 use crate::{
     disk::{checksum, create, names_of},
     foreign::foreign,
-    names::{OWN, PROBE, RUN, STATE, STATE_OLD, STORE, is_store},
+    names::{PROBE, RUN, STATE, STATE_OLD, STORE, is_store, own},
     part_file::{Mark, PartFile},
     part_folder::PartFolder,
     place::Place,
@@ -45,7 +45,7 @@ impl OutputFolder {
             };
             return Err(refuse(format!("no run was started here; {remedy}")));
         }
-        let mut folder = OutputFolder::of(path, OWN.map(String::from).into());
+        let mut folder = OutputFolder::of(path, own().map(String::from).collect());
         if !folder.claim().map_err(cannot)? {
             return Err(refuse("a run is writing here; wait until it ends".into()));
         }

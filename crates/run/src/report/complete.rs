@@ -4,10 +4,11 @@ use std::time::Duration;
 
 use super::{document::Document, overview::Overview, pictures::FinishedRun};
 use curvelax_base::error::{Error, Result};
-use curvelax_ensemble::Spec;
+use curvelax_ensemble::{Spec, request::spec::Tables};
 use curvelax_files::{
+    columns::columns,
     folder::OutputFolder,
-    names,
+    names, parquet,
     part_file::PartFile,
     part_folder::PartFolder,
     place::Place,
@@ -29,8 +30,9 @@ pub enum Form {
     Json,
 }
 
-/// Name of the pictures in the overview.
+/// Names in the overview of the pictures and of the tables as Parquet.
 const PLOTS: &str = "plots/*.svg";
+const PARQUET: &str = "*.parquet";
 
 /// A run whose members have all ended.
 pub struct Complete<'a> {
@@ -54,13 +56,28 @@ pub struct Complete<'a> {
 pub fn listed(is_there: impl Fn(&str) -> bool) -> Vec<&'static str> {
     let tables = names::TABLES.into_iter().filter(|name| is_there(name));
     let shard = Some(names::SHARD).filter(|name| is_there(name));
-    tables.chain([names::REPORT, PLOTS, names::RUN]).chain(shard).collect()
+    let parquet = names::PARQUET.iter().any(|name| is_there(name)).then_some(PARQUET);
+    tables.chain(parquet).chain([names::REPORT, PLOTS, names::RUN]).chain(shard).collect()
 }
 
 /// The place of the file `name`, under its temporary name.
 fn own<'a>(files: &'a [PartFile], name: &str) -> Result<&'a Place> {
     let file = files.iter().find(|file| file.name() == name);
     file.map(PartFile::part).ok_or_else(|| Error::Failed(format!("{name} was not written")))
+}
+
+/// The table `name` as Parquet, if it is one of the `files`.
+fn as_parquet(
+    name: &str,
+    files: &[PartFile],
+    spec: &Spec,
+    statistics: &EnsembleStatistics,
+    folder: &OutputFolder,
+) -> Result<Option<PartFile>> {
+    let (Some(file), Some(own)) = (files.iter().find(|file| file.name() == name), names::as_parquet(name)) else {
+        return Ok(None);
+    };
+    parquet::write(file.part(), &columns(name, spec, statistics)?, spec, folder.file(own)?).map(Some)
 }
 
 impl Complete<'_> {
@@ -94,6 +111,11 @@ impl Complete<'_> {
         let events = if spec.event.is_empty() { None } else { Some(own(&files, names::EVENTS)?) };
         let explained = &reader::explained((summary?, events), members?, spec, statistics.of_limits)?;
         files.push(Table::of(folder.file(names::EXPLAINED)?, &explained.rows)?);
+        if spec.tables == Tables::Parquet {
+            for name in names::TABLES {
+                files.extend(as_parquet(name, &files, spec, statistics, folder)?);
+            }
+        }
         if let Some(shard) = shard {
             files.push(folder.write(names::SHARD, shard)?);
         }

@@ -363,7 +363,10 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use curvelax_ensemble::{Features, Mollified, Observables, Portrait, Rows, Status, request::spec::Store};
+    use curvelax_ensemble::{
+        Features, Mollified, Observables, Portrait, Rows, Status,
+        request::spec::{Store, Tables},
+    };
     use curvelax_files::names;
     use curvelax_study::samples::{outcome, platform};
 
@@ -437,11 +440,15 @@ mod tests {
         let triangle = vec![DVec2::ZERO, DVec2::X, DVec2::Y];
         let portrait = Portrait { before: triangle.clone(), frames: Vec::new(), after: triangle };
 
-        let all = Spec { series: Some(0.1), snapshots: vec![0.0], ..Spec::default() };
+        let all = Spec { series: Some(0.1), snapshots: vec![0.0], tables: Tables::Parquet, ..Spec::default() };
         let (overview, _) = report(&out, &all, Some(portrait)).finish(&all, &[], Form::Overview).unwrap();
         let tables = ["ensemble.csv", "explained.csv", "levels.csv", "mean_excess.csv", "members.csv"];
         let always = [&tables[..], &["plots", "rates.csv", "report.html", "run.json"]].concat();
-        assert_eq!(files(&out), [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat());
+        let csv = [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat();
+        let parquet = csv.iter().filter_map(|name| names::as_parquet(name));
+        let mut both: Vec<&str> = csv.iter().copied().chain(parquet).collect();
+        both.sort_unstable();
+        assert_eq!((files(&out), both.len()), (both.iter().map(|name| name.to_string()).collect(), csv.len() + 9));
         let charts = [
             "distribution.svg",
             "excess.svg",
@@ -459,7 +466,7 @@ mod tests {
         assert!(
             overview.contains(
                 "summary.csv, members.csv, ensemble.csv, explained.csv, rates.csv, levels.csv, mean_excess.csv, series.csv, \
-                 snapshots.csv, report.html, plots/*.svg"
+                 snapshots.csv, *.parquet, report.html, plots/*.svg"
             ),
             "{overview}"
         );
@@ -520,6 +527,7 @@ mod tests {
             amplitude: 0.0.into(),
             series: Some(0.1),
             snapshots: vec![0.0],
+            tables: Tables::Parquet,
             ..Spec::default()
         };
         let zarr = Spec { store: Store::Zarr, ..csv.clone() };
@@ -545,11 +553,13 @@ mod tests {
             second.member(&ended(1, None)).unwrap();
             second.member(&standing.early[&2]).unwrap();
             second.finish(&spec, &[], Form::Overview).unwrap();
-            let tables: Vec<String> = files(&straight).into_iter().filter(|name| name.ends_with("csv")).collect();
+            let is_table = |name: &String| name.ends_with("csv") || name.ends_with("parquet");
+            let tables: Vec<String> = files(&straight).into_iter().filter(is_table).collect();
+            assert_eq!(tables.len(), if name == "csv" { 18 } else { 16 });
             assert_eq!(files(&straight), files(&broken));
             for name in tables {
-                let text = |folder: &Path| fs::read_to_string(folder.join(&name)).unwrap();
-                assert_eq!(text(&straight), text(&broken), "{name}");
+                let bytes = |folder: &Path| fs::read(folder.join(&name)).unwrap();
+                assert!(bytes(&straight) == bytes(&broken), "{name}");
             }
             if name == "zarr" {
                 for chunk in ["x/c.0.0.0", "k/c.0.0.0", "status/c.0", "zarr.json"] {
