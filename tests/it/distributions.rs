@@ -81,7 +81,10 @@ fn a_column_of_a_table_is_a_value_for_each_member_of_each_cell() {
 #[test]
 fn an_impossible_distribution_is_one_clear_message_before_any_work() {
     for (arguments, parts) in [
-        ("--shape ellipse:normal(1,0.5),1", &["half-axis -", "for member ", " more of 256;", "cut it: LAW in A..B"][..]),
+        (
+            "--shape ellipse:normal(1,0.5),1",
+            &["half-axis -", "for member ", " more of 256;", "cut it: LAW in A..B"][..],
+        ),
         ("--shape circle:uniform(-1..3)", &["the radius -", "for member "]),
         ("--shape circle:uniform(-3..1)", &["the radius -1 ", "at the medians of its distributions"]),
         ("--shape circle:normal(3,0.5) --accurate --accuracy 0.01", &["the radius -", "--accuracy adds members"]),
