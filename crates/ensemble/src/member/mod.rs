@@ -27,7 +27,7 @@ use glam::DVec2;
 use mollifier::mollify;
 use outline_curve::{OutlineCurve, Treatment};
 pub(crate) use outline_set::OutlineSet;
-use outline_set::{OutlineCurves, check_equal_points};
+use outline_set::{OutlineCurves, check_equal_points, scale};
 
 use crate::{MemberValues, Spec, theory::horizon::CurveScale};
 use curvelax_base::random::Stream;
@@ -131,8 +131,6 @@ struct MemberCurve {
 /// The group of outlines that do not have the property.
 const NO_GROUP: &str = "(none)";
 
-/// Nodes of a curve that is only measured.
-const PROBE_NODES: usize = 512;
 impl Family {
     /// Loads the shape and checks the keys shape, sampling, points, amplitude, modes and decay.
     ///
@@ -501,12 +499,6 @@ impl Curves {
             _ => &[],
         }
     }
-}
-
-/// The size of a curve.
-fn scale(curve: BaseCurve) -> Result<CurveScale> {
-    let sampler = Sampler::new(curve, Sampling::Parameter, PROBE_NODES)?;
-    Ok(CurveScale::of(&sampler.sample(&RadialFactor::default())))
 }
 
 /// The size of the curve of each of [`Spec::probes`].

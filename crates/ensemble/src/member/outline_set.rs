@@ -5,14 +5,13 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
-use super::{
-    outline_curve::{OutlineCurve, Treatment},
-    scale,
-};
+use super::outline_curve::{OutlineCurve, Treatment};
 use crate::theory::horizon::CurveScale;
 use curvelax_base::error::{Error, Result};
-use curvelax_curve::{BaseCurve, outlines::Labelled};
+use curvelax_curve::{BaseCurve, RadialFactor, Sampler, Sampling, outlines::Labelled};
 
+/// Nodes of a curve that is only measured.
+const PROBE_NODES: usize = 512;
 /// The outlines that stand for all are this many of the largest and of the longest ones, and of the smallest.
 const EXTREMES: usize = 8;
 
@@ -61,6 +60,12 @@ impl OutlineCurves {
         let made = self.made.get(i).and_then(OnceLock::get);
         made.map_or_else(|| self.treatment.corners(&self.set.all[i].outline), |curve| curve.treated.corners)
     }
+}
+
+/// The size of a curve.
+pub(super) fn scale(curve: BaseCurve) -> Result<CurveScale> {
+    let sampler = Sampler::new(curve, Sampling::Parameter, PROBE_NODES)?;
+    Ok(CurveScale::of(&sampler.sample(&RadialFactor::default())))
 }
 
 /// The sizes of the outlines that stand for all: the one of median radius, and the extreme ones, each once.

@@ -1,4 +1,4 @@
-//! Values of keys that are a word, or a number or a word: their types, and how flags and files write them.
+//! Values of keys that are a word, a number or a word, or a list: how flags and files write them.
 
 use std::{fmt, marker::PhantomData, str::FromStr};
 
@@ -335,5 +335,50 @@ impl<'de, T: From<f64> + FromStr<Err = String> + FromNumbers> de::Visitor<'de> f
             numbers.push(number);
         }
         T::from_numbers(numbers).ok_or_else(|| de::Error::invalid_type(de::Unexpected::Seq, &"a number or \"auto\""))
+    }
+}
+
+/// Reads a list: a TOML array, or the comma-separated text of a flag.
+pub(super) fn list<'de, D, T>(deserializer: D) -> Result<Vec<T>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de> + FromStr,
+{
+    deserializer.deserialize_any(ListVisitor(PhantomData))
+}
+
+/// Reads a list that may be absent.
+pub(super) fn some_list<'de, D, T>(deserializer: D) -> Result<Option<Vec<T>>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de> + FromStr,
+{
+    list(deserializer).map(Some)
+}
+
+struct ListVisitor<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de> + FromStr> de::Visitor<'de> for ListVisitor<T> {
+    type Value = Vec<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "an array of numbers, or numbers with commas between them in quotes")
+    }
+
+    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<Vec<T>, A::Error> {
+        let mut list = Vec::new();
+        while let Some(item) = items.next_element()? {
+            list.push(item);
+        }
+        Ok(list)
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Vec<T>, E> {
+        let item = |word: &str| {
+            word.trim()
+                .parse()
+                .map_err(|_| E::custom(format!("`{}` in `{}` is not a number of this list", echo(word), echo(text))))
+        };
+        text.split(',').map(item).collect()
     }
 }

@@ -1,15 +1,12 @@
 //! The spec as TOML: reading, writing, and messages about what is wrong in a file.
 
-use std::{fmt, io::ErrorKind, marker::PhantomData, path::Path, str::FromStr};
+use std::{io::ErrorKind, path::Path};
 
-use serde::{
-    Deserialize, Deserializer,
-    de::{self, IgnoredAny},
-};
+use serde::{Deserialize, de::IgnoredAny};
 
 use super::spec::{OmittedKeys, Spec};
 use curvelax_base::{
-    error::{Error, Result, did_you_mean, echo, echo_path, plainly, shortened},
+    error::{Error, Result, did_you_mean, echo_path, plainly, shortened},
     input,
 };
 
@@ -99,51 +96,6 @@ fn suggestion(message: &str) -> String {
 /// The parts of `text` between backticks.
 fn quoted(text: &str) -> impl Iterator<Item = &str> {
     text.split('`').skip(1).step_by(2)
-}
-
-/// Reads a list: a TOML array, or the comma-separated text of a flag.
-pub(super) fn list<'de, D, T>(deserializer: D) -> Result<Vec<T>, D::Error>
-where
-    D: Deserializer<'de>,
-    T: Deserialize<'de> + FromStr,
-{
-    deserializer.deserialize_any(ListVisitor(PhantomData))
-}
-
-/// Reads a list that may be absent.
-pub(super) fn some_list<'de, D, T>(deserializer: D) -> Result<Option<Vec<T>>, D::Error>
-where
-    D: Deserializer<'de>,
-    T: Deserialize<'de> + FromStr,
-{
-    list(deserializer).map(Some)
-}
-
-struct ListVisitor<T>(PhantomData<T>);
-
-impl<'de, T: Deserialize<'de> + FromStr> de::Visitor<'de> for ListVisitor<T> {
-    type Value = Vec<T>;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "an array of numbers, or numbers with commas between them in quotes")
-    }
-
-    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<Vec<T>, A::Error> {
-        let mut list = Vec::new();
-        while let Some(item) = items.next_element()? {
-            list.push(item);
-        }
-        Ok(list)
-    }
-
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<Vec<T>, E> {
-        let item = |word: &str| {
-            word.trim()
-                .parse()
-                .map_err(|_| E::custom(format!("`{}` in `{}` is not a number of this list", echo(word), echo(text))))
-        };
-        text.split(',').map(item).collect()
-    }
 }
 
 #[cfg(test)]

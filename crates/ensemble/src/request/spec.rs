@@ -8,9 +8,9 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    request::choices::{list, some_list},
     request::drawn::Drawn,
     request::event::Event,
-    request::reading::{list, some_list},
     request::seed,
     request::shard::Shard,
     request::sweep::{self, Sweep},
