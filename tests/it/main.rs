@@ -10,6 +10,7 @@ mod bench;
 mod cli;
 mod convergence;
 mod coverage;
+mod crystals;
 mod distributions;
 mod documents;
 mod ensemble;
