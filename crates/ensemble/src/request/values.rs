@@ -266,7 +266,7 @@ impl Spec {
     fn numbers(&self, uniform: impl Fn(&Distribution, DrawAddress) -> f64) -> [Vec<f64>; DRAWN] {
         let (seed, members) = (self.seed, self.members_per_cell());
         let (mut key, mut coordinate) = (0, 0);
-        self.distributions().map(|of_key| {
+        self.distributions().map(|of_key: &[Distribution]| {
             let number = |(rank, of): (u32, &Distribution)| {
                 let place = key << PLACE_BITS | rank;
                 let u = uniform(of, DrawAddress { seed, members, member: 0, place, coordinate: coordinate + rank });
