@@ -34,6 +34,9 @@ pub const ENERGY_UNIT: usize = DIFFUSIVITY_WAVES + MOST_WAVES * WAVE;
 /// The place of 4|W| of the [quotient](Equilibrium::quotient).
 pub const QUOTIENT: usize = ENERGY_UNIT + 1;
 
+/// Quotient of the two slowest rates of a crystal up to which they count as one.
+const EQUAL_RATES: f64 = 1.05;
+
 /// A fourth-order geometric flow, named as on the command line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
@@ -116,7 +119,7 @@ impl Flow {
     pub fn linear_rate(&self, m: u32, radius: f64) -> f64 {
         let m2 = f64::from(m * m);
         if let Flow::Crystal(crystal) = self {
-            return crystal.slowest_rate() * (m2 - 1.0) * m2 * radius.powi(-4);
+            return crystal.slowest_rates()[0] * (m2 - 1.0) * m2 * radius.powi(-4);
         }
         let k = 1.0 / radius;
         let slope: f64 =
@@ -135,12 +138,15 @@ impl Flow {
     /// Rate at which the excess of a nearly round curve of area `area` falls in mode `m`, by linear theory, in 1/time:
     /// `24/R⁴` for m = 2 and surface diffusion; for Willmore flow the exponent of `1 + 2t/R₀⁴`. `None` if the
     /// radius of a circle changes in another way: see `crates/ensemble/src/outcome/linear_rate.rs` for elastic flow. Of a
-    /// crystal the slowest rate, to which mode 2 leads whatever its direction.
+    /// crystal for m = 2 the mean of the two slowest rates, if they are nearly equal: otherwise it depends on the direction.
     pub fn excess_rate(&self, m: u32, area: f64) -> Option<f64> {
         let radius = (area.abs() / PI).sqrt();
         match self {
             Flow::SurfaceDiffusion => Some(2.0 * self.linear_rate(m, radius)),
-            Flow::Crystal(_) if m == 2 => Some(2.0 * self.linear_rate(m, radius)),
+            Flow::Crystal(crystal) if m == 2 => {
+                let [slow, fast] = crystal.slowest_rates();
+                (fast <= EQUAL_RATES * slow).then(|| 12.0 * (slow + fast) * radius.powi(-4))
+            }
             // The excess scales as the square of the mode's amplitude over the radius; both are powers of R₀⁴ + 2t.
             Flow::Willmore => Some(self.linear_rate(m, 1.0) + 0.5),
             _ => None,

@@ -7,7 +7,11 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Member, Observables, Spec, member::FEATURE_MODES, request::{DRAWN, drawn_names}};
+use crate::{
+    Member, Observables, Spec,
+    member::FEATURE_MODES,
+    request::{DRAWN, drawn_names},
+};
 use curvelax_base::error::Result;
 use curvelax_curve::{DESCRIPTORS, Modes, descriptors, polygon};
 

@@ -5,8 +5,8 @@
 
 use crate::request::event::{Event, MAX_EVENTS};
 use crate::request::spec::{
-    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, Precision, Pull,
-    PositionForm, ROUNDINGS, Sor, Spec, Store, Tau, final_times,
+    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, PositionForm,
+    Precision, Pull, ROUNDINGS, Sor, Spec, Store, Tau, final_times,
 };
 use curvelax_base::{
     error::{Error, Result},
@@ -319,15 +319,15 @@ impl Spec {
     fn check_crystals(&self) -> Result<()> {
         let (energy, diffusivity) = (&self.energy, &self.diffusivity);
         let given = energy.as_ref().map(|of| ("energy", of.to_string(), of.typical().waves()));
-        let Some((key, value, _)) = given.or(diffusivity
-            .as_ref()
-            .map(|of| ("diffusivity", of.to_string(), of.typical().waves())))
+        let Some((key, value, _)) =
+            given.or(diffusivity.as_ref().map(|of| ("diffusivity", of.to_string(), of.typical().waves())))
         else {
             return Ok(());
         };
         let refused = |problem: &str, allowed: &str| Err(Error::value(key, &value, problem, allowed));
         if self.flow != Flow::SurfaceDiffusion.into() {
-            let problem = format!("only surface diffusion has one that depends on the direction, not --flow {}", self.flow);
+            let problem =
+                format!("only surface diffusion has one that depends on the direction, not --flow {}", self.flow);
             return refused(&problem, "leave out one of the two");
         }
         if self.form == Some(PositionForm::Paper) {
@@ -341,7 +341,8 @@ impl Spec {
         if self.backend == BackendChoice::Gpu {
             return refused("crystals do not run on a GPU yet", "use --backend cpu");
         }
-        let waves = [energy.as_ref().map(|of| of.typical().waves()), diffusivity.as_ref().map(|of| of.typical().waves())];
+        let waves =
+            [energy.as_ref().map(|of| of.typical().waves()), diffusivity.as_ref().map(|of| of.typical().waves())];
         let highest = waves.into_iter().flatten().filter_map(|waves| waves.highest_mode()).max().unwrap_or(0);
         match highest as usize > self.points / 4 {
             true => {
@@ -597,10 +598,19 @@ mod tests {
         ("adaptive = 9e-6\nprecision = 'f32'", "--adaptive 9e-6: the rounding of the precision is larger; use 1e-5"),
         ("adaptive = 0.001\ntau = 0.001", "--tau 0.001: steps are either fixed or adaptive"),
         ("adaptive = 0.001\nomega = 1e9", "--omega 1000000000: adaptive steps are at most about 1/omega long"),
-        ("energy = 'cos:4,0.03'\nflow = 'willmore'", "--energy cos:4,0.03: only surface diffusion has one that depends"),
-        ("energy = 'cos:4,0.03'\nform = 'paper'", "--form paper: with it a crystal creeps at rest, and --energy cos:4,0.03"),
+        (
+            "energy = 'cos:4,0.03'\nflow = 'willmore'",
+            "--energy cos:4,0.03: only surface diffusion has one that depends",
+        ),
+        (
+            "energy = 'cos:4,0.03'\nform = 'paper'",
+            "--form paper: with it a crystal creeps at rest, and --energy cos:4,0.03",
+        ),
         ("energy = 'cos:4,0.03'\nrefine = true", "--refine true: its intervals were calibrated without crystals, and "),
-        ("diffusivity = 'cos:4,0.5'\nbackend = 'gpu'", "--diffusivity cos:4,0.5: crystals do not run on a GPU yet; use"),
+        (
+            "diffusivity = 'cos:4,0.5'\nbackend = 'gpu'",
+            "--diffusivity cos:4,0.5: crystals do not run on a GPU yet; use",
+        ),
         (
             "diffusivity = 'cos:9,0.5'\npoints = 32",
             "--diffusivity cos:9,0.5: 32 nodes resolve no wave above 8; use --points 36 or more, or a lower M",
