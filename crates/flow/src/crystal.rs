@@ -18,8 +18,6 @@ use serde::{Deserialize, Serialize};
 
 use curvelax_base::{error::echo, text::number};
 
-use crate::flow::parse_numbers;
-
 /// Waves of one function: what the numbers of a law have room for.
 pub const MOST_WAVES: usize = 2;
 /// The highest wave. The corners of a higher one need more nodes than a curve has.
@@ -418,6 +416,16 @@ fn eigenvalues<const K: usize>(mut a: Vec<f64>, n: usize, below: [usize; K]) -> 
         }
         0.5 * (low + high)
     })
+}
+
+/// Parses comma-separated finite numbers.
+pub fn parse_numbers(list: &str) -> Result<Vec<f64>, String> {
+    list.split(',')
+        .map(|word| match word.trim().parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(format!("`{}` is not a finite number", echo(word))),
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -9,13 +9,10 @@ use std::{f64::consts::PI, fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
-use curvelax_base::{
-    error::{did_you_mean, echo},
-    text::number,
-};
+use curvelax_base::{error::did_you_mean, text::number};
 
 use crate::{
-    crystal::{Crystal, MOST_WAVES, WAVE},
+    crystal::{Crystal, MOST_WAVES, WAVE, parse_numbers},
     equilibrium::Equilibrium,
 };
 
@@ -205,16 +202,6 @@ impl FromStr for Flow {
             )),
         }
     }
-}
-
-/// Parses comma-separated finite numbers.
-pub fn parse_numbers(list: &str) -> Result<Vec<f64>, String> {
-    list.split(',')
-        .map(|word| match word.trim().parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(format!("`{}` is not a finite number", echo(word))),
-        })
-        .collect()
 }
 
 #[cfg(test)]
