@@ -83,7 +83,7 @@ fn stages<T: Evolves>(c: &mut Criterion) {
         });
     });
     group.bench_function("observation", |b| {
-        b.iter(|| observe::glance(&curve, new, *blocks));
+        b.iter(|| observe::glance(&curve, new, &p, p.kind_of_law(), *blocks));
     });
 }
 

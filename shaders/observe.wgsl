@@ -1,5 +1,4 @@
-// Sums and maxima of a curve, and what they determine. Twin of crates/flow/src/scheme/observe.rs and
-// crates/flow/src/equilibrium.rs.
+// Sums and maxima of a curve, and what they determine. Twin of crates/flow/src/scheme/observe.rs.
 
 /// |k| r at which a curve counts as unresolved.
 const MAX_TURN = 2.0;
@@ -11,7 +10,8 @@ const MAX_DRIFT = 1.0;
 const MAX_GAP = 0.5;
 /// Excess at the end of an adaptive step, as a multiple of a threshold, above which nobody looks for a dip below it.
 const NEAR = 4.0;
-const FOUR_PI = 12.566370614359172;
+/// The place of 4π, or 4|W|, in the law.
+const QUOTIENT = 22u;
 
 /// Sums of the new curve: length, area, energy, turning.
 var<private> sums: vec;
@@ -19,11 +19,6 @@ var<private> sums: vec;
 var<private> extremes: vec;
 /// Largest curvature, minus the smallest, largest displacement of a node.
 var<private> others: vec;
-
-/// `L²/(4π|A|)`, least at equilibrium.
-fn quotient(length: real, area: real) -> real {
-    return length * length / (real(FOUR_PI) * abs(area));
-}
 
 /// How far the nodes of the new curve have moved.
 var<private> displacement: vec;
@@ -56,6 +51,11 @@ struct Corner { before_x: vec, x: vec, before_y: vec, y: vec }
 
 fn corner(wx: Window, wy: Window) -> Corner {
     return Corner(coordinate(minus1(wx)), coordinate(here(wx)), coordinate(minus1(wy)), coordinate(here(wy)));
+}
+
+/// `L²/(4π|A|)`, least at equilibrium.
+fn quotient(length: real, area: real) -> real {
+    return length * length / (all_parameters[member].law[QUOTIENT] * abs(area));
 }
 
 /// The distance from equilibrium: the quotient minus that of the regular polygon.

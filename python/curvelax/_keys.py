@@ -59,9 +59,9 @@ class Keys(TypedDict, total=False):
     and sin with the same power. By default amplitude-phase."""
 
     design: Literal["random", "sobol", "lhs"]
-    """How the members of a cell are spread over the distributions of shape, flow, amplitude and decay: each on its
-    own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay random. By default
-    random."""
+    """How the members of a cell are spread over the distributions of shape, flow, energy, diffusivity, amplitude and
+    decay: each on its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay
+    random. By default random."""
 
     sweep: Mapping[str, Sequence[Any]]
     """Vary this key: a cell of members for each value, and for each combination if the flag is given for several
@@ -80,6 +80,15 @@ class Keys(TypedDict, total=False):
     flow: str
     """Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions. By default
     surface-diffusion."""
+
+    energy: str
+    """Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG] is
+    1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any number may
+    be a distribution. By default 1."""
+
+    diffusivity: str
+    """Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ -
+    DEG), above 0 in all directions; a sum of two as for energy. By default 1."""
 
     mobility: float
     """Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in
@@ -138,7 +147,7 @@ class Keys(TypedDict, total=False):
     form: Literal["paper", "geometric", "auto"]
     """What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the force
     of the polygon itself, which halves the error of smooth, well resolved curves and fails for others; auto: paper.
-    By default paper."""
+    By default paper; of crystals geometric."""
 
     solver: Literal["auto", "gauss-seidel", "direct"]
     """Solver of the pentadiagonal systems. auto is gauss-seidel with tau and direct with adaptive. By default

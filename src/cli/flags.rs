@@ -5,6 +5,7 @@
 
 use super::parsers::{real, shard, solver, text_of, whole, word};
 use crate::{
+    crystal::{Diffusivity, Energy},
     curve::{Interpolation, Modes, Perturbation, Sampling, Shape},
     ensemble::{
         Drawn, Event, Shard, Spec,
@@ -105,8 +106,8 @@ pub struct SpecFlags {
     /// sin with the same power [default: amplitude-phase]
     #[arg(long, value_name = "LAW", value_parser = word::<Perturbation>(PERTURBATIONS), help_heading = ENSEMBLE)]
     perturbation: Option<Perturbation>,
-    /// How the members of a cell are spread over the distributions of --shape, --flow, --amplitude and --decay: each on
-    /// its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay random
+    /// How the members of a cell are spread over the distributions of --shape, --flow, --energy, --diffusivity,
+    /// --amplitude and --decay: each on its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay random
     /// [default: random]
     #[arg(long, value_name = "DESIGN", value_parser = word::<Design>(DESIGNS), help_heading = ENSEMBLE)]
     design: Option<Design>,
@@ -137,6 +138,20 @@ pub struct SpecFlags {
         help_heading = EVOLUTION
     )]
     flow: Option<Drawn<Flow>>,
+    /// Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG] is 1 +
+    /// EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any number may be a
+    /// distribution [default: 1]
+    #[arg(
+        long, value_name = "GAMMA", value_parser = text_of::<Drawn<Energy>>, allow_hyphen_values = true, help_heading = EVOLUTION
+    )]
+    energy: Option<Drawn<Energy>>,
+    /// Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ - DEG), above
+    /// 0 in all directions; a sum of two as for --energy [default: 1]
+    #[arg(
+        long, value_name = "M", value_parser = text_of::<Drawn<Diffusivity>>, allow_hyphen_values = true,
+        help_heading = EVOLUTION
+    )]
+    diffusivity: Option<Drawn<Diffusivity>>,
     /// Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in results,
     /// are then in its unit of time [default: 1]
     #[arg(long, value_name = "B", value_parser = real, allow_hyphen_values = true, help_heading = EVOLUTION)]
@@ -218,7 +233,7 @@ pub struct SpecFlags {
     )]
     pull: Option<Pull>,
     /// What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the force of the
-    /// polygon itself, which halves the error of smooth, well resolved curves and fails for others; auto: paper [default: paper]
+    /// polygon itself, which halves the error of smooth, well resolved curves and fails for others; auto: paper [default: paper; of crystals geometric]
     #[arg(long, value_name = "FORM", value_parser = word::<PositionForm>(FORMS), help_heading = METHOD)]
     form: Option<PositionForm>,
     /// Solver of the pentadiagonal systems. auto is gauss-seidel with --tau and direct with --adaptive [default: auto]
@@ -299,9 +314,9 @@ pub const OUTPUT: &str = "Output";
 macro_rules! every_flag {
     ($to:ident) => {
         $to! {
-            curves points seed shape sampling amplitude modes decay perturbation design flow no_redistribution pull form solver
+            curves points seed shape sampling amplitude modes decay perturbation design flow no_redistribution pull solver
             order sor max_sweeps backend snapshots store tables common_random_numbers refine event;
-            outlines group_by interpolate rounding accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
+            energy diffusivity form outlines group_by interpolate rounding accuracy mobility units tau adaptive t_end omega stop_when_relaxed relax_to relax_at only shard tolerance adapter precision series threads
         }
     };
 }

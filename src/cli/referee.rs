@@ -97,7 +97,7 @@ impl RefereeFlags {
             ..method
         };
         spec.make_accurate(&[]);
-        spec.form = self.form.unwrap_or(spec.form);
+        spec.form = self.form.or(spec.form);
         spec.pull = self.pull.unwrap_or(spec.pull);
         spec
     }

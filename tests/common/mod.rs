@@ -73,7 +73,7 @@ impl<T: Evolves> Stepper<T> {
     }
 
     pub fn sums(&self) -> CurveSums<T> {
-        observe::sums(&self.state.curve, &self.p, self.work.blocks)
+        observe::sums(&self.state.curve, &self.p, self.p.kind_of_law(), self.work.blocks)
     }
 
     pub fn positions(&self) -> Vec<DVec2> {

@@ -86,6 +86,9 @@ fn a_value_that_cannot_be_read_is_named_with_its_flag() {
         ("--modes", "2-8", "2..=8"),
         ("--flow", "elastic", "elastic:0.5"),
         ("--flow", "wilmore", "did you mean `willmore`?"),
+        ("--energy", "sin:4,0.1", "`sin:4,0.1` is not cos:M,SIZE"),
+        ("--energy", "cos:4,0.07", "ill-posed"),
+        ("--diffusivity", "cos:4,1", "atoms would run uphill"),
         ("--sampling", "arc", "arclength"),
         ("--solver", "gaus-seidel", "similar value exists: 'gauss-seidel'"),
         ("--order", "colored", "similar value exists: 'coloured'"),
@@ -248,7 +251,7 @@ fn a_wrong_cell_of_a_table_of_outlines_is_named_by_row_and_column() {
 fn an_overlong_value_is_echoed_by_its_beginning() {
     let long = "a".repeat(10_000);
     let of = |template: &str| template.replace("LONG", &long);
-    let flags = "curves points seed shape outlines sampling amplitude modes decay perturbation design sweep flow mobility form \
+    let flags = "curves points seed shape outlines sampling amplitude modes decay perturbation design sweep flow energy diffusivity mobility form \
                  units tau adaptive t-end omega pull solver order tolerance sor max-sweeps backend precision relax-to \
                  relax-at only shard accuracy event series snapshots store tables";
     let mut all: Vec<Vec<String>> =

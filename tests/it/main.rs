@@ -12,6 +12,7 @@ mod cli;
 mod clock;
 mod convergence;
 mod coverage;
+mod crystals;
 mod distributions;
 mod documents;
 mod ensemble;

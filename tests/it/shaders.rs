@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use curvelax::{
     backend::gpu::{Variant, kernel, shader},
     ensemble::Status,
-    flow::{LAW, LENGTH_PENALTY},
+    flow::{LAW, LENGTH_PENALTY, QUOTIENT},
     number::{BIG, LN_HALVINGS, LN_TERMS, Real},
     scheme::{
         decay, dense, extrapolation,
@@ -349,9 +349,9 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("SINGULAR", f64::from(Status::Singular as u32)),
         ("NONFINITE", f64::from(Status::Nonfinite as u32)),
         ("STALLED", f64::from(Status::Stalled as u32)),
-        ("FOUR_PI", 4.0 * std::f64::consts::PI),
         ("HALF_OVER_PI", 0.5 / std::f64::consts::PI),
         ("LENGTH_PENALTY", LENGTH_PENALTY as f64),
+        ("QUOTIENT", QUOTIENT as f64),
         ("TRACE_FIELDS", shader::TRACE_FIELDS as f64),
         ("CURVE", 0.0),
     ];

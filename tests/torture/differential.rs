@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Every key that can be swept, with values for it. Values that contain commas are why `;` separates them.
-const KEYS: [(&str, &[&str]); 21] = [
+const KEYS: [(&str, &[&str]); 23] = [
     ("points", &["13", "16", "24", "37"]),
     ("seed", &["1", "2", "77"]),
     (
@@ -33,6 +33,8 @@ const KEYS: [(&str, &[&str]); 21] = [
     ("modes", &["2..=2", "2..=3", "3..=3"]),
     ("decay", &["0", "1", "2.5"]),
     ("flow", &["surface-diffusion", "willmore", "elastic:0.5", "poly:0,-0.3", "poly:0.1,0,-0.5,0.01"]),
+    ("energy", &["cos:3,0.03", "cos:2,0.1,20"]),
+    ("diffusivity", &["cos:2,0.3"]),
     ("tau", &["1e-3", "5e-4", "2e-4"]),
     ("adaptive", &["1e-1", "3e-2", "1e-2"]),
     ("t-end", &["0.2", "0.5", "0.81"]),
@@ -51,6 +53,8 @@ const KEYS: [(&str, &[&str]); 21] = [
 const INSTEAD: [[&str; 2]; 2] = [["tau", "adaptive"], ["relax-to", "relax-at"]];
 /// Keys for sweeps of the solver, which a direct solver refuses.
 const OF_SWEEPS: [&str; 3] = ["order", "tolerance", "sor"];
+/// Keys that make a crystal.
+const CRYSTAL: [&str; 2] = ["energy", "diffusivity"];
 /// Tables with a row per member or cell.
 const TABLES: [&str; 9] = [
     "summary.csv",
@@ -100,13 +104,22 @@ impl Drawn {
         // Kinds of steps and numbers of nodes are entirely different paths through the program; other keys keep their
         // values half the time. On a GPU every number of nodes requires compiling a kernel.
         for (key, values) in KEYS {
-            let stays = OF_SWEEPS.contains(&key) || (on_the_gpu && ["points", "solver"].contains(&key));
+            let stays = OF_SWEEPS.contains(&key)
+                || (on_the_gpu && ["points", "solver", "energy", "diffusivity"].contains(&key));
             if !stays && random.below(2) == 0 {
                 set(&mut base, key, values[random.below(values.len())]);
             }
         }
         if keys.iter().any(|key| OF_SWEEPS.contains(key)) {
             set(&mut base, "solver", "gauss-seidel");
+        }
+        // Crystals have one flow, one form and no limits.
+        let plain = ["flow", "form"].into_iter().any(|key| keys.contains(&key));
+        let crystal = keys.iter().any(|key| CRYSTAL.contains(key)) || CRYSTAL.iter().any(|key| base.contains_key(key));
+        match crystal {
+            true if plain => CRYSTAL.iter().for_each(|key| drop(base.remove(key))),
+            true => ["flow", "form"].into_iter().for_each(|key| drop(base.remove(key))),
+            false => {}
         }
         // With a strong pull and no redistribution, so few nodes fall into disorder: the member stalls after thousands
         // of steps, and with sweeps it needs minutes.
@@ -134,7 +147,9 @@ impl Drawn {
         sometimes(" --store zarr", 4);
         sometimes(" --tables parquet", 4);
         sometimes(" --max-sweeps 40", 6);
-        sometimes(" --refine", 6);
+        if !crystal || plain {
+            sometimes(" --refine", 6);
+        }
         let common = random.below(3) == 0;
         if common {
             rest.push_str(" --common-random-numbers");
@@ -413,7 +428,8 @@ pub fn studies(backend: &'static str, wanted: usize, seed: u64) -> Outcome {
 
 /// Keys that a study can sweep on this back end.
 fn keys(backend: &str) -> Vec<&'static str> {
-    KEYS.iter().map(|(key, _)| *key).filter(|key| backend == "cpu" || *key != "order").collect()
+    let of_the_cpu = |key: &str| key == "order" || CRYSTAL.contains(&key);
+    KEYS.iter().map(|(key, _)| *key).filter(|key| backend == "cpu" || !of_the_cpu(key)).collect()
 }
 
 fn shuffled(random: &mut Random, mut keys: Vec<&'static str>) -> Vec<&'static str> {

@@ -5,13 +5,17 @@
 
 use std::f64::consts::PI;
 
-use crate::number::Number;
+use glam::DVec2;
+
+use crate::crystal::Energy;
 
 /// The shape of a curve at rest, of any size.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Equilibrium {
     /// The circle; among n-gons the regular one.
     Circle,
+    /// The Wulff shape of a surface energy.
+    Wulff(Energy),
 }
 
 impl Equilibrium {
@@ -19,31 +23,56 @@ impl Equilibrium {
     pub const fn excess_in_words(self) -> &'static str {
         match self {
             Equilibrium::Circle => "L²/(4πA) above that of a regular polygon",
+            Equilibrium::Wulff(_) => "E²/(4|W|A) above that of the Wulff shape",
         }
     }
 
-    /// Returns `L²/(4πA)` of a curve: least at equilibrium.
-    #[inline(always)]
-    pub fn quotient<N: Number>(self, length: N, area: N) -> N {
+    /// Returns |W|, the area of the shape whose support function is the surface energy: the unit circle's, π.
+    pub fn area(self) -> f64 {
         match self {
-            Equilibrium::Circle => length * length / (N::of(4.0 * PI) * area),
+            Equilibrium::Circle => PI,
+            Equilibrium::Wulff(energy) => energy.wulff_area(),
         }
     }
 
-    /// Returns that of n ≥ 3 nodes at equilibrium: `(n/π)·tan(π/n)` of the regular n-gon.
+    /// Returns `E²/(4|W|A)` of a curve of surface energy E, which is the length L of isotropic curves: least at equilibrium.
+    pub fn quotient(self, tension: f64, area: f64) -> f64 {
+        tension * tension / (4.0 * self.area() * area)
+    }
+
+    /// Returns that of n ≥ 3 nodes at equilibrium: `(n/π)·tan(π/n)` of the regular n-gon; of a Wulff shape with evenly
+    /// spaced nodes.
     ///
     /// The quotient alone would leave a relaxed polygon 1 + π²/(3n²) above a circle's 1 for ever.
     pub fn least_quotient(self, n: usize) -> f64 {
-        let n = n as f64;
         match self {
-            Equilibrium::Circle => n / PI * (PI / n).tan(),
+            Equilibrium::Circle => {
+                let n = n as f64;
+                n / PI * (PI / n).tan()
+            }
+            Equilibrium::Wulff(energy) => {
+                let nodes = energy.wulff_nodes(n);
+                let cross = |i: usize| nodes[i].perp_dot(nodes[(i + 1) % n]);
+                self.quotient(energy.of_polygon(&nodes), 0.5 * (0..n).map(cross).sum::<f64>())
+            }
         }
     }
 
     /// Returns the excess of a polygon of `n` nodes: 0 at equilibrium, and above 0 for every other embedded
     /// counter-clockwise polygon. Dimensionless.
-    pub fn excess(self, length: f64, area: f64, n: usize) -> f64 {
-        self.quotient(length, area) - self.least_quotient(n)
+    pub fn excess(self, tension: f64, area: f64, n: usize) -> f64 {
+        self.quotient(tension, area) - self.least_quotient(n)
+    }
+
+    /// Returns the surface energy of a closed polygon; of an isotropic one its length.
+    pub fn tension(self, nodes: &[DVec2]) -> f64 {
+        match self {
+            Equilibrium::Circle => {
+                let n = nodes.len();
+                (0..n).map(|i| nodes[i].distance(nodes[(i + 1) % n])).sum()
+            }
+            Equilibrium::Wulff(energy) => energy.of_polygon(nodes),
+        }
     }
 }
 

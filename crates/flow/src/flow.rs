@@ -9,19 +9,30 @@ use std::{f64::consts::PI, fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
-use curvelax_base::{
-    error::{did_you_mean, echo},
-    text::number,
-};
+use curvelax_base::{error::did_you_mean, text::number};
 
-use crate::equilibrium::Equilibrium;
+use crate::{
+    crystal::{Crystal, MOST_WAVES, WAVE, parse_numbers},
+    equilibrium::Equilibrium,
+};
 
 /// Highest power of `k` in `b(k)`; the coefficients are the first numbers of [`Flow::law`].
 pub const MAX_DEGREE: usize = 8;
 /// Numbers of a law in the parameters that the kernel gets.
-pub const LAW: usize = 16;
+pub const LAW: usize = 24;
 /// The place of λ among them, after the coefficients.
 pub const LENGTH_PENALTY: usize = MAX_DEGREE;
+/// The place of the waves of the surface energy, [`MOST_WAVES`] of them.
+pub const ENERGY_WAVES: usize = LENGTH_PENALTY + 1;
+/// The place of those of the mobility.
+pub const DIFFUSIVITY_WAVES: usize = ENERGY_WAVES + MOST_WAVES * WAVE;
+/// The place of the square of the unit of length, by which `∮γ ds` becomes an energy in units of 1/length.
+pub const ENERGY_UNIT: usize = DIFFUSIVITY_WAVES + MOST_WAVES * WAVE;
+/// The place of 4|W| of the [quotient](Equilibrium::quotient).
+pub const QUOTIENT: usize = ENERGY_UNIT + 1;
+
+/// Quotient of the two slowest rates of a crystal up to which they count as one.
+const EQUAL_RATES: f64 = 1.05;
 
 /// A fourth-order geometric flow, named as on the command line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -35,6 +46,9 @@ pub enum Flow {
     Elastic(f64),
     /// `b = c₁k + c₂k² + …`, coefficients from the first power on, at most [`MAX_DEGREE`].
     Polynomial(Vec<f64>),
+    /// Surface diffusion of a material whose energy and mobility depend on the direction. It has no name of its own: both
+    /// functions are keys.
+    Crystal(Crystal),
 }
 
 const NAMES: [&str; 4] = ["surface-diffusion", "willmore", "elastic", "poly"];
@@ -44,7 +58,7 @@ impl Flow {
     pub fn coefficients(&self) -> [f64; MAX_DEGREE] {
         let mut c = [0.0; MAX_DEGREE];
         match self {
-            Flow::SurfaceDiffusion => {}
+            Flow::SurfaceDiffusion | Flow::Crystal(_) => {}
             Flow::Willmore => c[2] = -0.5,
             Flow::Elastic(lambda) => {
                 c[0] = *lambda;
@@ -61,20 +75,35 @@ impl Flow {
     }
 
     /// Returns the numbers by which [forces](crate::scheme::forces) know the law, for lengths in units of `unit` and times
-    /// in units of its fourth power: `c₁ … c_8`, of dimension length^(j-3), and λ of the energy, of dimension 1/length².
-    /// The rest is 0.
+    /// in units of its fourth power: `c₁ … c_8`, of dimension length^(j-3), and λ of the energy, of dimension 1/length²;
+    /// what else there is has a constant with its place. The rest is 0.
     pub fn law(&self, unit: f64) -> [f64; LAW] {
         let mut law = [0.0; LAW];
         for (j, (to, c)) in (1..).zip(law.iter_mut().zip(self.coefficients())) {
             *to = c * f64::powi(unit, 3 - j);
         }
         law[LENGTH_PENALTY] = self.length_penalty() * unit * unit;
+        law[QUOTIENT] = 4.0 * self.equilibrium().area();
+        if let Flow::Crystal(Crystal { energy, diffusivity }) = self {
+            for (place, waves) in [(ENERGY_WAVES, energy.waves()), (DIFFUSIVITY_WAVES, diffusivity.waves())] {
+                law[place..].iter_mut().zip(waves.numbers().iter().flatten()).for_each(|(to, number)| *to = *number);
+            }
+            law[ENERGY_UNIT] = unit * unit;
+        }
         law
+    }
+
+    /// Returns whether energy or mobility are given as functions of the direction, perhaps constant ones.
+    pub fn is_crystal(&self) -> bool {
+        matches!(self, Flow::Crystal(_))
     }
 
     /// Returns the shape to which the flow relaxes closed curves, if it does.
     pub fn equilibrium(&self) -> Equilibrium {
-        Equilibrium::Circle
+        match self {
+            Flow::Crystal(crystal) => Equilibrium::Wulff(crystal.energy),
+            _ => Equilibrium::Circle,
+        }
     }
 
     /// Evaluates `b(k)`.
@@ -82,9 +111,13 @@ impl Flow {
         self.coefficients().iter().rev().fold(0.0, |sum, c| (sum + c) * k)
     }
 
-    /// Linear decay rate of mode `m` on a circle of radius `radius`: `(m²-1)·(m²/R⁴ + b'(1/R)/R²)`, in 1/time.
+    /// Linear decay rate of mode `m` on a circle of radius `radius`: `(m²-1)·(m²/R⁴ + b'(1/R)/R²)`, in 1/time. Of a crystal,
+    /// whose modes are others: in proportion to the slowest rate at the Wulff shape of the same area, which is that of m = 2.
     pub fn linear_rate(&self, m: u32, radius: f64) -> f64 {
         let m2 = f64::from(m * m);
+        if let Flow::Crystal(crystal) = self {
+            return crystal.slowest_rates()[0] * (m2 - 1.0) * m2 * radius.powi(-4);
+        }
         let k = 1.0 / radius;
         let slope: f64 =
             self.coefficients().iter().enumerate().map(|(j, c)| (j + 1) as f64 * c * k.powi(j as i32)).sum();
@@ -101,12 +134,16 @@ impl Flow {
 
     /// Rate at which the excess of a nearly round curve of area `area` falls in mode `m`, by linear theory, in 1/time:
     /// `24/R⁴` for m = 2 and surface diffusion; for Willmore flow the exponent of `1 + 2t/R₀⁴`. `None` if the
-    /// radius of a circle changes in another way: see `crates/ensemble/src/outcome/linear_rate.rs` for elastic flow.
+    /// radius of a circle changes in another way: see `crates/ensemble/src/outcome/linear_rate.rs` for elastic flow. Of a
+    /// crystal for m = 2 the mean of the two slowest rates, if they are nearly equal: otherwise it depends on the direction.
     pub fn excess_rate(&self, m: u32, area: f64) -> Option<f64> {
-        let Equilibrium::Circle = self.equilibrium();
         let radius = (area.abs() / PI).sqrt();
         match self {
             Flow::SurfaceDiffusion => Some(2.0 * self.linear_rate(m, radius)),
+            Flow::Crystal(crystal) if m == 2 => {
+                let [slow, fast] = crystal.slowest_rates();
+                (fast <= EQUAL_RATES * slow).then(|| 12.0 * (slow + fast) * radius.powi(-4))
+            }
             // The excess scales as the square of the mode's amplitude over the radius; both are powers of R₀⁴ + 2t.
             Flow::Willmore => Some(self.linear_rate(m, 1.0) + 0.5),
             _ => None,
@@ -118,7 +155,7 @@ impl Flow {
 impl fmt::Display for Flow {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Flow::SurfaceDiffusion => write!(f, "surface-diffusion"),
+            Flow::SurfaceDiffusion | Flow::Crystal(_) => write!(f, "surface-diffusion"),
             Flow::Willmore => write!(f, "willmore"),
             Flow::Elastic(lambda) => write!(f, "elastic:{}", number(*lambda)),
             Flow::Polynomial(c) => {
@@ -165,16 +202,6 @@ impl FromStr for Flow {
             )),
         }
     }
-}
-
-/// Parses comma-separated finite numbers.
-pub fn parse_numbers(list: &str) -> Result<Vec<f64>, String> {
-    list.split(',')
-        .map(|word| match word.trim().parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(format!("`{}` is not a finite number", echo(word))),
-        })
-        .collect()
 }
 
 #[cfg(test)]

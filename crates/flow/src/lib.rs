@@ -5,10 +5,12 @@
 //! |---|---|
 //! | [`number`] | the number type of the scheme, alone and in lanes |
 //! | [`flow`] | the law b(k) |
+//! | [`crystal`] | surface energies and mobilities that depend on the direction |
 //! | [`equilibrium`] | what a flow relaxes to, and the distance from it |
 //! | [`solver`] | periodic pentadiagonal systems: rows, sweeps, direct solution |
 //! | [`scheme`] | the step, one file per stage, named as in `shaders/` |
 
+pub mod crystal;
 pub mod equilibrium;
 pub mod flow;
 pub mod number;

@@ -144,6 +144,9 @@ fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
     if spec.order == Order::Lexicographic {
         return cpu(spec, n, "lexicographic sweeps run on the CPU".into());
     }
+    if spec.has_crystals() {
+        return cpu(spec, n, "crystals run on the CPU".into());
+    }
     let none = if LOADS_DRIVERS { "no hardware GPU found" } else { "a static program cannot load GPU drivers" };
     let mut reason = none.to_string();
     for adapter in adapters.into_iter().filter(Gpu::is_hardware) {
@@ -165,6 +168,10 @@ fn cpu(spec: &Spec, n: usize, reason: String) -> Result<Choice> {
 fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
     if spec.order == Order::Lexicographic {
         let message = "--adapter: lexicographic sweeps run on the CPU only; leave out --adapter";
+        return Err(Error::Request(message.into()));
+    }
+    if spec.has_crystals() {
+        let message = "--adapter: crystals run on the CPU only; leave out --adapter";
         return Err(Error::Request(message.into()));
     }
     let found = Gpu::list();

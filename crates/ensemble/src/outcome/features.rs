@@ -7,12 +7,16 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Member, Observables, Spec, member::FEATURE_MODES, request::drawn_names};
+use crate::{
+    Member, Observables, Spec,
+    member::FEATURE_MODES,
+    request::{DRAWN, drawn_names},
+};
 use curvelax_base::error::Result;
 use curvelax_curve::{DESCRIPTORS, Modes, descriptors, polygon};
 
 /// Keys on which the features depend.
-const KEYS: [&str; 5] = ["shape", "flow", "amplitude", "decay", "modes"];
+const KEYS: [&str; 7] = ["shape", "flow", "energy", "diffusivity", "amplitude", "decay", "modes"];
 
 /// The features of a member: a number for each of [`Spec::cell_features`], NaN if unknown.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -62,7 +66,7 @@ impl Spec {
         if !self.sweeps_features() {
             return Ok(self.cell_features());
         }
-        let (mut counts, mut modes) = ([0; 4], BTreeSet::new());
+        let (mut counts, mut modes) = ([0; DRAWN], BTreeSet::new());
         for index in 0..self.sweep.cells() {
             let cell = self.of_cell(index)?;
             counts.iter_mut().zip(cell.drawn_counts()).for_each(|(most, own)| *most = own.max(*most));
@@ -90,7 +94,7 @@ impl Spec {
 }
 
 /// The features of members for which so many numbers of each key are drawn, with these modes of the perturbation.
-fn features(drawn: [usize; 4], modes: &[u32]) -> Vec<Feature> {
+fn features(drawn: [usize; DRAWN], modes: &[u32]) -> Vec<Feature> {
     let drawn = drawn_names(drawn).into_iter().map(|name| {
         let (key, rank) = name.split_once('_').unwrap_or((&name, "1"));
         let meaning = format!("number {rank} that is drawn for --{key}");

@@ -78,23 +78,15 @@ impl<'de> Deserialize<'de> for SolverChoice {
 }
 
 /// What moves the nodes: the right-hand side of the position equation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PositionForm {
     /// The scheme's own curvatures and lengths, as in the paper.
-    #[default]
     Paper,
     /// The force of the polygon itself; curvatures and lengths only make the matrix.
     Geometric,
     /// The one that is right for every curve: the paper's.
     Auto,
-}
-
-impl PositionForm {
-    /// Whether it is the default.
-    pub(super) fn is_default(&self) -> bool {
-        *self == PositionForm::default()
-    }
 }
 
 /// The fixed time step.

@@ -13,7 +13,10 @@ use curvelax_base::{
     text::rounded,
 };
 use curvelax_curve::Shape;
-use curvelax_flow::flow::Flow;
+use curvelax_flow::{
+    crystal::{Diffusivity, Energy},
+    flow::Flow,
+};
 
 /// What may be drawn.
 pub trait Drawable: Clone + PartialEq + fmt::Display + Serialize {
@@ -64,17 +67,26 @@ impl Drawable for Shape {
     }
 }
 
-impl Drawable for Flow {
-    const EXPECTED: &'static str = "a string";
+/// What is text with numbers in it.
+macro_rules! drawable_text {
+    ($($kind:ident)*) => {
+        $(
+            impl Drawable for $kind {
+                const EXPECTED: &'static str = "a string";
 
-    fn read(text: &str) -> Result<Flow, String> {
-        text.parse()
-    }
+                fn read(text: &str) -> Result<$kind, String> {
+                    text.parse()
+                }
 
-    fn of_number(_: f64) -> Option<Flow> {
-        None
-    }
+                fn of_number(_: f64) -> Option<$kind> {
+                    None
+                }
+            }
+        )*
+    };
 }
+
+drawable_text!(Flow Energy Diffusivity);
 
 /// A value that is the same for all members, or drawn for each.
 #[derive(Clone, Debug, PartialEq)]

@@ -16,5 +16,5 @@ pub use drawn::Drawn;
 pub use event::Event;
 pub use shard::Shard;
 pub use spec::Spec;
-pub(crate) use values::drawn_names;
+pub(crate) use values::{DRAWN, drawn_names};
 pub use values::{MAX_NAMED, MemberValues};

@@ -20,7 +20,10 @@ use curvelax_base::{
     random::Design,
 };
 use curvelax_curve::{Interpolation, Modes, Perturbation, Sampling, Shape};
-use curvelax_flow::flow::Flow;
+use curvelax_flow::{
+    crystal::{Diffusivity, Energy},
+    flow::Flow,
+};
 
 pub use crate::request::{
     choices::{BackendChoice, FinalTime, Omega, Pace, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau},
@@ -74,6 +77,12 @@ pub struct Spec {
     pub design: Design,
     /// The law of motion.
     pub flow: Drawn<Flow>,
+    /// γ of the surface energy, if it depends on the direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy: Option<Drawn<Energy>>,
+    /// M of the mobility along the surface, if it depends on the direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffusivity: Option<Drawn<Diffusivity>>,
     /// B of the flow in the user's units of length and time, in length⁴/time; 1 if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mobility: Option<f64>,
@@ -100,9 +109,9 @@ pub struct Spec {
     pub no_redistribution: bool,
     /// κ of the metric pull.
     pub pull: Pull,
-    /// What moves the nodes.
-    #[serde(skip_serializing_if = "PositionForm::is_default")]
-    pub form: PositionForm,
+    /// What moves the nodes; if absent, the paper's form, and of crystals the geometric one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub form: Option<PositionForm>,
     /// Solver of the pentadiagonal systems.
     pub solver: SolverChoice,
     /// Order in which a sweep visits the nodes.
@@ -231,6 +240,8 @@ impl Default for Spec {
             perturbation: Perturbation::default(),
             design: Design::default(),
             flow: Flow::SurfaceDiffusion.into(),
+            energy: None,
+            diffusivity: None,
             mobility: None,
             units: None,
             tau: None,
@@ -240,7 +251,7 @@ impl Default for Spec {
             omega: None,
             no_redistribution: false,
             pull: Pull::Rate(0.0),
-            form: PositionForm::default(),
+            form: None,
             solver: SolverChoice::Auto,
             order: Order::Coloured,
             tolerance: None,
@@ -446,9 +457,14 @@ impl Spec {
     }
 
     /// Whether the force of the polygon moves the nodes. `auto` is the paper's form: the other one fails where nodes do not
-    /// resolve the curve, and intervals of limits were calibrated with this one.
+    /// resolve the curve, and intervals of limits were calibrated with this one. For crystals there is no other.
     pub fn is_geometric(&self) -> bool {
-        self.form == PositionForm::Geometric
+        self.form == Some(PositionForm::Geometric) || self.has_crystals()
+    }
+
+    /// Whether energy or mobility depend on the direction.
+    pub fn has_crystals(&self) -> bool {
+        self.energy.is_some() || self.diffusivity.is_some()
     }
 
     /// The excess at which a member that starts with `excess` counts as relaxed.
@@ -538,6 +554,8 @@ mod tests {
         let written: toml::Table = toml::from_str(&Spec::default().to_toml().unwrap()).unwrap();
         assert!(written.keys().all(|key| keys.contains(key)));
         let optional = [
+            "energy",
+            "diffusivity",
             "outlines",
             "group-by",
             "interpolate",

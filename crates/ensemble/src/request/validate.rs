@@ -5,14 +5,17 @@
 
 use crate::request::event::{Event, MAX_EVENTS};
 use crate::request::spec::{
-    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, Precision, Pull,
-    ROUNDINGS, Sor, Spec, Store, Tau, final_times,
+    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, PositionForm,
+    Precision, Pull, ROUNDINGS, Sor, Spec, Store, Tau, final_times,
 };
 use curvelax_base::{
     error::{Error, Result},
     text::{count, number},
 };
-use curvelax_flow::solver::{Facts, ring::MIN_POINTS};
+use curvelax_flow::{
+    flow::Flow,
+    solver::{Facts, ring::MIN_POINTS},
+};
 
 /// More members than this are a typing error.
 const MAX_CURVES: u64 = 1_000_000_000;
@@ -25,6 +28,8 @@ const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
 const MOBILITIES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 /// Keys that are chosen for an uncertainty.
 const CHOSEN: [&str; 3] = ["points", "tau", "adaptive"];
+/// Keys that make a crystal.
+const CRYSTAL: [&str; 2] = ["energy", "diffusivity"];
 /// Uncertainties of a median that members by the million, at a thousand nodes, can reach.
 const ACCURACIES: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
 /// The rows of a resident member stay in memory until it ends.
@@ -51,6 +56,7 @@ impl Spec {
         self.check_times()?;
         self.check_method()?;
         self.check_drawn()?;
+        self.check_crystals()?;
         self.check_rounding()?;
         self.check_relaxation()?;
         self.check_combinations()?;
@@ -77,6 +83,11 @@ impl Spec {
         }
         if self.relax_at.is_none() {
             self.relax_to.get_or_insert(DEFAULT_RELAX_TO);
+        }
+        if self.has_crystals() {
+            self.form = Some(PositionForm::Geometric);
+        } else if self.form == Some(PositionForm::Paper) && !CRYSTAL.into_iter().any(|key| self.sweep.has(key)) {
+            self.form = None;
         }
     }
 
@@ -302,6 +313,44 @@ impl Spec {
             return Err(Error::value("modes", modes, &problem, &allowed));
         }
         Ok(())
+    }
+
+    /// Refuses what crystals do not have, and waves that the nodes do not resolve.
+    fn check_crystals(&self) -> Result<()> {
+        let (energy, diffusivity) = (&self.energy, &self.diffusivity);
+        let given = energy.as_ref().map(|of| ("energy", of.to_string(), of.typical().waves()));
+        let Some((key, value, _)) =
+            given.or(diffusivity.as_ref().map(|of| ("diffusivity", of.to_string(), of.typical().waves())))
+        else {
+            return Ok(());
+        };
+        let refused = |problem: &str, allowed: &str| Err(Error::value(key, &value, problem, allowed));
+        if self.flow != Flow::SurfaceDiffusion.into() {
+            let problem =
+                format!("only surface diffusion has one that depends on the direction, not --flow {}", self.flow);
+            return refused(&problem, "leave out one of the two");
+        }
+        if self.form == Some(PositionForm::Paper) {
+            let problem = format!("with it a crystal creeps at rest, and --{key} {value} is given");
+            return Err(Error::value("form", "paper", &problem, "use --form geometric, or leave it out"));
+        }
+        if self.refine {
+            let problem = format!("its intervals were calibrated without crystals, and --{key} {value} is given");
+            return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
+        }
+        if self.backend == BackendChoice::Gpu {
+            return refused("crystals do not run on a GPU yet", "use --backend cpu");
+        }
+        let waves =
+            [energy.as_ref().map(|of| of.typical().waves()), diffusivity.as_ref().map(|of| of.typical().waves())];
+        let highest = waves.into_iter().flatten().filter_map(|waves| waves.highest_mode()).max().unwrap_or(0);
+        match highest as usize > self.points / 4 {
+            true => {
+                let problem = format!("{} nodes resolve no wave above {}", self.points, self.points / 4);
+                refused(&problem, &format!("use --points {} or more, or a lower M", 4 * highest))
+            }
+            false => Ok(()),
+        }
     }
 
     fn check_rounding(&self) -> Result<()> {

@@ -2,7 +2,7 @@
 //!
 //! They are a pure function of the spec and the member. The numbers of each key have draws of their own, so that the flow
 //! of a member is the same whether or not its shape is drawn, too; only the coordinates of `--design sobol` are counted
-//! through, in the order shape, flow, amplitude, decay.
+//! through, in the order shape, flow, amplitude, decay, energy, diffusivity.
 
 use std::{borrow::Cow, fmt};
 
@@ -15,7 +15,10 @@ use curvelax_base::{
     random::{Design, Distribution, DrawAddress, MAX_SOBOL},
 };
 use curvelax_curve::{RadialLaw, Shape};
-use curvelax_flow::flow::Flow;
+use curvelax_flow::{
+    crystal::{Crystal, Diffusivity, Energy},
+    flow::Flow,
+};
 
 /// Maximum number of members that are shown one by one.
 pub const MAX_NAMED: u64 = 20;
@@ -25,7 +28,11 @@ const PROBED: u64 = 32;
 /// Shares of the distributions below and above which a bound looks.
 const TAILS: [f64; 2] = [1e-5, 1.0 - 1e-5];
 /// The keys whose values may be drawn.
-const KEYS: [&str; 4] = ["shape", "flow", "amplitude", "decay"];
+const KEYS: [&str; DRAWN] = ["shape", "flow", "amplitude", "decay", "energy", "diffusivity"];
+/// Their number.
+pub(crate) const DRAWN: usize = 6;
+/// Those that are numbers, and so have one.
+const NUMBERS: [&str; 2] = ["amplitude", "decay"];
 /// Bits of the places of a key.
 const PLACE_BITS: u32 = 16;
 
@@ -47,10 +54,28 @@ impl Spec {
     pub fn typical(&self) -> MemberValues<'_> {
         MemberValues {
             shape: Cow::Borrowed(self.shape.typical()),
-            flow: Cow::Borrowed(self.flow.typical()),
+            flow: self.law_of_motion(
+                Cow::Borrowed(self.flow.typical()),
+                self.energy.as_ref().map(|energy| *energy.typical()),
+                self.diffusivity.as_ref().map(|diffusivity| *diffusivity.typical()),
+            ),
             amplitude: *self.amplitude.typical(),
             decay: *self.decay.typical(),
         }
+    }
+
+    /// The flow, with the energy and the mobility if they depend on the direction.
+    fn law_of_motion<'a>(
+        &self,
+        flow: Cow<'a, Flow>,
+        energy: Option<Energy>,
+        diffusivity: Option<Diffusivity>,
+    ) -> Cow<'a, Flow> {
+        let (energy, diffusivity) = match (energy, diffusivity) {
+            (None, None) => return flow,
+            (energy, diffusivity) => (energy.unwrap_or_default(), diffusivity.unwrap_or_default()),
+        };
+        Cow::Owned(Flow::Crystal(Crystal { energy, diffusivity }))
     }
 
     /// The values that are drawn for `member`, an index over all cells; with common random numbers, over one.
@@ -75,14 +100,14 @@ impl Spec {
     }
 
     /// The numbers that are drawn for `member`, as for [`Spec::values`], each with its name: that of its key, and its
-    /// rank from 1 where the key is a shape or a flow.
+    /// rank from 1 where the key is text.
     pub fn drawn_numbers(&self, member: u64) -> Vec<(String, f64)> {
         let numbers = self.numbers(|of, place| self.uniform(of, member, place));
         drawn_names(self.drawn_counts()).into_iter().zip(numbers.into_iter().flatten()).collect()
     }
 
-    /// How many numbers are drawn for the keys shape, flow, amplitude and decay.
-    pub(crate) fn drawn_counts(&self) -> [usize; 4] {
+    /// How many numbers are drawn for each key.
+    pub(crate) fn drawn_counts(&self) -> [usize; DRAWN] {
         self.distributions().map(<[Distribution]>::len)
     }
 
@@ -94,6 +119,12 @@ impl Spec {
     /// Whether members have values of their own.
     pub fn has_drawn_values(&self) -> bool {
         self.distributions().iter().any(|of_key| !of_key.is_empty())
+    }
+
+    /// Whether each member has a law of motion of its own.
+    pub fn has_drawn_flow(&self) -> bool {
+        let [_, flow, _, _, energy, diffusivity] = self.distributions();
+        [flow, energy, diffusivity].into_iter().any(|of_key| !of_key.is_empty())
     }
 
     /// Whether several members are made of one of many outlines.
@@ -156,8 +187,11 @@ impl Spec {
         let told = |key: &str, drawn: &dyn fmt::Display, reason| format!("--{key} {}: {reason}", echo(drawn));
         let of_shape = || Some(told("shape", &self.shape, self.shape.refusal()?));
         let of_flow = || Some(told("flow", &self.flow, self.flow.refusal()?));
+        let of_energy = || Some(told("energy", self.energy.as_ref()?, self.energy.as_ref()?.refusal()?));
+        let of_diffusivity =
+            || Some(told("diffusivity", self.diffusivity.as_ref()?, self.diffusivity.as_ref()?.refusal()?));
         let of_law = || {
-            let [_, _, amplitude, decay] = self.distributions();
+            let [_, _, amplitude, decay, ..] = self.distributions();
             let of: Vec<&Distribution> = amplitude.iter().chain(decay).collect();
             let reason = refusal(&of, |numbers| {
                 let (first, second) = numbers.split_at(amplitude.len());
@@ -171,7 +205,7 @@ impl Spec {
                 if amplitude.is_empty() { ("decay", &self.decay) } else { ("amplitude", &self.amplitude) };
             Some(told(drawn.0, drawn.1, reason?))
         };
-        of_shape().or_else(of_flow).or_else(of_law)
+        of_shape().or_else(of_flow).or_else(of_energy).or_else(of_diffusivity).or_else(of_law)
     }
 
     /// Checks the values of `member`, as for [`Spec::values`].
@@ -192,9 +226,18 @@ impl Spec {
     }
 
     /// The distributions of each key.
-    pub(crate) fn distributions(&self) -> [&[Distribution]; 4] {
-        let Spec { shape, flow, amplitude, decay, .. } = self;
-        [shape.distributions(), flow.distributions(), amplitude.distributions(), decay.distributions()]
+    pub(crate) fn distributions(&self) -> [&[Distribution]; DRAWN] {
+        let Spec { shape, flow, amplitude, decay, energy, diffusivity, .. } = self;
+        let energy = energy.as_ref().map_or(&[][..], Drawn::distributions);
+        let diffusivity = diffusivity.as_ref().map_or(&[][..], Drawn::distributions);
+        [
+            shape.distributions(),
+            flow.distributions(),
+            amplitude.distributions(),
+            decay.distributions(),
+            energy,
+            diffusivity,
+        ]
     }
 
     /// The uniform number of `member` at a place: drawn, or the one that gives it its own of listed values.
@@ -206,20 +249,24 @@ impl Spec {
     }
 
     fn values_at(&self, uniform: impl Fn(&Distribution, DrawAddress) -> f64) -> Result<MemberValues<'_>> {
-        let [shape, flow, amplitude, decay] = self.numbers(uniform);
+        let [shape, flow, amplitude, decay, energy, diffusivity] = self.numbers(uniform);
+        let of_energy = self.energy.as_ref().map(|drawn| own("energy", drawn, &energy)).transpose()?;
+        let of_diffusivity =
+            self.diffusivity.as_ref().map(|drawn| own("diffusivity", drawn, &diffusivity)).transpose()?;
+        let flow = own("flow", &self.flow, &flow)?;
         Ok(MemberValues {
             shape: own("shape", &self.shape, &shape)?,
-            flow: own("flow", &self.flow, &flow)?,
+            flow: self.law_of_motion(flow, of_energy.map(|of| *of), of_diffusivity.map(|of| *of)),
             amplitude: *own("amplitude", &self.amplitude, &amplitude)?,
             decay: *own("decay", &self.decay, &decay)?,
         })
     }
 
     /// The numbers of each key, from the uniform ones of their places.
-    fn numbers(&self, uniform: impl Fn(&Distribution, DrawAddress) -> f64) -> [Vec<f64>; 4] {
+    fn numbers(&self, uniform: impl Fn(&Distribution, DrawAddress) -> f64) -> [Vec<f64>; DRAWN] {
         let (seed, members) = (self.seed, self.members_per_cell());
         let (mut key, mut coordinate) = (0, 0);
-        self.distributions().map(|of_key| {
+        self.distributions().map(|of_key: &[Distribution]| {
             let number = |(rank, of): (u32, &Distribution)| {
                 let place = key << PLACE_BITS | rank;
                 let u = uniform(of, DrawAddress { seed, members, member: 0, place, coordinate: coordinate + rank });
@@ -232,9 +279,12 @@ impl Spec {
     }
 }
 
-/// The names of the numbers that are drawn, so many for each of the keys shape, flow, amplitude and decay.
-pub(crate) fn drawn_names(counts: [usize; 4]) -> Vec<String> {
-    let name = |key: usize, rank: usize| if key < 2 { format!("{}_{}", KEYS[key], rank + 1) } else { KEYS[key].into() };
+/// The names of the numbers that are drawn, so many for each key.
+pub(crate) fn drawn_names(counts: [usize; DRAWN]) -> Vec<String> {
+    let name = |key: usize, rank: usize| match KEYS[key] {
+        key if NUMBERS.contains(&key) => key.into(),
+        key => format!("{key}_{}", rank + 1),
+    };
     counts.into_iter().enumerate().flat_map(|(key, count)| (0..count).map(move |rank| name(key, rank))).collect()
 }
 

@@ -15,6 +15,9 @@
 //! geometric mean of the two. The time of theory is 0.4 to 8 times the real one, for ellipses from 1.1:1 to 20:1,
 //! flowers, the nonconvex curve, the astroid and islands under many flows, to shares of the excess from 0.5 to 10⁻⁶
 //! (table in docs/method.md).
+//!
+//! The excess of a crystal over its Wulff shape has its own size, by the surface energy of the curve, and falls at its
+//! slowest rate.
 
 use std::f64::consts::TAU;
 
@@ -22,7 +25,11 @@ use glam::{DMat2, DVec2};
 
 use super::rates;
 use curvelax_curve::polygon;
-use curvelax_flow::{equilibrium::Equilibrium, flow::Flow};
+use curvelax_flow::{
+    crystal::{Energy, HIGHEST_WAVE},
+    equilibrium::Equilibrium,
+    flow::Flow,
+};
 
 /// The highest mode that is followed; higher ones vanish before they matter.
 const MODES: usize = 32;
@@ -50,6 +57,11 @@ pub struct CurveScale {
     pub excess: f64,
     /// The parts of the excess in the modes from 2 on.
     parts: Vec<f64>,
+    nodes: usize,
+    area: f64,
+    /// The sums over the edges of their length times the powers of their direction, from the 0th on, by which surface
+    /// energies are known.
+    powers: Vec<DVec2>,
 }
 
 impl CurveScale {
@@ -64,7 +76,32 @@ impl CurveScale {
         if sum > 0.0 {
             parts.iter_mut().for_each(|part| *part *= excess / sum);
         }
-        CurveScale { radius, radius_of_length, simple, excess, parts }
+        let mut powers = vec![DVec2::ZERO; HIGHEST_WAVE as usize + 1];
+        for edge in polygon::edges(nodes).filter(|edge| *edge != DVec2::ZERO) {
+            let (tangent, mut power) = (edge.normalize(), DVec2::new(edge.length(), 0.0));
+            for sum in &mut powers {
+                *sum += power;
+                power = power.rotate(tangent);
+            }
+        }
+        CurveScale { radius, radius_of_length, simple, excess, parts, nodes: nodes.len(), area, powers }
+    }
+
+    /// Its excess under a flow, 0 if it is not simple.
+    pub fn excess_under(&self, flow: &Flow) -> f64 {
+        match flow.equilibrium() {
+            Equilibrium::Circle => self.excess,
+            of @ Equilibrium::Wulff(energy) if self.simple => {
+                of.excess(self.tension(&energy), self.area.abs(), self.nodes).max(0.0)
+            }
+            Equilibrium::Wulff(_) => 0.0,
+        }
+    }
+
+    /// Its surface energy.
+    fn tension(&self, energy: &Energy) -> f64 {
+        let waves = energy.waves().numbers();
+        self.powers[0].x + waves.iter().map(|[m, a, b]| self.powers[*m as usize].dot(DVec2::new(*a, *b))).sum::<f64>()
     }
 
     /// 24/R⁴, the rate at which the excess of a nearly round curve of this size decays under surface diffusion.
@@ -83,8 +120,12 @@ impl CurveScale {
     /// The time after which the excess has fallen to `threshold`, with `more` excess in the modes from 2 on, by theory;
     /// `None` if by theory it never does, and for a curve that is not simple.
     pub fn relaxes_after(&self, flow: &Flow, more: &[f64], threshold: f64) -> Option<f64> {
+        if flow.is_crystal() {
+            let fall = (self.excess_under(flow) + more.iter().sum::<f64>()) / threshold;
+            let t = fall.max(1.0).ln() / (2.0 * flow.linear_rate(2, self.radius));
+            return (self.simple && t.is_finite()).then_some(t);
+        }
         // The modes are those of a circle.
-        let Equilibrium::Circle = flow.equilibrium();
         let count = self.parts.len().max(more.len());
         let part = |parts: &[f64], i: usize| parts.get(i).copied().unwrap_or(0.0);
         let mut parts: Vec<f64> = (0..count).map(|i| part(&self.parts, i) + part(more, i)).collect();

@@ -30,6 +30,8 @@ const FAR_OMEGA: f64 = 100.0;
 const LONG_TAU: f64 = 100.0;
 const SHORT_TAU: f64 = 1e-5;
 const FAR_END: f64 = 1000.0;
+/// The largest anisotropy for which crystals were measured (docs/method.md).
+const PROVED_ANISOTROPY: f64 = 0.5;
 
 /// The spec of a cell with a number as its final time. `scales` are the sizes of [`Spec::probes`], or that of the curve
 /// of all members; so they are below.
@@ -55,13 +57,27 @@ fn probes<'a>(spec: &'a Spec, scales: &'a [CurveScale]) -> impl Iterator<Item = 
     pairs.into_iter().map(move |(values, scale)| (drawn[values].clone(), &scales[scale]))
 }
 
-/// What the user should know about times and rates that are far from what the typical curve of a cell needs, one
-/// sentence each.
+/// What the user should know about times and rates that are far from what the typical curve of a cell needs, and about a
+/// crystal, one sentence each.
 pub fn warnings(spec: &Spec, scales: &[CurveScale]) -> Vec<String> {
     let scale = &scales[0];
     let rate = rate(spec, scale);
     let (omega, tau) = (own_omega(rate), own_tau(rate));
-    [far_omega(spec, omega), far_tau(spec, tau), far_end(spec, scale)].into_iter().flatten().collect()
+    let all = [far_omega(spec, omega), far_tau(spec, tau), far_end(spec, scale), strong_crystal(spec)];
+    all.into_iter().flatten().collect()
+}
+
+fn strong_crystal(spec: &Spec) -> Option<String> {
+    let energy = spec.energy.as_ref()?;
+    let anisotropy = energy.typical().anisotropy();
+    (anisotropy > PROVED_ANISOTROPY).then(|| {
+        format!(
+            "--energy {energy}: the stiffness of the surface falls to {} of its mean; below {} the method was not shown to \
+             converge (docs/method.md)",
+            short(1.0 - anisotropy),
+            short(1.0 - PROVED_ANISOTROPY)
+        )
+    })
 }
 
 /// To three digits.
@@ -129,7 +145,7 @@ fn cap(spec: &Spec, scales: &[CurveScale]) -> f64 {
 fn expected(spec: &Spec, values: &MemberValues, scale: &CurveScale) -> f64 {
     let parts = spec.perturbed_excess(values);
     let own = |factor: f64| parts.iter().map(|part| factor * part).collect::<Vec<_>>();
-    let start = scale.excess + own(1.0).iter().sum::<f64>();
+    let start = scale.excess_under(&values.flow) + own(1.0).iter().sum::<f64>();
     let threshold = spec.threshold(start);
     let fourth = scale.first_radius(&values.flow).powi(4) / spec.mobility();
     match scale.relaxes_after(&values.flow, &own(PERTURBED), threshold) {

@@ -42,7 +42,7 @@ impl<'a> Trajectory<'a> {
         let unit = unit_of(&member.nodes);
         let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
         let time_unit = unit.powi(4) / spec.mobility();
-        let flow = member.flow.clone().unwrap_or_else(|| spec.flow.typical().clone());
+        let flow = member.flow.clone().unwrap_or_else(|| spec.typical().flow.into_owned());
         let parameters = parameters(spec, &flow, &nodes, [unit, time_unit], spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
         launch.counters.stop_when_relaxed = spec.stops_when_relaxed().into();

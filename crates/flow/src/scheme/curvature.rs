@@ -4,8 +4,10 @@
 //! `δ = k_new - k_old`. With `s = r_i/τ - (r k β)_i` the diagonal is `c = s - (a+b+d+e)`, so the residual of the
 //! old state is a sum of differences:
 //! `f - M k = ∂b + (r k β)_i k_i - Σ_j off_ij (k_j - k_i)`.
+//!
+//! Of a crystal, the stiff terms are those of w = g k with M at the nodes: a constant w is in their kernel, a constant k is not.
 
-use super::{Curve, Parameters, state::Motion};
+use super::{Curve, Parameters, forces, state::Motion};
 use crate::{
     number::Number,
     solver::{Equation, Equations},
@@ -32,6 +34,9 @@ impl<'a, N: Number> Curvature<'a, N> {
 impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
     #[inline(always)]
     fn equation(&self, i: usize) -> Equation<N, 1> {
+        if self.motion.law.kind.is_crystal() {
+            return self.of_crystal(i);
+        }
         let [kmm, km, kp, kpp] = self.old.k.offsets(i);
         let [_, irm, ir, irp, _] = self.motion.ir.window(i);
         let [iqmm, iqm, iq, iqp, _] = self.motion.iq.window(i);
@@ -50,5 +55,31 @@ impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
         let forcing = rise_of_bp * iq - rise_of_b * iqm;
         let stiff = a * kmm + b * km + d * kp + e * kpp;
         Equation { a, b, c, d, e, rhs: [forcing + rkb * self.old.k[i] - stiff], time_over_length: self.tau * ir }
+    }
+}
+
+impl<N: Number> Curvature<'_, N> {
+    /// The equation of a crystal.
+    #[inline(always)]
+    fn of_crystal(&self, i: usize) -> Equation<N, 1> {
+        let [_, km, kp, _] = self.old.k.offsets(i);
+        let [wmm, wm, wp, wpp] = self.motion.weighted.offsets(i);
+        let [gmm, gm, g, gp, gpp] = self.motion.stiffness.window(i);
+        let [_, irm, ir, irp, _] = self.motion.ir.window(i);
+        let [_, iqm, iq, _, _] = self.motion.iq.window(i);
+        let [pmm, pm, p, pp, _] = forces::conductance(self.motion, i);
+        let [_, alpha_m, alpha, _, _] = self.motion.alpha.window(i);
+        let (r, rkb) = (self.new.r[i], self.motion.rkb[i]);
+        let half = N::of(0.5);
+        let (before, after) = (half * alpha_m, half * alpha);
+        let a = iqm * irm * pmm;
+        let e = iq * irp * pp;
+        let b = -(pm * (ir * iq + iqm * (ir + irm)) + a);
+        let d = -(p * (ir * iqm + iq * (ir + irp)) + e);
+        let stiff = a * wmm + b * wm + d * wp + e * wpp;
+        let c = (r * self.rate - rkb) - (before - after) - (a + b + d + e) * g;
+        let rhs = rkb * self.old.k[i] - stiff - (before * km - after * kp);
+        let (a, b, d, e) = (a * gmm, b * gm + before, d * gp - after, e * gpp);
+        Equation { a, b, c, d, e, rhs: [rhs], time_over_length: self.tau * ir }
     }
 }

@@ -207,17 +207,17 @@ impl<N: Number> Team<N> {
         if branches.adaptive {
             extrapolation::finish_attempt(state, &mut work.new);
         }
-        let seen = observe::glance(&state.curve, &work.new, work.blocks);
+        let seen = observe::glance(&state.curve, &work.new, parameters, branches.law, work.blocks);
         if branches.adaptive {
             let followed = self.excess.le(parameters.follow_to).not();
             errors = extrapolation::errors_of_attempt(&state.gaps, &work.new, seen.length, followed, branches);
         }
-        let sizes = [seen.length, seen.area];
+        let sizes = [seen.tension, seen.area];
         if branches.adaptive {
             let (slope, bend) = (&state.slope_before, &state.bend_before);
-            decline = observe::decline(&work.new, slope, bend, sizes, parameters, work.blocks);
+            decline = observe::decline(&work.new, slope, bend, sizes, parameters, branches.law, work.blocks);
         }
-        let excess = observe::excess(seen.length, seen.area, parameters);
+        let excess = observe::excess(seen.tension, seen.area, parameters);
         Attempt { stepped, errors, decline, seen, excess }
     }
 
@@ -304,7 +304,7 @@ impl<N: Number> Team<N> {
     ) {
         let (n, adaptive) = (self.work.blocks.n, branches.adaptive);
         let [at_level, passed] =
-            if branches.watched { self.at_levels(runs, adaptive) } else { [N::Mask::all_of(false); 2] };
+            if branches.watched { self.at_levels(runs, branches) } else { [N::Mask::all_of(false); 2] };
         let gap = self.gap_at_threshold(runs, live, attempt.excess, adaptive);
         let (finite, singular) =
             (attempt.seen.is_finite(), attempt.seen.is_singular(self.turning, &self.parameters, n));
@@ -374,7 +374,8 @@ impl<N: Number> Team<N> {
     /// Where an observable of the new curves has reached a level at which the member pauses, and where one may have done
     /// so inside an adaptive step and left it again.
     #[inline(always)]
-    fn at_levels(&mut self, runs: &[&mut Run<N::Real>], adaptive: bool) -> [N::Mask; 2] {
+    fn at_levels(&mut self, runs: &[&mut Run<N::Real>], branches: Branches) -> [N::Mask; 2] {
+        let adaptive = branches.adaptive;
         let Team { state, parameters, strides, work, .. } = self;
         let mut seen = [Observed::default(); 2 + LOOKS.len()];
         let last = seen.len() - 1;
@@ -393,7 +394,7 @@ impl<N: Number> Team<N> {
                 look if look == last => &work.new,
                 _ => &state.part,
             };
-            let sums = observe::sums(curve, parameters, work.blocks);
+            let sums = observe::sums(curve, parameters, branches.law, work.blocks);
             seen[look] = observe::observed(&sums, &observe::maxima(curve), parameters);
         }
         let passed = if adaptive { observe::passes_level(&seen, parameters) } else { N::Mask::all_of(false) };

@@ -1,6 +1,9 @@
 //! The forces on a curve: the normal velocity `β = -∂²_s k + b(k)`, the force of the polygon, and the density of the energy.
 //! Twin of `shaders/forces.wgsl`.
 //!
+//! Of a crystal, `β = -∂_s(M ∂_s w)` with w = g k and g = γ + γ″. g and M go by the directions of the old polygon, on its
+//! segments and between them at its nodes.
+//!
 //! Nothing else reads the law of a member: another law is a change here, in [`law`](super::law) and in
 //! [`Flow`](crate::flow::Flow).
 
@@ -16,32 +19,101 @@ use crate::{flow::LENGTH_PENALTY, number::Number};
 pub fn fill<N: Number>(old: &Curve<N>, p: &Parameters<N>, kind: Kind, motion: &mut Motion<N>) {
     let law = p.law(kind);
     motion.law = law;
+    if kind.is_crystal() {
+        return fill_directions(old, motion);
+    }
     for i in 0..old.len() {
         motion.b[i] = law.b(old.k[i]);
     }
     motion.b.close();
 }
 
+/// The unit tangent of an edge.
+#[inline(always)]
+pub fn tangent_of<N: Number>([x, y, length]: [N; 3]) -> [N; 2] {
+    let inverse = length.recip();
+    [x * inverse, y * inverse]
+}
+
+/// Fills what a crystal is on the segments and at the nodes, with the lengths of the edges, by which their directions are
+/// known.
+#[inline(always)]
+fn fill_directions<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
+    let (n, one, law) = (old.len(), N::of(1.0), motion.law);
+    let first = edge(old, 0);
+    let at_first = law.directed(tangent_of(first));
+    let (mut length, mut here) = (first[2], at_first);
+    for i in 0..n {
+        // The edge after the last node is the first one.
+        let (mut after, mut next) = (first[2], at_first);
+        if i + 1 < n {
+            let ([.., x, _], [.., y, _]) = (old.x.rises_of_places(i), old.y.rises_of_places(i));
+            after = (x * x + y * y).sqrt();
+            next = law.directed(tangent_of([x, y, after]));
+        }
+        let stiffness = one + here.stiffness;
+        motion.edge[i] = length;
+        motion.stiffness[i] = stiffness;
+        motion.weighted[i] = stiffness * old.k[i];
+        let [stiffness_there, mobile_there] = law.between(&here, &next);
+        motion.stiffness_there[i] = stiffness_there;
+        if law.kind.is_diffusive() {
+            motion.mobile[i] = one + here.diffusivity;
+            motion.mobile_there[i] = mobile_there;
+        }
+        (length, here) = (after, next);
+    }
+    motion.edge.close();
+    motion.stiffness.close();
+    motion.weighted.close();
+    motion.stiffness_there.close();
+    if law.kind.is_diffusive() {
+        motion.mobile.close();
+        motion.mobile_there.close();
+    }
+}
+
 /// `β_i` of the curve whose reciprocal lengths and `b(k)` are in `motion`, with the [rises](crate::solver::Ring::rises)
 /// of its curvature.
 #[inline(always)]
 pub fn velocity<N: Number>(motion: &Motion<N>, [_, rise, next, _]: [N; 4], i: usize) -> N {
+    if motion.law.kind.is_crystal() {
+        let ([_, before, here, _, _], [_, rise, next, _]) = (conductance(motion, i), motion.weighted.rises(i));
+        return (rise * before - next * here) * motion.ir[i];
+    }
     let [_, iqm, iq, _, _] = motion.iq.window(i);
     motion.b[i] - (next * iq - rise * iqm) * motion.ir[i]
 }
 
+/// `M/q` at the nodes `i-2 … i+2` of a crystal.
+#[inline(always)]
+pub fn conductance<N: Number>(motion: &Motion<N>, i: usize) -> [N; 5] {
+    let mut all = motion.iq.window(i);
+    if motion.law.kind.is_diffusive() {
+        let mobile = motion.mobile_there.window(i);
+        for j in 0..5 {
+            all[j] = mobile[j] * all[j];
+        }
+    }
+    all
+}
+
 /// Fills the lengths of the polygon's edges and its own curvature at the nodes, `2 sin(θ/2)` of the angle θ there over
-/// half the length of both edges: in the geometric form, what forces the curve.
+/// half the length of both edges: in the geometric form, what forces the curve. Of a crystal, g times that curvature.
 #[inline(always)]
 pub fn measure<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
-    for i in 0..old.len() {
-        motion.edge[i] = edge(old, i)[2];
+    let crystal = motion.law.kind.is_crystal();
+    if !crystal {
+        for i in 0..old.len() {
+            motion.edge[i] = edge(old, i)[2];
+        }
+        motion.edge.close();
     }
-    motion.edge.close();
     for i in 0..old.len() {
         let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises_of_places(i), old.y.rises_of_places(i));
         let [_, _, e, f, _] = motion.edge.window(i);
-        motion.bent[i] = bent([ex, ey, e], [fx, fy, f]);
+        let bent = bent([ex, ey, e], [fx, fy, f]);
+        motion.bent[i] = if crystal { motion.stiffness_there[i] * bent } else { bent };
     }
     motion.bent.close();
 }
@@ -61,7 +133,15 @@ pub fn of_polygon<N: Number>(old: &Curve<N>, motion: &Motion<N>, i: usize) -> [N
     let [_, rise, next, _] = motion.bent.rises(i);
     let half = N::of(0.5);
     let along = [ex + fx, ey + fy];
-    let inward = half * (e + f) * motion.law.b(motion.bent[i]) - (next / f - rise / e);
+    let kind = motion.law.kind;
+    let inward = if kind.is_diffusive() {
+        let [_, _, mobile, mobile_after, _] = motion.mobile.window(i);
+        mobile * (rise / e) - mobile_after * (next / f)
+    } else if kind.is_crystal() {
+        rise / e - next / f
+    } else {
+        half * (e + f) * motion.law.b(motion.bent[i]) - (next / f - rise / e)
+    };
     let across = inward / (along[0] * along[0] + along[1] * along[1]).sqrt();
     let sliding = half * motion.alpha[i];
     [sliding * along[0] - across * along[1], sliding * along[1] + across * along[0]]

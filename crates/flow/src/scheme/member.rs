@@ -83,7 +83,7 @@ numbers! {
         tolerance,
         /// Over-relaxation factor of the sweeps; 0 to choose it by the stiffness of each system.
         sor,
-        /// Isoperimetric quotient of n nodes at [equilibrium](crate::equilibrium), `(n/π)·tan(π/n)`.
+        /// The quotient of n nodes at [equilibrium](crate::equilibrium), `(n/π)·tan(π/n)` of a circle.
         polygon_ratio,
         /// Excess at which the member is relaxed.
         relax_at,
@@ -163,7 +163,7 @@ numbers! {
         area,
         /// Distance from [equilibrium](crate::equilibrium).
         excess,
-        /// `∮(½k² + λ) ds`.
+        /// `∮(½k² + λ) ds`; of a crystal `∮γ ds`, in the same unit.
         energy,
         /// Smallest curvature.
         k_min,

@@ -1,11 +1,20 @@
 //! Sums and maxima of a curve, which determine its report, status and events. Twin of
 //! `shaders/observe.wgsl`.
 //!
-//! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r.
+//! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r. Of a crystal, energy
+//! and excess are those of the polygon, by the directions of its edges.
 
-use super::{Curve, Parameters, dense::LOOKS, member::Observed, pull, state::edge};
+use super::{
+    Curve, Parameters,
+    dense::LOOKS,
+    forces,
+    law::{Kind, Law},
+    member::Observed,
+    pull,
+    state::edge,
+};
 use crate::{
-    equilibrium::Equilibrium,
+    flow::QUOTIENT,
     number::{
         BIG, Mask, Number, Real,
         place::{apart, coordinate},
@@ -27,20 +36,19 @@ pub const MAX_GAP: f64 = 0.5;
 /// threshold inside the step.
 pub const NEAR: f64 = 4.0;
 
-/// What all flows relax to.
-const EQUILIBRIUM: Equilibrium = Equilibrium::Circle;
-
-/// The four sums, in the order of the kernel's `vec4`.
+/// The sums, the first four in the order of the kernel's `vec4`.
 #[derive(Clone, Copy, Debug)]
 pub struct CurveSums<N> {
     /// `Σ |e_i|`.
     pub length: N,
     /// `½ Σ x_{i-1} × x_i`.
     pub area: N,
-    /// `Σ (½k_i² + λ) r_i`.
+    /// `Σ (½k_i² + λ) r_i`; of a crystal `Σ γ |e_i|`, in the same unit.
     pub energy: N,
     /// Windings of the edge vector round the origin.
     pub turning: N,
+    /// `Σ γ |e_i|`, the length for γ = 1.
+    pub tension: N,
 }
 
 /// The maxima; a value that is not finite shows as more than [`BIG`].
@@ -63,6 +71,8 @@ pub struct Maxima<N> {
 pub struct Glance<N> {
     /// `Σ |e_i|`.
     pub length: N,
+    /// `Σ γ |e_i|`, the length for γ = 1.
+    pub tension: N,
     /// `½ Σ x_{i-1} × x_i`.
     pub area: N,
     /// Windings of the edge vector round the origin.
@@ -81,7 +91,7 @@ pub struct Glance<N> {
 
 /// Examines the curve that a step made from `old`.
 #[inline(always)]
-pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, blocks: Blocks) -> Glance<N> {
+pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: Blocks) -> Glance<N> {
     let low = N::of(-2.0 * BIG);
     let (mut turn, mut slack, mut minus_shortest, mut minus_k_min, mut farthest) = (low, low, low, low, N::of(0.0));
     let mut sums = solver::Sums::new(blocks);
@@ -97,7 +107,8 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, blocks: Blocks) -> Glan
     }
     let [length, area, turning] = sums.totals();
     let area = N::of(0.5) * area;
-    Glance { length, area, turning, turn, slack, minus_shortest, minus_k_min, farthest: farthest.sqrt() }
+    let tension = tension(new, length, &p.law(kind), blocks);
+    Glance { length, tension, area, turning, turn, slack, minus_shortest, minus_k_min, farthest: farthest.sqrt() }
 }
 
 impl<N: Number> Glance<N> {
@@ -122,6 +133,22 @@ impl<N: Number> Glance<N> {
     }
 }
 
+/// `Σ γ |e_i|` of a curve of this length.
+#[inline(always)]
+fn tension<N: Number>(curve: &Curve<N>, length: N, law: &Law<N>, blocks: Blocks) -> N {
+    if !law.kind.is_crystal() {
+        return length;
+    }
+    let mut sum = solver::Sums::new(blocks);
+    for i in 0..curve.len() {
+        let edge = edge(curve, i);
+        let [gamma, ..] = law.tension(forces::tangent_of(edge));
+        sum.add(i, [gamma * edge[2]]);
+    }
+    let [tension] = sum.totals();
+    tension
+}
+
 /// Coordinates of the nodes i-1 and i: both x, then both y.
 #[inline(always)]
 fn corner<N: Number>(curve: &Curve<N>, i: usize) -> [N; 4] {
@@ -138,7 +165,7 @@ fn cross<N: Number>(curve: &Curve<N>, i: usize) -> N {
 
 /// Computes the sums over the ring.
 #[inline(always)]
-pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> CurveSums<N> {
+pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: Blocks) -> CurveSums<N> {
     let half = N::of(0.5);
     let mut sums = solver::Sums::new(blocks);
     for i in 0..curve.len() {
@@ -147,7 +174,10 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, blocks: Blocks) -> C
         sums.add(i, [edge(curve, i)[2], cross(curve, i), energy, winding(curve, i)]);
     }
     let [length, area, energy, turning] = sums.totals();
-    CurveSums { length, area: half * area, energy, turning }
+    let law = p.law(kind);
+    let tension = tension(curve, length, &law, blocks);
+    let energy = if kind.is_crystal() { law.unit * tension } else { energy };
+    CurveSums { length, area: half * area, energy, turning, tension }
 }
 
 /// Computes the maxima over the ring.
@@ -166,25 +196,32 @@ pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
     m
 }
 
-/// The distance from equilibrium: `L²/(4π|A|)` minus that of the regular polygon.
+/// `E²/(4|W||A|)`, with the length as E for γ = 1: least at equilibrium.
 #[inline(always)]
-pub fn excess<N: Number>(length: N, area: N, p: &Parameters<N>) -> N {
-    EQUILIBRIUM.quotient(length, area.abs()) - p.polygon_ratio
+fn quotient<N: Number>(tension: N, area: N, p: &Parameters<N>) -> N {
+    tension * tension / (p.law[QUOTIENT] * area.abs())
+}
+
+/// The distance from equilibrium: the quotient minus that of the polygon at equilibrium.
+#[inline(always)]
+pub fn excess<N: Number>(tension: N, area: N, p: &Parameters<N>) -> N {
+    quotient(tension, area, p) - p.polygon_ratio
 }
 
 /// The first and the second derivative of ln excess along a step, by those of the nodes of the curve at its end.
 ///
-/// With length L, area A and Q = L²/(4π|A|), (ln Q)' is 2L'/L - A'/A.
+/// With length L, area A and Q = L²/(4π|A|), (ln Q)' is 2L'/L - A'/A. Of a crystal, `γ|e|` stands for the length of an edge.
 #[inline(always)]
 pub fn decline<N: Number>(
     curve: &Curve<N>,
     slope: &Curve<N>,
     bend: &Curve<N>,
-    [length, area]: [N; 2],
+    [tension, area]: [N; 2],
     p: &Parameters<N>,
+    kind: Kind,
     blocks: Blocks,
 ) -> [N; 2] {
-    let two = N::of(2.0);
+    let (two, law) = (N::of(2.0), p.law(kind));
     let mut sums = solver::Sums::new(blocks);
     for i in 0..curve.len() {
         let [xm, x, ym, y] = corner(curve, i);
@@ -194,18 +231,27 @@ pub fn decline<N: Number>(
         let ([_, fx, ..], [_, fy, ..]) = (slope.x.rises(i), slope.y.rises(i));
         let ([_, gx, ..], [_, gy, ..]) = (bend.x.rises(i), bend.y.rises(i));
         let inverse = (ex * ex + ey * ey).sqrt().recip();
-        let stretch = (ex * fx + ey * fy) * inverse;
-        let bent = (fx * fx + fy * fy + (ex * gx + ey * gy) - stretch * stretch) * inverse;
+        let (stretch, bent) = if kind.is_crystal() {
+            let [tx, ty] = [ex * inverse, ey * inverse];
+            let [gamma, turned, stiffness] = law.tension([tx, ty]);
+            let across = tx * fy - ty * fx;
+            let stretch = gamma * (tx * fx + ty * fy) + turned * across;
+            let pulled = gamma * (tx * gx + ty * gy) + turned * (tx * gy - ty * gx);
+            (stretch, stiffness * (across * across) * inverse + pulled)
+        } else {
+            let stretch = (ex * fx + ey * fy) * inverse;
+            (stretch, (fx * fx + fy * fy + (ex * gx + ey * gy) - stretch * stretch) * inverse)
+        };
         let area = (um * y - u * ym) + (xm * v - x * vm);
         let area_bend = (sm * y - s * ym) + (xm * t - x * tm) + two * (um * v - u * vm);
         sums.add(i, [stretch, bent, area, area_bend]);
     }
     let [stretch, bent, area_slope, area_bend] = sums.totals();
     let half = N::of(0.5);
-    let (growth, widening) = (stretch / length, half * area_slope / area);
+    let (growth, widening) = (stretch / tension, half * area_slope / area);
     let slope = two * growth - widening;
-    let bend = two * (bent / length - growth * growth) - (half * area_bend / area - widening * widening);
-    let ratio = EQUILIBRIUM.quotient(length, area.abs());
+    let bend = two * (bent / tension - growth * growth) - (half * area_bend / area - widening * widening);
+    let ratio = quotient(tension, area, p);
     let over = ratio / (ratio - p.polygon_ratio);
     let first = over * slope;
     [first, over * (bend + slope * slope) - first * first]
@@ -237,7 +283,7 @@ fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
 /// Observes a curve.
 #[inline(never)]
 pub fn observe<T: Real>(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
-    observed(&sums(curve, p, blocks), &maxima(curve), p)
+    observed(&sums(curve, p, p.kind_of_law(), blocks), &maxima(curve), p)
 }
 
 /// Derives the observables from the sums and maxima of a curve.
@@ -246,7 +292,7 @@ pub fn observed<N: Number>(sums: &CurveSums<N>, maxima: &Maxima<N>, p: &Paramete
     Observed {
         length: sums.length,
         area: sums.area,
-        excess: excess(sums.length, sums.area, p),
+        excess: excess(sums.tension, sums.area, p),
         energy: sums.energy,
         k_min: -maxima.minus_k_min,
         k_max: maxima.k_max,

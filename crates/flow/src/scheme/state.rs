@@ -301,8 +301,18 @@ pub struct Motion<N> {
     pub iq: Ring<N>,
     /// Lengths of the old polygon's edges, of the geometric form.
     pub edge: Ring<N>,
-    /// The old polygon's own curvature at its nodes, of the geometric form.
+    /// The old polygon's own curvature at its nodes, of the geometric form; of a crystal g times that.
     pub bent: Ring<N>,
+    /// g = γ + γ″ on the segments of a crystal.
+    pub stiffness: Ring<N>,
+    /// g at its nodes.
+    pub stiffness_there: Ring<N>,
+    /// `w = g k` of its old curvatures.
+    pub weighted: Ring<N>,
+    /// M on its segments.
+    pub mobile: Ring<N>,
+    /// M at its nodes.
+    pub mobile_there: Ring<N>,
 }
 
 /// Intermediate results of a step from the old curve to the new one.
@@ -335,7 +345,7 @@ impl<N: Number> Workspace<N> {
 
     /// Returns the numbers that it holds per node.
     pub const fn numbers<S: Solves>() -> usize {
-        12 + S::FACTS.numbers_per_node
+        17 + S::FACTS.numbers_per_node
     }
 
     fn with(blocks: Blocks, curvature: Memory<N, 1>, position: Memory<N, 2>) -> Workspace<N> {
@@ -354,6 +364,11 @@ impl<N: Number> Workspace<N> {
                 iq: ring(),
                 edge: ring(),
                 bent: ring(),
+                stiffness: ring(),
+                stiffness_there: ring(),
+                weighted: ring(),
+                mobile: ring(),
+                mobile_there: ring(),
             },
             new: Curve::zeros(n),
             curvature,

@@ -44,6 +44,8 @@ pub fn describe(spec: &Spec) -> String {
     let parts = [
         ("shape", spec.shape.to_string()),
         ("flow", spec.flow.to_string()),
+        ("energy", spec.energy.as_ref().map_or(String::new(), |energy| format!("energy {energy}"))),
+        ("diffusivity", spec.diffusivity.as_ref().map_or(String::new(), |of| format!("diffusivity {of}"))),
         ("amplitude", drawn("amplitude", &spec.amplitude)),
         ("decay", drawn("decay", &spec.decay)),
         ("perturbation", perturbation.into()),

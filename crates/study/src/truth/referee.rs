@@ -113,8 +113,11 @@ impl Referee {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Request`] if it is not smooth, or does not turn round once.
+    /// [`Error::Request`] if it is not smooth, or does not turn round once, and for a crystal.
     pub fn new(point: impl Fn(f64) -> DVec2, flow: &Flow) -> Result<Referee> {
+        if flow.is_crystal() {
+            return Err(refused("its energy or its mobility depends on the direction, and here neither does"));
+        }
         let mut samples = SAMPLES[0];
         let (bend, unit) = loop {
             if let Some(resolved) = resolve(&point, samples)? {

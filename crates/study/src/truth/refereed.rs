@@ -84,7 +84,7 @@ pub fn relaxation_truth(cell: &Cell, index: u64) -> Result<Truth> {
         return Err(Error::value("shape", &spec.shape, problem, remedy));
     }
     let (point, own) = family.curve(index)?;
-    let referee = Referee::new(point, own.as_ref().unwrap_or(spec.flow.typical()))?;
+    let referee = Referee::new(point, &own.unwrap_or_else(|| spec.typical().flow.into_owned()))?;
     let truth = referee.time_of_excess(spec.threshold(referee.excess()))?;
     Ok(Truth { t: truth.t / spec.mobility(), ..truth })
 }

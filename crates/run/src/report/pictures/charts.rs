@@ -13,7 +13,7 @@ use curvelax_draw::{
 };
 use curvelax_ensemble::{Event, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
 use curvelax_files::names;
-use curvelax_flow::flow::Flow;
+use curvelax_flow::{crystal::Energy, equilibrium::Equilibrium, flow::Flow};
 use curvelax_statistics::{HALF_INTERVAL, Interval, KaplanMeier, Sample};
 use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics, GroupStatistics},
@@ -224,7 +224,11 @@ impl FinishedRun<'_> {
         let note = format!("{}; {over}", self.what());
         let band = "5 to 95 % of the members";
         let decay = Decay { title, note: &note, band, key: key.clone(), curves, theory, time: None };
-        let excess = self.spec().flow.typical().equilibrium().excess_in_words();
+        let excess = match self.spec().sweep.has("energy") {
+            true => Equilibrium::Wulff(Energy::default()),
+            false => self.spec().typical().flow.equilibrium(),
+        };
+        let excess = excess.excess_in_words();
         let of_band = if decay.has_bands() { format!(" Band: {band}.") } else { String::new() };
         let caption = format!("How the excess, {excess}, falls{slope}.{of_band}");
         Ok(Some(chart(names::EXCESS, title, &caption, decay.draw())))
@@ -462,7 +466,7 @@ fn survival_curve(label: String, value: Option<f64>, sample: &Sample) -> Surviva
 /// The law by which, in linear theory, the excess of a curve of the members' mean area decreases, through the point
 /// where the mean has fallen to a tenth. There is none where each member has a shape or a flow of its own.
 fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
-    if spec.shape.is_drawn() || spec.flow.is_drawn() {
+    if spec.shape.is_drawn() || spec.has_drawn_flow() {
         return None;
     }
     let values = spec.typical();
@@ -485,7 +489,7 @@ fn law(spec: &Spec, cell: &CellTally, curve: &DecayCurve) -> Option<Theory> {
         (None, flow) => {
             let fourth_power = (area / std::f64::consts::PI).powi(2);
             let label = match flow {
-                Flow::SurfaceDiffusion => format!("exp(−{} t/R⁴)", brief(rate * fourth_power)),
+                Flow::SurfaceDiffusion | Flow::Crystal(_) => format!("exp(−{} t/R⁴)", brief(rate * fourth_power)),
                 // The radius still changes, and the rate with it.
                 _ => format!("exp(−{} t), for the radius at t = {}", brief(rate), significant(t, 2)),
             };
