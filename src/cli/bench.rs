@@ -52,7 +52,7 @@ pub struct BenchArgs {
     #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<usize>, allow_hyphen_values = true)]
     repeats: Option<usize>,
     /// Solvers of the pentadiagonal systems [default: all; direct with --adaptive]
-    #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = parsers::solver::<Solver>(&Solver::NAMES), help_heading = flags::METHOD)]
+    #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = parsers::name::<Solver>(&Solver::NAMES, &[crate::solver::MULTIGRID]), help_heading = flags::METHOD)]
     solver: Vec<Solver>,
     /// Adapt the steps to this local error; without TOL it is 0.001 [default: fixed steps]
     #[arg(
@@ -61,14 +61,14 @@ pub struct BenchArgs {
     )]
     adaptive: Option<f64>,
     /// Back ends [default: the CPU and every GPU adapter, software ones included]
-    #[arg(long, value_name = "WHERE,...", value_delimiter = ',', value_parser = parsers::word::<DeviceKind>(&DeviceKind::NAMES), help_heading = flags::MACHINE)]
+    #[arg(long, value_name = "WHERE,...", value_delimiter = ',', value_parser = parsers::name::<DeviceKind>(&DeviceKind::NAMES, &[]), help_heading = flags::MACHINE)]
     backend: Vec<DeviceKind>,
     /// GPU adapters to measure: part of the name, or the number in `curvelax adapters`. The CPU is then measured only with
     /// --backend [default: all]
     #[arg(long, value_name = "NAME", help_heading = flags::MACHINE)]
     adapter: Option<String>,
     /// Number types [default: f64,f32]
-    #[arg(long, value_name = "TYPE,...", value_delimiter = ',', value_parser = parsers::word::<Precision>(flags::PRECISIONS), help_heading = flags::MACHINE)]
+    #[arg(long, value_name = "TYPE,...", value_delimiter = ',', value_parser = parsers::word::<Precision>(), help_heading = flags::MACHINE)]
     precision: Vec<Precision>,
     /// Threads of the CPU back end [default: all cores]
     #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<usize>, allow_hyphen_values = true, help_heading = flags::MACHINE)]

@@ -55,12 +55,12 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    Run(Box<run::RunArgs>),
+    Run(run::RunArgs),
     Resume(resume::ResumeArgs),
     Merge(merge::MergeArgs),
     Check(check::CheckArgs),
     Bench(bench::BenchArgs),
-    Convergence(convergence::ConvergenceArgs),
+    Convergence(Box<convergence::ConvergenceArgs>),
     Figure(figure::FigureArgs),
     Plot(plot::PlotArgs),
     Animate(animate::AnimateArgs),
@@ -75,12 +75,12 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = parse(arguments).unwrap_or_else(|error| error.exit());
     signals::outlive_full_files();
     let done = match cli.command {
-        Command::Run(args) => run::run(*args),
+        Command::Run(args) => run::run(args),
         Command::Resume(args) => resume::resume(args),
         Command::Merge(args) => merge::merge(args),
         Command::Check(args) => check::check(args),
         Command::Bench(args) => bench::bench(args),
-        Command::Convergence(args) => convergence::convergence(args),
+        Command::Convergence(args) => convergence::convergence(*args),
         Command::Figure(args) => figure::figure(args),
         Command::Plot(args) => plot::plot(args),
         Command::Animate(args) => animate::animate(args),

@@ -5,26 +5,25 @@ use std::time::Duration;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::{Deserialize, de::value::StrDeserializer};
 
-use crate::{ensemble::Shard, error::echo, solver::MULTIGRID};
+pub(super) use crate::ensemble::request::value::{real, whole};
+use crate::{
+    ensemble::{
+        Shard,
+        request::value::{Takes, Value},
+    },
+    error::echo,
+};
 
 /// The number of shards, if not all are in the array.
 pub(super) const SHARDS: &str = "CURVELAX_SHARDS";
 
-pub(super) fn real(text: &str) -> Result<f64, String> {
-    text.trim().parse().map_err(|_| "not a number".into())
-}
-
-pub(super) fn whole<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
-    let value = text.trim().parse::<u64>().ok().and_then(|value| T::try_from(value).ok());
-    value.ok_or_else(|| format!("not a whole number from 0 to {}", u128::MAX >> (128 - 8 * size_of::<T>())))
-}
-
 /// Parses `I/N`, or `slurm`.
-pub(super) fn shard(text: &str) -> Result<Shard, String> {
-    match text.trim() {
-        "slurm" => slurm(|name| std::env::var(name).ok()),
-        text => text.parse(),
-    }
+pub(super) fn shard(text: &str) -> Result<String, String> {
+    let shard: Shard = match text.trim() {
+        "slurm" => slurm(|name| std::env::var(name).ok())?,
+        text => text.parse()?,
+    };
+    Ok(shard.to_string())
 }
 
 /// The shard of this task of a Slurm job array. If an array of only some of the N shards is submitted again, its own
@@ -76,31 +75,39 @@ pub(super) fn text_of<T: std::str::FromStr<Err = String>>(text: &str) -> Result<
     text.parse()
 }
 
-/// Parses one of `names` as in the spec file, with clap's listing and suggestions.
-pub(super) fn word<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+/// Parses a word of a key's type as in the spec file, with clap's listing and suggestions.
+pub(super) fn word<T>() -> impl TypedValueParser<Value = T>
 where
-    T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
+    T: Value + Clone + Send + Sync + 'static,
 {
-    word_or_gone(names, &[])
+    let (names, gone) = match T::TAKES {
+        Takes::Word { names, gone } => (names, gone),
+        _ => (&[][..], &[][..]),
+    };
+    listed(names, gone).try_map(|name| T::read(&name))
 }
 
-/// The same for a solver. The name of one that is gone has a message of its own.
-pub(super) fn solver<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+/// Parses one of the names of a type that is no key.
+pub(super) fn name<T>(names: &'static [&'static str], gone: &'static [&'static str]) -> impl TypedValueParser<Value = T>
 where
     T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
 {
-    word_or_gone(names, &[MULTIGRID])
+    listed(names, gone).try_map(|name| T::deserialize(StrDeserializer::<serde::de::value::Error>::new(&name)))
 }
 
-/// One of `names`; those that are `gone` are not shown, and reach the type, which refuses them.
-fn word_or_gone<T>(names: &'static [&'static str], gone: &'static [&'static str]) -> impl TypedValueParser<Value = T>
-where
-    T: for<'de> Deserialize<'de> + Clone + Send + Sync + 'static,
-{
+/// One of `names`, as it is written; those that are `gone` are not shown, and reach `check`, which refuses them.
+pub(super) fn word_of(
+    names: &'static [&'static str],
+    gone: &'static [&'static str],
+    check: fn(&str) -> Result<(), String>,
+) -> impl TypedValueParser<Value = String> {
+    listed(names, gone).try_map(move |name| check(&name).map(|()| name))
+}
+
+fn listed(names: &'static [&'static str], gone: &'static [&'static str]) -> PossibleValuesParser {
     let shown = names.iter().map(|&name| PossibleValue::new(name));
     let hidden = gone.iter().map(|&name| PossibleValue::new(name).hide(true));
     PossibleValuesParser::new(shown.chain(hidden).collect::<Vec<_>>())
-        .try_map(|name| T::deserialize(StrDeserializer::<serde::de::value::Error>::new(&name)))
 }
 
 #[cfg(test)]

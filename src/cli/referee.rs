@@ -1,6 +1,6 @@
 //! `curvelax convergence --referee`: relaxation times of the scheme beside those of an independent solver.
 
-use super::{flags, note, parsers, print};
+use super::{note, parsers, print};
 use crate::{
     curve::{Modes, Perturbation, Shape},
     ensemble::{
@@ -46,7 +46,7 @@ pub struct RefereeFlags {
     #[arg(long, value_name = "P", value_parser = parsers::text_of::<Drawn<f64>>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
     decay: Option<Drawn<f64>>,
     /// Its law [default: amplitude-phase]
-    #[arg(long, value_name = "LAW", value_parser = parsers::word::<Perturbation>(flags::PERTURBATIONS), requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "LAW", value_parser = parsers::word::<Perturbation>(), requires = "referee", help_heading = REFEREE)]
     perturbation: Option<Perturbation>,
     /// Its seed [default: 1]
     #[arg(long, value_name = "SEED", value_parser = parsers::whole::<u64>, requires = "referee", help_heading = REFEREE)]
@@ -58,7 +58,7 @@ pub struct RefereeFlags {
     #[arg(long, value_name = "EXCESS", value_parser = parsers::real, requires = "referee", help_heading = REFEREE)]
     relax_at: Option<f64>,
     /// What moves the nodes, as for `curvelax run` [default: as with --accurate]
-    #[arg(long, value_name = "FORM", value_parser = parsers::word::<PositionForm>(flags::FORMS), requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "FORM", value_parser = parsers::word::<PositionForm>(), requires = "referee", help_heading = REFEREE)]
     form: Option<PositionForm>,
     /// Rate κ of the metric pull, as for `curvelax run` [default: auto]
     #[arg(long, value_name = "KAPPA", value_parser = parsers::text_of::<Pull>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]

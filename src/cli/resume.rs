@@ -3,11 +3,7 @@
 
 use std::path::PathBuf;
 
-use super::{
-    flags::{BACKENDS, MACHINE},
-    manner::MannerFlags,
-    parsers,
-};
+use super::{flags::MACHINE, manner::MannerFlags, parsers};
 use crate::{
     ensemble::request::spec::BackendChoice,
     error::Result,
@@ -33,7 +29,7 @@ pub struct ResumeArgs {
     #[arg(value_name = "DIR")]
     run: PathBuf,
     /// Continue here instead of where the run began; digits then differ [default: where it began]
-    #[arg(long, value_name = "WHERE", value_parser = parsers::word::<BackendChoice>(BACKENDS), help_heading = MACHINE)]
+    #[arg(long, value_name = "WHERE", value_parser = parsers::word::<BackendChoice>(), help_heading = MACHINE)]
     backend: Option<BackendChoice>,
     /// Continue on this GPU adapter, given by a part of its name [default: the one on which it began]
     #[arg(long, value_name = "NAME", help_heading = MACHINE)]

@@ -102,6 +102,6 @@ pub fn run(args: RunArgs) -> Result<()> {
 fn request(file: Option<PathBuf>, flags: flags::SpecFlags) -> Result<Spec> {
     let mut spec = file.map_or_else(|| Spec::from_toml("").map_err(Error::Request), |path| Spec::read(&path))?;
     flags.check_sweeps()?;
-    flags.overlay(&mut spec);
+    flags.overlay(&mut spec)?;
     Ok(spec)
 }

@@ -3,6 +3,7 @@
 mod choices;
 pub mod drawn;
 pub mod event;
+mod key;
 mod reading;
 mod seed;
 pub mod shard;
@@ -10,6 +11,7 @@ pub mod spec;
 pub mod sweep;
 mod units;
 pub(crate) mod validate;
+pub mod value;
 mod values;
 
 pub use drawn::Drawn;

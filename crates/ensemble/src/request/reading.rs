@@ -4,7 +4,7 @@ use std::{io::ErrorKind, path::Path};
 
 use serde::{Deserialize, de::IgnoredAny};
 
-use super::spec::{OmittedKeys, Spec};
+use super::key::{OmittedKeys, Spec};
 use curvelax_base::{
     error::{Error, Result, did_you_mean, echo_path, plainly, shortened},
     input,
@@ -52,12 +52,6 @@ impl Spec {
     /// Returns the spec as TOML that [`Spec::from_toml`] reads back to the same spec.
     pub fn to_toml(&self) -> Result<String> {
         toml::to_string(self).map_err(|e| Error::Failed(format!("cannot write the spec as TOML: {e}")))
-    }
-
-    /// Names of all keys, in order.
-    pub fn keys() -> Vec<String> {
-        let refused = toml::from_str::<Spec>("\"\" = 0").expect_err("the empty key is unknown");
-        quoted(refused.message()).skip(1).map(str::to_owned).collect()
     }
 }
 

@@ -5,204 +5,21 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
-use crate::{
-    request::choices::{list, some_list},
-    request::drawn::Drawn,
-    request::event::Event,
-    request::seed,
-    request::shard::Shard,
-    request::sweep::{self, Sweep},
-};
-use curvelax_base::{
-    error::{Error, Result, echo, expected_of, shortened},
-    random::Design,
-};
-use curvelax_curve::{Interpolation, Modes, Perturbation, Sampling, Shape};
-use curvelax_flow::{
-    crystal::{Diffusivity, Energy},
-    flow::Flow,
-};
+use crate::request::sweep::{self, Sweep};
+use curvelax_base::error::{Error, Result, echo, expected_of, shortened};
+use curvelax_curve::Interpolation;
 
 pub use crate::request::{
     choices::{BackendChoice, FinalTime, Omega, Pace, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau},
+    key::{Group, Key, OmittedKeys, Spec},
     units::Units,
 };
 pub use curvelax_flow::{
     number::Precision,
     solver::{Order, Solver},
 };
-
-/// A complete description of an ensemble and of the method that relaxes it.
-///
-/// `Default` is the paper's first example as an ensemble: 256 perturbed 2:1 ellipses under surface diffusion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
-pub struct Spec {
-    /// Number of members; of outlines, copies of each.
-    pub curves: u64,
-    /// Number of outlines of the shape, if they are an ensemble; a study fills it in.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub outlines: Option<u64>,
-    /// Property of the outlines whose values are groups.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub group_by: Option<String>,
-    /// Nodes per member, n.
-    pub points: usize,
-    /// Seed of the ensemble.
-    #[serde(with = "seed")]
-    pub seed: u64,
-    /// The curve that is perturbed.
-    pub shape: Drawn<Shape>,
-    /// How nodes are placed on it.
-    pub sampling: Sampling,
-    /// How the curve runs between the points of an outline; a study of outlines fills it in.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub interpolate: Option<Interpolation>,
-    /// Smallest radius of curvature of an outline's corners, as a share of its length, 0 to leave them; likewise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rounding: Option<f64>,
-    /// σ of the random perturbation; 0 for none.
-    pub amplitude: Drawn<f64>,
-    /// Modes of the random perturbation.
-    pub modes: Modes,
-    /// p: mode m has standard deviation σ·m^-p.
-    pub decay: Drawn<f64>,
-    /// How a mode of the perturbation is drawn.
-    #[serde(skip_serializing_if = "Perturbation::is_default")]
-    pub perturbation: Perturbation,
-    /// How members are spread over the distributions of shape, flow, amplitude and decay.
-    #[serde(skip_serializing_if = "Design::is_random")]
-    pub design: Design,
-    /// The law of motion.
-    pub flow: Drawn<Flow>,
-    /// γ of the surface energy, if it depends on the direction.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub energy: Option<Drawn<Energy>>,
-    /// M of the mobility along the surface, if it depends on the direction.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub diffusivity: Option<Drawn<Diffusivity>>,
-    /// B of the flow in the user's units of length and time, in length⁴/time; 1 if absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mobility: Option<f64>,
-    /// The user's units of length and time, for the report and the axes.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub units: Option<Units>,
-    /// Fixed time step; [`DEFAULT_TAU`] if neither it nor `adaptive` is given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tau: Option<Tau>,
-    /// Local error tolerance of adaptive steps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub adaptive: Option<f64>,
-    /// Highest order of adaptive steps; if absent, that of the precision. Not a key: only
-    /// The study of work and precision sets it, to measure what every order costs.
-    #[serde(skip)]
-    pub most_order: Option<u32>,
-    /// Final time; [`DEFAULT_T_END`] if absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub t_end: Option<FinalTime>,
-    /// ω, speed of the redistribution towards equal spacing, in 1/time; if absent, that of the [pace](Spec::omega).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub omega: Option<Omega>,
-    /// No tangential redistribution (α = 0).
-    pub no_redistribution: bool,
-    /// κ of the metric pull.
-    pub pull: Pull,
-    /// What moves the nodes; if absent, the paper's form, and of crystals the geometric one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub form: Option<PositionForm>,
-    /// Solver of the pentadiagonal systems.
-    pub solver: SolverChoice,
-    /// Order in which a sweep visits the nodes.
-    pub order: Order,
-    /// Residual tolerance of the sweeps, relative to the increment; depends on the precision if absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tolerance: Option<f64>,
-    /// Over-relaxation; 1 is plain Gauss–Seidel.
-    pub sor: Sor,
-    /// Sweeps per system after which a member is `stalled`.
-    pub max_sweeps: u32,
-    /// Where to run.
-    pub backend: BackendChoice,
-    /// Part of the name of the GPU adapter to use.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub adapter: Option<String>,
-    /// Number type; if absent, f64 where the device has it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub precision: Option<Precision>,
-    /// A member is relaxed when its excess is at most this fraction of its start; [`DEFAULT_RELAX_TO`] if neither it
-    /// nor `relax_at` is given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub relax_to: Option<f64>,
-    /// A member is relaxed when its excess is at most this.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub relax_at: Option<f64>,
-    /// End a member when it is relaxed; if absent, only with a [final time](FinalTime::Auto) that means just that.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stop_when_relaxed: Option<bool>,
-    /// Run every member at coarser resolutions, too, and extrapolate its relaxation time.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub refine: bool,
-    /// Total relative uncertainty of the median relaxation time to reach, by the choice of n, tolerance and members.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub accuracy: Option<f64>,
-    /// Events of which each member's first time is found.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub event: Vec<Event>,
-    /// Interval between rows of `series.csv`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub series: Option<f64>,
-    /// Times of the snapshots.
-    #[serde(deserialize_with = "list")]
-    pub snapshots: Vec<f64>,
-    /// How snapshots are stored.
-    pub store: Store,
-    /// How tables are written.
-    #[serde(skip_serializing_if = "Tables::is_csv")]
-    pub tables: Tables,
-    /// Run only these members.
-    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
-    pub only: Option<Vec<u64>>,
-    /// Of these, run only the ones in this shard.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shard: Option<Shard>,
-    /// Threads of the CPU back end; all cores if absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub threads: Option<usize>,
-    /// Draw member j of every cell from the same random numbers.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub common_random_numbers: bool,
-    /// Keys that vary from cell to cell.
-    #[serde(skip_serializing_if = "Sweep::is_empty")]
-    pub sweep: Sweep,
-    /// Keys that the request leaves out. Not a key.
-    #[serde(skip)]
-    pub omitted: OmittedKeys,
-}
-
-/// Keys that a request leaves out, of those whose default is another one for outlines: one copy of each, not perturbed.
-#[derive(Clone, Copy, Default)]
-pub struct OmittedKeys {
-    /// There is no `curves`.
-    pub curves: bool,
-    /// There is no `amplitude`.
-    pub amplitude: bool,
-}
-
-/// Equal specs look equal, too.
-impl fmt::Debug for OmittedKeys {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("OmittedKeys")
-    }
-}
-
-/// Equal specs have equal values, wherever these come from.
-impl PartialEq for OmittedKeys {
-    fn eq(&self, _: &OmittedKeys) -> bool {
-        true
-    }
-}
 
 /// The paper's time step.
 pub const DEFAULT_TAU: f64 = 1e-3;
@@ -221,64 +38,6 @@ pub const ROUNDINGS: std::ops::RangeInclusive<f64> = 1e-4..=0.02;
 pub const DEFAULT_ADAPTIVE: f64 = 1e-3;
 /// Fraction of the initial excess at which a member is relaxed.
 pub const DEFAULT_RELAX_TO: f64 = 0.01;
-
-impl Default for Spec {
-    fn default() -> Spec {
-        Spec {
-            curves: 256,
-            outlines: None,
-            group_by: None,
-            points: 100,
-            seed: 1,
-            shape: Shape::Ellipse { a: 2.0, b: 1.0 }.into(),
-            sampling: Sampling::Arclength,
-            interpolate: None,
-            rounding: None,
-            amplitude: 0.05.into(),
-            modes: Modes { low: 2, high: 8 },
-            decay: 1.0.into(),
-            perturbation: Perturbation::default(),
-            design: Design::default(),
-            flow: Flow::SurfaceDiffusion.into(),
-            energy: None,
-            diffusivity: None,
-            mobility: None,
-            units: None,
-            tau: None,
-            adaptive: None,
-            most_order: None,
-            t_end: None,
-            omega: None,
-            no_redistribution: false,
-            pull: Pull::Rate(0.0),
-            form: None,
-            solver: SolverChoice::Auto,
-            order: Order::Coloured,
-            tolerance: None,
-            sor: Sor::Factor(1.0),
-            max_sweeps: 200_000,
-            backend: BackendChoice::Auto,
-            adapter: None,
-            precision: None,
-            relax_to: None,
-            relax_at: None,
-            stop_when_relaxed: None,
-            refine: false,
-            accuracy: None,
-            event: Vec::new(),
-            series: None,
-            snapshots: Vec::new(),
-            store: Store::Csv,
-            tables: Tables::Csv,
-            only: None,
-            shard: None,
-            threads: None,
-            common_random_numbers: false,
-            sweep: Sweep::default(),
-            omitted: OmittedKeys::default(),
-        }
-    }
-}
 
 impl Spec {
     /// Sets what `--accurate` stands for, except the keys that are `given` beside it.
@@ -488,6 +247,10 @@ pub(crate) fn final_times(times: usize, cells: u64) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Shard;
+    use curvelax_base::random::Design;
+    use curvelax_curve::Perturbation;
+    use curvelax_flow::flow::Flow;
 
     #[test]
     fn a_spec_reads_back_from_its_toml() {
