@@ -6,7 +6,7 @@
 //!
 //! by the semi-implicit Lagrangian scheme of K. Mikula and D. Ševčovič, *Numerical aspects of evolution of plane
 //! curves satisfying the fourth order geometric equation*. It runs on the CPU and, through WGSL and wgpu, on a GPU.
-//! `README.md` describes the program, `docs/method.md` the scheme.
+//! `README.md` describes the program, `docs/internals/method.md` the scheme.
 //!
 //! # Notation
 //!

@@ -175,10 +175,13 @@ fn the_site_has_every_page() {
     let links = summary.split("](").skip(1).filter_map(|rest| Some(PathBuf::from(rest.split_once(')')?.0)));
     let links: BTreeSet<PathBuf> = links.collect();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
-    let pages = fs::read_dir(folder).unwrap().map(|entry| PathBuf::from(entry.unwrap().file_name()));
-    let pages: Vec<PathBuf> =
-        pages.filter(|page| page.extension().is_some_and(|extension| extension == "md")).collect();
-    assert!(pages.len() >= 12, "{pages:?}");
+    let pages_in = |within: &str| {
+        let names = fs::read_dir(folder.join(within)).unwrap().map(|entry| entry.unwrap().file_name());
+        let pages = names.map(|name| Path::new(within).join(name));
+        pages.filter(|page| page.extension().is_some_and(|extension| extension == "md")).collect::<Vec<_>>()
+    };
+    let pages = [pages_in(""), pages_in("internals")].concat();
+    assert!(pages.len() >= 20, "{pages:?}");
     for page in pages.iter().filter(|page| page.as_path() != Path::new("SUMMARY.md")) {
         assert!(links.contains(page), "docs/SUMMARY.md does not name {}", page.display());
     }

@@ -91,7 +91,7 @@ impl Coverage {
         self.bars.iter().filter(|bars| **bars <= share).count()
     }
 
-    /// Whether all but one in ten are, or all but one: of one family fewer than 95 % are (`docs/method.md#limit`).
+    /// Whether all but one in ten are, or all but one: of one family fewer than 95 % are (`docs/internals/method.md#limit`).
     fn holds(&self, share: f64) -> bool {
         self.bars.len() - self.within(share) <= (self.bars.len() / 10).max(1)
     }

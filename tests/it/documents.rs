@@ -119,11 +119,17 @@ fn flags() -> String {
 
 /// A table with a name, and the heading, type and meaning of each column.
 fn table(name: &str, rows: &str, columns: impl Iterator<Item = [String; 3]>) -> String {
-    let lines = columns.map(|[heading, holds, meaning]| format!("| `{heading}` | {holds} | {} |\n", cell(&meaning)));
-    format!(
-        "\n### {name}\n\nOne row per {rows}.\n\n| column | holds | meaning |\n|---|---|---|\n{}",
-        lines.collect::<String>()
-    )
+    let (mut columns, mut lines) = (columns.peekable(), String::new());
+    while let Some([heading, holds, meaning]) = columns.next() {
+        // Both ends of an interval share a line, if their meanings differ in this word only.
+        let upper = meaning.replacen("lower end", "upper end", 1);
+        let (headings, meaning) = match columns.next_if(|[_, _, next]| *next == upper && upper != meaning) {
+            Some([end, ..]) => (format!("{heading}` `{end}"), meaning.replacen("lower end", "lower and upper end", 1)),
+            None => (heading, meaning),
+        };
+        lines += &format!("| `{headings}` | {holds} | {} |\n", cell(&meaning));
+    }
+    format!("\n### {name}\n\nOne row per {rows}.\n\n| column | holds | meaning |\n|---|---|---|\n{lines}")
 }
 
 fn table_of<R: TableRow>(name: &str, rows: &str) -> String {
@@ -165,7 +171,9 @@ fn columns() -> String {
 #[test]
 fn the_page_of_files_has_the_columns_of_the_program() {
     let columns = columns();
-    for line in ["| `t_relax` | float | first time", "| `t_relax_q05` | float |", "| `i` | integer |"] {
+    let ends = "| `t_relax_q05_low` `t_relax_q05_high` | float | t_relax: lower and upper end";
+    let others = ["| `t_relax` | float | first time", "| `t_relax_median_low` | float |", "| `i` | integer |"];
+    for line in others.into_iter().chain([ends]) {
         assert!(columns.contains(line), "{line} is not in the page: {columns}");
     }
     generated(FILES, &columns);
@@ -463,6 +471,28 @@ fn the_recipes_name_files_that_exist_and_every_crate() {
         let path = format!("crates/{}", entry.unwrap().file_name().to_string_lossy());
         assert!(paths.contains(&*path), "CONTRIBUTING.md does not say what {path} is");
     }
+}
+
+/// The decisions without an anchor, and those that the index at the top does not name.
+fn unlisted(text: &str) -> Vec<&str> {
+    let (index, decisions) = text.split_once("\n## Numerics\n").expect("the first section of decisions");
+    let (decisions, _) = decisions.split_once("\n## Dependencies\n").expect("the last section");
+    let listed = |line: &str| {
+        let anchor = line.strip_prefix("<a id=\"").and_then(|rest| rest.strip_suffix("\"></a>"));
+        anchor.is_some_and(|anchor| index.contains(&format!("](#{anchor})")))
+    };
+    let paragraphs = decisions.split("\n\n").map(|paragraph| paragraph.trim_start().lines().next().unwrap_or_default());
+    paragraphs.filter(|line| !line.is_empty() && !line.starts_with("## ") && !listed(line)).collect()
+}
+
+#[test]
+fn the_index_of_decisions_names_all_of_them() {
+    let text = read(&root().join("docs/internals/decisions.md"));
+    assert_eq!(unlisted(&text), [""; 0]);
+    assert!(text.matches("<a id=\"").count() > 100);
+    // A decision that is not listed is found, and one without an anchor.
+    let other = "[1](#one)\n\n## Numerics\n\n<a id=\"one\"></a>\n**1.** a\n\n<a id=\"two\"></a>\n**2.** b\n\n**3.** c\n\n## Dependencies\n";
+    assert_eq!(unlisted(other), ["<a id=\"two\"></a>", "**3.** c"]);
 }
 
 #[test]

@@ -108,7 +108,7 @@ fn the_time_does_not_depend_on_the_parameter_or_the_place_and_goes_with_the_four
     });
     assert!(is_near(moved.t, 81.0 * own.t, 1e-8) && !is_near(moved.t, 27.0 * own.t, 0.1), "{own:?} {moved:?}");
     assert!(own.error < 1e-6 && is_near(own.area, 0.7 * PI, 1e-9) && is_near(moved.area, 6.3 * PI, 1e-9), "{own:?}");
-    // docs/method.md: extrapolated from 400 and 800 nodes.
+    // docs/internals/method.md: extrapolated from 400 and 800 nodes.
     assert!(is_near(own.t, 0.08535, 1e-4) && !is_near(own.t, 0.0857, 1e-3), "{own:?}");
 }
 

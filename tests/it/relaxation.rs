@@ -480,7 +480,7 @@ fn a_thousand_random_polygons() {
 }
 
 #[test]
-#[ignore = "prints the table of docs/precision.md"]
+#[ignore = "prints the table of docs/internals/precision.md"]
 fn single_precision_against_double() {
     for flow in
         [Flow::SurfaceDiffusion, Flow::Willmore, Flow::Elastic(0.5), Flow::Polynomial(vec![3.0, -1.0, 0.2, 0.1])]

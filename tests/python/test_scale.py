@@ -1,4 +1,4 @@
-"""docs/scale.md shows what examples/python/makespan.py prints, and that plays a queue as it should."""
+"""docs/internals/scale.md shows what examples/python/makespan.py prints, and that plays a queue as it should."""
 
 import argparse
 import importlib.util
@@ -16,7 +16,7 @@ from common import CURVELAX
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "examples" / "python" / "makespan.py"
-PAGE = (ROOT / "docs" / "scale.md").read_text()
+PAGE = (ROOT / "docs" / "internals" / "scale.md").read_text()
 
 loaded = importlib.util.spec_from_file_location("makespan", SCRIPT)
 makespan = importlib.util.module_from_spec(loaded)

@@ -1,4 +1,5 @@
-//! The single table of tolerances: quantity, natural scale, factor. Measured maxima are in `docs/conformance.md`.
+//! The single table of tolerances: quantity, natural scale, factor. Measured maxima are in
+//! `docs/internals/conformance.md`.
 
 use crate::gpu::shader::TRACE_FIELDS;
 use curvelax_flow::{
@@ -7,7 +8,7 @@ use curvelax_flow::{
     solver::Row as Coefficients,
 };
 
-/// Largest n at which f32 was verified against f64 (`docs/conformance.md`).
+/// Largest n at which f32 was verified against f64 (`docs/internals/conformance.md`).
 pub const MAX_POINTS_F32: usize = 320;
 
 /// The unit of a bound: the size of the terms whose rounding the quantity inherits.

@@ -63,7 +63,7 @@ columns! { LevelRow:
     level: whole = level, "1: n/2 nodes; 2: n/√2; 3: n; with `--refine`, of members that need more, 4: √2 n; 5: 2n; and so on up to 1600 nodes; of outlines 100 more, on its finest one: with every second point, and 200 more: with corners rounded to twice the radius";
     cell: whole = cell, "index of its cell";
     points: whole = points, "nodes";
-    adaptive: optional = adaptive, "tolerance of the steps: a tenth of that of the run, 1e-4 beside fixed steps";
+    adaptive: optional = adaptive, "tolerance of the steps: a tenth of that of the run, 1e-4 with fixed steps";
     status: status = status, "how the member ended";
     t_relax: event = t_relax, "as in `summary.csv`";
     solves: whole = solves, "as in `summary.csv`";

@@ -49,9 +49,9 @@ mod tests {
             "after {} minutes",
             ["no", "one", "two", "three", "four", "five"][PATIENCE.as_secs() as usize / 60]
         );
-        let text = include_str!("../../../docs/reliability.md");
+        let text = include_str!("../../../docs/internals/reliability.md");
         let row = |begin: &str| text.lines().find(|line| line.starts_with(begin)).expect("a row of the table");
-        for begin in ["| hangs midway", "| compiles for ever"] {
+        for begin in ["| hangs midway", "| never finishes compiling"] {
             assert!(row(begin).contains(&told), "{}", row(begin));
         }
         // The example names another time.

@@ -9,7 +9,7 @@ pub(super) type Key = (usize, &'static str, Variant);
 /// Compiles the pipeline for subgroups of `subgroup` threads.
 ///
 /// The driver caches compiled code across processes (Mesa in `MESA_SHADER_CACHE_DIR`, NVIDIA in its ComputeCache);
-/// wgpu's own pipeline cache needs `unsafe`, see `docs/decisions.md`.
+/// wgpu's own pipeline cache needs `unsafe`, see `docs/internals/decisions.md`.
 pub fn compile<T: Real>(
     device: &wgpu::Device,
     blocks: Blocks,

@@ -12,7 +12,7 @@
 //! what these leave themselves. It is removed. What remains goes with that change, or with the tolerance over the amplitude
 //! of the shape at that time, which is the root of its excess. The parts of space and of steps are independent and add as
 //! squares. The constants were fitted to ensembles of curves and flows whose limits are known from more nodes and steps
-//! (`docs/method.md#limit`).
+//! (`docs/internals/method.md#limit`).
 
 use serde::{Deserialize, Serialize};
 
@@ -295,7 +295,7 @@ mod tests {
         let rough = limit(|h| 2.0 + 0.02 * h);
         assert!(!rough.asymptotic && !rough.needs_more(0.2), "{rough:?}");
         assert!(limit(|h| 2.0 + 0.5 * h).needs_more(0.2));
-        // Member 10 of docs/method.md#limit: times that agree by chance are not enough.
+        // Member 10 of docs/internals/method.md#limit: times that agree by chance are not enough.
         let (own, levels) = (31.82330, vec![31.81772, 31.82203, 31.82330]);
         let (points, tolerance, excess, is_adaptive) = (vec![53, 75, 106], 1e-4, 0.012, true);
         let times = Times { own, levels, points, own_level: 2, tolerance, is_adaptive, turn: 1.36, excess };

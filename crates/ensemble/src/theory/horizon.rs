@@ -14,7 +14,7 @@
 //! circle of the same area. Surface diffusion, b = 0, brings a thin curve down to the circle of its area; R is there the
 //! geometric mean of the two. The time of theory is 0.4 to 8 times the real one, for ellipses from 1.1:1 to 20:1,
 //! flowers, the nonconvex curve, the astroid and islands under many flows, to shares of the excess from 0.5 to 10⁻⁶
-//! (table in docs/method.md).
+//! (table in docs/internals/method.md).
 //!
 //! The excess of a crystal over its Wulff shape has its own size, by the surface energy of the curve, and falls at its
 //! slowest rate.

@@ -33,7 +33,7 @@ pub fn own_tau(rate: f64) -> f64 {
 /// The largest κ allowed for n nodes at a relaxation rate: n²/100 times it.
 ///
 /// A pull that is strong compared with the relaxation undoes the redistribution, and the mesh falls apart. For the
-/// nonconvex curve this happens at 20, 60 and 200 times the rate for n = 32, 64 and 100 (docs/method.md).
+/// nonconvex curve this happens at 20, 60 and 200 times the rate for n = 32, 64 and 100 (docs/internals/method.md).
 pub fn strongest_pull(rate: f64, n: usize) -> f64 {
     (n as f64 / 10.0).powi(2) * rate
 }

@@ -29,7 +29,8 @@ const NO_THRESHOLD: f64 = -1.0;
 const FITTED: [f64; 2] = [1e-3, 1e-1];
 /// A curve that has shrunk to this fraction of its length has vanished.
 const SHRUNK: f64 = 1e-3;
-/// Largest error of an adaptive step in units of the tolerance: t_relax is then off by a tenth of it (docs/method.md).
+/// Largest error of an adaptive step in units of the tolerance: t_relax is then off by a tenth of it
+/// (docs/internals/method.md).
 const ERROR_PER_TOLERANCE: f64 = 1.0 / 12.0;
 /// Minimum number of clock ticks in the first adaptive step.
 const FIRST_TICKS: f64 = 16.0;

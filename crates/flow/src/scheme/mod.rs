@@ -8,7 +8,7 @@
 //! 3. [`position`]: one matrix, two right-hand sides, for the increments of x and y;
 //! 4. [`observe`]: sums and maxima of the new state, which determine status and relaxation events.
 //!
-//! The paper's `𝓑_i` averages φ over segments i and i-1; this is a misprint (`docs/method.md`), and the average
+//! The paper's `𝓑_i` averages φ over segments i and i-1; this is a misprint (`docs/internals/method.md`), and the average
 //! here is over i and i+1. Both systems are written for the increment δ over the step: the right-hand side is
 //! the residual of the old state in node differences, so no digits are lost to the size of x.
 //!

@@ -2,7 +2,7 @@
 //!
 //! The paper's coefficients 𝓐…𝓔 of eq. (4), new r, q, k, old α. Node i lies between segments i and i+1, so the
 //! term with φ uses `(φ(k_i) + φ(k_{i+1}))/2` in both 𝓑 and 𝓓; the paper prints `φ(k_{i-1})` in 𝓑, which gives
-//! decay rates that do not converge (`docs/method.md`). `𝓒 = q_i/τ - (𝓐+𝓑+𝓓+𝓔)`, so the residual of the old
+//! decay rates that do not converge (`docs/internals/method.md`). `𝓒 = q_i/τ - (𝓐+𝓑+𝓓+𝓔)`, so the residual of the old
 //! state is `-Σ_j off_ij (x_j - x_i)`.
 //!
 //! A crystal has g at the nodes and M on the segments in them, and is moved by the force of the polygon only.

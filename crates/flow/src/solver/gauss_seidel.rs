@@ -54,7 +54,7 @@ pub fn solve<N: Number, const F: usize>(
 }
 
 /// The over-relaxation that needs about the fewest sweeps for a system of this size: 2g/(1 + g) with g = (⅝·size)^¼,
-/// about (10 τ/h⁴)^¼, measured (`docs/method.md`).
+/// about (10 τ/h⁴)^¼, measured (`docs/internals/method.md`).
 #[inline(always)]
 fn over_relaxation<N: Number>(size: N) -> N {
     let g = (N::of(AUTO_SCALE) * size).sqrt().sqrt();
