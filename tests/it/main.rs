@@ -25,6 +25,7 @@ mod interrupted;
 mod invariants;
 mod modules_depend_downward;
 mod outlines;
+mod papers;
 mod plot;
 mod polygons;
 mod rates;

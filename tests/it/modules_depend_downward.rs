@@ -14,7 +14,7 @@ use syn::{
 };
 
 /// Crates and modules; each may use only those above it. A name stands for what has no longer one; `program` for `src`.
-const LAYERS: [&str; 44] = [
+const LAYERS: [&str; 45] = [
     "shaders",
     "base/error",
     "base/guard",
@@ -53,6 +53,7 @@ const LAYERS: [&str; 44] = [
     "study",
     "files",
     "draw",
+    "paper",
     "run/report",
     "run/session",
     "run/estimate",
