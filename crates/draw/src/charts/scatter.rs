@@ -8,7 +8,7 @@ use super::{PanelGrid, TIME};
 use crate::{
     axis::{Axis, Scale},
     chart::{
-        CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, drawable, nothing,
+        CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, Panel, drawable, nothing,
         triangle_up,
     },
     medium::Medium,

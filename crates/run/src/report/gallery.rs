@@ -332,6 +332,21 @@ mod tests {
     }
 
     #[test]
+    fn on_paper_panels_fill_the_width_in_light_and_without_a_title() {
+        for (width, count, expected) in [(413.0, 12, 2), (826.0, 12, 4), (826.0, 1, 2), (1458.0, 12, 4), (388.0, 3, 2)] {
+            let (columns, side) = columns(Medium::Paper(width), count);
+            assert_eq!(columns, expected, "{width} {count}");
+            assert!((2.0 * MARGIN + columns as f64 * (side + GAP) - GAP - width).abs() < 1e-9);
+            let text = draw(Medium::Paper(width), &films(count as u64, 60), &Wording::default());
+            assert_eq!(text.matches("class=\"frame\"").count(), count);
+            assert!(text.contains(&format!("width=\"{width}\"")) && text.contains("grey: start"), "{text}");
+            assert!(!text.contains("@media") && !text.contains("class=\"head\""), "{text}");
+        }
+        let screen = draw(Medium::Screen, &films(1, 60), &Wording::default());
+        assert!(screen.contains("@media") && screen.contains("class=\"head\""), "the control");
+    }
+
+    #[test]
     fn states_on_the_way_differ_from_both_ends() {
         let circle = |r: f64| (0..9).map(|i| r * DVec2::from_angle(0.7 * f64::from(i))).collect::<Vec<_>>();
         let of = |sizes: &[f64]| shown(&sizes.iter().map(|r| circle(*r)).collect::<Vec<_>>());
