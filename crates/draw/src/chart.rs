@@ -14,8 +14,6 @@ use super::{
 };
 use curvelax_base::{interval::Interval, text::significant};
 
-/// Width of every chart on a screen, in pixels: the narrower, the larger its text where a phone shrinks it.
-pub const WIDTH: f64 = 560.0;
 /// Margin at the left and right of a chart.
 pub const MARGIN: f64 = 20.0;
 /// Space below a panel for tick labels and the name of the axis.

@@ -1,7 +1,7 @@
 //! Where a picture is seen: on a screen, or on paper at the width of a journal's column.
 
-use super::chart::WIDTH;
-
+/// Width of every chart on a screen, in pixels: the narrower, the larger its text where a phone shrinks it.
+const WIDTH: f64 = 560.0;
 /// Pictures narrower than this have their panels one below the other, in pixels.
 const NARROW: f64 = 500.0;
 

@@ -77,7 +77,8 @@ impl Printer {
     /// # Errors
     /// [`Error::Failed`] for text that is not SVG.
     pub fn read(&self, title: &str, svg: &str, width: PaperWidth) -> Result<Print> {
-        let tree = Tree::from_str(svg, &self.0).map_err(|e| Error::Failed(format!("{title}: not an SVG file ({e})")))?;
+        let tree =
+            Tree::from_str(svg, &self.0).map_err(|e| Error::Failed(format!("{title}: not an SVG file ({e})")))?;
         Ok(Print { title: title.into(), tree, width })
     }
 }

@@ -21,8 +21,8 @@ fn number(bytes: &[u8], at: usize) -> u32 {
 
 /// The rows of a PNG file, of 3 bytes for each pixel.
 fn pixels(png: &[u8]) -> Vec<u8> {
-    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
-    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let mut reader = png::Decoder::new(png).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size()];
     reader.next_frame(&mut pixels).unwrap();
     pixels
 }
@@ -47,7 +47,8 @@ fn letters_are_drawn_and_those_that_the_font_lacks_are_told() {
     };
     assert_eq!(dark(" "), (0, None), "the control");
     // What labels of this program have, and names of places.
-    for text in ["τ_relax", "µm⁴", "10⁻⁶ length⁻⁴", "t ∝ aᵖ", "χ²", "αβγδθκλωΣΔ", "ßéčşŁ", "Жук", "− ± × · … ≤ ≥ √ ∞ ∂"] {
+    for text in ["τ_relax", "µm⁴", "10⁻⁶ length⁻⁴", "t ∝ aᵖ", "χ²", "αβγδθκλωΣΔ", "ßéčşŁ", "Жук", "− ± × · … ≤ ≥ √ ∞ ∂"]
+    {
         let (count, missing) = dark(text);
         assert!(count > 100, "{text}: {count}");
         assert_eq!(missing, None, "{text}");

@@ -72,11 +72,16 @@ mod tests {
 
     #[test]
     fn widths_have_names_or_numbers_in_mm() {
-        for (text, mm) in [("column", 85.0), ("page", 170.0), ("90", 90.0), ("127.5", 127.5), ("90mm", 90.0), ("90 mm", 90.0)] {
+        for (text, mm) in
+            [("column", 85.0), ("page", 170.0), ("90", 90.0), ("127.5", 127.5), ("90mm", 90.0), ("90 mm", 90.0)]
+        {
             assert_eq!(text.parse::<PaperWidth>().unwrap().mm(), mm, "{text}");
         }
         for (text, said) in [
-            ("colunm", "--width colunm: not a width (did you mean `column`?); use column (85 mm), page (170 mm) or 80 to"),
+            (
+                "colunm",
+                "--width colunm: not a width (did you mean `column`?); use column (85 mm), page (170 mm) or 80 to",
+            ),
             ("8.5cm", "not a width"),
             ("79", "--width 79: out of range; use column (85 mm), page (170 mm) or 80 to 300 mm"),
             ("301", "out of range"),

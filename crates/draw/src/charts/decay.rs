@@ -135,7 +135,9 @@ impl Decay<'_> {
         match curves.iter().map(drawn).max() {
             None | Some(0) => return nothing(medium, title, sentences, "There is no positive mean excess to draw."),
             Some(1) => {
-                return nothing(medium, title,
+                return nothing(
+                    medium,
+                    title,
                     sentences,
                     "The mean excess is known at one time only: there is no line to draw.",
                 );

@@ -6,8 +6,8 @@ use super::TIME;
 use crate::{
     axis::{Axis, Scale, range},
     chart::{
-        CellKey, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, draw_marker,
-        drawable, nothing, triangle_right, triangle_up,
+        CellKey, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, draw_marker, drawable,
+        nothing, triangle_right, triangle_up,
     },
     medium::Medium,
     svg::{Svg, coordinate},
@@ -291,9 +291,8 @@ impl Dependence<'_> {
 
         let (time, most) = (self.time_axis(), medium.name(MAX_NAME));
         let shown: Vec<String> = names.iter().map(|name| shortened(name, SIZE, most)).collect();
-        let left = MARGIN
-            + 8.0
-            + shown.iter().map(|name| width(name, SIZE)).fold(width(self.key, SIZE), f64::max).min(most);
+        let left =
+            MARGIN + 8.0 + shown.iter().map(|name| width(name, SIZE)).fold(width(self.key, SIZE), f64::max).min(most);
         let rows = Axis::new("", "", Scale::Linear, (0.0, names.len() as f64));
         let size = DVec2::new(svg.width() - left - MARGIN - colours.room(height), height);
         let corner = DVec2::new(left, top + 28.0);

@@ -140,7 +140,7 @@ impl TimeDistribution<'_> {
             let below = corner.y + boxes + FOOT;
             for (i, (name, cells)) in groups.iter().enumerate() {
                 let corners = [2 * i, 2 * i + 1].map(|i| DVec2::new(0.0, below) + places.corner(i));
-                self.draw_laws(&mut svg, (corners, places.width), name, cells, &all);
+                self.draw_laws(medium, &mut svg, (corners, places.width), name, cells, &all);
             }
         }
         svg.finish()
@@ -160,6 +160,7 @@ impl TimeDistribution<'_> {
     /// Quantiles of some cells against those of the two laws, in panels `side` wide with their labels.
     fn draw_laws(
         &self,
+        medium: Medium,
         svg: &mut Svg,
         (corners, side): ([DVec2; 2], f64),
         name: &str,
@@ -180,7 +181,13 @@ impl TimeDistribution<'_> {
             let corner = corner + DVec2::new(left, HEADING);
             let size = DVec2::new(side - left, HEIGHT);
             let law = format!("against a {law} law");
-            let heading = shortened(if name.is_empty() { &law } else { name }, SIZE, size.x);
+            let heading = match medium {
+                _ if name.is_empty() => law,
+                // The caption of the page says which side is which.
+                Medium::Screen => name.into(),
+                Medium::Paper(_) => format!("{name}, {law}"),
+            };
+            let heading = shortened(&heading, SIZE, size.x);
             let panel = Panel { heading: &heading, corner, size, x: &normal, y: own_axis, labels_x: true };
             if own(all).is_empty() {
                 panel.say(svg, "The quartiles are not known, or equal.");

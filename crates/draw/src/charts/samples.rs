@@ -144,8 +144,8 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
         .draw(medium);
         add(&format!("relaxation-cells-{count}"), svg);
         let (title, unit) = ("Rates of decay", "length⁻⁴");
-        let svg =
-            FittedRates { title, note, key: key(), cells, relative: true, unit, without: 7 * count as u64 }.draw(medium);
+        let svg = FittedRates { title, note, key: key(), cells, relative: true, unit, without: 7 * count as u64 }
+            .draw(medium);
         add(&format!("rates-cells-{count}"), svg);
     }
 
@@ -366,7 +366,10 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
         dots.key = key();
         add(&format!("scatter-{name}"), dots.draw(medium));
         let (title, note, curves) = ("Share that has not relaxed", NOTE, cells(6, 100));
-        add(&format!("survival-{name}"), Survival { title, note, key: key(), curves, ..Survival::default() }.draw(medium));
+        add(
+            &format!("survival-{name}"),
+            Survival { title, note, key: key(), curves, ..Survival::default() }.draw(medium),
+        );
     }
     let wide = Crossed { colours: (0..12).map(|i| i.to_string()).collect(), ..crossed() };
     let wide = Crossed { places: (0..24).map(|i| (i / 2, i % 2)).collect(), ..wide };
@@ -397,7 +400,8 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
 
     let work = |rows: Vec<WorkPanels>| {
         let title = "What an error of the relaxation time costs";
-        WorkDiagram { title, note: NOTE, costs: [("solves per member", ""), ("time per member", "ms")], rows }.draw(medium)
+        WorkDiagram { title, note: NOTE, costs: [("solves per member", ""), ("time per member", "ms")], rows }
+            .draw(medium)
     };
     let way = |order: i32| {
         let point = |i: i32| (10_f64.powi(-i * order), [10.0 * 4_f64.powi(i), 0.1 * 4_f64.powi(i)]);

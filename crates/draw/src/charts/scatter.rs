@@ -7,10 +7,7 @@ use glam::DVec2;
 use super::{PanelGrid, TIME};
 use crate::{
     axis::{Axis, Scale},
-    chart::{
-        CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, Panel, drawable, nothing,
-        triangle_up,
-    },
+    chart::{CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, Panel, drawable, nothing, triangle_up},
     medium::Medium,
     svg::{Svg, dots},
     width::{SIZE, shortened},

@@ -149,7 +149,8 @@ pub fn draw(medium: Medium, films: &[Film], wording: &Wording) -> String {
         let corner = DVec2::new(MARGIN, HEAD) + place * pitch;
         let end = wording.ends.get(i).map_or(panel.film.status.name(), String::as_str);
         let cell = wording.cells.get(i).map_or("", String::as_str);
-        let fitted = |text: &str| if medium.is_screen() { text.into() } else { shortened(text, SIZE, side + 0.5 * GAP) };
+        let fitted =
+            |text: &str| if medium.is_screen() { text.into() } else { shortened(text, SIZE, side + 0.5 * GAP) };
         draw_panel(&mut svg, panel, corner, &layout, [&wording.unit, &fitted(cell), &fitted(end)]);
     }
     let foot = DVec2::new(MARGIN, height - 20.0);
@@ -333,7 +334,8 @@ mod tests {
 
     #[test]
     fn on_paper_panels_fill_the_width_in_light_and_without_a_title() {
-        for (width, count, expected) in [(413.0, 12, 2), (826.0, 12, 4), (826.0, 1, 2), (1458.0, 12, 4), (388.0, 3, 2)] {
+        for (width, count, expected) in [(413.0, 12, 2), (826.0, 12, 4), (826.0, 1, 2), (1458.0, 12, 4), (388.0, 3, 2)]
+        {
             let (columns, side) = columns(Medium::Paper(width), count);
             assert_eq!(columns, expected, "{width} {count}");
             assert!((2.0 * MARGIN + columns as f64 * (side + GAP) - GAP - width).abs() < 1e-9);
