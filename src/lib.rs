@@ -40,6 +40,7 @@
 //! | `curvelax-ensemble` | [`ensemble`], [`simulate`] | the spec, its members, their trajectories and results |
 //! | `curvelax-study` | [`placement`], [`relax`](fn@relax), [`conformance`], [`truth`], [`results`] | from a spec to results, on the device that suits it; exact solutions; what results say |
 //! | `curvelax-draw` | | SVG, axes and charts from plain numbers |
+//! | `curvelax-paper` | | the same as PNG and PDF, with a font of its own |
 //! | `curvelax-files` | | the folder of a run: tables, stores, checkpoints, shards, and their readers |
 //! | `curvelax-run` | | from a spec to a finished folder: sessions, reports, merges, estimates |
 //!
@@ -91,6 +92,8 @@ pub use curvelax_draw as draw;
 pub use curvelax_ensemble::{schedule, trajectory};
 #[doc(hidden)]
 pub use curvelax_files as files;
+#[doc(hidden)]
+pub use curvelax_paper as paper;
 #[doc(hidden)]
 pub use curvelax_run::{estimate, figures, report, session};
 

@@ -62,5 +62,8 @@ class FinishedRun:
     def attributes(self) -> list[tuple[str, str]]:
         """Attributes of the arrays of snapshots, as JSON."""
 
+    def on_paper(self, name: str, extension: str, width: str, dpi: int | None) -> tuple[bytes, str | None]:
+        """A picture as the file for a paper, .png or .pdf, and what is said of letters that it lacks."""
+
     def head(self) -> tuple[str, str, list[tuple[str, int]], list[tuple[str, str, str]]]:
         """Title, what was run, members by status, headline numbers."""

@@ -8,6 +8,7 @@ import importlib.util
 import json
 import os
 import shutil
+import warnings
 import weakref
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -42,11 +43,33 @@ def remove(home: Path, owner: int) -> None:
 
 
 class Picture:
-    """A picture of a run, shown by notebooks; ``svg`` is its text."""
+    """A picture of a run, shown by notebooks; ``svg`` is its text, :meth:`savefig` writes it for a paper."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, study: Study) -> None:
         self.path = path
         self.svg = path.read_text(encoding="utf-8")
+        self._study = study
+
+    def savefig(
+        self, out: str | os.PathLike[str], *, width: Literal["column", "page"] | float = "column", dpi: int | None = None
+    ) -> Path:
+        """Writes the picture for a paper as ``out``, whose name ends in .png or .pdf; returns its path.
+
+        It is white, with text of 7 points, and without title and sentences, which belong into the caption. ``width`` is
+        ``"column"`` (85 mm), ``"page"`` (170 mm) or 80 to 300 mm. ``dpi``, 72 to 1200, is for .png; its default is 600. An
+        existing file is replaced.
+
+        Raises
+        ------
+        RequestError
+            For another name or width.
+        """
+        path = Path(out)
+        content, note = self._study._run.on_paper(self.path.stem, path.suffix, str(width), dpi)
+        path.write_bytes(content)
+        if note is not None:
+            warnings.warn(note, stacklevel=2)
+        return path
 
     def _repr_svg_(self) -> str:
         return self.svg
@@ -329,7 +352,7 @@ class Study:
     @property
     def pictures(self) -> dict[str, Picture]:
         """The pictures of the run by name, such as ``"curves"``, ``"survival"`` or ``"features"``."""
-        return {path.stem: Picture(path) for path in sorted((self.folder / "plots").glob("*.svg"))}
+        return {path.stem: Picture(path, self) for path in sorted((self.folder / "plots").glob("*.svg"))}
 
     @property
     def report(self) -> Path:

@@ -3,13 +3,18 @@
 use std::path::PathBuf;
 
 use curvelax::{
+    Error, Result,
     files::{columns::columns, names, reader::Finished, zarr},
+    paper::{PaperFormat, PaperWidth, Printer, USUAL_DPI, told},
     report::pictures,
     results::EnsembleStatistics,
     statistics::{KaplanMeier, Observation, Sample, Step},
 };
 use numpy::PyArray1;
-use pyo3::{prelude::*, types::PyDict};
+use pyo3::{
+    prelude::*,
+    types::{PyBytes, PyDict},
+};
 
 use crate::{raise, unforked};
 
@@ -38,6 +43,33 @@ fn curve<'py>(py: Python<'py>, sample: &Sample) -> Curve<'py> {
 pub struct FinishedRun {
     run: Finished,
     statistics: EnsembleStatistics,
+}
+
+impl FinishedRun {
+    fn pictures(&self) -> pictures::FinishedRun<'_> {
+        let Finished { provenance, tally, excess, explained, films } = &self.run;
+        pictures::FinishedRun { provenance, tally, statistics: &self.statistics, excess, explained, films }
+    }
+
+    fn print(&self, name: &str, extension: &str, width: &str, dpi: Option<i64>) -> Result<(Vec<u8>, Option<String>)> {
+        let format = match (extension.to_lowercase().as_str(), dpi) {
+            (".png", dpi) => PaperFormat::png(dpi.unwrap_or(USUAL_DPI))?,
+            (".pdf", None) => PaperFormat::Pdf,
+            (".pdf", Some(dpi)) => return Err(Error::value("dpi", dpi, "a .pdf has no dots", "leave it out")),
+            (other, _) => {
+                let problem = format!("{other:?} is no extension of a picture for papers; use .png or .pdf");
+                return Err(Error::Request(problem));
+            }
+        };
+        let width: PaperWidth = width.parse()?;
+        let place = format!("{}/{name}.svg", names::PLOTS);
+        let all = self.pictures().on_paper(width.pixels())?;
+        let Some(picture) = all.into_iter().find(|picture| picture.name == place) else {
+            return Err(Error::Request(format!("{place}: the run has no picture of this name, or its files are gone")));
+        };
+        let print = Printer::default().read(&picture.figure.title, &picture.figure.svg, width)?;
+        Ok((print.file(format)?, told(&print.missing())))
+    }
 }
 
 #[pymethods]
@@ -126,12 +158,27 @@ impl FinishedRun {
         Ok(all.into_iter().map(|(name, json)| (name, json.to_string())).collect())
     }
 
+    /// The picture `name` as the file for a paper, with the extension `.png` or `.pdf`, and what is said of letters that
+    /// it lacks.
+    ///
+    /// # Errors
+    /// `RequestError` for another extension, width or density, and for a picture that the run has not.
+    fn on_paper<'py>(
+        &self,
+        py: Python<'py>,
+        name: &str,
+        extension: &str,
+        width: &str,
+        dpi: Option<i64>,
+    ) -> PyResult<(Bound<'py, PyBytes>, Option<String>)> {
+        let (bytes, note) = py.detach(|| self.print(name, extension, width, dpi)).map_err(|e| raise(py, e, None))?;
+        Ok((PyBytes::new(py, &bytes), note))
+    }
+
     /// What the report says first: its title, what was run, members by status, and headline numbers.
     #[expect(clippy::type_complexity, reason = "a tuple in Python")]
     fn head(&self) -> (String, String, Vec<(&'static str, u64)>, Vec<(String, String, String)>) {
-        let Finished { provenance, tally, excess, explained, films } = &self.run;
-        let head =
-            pictures::FinishedRun { provenance, tally, statistics: &self.statistics, excess, explained, films }.head();
+        let head = self.pictures().head();
         let headline = head.headline.into_iter().map(|own| (own.label, own.value, own.note)).collect();
         (head.title, head.what, head.statuses, headline)
     }

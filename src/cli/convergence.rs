@@ -7,7 +7,10 @@ use super::{
     referee::{RefereeFlags, referee},
 };
 use crate::{
-    draw::charts::{WorkCurve, WorkDiagram, WorkPanels},
+    draw::{
+        charts::{WorkCurve, WorkDiagram, WorkPanels},
+        medium::Medium,
+    },
     ensemble::{
         Spec, Study,
         request::spec::{BackendChoice, Precision, Solver, SolverChoice},
@@ -219,7 +222,7 @@ fn work_diagram(measured: &WorkPrecision, solvers: &[Solver], rows: &[Vec<WorkRo
         costs: [("solves per member", ""), ("time per member", "ms")],
         rows: solvers.iter().map(panels).collect(),
     }
-    .draw()
+    .draw(Medium::Screen)
 }
 
 /// An aligned table, grouped by problem; a run that ended early has its status instead of its error.

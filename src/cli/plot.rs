@@ -1,14 +1,21 @@
 //! `curvelax plot`: the pictures of a finished run, drawn again from its files.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
+
+use clap::ValueEnum;
 
 use super::{note, print};
 use crate::{
-    error::Result,
+    error::{Error, Result},
     files::{
         OutputFolder, Owner, names,
+        part_file::PartFile,
         reader::{self, Finished},
     },
+    paper::{PaperFormat, PaperWidth, Printer, USUAL_DPI, told},
     report::pictures::FinishedRun,
     results::EnsembleStatistics,
 };
@@ -17,9 +24,15 @@ const EXAMPLES: &str = "\
 Examples:
   curvelax plot ellipses
   curvelax plot ellipses --out pictures
+  curvelax plot ellipses --format pdf --out figures
+  curvelax plot ellipses --format png,pdf --width page --dpi 300
 
 Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, members.csv, levels.csv, mean_excess.csv and
-plots/portraits.json in DIR. The same version of the program writes the same bytes as the run.";
+plots/portraits.json in DIR. The same version of the program writes the same bytes as the run.
+
+Pictures as png and pdf are for papers: white, as wide as a column, with text of 7 points and without title and
+sentences, which belong into the caption. The text of a pdf can be selected. Journals ask for columns of 84 to 90 mm and
+for pages of 170 to 190 mm.";
 
 /// Redraw the plots and the report of a finished run.
 #[derive(clap::Args)]
@@ -28,6 +41,15 @@ pub struct PlotArgs {
     /// Folder of the run
     #[arg(value_name = "DIR")]
     run: PathBuf,
+    /// Formats: plots/*.svg with report.html for screens, plots/*.png and plots/*.pdf for papers
+    #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', value_enum, default_value = "svg")]
+    format: Vec<PictureFormat>,
+    /// Width of png and pdf: column (85 mm), page (170 mm) or 80 to 300 mm [default: column]
+    #[arg(long, value_name = "WIDTH")]
+    width: Option<String>,
+    /// Dots per inch of png, 72 to 1200 [default: 600]
+    #[arg(long, value_name = "DPI", allow_negative_numbers = true)]
+    dpi: Option<i64>,
     /// Folder for the pictures, which must not exist yet [default: that of the run]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -39,8 +61,76 @@ pub struct PlotArgs {
     quiet: bool,
 }
 
+/// The formats of pictures.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum PictureFormat {
+    Svg,
+    Png,
+    Pdf,
+}
+
+/// Pictures for papers, as they were asked for.
+struct Prints {
+    width: PaperWidth,
+    /// Extension and format.
+    formats: Vec<(&'static str, PaperFormat)>,
+}
+
+impl Prints {
+    /// # Errors
+    /// [`Error::Request`] for a wrong width or density, and for one that no format uses.
+    fn new(args: &PlotArgs) -> Result<Prints> {
+        let has = |format: PictureFormat| args.format.contains(&format);
+        let unused = |key: &str, value: &dyn std::fmt::Display, formats: &str| {
+            Err(Error::value(key, value, "no picture uses it", &format!("add --format {formats}, or leave it out")))
+        };
+        let png = PaperFormat::png(args.dpi.unwrap_or(USUAL_DPI))?;
+        let width = args.width.as_ref().map(|width| width.parse()).transpose()?.unwrap_or_default();
+        match (&args.width, args.dpi) {
+            (Some(width), _) if !has(PictureFormat::Png) && !has(PictureFormat::Pdf) => {
+                return unused("width", width, "png, or pdf");
+            }
+            (_, Some(dpi)) if !has(PictureFormat::Png) => return unused("dpi", &dpi, "png"),
+            _ => {}
+        }
+        let formats = [(PictureFormat::Png, ("png", png)), (PictureFormat::Pdf, ("pdf", PaperFormat::Pdf))];
+        let formats = formats.into_iter().filter(|(format, _)| has(*format)).map(|(_, paper)| paper).collect();
+        Ok(Prints { width, formats })
+    }
+
+    /// The files that may be written.
+    fn names(&self) -> impl Iterator<Item = &'static str> {
+        let of = |(extension, _): &(&'static str, _)| {
+            let extension = *extension;
+            names::PICTURES.into_iter().filter_map(move |name| names::on_paper(name, extension))
+        };
+        self.formats.iter().flat_map(of)
+    }
+
+    /// Writes the pictures of a run; returns their files, and letters that could not be drawn.
+    fn write(&self, study: &FinishedRun, folder: &OutputFolder) -> Result<(Vec<PartFile>, BTreeSet<char>)> {
+        let (mut files, mut missing) = (Vec::new(), BTreeSet::new());
+        if self.formats.is_empty() {
+            return Ok((files, missing));
+        }
+        let printer = Printer::default();
+        for picture in study.on_paper(self.width.pixels())? {
+            let print = printer.read(&picture.figure.title, &picture.figure.svg, self.width)?;
+            missing.append(&mut print.missing());
+            for (extension, format) in &self.formats {
+                if let Some(name) = names::on_paper(picture.name, extension) {
+                    files.push(folder.write(name, print.file(*format)?)?);
+                }
+            }
+        }
+        Ok((files, missing))
+    }
+}
+
 /// Runs the command.
 pub fn plot(args: PlotArgs) -> Result<()> {
+    let prints = Prints::new(&args)?;
+    let on_screen = args.format.contains(&PictureFormat::Svg);
     // Before the folder is opened, which would create a missing one.
     reader::provenance(&args.run)?;
     let (out, force, owner) = match &args.out {
@@ -48,7 +138,8 @@ pub fn plot(args: PlotArgs) -> Result<()> {
         Some(out) => (out, args.force, Owner::PicturesOfRun),
         None => (&args.run, true, Owner::PicturesOfRun),
     };
-    let folder = OutputFolder::open_for(out, force, owner, names::PICTURES.map(String::from).into())?;
+    let names = names::PICTURES.into_iter().filter(|_| on_screen).chain(prints.names());
+    let folder = OutputFolder::open_for(out, force, owner, names.map(String::from).collect())?;
     let Finished { provenance, mut tally, excess, explained, films } = Finished::read(&args.run)?;
     if films.is_empty() && !args.quiet {
         note(&format!("note: no {} in {}: without pictures of members", names::PORTRAITS, args.run.display()));
@@ -56,14 +147,18 @@ pub fn plot(args: PlotArgs) -> Result<()> {
     let statistics = &EnsembleStatistics::new(&provenance.spec, &mut tally)?;
     let (provenance, tally) = (&provenance, &tally);
     let study = FinishedRun { provenance, tally, statistics, excess: &excess, explained: &explained, films: &films };
-    let pictures = study.pictures()?;
-    let files = pictures.iter().map(|(name, text)| folder.write(name, text)).collect::<Result<_>>()?;
+    let pictures = if on_screen { study.pictures()? } else { Vec::new() };
+    let mut files: Vec<PartFile> =
+        pictures.iter().map(|(name, text)| folder.write(name, text)).collect::<Result<_>>()?;
+    let (printed, missing) = prints.write(&study, &folder)?;
+    files.extend(printed);
+    let names = files.iter().map(PartFile::name).collect::<Vec<_>>().join(", ");
     folder.publish_all(files)?;
     if args.quiet {
         return Ok(());
     }
-    let names: Vec<&str> = pictures.iter().map(|(name, _)| *name).collect();
-    print(&format!("results    {}: {}\n", out.display(), names.join(", ")))
+    told(&missing).iter().for_each(|told| note(&format!("note: {told}")));
+    print(&format!("results    {}: {names}\n", out.display()))
 }
 
 /// Whether both paths lead to the same folder.

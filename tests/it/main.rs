@@ -29,6 +29,7 @@ mod invariants;
 mod modules_depend_downward;
 mod outlines;
 mod overlong_input;
+mod papers;
 mod plot;
 mod polygons;
 mod rates;

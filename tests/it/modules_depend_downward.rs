@@ -54,6 +54,7 @@ const LAYERS: [&str; 45] = [
     "study",
     "files",
     "draw",
+    "paper",
     "run/report",
     "run/session",
     "run/estimate",

@@ -75,10 +75,10 @@ def page():
         parts.append(f"## `curvelax.{call}`\n\n{text(value.__doc__)}")
         if is_error:
             parts.append("Bases: " + ", ".join(f"`{base.__name__}`" for base in value.__mro__[1:-2]) + ".")
-        if name == "Study":
+        if name in ("Study", "Picture"):
             for own, item in members(value):
                 call = signature(own, item) if inspect.isfunction(vars(value)[own]) else own
-                parts.append(f"### `Study.{call}`\n\n{text(inspect.getdoc(item))}")
+                parts.append(f"### `{name}.{call}`\n\n{text(inspect.getdoc(item))}")
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
 

@@ -1,6 +1,9 @@
 //! The charts: those of the program's report, with a curve for the CPU and one for the GPU.
 
-use curvelax_draw::charts::{Decay, DecayCurve, DecayLaw, Survival, SurvivalCurve, Theory};
+use curvelax_draw::{
+    charts::{Decay, DecayCurve, DecayLaw, Survival, SurvivalCurve, Theory},
+    medium::Medium,
+};
 use curvelax_ensemble::{Spec, outcome::linear_rate};
 use curvelax_statistics::{HALF_INTERVAL, KaplanMeier, Observation, Sample, Step};
 use serde::Deserialize;
@@ -42,7 +45,7 @@ impl Charts {
             curves,
             ..Decay::default()
         };
-        Ok(json!({ "survival": survival.draw(), "decay": decay.draw() }))
+        Ok(json!({ "survival": survival.draw(Medium::Screen), "decay": decay.draw(Medium::Screen) }))
     }
 }
 

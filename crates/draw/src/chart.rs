@@ -7,14 +7,13 @@ use glam::DVec2;
 
 use super::{
     axis::{Axis, Scale, range},
+    medium::Medium,
     style,
     svg::{Svg, coordinate, dots},
     width::{SIZE, TITLE, shortened, width, wrapped},
 };
 use curvelax_base::{interval::Interval, text::significant};
 
-/// Width of every chart, in pixels: the narrower, the larger its text where a phone shrinks it.
-pub const WIDTH: f64 = 560.0;
 /// Margin at the left and right of a chart.
 pub const MARGIN: f64 = 20.0;
 /// Space below a panel for tick labels and the name of the axis.
@@ -79,6 +78,8 @@ pub enum LegendMark {
     Right,
     /// The short stroke of a censored member.
     Stroke,
+    /// Nothing: its label goes on from the line above.
+    More,
 }
 
 /// An entry of a legend.
@@ -103,6 +104,7 @@ impl Entry {
         match self.mark {
             LegendMark::Marker(_) | LegendMark::Points | LegendMark::Up => 10.0,
             LegendMark::HollowUp | LegendMark::Right | LegendMark::Stroke => 10.0,
+            LegendMark::More => 0.0,
             _ => SAMPLE,
         }
     }
@@ -124,6 +126,7 @@ impl Entry {
             LegendMark::HollowUp => svg.path("hollow", &triangle_up(middle)),
             LegendMark::Right => svg.path("solid", &triangle_right(middle)),
             LegendMark::Stroke => svg.path("thin", &stroke(middle)),
+            LegendMark::More => {}
         }
         svg.close();
     }
@@ -177,16 +180,21 @@ pub struct Heading<'a> {
 
 impl Heading<'_> {
     /// Begins a picture with this heading and `body` pixels below it; returns where these begin.
-    pub fn begin(&self, body: f64) -> (Svg, f64) {
-        let room = WIDTH - 2.0 * MARGIN;
-        let titles = wrapped(self.title, TITLE, room);
-        let lines: Vec<String> = self.sentences.iter().flat_map(|text| wrapped(text, SIZE, room)).collect();
-        let rows = self.rows(room);
+    pub fn begin(&self, medium: Medium, body: f64) -> (Svg, f64) {
+        let (full, room) = (medium.width(), medium.width() - 2.0 * MARGIN);
+        let (titles, lines) = match medium {
+            Medium::Screen => {
+                let lines = self.sentences.iter().flat_map(|text| wrapped(text, SIZE, room)).collect();
+                (wrapped(self.title, TITLE, room), lines)
+            }
+            Medium::Paper(_) => (Vec::new(), Vec::new()),
+        };
+        let rows = self.rows(room, medium);
         let above = [(titles.len(), TITLE_LINE), (lines.len(), LINE), (rows.len(), LEGEND_LINE)];
         let top = 22.0 + above.iter().map(|(count, height)| *count as f64 * height).sum::<f64>();
 
-        let mut svg = Svg::new(WIDTH, top + body, &style::chart(), self.title);
-        svg.rectangle("back", DVec2::ZERO, DVec2::new(WIDTH, top + body), 0.0);
+        let mut svg = Svg::new(full, top + body, &style::chart(medium), self.title);
+        svg.rectangle("back", DVec2::ZERO, DVec2::new(full, top + body), 0.0);
         let mut y = 6.0;
         let mut next = |height: f64| {
             y += height;
@@ -205,16 +213,30 @@ impl Heading<'_> {
         (svg, top)
     }
 
-    /// The rows of the legend, each entry with its position.
-    fn rows(&self, room: f64) -> Vec<Vec<(f64, Entry)>> {
+    /// The rows of the legend, each entry with its position. A label that is too long is cut on a screen, where the text
+    /// of the page has the rest, and broken into lines on paper.
+    fn rows(&self, room: f64, medium: Medium) -> Vec<Vec<(f64, Entry)>> {
         let most = room - SAMPLE - 6.0;
-        let fitted = |entry: &Entry| Entry { label: shortened(&entry.label, SIZE, most), ..entry.clone() };
-        let entries: Vec<Entry> = self.legend.iter().filter(|entry| !entry.label.is_empty()).map(fitted).collect();
+        let fitted = |entry: &Entry| -> Vec<Entry> {
+            let lines = match medium {
+                Medium::Screen => vec![shortened(&entry.label, SIZE, most)],
+                Medium::Paper(_) => wrapped(&entry.label, SIZE, most),
+            };
+            let mark = |i: usize| if i == 0 { entry.mark } else { LegendMark::More };
+            lines.iter().enumerate().map(|(i, line)| Entry::new(&entry.class, mark(i), line)).collect()
+        };
+        let entries: Vec<Entry> = self.legend.iter().filter(|entry| !entry.label.is_empty()).flat_map(fitted).collect();
         let extent = |entry: &Entry| entry.sample() + 24.0 + width(&entry.label, SIZE);
         let mut rows: Vec<Vec<(f64, Entry)>> = Vec::new();
-        let mut end = f64::INFINITY;
+        let (mut end, mut indent) = (f64::INFINITY, 0.0);
         for entry in entries {
+            if entry.mark == LegendMark::More {
+                rows.push(vec![(indent, entry)]);
+                end = f64::INFINITY;
+                continue;
+            }
             let extent = extent(&entry);
+            indent = entry.sample();
             if end + extent - 18.0 > room {
                 rows.push(Vec::new());
                 end = 0.0;
@@ -298,7 +320,7 @@ impl Panel<'_> {
             grid += &format!("M{} {top}V{bottom}", coordinate(x));
             marks += &format!("M{} {bottom}v-{TICK}", coordinate(x));
             if self.labels_x {
-                let inside = x.min(WIDTH - 0.5 * width(label, SIZE) - 1.0);
+                let inside = x.min(svg.width() - 0.5 * width(label, SIZE) - 1.0);
                 svg.text("x tick middle", DVec2::new(inside, self.end().y + 16.0), label);
             }
         }
@@ -344,13 +366,13 @@ impl Panel<'_> {
 }
 
 /// A picture that says why there is nothing to draw, recognised by [`reason`].
-pub fn nothing(title: &str, sentences: Vec<String>, reason: &str) -> String {
-    let (mut svg, top) = Heading { title, sentences, legend: Vec::new() }.begin(180.0);
+pub fn nothing(medium: Medium, title: &str, sentences: Vec<String>, reason: &str) -> String {
+    let (mut svg, top) = Heading { title, sentences, legend: Vec::new() }.begin(medium, 180.0);
     let axis = Axis::new("", "", Scale::Linear, (0.0, 1.0));
     let panel = Panel {
         heading: "",
         corner: DVec2::new(MARGIN, top),
-        size: DVec2::new(WIDTH - 2.0 * MARGIN, 180.0 - MARGIN),
+        size: DVec2::new(medium.width() - 2.0 * MARGIN, 180.0 - MARGIN),
         x: &axis,
         y: &axis,
         labels_x: false,
@@ -374,7 +396,7 @@ pub fn reason(svg: &str) -> Option<String> {
 /// The sample of an entry of a legend by itself, as the text of an SVG file.
 pub fn sample(entry: &Entry) -> String {
     let (width, height) = (SAMPLE, 12.0);
-    let mut svg = Svg::new(width, height, &style::chart(), "");
+    let mut svg = Svg::new(width, height, &style::chart(Medium::Screen), "");
     entry.draw(&mut svg, DVec2::new(0.0, 0.5 * height));
     svg.finish()
 }

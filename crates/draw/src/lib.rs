@@ -4,6 +4,7 @@ pub mod axis;
 pub mod chart;
 pub mod charts;
 pub mod gif;
+pub mod medium;
 pub mod plot;
 pub mod raster;
 pub mod style;

@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::{
     axis::{multiples, tick_step},
+    medium::Medium,
     style::sheet,
     svg::{Svg, closed_path, coordinate, dots},
 };
@@ -105,7 +106,7 @@ impl Plot {
         let top = HEAD + legend + heading;
         let left = 0.5 * (width - panels_width + LEFT - RIGHT);
 
-        let mut svg = Svg::new(width, top + frame.size.y + FOOT, &sheet(LIGHT, DARK), &self.title);
+        let mut svg = Svg::new(width, top + frame.size.y + FOOT, &sheet(Medium::Screen, LIGHT, DARK), &self.title);
         svg.rectangle("back", DVec2::ZERO, DVec2::new(width, top + frame.size.y + FOOT), 0.0);
         svg.text("head", DVec2::new(RIGHT, 26.0), &self.title);
         svg.text("note", DVec2::new(RIGHT, 46.0), &self.subtitle);

@@ -4,6 +4,8 @@
 //! they stand out from the background. The rules use only features that printers and converters of SVG support:
 //! classes, `currentColor` and one media query.
 
+use super::medium::Medium;
+
 /// Number of colours and dash patterns in [`chart`] that distinguish curves: classes `s0`, `s1`, …; the patterns alone are
 /// `d0`, `d1`, …
 pub const SERIES: usize = 8;
@@ -80,14 +82,17 @@ const CHART_DARK: &str = "\
 .r8 { color: #fdb22f } .r9 { color: #fdc627 } .r10 { color: #f9dd25 } .r11 { color: #f1f525 }
 ";
 
-/// Rules of all pictures, followed by those of one kind: always, and in dark mode.
-pub fn sheet(light: &str, dark: &str) -> String {
-    format!("{LIGHT}{light}@media screen and (prefers-color-scheme: dark) {{\n{DARK}{dark}}}\n")
+/// Rules of all pictures, followed by those of one kind: always, and in dark mode, which paper has not.
+pub fn sheet(medium: Medium, light: &str, dark: &str) -> String {
+    match medium {
+        Medium::Screen => format!("{LIGHT}{light}@media screen and (prefers-color-scheme: dark) {{\n{DARK}{dark}}}\n"),
+        Medium::Paper(_) => format!("{LIGHT}{light}"),
+    }
 }
 
 /// The sheet of all charts.
-pub fn chart() -> String {
-    sheet(CHART_LIGHT, CHART_DARK)
+pub fn chart(medium: Medium) -> String {
+    sheet(medium, CHART_LIGHT, CHART_DARK)
 }
 
 #[cfg(test)]

@@ -7,20 +7,26 @@ use glam::DVec2;
 /// An SVG picture under construction.
 pub struct Svg {
     text: String,
+    width: f64,
 }
 
 impl Svg {
     /// An empty picture of this size in pixels, with this style sheet and this title for screen readers.
     pub fn new(width: f64, height: f64, style: &str, title: &str) -> Svg {
-        let (width, height) = (coordinate(width), coordinate(height));
+        let (shown, height) = (coordinate(width), coordinate(height));
         let title = escape(title);
         let mut text = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {shown} {height}\" width=\"{shown}\" \
              height=\"{height}\" role=\"img\">\n<title>{title}</title>\n<style>\n"
         );
         text.push_str(style.trim());
         text.push_str("\n</style>\n");
-        Svg { text }
+        Svg { text, width }
+    }
+
+    /// Its width in pixels.
+    pub fn width(&self) -> f64 {
+        self.width
     }
 
     /// Adds a rectangle with rounded corners.

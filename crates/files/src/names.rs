@@ -86,7 +86,7 @@ pub const ROWS: &str = "curvelax.rows";
 /// All files that a run may write, or that are made from one without naming a place; the one that vouches for the others
 /// comes first.
 pub fn own() -> impl Iterator<Item = &'static str> {
-    OWN.into_iter().chain(PARQUET)
+    OWN.into_iter().chain(PARQUET).chain(PAPER)
 }
 
 const OWN: [&str; 32] = [
@@ -185,6 +185,40 @@ pub const PICTURES: [&str; 13] = [
     CURVES,
 ];
 
+/// The same pictures for papers.
+const PAPER: [&str; 24] = [
+    "plots/members.png",
+    "plots/members.pdf",
+    "plots/relaxation.png",
+    "plots/relaxation.pdf",
+    "plots/distribution.png",
+    "plots/distribution.pdf",
+    "plots/survival.png",
+    "plots/survival.pdf",
+    "plots/groups.png",
+    "plots/groups.pdf",
+    "plots/events.png",
+    "plots/events.pdf",
+    "plots/excess.png",
+    "plots/excess.pdf",
+    "plots/rate.png",
+    "plots/rate.pdf",
+    "plots/dependence.png",
+    "plots/dependence.pdf",
+    "plots/features.png",
+    "plots/features.pdf",
+    "plots/mesh.png",
+    "plots/mesh.pdf",
+    "plots/curves.png",
+    "plots/curves.pdf",
+];
+
+/// The name of the picture `name` for papers, with the extension `png` or `pdf`; none for the report.
+pub fn on_paper(name: &str, extension: &str) -> Option<&'static str> {
+    let stem = name.strip_suffix("svg")?;
+    PAPER.into_iter().find(|paper| paper.strip_prefix(stem) == Some(extension))
+}
+
 /// The remedy for a file that was changed or truncated.
 pub const REMEDY: &str = "restore the file, or run again";
 
@@ -225,5 +259,15 @@ mod tests {
             assert_eq!(as_parquet(name).map(str::to_owned), Some(name.replace(".csv", ".parquet")));
         }
         assert_eq!([STORE, RUN].map(as_parquet), [None, None]);
+    }
+
+    #[test]
+    fn every_picture_but_the_report_has_names_for_papers() {
+        let pictures = || PICTURES.into_iter().filter(|name| *name != REPORT);
+        for (name, extension) in pictures().flat_map(|name| ["png", "pdf"].map(|extension| (name, extension))) {
+            assert_eq!(on_paper(name, extension).map(str::to_owned), Some(name.replace("svg", extension)));
+        }
+        assert_eq!(PAPER.len(), 2 * pictures().count());
+        assert_eq!([on_paper(REPORT, "png"), on_paper(MESH, "gif")], [None, None]);
     }
 }

@@ -300,6 +300,34 @@ class Package(unittest.TestCase):
         self.assertTrue(self.study.pictures["survival"]._repr_svg_().startswith("<svg"))
         self.assertTrue(self.study.report.exists())
 
+    def test_a_picture_is_saved_for_a_paper(self):
+        import PIL.Image
+
+        picture = self.study.pictures["survival"]
+        with tempfile.TemporaryDirectory() as home:
+            out = pathlib.Path(home)
+            self.assertEqual(picture.savefig(out / "a.pdf"), out / "a.pdf")
+            self.assertTrue((out / "a.pdf").read_bytes().startswith(b"%PDF-1."))
+            for name, options, pixels in [
+                ("a.png", {}, 2008),
+                ("b.PNG", {"width": "page", "dpi": 100}, 669),
+                ("c.png", {"width": 127, "dpi": 100}, 500),
+            ]:
+                with PIL.Image.open(picture.savefig(str(out / name), **options)) as image:
+                    self.assertEqual((image.format, image.width), ("PNG", pixels))
+            for name, options, said in [
+                ("d.jpg", {}, "\".jpg\" is no extension of a picture for papers; use .png or .pdf"),
+                ("d", {}, "use .png or .pdf"),
+                ("d.pdf", {"dpi": 300}, "dpi=300: a .pdf has no dots; leave it out"),
+                ("d.png", {"dpi": 5}, "dpi=5: out of range; use 72 to 1200 dots per inch"),
+                ("d.png", {"width": 20}, "width=20: out of range; use column (85 mm), page (170 mm) or 80 to 300 mm"),
+                ("d.png", {"width": "colunm"}, "(did you mean `column`?)"),
+            ]:
+                with self.assertRaises(curvelax.RequestError) as raised:
+                    picture.savefig(out / name, **options)
+                self.assertIn(said, str(raised.exception))
+                self.assertFalse((out / name).exists())
+
     # Outlines
 
     def test_arrays_are_outlines(self):

@@ -6,6 +6,7 @@ use super::{MAX_BANDS, TIME, only_panel};
 use crate::{
     axis::{Axis, Scale},
     chart::{CellKey, Colours, Entry, FOOT, Heading, LegendMark, Panel, drawable, nothing},
+    medium::Medium,
     trace,
 };
 
@@ -121,7 +122,7 @@ impl DecayCurve {
 
 impl Decay<'_> {
     /// The text of an SVG file.
-    pub fn draw(&self) -> String {
+    pub fn draw(&self, medium: Medium) -> String {
         let Decay { title, note, curves, theory, .. } = self;
         let values: Vec<Option<f64>> = curves.iter().map(|curve| curve.value).collect();
         let colours = Colours::of(&values, &self.key);
@@ -132,9 +133,10 @@ impl Decay<'_> {
             curve.t.iter().zip(&curve.mean).filter(|(t, mean)| drawable((scale, **t), (Scale::Log, **mean))).count()
         };
         match curves.iter().map(drawn).max() {
-            None | Some(0) => return nothing(title, sentences, "There is no positive mean excess to draw."),
+            None | Some(0) => return nothing(medium, title, sentences, "There is no positive mean excess to draw."),
             Some(1) => {
                 return nothing(
+                    medium,
                     title,
                     sentences,
                     "The mean excess is known at one time only: there is no line to draw.",
@@ -144,11 +146,11 @@ impl Decay<'_> {
         }
         let bands = self.has_bands();
         let heading = Heading { title, sentences, legend: self.legend(&colours, bands) };
-        let (mut svg, top) = heading.begin(8.0 + HEIGHT + FOOT);
+        let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
 
         let across = Axis::over("t", TIME, scale, times()).with_zero();
         let upwards = self.excess(bands);
-        let panel = only_panel([&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
+        let panel = only_panel(&svg, [&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);
         let least = trace::tolerance(colours.shown.len() * if bands { 3 } else { 1 }, panel.size.x);
         for (i, class) in &colours.shown {

@@ -6,9 +6,10 @@ use super::TIME;
 use crate::{
     axis::{Axis, Scale, range},
     chart::{
-        CellKey, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, draw_marker,
-        drawable, nothing, triangle_right, triangle_up,
+        CellKey, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, draw_marker, drawable,
+        nothing, triangle_right, triangle_up,
     },
+    medium::Medium,
     svg::{Svg, coordinate},
     trace,
     width::{SIZE, shortened, width},
@@ -181,7 +182,7 @@ impl Series {
 
 impl Dependence<'_> {
     /// The text of an SVG file.
-    pub fn draw(&self) -> String {
+    pub fn draw(&self, medium: Medium) -> String {
         let values: Vec<Option<f64>> = self.series.iter().map(|series| series.value).collect();
         let colours = Colours::of(&values, &self.other_key);
         let mut sentences = vec![self.note.into(), colours.sentence(self.series.len()), self.missing()];
@@ -192,12 +193,12 @@ impl Dependence<'_> {
                 _ => "In no cell did enough members relax for a median.",
             };
             sentences.pop();
-            return nothing(self.title, sentences, reason);
+            return nothing(medium, self.title, sentences, reason);
         }
         if self.named() {
-            return self.draw_named(&colours, sentences);
+            return self.draw_named(medium, &colours, sentences);
         }
-        self.draw_numeric(&colours, sentences)
+        self.draw_numeric(medium, &colours, sentences)
     }
 
     fn levels(&self) -> impl Iterator<Item = &DependencePoint> {
@@ -234,14 +235,14 @@ impl Dependence<'_> {
         }
     }
 
-    fn draw_numeric(&self, colours: &Colours, sentences: Vec<String>) -> String {
+    fn draw_numeric(&self, medium: Medium, colours: &Colours, sentences: Vec<String>) -> String {
         let settings: Vec<f64> = self.levels().filter_map(DependencePoint::number).collect();
         let across = Axis::over(self.key, "", self.scale(self.across, &settings), settings);
         let time = self.time_axis();
         let heading = Heading { title: self.title, sentences, legend: self.legend(colours) };
-        let (mut svg, top) = heading.begin(8.0 + HEIGHT + FOOT);
+        let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
         let left = Panel::left(&time, HEIGHT);
-        let size = DVec2::new(WIDTH - left - MARGIN - colours.room(HEIGHT), HEIGHT);
+        let size = DVec2::new(svg.width() - left - MARGIN - colours.room(HEIGHT), HEIGHT);
         let corner = DVec2::new(left, top + 8.0);
         let panel = Panel { heading: "", corner, size, x: &across, y: &time, labels_x: true };
         panel.draw(&mut svg);
@@ -271,7 +272,7 @@ impl Dependence<'_> {
     }
 
     /// Draws named settings one below the other, with time across, so that names are not rotated.
-    fn draw_named(&self, colours: &Colours, mut sentences: Vec<String>) -> String {
+    fn draw_named(&self, medium: Medium, colours: &Colours, mut sentences: Vec<String>) -> String {
         let mut names: Vec<String> = Vec::new();
         for level in self.levels() {
             let name = level.name();
@@ -286,19 +287,18 @@ impl Dependence<'_> {
         let row = ROW + FURTHER * (colours.shown.len().min(crate::style::SERIES) as f64 - 1.0).max(0.0);
         let height = row * names.len() as f64;
         let heading = Heading { title: self.title, sentences, legend: self.legend(colours) };
-        let (mut svg, top) = heading.begin(28.0 + height + FOOT);
+        let (mut svg, top) = heading.begin(medium, 28.0 + height + FOOT);
 
-        let time = self.time_axis();
-        let shown: Vec<String> = names.iter().map(|name| shortened(name, SIZE, MAX_NAME)).collect();
-        let left = MARGIN
-            + 8.0
-            + shown.iter().map(|name| width(name, SIZE)).fold(width(self.key, SIZE), f64::max).min(MAX_NAME);
+        let (time, most) = (self.time_axis(), medium.name(MAX_NAME));
+        let shown: Vec<String> = names.iter().map(|name| shortened(name, SIZE, most)).collect();
+        let left =
+            MARGIN + 8.0 + shown.iter().map(|name| width(name, SIZE)).fold(width(self.key, SIZE), f64::max).min(most);
         let rows = Axis::new("", "", Scale::Linear, (0.0, names.len() as f64));
-        let size = DVec2::new(WIDTH - left - MARGIN - colours.room(height), height);
+        let size = DVec2::new(svg.width() - left - MARGIN - colours.room(height), height);
         let corner = DVec2::new(left, top + 28.0);
         let panel = Panel { heading: "", corner, size, x: &time, y: &rows, labels_x: true };
         panel.draw_x(&mut svg);
-        let key = shortened(self.key, SIZE, MAX_NAME);
+        let key = shortened(self.key, SIZE, most);
         svg.text("note end", DVec2::new(left - 8.0, panel.corner.y - 9.0), &key);
         let middle = |i: usize| panel.corner.y + (i as f64 + 0.5) * row;
         for (i, name) in shown.iter().enumerate() {

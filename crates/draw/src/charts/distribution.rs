@@ -5,10 +5,11 @@
 
 use glam::DVec2;
 
-use super::TIME;
+use super::{PanelGrid, TIME};
 use crate::{
     axis::{Axis, Scale},
-    chart::{CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH, nothing},
+    chart::{CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, nothing},
+    medium::Medium,
     svg::{Svg, coordinate, dots},
     width::{SIZE, shortened, told_apart, width},
 };
@@ -93,14 +94,14 @@ impl CellQuantiles {
 
 impl TimeDistribution<'_> {
     /// The text of an SVG file.
-    pub fn draw(&self) -> String {
+    pub fn draw(&self, medium: Medium) -> String {
         let TimeDistribution { title, note, quantity, key, keys, cells } = self;
         let values: Vec<Option<f64>> = cells.iter().map(|cell| cell.value).collect();
         let colours = Colours::of(&values, key);
         let sentences = vec![(*note).into(), colours.sentence(cells.len())];
         let times = || cells.iter().flat_map(|cell| cell.places.iter().flatten().copied());
         if times().next().is_none() {
-            return nothing(title, sentences, "Too few members relaxed for a quantile.");
+            return nothing(medium, title, sentences, "Too few members relaxed for a quantile.");
         }
         let rows = colours.shown.len();
         let boxes = ROW * rows as f64 + 8.0;
@@ -110,19 +111,19 @@ impl TimeDistribution<'_> {
         let groups = self.groups(&colours);
         // Where no quartiles are known, there is nothing to compare with a law.
         let compared = all.iter().any(|all| !all.iter().all(Vec::is_empty));
-        let pitch = HEADING + HEIGHT + FOOT;
-        let laws = if compared { groups.len() as f64 * pitch } else { 0.0 };
+        let places = PanelGrid::new(medium, HEADING + HEIGHT + FOOT, GAP, 0.0);
+        let laws = if compared { places.height(2 * groups.len()) } else { 0.0 };
         let above = if rows > 1 { 24.0 } else { 8.0 };
-        let (mut svg, top) = heading.begin(above + boxes + FOOT + laws);
+        let (mut svg, top) = heading.begin(medium, above + boxes + FOOT + laws);
 
         let names: Vec<String> = colours.shown.iter().map(|(i, _)| cells[*i].label.clone()).collect();
-        let names = if rows > 1 { told_apart(&names, SIZE, NAME) } else { vec![String::new(); rows] };
+        let names = if rows > 1 { told_apart(&names, SIZE, medium.name(NAME)) } else { vec![String::new(); rows] };
         let keys = if rows > 1 { *keys } else { "" };
         let left = MARGIN + 8.0 + names.iter().map(|name| width(name, SIZE)).fold(width(keys, SIZE), f64::max);
         let scale = Scale::of(times());
         let across = Axis::over(quantity, TIME, scale, times());
         let nothing = Axis::new("", "", Scale::Linear, (0.0, 1.0));
-        let (corner, size) = (DVec2::new(left, top + above), DVec2::new(WIDTH - left - MARGIN, boxes));
+        let (corner, size) = (DVec2::new(left, top + above), DVec2::new(svg.width() - left - MARGIN, boxes));
         let panel = Panel { heading: "", corner, size, x: &across, y: &nothing, labels_x: true };
         panel.draw_x(&mut svg);
         svg.text_unless_empty("note end", DVec2::new(left - 6.0, corner.y - 8.0), keys);
@@ -138,7 +139,8 @@ impl TimeDistribution<'_> {
         if compared {
             let below = corner.y + boxes + FOOT;
             for (i, (name, cells)) in groups.iter().enumerate() {
-                self.draw_laws(&mut svg, below + i as f64 * pitch + HEADING, name, cells, &all);
+                let corners = [2 * i, 2 * i + 1].map(|i| DVec2::new(0.0, below) + places.corner(i));
+                self.draw_laws(medium, &mut svg, (corners, places.width), name, cells, &all);
             }
         }
         svg.finish()
@@ -155,11 +157,12 @@ impl TimeDistribution<'_> {
         all.filter(|(_, cells)| !cells.is_empty()).collect()
     }
 
-    /// Quantiles of some cells against those of the two laws.
+    /// Quantiles of some cells against those of the two laws, in panels `side` wide with their labels.
     fn draw_laws(
         &self,
+        medium: Medium,
         svg: &mut Svg,
-        top: f64,
+        (corners, side): ([DVec2; 2], f64),
         name: &str,
         cells: &[&(usize, String)],
         all: &[Vec<Vec<(f64, f64)>>; 2],
@@ -174,12 +177,17 @@ impl TimeDistribution<'_> {
         };
         let upwards = [axis(&all[0]), axis(&all[1])];
         let left = upwards.iter().map(|axis| Panel::left(axis, HEIGHT)).fold(0.0, f64::max);
-        let side = 0.5 * (WIDTH - MARGIN - GAP);
-        for (i, ((law, all), own_axis)) in ["normal", "lognormal"].iter().zip(all).zip(&upwards).enumerate() {
-            let corner = DVec2::new(left + i as f64 * (side + GAP), top);
+        for (((law, all), own_axis), corner) in ["normal", "lognormal"].iter().zip(all).zip(&upwards).zip(corners) {
+            let corner = corner + DVec2::new(left, HEADING);
             let size = DVec2::new(side - left, HEIGHT);
             let law = format!("against a {law} law");
-            let heading = shortened(if name.is_empty() { &law } else { name }, SIZE, size.x);
+            let heading = match medium {
+                _ if name.is_empty() => law,
+                // The caption of the page says which side is which.
+                Medium::Screen => name.into(),
+                Medium::Paper(_) => format!("{name}, {law}"),
+            };
+            let heading = shortened(&heading, SIZE, size.x);
             let panel = Panel { heading: &heading, corner, size, x: &normal, y: own_axis, labels_x: true };
             if own(all).is_empty() {
                 panel.say(svg, "The quartiles are not known, or equal.");

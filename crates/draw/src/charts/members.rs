@@ -5,7 +5,8 @@ use glam::DVec2;
 use super::TIME;
 use crate::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, nothing, triangle_right},
+    chart::{Entry, FOOT, Heading, LegendMark, MARGIN, Panel, nothing, triangle_right},
+    medium::Medium,
     svg::{Svg, coordinate, dots},
     trace,
     width::{SIZE, told_apart, width},
@@ -74,19 +75,19 @@ impl MemberDot {
 
 impl MemberTimes<'_> {
     /// The text of an SVG file.
-    pub fn draw(&self) -> String {
+    pub fn draw(&self, medium: Medium) -> String {
         let MemberTimes { title, note, quantity, names, members } = self;
         let sentences = vec![(*note).into()];
         let reached = || members.iter().filter(|member| member.happened).map(|member| member.t);
         let scale = Scale::of(members.iter().map(|member| member.t));
         if !members.iter().any(|member| member.is_drawable(scale)) {
-            return nothing(title, sentences, "No member has a time.");
+            return nothing(medium, title, sentences, "No member has a time.");
         }
         let height = ROW * members.len() as f64;
         let heading = Heading { title, sentences, legend: self.legend() };
-        let (mut svg, top) = heading.begin(24.0 + height + FOOT);
+        let (mut svg, top) = heading.begin(medium, 24.0 + height + FOOT);
         let all: Vec<String> = members.iter().map(|member| member.name.clone()).collect();
-        let shown = told_apart(&all, SIZE, NAME);
+        let shown = told_apart(&all, SIZE, medium.name(NAME));
         let left = MARGIN + 8.0 + shown.iter().map(|name| width(name, SIZE)).fold(width(names, SIZE), f64::max);
         let times = members.iter().flat_map(MemberDot::ends).chain(members.iter().map(|member| member.t));
         let across = Axis::over(quantity, TIME, scale, times);
@@ -94,7 +95,7 @@ impl MemberTimes<'_> {
         let range = reached().fold((f64::INFINITY, 0.0_f64), |(low, high), t| (low.min(t), high.max(t)));
         let across = if range.0 < 0.7 * range.1 { across.with_zero() } else { across };
         let rows = Axis::new("", "", Scale::Linear, (0.0, members.len() as f64));
-        let (corner, size) = (DVec2::new(left, top + 24.0), DVec2::new(WIDTH - left - MARGIN, height));
+        let (corner, size) = (DVec2::new(left, top + 24.0), DVec2::new(svg.width() - left - MARGIN, height));
         let panel = Panel { heading: "", corner, size, x: &across, y: &rows, labels_x: true };
         panel.draw_x(&mut svg);
         svg.text_unless_empty("note end", DVec2::new(left - 8.0, corner.y - 8.0), names);

@@ -2,10 +2,14 @@
 
 use glam::DVec2;
 
-use super::bins::{Bins, guide};
+use super::{
+    PanelGrid,
+    bins::{Bins, guide},
+};
 use crate::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH},
+    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel},
+    medium::Medium,
     svg::Svg,
     width::{SIZE, shortened},
 };
@@ -109,7 +113,7 @@ fn middle_and_most(sorted: &[f64]) -> String {
 
 impl MeshQuality<'_> {
     /// The text of an SVG file.
-    pub fn draw(&self) -> String {
+    pub fn draw(&self, medium: Medium) -> String {
         let ratio = MeshMeasure::new("mesh_ratio", self.mesh_ratio);
         let drift = MeshMeasure::new("metric_drift", self.metric_drift);
         let distrusted = self.distrusted.filter(|(bound, _)| Scale::Log.holds(*bound));
@@ -123,11 +127,11 @@ impl MeshQuality<'_> {
         let label = |(bound, _)| format!("metric_drift {}, above which results are distrusted", significant(bound, 1));
         let shown = distrusted.filter(|(_, above)| *above > 0).map(label);
         let legend = shown.iter().map(|label| Entry::new("ink", LegendMark::Dashed, label)).collect();
-        let (mut svg, top) = Heading { title: self.title, sentences, legend }.begin(HEADING + HEIGHT + FOOT);
-        let width = 0.5 * (WIDTH - MARGIN - GAP);
-        let corner = DVec2::new(0.0, top + HEADING);
-        ratio.draw(&mut svg, corner, width, None);
-        drift.draw(&mut svg, corner + DVec2::new(width + GAP, 0.0), width, distrusted.map(|(bound, _)| bound));
+        let places = PanelGrid::new(medium, HEADING + HEIGHT + FOOT, GAP, 0.0);
+        let (mut svg, top) = Heading { title: self.title, sentences, legend }.begin(medium, places.height(2));
+        let corner = |i: usize| DVec2::new(0.0, top + HEADING) + places.corner(i);
+        ratio.draw(&mut svg, corner(0), places.width, None);
+        drift.draw(&mut svg, corner(1), places.width, distrusted.map(|(bound, _)| bound));
         svg.finish()
     }
 }

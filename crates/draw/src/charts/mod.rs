@@ -34,7 +34,9 @@ use glam::DVec2;
 
 use super::{
     axis::Axis,
-    chart::{MARGIN, Panel, WIDTH},
+    chart::{MARGIN, Panel},
+    medium::Medium,
+    svg::Svg,
 };
 
 /// The unit of all times.
@@ -43,10 +45,43 @@ const TIME: &str = "length⁴";
 const MAX_BANDS: usize = 4;
 
 /// The panel of a picture that has only one, `height` high below `top`, with `room` for a colour bar at its right.
-fn only_panel<'a>([x, y]: [&'a Axis; 2], top: f64, height: f64, room: f64) -> Panel<'a> {
+fn only_panel<'a>(svg: &Svg, [x, y]: [&'a Axis; 2], top: f64, height: f64, room: f64) -> Panel<'a> {
     let left = Panel::left(y, height);
-    let size = DVec2::new(WIDTH - left - MARGIN - room, height);
+    let size = DVec2::new(svg.width() - left - MARGIN - room, height);
     Panel { heading: "", corner: DVec2::new(left, top + 8.0), size, x, y, labels_x: true }
+}
+
+/// Panels of equal width side by side, in as many rows as they need.
+struct PanelGrid {
+    columns: usize,
+    /// Width of a panel with its labels.
+    width: f64,
+    /// Height of a row.
+    row: f64,
+    gap: f64,
+}
+
+impl PanelGrid {
+    /// Rows `row` high, with `gap` between panels and `room` for a colour bar at the right.
+    fn new(medium: Medium, row: f64, gap: f64, room: f64) -> PanelGrid {
+        let columns = medium.columns();
+        let width = match columns {
+            1 => medium.width() - MARGIN - room,
+            _ => 0.5 * (medium.width() - MARGIN - gap - room),
+        };
+        PanelGrid { columns, width, row, gap }
+    }
+
+    /// Height of all rows of so many panels.
+    fn height(&self, panels: usize) -> f64 {
+        panels.div_ceil(self.columns) as f64 * self.row
+    }
+
+    /// Where the panel `i` begins, from where the first does.
+    fn corner(&self, i: usize) -> DVec2 {
+        let [column, row] = [i % self.columns, i / self.columns].map(|place| place as f64);
+        DVec2::new(column * (self.width + self.gap), row * self.row)
+    }
 }
 
 #[doc(hidden)]

@@ -7,6 +7,7 @@ use super::{
 use crate::{
     axis::{Axis, Scale},
     chart::{CellKey, Colours, Entry, FOOT, Heading, LegendMark, nothing},
+    medium::Medium,
 };
 use curvelax_base::text::{count, significant};
 
@@ -34,7 +35,7 @@ pub struct FittedRates<'a> {
 
 impl FittedRates<'_> {
     /// The text of an SVG file.
-    pub fn draw(self) -> String {
+    pub fn draw(self, medium: Medium) -> String {
         let FittedRates { title, note, key, mut cells, relative, unit, without } = self;
         CellValues::sort(&mut cells);
         let without = match without {
@@ -43,7 +44,7 @@ impl FittedRates<'_> {
         };
         if cells.iter().all(|cell| cell.numbers.is_empty()) {
             let sentences = vec![note.into(), without];
-            return nothing(title, sentences, "No member was followed closely enough for a rate to be fitted.");
+            return nothing(medium, title, sentences, "No member was followed closely enough for a rate to be fitted.");
         }
         let middle = match &cells[..] {
             [CellValues { numbers, .. }] => {
@@ -65,8 +66,8 @@ impl FittedRates<'_> {
         let theory = shown.then(|| Entry::new("ink", LegendMark::Dashed, "as linear theory has it"));
         let legend = named.chain(theory).collect();
         let sentences = vec![note.into(), middle, without, colours.sentence(cells.len())];
-        let (mut svg, top) = Heading { title, sentences, legend }.begin(HEIGHT + FOOT + 8.0);
-        let panel = only_panel([&across, &members], top, HEIGHT, colours.room(HEIGHT));
+        let (mut svg, top) = Heading { title, sentences, legend }.begin(medium, HEIGHT + FOOT + 8.0);
+        let panel = only_panel(&svg, [&across, &members], top, HEIGHT, colours.room(HEIGHT));
         panel.draw_x(&mut svg);
         panel.draw_y(&mut svg);
         Bins::draw_all(&bins, &colours, &mut svg, &panel);

@@ -10,7 +10,8 @@ use super::{
 };
 use crate::{
     axis::{Axis, Scale},
-    chart::{CellKey, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, WIDTH, nothing},
+    chart::{CellKey, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, nothing},
+    medium::Medium,
     trace,
 };
 use curvelax_base::{
@@ -43,7 +44,7 @@ pub struct RelaxationTimes<'a> {
 
 impl RelaxationTimes<'_> {
     /// The text of an SVG file.
-    pub fn draw(self) -> String {
+    pub fn draw(self, medium: Medium) -> String {
         let RelaxationTimes { title, note, quantity, key, mut cells, others, median } = self;
         let members = cells.iter().map(|cell| cell.members).sum();
         CellValues::sort(&mut cells);
@@ -52,13 +53,13 @@ impl RelaxationTimes<'_> {
         let colours = Colours::of(&values, &key);
         let sentences = vec![counts(quantity, relaxed, members, others), note.into(), colours.sentence(cells.len())];
         if relaxed == 0 {
-            return nothing(title, sentences, "No member relaxed, so there are no relaxation times to count.");
+            return nothing(medium, title, sentences, "No member relaxed, so there are no relaxation times to count.");
         }
         let median = median.filter(|median| Scale::Linear.holds(median.value));
         let named = colours.legend(|i| &cells[i].label).filter(|_| cells.len() > 1);
         let middle = median.iter().map(|median| Entry::new("ink", LegendMark::Dashed, &label(median)));
         let heading = Heading { title, sentences, legend: named.chain(middle).collect() };
-        let (mut svg, top) = heading.begin(HISTOGRAM + GAP + SHARE + FOOT + 8.0);
+        let (mut svg, top) = heading.begin(medium, HISTOGRAM + GAP + SHARE + FOOT + 8.0);
 
         let scale = CellValues::scale(&cells);
         let bins = Bins::shared(&cells, scale);
@@ -66,7 +67,7 @@ impl RelaxationTimes<'_> {
         let counted = Axis::counts("members", bins.iter().map(Bins::most).max().unwrap_or(0));
         let share = Axis::new("share relaxed", "", Scale::Linear, (0.0, 1.05));
         let left = Panel::left(&counted, HISTOGRAM).max(Panel::left(&share, SHARE));
-        let width = WIDTH - MARGIN - left - colours.room(HISTOGRAM);
+        let width = svg.width() - MARGIN - left - colours.room(HISTOGRAM);
         let above = Panel {
             heading: "",
             corner: DVec2::new(left, top + 8.0),

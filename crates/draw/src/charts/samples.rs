@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::{axis::Scale, charts::*};
+use crate::{axis::Scale, charts::*, medium::Medium};
 use curvelax_base::interval::Interval;
 
 /// Numbers in (0, 1), equal on every machine: Halton numbers of base 2 or 3.
@@ -77,11 +77,11 @@ const NOTE: &str = "ellipse:2,1, surface-diffusion, n = 100, adaptive 0.0001, t-
 /// Every chart with data of every kind, and its name; drawn once.
 pub fn pictures() -> &'static [(String, String)] {
     static PICTURES: OnceLock<Vec<(String, String)>> = OnceLock::new();
-    PICTURES.get_or_init(draw_all)
+    PICTURES.get_or_init(|| draw_all(Medium::Screen))
 }
 
 /// See [`pictures`].
-pub fn draw_all() -> Vec<(String, String)> {
+pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     let mut pictures = Vec::new();
     let mut add = |name: &str, svg: String| pictures.push((name.to_owned(), svg));
     let unknown = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN_POSITIVE];
@@ -93,7 +93,7 @@ pub fn draw_all() -> Vec<(String, String)> {
         let members = times.len() as u64 + others.iter().map(|(_, count)| count).sum::<u64>();
         let cells = vec![CellValues { numbers: times.to_vec(), members, ..CellValues::default() }];
         let (title, quantity, key) = ("Relaxation times", "t_relax", CellKey::default());
-        RelaxationTimes { title, note: NOTE, quantity, key, cells, others, median }.draw()
+        RelaxationTimes { title, note: NOTE, quantity, key, cells, others, median }.draw(medium)
     };
     add("relaxation", relaxation(&times(412, 0.4, 0.2), &some, Some(0.42)));
     add("relaxation-wide", relaxation(&times(5000, 1e-6, 1.5), &[], Some(1e-6)));
@@ -108,7 +108,7 @@ pub fn draw_all() -> Vec<(String, String)> {
     let rates = |rates: &[f64], relative: bool, without: u64| {
         let cells = vec![CellValues { numbers: rates.to_vec(), members: rates.len() as u64, ..CellValues::default() }];
         let (title, key, unit) = ("Rates of decay", CellKey::default(), "length⁻⁴");
-        FittedRates { title, note: NOTE, key, cells, relative, unit, without }.draw()
+        FittedRates { title, note: NOTE, key, cells, relative, unit, without }.draw(medium)
     };
     add("rates", rates(&times(412, 1.0, 0.01), true, 3));
     add("rates-absolute", rates(&times(412, 24.0, 0.5), false, 0));
@@ -141,11 +141,11 @@ pub fn draw_all() -> Vec<(String, String)> {
             others: &others,
             median: None,
         }
-        .draw();
+        .draw(medium);
         add(&format!("relaxation-cells-{count}"), svg);
         let (title, unit) = ("Rates of decay", "length⁻⁴");
-        let svg =
-            FittedRates { title, note, key: key(), cells, relative: true, unit, without: 7 * count as u64 }.draw();
+        let svg = FittedRates { title, note, key: key(), cells, relative: true, unit, without: 7 * count as u64 }
+            .draw(medium);
         add(&format!("rates-cells-{count}"), svg);
     }
 
@@ -158,7 +158,7 @@ pub fn draw_all() -> Vec<(String, String)> {
             time,
             ..Survival::default()
         }
-        .draw()
+        .draw(medium)
     };
     let amplitude = |i: usize| 0.01 * 1.3_f64.powi(i as i32);
     let cells = |cells: usize, count: usize| -> Vec<SurvivalCurve> {
@@ -199,7 +199,7 @@ pub fn draw_all() -> Vec<(String, String)> {
             theory,
             time,
         }
-        .draw()
+        .draw(medium)
     };
     let falls = |cells: usize, count: usize| -> Vec<DecayCurve> {
         let cell =
@@ -236,7 +236,7 @@ pub fn draw_all() -> Vec<(String, String)> {
             across: None,
             time: None,
         }
-        .draw()
+        .draw(medium)
     };
     add("dependence", depend(vec![amplitudes("all", 0.12, 8)], "amplitude"));
     let mut partial = amplitudes("all", 0.12, 8);
@@ -251,7 +251,7 @@ pub fn draw_all() -> Vec<(String, String)> {
         series: vec![partial],
         ..Dependence::default()
     };
-    add("dependence-partial", linear.draw());
+    add("dependence-partial", linear.draw(medium));
     let series = |count: usize| -> Vec<Series> {
         (0..count).map(|i| amplitudes(&format!("aspect = {}", i + 1), 0.1 * 1.3_f64.powi(i as i32), 6)).collect()
     };
@@ -292,7 +292,7 @@ pub fn draw_all() -> Vec<(String, String)> {
             [mesh_ratio, metric_drift].map(|values| values.iter().map(|v| *v as f32).collect::<Vec<_>>());
         let [mesh_ratio, metric_drift] = [&mesh_ratio[..], &metric_drift[..]];
         let distrusted = Some((0.1, metric_drift.iter().filter(|drift| **drift > 0.1).count() as u64));
-        MeshQuality { title: "Mesh quality at the end", note: NOTE, mesh_ratio, metric_drift, distrusted }.draw()
+        MeshQuality { title: "Mesh quality at the end", note: NOTE, mesh_ratio, metric_drift, distrusted }.draw(medium)
     };
     let ratios = |count: usize| -> Vec<f64> { times(count, 0.05, 0.4).iter().map(|t| 1.0 + t).collect() };
     add("mesh", mesh(&ratios(512), &times(512, 1e-3, 2.2)));
@@ -319,15 +319,15 @@ pub fn draw_all() -> Vec<(String, String)> {
         let (key, panels, reason) = ("amplitude".into(), (0..panels).map(panel).collect(), "Nothing is claimed.");
         Scatter { title, notes, quantity: "t_relax", key, cells, panels, reason }
     };
-    add("scatter", scatter(256, 1, 4).draw());
-    add("scatter-cells-3", scatter(250, 3, 4).draw());
-    add("scatter-cells-12", scatter(250, 12, 3).draw());
-    add("scatter-one", scatter(1, 1, 1).draw());
-    add("scatter-none", scatter(0, 1, 0).draw());
+    add("scatter", scatter(256, 1, 4).draw(medium));
+    add("scatter-cells-3", scatter(250, 3, 4).draw(medium));
+    add("scatter-cells-12", scatter(250, 12, 3).draw(medium));
+    add("scatter-one", scatter(1, 1, 1).draw(medium));
+    add("scatter-none", scatter(0, 1, 0).draw(medium));
     let mut unknown_dots = scatter(30, 1, 2);
     unknown_dots.panels[1].points[4].x = f64::INFINITY;
     unknown_dots.panels[0].points[5].t = f64::NAN;
-    add("scatter-unknown", unknown_dots.draw());
+    add("scatter-unknown", unknown_dots.draw(medium));
 
     let quantiles = |count: usize, known: f64| {
         let cell = |i: usize| {
@@ -343,14 +343,14 @@ pub fn draw_all() -> Vec<(String, String)> {
         let (title, cells) = ("Distribution of the relaxation times", (0..count).map(cell).collect());
         TimeDistribution { title, note: NOTE, quantity: "t_relax", key: "amplitude".into(), keys: "amplitude", cells }
     };
-    add("distribution", quantiles(1, 1.0).draw());
-    add("distribution-cells-5", quantiles(5, 1.0).draw());
-    add("distribution-cells-30", quantiles(30, 1.0).draw());
-    add("distribution-censored", quantiles(2, 0.6).draw());
-    add("distribution-none", quantiles(2, 0.0).draw());
+    add("distribution", quantiles(1, 1.0).draw(medium));
+    add("distribution-cells-5", quantiles(5, 1.0).draw(medium));
+    add("distribution-cells-30", quantiles(30, 1.0).draw(medium));
+    add("distribution-censored", quantiles(2, 0.6).draw(medium));
+    add("distribution-none", quantiles(2, 0.0).draw(medium));
     let mut unknown_place = quantiles(2, 1.0);
     unknown_place.cells[1].places = [Some(f64::INFINITY), Some(-1.0), Some(0.0), Some(f64::NAN), None];
-    add("distribution-unknown", unknown_place.draw());
+    add("distribution-unknown", unknown_place.draw(medium));
 
     let crossed = || {
         let [colours, patterns] = [["0.01", "0.1", "0.2"].as_slice(), ["surface-diffusion", "willmore"].as_slice()]
@@ -361,22 +361,25 @@ pub fn draw_all() -> Vec<(String, String)> {
         let key = || CellKey { name: "amplitude".into(), crossed: Some(crossed()), is_told };
         let mut boxes = quantiles(6, 1.0);
         boxes.key = key();
-        add(&format!("distribution-{name}"), boxes.draw());
+        add(&format!("distribution-{name}"), boxes.draw(medium));
         let mut dots = scatter(250, 6, 2);
         dots.key = key();
-        add(&format!("scatter-{name}"), dots.draw());
+        add(&format!("scatter-{name}"), dots.draw(medium));
         let (title, note, curves) = ("Share that has not relaxed", NOTE, cells(6, 100));
-        add(&format!("survival-{name}"), Survival { title, note, key: key(), curves, ..Survival::default() }.draw());
+        add(
+            &format!("survival-{name}"),
+            Survival { title, note, key: key(), curves, ..Survival::default() }.draw(medium),
+        );
     }
     let wide = Crossed { colours: (0..12).map(|i| i.to_string()).collect(), ..crossed() };
     let wide = Crossed { places: (0..24).map(|i| (i / 2, i % 2)).collect(), ..wide };
     let key = CellKey { name: "amplitude".into(), crossed: Some(wide), is_told: false };
     let (title, note, curves) = ("Share that has not relaxed", NOTE, cells(24, 100));
-    add("survival-crossed-24", Survival { title, note, key, curves, ..Survival::default() }.draw());
+    add("survival-crossed-24", Survival { title, note, key, curves, ..Survival::default() }.draw(medium));
 
     let few = |members: Vec<MemberDot>| {
         let (title, note, quantity, names) = ("Relaxation times", NOTE, "t_limit", "outline");
-        MemberTimes { title, note, quantity, names, members }.draw()
+        MemberTimes { title, note, quantity, names, members }.draw(medium)
     };
     let dot =
         |name: &str, t: f64, error: Option<f64>, happened: bool| MemberDot { name: name.into(), t, error, happened };
@@ -397,7 +400,8 @@ pub fn draw_all() -> Vec<(String, String)> {
 
     let work = |rows: Vec<WorkPanels>| {
         let title = "What an error of the relaxation time costs";
-        WorkDiagram { title, note: NOTE, costs: [("solves per member", ""), ("time per member", "ms")], rows }.draw()
+        WorkDiagram { title, note: NOTE, costs: [("solves per member", ""), ("time per member", "ms")], rows }
+            .draw(medium)
     };
     let way = |order: i32| {
         let point = |i: i32| (10_f64.powi(-i * order), [10.0 * 4_f64.powi(i), 0.1 * 4_f64.powi(i)]);
@@ -424,7 +428,7 @@ pub fn draw_all() -> Vec<(String, String)> {
             curves,
             time: None,
         }
-        .draw(),
+        .draw(medium),
     );
     pictures
 }

@@ -4,13 +4,11 @@
 
 use glam::DVec2;
 
-use super::TIME;
+use super::{PanelGrid, TIME};
 use crate::{
     axis::{Axis, Scale},
-    chart::{
-        CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH, drawable, nothing,
-        triangle_up,
-    },
+    chart::{CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, Panel, drawable, nothing, triangle_up},
+    medium::Medium,
     svg::{Svg, dots},
     width::{SIZE, shortened},
 };
@@ -18,8 +16,6 @@ use curvelax_base::text::{count, significant};
 
 const HEIGHT: f64 = 200.0;
 const GAP: f64 = 14.0;
-/// Panels side by side.
-const COLUMNS: usize = 2;
 
 /// A time against features.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -83,10 +79,10 @@ impl ScatterPoint {
 
 impl Scatter<'_> {
     /// The text of an SVG file.
-    pub fn draw(&self) -> String {
+    pub fn draw(&self, medium: Medium) -> String {
         let mut sentences = self.notes.clone();
         if self.panels.is_empty() {
-            return nothing(self.title, sentences, self.reason);
+            return nothing(medium, self.title, sentences, self.reason);
         }
         let values: Vec<Option<f64>> = self.cells.iter().map(|(_, value)| *value).collect();
         let colours = Colours::of(&values, &self.key);
@@ -95,23 +91,20 @@ impl Scatter<'_> {
         if hidden > 0 {
             sentences.push(format!("{} out of range.", count(hidden as u64, "dot")));
         }
-        let rows = self.panels.len().div_ceil(COLUMNS);
-        let row = HEADING + HEIGHT + FOOT;
+        let places = PanelGrid::new(medium, HEADING + HEIGHT + FOOT, GAP, colours.room(HEIGHT));
         let heading = Heading { title: self.title, sentences, legend: self.legend(&colours) };
-        let (mut svg, top) = heading.begin(rows as f64 * row);
+        let (mut svg, top) = heading.begin(medium, places.height(self.panels.len()));
         let times = self.panels.iter().flat_map(|panel| &panel.points).filter(|point| point.is_drawable());
         let scale = Scale::of(times.clone().map(|point| point.t));
         let time = Axis::over(self.quantity, TIME, scale, times.map(|point| point.t));
         let left = Panel::left(&time, HEIGHT);
-        let across = 0.5 * (WIDTH - MARGIN - GAP - colours.room(HEIGHT));
         for (i, of) in self.panels.iter().enumerate() {
             let known = of.points.iter().filter(|point| point.is_drawable());
             // Where times are over several magnitudes, features may be, too.
             let own = if scale == Scale::Log { Scale::of(known.clone().map(|point| point.x)) } else { Scale::Linear };
             let axis = Axis::over(&of.feature, "", own, known.map(|point| point.x));
-            let corner =
-                DVec2::new(left + (i % COLUMNS) as f64 * (across + GAP), top + HEADING + (i / COLUMNS) as f64 * row);
-            let size = DVec2::new(across - left, HEIGHT);
+            let corner = DVec2::new(left, top + HEADING) + places.corner(i);
+            let size = DVec2::new(places.width - left, HEIGHT);
             let heading = shortened(&of.heading, SIZE, size.x);
             let panel = Panel { heading: &heading, corner, size, x: &axis, y: &time, labels_x: true };
             panel.draw_x(&mut svg);
@@ -130,7 +123,7 @@ impl Scatter<'_> {
                 svg.close();
             }
             panel.draw_frame(&mut svg);
-            if i == COLUMNS - 1 || i + 1 == self.panels.len().min(COLUMNS) {
+            if i + 1 == self.panels.len().min(places.columns) {
                 colours.draw_bar(&mut svg, &panel);
             }
         }

@@ -8,6 +8,7 @@ use super::{MAX_BANDS, TIME, only_panel};
 use crate::{
     axis::{Axis, Scale},
     chart::{CellKey, Colours, Entry, FOOT, Heading, LegendMark, Panel, nothing, stroke},
+    medium::Medium,
     trace,
 };
 
@@ -141,24 +142,24 @@ impl SurvivalCurve {
 
 impl Survival<'_> {
     /// The text of an SVG file.
-    pub fn draw(&self) -> String {
+    pub fn draw(&self, medium: Medium) -> String {
         let Survival { title, note, curves, .. } = self;
         let values: Vec<Option<f64>> = curves.iter().map(|curve| curve.value).collect();
         let colours = Colours::of(&values, &self.key);
         let sentences = vec![(*note).into(), colours.sentence(curves.len())];
         if curves.iter().all(|curve| curve.end(Scale::Linear).is_none()) {
-            return nothing(title, sentences, self.none);
+            return nothing(medium, title, sentences, self.none);
         }
         let (bands, censored) = (self.has_bands(), self.has_strokes());
         let heading = Heading { title, sentences, legend: self.legend(&colours, bands, censored) };
-        let (mut svg, top) = heading.begin(8.0 + HEIGHT + FOOT);
+        let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
 
         let times = || curves.iter().flat_map(SurvivalCurve::times);
         let scale = self.time.unwrap_or_else(|| Scale::of(curves.iter().flat_map(SurvivalCurve::quartiles)));
         let scale = if times().any(|t| scale.holds(t)) { scale } else { Scale::Linear };
         let across = Axis::over(self.quantity, TIME, scale, times()).with_zero();
         let upwards = Axis::new(self.share, "", Scale::Linear, (0.0, 1.02));
-        let panel = only_panel([&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
+        let panel = only_panel(&svg, [&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);
         let lines = colours.shown.len() * if bands { 3 } else { 1 };
         let least = trace::tolerance(lines, HEIGHT);

@@ -4,7 +4,8 @@ use glam::DVec2;
 
 use crate::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, WIDTH, draw_marker, drawable, nothing},
+    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, draw_marker, drawable, nothing},
+    medium::Medium,
     trace,
 };
 
@@ -44,7 +45,7 @@ pub struct WorkCurve {
 
 impl WorkDiagram<'_> {
     /// The text of an SVG file.
-    pub fn draw(&self) -> String {
+    pub fn draw(&self, medium: Medium) -> String {
         let WorkDiagram { title, note, costs, rows } = self;
         let shown = |points: &[(f64, [f64; 2])], column: usize| -> Vec<(f64, f64)> {
             let pairs = points.iter().map(|(error, costs)| (costs[column], *error));
@@ -53,7 +54,7 @@ impl WorkDiagram<'_> {
         let curves = || rows.iter().flat_map(|row| &row.curves);
         let all = |column: usize| curves().flat_map(move |curve| shown(&curve.points, column));
         if all(0).next().is_none() {
-            return nothing(title, vec![(*note).into()], "No run gave an error.");
+            return nothing(medium, title, vec![(*note).into()], "No run gave an error.");
         }
         let entry = |(rank, curve): (usize, &WorkCurve)| {
             Entry::new(&format!("s{rank}"), LegendMark::Marker(rank), &curve.label)
@@ -62,14 +63,14 @@ impl WorkDiagram<'_> {
         let legend = longest.into_iter().flat_map(|row| row.curves.iter().enumerate().map(entry)).collect();
         let row_height = HEADING + HEIGHT + FOOT;
         let heading = Heading { title, sentences: vec![(*note).into()], legend };
-        let (mut svg, top) = heading.begin(rows.len() as f64 * row_height);
+        let (mut svg, top) = heading.begin(medium, rows.len() as f64 * row_height);
         let errors = Axis::over("error of t_relax", "", Scale::Log, all(0).map(|(_, error)| error));
         let across = [0, 1].map(|column| {
             let (name, unit) = costs[column];
             Axis::over(name, unit, Scale::Log, all(column).map(|(cost, _)| cost))
         });
         let left = Panel::left(&errors, HEIGHT);
-        let size = DVec2::new(0.5 * (WIDTH - left - MARGIN - GAP), HEIGHT);
+        let size = DVec2::new(0.5 * (svg.width() - left - MARGIN - GAP), HEIGHT);
         for (i, row) in rows.iter().enumerate() {
             for (column, x) in across.iter().enumerate() {
                 let corner = DVec2::new(left + column as f64 * (size.x + GAP), top + HEADING + i as f64 * row_height);

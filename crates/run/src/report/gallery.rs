@@ -5,6 +5,7 @@ use glam::DVec2;
 
 use curvelax_curve::polygon;
 use curvelax_draw::{
+    medium::Medium,
     svg::{Svg, closed_path, coordinate, dots},
     width::shortened,
 };
@@ -17,11 +18,13 @@ pub const MAX_PANELS: usize = PORTRAITS;
 /// Maximum characters of the name of a member.
 const MAX_NAME: usize = 24;
 const COLUMNS: usize = 4;
-/// Width and maximum height of a panel in pixels, and the free space inside it.
-pub(super) const SIDE: f64 = 200.0;
+/// Width and maximum height of a panel on a screen in pixels, and the least on paper.
+const SIDE: f64 = 200.0;
+const LEAST_SIDE: f64 = 170.0;
 /// Size of text.
 pub(super) const SIZE: f64 = 12.0;
 const MIN_HEIGHT: f64 = 100.0;
+/// Free space inside a panel.
 const PADDING: f64 = 14.0;
 const CAPTION: f64 = 44.0;
 /// Distance of two lines of it.
@@ -42,8 +45,8 @@ const APART: std::ops::RangeInclusive<f64> = 0.12..=0.88;
 /// Nodes closer than this, in pixels, look like a line and are not marked.
 const MIN_SPACING: f64 = 2.5;
 
-/// The style of a gallery and of a movie.
-pub(super) const STYLE: &str = "
+/// The style of a gallery and of a movie, in light.
+const LIGHT: &str = "
 .back { fill: #ffffff }
 .frame { fill: none; stroke: #e3e6ea }
 text { font-family: sans-serif; font-size: 12px; fill: #24292f }
@@ -64,6 +67,10 @@ text { font-family: sans-serif; font-size: 12px; fill: #24292f }
 .panel .before { fill: none; stroke: #8c959f }
 .panel .way { fill: none; stroke-opacity: 0.5 }
 .panel .nodes { fill: none }
+";
+
+/// What is different in dark.
+const DARK: &str = "\
 @media screen and (prefers-color-scheme: dark) {
 .back { fill: #15191e }
 .frame { stroke: #2d343c }
@@ -79,6 +86,24 @@ text { fill: #e6edf3 }
 .panel .nodes { fill: none }
 }
 ";
+
+/// The style of a gallery and of a movie.
+pub(super) fn style(medium: Medium) -> String {
+    if medium.is_screen() { format!("{LIGHT}{DARK}") } else { LIGHT.into() }
+}
+
+/// Panels side by side, of `count` in all, and the width of each.
+pub(super) fn columns(medium: Medium, count: usize) -> (usize, f64) {
+    match medium {
+        Medium::Screen => (count.clamp(MIN_COLUMNS, COLUMNS), SIDE),
+        Medium::Paper(width) => {
+            let room = width - 2.0 * MARGIN + GAP;
+            let most = ((room / (LEAST_SIDE + GAP)) as usize).clamp(MIN_COLUMNS, COLUMNS);
+            let columns = count.clamp(MIN_COLUMNS, most);
+            (columns, room / columns as f64 - GAP)
+        }
+    }
+}
 
 /// What is written below the panels.
 #[derive(Clone, Debug, Default)]
@@ -98,31 +123,39 @@ impl Wording {
 }
 
 /// The gallery of the first [`MAX_PANELS`] of `films`, as the text of an SVG file.
-pub fn draw(films: &[Film], wording: &Wording) -> String {
+pub fn draw(medium: Medium, films: &[Film], wording: &Wording) -> String {
     let panels: Vec<MemberPanel> = films.iter().take(MAX_PANELS).map(MemberPanel::new).collect();
-    let columns = panels.len().clamp(MIN_COLUMNS, COLUMNS);
+    let (columns, side) = columns(medium, panels.len());
     let rows = panels.len().div_ceil(columns).max(1);
-    let layout = PanelLayout::new(&panels);
+    let layout = PanelLayout::new(&panels, side);
     let frame = layout.frame;
     let caption = CAPTION + if wording.has_cells() { LINE } else { 0.0 };
     let pitch = frame + DVec2::new(GAP, caption);
     let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
     let height = HEAD + rows as f64 * pitch.y + FOOT;
 
-    let mut svg = Svg::new(width, height, STYLE, "Members before, during and after relaxation");
+    let mut svg = Svg::new(width, height, &style(medium), "Members before, during and after relaxation");
     svg.rectangle("back", DVec2::ZERO, DVec2::new(width, height), 0.0);
-    svg.text("head", DVec2::new(MARGIN, 30.0), "Before, during and after");
-    svg.text("note end", DVec2::new(width - MARGIN, 30.0), "grey: start, light: on the way, colour: end");
+    let legend = "grey: start, light: on the way, colour: end";
+    match medium {
+        Medium::Screen => {
+            svg.text("head", DVec2::new(MARGIN, 30.0), "Before, during and after");
+            svg.text("note end", DVec2::new(width - MARGIN, 30.0), legend);
+        }
+        Medium::Paper(_) => svg.text("note", DVec2::new(MARGIN, 30.0), legend),
+    }
     for (i, panel) in panels.iter().enumerate() {
         let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
         let corner = DVec2::new(MARGIN, HEAD) + place * pitch;
         let end = wording.ends.get(i).map_or(panel.film.status.name(), String::as_str);
         let cell = wording.cells.get(i).map_or("", String::as_str);
-        draw_panel(&mut svg, panel, corner, &layout, [&wording.unit, cell, end]);
+        let fitted =
+            |text: &str| if medium.is_screen() { text.into() } else { shortened(text, SIZE, side + 0.5 * GAP) };
+        draw_panel(&mut svg, panel, corner, &layout, [&wording.unit, &fitted(cell), &fitted(end)]);
     }
     let foot = DVec2::new(MARGIN, height - 20.0);
     match layout.common {
-        Some(largest) => draw_scale(&mut svg, foot, layout.scale(largest), &wording.unit),
+        Some(largest) => draw_scale(&mut svg, foot, &layout, largest, &wording.unit),
         None => svg.text("note", foot + DVec2::new(0.0, 4.0), OWN_SCALES),
     }
     svg.finish()
@@ -188,7 +221,7 @@ fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelL
         }
     }
     let below = DVec2::new(middle.x, corner.y + frame.y + 16.0);
-    svg.text("middle", below, &shortened(&name, SIZE, SIDE));
+    svg.text("middle", below, &shortened(&name, SIZE, layout.side()));
     svg.text_unless_empty("middle", below + DVec2::new(0.0, LINE), cell);
     let lines = if cell.is_empty() { 1.0 } else { 2.0 };
     svg.text("middle word", below + DVec2::new(0.0, lines * LINE), end);
@@ -196,8 +229,9 @@ fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelL
 }
 
 /// A bar of a round length: 1, 2 or 5 times a power of ten, at most half a panel long.
-fn draw_scale(svg: &mut Svg, left: DVec2, scale: f64, unit: &str) {
-    let most = 0.5 * SIDE / scale;
+fn draw_scale(svg: &mut Svg, left: DVec2, layout: &PanelLayout, largest: f64, unit: &str) {
+    let scale = layout.scale(largest);
+    let most = 0.5 * layout.side() / scale;
     let power = 10_f64.powi(most.log10().floor() as i32);
     let length = [5.0, 2.0, 1.0].map(|digit| digit * power).into_iter().find(|l| *l <= most).unwrap_or(power);
     let [x, y, end] = [left.x, left.y, left.x + length * scale].map(coordinate);
@@ -229,19 +263,24 @@ pub(super) fn common_extent(extents: impl Iterator<Item = f64> + Clone) -> Optio
 
 impl PanelLayout {
     /// Fits `panels` into frames that are no higher than the tallest panel needs.
-    fn new(panels: &[MemberPanel]) -> PanelLayout {
+    fn new(panels: &[MemberPanel], side: f64) -> PanelLayout {
         let extents: Vec<DVec2> = panels.iter().filter_map(MemberPanel::bounds).map(|(low, high)| high - low).collect();
         let common = common_extent(extents.iter().map(|extent| extent.max_element()));
-        let layout = PanelLayout { common, frame: DVec2::new(SIDE, SIDE) };
+        let layout = PanelLayout { common, frame: DVec2::new(side, side) };
         let heights = extents.iter().map(|extent| extent.y * layout.scale(extent.max_element()));
-        let height = (heights.fold(0.0, f64::max) + 2.0 * PADDING).clamp(MIN_HEIGHT, SIDE);
-        PanelLayout { frame: DVec2::new(SIDE, height), ..layout }
+        let height = (heights.fold(0.0, f64::max) + 2.0 * PADDING).clamp(MIN_HEIGHT, side);
+        PanelLayout { frame: DVec2::new(side, height), ..layout }
+    }
+
+    /// Width of a panel.
+    fn side(&self) -> f64 {
+        self.frame.x
     }
 
     /// Pixels per unit of length, for a member of this extent.
     fn scale(&self, own: f64) -> f64 {
         let extent = self.common.unwrap_or(own);
-        if extent > 0.0 && extent.is_finite() { (SIDE - 2.0 * PADDING) / extent } else { 1.0 }
+        if extent > 0.0 && extent.is_finite() { (self.side() - 2.0 * PADDING) / extent } else { 1.0 }
     }
 }
 
@@ -280,17 +319,33 @@ mod tests {
     #[test]
     fn a_gallery_has_a_panel_for_each_of_the_first_twelve() {
         for (count, shown) in [(0, 0), (1, 1), (5, 5), (12, 12), (30, 12)] {
-            let text = draw(&films(count, 60), &Wording::default());
+            let text = draw(Medium::Screen, &films(count, 60), &Wording::default());
             assert_eq!(text.matches("class=\"frame\"").count(), shown);
             assert_eq!(text.matches("class=\"after\"").count(), shown);
             assert_eq!(text.matches("class=\"way\"").count(), 2 * shown);
-            assert_eq!(text, draw(&films(count, 60), &Wording::default()));
+            assert_eq!(text, draw(Medium::Screen, &films(count, 60), &Wording::default()));
             // To look at: CURVELAX_GALLERY=FOLDER cargo test gallery
             if let Some(folder) = std::env::var_os("CURVELAX_GALLERY") {
                 let path = std::path::Path::new(&folder).join(format!("gallery{count}.svg"));
                 std::fs::write(path, &text).unwrap();
             }
         }
+    }
+
+    #[test]
+    fn on_paper_panels_fill_the_width_in_light_and_without_a_title() {
+        for (width, count, expected) in [(413.0, 12, 2), (826.0, 12, 4), (826.0, 1, 2), (1458.0, 12, 4), (388.0, 3, 2)]
+        {
+            let (columns, side) = columns(Medium::Paper(width), count);
+            assert_eq!(columns, expected, "{width} {count}");
+            assert!((2.0 * MARGIN + columns as f64 * (side + GAP) - GAP - width).abs() < 1e-9);
+            let text = draw(Medium::Paper(width), &films(count as u64, 60), &Wording::default());
+            assert_eq!(text.matches("class=\"frame\"").count(), count);
+            assert!(text.contains(&format!("width=\"{width}\"")) && text.contains("grey: start"), "{text}");
+            assert!(!text.contains("@media") && !text.contains("class=\"head\""), "{text}");
+        }
+        let screen = draw(Medium::Screen, &films(1, 60), &Wording::default());
+        assert!(screen.contains("@media") && screen.contains("class=\"head\""), "the control");
     }
 
     #[test]
@@ -310,7 +365,7 @@ mod tests {
         let mut panels: Vec<MemberPanel> = films.iter().map(MemberPanel::new).collect();
         panels[1].states[0].iter_mut().for_each(|p| *p *= 3.0);
         let slack = |panels: &[MemberPanel], i: usize| {
-            let layout = PanelLayout::new(panels);
+            let layout = PanelLayout::new(panels, SIDE);
             let (low, high) = panels[i].bounds().unwrap();
             layout.frame - (high - low) * layout.scale((high - low).max_element()) - 2.0 * PADDING
         };
@@ -331,7 +386,7 @@ mod tests {
 
     #[test]
     fn many_nodes_are_drawn_as_a_line() {
-        let text = draw(&films(1, 5000), &Wording::default());
+        let text = draw(Medium::Screen, &films(1, 5000), &Wording::default());
         assert!(!text.contains("class=\"nodes\""));
         assert!(text.len() < 50_000, "{}", text.len());
     }

@@ -8,6 +8,7 @@ use super::{
     Setting,
     samples::{amplitudes, decay, draw_all, pictures, survival},
 };
+use crate::medium::Medium;
 use reading::{attribute, commands, complaint, paths, scale, texts};
 
 #[test]
@@ -28,8 +29,29 @@ fn no_text_of_any_chart_is_cut_off_or_over_another() {
 }
 
 #[test]
+fn no_text_is_cut_off_or_over_another_on_paper_of_any_width() {
+    // 80 mm, a column, a page and 300 mm, with 7 points for 12 pixels.
+    for width in [388.0, 413.0, 826.0, 1458.0] {
+        for (name, svg) in draw_all(Medium::Paper(width)) {
+            // Hostile names are as long as they like.
+            if let Some(complaint) = complaint(&svg).filter(|_| name != "hostile") {
+                panic!("{name}: {complaint}\n{svg}");
+            }
+            assert!(!svg.contains("@media") && attribute(&svg, "width") == width.to_string(), "{name}");
+            assert!(!texts(&svg).iter().any(|text| text.class == "head" || text.content.contains("seed 1")), "{name}");
+            // What a legend says is not shortened.
+            let cut = texts(&svg).into_iter().find(|text| text.class == "label" && text.content.ends_with('…'));
+            assert!(cut.is_none(), "{name}: {}", cut.unwrap().content);
+        }
+    }
+    // The charts of a screen would not fit.
+    let narrow = |svg: &str| svg.replacen("width=\"560\"", "width=\"413\"", 1);
+    assert!(pictures().iter().all(|(_, svg)| complaint(&narrow(svg)).is_some()));
+}
+
+#[test]
 fn equal_data_give_equal_bytes_and_no_number_is_unknown() {
-    for ((name, svg), (_, twin)) in pictures().iter().zip(draw_all()) {
+    for ((name, svg), (_, twin)) in pictures().iter().zip(draw_all(Medium::Screen)) {
         assert!(*svg == twin, "{name}: two drawings differ");
         let drawing = svg.split("</style>").nth(1).unwrap();
         for word in ["NaN", "inf", "-0 ", "e-", "null"] {

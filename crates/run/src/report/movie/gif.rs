@@ -130,11 +130,13 @@ impl Movie {
 mod tests {
     use super::*;
     use crate::report::{gallery, movie::tests::movie};
+    use curvelax_draw::medium::Medium;
 
     #[test]
     fn the_colours_are_those_of_the_gallery() {
         let word = |[r, g, b]: Colour| format!("#{r:02x}{g:02x}{b:02x}");
-        let (light, _) = gallery::STYLE.split_once("@media").unwrap();
+        let style = gallery::style(Medium::Screen);
+        let (light, _) = style.split_once("@media").unwrap();
         for status in Status::ALL {
             let rule = format!(".{} path {{ stroke: {}", status.name(), word(colour(status)));
             assert!(light.contains(&rule), "{rule}");

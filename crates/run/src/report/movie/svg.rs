@@ -10,6 +10,7 @@ use glam::DVec2;
 use super::{GREY, HOLD, MARGIN, Movie, MoviePanel, gif::INSIDE};
 use crate::report::gallery::{self, OWN_SCALES};
 use curvelax_draw::{
+    medium::Medium,
     svg::{Svg, coordinate, escape},
     width::{SIZE, shortened},
 };
@@ -32,7 +33,7 @@ const STYLE: &str = "
 impl Movie {
     /// The text of an SVG file.
     pub fn svg(&self) -> String {
-        let style = format!("{}\n{}", gallery::STYLE.trim(), STYLE.trim());
+        let style = format!("{}\n{}", gallery::style(Medium::Screen).trim(), STYLE.trim());
         let mut svg = Svg::new(self.size.x, self.size.y, &style, "Members during relaxation");
         svg.rectangle("back", DVec2::ZERO, self.size, 0.0);
         if self.size.x > 300.0 {

@@ -9,6 +9,7 @@ use curvelax_draw::{
         EstimatedNumber, FittedRates, MemberDot, MemberTimes, MeshQuality, PowerLawLine, RelaxationTimes, Scatter,
         ScatterPanel, ScatterPoint, Series, Setting, Survival, SurvivalCurve, Theory, TimeDistribution,
     },
+    medium::Medium,
     style::SERIES,
 };
 use curvelax_ensemble::{Event, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
@@ -40,25 +41,25 @@ impl FinishedRun<'_> {
     ///
     /// # Errors
     /// [`Error::Request`](curvelax_base::error::Error::Request) if the values of a cell do not fit the spec.
-    pub fn charts(&self, is_told: bool) -> Result<Vec<Chart>> {
+    pub fn charts(&self, medium: Medium, is_told: bool) -> Result<Vec<Chart>> {
         let key = &self.cell_key(is_told);
         if self.spec().names_members() {
             // A mean over outlines of unlike sizes would mean nothing.
-            let excess = if self.spec().members_per_cell() == 1 { self.excess(key)? } else { None };
-            return Ok([self.members()].into_iter().chain(excess).chain(self.dependence()).collect());
+            let excess = if self.spec().members_per_cell() == 1 { self.excess(medium, key)? } else { None };
+            return Ok([self.members(medium)].into_iter().chain(excess).chain(self.dependence(medium)).collect());
         }
-        let mut charts = vec![self.relaxation(key), self.distribution(key), self.survival(key)];
-        charts.extend(self.groups());
-        charts.extend(self.events());
-        charts.extend(self.excess(key)?);
-        charts.push(self.rates(key));
-        charts.extend(self.dependence());
-        charts.push(self.features(key));
-        charts.push(self.mesh());
+        let mut charts = vec![self.relaxation(medium, key), self.distribution(medium, key), self.survival(medium, key)];
+        charts.extend(self.groups(medium));
+        charts.extend(self.events(medium));
+        charts.extend(self.excess(medium, key)?);
+        charts.push(self.rates(medium, key));
+        charts.extend(self.dependence(medium));
+        charts.push(self.features(medium, key));
+        charts.push(self.mesh(medium));
         Ok(charts)
     }
 
-    fn relaxation(&self, key: &CellKey) -> Chart {
+    fn relaxation(&self, medium: Medium, key: &CellKey) -> Chart {
         let cells = &self.statistics.cells;
         let numbers = self.numbers();
         let times = cells.iter().enumerate().map(|(rank, cell)| CellValues {
@@ -75,7 +76,7 @@ impl FinishedRun<'_> {
         let median = if let [cell] = &cells[..] { median(self.statistics.times(cell)) } else { None };
         let (title, quantity) = ("Relaxation times", self.statistics.time());
         let (note, key, cells) = (&self.what_and_error(), key.clone(), times.collect());
-        let svg = RelaxationTimes { title, note, quantity, key, cells, others: &others, median }.draw();
+        let svg = RelaxationTimes { title, note, quantity, key, cells, others: &others, median }.draw(medium);
         let by_cell = if self.statistics.cells.len() > 1 { ", cell by cell" } else { "" };
         let caption =
             format!("How many members relaxed when, and which share of all had relaxed by then{by_cell}: {quantity}.");
@@ -83,7 +84,7 @@ impl FinishedRun<'_> {
     }
 
     /// The times of each cell as a box, and their quantiles against those of two laws.
-    fn distribution(&self, key: &CellKey) -> Chart {
+    fn distribution(&self, medium: Medium, key: &CellKey) -> Chart {
         let numbers = self.numbers();
         let cells = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
             let survival = KaplanMeier::new(&self.statistics.times(cell).sample);
@@ -99,13 +100,13 @@ impl FinishedRun<'_> {
         });
         let title = "Distribution of the relaxation times";
         let (note, key, keys, cells) = (&self.what_and_error(), key.clone(), &self.keys(), cells.collect());
-        let svg = TimeDistribution { title, note, quantity: self.statistics.time(), key, keys, cells }.draw();
+        let svg = TimeDistribution { title, note, quantity: self.statistics.time(), key, keys, cells }.draw(medium);
         let caption = "Above: the median, the middle half and the middle nine tenths of the members. Below: quantiles \
                        against those of a normal law, left, and of a lognormal one, right.";
         chart(names::DISTRIBUTION, title, caption, svg)
     }
 
-    fn survival(&self, key: &CellKey) -> Chart {
+    fn survival(&self, medium: Medium, key: &CellKey) -> Chart {
         let numbers = self.numbers();
         let curves = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
             let value = numbers.as_ref().map(|numbers| numbers[rank]);
@@ -120,11 +121,11 @@ impl FinishedRun<'_> {
             curves: curves.collect(),
             ..Survival::default()
         };
-        chart(names::SURVIVAL, title, &survival_caption(&survival, "it relaxed"), survival.draw())
+        chart(names::SURVIVAL, title, &survival_caption(&survival, "it relaxed"), survival.draw(medium))
     }
 
     /// The members not yet relaxed, by group of their outlines.
-    fn groups(&self) -> Option<Chart> {
+    fn groups(&self, medium: Medium) -> Option<Chart> {
         let (key, all) = (self.spec().group_by.as_deref()?, &self.statistics.groups);
         let mut groups: Vec<&GroupStatistics> = all.iter().collect();
         if groups.len() > DISTINCT {
@@ -148,7 +149,7 @@ impl FinishedRun<'_> {
         let (quantity, key) = (self.statistics.time(), CellKey::from(key));
         let survival = Survival { title: &title, note, quantity, key, curves, ..Survival::default() };
         let caption = survival_caption(&survival, "it relaxed");
-        Some(chart(names::GROUP_SURVIVAL, &title, &caption, survival.draw()))
+        Some(chart(names::GROUP_SURVIVAL, &title, &caption, survival.draw(medium)))
     }
 
     /// The name of a group or an event of a cell in a legend.
@@ -157,7 +158,7 @@ impl FinishedRun<'_> {
     }
 
     /// A survival curve for each event of each cell, if there are events.
-    fn events(&self) -> Option<Chart> {
+    fn events(&self, medium: Medium) -> Option<Chart> {
         let spec = self.spec();
         let curves = self.statistics.cells.iter().flat_map(|cell| {
             let events = spec.event.iter().zip(&cell.events).filter(|(_, of)| of.stopped == 0);
@@ -183,11 +184,11 @@ impl FinishedRun<'_> {
             "Share of the members in which an event has not happened yet. {}",
             survival_caption(&survival, "that")
         );
-        Some(chart(names::EVENT_SURVIVAL, title, &caption, survival.draw()))
+        Some(chart(names::EVENT_SURVIVAL, title, &caption, survival.draw(medium)))
     }
 
     /// The mean excess, for as long as all members of a cell are running.
-    fn excess(&self, key: &CellKey) -> Result<Option<Chart>> {
+    fn excess(&self, medium: Medium, key: &CellKey) -> Result<Option<Chart>> {
         let numbers = self.numbers();
         let curve = |(rank, cell): (usize, &CellTally)| {
             let all: u64 = cell.counts.iter().sum();
@@ -231,10 +232,10 @@ impl FinishedRun<'_> {
         let excess = excess.excess_in_words();
         let of_band = if decay.has_bands() { format!(" Band: {band}.") } else { String::new() };
         let caption = format!("How the excess, {excess}, falls{slope}.{of_band}");
-        Ok(Some(chart(names::EXCESS, title, &caption, decay.draw())))
+        Ok(Some(chart(names::EXCESS, title, &caption, decay.draw(medium))))
     }
 
-    fn rates(&self, key: &CellKey) -> Chart {
+    fn rates(&self, medium: Medium, key: &CellKey) -> Chart {
         let EnsembleStatistics { cells, relative, .. } = self.statistics;
         let numbers = self.numbers();
         let rates = cells.iter().enumerate().map(|(rank, cell)| CellValues {
@@ -248,7 +249,7 @@ impl FinishedRun<'_> {
         let without = self.tally.members() - rates.iter().map(|cell| cell.numbers.len() as u64).sum::<u64>();
         let (relative, unit) = (*relative, "length⁻⁴");
         let (note, key, cells) = (&self.what(), key.clone(), rates);
-        let svg = FittedRates { title, note, key, cells, relative, unit, without }.draw();
+        let svg = FittedRates { title, note, key, cells, relative, unit, without }.draw(medium);
         let over = if relative { ", over the rate that linear theory gives the slowest mode" } else { "" };
         let caption = format!(
             "Slope of the line through ln excess, while that falls from a tenth to a thousandth of its start{over}."
@@ -258,7 +259,7 @@ impl FinishedRun<'_> {
 
     /// The time against one swept key, with a series for each combination of the others: against the one that colours
     /// show, or that changes fastest.
-    fn dependence(&self) -> Option<Chart> {
+    fn dependence(&self, medium: Medium) -> Option<Chart> {
         let axes = self.spec().sweep.axes();
         let across = self.two_axes().map_or(axes.len().checked_sub(1)?, |[colour, _]| colour);
         let axis = &axes[across];
@@ -323,7 +324,7 @@ impl FinishedRun<'_> {
                     .into()
             }
         };
-        Some(chart(names::DEPENDENCE, &title, &caption, chart_of.draw()))
+        Some(chart(names::DEPENDENCE, &title, &caption, chart_of.draw(medium)))
     }
 
     /// The line of the power law of the medians, if one was fitted.
@@ -338,7 +339,7 @@ impl FinishedRun<'_> {
 
     /// The time against the features that explain it best. Flows and shapes have a panel each; cells that differ in a
     /// number have a colour each, and no R² over all of them.
-    fn features(&self, key: &CellKey) -> Chart {
+    fn features(&self, medium: Medium, key: &CellKey) -> Chart {
         let Explained { rows, features, pictured, drawn, times } = self.explained;
         let quantity = times.first().map_or("t_relax", String::as_str);
         let numbers = self.numbers();
@@ -392,13 +393,13 @@ impl FinishedRun<'_> {
         };
         let notes = vec![self.what(), some, left_out, silent];
         let (key, cells, reason) = (key.clone(), cells.collect(), &*reason);
-        let svg = Scatter { title, notes, quantity, key, cells, panels, reason }.draw();
+        let svg = Scatter { title, notes, quantity, key, cells, panels, reason }.draw(medium);
         let caption = format!("The features of members.csv whose straight line explains most of {quantity}.");
         chart(names::FEATURES, title, &caption, svg)
     }
 
     /// The times of members that are known by name.
-    fn members(&self) -> Chart {
+    fn members(&self, medium: Medium) -> Chart {
         let dot = |member: &MemberTime| {
             let (t, error) = member.shown().unwrap_or((member.t_end, None));
             let name = member_name(self.spec(), member);
@@ -410,11 +411,11 @@ impl FinishedRun<'_> {
         let open = if has(&|member| !member.happened) { " Hollow: the member ended before." } else { "" };
         let (title, quantity) = ("Relaxation times", self.statistics.time());
         let caption = format!("Dot: {quantity} of a member.{bar}{open}");
-        let svg = MemberTimes { title, note: &self.what(), quantity, names: "", members }.draw();
+        let svg = MemberTimes { title, note: &self.what(), quantity, names: "", members }.draw(medium);
         chart(names::MEMBER_TIMES, title, &caption, svg)
     }
 
-    fn mesh(&self) -> Chart {
+    fn mesh(&self, medium: Medium) -> Chart {
         let title = "Mesh quality at the end";
         let quality = MeshQuality {
             title,
@@ -424,7 +425,7 @@ impl FinishedRun<'_> {
             distrusted: Some((DISTRUSTED_DRIFT, self.tally.distrusted())),
         };
         let caption = "Longest over shortest edge, and how far the scheme's lengths have left the polygon's.";
-        chart(names::MESH, title, caption, quality.draw())
+        chart(names::MESH, title, caption, quality.draw(medium))
     }
 }
 

@@ -11,7 +11,7 @@ use super::{
     words::place,
 };
 use curvelax_base::{error::Result, text::significant};
-use curvelax_draw::{chart, width::told_apart};
+use curvelax_draw::{chart, medium::Medium, width::told_apart};
 use curvelax_ensemble::Spec;
 use curvelax_files::{names, portraits::Film};
 use curvelax_study::results::{
@@ -63,13 +63,30 @@ pub struct Chart {
 }
 
 impl FinishedRun<'_> {
+    /// The pictures for white paper so many pixels wide, without what a caption says.
+    ///
+    /// # Errors
+    /// [`Error::Request`](curvelax_base::error::Error::Request) if the values of a cell do not fit the spec.
+    pub fn on_paper(&self, width: f64) -> Result<Vec<Chart>> {
+        let medium = Medium::Paper(width);
+        let gallery = self.gallery(medium).map(|svg| Chart { name: names::CURVES, figure: first_members(svg) });
+        let mut all: Vec<Chart> = self.charts(medium, false)?.into_iter().chain(gallery).collect();
+        all.iter_mut().for_each(|chart| chart.figure.svg = self.with_unit(std::mem::take(&mut chart.figure.svg)));
+        Ok(all)
+    }
+
+    /// The first members, if there are portraits of them.
+    fn gallery(&self, medium: Medium) -> Option<String> {
+        (!self.films.is_empty()).then(|| gallery::draw(medium, self.films, &self.wording(medium)))
+    }
+
     /// The files that are drawn: name and text.
     pub fn pictures(&self) -> Result<Vec<(&'static str, String)>> {
-        let charts = self.charts(false)?;
+        let charts = self.charts(Medium::Screen, false)?;
         let legend = self.legend();
         // A page has one legend for all charts, a file its own.
-        let on_page = if legend.is_empty() { None } else { Some(self.charts(true)?) };
-        let gallery = (!self.films.is_empty()).then(|| gallery::draw(self.films, &self.wording()));
+        let on_page = if legend.is_empty() { None } else { Some(self.charts(Medium::Screen, true)?) };
+        let gallery = self.gallery(Medium::Screen);
         let page = self.page(on_page.as_ref().unwrap_or(&charts), &legend, gallery.as_deref())?;
         let charts = charts.into_iter().map(|chart| (chart.name, chart.figure.svg));
         let gallery = gallery.map(|svg| (names::CURVES, svg));
@@ -94,11 +111,7 @@ impl FinishedRun<'_> {
     fn page(&self, charts: &[Chart], legend: &[chart::Entry], gallery: Option<&str>) -> Result<String> {
         // Equal results give equal bytes, on any number of threads.
         let spec = Spec { threads: None, ..self.spec().clone() }.to_toml()?;
-        let first = gallery.map(|svg| {
-            let title = "The first members before, on their way and after";
-            let caption = "Grey: the start. Light: on the way. Colour: the last state, by status.";
-            figure(title, caption, svg.into())
-        });
+        let first = gallery.map(|svg| first_members(svg.into()));
         let PageHead { title, what, statuses, headline } = self.head();
         let page = Page {
             title: &title,
@@ -127,10 +140,11 @@ impl FinishedRun<'_> {
     }
 
     /// What is written below the portraits.
-    fn wording(&self) -> Wording {
+    fn wording(&self, medium: Medium) -> Wording {
         let cell = |film: &Film| self.short_label(film.member / self.spec().members_per_cell());
         let cells: Vec<String> = self.films.iter().map(cell).collect();
-        let cells = told_apart(&cells, gallery::SIZE, gallery::SIDE);
+        let (_, side) = gallery::columns(medium, self.films.len().min(gallery::MAX_PANELS));
+        let cells = told_apart(&cells, gallery::SIZE, side);
         let end = |film: &Film| format!("{}{}", film.status.name(), self.relaxed_at(film));
         let ends = self.films.iter().map(end);
         Wording { unit: self.length_unit(), cells, ends: ends.collect() }
@@ -170,6 +184,12 @@ impl FinishedRun<'_> {
         .map(|(name, value)| (name.to_string(), value))
         .collect()
     }
+}
+
+/// The gallery with its words.
+fn first_members(svg: String) -> PageFigure {
+    let caption = "Grey: the start. Light: on the way. Colour: the last state, by status.";
+    figure("The first members before, on their way and after", caption, svg)
 }
 
 fn figure(title: &str, caption: &str, svg: String) -> PageFigure {

@@ -1,0 +1,115 @@
+//! Sizes, letters and bytes of pictures for papers.
+
+use super::*;
+use curvelax_draw::{
+    charts::samples::draw_all,
+    medium::Medium,
+    svg::Svg,
+    width::{SIZE, width},
+};
+
+/// A picture of that width with one line of text.
+fn written(text: &str, mm: PaperWidth) -> Print {
+    let mut svg = Svg::new(mm.pixels(), 60.0, "text { font-family: sans-serif; font-size: 12px; fill: #24292f }", "a");
+    svg.text("middle", [20.0, 40.0].into(), text);
+    Printer::default().read("Words", &svg.finish(), mm).unwrap()
+}
+
+fn number(bytes: &[u8], at: usize) -> u32 {
+    u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap())
+}
+
+/// The rows of a PNG file, of 3 bytes for each pixel.
+fn pixels(png: &[u8]) -> Vec<u8> {
+    let mut reader = png::Decoder::new(png).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size()];
+    reader.next_frame(&mut pixels).unwrap();
+    pixels
+}
+
+#[test]
+fn pixels_are_those_of_the_width_at_the_density_which_the_file_tells() {
+    for (width, dpi, dots) in [("column", 600, 2008), ("page", 300, 2008), ("100", 127, 500)] {
+        let png = written("a", width.parse().unwrap()).file(PaperFormat::png(dpi).unwrap()).unwrap();
+        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+        assert_eq!(number(&png, 16), dots, "{width}");
+        let place = png.windows(4).position(|name| name == b"pHYs").unwrap() + 4;
+        assert_eq!(number(&png, place), (dpi as f64 / 0.0254).round() as u32);
+    }
+}
+
+#[test]
+fn letters_are_drawn_and_those_that_the_font_lacks_are_told() {
+    let dark = |text: &str| {
+        let print = written(text, PaperWidth::default());
+        let png = print.file(PaperFormat::png(300).unwrap()).unwrap();
+        (pixels(&png).iter().filter(|byte| **byte < 128).count(), told(&print.missing()))
+    };
+    assert_eq!(dark(" "), (0, None), "the control");
+    // What labels of this program have, and names of places.
+    for text in ["τ_relax", "µm⁴", "10⁻⁶ length⁻⁴", "t ∝ aᵖ", "χ²", "αβγδθκλωΣΔ", "ßéčşŁ", "Жук", "− ± × · … ≤ ≥ √ ∞ ∂"]
+    {
+        let (count, missing) = dark(text);
+        assert!(count > 100, "{text}: {count}");
+        assert_eq!(missing, None, "{text}");
+    }
+    let (_, missing) = dark("長 a 平");
+    assert_eq!(missing.unwrap(), "2 letters not in the font of png and pdf, drawn as empty boxes: 平長");
+}
+
+#[test]
+fn text_is_as_wide_as_charts_are_laid_out_for() {
+    for text in ["median t_relax 0.412 (95 %: 0.401 to 0.420)", "ABCDEFGHIJKLM nopqrstuvwxyz 0123456789"] {
+        let print = written(text, PaperWidth::default());
+        let drawn = f64::from(print.tree.root().layer_bounding_box().width());
+        let laid_out = width(text, SIZE);
+        assert!((drawn / laid_out - 1.0).abs() < 0.02, "{text}: {drawn} {laid_out}");
+    }
+}
+
+#[test]
+fn a_pdf_has_the_size_of_the_width_and_the_letters_of_its_text() {
+    let pdf = written("τ a", PaperWidth::default()).file(PaperFormat::Pdf).unwrap();
+    let text = String::from_utf8_lossy(&pdf);
+    assert!(text.starts_with("%PDF-1.") && text.contains("/MediaBox"), "{text}");
+    let sides = text.split("/MediaBox").nth(1).unwrap().split(['[', ']']).nth(1).unwrap();
+    let sides: Vec<f64> = sides.split_whitespace().map(|side| side.parse().unwrap()).collect();
+    assert!((sides[2] - 85.0 / 25.4 * 72.0).abs() < 0.01, "{sides:?}");
+    assert!(text.contains("DejaVuSans") && text.contains("/ToUnicode"), "text is not text: {text}");
+    let none = written("", PaperWidth::default()).file(PaperFormat::Pdf).unwrap();
+    assert!(!String::from_utf8_lossy(&none).contains("/ToUnicode"), "the control");
+}
+
+#[test]
+fn every_chart_is_printed_to_equal_bytes() {
+    let (column, printer) = (PaperWidth::default(), Printer::default());
+    let format = PaperFormat::png(100).unwrap();
+    for (name, svg) in draw_all(Medium::Paper(column.pixels())) {
+        let print = |format| printer.read(&name, &svg, column).unwrap().file(format).unwrap();
+        let png = print(format);
+        assert!(pixels(&png).chunks(3).any(|pixel| pixel != [255; 3]), "{name} is blank");
+        assert!(png == print(format), "{name}");
+        assert!(print(PaperFormat::Pdf) == print(PaperFormat::Pdf), "{name}");
+        // To look at: CURVELAX_CHARTS=FOLDER cargo test -p curvelax-paper
+        if let Some(folder) = std::env::var_os("CURVELAX_CHARTS") {
+            let at = |extension: &str| std::path::Path::new(&folder).join(format!("{name}.{extension}"));
+            std::fs::write(at("png"), print(PaperFormat::png(300).unwrap())).unwrap();
+            std::fs::write(at("pdf"), print(PaperFormat::Pdf)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn wrong_densities_and_pictures_that_are_too_large_are_refused() {
+    for dpi in [71, 1201, -3] {
+        let error = PaperFormat::png(dpi).unwrap_err();
+        assert_eq!(error.to_string(), format!("--dpi {dpi}: out of range; use 72 to 1200 dots per inch"));
+    }
+    let svg = Svg::new(100.0, 5000.0, "", "a").finish();
+    let print = Printer::default().read("Members", &svg, "page".parse().unwrap()).unwrap();
+    assert!(print.file(PaperFormat::png(100).unwrap()).is_ok());
+    let error = print.file(PaperFormat::png(1200).unwrap()).unwrap_err();
+    let said = "--dpi 1200: Members would have 8031 × 401575 pixels, 10⁸ are the most; use fewer dots per inch";
+    assert!(error.to_string().starts_with(said) && error.exit_code() == 2, "{error}");
+    assert!(Printer::default().read("Words", "<svg", PaperWidth::default()).is_err());
+}
