@@ -15,6 +15,13 @@ class Keys(TypedDict, total=False):
     """Number of members. Of outlines, the number of copies of each; without the flag, each runs once, unperturbed. By
     default 256."""
 
+    outlines: int
+    """Expected number of outlines: another number is refused. The spec of a run records it. By default any number."""
+
+    group_by: str
+    """Compare the outlines by the values of this property of their features, column of their table, or `file`. By
+    default no groups."""
+
     points: int
     """Nodes per member, n ≥ 6. By default 100."""
 
@@ -26,13 +33,6 @@ class Keys(TypedDict, total=False):
     outlines in file:PATH or 'files:PATTERN' (CSV, GeoJSON, WKT, NumPy), each of which is a member. Paths are relative
     to the current folder. Any number may be a distribution, such as uniform(1.2..3): see below. By default
     ellipse:2,1."""
-
-    outlines: int
-    """Expected number of outlines: another number is refused. The spec of a run records it. By default any number."""
-
-    group_by: str
-    """Compare the outlines by the values of this property of their features, column of their table, or `file`. By
-    default no groups."""
 
     sampling: Literal["parameter", "arclength", "points"]
     """Placement of the nodes on the curve. By default arclength."""
@@ -63,19 +63,19 @@ class Keys(TypedDict, total=False):
     decay: each on its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay
     random. By default random."""
 
-    sweep: Mapping[str, Sequence[Any]]
-    """Vary this key: a cell of members for each value, and for each combination if the flag is given for several
-    keys. Separate values that contain commas by semicolons: sweep 'shape=ellipse:2,1;circle:1'. By default none."""
-
-    common_random_numbers: bool
-    """Draw member j of every cell from the same random numbers. By default false."""
-
     only: Sequence[int]
     """Run only these members; each is bit-identical to its run in the whole ensemble. By default all."""
 
     shard: str
     """Run only the members j with j mod N = I, for `curvelax merge`; `slurm` reads I/N from the job array. By default
     all."""
+
+    common_random_numbers: bool
+    """Draw member j of every cell from the same random numbers. By default false."""
+
+    sweep: Mapping[str, Sequence[Any]]
+    """Vary this key: a cell of members for each value, and for each combination if the flag is given for several
+    keys. Separate values that contain commas by semicolons: sweep 'shape=ellipse:2,1;circle:1'. By default none."""
 
     flow: str
     """Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions. By default

@@ -10,7 +10,7 @@ use crate::{
     ensemble::{
         Spec,
         request::{
-            spec::{Group, Key},
+            spec::{Heading, SpecKey},
             sweep::{self, SweepAxis},
             value::Takes,
         },
@@ -19,11 +19,11 @@ use crate::{
 };
 
 /// Heading of the flags for the method.
-pub(super) const METHOD: &str = Group::Method.name();
+pub(super) const METHOD: &str = Heading::Method.name();
 /// Heading of the flags for the machine.
-pub(super) const MACHINE: &str = Group::Machine.name();
+pub(super) const MACHINE: &str = Heading::Machine.name();
 /// Heading of the flags for output.
-pub const OUTPUT: &str = Group::Output.name();
+pub const OUTPUT: &str = Heading::Output.name();
 
 /// The flag that stands for several keys, and the first of them in the help after it.
 const ACCURATE: &str = "accurate";
@@ -31,13 +31,13 @@ const AFTER_ACCURATE: &str = "refine";
 
 /// The keys of [`Spec`] that the user gave as flags, with their words.
 pub struct SpecFlags {
-    given: Vec<(&'static Key, Vec<String>)>,
+    given: Vec<(&'static SpecKey, Vec<String>)>,
     accurate: bool,
 }
 
 /// The flag of a key.
-fn flag(key: &'static Key) -> Arg {
-    let arg = Arg::new(key.name).long(key.name).value_name(key.value).help(key.help()).help_heading(key.group.name());
+fn flag(key: &'static SpecKey) -> Arg {
+    let arg = Arg::new(key.name).long(key.name).value_name(key.value).help(key.help()).help_heading(key.heading.name());
     let checked = ValueParser::from(|word: &str| (key.check)(word).map(|()| word.to_owned()));
     match (key.takes, key.missing) {
         // The name of a Slurm job array stands for two numbers.
@@ -62,7 +62,7 @@ fn flag(key: &'static Key) -> Arg {
 impl clap::Args for SpecFlags {
     fn augment_args(command: Command) -> Command {
         let accurate =
-            Arg::new(ACCURATE).long(ACCURATE).action(ArgAction::SetTrue).help_heading(Group::Evolution.name());
+            Arg::new(ACCURATE).long(ACCURATE).action(ArgAction::SetTrue).help_heading(Heading::Evolution.name());
         let accurate = accurate.help(
             "What we recommend for numbers to publish: --adaptive --pull auto --omega auto --t-end auto --stop-when-relaxed --refine. Each can still be set on its own [default: off]",
         );
@@ -79,7 +79,7 @@ impl clap::Args for SpecFlags {
 
 impl FromArgMatches for SpecFlags {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let words = |key: &'static Key| Some((key, matches.get_many::<String>(key.name)?.cloned().collect()));
+        let words = |key: &'static SpecKey| Some((key, matches.get_many::<String>(key.name)?.cloned().collect()));
         Ok(SpecFlags { given: Spec::KEYS.iter().filter_map(words).collect(), accurate: matches.get_flag(ACCURATE) })
     }
 

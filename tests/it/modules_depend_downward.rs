@@ -14,7 +14,7 @@ use syn::{
 };
 
 /// Crates and modules; each may use only those above it. A name stands for what has no longer one; `program` for `src`.
-const LAYERS: [&str; 45] = [
+const LAYERS: [&str; 46] = [
     "shaders",
     "base/error",
     "base/guard",
@@ -281,7 +281,7 @@ fn arrows_upward_and_circles_are_found() {
         }
         faults(&sources)
     };
-    let up = ["statistics/fit uses ensemble/request/spec, which is above it"];
+    let up = ["statistics/fit uses ensemble/request/key, which is above it"];
     assert_eq!(with(&[("statistics/fit", "use curvelax_ensemble::Spec;")]), up);
     assert_eq!(with(&[("statistics/fit", "fn f() -> Option<curvelax_ensemble::Spec> { None }")]), up);
     assert_eq!(with(&[("statistics/fit", "#[cfg(test)] mod more { use curvelax_ensemble::Spec; }")]), [""; 0]);

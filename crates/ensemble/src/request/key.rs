@@ -30,13 +30,13 @@ use curvelax_flow::{
 
 /// A key, as far as a flag must know it.
 #[derive(Debug)]
-pub struct Key {
+pub struct SpecKey {
     /// Its name in spec files, which is that of its flag.
     pub name: &'static str,
     /// What stands for its value in the help.
     pub value: &'static str,
     /// The heading of the help under which it stands.
-    pub group: Group,
+    pub heading: Heading,
     /// What it does, over several lines, with its default in brackets at the end.
     help: &'static str,
     /// What its flag takes.
@@ -49,7 +49,7 @@ pub struct Key {
     pub set: fn(&mut Spec, &[String]) -> Result<(), String>,
 }
 
-impl Key {
+impl SpecKey {
     /// What it does, with its default in brackets at the end.
     pub fn help(&self) -> String {
         self.help.lines().map(str::trim).collect::<Vec<_>>().join(" ")
@@ -58,7 +58,7 @@ impl Key {
 
 /// A heading of the help.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
+pub enum Heading {
     /// Which curves.
     Ensemble,
     /// How they move, and when they count as relaxed.
@@ -71,15 +71,15 @@ pub enum Group {
     Output,
 }
 
-impl Group {
+impl Heading {
     /// The heading.
     pub const fn name(self) -> &'static str {
         match self {
-            Group::Ensemble => "Ensemble",
-            Group::Evolution => "Evolution",
-            Group::Method => "Method",
-            Group::Machine => "Machine",
-            Group::Output => "Output",
+            Heading::Ensemble => "Ensemble",
+            Heading::Evolution => "Evolution",
+            Heading::Method => "Method",
+            Heading::Machine => "Machine",
+            Heading::Output => "Output",
         }
     }
 }
@@ -125,7 +125,7 @@ macro_rules! keys {
 
         impl $spec {
             /// The keys, in the order of the spec.
-            pub const KEYS: &[Key] = &[$(Key {
+            pub const KEYS: &[SpecKey] = &[$(SpecKey {
                 name: {
                     const NAME: [u8; stringify!($key).len()] = hyphenated(stringify!($key));
                     match std::str::from_utf8(&NAME) {
@@ -134,7 +134,7 @@ macro_rules! keys {
                     }
                 },
                 value: $value,
-                group: Group::$group,
+                heading: Heading::$group,
                 help: concat!($($help, "\n",)+),
                 takes: <$type as Value>::TAKES,
                 missing: (&[$($missing)?] as &[&'static str]).first().copied(),
