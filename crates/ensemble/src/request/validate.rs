@@ -338,9 +338,6 @@ impl Spec {
             let problem = format!("its intervals were calibrated without crystals, and --{key} {value} is given");
             return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
         }
-        if self.backend == BackendChoice::Gpu {
-            return refused("crystals do not run on a GPU yet", "use --backend cpu");
-        }
         let waves =
             [energy.as_ref().map(|of| of.typical().waves()), diffusivity.as_ref().map(|of| of.typical().waves())];
         let highest = waves.into_iter().flatten().filter_map(|waves| waves.highest_mode()).max().unwrap_or(0);
@@ -607,10 +604,6 @@ mod tests {
             "--form paper: with it a crystal creeps at rest, and --energy cos:4,0.03",
         ),
         ("energy = 'cos:4,0.03'\nrefine = true", "--refine true: its intervals were calibrated without crystals, and "),
-        (
-            "diffusivity = 'cos:4,0.5'\nbackend = 'gpu'",
-            "--diffusivity cos:4,0.5: crystals do not run on a GPU yet; use",
-        ),
         (
             "diffusivity = 'cos:9,0.5'\npoints = 32",
             "--diffusivity cos:9,0.5: 32 nodes resolve no wave above 8; use --points 36 or more, or a lower M",

@@ -5,7 +5,7 @@
 
 use super::{
     adaptive_members,
-    cases::LAWS,
+    cases::{Driven, LAWS},
     compare::{ConformanceRow, Left, compare_ends},
     members,
 };
@@ -21,9 +21,8 @@ const STEPS: u32 = 2;
 /// Tolerance of adaptive steps.
 const ADAPTIVE: f64 = 1e-3;
 
-/// Makes two steps with members of `n` nodes, or adaptive ones over the same time, in the paper's form or the geometric one,
-/// and compares the results with those
-/// of `method` on the CPU. The slots must be free, and are free again afterwards.
+/// Makes two steps with members of `n` nodes, or adaptive ones over the same time, in the paper's form, in the
+/// geometric one or as crystals, and compares the results with those of `method` on the CPU. The slots must be free, and are free again afterwards.
 ///
 /// # Errors
 /// [`Error::Device`] with the quantity, its error and its bound; errors of `backend`.
@@ -34,14 +33,14 @@ pub fn self_test<T: Evolves>(
     method: &Method,
     n: usize,
     adaptive: bool,
-    geometric: bool,
+    driven: Driven,
 ) -> Result<()> {
     let count = MEMBERS.min(backend.slots());
     let mut launches = match adaptive {
         false => members(n, count, STEPS, T::PRECISION.tolerance())?,
         true => adaptive_members(n, count, STEPS, ADAPTIVE, T::PRECISION)?,
     };
-    launches.iter_mut().for_each(|launch| launch.parameters.geometric = f64::from(u8::from(geometric)));
+    driven.change(&mut launches);
     // In all batches.
     let slots: Vec<usize> = (0..count).map(|member| member * backend.slots() / count).collect();
     for (slot, launch) in slots.iter().zip(&launches) {
