@@ -180,9 +180,9 @@ fn fill_directions(k: vec) {
     let there = between(own, directed(tangent_of(edge(x.plus1, y.plus1))));
     let g = vec(1.0) + own.stiffness;
     settle();
-    let shared = windows(g, g * k);
-    stiffness = shared.a;
-    weighted = shared.b;
+    let exchanged = windows(g, g * k);
+    stiffness = exchanged.a;
+    weighted = exchanged.b;
     settle();
     mobile_there = lone_window(there.diffusivity);
 }
