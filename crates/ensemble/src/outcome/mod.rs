@@ -23,7 +23,7 @@ pub use levels::{LevelRow, RefinementLevel};
 pub use rows::{Extent, Rows};
 pub use sink::{Sink, Wish};
 pub use standing::{Paused, Standing};
-pub use wulff::wulff_distance;
+pub use wulff::{wulff_distance, wulff_outline};
 
 /// Scalar observables of one curve at one time (f64 whatever the precision of the run).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -80,6 +80,10 @@ text { fill: #e6edf3 }
 }
 ";
 
+/// What is added to it where shapes at rest are drawn.
+const STYLE_OF_RESTS: &str =
+    ".panel .rest { fill: none; stroke-width: 1; stroke-dasharray: 4 3; stroke-opacity: 0.6 }\n";
+
 /// What is written below the panels.
 #[derive(Clone, Debug, Default)]
 pub struct Wording {
@@ -89,11 +93,17 @@ pub struct Wording {
     pub cells: Vec<String>,
     /// How and when each member ended.
     pub ends: Vec<String>,
+    /// The shape to which each relaxes, if it is not a circle.
+    pub rests: Vec<Vec<DVec2>>,
 }
 
 impl Wording {
     fn has_cells(&self) -> bool {
         self.cells.iter().any(|cell| !cell.is_empty())
+    }
+
+    fn has_rests(&self) -> bool {
+        self.rests.iter().any(|rest| !rest.is_empty())
     }
 }
 
@@ -109,16 +119,23 @@ pub fn draw(films: &[Film], wording: &Wording) -> String {
     let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
     let height = HEAD + rows as f64 * pitch.y + FOOT;
 
-    let mut svg = Svg::new(width, height, STYLE, "Members before, during and after relaxation");
+    let rests = wording.has_rests();
+    let style = if rests { [STYLE, STYLE_OF_RESTS].concat() } else { STYLE.into() };
+    let mut svg = Svg::new(width, height, &style, "Members before, during and after relaxation");
     svg.rectangle("back", DVec2::ZERO, DVec2::new(width, height), 0.0);
     svg.text("head", DVec2::new(MARGIN, 30.0), "Before, during and after");
-    svg.text("note end", DVec2::new(width - MARGIN, 30.0), "grey: start, light: on the way, colour: end");
+    let note = match rests {
+        true => "dashed: Wulff shape, grey: start, colour: end",
+        false => "grey: start, light: on the way, colour: end",
+    };
+    svg.text("note end", DVec2::new(width - MARGIN, 30.0), note);
     for (i, panel) in panels.iter().enumerate() {
         let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
         let corner = DVec2::new(MARGIN, HEAD) + place * pitch;
         let end = wording.ends.get(i).map_or(panel.film.status.name(), String::as_str);
         let cell = wording.cells.get(i).map_or("", String::as_str);
-        draw_panel(&mut svg, panel, corner, &layout, [&wording.unit, cell, end]);
+        let rest = wording.rests.get(i).map_or(&[][..], Vec::as_slice);
+        draw_panel(&mut svg, panel, corner, &layout, rest, [&wording.unit, cell, end]);
     }
     let foot = DVec2::new(MARGIN, height - 20.0);
     match layout.common {
@@ -162,7 +179,14 @@ fn shown(frames: &[Vec<DVec2>]) -> Vec<usize> {
     shown
 }
 
-fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelLayout, [unit, cell, end]: [&str; 3]) {
+fn draw_panel(
+    svg: &mut Svg,
+    panel: &MemberPanel,
+    corner: DVec2,
+    layout: &PanelLayout,
+    rest: &[DVec2],
+    [unit, cell, end]: [&str; 3],
+) {
     let frame = layout.frame;
     let middle = corner + 0.5 * frame;
     let Film { status, points, .. } = panel.film;
@@ -178,6 +202,9 @@ fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelL
         // y grows downwards in SVG.
         let place = |p: &DVec2| middle + (*p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
         let last = panel.states.len() - 1;
+        if !rest.is_empty() {
+            svg.path("rest", &closed_path(&rest.iter().map(place).collect::<Vec<_>>()));
+        }
         for (i, nodes) in panel.states.iter().enumerate() {
             let nodes: Vec<DVec2> = nodes.iter().map(place).collect();
             let class = if i == last { "after" } else { ["before", "way"][usize::from(i > 0)] };
