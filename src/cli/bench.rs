@@ -4,7 +4,7 @@ use std::{collections::HashSet, time::Duration};
 
 use serde::Serialize;
 
-use super::{flags, note, print, print_json};
+use super::{flags, note, parsers, print, print_json};
 use crate::{
     backend::{DeviceKind, gpu::Gpu},
     bench::{self, Bench, BenchSample},
@@ -39,39 +39,39 @@ const MAX_REPEATS: usize = 1000;
 #[command(after_help = EXAMPLES)]
 pub struct BenchArgs {
     /// Nodes per member, n; several values are measured in turn [default: 100]
-    #[arg(long, value_name = "N1,N2,...", value_delimiter = ',', value_parser = flags::whole::<usize>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "N1,N2,...", value_delimiter = ',', value_parser = parsers::whole::<usize>, allow_hyphen_values = true)]
     points: Vec<usize>,
     /// Members resident at once, limited by the slots of the back end [default: 8192 on hardware GPUs, 32 on software ones, all
     /// slots of the CPU]
-    #[arg(long, value_name = "COUNT", value_parser = flags::whole::<u64>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<u64>, allow_hyphen_values = true)]
     curves: Option<u64>,
     /// Measuring time per case, in seconds [default: 2]
-    #[arg(long, value_name = "SECONDS", value_parser = flags::real, allow_hyphen_values = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = parsers::real, allow_hyphen_values = true)]
     seconds: Option<f64>,
     /// Windows into which this time is divided; the table shows their median, minimum and maximum [default: 5]
-    #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<usize>, allow_hyphen_values = true)]
     repeats: Option<usize>,
     /// Solvers of the pentadiagonal systems [default: all; direct with --adaptive]
-    #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = flags::solver::<Solver>(&Solver::NAMES), help_heading = flags::METHOD)]
+    #[arg(long, value_name = "SOLVER,...", value_delimiter = ',', value_parser = parsers::solver::<Solver>(&Solver::NAMES), help_heading = flags::METHOD)]
     solver: Vec<Solver>,
     /// Adapt the steps to this local error; without TOL it is 0.001 [default: fixed steps]
     #[arg(
-        long, value_name = "TOL", value_parser = flags::real, allow_negative_numbers = true, num_args = 0..=1,
+        long, value_name = "TOL", value_parser = parsers::real, allow_negative_numbers = true, num_args = 0..=1,
         default_missing_value = "0.001", help_heading = flags::METHOD
     )]
     adaptive: Option<f64>,
     /// Back ends [default: the CPU and every GPU adapter, software ones included]
-    #[arg(long, value_name = "WHERE,...", value_delimiter = ',', value_parser = flags::word::<DeviceKind>(&DeviceKind::NAMES), help_heading = flags::MACHINE)]
+    #[arg(long, value_name = "WHERE,...", value_delimiter = ',', value_parser = parsers::word::<DeviceKind>(&DeviceKind::NAMES), help_heading = flags::MACHINE)]
     backend: Vec<DeviceKind>,
     /// GPU adapters to measure: part of the name, or the number in `curvelax adapters`. The CPU is then measured only with
     /// --backend [default: all]
     #[arg(long, value_name = "NAME", help_heading = flags::MACHINE)]
     adapter: Option<String>,
     /// Number types [default: f64,f32]
-    #[arg(long, value_name = "TYPE,...", value_delimiter = ',', value_parser = flags::word::<Precision>(flags::PRECISIONS), help_heading = flags::MACHINE)]
+    #[arg(long, value_name = "TYPE,...", value_delimiter = ',', value_parser = parsers::word::<Precision>(flags::PRECISIONS), help_heading = flags::MACHINE)]
     precision: Vec<Precision>,
     /// Threads of the CPU back end [default: all cores]
-    #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true, help_heading = flags::MACHINE)]
+    #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<usize>, allow_hyphen_values = true, help_heading = flags::MACHINE)]
     threads: Option<usize>,
     /// Print the rows as JSON, with every window, instead of the table
     #[arg(long, help_heading = flags::OUTPUT)]

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    flags, note, print,
+    flags, note, parsers, print,
     referee::{RefereeFlags, referee},
 };
 use crate::{
@@ -15,7 +15,8 @@ use crate::{
     error::{Error, Result},
     files::{
         OutputFolder, Owner, names,
-        tables::{CostRow, ErrorRow, Table},
+        tables::Table,
+        truth_tables::{CostRow, ErrorRow},
     },
     placement,
     text::significant,
@@ -59,16 +60,16 @@ pub struct ConvergenceArgs {
     #[command(flatten)]
     referee: RefereeFlags,
     /// Solver of the pentadiagonal systems; sweeps take longer [default: direct; with --work-precision all]
-    #[arg(long, value_name = "SOLVER", value_parser = flags::solver::<SolverChoice>(&SolverChoice::NAMES), help_heading = flags::METHOD)]
+    #[arg(long, value_name = "SOLVER", value_parser = parsers::solver::<SolverChoice>(&SolverChoice::NAMES), help_heading = flags::METHOD)]
     solver: Option<SolverChoice>,
     /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]
-    #[arg(long, value_name = "WHERE", value_parser = flags::word::<BackendChoice>(flags::BACKENDS), help_heading = flags::MACHINE)]
+    #[arg(long, value_name = "WHERE", value_parser = parsers::word::<BackendChoice>(flags::BACKENDS), help_heading = flags::MACHINE)]
     backend: Option<BackendChoice>,
     /// GPU adapter to use, given by a part of its name [default: the best]
     #[arg(long, value_name = "NAME", help_heading = flags::MACHINE)]
     adapter: Option<String>,
     /// Number type [default: f64 where the device has it]
-    #[arg(long, value_name = "TYPE", value_parser = flags::word::<Precision>(flags::PRECISIONS), help_heading = flags::MACHINE)]
+    #[arg(long, value_name = "TYPE", value_parser = parsers::word::<Precision>(flags::PRECISIONS), help_heading = flags::MACHINE)]
     precision: Option<Precision>,
     /// Folder for convergence.csv, work_precision.csv and .svg, or referee.csv, which must not exist yet [default: no file]
     #[arg(long, value_name = "DIR", help_heading = flags::OUTPUT)]

@@ -5,7 +5,7 @@ use crate::{
     ensemble::Spec,
     error::Result,
     estimate::{Estimate, Pilot},
-    report::{Stop, overview::machine},
+    report::{Stop, words::machine},
     session::{Host, PlacedStudy},
     text::{bytes, duration, plural},
 };

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{flags, note, print, signals};
+use super::{flags, note, parsers, print, signals};
 use crate::{
     error::{Error, Result},
     files::{
@@ -33,11 +33,11 @@ pub struct MannerFlags {
     #[arg(long, help_heading = flags::OUTPUT)]
     strict: bool,
     /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; `curvelax resume` continues
-    #[arg(long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, help_heading = flags::OUTPUT)]
+    #[arg(long, value_name = "DURATION", value_parser = parsers::duration, allow_hyphen_values = true, help_heading = flags::OUTPUT)]
     max_time: Option<Duration>,
     /// Interval between checkpoints for `curvelax resume`: a run that is killed loses at most this much work
     #[arg(
-        long, value_name = "DURATION", value_parser = flags::duration, allow_hyphen_values = true, default_value = "5s",
+        long, value_name = "DURATION", value_parser = parsers::duration, allow_hyphen_values = true, default_value = "5s",
         help_heading = flags::OUTPUT
     )]
     checkpoint_every: Duration,

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{flags, manner::check_name, print};
+use super::{flags, manner::check_name, parsers, print};
 use crate::{
     error::{Error, Result},
     files::{OutputFolder, names, state::shard},
@@ -80,7 +80,7 @@ fn missing(shards: &Shards, script: &Path) -> String {
         return format!("all {count} {} are present\n", plural(count, "shard"));
     }
     let array = listed_ranges(&missing);
-    let submit = format!("sbatch --array={array} --export=ALL,{}={count} {}", flags::SHARDS, quoted(script));
+    let submit = format!("sbatch --array={array} --export=ALL,{}={count} {}", parsers::SHARDS, quoted(script));
     shards.told().into_iter().chain([submit]).map(|line| line + "\n").collect()
 }
 

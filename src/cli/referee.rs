@@ -1,6 +1,6 @@
 //! `curvelax convergence --referee`: relaxation times of the scheme beside those of an independent solver.
 
-use super::{flags, note, print};
+use super::{flags, note, parsers, print};
 use crate::{
     curve::{Modes, Perturbation, Shape},
     ensemble::{
@@ -8,10 +8,7 @@ use crate::{
         request::spec::{PositionForm, Pull},
     },
     error::{Error, Result},
-    files::{
-        OutputFolder, names,
-        tables::{Table, TruthRow},
-    },
+    files::{OutputFolder, names, tables::Table, truth_tables::TruthRow},
     flow::Flow,
     text::significant,
     truth::{RefereeRow, limits, one_curve},
@@ -25,46 +22,46 @@ pub struct RefereeFlags {
     referee: bool,
     /// Compare the limits of so many members of an ensemble, as `curvelax run --accurate` makes them, instead of one curve
     /// at several n
-    #[arg(long, value_name = "COUNT", value_parser = flags::whole::<u64>, requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<u64>, requires = "referee", help_heading = REFEREE)]
     curves: Option<u64>,
     /// Only these members [default: all]
-    #[arg(long, value_name = "J1,J2,...", value_delimiter = ',', value_parser = flags::whole::<u64>, requires = "curves", help_heading = REFEREE)]
+    #[arg(long, value_name = "J1,J2,...", value_delimiter = ',', value_parser = parsers::whole::<u64>, requires = "curves", help_heading = REFEREE)]
     only: Option<Vec<u64>>,
     /// Curve, as for `curvelax run` [default: ellipse:2,1]
-    #[arg(long, value_name = "SHAPE", value_parser = flags::text_of::<Drawn<Shape>>, requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "SHAPE", value_parser = parsers::text_of::<Drawn<Shape>>, requires = "referee", help_heading = REFEREE)]
     shape: Option<Drawn<Shape>>,
     /// Flow, as for `curvelax run` [default: surface-diffusion]
-    #[arg(long, value_name = "FLOW", value_parser = flags::text_of::<Drawn<Flow>>, requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "FLOW", value_parser = parsers::text_of::<Drawn<Flow>>, requires = "referee", help_heading = REFEREE)]
     flow: Option<Drawn<Flow>>,
     /// Nodes at which limits are found [default: 100]
-    #[arg(long, value_name = "N", value_parser = flags::whole::<usize>, requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "N", value_parser = parsers::whole::<usize>, requires = "referee", help_heading = REFEREE)]
     points: Option<usize>,
     /// Size σ of the random perturbation [default: 0, with --curves 0.05]
-    #[arg(long, value_name = "SIGMA", value_parser = flags::text_of::<Drawn<f64>>, requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "SIGMA", value_parser = parsers::text_of::<Drawn<f64>>, requires = "referee", help_heading = REFEREE)]
     amplitude: Option<Drawn<f64>>,
     /// Its modes [default: 2..=8]
-    #[arg(long, value_name = "LO..=HI", value_parser = flags::text_of::<Modes>, requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "LO..=HI", value_parser = parsers::text_of::<Modes>, requires = "referee", help_heading = REFEREE)]
     modes: Option<Modes>,
     /// Its power p: mode m has standard deviation σ m^-p [default: 1]
-    #[arg(long, value_name = "P", value_parser = flags::text_of::<Drawn<f64>>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
+    #[arg(long, value_name = "P", value_parser = parsers::text_of::<Drawn<f64>>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
     decay: Option<Drawn<f64>>,
     /// Its law [default: amplitude-phase]
-    #[arg(long, value_name = "LAW", value_parser = flags::word::<Perturbation>(flags::PERTURBATIONS), requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "LAW", value_parser = parsers::word::<Perturbation>(flags::PERTURBATIONS), requires = "referee", help_heading = REFEREE)]
     perturbation: Option<Perturbation>,
     /// Its seed [default: 1]
-    #[arg(long, value_name = "SEED", value_parser = flags::whole::<u64>, requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "SEED", value_parser = parsers::whole::<u64>, requires = "referee", help_heading = REFEREE)]
     seed: Option<u64>,
     /// Fraction of the initial excess at which a member is relaxed [default: 0.01]
-    #[arg(long, value_name = "FRACTION", value_parser = flags::real, requires = "referee", conflicts_with = "relax_at", help_heading = REFEREE)]
+    #[arg(long, value_name = "FRACTION", value_parser = parsers::real, requires = "referee", conflicts_with = "relax_at", help_heading = REFEREE)]
     relax_to: Option<f64>,
     /// Excess at which it is, instead [default: off]
-    #[arg(long, value_name = "EXCESS", value_parser = flags::real, requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "EXCESS", value_parser = parsers::real, requires = "referee", help_heading = REFEREE)]
     relax_at: Option<f64>,
     /// What moves the nodes, as for `curvelax run` [default: as with --accurate]
-    #[arg(long, value_name = "FORM", value_parser = flags::word::<PositionForm>(flags::FORMS), requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "FORM", value_parser = parsers::word::<PositionForm>(flags::FORMS), requires = "referee", help_heading = REFEREE)]
     form: Option<PositionForm>,
     /// Rate κ of the metric pull, as for `curvelax run` [default: auto]
-    #[arg(long, value_name = "KAPPA", value_parser = flags::text_of::<Pull>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
+    #[arg(long, value_name = "KAPPA", value_parser = parsers::text_of::<Pull>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
     pull: Option<Pull>,
 }
 

@@ -4,8 +4,9 @@
 use std::path::PathBuf;
 
 use super::{
-    flags::{self, BACKENDS, MACHINE},
+    flags::{BACKENDS, MACHINE},
     manner::MannerFlags,
+    parsers,
 };
 use crate::{
     ensemble::request::spec::BackendChoice,
@@ -32,13 +33,13 @@ pub struct ResumeArgs {
     #[arg(value_name = "DIR")]
     run: PathBuf,
     /// Continue here instead of where the run began; digits then differ [default: where it began]
-    #[arg(long, value_name = "WHERE", value_parser = flags::word::<BackendChoice>(BACKENDS), help_heading = MACHINE)]
+    #[arg(long, value_name = "WHERE", value_parser = parsers::word::<BackendChoice>(BACKENDS), help_heading = MACHINE)]
     backend: Option<BackendChoice>,
     /// Continue on this GPU adapter, given by a part of its name [default: the one on which it began]
     #[arg(long, value_name = "NAME", help_heading = MACHINE)]
     adapter: Option<String>,
     /// Threads of the CPU back end [default: as in the spec, otherwise all cores]
-    #[arg(long, value_name = "COUNT", value_parser = flags::whole::<usize>, allow_hyphen_values = true, help_heading = MACHINE)]
+    #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<usize>, allow_hyphen_values = true, help_heading = MACHINE)]
     threads: Option<usize>,
     #[command(flatten)]
     manner: MannerFlags,

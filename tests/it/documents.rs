@@ -12,7 +12,7 @@ use curvelax::{
     ensemble::{Spec, request::event::MAX_EVENTS},
     files::{
         TableRow, columns, names,
-        tables::{CostRow, ErrorRow, TruthRow},
+        truth_tables::{CostRow, ErrorRow, TruthRow},
     },
     results::{cells::EnsembleStatistics, tally::Tally},
     solver::{Blocks, Solver},

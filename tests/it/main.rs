@@ -5,9 +5,11 @@
 mod common;
 
 mod animate;
+mod bad_folders;
 mod bad_input;
 mod bench;
 mod cli;
+mod clock;
 mod convergence;
 mod coverage;
 mod crystals;
@@ -26,6 +28,7 @@ mod interrupted;
 mod invariants;
 mod modules_depend_downward;
 mod outlines;
+mod overlong_input;
 mod plot;
 mod polygons;
 mod rates;

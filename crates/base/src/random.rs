@@ -10,11 +10,13 @@
 
 mod design;
 pub mod distribution;
+mod normal;
 
 use std::f64::consts::TAU;
 
 pub use design::{Design, DrawAddress, MAX_SOBOL};
-pub use distribution::{Distribution, normal_quantile};
+pub use distribution::Distribution;
+pub use normal::normal_quantile;
 
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];

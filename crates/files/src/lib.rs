@@ -25,6 +25,7 @@ pub mod spill;
 pub mod state;
 mod table_reader;
 pub mod tables;
+pub mod truth_tables;
 pub mod zarr;
 
 pub use column::{Column, TableRow};

@@ -116,8 +116,7 @@ pub fn plan(spec: Spec, mut tell: impl FnMut(&Round), stopped: impl Fn() -> Opti
     let Some(goal) = spec.accuracy else { return Ok(spec) };
     let mut spec = spec.validate()?;
     // The rounds have no goal: what it forbids is refused here.
-    Study::new(spec.clone())?;
-    let of_each = quiet(&spec, true)?.spec().outlines.is_some();
+    let of_each = Study::new(spec.clone())?.spec().outlines.is_some();
     if !of_each && spec.has_different_members() {
         spec.curves = spec.curves.max(MIN_MEMBERS);
     }

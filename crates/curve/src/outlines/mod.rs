@@ -19,6 +19,7 @@
 //! One point per line, in columns separated by commas, semicolons, tabs or spaces, in UTF-8. Lines that begin with `#` are
 //! skipped. A first line without any number is a header; it must name the columns `x` and `y`, or `lon` and `lat`.
 
+mod columns;
 mod geojson;
 mod npy;
 mod piece;

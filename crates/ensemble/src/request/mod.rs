@@ -1,7 +1,9 @@
 //! The request: what a run shall do, under the names that flags and TOML keys share, checked before any work starts.
 
+mod choices;
 pub mod drawn;
 pub mod event;
+mod reading;
 mod seed;
 pub mod shard;
 pub mod spec;

@@ -3,26 +3,21 @@
 //! A spec is read once ([`Spec::from_toml`]), overlaid with the flags by `cli`, and checked once ([`Spec::validate`],
 //! in `validate.rs`). Everything after that relies on it.
 
-use std::{fmt, io::ErrorKind, marker::PhantomData, path::Path, str::FromStr};
+use std::fmt;
 
-use serde::{
-    Deserialize, Deserializer, Serialize, Serializer,
-    de::{self, IgnoredAny},
-};
+use serde::{Deserialize, Serialize};
 
 use crate::{
+    request::choices::{list, some_list},
     request::drawn::Drawn,
     request::event::Event,
     request::seed,
     request::shard::Shard,
     request::sweep::{self, Sweep},
 };
-use curvelax_backend::DeviceKind;
 use curvelax_base::{
-    error::{Error, Result, did_you_mean, echo, echo_path, expected_of, plainly, shortened},
-    input,
+    error::{Error, Result, echo, expected_of, shortened},
     random::Design,
-    text,
 };
 use curvelax_curve::{Interpolation, Modes, Perturbation, Sampling, Shape};
 use curvelax_flow::{
@@ -30,174 +25,14 @@ use curvelax_flow::{
     flow::Flow,
 };
 
-pub use crate::request::units::Units;
+pub use crate::request::{
+    choices::{BackendChoice, FinalTime, Omega, Pace, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau},
+    units::Units,
+};
 pub use curvelax_flow::{
     number::Precision,
     solver::{Order, Solver},
 };
-
-/// Where the members are advanced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum BackendChoice {
-    /// A hardware GPU if there is one, else the CPU.
-    Auto,
-    /// A GPU, including software ones.
-    Gpu,
-    /// The CPU back end.
-    Cpu,
-}
-
-impl From<DeviceKind> for BackendChoice {
-    fn from(kind: DeviceKind) -> BackendChoice {
-        match kind {
-            DeviceKind::Cpu => BackendChoice::Cpu,
-            DeviceKind::Gpu => BackendChoice::Gpu,
-        }
-    }
-}
-
-/// The requested solver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SolverChoice {
-    /// Gauss–Seidel with a fixed τ, as in the paper; the direct solver with adaptive steps, because sweeps get more
-    /// numerous as steps grow.
-    Auto,
-    /// This one.
-    Only(Solver),
-}
-
-impl SolverChoice {
-    /// Names in flags and files: `auto`, then the solvers.
-    pub const NAMES: [&str; 1 + Solver::NAMES.len()] = {
-        let mut names = ["auto"; 1 + Solver::NAMES.len()];
-        let mut i = 0;
-        while i < Solver::NAMES.len() {
-            names[1 + i] = Solver::NAMES[i];
-            i += 1;
-        }
-        names
-    };
-}
-
-impl From<Solver> for SolverChoice {
-    fn from(solver: Solver) -> SolverChoice {
-        SolverChoice::Only(solver)
-    }
-}
-
-impl Serialize for SolverChoice {
-    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-        match self {
-            SolverChoice::Auto => serializer.serialize_str(SolverChoice::NAMES[0]),
-            SolverChoice::Only(solver) => solver.serialize(serializer),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for SolverChoice {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        let name = String::deserialize(deserializer)?;
-        match name == SolverChoice::NAMES[0] {
-            true => Ok(SolverChoice::Auto),
-            false => Solver::named(&name, &SolverChoice::NAMES).map(SolverChoice::Only),
-        }
-    }
-}
-
-/// What moves the nodes: the right-hand side of the position equation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PositionForm {
-    /// The scheme's own curvatures and lengths, as in the paper.
-    Paper,
-    /// The force of the polygon itself; curvatures and lengths only make the matrix.
-    Geometric,
-    /// The one that is right for every curve: the paper's.
-    Auto,
-}
-
-/// The fixed time step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Tau {
-    /// τ itself.
-    Step(f64),
-    /// From each member's own relaxation time.
-    Auto,
-}
-
-/// How time is cut into steps.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pace {
-    /// Steps of one length.
-    Fixed(Tau),
-    /// Extrapolated steps with this local error tolerance.
-    Adaptive(f64),
-}
-
-/// ω of the redistribution.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Omega {
-    /// ω itself, in 1/time.
-    Rate(f64),
-    /// From each member's own relaxation time.
-    Auto,
-}
-
-/// When a member ends at the latest.
-#[derive(Clone, Debug, PartialEq)]
-pub enum FinalTime {
-    /// At this time.
-    At(f64),
-    /// When it is relaxed, or at the time that its cell's curve gives as a cap.
-    Auto,
-    /// For each cell of a sweep at its own time.
-    OfCells(Vec<f64>),
-}
-
-/// κ of the metric pull.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pull {
-    /// κ itself, in 1/time; 0 is the paper's scheme.
-    Rate(f64),
-    /// κ from each member's own relaxation time.
-    Auto,
-}
-
-/// ω_SOR of the sweeps.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sor {
-    /// The factor itself; 1 is the paper's.
-    Factor(f64),
-    /// From the stiffness of each system.
-    Auto,
-}
-
-/// How snapshots are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Store {
-    /// The table `snapshots.csv`.
-    Csv,
-    /// The arrays of `snapshots.zarr`.
-    Zarr,
-}
-
-/// How tables are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Tables {
-    /// As CSV, from which a run is resumed, merged and drawn again.
-    Csv,
-    /// At the end of the run as Parquet, too.
-    Parquet,
-}
-
-impl Tables {
-    fn is_csv(&self) -> bool {
-        *self == Tables::Csv
-    }
-}
 
 /// A complete description of an ensemble and of the method that relaxes it.
 ///
@@ -355,13 +190,6 @@ pub struct OmittedKeys {
     pub amplitude: bool,
 }
 
-/// The same keys in a spec file.
-#[derive(Deserialize)]
-struct Given {
-    curves: Option<IgnoredAny>,
-    amplitude: Option<IgnoredAny>,
-}
-
 /// Equal specs look equal, too.
 impl fmt::Debug for OmittedKeys {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
@@ -453,20 +281,6 @@ impl Default for Spec {
 }
 
 impl Spec {
-    /// Reads a spec file; absent keys have their defaults.
-    ///
-    /// The result is not yet [validated](Spec::validate): flags may still replace wrong values.
-    pub fn read(path: &Path) -> Result<Spec> {
-        let text = input::text(path, input::MAX_SPEC).map_err(|e| {
-            let problem = match e.kind() {
-                ErrorKind::NotFound => "it does not exist; check its name and the folder".into(),
-                _ => e.to_string(),
-            };
-            Error::Request(format!("cannot read the spec {}: {problem}", echo_path(path)))
-        })?;
-        Spec::from_toml(&text).map_err(|message| Error::Request(format!("in the spec {}: {message}", echo_path(path))))
-    }
-
     /// Sets what `--accurate` stands for, except the keys that are `given` beside it.
     pub fn make_accurate(&mut self, given: &[String]) {
         let is_free = |key: &str| !given.iter().any(|given| given == key);
@@ -486,41 +300,6 @@ impl Spec {
             self.stop_when_relaxed = Some(true);
         }
         self.refine |= is_free("refine");
-    }
-
-    /// Parses the text of a spec file; absent keys have their defaults.
-    ///
-    /// ```
-    /// use curvelax_ensemble::Spec;
-    /// use curvelax_flow::flow::Flow;
-    ///
-    /// let spec = Spec::from_toml("flow = 'willmore'\ncurves = 8").unwrap();
-    /// assert_eq!((spec.flow, spec.curves, spec.points), (Flow::Willmore.into(), 8, 100));
-    /// assert!(Spec::from_toml("curvs = 8").unwrap_err().contains("did you mean `curves`?"));
-    /// ```
-    ///
-    /// # Errors
-    /// The message has toml's line and caret, and suggests the nearest valid spelling.
-    pub fn from_toml(text: &str) -> Result<Spec, String> {
-        // First, so that a large spec is in memory once. What is wrong is said below.
-        let given = toml::from_str::<Given>(text).ok();
-        let omitted = given.map_or(OmittedKeys::default(), |given| OmittedKeys {
-            curves: given.curves.is_none(),
-            amplitude: given.amplitude.is_none(),
-        });
-        let spec: Spec = toml::from_str(text).map_err(|e| format!("{}{}", told(&e), suggestion(e.message())))?;
-        Ok(Spec { omitted, ..spec })
-    }
-
-    /// Returns the spec as TOML that [`Spec::from_toml`] reads back to the same spec.
-    pub fn to_toml(&self) -> Result<String> {
-        toml::to_string(self).map_err(|e| Error::Failed(format!("cannot write the spec as TOML: {e}")))
-    }
-
-    /// Names of all keys, in order.
-    pub fn keys() -> Vec<String> {
-        let refused = toml::from_str::<Spec>("\"\" = 0").expect_err("the empty key is unknown");
-        quoted(refused.message()).skip(1).map(str::to_owned).collect()
     }
 
     /// Returns the spec of cell `index` of the sweep, not yet validated.
@@ -706,239 +485,6 @@ pub(crate) fn final_times(times: usize, cells: u64) -> Error {
     Error::value("t-end", format!("({times} times)"), &problem, "give one time, auto, or one for each cell")
 }
 
-/// Lines longer than this are not shown with a caret.
-const MAX_LINE: usize = 300;
-/// Maximum characters of a message; the list of all keys is half as long.
-const MAX_SHOWN: usize = 1000;
-
-/// What is wrong, with the line and a caret; for an overlong line, only where.
-fn told(error: &toml::de::Error) -> String {
-    let whole = error.to_string();
-    let (whole, message) = (whole.trim_end(), error.message().trim_end());
-    let problem = shortened(&plainly(message), MAX_SHOWN);
-    match whole.strip_suffix(message) {
-        Some(shown) if shown.lines().all(|line| line.len() <= MAX_LINE) => format!("{shown}{problem}"),
-        _ => format!("{}: {problem}", shortened(whole.lines().next().unwrap_or_default(), MAX_LINE)),
-    }
-}
-
-/// Suggests the nearest of the names that serde lists after "unknown field `x`, expected one of `a`, `b`".
-fn suggestion(message: &str) -> String {
-    let mut names = quoted(message);
-    match names.next() {
-        Some(word) if message.starts_with("unknown ") => did_you_mean(word, names),
-        _ => String::new(),
-    }
-}
-
-/// The parts of `text` between backticks.
-fn quoted(text: &str) -> impl Iterator<Item = &str> {
-    text.split('`').skip(1).step_by(2)
-}
-
-/// Reads and writes `$kind` as a number, `$kind::$number`, or as the word `auto`.
-macro_rules! number_or_auto {
-    ($kind:ident, $number:ident) => {
-        impl FromStr for $kind {
-            type Err = String;
-
-            fn from_str(text: &str) -> Result<$kind, String> {
-                match text.trim() {
-                    "auto" => Ok($kind::Auto),
-                    text => text
-                        .parse()
-                        .map($kind::$number)
-                        .map_err(|_| format!("`{}` is neither a number nor `auto`", echo(text))),
-                }
-            }
-        }
-
-        impl fmt::Display for $kind {
-            fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                match self {
-                    $kind::$number(number) => write!(f, "{}", text::number(*number)),
-                    $kind::Auto => write!(f, "auto"),
-                }
-            }
-        }
-
-        impl FromNumbers for $kind {
-            fn from_numbers(_: Vec<f64>) -> Option<$kind> {
-                None
-            }
-        }
-
-        impl From<f64> for $kind {
-            fn from(number: f64) -> $kind {
-                $kind::$number(number)
-            }
-        }
-
-        impl Serialize for $kind {
-            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                match self {
-                    $kind::$number(number) => serializer.serialize_f64(*number),
-                    $kind::Auto => serializer.serialize_str("auto"),
-                }
-            }
-        }
-
-        impl<'de> Deserialize<'de> for $kind {
-            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<$kind, D::Error> {
-                deserializer.deserialize_any(OrAuto(PhantomData))
-            }
-        }
-    };
-}
-
-number_or_auto!(Tau, Step);
-number_or_auto!(Omega, Rate);
-number_or_auto!(Pull, Rate);
-number_or_auto!(Sor, Factor);
-
-impl fmt::Display for FinalTime {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            FinalTime::At(t) => write!(f, "{}", text::number(*t)),
-            FinalTime::Auto => write!(f, "auto"),
-            FinalTime::OfCells(times) => {
-                let (low, high) =
-                    times.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), t| (low.min(*t), high.max(*t)));
-                write!(f, "{} to {}", text::number(low), text::number(high))
-            }
-        }
-    }
-}
-
-impl FromStr for FinalTime {
-    type Err = String;
-
-    /// Parses a time, `auto`, or a list of times with commas between them.
-    fn from_str(text: &str) -> Result<FinalTime, String> {
-        let number = |word: &str| {
-            let number = word.trim().parse::<f64>();
-            number.map_err(|_| format!("`{}` is neither a number nor `auto`", echo(word.trim())))
-        };
-        match text.trim() {
-            "auto" => Ok(FinalTime::Auto),
-            list if list.contains(',') => list.split(',').map(number).collect::<Result<_, _>>().map(FinalTime::OfCells),
-            word => number(word).map(FinalTime::At),
-        }
-    }
-}
-
-impl From<f64> for FinalTime {
-    fn from(t: f64) -> FinalTime {
-        FinalTime::At(t)
-    }
-}
-
-impl Serialize for FinalTime {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            FinalTime::At(t) => serializer.serialize_f64(*t),
-            FinalTime::Auto => serializer.serialize_str("auto"),
-            FinalTime::OfCells(times) => times.serialize(serializer),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for FinalTime {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<FinalTime, D::Error> {
-        deserializer.deserialize_any(OrAuto(PhantomData))
-    }
-}
-
-/// Kinds that may also be read from a list of numbers.
-trait FromNumbers: Sized {
-    /// The kind with these numbers, if it can have several.
-    fn from_numbers(numbers: Vec<f64>) -> Option<Self>;
-}
-
-impl FromNumbers for FinalTime {
-    fn from_numbers(numbers: Vec<f64>) -> Option<FinalTime> {
-        Some(FinalTime::OfCells(numbers))
-    }
-}
-
-struct OrAuto<T>(PhantomData<T>);
-
-impl<'de, T: From<f64> + FromStr<Err = String> + FromNumbers> de::Visitor<'de> for OrAuto<T> {
-    type Value = T;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "a number or \"auto\"")
-    }
-
-    fn visit_f64<E: de::Error>(self, number: f64) -> Result<T, E> {
-        Ok(number.into())
-    }
-
-    fn visit_i64<E: de::Error>(self, number: i64) -> Result<T, E> {
-        Ok((number as f64).into())
-    }
-
-    fn visit_u64<E: de::Error>(self, number: u64) -> Result<T, E> {
-        Ok((number as f64).into())
-    }
-
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<T, E> {
-        text.parse().map_err(E::custom)
-    }
-
-    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<T, A::Error> {
-        let mut numbers = Vec::new();
-        while let Some(number) = items.next_element()? {
-            numbers.push(number);
-        }
-        T::from_numbers(numbers).ok_or_else(|| de::Error::invalid_type(de::Unexpected::Seq, &"a number or \"auto\""))
-    }
-}
-
-/// Reads a list: a TOML array, or the comma-separated text of a flag.
-fn list<'de, D, T>(deserializer: D) -> Result<Vec<T>, D::Error>
-where
-    D: Deserializer<'de>,
-    T: Deserialize<'de> + FromStr,
-{
-    deserializer.deserialize_any(ListVisitor(PhantomData))
-}
-
-fn some_list<'de, D, T>(deserializer: D) -> Result<Option<Vec<T>>, D::Error>
-where
-    D: Deserializer<'de>,
-    T: Deserialize<'de> + FromStr,
-{
-    list(deserializer).map(Some)
-}
-
-struct ListVisitor<T>(PhantomData<T>);
-
-impl<'de, T: Deserialize<'de> + FromStr> de::Visitor<'de> for ListVisitor<T> {
-    type Value = Vec<T>;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "an array of numbers, or numbers with commas between them in quotes")
-    }
-
-    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<Vec<T>, A::Error> {
-        let mut list = Vec::new();
-        while let Some(item) = items.next_element()? {
-            list.push(item);
-        }
-        Ok(list)
-    }
-
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<Vec<T>, E> {
-        let item = |word: &str| {
-            word.trim()
-                .parse()
-                .map_err(|_| E::custom(format!("`{}` in `{}` is not a number of this list", echo(word), echo(text))))
-        };
-        text.split(',').map(item).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -1041,40 +587,5 @@ mod tests {
             assert!(keys.iter().any(|known| known == key), "{key}");
         }
         assert_eq!(keys.len(), written.len() + optional.len());
-    }
-
-    #[test]
-    fn a_list_is_an_array_or_the_text_of_the_flag() {
-        for text in ["snapshots = [0, 0.5]", "snapshots = '0,0.5'", "snapshots = '0, 0.5'"] {
-            assert_eq!(Spec::from_toml(text).unwrap().snapshots, [0.0, 0.5], "{text}");
-        }
-        assert_eq!(Spec::from_toml("only = [3, 1]").unwrap().only, Some(vec![3, 1]));
-        for text in ["snapshots = 1", "snapshots = '0,,1'", "snapshots = ['a']", "only = [1.5]", "only = [-1]"] {
-            assert!(Spec::from_toml(text).is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn of_a_line_without_end_only_the_place_is_told() {
-        let long = "x".repeat(100_000);
-        for (text, start) in [
-            (format!("\nshape = '{long}'"), "TOML parse error at line 2, column 9: unknown shape `xxx"),
-            (format!("{long} = 1"), "TOML parse error at line 1, column 1: unknown key `xxx"),
-            (format!("a = {}", "[".repeat(100_000)), "TOML parse error at line 1, column 85: cannot recurse further"),
-        ] {
-            let message = Spec::from_toml(&text).unwrap_err();
-            assert!(message.starts_with(start) && message.len() < 1200 && !message.contains('\n'), "{message}");
-        }
-    }
-
-    #[test]
-    fn a_wrong_key_or_word_is_shown_in_its_line_with_the_nearest_spelling() {
-        let message = Spec::from_toml("curves = 3\nomga = 1\n").unwrap_err();
-        for part in ["line 2, column 1", "2 | omga = 1", "^^^^", "unknown key `omga`", "did you mean `omega`?"] {
-            assert!(message.contains(part), "no {part:?} in: {message}");
-        }
-        let message = Spec::from_toml("order = 'colored'").unwrap_err();
-        assert!(message.contains("unknown value `colored`"), "{message}");
-        assert!(message.contains("did you mean `coloured`?"), "{message}");
     }
 }

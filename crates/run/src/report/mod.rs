@@ -13,6 +13,7 @@ pub mod page;
 pub mod pictures;
 pub mod progress;
 pub mod stop;
+pub mod words;
 
 use std::{
     collections::BTreeMap,

@@ -9,6 +9,7 @@ pub mod scaling;
 pub mod shortfall;
 pub mod tally;
 pub mod times;
+pub mod treatment;
 pub mod verdict;
 
 pub use cells::EnsembleStatistics;

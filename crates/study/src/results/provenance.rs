@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
-use super::tally::{MollifiedMembers, Tally};
+use super::{tally::Tally, treatment::MollifiedMembers};
 use crate::placement::Platform;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{Spec, request::spec::Precision};

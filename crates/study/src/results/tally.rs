@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use curvelax_base::error::Result;
-use curvelax_base::text::{plural, significant};
+use super::treatment::{FinerMembers, MollifiedMembers};
+use curvelax_base::{
+    error::Result,
+    text::{plural, significant},
+};
 use curvelax_ensemble::{
-    LevelTimes, Mollified, Outcome, Spec, Status, Treated,
-    member::mollifier::MAX_VERTEX_TURN,
+    LevelTimes, Mollified, Outcome, Spec, Status,
     request::{MAX_NAMED, sweep::Sweep},
     schedule::grid,
 };
@@ -264,172 +266,6 @@ pub const DISTRUSTED_DRIFT: f64 = 0.1;
 
 /// Share of a limit that moves with half the points of an outline, above which these are too few.
 const OPEN_BY_POINTS: f64 = 0.01;
-
-/// How corners of members were rounded off (`ensemble/mollifier.rs`).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MollifiedMembers {
-    /// Members that were changed.
-    pub members: u64,
-    /// Maximum rounds for one member.
-    pub most_rounds: u32,
-    /// Largest relative change of area, before it was put back.
-    pub largest_area_change: f64,
-    /// Members that are not resolved, for one of the next three reasons.
-    pub unresolved: u64,
-    /// Members that cross themselves at the start, though their outline does not.
-    pub crossed: u64,
-    /// Members that start with a turn of more than 1.5 rad at a node.
-    pub sharp: u64,
-    /// Members whose area changed by more than a tenth.
-    pub distorted: u64,
-    /// Members of outlines without corners, a spline each.
-    #[serde(default)]
-    pub splines: u64,
-    /// Members of outlines with corners among other points.
-    #[serde(default)]
-    pub cornered: u64,
-    /// Members of outlines all of whose points are corners.
-    #[serde(default)]
-    pub polygons: u64,
-    /// Members of outlines whose corners were rounded before nodes were placed, and the largest relative change of area by
-    /// that, before it was put back.
-    #[serde(default)]
-    pub rounded: u64,
-    /// See there.
-    #[serde(default)]
-    pub outline_area_change: f64,
-}
-
-impl MollifiedMembers {
-    /// Adds one member.
-    fn add(&mut self, mollified: &Mollified) {
-        self.members += u64::from(mollified.rounds > 0);
-        self.most_rounds = self.most_rounds.max(mollified.rounds);
-        self.largest_area_change = self.largest_area_change.max(mollified.area_change.abs());
-        let faults = [mollified.crossed, mollified.sharp, mollified.distorted()];
-        self.unresolved += u64::from(faults.contains(&true));
-        for (count, fault) in [&mut self.crossed, &mut self.sharp, &mut self.distorted].into_iter().zip(faults) {
-            *count += u64::from(fault);
-        }
-        let Treated { points, corners, rounded, area_change } = mollified.outline;
-        self.splines += u64::from(points > 0 && corners == 0);
-        self.cornered += u64::from(0 < corners && corners < points);
-        self.polygons += u64::from(points > 0 && corners >= points);
-        self.rounded += u64::from(rounded);
-        self.outline_area_change = self.outline_area_change.max(area_change.abs());
-    }
-
-    /// Adds other members.
-    fn merge(&mut self, other: &MollifiedMembers) {
-        let MollifiedMembers {
-            members, most_rounds, largest_area_change, unresolved, crossed, sharp, distorted, ..
-        } = other;
-        let MollifiedMembers { splines, cornered, polygons, rounded, outline_area_change, .. } = other;
-        self.splines = self.splines.saturating_add(*splines);
-        self.cornered = self.cornered.saturating_add(*cornered);
-        self.polygons = self.polygons.saturating_add(*polygons);
-        self.rounded = self.rounded.saturating_add(*rounded);
-        self.outline_area_change = self.outline_area_change.max(*outline_area_change);
-        self.members = self.members.saturating_add(*members);
-        self.most_rounds = self.most_rounds.max(*most_rounds);
-        self.largest_area_change = self.largest_area_change.max(*largest_area_change);
-        self.unresolved = self.unresolved.saturating_add(*unresolved);
-        self.crossed = self.crossed.saturating_add(*crossed);
-        self.sharp = self.sharp.saturating_add(*sharp);
-        self.distorted = self.distorted.saturating_add(*distorted);
-    }
-
-    /// What their outlines were taken as, and how corners were rounded; `None` if there are none.
-    pub fn outlines(&self) -> Option<String> {
-        let MollifiedMembers { splines, cornered, polygons, rounded, outline_area_change, .. } = *self;
-        let parts = [(splines, "spline"), (cornered, "spline with corners"), (polygons, "polygon")];
-        let parts = parts.into_iter().filter(|(count, _)| *count > 0);
-        let parts: Vec<String> = parts.map(|(count, what)| format!("{count} as a {what}")).collect();
-        let change = significant(100.0 * outline_area_change, 2);
-        let round = match rounded {
-            0 => String::new(),
-            _ => format!("; corners of {rounded} rounded, which changed the area by at most {change} % and put back"),
-        };
-        (!parts.is_empty()).then(|| format!("{}{round}", parts.join(", ")))
-    }
-
-    /// What was done for their nodes, after "were"; `None` if nothing was.
-    pub fn told(&self) -> Option<String> {
-        let MollifiedMembers { members, most_rounds, largest_area_change, crossed, distorted, .. } = *self;
-        // Of those two kinds some are left with another area.
-        let put_back = if crossed + distorted == 0 { " and put back" } else { "" };
-        (members > 0).then(|| {
-            format!(
-                "rounded off in {members} {}, in at most {most_rounds} {}, which changed the area by at most {} %{put_back}",
-                plural(members, "member"),
-                plural(most_rounds.into(), "round"),
-                significant(100.0 * largest_area_change, 2)
-            )
-        })
-    }
-
-    /// What the user should know, if anything.
-    fn warning(&self, all: u64) -> Option<String> {
-        let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = self;
-        (*unresolved > 0).then(|| {
-            let parts = [
-                (crossed, "with crossings that the outline has not".to_owned()),
-                (sharp, format!("with a turn left above {MAX_VERTEX_TURN} rad")),
-                (distorted, format!("with an area changed by more than {} %", 100.0 * Mollified::DISTORTED)),
-            ];
-            let parts = parts.into_iter().filter(|(count, _)| **count > 0);
-            let parts: Vec<String> = parts.map(|(count, what)| format!("{count} {what}")).collect();
-            format!(
-                "{unresolved} of {all} {} started from an outline with parts thinner than the spacing of the nodes: {}; \
-                 use more --points or a simpler outline",
-                plural(all, "member"),
-                parts.join(", ")
-            )
-        })
-    }
-}
-
-/// Members with limits that rest on more nodes than the members have.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct FinerMembers {
-    /// Members with limits.
-    judged: u64,
-    /// Those that needed more nodes, and the most that any of them did.
-    finer: u64,
-    most: u64,
-    /// Members whose differences do not fall as they should at their finest level: their errors are bounds.
-    bounds: u64,
-}
-
-impl FinerMembers {
-    fn add(&mut self, outcome: &Outcome) {
-        let Some(limit) = &outcome.judged else { return };
-        self.judged += 1;
-        self.bounds += u64::from(!limit.asymptotic);
-        if outcome.is_finer {
-            self.finer += 1;
-            self.most = self.most.max(outcome.points);
-        }
-    }
-
-    /// How many needed more nodes, of how many, and up to how many nodes; `None` if none did.
-    pub fn counted(&self) -> Option<(String, String)> {
-        let FinerMembers { judged, finer, most, .. } = *self;
-        (finer > 0).then(|| (format!("{finer} of {judged}"), format!("at up to n = {most}")))
-    }
-
-    /// How many needed more nodes, up to how many, and what of them is not known; `None` if n nodes were enough for all.
-    pub fn told(&self) -> Option<String> {
-        let FinerMembers { judged, finer, most, bounds } = *self;
-        let all = format!("{judged} {}", plural(judged, "member"));
-        let more = (finer > 0).then(|| format!("{finer} of {all} at up to n = {most}"));
-        let open = (bounds > 0).then(|| match finer {
-            0 => format!("the errors of {bounds} of {all} are bounds"),
-            _ => format!("the errors of {bounds} are bounds"),
-        });
-        (finer + bounds > 0).then(|| more.into_iter().chain(open).collect::<Vec<_>>().join("; "))
-    }
-}
 
 impl Tally {
     /// That of a run of `spec` before its members, after these times at its levels.

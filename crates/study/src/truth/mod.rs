@@ -22,6 +22,7 @@
 //! by another method; a [`RefereeRow`] compares a relaxation time with it.
 
 mod convergence;
+mod fourier;
 mod measure;
 mod problems;
 mod referee;

@@ -29,6 +29,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
+use super::fourier::{Fourier, conjugate, set_real, signed};
 use curvelax_base::error::{Error, Result};
 use curvelax_flow::flow::{Flow, MAX_DEGREE};
 
@@ -544,62 +545,6 @@ impl SpectralRun {
             (self.grid, self.kappa) = (vec![DVec2::ZERO; half], vec![0.0; half]);
             self.form.bend.truncate(half / 3);
             self.velocity.bend.truncate(half / 3);
-        }
-    }
-}
-
-/// The wave number of coefficient `m` of `n`.
-fn signed(m: usize, n: usize) -> f64 {
-    if m <= n / 2 { m as f64 } else { m as f64 - n as f64 }
-}
-
-fn conjugate(z: DVec2) -> DVec2 {
-    DVec2::new(z.x, -z.y)
-}
-
-/// Sets coefficient `m` of a real field, where a forward transform sums the field.
-fn set_real(grid: &mut [DVec2], m: usize, c: DVec2) {
-    let n = grid.len();
-    (grid[n - m], grid[m]) = (c, conjugate(c));
-}
-
-/// The discrete Fourier transform of length n, a power of two, of complex numbers.
-///
-/// Radix 2 in place: with some hundred numbers it needs no library. The inverse is the same of the numbers in reverse.
-struct Fourier {
-    /// `e^{-2πij/n}`, j = 0 … n/2 - 1.
-    roots: Vec<DVec2>,
-    /// Places with their bits in reverse.
-    reversed: Vec<u32>,
-}
-
-impl Fourier {
-    fn new(n: usize) -> Fourier {
-        let unused = u32::BITS - n.trailing_zeros();
-        let reversed = (0..n as u32).map(|i| i.reverse_bits() >> unused).collect();
-        let roots = (0..n / 2).map(|j| DVec2::from_angle(-TAU * j as f64 / n as f64)).collect();
-        Fourier { roots, reversed }
-    }
-
-    /// Replaces `data[m]` by `Σ_j data[j] e^{-2πijm/n}`.
-    fn transform(&self, data: &mut [DVec2]) {
-        for (i, &j) in self.reversed.iter().enumerate() {
-            if i < j as usize {
-                data.swap(i, j as usize);
-            }
-        }
-        let n = data.len();
-        let mut half = 1;
-        while half < n {
-            let roots = self.roots.iter().step_by(n / (2 * half));
-            for block in data.chunks_exact_mut(2 * half) {
-                let (low, high) = block.split_at_mut(half);
-                for ((a, b), root) in low.iter_mut().zip(high).zip(roots.clone()) {
-                    let turned = root.rotate(*b);
-                    (*a, *b) = (*a + turned, *a - turned);
-                }
-            }
-            half *= 2;
         }
     }
 }

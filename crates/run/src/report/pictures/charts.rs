@@ -1,7 +1,7 @@
 //! The charts of a run, from its statistics.
 
 use super::{Chart, FinishedRun, cells::CellGroup, figure, tables::claims};
-use crate::report::{overview::member_name, page::spread};
+use crate::report::{page::spread, words::member_name};
 use curvelax_base::{error::Result, random::normal_quantile, text::significant};
 use curvelax_draw::{
     charts::{

@@ -2,8 +2,8 @@
 
 use super::{DIGITS, FinishedRun, MAX_NAME, PageHead};
 use crate::report::{
-    overview::{describe, member_name, member_time},
     page::Headline,
+    words::{describe, member_name, member_time},
 };
 use curvelax_base::{
     error::shortened,

@@ -7,8 +7,8 @@ mod tables;
 
 use super::{
     gallery::{self, Wording},
-    overview::place,
     page::{Headline, MAX_MEMBERS, MovingMember, Page, PageFigure, spread},
+    words::place,
 };
 use curvelax_base::{error::Result, text::significant};
 use curvelax_draw::{chart, width::told_apart};

@@ -1,7 +1,7 @@
 //! The tables of a page.
 
 use super::{DIGITS, FinishedRun};
-use crate::report::{overview::member_name, page::PageTable};
+use crate::report::{page::PageTable, words::member_name};
 use curvelax_base::text::{p_value, significant};
 use curvelax_ensemble::{Event, Spec, Status};
 use curvelax_files::names;
