@@ -10,6 +10,8 @@ use super::{
     page::{Headline, MAX_MEMBERS, MovingMember, Page, PageFigure, spread},
     words::place,
 };
+use glam::DVec2;
+
 use curvelax_base::{error::Result, text::significant};
 use curvelax_draw::{chart, width::told_apart};
 use curvelax_ensemble::{Spec, outcome::wulff_outline};
